@@ -59,11 +59,11 @@ impl SensorArgs {
             (Some(path), _) => hzn_calib::sensor::load(path)?,
             // If the text names a camera file, the file is expected next to the recording.
             (None, Some(text)) => hzn_calib::sensor::parse(text, &beside)
-                .map_err(|e| usage(format!("the sensor.toml in the recording: {e}; --sensor FILE takes its place")))?,
+                .map_err(|e| usage(format!("the sensor.toml in the recording: {e}; --sensor FILE replaces it")))?,
             (None, None) if beside.exists() => hzn_calib::sensor::load(&beside)?,
             (None, None) => {
                 let what = format!("no sensor: give --sensor FILE, or put a sensor.toml into {}", shown(&folder));
-                return Err(usage(format!("{what} (`hzn init` writes one to start from)")));
+                return Err(usage(format!("{what} (`hzn init` writes a first one)")));
             }
         };
         sensor.warnings.iter().for_each(tell::warning);
@@ -154,9 +154,8 @@ pub(crate) fn settle_input(source: &mut dyn Source, sensor: &mut Sensor) -> Resu
         && let Some((name, how)) = source.to_be_turned()
     {
         notes.push(format!(
-            "{name} says that it is to be shown {how}; pixels are taken as they are stored. If the camera was \
-             calibrated with turned pictures, as OpenCV's imread gives them, turn them with orient in [input] of \
-             sensor.toml"
+            "{name} is to be shown {how}; its pixels are used as stored. If the camera was calibrated with turned \
+             pictures, as OpenCV's imread returns them, turn them with orient in [input] of sensor.toml"
         ));
     }
     Ok(notes)
@@ -180,9 +179,9 @@ pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Sto
     let Some((name, (width, height))) = first else { return Ok(()) };
     let hint = if (height, width) == own { "turn the pictures with orient in [input], " } else { "" };
     Err(usage(format!(
-        "the sensor is for pictures of {} x {} px, but those here are not: {name} is {width} x {height}; {hint}give \
-         the sensor of this camera with --sensor, or set camera.width and height and scale focal lengths and centre \
-         with them",
+        "the sensor is for pictures of {} x {} px, but none of the pictures has this size: {name} is {width} x \
+         {height}; {hint}give the sensor of this camera with --sensor, or set camera.width and height and scale focal \
+         lengths and centre with them",
         own.0, own.1
     )))
 }
@@ -198,7 +197,7 @@ pub(crate) fn need_altitude(sensor: &Sensor, source: &dyn Source, frames: Option
     if sensor.config.each_body().iter().any(known) {
         return above_the_limb(&sensor.config);
     }
-    let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or a frames.csv with it";
+    let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or give a frames.csv with altitudes";
     Err(Stop { exit: Exit::Usage, error: anyhow::anyhow!(what) })
 }
 
@@ -209,7 +208,7 @@ fn above_the_limb(config: &Config) -> Result<(), Stop> {
     let below = |e: &Result<f64, PriorError>| e.err().filter(|e| matches!(e, PriorError::BelowLimb { .. }));
     match half_angles.iter().map(below).collect::<Option<Vec<_>>>().and_then(|each| each.first().copied()) {
         Some(why) => {
-            Err(usage(format!("body.altitude_km: {why}, so that no limb can be seen; give the altitude of the camera")))
+            Err(usage(format!("body.altitude_km: {why}, so no limb can be seen; give the altitude of the camera")))
         }
         None => Ok(()),
     }
@@ -241,7 +240,7 @@ pub(crate) fn stop_flag() -> Arc<AtomicBool> {
         if shared.swap(true, Ordering::SeqCst) {
             std::process::exit(i32::from(Exit::Interrupted as u8));
         }
-        tell::line(format_args!("\nfinishing the frames that were begun; press Ctrl-C again to leave at once"));
+        tell::line(format_args!("\nfinishing the pictures that were begun; press Ctrl-C again to stop at once"));
     });
     // Without a handler, Ctrl-C ends the program at once; the output can still be continued.
     drop(handler);

@@ -109,7 +109,7 @@ fn explain_tells_of_each_body() {
     let place = earth_and_sun(1);
     let told = place.run(&["explain", "in/0000.png", "--overlay", "o.png"]).expect(0).out;
     assert!(told.contains("half-angle (altitude 400 km, limb at"), "{told}");
-    assert!(told.contains("sun, cone of 0.2665 deg half-angle, as seen from about the Earth\n"), "{told}");
+    assert!(told.contains("sun, cone of 0.2665 deg half-angle, as seen from near the Earth\n"), "{told}");
     assert_eq!(told.matches("status      ok").count(), 2, "{told}");
     assert!(told.contains("earth-sphere, cone of") && told.contains("sun, cone of 0.26"), "{told}");
     assert!(told.contains("(fixed)") && told.contains("(otsu)"), "{told}");

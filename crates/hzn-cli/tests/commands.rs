@@ -197,7 +197,7 @@ fn wrong_usage_is_2() {
         (&["--altitude-km", "-5"], "--altitude-km: body.altitude_km"),
         (&["-j", "0"], "0 is not in 1.."),
         (&["--no-images", "-o", "a.csv"], "--no-images: only an MCAP"),
-        (&["--topic", "/x"], "only an MCAP has topics; leave --topic out"),
+        (&["--topic", "/x"], "only an MCAP has topics; leave out --topic"),
         (&["--resume"], "--output <FILE>"),
         (&["-o", "a.csv", "--resume", "--force"], "cannot be used with"),
         (&["-s", "nowhere.toml"], "hzn init"),
@@ -210,7 +210,7 @@ fn wrong_usage_is_2() {
     place.run(&["recover", "in/0000.png"]).expect(2).says("is no file of results");
     place.write("other.csv", b"a,b\n1,2\n");
     place.run(&["recover", "other.csv"]).expect(1).says("other.csv: has other columns");
-    place.run(&["export", "other.csv", "-o", "x.csv"]).expect(1).says("other.csv:2: no row of hzn results");
+    place.run(&["export", "other.csv", "-o", "x.csv"]).expect(1).says("other.csv:2: not a row of hzn results");
     assert!(!place.path("other.recovered.csv.part").exists());
 }
 
@@ -278,12 +278,12 @@ fn a_telecommand_has_values_that_can_be() {
     assert_eq!(refused("binarize.method 7"), "binarize.method cannot be 7: it is one of 0 otsu, 1 fixed, 2 dynamic");
     assert!(refused("camera.width 640.5").contains("cannot be 640.5: it is a whole number from"));
     assert!(refused("reject.threshold_px -1").contains("above 0, to 1000"));
-    assert!(refused("camera.theta_max_deg 200").contains("or NaN where it is left out"));
+    assert!(refused("camera.theta_max_deg 200").contains("or NaN to leave it out"));
     assert!(refused("telemetry.housekeeping_every 0").contains("from 1 to 65535"));
     assert!(refused("select.max_rms_px much").contains("cannot be much: it is"));
     assert!(refused("200 inf").contains("mask corners cannot be inf"));
-    place.run(&["telecommand", "known -5"]).expect(2).says("the altitude cannot be -5 km: above 0");
-    place.run(&["telecommand", "known 230 1e40 0 0"]).expect(2).says("no finite number of kilometres");
+    place.run(&["telecommand", "known -5"]).expect(2).says("the altitude -5 km is refused: must be above 0");
+    place.run(&["telecommand", "known 230 1e40 0 0"]).expect(2).says("not a finite number of kilometres");
     // A choice by name gives the same command as by number. An optional value may be NaN.
     let (named, numbered) = (set("binarize.method fixed"), set("50 1"));
     assert!(named.status.success() && named.stdout == numbered.stdout);

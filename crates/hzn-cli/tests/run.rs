@@ -133,7 +133,7 @@ fn patterns_and_single_pictures() {
     let all = ["run", "in/0000.png", "in/0001.png", "in/notes.txt", "in/sensor.toml"];
     assert_eq!(without_time(&place.run(&all).expect(0).out).len(), 2);
     assert_eq!(without_time(&place.run(&["run", "in/*"]).expect(0).out).len(), 12);
-    place.run(&["run", "in/sensor.toml"]).expect(2).says("is no picture");
+    place.run(&["run", "in/sensor.toml"]).expect(2).says("is not a picture");
     place.run(&["run", "nowhere"]).expect(2).says("nowhere: no such file or folder");
 }
 
@@ -148,15 +148,15 @@ fn numbers_in_names_count_by_their_value() {
     };
     for input in ["in", "in/*.png"] {
         let ran = place.run(&["run", input]).expect(0);
-        assert!(!ran.err.contains("order given"), "{}", ran.err);
+        assert!(!ran.err.contains("given order"), "{}", ran.err);
         assert_eq!(names(ran), "img1.png img2.png img10.png");
     }
     // A shell expands the pattern to this list. A list keeps its order, and a note says so.
     let ran = place.run(&["run", "in/img1.png", "in/img10.png", "in/img2.png"]).expect(0);
-    let ran = ran.says("note: pictures are taken in the order given, img10.png before img2.png; give the folder");
+    let ran = ran.says("note: pictures are processed in the given order, img10.png before img2.png; give the folder");
     assert_eq!(names(ran), "img1.png img10.png img2.png");
     let ran = place.run(&["run", "in/img2.png", "in/img1.png", "in/img10.png"]).expect(0);
-    assert!(!ran.err.contains("order given"), "{}", ran.err);
+    assert!(!ran.err.contains("given order"), "{}", ran.err);
 }
 
 #[cfg(unix)]
@@ -167,12 +167,12 @@ fn a_link_to_nothing_is_a_picture_that_cannot_be_read() {
     std::fs::create_dir(place.path("in/9.png")).unwrap();
     for input in [&["in"][..], &["in/*.png"], &["in/0000.png", "in/0000a.png", "in/0001.png"]] {
         let ran = place.run(&[&["run"], input].concat()).expect(3);
-        assert_eq!(ran.err.contains("note: 1 folder ending in .png left out"), input.len() == 1, "{}", ran.err);
+        assert_eq!(ran.err.contains("note: 1 folder ending in .png was left out"), input.len() == 1, "{}", ran.err);
         let rows = without_time(&ran.out);
         let of = |name: &str| rows.iter().map(|r| cell(r, name).to_owned()).collect::<Vec<_>>();
         assert_eq!(of("file"), ["0000.png", "0000a.png", "0001.png"], "{input:?}");
         assert_eq!(of("status"), ["ok", "unreadable", "ok"], "{input:?}");
-        assert_eq!(of("detail")[1], "is a link to /nonexistent/0.png, which is not there");
+        assert_eq!(of("detail")[1], "is a link to /nonexistent/0.png, which does not exist");
     }
     place.run(&["run", "in/0000a.png"]).expect(2).says("in/0000a.png: no such file");
 }
@@ -190,7 +190,7 @@ fn headerless_pictures() {
     assert_eq!((cell(&rows[0], "status"), cell(&rows[1], "status")), ("ok", "unreadable"));
     assert_eq!(
         cell(&rows[1], "detail"),
-        "153600 bytes, but a picture of 320x240:mono8 has 76800: these are 2 pictures; give each a file of its own; it \
+        "153600 bytes, but a picture of 320x240:mono8 has 76800: these are 2 pictures; write each into its own file; it \
          fits mono10, mono12, mono16"
     );
     let ran = place.run(&["run", "raw/b.raw", "--raw", "320x240:mono12", "-s", "in/sensor.toml"]).expect(0);
@@ -253,7 +253,7 @@ fn a_disk_that_fills_up_keeps_what_is_finished() {
         common::Ran::from_output(&shell.output().unwrap(), &place.path(""))
             .expect(1)
             .says("ulimit -f")
-            .says("resume the run to go on");
+            .says("resume the run to continue");
         assert!(!place.path(out).exists());
         let info = place.run(&["info", &format!("{out}.part")]).expect(0).out;
         assert!(!info.contains("frames           0"), "{out}: {info}");
@@ -311,7 +311,8 @@ fn recover_closes_what_a_crash_left() {
         let part = place.path(&format!("{out}.part"));
         let file = std::fs::OpenOptions::new().write(true).open(&part).unwrap();
         file.set_len(std::fs::metadata(&part).unwrap().len() - 3).unwrap();
-        let ran = place.run(&["recover", &format!("{out}.part")]).expect(0).says(" bytes of unfinished frames dropped");
+        let ran =
+            place.run(&["recover", &format!("{out}.part")]).expect(0).says(" bytes of unfinished pictures dropped");
         let kept = ran.err.split_whitespace().nth(1).unwrap().to_owned();
         place.run(&["export", out, "-o", "kept.csv", "--force"]).expect(0).says(&format!("{kept} rows"));
         place.run(&["info", out]).expect(0);
@@ -341,10 +342,10 @@ fn another_input_is_not_appended() {
     place.run(&["run", "in/0000.png", "in/0002.png", "-o", "a.csv"]).expect(0);
     let before = place.read("a.csv");
     let err = place.run(&["run", "in", "-o", "a.csv", "--resume"]).expect(2).err;
-    insta::assert_snapshot!(err, @"error: a.csv: its last frame is 0002.png, but the input has 0001.png in that place; \
+    insta::assert_snapshot!(err, @"error: a.csv: its last picture is 0002.png, but the input has 0001.png in this place; \
                                    give the input that it was begun with, or start over with --force");
     let err = place.run(&["run", "in/0000.png", "-o", "a.csv", "--resume"]).expect(2).err;
-    insta::assert_snapshot!(err, @"error: a.csv: holds 2 frames, but the input has only 1; give the input that it was \
+    insta::assert_snapshot!(err, @"error: a.csv: contains 2 pictures, but the input has only 1; give the input that it was \
                                    begun with, or start over with --force");
     assert_eq!(place.read("a.csv"), before);
 }
@@ -359,7 +360,7 @@ fn another_sensor_is_not_appended() {
             .run(&["run", "in", "-o", out, "--resume", "--altitude-km", "410"])
             .expect(2)
             // A recording contains its sensor.
-            .says(if out == "a.mcap" { "was begun with another sensor.toml" } else { "now comes out differently" });
+            .says(if out == "a.mcap" { "was begun with another sensor.toml" } else { "now gives another result" });
         assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
         place.write("other.toml", format!("{}[reject]\nseed = 2\n", common::SENSOR).as_bytes());
         let ran = place.run(&["run", "in", "-o", out, "--resume", "-s", "other.toml"]);
@@ -393,10 +394,11 @@ fn nobody_listening_is_no_crash() {
     assert_eq!(without_time(&place.read("a.csv")).len(), 3);
 }
 
-/// Returns the command that `hzn run` prints after `what to try: `.
+/// Returns the command that `hzn run` prints after `an explanation and advice: `.
 fn suggested(ran: &common::Ran) -> String {
-    let line = ran.err.lines().find(|l| l.contains("what to try: ")).unwrap_or_else(|| panic!("{}", ran.err));
-    line.split("what to try: ").nth(1).unwrap().to_owned()
+    let line =
+        ran.err.lines().find(|l| l.contains("an explanation and advice: ")).unwrap_or_else(|| panic!("{}", ran.err));
+    line.split("an explanation and advice: ").nth(1).unwrap().to_owned()
 }
 
 #[cfg(unix)]

@@ -317,5 +317,5 @@ fn one_colour_of_a_video_and_its_rotation() {
     };
     // The option of ffmpeg 6 counts counter-clockwise. In older versions the written tag also counts counter-clockwise.
     assert!(turned(&["-display_rotation", "-90"], &[]) || turned(&[], &["-metadata:s:v:0", "rotate=270"]));
-    run(&place, "turned.mp4").expect(0).says("turned.mp4 says that it is to be shown turned by 90 degrees clockwise");
+    run(&place, "turned.mp4").expect(0).says("turned.mp4 is to be shown turned by 90 degrees clockwise");
 }

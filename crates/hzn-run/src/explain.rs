@@ -10,7 +10,7 @@ pub fn why(verdict: Verdict, s: &gates::Config) -> String {
     match verdict {
         Verdict::Chosen => "the answer".into(),
         Verdict::Passed => "passed every gate, but another fits better".into(),
-        Verdict::NoConsensus => "no limb goes through enough of its points".into(),
+        Verdict::NoConsensus => "too few edge points agree on one limb".into(),
         Verdict::FewInliers => format!("fewer than {} inliers (select.min_inliers)", s.min_inliers),
         Verdict::ShortArc => match s.min_arc_px {
             Some(px) => format!("inliers cover less than {px} px (select.min_arc_px)"),
@@ -23,34 +23,36 @@ pub fn why(verdict: Verdict, s: &gates::Config) -> String {
         ),
         Verdict::Uncertain => format!("sigma above {} deg (select.max_sigma_deg)", s.max_sigma_deg),
         Verdict::NoFit => "the fit did not converge".into(),
-        Verdict::Indistinct => "a curve through clutter: many of its points lie close beside the fitted limb, or a \
-                                part of it follows the limb by chance"
-            .into(),
-        Verdict::NoSky => "what lies beyond the fitted limb is no sky (select.max_lit_sky)".into(),
-        Verdict::Taken => "it is the limb of another body, found before".into(),
-        Verdict::OutOfView => {
-            "the limb that is expected about the fitted axis is not in the picture (select.limb_in_view)".into()
-        }
-        Verdict::Straight => {
-            "a straight line fits the edge nearly as well (select.min_evidence), or its curvature does not tell the \
-             body's side (select.min_side_sigma)"
+        Verdict::Indistinct => {
+            "the edge is clutter: many of its points lie close to the fitted limb but not on it, or \
+                                a part of it follows the limb by chance"
                 .into()
         }
-        Verdict::Radius => "the limb is not that wide at any altitude allowed (select.altitude_limits_km)".into(),
-        Verdict::Unsupported => "the fitted limb goes on where the picture shows none".into(),
+        Verdict::NoSky => "the region beyond the fitted limb is not sky (select.max_lit_sky)".into(),
+        Verdict::Taken => "this limb was already assigned to another body".into(),
+        Verdict::OutOfView => {
+            "the expected limb around the fitted axis is outside the picture (select.limb_in_view)".into()
+        }
+        Verdict::Straight => {
+            "a straight line fits the edge nearly as well (select.min_evidence), or its curvature is too uncertain to \
+             say on which side the body is (select.min_side_sigma)"
+                .into()
+        }
+        Verdict::Radius => "no allowed altitude gives a limb of this half-angle (select.altitude_limits_km)".into(),
+        Verdict::Unsupported => "the picture shows no edge along a part of the fitted limb".into(),
         Verdict::Circle => format!(
-            "a circle of the image fits it more than {} times better than the limb: a lens flare \
+            "a circle in the picture fits more than {} times better than the limb: it is a lens flare \
              (select.max_rival_ratio)",
             s.max_rival_ratio
         ),
         Verdict::Polyline => format!(
-            "straight pieces fit it more than {} times better than the limb: an iris or a vehicle's part \
+            "straight lines fit more than {} times better than the limb: it is an iris or a part of the vehicle \
              (select.max_rival_ratio)",
             s.max_rival_ratio
         ),
-        Verdict::Departure => "the edge goes on smoothly beside the fitted limb (select.max_departure)".into(),
+        Verdict::Departure => "the edge leaves the fitted limb smoothly (select.max_departure)".into(),
         Verdict::Band => {
-            "behind the edge is a narrow band and then the sky again, not the body (select.max_band)".into()
+            "behind the edge there is a narrow band and then the sky again, not the body (select.max_band)".into()
         }
         Verdict::Attitude => format!(
             "the axis is more than {} sigma from the given attitude (select.max_attitude_sigma)",
@@ -74,7 +76,7 @@ pub fn term(term: Term) -> &'static str {
         Term::CommonTilt => "a tilt that the whole edge shares",
         Term::UnknownAzimuth => "the limb's unknown azimuth",
         Term::Lens => "the calibration of the lens",
-        Term::Clipping => "the height of a limb that is clipped at full scale",
+        Term::Clipping => "the limb height where the picture is clipped at full scale",
         Term::LimbHeight => "the limb height",
         Term::Altitude => "the altitude",
         Term::Radius => "the unknown local radius",
@@ -85,13 +87,13 @@ pub fn term(term: Term) -> &'static str {
 pub fn without_edges(status: Status) -> &'static str {
     match status {
         Status::Ok => "the answer",
-        Status::NoLimb => "no edge that could be a limb, or one brightness all over",
-        Status::TooDark => "darker than gate.min_mean allows",
-        Status::TooBright => "brighter than gate.max_mean allows",
-        Status::TooFewPoints => "only short edges (candidates.min_points)",
+        Status::NoLimb => "no edge can be a limb, or the whole picture has one brightness",
+        Status::TooDark => "the picture is darker than gate.min_mean allows",
+        Status::TooBright => "the picture is brighter than gate.max_mean allows",
+        Status::TooFewPoints => "only short edges were found (candidates.min_points)",
         Status::Ambiguous => "two directions fit about equally well",
         Status::Rejected => "an edge failed a gate",
-        Status::Truncated => "more edges than may be looked at (limits.max_work)",
+        Status::Truncated => "the picture has more edges than the work budget allows (limits.max_work)",
         Status::Unreadable => "the picture cannot be read",
         Status::NoAltitude => "no altitude above the limb height is known",
     }
@@ -121,41 +123,39 @@ pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
     let mut tips: Vec<&str> = Vec::new();
     match r.status {
         Status::TooDark => tips.push("the picture is darker than gate.min_mean allows: lower it, or expose longer"),
-        Status::TooBright => tips.push(
-            "the picture is brighter than gate.max_mean allows: raise it, or expose \
-                                        shorter",
-        ),
+        Status::TooBright => {
+            tips.push("the picture is brighter than gate.max_mean allows: raise it, or expose shorter")
+        }
         Status::TooFewPoints => tips.push(
-            "only short edges were found, as of stars, noise or hot pixels: is the body \
-                                           in view? if it is as small as that, lower candidates.min_points",
+            "only short edges were found, for example of stars, noise or hot pixels. Is the body in view? If the body \
+             is very small, lower candidates.min_points",
         ),
         Status::Truncated => tips.push(
-            "the picture has more edges than it may cost to look at: raise limits.max_work, \
-                                        mask structure in view, or set a level above the clouds (binarize.method = \
-                                        \"fixed\")",
+            "the edges of the picture cost more than the work budget: raise limits.max_work, mask structure in view, \
+             or set a threshold above the clouds (binarize.method = \"fixed\")",
         ),
-        Status::Ambiguous => tips.push(
-            "two directions fit about equally well: mask structure in view \
-                                        (mask.polygons_px)",
-        ),
+        Status::Ambiguous => {
+            tips.push("two directions fit about equally well: mask structure in view (mask.polygons_px)");
+        }
         _ => {}
     }
     if r.status == Status::NoLimb && r.stage == Stage::Binarize {
-        tips.push("the picture has one brightness all over: nothing is in view, or the exposure does not show it");
+        tips.push("the whole picture has one brightness: nothing is in view, or the exposure does not show it");
     } else if r.candidates.is_empty() && r.status == Status::NoLimb {
         tips.push(
-            "no edge is long enough: is the limb in view? try another level (binarize.scale, or method = \"fixed\")",
+            "no edge is long enough. Is the limb in view? Try another threshold (binarize.scale, or method = \
+             \"fixed\")",
         );
     }
     if has(Verdict::NoConsensus) || has(Verdict::FewInliers) {
         tips.push(
             "no candidate has the form of the expected limb: check altitude_km, the focal length and the lens \
-                   model; a larger reject.threshold_px forgives a poor calibration",
+                   model; a larger reject.threshold_px tolerates a poor calibration",
         );
     }
     if has(Verdict::HalfAngle) {
         tips.push(
-            "a limb was found, but larger or smaller than expected: check altitude and focal length, or raise \
+            "a limb was found, but it is larger or smaller than expected: check altitude and focal length, or raise \
                    body.limb_height_sigma_km",
         );
     }
@@ -164,12 +164,14 @@ pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
     }
     if has(Verdict::ShortArc) || has(Verdict::Uncertain) {
         tips.push(
-            "too little of the limb is in view for a good answer: lower select.min_arc_px or raise \
-                   select.max_sigma_deg if a poor one will do",
+            "too little of the limb is in view for a good answer: if a less accurate answer is sufficient, lower \
+             select.min_arc_px or raise select.max_sigma_deg",
         );
     }
     if has(Verdict::Unsupported) {
-        tips.push("an edge fits by chance (cloud, structure): mask what belongs to the vehicle, or try another level");
+        tips.push(
+            "an edge fits by chance (cloud, structure): mask the parts of the vehicle in view, or try another threshold",
+        );
     }
     if has(Verdict::Attitude) {
         tips.push(

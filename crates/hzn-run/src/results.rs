@@ -37,7 +37,7 @@ pub type AllRows = Box<dyn Iterator<Item = Result<Row, Error>>>;
 /// The file is of another kind or cannot be read, or a row is not a row of results.
 pub fn rows(file: &Path, kind: &str) -> Result<AllRows, Error> {
     let name = file.display().to_string();
-    let not = move |line: u64, why: String| failed(format!("{name}:{line}: no row of hzn results: {why}"));
+    let not = move |line: u64, why: String| failed(format!("{name}:{line}: not a row of hzn results: {why}"));
     match kind {
         "csv" => {
             let reader = csv::Reader::from_path(file).map_err(failed)?;

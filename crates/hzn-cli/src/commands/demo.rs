@@ -144,9 +144,10 @@ fn process(folder: &Path, out: &Path) -> Result<(), Stop> {
     match sequence::run(&sequence::Args::quietly(folder, out))? {
         Exit::Done => Ok(()),
         Exit::Interrupted => Err(failed(format!("{}: interrupted", folder.display()))),
-        _ => {
-            Err(failed(format!("{}: some pictures could not be processed; `hzn run` on it says why", folder.display())))
-        }
+        _ => Err(failed(format!(
+            "{}: some pictures could not be processed; `hzn run` on this folder says why",
+            folder.display()
+        ))),
     }
 }
 
@@ -186,7 +187,7 @@ fn flight_text(rows: &[Row], truth: &[Truth]) -> Result<String, Stop> {
     let mut microseconds: Vec<f64> = rows.iter().filter_map(|r| r.elapsed_us).collect();
     microseconds.sort_by(f64::total_cmp);
     if let Some(middle) = microseconds.get(microseconds.len() / 2) {
-        line("processing", format!("{middle:.0} us a frame in the middle, without decoding"));
+        line("processing", format!("{middle:.0} us a picture (median), without decoding"));
     }
     Ok(out)
 }

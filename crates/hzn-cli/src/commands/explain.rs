@@ -58,8 +58,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     let decoding = decoding.elapsed();
     if picture.pages > 1 {
-        let what = "pictures, of which this is the first";
-        tell::line(format_args!("note: {} holds {} {what}", item.name, picture.pages));
+        let what = "pictures; only the first is explained";
+        tell::line(format_args!("note: {} contains {} {what}", item.name, picture.pages));
     }
     let looked = Looked { name: &item.name, config, data: data.as_ref(), picture: &picture };
     looked.explain(args, decoding)
@@ -199,10 +199,13 @@ impl Explained<'_> {
         if !again.is_empty() {
             let levels: Vec<String> = again.iter().map(u16::to_string).collect();
             let looks = self.report.counters.looks;
-            line("looks", format!("{looks}: without an answer at that level, also at {}", levels.join(", ")));
+            line(
+                "looks",
+                format!("{looks}: there was no answer at this threshold, so further looks used {}", levels.join(", ")),
+            );
         }
         if self.trace.frame_px() > 0 {
-            line("frame", format!("{} px of dark frame around the picture left out", self.trace.frame_px()));
+            line("frame", format!("a dark border of {} px around the picture is left out", self.trace.frame_px()));
         }
     }
 
@@ -236,14 +239,14 @@ impl Explained<'_> {
         }
         let more = (r.counters.candidates as usize).saturating_sub(r.candidates.len());
         if more > 0 {
-            line("", format!("and {more} further ones that are not listed"));
+            line("", format!("{more} further edges are not listed"));
         }
     }
 
     fn points(&self, line: &mut impl FnMut(&str, String)) {
         let c = self.report.counters;
         if c.fallback_points > 0 {
-            let what = "points stand at the global level, because their local one was not found";
+            let what = "points are at the global threshold, because no local mid-level was found";
             line("sub-pixel", format!("{} of {} {what}", c.fallback_points, c.edge_points));
         }
         if self.report.stage >= Stage::Reject {
@@ -260,7 +263,7 @@ impl Explained<'_> {
     fn times(&self, decoding: Duration, elapsed: Duration, line: &mut impl FnMut(&str, String)) {
         let us = |d: Duration| d.as_nanos() as f64 / 1e3;
         let (all, ms) = (us(elapsed), decoding.as_secs_f64() * 1e3);
-        let by_stage = "by stage, while watched (which takes time too):";
+        let by_stage = "by stage, with an observer (which takes time too):";
         line("time", format!("{all:.0} us in all, after {ms:.1} ms of decoding; {by_stage}"));
         for (stage, time) in self.trace.times() {
             if time > Duration::ZERO {
@@ -273,7 +276,7 @@ impl Explained<'_> {
         let body = self.body;
         let cone = format!("{}, cone of {:.4} deg half-angle", body.kind.name(), self.half_angle.to_degrees());
         let Some(km) = sink::altitude_km(self.data, body) else {
-            return format!("{cone}, as seen from about the Earth");
+            return format!("{cone}, as seen from near the Earth");
         };
         let from = match self.data {
             Some(d) if d.position_km.is_some() => format!("position at {km:.2} km given with the picture"),
@@ -292,10 +295,12 @@ impl Explained<'_> {
                 format!("mean brightness is outside of {} to {} of full scale", g.min_mean, g.max_mean)
             }
             (Some((level, mean, n)), _) => {
-                format!("level {level} of {full} ({method}), mean {mean:.1} over a sample of {n} pixels")
+                format!("threshold {level} of {full} ({method}), mean {mean:.1} over a sample of {n} pixels")
             }
-            (None, Status::NoLimb) if self.report.level == 0 => format!("all alike: no level ({method})"),
-            (None, _) => format!("level {} of {full} ({method})", self.report.level),
+            (None, Status::NoLimb) if self.report.level == 0 => {
+                format!("one brightness everywhere: no threshold ({method})")
+            }
+            (None, _) => format!("threshold {} of {full} ({method})", self.report.level),
         }
     }
 
@@ -314,9 +319,10 @@ impl Explained<'_> {
         let turned = |rate: [f64; 3]| rate.map(|r| (r * readout_s).to_degrees());
         (readout_s != 0.0).then(|| match rate.map(turned) {
             Some([x, y, z]) => {
-                format!("rows turned back by the rate: {x:.3}, {y:.3}, {z:.3} deg from the first to the last")
+                format!("the rows are corrected by the rate: {x:.3}, {y:.3}, {z:.3} deg from the first to the last")
             }
-            None => "no rate of rotation is given: the rows are not turned back, and sigma does not hold it".to_owned(),
+            None => "no rate of rotation is known: the rows are not corrected, and sigma does not include this error"
+                .to_owned(),
         })
     }
 
@@ -374,7 +380,7 @@ fn advice(r: &Report<f64>, picture: &Picture, line: &mut impl FnMut(&str, String
     let mut tips: Vec<String> = explain::tips(r).into_iter().map(str::to_owned).collect();
     tips.extend(picture.unused_bits());
     if tips.is_empty() {
-        tips.push("look at the edges that were found: --overlay out.png".to_owned());
+        tips.push("look at the edges that were found, with --overlay out.png".to_owned());
     }
     for (i, tip) in tips.into_iter().enumerate() {
         line(if i == 0 { "try" } else { "" }, tip);

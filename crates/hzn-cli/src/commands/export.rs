@@ -41,10 +41,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.output
         && sink::target(path)? == sink::Target::Mcap
     {
-        return Err(usage(format!("{}: a table is written here: .csv or .jsonl", path.display())));
+        return Err(usage(format!("{}: a table must end in .csv or .jsonl", path.display())));
     }
     if kind != "mcap" && pictures {
-        return Err(usage(format!("{}: only a recording (.mcap) holds pictures", file.display())));
+        return Err(usage(format!("{}: only a recording (.mcap) contains pictures", file.display())));
     }
     for folder in [&args.images, &args.overlay].into_iter().flatten() {
         std::fs::create_dir_all(folder).map_err(|e| sink::cannot(folder, &e))?;
@@ -68,7 +68,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         }
         lost = source::lost_of_recording(&reader, file, "exported");
         if pictures && images == 0 {
-            tell::warning(format_args!("{}: holds no pictures (was it recorded with --no-images?)", file.display()));
+            tell::warning(format_args!("{}: contains no pictures (was it recorded with --no-images?)", file.display()));
         }
     } else {
         for row in results::rows(file, &kind)? {

@@ -105,7 +105,7 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
         if !header.iter().eq(Row::COLUMNS) {
             let frames = hzn_calib::frames::load(file)?;
             let with = |has: fn(&hzn_calib::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
-            let mut out = what("frames.csv, what is known of pictures");
+            let mut out = what("frames.csv, the priors of pictures");
             out.push_str(&format!("pictures         {}\n", frames.rows.len()));
             for (name, n) in [
                 ("time", with(|r| r.time_s.is_some())),
@@ -155,7 +155,7 @@ fn series(file: &Path, header: &csv::StringRecord) -> Result<String, Stop> {
     let mut out = what(match () {
         () if has("gyro_x_radps").is_some() => "imu.csv, rates and accelerations of a simulated vehicle",
         () if has("x_m").is_some() && has("vx_mps").is_some() => "gnss.csv, fixes of a simulated satellite receiver",
-        () => "table that is none of hzn's (results, frames.csv, truth.csv, imu.csv, gnss.csv)",
+        () => "table that hzn does not know (results, frames.csv, truth.csv, imu.csv, gnss.csv)",
     });
     let number = |row: &csv::StringRecord, name: &str| has(name).and_then(|i| row.get(i)?.parse::<f64>().ok());
     let (mut rows, mut span, mut saturated) = (0u64, None::<(f64, f64)>, 0u64);
@@ -227,13 +227,13 @@ fn one_picture(file: &Path) -> Result<String, Stop> {
         l.bits
     ));
     if p.pages > 1 {
-        out.push_str(&format!("pictures         {}, of which hzn takes the first\n", p.pages));
+        out.push_str(&format!("pictures         {}; hzn processes only the first\n", p.pages));
     }
     if let Some(how) = p.to_be_turned() {
-        out.push_str(&format!("to be shown      {how}; input.orient says whether it is\n"));
+        out.push_str(&format!("to be shown      {how}; input.orient decides whether hzn turns it\n"));
     }
     if let Some(t) = p.exif_time_s {
-        out.push_str(&format!("EXIF time        {t:.3} s since 1970, taken as UTC\n"));
+        out.push_str(&format!("EXIF time        {t:.3} s since 1970, assumed to be UTC\n"));
     }
     Ok(out)
 }
@@ -301,7 +301,7 @@ impl Summary {
             ] {
                 if let Some([low, middle, high]) = percentiles(values) {
                     let [low, middle, high] = [low, middle, high].map(three_digits);
-                    line(name, format!("{middle} {unit} in the middle, {low} to {high} for 90 %"));
+                    line(name, format!("median {middle} {unit}, 90 % from {low} to {high}"));
                 }
             }
         }

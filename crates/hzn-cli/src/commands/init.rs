@@ -83,7 +83,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     start.warnings.iter().for_each(tell::warning);
     if known.exif.turned {
         tell::warning(
-            "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the picture as it is stored",
+            "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
         );
     }
     tell::line(format_args!(
@@ -97,8 +97,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     ));
     if known.altitude_km.is_none() {
         tell::line(
-            "every picture needs an altitude: from a frames.csv beside them (columns file, altitude_km), or from \
-             --altitude KM",
+            "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or --altitude \
+             KM",
         );
     }
     Ok(Exit::Done)
@@ -124,13 +124,13 @@ fn known(args: &Args) -> Result<Known, Stop> {
 fn one_size(source: &dyn Source) -> Result<(u32, u32), Stop> {
     let mut sizes = source.sizes();
     let Some((first, size)) = sizes.next() else {
-        return Err(usage("none of the pictures can be read, so that their size is not known"));
+        return Err(usage("none of the pictures can be read, so their size is not known"));
     };
     let word = |(w, h): (u32, u32)| format!("{w}x{h}");
     match sizes.find(|(_, other)| *other != size) {
         Some((name, other)) => Err(usage(format!(
-            "{first} is {}, but {name} is {}: a sensor.toml is for pictures of one size; give those of one camera and \
-             mode",
+            "{first} is {}, but {name} is {}: a sensor.toml is for pictures of one size; give the pictures of one \
+             camera and mode",
             word(size),
             word(other)
         ))),

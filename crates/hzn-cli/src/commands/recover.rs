@@ -29,7 +29,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
     let (kind, unfinished) = source::existing(file)?;
     if !matches!(kind.as_str(), "mcap" | "csv" | "jsonl") {
-        let what = "is no file of results (.mcap, .csv or .jsonl, with .part behind it when it is unfinished)";
+        let what = "is not a file of results (.mcap, .csv or .jsonl, followed by .part if it is unfinished)";
         return Err(usage(format!("{}: {what}", file.display())));
     }
     let path = match &args.output {
@@ -43,7 +43,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     let target = sink::target(&path)?;
     if path.exists() {
         if !args.force {
-            return Err(usage(format!("{}: exists already; choose another name with -o, or --force", path.display())));
+            return Err(usage(format!(
+                "{}: exists already; choose another name with -o, or --force replaces it",
+                path.display()
+            )));
         }
         if path.canonicalize()? == file.canonicalize()? {
             return Err(usage("the output must be another file than the input"));
@@ -56,7 +59,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             _ => sink::cannot(&path, &e).into(),
         })?,
     };
-    let dropped = if lost > 0 { format!(", {lost} bytes of unfinished frames dropped") } else { String::new() };
+    let dropped = if lost > 0 { format!(", {lost} bytes of unfinished pictures dropped") } else { String::new() };
     tell::line(format_args!("{}: {} kept{dropped}", path.display(), explain::counted(rows, "row")));
     if unfinished && args.output.is_none() && file.exists() {
         // Its results are in the new file. Next to it, the old file would look like another unfinished run.
@@ -74,9 +77,9 @@ fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> 
     }
     let found = hzn_mcap::recover(file, &beside).map_err(|e| match e {
         hzn_mcap::Error::DiskFull { folder, .. } => {
-            let what = "free some, or choose another folder with -o";
+            let what = "free some space, or choose another folder with -o";
             failed(format!(
-                "no space left on the disk of {}: {what}; {} is as it was",
+                "no space left on the disk of {}: {what}; {} is unchanged",
                 folder.display(),
                 file.display()
             ))
@@ -85,7 +88,7 @@ fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> 
     })?;
     std::fs::rename(&beside, path)?;
     if found.broken_chunks > 0 {
-        tell::warning(format_args!("{} damaged parts were left out; their frames are missing", found.broken_chunks));
+        tell::warning(format_args!("{} damaged parts were left out; their pictures are missing", found.broken_chunks));
     }
     Ok((found.frames, found.dropped_bytes))
 }

@@ -105,7 +105,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     }
     if held.frames > 0 && plan.overlay.is_some() && !args.quiet {
-        tell::line(format_args!("note: what was finished before ({} frames) is not drawn again", held.frames));
+        tell::line(format_args!("note: the {} pictures of the earlier run are not drawn again", held.frames));
     }
     let total = source.total();
     if let Err(stop) = skip(source.as_mut(), &held, &plan, path) {
@@ -147,7 +147,7 @@ fn check_arguments(args: &Args) -> Result<(), Stop> {
         return Err(usage(format!("{}: is the input itself; choose another name for the output", input.display())));
     }
     if args.no_images && args.output.as_deref().is_none_or(|p| ending(p) != "mcap") {
-        return Err(usage("--no-images: only an MCAP holds pictures; give -o out.mcap, or leave it out"));
+        return Err(usage("--no-images: only an MCAP contains pictures; give -o out.mcap, or leave out --no-images"));
     }
     Ok(())
 }
@@ -156,12 +156,12 @@ fn check_arguments(args: &Args) -> Result<(), Stop> {
 fn prepare_overlays(drawn: &Path, pictures: &Path, may_hold: bool) -> Result<(), Stop> {
     std::fs::create_dir_all(drawn).map_err(|e| sink::cannot(drawn, &e))?;
     if sink::is_same(drawn, pictures) {
-        let what = "is where the pictures are, which would be replaced; choose another folder";
+        let what = "is the folder of the pictures, and they would be replaced; choose another folder";
         return Err(usage(format!("--overlay {}: {what}", drawn.display())));
     }
     let holds = std::fs::read_dir(drawn).map_err(|e| sink::cannot(drawn, &e))?.next().is_some();
     if holds && !may_hold {
-        let what = "holds files already; choose another folder, or --force replaces those of the same name";
+        let what = "contains files already; choose another folder, or --force replaces files of the same name";
         return Err(usage(format!("--overlay {}: {what}", drawn.display())));
     }
     Ok(())
@@ -221,7 +221,7 @@ impl Watch {
         self.several.count(frame);
         if let Some(tip) = frame.tip.as_ref().filter(|_| !self.tipped) {
             self.tipped = true;
-            self.progress.say(&format!("note: nothing found in {}: {tip}", frame.name));
+            self.progress.say(&format!("note: nothing was found in {}: {tip}", frame.name));
         }
         // A picture that cannot be read is unreadable for every body.
         if let Some(e) = frame.unreadable().filter(|_| !self.quiet) {
@@ -245,7 +245,7 @@ impl Watch {
             let found = if nothing { "nothing was found in any picture; " } else { "" };
             let more = frame.map(|frame| {
                 let command = explain_command(args, source, frame);
-                format!("; what happens to one, and what to try: {command}")
+                format!("; for an explanation and advice: {command}")
             });
             tell::line(format_args!("note: {found}{why}{}", more.unwrap_or_default()));
         }
@@ -302,14 +302,14 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
         match source.next() {
             Some(item) => last = Some(item?),
             None => {
-                let what = format!("holds {} frames, but the input has only {n}", held.frames);
+                let what = format!("contains {} pictures, but the input has only {n}", held.frames);
                 return other(format!("{what}; give the input that it was begun with"));
             }
         }
     }
     let (Some(item), Some(there)) = (last, &held.last) else { return Ok(()) };
     if item.name != there.file {
-        let what = format!("its last frame is {}, but the input has {} in that place", there.file, item.name);
+        let what = format!("its last picture is {}, but the input has {} in this place", there.file, item.name);
         return other(format!("{what}; give the input that it was begun with"));
     }
     if plan.config.tracks() {
@@ -321,7 +321,7 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
     let Some(here) = sink::rows(&here, &plan.config).pop() else { return Ok(()) };
     let here = Row { elapsed_us: there.elapsed_us, ..here };
     if here != *there {
-        let what = format!("its last frame, {}, now comes out differently", there.file);
+        let what = format!("its last picture, {}, now gives another result", there.file);
         return other(format!(
             "{what}; give the sensor.toml, frames.csv and options (--altitude-km, --fps, --flight) that it was begun \
              with"
@@ -363,8 +363,8 @@ impl Several {
         let Some((name, pages)) = &self.first else { return };
         let files = explain::counted(self.files, "file");
         tell::warning(format_args!(
-            "only the first picture was processed of {files} with several pages or frames (the first is {name} with \
-             {pages} pictures): write each picture into a file of its own, or give a video"
+            "only the first picture of {files} with several pages or frames was processed (the first file is {name} \
+             with {pages} pictures); write each picture into its own file, or give a video"
         ));
     }
 }

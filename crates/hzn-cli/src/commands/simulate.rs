@@ -85,7 +85,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         let changed =
             |(file, bytes): &&(String, Vec<u8>)| std::fs::read(folder.join(file)).ok().as_ref() != Some(bytes);
         if let Some((file, _)) = files.iter().find(changed) {
-            let what = "is not what the scene names any more; --force starts over";
+            let what = "differs from the file that the scene names; --force starts over";
             return Err(usage(format!("{}: {what}", folder.join(file).display())));
         }
     } else if folder.exists() && !args.force {

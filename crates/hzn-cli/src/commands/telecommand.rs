@@ -91,7 +91,7 @@ fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
         bytes.truncate(n);
         Ok(vec![bytes])
     };
-    let number = |word: &str| word.parse::<f64>().map_err(|_| bad(&format!("{word:?} is no number")));
+    let number = |word: &str| word.parse::<f64>().map_err(|_| bad(&format!("{word:?} is not a number")));
     match function {
         Function::SetMode => {
             let mode = rest.first().and_then(|w| Mode::ALL.iter().find(|m| m.name() == *w));
@@ -125,10 +125,10 @@ fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
             let given = rest.iter().map(|w| number(w)).collect::<Result<Vec<_>, _>>()?;
             let (km, rate) = given.split_at(given.len().min(4));
             if let Some(x) = km.iter().find(|km| !((**km * 1e3) as f32).is_finite()) {
-                return Err(bad(&format!("{x} is no finite number of kilometres")));
+                return Err(bad(&format!("{x} is not a finite number of kilometres")));
             }
             if let Some(h) = km.first().filter(|h| **h <= 0.0) {
-                return Err(bad(&format!("the altitude cannot be {h} km: above 0")));
+                return Err(bad(&format!("the altitude {h} km is refused: must be above 0")));
             }
             let [h, x, y, z] = match km[..] {
                 [h] => [h, f64::NAN, f64::NAN, f64::NAN],
@@ -144,7 +144,7 @@ fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
             })
         }
         Function::ProcessOnce | Function::DumpEdges | Function::ResetCounters if !rest.is_empty() => {
-            Err(bad("takes nothing else"))
+            Err(bad("takes no arguments"))
         }
         Function::ProcessOnce | Function::DumpEdges | Function::ResetCounters => user(&mut |_| {}),
     }
@@ -166,7 +166,7 @@ fn parameter(word: &str) -> Result<u16, String> {
         let ids = Parameters::idle();
         let names = ids.numbers().filter_map(parameters::name);
         let near = hzn_calib::nearest(word, names).map(|n| format!("; did you mean {n}?"));
-        format!("{word} is no parameter{}", near.unwrap_or_default())
+        format!("{word} is not a parameter{}", near.unwrap_or_default())
     })
 }
 
@@ -174,7 +174,7 @@ fn parameter(word: &str) -> Result<u16, String> {
 /// whether the value fits the other parameters, because only it has them.
 fn value(id: u16, word: &str) -> Result<f64, String> {
     let name = parameters::name(id).unwrap_or("?");
-    let cannot = |what: String| Err(format!("{name} cannot be {word}: it is {what}"));
+    let cannot = |what: String| Err(format!("{name} cannot be {word}: it must be {what}"));
     let number = word.parse::<f64>();
     let taken = |x: f64| Parameters::idle().set(id, x).is_ok();
     let choices = choices(name);
@@ -209,7 +209,7 @@ fn value(id: u16, word: &str) -> Result<f64, String> {
         Some((low, false, _)) => format!(" from {low} on"),
         None => String::new(),
     };
-    cannot(format!("{kind}{range}{}", if optional { ", or NaN where it is left out" } else { "" }))
+    cannot(format!("{kind}{range}{}", if optional { ", or NaN to leave it out" } else { "" }))
 }
 
 /// Returns the choices of a parameter on the flight computer: the words of sensor.toml with their numbers.
@@ -224,7 +224,7 @@ fn load(path: &Path) -> Result<Vec<Vec<u8>>, Stop> {
     let parameters = Parameters::new(sensor.config);
     parameters.flyable().map_err(|key| {
         usage(format!(
-            "{}: {key} has a value that does not fly; leave it at its default (book/reference/telemetry.md)",
+            "{}: {key} has a value that the flight computer does not support; leave it at its default (book/reference/telemetry.md)",
             path.display()
         ))
     })?;
@@ -235,7 +235,7 @@ fn load(path: &Path) -> Result<Vec<Vec<u8>>, Stop> {
     set(&mut out, &pairs);
     let n = out.finish().filter(|&n| n + 20 <= packet::MAX_BYTES).ok_or_else(|| {
         let text = format!("{}: {} parameters are too many for one command (99)", path.display(), pairs.len());
-        usage(format!("{text}; a mask of fewer corners fits"))
+        usage(format!("{text}; give the mask fewer corners"))
     })?;
     bytes.truncate(n);
     Ok(vec![bytes])

@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     heard.summary();
     if heard.packets == 0 && !bytes.is_empty() {
-        let what = "no packet in it; is this what the flight computer sent? (book/reference/telemetry.md)";
+        let what = "no packet was found; is this the stream of a flight computer? (book/reference/telemetry.md)";
         return Err(failed(format!("{}: {what}", args.file.display())));
     }
     Ok(Exit::Done)
@@ -222,7 +222,7 @@ impl Heard {
     fn answer(&mut self, exposure: &Exposure, answer: &PictureAnswer, sink: &mut Option<Sink>) -> Result<(), Stop> {
         let time_s = exposure.exposure_us as f64 * 1e-6;
         let Some(report) = answer.report() else {
-            self.note(time_s, LogLevel::Warning, &format!("picture {}: numbers that mean nothing", exposure.picture));
+            self.note(time_s, LogLevel::Warning, &format!("picture {}: invalid numbers", exposure.picture));
             return Ok(());
         };
         self.answers += 1;

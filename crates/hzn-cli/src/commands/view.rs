@@ -22,7 +22,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let program = beside.unwrap_or_else(|| name.into());
     let status = Command::new(&program).args(&args.arguments).status().map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => failed(
-            "`hzn-viewer` is neither beside `hzn` nor on PATH; `cargo install --path crates/hzn-viewer` puts it there",
+            "`hzn-viewer` is neither next to `hzn` nor on PATH; `cargo install --path crates/hzn-viewer` installs it",
         ),
         _ => failed(format!("{} cannot be started: {e}", program.display())),
     })?;

@@ -123,7 +123,7 @@ pub fn open(
             if path.exists() {
                 // This fails if the unfinished file is still being written.
                 hzn_mcap::open_part(&part).map_err(|e| cannot(&part, &e))?;
-                let what = "exists beside what an unfinished run left; remove one of the two";
+                let what = "exists together with the file of an unfinished run; remove one of them";
                 return Err(unusable(format!("{}: {what} ({})", path.display(), part.display())));
             }
             let (kind, held) = resume(path, &part, target, config, sensor_toml)?;
@@ -213,7 +213,7 @@ pub(crate) fn advice_of_run(path: &Path, error: &std::io::Error) -> String {
     let what = advice(path, error);
     match error.kind() {
         std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded | std::io::ErrorKind::FileTooLarge => {
-            format!("{what}; finished frames are kept; resume the run to go on with them")
+            format!("{what}; finished pictures are kept; resume the run to continue after them")
         }
         _ => what,
     }
@@ -264,7 +264,7 @@ pub fn advice(path: &Path, error: &std::io::Error) -> String {
             format!("{name}: no permission to write here; choose another folder for the output")
         }
         std::io::ErrorKind::FileTooLarge => {
-            format!("{name}: larger than files may be here (ulimit -f): raise the limit, or write elsewhere")
+            format!("{name}: the file is larger than the limit (ulimit -f): raise the limit, or write elsewhere")
         }
         std::io::ErrorKind::ResourceBusy => format!("{name}: {error}"),
         std::io::ErrorKind::NotFound => format!("{name}: the folder does not exist; create it first"),

@@ -146,7 +146,7 @@ fn whole(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(Held, u
 /// incomplete.
 fn each_row(bytes: &[u8], form: Form, mut visit: impl FnMut(Row, usize) -> bool) -> io::Result<()> {
     let other = || {
-        let what = "has other columns than the results of this version";
+        let what = "does not have the columns of results of this version";
         Err(io::Error::new(io::ErrorKind::InvalidData, what))
     };
     if form == Form::Jsonl {

@@ -32,8 +32,8 @@ impl std::fmt::Display for FoundBits {
         let of = crate::explain::counted(*pictures as u64, "picture");
         write!(
             f,
-            "samples are words of 16 bits that reach {most} in {of} looked at: taken as {bits} bits; if the camera has \
-             others, say so with bits = ... in [input] of sensor.toml"
+            "the largest 16-bit sample in {of} is {most}: the camera is assumed to have {bits} bits; if it has another \
+             number, set bits = ... in [input] of sensor.toml"
         )
     }
 }

@@ -78,7 +78,7 @@ impl Files {
             if input.is_dir() {
                 if inputs.len() > 1 {
                     return Err(unusable(format!(
-                        "{text}: a folder is a sequence of its own; give one folder, or only files"
+                        "{text}: a folder cannot be combined with other inputs; give one folder, or only files"
                     )));
                 }
                 folder = Some(input.clone());
@@ -86,13 +86,13 @@ impl Files {
             } else if input.exists() || (inputs.len() > 1 && input.is_symlink()) {
                 if inputs.len() > 1 && (ending(input) == "mcap" || video::ENDINGS.contains(&ending(input).as_str())) {
                     return Err(unusable(format!(
-                        "{text}: a video or recording is a sequence of its own; give it alone"
+                        "{text}: a video or a recording cannot be combined with other inputs; give it alone"
                     )));
                 }
                 if raw.is_none() && COMPANIONS.contains(&ending(input).as_str()) {
                     // The shell expands `hzn run flight/*` to a list that contains these files.
                     if inputs.len() == 1 {
-                        return Err(unusable(format!("{text}: is no picture (PNG, JPEG, TIFF, PNM, BMP)")));
+                        return Err(unusable(format!("{text}: is not a picture (PNG, JPEG, TIFF, PNM, BMP)")));
                     }
                     continue;
                 }
@@ -269,13 +269,14 @@ impl Source for Files {
                 Kind::Special => "special file",
             };
             let name = if ending.is_empty() { "without an ending".to_owned() } else { format!("ending in .{ending}") };
-            format!("{} {name} left out", explain::counted(*n as u64, what))
+            let were = if *n == 1 { "was" } else { "were" };
+            format!("{} {name} {were} left out", explain::counted(*n as u64, what))
         };
         let mut notes: Vec<String> = self.left_out.iter().map(note).collect();
         notes.extend(self.out_of_order.as_ref().map(|[a, b]| {
             format!(
-                "pictures are taken in the order given, {a} before {b}; give the folder, or the pattern in quotes, \
-                     to count them"
+                "pictures are processed in the given order, {a} before {b}; give the folder, or the pattern in quotes, \
+                 to sort them by number"
             )
         }));
         notes

@@ -57,8 +57,8 @@ impl Picture {
             if u32::from(most) >> bits > 0 {
                 let needed = 16 - most.leading_zeros();
                 return Err(format!(
-                    "a sample of {most} has more bits than input.bits = {bits}, which sensor.toml or the other \
-                     pictures say: write bits = {needed} or more in [input] of sensor.toml"
+                    "a sample of {most} has more bits than input.bits = {bits} (from sensor.toml or from the other \
+                     pictures): set bits = {needed} or more in [input] of sensor.toml"
                 ));
             }
             self.layout.bits = bits;
@@ -155,8 +155,8 @@ pub fn unused_bits(most: u16) -> Option<String> {
     let bits = (16 - most.leading_zeros()).max(8);
     (bits + UNUSED_BITS <= 16).then(|| {
         format!(
-            "samples reach {most} of 65535: if the camera has fewer bits than the file has room for, say so with bits \
-             = {bits} in [input] of sensor.toml"
+            "the largest sample is {most} of 65535: if the camera has fewer bits than the file, set bits = {bits} in \
+             [input] of sensor.toml"
         )
     })
 }
@@ -218,7 +218,7 @@ pub(super) fn size_in(contents: impl std::io::BufRead + std::io::Seek) -> Option
 pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
     let told = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::NotFound => match std::fs::read_link(path) {
-            Ok(there) => format!("is a link to {}, which is not there", there.display()),
+            Ok(there) => format!("is a link to {}, which does not exist", there.display()),
             Err(_) => "no such file".to_owned(),
         },
         _ => format!("cannot be read: {e}"),
@@ -249,7 +249,7 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
     let mut limits = image::Limits::no_limits();
     limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
-    let format = reader.format().ok_or("is no picture that is known here (PNG, JPEG, TIFF, PNM, BMP)")?;
+    let format = reader.format().ok_or("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP)")?;
     let mut decoder = reader.into_decoder().map_err(|e| explain(&e, format))?;
     let (width, height) = decoder.dimensions();
     check_size(width, height, expected)?;
@@ -261,7 +261,7 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
         ));
     }
     if format == ImageFormat::Jpeg && jpeg_is_cut(bytes) {
-        return Err("JPEG data end before the picture does: the file is truncated".into());
+        return Err("JPEG data end before the picture is complete: the file is truncated".into());
     }
     let exif_time_s = decoder.exif_metadata().ok().flatten().and_then(super::exif::time_s);
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
@@ -276,7 +276,7 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
         DynamicImage::ImageRgb16(i) => (Samples::Words(i.into_raw()), 3, 16),
         DynamicImage::ImageRgba16(i) => (Samples::Words(i.into_raw()), 4, 16),
         other => {
-            return Err(format!("samples of kind {:?} are not supported; use 8 or 16 bit integers", other.color()));
+            return Err(format!("samples of kind {:?} are not supported; use integers of 8 or 16 bits", other.color()));
         }
     };
     let layout = Layout::packed(width, height, channels, bits);
@@ -318,7 +318,7 @@ fn explain(error: &image::ImageError, format: ImageFormat) -> String {
         image::ImageError::Limits(_) => format!("{name} needs more memory than the limit of {} MB", MAX_BYTES >> 20),
         image::ImageError::Unsupported(_) => format!("{name} of a kind that is not supported: {text}"),
         image::ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
-            format!("{name} data end before the picture does: the file is truncated")
+            format!("{name} data end before the picture is complete: the file is truncated")
         }
         _ => format!("{name} cannot be decoded: {text}"),
     }

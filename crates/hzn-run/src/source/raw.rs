@@ -48,7 +48,7 @@ impl FromStr for Raw {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let form = "WIDTHxHEIGHT:FORMAT is expected, such as 1920x1080:mono12";
+        let form = "WIDTHxHEIGHT:FORMAT is expected, for example 1920x1080:mono12";
         let (size, name) = text.split_once(':').ok_or(form)?;
         let (width, height) = size.split_once(['x', 'X']).ok_or(form)?;
         let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=super::picture::MAX_SIDE_PX).contains(n));
@@ -63,7 +63,10 @@ impl FromStr for Raw {
                 Some(bits) => format!("; did you mean mono16, with bits = {bits} in [input] of sensor.toml?"),
                 None => hzn_calib::nearest(name, names()).map(|n| format!("; did you mean {n}?")).unwrap_or_default(),
             };
-            return Err(format!("no format {name:?}{hint} (there are {})", names().collect::<Vec<_>>().join(", ")));
+            return Err(format!(
+                "there is no format {name:?}{hint} (the formats are {})",
+                names().collect::<Vec<_>>().join(", ")
+            ));
         };
         if *format == Format::Bayer8 && (width % 2 != 0 || height % 2 != 0) {
             return Err("a Bayer mosaic has an even width and height".into());
@@ -111,7 +114,7 @@ impl Raw {
         let one = self.bytes();
         let left = match (length / one, length % one) {
             (0, _) => format!("{} less", one - length),
-            (n, 0) => format!("these are {n} pictures; give each a file of its own"),
+            (n, 0) => format!("these are {n} pictures; write each into its own file"),
             (1, more) => format!("{more} bytes more"),
             (n, more) => format!("these are {n} pictures and {more} bytes more"),
         };

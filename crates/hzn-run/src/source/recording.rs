@@ -39,8 +39,8 @@ impl Recording {
                     }
                     (Some(topic), true) => format!("no pictures on topic {topic}, nor on any other"),
                     (None, _) => {
-                        "no pictures in this recording (understood are foxglove.CompressedImage and RawImage in \
-                                  protobuf, sensor_msgs/msg/Image and CompressedImage in CDR)"
+                        "no pictures in this recording (supported are foxglove.CompressedImage and RawImage in \
+                         protobuf, sensor_msgs/msg/Image and CompressedImage in CDR)"
                             .to_owned()
                     }
                 };

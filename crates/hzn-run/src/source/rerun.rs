@@ -28,11 +28,11 @@ impl Rerun {
         match holds(path).map_err(unusable)? {
             Holds::Pictures => {}
             Holds::Results => {
-                let what = "holds results without their pictures; give the pictures themselves";
+                let what = "contains results without their pictures; give the pictures themselves";
                 return Err(unusable(format!("{}: {what}", path.display())));
             }
             Holds::LostPictures => {
-                let what = "was cut off before its first picture was whole; give the pictures themselves";
+                let what = "ends before its first picture is complete; give the pictures themselves";
                 return Err(unusable(format!("{}: {what}", path.display())));
             }
         }
@@ -67,7 +67,8 @@ fn holds(path: &Path) -> Result<Holds, hzn_mcap::Error> {
 
 fn item(record: FrameRecord) -> Item {
     let data: FrameData = sink::frame_data(&record.row, &record.given);
-    let picture = record.image.map_or_else(|| Payload::Broken("the recording holds no picture of it".into()), payload);
+    let picture =
+        record.image.map_or_else(|| Payload::Broken("the recording does not contain this picture".into()), payload);
     Item { name: record.row.file, time: TimeSource::Table, data: Some(data), payload: picture }
 }
 
@@ -111,7 +112,7 @@ pub fn lost(reader: &Reader, path: &Path, done: &str) -> Option<String> {
     match reader.broken_chunks() {
         0 if reader.is_complete() => None,
         0 => Some(format!("{name}: was cut off; its finished frames were {done} (`hzn recover` closes it)")),
-        1 => Some(format!("{name}: 1 damaged part was left out; what it held is missing")),
-        n => Some(format!("{name}: {n} damaged parts were left out; what they held is missing")),
+        1 => Some(format!("{name}: 1 damaged part was left out; its content is missing")),
+        n => Some(format!("{name}: {n} damaged parts were left out; their content is missing")),
     }
 }

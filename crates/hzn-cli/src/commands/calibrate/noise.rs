@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     notes.extend(settle_input(source.as_mut(), &mut sensor)?);
     check_size(source.as_ref(), &sensor)?;
     let Some(config) = noise::looks_with(&sensor.config) else {
-        return Err(usage("the sensor looks for Sun and Moon only, whose limb has no height to measure"));
+        return Err(usage("the sensor looks only for Sun and Moon, which have no limb height to measure"));
     };
     let wide = Sensor { config, ..sensor.clone() };
     let frames = args.source.frames(source.as_ref(), &wide, args.sensor.flight)?;

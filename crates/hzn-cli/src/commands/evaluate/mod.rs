@@ -67,7 +67,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let sensor = sensor(args.sensor.as_deref(), recorded_sensor.as_deref(), folder)?;
     let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok());
     if camera.is_none() {
-        tell::line("note: no sensor.toml at hand (--sensor): the length of limb in view is left out");
+        tell::line("note: no sensor.toml is available (--sensor): the length of limb in view is left out");
     }
     let answers: Vec<Answer> = rows.iter().map(sink::answer).collect();
     let cases = pair(&answers, &truth, camera.as_ref())

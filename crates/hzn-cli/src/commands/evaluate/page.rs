@@ -50,7 +50,7 @@ pub(super) fn html(report: &Report, worst: &[Drawn]) -> anyhow::Result<String> {
                     let data = base64::engine::general_purpose::STANDARD.encode(jpeg);
                     format!("<img alt=\"{}\" src=\"data:image/jpeg;base64,{data}\">", escape(&frame.caption))
                 }
-                None => "<p class=\"sub\">the picture is neither recorded nor beside the truth</p>".into(),
+                None => "<p class=\"sub\">the picture is neither in the recording nor next to the truth</p>".into(),
             };
             body.push_str(&format!("<figure>{picture}<figcaption>{}</figcaption></figure>", escape(&frame.caption)));
         }

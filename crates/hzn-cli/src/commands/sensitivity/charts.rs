@@ -13,14 +13,14 @@ pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
     let body = match args.body.as_slice() {
         [] => Body::EARTH,
         [one] => *one,
-        _ => return Err(usage("--body: one body for this chart")),
+        _ => return Err(usage("--body: give one body for this chart")),
     };
     let altitudes =
         args.altitude.as_ref().map_or_else(|| (1..=60).map(|i| 50.0 * f64::from(i)).collect(), |v| v.0.clone());
     let limb_height_km = match args.limb_height.as_ref().map(|v| v.0.as_slice()) {
         None => body.limb_height_km,
         Some([one]) => *one,
-        Some(_) => return Err(usage("--limb-height: one value for this chart")),
+        Some(_) => return Err(usage("--limb-height: give one value for this chart")),
     };
     let mut rows = Vec::new();
     for km in altitudes {
@@ -55,12 +55,12 @@ pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
 /// axis).
 pub(super) fn spherical_earth(args: &Args) -> Result<Finished, Stop> {
     if !args.body.is_empty() {
-        return Err(usage("--body: this is about the Earth (WGS-84)"));
+        return Err(usage("--body: this chart is for the Earth (WGS-84); leave --body out"));
     }
     let altitudes = args.altitude.as_ref().map_or_else(|| vec![100.0, 240.0, 600.0, 2000.0], |v| v.0.clone());
     let limb_height_km = args.limb_height.as_ref().map_or(Ok(0.0), |v| match v.0.as_slice() {
         [one] => Ok(*one),
-        _ => Err(usage("--limb-height: one value for this chart")),
+        _ => Err(usage("--limb-height: give one value for this chart")),
     })?;
     let mut rows = Vec::new();
     for &km in &altitudes {
@@ -83,7 +83,7 @@ pub(super) fn spherical_earth(args: &Args) -> Result<Finished, Stop> {
     for (name, head, value) in columns {
         table.column(name, head, rows.iter().map(|r| Some(value(&r.2))));
     }
-    let title = "Error of taking the Earth for a sphere: centre to limb axis";
+    let title = "Error of treating the Earth as a sphere: centre to limb axis";
     let mut chart = Chart::new(title, "latitude [deg]", "deg");
     for km in altitudes {
         let of = rows.iter().filter(|r| r.1 == km).map(|r| (r.0, r.2.geocentric_to_axis_deg));

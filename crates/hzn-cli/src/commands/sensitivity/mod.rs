@@ -136,7 +136,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             table.csv()
         } else {
             let Some(chart) = &chart else {
-                let what = "nothing to plot over: give one value a range, such as --fov 60:150";
+                let what = "there is no range to plot over: give one, for example --fov 60:150";
                 return Err(usage(format!("{}: {what}", path.display())));
             };
             chart.svg()?.into_bytes()
@@ -274,7 +274,9 @@ fn lens(lens: Lens, size: Size, fov_deg: f64, rows: Option<f64>) -> Result<camer
         Some(rows) => {
             let width = (rows * f64::from(size.width) / f64::from(size.height)).round();
             if !(rows >= 2.0 && rows.fract() == 0.0 && width >= 2.0 && width.max(rows) <= 65535.0) {
-                return Err(usage(format!("--rows: {rows} is refused: a whole number of pixels from 2 to 65535")));
+                return Err(usage(format!(
+                    "--rows: {rows} is refused: must be a whole number of pixels from 2 to 65535"
+                )));
             }
             (width as u16, rows as u16)
         }
@@ -285,7 +287,9 @@ fn lens(lens: Lens, size: Size, fov_deg: f64, rows: Option<f64>) -> Result<camer
     };
     if !(fov_deg > 0.0 && fov_deg <= most) {
         let hint = if lens == Lens::Pinhole { "; --lens equidistant goes to 350" } else { "" };
-        return Err(usage(format!("--fov: {fov_deg} is refused: above 0 and up to {most} for this lens{hint}")));
+        return Err(usage(format!(
+            "--fov: {fov_deg} is refused: must be above 0 and up to {most} for this lens{hint}"
+        )));
     }
     let half = (fov_deg / 2.0).to_radians();
     let f_px = f64::from(width) / 2.0 / if lens == Lens::Pinhole { half.tan() } else { half };
@@ -346,8 +350,8 @@ fn sigma(args: &Args) -> Result<Finished, Stop> {
         let n = unseen.len();
         let (of, km) = (results.len(), design.altitude_km);
         notes.push(format!(
-            "{n} of {of} see no limb, or too little of it: at {km} km it is {dip:.1} deg below the horizontal; \
-             --depression {dip:.0} looks at it"
+            "{n} of {of} designs see no limb, or too little of it: at {km} km the limb is {dip:.1} deg below the \
+             horizontal; --depression {dip:.0} looks at it"
         ));
     }
     let best = |value: Pick| {

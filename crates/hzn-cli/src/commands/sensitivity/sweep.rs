@@ -16,7 +16,7 @@ impl FromStr for Values {
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |t: &str| match t.trim().parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(x),
-            _ => Err(format!("{t:?} is no number; expected a number, a list A,B,C or a range A:B or A:B:STEP")),
+            _ => Err(format!("{t:?} is not a number; expected a number, a list A,B,C or a range A:B or A:B:STEP")),
         };
         let mut values = Vec::new();
         for part in text.split(',') {
@@ -33,7 +33,7 @@ impl FromStr for Values {
 
 fn range(from: f64, to: f64, step: Option<f64>) -> Result<Vec<f64>, String> {
     if !(to > from) {
-        return Err(format!("{from}:{to}: a range rises, from the lower to the higher value"));
+        return Err(format!("{from}:{to}: a range must go from the lower to the higher value"));
     }
     let step = step.unwrap_or_else(|| nice((to - from) / STEPS));
     let count = ((to - from) / step + 1e-9).floor();
@@ -78,8 +78,8 @@ mod tests {
 
     #[test]
     fn wrong_ones_are_said() {
-        assert!(values("wide").unwrap_err().contains("\"wide\" is no number"));
-        assert!(values("150:60").unwrap_err().contains("a range rises"));
+        assert!(values("wide").unwrap_err().contains("\"wide\" is not a number"));
+        assert!(values("150:60").unwrap_err().contains("from the lower to the higher"));
         assert!(values("1:2:3:4").unwrap_err().contains("two or three numbers"));
         assert!(values("1:2:0").unwrap_err().contains("above 0"));
         assert!(values("1:2:-1").unwrap_err().contains("above 0"));

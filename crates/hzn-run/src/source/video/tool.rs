@@ -24,7 +24,7 @@ pub(super) fn tool(name: &str) -> Command {
 pub(super) fn absent(tool: &str, error: &std::io::Error) -> Error {
     match error.kind() {
         ErrorKind::NotFound => unusable(format!(
-            "videos need `{tool}` on PATH, and it is not there; install ffmpeg, or extract the frames as pictures"
+            "videos need `{tool}`, which is not on PATH; install ffmpeg, or extract the frames as pictures"
         )),
         _ => failed(format!("{tool} cannot be started: {error}")),
     }
