@@ -17,7 +17,6 @@ const STILL_LONG: &[&str] = &[
     "crates/hzn-calib/src/camera_file/read.rs",
     "crates/hzn-calib/src/frames.rs",
     "crates/hzn-calib/src/sensor.rs",
-    "crates/hzn-cli/tests/run.rs",
     "crates/hzn-core/src/base/keys.rs",
     "crates/hzn-core/src/image/mod.rs",
     "crates/hzn-core/src/pipeline/golden.rs",
@@ -29,7 +28,6 @@ const STILL_LONG: &[&str] = &[
     "crates/hzn-flight/src/flight.rs",
     "crates/hzn-flight/tests/flight.rs",
     "crates/hzn-py/src/report.rs",
-    "crates/hzn-run/src/engine/mod.rs",
     "crates/hzn-viewer/src/model/session.rs",
 ];
 

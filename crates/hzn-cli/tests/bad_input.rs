@@ -62,7 +62,7 @@ fn wrong_rows_of_frames_csv() {
 }
 
 #[test]
-fn the_sensor_of_another_camera_is_said_once() {
+fn the_sensor_of_another_camera_is_reported_once() {
     let place = Place::with_pictures(5);
     let other = common::SENSOR.replace("width = 320", "width = 640").replace("height = 240", "height = 480");
     let other = other.replace("159.5", "319.5").replace("119.5", "239.5");
@@ -168,7 +168,7 @@ fn palettes_are_read_and_animations_refused_by_name() {
 
 #[cfg(unix)]
 #[test]
-fn unwritable_folders_are_said() {
+fn unwritable_folders_are_reported() {
     let place = Place::with_pictures(1);
     // A file is in the place of the folder. Missing permissions would not stop a test that runs as root.
     place.write("file", b"");
@@ -201,7 +201,7 @@ fn pictures_of_nothing_come_with_advice() {
 }
 
 #[test]
-fn the_length_of_headerless_pictures_is_told() {
+fn a_wrong_length_of_headerless_pictures_is_reported() {
     let place = Place::new();
     std::fs::create_dir(place.path("raw")).unwrap();
     for (name, bytes) in [("short", 76_000), ("three", 230_400), ("more", 76_812)] {

@@ -65,7 +65,7 @@ fn recover_keeps_no_part_of_a_frame() {
 }
 
 #[test]
-fn a_sun_beside_the_earth_has_a_level_of_its_own() {
+fn a_sun_next_to_the_earth_has_its_own_threshold() {
     let place = earth_and_sun(1);
     let rows = without_time(&place.run(&["run", "in"]).expect(0).out);
     // Without this section the result is the same. With the Earth's threshold, the Earth would be taken for the bright
@@ -105,7 +105,7 @@ fn frames_of_several_bodies_are_kept_whole() {
 }
 
 #[test]
-fn explain_tells_of_each_body() {
+fn explain_shows_each_body() {
     let place = earth_and_sun(1);
     let told = place.run(&["explain", "in/0000.png", "--overlay", "o.png"]).expect(0).out;
     assert!(told.contains("half-angle (altitude 400 km, limb at"), "{told}");

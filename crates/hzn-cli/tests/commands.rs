@@ -59,7 +59,7 @@ fn init_writes_what_run_takes() {
 }
 
 #[test]
-fn explain_tells_every_stage() {
+fn explain_shows_every_stage() {
     let place = Place::with_pictures(2);
     let out = place.run(&["explain", "in/0001.png", "--overlay", "o.png"]).expect(0).out;
     for word in
@@ -154,7 +154,7 @@ fn annotations_count_from_the_corner() {
 }
 
 #[test]
-fn overlays_replace_nothing_unasked() {
+fn overlays_replace_nothing_without_force() {
     let place = Place::with_pictures(2);
     let before = std::fs::read(place.path("in/0001.png")).unwrap();
     place.run(&["run", "in", "--overlay", "in"]).expect(2).says("is where the pictures are");

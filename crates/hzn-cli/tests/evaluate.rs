@@ -92,7 +92,7 @@ fn what_does_not_fit_is_named() {
 }
 
 #[test]
-fn other_times_and_a_missing_sensor_are_said() {
+fn other_times_and_a_missing_sensor_are_reported() {
     let place = place();
     let truth = place.read("in/truth.csv").replace("0002.png,2,", "0002.png,2.5,");
     place.write("t.csv", truth.as_bytes());

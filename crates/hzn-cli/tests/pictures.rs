@@ -98,7 +98,7 @@ fn bits_are_found_once_for_a_sequence() {
 }
 
 #[test]
-fn a_picture_with_more_bits_than_the_others_is_not_taken_for_another() {
+fn a_picture_with_more_bits_than_the_others_is_unreadable() {
     let place = Place::new();
     for i in 0..33 {
         // Of 33 pictures 16 are examined; this one is not.
@@ -146,7 +146,7 @@ fn bits_of_headerless_words_and_of_transparent_ones() {
 }
 
 #[test]
-fn bits_that_are_told_hold() {
+fn bits_of_sensor_toml_are_used() {
     let place = Place::new();
     words(0.0, |v| v << 2).save(place.path("in/low.png")).unwrap();
     let told = |bits: u8| format!("{}[input]\nbits = {bits}\n", common::SENSOR);
@@ -245,12 +245,13 @@ fn animated_png(first: &GrayImage, second: &GrayImage) -> Vec<u8> {
 }
 
 #[test]
-fn of_an_animation_the_first_picture_is_taken_and_the_others_are_told() {
+fn the_first_picture_of_an_animation_is_processed_and_the_others_are_reported() {
     let place = Place::new();
     place.write("in/film.png", &animated_png(&limb(320, 240, 0.0), &limb(320, 240, 40.0)));
     let ran = place.run(&["run", "in"]).expect(3);
     let ran = ran.says(
-        "warning: only the first picture of 1 file with several pages or frames was processed (the first file is film.png",
+        "warning: only the first picture of 1 file with several pages or frames was processed (the first file is \
+         film.png",
     );
     let rows = without_time(&ran.out);
     let axis = ["axis_x", "axis_y", "axis_z"].map(|name| cell(&rows[0], name).parse().unwrap());
@@ -321,7 +322,7 @@ fn exif_orientation(number: u16) -> Vec<u8> {
 }
 
 #[test]
-fn pictures_are_turned_only_when_it_is_asked_for() {
+fn pictures_are_turned_only_on_request() {
     let place = Place::new();
     let turned = image::imageops::rotate270(&limb(320, 240, 0.0));
     let save = |orientation: u16| {

@@ -66,7 +66,7 @@ fn several_bodies_are_one_frame() {
 }
 
 #[test]
-fn what_a_recording_does_not_hold_is_said() {
+fn missing_content_of_a_recording_is_reported() {
     let place = place();
     place.run(&["run", "in", "-o", "bare.mcap", "--no-images"]).expect(0);
     place.run(&["run", "bare.mcap"]).expect(2).says("holds results without their pictures");
@@ -87,7 +87,7 @@ fn what_a_recording_does_not_hold_is_said() {
 }
 
 #[test]
-fn a_recording_that_is_not_whole_is_told_wherever_it_is_read() {
+fn an_incomplete_recording_is_reported_wherever_it_is_read() {
     let place = place();
     let whole = std::fs::read(place.path("out.mcap")).unwrap();
     let chunk = |picture: &str| {

@@ -116,7 +116,7 @@ fn pictures_of_the_rendering_before_do_not_stay() {
 }
 
 #[test]
-fn what_cannot_be_is_said_before_anything_is_written() {
+fn impossible_values_are_refused_before_anything_is_written() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
     let refused = |text: &str| {

@@ -168,7 +168,7 @@ fn frames_of_a_video_go_by_one_clock() {
 
 #[cfg(unix)]
 #[test]
-fn how_ffmpeg_ends_is_told() {
+fn the_end_of_ffmpeg_is_reported() {
     let scripts = Scripts::new();
     let ends = |end: &str| {
         let ran = scripts.run("echo best_effort_timestamp_time=0.1", end);
@@ -193,8 +193,8 @@ fn how_ffmpeg_ends_is_told() {
 }
 
 #[test]
-fn a_video_that_breaks_off_is_told() {
-    if !decoder("a_video_that_breaks_off_is_told") {
+fn a_truncated_video_is_reported() {
+    if !decoder("a_truncated_video_is_reported") {
         return;
     }
     let place = Place::with_pictures(40);

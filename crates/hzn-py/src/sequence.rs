@@ -54,7 +54,7 @@ impl Sequence {
             let own = source.sensor_toml().is_some();
             let frames = (!own && beside.exists()).then(|| hzn_calib::frames::load(&beside)).transpose();
             let frames = frames.map_err(errors::config)?;
-            engine::prepare(&state.config, state.flight, frames.as_ref()).map_err(errors::config)?;
+            engine::check_frames(&state.config, state.flight, frames.as_ref()).map_err(errors::config)?;
             Ok((source, frames, bits))
         })??;
         for warning in frames.iter().flat_map(|f: &hzn_calib::Frames| f.check_sensor(&state.config)) {
@@ -80,7 +80,7 @@ impl Sequence {
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<Item>> {
         let next = || {
             let mut source = self.source.lock().unwrap_or_else(PoisonError::into_inner);
-            source.next().ok_or_else(|| source.lost())
+            source.next().ok_or_else(|| source.describe_loss())
         };
         let item = match errors::detached(py, next)? {
             Ok(item) => item,
@@ -145,12 +145,12 @@ fn plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
 }
 
 fn processed(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: source::Item) -> PyResult<Report> {
-    let finished = errors::detached(py, || state.lend(|sensor| engine::one(plan, sensor, index, item)))??;
+    let finished = errors::detached(py, || state.lend(|sensor| engine::process_one(plan, sensor, index, item)))??;
     let finished: Finished = finished.map_err(|e| errors::other(format!("{e:#}")))?;
     let rows = hzn_run::sink::rows(&finished, &plan.config);
     let report = |(row, found): (hzn_mcap::Row, &engine::BodyOutcome)| match &found.report {
         Ok(found) => Report::new(row, found, None, &state.camera),
         Err(_) => Report::of_row(row),
     };
-    Report::of_bodies(py, rows.into_iter().zip(&finished.found).map(report))
+    Report::of_bodies(py, rows.into_iter().zip(&finished.outcomes).map(report))
 }

@@ -7,13 +7,13 @@ use hzn_calib::FrameData;
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Report, Solution, body, threshold};
 use hzn_mcap::Annotations;
-
-use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::setup::{InputArgs, SensorArgs, need_altitude, settle_input};
-use crate::tell;
 use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
 use hzn_run::source::{self, Item, Picture, Source};
-use hzn_run::{explain, overlay, sink};
+use hzn_run::{disk, engine, explain, overlay, sink};
+
+use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::setup::{InputArgs, SensorArgs, check_altitude, find_input};
+use crate::tell;
 
 /// Show what happens to one picture: what is kept, what is dropped, and why
 #[derive(Debug, clap::Args)]
@@ -41,13 +41,13 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let mut source = args.source.open(std::slice::from_ref(&args.frame))?;
     let mut sensor = args.sensor.load(source.as_ref())?;
-    let notes = settle_input(source.as_mut(), &mut sensor)?;
+    let notes = find_input(source.as_mut(), &mut sensor)?;
     notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
-    need_altitude(&sensor, source.as_ref(), frames.as_ref())?;
+    check_altitude(&sensor, source.as_ref(), frames.as_ref())?;
     let mut item = item(source.as_mut(), args.index)?;
     let config = &sensor.config;
-    let data = item.known(frames.as_ref());
+    let data = item.take_prior(frames.as_ref());
     let decoding = Instant::now();
     let picture = match item.payload.decode(Some(config)) {
         Ok((picture, _)) => picture,
@@ -61,8 +61,8 @@ pub(super) fn run(args: &Args) -> Outcome {
         let what = "pictures; only the first is explained";
         tell::line(format_args!("note: {} contains {} {what}", item.name, picture.pages));
     }
-    let looked = Looked { name: &item.name, config, data: data.as_ref(), picture: &picture };
-    looked.explain(args, decoding)
+    let picture = PictureWithPrior { name: &item.name, config, data: data.as_ref(), picture: &picture };
+    picture.explain(args, decoding)
 }
 
 /// Refuses an overlay that is not a PNG, is the picture itself, or exists.
@@ -70,11 +70,11 @@ fn check_overlay(path: &Path, args: &Args) -> Result<(), Stop> {
     if source::ending(path) != "png" {
         return Err(usage(format!("{}: the overlay's ending must be .png", path.display())));
     }
-    if sink::is_same(path, &args.frame) {
+    if disk::is_same(path, &args.frame) {
         let what = "is the picture itself; choose another name for the overlay";
         return Err(usage(format!("{}: {what}", path.display())));
     }
-    Ok(sink::refuse_existing(path, args.force)?)
+    Ok(disk::refuse_existing(path, args.force)?)
 }
 
 /// Returns picture number `index` of a sequence, counted from 0.
@@ -90,14 +90,14 @@ fn item(source: &mut dyn Source, index: u64) -> Result<Item, Stop> {
 }
 
 /// A picture with its prior.
-struct Looked<'a> {
+struct PictureWithPrior<'a> {
     name: &'a str,
     config: &'a Config,
     data: Option<&'a FrameData>,
     picture: &'a Picture,
 }
 
-impl Looked<'_> {
+impl PictureWithPrior<'_> {
     /// Processes the picture and explains each body; draws the overlay.
     fn explain(&self, args: &Args, decoding: Duration) -> Outcome {
         let Self { name: file, config, data, picture } = *self;
@@ -133,7 +133,7 @@ impl Looked<'_> {
             tell::result(format_args!("{between}{}", explained.text(decoding, time.elapsed)))?;
             // The camera includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
             let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
-            drawing.add(sink::annotations(trace, report.solution.as_ref(), &camera));
+            drawing.add(engine::annotate(trace, report.solution.as_ref(), &camera));
             let status = report.status;
             statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
         }
@@ -167,8 +167,8 @@ impl Explained<'_> {
         };
         line("picture", self.layout());
         line("expected", self.expected());
-        line("binarize", self.level());
-        self.looks(&mut line);
+        line("binarize", self.threshold());
+        self.further_looks(&mut line);
         self.edges(&mut line);
         self.candidates(&mut line);
         self.points(&mut line);
@@ -194,18 +194,18 @@ impl Explained<'_> {
     }
 
     /// Prints the further looks, and the width of a dark border that was left out.
-    fn looks(&self, line: &mut impl FnMut(&str, String)) {
-        let again = self.trace.again();
-        if !again.is_empty() {
-            let levels: Vec<String> = again.iter().map(u16::to_string).collect();
+    fn further_looks(&self, line: &mut impl FnMut(&str, String)) {
+        let further = self.trace.further_thresholds();
+        if !further.is_empty() {
+            let levels: Vec<String> = further.iter().map(u16::to_string).collect();
             let looks = self.report.counters.looks;
             line(
                 "looks",
                 format!("{looks}: there was no answer at this threshold, so further looks used {}", levels.join(", ")),
             );
         }
-        if self.trace.frame_px() > 0 {
-            line("frame", format!("a dark border of {} px around the picture is left out", self.trace.frame_px()));
+        if self.trace.border_px() > 0 {
+            line("frame", format!("a dark border of {} px around the picture is left out", self.trace.border_px()));
         }
     }
 
@@ -235,7 +235,10 @@ impl Explained<'_> {
         for k in &r.candidates {
             let rms = if k.rms_px.is_finite() { format!("{:.3}", k.rms_px) } else { "-".into() };
             let numbers = format!("{:>4} {:>8} {:>8} {:>8} {rms:>8}", k.number, k.length_px, k.points, k.inliers);
-            line("", format!("{numbers}  {}: {}", k.verdict.name(), explain::why(k.verdict, &self.config.select)));
+            line(
+                "",
+                format!("{numbers}  {}: {}", k.verdict.name(), explain::verdict_text(k.verdict, &self.config.select)),
+            );
         }
         let more = (r.counters.candidates as usize).saturating_sub(r.candidates.len());
         if more > 0 {
@@ -286,7 +289,7 @@ impl Explained<'_> {
         format!("{cone} ({from}, limb at {} +- {} km)", body.limb_height_km, body.limb_height_sigma_km)
     }
 
-    fn level(&self) -> String {
+    fn threshold(&self) -> String {
         let method = format!("{:?}", self.levels.method).to_lowercase();
         let full = (1u32 << self.picture.layout.bits) - 1;
         match (self.trace.level(), self.report.status) {
@@ -309,15 +312,19 @@ impl Explained<'_> {
     fn budget(&self, candidate: u32) -> Vec<(&'static str, f64)> {
         let edges = self.trace.edges();
         let terms = edges.iter().find(|e| e.candidate == candidate).map_or(&[][..], |e| &e.budget_rad);
-        terms.iter().filter(|(_, rad)| *rad > 0.0).map(|(term, rad)| (explain::term(*term), rad.to_degrees())).collect()
+        terms
+            .iter()
+            .filter(|(_, rad)| *rad > 0.0)
+            .map(|(term, rad)| (explain::term_text(*term), rad.to_degrees()))
+            .collect()
     }
 
     /// Returns how the rolling shutter was treated; `None` without a rolling shutter.
     fn shutter(&self) -> Option<String> {
         let readout_s = self.config.camera.readout_s;
         let rate = self.data.and_then(|d| d.rate_rad_s);
-        let turned = |rate: [f64; 3]| rate.map(|r| (r * readout_s).to_degrees());
-        (readout_s != 0.0).then(|| match rate.map(turned) {
+        let drift = |rate: [f64; 3]| rate.map(|r| (r * readout_s).to_degrees());
+        (readout_s != 0.0).then(|| match rate.map(drift) {
             Some([x, y, z]) => {
                 format!("the rows are corrected by the rate: {x:.3}, {y:.3}, {z:.3} deg from the first to the last")
             }
@@ -335,7 +342,7 @@ impl Explained<'_> {
                 z.clamp(-1.0, 1.0).acos().to_degrees()
             ),
         );
-        let (sigma, angle_rad) = explain::principal(s);
+        let (sigma, angle_rad) = explain::principal_sigmas(s);
         line(
             "sigma",
             format!(

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use hzn_calib::start::{self, Known};
 use hzn_core::camera::Model;
+use hzn_run::disk;
+use hzn_run::source::{self, Payload, Source};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
-use hzn_run::sink;
-use hzn_run::source::{self, Payload, Source};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -71,7 +71,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.output.exists() && !args.force {
         return Err(usage(format!("{name}: exists already; choose another name with -o, or --force replaces it")));
     }
-    let write = |text: &str| std::fs::write(&args.output, text).map_err(|e| sink::cannot(&args.output, &e));
+    let write = |text: &str| std::fs::write(&args.output, text).map_err(|e| disk::cannot_write(&args.output, &e));
     if args.pictures.is_empty() {
         write(hzn_calib::template::SENSOR_TOML)?;
         tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));
@@ -97,8 +97,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     ));
     if known.altitude_km.is_none() {
         tell::line(
-            "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or --altitude \
-             KM",
+            "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or \
+             --altitude KM",
         );
     }
     Ok(Exit::Done)

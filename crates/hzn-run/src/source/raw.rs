@@ -51,9 +51,9 @@ impl FromStr for Raw {
         let form = "WIDTHxHEIGHT:FORMAT is expected, for example 1920x1080:mono12";
         let (size, name) = text.split_once(':').ok_or(form)?;
         let (width, height) = size.split_once(['x', 'X']).ok_or(form)?;
-        let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=super::picture::MAX_SIDE_PX).contains(n));
+        let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=super::decode::MAX_SIDE_PX).contains(n));
         let (Some(width), Some(height)) = (side(width), side(height)) else {
-            return Err(format!("width and height must be 1 to {}", super::picture::MAX_SIDE_PX));
+            return Err(format!("width and height must be 1 to {}", super::decode::MAX_SIDE_PX));
         };
         let names = || FORMATS.iter().map(|(n, _)| *n);
         let Some((_, format)) = FORMATS.iter().find(|(n, _)| n.eq_ignore_ascii_case(name)) else {
@@ -166,14 +166,14 @@ impl Raw {
 /// Unpacks samples of `bits` bits that lie without gaps, least significant bit first.
 fn unpack(data: &[u8], bits: u32, count: usize) -> Vec<u16> {
     let mut out = Vec::with_capacity(count);
-    let (mut held, mut have) = (0u32, 0u32);
+    let (mut buffer, mut buffered) = (0u32, 0u32);
     for &byte in data {
-        held |= u32::from(byte) << have;
-        have += 8;
-        while have >= bits && out.len() < count {
-            out.push((held & ((1 << bits) - 1)) as u16);
-            held >>= bits;
-            have -= bits;
+        buffer |= u32::from(byte) << buffered;
+        buffered += 8;
+        while buffered >= bits && out.len() < count {
+            out.push((buffer & ((1 << bits) - 1)) as u16);
+            buffer >>= bits;
+            buffered -= bits;
         }
     }
     out

@@ -93,7 +93,7 @@ pub(super) fn lines(card: &Card, sight: &FrameView, outcome: &Outcome, answer: &
             out
         }),
         "Covariance" => answer.solution().map_or_else(Vec::new, |s| {
-            let ([major, minor], angle) = hzn_run::explain::principal(s);
+            let ([major, minor], angle) = hzn_run::explain::principal_sigmas(s);
             vec![format!(
                 "σ {:.4}° along {:.0}° from image x, {:.4}° across",
                 major.to_degrees(),

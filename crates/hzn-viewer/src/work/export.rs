@@ -150,7 +150,7 @@ impl Film {
             _ if end.status.success() => Ok(()),
             Some(_) if why.contains("No space left") => {
                 let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
-                Err(Halt::Failed(hzn_run::sink::advice(path, &full)))
+                Err(Halt::Failed(hzn_run::disk::advice(path, &full)))
             }
             last => Err(Halt::Failed(format!("{}: ffmpeg: {}", path.display(), last.unwrap_or("ended with an error")))),
         }

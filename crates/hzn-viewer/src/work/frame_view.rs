@@ -19,7 +19,7 @@ use hzn_mcap::Row;
 use hzn_run::engine::trace::Edge;
 use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Traces, Watch};
 use hzn_run::source::Picture;
-use hzn_run::{explain, sink};
+use hzn_run::{explain, overlay, sink};
 
 use super::paint::Recipe;
 use crate::model::view::Point;
@@ -228,7 +228,7 @@ pub fn look(subject: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySenso
         name: name.to_owned(),
         time_s,
         data: data.cloned(),
-        found: plain.into_iter().map(BodyOutcome::from).collect(),
+        outcomes: plain.into_iter().map(BodyOutcome::from).collect(),
         drawing: hzn_mcap::Annotations::default(),
         picture: None,
         traces: None,
@@ -239,7 +239,7 @@ pub fn look(subject: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySenso
     let half_angles = sensor.expected_half_angles_rad(data);
     // Drawn where each row sees it.
     let camera = &sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
-    let each = bodies.iter().zip(finished.found).zip(rows).zip(half_angles).zip(&watch.traces.each);
+    let each = bodies.iter().zip(finished.outcomes).zip(rows).zip(half_angles).zip(&watch.traces.each);
     for ((((body, found), row), expected), trace) in each {
         let solution = found.report.as_ref().ok().and_then(|r| r.solution.as_ref()).copied();
         let edges = trace.edges().clone();
@@ -251,7 +251,9 @@ pub fn look(subject: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySenso
             times: trace.times().to_vec(),
             elapsed: found.elapsed,
             expected_rad: expected.ok(),
-            limb: solution.map(|s| sink::fitted(&s.axis, s.fused_half_angle_rad, camera).limb).unwrap_or_default(),
+            limb: solution
+                .map(|s| overlay::draw_cone(&s.axis, s.fused_half_angle_rad, camera).limb)
+                .unwrap_or_default(),
             axis: solution.and_then(|s| camera.project(&s.axis)).map(|p| [p.u, p.v]),
             ellipse: solution.map(|s| ellipse(&s, camera)).unwrap_or_default(),
             residuals: solution.zip(chosen).map(|(s, edge)| residuals(&s, edge, camera)).unwrap_or_default(),
@@ -303,7 +305,7 @@ fn beside(axis: [f64; 3], angle_rad: f64, azimuth_rad: f64) -> Option<UnitVec3<h
 
 fn ellipse(s: &Solution<f64>, camera: &Camera<f64>) -> Vec<Point> {
     const STEPS: usize = 72;
-    let ([major, minor], angle) = explain::principal(s);
+    let ([major, minor], angle) = explain::principal_sigmas(s);
     let point = |i: usize| {
         let (sin, cos) = (i as f64 * std::f64::consts::TAU / STEPS as f64).sin_cos();
         let (a, b) = (3.0 * major * cos, 3.0 * minor * sin);

@@ -1,20 +1,19 @@
 //! A calibration in words and numbers.
 
 use hzn_calib::noise::Calibration;
-
 use hzn_run::explain::counted;
 
 /// Returns the report.
-pub(super) fn of(calibration: &Calibration, pictures: u64) -> String {
+pub(super) fn report(calibration: &Calibration, pictures: u64) -> String {
     lines(calibration, pictures).iter().map(|(name, value)| format!("{name:<14} {value}\n")).collect()
 }
 
 /// Returns the lines of the report: name and value.
 pub(super) fn lines(calibration: &Calibration, pictures: u64) -> Vec<(&'static str, String)> {
     let (h, e) = (&calibration.height, &calibration.edge);
-    let apart: Vec<&str> = calibration.pictures.iter().filter(|p| !p.counts).map(|p| p.name.as_str()).collect();
+    let outliers: Vec<&str> = calibration.pictures.iter().filter(|p| !p.counts).map(|p| p.name.as_str()).collect();
     let answered = calibration.pictures.len();
-    let left_out = match apart.as_slice() {
+    let left_out = match outliers.as_slice() {
         [] => String::new(),
         several => format!(", {} outliers left out: {}", several.len(), several.join(", ")),
     };

@@ -5,11 +5,11 @@ use std::str::FromStr;
 
 use hzn_calib::camera_file::{self, Format};
 use hzn_core::camera::{self, Camera};
+use hzn_run::disk;
+use hzn_run::source::ending;
 
 use crate::exit::{Stop, usage};
 use crate::tell;
-use hzn_run::sink;
-use hzn_run::source::ending;
 
 /// Convert a calibration: sensor.toml, Kalibr, OpenCV, EuRoC, or the coefficients of Braun & Barf
 ///
@@ -110,7 +110,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     if to == To::Sensor {
         text = format!("# From {}. Every other key: hzn init.\npreset = \"hzn\"\n\n{text}", source(args));
     }
-    std::fs::write(path, text).map_err(|e| sink::cannot(path, &e))?;
+    std::fs::write(path, text).map_err(|e| disk::cannot_write(path, &e))?;
     tell::line(format_args!("{} written; look at it with  hzn camera show {0}", path.display()));
     Ok(())
 }

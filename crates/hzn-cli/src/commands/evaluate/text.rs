@@ -2,9 +2,9 @@
 
 use hzn_sim::evaluate::{Case, Evaluation, Group, Honesty};
 
-use super::Report;
+use super::report::Report;
 
-pub(super) fn of(report: &Report, worst: &[&Case]) -> String {
+pub(super) fn report(report: &Report, worst: &[&Case]) -> String {
     let mut out = String::new();
     for e in &report.evaluations {
         out.push_str(&format!("{}\n", e.body));
@@ -27,7 +27,7 @@ pub(super) fn of(report: &Report, worst: &[&Case]) -> String {
 }
 
 /// Returns the numbers of one body with their names.
-pub(in crate::commands) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
+pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
     let mut out = Vec::new();
     let mut line = |name, value| out.push((name, value));
     let mut answered = format!("{} of {} frames with a limb in view", e.answered, e.with_limb);

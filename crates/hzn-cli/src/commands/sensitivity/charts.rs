@@ -2,14 +2,15 @@
 
 use hzn_sim::sensitivity::chart::{Vertical, Visibility};
 
+use super::args::Args;
 use super::body::Body;
+use super::study::Study;
 use super::table::Table;
-use super::{Args, Finished};
 use crate::exit::{Stop, usage};
 use crate::plot::{Chart, Series, Style};
 
 /// Computes fields of view by altitude (Braun & Barf 2022, figures 6 and 7).
-pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
+pub(super) fn visibility(args: &Args) -> Result<Study, Stop> {
     let body = match args.body.as_slice() {
         [] => Body::EARTH,
         [one] => *one,
@@ -44,16 +45,16 @@ pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
     for (name, head, label, value) in columns {
         table.column(name, head, rows.iter().map(|(_, v)| Some(value(v))));
         if !label.is_empty() {
-            chart = chart.with(Series::new(label, Style::Line, rows.iter().map(|(km, v)| (*km, value(v)))));
+            chart = chart.with_series(Series::new(label, Style::Line, rows.iter().map(|(km, v)| (*km, value(v)))));
         }
     }
     let chart = (rows.len() > 1).then_some(chart);
-    Ok(Finished { table, chart, notes: Vec::new() })
+    Ok(Study { table, chart, notes: Vec::new() })
 }
 
 /// Computes angles by latitude and altitude (Braun & Barf 2022, figure 8, and the angle that remains with the limb
 /// axis).
-pub(super) fn spherical_earth(args: &Args) -> Result<Finished, Stop> {
+pub(super) fn spherical_earth(args: &Args) -> Result<Study, Stop> {
     if !args.body.is_empty() {
         return Err(usage("--body: this chart is for the Earth (WGS-84); leave --body out"));
     }
@@ -86,8 +87,8 @@ pub(super) fn spherical_earth(args: &Args) -> Result<Finished, Stop> {
     let title = "Error of treating the Earth as a sphere: centre to limb axis";
     let mut chart = Chart::new(title, "latitude [deg]", "deg");
     for km in altitudes {
-        let of = rows.iter().filter(|r| r.1 == km).map(|r| (r.0, r.2.geocentric_to_axis_deg));
-        chart = chart.with(Series::new(format!("{km} km"), Style::Line, of));
+        let points = rows.iter().filter(|r| r.1 == km).map(|r| (r.0, r.2.geocentric_to_axis_deg));
+        chart = chart.with_series(Series::new(format!("{km} km"), Style::Line, points));
     }
-    Ok(Finished { table, chart: Some(chart), notes: Vec::new() })
+    Ok(Study { table, chart: Some(chart), notes: Vec::new() })
 }
