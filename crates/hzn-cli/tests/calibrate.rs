@@ -131,5 +131,5 @@ fn sun_and_moon_have_no_limb_height() {
                   model = \"pinhole\"\n";
     std::fs::write(at.join("in/sensor.toml"), sensor).unwrap();
     let (code, _, stderr) = hzn(at, &["calibrate", "noise", "in"]);
-    assert!(code == 2 && stderr.contains("no height to measure"), "{stderr}");
+    assert!(code == 2 && stderr.contains("no limb height to measure"), "{stderr}");
 }

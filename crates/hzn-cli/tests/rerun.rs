@@ -69,7 +69,7 @@ fn several_bodies_are_one_frame() {
 fn missing_content_of_a_recording_is_reported() {
     let place = place();
     place.run(&["run", "in", "-o", "bare.mcap", "--no-images"]).expect(0);
-    place.run(&["run", "bare.mcap"]).expect(2).says("holds results without their pictures");
+    place.run(&["run", "bare.mcap"]).expect(2).says("contains results without their pictures");
     place.write("in/b-empty.png", b"");
     place.run(&["run", "in", "-o", "one.mcap"]).expect(3);
     let ran = place.run(&["run", "one.mcap"]).expect(3).says("the recording does not contain this picture");
