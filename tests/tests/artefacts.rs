@@ -25,7 +25,7 @@ fn outcomes(
     let mut outcome = |threshold_px: &Option<f64>| {
         let mut config = Config::new(trial.scene.camera.clone());
         config.reject.threshold_px = threshold_px.unwrap_or(config.reject.threshold_px);
-        look(horizon, &config, trial, &picture, prior, &Unobserved).unwrap()
+        process_trial(horizon, &config, trial, &picture, prior, &Unobserved).unwrap()
     };
     thresholds_px.iter().map(&mut outcome).collect()
 }

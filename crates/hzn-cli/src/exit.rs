@@ -70,9 +70,9 @@ fn option(remedy: Remedy) -> Option<&'static str> {
     Some(match remedy {
         Remedy::Replace => "--force replaces it",
         Remedy::ReplaceOrResume => "--force replaces it, --resume continues it",
-        Remedy::ResumeOrRestart => "--resume goes on with it, --force starts over",
+        Remedy::ResumeOrRestart => "--resume continues it, --force starts over",
         Remedy::Restart => "--force starts over",
-        Remedy::NoTopic => "leave --topic out, or give an MCAP as the input",
+        Remedy::NoTopic => "leave out --topic, or give an MCAP as the input",
         Remedy::Headerless => "--raw reads files without a header",
         _ => return None,
     })

@@ -5,7 +5,7 @@
 //! from the parts of `hzn-run`. This crate has the arguments, the progress bar, the exit codes ([`exit`]) and the
 //! charts of reports ([`plot`]).
 
-#![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic when nobody reads; `tell` does not")]
+#![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic when the output is closed; `tell` does not")]
 
 pub mod commands;
 pub mod exit;

@@ -68,7 +68,7 @@ impl Chart {
     }
     /// Adds a series.
     #[must_use]
-    pub fn with(mut self, series: Series) -> Self {
+    pub fn with_series(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
@@ -78,8 +78,8 @@ impl Chart {
     /// # Errors
     /// There is nothing to draw: no point is finite.
     pub fn svg(&self) -> anyhow::Result<String> {
-        let range = |of: fn(&(f64, f64)) -> f64| {
-            let values = self.series.iter().flat_map(|s| &s.points).filter(|p| shown(p)).map(of);
+        let range = |value: fn(&(f64, f64)) -> f64| {
+            let values = self.series.iter().flat_map(|s| &s.points).filter(|p| is_drawable(p)).map(value);
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
         };
         let (x, y) = (range(|p| p.0), range(|p| p.1));
@@ -99,12 +99,12 @@ impl Chart {
 
     fn draw(&self, x: (f64, f64), y: Range<f64>) -> anyhow::Result<String> {
         let mut out = String::new();
-        self.onto(SVGBackend::with_string(&mut out, self.size), x.0..x.1, y)
+        self.draw_onto(SVGBackend::with_string(&mut out, self.size), x.0..x.1, y)
             .map_err(|e| anyhow!("{}: cannot be drawn: {e}", self.title))?;
         Ok(out)
     }
 
-    fn onto<'a>(&'a self, backend: SVGBackend<'a>, x: Range<f64>, y: Range<f64>) -> anyhow::Result<()> {
+    fn draw_onto<'a>(&'a self, backend: SVGBackend<'a>, x: Range<f64>, y: Range<f64>) -> anyhow::Result<()> {
         let font = |size: u32| ("sans-serif", size);
         let root = backend.into_drawing_area();
         root.fill(&WHITE)?;
@@ -134,10 +134,10 @@ impl Chart {
                 Style::Dots => (colours.next().unwrap_or(&BLACK).mix(0.75).filled(), true),
             };
             let annotation = if dots {
-                chart.draw_series(series.points.iter().filter(|p| shown(p)).map(|p| Circle::new(*p, 3, style)))?
+                chart.draw_series(series.points.iter().filter(|p| is_drawable(p)).map(|p| Circle::new(*p, 3, style)))?
             } else {
-                for piece in series.points.split(|p| !shown(p)) {
-                    chart.draw_series(LineSeries::new(piece.iter().copied(), style))?;
+                for part in series.points.split(|p| !is_drawable(p)) {
+                    chart.draw_series(LineSeries::new(part.iter().copied(), style))?;
                 }
                 // All parts of a line share one legend entry.
                 chart.draw_series(LineSeries::new([], style))?
@@ -167,7 +167,7 @@ impl Chart {
 }
 
 /// Returns whether a point can be drawn.
-fn shown(&(x, y): &(f64, f64)) -> bool {
+fn is_drawable(&(x, y): &(f64, f64)) -> bool {
     x.is_finite() && y.is_finite()
 }
 
@@ -191,8 +191,12 @@ mod tests {
     #[test]
     fn a_chart_names_everything_and_breaks_lines() {
         let chart = Chart::new("Error & sigma", "altitude [km]", "error [deg]")
-            .with(Series::new("measured", Style::Dots, [(70.0, 0.01), (240.0, 0.02)]))
-            .with(Series::new("expected", Style::Line, [(70.0, 0.02), (100.0, f64::NAN), (200.0, 0.1), (240.0, 0.2)]));
+            .with_series(Series::new("measured", Style::Dots, [(70.0, 0.01), (240.0, 0.02)]))
+            .with_series(Series::new(
+                "expected",
+                Style::Line,
+                [(70.0, 0.02), (100.0, f64::NAN), (200.0, 0.1), (240.0, 0.2)],
+            ));
         let svg = chart.svg().unwrap();
         for text in ["<svg", "Error &amp; sigma", "altitude [km]", "error [deg]", "measured", "expected", "</svg>"] {
             assert!(svg.contains(text), "{text} in {svg}");
@@ -204,7 +208,7 @@ mod tests {
     #[test]
     fn nothing_is_an_error_and_one_point_is_drawn() {
         assert!(Chart::new("t", "x", "y").svg().unwrap_err().to_string().contains("nothing to draw"));
-        let one = Chart::new("t", "x", "y").with(Series::new("", Style::Dots, [(3.0, 0.0)]));
+        let one = Chart::new("t", "x", "y").with_series(Series::new("", Style::Dots, [(3.0, 0.0)]));
         assert!(one.svg().unwrap().contains("<circle"));
     }
 

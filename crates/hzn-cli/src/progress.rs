@@ -87,8 +87,8 @@ impl Progress {
     }
     /// Returns whether any picture could not be processed.
     pub(crate) fn any_unprocessed(&self) -> bool {
-        let none = [Status::Unreadable, Status::NoAltitude];
-        self.bodies.iter().any(|counts| none.iter().any(|s| counts[*s as usize] > 0))
+        let unprocessed = [Status::Unreadable, Status::NoAltitude];
+        self.bodies.iter().any(|counts| unprocessed.iter().any(|s| counts[*s as usize] > 0))
     }
     fn rate(&self) -> f64 {
         self.frames as f64 / self.start.elapsed().as_secs_f64().max(1e-9)
@@ -103,7 +103,7 @@ impl Progress {
             1 => "1 frame".to_owned(),
             n => format!("{n} frames"),
         };
-        let parts: Vec<String> = self.bodies.iter().map(in_words).collect();
+        let parts: Vec<String> = self.bodies.iter().map(count_text).collect();
         let found = match parts.as_slice() {
             [one] => one.clone(),
             several => {
@@ -123,7 +123,7 @@ impl Progress {
     }
 }
 
-fn in_words(counts: &Counts) -> String {
+fn count_text(counts: &Counts) -> String {
     let present = Status::ALL.iter().zip(counts).filter(|(_, n)| **n > 0);
     let parts: Vec<String> = present.map(|(status, n)| format!("{n} {}", status.name())).collect();
     parts.join(", ")

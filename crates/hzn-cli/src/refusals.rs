@@ -5,7 +5,6 @@ use std::path::Path;
 use hzn_core::status::Status;
 use hzn_core::verdict::Verdict;
 use hzn_core::{Report, gates};
-
 use hzn_run::engine::Finished;
 use hzn_run::explain;
 
@@ -25,14 +24,14 @@ impl Why {
         }
         // Among edges with equally many inliers the first is used. It begins next to the longest dark stretch of the
         // border.
-        let most = report.candidates.iter().rev().max_by_key(|c| c.inliers);
-        Some(most.map_or(Self::Status(report.status), |c| Self::Verdict(c.verdict)))
+        let best = report.candidates.iter().rev().max_by_key(|c| c.inliers);
+        Some(best.map_or(Self::Status(report.status), |c| Self::Verdict(c.verdict)))
     }
 
     fn text(self, limits: &gates::Config) -> String {
         match self {
-            Self::Verdict(verdict) => format!("{}: {}", verdict.name(), explain::why(verdict, limits)),
-            Self::Status(status) => format!("{status}: {}", explain::without_edges(status)),
+            Self::Verdict(verdict) => format!("{}: {}", verdict.name(), explain::verdict_text(verdict, limits)),
+            Self::Status(status) => format!("{status}: {}", explain::status_text(status)),
         }
     }
 }
@@ -50,14 +49,14 @@ pub(crate) struct Refusals {
 
 impl Refusals {
     pub(crate) fn count(&mut self, frame: &Finished) {
-        let whole = frame.found.iter().all(|f| f.report.is_ok()).then_some(frame.index);
-        let again = |report: &Report<f64>| report.status == Status::Ok && report.counters.looks > 1;
-        self.further += frame.found.iter().filter(|f| f.report.as_ref().is_ok_and(again)).count() as u64;
-        for why in frame.found.iter().filter_map(|f| Why::from_report(f.report.as_ref().ok()?)) {
+        let first_here = frame.outcomes.iter().all(|f| f.report.is_ok()).then_some(frame.index);
+        let is_further = |report: &Report<f64>| report.status == Status::Ok && report.counters.looks > 1;
+        self.further += frame.outcomes.iter().filter(|f| f.report.as_ref().is_ok_and(is_further)).count() as u64;
+        for why in frame.outcomes.iter().filter_map(|f| Why::from_report(f.report.as_ref().ok()?)) {
             self.total += 1;
             match self.each.iter_mut().find(|(known, ..)| *known == why) {
-                Some((_, n, first)) => (*n, *first) = (*n + 1, first.or(whole)),
-                None => self.each.push((why, 1, whole)),
+                Some((_, n, first)) => (*n, *first) = (*n + 1, first.or(first_here)),
+                None => self.each.push((why, 1, first_here)),
             }
         }
     }
@@ -66,8 +65,8 @@ impl Refusals {
     pub(crate) fn further(&self) -> Option<String> {
         match self.further {
             0 => None,
-            1 => Some("1 answer came from a further look at another level (recover.levels)".to_owned()),
-            n => Some(format!("{n} answers came from a further look at another level (recover.levels)")),
+            1 => Some("1 answer came from a further look at another threshold (recover.levels)".to_owned()),
+            n => Some(format!("{n} answers came from a further look at another threshold (recover.levels)")),
         }
     }
 

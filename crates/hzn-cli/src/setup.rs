@@ -9,13 +9,13 @@ use hzn_calib::{FrameData, Frames, Sensor, plausible};
 use hzn_core::Config;
 use hzn_core::body::{self, PriorError};
 use hzn_core::config::Orient;
+use hzn_run::disk;
+use hzn_run::engine::{self, AnySensor};
+use hzn_run::source::{self, Raw, Source};
 use hzn_sim::Truth;
 
 use crate::exit::{Exit, Stop, usage};
 use crate::tell;
-use hzn_run::engine::{self, AnySensor};
-use hzn_run::sink;
-use hzn_run::source::{self, Raw, Source};
 
 /// The arguments that select the sensor.
 #[derive(Debug, Clone, Args)]
@@ -54,31 +54,31 @@ impl SensorArgs {
     /// Reads the sensor for the pictures.
     pub(crate) fn load(&self, source: &dyn Source) -> Result<Sensor, Stop> {
         let folder = source.folder();
-        let beside = folder.join("sensor.toml");
+        let neighbour = folder.join("sensor.toml");
         let mut sensor = match (&self.sensor, source.sensor_toml()) {
             (Some(path), _) => hzn_calib::sensor::load(path)?,
             // If the text names a camera file, the file is expected next to the recording.
-            (None, Some(text)) => hzn_calib::sensor::parse(text, &beside)
-                .map_err(|e| usage(format!("the sensor.toml in the recording: {e}; --sensor FILE takes its place")))?,
-            (None, None) if beside.exists() => hzn_calib::sensor::load(&beside)?,
+            (None, Some(text)) => hzn_calib::sensor::parse(text, &neighbour)
+                .map_err(|e| usage(format!("the sensor.toml in the recording: {e}; --sensor FILE replaces it")))?,
+            (None, None) if neighbour.exists() => hzn_calib::sensor::load(&neighbour)?,
             (None, None) => {
-                let what = format!("no sensor: give --sensor FILE, or put a sensor.toml into {}", shown(&folder));
-                return Err(usage(format!("{what} (`hzn init` writes one to start from)")));
+                let what = format!("no sensor: give --sensor FILE, or put a sensor.toml into {}", folder_name(&folder));
+                return Err(usage(format!("{what} (`hzn init` writes a first one)")));
             }
         };
         sensor.warnings.iter().for_each(tell::warning);
         if let Some(km) = self.altitude_km {
             let only_free = sensor.config.each_body().iter().all(body::Config::half_angle_is_free);
             // The altitude above the Earth is not the altitude above a Moon in the same picture.
-            let mut taken = Vec::new();
+            let mut changed = Vec::new();
             for (which, body) in sensor.config.each_body_mut().iter_mut().enumerate() {
                 if only_free || !body.half_angle_is_free() {
                     body.altitude_km = Some(km);
-                    taken.push(which);
+                    changed.push(which);
                 }
             }
             // With the changed text, a recording is processed again with the same altitude.
-            sensor.text = with_altitude(&sensor.text, km, &taken);
+            sensor.text = with_altitude(&sensor.text, km, &changed);
             hzn_calib::sensor::check(&sensor.config).map_err(|e| usage(format!("--altitude-km: {e}")))?;
             let doubts = plausible::find_implausible(&sensor.config);
             if let Some(doubt) = doubts.iter().find(|d| d.key == "body.altitude_km") {
@@ -100,10 +100,10 @@ impl InputArgs {
 
     /// Reads frames.csv, if there is one, and checks every row against the sensor. Warnings are printed to stderr.
     pub(crate) fn frames(&self, source: &dyn Source, sensor: &Sensor, flight: bool) -> Result<Option<Frames>, Stop> {
-        let beside = source.folder().join("frames.csv");
+        let neighbour = source.folder().join("frames.csv");
         let path = match &self.frames {
             Some(path) => path.clone(),
-            None if source.sensor_toml().is_none() && beside.exists() => beside,
+            None if source.sensor_toml().is_none() && neighbour.exists() => neighbour,
             None => return Ok(None),
         };
         let frames = hzn_calib::frames::load(&path)?;
@@ -113,7 +113,7 @@ impl InputArgs {
         for warning in frames.check_sensor(&sensor.config) {
             tell::warning(warning);
         }
-        engine::prepare(&sensor.config, flight, Some(&frames))?;
+        engine::check_frames(&sensor.config, flight, Some(&frames))?;
         Ok(Some(frames))
     }
 }
@@ -136,7 +136,7 @@ fn with_altitude(text: &str, km: f64, bodies: &[usize]) -> String {
 
 /// Requests the colour channel from the source. If sensor.toml does not state the number of bits, finds it from the
 /// pictures and sets it in the sensor and its text. Returns notes for the user.
-pub(crate) fn settle_input(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<String>, Stop> {
+pub(crate) fn find_input(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<String>, Stop> {
     let mut notes = Vec::new();
     source.want_channel(sensor.config.input.channel)?;
     if sensor.config.input.bits.is_none() {
@@ -151,12 +151,11 @@ pub(crate) fn settle_input(source: &mut dyn Source, sensor: &mut Sensor) -> Resu
         notes.extend(found.filter(|f| f.bits < 16).map(|f| f.to_string()));
     }
     if sensor.config.input.orient == Orient::AsStored
-        && let Some((name, how)) = source.to_be_turned()
+        && let Some((name, how)) = source.display_turn()
     {
         notes.push(format!(
-            "{name} says that it is to be shown {how}; pixels are taken as they are stored. If the camera was \
-             calibrated with turned pictures, as OpenCV's imread gives them, turn them with orient in [input] of \
-             sensor.toml"
+            "{name} is to be shown {how}; its pixels are used as stored. If the camera was calibrated with turned \
+             pictures, as OpenCV's imread returns them, turn them with orient in [input] of sensor.toml"
         ));
     }
     Ok(notes)
@@ -180,36 +179,37 @@ pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Sto
     let Some((name, (width, height))) = first else { return Ok(()) };
     let hint = if (height, width) == own { "turn the pictures with orient in [input], " } else { "" };
     Err(usage(format!(
-        "the sensor is for pictures of {} x {} px, but those here are not: {name} is {width} x {height}; {hint}give \
-         the sensor of this camera with --sensor, or set camera.width and height and scale focal lengths and centre \
-         with them",
+        "the sensor is for pictures of {} x {} px, but none of the pictures has this size: {name} is {width} x \
+         {height}; {hint}give the sensor of this camera with --sensor, or set camera.width and height and scale focal \
+         lengths and centre with them",
         own.0, own.1
     )))
 }
 
 /// Checks that an altitude is known from any source. Without one, every picture would fail.
-pub(crate) fn need_altitude(sensor: &Sensor, source: &dyn Source, frames: Option<&Frames>) -> Result<(), Stop> {
+pub(crate) fn check_altitude(sensor: &Sensor, source: &dyn Source, frames: Option<&Frames>) -> Result<(), Stop> {
     let known = |b: &body::Config| b.half_angle_is_free() || b.altitude_km.is_some();
-    let tells = |row: &FrameData| row.altitude_km.is_some() || row.position_km.is_some();
-    let rows = frames.map_or(source.sensor_toml().is_some(), |f| f.rows.iter().any(tells));
+    let has_altitude = |row: &FrameData| row.altitude_km.is_some() || row.position_km.is_some();
+    let rows = frames.map_or(source.sensor_toml().is_some(), |f| f.rows.iter().any(has_altitude));
     if rows {
         return Ok(());
     }
     if sensor.config.each_body().iter().any(known) {
-        return above_the_limb(&sensor.config);
+        return check_above_limb(&sensor.config);
     }
-    let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or a frames.csv with it";
+    let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or give a frames.csv with \
+                altitudes";
     Err(Stop { exit: Exit::Usage, error: anyhow::anyhow!(what) })
 }
 
 /// Checks the sensor's own altitude if no other is known: it must be above the limb height of at least one body.
-fn above_the_limb(config: &Config) -> Result<(), Stop> {
+fn check_above_limb(config: &Config) -> Result<(), Stop> {
     let Ok(sensor) = AnySensor::new(config, false) else { return Ok(()) };
     let half_angles = sensor.expected_half_angles_rad(None);
     let below = |e: &Result<f64, PriorError>| e.err().filter(|e| matches!(e, PriorError::BelowLimb { .. }));
     match half_angles.iter().map(below).collect::<Option<Vec<_>>>().and_then(|each| each.first().copied()) {
         Some(why) => {
-            Err(usage(format!("body.altitude_km: {why}, so that no limb can be seen; give the altitude of the camera")))
+            Err(usage(format!("body.altitude_km: {why}, so no limb can be seen; give the altitude of the camera")))
         }
         None => Ok(()),
     }
@@ -222,14 +222,14 @@ pub(crate) fn clear_rendered(folder: &Path) -> Result<(), Stop> {
     for truth in before.deserialize::<Truth>().map_while(Result::ok) {
         let path = folder.join(Path::new(&truth.file).file_name().unwrap_or_default());
         if path.is_file() {
-            std::fs::remove_file(&path).map_err(|e| sink::cannot(&path, &e))?;
+            std::fs::remove_file(&path).map_err(|e| disk::cannot_write(&path, &e))?;
         }
     }
     Ok(())
 }
 
 /// Returns a folder's name for messages.
-pub(crate) fn shown(folder: &Path) -> String {
+pub(crate) fn folder_name(folder: &Path) -> String {
     if folder.as_os_str().is_empty() { "this folder".into() } else { folder.display().to_string() }
 }
 
@@ -241,7 +241,7 @@ pub(crate) fn stop_flag() -> Arc<AtomicBool> {
         if shared.swap(true, Ordering::SeqCst) {
             std::process::exit(i32::from(Exit::Interrupted as u8));
         }
-        tell::line(format_args!("\nfinishing the frames that were begun; press Ctrl-C again to leave at once"));
+        tell::line(format_args!("\nfinishing the pictures that were begun; press Ctrl-C again to stop at once"));
     });
     // Without a handler, Ctrl-C ends the program at once; the output can still be continued.
     drop(handler);

@@ -62,7 +62,7 @@ fn wrong_rows_of_frames_csv() {
 }
 
 #[test]
-fn the_sensor_of_another_camera_is_said_once() {
+fn the_sensor_of_another_camera_is_reported_once() {
     let place = Place::with_pictures(5);
     let other = common::SENSOR.replace("width = 320", "width = 640").replace("height = 240", "height = 480");
     let other = other.replace("159.5", "319.5").replace("119.5", "239.5");
@@ -70,7 +70,7 @@ fn the_sensor_of_another_camera_is_said_once() {
     place.write("p.raw", &[0; 100]);
     place.run(&["run", "in", "-o", "a.mcap"]).expect(0);
     let err = place.run(&["run", "in", "-s", "other.toml", "-o", "b.csv"]).expect(2).err;
-    insta::assert_snapshot!(err, @"error: the sensor is for pictures of 640 x 480 px, but those here are not: 0000.png \
+    insta::assert_snapshot!(err, @"error: the sensor is for pictures of 640 x 480 px, but none of the pictures has this size: 0000.png \
                                    is 320 x 240; give the sensor of this camera with --sensor, or set camera.width and \
                                    height and scale focal lengths and centre with them");
     assert!(!place.path("b.csv.part").exists());
@@ -117,7 +117,7 @@ fn broken_pictures_are_records_and_the_run_goes_on() {
     has(1, "unreadable: file is empty");
     has(2, "unreadable: PNG");
     has(3, "the file is truncated");
-    has(4, "is no picture that is known here");
+    has(4, "is not a picture of a supported format");
     has(5, "picture of 60000x60000 is larger than the limit of 20000 px a side");
     has(6, "unreadable: ");
     has(7, "but the camera is 320x240");
@@ -160,7 +160,7 @@ fn palettes_are_read_and_animations_refused_by_name() {
     place.write("in/palette.png", &palette_png(&limb(320, 240, 0.0)));
     place.write("in/film.gif", b"GIF89a\x01\x00\x01\x00");
     place.write("in/zgif.png", b"GIF89a\x01\x00\x01\x00\x00\x00\x00;");
-    let ran = place.run(&["run", "in"]).expect(3).says("1 file ending in .gif left out");
+    let ran = place.run(&["run", "in"]).expect(3).says("1 file ending in .gif was left out");
     let rows = without_time(&ran.out);
     assert_eq!(cell(&rows[0], "axis_y"), cell(&rows[1], "axis_y"));
     assert_eq!(cell(&rows[2], "status"), "unreadable");
@@ -168,7 +168,7 @@ fn palettes_are_read_and_animations_refused_by_name() {
 
 #[cfg(unix)]
 #[test]
-fn unwritable_folders_are_said() {
+fn unwritable_folders_are_reported() {
     let place = Place::with_pictures(1);
     // A file is in the place of the folder. Missing permissions would not stop a test that runs as root.
     place.write("file", b"");
@@ -193,15 +193,15 @@ fn pictures_of_nothing_come_with_advice() {
     (0..60u32).for_each(|i| stars.put_pixel(i * 97 % 320, i * 53 % 240, image::Luma([200])));
     stars.save(place.path("in/stars.png")).unwrap();
     let told = |name: &str| place.run(&["explain", name]).expect(0).out;
-    assert!(told("in/black.png").contains("one brightness all over: nothing is in view"));
-    assert!(told("in/stars.png").contains("as of stars, noise or hot pixels"), "{}", told("in/stars.png"));
+    assert!(told("in/black.png").contains("one brightness: nothing is in view"));
+    assert!(told("in/stars.png").contains("for example of stars, noise or hot pixels"), "{}", told("in/stars.png"));
     place.run(&["run", "in"]).expect(0).says("nothing was found in any picture").says("hzn explain in/black.png\n");
     limb(320, 240, 0.0).save(place.path("in/z.png")).unwrap();
     assert!(!place.run(&["run", "in"]).expect(0).err.contains("nothing was found"));
 }
 
 #[test]
-fn the_length_of_headerless_pictures_is_told() {
+fn a_wrong_length_of_headerless_pictures_is_reported() {
     let place = Place::new();
     std::fs::create_dir(place.path("raw")).unwrap();
     for (name, bytes) in [("short", 76_000), ("three", 230_400), ("more", 76_812)] {

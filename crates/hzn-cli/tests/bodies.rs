@@ -65,7 +65,7 @@ fn recover_keeps_no_part_of_a_frame() {
 }
 
 #[test]
-fn a_sun_beside_the_earth_has_a_level_of_its_own() {
+fn a_sun_next_to_the_earth_has_its_own_threshold() {
     let place = earth_and_sun(1);
     let rows = without_time(&place.run(&["run", "in"]).expect(0).out);
     // Without this section the result is the same. With the Earth's threshold, the Earth would be taken for the bright
@@ -105,11 +105,11 @@ fn frames_of_several_bodies_are_kept_whole() {
 }
 
 #[test]
-fn explain_tells_of_each_body() {
+fn explain_shows_each_body() {
     let place = earth_and_sun(1);
     let told = place.run(&["explain", "in/0000.png", "--overlay", "o.png"]).expect(0).out;
     assert!(told.contains("half-angle (altitude 400 km, limb at"), "{told}");
-    assert!(told.contains("sun, cone of 0.2665 deg half-angle, as seen from about the Earth\n"), "{told}");
+    assert!(told.contains("sun, cone of 0.2665 deg half-angle, as seen from near the Earth\n"), "{told}");
     assert_eq!(told.matches("status      ok").count(), 2, "{told}");
     assert!(told.contains("earth-sphere, cone of") && told.contains("sun, cone of 0.26"), "{told}");
     assert!(told.contains("(fixed)") && told.contains("(otsu)"), "{told}");

@@ -44,19 +44,37 @@ fn value(text: &str, key: &str) -> f64 {
     line.split(" = ").nth(1).unwrap().split_whitespace().next().unwrap().parse().unwrap()
 }
 
-#[test]
-fn a_flight_tells_limb_height_and_noise_or_why_not() {
-    let dir = tempfile::tempdir().unwrap();
-    let at = dir.path();
+/// Renders a flight, and writes mine.toml, the sensor of a user who knows only the camera. Returns the text of the
+/// sensor.toml that fits the scene.
+fn render_flight(at: &Path) -> String {
     std::fs::write(at.join("my.toml"), SCENE).unwrap();
     let (code, _, stderr) = hzn(at, &["simulate", "my.toml", "-o", "flight", "-q"]);
     assert_eq!(code, 0, "{stderr}");
-    let told = std::fs::read_to_string(at.join("flight/sensor.toml")).unwrap();
-    // This sensor.toml is that of a user who knows only the camera.
-    let (_, camera) = told.split_once("[camera]").unwrap();
+    let sensor = std::fs::read_to_string(at.join("flight/sensor.toml")).unwrap();
+    let (_, camera) = sensor.split_once("[camera]").unwrap();
     let camera = camera.split("\n[").next().unwrap();
     std::fs::write(at.join("mine.toml"), format!("# my camera\n[camera]{camera}\n")).unwrap();
+    sensor
+}
 
+/// Writes wrong.csv: the table of the flight with altitudes that are alternately 10 km too low and too high.
+fn write_wrong_altitudes(at: &Path) {
+    let mut rows = csv::Reader::from_path(at.join("flight/frames.csv")).unwrap();
+    let column = rows.headers().unwrap().iter().position(|h| h == "altitude_km").unwrap();
+    let mut wrong = String::from("file,altitude_km\n");
+    for (i, row) in rows.records().enumerate() {
+        let row = row.unwrap();
+        let altitude_km: f64 = row[column].parse().unwrap();
+        wrong += &format!("{},{}\n", &row[0], altitude_km + if i % 2 == 0 { 10.0 } else { -10.0 });
+    }
+    std::fs::write(at.join("wrong.csv"), wrong).unwrap();
+}
+
+#[test]
+fn a_flight_gives_limb_height_and_noise_or_the_reason_why_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let rendered = render_flight(at);
     let calibrate = ["calibrate", "noise", "flight", "--sensor", "mine.toml"];
     let outputs = ["-o", "out.toml", "-o", "out.html"];
     let (code, stdout, stderr) = hzn(at, &[&calibrate[..], &outputs].concat());
@@ -68,7 +86,7 @@ fn a_flight_tells_limb_height_and_noise_or_why_not() {
     assert!(text.starts_with("# my camera\n") && text.contains("# calibrated: measured on "), "{text}");
     let (km, sigma) = (value(&text, "limb_height_km"), value(&text, "limb_height_sigma_km"));
     // The truth is the height that `hzn simulate` measured on other pictures of the scene.
-    let true_km = value(&told, "limb_height_km");
+    let true_km = value(&rendered, "limb_height_km");
     // A pixel is 7 km wide here, so blur bends the edge of the air. The limb height is 2 to 3 km too low in this scene.
     assert!((km - true_km).abs() < 3.0 * sigma && sigma < 3.5, "{km} ± {sigma}, {true_km}");
     let html = std::fs::read_to_string(at.join("out.html")).unwrap();
@@ -93,16 +111,8 @@ fn a_flight_tells_limb_height_and_noise_or_why_not() {
     assert_eq!(code, 1, "{stdout}{stderr}");
     assert!(stderr.contains("5 pictures have an answer, but at least 12 are needed"), "{stderr}");
 
-    // The altitudes are wrong: alternately 10 km too low and too high.
-    let mut rows = csv::Reader::from_path(at.join("flight/frames.csv")).unwrap();
-    let column = rows.headers().unwrap().iter().position(|h| h == "altitude_km").unwrap();
-    let mut wrong = String::from("file,altitude_km\n");
-    for (i, row) in rows.records().enumerate() {
-        let row = row.unwrap();
-        let altitude_km: f64 = row[column].parse().unwrap();
-        wrong += &format!("{},{}\n", &row[0], altitude_km + if i % 2 == 0 { 10.0 } else { -10.0 });
-    }
-    std::fs::write(at.join("wrong.csv"), wrong).unwrap();
+    // The altitudes contradict each other.
+    write_wrong_altitudes(at);
     let (code, stdout, stderr) =
         hzn(at, &[&calibrate[..], &["--frames", "wrong.csv", "-o", "wrong.toml", "-q"]].concat());
     assert_eq!(code, 1, "{stdout}{stderr}");
@@ -121,5 +131,5 @@ fn sun_and_moon_have_no_limb_height() {
                   model = \"pinhole\"\n";
     std::fs::write(at.join("in/sensor.toml"), sensor).unwrap();
     let (code, _, stderr) = hzn(at, &["calibrate", "noise", "in"]);
-    assert!(code == 2 && stderr.contains("no height to measure"), "{stderr}");
+    assert!(code == 2 && stderr.contains("no limb height to measure"), "{stderr}");
 }

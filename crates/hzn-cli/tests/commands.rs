@@ -59,7 +59,7 @@ fn init_writes_what_run_takes() {
 }
 
 #[test]
-fn explain_tells_every_stage() {
+fn explain_shows_every_stage() {
     let place = Place::with_pictures(2);
     let out = place.run(&["explain", "in/0001.png", "--overlay", "o.png"]).expect(0).out;
     for word in
@@ -81,12 +81,12 @@ fn info_claims_no_more_than_it_knows() {
     place.run(&["run", "in", "-o", "a.csv"]).expect(0);
     let out = place.run(&["info", "a.csv"]).expect(0).out;
     let digits = |word: &str| word.chars().filter(char::is_ascii_digit).collect::<String>();
-    for line in out.lines().filter(|l| l.contains("for 90 %")) {
+    for line in out.lines().filter(|l| l.contains(", 90 % from ")) {
         for number in line.split_whitespace().filter(|w| w.contains('.')) {
             assert!(digits(number).trim_start_matches('0').len() <= 3, "{line}");
         }
     }
-    assert!(out.contains("for 90 %"), "{out}");
+    assert!(out.contains(", 90 % from "), "{out}");
 }
 
 #[test]
@@ -154,14 +154,14 @@ fn annotations_count_from_the_corner() {
 }
 
 #[test]
-fn overlays_replace_nothing_unasked() {
+fn overlays_replace_nothing_without_force() {
     let place = Place::with_pictures(2);
     let before = std::fs::read(place.path("in/0001.png")).unwrap();
-    place.run(&["run", "in", "--overlay", "in"]).expect(2).says("is where the pictures are");
-    place.run(&["run", "in", "--overlay", "in", "--force"]).expect(2).says("is where the pictures are");
+    place.run(&["run", "in", "--overlay", "in"]).expect(2).says("is the folder of the pictures");
+    place.run(&["run", "in", "--overlay", "in", "--force"]).expect(2).says("is the folder of the pictures");
     std::fs::create_dir(place.path("notes")).unwrap();
     place.write("notes/mine.txt.png", b"mine");
-    place.run(&["run", "in", "--overlay", "notes"]).expect(2).says("holds files already");
+    place.run(&["run", "in", "--overlay", "notes"]).expect(2).says("contains files already");
     place.run(&["run", "in", "--overlay", "notes", "--force"]).expect(0);
     place.run(&["explain", "in/0001.png", "--overlay", "in/0001.png"]).expect(2).says("is the picture itself");
     place
@@ -197,20 +197,20 @@ fn wrong_usage_is_2() {
         (&["--altitude-km", "-5"], "--altitude-km: body.altitude_km"),
         (&["-j", "0"], "0 is not in 1.."),
         (&["--no-images", "-o", "a.csv"], "--no-images: only an MCAP"),
-        (&["--topic", "/x"], "only an MCAP has topics; leave --topic out"),
+        (&["--topic", "/x"], "only an MCAP has topics; leave out --topic"),
         (&["--resume"], "--output <FILE>"),
         (&["-o", "a.csv", "--resume", "--force"], "cannot be used with"),
         (&["-s", "nowhere.toml"], "hzn init"),
         (&["--frames", "nowhere.csv"], "no such file"),
-        (&["--raw", "10x10"], "such as 1920x1080:mono12"),
+        (&["--raw", "10x10"], "for example 1920x1080:mono12"),
     ] {
         place.run(&[&["run", "in"], args].concat()).expect(2).says(what);
     }
     place.run(&["info", "in"]).expect(2).says("is a folder");
-    place.run(&["recover", "in/0000.png"]).expect(2).says("is no file of results");
+    place.run(&["recover", "in/0000.png"]).expect(2).says("is not a file of results");
     place.write("other.csv", b"a,b\n1,2\n");
-    place.run(&["recover", "other.csv"]).expect(1).says("other.csv: has other columns");
-    place.run(&["export", "other.csv", "-o", "x.csv"]).expect(1).says("other.csv:2: no row of hzn results");
+    place.run(&["recover", "other.csv"]).expect(1).says("other.csv: does not have the columns");
+    place.run(&["export", "other.csv", "-o", "x.csv"]).expect(1).says("other.csv:2: not a row of hzn results");
     assert!(!place.path("other.recovered.csv.part").exists());
 }
 
@@ -273,17 +273,20 @@ fn a_telecommand_has_values_that_can_be() {
         assert!(ran.out.is_empty());
         ran.err.trim_end().split_once("\": ").unwrap().1.to_owned()
     };
-    assert_eq!(refused("camera.fx_px nan"), "camera.fx_px cannot be nan: it is a finite number above 0");
-    assert_eq!(refused("gate.max_mean 1.5"), "gate.max_mean cannot be 1.5: it is a finite number from 0 to 1");
-    assert_eq!(refused("binarize.method 7"), "binarize.method cannot be 7: it is one of 0 otsu, 1 fixed, 2 dynamic");
-    assert!(refused("camera.width 640.5").contains("cannot be 640.5: it is a whole number from"));
+    assert_eq!(refused("camera.fx_px nan"), "camera.fx_px cannot be nan: it must be a finite number above 0");
+    assert_eq!(refused("gate.max_mean 1.5"), "gate.max_mean cannot be 1.5: it must be a finite number from 0 to 1");
+    assert_eq!(
+        refused("binarize.method 7"),
+        "binarize.method cannot be 7: it must be one of 0 otsu, 1 fixed, 2 dynamic"
+    );
+    assert!(refused("camera.width 640.5").contains("cannot be 640.5: it must be a whole number from"));
     assert!(refused("reject.threshold_px -1").contains("above 0, to 1000"));
-    assert!(refused("camera.theta_max_deg 200").contains("or NaN where it is left out"));
+    assert!(refused("camera.theta_max_deg 200").contains("or NaN to leave it out"));
     assert!(refused("telemetry.housekeeping_every 0").contains("from 1 to 65535"));
-    assert!(refused("select.max_rms_px much").contains("cannot be much: it is"));
+    assert!(refused("select.max_rms_px much").contains("cannot be much: it must be"));
     assert!(refused("200 inf").contains("mask corners cannot be inf"));
-    place.run(&["telecommand", "known -5"]).expect(2).says("the altitude cannot be -5 km: above 0");
-    place.run(&["telecommand", "known 230 1e40 0 0"]).expect(2).says("no finite number of kilometres");
+    place.run(&["telecommand", "known -5"]).expect(2).says("the altitude -5 km is refused: must be above 0");
+    place.run(&["telecommand", "known 230 1e40 0 0"]).expect(2).says("not a finite number of kilometres");
     // A choice by name gives the same command as by number. An optional value may be NaN.
     let (named, numbered) = (set("binarize.method fixed"), set("50 1"));
     assert!(named.status.success() && named.stdout == numbered.stdout);

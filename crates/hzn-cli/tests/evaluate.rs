@@ -92,13 +92,14 @@ fn what_does_not_fit_is_named() {
 }
 
 #[test]
-fn other_times_and_a_missing_sensor_are_said() {
+fn other_times_and_a_missing_sensor_are_reported() {
     let place = place();
     let truth = place.read("in/truth.csv").replace("0002.png,2,", "0002.png,2.5,");
     place.write("t.csv", truth.as_bytes());
     let ran = place.run(&["evaluate", "out.csv", "--truth", "t.csv"]).expect(0);
     assert!(!ran.out.contains("limb in view [px]"), "{}", ran.out);
-    ran.says("warning: 0002.png: at 2 s in the results, at 2.5 s in the truth").says("note: no sensor.toml at hand");
+    ran.says("warning: 0002.png: at 2 s in the results, at 2.5 s in the truth")
+        .says("note: no sensor.toml is available");
     place.write("bad.toml", SENSOR.replace("pinhole", "pinhol").as_bytes());
     place.run(&["evaluate", "out.csv", "--truth", "t.csv", "-s", "bad.toml"]).expect(2).says("did you mean pinhole");
 }

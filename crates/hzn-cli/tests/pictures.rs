@@ -81,7 +81,8 @@ fn bits_are_found_once_for_a_sequence() {
         assert!(off < 0.1, "{off}");
         // A single picture is treated as one of its folder.
         let told = place.run(&["explain", "in/1.png"]).expect(0);
-        let found = ran.err.split("taken as ").nth(1).map_or("16".into(), |t| t.split(' ').next().unwrap().to_owned());
+        let found =
+            ran.err.split("assumed to have ").nth(1).map_or("16".into(), |t| t.split(' ').next().unwrap().to_owned());
         assert!(told.out.contains(&format!("1 channel of {found} bits")), "{}", told.out);
         found
     };
@@ -97,7 +98,7 @@ fn bits_are_found_once_for_a_sequence() {
 }
 
 #[test]
-fn a_picture_with_more_bits_than_the_others_is_not_taken_for_another() {
+fn a_picture_with_more_bits_than_the_others_is_unreadable() {
     let place = Place::new();
     for i in 0..33 {
         // Of 33 pictures 16 are examined; this one is not.
@@ -105,7 +106,7 @@ fn a_picture_with_more_bits_than_the_others_is_not_taken_for_another() {
         words(f64::from(i), |v| v << shift).save(place.path(&format!("in/{i:02}.png"))).unwrap();
     }
     let alone = place.run(&["run", "in", "-j", "1", "-o", "a.mcap"]).expect(3);
-    let alone = alone.says("samples are words of 16 bits that reach 800 in 16 pictures looked at: taken as 10 bits");
+    let alone = alone.says("the largest 16-bit sample in 16 pictures is 800: the camera is assumed to have 10 bits");
     assert!(
         alone.err.contains("unreadable: 09.png: a sample of 3200 has more bits than input.bits = 10"),
         "{}",
@@ -116,12 +117,12 @@ fn a_picture_with_more_bits_than_the_others_is_not_taken_for_another() {
     assert_eq!(without_time(&place.read("a.csv")), without_time(&three.out));
     // The recorded sensor states the bits. The recording does not contain the lost picture.
     let again = place.run(&["run", "a.mcap"]).expect(3);
-    assert!(!again.err.contains("taken as"), "{}", again.err);
+    assert!(!again.err.contains("assumed to have"), "{}", again.err);
     let axis = |rows: &[Vec<(String, String)>]| rows.iter().map(|r| cell(r, "axis_y").to_owned()).collect::<Vec<_>>();
     assert_eq!(axis(&without_time(&again.out)), axis(&without_time(&three.out)));
     place.write("in/sensor.toml", format!("{}[input]\nbits = 12\n", common::SENSOR).as_bytes());
     let told = place.run(&["run", "in"]).expect(0);
-    assert!(!told.err.contains("taken as"), "{}", told.err);
+    assert!(!told.err.contains("assumed to have"), "{}", told.err);
 }
 
 #[test]
@@ -129,23 +130,23 @@ fn bits_of_headerless_words_and_of_transparent_ones() {
     let place = Place::new();
     let bytes: Vec<u8> = words(0.0, |v| v << 4).into_raw().iter().flat_map(|w| w.to_le_bytes()).collect();
     place.write("in/a.raw", &bytes);
-    let ran = place.run(&["run", "in", "--raw", "320x240:mono16"]).expect(0).says("taken as 12 bits");
+    let ran = place.run(&["run", "in", "--raw", "320x240:mono16"]).expect(0).says("assumed to have 12 bits");
     assert_eq!(without_time(&ran.out).len(), 1);
     std::fs::remove_file(place.path("in/a.raw")).unwrap();
     // The values of an alpha channel are not brightness. The full scale in a header is used as it is.
     let grey = words(0.0, |v| v << 4);
     let clear = image::ImageBuffer::from_fn(320, 240, |x, y| image::LumaA([grey.get_pixel(x, y).0[0], u16::MAX]));
     DynamicImage::ImageLumaA16(clear).save(place.path("in/a.png")).unwrap();
-    place.run(&["run", "in"]).expect(0).says("taken as 12 bits").says("1 frame: 1 ok");
+    place.run(&["run", "in"]).expect(0).says("assumed to have 12 bits").says("1 frame: 1 ok");
     std::fs::remove_file(place.path("in/a.png")).unwrap();
     let big_endian = grey.into_raw().iter().flat_map(|w| w.to_be_bytes()).collect::<Vec<u8>>();
     place.write("in/a.pgm", &[b"P5 320 240 4095\n".to_vec(), big_endian].concat());
     let ran = place.run(&["run", "in"]).expect(0).says("1 frame: 1 ok");
-    assert!(!ran.err.contains("taken as"), "{}", ran.err);
+    assert!(!ran.err.contains("assumed to have"), "{}", ran.err);
 }
 
 #[test]
-fn bits_that_are_told_hold() {
+fn bits_of_sensor_toml_are_used() {
     let place = Place::new();
     words(0.0, |v| v << 2).save(place.path("in/low.png")).unwrap();
     let told = |bits: u8| format!("{}[input]\nbits = {bits}\n", common::SENSOR);
@@ -244,19 +245,20 @@ fn animated_png(first: &GrayImage, second: &GrayImage) -> Vec<u8> {
 }
 
 #[test]
-fn of_an_animation_the_first_picture_is_taken_and_the_others_are_told() {
+fn the_first_picture_of_an_animation_is_processed_and_the_others_are_reported() {
     let place = Place::new();
     place.write("in/film.png", &animated_png(&limb(320, 240, 0.0), &limb(320, 240, 40.0)));
     let ran = place.run(&["run", "in"]).expect(3);
     let ran = ran.says(
-        "warning: only the first picture was processed of 1 file with several pages or frames (the first is film.png",
+        "warning: only the first picture of 1 file with several pages or frames was processed (the first file is \
+         film.png",
     );
     let rows = without_time(&ran.out);
     let axis = ["axis_x", "axis_y", "axis_z"].map(|name| cell(&rows[0], name).parse().unwrap());
     assert_eq!(axis, plain(0.0));
     assert!(angle_deg(axis, plain(40.0)) > 1.0);
     let told = place.run(&["info", "in/film.png"]).expect(0).out;
-    assert!(told.contains("pictures         2, of which hzn takes the first"), "{told}");
+    assert!(told.contains("pictures         2; hzn processes only the first"), "{told}");
     // The file is a stack of pages, one after another.
     std::fs::remove_file(place.path("in/film.png")).unwrap();
     place.write("in/stack.tif", &two_pages(&limb(320, 240, 0.0)));
@@ -302,7 +304,7 @@ fn an_edge_that_comes_late_is_listed_as_chosen() {
     picture.save(place.path("in/0.png")).unwrap();
     let told = place.run(&["explain", "in/0.png", "--overlay", "o.png"]).expect(0).out;
     let chosen: Vec<&str> = told.lines().filter(|l| l.contains("chosen: ")).collect();
-    assert!(chosen.len() == 1 && told.contains("further ones that are not listed"), "{told}");
+    assert!(chosen.len() == 1 && told.contains("further edges are not listed"), "{told}");
     let number: u32 = chosen[0].split_whitespace().next().unwrap().parse().unwrap();
     assert!(number >= 16, "{told}");
     place.run(&["run", "in", "-o", "a.mcap"]).expect(0).says("1 frame: 1 ok");
@@ -320,7 +322,7 @@ fn exif_orientation(number: u16) -> Vec<u8> {
 }
 
 #[test]
-fn pictures_are_turned_only_when_it_is_asked_for() {
+fn pictures_are_turned_only_on_request() {
     let place = Place::new();
     let turned = image::imageops::rotate270(&limb(320, 240, 0.0));
     let save = |orientation: u16| {
@@ -353,9 +355,7 @@ fn pictures_are_turned_only_when_it_is_asked_for() {
     let sensor = place.read("in/sensor.toml").replace("width = 320\nheight = 240", "width = 240\nheight = 320");
     place.write("in/sensor.toml", sensor.as_bytes());
     let ran = place.run(&["run", "in"]).expect(0);
-    ran.says(
-        "note: a.png says that it is to be shown turned by 90 degrees clockwise; pixels are taken as they are stored",
-    );
+    ran.says("note: a.png is to be shown turned by 90 degrees clockwise; its pixels are used as stored");
     save(1);
     let ran = place.run(&["run", "in"]).expect(0);
     assert!(!ran.err.contains("to be shown"), "{}", ran.err);

@@ -66,13 +66,13 @@ fn several_bodies_are_one_frame() {
 }
 
 #[test]
-fn what_a_recording_does_not_hold_is_said() {
+fn missing_content_of_a_recording_is_reported() {
     let place = place();
     place.run(&["run", "in", "-o", "bare.mcap", "--no-images"]).expect(0);
-    place.run(&["run", "bare.mcap"]).expect(2).says("holds results without their pictures");
+    place.run(&["run", "bare.mcap"]).expect(2).says("contains results without their pictures");
     place.write("in/b-empty.png", b"");
     place.run(&["run", "in", "-o", "one.mcap"]).expect(3);
-    let ran = place.run(&["run", "one.mcap"]).expect(3).says("the recording holds no picture of it");
+    let ran = place.run(&["run", "one.mcap"]).expect(3).says("the recording does not contain this picture");
     assert_eq!(cell(&without_time(&ran.out)[4], "file"), "b-empty.png");
     // The bytes of a picture in its chunk are damaged, so the picture is lost.
     let whole = std::fs::read(place.path("out.mcap")).unwrap();
@@ -87,7 +87,7 @@ fn what_a_recording_does_not_hold_is_said() {
 }
 
 #[test]
-fn a_recording_that_is_not_whole_is_told_wherever_it_is_read() {
+fn an_incomplete_recording_is_reported_wherever_it_is_read() {
     let place = place();
     let whole = std::fs::read(place.path("out.mcap")).unwrap();
     let chunk = |picture: &str| {
@@ -95,7 +95,7 @@ fn a_recording_that_is_not_whole_is_told_wherever_it_is_read() {
         whole.windows(picture.len()).position(|w| w == picture).unwrap()
     };
     place.write("early.mcap", &whole[..chunk("0000") + 100]);
-    place.run(&["run", "early.mcap"]).expect(2).says("was cut off before its first picture was whole");
+    place.run(&["run", "early.mcap"]).expect(2).says("ends before its first picture is complete");
     let pictures = chunk("0003") + std::fs::metadata(place.path("in/0003.png")).unwrap().len() as usize;
     place.write("cut.mcap", &whole[..pictures + 100]);
     let mut damaged = whole.clone();

@@ -1,9 +1,8 @@
-//! Tests of `hzn run`: inputs, outputs, order, and continuation after any kind of end.
+//! Tests of `hzn run`: inputs, outputs, order, and messages.
 
 mod common;
 
 use common::{Place, cell, without_time};
-use std::time::{Duration, Instant};
 
 #[test]
 fn a_folder_gives_a_table_in_order_with_every_number_of_threads() {
@@ -133,7 +132,7 @@ fn patterns_and_single_pictures() {
     let all = ["run", "in/0000.png", "in/0001.png", "in/notes.txt", "in/sensor.toml"];
     assert_eq!(without_time(&place.run(&all).expect(0).out).len(), 2);
     assert_eq!(without_time(&place.run(&["run", "in/*"]).expect(0).out).len(), 12);
-    place.run(&["run", "in/sensor.toml"]).expect(2).says("is no picture");
+    place.run(&["run", "in/sensor.toml"]).expect(2).says("is not a picture");
     place.run(&["run", "nowhere"]).expect(2).says("nowhere: no such file or folder");
 }
 
@@ -148,15 +147,15 @@ fn numbers_in_names_count_by_their_value() {
     };
     for input in ["in", "in/*.png"] {
         let ran = place.run(&["run", input]).expect(0);
-        assert!(!ran.err.contains("order given"), "{}", ran.err);
+        assert!(!ran.err.contains("given order"), "{}", ran.err);
         assert_eq!(names(ran), "img1.png img2.png img10.png");
     }
     // A shell expands the pattern to this list. A list keeps its order, and a note says so.
     let ran = place.run(&["run", "in/img1.png", "in/img10.png", "in/img2.png"]).expect(0);
-    let ran = ran.says("note: pictures are taken in the order given, img10.png before img2.png; give the folder");
+    let ran = ran.says("note: pictures are processed in the given order, img10.png before img2.png; give the folder");
     assert_eq!(names(ran), "img1.png img10.png img2.png");
     let ran = place.run(&["run", "in/img2.png", "in/img1.png", "in/img10.png"]).expect(0);
-    assert!(!ran.err.contains("order given"), "{}", ran.err);
+    assert!(!ran.err.contains("given order"), "{}", ran.err);
 }
 
 #[cfg(unix)]
@@ -167,12 +166,12 @@ fn a_link_to_nothing_is_a_picture_that_cannot_be_read() {
     std::fs::create_dir(place.path("in/9.png")).unwrap();
     for input in [&["in"][..], &["in/*.png"], &["in/0000.png", "in/0000a.png", "in/0001.png"]] {
         let ran = place.run(&[&["run"], input].concat()).expect(3);
-        assert_eq!(ran.err.contains("note: 1 folder ending in .png left out"), input.len() == 1, "{}", ran.err);
+        assert_eq!(ran.err.contains("note: 1 folder ending in .png was left out"), input.len() == 1, "{}", ran.err);
         let rows = without_time(&ran.out);
         let of = |name: &str| rows.iter().map(|r| cell(r, name).to_owned()).collect::<Vec<_>>();
         assert_eq!(of("file"), ["0000.png", "0000a.png", "0001.png"], "{input:?}");
         assert_eq!(of("status"), ["ok", "unreadable", "ok"], "{input:?}");
-        assert_eq!(of("detail")[1], "is a link to /nonexistent/0.png, which is not there");
+        assert_eq!(of("detail")[1], "is a link to /nonexistent/0.png, which does not exist");
     }
     place.run(&["run", "in/0000a.png"]).expect(2).says("in/0000a.png: no such file");
 }
@@ -190,8 +189,8 @@ fn headerless_pictures() {
     assert_eq!((cell(&rows[0], "status"), cell(&rows[1], "status")), ("ok", "unreadable"));
     assert_eq!(
         cell(&rows[1], "detail"),
-        "153600 bytes, but a picture of 320x240:mono8 has 76800: these are 2 pictures; give each a file of its own; it \
-         fits mono10, mono12, mono16"
+        "153600 bytes, but a picture of 320x240:mono8 has 76800: these are 2 pictures; write each into its own file; \
+         it fits mono10, mono12, mono16"
     );
     let ran = place.run(&["run", "raw/b.raw", "--raw", "320x240:mono12", "-s", "in/sensor.toml"]).expect(0);
     let found = without_time(&ran.out);
@@ -221,154 +220,6 @@ fn outputs_that_exist_are_kept() {
     place.run(&["run", "in", "-o", "no/such/out.csv"]).expect(1).says("the folder does not exist");
 }
 
-#[cfg(target_os = "linux")]
-#[test]
-fn a_full_disk_is_said_and_finished_frames_stay() {
-    let place = Place::with_pictures(3);
-    // /dev/full replaces the unfinished file: every write to it reports a full disk.
-    std::os::unix::fs::symlink("/dev/full", place.path("a.csv.part")).unwrap();
-    place.run(&["run", "in", "-o", "a.csv", "--force"]).expect(1).says("the disk is full");
-    std::os::unix::fs::symlink("/dev/full", place.path("a.mcap.part")).unwrap();
-    place.run(&["run", "in", "-o", "a.mcap", "--force"]).expect(1).says("no space left").says("--resume");
-    std::os::unix::fs::symlink("/dev/full", place.path("o.png")).unwrap();
-    place.run(&["explain", "in/0000.png", "--overlay", "o.png", "--force"]).expect(1).says("the disk is full");
-    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let output = place.command(&["run", "in"]).stdout(full).output().unwrap();
-    common::Ran::from_output(&output, &place.path("")).expect(1).says("cannot be written to stdout");
-}
-
-/// A limit on the file size simulates a disk that fills up during a run.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_disk_that_fills_up_keeps_what_is_finished() {
-    let place = Place::with_pictures(600);
-    place.run(&["run", "in", "-o", "whole.csv", "-q"]).expect(0);
-    let whole = without_time(&place.read("whole.csv"));
-    for (out, blocks) in [("a.csv", 60), ("a.jsonl", 120), ("a.mcap", 800)] {
-        // The signal of the limit is ignored, so that a write fails as on a full disk.
-        let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" run in -o {out}");
-        let hzn = place.command(&[]);
-        let mut shell = std::process::Command::new("bash");
-        shell.args(["-c", &limited]).arg(hzn.get_program()).current_dir(place.path(""));
-        common::Ran::from_output(&shell.output().unwrap(), &place.path(""))
-            .expect(1)
-            .says("ulimit -f")
-            .says("resume the run to go on");
-        assert!(!place.path(out).exists());
-        let info = place.run(&["info", &format!("{out}.part")]).expect(0).out;
-        assert!(!info.contains("frames           0"), "{out}: {info}");
-        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("that were finished before");
-        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
-        assert_eq!(without_time(&place.read("rows.csv")), whole, "{out}");
-    }
-}
-
-/// Starts a run of many pictures, waits until some are finished, and ends it with the signal `end`.
-#[cfg(unix)]
-fn cut_short(place: &Place, out: &str, end: &str) -> Option<i32> {
-    let mut child =
-        place.command(&["run", "in", "-o", out, "-j", "1"]).stderr(std::process::Stdio::null()).spawn().unwrap();
-    let part = place.path(&format!("{out}.part"));
-    let begin = Instant::now();
-    // The file is larger than the part before the first picture.
-    let grown = |part: &std::path::Path| std::fs::metadata(part).is_ok_and(|m| m.len() > 100_000);
-    while !grown(&part) && begin.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    if out.ends_with(".mcap") {
-        // Pictures precede their results in a recording; the pause lets the results follow.
-        std::thread::sleep(Duration::from_millis(60));
-    }
-    let id = child.id().to_string();
-    std::process::Command::new("kill").args([end, &id]).status().unwrap();
-    child.wait().unwrap().code()
-}
-
-#[cfg(unix)]
-#[test]
-fn killed_and_continued_gives_the_same() {
-    let place = Place::with_pictures(2000);
-    place.run(&["run", "in", "-o", "whole.csv", "-q"]).expect(0);
-    let whole = without_time(&place.read("whole.csv"));
-    for out in ["a.csv", "a.jsonl", "a.mcap"] {
-        let code = cut_short(&place, out, "-9");
-        assert_eq!(code, None, "{out}: ended before it was killed");
-        assert!(!place.path(out).exists());
-        place.run(&["run", "in", "-o", out]).expect(2).says("--resume");
-        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("that were finished before");
-        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
-        assert_eq!(without_time(&place.read("rows.csv")), whole, "{out}");
-    }
-}
-
-#[cfg(unix)]
-#[test]
-fn recover_closes_what_a_crash_left() {
-    let place = Place::with_pictures(2000);
-    for out in ["a.csv", "a.mcap"] {
-        cut_short(&place, out, "-9");
-        // The end of the last write is cut off.
-        let part = place.path(&format!("{out}.part"));
-        let file = std::fs::OpenOptions::new().write(true).open(&part).unwrap();
-        file.set_len(std::fs::metadata(&part).unwrap().len() - 3).unwrap();
-        let ran = place.run(&["recover", &format!("{out}.part")]).expect(0).says(" bytes of unfinished frames dropped");
-        let kept = ran.err.split_whitespace().nth(1).unwrap().to_owned();
-        place.run(&["export", out, "-o", "kept.csv", "--force"]).expect(0).says(&format!("{kept} rows"));
-        place.run(&["info", out]).expect(0);
-        assert!(!place.path(&format!("{out}.part")).exists());
-        // The recovered file can be continued.
-        place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
-        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0).says("2000 rows");
-    }
-}
-
-#[cfg(unix)]
-#[test]
-fn interrupted_leaves_a_valid_file() {
-    let place = Place::with_pictures(2000);
-    for out in ["a.csv", "a.mcap"] {
-        assert_eq!(cut_short(&place, out, "-INT"), Some(130), "{out}");
-        assert!(place.path(out).exists());
-        place.run(&["info", out]).expect(0);
-        place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
-        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0).says("2000 rows");
-    }
-}
-
-#[test]
-fn another_input_is_not_appended() {
-    let place = Place::with_pictures(4);
-    place.run(&["run", "in/0000.png", "in/0002.png", "-o", "a.csv"]).expect(0);
-    let before = place.read("a.csv");
-    let err = place.run(&["run", "in", "-o", "a.csv", "--resume"]).expect(2).err;
-    insta::assert_snapshot!(err, @"error: a.csv: its last frame is 0002.png, but the input has 0001.png in that place; \
-                                   give the input that it was begun with, or start over with --force");
-    let err = place.run(&["run", "in/0000.png", "-o", "a.csv", "--resume"]).expect(2).err;
-    insta::assert_snapshot!(err, @"error: a.csv: holds 2 frames, but the input has only 1; give the input that it was \
-                                   begun with, or start over with --force");
-    assert_eq!(place.read("a.csv"), before);
-}
-
-#[test]
-fn another_sensor_is_not_appended() {
-    let place = Place::with_pictures(4);
-    for out in ["a.csv", "a.jsonl", "a.mcap"] {
-        place.run(&["run", "in/0000.png", "in/0001.png", "-o", out]).expect(0);
-        let before = std::fs::read(place.path(out)).unwrap();
-        place
-            .run(&["run", "in", "-o", out, "--resume", "--altitude-km", "410"])
-            .expect(2)
-            // A recording contains its sensor.
-            .says(if out == "a.mcap" { "was begun with another sensor.toml" } else { "now comes out differently" });
-        assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
-        place.write("other.toml", format!("{}[reject]\nseed = 2\n", common::SENSOR).as_bytes());
-        let ran = place.run(&["run", "in", "-o", out, "--resume", "-s", "other.toml"]);
-        assert!(ran.code == 2 && ran.err.contains("--force"), "{out}: {}", ran.err);
-        assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
-        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("2 frames: 2 ok");
-    }
-}
-
 #[cfg(unix)]
 #[test]
 fn nobody_listening_is_no_crash() {
@@ -393,10 +244,11 @@ fn nobody_listening_is_no_crash() {
     assert_eq!(without_time(&place.read("a.csv")).len(), 3);
 }
 
-/// Returns the command that `hzn run` prints after `what to try: `.
+/// Returns the command that `hzn run` prints after `an explanation and advice: `.
 fn suggested(ran: &common::Ran) -> String {
-    let line = ran.err.lines().find(|l| l.contains("what to try: ")).unwrap_or_else(|| panic!("{}", ran.err));
-    line.split("what to try: ").nth(1).unwrap().to_owned()
+    let line =
+        ran.err.lines().find(|l| l.contains("an explanation and advice: ")).unwrap_or_else(|| panic!("{}", ran.err));
+    line.split("an explanation and advice: ").nth(1).unwrap().to_owned()
 }
 
 #[cfg(unix)]

@@ -111,20 +111,24 @@ fn designs_that_cannot_be_are_refused_with_a_reason() {
     };
     refused(&[], "--altitude: missing; give it in kilometres");
     refused(&["--altitude", "5"], "the camera at 5 km is not above the limb at 10 km");
-    refused(&["--altitude", "high"], "\"high\" is no number");
-    refused(&["--altitude", "200", "--fov", "150:60"], "a range rises");
-    refused(&["--altitude", "200", "--fov", "190"], "--fov: 190 is refused: above 0 and up to 175 for this lens");
+    refused(&["--altitude", "high"], "\"high\" is not a number");
+    refused(&["--altitude", "200", "--fov", "150:60"], "from the lower to the higher");
+    refused(
+        &["--altitude", "200", "--fov", "190"],
+        "--fov: 190 is refused: must be above 0 and up to 175 for this lens",
+    );
     refused(&["--altitude", "200", "--size", "1920"], "expected WIDTHxHEIGHT");
     refused(&["--altitude", "200", "--rows", "0.5"], "--rows: 0.5 is refused");
-    refused(&["--altitude", "200", "--body", "mars"], "\"mars\" is no body; expected earth, moon, sun, or a radius");
+    refused(&["--altitude", "200", "--body", "mars"], "\"mars\" is not a body; expected earth, moon, sun, or a radius");
     refused(&["--altitude", "200", "--sigma-px", "0"], "--sigma-px: 0 is refused");
     refused(&["--altitude", "200", "-o", "x.pdf"], "a table ends in .csv, a plot in .svg");
-    refused(&["--altitude", "200", "-o", "x.svg"], "give one value a range");
+    refused(&["--altitude", "200", "-o", "x.svg"], "there is no range to plot over");
     refused(&["visibility", "--altitude", "5"], "5 km is not above the limb at 10 km");
     // No limb in view is a valid result, with advice.
     let ran = place.run(&["sensitivity", "--altitude", "3000", "--fov", "30"]).expect(0);
     assert!(ran.out.lines().nth(1).unwrap().ends_with('-'), "{}", ran.out);
     ran.says(
-        "1 of 1 see no limb, or too little of it: at 3000 km it is 47.1 deg below the horizontal; --depression 47",
+        "1 of 1 designs see no limb, or too little of it: at 3000 km the limb is 47.1 deg below the horizontal; \
+         --depression 47",
     );
 }

@@ -66,7 +66,7 @@ fn a_scene_becomes_pictures_that_the_sensor_answers() {
         ("sensor.toml", "sensor.toml", "lens "),
         ("imu.csv", "imu.csv, rates and accelerations", "rows             3501\n"),
         ("gnss.csv", "gnss.csv, fixes", "rows             351\n"),
-        ("frames.csv", "frames.csv, what is known", "pictures         5\n"),
+        ("frames.csv", "frames.csv, the priors of pictures", "pictures         5\n"),
         ("truth.csv", "truth of pictures", "limb in view in 5 of 5"),
         ("small-00000.png", "PNG picture of", "1 channel of 8 bits"),
     ] {
@@ -75,7 +75,7 @@ fn a_scene_becomes_pictures_that_the_sensor_answers() {
         assert!(told.starts_with(&format!("file             {kind}")) && told.contains(more), "{file}: {told}");
     }
     std::fs::write(at.join("any.csv"), "a,b\n1,2\n").unwrap();
-    assert!(hzn(at, "1", &["info", "any.csv"]).1.starts_with("file             table that is none of hzn's"));
+    assert!(hzn(at, "1", &["info", "any.csv"]).1.starts_with("file             table that hzn does not know"));
 
     // The sensor processes the pictures without changes.
     let (code, stdout, stderr) = hzn(at, "2", &["run", "out"]);
@@ -116,7 +116,7 @@ fn pictures_of_the_rendering_before_do_not_stay() {
 }
 
 #[test]
-fn what_cannot_be_is_said_before_anything_is_written() {
+fn impossible_values_are_refused_before_anything_is_written() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
     let refused = |text: &str| {
@@ -207,7 +207,10 @@ fn radiances_of_ones_own() {
     }
     std::fs::write(at.join("moved/scene-radiance.csv"), radiances().replace("0.600", "0.650")).unwrap();
     let (code, _, stderr) = hzn(at, "1", &["simulate", "moved/scene.toml", "-o", "again", "--resume"]);
-    assert!(code == 2 && stderr.contains("again/scene-radiance.csv: is not what the scene names"), "{stderr}");
+    assert!(
+        code == 2 && stderr.contains("again/scene-radiance.csv: differs from the file that the scene names"),
+        "{stderr}"
+    );
 
     let (code, _, stderr) = simulate(&radiances().replacen("0.800", "0.000", 1));
     let what = "line 2: radiance = 0 at 0 km at latitude -90 and season 0 deg: must be above 0 at the lowest";

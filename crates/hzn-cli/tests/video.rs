@@ -168,7 +168,7 @@ fn frames_of_a_video_go_by_one_clock() {
 
 #[cfg(unix)]
 #[test]
-fn how_ffmpeg_ends_is_told() {
+fn the_end_of_ffmpeg_is_reported() {
     let scripts = Scripts::new();
     let ends = |end: &str| {
         let ran = scripts.run("echo best_effort_timestamp_time=0.1", end);
@@ -193,8 +193,8 @@ fn how_ffmpeg_ends_is_told() {
 }
 
 #[test]
-fn a_video_that_breaks_off_is_told() {
-    if !decoder("a_video_that_breaks_off_is_told") {
+fn a_truncated_video_is_reported() {
+    if !decoder("a_truncated_video_is_reported") {
         return;
     }
     let place = Place::with_pictures(40);
@@ -317,5 +317,5 @@ fn one_colour_of_a_video_and_its_rotation() {
     };
     // The option of ffmpeg 6 counts counter-clockwise. In older versions the written tag also counts counter-clockwise.
     assert!(turned(&["-display_rotation", "-90"], &[]) || turned(&[], &["-metadata:s:v:0", "rotate=270"]));
-    run(&place, "turned.mp4").expect(0).says("turned.mp4 says that it is to be shown turned by 90 degrees clockwise");
+    run(&place, "turned.mp4").expect(0).says("turned.mp4 is to be shown turned by 90 degrees clockwise");
 }

@@ -20,7 +20,7 @@ pub(crate) fn read_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyD
     let read = errors::detached(py, || {
         let mut reader = Reader::open(&path, Contents::WithoutImages)?;
         let rows = reader.by_ref().map(|frame| frame.map(|f| f.row)).collect::<Result<Vec<Row>, hzn_mcap::Error>>()?;
-        Ok::<_, hzn_mcap::Error>((rows, hzn_run::source::lost_of_recording(&reader, &path, "read")))
+        Ok::<_, hzn_mcap::Error>((rows, hzn_run::source::describe_recording_loss(&reader, &path, "read")))
     })?;
     let (rows, lost) = read.map_err(errors::other)?;
     lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
@@ -83,7 +83,7 @@ impl Open {
         if std::mem::replace(&mut self.warned, true) {
             None
         } else {
-            hzn_run::source::lost_of_recording(&self.reader, path, "read")
+            hzn_run::source::describe_recording_loss(&self.reader, path, "read")
         }
     }
 
@@ -165,7 +165,7 @@ impl Frame {
     #[getter]
     fn image<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Some(image) = self.image.clone() else { return Ok(None) };
-        let decoded = errors::detached(py, || hzn_run::source::recorded(image).decode(None))?;
+        let decoded = errors::detached(py, || hzn_run::source::Payload::from_recorded(image).decode(None))?;
         crate::image::to_array(py, decoded.map_err(errors::image)?.0).map(Some)
     }
     #[doc = doc!("Frame.report")]

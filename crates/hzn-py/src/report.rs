@@ -63,7 +63,7 @@ impl Report {
     pub(crate) fn new(row: Row, report: &hzn_core::Report<f64>, trace: Option<&Trace>, camera: &Arc<Camera>) -> Self {
         let detail = trace.map(|trace| Detail {
             stages_us: trace.times().into_iter().map(|(s, t)| (s.name().into(), t.as_nanos() as f64 / 1e3)).collect(),
-            drawing: hzn_run::sink::annotations(trace, report.solution.as_ref(), &camera.lens),
+            drawing: hzn_run::engine::annotate(trace, report.solution.as_ref(), &camera.lens),
         });
         Self {
             candidates: CandidateEdge::from_report(report),
@@ -141,7 +141,7 @@ impl Report {
             }
             let fitted = || {
                 let axis = UnitVec3::try_new(self.row.axis()?)?;
-                Some(hzn_run::sink::fitted(&axis, self.half_angle_rad?, &self.camera.as_ref()?.lens))
+                Some(hzn_run::overlay::draw_cone(&axis, self.half_angle_rad?, &self.camera.as_ref()?.lens))
             };
             fitted().unwrap_or_default()
         })

@@ -55,7 +55,7 @@ impl Sequence {
             let has_sensor = source.sensor_toml().is_some();
             let frames = (!has_sensor && table.exists()).then(|| hzn_calib::frames::load(&table)).transpose();
             let frames = frames.map_err(errors::config)?;
-            engine::prepare(&state.config, state.flight, frames.as_ref()).map_err(errors::config)?;
+            engine::check_frames(&state.config, state.flight, frames.as_ref()).map_err(errors::config)?;
             Ok((source, frames, bits))
         })??;
         for warning in frames.iter().flat_map(|f: &hzn_calib::Frames| f.check_sensor(&state.config)) {
@@ -81,7 +81,7 @@ impl Sequence {
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<Item>> {
         let next = || {
             let mut source = self.source.lock().unwrap_or_else(PoisonError::into_inner);
-            source.next().ok_or_else(|| source.lost())
+            source.next().ok_or_else(|| source.describe_loss())
         };
         let item = match errors::detached(py, next)? {
             Ok(item) => item,
@@ -146,12 +146,12 @@ fn default_plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
 }
 
 fn process_item(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: source::Item) -> PyResult<Report> {
-    let finished = errors::detached(py, || state.lend(|sensor| engine::one(plan, sensor, index, item)))??;
+    let finished = errors::detached(py, || state.lend(|sensor| engine::process_one(plan, sensor, index, item)))??;
     let finished: Finished = finished.map_err(|e| errors::other(format!("{e:#}")))?;
     let rows = hzn_run::sink::rows(&finished, &plan.config);
     let report = |(row, found): (hzn_mcap::Row, &engine::BodyOutcome)| match &found.report {
         Ok(found) => Report::new(row, found, None, &state.camera),
         Err(_) => Report::from_row(row),
     };
-    Report::from_bodies(py, rows.into_iter().zip(&finished.found).map(report))
+    Report::from_bodies(py, rows.into_iter().zip(&finished.outcomes).map(report))
 }

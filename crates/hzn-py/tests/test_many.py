@@ -183,7 +183,7 @@ def test_bits_are_found_once_for_a_sequence(sensor, tmp_path):
     for i, scale in enumerate((0.25, 16, 16)):
         words = (limb(i).astype(float) * scale).astype(">u2")
         (tmp_path / f"{i}.pgm").write_bytes(b"P5\n320 240\n65535\n" + words.tobytes())
-    with pytest.warns(UserWarning, match="reach 3200 in 3 pictures looked at: taken as 12 bits"):
+    with pytest.warns(UserWarning, match="in 3 pictures is 3200: the camera is assumed to have 12 bits"):
         reports = list(sensor.process_many(tmp_path))
     assert reports[1].ok and np.allclose(reports[1].axis, sensor.process(limb(1)).axis, atol=1e-4)
 

@@ -54,7 +54,7 @@ impl Error {
     pub fn into_cause(self) -> anyhow::Error {
         self.cause
     }
-    pub(crate) fn with(self, remedy: Remedy) -> Self {
+    pub(crate) fn with_remedy(self, remedy: Remedy) -> Self {
         Self { remedy: Some(remedy), ..self }
     }
 }

@@ -6,16 +6,13 @@ use hzn_core::verdict::Verdict;
 use hzn_core::{Report, Solution, gates};
 
 /// Returns the meaning of a verdict, with the limit that was not met.
-pub fn why(verdict: Verdict, s: &gates::Config) -> String {
+pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
     match verdict {
         Verdict::Chosen => "the answer".into(),
         Verdict::Passed => "passed every gate, but another fits better".into(),
-        Verdict::NoConsensus => "no limb goes through enough of its points".into(),
+        Verdict::NoConsensus => "too few edge points agree on one limb".into(),
         Verdict::FewInliers => format!("fewer than {} inliers (select.min_inliers)", s.min_inliers),
-        Verdict::ShortArc => match s.min_arc_px {
-            Some(px) => format!("inliers cover less than {px} px (select.min_arc_px)"),
-            None => "inliers cover less than a tenth of the picture's diagonal (select.min_arc_px)".into(),
-        },
+        Verdict::ShortArc => short_arc_text(s.min_arc_px),
         Verdict::Residuals => format!("rms above {} px (select.max_rms_px)", s.max_rms_px),
         Verdict::HalfAngle => format!(
             "half-angle more than {} sigma from the expected one (select.max_half_angle_sigma)",
@@ -23,34 +20,36 @@ pub fn why(verdict: Verdict, s: &gates::Config) -> String {
         ),
         Verdict::Uncertain => format!("sigma above {} deg (select.max_sigma_deg)", s.max_sigma_deg),
         Verdict::NoFit => "the fit did not converge".into(),
-        Verdict::Indistinct => "a curve through clutter: many of its points lie close beside the fitted limb, or a \
-                                part of it follows the limb by chance"
-            .into(),
-        Verdict::NoSky => "what lies beyond the fitted limb is no sky (select.max_lit_sky)".into(),
-        Verdict::Taken => "it is the limb of another body, found before".into(),
-        Verdict::OutOfView => {
-            "the limb that is expected about the fitted axis is not in the picture (select.limb_in_view)".into()
-        }
-        Verdict::Straight => {
-            "a straight line fits the edge nearly as well (select.min_evidence), or its curvature does not tell the \
-             body's side (select.min_side_sigma)"
+        Verdict::Indistinct => {
+            "the edge is clutter: many of its points lie close to the fitted limb but not on it, or \
+                                a part of it follows the limb by chance"
                 .into()
         }
-        Verdict::Radius => "the limb is not that wide at any altitude allowed (select.altitude_limits_km)".into(),
-        Verdict::Unsupported => "the fitted limb goes on where the picture shows none".into(),
+        Verdict::NoSky => "the region beyond the fitted limb is not sky (select.max_lit_sky)".into(),
+        Verdict::Taken => "this limb was already assigned to another body".into(),
+        Verdict::OutOfView => {
+            "the expected limb around the fitted axis is outside the picture (select.limb_in_view)".into()
+        }
+        Verdict::Straight => {
+            "a straight line fits the edge nearly as well (select.min_evidence), or its curvature is too uncertain to \
+             say on which side the body is (select.min_side_sigma)"
+                .into()
+        }
+        Verdict::Radius => "no allowed altitude gives a limb of this half-angle (select.altitude_limits_km)".into(),
+        Verdict::Unsupported => "the picture shows no edge along a part of the fitted limb".into(),
         Verdict::Circle => format!(
-            "a circle of the image fits it more than {} times better than the limb: a lens flare \
+            "a circle in the picture fits more than {} times better than the limb: it is a lens flare \
              (select.max_rival_ratio)",
             s.max_rival_ratio
         ),
         Verdict::Polyline => format!(
-            "straight pieces fit it more than {} times better than the limb: an iris or a vehicle's part \
+            "straight lines fit more than {} times better than the limb: it is an iris or a part of the vehicle \
              (select.max_rival_ratio)",
             s.max_rival_ratio
         ),
-        Verdict::Departure => "the edge goes on smoothly beside the fitted limb (select.max_departure)".into(),
+        Verdict::Departure => "the edge leaves the fitted limb smoothly (select.max_departure)".into(),
         Verdict::Band => {
-            "behind the edge is a narrow band and then the sky again, not the body (select.max_band)".into()
+            "behind the edge there is a narrow band and then the sky again, not the body (select.max_band)".into()
         }
         Verdict::Attitude => format!(
             "the axis is more than {} sigma from the given attitude (select.max_attitude_sigma)",
@@ -66,15 +65,23 @@ pub fn why(verdict: Verdict, s: &gates::Config) -> String {
     }
 }
 
+/// Returns the meaning of [`Verdict::ShortArc`]; without a limit in pixels, it is a part of the picture's diagonal.
+fn short_arc_text(min_arc_px: Option<f64>) -> String {
+    match min_arc_px {
+        Some(px) => format!("inliers cover less than {px} px (select.min_arc_px)"),
+        None => "inliers cover less than a tenth of the picture's diagonal (select.min_arc_px)".into(),
+    }
+}
+
 /// Returns the name of a source of error in words.
-pub fn term(term: Term) -> &'static str {
+pub fn term_text(term: Term) -> &'static str {
     match term {
         Term::EdgeNoise => "edge noise",
         Term::CommonShift => "a shift that the whole edge shares",
         Term::CommonTilt => "a tilt that the whole edge shares",
         Term::UnknownAzimuth => "the limb's unknown azimuth",
         Term::Lens => "the calibration of the lens",
-        Term::Clipping => "the height of a limb that is clipped at full scale",
+        Term::Clipping => "the limb height where the picture is clipped at full scale",
         Term::LimbHeight => "the limb height",
         Term::Altitude => "the altitude",
         Term::Radius => "the unknown local radius",
@@ -82,16 +89,16 @@ pub fn term(term: Term) -> &'static str {
 }
 
 /// Returns the meaning of a status for a picture in which no edge was fitted.
-pub fn without_edges(status: Status) -> &'static str {
+pub fn status_text(status: Status) -> &'static str {
     match status {
         Status::Ok => "the answer",
-        Status::NoLimb => "no edge that could be a limb, or one brightness all over",
-        Status::TooDark => "darker than gate.min_mean allows",
-        Status::TooBright => "brighter than gate.max_mean allows",
-        Status::TooFewPoints => "only short edges (candidates.min_points)",
+        Status::NoLimb => "no edge can be a limb, or the whole picture has one brightness",
+        Status::TooDark => "the picture is darker than gate.min_mean allows",
+        Status::TooBright => "the picture is brighter than gate.max_mean allows",
+        Status::TooFewPoints => "only short edges were found (candidates.min_points)",
         Status::Ambiguous => "two directions fit about equally well",
         Status::Rejected => "an edge failed a gate",
-        Status::Truncated => "more edges than may be looked at (limits.max_work)",
+        Status::Truncated => "the picture has more edges than the work budget allows (limits.max_work)",
         Status::Unreadable => "the picture cannot be read",
         Status::NoAltitude => "no altitude above the limb height is known",
     }
@@ -99,7 +106,7 @@ pub fn without_edges(status: Status) -> &'static str {
 
 /// Returns the standard deviations of the axis along its two principal directions, the larger first, and the angle of
 /// the larger one, measured from image x towards image y. All are in radians.
-pub fn principal(s: &Solution<f64>) -> ([f64; 2], f64) {
+pub fn principal_sigmas(s: &Solution<f64>) -> ([f64; 2], f64) {
     let [x, y, z] = s.axis.xyz();
     // Image x and y are rotated to the axis by the shortest rotation, as for the rays.
     let q = 1.0 / (1.0 + z).max(1e-9);
@@ -117,74 +124,72 @@ pub fn principal(s: &Solution<f64>) -> ([f64; 2], f64) {
 
 /// Returns advice for a picture without an answer.
 pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
-    let has = |v: Verdict| r.candidates.iter().any(|c| c.verdict == v);
-    let mut tips: Vec<&str> = Vec::new();
-    match r.status {
-        Status::TooDark => tips.push("the picture is darker than gate.min_mean allows: lower it, or expose longer"),
-        Status::TooBright => tips.push(
-            "the picture is brighter than gate.max_mean allows: raise it, or expose \
-                                        shorter",
-        ),
-        Status::TooFewPoints => tips.push(
-            "only short edges were found, as of stars, noise or hot pixels: is the body \
-                                           in view? if it is as small as that, lower candidates.min_points",
-        ),
-        Status::Truncated => tips.push(
-            "the picture has more edges than it may cost to look at: raise limits.max_work, \
-                                        mask structure in view, or set a level above the clouds (binarize.method = \
-                                        \"fixed\")",
-        ),
-        Status::Ambiguous => tips.push(
-            "two directions fit about equally well: mask structure in view \
-                                        (mask.polygons_px)",
-        ),
-        _ => {}
-    }
-    if r.status == Status::NoLimb && r.stage == Stage::Binarize {
-        tips.push("the picture has one brightness all over: nothing is in view, or the exposure does not show it");
-    } else if r.candidates.is_empty() && r.status == Status::NoLimb {
-        tips.push(
-            "no edge is long enough: is the limb in view? try another level (binarize.scale, or method = \"fixed\")",
-        );
-    }
-    if has(Verdict::NoConsensus) || has(Verdict::FewInliers) {
-        tips.push(
-            "no candidate has the form of the expected limb: check altitude_km, the focal length and the lens \
-                   model; a larger reject.threshold_px forgives a poor calibration",
-        );
-    }
-    if has(Verdict::HalfAngle) {
-        tips.push(
-            "a limb was found, but larger or smaller than expected: check altitude and focal length, or raise \
-                   body.limb_height_sigma_km",
-        );
-    }
-    if has(Verdict::Residuals) {
-        tips.push("the edge does not follow the limb closely: check the calibration, or raise select.max_rms_px");
-    }
-    if has(Verdict::ShortArc) || has(Verdict::Uncertain) {
-        tips.push(
-            "too little of the limb is in view for a good answer: lower select.min_arc_px or raise \
-                   select.max_sigma_deg if a poor one will do",
-        );
-    }
-    if has(Verdict::Unsupported) {
-        tips.push("an edge fits by chance (cloud, structure): mask what belongs to the vehicle, or try another level");
-    }
-    if has(Verdict::Attitude) {
-        tips.push(
-            "the picture contradicts the given attitude: check the order of the quaternion (qw, qx, qy, qz: \
-                   camera to ECEF), its time, and attitude_sigma_deg",
-        );
-    }
-    if has(Verdict::Sun) {
-        tips.push(
-            "the limb is on the night side of the given Sun: check sun_x, sun_y, sun_z (in the camera); for a \
-                   thermal camera set body.sunlit = false",
-        );
-    }
-    tips
+    let has = |v: &Verdict| r.candidates.iter().any(|c| c.verdict == *v);
+    let by_verdict = VERDICT_TIPS.iter().filter(|(verdicts, _)| verdicts.iter().any(has)).map(|(_, tip)| *tip);
+    status_tip(r).into_iter().chain(by_verdict).collect()
 }
+
+/// Returns advice that follows from the status of a picture.
+fn status_tip(r: &Report<f64>) -> Option<&'static str> {
+    Some(match r.status {
+        Status::TooDark => "the picture is darker than gate.min_mean allows: lower it, or expose longer",
+        Status::TooBright => "the picture is brighter than gate.max_mean allows: raise it, or expose shorter",
+        Status::TooFewPoints => {
+            "only short edges were found, for example of stars, noise or hot pixels. Is the body in view? If the body \
+             is very small, lower candidates.min_points"
+        }
+        Status::Truncated => {
+            "the edges of the picture cost more than the work budget: raise limits.max_work, mask structure in view, \
+             or set a threshold above the clouds (binarize.method = \"fixed\")"
+        }
+        Status::Ambiguous => "two directions fit about equally well: mask structure in view (mask.polygons_px)",
+        Status::NoLimb if r.stage == Stage::Binarize => {
+            "the whole picture has one brightness: nothing is in view, or the exposure does not show it"
+        }
+        Status::NoLimb if r.candidates.is_empty() => {
+            "no edge is long enough. Is the limb in view? Try another threshold (binarize.scale, or method = \
+             \"fixed\")"
+        }
+        _ => return None,
+    })
+}
+
+/// Advice for a picture that has a candidate with one of these verdicts.
+const VERDICT_TIPS: &[(&[Verdict], &str)] = &[
+    (
+        &[Verdict::NoConsensus, Verdict::FewInliers],
+        "no candidate has the form of the expected limb: check altitude_km, the focal length and the lens model; a \
+         larger reject.threshold_px tolerates a poor calibration",
+    ),
+    (
+        &[Verdict::HalfAngle],
+        "a limb was found, but it is larger or smaller than expected: check altitude and focal length, or raise \
+         body.limb_height_sigma_km",
+    ),
+    (
+        &[Verdict::Residuals],
+        "the edge does not follow the limb closely: check the calibration, or raise select.max_rms_px",
+    ),
+    (
+        &[Verdict::ShortArc, Verdict::Uncertain],
+        "too little of the limb is in view for a good answer: if a less accurate answer is sufficient, lower \
+         select.min_arc_px or raise select.max_sigma_deg",
+    ),
+    (
+        &[Verdict::Unsupported],
+        "an edge fits by chance (cloud, structure): mask the parts of the vehicle in view, or try another threshold",
+    ),
+    (
+        &[Verdict::Attitude],
+        "the picture contradicts the given attitude: check the order of the quaternion (qw, qx, qy, qz: camera to \
+         ECEF), its time, and attitude_sigma_deg",
+    ),
+    (
+        &[Verdict::Sun],
+        "the limb is on the night side of the given Sun: check sun_x, sun_y, sun_z (in the camera); for a thermal \
+         camera set body.sunlit = false",
+    ),
+];
 
 /// Returns a number with its noun: `1 picture`, `2 pictures`.
 pub fn counted(n: u64, what: &str) -> String {

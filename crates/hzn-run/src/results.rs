@@ -37,7 +37,7 @@ pub type AllRows = Box<dyn Iterator<Item = Result<Row, Error>>>;
 /// The file is of another kind or cannot be read, or a row is not a row of results.
 pub fn rows(file: &Path, kind: &str) -> Result<AllRows, Error> {
     let name = file.display().to_string();
-    let not = move |line: u64, why: String| failed(format!("{name}:{line}: no row of hzn results: {why}"));
+    let refuse = move |line: u64, why: String| failed(format!("{name}:{line}: not a row of hzn results: {why}"));
     match kind {
         "csv" => {
             let reader = csv::Reader::from_path(file).map_err(failed)?;
@@ -46,20 +46,20 @@ pub fn rows(file: &Path, kind: &str) -> Result<AllRows, Error> {
                 csv::ErrorKind::Deserialize { err, .. } => err.kind().to_string(),
                 _ => e.to_string(),
             };
-            let row = move |(i, r): (usize, csv::Result<Row>)| r.map_err(|e| not(i as u64 + 2, why(e)));
-            Ok(whole(Box::new(reader.into_deserialize().enumerate().map(row)), file))
+            let row = move |(i, r): (usize, csv::Result<Row>)| r.map_err(|e| refuse(i as u64 + 2, why(e)));
+            Ok(drop_incomplete(Box::new(reader.into_deserialize().enumerate().map(row)), file))
         }
         "jsonl" => {
             let lines = std::io::BufReader::new(std::fs::File::open(file)?).lines();
             let row = move |(i, line): (usize, std::io::Result<String>)| {
-                serde_json::from_str(&line?).map_err(|e| not(i as u64 + 1, e.to_string()))
+                serde_json::from_str(&line?).map_err(|e| refuse(i as u64 + 1, e.to_string()))
             };
-            Ok(whole(Box::new(lines.enumerate().map(row)), file))
+            Ok(drop_incomplete(Box::new(lines.enumerate().map(row)), file))
         }
         _ => Err(unusable(format!("{}: .mcap, .csv or .jsonl is expected", file.display()))),
     }
 }
 
-fn whole(rows: AllRows, file: &Path) -> AllRows {
+fn drop_incomplete(rows: AllRows, file: &Path) -> AllRows {
     if ending(file) == "part" { Box::new(rows.take_while(Result::is_ok)) } else { rows }
 }

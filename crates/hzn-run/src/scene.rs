@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use hzn_sim::scenario::BUILTIN;
 use hzn_sim::{Scenario, ScenarioError};
 
+use crate::disk;
 use crate::error::{Error, unusable};
-use crate::sink;
 
 /// Returns the path and the text of a scene. `name` is one of [`BUILTIN`], or the path of a scene.toml.
 ///
@@ -22,7 +22,7 @@ pub fn source(name: &str) -> Result<(PathBuf, String), Error> {
         match hzn_calib::nearest(name, names.iter().copied()) {
             Some(near) if !path.exists() => unusable(format!("{name}: no such scene or file; did you mean {near}?")),
             _ if !path.exists() => unusable(format!("{name}: no such file; built-in scenes are {}", names.join(", "))),
-            _ => sink::cannot(&path, &e),
+            _ => disk::cannot_write(&path, &e),
         }
     })?;
     Ok((path, text))

@@ -60,7 +60,7 @@ fn process_in_settings(horizon: &mut HostHorizon, trial: &Trial, settings: &[Set
     let picture = trial.render()?;
     let one = |s: &Setting| {
         let prior = PriorKnowledge { attitude_sigma_deg: s.attitude.then_some(ATTITUDE_DEG) };
-        Ok(look(horizon, &sensor(trial, s.threshold_px), trial, &picture, prior, &Unobserved)?)
+        Ok(process_trial(horizon, &sensor(trial, s.threshold_px), trial, &picture, prior, &Unobserved)?)
     };
     settings.iter().map(one).collect()
 }

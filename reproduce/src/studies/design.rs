@@ -178,9 +178,9 @@ pub(super) fn visibility(_: &Effort) -> anyhow::Result<Section> {
         Series::new(name, Style::Line, altitudes.iter().map(|&km| (km, value(&visibility(km)))))
     };
     let chart = Chart::new("Field of view from which on a limb can be seen", "altitude [km]", "field of view [deg]")
-        .with(curve("arc of an ellipse", |v| v.ellipse_deg))
-        .with(curve("arc of a hyperbola", |v| v.hyperbola_deg))
-        .with(curve("whole disc", |v| v.disc_deg));
+        .with_series(curve("arc of an ellipse", |v| v.ellipse_deg))
+        .with_series(curve("arc of a hyperbola", |v| v.hyperbola_deg))
+        .with_series(curve("whole disc", |v| v.disc_deg));
     s.figure("visibility", &chart)?;
     Ok(s)
 }
@@ -215,7 +215,7 @@ pub(super) fn spherical_earth(_: &Effort) -> anyhow::Result<Section> {
             let latitude = f64::from(i);
             (latitude, Vertical::from_position(latitude, km, 0.0).map_or(f64::NAN, |v| v.geocentric_to_axis_deg))
         });
-        chart = chart.with(Series::new(format!("{km} km"), Style::Line, points));
+        chart = chart.with_series(Series::new(format!("{km} km"), Style::Line, points));
     }
     s.figure("spherical-earth", &chart)?;
     Ok(s)

@@ -111,7 +111,7 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
     let chart = Chart::new("RMS error by angle off nadir", "off nadir [deg]", "deg");
     let series = names.into_iter().zip(curves).map(|(name, curve)| Series::new(name, Style::Line, curve));
     let published = Series::new("[W], published", Style::Dots, [(0.0, 0.04), (120.0, 0.16)]);
-    s.figure("infrared", &series.fold(chart, Chart::with).with(published))?;
+    s.figure("infrared", &series.fold(chart, Chart::with_series).with_series(published))?;
     s.text(
         "`zju-2022` rebuilds [W]: Zernike points, RANSAC with pre-verification, and an elliptic cone by (weighted) \
          total least squares. Its five free parameters cost little on a whole disc and much on an arc, because it uses \

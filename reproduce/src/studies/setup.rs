@@ -4,7 +4,7 @@ use anyhow::{Context, anyhow};
 use hzn_core::Preset;
 use hzn_core::body::Kind;
 use hzn_core::{Config, body, covariance};
-use hzn_sim::scenario::{Fit, FIT_PICTURES};
+use hzn_sim::scenario::{FIT_PICTURES, Fit};
 use hzn_sim::{Flight, Scenario};
 
 /// Note on the results of sensors whose limb height and noise come from [`simulated`].

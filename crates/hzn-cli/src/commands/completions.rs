@@ -1,7 +1,5 @@
 //! `hzn completions`: prints completions for a shell.
 
-use clap::CommandFactory;
-
 use crate::exit::{Exit, Outcome};
 
 /// Print completions for a shell
@@ -21,7 +19,8 @@ enum Shell {
     Fish,
 }
 
-pub(super) fn run(args: &Args) -> Outcome {
+/// Prints the completions of `command`.
+pub(super) fn run(args: &Args, mut command: clap::Command) -> Outcome {
     let shell = match args.shell {
         Shell::Bash => clap_complete::Shell::Bash,
         Shell::Zsh => clap_complete::Shell::Zsh,
@@ -29,7 +28,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     // The text goes to memory first, because the generator panics when stdout is closed early.
     let mut text = Vec::new();
-    clap_complete::generate(shell, &mut super::Cli::command(), "hzn", &mut text);
+    clap_complete::generate(shell, &mut command, "hzn", &mut text);
     std::io::Write::write_all(&mut std::io::stdout(), &text)?;
     Ok(Exit::Done)
 }

@@ -1,10 +1,10 @@
 //! `hzn demo`: processes a rendered flight with known truth, and a real photograph, from beginning to end.
 
-use hzn_run::explain;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use hzn_mcap::{Contents, Reader, Row};
+use hzn_run::{disk, explain, overlay, sink};
 use hzn_sim::evaluate::{Evaluation, pair};
 use hzn_sim::{Flight, Truth};
 
@@ -12,8 +12,6 @@ use super::{evaluate, run as sequence};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::setup::clear_rendered;
 use crate::tell;
-use hzn_run::overlay;
-use hzn_run::sink;
 
 const ISS_PICTURE: &[u8] = include_bytes!("../../assets/iss-limb-2020-11-20.jpg");
 const ISS_SENSOR: &str = include_str!("../../assets/iss.toml");
@@ -46,64 +44,101 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage("--count: must be 1 or more"));
     }
     let begin = Instant::now();
-    clear_rendered(&folder.join("flight"))?;
-    let (flight_dir, iss_dir) = (folder.join("flight"), folder.join("iss"));
-    for dir in [&flight_dir, &iss_dir] {
-        std::fs::create_dir_all(dir).map_err(|e| sink::cannot(dir, &e))?;
+    let places = Places::new(folder);
+    clear_rendered(&places.flight)?;
+    for dir in [&places.flight, &places.iss] {
+        std::fs::create_dir_all(dir).map_err(|e| disk::cannot_write(dir, &e))?;
     }
     tell::line(format_args!("rendering {} of a rocket flight ...", explain::counted(args.count.into(), "picture")));
     let flight = hzn_sim::flight::rocket(1280, 720, usize::from(args.count), 1);
-    let truth = write_flight(&flight, &flight_dir)?;
-
+    let truth = write_flight(&flight, &places.flight)?;
     tell::line(format_args!("looking for the limb ..."));
-    let (flight_mcap, flight_csv) = (folder.join("flight.mcap"), folder.join("flight.csv"));
-    process(&flight_dir, &flight_mcap)?;
-    let rows = rows(&flight_mcap)?;
-    let mut table = sink::RowFile::create(&flight_csv, sink::Existing::Replace)?;
+    let rows = process_flight(&places)?;
+    let iss = process_photograph(&places)?;
+    std::fs::write(&places.layout, hzn_mcap::LAYOUT).map_err(|e| disk::cannot_write(&places.layout, &e))?;
+    std::fs::create_dir_all(&places.overlays).map_err(|e| disk::cannot_write(&places.overlays, &e))?;
+    let drawn = draw(&places.flight_mcap, &places.overlays, 5)? + draw(&places.iss_mcap, &places.overlays, 1)?;
+
+    let mut out = format!("{}\n{}\n", flight_text(&rows, &truth)?, iss_text(iss.first()));
+    out.push_str(&format!("Files, after {:.1} s:\n", begin.elapsed().as_secs_f64()));
+    out.push_str(&places.text(drawn));
+    tell::result(out)?;
+    Ok(Exit::Done)
+}
+
+/// The files and folders of the demo.
+struct Places {
+    flight: PathBuf,
+    flight_mcap: PathBuf,
+    flight_csv: PathBuf,
+    iss: PathBuf,
+    iss_mcap: PathBuf,
+    layout: PathBuf,
+    overlays: PathBuf,
+}
+
+impl Places {
+    fn new(folder: &Path) -> Self {
+        Self {
+            flight: folder.join("flight"),
+            flight_mcap: folder.join("flight.mcap"),
+            flight_csv: folder.join("flight.csv"),
+            iss: folder.join("iss"),
+            iss_mcap: folder.join("iss.mcap"),
+            layout: folder.join("foxglove-layout.json"),
+            overlays: folder.join("overlay"),
+        }
+    }
+
+    /// Returns the list of the files, and the commands to try next. `drawn` is the number of overlays.
+    fn text(&self, drawn: usize) -> String {
+        let place = |p: &Path| p.display().to_string();
+        let files = [
+            (place(&self.flight), "rendered pictures with sensor.toml, frames.csv (positions) and truth.csv"),
+            (place(&self.flight_mcap), "results with pictures, for Foxglove"),
+            (place(&self.flight_csv), "the same results as a table"),
+            (place(&self.iss), "a photograph from the ISS with its sensor.toml"),
+            (place(&self.iss_mcap), "its result"),
+            (place(&self.layout), "panels for these results, to be imported in Foxglove"),
+            (place(&self.overlays), &format!("{drawn} pictures with everything drawn over them")),
+        ];
+        let mut out = String::new();
+        let wide = files.iter().map(|(name, _)| name.len()).max().unwrap_or_default();
+        for (name, what) in files {
+            out.push_str(&format!("  {name:<wide$}  {what}\n"));
+        }
+        let picture = place(&self.iss.join("iss-limb-2020-11-20.jpg"));
+        out.push_str(&format!("\nNext:  hzn explain {picture} --overlay out.png\n"));
+        out.push_str(&format!("       hzn run {} -o mine.csv\n", place(&self.flight)));
+        let truth = place(&self.flight.join("truth.csv"));
+        out.push_str(&format!("       hzn evaluate {} --truth {truth} -o report.html\n", place(&self.flight_mcap)));
+        out
+    }
+}
+
+/// Processes the rendered flight. Writes its results as MCAP and as CSV, and returns them.
+fn process_flight(places: &Places) -> Result<Vec<Row>, Stop> {
+    process(&places.flight, &places.flight_mcap)?;
+    let rows = read_rows(&places.flight_mcap)?;
+    let mut table = sink::RowFile::create(&places.flight_csv, sink::Existing::Replace)?;
     for row in &rows {
         table.write(row)?;
     }
     table.finish()?;
+    Ok(rows)
+}
 
+/// Writes the photograph with its sensor, processes it, and returns its result.
+fn process_photograph(places: &Places) -> Result<Vec<Row>, Stop> {
     let write = |name: &str, bytes: &[u8]| {
-        let path = iss_dir.join(name);
-        std::fs::write(&path, bytes).map_err(|e| sink::cannot(&path, &e))
+        let path = places.iss.join(name);
+        std::fs::write(&path, bytes).map_err(|e| disk::cannot_write(&path, &e))
     };
     write("iss-limb-2020-11-20.jpg", ISS_PICTURE)?;
     write("sensor.toml", ISS_SENSOR.as_bytes())?;
     write("CREDITS.md", ISS_CREDITS.as_bytes())?;
-    let iss_mcap = folder.join("iss.mcap");
-    process(&iss_dir, &iss_mcap)?;
-    let iss = self::rows(&iss_mcap)?;
-    let layout = folder.join("foxglove-layout.json");
-    std::fs::write(&layout, hzn_mcap::LAYOUT).map_err(|e| sink::cannot(&layout, &e))?;
-    let overlays = folder.join("overlay");
-    std::fs::create_dir_all(&overlays).map_err(|e| sink::cannot(&overlays, &e))?;
-    let shown = draw(&flight_mcap, &overlays, 5)? + draw(&iss_mcap, &overlays, 1)?;
-
-    let mut out = format!("{}\n{}\n", flight_text(&rows, &truth)?, iss_text(iss.first()));
-    let place = |p: &Path| p.display().to_string();
-    out.push_str(&format!("Files, after {:.1} s:\n", begin.elapsed().as_secs_f64()));
-    let files = [
-        (place(&flight_dir), "rendered pictures with sensor.toml, frames.csv (positions) and truth.csv"),
-        (place(&flight_mcap), "results with pictures, for Foxglove"),
-        (place(&flight_csv), "the same results as a table"),
-        (place(&iss_dir), "a photograph from the ISS with its sensor.toml"),
-        (place(&iss_mcap), "its result"),
-        (place(&layout), "panels for these results, to be imported in Foxglove"),
-        (place(&overlays), &format!("{shown} pictures with everything drawn over them")),
-    ];
-    let wide = files.iter().map(|(name, _)| name.len()).max().unwrap_or_default();
-    for (name, what) in files {
-        out.push_str(&format!("  {name:<wide$}  {what}\n"));
-    }
-    let picture = place(&iss_dir.join("iss-limb-2020-11-20.jpg"));
-    out.push_str(&format!("\nNext:  hzn explain {picture} --overlay out.png\n"));
-    out.push_str(&format!("       hzn run {} -o mine.csv\n", place(&flight_dir)));
-    let truth = place(&flight_dir.join("truth.csv"));
-    out.push_str(&format!("       hzn evaluate {} --truth {truth} -o report.html\n", place(&flight_mcap)));
-    tell::result(out)?;
-    Ok(Exit::Done)
+    process(&places.iss, &places.iss_mcap)?;
+    read_rows(&places.iss_mcap)
 }
 
 /// Writes pictures, sensor.toml, frames.csv and truth.csv of the flight. Returns the truth.
@@ -111,12 +146,12 @@ fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
     let config = toml::to_string(&flight.sensor).map_err(failed)?;
     let path = folder.join("sensor.toml");
     let text = format!("# The camera of a rendered rocket flight.\npreset = \"hzn\"\n\n{config}");
-    std::fs::write(&path, text).map_err(|e| sink::cannot(&path, &e))?;
+    std::fs::write(&path, text).map_err(|e| disk::cannot_write(&path, &e))?;
 
     // The pictures are rendered one after the other, because each already uses all cores.
     for frame in &flight.frames {
         let path = folder.join(&frame.file);
-        frame.render().map_err(failed)?.save(&path).map_err(|e| sink::not_saved(&path, &e))?;
+        frame.render().map_err(failed)?.save(&path).map_err(|e| disk::cannot_save(&path, &e))?;
     }
     let mut known = String::from("file,time_s,x_km,y_km,z_km\n");
     for frame in &flight.frames {
@@ -124,40 +159,41 @@ fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
         known.push_str(&format!("{},{},{x},{y},{z}\n", frame.file, frame.time_s));
     }
     let path = folder.join("frames.csv");
-    std::fs::write(&path, known).map_err(|e| sink::cannot(&path, &e))?;
+    std::fs::write(&path, known).map_err(|e| disk::cannot_write(&path, &e))?;
 
     let truth: Vec<Truth> = flight.frames.iter().map(|f| f.truth()).collect::<Result<_, _>>().map_err(failed)?;
     let path = folder.join("truth.csv");
     let written = |e: csv::Error| match e.into_kind() {
-        csv::ErrorKind::Io(e) => sink::cannot(&path, &e).into(),
+        csv::ErrorKind::Io(e) => disk::cannot_write(&path, &e).into(),
         other => failed(format!("{}: {other:?}", path.display())),
     };
     let mut table = csv::Writer::from_path(&path).map_err(written)?;
     for row in &truth {
         table.serialize(row).map_err(written)?;
     }
-    table.flush().map_err(|e| sink::cannot(&path, &e))?;
+    table.flush().map_err(|e| disk::cannot_write(&path, &e))?;
     Ok(truth)
 }
 
 fn process(folder: &Path, out: &Path) -> Result<(), Stop> {
-    match sequence::run(&sequence::Args::quietly(folder, out))? {
+    match sequence::run(&sequence::Args::quiet_run(folder, out))? {
         Exit::Done => Ok(()),
         Exit::Interrupted => Err(failed(format!("{}: interrupted", folder.display()))),
-        _ => {
-            Err(failed(format!("{}: some pictures could not be processed; `hzn run` on it says why", folder.display())))
-        }
+        _ => Err(failed(format!(
+            "{}: some pictures could not be processed; `hzn run` on this folder says why",
+            folder.display()
+        ))),
     }
 }
 
-fn rows(path: &Path) -> Result<Vec<Row>, Stop> {
+fn read_rows(path: &Path) -> Result<Vec<Row>, Stop> {
     let reader = Reader::open(path, Contents::WithoutImages).map_err(failed)?;
     reader.map(|frame| frame.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)
 }
 
 /// Draws `count` pictures of a recording, evenly spread. Returns how many were drawn.
 fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
-    let total = rows(recording)?.len();
+    let total = read_rows(recording)?.len();
     let mut drawn = 0;
     for (i, frame) in Reader::open(recording, Contents::All).map_err(failed)?.enumerate() {
         let frame = frame.map_err(failed)?;
@@ -166,7 +202,7 @@ fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
             continue;
         }
         let Some(image) = frame.image else { continue };
-        let (picture, _) = hzn_run::source::recorded(image).decode(None).map_err(failed)?;
+        let (picture, _) = hzn_run::source::Payload::from_recorded(image).decode(None).map_err(failed)?;
         let image = overlay::draw_annotations(picture.to_rgb(), &frame.annotations, frame.row.status.name());
         overlay::save(&image, &folder.join(overlay::file_name(&frame.row.file)))?;
         drawn += 1;
@@ -176,7 +212,7 @@ fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
 
 /// Compares the results with the truth, in words and numbers.
 fn flight_text(rows: &[Row], truth: &[Truth]) -> Result<String, Stop> {
-    let answers: Vec<_> = rows.iter().map(hzn_run::sink::answer).collect();
+    let answers: Vec<_> = rows.iter().map(sink::answer).collect();
     let cases = pair(&answers, truth, None).map_err(failed)?;
     let mut out = String::from("Rendered rocket flight, against the truth\n");
     let mut line = |name: &str, value: String| out.push_str(&format!("  {name:<22} {value}\n"));
@@ -186,7 +222,7 @@ fn flight_text(rows: &[Row], truth: &[Truth]) -> Result<String, Stop> {
     let mut microseconds: Vec<f64> = rows.iter().filter_map(|r| r.elapsed_us).collect();
     microseconds.sort_by(f64::total_cmp);
     if let Some(middle) = microseconds.get(microseconds.len() / 2) {
-        line("processing", format!("{middle:.0} us a frame in the middle, without decoding"));
+        line("processing", format!("{middle:.0} us a picture (median), without decoding"));
     }
     Ok(out)
 }
@@ -201,8 +237,8 @@ fn iss_text(row: Option<&Row>) -> String {
             let found = (row.inliers.unwrap_or(0), row.edge_points.unwrap_or(0), row.rms_px.unwrap_or(0.0));
             line("fit", format!("{} of {} edge points, rms {:.2} px", found.0, found.1, found.2));
             if let (Some(h), Some(s)) = (row.altitude_est_km, row.altitude_est_sigma_km) {
-                let given = row.altitude_km.unwrap_or(0.0);
-                line("altitude from the limb", format!("{h:.0} +- {s:.0} km (the station was at about {given} km)"));
+                let flown = row.altitude_km.unwrap_or(0.0);
+                line("altitude from the limb", format!("{h:.0} +- {s:.0} km (the station was at about {flown} km)"));
             }
         }
         _ => line("status", format!("{}: {}", row.status.name(), row.detail)),

@@ -7,13 +7,13 @@ use hzn_calib::FrameData;
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Report, Solution, body, threshold};
 use hzn_mcap::Annotations;
-
-use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::setup::{InputArgs, SensorArgs, need_altitude, settle_input};
-use crate::tell;
 use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
 use hzn_run::source::{self, Item, Picture, Source};
-use hzn_run::{explain, overlay, sink};
+use hzn_run::{disk, engine, explain, overlay, sink};
+
+use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::setup::{InputArgs, SensorArgs, check_altitude, find_input};
+use crate::tell;
 
 /// Show what happens to one picture: what is kept, what is dropped, and why
 #[derive(Debug, clap::Args)]
@@ -41,13 +41,13 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let mut source = args.source.open(std::slice::from_ref(&args.frame))?;
     let mut sensor = args.sensor.load(source.as_ref())?;
-    let notes = settle_input(source.as_mut(), &mut sensor)?;
+    let notes = find_input(source.as_mut(), &mut sensor)?;
     notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
-    need_altitude(&sensor, source.as_ref(), frames.as_ref())?;
+    check_altitude(&sensor, source.as_ref(), frames.as_ref())?;
     let mut item = item(source.as_mut(), args.index)?;
     let config = &sensor.config;
-    let data = item.known(frames.as_ref());
+    let data = item.take_prior(frames.as_ref());
     let decoding = Instant::now();
     let picture = match item.payload.decode(Some(config)) {
         Ok((picture, _)) => picture,
@@ -58,11 +58,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     let decoding = decoding.elapsed();
     if picture.pages > 1 {
-        let what = "pictures, of which this is the first";
-        tell::line(format_args!("note: {} holds {} {what}", item.name, picture.pages));
+        let what = "pictures; only the first is explained";
+        tell::line(format_args!("note: {} contains {} {what}", item.name, picture.pages));
     }
-    let looked = Looked { name: &item.name, config, data: data.as_ref(), picture: &picture };
-    looked.explain(args, decoding)
+    let picture = PictureWithPrior { name: &item.name, config, data: data.as_ref(), picture: &picture };
+    picture.explain(args, decoding)
 }
 
 /// Refuses an overlay that is not a PNG, is the picture itself, or exists.
@@ -70,11 +70,11 @@ fn check_overlay(path: &Path, args: &Args) -> Result<(), Stop> {
     if source::ending(path) != "png" {
         return Err(usage(format!("{}: the overlay's ending must be .png", path.display())));
     }
-    if sink::is_same(path, &args.frame) {
+    if disk::is_same(path, &args.frame) {
         let what = "is the picture itself; choose another name for the overlay";
         return Err(usage(format!("{}: {what}", path.display())));
     }
-    Ok(sink::refuse_existing(path, args.force)?)
+    Ok(disk::refuse_existing(path, args.force)?)
 }
 
 /// Returns picture number `index` of a sequence, counted from 0.
@@ -90,14 +90,14 @@ fn item(source: &mut dyn Source, index: u64) -> Result<Item, Stop> {
 }
 
 /// A picture with its prior.
-struct Looked<'a> {
+struct PictureWithPrior<'a> {
     name: &'a str,
     config: &'a Config,
     data: Option<&'a FrameData>,
     picture: &'a Picture,
 }
 
-impl Looked<'_> {
+impl PictureWithPrior<'_> {
     /// Processes the picture and explains each body; draws the overlay.
     fn explain(&self, args: &Args, decoding: Duration) -> Outcome {
         let Self { name: file, config, data, picture } = *self;
@@ -133,7 +133,7 @@ impl Looked<'_> {
             tell::result(format_args!("{between}{}", explained.text(decoding, time.elapsed)))?;
             // The camera includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
             let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
-            drawing.add(sink::annotations(trace, report.solution.as_ref(), &camera));
+            drawing.add(engine::annotate(trace, report.solution.as_ref(), &camera));
             let status = report.status;
             statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
         }
@@ -167,8 +167,8 @@ impl Explained<'_> {
         };
         line("picture", self.layout());
         line("expected", self.expected());
-        line("binarize", self.level());
-        self.looks(&mut line);
+        line("binarize", self.threshold());
+        self.further_looks(&mut line);
         self.edges(&mut line);
         self.candidates(&mut line);
         self.points(&mut line);
@@ -194,15 +194,18 @@ impl Explained<'_> {
     }
 
     /// Prints the further looks, and the width of a dark border that was left out.
-    fn looks(&self, line: &mut impl FnMut(&str, String)) {
-        let again = self.trace.again();
-        if !again.is_empty() {
-            let levels: Vec<String> = again.iter().map(u16::to_string).collect();
+    fn further_looks(&self, line: &mut impl FnMut(&str, String)) {
+        let further = self.trace.further_thresholds();
+        if !further.is_empty() {
+            let levels: Vec<String> = further.iter().map(u16::to_string).collect();
             let looks = self.report.counters.looks;
-            line("looks", format!("{looks}: without an answer at that level, also at {}", levels.join(", ")));
+            line(
+                "looks",
+                format!("{looks}: there was no answer at this threshold, so further looks used {}", levels.join(", ")),
+            );
         }
-        if self.trace.frame_px() > 0 {
-            line("frame", format!("{} px of dark frame around the picture left out", self.trace.frame_px()));
+        if self.trace.border_px() > 0 {
+            line("frame", format!("a dark border of {} px around the picture is left out", self.trace.border_px()));
         }
     }
 
@@ -232,18 +235,21 @@ impl Explained<'_> {
         for k in &r.candidates {
             let rms = if k.rms_px.is_finite() { format!("{:.3}", k.rms_px) } else { "-".into() };
             let numbers = format!("{:>4} {:>8} {:>8} {:>8} {rms:>8}", k.number, k.length_px, k.points, k.inliers);
-            line("", format!("{numbers}  {}: {}", k.verdict.name(), explain::why(k.verdict, &self.config.select)));
+            line(
+                "",
+                format!("{numbers}  {}: {}", k.verdict.name(), explain::verdict_text(k.verdict, &self.config.select)),
+            );
         }
         let more = (r.counters.candidates as usize).saturating_sub(r.candidates.len());
         if more > 0 {
-            line("", format!("and {more} further ones that are not listed"));
+            line("", format!("{more} further edges are not listed"));
         }
     }
 
     fn points(&self, line: &mut impl FnMut(&str, String)) {
         let c = self.report.counters;
         if c.fallback_points > 0 {
-            let what = "points stand at the global level, because their local one was not found";
+            let what = "points are at the global threshold, because no local mid-level was found";
             line("sub-pixel", format!("{} of {} {what}", c.fallback_points, c.edge_points));
         }
         if self.report.stage >= Stage::Reject {
@@ -260,7 +266,7 @@ impl Explained<'_> {
     fn times(&self, decoding: Duration, elapsed: Duration, line: &mut impl FnMut(&str, String)) {
         let us = |d: Duration| d.as_nanos() as f64 / 1e3;
         let (all, ms) = (us(elapsed), decoding.as_secs_f64() * 1e3);
-        let by_stage = "by stage, while watched (which takes time too):";
+        let by_stage = "by stage, with an observer (which takes time too):";
         line("time", format!("{all:.0} us in all, after {ms:.1} ms of decoding; {by_stage}"));
         for (stage, time) in self.trace.times() {
             if time > Duration::ZERO {
@@ -273,7 +279,7 @@ impl Explained<'_> {
         let body = self.body;
         let cone = format!("{}, cone of {:.4} deg half-angle", body.kind.name(), self.half_angle.to_degrees());
         let Some(km) = sink::altitude_km(self.data, body) else {
-            return format!("{cone}, as seen from about the Earth");
+            return format!("{cone}, as seen from near the Earth");
         };
         let from = match self.data {
             Some(d) if d.position_km.is_some() => format!("position at {km:.2} km given with the picture"),
@@ -283,7 +289,7 @@ impl Explained<'_> {
         format!("{cone} ({from}, limb at {} +- {} km)", body.limb_height_km, body.limb_height_sigma_km)
     }
 
-    fn level(&self) -> String {
+    fn threshold(&self) -> String {
         let method = format!("{:?}", self.levels.method).to_lowercase();
         let full = (1u32 << self.picture.layout.bits) - 1;
         match (self.trace.level(), self.report.status) {
@@ -292,10 +298,12 @@ impl Explained<'_> {
                 format!("mean brightness is outside of {} to {} of full scale", g.min_mean, g.max_mean)
             }
             (Some((level, mean, n)), _) => {
-                format!("level {level} of {full} ({method}), mean {mean:.1} over a sample of {n} pixels")
+                format!("threshold {level} of {full} ({method}), mean {mean:.1} over a sample of {n} pixels")
             }
-            (None, Status::NoLimb) if self.report.level == 0 => format!("all alike: no level ({method})"),
-            (None, _) => format!("level {} of {full} ({method})", self.report.level),
+            (None, Status::NoLimb) if self.report.level == 0 => {
+                format!("one brightness everywhere: no threshold ({method})")
+            }
+            (None, _) => format!("threshold {} of {full} ({method})", self.report.level),
         }
     }
 
@@ -304,19 +312,24 @@ impl Explained<'_> {
     fn budget(&self, candidate: u32) -> Vec<(&'static str, f64)> {
         let edges = self.trace.edges();
         let terms = edges.iter().find(|e| e.candidate == candidate).map_or(&[][..], |e| &e.budget_rad);
-        terms.iter().filter(|(_, rad)| *rad > 0.0).map(|(term, rad)| (explain::term(*term), rad.to_degrees())).collect()
+        terms
+            .iter()
+            .filter(|(_, rad)| *rad > 0.0)
+            .map(|(term, rad)| (explain::term_text(*term), rad.to_degrees()))
+            .collect()
     }
 
     /// Returns how the rolling shutter was treated; `None` without a rolling shutter.
     fn shutter(&self) -> Option<String> {
         let readout_s = self.config.camera.readout_s;
         let rate = self.data.and_then(|d| d.rate_rad_s);
-        let turned = |rate: [f64; 3]| rate.map(|r| (r * readout_s).to_degrees());
-        (readout_s != 0.0).then(|| match rate.map(turned) {
+        let drift = |rate: [f64; 3]| rate.map(|r| (r * readout_s).to_degrees());
+        (readout_s != 0.0).then(|| match rate.map(drift) {
             Some([x, y, z]) => {
-                format!("rows turned back by the rate: {x:.3}, {y:.3}, {z:.3} deg from the first to the last")
+                format!("the rows are corrected by the rate: {x:.3}, {y:.3}, {z:.3} deg from the first to the last")
             }
-            None => "no rate of rotation is given: the rows are not turned back, and sigma does not hold it".to_owned(),
+            None => "no rate of rotation is known: the rows are not corrected, and sigma does not include this error"
+                .to_owned(),
         })
     }
 
@@ -329,7 +342,7 @@ impl Explained<'_> {
                 z.clamp(-1.0, 1.0).acos().to_degrees()
             ),
         );
-        let (sigma, angle_rad) = explain::principal(s);
+        let (sigma, angle_rad) = explain::principal_sigmas(s);
         line(
             "sigma",
             format!(
@@ -374,7 +387,7 @@ fn advice(r: &Report<f64>, picture: &Picture, line: &mut impl FnMut(&str, String
     let mut tips: Vec<String> = explain::tips(r).into_iter().map(str::to_owned).collect();
     tips.extend(picture.unused_bits());
     if tips.is_empty() {
-        tips.push("look at the edges that were found: --overlay out.png".to_owned());
+        tips.push("look at the edges that were found, with --overlay out.png".to_owned());
     }
     for (i, tip) in tips.into_iter().enumerate() {
         line(if i == 0 { "try" } else { "" }, tip);

@@ -1,16 +1,14 @@
 //! `hzn export`: writes results in another form.
 
-use hzn_run::explain;
 use std::path::{Path, PathBuf};
 
 use hzn_mcap::{Contents, FrameRecord, ImageFormat, Reader};
-use hzn_run::results;
+use hzn_run::sink::{self, Existing, RowFile};
+use hzn_run::source::{self, ending};
+use hzn_run::{disk, explain, overlay, results};
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
-use hzn_run::overlay;
-use hzn_run::sink::{self, Existing, RowFile};
-use hzn_run::source::{self, ending};
 
 /// Turn a recording into a table, pictures, or pictures with overlay
 #[derive(Debug, clap::Args)]
@@ -33,7 +31,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    let (kind, _) = source::existing(file)?;
+    let (kind, _) = source::check_exists(file)?;
     let pictures = args.images.is_some() || args.overlay.is_some();
     if args.output.is_none() && !pictures {
         return Err(usage("nothing to export: give -o out.csv, -o out.jsonl, --images DIR or --overlay DIR"));
@@ -41,13 +39,13 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.output
         && sink::target(path)? == sink::Target::Mcap
     {
-        return Err(usage(format!("{}: a table is written here: .csv or .jsonl", path.display())));
+        return Err(usage(format!("{}: a table must end in .csv or .jsonl", path.display())));
     }
     if kind != "mcap" && pictures {
-        return Err(usage(format!("{}: only a recording (.mcap) holds pictures", file.display())));
+        return Err(usage(format!("{}: only a recording (.mcap) contains pictures", file.display())));
     }
     for folder in [&args.images, &args.overlay].into_iter().flatten() {
-        std::fs::create_dir_all(folder).map_err(|e| sink::cannot(folder, &e))?;
+        std::fs::create_dir_all(folder).map_err(|e| disk::cannot_write(folder, &e))?;
     }
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
     let mut table = args.output.as_deref().map(|path| RowFile::create(path, existing)).transpose()?;
@@ -66,9 +64,9 @@ pub(super) fn run(args: &Args) -> Outcome {
                 images += 1;
             }
         }
-        lost = source::lost_of_recording(&reader, file, "exported");
+        lost = source::describe_recording_loss(&reader, file, "exported");
         if pictures && images == 0 {
-            tell::warning(format_args!("{}: holds no pictures (was it recorded with --no-images?)", file.display()));
+            tell::warning(format_args!("{}: contains no pictures (was it recorded with --no-images?)", file.display()));
         }
     } else {
         for row in results::rows(file, &kind)? {
@@ -99,12 +97,12 @@ fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {
             _ => (decode(&image, &name)?.to_png().map_err(failed)?, "png"),
         };
         let path = folder.join(picture_name(&name, ending));
-        sink::refuse_existing(&path, args.force)?;
-        std::fs::write(&path, bytes).map_err(|e| sink::cannot(&path, &e))?;
+        disk::refuse_existing(&path, args.force)?;
+        std::fs::write(&path, bytes).map_err(|e| disk::cannot_write(&path, &e))?;
     }
     if let Some(folder) = &args.overlay {
         let path = folder.join(overlay::file_name(&name));
-        sink::refuse_existing(&path, args.force)?;
+        disk::refuse_existing(&path, args.force)?;
         let picture = decode(&image, &name)?;
         let drawn = overlay::draw_annotations(picture.to_rgb(), &frame.annotations, frame.row.status.name());
         overlay::save(&drawn, &path)?;
@@ -113,7 +111,7 @@ fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {
 }
 
 fn decode(image: &hzn_mcap::EncodedImage, name: &str) -> Result<hzn_run::source::Picture, Stop> {
-    let decoded = hzn_run::source::recorded(image.clone()).decode(None);
+    let decoded = hzn_run::source::Payload::from_recorded(image.clone()).decode(None);
     decoded.map(|(picture, _)| picture).map_err(|why| failed(format!("{name}: {why}")))
 }
 

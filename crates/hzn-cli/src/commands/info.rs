@@ -1,16 +1,16 @@
 //! `hzn info`: describes the content of a file.
 
-use hzn_run::explain;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hzn_core::status::Status;
 use hzn_mcap::{Contents, Reader, Row};
+use hzn_run::explain;
+use hzn_run::source::{self, decode, ending};
 use hzn_sim::Scenario;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
-use hzn_run::source::{self, ending, picture};
 
 /// Say what a file is, and what it contains
 ///
@@ -24,7 +24,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    let (kind, _) = source::existing(file)?;
+    let (kind, _) = source::check_exists(file)?;
     let (text, lost) = match kind.as_str() {
         "mcap" => recording(file)?,
         "csv" | "jsonl" => (table(file, &kind)?, None),
@@ -37,9 +37,9 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 /// The description of a file, and what is missing in it.
-type Said = (String, Option<String>);
+type Described = (String, Option<String>);
 
-fn recording(file: &Path) -> Result<Said, Stop> {
+fn recording(file: &Path) -> Result<Described, Stop> {
     // The pictures are read too, because the result says whether they are complete.
     let mut reader = Reader::open(file, Contents::All).map_err(failed)?;
     let mut summary = Summary::default();
@@ -49,7 +49,7 @@ fn recording(file: &Path) -> Result<Said, Stop> {
     if summary.frames == 0 && reader.sensor_toml().is_none() {
         return foreign(file);
     }
-    let mut out = what("recording of hzn run") + &summary.text();
+    let mut out = kind_line("recording of hzn run") + &summary.text();
     for (key, value) in reader.metadata() {
         out.push_str(&format!("{key:<16} {value}\n"));
     }
@@ -65,7 +65,7 @@ fn recording(file: &Path) -> Result<Said, Stop> {
     }
     // An unfinished file without broken parts is not damaged: its run still goes on, or --resume continues it.
     let unfinished = ending(file) == "part" && reader.broken_chunks() == 0;
-    Ok((out, source::lost_of_recording(&reader, file, "counted").filter(|_| !unfinished)))
+    Ok((out, source::describe_recording_loss(&reader, file, "counted").filter(|_| !unfinished)))
 }
 
 fn unfinished(file: &Path) -> String {
@@ -73,7 +73,7 @@ fn unfinished(file: &Path) -> String {
 }
 
 /// Describes the pictures in a recording of another program.
-fn foreign(file: &Path) -> Result<Said, Stop> {
+fn foreign(file: &Path) -> Result<Described, Stop> {
     let mut reader = hzn_mcap::ImageReader::open(file, None).map_err(failed)?;
     let (mut count, mut span) = (0u64, None::<(f64, f64)>);
     for image in reader.by_ref() {
@@ -81,7 +81,7 @@ fn foreign(file: &Path) -> Result<Said, Stop> {
         count += 1;
         span = Some(span.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
     }
-    let mut out = what("recording without results of hzn") + &format!("pictures         {count}\n");
+    let mut out = kind_line("recording without results of hzn") + &format!("pictures         {count}\n");
     if let (Some(topic), Some((a, b))) = (reader.topic(), span) {
         out.push_str(&format!("topic            {topic}\ntime             {a:.3} to {b:.3} s\n"));
     }
@@ -105,7 +105,7 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
         if !header.iter().eq(Row::COLUMNS) {
             let frames = hzn_calib::frames::load(file)?;
             let with = |has: fn(&hzn_calib::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
-            let mut out = what("frames.csv, what is known of pictures");
+            let mut out = kind_line("frames.csv, the priors of pictures");
             out.push_str(&format!("pictures         {}\n", frames.rows.len()));
             for (name, n) in [
                 ("time", with(|r| r.time_s.is_some())),
@@ -127,7 +127,7 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
     for row in hzn_run::results::rows(file, kind)? {
         summary.add(&row?);
     }
-    let mut out = what("results of hzn run") + &summary.text();
+    let mut out = kind_line("results of hzn run") + &summary.text();
     if ending(file) == "part" {
         out.push_str(&unfinished(file));
     }
@@ -142,7 +142,7 @@ fn truth(file: &Path) -> Result<String, Stop> {
         *seen += usize::from(row.has_limb());
         *all += 1;
     }
-    let mut out = what("truth of pictures, for `hzn evaluate RESULTS --truth FILE`");
+    let mut out = kind_line("truth of pictures, for `hzn evaluate RESULTS --truth FILE`");
     for (body, [seen, all]) in bodies {
         out.push_str(&format!("{body:<16} limb in view in {seen} of {all} pictures\n"));
     }
@@ -152,10 +152,10 @@ fn truth(file: &Path) -> Result<String, Stop> {
 /// Describes a table of measurements over time, from the instruments of `hzn simulate` or from another program.
 fn series(file: &Path, header: &csv::StringRecord) -> Result<String, Stop> {
     let has = |name: &str| header.iter().position(|column| column == name);
-    let mut out = what(match () {
+    let mut out = kind_line(match () {
         () if has("gyro_x_radps").is_some() => "imu.csv, rates and accelerations of a simulated vehicle",
         () if has("x_m").is_some() && has("vx_mps").is_some() => "gnss.csv, fixes of a simulated satellite receiver",
-        () => "table that is none of hzn's (results, frames.csv, truth.csv, imu.csv, gnss.csv)",
+        () => "table that hzn does not know (results, frames.csv, truth.csv, imu.csv, gnss.csv)",
     });
     let number = |row: &csv::StringRecord, name: &str| has(name).and_then(|i| row.get(i)?.parse::<f64>().ok());
     let (mut rows, mut span, mut saturated) = (0u64, None::<(f64, f64)>, 0u64);
@@ -179,14 +179,14 @@ fn series(file: &Path, header: &csv::StringRecord) -> Result<String, Stop> {
 }
 
 /// Returns the first line: the kind of the file.
-fn what(kind: &str) -> String {
+fn kind_line(kind: &str) -> String {
     format!("file             {kind}\n")
 }
 
 fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
     if kind != "toml" {
         let camera = hzn_calib::camera_file::load(file, None)?;
-        return Ok(what("camera file") + &super::camera::describe(&hzn_core::Config::new(camera))?);
+        return Ok(kind_line("camera file") + &super::camera::describe(&hzn_core::Config::new(camera))?);
     }
     let text = std::fs::read_to_string(file).map_err(|e| failed(format!("{}: cannot be read: {e}", file.display())))?;
     // The function that reads the text below reports its errors.
@@ -196,11 +196,11 @@ fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
     }
     let sensor = hzn_calib::sensor::load(file)?;
     sensor.warnings.iter().for_each(tell::warning);
-    Ok(what("sensor.toml") + &super::camera::describe(&sensor.config)?)
+    Ok(kind_line("sensor.toml") + &super::camera::describe(&sensor.config)?)
 }
 
 fn scene(scenario: &Scenario) -> Result<String, Stop> {
-    let mut out = what("scene, for `hzn simulate FILE`");
+    let mut out = kind_line("scene, for `hzn simulate FILE`");
     let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {value}\n"));
     let (capture, camera) = (&scenario.capture, &scenario.camera);
     line("name", scenario.name.clone());
@@ -215,11 +215,11 @@ fn scene(scenario: &Scenario) -> Result<String, Stop> {
 
 fn one_picture(file: &Path) -> Result<String, Stop> {
     let named = |why: String| failed(format!("{}: {why}", file.display()));
-    let bytes = picture::read_file(file).map_err(named)?;
-    let p = picture::decode(&bytes, None).map_err(named)?;
-    let format = picture::format_of(&bytes).map(|f| format!("{f:?}").to_uppercase()).unwrap_or_default();
+    let bytes = decode::read_file(file).map_err(named)?;
+    let p = decode::decode(&bytes, None).map_err(named)?;
+    let format = decode::guess_format(&bytes).map(|f| format!("{f:?}").to_uppercase()).unwrap_or_default();
     let l = p.layout;
-    let mut out = what(&format!(
+    let mut out = kind_line(&format!(
         "{format} picture of {} x {} px, {} of {} bits",
         l.width,
         l.height,
@@ -227,13 +227,13 @@ fn one_picture(file: &Path) -> Result<String, Stop> {
         l.bits
     ));
     if p.pages > 1 {
-        out.push_str(&format!("pictures         {}, of which hzn takes the first\n", p.pages));
+        out.push_str(&format!("pictures         {}; hzn processes only the first\n", p.pages));
     }
-    if let Some(how) = p.to_be_turned() {
-        out.push_str(&format!("to be shown      {how}; input.orient says whether it is\n"));
+    if let Some(how) = p.display_turn() {
+        out.push_str(&format!("to be shown      {how}; input.orient decides whether hzn turns it\n"));
     }
     if let Some(t) = p.exif_time_s {
-        out.push_str(&format!("EXIF time        {t:.3} s since 1970, taken as UTC\n"));
+        out.push_str(&format!("EXIF time        {t:.3} s since 1970, assumed to be UTC\n"));
     }
     Ok(out)
 }
@@ -301,7 +301,7 @@ impl Summary {
             ] {
                 if let Some([low, middle, high]) = percentiles(values) {
                     let [low, middle, high] = [low, middle, high].map(three_digits);
-                    line(name, format!("{middle} {unit} in the middle, {low} to {high} for 90 %"));
+                    line(name, format!("median {middle} {unit}, 90 % from {low} to {high}"));
                 }
             }
         }

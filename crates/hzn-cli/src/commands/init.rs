@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use hzn_calib::start::{self, CameraFacts};
 use hzn_core::camera::Model;
+use hzn_run::disk;
+use hzn_run::source::{self, Payload, Source};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
-use hzn_run::sink;
-use hzn_run::source::{self, Payload, Source};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -71,7 +71,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.output.exists() && !args.force {
         return Err(usage(format!("{name}: exists already; choose another name with -o, or --force replaces it")));
     }
-    let write = |text: &str| std::fs::write(&args.output, text).map_err(|e| sink::cannot(&args.output, &e));
+    let write = |text: &str| std::fs::write(&args.output, text).map_err(|e| disk::cannot_write(&args.output, &e));
     if args.pictures.is_empty() {
         write(hzn_calib::template::SENSOR_TOML)?;
         tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));
@@ -83,7 +83,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     start.warnings.iter().for_each(tell::warning);
     if known.exif.turned {
         tell::warning(
-            "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the picture as it is stored",
+            "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
         );
     }
     tell::line(format_args!(
@@ -97,7 +97,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     ));
     if known.altitude_km.is_none() {
         tell::line(
-            "every picture needs an altitude: from a frames.csv beside them (columns file, altitude_km), or from \
+            "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or \
              --altitude KM",
         );
     }
@@ -124,13 +124,13 @@ fn known(args: &Args) -> Result<CameraFacts, Stop> {
 fn one_size(source: &dyn Source) -> Result<(u32, u32), Stop> {
     let mut sizes = source.sizes();
     let Some((first, size)) = sizes.next() else {
-        return Err(usage("none of the pictures can be read, so that their size is not known"));
+        return Err(usage("none of the pictures can be read, so their size is not known"));
     };
     let word = |(w, h): (u32, u32)| format!("{w}x{h}");
     match sizes.find(|(_, other)| *other != size) {
         Some((name, other)) => Err(usage(format!(
-            "{first} is {}, but {name} is {}: a sensor.toml is for pictures of one size; give those of one camera and \
-             mode",
+            "{first} is {}, but {name} is {}: a sensor.toml is for pictures of one size; give the pictures of one \
+             camera and mode",
             word(size),
             word(other)
         ))),

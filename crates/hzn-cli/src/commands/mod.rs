@@ -17,7 +17,7 @@ mod telecommand;
 mod telemetry;
 mod view;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::exit::Outcome;
 
@@ -74,6 +74,6 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Telemetry(args) => telemetry::run(&args),
         Command::Telecommand(args) => telecommand::run(&args),
         Command::View(args) => view::run(&args),
-        Command::Completions(args) => completions::run(&args),
+        Command::Completions(args) => completions::run(&args, Cli::command()),
     }
 }

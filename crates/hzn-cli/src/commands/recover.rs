@@ -1,12 +1,11 @@
 //! `hzn recover`: closes a file that a crash left unfinished.
 
-use hzn_run::explain;
 use std::path::{Path, PathBuf};
+
+use hzn_run::{disk, explain, sink, source};
 
 use crate::exit::{Exit, Outcome, failed, usage};
 use crate::tell;
-use hzn_run::sink;
-use hzn_run::source;
 
 /// Close a file that a crash left unfinished
 ///
@@ -27,9 +26,9 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    let (kind, unfinished) = source::existing(file)?;
+    let (kind, unfinished) = source::check_exists(file)?;
     if !matches!(kind.as_str(), "mcap" | "csv" | "jsonl") {
-        let what = "is no file of results (.mcap, .csv or .jsonl, with .part behind it when it is unfinished)";
+        let what = "is not a file of results (.mcap, .csv or .jsonl, followed by .part if it is unfinished)";
         return Err(usage(format!("{}: {what}", file.display())));
     }
     let path = match &args.output {
@@ -43,7 +42,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     let target = sink::target(&path)?;
     if path.exists() {
         if !args.force {
-            return Err(usage(format!("{}: exists already; choose another name with -o, or --force", path.display())));
+            return Err(usage(format!(
+                "{}: exists already; choose another name with -o, or --force replaces it",
+                path.display()
+            )));
         }
         if path.canonicalize()? == file.canonicalize()? {
             return Err(usage("the output must be another file than the input"));
@@ -53,10 +55,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         sink::Target::Mcap => recording(file, &path)?,
         target => sink::recover_text(file, &path, target).map_err(|e| match e.kind() {
             std::io::ErrorKind::InvalidData => failed(format!("{}: {e}", file.display())),
-            _ => sink::cannot(&path, &e).into(),
+            _ => disk::cannot_write(&path, &e).into(),
         })?,
     };
-    let dropped = if lost > 0 { format!(", {lost} bytes of unfinished frames dropped") } else { String::new() };
+    let dropped = if lost > 0 { format!(", {lost} bytes of unfinished pictures dropped") } else { String::new() };
     tell::line(format_args!("{}: {} kept{dropped}", path.display(), explain::counted(rows, "row")));
     if unfinished && args.output.is_none() && file.exists() {
         // Its results are in the new file. Next to it, the old file would look like another unfinished run.
@@ -68,24 +70,24 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// Recovers a recording. Returns the number of rows kept and of bytes dropped.
 fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> {
     // The library never replaces a file. Therefore the result is written next to it and then renamed.
-    let beside = path.with_extension("recovering.mcap");
-    if beside.exists() {
-        std::fs::remove_file(&beside)?;
+    let recovering = path.with_extension("recovering.mcap");
+    if recovering.exists() {
+        std::fs::remove_file(&recovering)?;
     }
-    let found = hzn_mcap::recover(file, &beside).map_err(|e| match e {
+    let found = hzn_mcap::recover(file, &recovering).map_err(|e| match e {
         hzn_mcap::Error::DiskFull { folder, .. } => {
-            let what = "free some, or choose another folder with -o";
+            let what = "free some space, or choose another folder with -o";
             failed(format!(
-                "no space left on the disk of {}: {what}; {} is as it was",
+                "no space left on the disk of {}: {what}; {} is unchanged",
                 folder.display(),
                 file.display()
             ))
         }
         e => failed(e),
     })?;
-    std::fs::rename(&beside, path)?;
+    std::fs::rename(&recovering, path)?;
     if found.broken_chunks > 0 {
-        tell::warning(format_args!("{} damaged parts were left out; their frames are missing", found.broken_chunks));
+        tell::warning(format_args!("{} damaged parts were left out; their pictures are missing", found.broken_chunks));
     }
     Ok((found.frames, found.dropped_bytes))
 }

@@ -1,21 +1,21 @@
 //! `hzn run`: processes a sequence of pictures and writes the results.
 
-use hzn_run::explain;
 use std::path::{Path, PathBuf};
 
 use hzn_calib::{Frames, Sensor};
 use hzn_core::config::Orient;
 use hzn_core::status::Status;
 use hzn_mcap::{Row, part_path};
+use hzn_run::engine::{self, AnySensor, BodyOutcome, End, Finished, Plan};
+use hzn_run::sink::{self, Existing, Output, StoredResults};
+use hzn_run::source::{self, Source, ending};
+use hzn_run::{disk, explain};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
-use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, settle_input, stop_flag};
+use crate::setup::{InputArgs, SensorArgs, check_altitude, check_size, find_input, stop_flag};
 use crate::tell;
-use hzn_run::engine::{self, AnySensor, BodyOutcome, End, Finished, Plan};
-use hzn_run::sink::{self, Existing, Held, Output};
-use hzn_run::source::{self, Source, ending};
 
 /// Process a sequence of pictures
 ///
@@ -59,7 +59,7 @@ pub(super) struct Args {
 impl Args {
     /// Returns the arguments to process a folder with its own sensor.toml into `output`. An existing output is
     /// replaced, and no progress is printed.
-    pub(super) fn quietly(folder: &Path, output: &Path) -> Self {
+    pub(super) fn quiet_run(folder: &Path, output: &Path) -> Self {
         Self {
             input: vec![folder.to_owned()],
             sensor: SensorArgs { sensor: None, altitude_km: None, flight: false },
@@ -81,13 +81,13 @@ pub(super) fn run(args: &Args) -> Outcome {
     let folder = source.folder();
     let mut sensor = args.sensor.load(source.as_ref())?;
     let mut notes = source.notes();
-    notes.extend(settle_input(source.as_mut(), &mut sensor)?);
+    notes.extend(find_input(source.as_mut(), &mut sensor)?);
     check_size(source.as_ref(), &sensor)?;
     let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
-    need_altitude(&sensor, source.as_ref(), frames.as_ref())?;
+    check_altitude(&sensor, source.as_ref(), frames.as_ref())?;
     // The check is made only for folders, because the table next to a single picture also lists all others.
     if let Some(frames) = frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
-        warn_of_missing(frames, &folder);
+        warn_of_missing_pictures(frames, &folder);
     }
     if let Some(drawn) = &args.overlay {
         prepare_overlays(drawn, &folder, args.force || args.resume)?;
@@ -99,40 +99,40 @@ pub(super) fn run(args: &Args) -> Outcome {
         _ => source::with_key(&sensor.text, "orient", "as-stored"),
     };
     let plan = plan(args, sensor, frames);
-    let (mut output, held) = sink::open(path, existing(args), &plan.config, &recorded)?;
-    let plan = Plan { last: held.answered.clone(), ..plan };
+    let (mut output, stored) = sink::open(path, existing(args), &plan.config, &recorded)?;
+    let plan = Plan { last: stored.last_answers.clone(), ..plan };
     if !args.quiet {
         notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     }
-    if held.frames > 0 && plan.overlay.is_some() && !args.quiet {
-        tell::line(format_args!("note: what was finished before ({} frames) is not drawn again", held.frames));
+    if stored.frames > 0 && plan.overlay.is_some() && !args.quiet {
+        tell::line(format_args!("note: the {} pictures of the earlier run are not drawn again", stored.frames));
     }
     let total = source.total();
-    if let Err(stop) = skip(source.as_mut(), &held, &plan, path) {
+    if let Err(stop) = skip_stored(source.as_mut(), &stored, &plan, path) {
         // The output keeps its results, under its final name.
         output.finish()?;
         return Err(stop);
     }
-    let mut watch = Watch::new(Progress::new(total, held.frames, args.quiet), args.quiet);
+    let mut watch = Watch::new(Progress::new(total, stored.frames, args.quiet), args.quiet);
     let stop = stop_flag();
-    let end = engine::run(&plan, source.as_mut(), held.frames, &stop, &mut output, &mut |frame| watch.see(frame));
+    let end = engine::run(&plan, source.as_mut(), stored.frames, &stop, &mut output, &mut |frame| watch.see(frame));
     let bodies: Vec<&str> = plan.config.each_body().iter().map(|b| b.kind.name()).collect();
     let summary = watch.progress.summary(&bodies);
     let end = end?;
     output.finish()?;
-    let lost = source.lost().filter(|_| end == End::Complete);
+    let lost = source.describe_loss().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
-    watch.gaps.tell(plan.frames.as_ref());
-    watch.several.tell();
+    watch.missing.tell(plan.frames.as_ref());
+    watch.multi_page.tell();
     if !args.quiet {
-        watch.sum_up(args, &plan, source.as_ref(), &summary, held.frames);
+        watch.sum_up(args, &plan, source.as_ref(), &summary, stored.frames);
     }
-    let done = held.frames + watch.progress.frames();
+    let done = stored.frames + watch.progress.frames();
     if end == End::Interrupted && total.is_none_or(|n| done < n) {
         tell_interruption(done, total, path);
         return Ok(Exit::Interrupted);
     }
-    let missed = watch.progress.any_unprocessed() || lost.is_some() || watch.several.files > 0;
+    let missed = watch.progress.any_unprocessed() || lost.is_some() || watch.multi_page.files > 0;
     Ok(if missed { Exit::SomeUnreadable } else { Exit::Done })
 }
 
@@ -142,26 +142,26 @@ fn check_arguments(args: &Args) -> Result<(), Stop> {
         sink::target(path)?;
     }
     if let Some(path) = &args.output
-        && let Some(input) = args.input.iter().find(|i| sink::is_same(path, i) || sink::is_same(&part_path(path), i))
+        && let Some(input) = args.input.iter().find(|i| disk::is_same(path, i) || disk::is_same(&part_path(path), i))
     {
         return Err(usage(format!("{}: is the input itself; choose another name for the output", input.display())));
     }
     if args.no_images && args.output.as_deref().is_none_or(|p| ending(p) != "mcap") {
-        return Err(usage("--no-images: only an MCAP holds pictures; give -o out.mcap, or leave it out"));
+        return Err(usage("--no-images: only an MCAP contains pictures; give -o out.mcap, or leave out --no-images"));
     }
     Ok(())
 }
 
-/// Makes the folder of the overlays. If `may_hold` is true, the folder may already contain files.
-fn prepare_overlays(drawn: &Path, pictures: &Path, may_hold: bool) -> Result<(), Stop> {
-    std::fs::create_dir_all(drawn).map_err(|e| sink::cannot(drawn, &e))?;
-    if sink::is_same(drawn, pictures) {
-        let what = "is where the pictures are, which would be replaced; choose another folder";
+/// Makes the folder of the overlays. If `may_have_files` is true, the folder may already contain files.
+fn prepare_overlays(drawn: &Path, pictures: &Path, may_have_files: bool) -> Result<(), Stop> {
+    std::fs::create_dir_all(drawn).map_err(|e| disk::cannot_write(drawn, &e))?;
+    if disk::is_same(drawn, pictures) {
+        let what = "is the folder of the pictures, and they would be replaced; choose another folder";
         return Err(usage(format!("--overlay {}: {what}", drawn.display())));
     }
-    let holds = std::fs::read_dir(drawn).map_err(|e| sink::cannot(drawn, &e))?.next().is_some();
-    if holds && !may_hold {
-        let what = "holds files already; choose another folder, or --force replaces those of the same name";
+    let has_files = std::fs::read_dir(drawn).map_err(|e| disk::cannot_write(drawn, &e))?.next().is_some();
+    if has_files && !may_have_files {
+        let what = "contains files already; choose another folder, or --force replaces files of the same name";
         return Err(usage(format!("--overlay {}: {what}", drawn.display())));
     }
     Ok(())
@@ -198,9 +198,9 @@ struct Watch {
     progress: Progress,
     quiet: bool,
     tipped: bool,
-    gaps: Gaps,
+    missing: MissingPriors,
     refusals: Refusals,
-    several: Several,
+    multi_page: MultiPageFiles,
 }
 
 impl Watch {
@@ -209,30 +209,30 @@ impl Watch {
             progress,
             quiet,
             tipped: quiet,
-            gaps: Gaps::default(),
+            missing: MissingPriors::default(),
             refusals: Refusals::default(),
-            several: Several::default(),
+            multi_page: MultiPageFiles::default(),
         }
     }
 
     fn see(&mut self, frame: &Finished) {
-        self.gaps.count(frame);
+        self.missing.count(frame);
         self.refusals.count(frame);
-        self.several.count(frame);
+        self.multi_page.count(frame);
         if let Some(tip) = frame.tip.as_ref().filter(|_| !self.tipped) {
             self.tipped = true;
-            self.progress.say(&format!("note: nothing found in {}: {tip}", frame.name));
+            self.progress.say(&format!("note: nothing was found in {}: {tip}", frame.name));
         }
         // A picture that cannot be read is unreadable for every body.
         if let Some(e) = frame.unreadable().filter(|_| !self.quiet) {
             self.progress.say(&format!("unreadable: {}: {e}", frame.name));
         }
-        self.progress.count(frame.found.iter().map(|f| f.status()));
+        self.progress.count(frame.outcomes.iter().map(|f| f.status()));
     }
 
     /// Prints the summary, the commonest refusal, and the command that explains it.
-    fn sum_up(&self, args: &Args, plan: &Plan, source: &dyn Source, summary: &str, held: u64) {
-        let before = match held {
+    fn sum_up(&self, args: &Args, plan: &Plan, source: &dyn Source, summary: &str, stored: u64) {
+        let before = match stored {
             0 => String::new(),
             n => format!(" (after {n} that were finished before)"),
         };
@@ -241,11 +241,11 @@ impl Watch {
             tell::line(format_args!("note: {further}"));
         }
         if let Some((why, frame)) = self.refusals.commonest(&plan.config.select) {
-            let nothing = !self.progress.any_answered() && held == 0;
+            let nothing = !self.progress.any_answered() && stored == 0;
             let found = if nothing { "nothing was found in any picture; " } else { "" };
             let more = frame.map(|frame| {
                 let command = explain_command(args, source, frame);
-                format!("; what happens to one, and what to try: {command}")
+                format!("; for an explanation and advice: {command}")
             });
             tell::line(format_args!("note: {found}{why}{}", more.unwrap_or_default()));
         }
@@ -294,22 +294,22 @@ pub(super) fn cores() -> usize {
 
 /// Skips the pictures that the output contains already, and checks that this run would give the same results. The last
 /// skipped picture is processed again and must give the row in the output.
-fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) -> Result<(), Stop> {
+fn skip_stored(source: &mut dyn Source, stored: &StoredResults, plan: &Plan, path: Option<&Path>) -> Result<(), Stop> {
     let name = path.map(|p| p.display().to_string()).unwrap_or_default();
     let other = |what: String| Err(usage(format!("{name}: {what}, or start over with --force")));
     let mut last = None;
-    for n in 0..held.frames {
+    for n in 0..stored.frames {
         match source.next() {
             Some(item) => last = Some(item?),
             None => {
-                let what = format!("holds {} frames, but the input has only {n}", held.frames);
+                let what = format!("contains {} pictures, but the input has only {n}", stored.frames);
                 return other(format!("{what}; give the input that it was begun with"));
             }
         }
     }
-    let (Some(item), Some(there)) = (last, &held.last) else { return Ok(()) };
-    if item.name != there.file {
-        let what = format!("its last frame is {}, but the input has {} in that place", there.file, item.name);
+    let (Some(item), Some(stored_row)) = (last, &stored.last) else { return Ok(()) };
+    if item.name != stored_row.file {
+        let what = format!("its last picture is {}, but the input has {} in this place", stored_row.file, item.name);
         return other(format!("{what}; give the input that it was begun with"));
     }
     if plan.config.tracks() {
@@ -317,11 +317,11 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
         return Ok(());
     }
     let mut sensor = AnySensor::new(&plan.config, plan.flight).map_err(usage)?;
-    let here = engine::one(&Plan { overlay: None, ..plan.clone() }, &mut sensor, there.index, item)?;
-    let Some(here) = sink::rows(&here, &plan.config).pop() else { return Ok(()) };
-    let here = Row { elapsed_us: there.elapsed_us, ..here };
-    if here != *there {
-        let what = format!("its last frame, {}, now comes out differently", there.file);
+    let processed = engine::process_one(&Plan { overlay: None, ..plan.clone() }, &mut sensor, stored_row.index, item)?;
+    let Some(row) = sink::rows(&processed, &plan.config).pop() else { return Ok(()) };
+    let row = Row { elapsed_us: stored_row.elapsed_us, ..row };
+    if row != *stored_row {
+        let what = format!("its last picture, {}, now gives another result", stored_row.file);
         return other(format!(
             "{what}; give the sensor.toml, frames.csv and options (--altitude-km, --fps, --flight) that it was begun \
              with"
@@ -330,28 +330,28 @@ fn skip(source: &mut dyn Source, held: &Held, plan: &Plan, path: Option<&Path>) 
     Ok(())
 }
 
-fn warn_of_missing(frames: &Frames, folder: &Path) {
+fn warn_of_missing_pictures(frames: &Frames, folder: &Path) {
     let missing: Vec<_> = frames.rows.iter().filter(|r| !folder.join(&r.file).exists()).collect();
-    for row in missing.iter().take(MISSING_TOLD) {
+    for row in missing.iter().take(MAX_MISSING_LISTED) {
         tell::warning(frames.problem(row, "no such picture in the folder; the row is not used"));
     }
-    if let Some(more) = missing.len().checked_sub(MISSING_TOLD).filter(|n| *n > 0) {
+    if let Some(more) = missing.len().checked_sub(MAX_MISSING_LISTED).filter(|n| *n > 0) {
         let rows = explain::counted(more as u64, "further row");
         tell::warning(format_args!("{}: {rows} without a picture in the folder", frames.path.display()));
     }
 }
 
 /// Number of rows without a picture that are reported one by one.
-const MISSING_TOLD: usize = 3;
+const MAX_MISSING_LISTED: usize = 3;
 
 /// Counts files that contain more pictures than the one that was processed.
 #[derive(Default)]
-struct Several {
+struct MultiPageFiles {
     files: u64,
     first: Option<(String, u32)>,
 }
 
-impl Several {
+impl MultiPageFiles {
     fn count(&mut self, frame: &Finished) {
         if frame.pages > 1 {
             self.files += 1;
@@ -363,15 +363,15 @@ impl Several {
         let Some((name, pages)) = &self.first else { return };
         let files = explain::counted(self.files, "file");
         tell::warning(format_args!(
-            "only the first picture was processed of {files} with several pages or frames (the first is {name} with \
-             {pages} pictures): write each picture into a file of its own, or give a video"
+            "only the first picture of {files} with several pages or frames was processed (the first file is {name} \
+             with {pages} pictures); write each picture into its own file, or give a video"
         ));
     }
 }
 
 /// Counts pictures with missing priors, so that each kind is reported once.
 #[derive(Default)]
-struct Gaps {
+struct MissingPriors {
     frames: u64,
     no_row: u64,
     no_time: u64,
@@ -379,14 +379,14 @@ struct Gaps {
     below_limb: u64,
 }
 
-impl Gaps {
+impl MissingPriors {
     fn count(&mut self, frame: &Finished) {
         self.frames += 1;
         self.no_row += u64::from(frame.data.is_none());
         self.no_time += u64::from(frame.time_s.is_none());
         let unprocessed = |f: &BodyOutcome| f.status() == Status::NoAltitude;
-        if frame.found.iter().any(unprocessed) {
-            let below = frame.found.iter().any(BodyOutcome::is_below_limb);
+        if frame.outcomes.iter().any(unprocessed) {
+            let below = frame.outcomes.iter().any(BodyOutcome::is_below_limb);
             *(if below { &mut self.below_limb } else { &mut self.no_altitude }) += 1;
         }
     }

@@ -1,11 +1,11 @@
 //! `hzn simulate`: renders pictures of a scene, with truth.
 
-use hzn_run::explain;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hzn_core::status::Status;
+use hzn_run::{disk, explain, scene};
 use hzn_sim::scenario::{BUILTIN, FIT_PICTURES, Fit};
 use hzn_sim::{Flight, FlightFrame, Scenario};
 use rayon::prelude::*;
@@ -14,8 +14,6 @@ use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::progress::Progress;
 use crate::setup::{clear_rendered, stop_flag};
 use crate::tell;
-use hzn_run::scene;
-use hzn_run::sink;
 
 /// Render a sequence of pictures with truth, and write a sensor.toml that fits it
 ///
@@ -85,16 +83,16 @@ pub(super) fn run(args: &Args) -> Outcome {
         let changed =
             |(file, bytes): &&(String, Vec<u8>)| std::fs::read(folder.join(file)).ok().as_ref() != Some(bytes);
         if let Some((file, _)) = files.iter().find(changed) {
-            let what = "is not what the scene names any more; --force starts over";
+            let what = "differs from the file that the scene names; --force starts over";
             return Err(usage(format!("{}: {what}", folder.join(file).display())));
         }
     } else if folder.exists() && !args.force {
-        let what = "exists already; choose another folder, --resume goes on, or --force writes into it";
+        let what = "exists already; choose another folder, --resume continues it, or --force writes into it";
         return Err(usage(format!("{}: {what}", folder.display())));
     }
     // All errors of the scene are reported before anything is written.
     let flight = scenario.flight().map_err(|e| scene::refused(name, &e))?;
-    std::fs::create_dir_all(&folder).map_err(|e| sink::cannot(&folder, &e))?;
+    std::fs::create_dir_all(&folder).map_err(|e| disk::cannot_write(&folder, &e))?;
     if !args.resume {
         clear_rendered(&folder)?;
     }
@@ -117,7 +115,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn files(scenario: &mut Scenario, from: &Path) -> Result<Vec<(String, Vec<u8>)>, Stop> {
     let take = |(what, path): (&str, &mut PathBuf)| {
         let source = from.join(&*path);
-        let bytes = std::fs::read(&source).map_err(|e| sink::cannot(&source, &e))?;
+        let bytes = std::fs::read(&source).map_err(|e| disk::cannot_write(&source, &e))?;
         let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
         let name = format!("scene-{what}.{ending}");
         *path = PathBuf::from(&name);
@@ -127,7 +125,7 @@ fn files(scenario: &mut Scenario, from: &Path) -> Result<Vec<(String, Vec<u8>)>,
 }
 
 fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Stop> {
-    std::fs::write(path, text).map_err(|e| sink::cannot(path, &e).into())
+    std::fs::write(path, text).map_err(|e| disk::cannot_write(path, &e).into())
 }
 
 /// Returns the text of the sensor.toml: the values that differ from the defaults, with a measured noise model.
@@ -151,10 +149,10 @@ fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Resu
             continue;
         };
         fit.apply(&mut sensor);
-        let [answered, of] = fit.frames;
+        let [answered, rendered] = fit.frames;
         how += &format!(
-            "# The {name}: limb height and noise model are measured on {of} other pictures of the scene, {answered} of \
-             them\n\
+            "# The {name}: limb height and noise model are measured on {rendered} other pictures of the scene, \
+             {answered} of them\n\
              # answered; squared errors there are {:.2} times their covariance on average (2 is ideal).\n",
             fit.nees
         );
@@ -234,7 +232,7 @@ fn pictures(flight: &Flight, folder: &Path, args: &Args) -> Outcome {
     }
     let done = done.into_inner();
     if done < flight.frames.len() {
-        tell::line(format_args!("interrupted after {done} of {total} pictures; --resume goes on"));
+        tell::line(format_args!("interrupted after {done} of {total} pictures; --resume continues"));
         return Ok(Exit::Interrupted);
     }
     Ok(Exit::Done)
@@ -249,8 +247,8 @@ fn render(frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
         Some(quality) => picture.encode_jpeg(quality).and_then(|file| Ok(std::fs::write(&part, file)?)),
         None => picture.save(&part),
     };
-    saved.map_err(|e| sink::not_saved(&path, &e))?;
-    std::fs::rename(&part, &path).map_err(|e| sink::cannot(&path, &e).into())
+    saved.map_err(|e| disk::cannot_save(&path, &e))?;
+    std::fs::rename(&part, &path).map_err(|e| disk::cannot_write(&path, &e).into())
 }
 
 fn summary(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Stop> {

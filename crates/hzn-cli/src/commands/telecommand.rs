@@ -8,9 +8,9 @@ use hzn_flight::bytes::Writer;
 use hzn_flight::messages::{Function, Mode};
 use hzn_flight::packet::{self, Apid};
 use hzn_flight::{Parameters, parameters};
+use hzn_run::disk;
 
 use crate::exit::{Exit, Outcome, Stop, usage};
-use hzn_run::sink;
 
 /// Write commands for a flight computer
 ///
@@ -54,8 +54,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     match &args.output {
         Some(path) => {
-            sink::refuse_existing(path, args.force)?;
-            std::fs::write(path, out).map_err(|e| sink::cannot(path, &e))?;
+            disk::refuse_existing(path, args.force)?;
+            std::fs::write(path, out).map_err(|e| disk::cannot_write(path, &e))?;
             Ok(Exit::Done)
         }
         None => {
@@ -66,12 +66,11 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 /// Returns the user data of each packet of a command. At present every command has one packet.
-fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
-    let bad = |what: &str| usage(format!("{command:?}: {what}"));
-    let words: Vec<&str> = command.split_whitespace().collect();
-    let Some((&verb, rest)) = words.split_first() else { return Err(bad("is empty")) };
+fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let Some((&verb, arguments)) = words.split_first() else { return Err(refuse(text, "is empty")) };
     if verb == "load" {
-        let [path] = rest else { return Err(bad("load takes one file, a sensor.toml")) };
+        let [path] = arguments else { return Err(refuse(text, "load takes one file, a sensor.toml")) };
         return load(Path::new(path));
     }
     let Some(function) = Function::ALL.iter().copied().find(|f| f.name() == verb) else {
@@ -80,77 +79,115 @@ fn encode(command: &str) -> Result<Vec<Vec<u8>>, Stop> {
             Some(near) => format!("did you mean {near:?}?"),
             None => format!("there are {}", names.join(", ")),
         };
-        return Err(bad(&format!("there is no such command; {hint}")));
+        return Err(refuse(text, &format!("there is no such command; {hint}")));
     };
-    let user = |fill: &mut dyn FnMut(&mut Writer<'_>)| {
+    let command = Command { text, function, arguments };
+    let user = match function {
+        Function::SetMode => command.set_mode()?,
+        Function::SetParameters => command.set_parameters()?,
+        Function::ReadParameters => command.read_parameters()?,
+        Function::SetKnown => command.set_known()?,
+        Function::ProcessOnce | Function::DumpEdges | Function::ResetCounters => command.without_arguments()?,
+    };
+    Ok(vec![user])
+}
+
+/// Returns the error for a refused command.
+fn refuse(command: &str, what: &str) -> Stop {
+    usage(format!("{command:?}: {what}"))
+}
+
+/// One command: its text, its function, and the words after the name of the function.
+struct Command<'a> {
+    text: &'a str,
+    function: Function,
+    arguments: &'a [&'a str],
+}
+
+impl Command<'_> {
+    fn refuse(&self, what: &str) -> Stop {
+        refuse(self.text, what)
+    }
+
+    /// Returns the user data of the packet: the number of the function, and what `fill` writes.
+    fn user_data(&self, fill: impl FnOnce(&mut Writer<'_>)) -> Result<Vec<u8>, Stop> {
         let mut bytes = vec![0; packet::MAX_BYTES];
         let mut out = Writer::new(&mut bytes);
-        out.u8(function as u8);
+        out.u8(self.function as u8);
         fill(&mut out);
-        let n = out.finish().ok_or_else(|| bad("is too long for one packet; split it"))?;
+        let n = out.finish().ok_or_else(|| self.refuse("is too long for one packet; split it"))?;
         bytes.truncate(n);
-        Ok(vec![bytes])
-    };
-    let number = |word: &str| word.parse::<f64>().map_err(|_| bad(&format!("{word:?} is no number")));
-    match function {
-        Function::SetMode => {
-            let mode = rest.first().and_then(|w| Mode::ALL.iter().find(|m| m.name() == *w));
-            match (mode, rest.len()) {
-                (Some(&mode), 1) => user(&mut |w| w.u8(mode as u8)),
-                _ => Err(bad("modes are standby, flight, safe, shut-down")),
-            }
+        Ok(bytes)
+    }
+
+    fn set_mode(&self) -> Result<Vec<u8>, Stop> {
+        let mode = self.arguments.first().and_then(|w| Mode::ALL.iter().find(|m| m.name() == *w));
+        match (mode, self.arguments.len()) {
+            (Some(&mode), 1) => self.user_data(|w| w.u8(mode as u8)),
+            _ => Err(self.refuse("modes are standby, flight, safe, shut-down")),
         }
-        Function::SetParameters => {
-            if rest.is_empty() || !rest.len().is_multiple_of(2) || rest.len() > 160 {
-                return Err(bad("set takes pairs of a name and a value, up to 80"));
-            }
-            let mut pairs = Vec::new();
-            for pair in rest.chunks(2) {
-                let id = parameter(pair[0]).map_err(|e| bad(&e))?;
-                pairs.push((id, value(id, pair[1]).map_err(|e| bad(&e))?));
-            }
-            user(&mut |w| set(w, &pairs))
+    }
+
+    fn set_parameters(&self) -> Result<Vec<u8>, Stop> {
+        let words = self.arguments;
+        if words.is_empty() || !words.len().is_multiple_of(2) || words.len() > 160 {
+            return Err(self.refuse("set takes pairs of a name and a value, up to 80"));
         }
-        Function::ReadParameters => {
-            if rest.is_empty() || rest.len() > 90 {
-                return Err(bad("read takes the names of parameters, up to 90"));
-            }
-            let ids = rest.iter().map(|w| parameter(w).map_err(|e| bad(&e))).collect::<Result<Vec<_>, _>>()?;
-            user(&mut |w| {
-                w.u8(ids.len() as u8);
-                ids.iter().for_each(|&id| w.u16(id));
-            })
+        let mut pairs = Vec::new();
+        for pair in words.chunks(2) {
+            let id = parameter_number(pair[0]).map_err(|e| self.refuse(&e))?;
+            pairs.push((id, parse_value(id, pair[1]).map_err(|e| self.refuse(&e))?));
         }
-        Function::SetKnown => {
-            let given = rest.iter().map(|w| number(w)).collect::<Result<Vec<_>, _>>()?;
-            let (km, rate) = given.split_at(given.len().min(4));
-            if let Some(x) = km.iter().find(|km| !((**km * 1e3) as f32).is_finite()) {
-                return Err(bad(&format!("{x} is no finite number of kilometres")));
-            }
-            if let Some(h) = km.first().filter(|h| **h <= 0.0) {
-                return Err(bad(&format!("the altitude cannot be {h} km: above 0")));
-            }
-            let [h, x, y, z] = match km[..] {
-                [h] => [h, f64::NAN, f64::NAN, f64::NAN],
-                [h, x, y, z] => [h, x, y, z],
-                _ => return Err(bad("known takes the altitude in kilometres, and the ECEF position if there is one")),
-            };
-            if !matches!(rate.len(), 0 | 3) {
-                return Err(bad("known takes the rate of rotation as three numbers, rad/s, after the position"));
-            }
-            user(&mut |w| {
-                [h, x, y, z].iter().for_each(|v| w.f32((v * 1e3) as f32));
-                rate.iter().for_each(|v| w.f32(*v as f32));
-            })
+        self.user_data(|w| write_pairs(w, &pairs))
+    }
+
+    fn read_parameters(&self) -> Result<Vec<u8>, Stop> {
+        let words = self.arguments;
+        if words.is_empty() || words.len() > 90 {
+            return Err(self.refuse("read takes the names of parameters, up to 90"));
         }
-        Function::ProcessOnce | Function::DumpEdges | Function::ResetCounters if !rest.is_empty() => {
-            Err(bad("takes nothing else"))
+        let ids =
+            words.iter().map(|w| parameter_number(w).map_err(|e| self.refuse(&e))).collect::<Result<Vec<_>, _>>()?;
+        self.user_data(|w| {
+            w.u8(ids.len() as u8);
+            ids.iter().for_each(|&id| w.u16(id));
+        })
+    }
+
+    fn set_known(&self) -> Result<Vec<u8>, Stop> {
+        let number = |word: &str| word.parse::<f64>().map_err(|_| self.refuse(&format!("{word:?} is not a number")));
+        let numbers = self.arguments.iter().map(|w| number(w)).collect::<Result<Vec<_>, _>>()?;
+        let (km, rate) = numbers.split_at(numbers.len().min(4));
+        if let Some(x) = km.iter().find(|km| !((**km * 1e3) as f32).is_finite()) {
+            return Err(self.refuse(&format!("{x} is not a finite number of kilometres")));
         }
-        Function::ProcessOnce | Function::DumpEdges | Function::ResetCounters => user(&mut |_| {}),
+        if let Some(h) = km.first().filter(|h| **h <= 0.0) {
+            return Err(self.refuse(&format!("the altitude {h} km is refused: must be above 0")));
+        }
+        let [h, x, y, z] = match km[..] {
+            [h] => [h, f64::NAN, f64::NAN, f64::NAN],
+            [h, x, y, z] => [h, x, y, z],
+            _ => {
+                let what = "known takes the altitude in kilometres, and the ECEF position if there is one";
+                return Err(self.refuse(what));
+            }
+        };
+        if !matches!(rate.len(), 0 | 3) {
+            let what = "known takes the rate of rotation as three numbers, rad/s, after the position";
+            return Err(self.refuse(what));
+        }
+        self.user_data(|w| {
+            [h, x, y, z].iter().for_each(|v| w.f32((v * 1e3) as f32));
+            rate.iter().for_each(|v| w.f32(*v as f32));
+        })
+    }
+
+    fn without_arguments(&self) -> Result<Vec<u8>, Stop> {
+        if self.arguments.is_empty() { self.user_data(|_| {}) } else { Err(self.refuse("takes no arguments")) }
     }
 }
 
-fn set(out: &mut Writer<'_>, pairs: &[(u16, f64)]) {
+fn write_pairs(out: &mut Writer<'_>, pairs: &[(u16, f64)]) {
     out.u8(pairs.len() as u8);
     for &(id, value) in pairs {
         out.u16(id);
@@ -158,7 +195,8 @@ fn set(out: &mut Writer<'_>, pairs: &[(u16, f64)]) {
     }
 }
 
-fn parameter(word: &str) -> Result<u16, String> {
+/// Returns the number of a parameter, from its name or its number.
+fn parameter_number(word: &str) -> Result<u16, String> {
     if let Ok(id) = word.parse::<u16>() {
         return parameters::name(id).map(|_| id).ok_or_else(|| format!("no parameter has the number {id}"));
     }
@@ -166,21 +204,21 @@ fn parameter(word: &str) -> Result<u16, String> {
         let ids = Parameters::defaults();
         let names = ids.numbers().filter_map(parameters::name);
         let near = hzn_calib::nearest(word, names).map(|n| format!("; did you mean {n}?"));
-        format!("{word} is no parameter{}", near.unwrap_or_default())
+        format!("{word} is not a parameter{}", near.unwrap_or_default())
     })
 }
 
 /// Returns a value that this parameter can have, from a number or the name of a choice. The flight computer checks
 /// whether the value fits the other parameters, because only it has them.
-fn value(id: u16, word: &str) -> Result<f64, String> {
+fn parse_value(id: u16, word: &str) -> Result<f64, String> {
     let name = parameters::name(id).unwrap_or("?");
-    let cannot = |what: String| Err(format!("{name} cannot be {word}: it is {what}"));
+    let cannot = |what: String| Err(format!("{name} cannot be {word}: it must be {what}"));
     let number = word.parse::<f64>();
-    let taken = |x: f64| Parameters::defaults().set(id, x).is_ok();
+    let is_accepted = |x: f64| Parameters::defaults().set(id, x).is_ok();
     let choices = choices(name);
     if !choices.is_empty() {
         let named = choices.iter().find(|(choice, _)| *choice == word).map(|(_, number)| *number);
-        if let Some(number) = named.or(number.ok().filter(|x| taken(*x))) {
+        if let Some(number) = named.or(number.ok().filter(|x| is_accepted(*x))) {
             return Ok(number);
         }
         let each: Vec<String> = choices.iter().map(|(choice, number)| format!("{number} {choice}")).collect();
@@ -194,14 +232,14 @@ fn value(id: u16, word: &str) -> Result<f64, String> {
     let within = |x: f64| limits.is_none_or(|(low, above, high)| x <= high && if above { x > low } else { x >= low });
     // The corners of a mask are set one after another. The earlier corners are not known here, so a corner is not
     // checked against them.
-    let of_mask = name.starts_with("mask");
-    let optional = !of_mask && taken(f64::NAN);
+    let is_mask = name.starts_with("mask");
+    let optional = !is_mask && is_accepted(f64::NAN);
     match number {
         Ok(x) if x.is_nan() && optional => return Ok(x),
-        Ok(x) if x.is_finite() && within(x) && (of_mask || taken(x)) => return Ok(x),
+        Ok(x) if x.is_finite() && within(x) && (is_mask || is_accepted(x)) => return Ok(x),
         _ => {}
     }
-    let kind = if of_mask || taken(0.5) { "a finite number" } else { "a whole number" };
+    let kind = if is_mask || is_accepted(0.5) { "a finite number" } else { "a whole number" };
     let range = match limits {
         Some((low, true, high)) if high.is_finite() => format!(" above {low}, to {high}"),
         Some((low, true, _)) => format!(" above {low}"),
@@ -209,7 +247,7 @@ fn value(id: u16, word: &str) -> Result<f64, String> {
         Some((low, false, _)) => format!(" from {low} on"),
         None => String::new(),
     };
-    cannot(format!("{kind}{range}{}", if optional { ", or NaN where it is left out" } else { "" }))
+    cannot(format!("{kind}{range}{}", if optional { ", or NaN to leave it out" } else { "" }))
 }
 
 /// Returns the choices of a parameter on the flight computer: the words of sensor.toml with their numbers.
@@ -224,7 +262,8 @@ fn load(path: &Path) -> Result<Vec<Vec<u8>>, Stop> {
     let parameters = Parameters::new(sensor.config);
     parameters.check_flyable().map_err(|key| {
         usage(format!(
-            "{}: {key} has a value that does not fly; leave it at its default (book/reference/telemetry.md)",
+            "{}: {key} has a value that the flight computer does not support; leave it at its default \
+             (book/reference/telemetry.md)",
             path.display()
         ))
     })?;
@@ -232,10 +271,10 @@ fn load(path: &Path) -> Result<Vec<Vec<u8>>, Stop> {
     let mut bytes = vec![0; packet::MAX_BYTES];
     let mut out = Writer::new(&mut bytes);
     out.u8(Function::SetParameters as u8);
-    set(&mut out, &pairs);
+    write_pairs(&mut out, &pairs);
     let n = out.finish().filter(|&n| n + 20 <= packet::MAX_BYTES).ok_or_else(|| {
         let text = format!("{}: {} parameters are too many for one command (99)", path.display(), pairs.len());
-        usage(format!("{text}; a mask of fewer corners fits"))
+        usage(format!("{text}; give the mask fewer corners"))
     })?;
     bytes.truncate(n);
     Ok(vec![bytes])

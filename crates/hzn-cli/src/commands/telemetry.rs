@@ -13,10 +13,11 @@ use hzn_flight::messages::{
 use hzn_flight::packet::{self, Apid, Packet, Scan};
 use hzn_flight::{Parameters, parameters};
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, RowMeta};
+use hzn_run::disk;
+use hzn_run::sink::{self, Existing, RowFile, Target};
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
-use hzn_run::sink::{self, Existing, RowFile, Target};
 
 /// Decode a flight computer's telemetry
 ///
@@ -42,24 +43,24 @@ pub(super) fn run(args: &Args) -> Outcome {
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
     let mut sink = args.output.as_deref().map(|path| Sink::create(path, existing)).transpose()?;
     let mut housekeeping = args.housekeeping.as_deref().map(|path| table(path, args.force)).transpose()?;
-    let mut heard = Heard::default();
+    let mut counts = StreamCounts::default();
     let mut rest = &bytes[..];
     loop {
         match packet::scan(rest) {
             Scan::More { skip } => {
-                heard.skipped += rest.len() as u64;
+                counts.skipped += rest.len() as u64;
                 // The rest is an incomplete packet, or noise.
-                heard.cut += u64::from(rest.len() > skip + packet::SYNC.len());
+                counts.cut += u64::from(rest.len() > skip + packet::SYNC.len());
                 break;
             }
             Scan::Bad { skip } => {
-                heard.cut += 1;
-                heard.skipped += skip as u64;
+                counts.cut += 1;
+                counts.skipped += skip as u64;
                 rest = rest.get(skip..).unwrap_or_default();
             }
             Scan::Packet { end, packet } => {
-                heard.skipped += end.saturating_sub(packet.user.len() + OVERHEAD) as u64;
-                heard.take(&packet, &mut sink, &mut housekeeping)?;
+                counts.skipped += end.saturating_sub(packet.user.len() + OVERHEAD) as u64;
+                counts.take(&packet, &mut sink, &mut housekeeping)?;
                 rest = rest.get(end..).unwrap_or_default();
             }
         }
@@ -70,9 +71,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(mut table) = housekeeping {
         table.flush()?;
     }
-    heard.summary();
-    if heard.packets == 0 && !bytes.is_empty() {
-        let what = "no packet in it; is this what the flight computer sent? (book/reference/telemetry.md)";
+    counts.summary();
+    if counts.packets == 0 && !bytes.is_empty() {
+        let what = "no packet was found; is this the stream of a flight computer? (book/reference/telemetry.md)";
         return Err(failed(format!("{}: {what}", args.file.display())));
     }
     Ok(Exit::Done)
@@ -91,7 +92,7 @@ fn read(path: &Path) -> Result<Vec<u8>, Stop> {
 }
 
 fn table(path: &Path, force: bool) -> Result<csv::Writer<std::fs::File>, Stop> {
-    sink::refuse_existing(path, force)?;
+    disk::refuse_existing(path, force)?;
     let mut table = csv::Writer::from_path(path).map_err(|e| failed(format!("{}: {e}", path.display())))?;
     let columns = ["time_s"].into_iter().chain(Housekeeping::FIELDS.iter().copied());
     table.write_record(columns).map_err(failed)?;
@@ -130,7 +131,7 @@ impl Sink {
 
 /// Counts of a stream, and the log lines for the next answer.
 #[derive(Default)]
-struct Heard {
+struct StreamCounts {
     packets: u64,
     answers: u64,
     cut: u64,
@@ -141,7 +142,7 @@ struct Heard {
     log: Vec<LogLine>,
 }
 
-impl Heard {
+impl StreamCounts {
     fn take(
         &mut self,
         packet: &Packet<'_>,
@@ -149,80 +150,88 @@ impl Heard {
         housekeeping: &mut Option<csv::Writer<std::fs::File>>,
     ) -> Result<(), Stop> {
         self.packets += 1;
+        self.count_lost(packet);
+        let time_s = packet.time_us as f64 * 1e-6;
+        let from = &mut Reader::new(packet.user);
+        let is_understood = match Apid::from_number(packet.apid) {
+            Some(Apid::Science) => match (Exposure::read(from), PictureAnswer::read(from)) {
+                (Some(exposure), Some(answer)) => {
+                    self.answer(&exposure, &answer, sink)?;
+                    true
+                }
+                _ => false,
+            },
+            Some(Apid::Housekeeping) => match Housekeeping::read(from) {
+                Some(record) => {
+                    write_housekeeping(time_s, &record, housekeeping)?;
+                    true
+                }
+                None => false,
+            },
+            Some(Apid::Event) => EventRecord::read(from).map(|record| self.event(time_s, &record)).is_some(),
+            Some(Apid::Acknowledge) => Acknowledge::read(from).map(|a| self.acknowledge(time_s, &a)).is_some(),
+            Some(Apid::Parameters) => {
+                self.parameters(time_s, from);
+                true
+            }
+            Some(Apid::Edge) => EdgePart::read(from).map(|part| self.edge(time_s, &part, from)).is_some(),
+            Some(Apid::Command) | None => false,
+        };
+        if !is_understood {
+            let name = Apid::from_number(packet.apid).map_or(String::new(), |a| format!(" ({})", a.name()));
+            let what = format!("a packet of APID {:#x}{name} with {} bytes", packet.apid, packet.user.len());
+            self.note(time_s, LogLevel::Warning, &format!("{what} is not understood"));
+        }
+        Ok(())
+    }
+
+    /// Counts the packets that are missing before this one, from its sequence count.
+    fn count_lost(&mut self, packet: &Packet<'_>) {
         if let Some(next) = self.next.insert(packet.apid, (packet.sequence + 1) & 0x3FFF) {
             // A count of 0 means that the computer has restarted.
             if packet.sequence != next && packet.sequence != 0 {
                 self.lost += u64::from(packet.sequence.wrapping_sub(next) & 0x3FFF);
             }
         }
-        let time_s = packet.time_us as f64 * 1e-6;
-        let from = &mut Reader::new(packet.user);
-        let apid = Apid::from_number(packet.apid);
-        let strange = || {
-            let name = apid.map_or(String::new(), |a| format!(" ({})", a.name()));
-            format!("a packet of APID {:#x}{name} with {} bytes is not understood", packet.apid, packet.user.len())
+    }
+
+    fn event(&mut self, time_s: f64, record: &EventRecord) {
+        let level = match Severity::from_number(record.severity) {
+            Some(Severity::Information) => LogLevel::Info,
+            Some(Severity::Warning) => LogLevel::Warning,
+            Some(Severity::Error) | None => LogLevel::Error,
         };
-        match apid {
-            Some(Apid::Science) => match (Exposure::read(from), PictureAnswer::read(from)) {
-                (Some(exposure), Some(answer)) => self.answer(&exposure, &answer, sink)?,
-                _ => self.note(time_s, LogLevel::Warning, &strange()),
-            },
-            Some(Apid::Housekeeping) => match Housekeeping::read(from) {
-                Some(record) => {
-                    if let Some(table) = housekeeping {
-                        let values = std::iter::once(time_s).chain(record.values());
-                        table.write_record(values.map(|v| v.to_string())).map_err(failed)?;
-                    }
-                }
-                None => self.note(time_s, LogLevel::Warning, &strange()),
-            },
-            Some(Apid::Event) => match EventRecord::read(from) {
-                Some(record) => {
-                    let level = match Severity::from_number(record.severity) {
-                        Some(Severity::Information) => LogLevel::Info,
-                        Some(Severity::Warning) => LogLevel::Warning,
-                        Some(Severity::Error) | None => LogLevel::Error,
-                    };
-                    self.note(time_s, level, &event(&record));
-                }
-                None => self.note(time_s, LogLevel::Warning, &strange()),
-            },
-            Some(Apid::Acknowledge) => match Acknowledge::read(from) {
-                Some(a) => {
-                    let function = Function::from_number(a.function).map_or("?", Function::name);
-                    let code = Code::from_number(a.code).map_or("?", Code::name);
-                    let level = if a.code == 0 { LogLevel::Info } else { LogLevel::Warning };
-                    self.note(time_s, level, &format!("command {} ({function}): {code}", a.sequence));
-                }
-                None => self.note(time_s, LogLevel::Warning, &strange()),
-            },
-            Some(Apid::Parameters) => {
-                let count = from.u8().unwrap_or(0);
-                for _ in 0..count {
-                    let (Some(id), Some(value)) = (from.u16(), from.f64()) else { break };
-                    let name = parameters::name(id).unwrap_or("?");
-                    self.note(time_s, LogLevel::Info, &format!("parameter {id} {name} = {value}"));
-                }
-            }
-            Some(Apid::Edge) => match EdgePart::read(from) {
-                Some(part) => {
-                    let pixels = std::iter::from_fn(|| Some(format!("{},{}", from.u16()?, from.u16()?)));
-                    let list: Vec<String> = pixels.take(part.count.into()).collect();
-                    let EdgePart { picture, candidate, first, total, stride, .. } = part;
-                    let what = format!("edge of picture {picture}, candidate {candidate}, stride {stride}");
-                    self.note(time_s, LogLevel::Info, &format!("{what}, {first} of {total}: {}", list.join(" ")));
-                }
-                None => self.note(time_s, LogLevel::Warning, &strange()),
-            },
-            Some(Apid::Command) | None => self.note(time_s, LogLevel::Warning, &strange()),
+        self.note(time_s, level, &describe_event(record));
+    }
+
+    fn acknowledge(&mut self, time_s: f64, a: &Acknowledge) {
+        let function = Function::from_number(a.function).map_or("?", Function::name);
+        let code = Code::from_number(a.code).map_or("?", Code::name);
+        let level = if a.code == 0 { LogLevel::Info } else { LogLevel::Warning };
+        self.note(time_s, level, &format!("command {} ({function}): {code}", a.sequence));
+    }
+
+    fn parameters(&mut self, time_s: f64, from: &mut Reader<'_>) {
+        let count = from.u8().unwrap_or(0);
+        for _ in 0..count {
+            let (Some(id), Some(value)) = (from.u16(), from.f64()) else { break };
+            let name = parameters::name(id).unwrap_or("?");
+            self.note(time_s, LogLevel::Info, &format!("parameter {id} {name} = {value}"));
         }
-        Ok(())
+    }
+
+    fn edge(&mut self, time_s: f64, part: &EdgePart, from: &mut Reader<'_>) {
+        let pixels = std::iter::from_fn(|| Some(format!("{},{}", from.u16()?, from.u16()?)));
+        let list: Vec<String> = pixels.take(part.count.into()).collect();
+        let EdgePart { picture, candidate, first, total, stride, .. } = part;
+        let what = format!("edge of picture {picture}, candidate {candidate}, stride {stride}");
+        self.note(time_s, LogLevel::Info, &format!("{what}, {first} of {total}: {}", list.join(" ")));
     }
 
     fn answer(&mut self, exposure: &Exposure, answer: &PictureAnswer, sink: &mut Option<Sink>) -> Result<(), Stop> {
         let time_s = exposure.exposure_us as f64 * 1e-6;
-        let Some(report) = answer.to_report() else {
-            self.note(time_s, LogLevel::Warning, &format!("picture {}: numbers that mean nothing", exposure.picture));
+        let Some(report) = answer.report() else {
+            self.note(time_s, LogLevel::Warning, &format!("picture {}: invalid numbers", exposure.picture));
             return Ok(());
         };
         self.answers += 1;
@@ -262,7 +271,20 @@ impl Heard {
     }
 }
 
-fn event(record: &EventRecord) -> String {
+fn write_housekeeping(
+    time_s: f64,
+    record: &Housekeeping,
+    table: &mut Option<csv::Writer<std::fs::File>>,
+) -> Result<(), Stop> {
+    if let Some(table) = table {
+        let values = std::iter::once(time_s).chain(record.values());
+        table.write_record(values.map(|v| v.to_string())).map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// Returns an event in words.
+fn describe_event(record: &EventRecord) -> String {
     let EventRecord { number, a, b, .. } = *record;
     let mode = |n: u32| u8::try_from(n).ok().and_then(Mode::from_number).map_or("?", Mode::name);
     match Event::from_number(number) {

@@ -18,11 +18,11 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let name = format!("hzn-viewer{}", std::env::consts::EXE_SUFFIX);
-    let beside = std::env::current_exe().ok().map(|own| own.with_file_name(&name)).filter(|p| p.is_file());
-    let program = beside.unwrap_or_else(|| name.into());
+    let neighbour = std::env::current_exe().ok().map(|own| own.with_file_name(&name)).filter(|p| p.is_file());
+    let program = neighbour.unwrap_or_else(|| name.into());
     let status = Command::new(&program).args(&args.arguments).status().map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => failed(
-            "`hzn-viewer` is neither beside `hzn` nor on PATH; `cargo install --path crates/hzn-viewer` puts it there",
+            "`hzn-viewer` is neither next to `hzn` nor on PATH; `cargo install --path crates/hzn-viewer` installs it",
         ),
         _ => failed(format!("{} cannot be started: {e}", program.display())),
     })?;

@@ -6,14 +6,14 @@ use hzn_calib::{FrameData, Frames, Problem};
 use hzn_core::body::{self, PriorError};
 use hzn_core::camera::Camera;
 use hzn_core::error::ConfigError;
-use hzn_core::frames::{Cov3, Ecef, UnitVec3};
+use hzn_core::frames::{Ecef, UnitVec3};
 use hzn_core::image::{ImageView, Pixels};
 use hzn_core::real::Real;
-use hzn_core::report::{Candidate, Free};
-use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report, Solution};
+use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report};
 use hzn_nav::ephemeris;
 
 use super::trace::{Clock, Traces, Watch};
+use super::widen::widen_report;
 
 enum Kind {
     Host(Box<HostHorizon>),
@@ -27,14 +27,14 @@ pub struct AnySensor {
     camera: Camera<f64>,
     bodies: Vec<body::Kind>,
     /// The last answer of each body, for `select.max_rate_deg_s`.
-    last: Vec<Option<Answered>>,
+    last: Vec<Option<LastAnswer>>,
     /// The time of the next picture in seconds, for `select.max_rate_deg_s`.
     time_s: Option<f64>,
 }
 
 /// The answer to an earlier picture, for `select.max_rate_deg_s`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Answered {
+pub struct LastAnswer {
     /// The limb axis, camera frame.
     pub axis: [f64; 3],
     /// Its larger standard deviation (1 sigma), in radians.
@@ -43,9 +43,9 @@ pub struct Answered {
     pub time_s: f64,
 }
 
-impl Answered {
+impl LastAnswer {
     /// Returns the answer of a row of results, if the row has an answer and a time.
-    pub fn of_row(row: &hzn_mcap::Row) -> Option<Self> {
+    pub fn from_row(row: &hzn_mcap::Row) -> Option<Self> {
         Some(Self {
             axis: [row.axis_x?, row.axis_y?, row.axis_z?],
             sigma_rad: row.sigma_max_deg?.to_radians(),
@@ -75,9 +75,9 @@ impl AnySensor {
     }
 
     /// Sets the last answer of each body, from another run. Answers beyond the number of bodies are ignored.
-    pub fn remember(&mut self, answered: &[Option<Answered>]) {
-        for (last, answered) in self.last.iter_mut().zip(answered) {
-            *last = *answered;
+    pub fn remember(&mut self, answers: &[Option<LastAnswer>]) {
+        for (last, answer) in self.last.iter_mut().zip(answers) {
+            *last = *answer;
         }
     }
 
@@ -167,12 +167,12 @@ impl AnySensor {
         };
         for (last, processed) in self.last.iter_mut().zip(&processed) {
             if let (Ok(Report { solution: Some(s), .. }), Some(time_s)) = (&processed.report, now_s) {
-                *last = Some(Answered { axis: s.axis.xyz(), sigma_rad: s.covariance.sigma_max_rad(), time_s });
+                *last = Some(LastAnswer { axis: s.axis.xyz(), sigma_rad: s.covariance.sigma_max_rad(), time_s });
             }
         }
         for (&body, processed) in self.bodies.iter().zip(&mut processed) {
             if let (Ok(Report { solution: Some(solution), .. }), Some(direction)) =
-                (&mut processed.report, data.and_then(|d| in_the_sky(body, d)))
+                (&mut processed.report, data.and_then(|d| direction_ecef(body, d)))
             {
                 solution.axis_ecef = Some(direction);
             }
@@ -182,7 +182,7 @@ impl AnySensor {
 }
 
 /// Returns the direction of Sun or Moon in ECEF, seen from the position at the time of the picture.
-fn in_the_sky(body: body::Kind, data: &FrameData) -> Option<UnitVec3<Ecef, f64>> {
+fn direction_ecef(body: body::Kind, data: &FrameData) -> Option<UnitVec3<Ecef, f64>> {
     let place = match body {
         body::Kind::Sun => ephemeris::sun(data.utc_s?),
         body::Kind::Moon => ephemeris::moon(data.utc_s?),
@@ -204,11 +204,11 @@ fn half_angles<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, co
     horizon: &Horizon<T, POINTS, BLOCKS, WORDS>,
     data: Option<&FrameData>,
 ) -> Vec<Result<f64, PriorError>> {
-    let expect = |which| Ok(horizon.expect_body(which, &frame(data))?.half_angle_rad().into());
+    let expect = |which| Ok(horizon.expect_body(which, &prior(data))?.half_angle_rad().into());
     (0..horizon.config().each_body().len()).map(expect).collect()
 }
 
-fn frame<T: Real>(data: Option<&FrameData>) -> Prior<T> {
+fn prior<T: Real>(data: Option<&FrameData>) -> Prior<T> {
     data.map(|d| d.to_prior(None)).unwrap_or_default()
 }
 
@@ -223,13 +223,13 @@ fn run<
     horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
     picture: &P,
     data: Option<&FrameData>,
-    last: &[Option<Answered>],
+    last: &[Option<LastAnswer>],
     now_s: Option<f64>,
     watch: &W,
 ) -> Vec<Processed> {
-    let expect = |(which, last): (usize, &Option<Answered>)| {
+    let expect = |(which, last): (usize, &Option<LastAnswer>)| {
         let last = last.zip(now_s).and_then(|(last, now_s)| last.to_last(now_s));
-        horizon.expect_body(which, &Prior { last, ..frame(data) })
+        horizon.expect_body(which, &Prior { last, ..prior(data) })
     };
     let expected: Vec<_> = last.iter().enumerate().map(expect).collect();
     let known: Vec<_> = expected.iter().filter_map(|e| e.as_ref().ok().copied()).collect();
@@ -239,62 +239,9 @@ fn run<
     // There is one report for each body with an expected half-angle.
     let result = |expected: Result<_, PriorError>| match expected {
         Err(why) => Some(Processed { report: Err(why), elapsed: Duration::ZERO }),
-        Ok(_) => done.next().map(|(report, elapsed)| Processed { report: Ok(widen(report)), elapsed }),
+        Ok(_) => done.next().map(|(report, elapsed)| Processed { report: Ok(widen_report(report)), elapsed }),
     };
     expected.into_iter().filter_map(result).collect()
-}
-
-/// Converts a report to f64.
-fn widen<T: Real + Into<f64>>(r: &Report<T>) -> Report<f64> {
-    Report {
-        status: r.status,
-        stage: r.stage,
-        level: r.level,
-        next_level: r.next_level,
-        counters: r.counters,
-        candidates: r.candidates.iter().map(widen_candidate).collect(),
-        solution: r.solution.as_ref().and_then(widen_solution),
-    }
-}
-
-pub(super) fn widen_candidate<T: Real + Into<f64>>(c: &Candidate<T>) -> Candidate<f64> {
-    Candidate {
-        number: c.number,
-        length_px: c.length_px,
-        points: c.points,
-        inliers: c.inliers,
-        rms_px: c.rms_px.into(),
-        verdict: c.verdict,
-    }
-}
-
-pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Solution<f64>> {
-    let [xx, xy, xz] = s.covariance.rows()[0].map(Into::into);
-    let [_, yy, yz] = s.covariance.rows()[1].map(Into::into);
-    let zz = s.covariance.rows()[2][2].into();
-    Some(Solution {
-        axis: UnitVec3::try_new(s.axis.xyz().map(Into::into))?,
-        covariance: Cov3::from_upper([xx, xy, xz, yy, yz, zz]),
-        axis_ecef: s.axis_ecef.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
-        axis_body: s.axis_body.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
-        half_angle_rad: s.half_angle_rad.into(),
-        fused_half_angle_rad: s.fused_half_angle_rad.into(),
-        altitude_m: s.altitude_m.map(|(h, sigma)| (h.into(), sigma.into())),
-        free: s.free.as_ref().and_then(widen_free),
-        rms_px: s.rms_px.into(),
-        inliers: s.inliers,
-        arc_px: s.arc_px.into(),
-        candidate: s.candidate,
-    })
-}
-
-fn widen_free<T: Real + Into<f64>>(f: &Free<T>) -> Option<Free<f64>> {
-    Some(Free {
-        axis: UnitVec3::try_new(f.axis.xyz().map(Into::into))?,
-        cos: f.cos.into(),
-        var_cos: f.var_cos.into(),
-        cos_per_px: f.cos_per_px.into(),
-    })
 }
 
 /// Checks every row of frames.csv against the sensor, before the first picture is processed. A row without an altitude,
@@ -303,7 +250,7 @@ fn widen_free<T: Real + Into<f64>>(f: &Free<T>) -> Option<Free<f64>> {
 ///
 /// # Errors
 /// The row, the picture and the column with an impossible value.
-pub fn prepare(config: &Config, flight: bool, frames: Option<&Frames>) -> Result<(), Problem> {
+pub fn check_frames(config: &Config, flight: bool, frames: Option<&Frames>) -> Result<(), Problem> {
     let Some(frames) = frames else { return Ok(()) };
     let Ok(sensor) = AnySensor::new(config, flight) else { return Ok(()) };
     for row in &frames.rows {

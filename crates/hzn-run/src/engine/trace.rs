@@ -10,7 +10,7 @@ use hzn_core::report::Candidate;
 use hzn_core::status::Stage;
 use hzn_core::{Observer, Solution};
 
-use super::sensor::{widen_candidate, widen_solution};
+use super::widen::{widen_candidate, widen_solution};
 
 /// One candidate edge.
 #[derive(Debug, Clone, Default)]
@@ -39,8 +39,8 @@ pub struct Edge {
 pub struct Trace {
     edges: RefCell<Vec<Edge>>,
     level: Cell<Option<(u16, f64, u32)>>,
-    again: RefCell<Vec<u16>>,
-    frame_px: Cell<u16>,
+    further_thresholds: RefCell<Vec<u16>>,
+    border_px: Cell<u16>,
     times: Cell<[Duration; 8]>,
     running: Cell<Option<(Stage, Instant)>>,
 }
@@ -55,13 +55,13 @@ impl Trace {
         self.level.get()
     }
     /// Returns the thresholds of the further looks, in counts.
-    pub fn again(&self) -> Vec<u16> {
-        self.again.borrow().clone()
+    pub fn further_thresholds(&self) -> Vec<u16> {
+        self.further_thresholds.borrow().clone()
     }
     /// Returns the width of the dark border around the picture that was left out, in pixels; 0 means that there is
     /// none.
-    pub fn frame_px(&self) -> u16 {
-        self.frame_px.get()
+    pub fn border_px(&self) -> u16 {
+        self.border_px.get()
     }
     /// Returns the time spent in every stage.
     pub fn times(&self) -> [(Stage, Duration); 8] {
@@ -69,16 +69,16 @@ impl Trace {
         std::array::from_fn(|i| (Stage::ALL[i], times[i]))
     }
 
-    fn with(&self, candidate: u32, change: impl FnOnce(&mut Edge)) {
+    fn change_edge(&self, candidate: u32, change: impl FnOnce(&mut Edge)) {
         let mut edges = self.edges.borrow_mut();
-        let at = match edges.iter().rposition(|e| e.candidate == candidate) {
-            Some(at) => at,
+        let index = match edges.iter().rposition(|e| e.candidate == candidate) {
+            Some(index) => index,
             None => {
                 edges.push(Edge { candidate, stride: 1, ..Edge::default() });
                 edges.len() - 1
             }
         };
-        if let Some(edge) = edges.get_mut(at) {
+        if let Some(edge) = edges.get_mut(index) {
             change(edge);
         }
     }
@@ -201,22 +201,22 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
         self.level.set(Some((level, mean.into(), samples)));
     }
     fn frame(&self, px: u16) {
-        self.frame_px.set(px);
+        self.border_px.set(px);
     }
     fn look(&self, _: u32, level: u16) {
-        self.again.borrow_mut().push(level);
+        self.further_thresholds.borrow_mut().push(level);
     }
     fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
-        self.with(candidate, |e| {
+        self.change_edge(candidate, |e| {
             e.border = border.collect();
             e.stride = stride;
         });
     }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
-        self.with(candidate, |e| e.points.push([point.u.into(), point.v.into()]));
+        self.change_edge(candidate, |e| e.points.push([point.u.into(), point.v.into()]));
     }
     fn weight(&self, candidate: u32, point: u32, weight: T) {
-        self.with(candidate, |e| {
+        self.change_edge(candidate, |e| {
             e.weights.resize(e.points.len(), 0.0);
             if let Some(slot) = e.weights.get_mut(point as usize) {
                 *slot = weight.into();
@@ -227,12 +227,12 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
         true
     }
     fn budget(&self, candidate: u32, budget: &ErrorBudget<T>) {
-        self.with(candidate, |e| {
+        self.change_edge(candidate, |e| {
             e.budget_rad = Term::ALL.map(|term| (term, budget.of(term).sigma_max_rad().into())).into();
         });
     }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
-        self.with(candidate, |e| {
+        self.change_edge(candidate, |e| {
             e.outcome = Some(widen_candidate(outcome));
             e.solution = solution.and_then(widen_solution);
         });

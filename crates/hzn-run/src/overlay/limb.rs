@@ -12,7 +12,7 @@ pub fn lines(axis: [f64; 3], half_angle_rad: f64, camera: &Camera<f64>) -> Vec<V
     let (b1, b2) = basis(axis);
     let (sin, cos) = half_angle_rad.sin_cos();
     let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
-    let at = |step: usize| -> Option<[f64; 2]> {
+    let point = |step: usize| -> Option<[f64; 2]> {
         let (s, c) = (step as f64 * std::f64::consts::TAU / STEPS as f64).sin_cos();
         let ray = std::array::from_fn(|i| cos * axis[i] + sin * (c * b1[i] + s * b2[i]));
         let p = camera.project(&UnitVec3::try_new(ray)?)?;
@@ -20,11 +20,11 @@ pub fn lines(axis: [f64; 3], half_angle_rad: f64, camera: &Camera<f64>) -> Vec<V
         ((-1.0..=w).contains(&p.u) && (-1.0..=h).contains(&p.v)).then_some([p.u, p.v])
     };
     // The loop starts outside the picture, so that a line across the first step is not cut there.
-    let start = (0..STEPS).find(|&i| at(i).is_none()).unwrap_or(0);
+    let start = (0..STEPS).find(|&i| point(i).is_none()).unwrap_or(0);
     let mut out = Vec::new();
     let mut line = Vec::new();
     for step in start..=start + STEPS {
-        match at(step % STEPS) {
+        match point(step % STEPS) {
             Some(p) => line.push(p),
             None if line.len() > 1 => out.push(std::mem::take(&mut line)),
             None => line.clear(),

@@ -7,9 +7,13 @@ pub mod limb;
 
 use std::path::Path;
 
+use hzn_core::camera::Camera;
+use hzn_core::frames::{Cam, UnitVec3};
+use hzn_core::pixel::ImagePoint;
 use image::RgbImage;
 
 use canvas::{Canvas, Colour};
+use hzn_mcap::Annotations;
 use hzn_mcap::palette::{AXIS, EDGE, INLIER, LIMB, REJECTED};
 
 const TRUTH: Colour = [230, 159, 0];
@@ -21,17 +25,12 @@ pub fn file_name(name: &str) -> String {
 }
 
 /// Draws annotations (pixel centres at integers) with a legend that begins with `title`.
-pub fn draw_annotations(image: RgbImage, drawing: &hzn_mcap::Annotations, title: &str) -> RgbImage {
-    draw_beside(image, drawing, &[], title)
+pub fn draw_annotations(image: RgbImage, drawing: &Annotations, title: &str) -> RgbImage {
+    draw_with_truth(image, drawing, &[], title)
 }
 
 /// Draws annotations as [`draw_annotations`] does, and the true limb with them.
-pub fn draw_beside(
-    image: RgbImage,
-    drawing: &hzn_mcap::Annotations,
-    true_limb: &[Vec<[f64; 2]>],
-    title: &str,
-) -> RgbImage {
+pub fn draw_with_truth(image: RgbImage, drawing: &Annotations, true_limb: &[Vec<[f64; 2]>], title: &str) -> RgbImage {
     let mut canvas = Canvas { image };
     let (w, h) = (canvas.image.width(), canvas.image.height());
     // The pen is wide enough to be visible when the whole picture is shown on a screen of about 1600 px.
@@ -65,7 +64,21 @@ pub fn draw_beside(
     canvas.image
 }
 
-fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, truth: bool, title: &str) {
+/// Returns the drawing for a fitted cone: its limb as lines, broken where it leaves the picture, and its axis.
+/// Coordinates are in pixels.
+pub fn draw_cone(axis: &UnitVec3<Cam, f64>, half_angle_rad: f64, camera: &Camera<f64>) -> Annotations {
+    let inside = |p: &ImagePoint<f64>| {
+        (-0.5..=f64::from(camera.width()) - 0.5).contains(&p.u)
+            && (-0.5..=f64::from(camera.height()) - 0.5).contains(&p.v)
+    };
+    Annotations {
+        limb: limb::lines(axis.xyz(), half_angle_rad, camera),
+        axes: camera.project(axis).filter(inside).map(|p| [p.u, p.v]).into_iter().collect(),
+        ..Annotations::default()
+    }
+}
+
+fn legend(canvas: &mut Canvas, drawing: &Annotations, truth: bool, title: &str) {
     let (w, h) = (canvas.image.width(), canvas.image.height());
     let scale = (w.max(h) / 600).max(1);
     let line = 11 * scale;
@@ -100,7 +113,7 @@ fn legend(canvas: &mut Canvas, drawing: &hzn_mcap::Annotations, truth: bool, tit
 pub fn save(image: &RgbImage, path: &Path) -> anyhow::Result<()> {
     // The picture is encoded in memory first, because the encoder has its own words for a full disk.
     let bytes = png(image).map_err(|e| e.context(path.display().to_string()))?;
-    std::fs::write(path, bytes).map_err(|e| anyhow::anyhow!(crate::sink::advice(path, &e)))
+    std::fs::write(path, bytes).map_err(|e| anyhow::anyhow!(crate::disk::advice(path, &e)))
 }
 
 /// Encodes a picture as PNG.

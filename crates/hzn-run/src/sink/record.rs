@@ -1,19 +1,14 @@
 //! Converts a processed picture to the rows and records of files.
 
 use hzn_calib::FrameData;
-use hzn_core::camera::Camera;
-use hzn_core::frames::{Cam, UnitVec3};
-use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
-use hzn_core::{Config, Solution, body};
+use hzn_core::{Config, body};
 use hzn_mcap::{
-    Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, PicturePrior, Row,
-    RowMeta,
+    Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, PicturePrior, Row, RowMeta,
 };
 use hzn_sim::evaluate;
 
-use crate::engine::{BodyOutcome, Finished, Trace};
-use crate::overlay::limb;
+use crate::engine::{BodyOutcome, Finished};
 
 /// Returns the altitude above a body in kilometres: from the position if there is one, otherwise the given altitude.
 /// Sun and Moon have none.
@@ -22,8 +17,8 @@ pub fn altitude_km(data: Option<&FrameData>, body: &body::Config) -> Option<f64>
         return None;
     }
     let own = data.and_then(|d| {
-        let at = |p| hzn_calib::frames::altitude_at_km(p, body.kind, body.mean_radius_km());
-        d.position_km.and_then(at).or(d.altitude_km)
+        let altitude = |p| hzn_calib::frames::altitude_at_km(p, body.kind, body.mean_radius_km());
+        d.position_km.and_then(altitude).or(d.altitude_km)
     });
     own.or(body.altitude_km)
 }
@@ -43,7 +38,7 @@ pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
             Err(e) => Row::unprocessed(&meta, e.status, e.why.clone()),
         }
     };
-    config.each_body().iter().zip(&frame.found).map(row).collect()
+    config.each_body().iter().zip(&frame.outcomes).map(row).collect()
 }
 
 /// Returns the records of a picture, one for each body. The pixels and the drawing are moved out of the picture, into
@@ -52,19 +47,19 @@ pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
     let mut records: Vec<FrameRecord> = rows(frame, config).into_iter().map(FrameRecord::new).collect();
     if let Some(first) = records.first_mut() {
         if let Some(data) = &frame.data {
-            first.prior = given(data);
+            first.prior = to_picture_prior(data);
             first.attitude = data.camera_to_ecef_wxyz.map(|q| Attitude {
                 q_ecef_from_camera_wxyz: q,
                 position_m: data.position_km.unwrap_or_default().map(|km| km * 1e3),
             });
         }
         first.image = frame.picture.take().map(|bytes| {
-            let png = matches!(crate::source::picture::format_of(&bytes), Some(image::ImageFormat::Png));
+            let png = matches!(crate::source::decode::guess_format(&bytes), Some(image::ImageFormat::Png));
             EncodedImage { format: if png { ImageFormat::Png } else { ImageFormat::Jpeg }, bytes }
         });
         first.annotations = std::mem::take(&mut frame.drawing);
     }
-    for (record, found) in records.iter_mut().zip(&frame.found) {
+    for (record, found) in records.iter_mut().zip(&frame.outcomes) {
         match &found.report {
             Ok(report) => record.candidates = CandidateEdge::from_report(report),
             Err(e) => record.log.push(LogLine { level: LogLevel::Error, message: e.why.clone() }),
@@ -87,7 +82,7 @@ pub fn answer(row: &Row) -> evaluate::Answer {
 }
 
 /// Converts a row of frames.csv to the prior that recordings store.
-fn given(data: &FrameData) -> PicturePrior {
+fn to_picture_prior(data: &FrameData) -> PicturePrior {
     PicturePrior {
         utc_s: data.utc_s,
         altitude_km: data.altitude_km,
@@ -96,53 +91,5 @@ fn given(data: &FrameData) -> PicturePrior {
         attitude_sigma_deg: data.attitude_sigma_deg,
         sun_camera: data.sun_camera,
         rate_rad_s: data.rate_rad_s,
-    }
-}
-
-/// Returns the row of frames.csv for a picture, from the prior that a recording stores.
-pub fn frame_data(row: &Row, given: &PicturePrior) -> FrameData {
-    FrameData {
-        file: row.file.clone(),
-        line: 0,
-        time_s: row.time_s,
-        utc_s: given.utc_s,
-        altitude_km: given.altitude_km,
-        position_km: given.position_km,
-        camera_to_ecef_wxyz: given.q_ecef_from_camera_wxyz,
-        attitude_sigma_deg: given.attitude_sigma_deg,
-        sun_camera: given.sun_camera,
-        rate_rad_s: given.rate_rad_s,
-    }
-}
-
-/// Returns the drawing for a picture: the edges, the points of the chosen edge, and the fitted limb. Coordinates are in
-/// pixels.
-pub fn annotations(trace: &Trace, solution: Option<&Solution<f64>>, camera: &Camera<f64>) -> Annotations {
-    let mut out = Annotations::default();
-    for edge in trace.edges().iter() {
-        out.edges.push(edge.border.iter().map(|p| [f64::from(p.x), f64::from(p.y)]).collect());
-        if solution.is_some_and(|s| s.candidate == edge.candidate) {
-            for (point, weight) in edge.points.iter().zip(&edge.weights) {
-                if *weight > 0.0 { out.inliers.push(*point) } else { out.rejected.push(*point) }
-            }
-        }
-    }
-    if let Some(s) = solution {
-        out.add(fitted(&s.axis, s.fused_half_angle_rad, camera));
-    }
-    out
-}
-
-/// Returns the drawing for a fitted cone: its limb as lines, broken where it leaves the picture, and its axis.
-/// Coordinates are in pixels.
-pub fn fitted(axis: &UnitVec3<Cam, f64>, half_angle_rad: f64, camera: &Camera<f64>) -> Annotations {
-    let inside = |p: &ImagePoint<f64>| {
-        (-0.5..=f64::from(camera.width()) - 0.5).contains(&p.u)
-            && (-0.5..=f64::from(camera.height()) - 0.5).contains(&p.v)
-    };
-    Annotations {
-        limb: limb::lines(axis.xyz(), half_angle_rad, camera),
-        axes: camera.project(axis).filter(inside).map(|p| [p.u, p.v]).into_iter().collect(),
-        ..Annotations::default()
     }
 }

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use hzn_mcap::Row;
 
-use super::{Held, advice_of_run};
+use super::stored::StoredResults;
+use crate::disk::run_advice;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
@@ -36,13 +37,13 @@ impl Text {
         Ok(text)
     }
 
-    fn on(file: File, path: &Path, part: &Path, form: Form) -> Self {
+    fn from_file(file: File, path: &Path, part: &Path, form: Form) -> Self {
         let out = BufWriter::with_capacity(1 << 16, Box::new(file) as Box<dyn Write>);
         Self { out, form, names: Some((path.to_owned(), part.to_owned())) }
     }
 
     pub(crate) fn create(path: &Path, part: &Path, form: Form) -> io::Result<Self> {
-        let mut text = Self::on(hzn_mcap::create_part(part)?, path, part, form);
+        let mut text = Self::from_file(hzn_mcap::create_part(part)?, path, part, form);
         if form == Form::Csv {
             text.out.write_all(header().as_bytes())?;
             text.out.flush()?;
@@ -52,22 +53,27 @@ impl Text {
 
     /// Continues after the last picture that has all of its rows. This number is `bodies`, or that of the first
     /// picture. Without an unfinished file, begins a new one.
-    pub(crate) fn resume(path: &Path, part: &Path, form: Form, bodies: Option<usize>) -> io::Result<(Self, Held)> {
+    pub(crate) fn resume(
+        path: &Path,
+        part: &Path,
+        form: Form,
+        bodies: Option<usize>,
+    ) -> io::Result<(Self, StoredResults)> {
         if !part.exists() {
-            return Ok((Self::create(path, part, form)?, Held::default()));
+            return Ok((Self::create(path, part, form)?, StoredResults::default()));
         }
         let mut file = hzn_mcap::open_part(part)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
-        let (held, end) = whole(&bytes, form, bodies)?;
+        let (stored, end) = find_complete(&bytes, form, bodies)?;
         if end == 0 {
             drop(file);
-            return Ok((Self::create(path, part, form)?, Held::default()));
+            return Ok((Self::create(path, part, form)?, StoredResults::default()));
         }
         // The rest of the file is an incomplete row or picture.
         file.set_len(end as u64)?;
         file.seek(SeekFrom::End(0))?;
-        Ok((Self::on(file, path, part, form), held))
+        Ok((Self::from_file(file, path, part, form), stored))
     }
 
     pub(crate) fn write(&mut self, row: &Row) -> io::Result<()> {
@@ -87,9 +93,9 @@ impl Text {
     }
 
     /// Returns the error for a failed write of a run's results, with advice.
-    pub(crate) fn told(&self, error: io::Error) -> anyhow::Error {
+    pub(crate) fn write_error(&self, error: io::Error) -> anyhow::Error {
         match &self.names {
-            Some((_, part)) => anyhow::anyhow!(advice_of_run(part, &error)),
+            Some((_, part)) => anyhow::anyhow!(run_advice(part, &error)),
             None if error.kind() == io::ErrorKind::BrokenPipe => error.into(),
             None => anyhow::anyhow!("results cannot be written to stdout: {error}"),
         }
@@ -113,7 +119,7 @@ pub(crate) fn csv_line(row: &Row) -> anyhow::Result<Vec<u8>> {
 
 /// Returns the complete pictures of `bodies` rows each, and the offset of their end. If the number of bodies is
 /// unknown, it is the number of rows of the first picture.
-fn whole(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(Held, usize)> {
+fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(StoredResults, usize)> {
     let bodies = match bodies {
         Some(bodies) => bodies,
         None => {
@@ -126,27 +132,27 @@ fn whole(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(Held, u
             first.len().max(1)
         }
     };
-    let (mut held, mut end, mut frame) = (Held::default(), 0, Vec::new());
+    let (mut stored, mut end, mut frame) = (StoredResults::default(), 0, Vec::new());
     each_row(bytes, form, |row, to| {
         frame.push(row);
         if frame.len() == bodies {
-            held.answers(&frame);
-            held.frames += 1;
-            held.rows += bodies as u64;
-            held.last = frame.pop();
+            stored.record_answers(&frame);
+            stored.frames += 1;
+            stored.rows += bodies as u64;
+            stored.last = frame.pop();
             frame.clear();
             end = to;
         }
         true
     })?;
-    Ok((held, end))
+    Ok((stored, end))
 }
 
 /// Calls `visit` with every complete row and the offset of its end. Stops if `visit` returns false or a row is
 /// incomplete.
 fn each_row(bytes: &[u8], form: Form, mut visit: impl FnMut(Row, usize) -> bool) -> io::Result<()> {
     let other = || {
-        let what = "has other columns than the results of this version";
+        let what = "does not have the columns of results of this version";
         Err(io::Error::new(io::ErrorKind::InvalidData, what))
     };
     if form == Form::Jsonl {

@@ -5,13 +5,13 @@
 //! Therefore pictures are sampled evenly from the whole sequence, by their place in it, and the result holds for all
 //! pictures.
 
-use super::Source;
+use super::sequence::Source;
 
 /// Number of pictures that are examined. If the input is one picture, it is examined in addition to those of its
 /// folder.
-pub(super) const LOOKED_AT: usize = 16;
+pub(super) const MAX_EXAMINED: usize = 16;
 /// If this many pictures at the beginning have no words, the sequence has none.
-const BYTES: usize = 3;
+const MAX_PICTURES_WITHOUT_WORDS: usize = 3;
 /// Numbers of bits that cameras have.
 const BITS: [u8; 5] = [8, 10, 12, 14, 16];
 
@@ -21,19 +21,19 @@ pub struct FoundBits {
     /// The smallest of 8, 10, 12, 14 and 16 bits that can represent every examined sample.
     pub bits: u8,
     /// The largest examined sample.
-    pub most: u16,
+    pub largest_sample: u16,
     /// Number of pictures that were examined.
     pub pictures: usize,
 }
 
 impl std::fmt::Display for FoundBits {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { bits, most, pictures } = self;
-        let of = crate::explain::counted(*pictures as u64, "picture");
+        let Self { bits, largest_sample, pictures } = self;
+        let examined = crate::explain::counted(*pictures as u64, "picture");
         write!(
             f,
-            "samples are words of 16 bits that reach {most} in {of} looked at: taken as {bits} bits; if the camera has \
-             others, say so with bits = ... in [input] of sensor.toml"
+            "the largest 16-bit sample in {examined} is {largest_sample}: the camera is assumed to have {bits} bits; \
+             if it has another number, set bits = ... in [input] of sensor.toml"
         )
     }
 }
@@ -44,17 +44,17 @@ pub fn find_bits(source: &dyn Source) -> Option<FoundBits> {
     if source.bits().is_some() {
         return None;
     }
-    let (mut most, mut pictures) = (0, 0);
-    for (i, payload) in source.samples().take(LOOKED_AT + 1).enumerate() {
+    let (mut largest_sample, mut pictures) = (0, 0);
+    for (i, payload) in source.samples().take(MAX_EXAMINED + 1).enumerate() {
         match payload.largest_word() {
-            Some(word) => (most, pictures) = (word.max(most), pictures + 1),
-            None if pictures == 0 && i + 1 >= BYTES => return None,
+            Some(word) => (largest_sample, pictures) = (word.max(largest_sample), pictures + 1),
+            None if pictures == 0 && i + 1 >= MAX_PICTURES_WITHOUT_WORDS => return None,
             None => {}
         }
     }
-    let bits = BITS.into_iter().find(|bits| u32::from(most) >> bits == 0)?;
+    let bits = BITS.into_iter().find(|bits| u32::from(largest_sample) >> bits == 0)?;
     // Black pictures contain no information about the bits.
-    (most > 0).then_some(FoundBits { bits, most, pictures })
+    (largest_sample > 0).then_some(FoundBits { bits, largest_sample, pictures })
 }
 
 /// Returns the text of a sensor.toml with this key set in `[input]`. Text that is not TOML is returned unchanged.
@@ -70,6 +70,6 @@ pub fn with_key(text: &str, key: &str, value: impl Into<toml_edit::Value>) -> St
 /// Returns the places of the pictures to examine, evenly spread over a sequence of `count`, including its first and
 /// last.
 pub(super) fn places(count: usize) -> impl Iterator<Item = usize> {
-    let n = count.min(LOOKED_AT);
+    let n = count.min(MAX_EXAMINED);
     (0..n).map(move |i| if n > 1 { i * (count - 1) / (n - 1) } else { 0 })
 }

@@ -3,7 +3,7 @@
 use image::ImageFormat;
 
 /// Largest number of pictures that is counted, so that a malicious file cannot cause an endless loop.
-const MOST: u32 = 100_000;
+const MAX_PAGES: u32 = 100_000;
 
 /// Returns the number of pictures; 1 if the format has only one or the file is broken.
 pub(super) fn count(bytes: &[u8], format: ImageFormat) -> u32 {
@@ -32,7 +32,7 @@ fn tiff(bytes: &[u8]) -> Option<u32> {
         _ => return None,
     };
     let (mut at, mut pages) = (first, 0);
-    for _ in 0..MOST {
+    for _ in 0..MAX_PAGES {
         if at == 0 {
             break;
         }
@@ -62,7 +62,7 @@ fn animation(bytes: &[u8]) -> Option<u32> {
         let length = usize::try_from(u32::from_be_bytes(*length)).ok()?;
         let (kind, after) = after.split_first_chunk::<4>()?;
         match kind {
-            b"acTL" => return Some(u32::from_be_bytes(*after.first_chunk::<4>()?).min(MOST)),
+            b"acTL" => return Some(u32::from_be_bytes(*after.first_chunk::<4>()?).min(MAX_PAGES)),
             b"IDAT" => return None,
             // The chunk's data and checksum are skipped.
             _ => rest = after.get(length.checked_add(4)?..)?,
@@ -73,7 +73,7 @@ fn animation(bytes: &[u8]) -> Option<u32> {
 /// Counts the pictures of a binary PGM or PPM, which may follow one another in a file.
 fn portable(bytes: &[u8]) -> Option<u32> {
     let (mut rest, mut pictures) = (bytes, 0);
-    while pictures < MOST {
+    while pictures < MAX_PAGES {
         let channels = match rest.get(..2) {
             Some(b"P5") => 1,
             Some(b"P6") => 3,
@@ -94,9 +94,9 @@ fn portable(bytes: &[u8]) -> Option<u32> {
             at += digits;
             Some(number)
         };
-        let (Some(width), Some(height), Some(most)) = (next(), next(), next()) else { break };
+        let (Some(width), Some(height), Some(white)) = (next(), next(), next()) else { break };
         let samples = width.checked_mul(height)?.checked_mul(channels)?;
-        let length = samples.checked_mul(if most > 255 { 2 } else { 1 })?;
+        let length = samples.checked_mul(if white > 255 { 2 } else { 1 })?;
         pictures += 1;
         rest = rest.get((at + 1).checked_add(length)?..).unwrap_or_default();
     }
@@ -119,7 +119,7 @@ mod tests {
         assert_eq!(count(&tiff, ImageFormat::Tiff), 2);
         // The directories form a circle; the count ends nevertheless.
         let circle = [b"II*\0\x08\0\0\0".to_vec(), page(256, 9, 8)].concat();
-        assert_eq!(count(&circle, ImageFormat::Tiff), MOST);
+        assert_eq!(count(&circle, ImageFormat::Tiff), MAX_PAGES);
         assert_eq!(count(&tiff[..20], ImageFormat::Tiff), 1);
         assert_eq!(count(b"MM", ImageFormat::Tiff), 1);
         let pgm = b"P5 2 1 255\n\x01\x02".as_slice();

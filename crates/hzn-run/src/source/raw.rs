@@ -48,12 +48,12 @@ impl FromStr for Raw {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let form = "WIDTHxHEIGHT:FORMAT is expected, such as 1920x1080:mono12";
+        let form = "WIDTHxHEIGHT:FORMAT is expected, for example 1920x1080:mono12";
         let (size, name) = text.split_once(':').ok_or(form)?;
         let (width, height) = size.split_once(['x', 'X']).ok_or(form)?;
-        let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=super::picture::MAX_SIDE_PX).contains(n));
+        let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=super::decode::MAX_SIDE_PX).contains(n));
         let (Some(width), Some(height)) = (side(width), side(height)) else {
-            return Err(format!("width and height must be 1 to {}", super::picture::MAX_SIDE_PX));
+            return Err(format!("width and height must be 1 to {}", super::decode::MAX_SIDE_PX));
         };
         let names = || FORMATS.iter().map(|(n, _)| *n);
         let Some((_, format)) = FORMATS.iter().find(|(n, _)| n.eq_ignore_ascii_case(name)) else {
@@ -63,7 +63,10 @@ impl FromStr for Raw {
                 Some(bits) => format!("; did you mean mono16, with bits = {bits} in [input] of sensor.toml?"),
                 None => hzn_calib::nearest(name, names()).map(|n| format!("; did you mean {n}?")).unwrap_or_default(),
             };
-            return Err(format!("no format {name:?}{hint} (there are {})", names().collect::<Vec<_>>().join(", ")));
+            return Err(format!(
+                "there is no format {name:?}{hint} (the formats are {})",
+                names().collect::<Vec<_>>().join(", ")
+            ));
         };
         if *format == Format::Bayer8 && (width % 2 != 0 || height % 2 != 0) {
             return Err("a Bayer mosaic has an even width and height".into());
@@ -111,7 +114,7 @@ impl Raw {
         let one = self.bytes();
         let left = match (length / one, length % one) {
             (0, _) => format!("{} less", one - length),
-            (n, 0) => format!("these are {n} pictures; give each a file of its own"),
+            (n, 0) => format!("these are {n} pictures; write each into its own file"),
             (1, more) => format!("{more} bytes more"),
             (n, more) => format!("these are {n} pictures and {more} bytes more"),
         };
@@ -163,14 +166,14 @@ impl Raw {
 /// Unpacks samples of `bits` bits that lie without gaps, least significant bit first.
 fn unpack(data: &[u8], bits: u32, count: usize) -> Vec<u16> {
     let mut out = Vec::with_capacity(count);
-    let (mut held, mut have) = (0u32, 0u32);
+    let (mut buffer, mut buffered) = (0u32, 0u32);
     for &byte in data {
-        held |= u32::from(byte) << have;
-        have += 8;
-        while have >= bits && out.len() < count {
-            out.push((held & ((1 << bits) - 1)) as u16);
-            held >>= bits;
-            have -= bits;
+        buffer |= u32::from(byte) << buffered;
+        buffered += 8;
+        while buffered >= bits && out.len() < count {
+            out.push((buffer & ((1 << bits) - 1)) as u16);
+            buffer >>= bits;
+            buffered -= bits;
         }
     }
     out

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_core::image::Layout;
 use hzn_mcap::{EncodedImage, ImageFormat, ImageReader};
 
-use super::picture::{self, Picture, Samples};
-use super::{Item, Payload, SIZES, Source, TimeSource};
+use super::header;
+use super::item::{Item, TimeSource};
+use super::payload::Payload;
+use super::sequence::{MAX_SIZES_READ, Source};
 use crate::error::{Error, unusable};
 
 /// Step between the pictures of [`Source::samples`]. A recording does not say how many pictures it has, so the samples
@@ -39,8 +40,8 @@ impl Recording {
                     }
                     (Some(topic), true) => format!("no pictures on topic {topic}, nor on any other"),
                     (None, _) => {
-                        "no pictures in this recording (understood are foxglove.CompressedImage and RawImage in \
-                                  protobuf, sensor_msgs/msg/Image and CompressedImage in CDR)"
+                        "no pictures in this recording (supported are foxglove.CompressedImage and RawImage in \
+                         protobuf, sensor_msgs/msg/Image and CompressedImage in CDR)"
                             .to_owned()
                     }
                 };
@@ -63,7 +64,7 @@ impl Recording {
         let name = self.frame_name(self.index);
         self.index += 1;
         let payload = match image.image {
-            Ok(image) => payload(image),
+            Ok(image) => Payload::from_recorded(image),
             Err(why) => Payload::Broken(why),
         };
         Some(Ok(Item { name, time: TimeSource::Container(Some(image.time_s)), data: None, payload }))
@@ -71,34 +72,13 @@ impl Recording {
 }
 
 /// Returns width and height in pixels, if they are known without decoding.
-pub(super) fn size_of(image: &EncodedImage) -> Option<(u32, u32)> {
+pub(super) fn known_size(image: &EncodedImage) -> Option<(u32, u32)> {
     match image.format {
-        ImageFormat::Png | ImageFormat::Jpeg => picture::size_in(std::io::Cursor::new(&image.bytes)),
+        ImageFormat::Png | ImageFormat::Jpeg => header::read_size_from(std::io::Cursor::new(&image.bytes)),
         ImageFormat::Other(_) => None,
         ImageFormat::Mono8 { width, height }
         | ImageFormat::Rgb8 { width, height }
         | ImageFormat::Mono16 { width, height } => Some((width, height)),
-    }
-}
-
-/// Returns the picture of a message.
-pub(crate) fn payload(image: EncodedImage) -> Payload {
-    let EncodedImage { format, bytes } = image;
-    let raw = |samples, width, height, channels, bits| {
-        let layout = Layout::packed(width, height, channels, bits);
-        Payload::Decoded(Picture::new(samples, layout))
-    };
-    match format {
-        ImageFormat::Png | ImageFormat::Jpeg => Payload::Encoded(bytes),
-        ImageFormat::Other(name) => {
-            Payload::Broken(format!("pictures in {name} are not supported; record PNG or JPEG"))
-        }
-        ImageFormat::Mono8 { width, height } => raw(Samples::Bytes(bytes), width, height, 1, 8),
-        ImageFormat::Rgb8 { width, height } => raw(Samples::Bytes(bytes), width, height, 3, 8),
-        ImageFormat::Mono16 { width, height } => {
-            let words = bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
-            raw(Samples::Words(words), width, height, 1, 16)
-        }
     }
 }
 
@@ -116,8 +96,8 @@ impl Source for Recording {
         let Ok(reader) = ImageReader::open(&self.path, self.reader.topic()) else {
             return Box::new(std::iter::empty());
         };
-        let images = reader.map_while(Result::ok).take(SIZES);
-        Box::new(images.enumerate().filter_map(|(i, m)| Some((self.frame_name(i as u64), size_of(&m.image.ok()?)?))))
+        let images = reader.map_while(Result::ok).take(MAX_SIZES_READ);
+        Box::new(images.enumerate().filter_map(|(i, m)| Some((self.frame_name(i as u64), known_size(&m.image.ok()?)?))))
     }
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()
@@ -127,9 +107,9 @@ impl Source for Recording {
             return Box::new(std::iter::empty());
         };
         let images = reader.map_while(Result::ok).step_by(SAMPLE_EVERY);
-        Box::new(images.map(|m| m.image.map_or_else(Payload::Broken, payload)))
+        Box::new(images.map(|m| m.image.map_or_else(Payload::Broken, Payload::from_recorded)))
     }
-    fn lost(&self) -> Option<String> {
+    fn describe_loss(&self) -> Option<String> {
         let why = self.reader.broken()?;
         Some(format!("{}: {why}; the pictures before that were processed", self.path.display()))
     }

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use hzn_calib::FrameData;
-use hzn_mcap::{Contents, FrameRecord, Index, IndexEntry, Reader};
+use hzn_mcap::{Contents, FrameRecord, Index, IndexEntry, PicturePrior, Reader, Row};
 
-use super::recording::{SAMPLE_EVERY, payload, size_of};
-use super::{Item, Payload, SIZES, Source, TimeSource};
+use super::item::{Item, TimeSource};
+use super::payload::Payload;
+use super::recording::{SAMPLE_EVERY, known_size};
+use super::sequence::{MAX_SIZES_READ, Source};
 use crate::error::{Error, unusable};
-use crate::sink;
 
 /// Pictures as they were recorded: with their names, times, priors, and the sensor.
 pub(super) struct Rerun {
@@ -25,14 +26,14 @@ impl Rerun {
         if reader.sensor_toml().is_none() {
             return Ok(None);
         }
-        match holds(path).map_err(unusable)? {
-            Holds::Pictures => {}
-            Holds::Results => {
-                let what = "holds results without their pictures; give the pictures themselves";
+        match find_pictures(path).map_err(unusable)? {
+            RecordedPictures::Present => {}
+            RecordedPictures::LeftOut => {
+                let what = "contains results without their pictures; give the pictures themselves";
                 return Err(unusable(format!("{}: {what}", path.display())));
             }
-            Holds::LostPictures => {
-                let what = "was cut off before its first picture was whole; give the pictures themselves";
+            RecordedPictures::Lost => {
+                let what = "ends before its first picture is complete; give the pictures themselves";
                 return Err(unusable(format!("{}: {what}", path.display())));
             }
         }
@@ -44,30 +45,33 @@ fn open(path: &Path) -> Result<Reader, hzn_mcap::Error> {
     Reader::open(path, Contents::All)
 }
 
-enum Holds {
-    Pictures,
-    Results,
+enum RecordedPictures {
+    Present,
+    /// The file has only results.
+    LeftOut,
     /// The file contains nothing that is complete.
-    LostPictures,
+    Lost,
 }
 
-/// Says what a recording contains. Pictures come before the results, so only little of a recording with pictures is
-/// read.
-fn holds(path: &Path) -> Result<Holds, hzn_mcap::Error> {
+/// Returns whether a recording contains pictures. Pictures come before the results, so only little of a recording with
+/// pictures is read.
+fn find_pictures(path: &Path) -> Result<RecordedPictures, hzn_mcap::Error> {
     let mut index = Index::open(path)?;
     let mut any = false;
     while let Some(part) = index.next_part()? {
         if part.iter().any(|found| matches!(found, IndexEntry::Picture(_))) {
-            return Ok(Holds::Pictures);
+            return Ok(RecordedPictures::Present);
         }
         any |= !part.is_empty();
     }
-    Ok(if any || index.is_complete() { Holds::Results } else { Holds::LostPictures })
+    Ok(if any || index.is_complete() { RecordedPictures::LeftOut } else { RecordedPictures::Lost })
 }
 
 fn item(record: FrameRecord) -> Item {
-    let data: FrameData = sink::frame_data(&record.row, &record.prior);
-    let picture = record.image.map_or_else(|| Payload::Broken("the recording holds no picture of it".into()), payload);
+    let data: FrameData = recorded_prior(&record.row, &record.prior);
+    let picture = record
+        .image
+        .map_or_else(|| Payload::Broken("the recording does not contain this picture".into()), Payload::from_recorded);
     Item { name: record.row.file, time: TimeSource::Table, data: Some(data), payload: picture }
 }
 
@@ -86,13 +90,13 @@ impl Source for Rerun {
     }
     fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_> {
         let Ok(reader) = open(&self.path) else { return Box::new(std::iter::empty()) };
-        let records = reader.map_while(Result::ok).take(SIZES);
-        Box::new(records.filter_map(|r| Some((r.row.file, size_of(r.image.as_ref()?)?))))
+        let records = reader.map_while(Result::ok).take(MAX_SIZES_READ);
+        Box::new(records.filter_map(|r| Some((r.row.file, known_size(r.image.as_ref()?)?))))
     }
     fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
         let Ok(reader) = open(&self.path) else { return Box::new(std::iter::empty()) };
         let pictures = reader.map_while(Result::ok).filter_map(|record| record.image);
-        Box::new(pictures.step_by(SAMPLE_EVERY).map(payload))
+        Box::new(pictures.step_by(SAMPLE_EVERY).map(Payload::from_recorded))
     }
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()
@@ -100,18 +104,34 @@ impl Source for Rerun {
     fn sensor_toml(&self) -> Option<&str> {
         self.reader.sensor_toml()
     }
-    fn lost(&self) -> Option<String> {
-        lost(&self.reader, &self.path, "processed")
+    fn describe_loss(&self) -> Option<String> {
+        describe_loss(&self.reader, &self.path, "processed")
     }
 }
 
 /// Describes what is missing in a recording that was read to its end. `done` says what was done with the rest.
-pub fn lost(reader: &Reader, path: &Path, done: &str) -> Option<String> {
+pub fn describe_loss(reader: &Reader, path: &Path, done: &str) -> Option<String> {
     let name = path.display();
     match reader.broken_chunks() {
         0 if reader.is_complete() => None,
         0 => Some(format!("{name}: was cut off; its finished frames were {done} (`hzn recover` closes it)")),
-        1 => Some(format!("{name}: 1 damaged part was left out; what it held is missing")),
-        n => Some(format!("{name}: {n} damaged parts were left out; what they held is missing")),
+        1 => Some(format!("{name}: 1 damaged part was left out; its content is missing")),
+        n => Some(format!("{name}: {n} damaged parts were left out; their content is missing")),
+    }
+}
+
+/// Returns the row of frames.csv for a picture, from the prior that a recording stores.
+pub fn recorded_prior(row: &Row, given: &PicturePrior) -> FrameData {
+    FrameData {
+        file: row.file.clone(),
+        line: 0,
+        time_s: row.time_s,
+        utc_s: given.utc_s,
+        altitude_km: given.altitude_km,
+        position_km: given.position_km,
+        camera_to_ecef_wxyz: given.q_ecef_from_camera_wxyz,
+        attitude_sigma_deg: given.attitude_sigma_deg,
+        sun_camera: given.sun_camera,
+        rate_rad_s: given.rate_rad_s,
     }
 }

@@ -6,8 +6,8 @@ use image::metadata::Orientation;
 
 use super::picture::{Picture, Samples};
 
-/// Returns the turn that a picture with this EXIF orientation needs.
-pub(super) fn needed(orient: Orient, exif: Orientation) -> Orientation {
+/// Chooses the turn of a picture, from `input.orient` and its EXIF orientation.
+pub(super) fn choose(orient: Orient, exif: Orientation) -> Orientation {
     match orient {
         Orient::Exif => exif,
         Orient::Rotate90 => Orientation::Rotate90,
@@ -24,7 +24,7 @@ pub(super) fn swaps_sides(turn: Orientation) -> bool {
 }
 
 /// Returns the turn in words, for a message.
-pub(super) fn in_words(turn: Orientation) -> &'static str {
+pub(super) fn describe(turn: Orientation) -> &'static str {
     match turn {
         Orientation::NoTransforms => "as it is",
         Orientation::Rotate90 => "turned by 90 degrees clockwise",
@@ -36,7 +36,7 @@ pub(super) fn in_words(turn: Orientation) -> &'static str {
 }
 
 /// Returns the turned picture.
-pub(super) fn turned(picture: Picture, turn: Orientation) -> Picture {
+pub(super) fn apply(picture: Picture, turn: Orientation) -> Picture {
     if turn == Orientation::NoTransforms {
         return picture;
     }
@@ -87,7 +87,7 @@ mod tests {
             let turn = Orientation::from_exif(number).unwrap();
             let mut expected = DynamicImage::ImageRgb8(RgbImage::from_raw(3, 2, data.clone()).unwrap());
             expected.apply_orientation(turn);
-            let found = turned(picture.clone(), turn);
+            let found = apply(picture.clone(), turn);
             assert_eq!((found.layout.width, found.layout.height), (expected.width(), expected.height()), "{turn:?}");
             let Samples::Bytes(found) = found.samples else { panic!() };
             assert_eq!(found, expected.as_bytes(), "{turn:?}");

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 pub fn replace<E: From<String>>(path: &Path, write: impl FnOnce(&Path) -> Result<(), E>) -> Result<(), E> {
     let part = part(path);
     let written =
-        write(&part).and_then(|()| std::fs::rename(&part, path).map_err(|e| E::from(hzn_run::sink::advice(path, &e))));
+        write(&part).and_then(|()| std::fs::rename(&part, path).map_err(|e| E::from(hzn_run::disk::advice(path, &e))));
     if written.is_err() {
         let _ = std::fs::remove_file(&part);
     }
@@ -23,7 +23,7 @@ pub fn replace<E: From<String>>(path: &Path, write: impl FnOnce(&Path) -> Result
 /// # Errors
 /// The file cannot be written; the message says why and what to do.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
-    replace(path, |part| std::fs::write(part, bytes).map_err(|e| hzn_run::sink::advice(path, &e)))
+    replace(path, |part| std::fs::write(part, bytes).map_err(|e| hzn_run::disk::advice(path, &e)))
 }
 
 /// Returns `NAME.part.ENDING`.

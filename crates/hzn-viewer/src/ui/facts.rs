@@ -147,7 +147,7 @@ fn fit(s: &Solution<f64>, answer: &BodyResult) -> Vec<String> {
 }
 
 fn covariance(s: &Solution<f64>) -> Vec<String> {
-    let ([major, minor], angle) = hzn_run::explain::principal(s);
+    let ([major, minor], angle) = hzn_run::explain::principal_sigmas(s);
     vec![format!(
         "σ {:.4}° at {:.0}° from image x, {:.4}° perpendicular to it",
         major.to_degrees(),

@@ -106,9 +106,9 @@ struct Worker {
 fn with_input(picture: Arc<Picture>, input: &Input) -> Result<Arc<Picture>, String> {
     match (&picture.samples, input.bits) {
         (Samples::Words(_), Some(bits)) if bits != picture.layout.bits => {
-            Picture::clone(&picture).told(input).map(Arc::new)
+            Picture::clone(&picture).with_input(input).map(Arc::new)
         }
-        _ if picture.is_turned(input) => Picture::clone(&picture).told(input).map(Arc::new),
+        _ if picture.is_turned(input) => Picture::clone(&picture).with_input(input).map(Arc::new),
         _ => Ok(picture),
     }
 }

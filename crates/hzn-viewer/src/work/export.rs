@@ -152,7 +152,7 @@ impl Video {
             _ if end.status.success() => Ok(()),
             Some(_) if why.contains("No space left") => {
                 let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
-                Err(JobError::Failed(hzn_run::sink::advice(path, &full)))
+                Err(JobError::Failed(hzn_run::disk::advice(path, &full)))
             }
             last => {
                 Err(JobError::Failed(format!("{}: ffmpeg: {}", path.display(), last.unwrap_or("ended with an error"))))

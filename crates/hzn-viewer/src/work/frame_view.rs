@@ -19,7 +19,7 @@ use hzn_mcap::Row;
 use hzn_run::engine::trace::Edge;
 use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Trace, Traces, Watch};
 use hzn_run::source::Picture;
-use hzn_run::{explain, sink};
+use hzn_run::{explain, overlay, sink};
 
 use super::paint::Recipe;
 use crate::model::view::Point;
@@ -161,7 +161,9 @@ impl BodyResult {
             times: trace.times().to_vec(),
             elapsed: outcome.elapsed,
             expected_rad,
-            limb: solution.map(|s| sink::fitted(&s.axis, s.fused_half_angle_rad, camera).limb).unwrap_or_default(),
+            limb: solution
+                .map(|s| overlay::draw_cone(&s.axis, s.fused_half_angle_rad, camera).limb)
+                .unwrap_or_default(),
             axis: solution.and_then(|s| camera.project(&s.axis)).map(|p| [p.u, p.v]),
             ellipse: solution.map(|s| ellipse(&s, camera)).unwrap_or_default(),
             residuals: solution.zip(chosen).map(|(s, edge)| residuals(&s, edge, camera)).unwrap_or_default(),
@@ -278,7 +280,7 @@ pub fn process_frame(input: FrameInput<'_>, config: &Arc<Config>, sensor: &mut A
     let half_angles = sensor.expected_half_angles_rad(input.data);
     // The drawing takes the rotation rate into account, so every row is drawn where the sensor saw it.
     let camera = &sensor.camera().turning(input.data.and_then(|d| d.rate_rad_s));
-    let each = bodies.iter().zip(finished.found).zip(rows).zip(half_angles).zip(&watch.traces.each);
+    let each = bodies.iter().zip(finished.outcomes).zip(rows).zip(half_angles).zip(&watch.traces.each);
     for ((((body, found), row), expected), trace) in each {
         outcome.bodies.push(BodyResult::new(body.kind, found, row, expected.ok(), trace, camera));
     }
@@ -340,7 +342,7 @@ fn direction_at(axis: [f64; 3], angle_rad: f64, azimuth_rad: f64) -> Option<Unit
 
 fn ellipse(s: &Solution<f64>, camera: &Camera<f64>) -> Vec<Point> {
     const STEPS: usize = 72;
-    let ([major, minor], angle) = explain::principal(s);
+    let ([major, minor], angle) = explain::principal_sigmas(s);
     let point = |i: usize| {
         let (sin, cos) = (i as f64 * std::f64::consts::TAU / STEPS as f64).sin_cos();
         let (a, b) = (3.0 * major * cos, 3.0 * minor * sin);

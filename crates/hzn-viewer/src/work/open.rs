@@ -279,7 +279,7 @@ impl FrameJoiner {
                         continue;
                     }
                     out.extend(self.last.take());
-                    let data = hzn_run::sink::frame_data(&row, &given);
+                    let data = hzn_run::source::recorded_prior(&row, &given);
                     let place = self.pending.remove(&(row.index as u32)).map_or(Place::Nowhere, Place::Recorded);
                     let entry = Entry { name: row.file.clone(), time_s: row.time_s, data: Some(data), place };
                     self.last = Some((entry, vec![*row]));
@@ -314,7 +314,7 @@ fn open_pictures(request: &Request, events: &EventSender) -> Result<(), String> 
             }
         };
         let time = item.time_source(frames.as_ref());
-        let data = item.known(frames.as_ref());
+        let data = item.take_prior(frames.as_ref());
         let Item { name, payload, .. } = item;
         let place = match payload {
             Payload::File(path) => Place::File(path),
@@ -336,7 +336,7 @@ fn open_pictures(request: &Request, events: &EventSender) -> Result<(), String> 
     }
     events.send(Event::Frames(batch));
     let missing = frames.as_ref().and_then(|f| missing_note(f, request, &source.folder()));
-    events.send(Event::End { cut_off: false, note: source.lost().or(missing) });
+    events.send(Event::End { cut_off: false, note: source.describe_loss().or(missing) });
     Ok(())
 }
 

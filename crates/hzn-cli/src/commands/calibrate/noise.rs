@@ -1,6 +1,5 @@
 //! `hzn calibrate noise`: measures limb height and edge noise on the pictures of a flight.
 
-use hzn_run::explain;
 use std::path::PathBuf;
 
 use hzn_calib::Sensor;
@@ -8,16 +7,16 @@ use hzn_calib::noise::{self, Calibration, Sighting};
 use hzn_core::Prior;
 use hzn_core::body;
 use hzn_core::camera::Camera;
+use hzn_run::engine::{self, End, Finished, Plan, Sink};
+use hzn_run::source::{Source, ending};
+use hzn_run::{disk, explain};
 
 use super::{page, text};
 use crate::commands::run::cores;
-use crate::exit::{Exit, Outcome, failed, usage};
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::progress::Progress;
-use crate::setup::{InputArgs, SensorArgs, check_size, need_altitude, settle_input, stop_flag};
+use crate::setup::{InputArgs, SensorArgs, check_altitude, check_size, find_input, stop_flag};
 use crate::tell;
-use hzn_run::engine::{self, End, Finished, Plan, Sink};
-use hzn_run::sink;
-use hzn_run::source::ending;
 
 /// Measure limb height and edge noise on the pictures of a flight
 ///
@@ -51,9 +50,9 @@ pub(super) struct Args {
 }
 
 /// A sink that stores nothing; only the sightings of the pictures are kept.
-struct Nowhere;
+struct NoSink;
 
-impl Sink for Nowhere {
+impl Sink for NoSink {
     fn write(&mut self, _: &mut Finished) -> anyhow::Result<()> {
         Ok(())
     }
@@ -63,29 +62,68 @@ impl Sink for Nowhere {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
+    check_outputs(args)?;
+    let mut source = args.source.open(&args.input)?;
+    let mut sensor = args.sensor.load(source.as_ref())?;
+    let mut notes = source.notes();
+    notes.extend(find_input(source.as_mut(), &mut sensor)?);
+    check_size(source.as_ref(), &sensor)?;
+    let plan = plan(args, source.as_ref(), &sensor)?;
+    if !args.quiet {
+        notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
+    }
+    let mut progress = Progress::new(source.total(), 0, args.quiet);
+    let Some(sightings) = collect_sightings(&plan, source.as_mut(), &mut progress)? else {
+        tell::line("interrupted; nothing was measured");
+        return Ok(Exit::Interrupted);
+    };
+    let input = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
+    let pictures = progress.frames();
+    let calibration = Calibration::new(&plan.config.body, &sightings)
+        .map_err(|why| failed(format!("{input}: of {} {why}", explain::counted(pictures, "picture"))))?;
+    let written = noise::into_sensor_toml(&sensor.text, &calibration, &input).map_err(failed)?;
+    tell::result(text::report(&calibration, pictures))?;
+    for path in args.output.iter().filter(|p| ending(p) == "html") {
+        let html = page::html(&calibration, pictures, &input)?;
+        std::fs::write(path, html).map_err(|e| disk::cannot_write(path, &e))?;
+    }
+    if let Some(alarm) = calibration.alarm() {
+        return Err(failed(format!("{input}: no sensor.toml is written: {alarm}")));
+    }
+    tell::result(format_args!("\n{}\n", written.keys.join("\n")))?;
+    let sensors: Vec<_> = args.output.iter().filter(|p| ending(p) == "toml").collect();
+    for path in &sensors {
+        std::fs::write(path, &written.text).map_err(|e| disk::cannot_write(path, &e))?;
+    }
+    if sensors.is_empty() && !args.quiet {
+        tell::line("note: -o sensor.toml writes these keys into a copy of the sensor.toml");
+    }
+    Ok(Exit::Done)
+}
+
+/// Refuses outputs of another kind, and files that exist.
+fn check_outputs(args: &Args) -> Result<(), Stop> {
     for path in &args.output {
         match ending(path).as_str() {
             "toml" | "html" => {}
             _ => return Err(usage(format!("{}: a sensor ends in .toml, a report in .html", path.display()))),
         }
-        sink::refuse_existing(path, args.force)?;
+        disk::refuse_existing(path, args.force)?;
     }
-    let mut source = args.source.open(&args.input)?;
-    let mut sensor = args.sensor.load(source.as_ref())?;
-    let mut notes = source.notes();
-    notes.extend(settle_input(source.as_mut(), &mut sensor)?);
-    check_size(source.as_ref(), &sensor)?;
+    Ok(())
+}
+
+/// Returns the plan of the run. Its sensor has a very wide prior of the limb height.
+fn plan(args: &Args, source: &dyn Source, sensor: &Sensor) -> Result<Plan, Stop> {
     let Some(config) = noise::config_for_calibration(&sensor.config) else {
-        return Err(usage("the sensor looks for Sun and Moon only, whose limb has no height to measure"));
+        return Err(usage("the sensor looks only for Sun and Moon, which have no limb height to measure"));
     };
-    let wide = Sensor { config, ..sensor.clone() };
-    let frames = args.source.frames(source.as_ref(), &wide, args.sensor.flight)?;
-    need_altitude(&wide, source.as_ref(), frames.as_ref())?;
-    let camera = Camera::try_new(&wide.config.camera).map_err(usage)?;
-    let body = wide.config.body.clone();
-    let threads = if wide.config.tracks() { 1 } else { args.jobs.map_or_else(cores, usize::from) };
-    let plan = Plan {
-        config: wide.config,
+    let sensor = Sensor { config, ..sensor.clone() };
+    let frames = args.source.frames(source, &sensor, args.sensor.flight)?;
+    check_altitude(&sensor, source, frames.as_ref())?;
+    let threads = if sensor.config.tracks() { 1 } else { args.jobs.map_or_else(cores, usize::from) };
+    Ok(Plan {
+        config: sensor.config,
         flight: args.sensor.flight,
         threads,
         frames,
@@ -95,50 +133,29 @@ pub(super) fn run(args: &Args) -> Outcome {
         keep_picture: false,
         overlay: None,
         last: Vec::new(),
-    };
-    if !args.quiet {
-        notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
-    }
-    let mut progress = Progress::new(source.total(), 0, args.quiet);
+    })
+}
+
+/// Processes the flight and measures each picture that is answered. Returns `None` if the run was interrupted.
+fn collect_sightings(
+    plan: &Plan,
+    source: &mut dyn Source,
+    progress: &mut Progress,
+) -> Result<Option<Vec<Sighting>>, Stop> {
+    let camera = Camera::try_new(&plan.config.camera).map_err(usage)?;
     let mut sightings = Vec::new();
     let mut seen = |frame: &Finished| {
-        progress.count(frame.found.iter().map(engine::BodyOutcome::status));
-        sightings.extend(sighting(frame, &camera, &body));
+        progress.count(frame.outcomes.iter().map(engine::BodyOutcome::status));
+        sightings.extend(measure(frame, &camera, &plan.config.body));
     };
-    let stop = stop_flag();
-    let end = engine::run(&plan, source.as_mut(), 0, &stop, &mut Nowhere, &mut seen)?;
+    let end = engine::run(plan, source, 0, &stop_flag(), &mut NoSink, &mut seen)?;
     progress.finish();
-    if end == End::Interrupted {
-        tell::line("interrupted; nothing was measured");
-        return Ok(Exit::Interrupted);
-    }
-    let shown = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
-    let pictures = progress.frames();
-    let calibration = Calibration::new(&body, &sightings)
-        .map_err(|why| failed(format!("{shown}: of {} {why}", explain::counted(pictures, "picture"))))?;
-    let written = noise::into_sensor_toml(&sensor.text, &calibration, &shown).map_err(failed)?;
-    tell::result(text::of(&calibration, pictures))?;
-    for path in args.output.iter().filter(|p| ending(p) == "html") {
-        let html = page::html(&calibration, pictures, &shown)?;
-        std::fs::write(path, html).map_err(|e| sink::cannot(path, &e))?;
-    }
-    if let Some(alarm) = calibration.alarm() {
-        return Err(failed(format!("{shown}: no sensor.toml is written: {alarm}")));
-    }
-    tell::result(format_args!("\n{}\n", written.keys.join("\n")))?;
-    let sensors: Vec<_> = args.output.iter().filter(|p| ending(p) == "toml").collect();
-    for path in &sensors {
-        std::fs::write(path, &written.text).map_err(|e| sink::cannot(path, &e))?;
-    }
-    if sensors.is_empty() && !args.quiet {
-        tell::line("note: -o sensor.toml writes these keys into a copy of the sensor.toml");
-    }
-    Ok(Exit::Done)
+    Ok((end == End::Complete).then_some(sightings))
 }
 
 /// Measures the limb height of one picture, if it was answered.
-fn sighting(frame: &Finished, camera: &Camera<f64>, body: &body::Config) -> Option<Sighting> {
-    let report = frame.found.first()?.report.as_ref().ok()?;
+fn measure(frame: &Finished, camera: &Camera<f64>, body: &body::Config) -> Option<Sighting> {
+    let report = frame.outcomes.first()?.report.as_ref().ok()?;
     let solution = report.solution.as_ref()?;
     let edges = frame.traces.as_ref()?.each.first()?.edges();
     let edge = edges.iter().find(|e| e.candidate == solution.candidate)?;

@@ -33,11 +33,11 @@ fn heights(calibration: &Calibration) -> Chart {
     let dots = |counts: bool| each().filter(move |(_, p)| p.counts == counts).map(|(x, p)| (x, p.km));
     let bars = each().flat_map(|(x, p)| [(x, p.km - p.sigma_km), (x, p.km + p.sigma_km), (x, f64::NAN)]);
     let mut chart = Chart::new("Limb height of each picture", "picture", "limb height [km]")
-        .with(Series::new("1 sigma from edge noise", Style::Ideal, bars))
-        .with(Series::new("measured", Style::Dots, dots(true)))
-        .with(Series::new("calibration", Style::Line, each().map(|(x, p)| (x, p.explained_km))));
+        .with_series(Series::new("1 sigma from edge noise", Style::Ideal, bars))
+        .with_series(Series::new("measured", Style::Dots, dots(true)))
+        .with_series(Series::new("calibration", Style::Line, each().map(|(x, p)| (x, p.explained_km))));
     if calibration.pictures.iter().any(|p| !p.counts) {
-        chart = chart.with(Series::new("left out", Style::Dots, dots(false)));
+        chart = chart.with_series(Series::new("left out", Style::Dots, dots(false)));
     }
     chart
 }
@@ -51,8 +51,8 @@ fn correlation(calibration: &Calibration) -> Chart {
         (px, (1.0 - e.white) * (-px / e.length_px).exp())
     });
     Chart::new("Correlation of the residuals along the limb", "distance [px]", "correlation")
-        .with(Series::new("model, before three parameters are fitted", Style::Ideal, model))
-        .with(Series::new("residuals", Style::Line, calibration.correlation.iter().copied()))
+        .with_series(Series::new("model, before three parameters are fitted", Style::Ideal, model))
+        .with_series(Series::new("residuals", Style::Line, calibration.correlation.iter().copied()))
 }
 
 fn escape(text: &str) -> String {

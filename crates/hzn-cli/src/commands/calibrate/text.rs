@@ -1,48 +1,53 @@
 //! A calibration in words and numbers.
 
 use hzn_calib::noise::Calibration;
-
 use hzn_run::explain::counted;
 
 /// Returns the report.
-pub(super) fn of(calibration: &Calibration, pictures: u64) -> String {
+pub(super) fn report(calibration: &Calibration, pictures: u64) -> String {
     lines(calibration, pictures).iter().map(|(name, value)| format!("{name:<14} {value}\n")).collect()
 }
 
 /// Returns the lines of the report: name and value.
 pub(super) fn lines(calibration: &Calibration, pictures: u64) -> Vec<(&'static str, String)> {
     let (h, e) = (&calibration.height, &calibration.edge);
-    let apart: Vec<&str> = calibration.pictures.iter().filter(|p| !p.counts).map(|p| p.name.as_str()).collect();
+    let outliers: Vec<&str> = calibration.pictures.iter().filter(|p| !p.counts).map(|p| p.name.as_str()).collect();
     let answered = calibration.pictures.len();
-    let left_out = match apart.as_slice() {
+    let left_out = match outliers.as_slice() {
         [] => String::new(),
-        several => format!(", {} left out that are apart from all others: {}", several.len(), several.join(", ")),
+        several => format!(", {} outliers left out: {}", several.len(), several.join(", ")),
     };
     let mut lines = vec![
         ("pictures", format!("{}, {answered} answered{left_out}", counted(pictures, "picture"))),
         ("limb height", format!("{:.2} km ± {:.2} km", h.km, h.sigma_km)),
         ("", format!("{:.2} km from edge noise over all pictures", h.statistical_km)),
         ("", format!("{:.2} km of scatter between pictures beyond it", h.scatter_km)),
-        ("", format!("{:.2} km for a shift of all edges alike by their RMS, 0.1 px at least", h.shift_km)),
+        ("", format!("{:.2} km for a common shift of all edges by their RMS, at least 0.1 px", h.shift_km)),
         ("", format!("{:.2} km for a bend that all edges share", h.bend_km)),
     ];
     if h.radius_km > 0.0 {
-        lines.push(("", format!("{:.2} km for the local radius, which no position tells", h.radius_km)));
+        lines.push(("", format!("{:.2} km for the local radius, which is unknown without a position", h.radius_km)));
     }
     for [deg, km, sigma] in &h.by_latitude {
         lines.push(("by latitude", format!("{deg:.0}°: {km:.2} km ± {sigma:.2} km")));
     }
-    lines.push(("edge noise", format!("{:.3} px, alike over {:.0} px", e.sigma_px, e.correlation_px)));
+    lines.push(("edge noise", format!("{:.3} px, correlation length {:.0} px", e.sigma_px, e.correlation_px)));
     let white = 100.0 * e.white;
     lines.push((
         "",
-        format!("likeliest for all residuals: {white:.0} % white, the rest alike over {:.0} px", e.length_px),
+        format!(
+            "most likely for all residuals: {white:.0} % white, the rest with a correlation length of {:.0} px",
+            e.length_px
+        ),
     ));
-    lines.push(("chi-square", format!("{:.2} a degree of freedom; 1 is ideal, above 2 an alarm", calibration.chi2)));
+    lines.push((
+        "chi-square",
+        format!("{:.2} a degree of freedom; 1 is ideal, a value above 2 is an alarm", calibration.chi2),
+    ));
     if let Some(f) = &calibration.focal {
         let sure = f.percent.abs() > 3.0 * f.sigma_percent;
         let hint = if sure { "; check the camera's calibration" } else { "" };
-        let what = "longer than told, with the limb height free; not applied";
+        let what = "longer than in sensor.toml, with a free limb height; not applied";
         lines.push(("focal length", format!("{:+.2} % ± {:.2} % {what}{hint}", f.percent, f.sigma_percent)));
         lines.push(("", format!("0.1 % of it is {:.2} km of limb height", f.km_per_permille.abs())));
     }

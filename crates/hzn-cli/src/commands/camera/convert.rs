@@ -5,11 +5,11 @@ use std::str::FromStr;
 
 use hzn_calib::camera_file::{self, Format};
 use hzn_core::camera::{self, Camera};
+use hzn_run::disk;
+use hzn_run::source::ending;
 
 use crate::exit::{Stop, usage};
 use crate::tell;
-use hzn_run::sink;
-use hzn_run::source::ending;
 
 /// Convert a calibration: sensor.toml, Kalibr, OpenCV, EuRoC, or the coefficients of Braun & Barf
 ///
@@ -82,7 +82,7 @@ impl FromStr for Size {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
-        sides.map(Self).ok_or_else(|| "such as 1920x1080 is expected".to_owned())
+        sides.map(Self).ok_or_else(|| "WIDTHxHEIGHT is expected, for example 1920x1080".to_owned())
     }
 }
 
@@ -99,7 +99,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     };
     let mut text = camera_file::write(&camera, format).map_err(|e| usage(format!("{}: {e}", source(args))))?;
     if let (Some(deg), true) = (camera.theta_max_deg, to != To::Sensor) {
-        let what = "has no place in the result; put it into the [camera] that takes this file";
+        let what = "has no place in the result; put it into the [camera] section that names this file";
         tell::warning(format_args!("theta_max_deg = {deg} {what}"));
     }
     let Some(path) = &args.output else { return Ok(tell::result(text)?) };
@@ -110,20 +110,21 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     if to == To::Sensor {
         text = format!("# From {}. Every other key: hzn init.\npreset = \"hzn\"\n\n{text}", source(args));
     }
-    std::fs::write(path, text).map_err(|e| sink::cannot(path, &e))?;
+    std::fs::write(path, text).map_err(|e| disk::cannot_write(path, &e))?;
     tell::line(format_args!("{} written; look at it with  hzn camera show {0}", path.display()));
     Ok(())
 }
 
 fn read(args: &Args) -> Result<camera::Config, Stop> {
     if let (Some(kappa), Some(size), Some(centre)) = (args.braun_barf, args.size, args.centre) {
-        return camera_file::from_braun_barf(kappa.0, size.0, centre.0)
-            .ok_or_else(|| usage("--braun-barf: the first coefficient is the focal length in pixels: above 0"));
+        return camera_file::from_braun_barf(kappa.0, size.0, centre.0).ok_or_else(|| {
+            usage("--braun-barf: the first coefficient is the focal length in pixels and must be above 0")
+        });
     }
     let Some(file) = &args.file else { return Err(usage("no calibration is given")) };
     match ending(file).as_str() {
         "toml" if args.camera.is_some() => {
-            Err(usage(format!("--camera: {} holds one camera; leave it out", file.display())))
+            Err(usage(format!("--camera: {} contains one camera; leave out --camera", file.display())))
         }
         "toml" => Ok(hzn_calib::sensor::load(file)?.config.camera),
         _ => Ok(camera_file::load(file, args.camera.as_deref())?),

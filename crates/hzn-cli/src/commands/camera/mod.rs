@@ -9,10 +9,10 @@ use hzn_core::camera::{self, Camera, Model};
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use hzn_run::engine::AnySensor;
+use hzn_run::source::ending;
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
-use hzn_run::source::ending;
 
 /// Show a camera calibration, or convert it
 #[derive(Debug, clap::Args)]

@@ -1,6 +1,7 @@
 //! `hzn evaluate`: compares results with the truth.
 
 mod page;
+mod report;
 pub(super) mod text;
 mod worst;
 
@@ -8,14 +9,14 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera;
 use hzn_mcap::Row;
+use hzn_run::source::ending;
+use hzn_run::{disk, sink};
 use hzn_sim::Truth;
-use hzn_sim::evaluate::{Answer, Case, Evaluation, pair};
-use serde::Serialize;
+use hzn_sim::evaluate::{Answer, Evaluation, pair};
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
-use hzn_run::sink;
-use hzn_run::source::ending;
+use report::Report;
 
 /// Compare results with the truth: shares of answers, errors, and whether the covariance is right
 ///
@@ -43,22 +44,13 @@ pub(super) struct Args {
     force: bool,
 }
 
-/// The content of a report.
-#[derive(Debug, Serialize)]
-pub(super) struct Report {
-    results: String,
-    truth: String,
-    evaluations: Vec<Evaluation>,
-    frames: Vec<Case>,
-}
-
 pub(super) fn run(args: &Args) -> Outcome {
     for path in &args.output {
         match ending(path).as_str() {
             "json" | "html" => {}
             _ => return Err(usage(format!("{}: a report ends in .json or .html", path.display()))),
         }
-        sink::refuse_existing(path, args.force)?;
+        disk::refuse_existing(path, args.force)?;
     }
     let truth_path = if args.truth.is_dir() { args.truth.join("truth.csv") } else { args.truth.clone() };
     let folder = truth_path.parent().unwrap_or(Path::new(""));
@@ -67,7 +59,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let sensor = sensor(args.sensor.as_deref(), recorded_sensor.as_deref(), folder)?;
     let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok());
     if camera.is_none() {
-        tell::line("note: no sensor.toml at hand (--sensor): the length of limb in view is left out");
+        tell::line("note: no sensor.toml is available (--sensor): the length of limb in view is left out");
     }
     let answers: Vec<Answer> = rows.iter().map(sink::answer).collect();
     let cases = pair(&answers, &truth, camera.as_ref())
@@ -79,7 +71,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         evaluations: Evaluation::by_body(&cases),
         frames: cases,
     };
-    let worst = worst::of(&report.frames, args.worst);
+    let worst = worst::select(&report.frames, args.worst);
     for path in &args.output {
         let bytes = if ending(path) == "json" {
             serde_json::to_vec_pretty(&report).map_err(failed)?
@@ -87,19 +79,19 @@ pub(super) fn run(args: &Args) -> Outcome {
             let drawn = worst::draw(&worst, &args.results, folder, &truth, camera.as_ref())?;
             page::html(&report, &drawn)?.into_bytes()
         };
-        std::fs::write(path, bytes).map_err(|e| sink::cannot(path, &e))?;
+        std::fs::write(path, bytes).map_err(|e| disk::cannot_write(path, &e))?;
     }
-    tell::result(text::of(&report, &worst))?;
+    tell::result(text::report(&report, &worst))?;
     Ok(Exit::Done)
 }
 
-fn sensor(given: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result<Option<hzn_core::Config>, Stop> {
-    let beside = folder.join("sensor.toml");
-    Ok(match (given, recorded) {
+fn sensor(sensor: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result<Option<hzn_core::Config>, Stop> {
+    let neighbour = folder.join("sensor.toml");
+    Ok(match (sensor, recorded) {
         (Some(path), _) => Some(hzn_calib::sensor::load(path)?.config),
         // A recorded sensor.toml may name a camera file that is not here.
         (None, Some(text)) => hzn_calib::sensor::parse(text, Path::new("sensor.toml")).ok().map(|s| s.config),
-        (None, None) if beside.exists() => Some(hzn_calib::sensor::load(&beside)?.config),
+        (None, None) if neighbour.exists() => Some(hzn_calib::sensor::load(&neighbour)?.config),
         (None, None) => None,
     })
 }
@@ -107,8 +99,9 @@ fn sensor(given: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result
 /// Warns if the times differ: two sequences may have the same file names.
 fn warn_of_other_times(rows: &[Row], truth: &[Truth]) {
     let time = |file: &str| truth.iter().find(|t| file.ends_with(t.file.as_str())).map(|t| t.time_s);
-    let apart = |row: &Row| Some((row.time_s?, time(&row.file)?)).filter(|(here, there)| (here - there).abs() > 1e-3);
-    let other = rows.iter().find_map(|row| apart(row).map(|(here, there)| (row, here, there)));
+    let other_times =
+        |row: &Row| Some((row.time_s?, time(&row.file)?)).filter(|(here, there)| (here - there).abs() > 1e-3);
+    let other = rows.iter().find_map(|row| other_times(row).map(|(here, there)| (row, here, there)));
     if let Some((row, here, there)) = other {
         let what = "if they are not counted from different instants, this is the truth of another sequence";
         tell::warning(format_args!("{}: at {here} s in the results, at {there} s in the truth; {what}", row.file));

@@ -3,8 +3,9 @@
 use base64::Engine;
 use hzn_sim::evaluate::{Case, Evaluation, Miss};
 
+use super::report::Report;
+use super::text;
 use super::worst::Drawn;
-use super::{Report, text};
 use crate::plot::{Chart, Series, Style};
 
 const STYLE: &str = "\
@@ -50,7 +51,7 @@ pub(super) fn html(report: &Report, worst: &[Drawn]) -> anyhow::Result<String> {
                     let data = base64::engine::general_purpose::STANDARD.encode(jpeg);
                     format!("<img alt=\"{}\" src=\"data:image/jpeg;base64,{data}\">", escape(&frame.caption))
                 }
-                None => "<p class=\"sub\">the picture is neither recorded nor beside the truth</p>".into(),
+                None => "<p class=\"sub\">the picture is neither in the recording nor next to the truth</p>".into(),
             };
             body.push_str(&format!("<figure>{picture}<figcaption>{}</figcaption></figure>", escape(&frame.caption)));
         }
@@ -72,12 +73,12 @@ fn charts(e: &Evaluation, frames: &[Case]) -> Vec<Chart> {
     };
     let mut out = vec![
         Chart::new("Error and claimed sigma over time", "time [s]", "deg")
-            .with(dots("error", &|c| Some(c.time_s), &|m| m.angle_deg))
-            .with(dots("largest sigma", &|c| Some(c.time_s), &|m| m.sigma_max_deg)),
+            .with_series(dots("error", &|c| Some(c.time_s), &|m| m.angle_deg))
+            .with_series(dots("largest sigma", &|c| Some(c.time_s), &|m| m.sigma_max_deg)),
         Chart::new("Error about the camera's axes", "time [s]", "deg")
-            .with(dots("about x", &|c| Some(c.time_s), &|m| m.about_deg[0]))
-            .with(dots("about y", &|c| Some(c.time_s), &|m| m.about_deg[1]))
-            .with(dots("about z", &|c| Some(c.time_s), &|m| m.about_deg[2])),
+            .with_series(dots("about x", &|c| Some(c.time_s), &|m| m.about_deg[0]))
+            .with_series(dots("about y", &|c| Some(c.time_s), &|m| m.about_deg[1]))
+            .with_series(dots("about z", &|c| Some(c.time_s), &|m| m.about_deg[2])),
         distribution(&cases),
     ];
     out.extend(calibration(&cases));
@@ -89,8 +90,8 @@ fn charts(e: &Evaluation, frames: &[Case]) -> Vec<Chart> {
         };
         out.push(
             Chart::new(format!("Error by {}", group.name), format!("{} [{}]", group.name, group.unit), "deg")
-                .with(dots("error", x, &|m| m.angle_deg))
-                .with(dots("largest sigma", x, &|m| m.sigma_max_deg)),
+                .with_series(dots("error", x, &|m| m.angle_deg))
+                .with_series(dots("largest sigma", x, &|m| m.sigma_max_deg)),
         );
     }
     out
@@ -102,7 +103,11 @@ fn distribution(cases: &[(&Case, Miss)]) -> Chart {
     errors.sort_by(f64::total_cmp);
     let n = errors.len() as f64;
     let steps = errors.iter().enumerate().flat_map(|(i, &e)| [(e, i as f64 / n), (e, (i as f64 + 1.0) / n)]);
-    Chart::new("Share of the answers up to an error", "error [deg]", "share").with(Series::new("", Style::Line, steps))
+    Chart::new("Share of the answers up to an error", "error [deg]", "share").with_series(Series::new(
+        "",
+        Style::Line,
+        steps,
+    ))
 }
 
 /// Plots the distance of answers from the truth in sigma against the expected distance. The points lie on the diagonal
@@ -117,8 +122,8 @@ fn calibration(cases: &[(&Case, Miss)]) -> Option<Chart> {
     let far = points.last()?.0;
     Some(
         Chart::new("Calibration of sigma (above the line: too small)", "expected distance [sigma]", "distance [sigma]")
-            .with(Series::new("right", Style::Ideal, [(0.0, 0.0), (far, far)]))
-            .with(Series::new("answers", Style::Dots, points)),
+            .with_series(Series::new("right", Style::Ideal, [(0.0, 0.0), (far, far)]))
+            .with_series(Series::new("answers", Style::Dots, points)),
     )
 }
 

@@ -2,9 +2,9 @@
 
 use hzn_sim::evaluate::{Case, Evaluation, Group, Honesty};
 
-use super::Report;
+use super::report::Report;
 
-pub(super) fn of(report: &Report, worst: &[&Case]) -> String {
+pub(super) fn report(report: &Report, worst: &[&Case]) -> String {
     let mut out = String::new();
     for e in &report.evaluations {
         out.push_str(&format!("{}\n", e.body));
@@ -27,7 +27,7 @@ pub(super) fn of(report: &Report, worst: &[&Case]) -> String {
 }
 
 /// Returns the numbers of one body with their names.
-pub(in crate::commands) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
+pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
     let mut out = Vec::new();
     let mut line = |name, value| out.push((name, value));
     let mut answered = format!("{} of {} frames with a limb in view", e.answered, e.with_limb);
@@ -65,7 +65,7 @@ pub(in crate::commands) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> 
         );
     }
     if let Some(h) = &e.honesty {
-        line("honesty (NEES)", format!("{}, {}", nees(h), verdict(h)));
+        line("covariance (NEES)", format!("{}, {}", nees(h), verdict(h)));
         let parts = h.within.map(|w| format!("{} within {} sigma", percent(w.share), w.sigma));
         let ideal = h.within.map(|w| format!("{:.1}", 100.0 * w.expected)).join(", ");
         line("sigma", format!("{} ({ideal} % when right)", parts.join(", ")));
@@ -88,14 +88,14 @@ pub(in crate::commands) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> 
 /// Returns the meaning of the mean NEES in words.
 pub(super) fn verdict(h: &Honesty) -> &'static str {
     match h {
-        h if h.is_within_interval() => "honest",
+        h if h.is_within_interval() => "covariance is right",
         h if h.nees > h.interval[1] => "sigma is too small",
         _ => "sigma is larger than it needs to be",
     }
 }
 
 fn nees(h: &Honesty) -> String {
-    format!("{:.2}; honest means are {:.2} to {:.2} (95 %)", h.nees, h.interval[0], h.interval[1])
+    format!("{:.2}; expected mean {:.2} to {:.2} (95 %)", h.nees, h.interval[0], h.interval[1])
 }
 
 /// Columns of a group's table.

@@ -5,20 +5,20 @@ use std::path::Path;
 
 use hzn_core::camera::Camera;
 use hzn_mcap::{Annotations, Contents, Reader};
+use hzn_run::overlay::{self, limb};
+use hzn_run::source::{Payload, ending};
 use hzn_sim::Truth;
 use hzn_sim::evaluate::Case;
 use image::RgbImage;
 
 use super::text::worst_line;
 use crate::exit::{Stop, failed};
-use hzn_run::overlay::{self, limb};
-use hzn_run::source::{Payload, ending};
 
 /// Width of the drawn pictures: large enough to show an error of a pixel, small enough for a file that is sent.
 const WIDTH_PX: u32 = 960;
 
 /// Returns the worst cases first: answers without a limb in view, then missed pictures, then answers by their error.
-pub(super) fn of(cases: &[Case], count: usize) -> Vec<&Case> {
+pub(super) fn select(cases: &[Case], count: usize) -> Vec<&Case> {
     let badness = |c: &&Case| match (&c.miss, c.limb) {
         (Some(_), false) => 2e3,
         (None, true) => 1e3,
@@ -49,42 +49,57 @@ pub(super) fn draw(
     truth: &[Truth],
     camera: Option<&Camera<f64>>,
 ) -> Result<Vec<Drawn>, Stop> {
-    let mut pictures: HashMap<String, RgbImage> = HashMap::new();
-    let mut drawings: HashMap<(String, String), Annotations> = HashMap::new();
-    let base = |file: &str| file.rsplit(['/', '\\']).next().unwrap_or(file).to_owned();
+    let mut recorded = Recorded::default();
     if ending(results) == "mcap" && !worst.is_empty() {
-        for frame in Reader::open(results, Contents::All).map_err(failed)? {
-            let frame = frame.map_err(failed)?;
-            let file = base(&frame.row.file);
-            // A picture of several bodies is recorded once, with one of them.
-            if let Some(image) = frame.image.filter(|_| worst.iter().any(|c| c.file == file))
-                && let Ok((picture, _)) = hzn_run::source::recorded(image).decode(None)
-            {
-                pictures.insert(file.clone(), picture.to_rgb());
-            }
-            if worst.iter().any(|c| c.file == file && c.body == frame.row.body) {
-                drawings.insert((file, frame.row.body), frame.annotations);
-            }
-        }
+        recorded.read(results, worst)?;
     }
-    let mut one = |case: &&Case| -> Result<Drawn, Stop> {
-        let drawing = drawings.remove(&(case.file.clone(), case.body.clone())).unwrap_or_default();
-        let beside = || {
+    let mut draw_case = |case: &&Case| -> Result<Drawn, Stop> {
+        let drawing = recorded.drawings.remove(&(case.file.clone(), case.body.clone())).unwrap_or_default();
+        let read_file = || {
             let path = folder.join(&case.file);
             let read = path.is_file().then(|| Payload::File(path).decode(None).ok()).flatten();
             read.map(|(picture, _)| picture.to_rgb())
         };
-        let is = truth.iter().find(|t| t.file == case.file && t.body == case.body);
-        let true_limb = is.filter(|_| case.limb).zip(camera).map_or_else(Vec::new, |(t, camera)| {
+        let true_cone = truth.iter().find(|t| t.file == case.file && t.body == case.body);
+        let true_limb = true_cone.filter(|_| case.limb).zip(camera).map_or_else(Vec::new, |(t, camera)| {
             limb::lines([t.axis_x, t.axis_y, t.axis_z], t.half_angle_deg.to_radians(), camera)
         });
-        let jpeg = match pictures.get(&case.file).cloned().or_else(beside) {
-            Some(image) => Some(encode(overlay::draw_beside(image, &drawing, &true_limb, case.status))?),
+        let jpeg = match recorded.pictures.get(&case.file).cloned().or_else(read_file) {
+            Some(image) => Some(encode(overlay::draw_with_truth(image, &drawing, &true_limb, case.status))?),
             None => None,
         };
         Ok(Drawn { caption: worst_line(case), jpeg })
     };
-    worst.iter().map(&mut one).collect()
+    worst.iter().map(&mut draw_case).collect()
+}
+
+/// What a recording has of the worst pictures.
+#[derive(Default)]
+struct Recorded {
+    /// Pictures by file name.
+    pictures: HashMap<String, RgbImage>,
+    /// Drawings by file name and body.
+    drawings: HashMap<(String, String), Annotations>,
+}
+
+impl Recorded {
+    fn read(&mut self, recording: &Path, worst: &[&Case]) -> Result<(), Stop> {
+        let base = |file: &str| file.rsplit(['/', '\\']).next().unwrap_or(file).to_owned();
+        for frame in Reader::open(recording, Contents::All).map_err(failed)? {
+            let frame = frame.map_err(failed)?;
+            let file = base(&frame.row.file);
+            // A picture of several bodies is recorded once, with one of them.
+            if let Some(image) = frame.image.filter(|_| worst.iter().any(|c| c.file == file))
+                && let Ok((picture, _)) = Payload::from_recorded(image).decode(None)
+            {
+                self.pictures.insert(file.clone(), picture.to_rgb());
+            }
+            if worst.iter().any(|c| c.file == file && c.body == frame.row.body) {
+                self.drawings.insert((file, frame.row.body), frame.annotations);
+            }
+        }
+        Ok(())
+    }
 }
 
 fn encode(image: RgbImage) -> Result<Vec<u8>, Stop> {

@@ -30,7 +30,7 @@ impl std::str::FromStr for Body {
             "sun" => Ok(bare(SUN_RADIUS_KM)),
             _ => match text.parse::<f64>() {
                 Ok(km) if km > 0.0 && km.is_finite() => Ok(bare(km)),
-                _ => Err(format!("{text:?} is no body; expected earth, moon, sun, or a radius in kilometres")),
+                _ => Err(format!("{text:?} is not a body; expected earth, moon, sun, or a radius in kilometres")),
             },
         }
     }

@@ -2,25 +2,26 @@
 
 use hzn_sim::sensitivity::chart::{Vertical, Visibility};
 
+use super::args::Args;
 use super::body::Body;
+use super::study::Study;
 use super::table::Table;
-use super::{Args, Finished};
 use crate::exit::{Stop, usage};
 use crate::plot::{Chart, Series, Style};
 
 /// Computes fields of view by altitude (Braun & Barf 2022, figures 6 and 7).
-pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
+pub(super) fn visibility(args: &Args) -> Result<Study, Stop> {
     let body = match args.body.as_slice() {
         [] => Body::EARTH,
         [one] => *one,
-        _ => return Err(usage("--body: one body for this chart")),
+        _ => return Err(usage("--body: give one body for this chart")),
     };
     let altitudes =
         args.altitude.as_ref().map_or_else(|| (1..=60).map(|i| 50.0 * f64::from(i)).collect(), |v| v.0.clone());
     let limb_height_km = match args.limb_height.as_ref().map(|v| v.0.as_slice()) {
         None => body.limb_height_km,
         Some([one]) => *one,
-        Some(_) => return Err(usage("--limb-height: one value for this chart")),
+        Some(_) => return Err(usage("--limb-height: give one value for this chart")),
     };
     let mut rows = Vec::new();
     for km in altitudes {
@@ -44,23 +45,23 @@ pub(super) fn visibility(args: &Args) -> Result<Finished, Stop> {
     for (name, head, label, value) in columns {
         table.column(name, head, rows.iter().map(|(_, v)| Some(value(v))));
         if !label.is_empty() {
-            chart = chart.with(Series::new(label, Style::Line, rows.iter().map(|(km, v)| (*km, value(v)))));
+            chart = chart.with_series(Series::new(label, Style::Line, rows.iter().map(|(km, v)| (*km, value(v)))));
         }
     }
     let chart = (rows.len() > 1).then_some(chart);
-    Ok(Finished { table, chart, notes: Vec::new() })
+    Ok(Study { table, chart, notes: Vec::new() })
 }
 
 /// Computes angles by latitude and altitude (Braun & Barf 2022, figure 8, and the angle that remains with the limb
 /// axis).
-pub(super) fn spherical_earth(args: &Args) -> Result<Finished, Stop> {
+pub(super) fn spherical_earth(args: &Args) -> Result<Study, Stop> {
     if !args.body.is_empty() {
-        return Err(usage("--body: this is about the Earth (WGS-84)"));
+        return Err(usage("--body: this chart is for the Earth (WGS-84); leave --body out"));
     }
     let altitudes = args.altitude.as_ref().map_or_else(|| vec![100.0, 240.0, 600.0, 2000.0], |v| v.0.clone());
     let limb_height_km = args.limb_height.as_ref().map_or(Ok(0.0), |v| match v.0.as_slice() {
         [one] => Ok(*one),
-        _ => Err(usage("--limb-height: one value for this chart")),
+        _ => Err(usage("--limb-height: give one value for this chart")),
     })?;
     let mut rows = Vec::new();
     for &km in &altitudes {
@@ -83,11 +84,11 @@ pub(super) fn spherical_earth(args: &Args) -> Result<Finished, Stop> {
     for (name, head, value) in columns {
         table.column(name, head, rows.iter().map(|r| Some(value(&r.2))));
     }
-    let title = "Error of taking the Earth for a sphere: centre to limb axis";
+    let title = "Error of treating the Earth as a sphere: centre to limb axis";
     let mut chart = Chart::new(title, "latitude [deg]", "deg");
     for km in altitudes {
-        let of = rows.iter().filter(|r| r.1 == km).map(|r| (r.0, r.2.geocentric_to_axis_deg));
-        chart = chart.with(Series::new(format!("{km} km"), Style::Line, of));
+        let points = rows.iter().filter(|r| r.1 == km).map(|r| (r.0, r.2.geocentric_to_axis_deg));
+        chart = chart.with_series(Series::new(format!("{km} km"), Style::Line, points));
     }
-    Ok(Finished { table, chart: Some(chart), notes: Vec::new() })
+    Ok(Study { table, chart: Some(chart), notes: Vec::new() })
 }

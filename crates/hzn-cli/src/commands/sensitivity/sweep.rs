@@ -5,7 +5,7 @@ use std::str::FromStr;
 /// Approximate number of values of a range without a step.
 const STEPS: f64 = 15.0;
 /// Largest number of values of a range; more are a typing error.
-const MOST: usize = 10_000;
+const MAX_VALUES: usize = 10_000;
 
 /// The values of one quantity.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,7 +16,7 @@ impl FromStr for Values {
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |t: &str| match t.trim().parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(x),
-            _ => Err(format!("{t:?} is no number; expected a number, a list A,B,C or a range A:B or A:B:STEP")),
+            _ => Err(format!("{t:?} is not a number; expected a number, a list A,B,C or a range A:B or A:B:STEP")),
         };
         let mut values = Vec::new();
         for part in text.split(',') {
@@ -33,12 +33,12 @@ impl FromStr for Values {
 
 fn range(from: f64, to: f64, step: Option<f64>) -> Result<Vec<f64>, String> {
     if !(to > from) {
-        return Err(format!("{from}:{to}: a range rises, from the lower to the higher value"));
+        return Err(format!("{from}:{to}: a range must go from the lower to the higher value"));
     }
     let step = step.unwrap_or_else(|| nice((to - from) / STEPS));
     let count = ((to - from) / step + 1e-9).floor();
-    if !(step > 0.0 && count < MOST as f64) {
-        return Err(format!("{from}:{to}:{step}: the step must be above 0 and give fewer than {MOST} values"));
+    if !(step > 0.0 && count < MAX_VALUES as f64) {
+        return Err(format!("{from}:{to}:{step}: the step must be above 0 and give fewer than {MAX_VALUES} values"));
     }
     // Values are rounded to nine decimals, so that 0.1 does not become 0.30000000000000004.
     let tidy = |x: f64| (x * 1e9).round() / 1e9;
@@ -77,9 +77,9 @@ mod tests {
     }
 
     #[test]
-    fn wrong_ones_are_said() {
-        assert!(values("wide").unwrap_err().contains("\"wide\" is no number"));
-        assert!(values("150:60").unwrap_err().contains("a range rises"));
+    fn wrong_values_are_refused() {
+        assert!(values("wide").unwrap_err().contains("\"wide\" is not a number"));
+        assert!(values("150:60").unwrap_err().contains("from the lower to the higher"));
         assert!(values("1:2:3:4").unwrap_err().contains("two or three numbers"));
         assert!(values("1:2:0").unwrap_err().contains("above 0"));
         assert!(values("1:2:-1").unwrap_err().contains("above 0"));

@@ -19,12 +19,15 @@ use std::thread::JoinHandle;
 
 use hzn_core::image::{Channel, Layout};
 
-use super::picture::{Picture, Samples, check_size};
-use super::{Item, Payload, Source};
+use super::decode::check_size;
+use super::item::Item;
+use super::payload::Payload;
+use super::picture::{Picture, Samples};
+use super::sequence::Source;
 use crate::error::{Error, unusable};
 use crate::explain;
 use times::Times;
-use tool::{Running, Said, absent, tool};
+use tool::{Running, ToolErrors, cannot_start, tool};
 
 pub(super) const ENDINGS: &[&str] = &[
     "mp4", "m4v", "mov", "avi", "mkv", "webm", "mpg", "mpeg", "ts", "mts", "m2ts", "wmv", "flv", "y4m", "mjpeg", "mj2",
@@ -44,16 +47,16 @@ pub(super) struct Video {
     bits: u8,
     pix_fmt: String,
     /// The turn that the container asks for when the video is shown.
-    turned: Option<&'static str>,
+    rotation: Option<&'static str>,
     frames: Running,
     pixels: Pixels,
     /// The thread that reads the messages of ffmpeg while it runs.
-    said: Option<JoinHandle<Said>>,
+    errors: Option<JoinHandle<ToolErrors>>,
     times: Times,
     index: u64,
     count: Option<u64>,
     ended: bool,
-    lost: Option<String>,
+    loss: Option<String>,
 }
 
 impl Video {
@@ -70,7 +73,7 @@ impl Video {
             ])
             .arg(path)
             .output()
-            .map_err(|e| absent("ffprobe", &e))?;
+            .map_err(|e| cannot_start("ffprobe", &e))?;
         if !probe.status.success() {
             let why = String::from_utf8_lossy(&probe.stderr);
             return Err(unusable(format!("{name}: ffprobe cannot read it: {}", why.trim())));
@@ -83,11 +86,11 @@ impl Video {
         };
         check_size(width, height, None).map_err(|e| unusable(format!("{name}: {e}")))?;
         let pix_fmt = entry("pix_fmt").unwrap_or_default().trim();
-        let (bits, arguments) = luma(pix_fmt);
-        let (frames, pixels, said) = start(path, &arguments)?;
+        let (bits, arguments) = luma_output(pix_fmt);
+        let (frames, pixels, errors) = start(path, &arguments)?;
         let degrees = |key: &str| entry(key).and_then(|deg| deg.trim().parse::<f64>().ok());
         // The tag of older files counts clockwise, so its sign is inverted.
-        let turned = degrees("rotation").or(degrees("TAG:rotate").map(|deg| -deg)).and_then(turned);
+        let rotation = degrees("rotation").or(degrees("TAG:rotate").map(|deg| -deg)).and_then(describe_rotation);
         Ok(Self {
             path: path.to_owned(),
             stem: path.file_name().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default(),
@@ -96,39 +99,39 @@ impl Video {
             channels: 1,
             bits,
             pix_fmt: pix_fmt.to_owned(),
-            turned,
+            rotation,
             frames,
             pixels,
-            said: Some(said),
+            errors: Some(errors),
             times: Times::start(path)?,
             index: 0,
             count: entry("nb_frames").and_then(|n| n.trim().parse().ok()),
             ended: false,
-            lost: None,
+            loss: None,
         })
     }
 
-    /// Ends the video. [`Source::lost`] describes what is missing at the end of a video or was lost in it. If no frame
-    /// could be decoded, or ffmpeg was ended from outside, this is an error.
+    /// Ends the video. [`Source::describe_loss`] describes what is missing at the end of a video or was lost in it. If
+    /// no frame could be decoded, or ffmpeg was ended from outside, this is an error.
     fn end(&mut self, rest: usize) -> Option<anyhow::Result<Item>> {
         self.ended = true;
         let name = self.path.display();
         let code = self.frames.wait().ok().and_then(|status| status.code());
-        let said = self.said.take().and_then(|said| said.join().ok()).unwrap_or_default().summary();
+        let error = self.errors.take().and_then(|errors| errors.join().ok()).unwrap_or_default().summary();
         let frames = explain::counted(self.index, "frame");
         let Some(code) = code.filter(|code| *code != STOPPED) else {
             return Some(Err(anyhow::anyhow!("{name}: ffmpeg was ended from outside after {frames}")));
         };
         let missing = riff::missing_bytes(&self.path).map(|n| format!("{n} bytes are missing at its end"));
-        let said = said.map(|said| format!("ffmpeg: {said}"));
+        let error = error.map(|error| format!("ffmpeg: {error}"));
         let bad = (code != 0).then(|| format!("ffmpeg ended with code {code}"));
         let torn = (rest > 0).then(|| "it ends in the middle of a frame".to_owned());
-        let why = missing.or(said).or(bad).or(torn);
+        let why = missing.or(error).or(bad).or(torn);
         if self.index == 0 {
             let why = why.map(|why| format!(": {why}")).unwrap_or_default();
             return Some(Err(anyhow::anyhow!("{name}: no frame of this video can be decoded{why}")));
         }
-        self.lost = why.map(|why| {
+        self.loss = why.map(|why| {
             format!("{name}: was cut off or is damaged ({why}); {frames} could be decoded and were processed")
         });
         None
@@ -136,8 +139,8 @@ impl Video {
 }
 
 /// Returns the bits of a stream's luma, and the arguments that make ffmpeg write it.
-fn luma(pix_fmt: &str) -> (u8, Vec<String>) {
-    let bits = bits_of(pix_fmt);
+fn luma_output(pix_fmt: &str) -> (u8, Vec<String>) {
+    let bits = sample_bits(pix_fmt);
     let out_format = if bits == 8 { "gray".to_owned() } else { format!("gray{bits}le") };
     // RGB and palette formats have no luma plane to extract.
     let filter = if ["rgb", "bgr", "gbr", "pal"].iter().any(|p| pix_fmt.contains(p)) {
@@ -149,19 +152,19 @@ fn luma(pix_fmt: &str) -> (u8, Vec<String>) {
 }
 
 /// Returns the bits of the colours that are handed out, and the arguments that make ffmpeg write them.
-fn colours(pix_fmt: &str) -> (u8, Vec<String>) {
-    let (bits, out_format) = if bits_of(pix_fmt) == 8 { (8, "rgb24") } else { (16, "rgb48le") };
+fn colour_output(pix_fmt: &str) -> (u8, Vec<String>) {
+    let (bits, out_format) = if sample_bits(pix_fmt) == 8 { (8, "rgb24") } else { (16, "rgb48le") };
     (bits, ["-pix_fmt", out_format].map(str::to_owned).to_vec())
 }
 
-fn bits_of(pix_fmt: &str) -> u8 {
+fn sample_bits(pix_fmt: &str) -> u8 {
     let deep = [("16", 16), ("14", 14), ("12", 12), ("10", 10), ("9", 9)];
     let named = |n: &str| pix_fmt.ends_with(&format!("{n}le")) || pix_fmt.ends_with(&format!("{n}be"));
     deep.iter().find(|(n, _)| named(n)).map_or(8, |(_, bits)| *bits)
 }
 
 /// Returns a container's rotation in words; `None` if there is none.
-fn turned(counter_clockwise_deg: f64) -> Option<&'static str> {
+fn describe_rotation(counter_clockwise_deg: f64) -> Option<&'static str> {
     match (counter_clockwise_deg / 90.0).round().rem_euclid(4.0) as u8 {
         1 => Some("turned by 90 degrees counter-clockwise"),
         2 => Some("turned by 180 degrees"),
@@ -173,7 +176,7 @@ fn turned(counter_clockwise_deg: f64) -> Option<&'static str> {
 type Pixels = BufReader<Box<dyn Read + Send>>;
 
 /// Starts ffmpeg on a video.
-fn start(path: &Path, arguments: &[String]) -> Result<(Running, Pixels, JoinHandle<Said>), Error> {
+fn start(path: &Path, arguments: &[String]) -> Result<(Running, Pixels, JoinHandle<ToolErrors>), Error> {
     let mut command = tool("ffmpeg");
     command
         .args(["-nostdin", "-noautorotate", "-i"])
@@ -183,22 +186,22 @@ fn start(path: &Path, arguments: &[String]) -> Result<(Running, Pixels, JoinHand
         .args(["-f", "rawvideo", "-"])
         .stderr(Stdio::piped());
     let (mut frames, pixels) = Running::start("ffmpeg", &mut command)?;
-    let said = frames.listen();
-    Ok((frames, BufReader::with_capacity(1 << 20, Box::new(pixels)), said))
+    let errors = frames.read_errors();
+    Ok((frames, BufReader::with_capacity(1 << 20, Box::new(pixels)), errors))
 }
 
 impl Source for Video {
-    fn to_be_turned(&self) -> Option<(String, &'static str)> {
-        self.turned.map(|how| (self.stem.clone(), how))
+    fn display_turn(&self) -> Option<(String, &'static str)> {
+        self.rotation.map(|how| (self.stem.clone(), how))
     }
     fn want_channel(&mut self, channel: Channel) -> Result<(), Error> {
         // A grey video has no colours: its luma is the value of each colour.
         if channel == Channel::Mean || self.channels == 3 || self.pix_fmt.starts_with("gray") {
             return Ok(());
         }
-        let (bits, arguments) = colours(&self.pix_fmt);
-        let (frames, pixels, said) = start(&self.path, &arguments)?;
-        (self.frames, self.pixels, self.said) = (frames, pixels, Some(said));
+        let (bits, arguments) = colour_output(&self.pix_fmt);
+        let (frames, pixels, errors) = start(&self.path, &arguments)?;
+        (self.frames, self.pixels, self.errors) = (frames, pixels, Some(errors));
         (self.bits, self.channels) = (bits, 3);
         Ok(())
     }
@@ -243,8 +246,8 @@ impl Source for Video {
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()
     }
-    fn lost(&self) -> Option<String> {
-        self.lost.clone()
+    fn describe_loss(&self) -> Option<String> {
+        self.loss.clone()
     }
 }
 
@@ -253,19 +256,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rotations_are_told_the_way_they_turn() {
-        assert_eq!(turned(-90.0), Some("turned by 90 degrees clockwise"));
-        assert_eq!(turned(270.0), turned(-90.0));
-        assert_eq!(turned(90.0), Some("turned by 90 degrees counter-clockwise"));
-        assert_eq!((turned(-180.0), turned(0.0)), (Some("turned by 180 degrees"), None));
+    fn rotations_are_described_by_the_way_they_turn() {
+        assert_eq!(describe_rotation(-90.0), Some("turned by 90 degrees clockwise"));
+        assert_eq!(describe_rotation(270.0), describe_rotation(-90.0));
+        assert_eq!(describe_rotation(90.0), Some("turned by 90 degrees counter-clockwise"));
+        assert_eq!((describe_rotation(-180.0), describe_rotation(0.0)), (Some("turned by 180 degrees"), None));
     }
 
     #[test]
-    fn colours_are_asked_for_only_where_they_are_wanted() {
-        assert_eq!(luma("yuv420p10le").1, ["-vf", "extractplanes=y", "-pix_fmt", "gray10le"]);
-        assert_eq!(luma("gbrp").1, ["-vf", "format=gray", "-pix_fmt", "gray"]);
+    fn colours_are_requested_only_if_wanted() {
+        assert_eq!(luma_output("yuv420p10le").1, ["-vf", "extractplanes=y", "-pix_fmt", "gray10le"]);
+        assert_eq!(luma_output("gbrp").1, ["-vf", "format=gray", "-pix_fmt", "gray"]);
         assert_eq!(
-            (colours("yuv420p").0, colours("yuv422p12le")),
+            (colour_output("yuv420p").0, colour_output("yuv422p12le")),
             (8, (16, vec!["-pix_fmt".into(), "rgb48le".into()]))
         );
     }

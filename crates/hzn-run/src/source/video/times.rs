@@ -7,10 +7,10 @@ use std::process::Stdio;
 
 use super::tool::{Running, tool};
 use crate::error::Error;
-use crate::source::TimeSource;
+use crate::source::item::TimeSource;
 
 /// If this many frames at the beginning of a container have no time, the container has no times.
-const TIMELESS: usize = 32;
+const MAX_FRAMES_WITHOUT_TIME: usize = 32;
 
 pub(super) struct Times {
     lines: BufReader<Box<dyn Read + Send>>,
@@ -38,7 +38,7 @@ impl Times {
         let (probe, lines) = Running::start("ffprobe", &mut command)?;
         let lines = BufReader::new(Box::new(lines) as Box<dyn Read + Send>);
         let mut times = Self { lines, ahead: VecDeque::new(), in_container: false, _probe: probe };
-        while !times.in_container && times.ahead.len() < TIMELESS {
+        while !times.in_container && times.ahead.len() < MAX_FRAMES_WITHOUT_TIME {
             let Some(time_s) = next_time_s(&mut times.lines) else { break };
             times.in_container = time_s.is_some();
             times.ahead.push_back(time_s);

@@ -21,10 +21,10 @@ pub(super) fn tool(name: &str) -> Command {
 }
 
 /// Returns the error for a program that cannot be started.
-pub(super) fn absent(tool: &str, error: &std::io::Error) -> Error {
+pub(super) fn cannot_start(tool: &str, error: &std::io::Error) -> Error {
     match error.kind() {
         ErrorKind::NotFound => unusable(format!(
-            "videos need `{tool}` on PATH, and it is not there; install ffmpeg, or extract the frames as pictures"
+            "videos need `{tool}`, which is not on PATH; install ffmpeg, or extract the frames as pictures"
         )),
         _ => failed(format!("{tool} cannot be started: {error}")),
     }
@@ -37,16 +37,16 @@ pub(super) struct Running(Child);
 impl Running {
     /// Starts the program. Also returns the reader of its stdout.
     pub(super) fn start(name: &str, command: &mut Command) -> Result<(Self, impl Read + Send + use<>), Error> {
-        let mut child = command.stdout(Stdio::piped()).spawn().map_err(|e| absent(name, &e))?;
+        let mut child = command.stdout(Stdio::piped()).spawn().map_err(|e| cannot_start(name, &e))?;
         let out = child.stdout.take();
         let running = Self(child);
         Ok((running, out.ok_or_else(|| failed(format!("{name} gives no output")))?))
     }
 
     /// Starts a thread that reads the program's stderr, which must be a pipe.
-    pub(super) fn listen(&mut self) -> JoinHandle<Said> {
+    pub(super) fn read_errors(&mut self) -> JoinHandle<ToolErrors> {
         let errors = self.0.stderr.take();
-        std::thread::spawn(move || errors.map(|e| Said::read(BufReader::new(e))).unwrap_or_default())
+        std::thread::spawn(move || errors.map(|e| ToolErrors::read(BufReader::new(e))).unwrap_or_default())
     }
 
     pub(super) fn wait(&mut self) -> std::io::Result<ExitStatus> {
@@ -63,14 +63,14 @@ impl Drop for Running {
 
 /// Errors that a program printed.
 #[derive(Default)]
-pub(super) struct Said {
+pub(super) struct ToolErrors {
     count: u64,
     last: String,
 }
 
-impl Said {
+impl ToolErrors {
     fn read(mut errors: impl BufRead) -> Self {
-        let mut said = Self::default();
+        let mut found = Self::default();
         let mut line = Vec::new();
         while errors.read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
             let text = String::from_utf8_lossy(&line);
@@ -78,12 +78,12 @@ impl Said {
             let text = text.trim();
             let text = text.strip_prefix('[').and_then(|t| t.split_once("] ")).map_or(text, |(_, what)| what);
             if !text.is_empty() && !HARMLESS.iter().any(|h| text.contains(h)) {
-                said.count += 1;
-                said.last = text.to_owned();
+                found.count += 1;
+                found.last = text.to_owned();
             }
             line.clear();
         }
-        said
+        found
     }
 
     /// Returns the last error, and the number of errors if there are several.
@@ -101,15 +101,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_error_is_told() {
-        let told = |text: &str| Said::read(text.as_bytes()).summary();
-        assert_eq!(told(""), None);
-        assert_eq!(told("[matroska,webm @ 0x55c8] File ended prematurely\n").unwrap(), "File ended prematurely");
+    fn the_last_error_is_reported() {
+        let summary = |text: &str| ToolErrors::read(text.as_bytes()).summary();
+        assert_eq!(summary(""), None);
+        assert_eq!(summary("[matroska,webm @ 0x55c8] File ended prematurely\n").unwrap(), "File ended prematurely");
         let several = "[h264 @ 0x1] Invalid NAL unit size\n\nError while decoding stream #0:0: no\n[mjpeg @ 0x2] \
                        unable to decode APP fields: x\n";
-        assert_eq!(told(several).unwrap(), "Error while decoding stream #0:0: no; 2 errors in all");
+        assert_eq!(summary(several).unwrap(), "Error while decoding stream #0:0: no; 2 errors in all");
         assert_eq!(
-            told("[rawvideo @ 0x1] Application provided invalid, non monotonically increasing dts to muxer\n"),
+            summary("[rawvideo @ 0x1] Application provided invalid, non monotonically increasing dts to muxer\n"),
             None
         );
     }

@@ -1,0 +1,13 @@
+//! The content of a report.
+
+use hzn_sim::evaluate::{Case, Evaluation};
+use serde::Serialize;
+
+/// Everything that a report shows. Its JSON is this structure.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    pub(super) results: String,
+    pub(super) truth: String,
+    pub(super) evaluations: Vec<Evaluation>,
+    pub(super) frames: Vec<Case>,
+}

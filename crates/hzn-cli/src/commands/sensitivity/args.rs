@@ -1,0 +1,105 @@
+//! The arguments of `hzn sensitivity`.
+
+use std::path::PathBuf;
+
+use super::body::Body;
+use super::sweep::Values;
+
+/// Compute how accurate a camera would be, without rendering: sigma of the direction by field of view, altitude,
+/// resolution
+///
+/// A value may be a number (94.4), a list (60,90,120) or a range (60:150 or 60:150:10); the table has a row for every
+/// combination. The limb is that of a sphere. Its points are a pixel apart, with errors that are correlated along the
+/// edge. Sigmas are 1 sigma in degrees: pitch in the plane of optical axis and body, roll across it. `free` fits the
+/// half-angle, `fused` also uses altitude and limb height with their sigmas (as `hzn run` does), `known` treats them as
+/// exact.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Sigmas; or the field of view that shows each kind of limb; or the error of treating the Earth as a sphere
+    #[arg(value_enum, default_value_t = What::Sigma)]
+    pub(super) what: What,
+    /// Field of view across the width, degrees
+    #[arg(long, value_name = "DEG", default_value = "90", conflicts_with = "sensor")]
+    pub(super) fov: Values,
+    /// Altitude, kilometres
+    #[arg(long, value_name = "KM")]
+    pub(super) altitude: Option<Values>,
+    /// Width and height of the picture, pixels
+    #[arg(long, value_name = "WxH", default_value = "1920x1080", conflicts_with = "sensor")]
+    pub(super) size: Size,
+    /// Rows of the picture; replaces the height, and the width is scaled: resolutions of one sensor area
+    #[arg(long, value_name = "PX", conflicts_with = "sensor")]
+    pub(super) rows: Option<Values>,
+    /// The lens
+    #[arg(long, value_enum, default_value_t = Lens::Pinhole, conflicts_with = "sensor")]
+    pub(super) lens: Lens,
+    /// Take camera, body and noise from this sensor.toml
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) sensor: Option<PathBuf>,
+    /// Bodies: earth, moon, sun, or a radius in kilometres; several with commas
+    #[arg(long, value_name = "BODY", value_delimiter = ',')]
+    pub(super) body: Vec<Body>,
+    /// Height of the visible limb, kilometres [default: 10 for the Earth, else 0]
+    #[arg(long, value_name = "KM")]
+    pub(super) limb_height: Option<Values>,
+    /// 1-sigma of the limb height, kilometres [default: 2]
+    #[arg(long, value_name = "KM")]
+    pub(super) limb_height_sigma: Option<f64>,
+    /// 1-sigma of the altitude, kilometres [default: 0.5]
+    #[arg(long, value_name = "KM")]
+    pub(super) altitude_sigma: Option<f64>,
+    /// Angle of the optical axis below the horizontal, degrees; 90 looks straight down
+    #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true)]
+    pub(super) depression: Values,
+    /// Turn of the camera about its optical axis, degrees
+    #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true)]
+    pub(super) roll: Values,
+    /// 1-sigma of an edge point, pixels [default: 1]
+    #[arg(long, value_name = "PX")]
+    pub(super) sigma_px: Option<f64>,
+    /// Correlation length of the errors along the edge, pixels [default: 300]
+    #[arg(long, value_name = "PX")]
+    pub(super) correlation_px: Option<f64>,
+    /// Also write the table (.csv) or a plot over the first range (.svg); may be given twice
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: Vec<PathBuf>,
+    /// Replace files that exist
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum What {
+    /// Sigma of the direction
+    Sigma,
+    /// Smallest fields of view that show an ellipse, a hyperbola, or the whole disc, by altitude
+    Visibility,
+    /// Angles between centre, geodetic vertical and limb axis of WGS-84, by latitude and altitude
+    SphericalEarth,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Lens {
+    /// r = f tan(angle), below 180 degrees
+    Pinhole,
+    /// r = f angle, up to 350 degrees
+    Equidistant,
+}
+
+/// Columns and rows of the picture, in pixels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Size {
+    pub(super) width: u16,
+    pub(super) height: u16,
+}
+
+impl std::str::FromStr for Size {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1920x1080")?;
+        match (w.parse(), h.parse()) {
+            (Ok(width), Ok(height)) if width >= 2 && height >= 2 => Ok(Self { width, height }),
+            _ => Err("width and height must be whole numbers from 2 to 65535".into()),
+        }
+    }
+}

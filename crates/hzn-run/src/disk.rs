@@ -1,0 +1,74 @@
+//! Paths and errors of files that are written, with advice for the user.
+
+use std::path::Path;
+
+use crate::error::{Error, Remedy, failed, unusable};
+
+/// Returns whether two paths lead to the same existing file or folder.
+pub fn is_same(a: &Path, b: &Path) -> bool {
+    let b = if b.as_os_str().is_empty() { Path::new(".") } else { b };
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Refuses a file that exists, unless it may be replaced.
+///
+/// # Errors
+/// The file exists and `force` is false.
+pub fn refuse_existing(path: &Path, force: bool) -> Result<(), Error> {
+    if path.exists() && !force {
+        return Err(unusable(format!("{}: exists already", path.display())).with_remedy(Remedy::Replace));
+    }
+    Ok(())
+}
+
+/// Returns the error for a file that cannot be written, with advice.
+pub fn cannot_write(path: &Path, error: &std::io::Error) -> Error {
+    failed(advice(path, error))
+}
+
+/// Returns the error for a picture that cannot be written, with advice.
+pub fn cannot_save(path: &Path, error: &image::ImageError) -> Error {
+    let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
+    while let Some(e) = cause {
+        if let Some(e) = e.downcast_ref::<std::io::Error>() {
+            return cannot_write(path, e);
+        }
+        cause = e.source();
+    }
+    failed(format!("{}: {error}", path.display()))
+}
+
+/// Returns the meaning of a write error, with advice.
+pub fn advice(path: &Path, error: &std::io::Error) -> String {
+    let name = path.display();
+    match error.kind() {
+        std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
+            format!("{name}: the disk is full: free some space, or write elsewhere")
+        }
+        std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem => {
+            format!("{name}: no permission to write here; choose another folder for the output")
+        }
+        std::io::ErrorKind::FileTooLarge => {
+            format!("{name}: the file is larger than the limit (ulimit -f): raise the limit, or write elsewhere")
+        }
+        std::io::ErrorKind::ResourceBusy => format!("{name}: {error}"),
+        std::io::ErrorKind::NotFound => format!("{name}: the folder does not exist; create it first"),
+        std::io::ErrorKind::NotADirectory => {
+            format!("{name}: a part of this path is a file, not a folder; choose another folder for the output")
+        }
+        // This error comes from making a folder.
+        std::io::ErrorKind::AlreadyExists => format!("{name}: is a file, not a folder; choose another name"),
+        _ => format!("{name}: cannot be written: {error}"),
+    }
+}
+
+/// Returns the text of [`advice`] for the file of a run. If the disk is full, it adds that finished pictures are kept.
+pub(crate) fn run_advice(path: &Path, error: &std::io::Error) -> String {
+    let what = advice(path, error);
+    match error.kind() {
+        std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded | std::io::ErrorKind::FileTooLarge => {
+            format!("{what}; finished pictures are kept; resume the run to continue after them")
+        }
+        _ => what,
+    }
+}

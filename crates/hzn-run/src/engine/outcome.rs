@@ -1,0 +1,99 @@
+//! The outcome of a picture: a report for each body, or the reason why there is none.
+
+use std::time::Duration;
+
+use hzn_calib::FrameData;
+use hzn_core::Report;
+use hzn_core::body::PriorError;
+use hzn_core::status::Status;
+
+use super::plan::Plan;
+use super::sensor::Processed;
+use super::trace::Traces;
+
+/// A processed picture.
+#[derive(Debug)]
+pub struct Finished {
+    /// Place in the sequence, from 0.
+    pub index: u64,
+    /// Name of the picture.
+    pub name: String,
+    /// Time in seconds, if it is known.
+    pub time_s: Option<f64>,
+    /// The prior of this picture from frames.csv or from a recording of ours.
+    pub data: Option<FrameData>,
+    /// The outcome of each body, in the order of the configuration.
+    pub outcomes: Vec<BodyOutcome>,
+    /// The drawing over the picture, if the plan asks for it.
+    pub drawing: hzn_mcap::Annotations,
+    /// The picture as PNG or JPEG, if the plan asks for it.
+    pub picture: Option<Vec<u8>>,
+    /// What the pipeline showed of its work, one record for each body, if the plan asks for it.
+    pub traces: Option<Traces>,
+    /// Advice, if nothing was found and the picture itself suggests a reason.
+    pub tip: Option<String>,
+    /// Number of pictures in the file; only the first was processed.
+    pub pages: u32,
+}
+
+/// The outcome of one body in one picture.
+#[derive(Debug)]
+pub struct BodyOutcome {
+    /// The report, or the reason why the picture was not processed.
+    pub report: Result<Report<f64>, Unprocessed>,
+    /// Time of processing, without decoding.
+    pub elapsed: Duration,
+}
+
+impl BodyOutcome {
+    /// Returns the status.
+    pub fn status(&self) -> Status {
+        self.report.as_ref().map_or_else(|e| e.status, |r| r.status)
+    }
+
+    /// Returns whether the body was not searched for because the camera is not above the limb height.
+    pub fn is_below_limb(&self) -> bool {
+        self.report.as_ref().is_err_and(|e| e.below_limb)
+    }
+}
+
+impl From<Processed> for BodyOutcome {
+    fn from(p: Processed) -> Self {
+        Self { report: p.report.map_err(Into::into), elapsed: p.elapsed }
+    }
+}
+
+/// The reason why a picture was not processed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unprocessed {
+    /// [`Status::Unreadable`] or [`Status::NoAltitude`].
+    pub status: Status,
+    /// The reason in words.
+    pub why: String,
+    /// True if the camera is not above the limb height.
+    pub below_limb: bool,
+}
+
+impl From<PriorError> for Unprocessed {
+    fn from(error: PriorError) -> Self {
+        let status = match error {
+            PriorError::NoAltitude | PriorError::BelowLimb { .. } => Status::NoAltitude,
+            _ => Status::Unreadable,
+        };
+        Self { status, why: error.to_string(), below_limb: matches!(error, PriorError::BelowLimb { .. }) }
+    }
+}
+
+impl Finished {
+    /// Returns the reason why the picture could not be read, if it could not.
+    pub fn unreadable(&self) -> Option<&str> {
+        let errors = self.outcomes.iter().filter_map(|f| f.report.as_ref().err());
+        errors.filter(|e| e.status == Status::Unreadable).map(|e| e.why.as_str()).next()
+    }
+    /// Returns the result of a picture that could not be read. It is unreadable for every body.
+    pub(super) fn into_unreadable(self, plan: &Plan, why: &str) -> Self {
+        let why = Unprocessed { status: Status::Unreadable, why: why.to_owned(), below_limb: false };
+        let none = || BodyOutcome { report: Err(why.clone()), elapsed: Duration::ZERO };
+        Self { outcomes: plan.config.each_body().iter().map(|_| none()).collect(), ..self }
+    }
+}

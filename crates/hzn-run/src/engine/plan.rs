@@ -1,0 +1,31 @@
+//! The settings of a run.
+
+use hzn_calib::Frames;
+use hzn_core::Config;
+
+use super::sensor::LastAnswer;
+
+/// The settings of a run, for every picture.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The sensor.
+    pub config: Config,
+    /// Use single precision and 2048 points, as on the flight computer.
+    pub flight: bool,
+    /// Number of threads.
+    pub threads: usize,
+    /// The content of frames.csv; it replaces the priors from the source itself.
+    pub frames: Option<Frames>,
+    /// Frames a second, for pictures without any other time.
+    pub fps: f64,
+    /// Collect what is to be drawn over the picture.
+    pub trace: bool,
+    /// Return the traces: everything that the pipeline showed of its work.
+    pub keep_traces: bool,
+    /// Hand the picture to the sink.
+    pub keep_picture: bool,
+    /// Draw an overlay of every picture into this folder.
+    pub overlay: Option<std::path::PathBuf>,
+    /// The last answers of the run that this one continues, one for each body.
+    pub last: Vec<Option<LastAnswer>>,
+}

@@ -1,0 +1,95 @@
+//! The processing of one picture: decoding, the sensor, the drawing, the overlay.
+
+use hzn_core::camera::Camera;
+use hzn_core::status::Status;
+use hzn_mcap::Annotations;
+
+use super::annotate::annotate;
+use super::outcome::{BodyOutcome, Finished};
+use super::plan::Plan;
+use super::sensor::AnySensor;
+use super::trace::Traces;
+use crate::overlay;
+use crate::source::Item;
+
+/// Decodes and processes one picture.
+///
+/// # Errors
+/// An overlay cannot be written.
+pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: Item) -> anyhow::Result<Finished> {
+    let time = item.time_source(plan.frames.as_ref());
+    let data = item.take_prior(plan.frames.as_ref());
+    let decoded = item.payload.decode(Some(&plan.config));
+    let exif = || decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
+    let time_s = time.time_s(data.as_ref(), exif, index, plan.fps);
+    let mut finished = Finished {
+        index,
+        name: item.name,
+        time_s,
+        data,
+        outcomes: Vec::new(),
+        drawing: Annotations::default(),
+        picture: None,
+        traces: None,
+        tip: None,
+        pages: decoded.as_ref().map_or(1, |(p, _)| p.pages),
+    };
+    let (picture, original) = match decoded {
+        Ok(decoded) => decoded,
+        Err(why) => return Ok(finished.into_unreadable(plan, &why)),
+    };
+    let traces =
+        (plan.trace || plan.keep_traces || plan.overlay.is_some()).then(|| Traces::new(plan.config.each_body().len()));
+    let view = match picture.view(plan.config.input.channel) {
+        Ok(view) => view,
+        Err(why) => return Ok(finished.into_unreadable(plan, &format!("{why} (input.channel in sensor.toml)"))),
+    };
+    let data = finished.data.as_ref();
+    sensor.set_time(finished.time_s);
+    finished.outcomes = sensor.process(&view, data, traces.as_ref()).into_iter().map(BodyOutcome::from).collect();
+    if finished.outcomes.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
+        finished.tip = picture.unused_bits();
+    }
+    if let Some(traces) = traces.as_ref().filter(|_| plan.trace || plan.overlay.is_some()) {
+        // The drawing is made here, because in the single writing thread it would delay all other threads. The camera
+        // includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
+        let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
+        let drawing = draw(&finished.outcomes, traces, &camera);
+        if let Some(folder) = &plan.overlay {
+            let title = status_text(&finished.outcomes, plan);
+            let image = overlay::draw_annotations(picture.to_rgb(), &drawing, &title);
+            overlay::save(&image, &folder.join(overlay::file_name(&finished.name)))?;
+        }
+        finished.drawing = drawing;
+    }
+    finished.traces = traces.filter(|_| plan.keep_traces);
+    if plan.keep_picture {
+        finished.picture = match original {
+            Some(bytes) => Some(bytes),
+            None => Some(picture.to_png().map_err(|e| anyhow::anyhow!("{}: {e}", finished.name))?),
+        };
+    }
+    Ok(finished)
+}
+
+/// Returns the drawing over the picture for all of its bodies.
+fn draw(outcomes: &[BodyOutcome], traces: &Traces, camera: &Camera<f64>) -> Annotations {
+    let mut drawing = Annotations::default();
+    for (outcome, trace) in outcomes.iter().zip(&traces.each) {
+        let solution = outcome.report.as_ref().ok().and_then(|r| r.solution.as_ref());
+        drawing.add(annotate(trace, solution, camera));
+    }
+    drawing
+}
+
+/// Returns the statuses of the bodies in words.
+fn status_text(outcomes: &[BodyOutcome], plan: &Plan) -> String {
+    match outcomes {
+        [one] => one.status().name().to_owned(),
+        several => {
+            let bodies = plan.config.each_body().iter().map(|b| b.kind.name());
+            let each: Vec<String> = bodies.zip(several).map(|(body, f)| format!("{body} {}", f.status())).collect();
+            each.join(", ")
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Conversion of reports to f64.
+
+use hzn_core::frames::{Cov3, UnitVec3};
+use hzn_core::real::Real;
+use hzn_core::report::{Candidate, Free};
+use hzn_core::{Report, Solution};
+
+/// Converts a report to f64.
+pub(super) fn widen_report<T: Real + Into<f64>>(r: &Report<T>) -> Report<f64> {
+    Report {
+        status: r.status,
+        stage: r.stage,
+        level: r.level,
+        next_level: r.next_level,
+        counters: r.counters,
+        candidates: r.candidates.iter().map(widen_candidate).collect(),
+        solution: r.solution.as_ref().and_then(widen_solution),
+    }
+}
+
+pub(super) fn widen_candidate<T: Real + Into<f64>>(c: &Candidate<T>) -> Candidate<f64> {
+    Candidate {
+        number: c.number,
+        length_px: c.length_px,
+        points: c.points,
+        inliers: c.inliers,
+        rms_px: c.rms_px.into(),
+        verdict: c.verdict,
+    }
+}
+
+pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Solution<f64>> {
+    let [xx, xy, xz] = s.covariance.rows()[0].map(Into::into);
+    let [_, yy, yz] = s.covariance.rows()[1].map(Into::into);
+    let zz = s.covariance.rows()[2][2].into();
+    Some(Solution {
+        axis: UnitVec3::try_new(s.axis.xyz().map(Into::into))?,
+        covariance: Cov3::from_upper([xx, xy, xz, yy, yz, zz]),
+        axis_ecef: s.axis_ecef.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
+        axis_body: s.axis_body.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
+        half_angle_rad: s.half_angle_rad.into(),
+        fused_half_angle_rad: s.fused_half_angle_rad.into(),
+        altitude_m: s.altitude_m.map(|(h, sigma)| (h.into(), sigma.into())),
+        free: s.free.as_ref().and_then(widen_free),
+        rms_px: s.rms_px.into(),
+        inliers: s.inliers,
+        arc_px: s.arc_px.into(),
+        candidate: s.candidate,
+    })
+}
+
+fn widen_free<T: Real + Into<f64>>(f: &Free<T>) -> Option<Free<f64>> {
+    Some(Free {
+        axis: UnitVec3::try_new(f.axis.xyz().map(Into::into))?,
+        cos: f.cos.into(),
+        var_cos: f.var_cos.into(),
+        cos_per_px: f.cos_per_px.into(),
+    })
+}

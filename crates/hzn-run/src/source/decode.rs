@@ -1,0 +1,134 @@
+//! Reads and decodes picture files, with limits.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use hzn_core::image::Layout;
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+
+use super::picture::{Picture, Samples};
+use super::{exif, pages};
+
+/// Longest side of a picture that is read, in pixels.
+pub const MAX_SIDE_PX: u32 = 20_000;
+/// Largest decoded picture, in bytes.
+pub const MAX_BYTES: u64 = 512 << 20;
+
+/// Returns the format of picture data, from their first bytes.
+pub fn guess_format(bytes: &[u8]) -> Option<ImageFormat> {
+    image::guess_format(bytes).ok()
+}
+
+/// Reads a whole file, unless it is far too large for a picture.
+///
+/// # Errors
+/// The reason why it cannot be read, for the picture's result.
+pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
+    let refuse = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::NotFound => match std::fs::read_link(path) {
+            Ok(there) => format!("is a link to {}, which does not exist", there.display()),
+            Err(_) => "no such file".to_owned(),
+        },
+        _ => format!("cannot be read: {e}"),
+    };
+    let meta = std::fs::metadata(path).map_err(refuse)?;
+    if meta.is_dir() {
+        return Err("is a folder".into());
+    }
+    if meta.len() > 2 * MAX_BYTES {
+        return Err(format!(
+            "file of {} MB is larger than the limit of {} MB",
+            meta.len() >> 20,
+            (2 * MAX_BYTES) >> 20
+        ));
+    }
+    let bytes = std::fs::read(path).map_err(refuse)?;
+    if bytes.is_empty() { Err("file is empty".into()) } else { Ok(bytes) }
+}
+
+/// Decodes PNG, JPEG, TIFF, PNM or BMP. Palettes become colour, and CMYK becomes RGB. If a file contains several
+/// pictures, the first is decoded. `expected` is the camera's size in pixels: a picture of another size is refused
+/// before anything large is decoded.
+///
+/// # Errors
+/// The reason why it cannot be decoded, for the picture's result.
+pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, String> {
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+    let mut limits = image::Limits::no_limits();
+    limits.max_alloc = Some(MAX_BYTES);
+    reader.limits(limits);
+    let format = reader.format().ok_or("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP)")?;
+    let mut decoder = reader.into_decoder().map_err(|e| explain(&e, format))?;
+    let (width, height) = decoder.dimensions();
+    check_size(width, height, expected)?;
+    if decoder.total_bytes() > MAX_BYTES {
+        return Err(format!(
+            "picture of {width}x{height} needs {} MB, above the limit of {} MB",
+            decoder.total_bytes() >> 20,
+            MAX_BYTES >> 20
+        ));
+    }
+    if format == ImageFormat::Jpeg && jpeg_is_truncated(bytes) {
+        return Err("JPEG data end before the picture is complete: the file is truncated".into());
+    }
+    let exif_time_s = decoder.exif_metadata().ok().flatten().and_then(exif::time_s);
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let image = DynamicImage::from_decoder(decoder).map_err(|e| explain(&e, format))?;
+    let (samples, channels, bits) = match image {
+        DynamicImage::ImageLuma8(i) => (Samples::Bytes(i.into_raw()), 1, 8),
+        DynamicImage::ImageLumaA8(i) => (Samples::Bytes(i.into_raw()), 2, 8),
+        DynamicImage::ImageRgb8(i) => (Samples::Bytes(i.into_raw()), 3, 8),
+        DynamicImage::ImageRgba8(i) => (Samples::Bytes(i.into_raw()), 4, 8),
+        DynamicImage::ImageLuma16(i) => (Samples::Words(i.into_raw()), 1, 16),
+        DynamicImage::ImageLumaA16(i) => (Samples::Words(i.into_raw()), 2, 16),
+        DynamicImage::ImageRgb16(i) => (Samples::Words(i.into_raw()), 3, 16),
+        DynamicImage::ImageRgba16(i) => (Samples::Words(i.into_raw()), 4, 16),
+        other => {
+            return Err(format!("samples of kind {:?} are not supported; use integers of 8 or 16 bits", other.color()));
+        }
+    };
+    let layout = Layout::packed(width, height, channels, bits);
+    Ok(Picture { exif_time_s, orientation, pages: pages::count(bytes, format), ..Picture::new(samples, layout) })
+}
+
+/// Refuses sizes that are zero, above the limit, or not the camera's size.
+pub(crate) fn check_size(width: u32, height: u32, expected: Option<(u32, u32)>) -> Result<(), String> {
+    if width == 0 || height == 0 {
+        return Err(format!("picture of {width}x{height} has no pixels"));
+    }
+    if width > MAX_SIDE_PX || height > MAX_SIDE_PX {
+        return Err(format!("picture of {width}x{height} is larger than the limit of {MAX_SIDE_PX} px a side"));
+    }
+    match expected {
+        Some((w, h)) if (w, h) != (width, height) => Err(format!(
+            "picture is {width}x{height} but the camera is {w}x{h} (camera.width, camera.height in sensor.toml){}",
+            if (h, w) == (width, height) { "; input.orient turns pictures" } else { "" }
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Returns whether a JPEG is truncated. JPEG decoders fill missing parts with grey, which would pass as a picture. A
+/// scan that began (FF DA) must be followed by an end (FF D9). Neither marker occurs within entropy-coded data.
+fn jpeg_is_truncated(bytes: &[u8]) -> bool {
+    let last = |marker: u8| bytes.windows(2).rposition(|w| *w == [0xff, marker]);
+    match (last(0xda), last(0xd9)) {
+        (Some(scan), Some(end)) => end < scan,
+        (Some(_), None) => true,
+        (None, _) => false,
+    }
+}
+
+fn explain(error: &image::ImageError, format: ImageFormat) -> String {
+    let name = format!("{format:?}").to_uppercase();
+    let text = error.to_string().replace('\n', " ");
+    match error {
+        image::ImageError::Limits(_) => format!("{name} needs more memory than the limit of {} MB", MAX_BYTES >> 20),
+        image::ImageError::Unsupported(_) => format!("{name} of a kind that is not supported: {text}"),
+        image::ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+            format!("{name} data end before the picture is complete: the file is truncated")
+        }
+        _ => format!("{name} cannot be decoded: {text}"),
+    }
+}

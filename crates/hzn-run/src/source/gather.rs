@@ -1,0 +1,157 @@
+//! Gathers the picture files of the inputs: of a folder, of a pattern, or of a list.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::paths::ending;
+use super::{natural, video};
+use crate::error::{Error, Remedy, unusable};
+
+/// Endings of the picture files that can be read.
+const PICTURES: &[&str] = &["png", "jpg", "jpeg", "jpe", "tif", "tiff", "pnm", "pgm", "ppm", "pbm", "bmp"];
+/// Endings of files that often lie next to pictures but are not pictures.
+const COMPANIONS: &[&str] = &["csv", "toml", "txt", "md", "json", "jsonl", "yaml", "yml", "xml", "log", "mcap", "part"];
+
+/// Files and other things that were left out, counted by kind and ending.
+pub(super) type LeftOut = BTreeMap<(Kind, String), usize>;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    File,
+    Folder,
+    /// A device, a pipe, a socket.
+    Special,
+}
+
+impl Kind {
+    /// A path without metadata counts as a file: it is a picture that cannot be read, such as a link into an archive
+    /// that is not mounted.
+    fn from_path(path: &Path) -> Self {
+        match std::fs::metadata(path) {
+            Ok(meta) if meta.is_dir() => Self::Folder,
+            Ok(meta) if !meta.is_file() => Self::Special,
+            _ => Self::File,
+        }
+    }
+}
+
+/// Removes everything that is not a file, and counts it in `left_out`.
+fn retain_files(paths: &mut Vec<PathBuf>, left_out: &mut LeftOut) {
+    paths.retain(|p| {
+        let kind = Kind::from_path(p);
+        if kind != Kind::File {
+            *left_out.entry((kind, ending(p))).or_default() += 1;
+        }
+        kind == Kind::File
+    });
+}
+
+/// The picture files of the inputs.
+#[derive(Default)]
+pub(super) struct Gathered {
+    /// The files, in order.
+    pub(super) paths: Vec<PathBuf>,
+    /// The folder, if the input is one.
+    pub(super) folder: Option<PathBuf>,
+    /// What was left out.
+    pub(super) left_out: LeftOut,
+}
+
+impl Gathered {
+    /// Gathers the files; `raw` says that they have no header.
+    pub(super) fn from_inputs(inputs: &[PathBuf], raw: bool) -> Result<Self, Error> {
+        let mut gathered = Self::default();
+        for input in inputs {
+            gathered.add(input, inputs.len() == 1, raw)?;
+        }
+        if gathered.paths.is_empty() { Err(gathered.empty(inputs, raw)) } else { Ok(gathered) }
+    }
+
+    /// Adds the files of one input; `alone` says that there is no other input.
+    fn add(&mut self, input: &Path, alone: bool, raw: bool) -> Result<(), Error> {
+        let text = input.to_string_lossy();
+        if input.is_dir() {
+            if !alone {
+                return Err(unusable(format!(
+                    "{text}: a folder cannot be combined with other inputs; give one folder, or only files"
+                )));
+            }
+            self.folder = Some(input.to_owned());
+            self.paths.extend(list_folder(input, raw, &mut self.left_out)?);
+            Ok(())
+        } else if input.exists() || (!alone && input.is_symlink()) {
+            self.add_file(input, alone, raw)
+        } else if text.contains(['*', '?', '[']) {
+            self.add_pattern(&text, raw)
+        } else {
+            Err(unusable(format!("{text}: no such file or folder")))
+        }
+    }
+
+    fn add_file(&mut self, input: &Path, alone: bool, raw: bool) -> Result<(), Error> {
+        let text = input.display();
+        if !alone && (ending(input) == "mcap" || video::ENDINGS.contains(&ending(input).as_str())) {
+            return Err(unusable(format!(
+                "{text}: a video or a recording cannot be combined with other inputs; give it alone"
+            )));
+        }
+        if !raw && COMPANIONS.contains(&ending(input).as_str()) {
+            // The shell expands `hzn run flight/*` to a list that contains these files.
+            if alone {
+                return Err(unusable(format!("{text}: is not a picture (PNG, JPEG, TIFF, PNM, BMP)")));
+            }
+            return Ok(());
+        }
+        self.paths.push(input.to_owned());
+        Ok(())
+    }
+
+    fn add_pattern(&mut self, text: &str, raw: bool) -> Result<(), Error> {
+        let matches = glob::glob(text).map_err(|e| unusable(format!("{text}: not a valid pattern: {e}")))?;
+        let mut found: Vec<PathBuf> = matches.flatten().collect();
+        found.retain(|p| match Kind::from_path(p) {
+            Kind::File => raw || !COMPANIONS.contains(&ending(p).as_str()),
+            _ => PICTURES.contains(&ending(p).as_str()),
+        });
+        retain_files(&mut found, &mut self.left_out);
+        if found.is_empty() {
+            return Err(unusable(format!("{text}: no picture matches")));
+        }
+        found.sort_by(|a, b| natural::compare(a, b));
+        self.paths.extend(found);
+        Ok(())
+    }
+
+    /// Returns the error for inputs without a picture.
+    fn empty(&self, inputs: &[PathBuf], raw: bool) -> Error {
+        let what = if raw { "no headerless files" } else { "no pictures (PNG, JPEG, TIFF, PNM, BMP)" };
+        let name = inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
+        let what = format!("{name}: {what} in this folder");
+        match self.left_out.keys().next() {
+            Some((Kind::File, e)) => unusable(format!("{what}; there are files ending in .{e}: convert them"))
+                .with_remedy(Remedy::Headerless),
+            _ => unusable(what),
+        }
+    }
+}
+
+/// Returns the pictures of a folder in order, and counts other files in `left_out`.
+pub(super) fn list_folder(folder: &Path, raw: bool, left_out: &mut LeftOut) -> Result<Vec<PathBuf>, Error> {
+    let cannot = |e: std::io::Error| unusable(format!("{}: cannot be listed: {e}", folder.display()));
+    let list = std::fs::read_dir(folder).map_err(cannot)?;
+    let mut paths = list.map(|e| Ok(e.map_err(cannot)?.path())).collect::<Result<Vec<PathBuf>, Error>>()?;
+    paths.retain(|p| {
+        let e = ending(p);
+        let hidden = p.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
+        let (picture, companion) = (PICTURES.contains(&e.as_str()), COMPANIONS.contains(&e.as_str()) || hidden);
+        let take = if raw { !picture && !companion } else { picture };
+        if !take && !companion && Kind::from_path(p) == Kind::File {
+            *left_out.entry((Kind::File, e)).or_default() += 1;
+        }
+        take
+    });
+    retain_files(&mut paths, left_out);
+    // The paths are sorted by name, so that the order does not depend on the file system.
+    paths.sort_by(|a, b| natural::compare(a, b));
+    Ok(paths)
+}

@@ -1,0 +1,24 @@
+//! Checks of input paths, and their endings.
+
+use std::path::Path;
+
+use crate::error::{Error, unusable};
+
+/// Checks that an input file exists. Returns the ending of its kind, and whether an unfinished run left it. An
+/// unfinished file has the ending of its kind before `.part`.
+///
+/// # Errors
+/// The file does not exist, or is a folder.
+pub fn check_exists(file: &Path) -> Result<(String, bool), Error> {
+    if !file.is_file() {
+        let what = if file.is_dir() { "is a folder; a file is expected here" } else { "no such file" };
+        return Err(unusable(format!("{}: {what}", file.display())));
+    }
+    let unfinished = ending(file) == "part";
+    Ok((if unfinished { ending(&file.with_extension("")) } else { ending(file) }, unfinished))
+}
+
+/// Returns the file's ending in lower case, without the dot.
+pub fn ending(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+}

@@ -1,0 +1,102 @@
+//! The picture of an item before it is decoded, and its decoding.
+
+use std::path::PathBuf;
+
+use hzn_core::Config;
+use hzn_core::config::Orient;
+use hzn_core::image::Layout;
+use hzn_mcap::{EncodedImage, ImageFormat};
+
+use super::picture::{Picture, Samples};
+use super::raw::Raw;
+use super::{decode, header};
+
+/// A picture on its way from the source to a thread.
+#[derive(Debug)]
+pub enum Payload {
+    /// A picture file.
+    File(PathBuf),
+    /// A headerless file.
+    RawFile(PathBuf, Raw),
+    /// The contents of a picture file, from a container.
+    Encoded(Vec<u8>),
+    /// A picture that is decoded already.
+    Decoded(Picture),
+    /// A picture that was lost, with the reason.
+    Broken(String),
+}
+
+impl Payload {
+    /// Returns the picture of a recorded message.
+    pub fn from_recorded(image: EncodedImage) -> Self {
+        let EncodedImage { format, bytes } = image;
+        let raw = |samples, width, height, channels, bits| {
+            let layout = Layout::packed(width, height, channels, bits);
+            Self::Decoded(Picture::new(samples, layout))
+        };
+        match format {
+            ImageFormat::Png | ImageFormat::Jpeg => Self::Encoded(bytes),
+            ImageFormat::Other(name) => {
+                Self::Broken(format!("pictures in {name} are not supported; record PNG or JPEG"))
+            }
+            ImageFormat::Mono8 { width, height } => raw(Samples::Bytes(bytes), width, height, 1, 8),
+            ImageFormat::Rgb8 { width, height } => raw(Samples::Bytes(bytes), width, height, 3, 8),
+            ImageFormat::Mono16 { width, height } => {
+                let words = bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+                raw(Samples::Words(words), width, height, 1, 16)
+            }
+        }
+    }
+
+    /// Decodes the picture. With a sensor, the picture must have the sensor's size, and gets the sensor's number of
+    /// bits and turn. Also returns the file's own bytes, if they are PNG or JPEG and can be kept unchanged.
+    ///
+    /// # Errors
+    /// The reason why the picture cannot be read, for its result.
+    pub fn decode(self, sensor: Option<&Config>) -> Result<(Picture, Option<Vec<u8>>), String> {
+        let Some(sensor) = sensor else { return self.decode_as_stored(None) };
+        let own = (u32::from(sensor.camera.width), u32::from(sensor.camera.height));
+        // With EXIF, each picture has its own turn, so the stored size is known only after decoding.
+        let stored = match sensor.input.orient {
+            Orient::Exif => None,
+            Orient::Rotate90 | Orient::Rotate270 => Some((own.1, own.0)),
+            _ => Some(own),
+        };
+        let (picture, original) = self.decode_as_stored(stored)?;
+        let turned = picture.is_turned(&sensor.input);
+        let picture = picture.with_input(&sensor.input)?;
+        decode::check_size(picture.layout.width, picture.layout.height, Some(own))?;
+        Ok((picture, original.filter(|_| !turned)))
+    }
+
+    /// Returns the largest sample of a picture of 16-bit words. Returns `None` for any other or unreadable picture.
+    pub(super) fn largest_word(self) -> Option<u16> {
+        match &self {
+            Self::File(path) if !header::has_words(std::fs::File::open(path).ok()?) => return None,
+            Self::File(path) if header::has_white_value(path) => return Some(u16::MAX),
+            Self::Encoded(bytes) if !header::has_words(std::io::Cursor::new(bytes)) => return None,
+            _ => {}
+        }
+        self.decode_as_stored(None).ok()?.0.largest_word()
+    }
+
+    fn decode_as_stored(self, expected: Option<(u32, u32)>) -> Result<(Picture, Option<Vec<u8>>), String> {
+        let encoded = |bytes: Vec<u8>| {
+            let picture = decode::decode(&bytes, expected)?;
+            let keep = matches!(decode::guess_format(&bytes), Some(image::ImageFormat::Png | image::ImageFormat::Jpeg));
+            Ok((picture, keep.then_some(bytes)))
+        };
+        let sized = |picture: Picture| {
+            decode::check_size(picture.layout.width, picture.layout.height, expected)?;
+            Ok((picture, None))
+        };
+        match self {
+            Self::File(path) => encoded(decode::read_file(&path)?),
+            Self::Encoded(bytes) if bytes.is_empty() => Err("message without picture data".into()),
+            Self::Encoded(bytes) => encoded(bytes),
+            Self::RawFile(path, raw) => sized(raw.decode(&decode::read_file(&path)?)?),
+            Self::Decoded(picture) => sized(picture),
+            Self::Broken(why) => Err(why),
+        }
+    }
+}
