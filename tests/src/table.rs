@@ -54,7 +54,7 @@ pub fn cell(
         limb_height_sigma_km: HEIGHT_SIGMA_KM,
         ..sensor.body
     };
-    sensor.covariance = covariance::Config { bias_px: 0.25, ..covariance::Config::told(sigma_px, correlation_px) };
+    sensor.covariance = covariance::Config { bias_px: 0.25, ..covariance::Config::given(sigma_px, correlation_px) };
     let edge = (1.0 - open) * w;
     // The mask is four pixels larger than the vehicle, because the vehicle's edge is blurred.
     let part = |grow: f64| [[-20.0, -20.0], [edge + grow, -20.0], [edge + grow, h + 20.0], [-20.0, h + 20.0]];

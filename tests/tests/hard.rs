@@ -24,7 +24,7 @@ fn pinhole() -> Camera {
 fn sensor(scene: &Scene) -> Config {
     let mut sensor = Config::new(scene.camera.clone());
     sensor.body = body::Config { altitude_sigma_km: 0.1, limb_height_sigma_km: 1.0, ..scene.body.clone() };
-    sensor.covariance = hzn_core::covariance::Config::told(0.1, 30.0);
+    sensor.covariance = hzn_core::covariance::Config::given(0.1, 30.0);
     sensor
 }
 

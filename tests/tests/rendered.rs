@@ -95,7 +95,7 @@ fn white_noise_against_the_bound() {
     sensor.body.kind = hzn_core::body::Kind::EarthSphere;
     sensor.estimate.half_angle = hzn_core::fit::HalfAngle::Known;
     // This is less than the error of any edge point, so the covariance follows from the residuals.
-    sensor.covariance = hzn_core::covariance::Config::told(1e-3, 0.0);
+    sensor.covariance = hzn_core::covariance::Config::given(1e-3, 0.0);
     let look = Look { azimuth_rad: 0.3, depression_rad: 0.25, roll_rad: 0.2 };
     let mut scene = hzn_sim::Scene::new(camera, Pose::looking(position_m(20.0, 10.0, 240.0), look));
     let pixel_deg = (1.0f64 / 277.0).to_degrees();

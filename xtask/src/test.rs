@@ -23,7 +23,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     // A workspace build unites the features of all crates. Alone, the core is built as it flies.
     all.step("tests of hzn-core alone", |s| s.cargo_test(&["--package", "hzn-core"]));
     all.step("feature sets of hzn-core", |_| {
-        ["std", "serde", "std,serde", "dlr", "zju", "horace", "erf", "_edges", "dlr,zju,horace,erf"]
+        ["std", "serde", "std,serde", "dlr", "zju", "horace", "erf", "kalibr", "reml", "_edges", "dlr,zju,horace,erf"]
             .into_iter()
             .try_for_each(check_core_with)
     });
@@ -32,6 +32,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     });
     all.step("flight build", |_| flight_build::run_step());
     all.step("firmware", firmware::test);
+    all.step("examples of hzn-core", |_| run_core_examples());
     all.step("demo", |_| run_demo());
     all.step("viewer", |_| viewer::test());
     all.step("lenses against OpenCV", |_| compare_lenses_with_opencv());
@@ -53,6 +54,15 @@ fn check_core_with(features: &str) -> Outcome {
 /// Compares the lens models with those of OpenCV.
 fn compare_lenses_with_opencv() -> Outcome {
     compare_in_python("check_lenses.py", "debug/examples/rays", "lenses")
+}
+
+/// Runs the examples of hzn-core; each checks its own answer.
+fn run_core_examples() -> Outcome {
+    build_tests()?;
+    let examples = target().join("debug/examples");
+    ["picture", "no_std", "rows", "own_lens"]
+        .into_iter()
+        .try_for_each(|example| steps::run(&mut Command::new(examples.join(example))))
 }
 
 /// Compares a simulated picture with one that NumPy and OpenCV compute from the documented model.

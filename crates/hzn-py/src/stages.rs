@@ -3,7 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use hzn_core::frames::{Cam, UnitVec3};
-use hzn_core::pipeline::edges::{Agreed, Edges, Fitted};
+use hzn_core::pipeline::edges::{ConsensusCone, Edges, Fitted};
 use hzn_core::pixel::{ImagePoint, Pixel};
 use numpy::ndarray::{Array1, Array2, arr1, arr2};
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, ToPyArray};
@@ -20,7 +20,7 @@ type Array2d<'py> = Bound<'py, PyArray2<f64>>;
 
 #[doc = doc!("Cone")]
 #[pyclass(frozen, subclass, module = "hzn.consensus")]
-pub(crate) struct Cone(Agreed<f64>);
+pub(crate) struct Cone(ConsensusCone<f64>);
 
 #[pymethods]
 impl Cone {
@@ -33,7 +33,7 @@ impl Cone {
                 "cos_half_angle: {cos_half_angle} is refused: must be between -1 and 1"
             )));
         }
-        Ok(Self(Agreed { axis, cos_half_angle, draws: 0, all: false }))
+        Ok(Self(ConsensusCone { axis, cos_half_angle, draws: 0, all: false }))
     }
     #[doc = doc!("Cone.axis")]
     #[getter]
@@ -250,7 +250,7 @@ pub(crate) fn fit_cone(
     let state = sensor.state();
     let core = state.core()?;
     let fitted = errors::detached(py, || rays.edges().fit(core, &start.0, &expected.core))?;
-    let cone = |f: &Fitted<f64>| Agreed { axis: f.axis(), cos_half_angle: f.cos_half_angle(), ..start.0 };
+    let cone = |f: &Fitted<f64>| ConsensusCone { axis: f.axis(), cos_half_angle: f.cos_half_angle(), ..start.0 };
     let fit = |f: Fitted<f64>| Py::new(py, PyClassInitializer::from(Cone(cone(&f))).add_subclass(Fit(f)));
     fitted.map(fit).transpose()
 }
@@ -272,7 +272,7 @@ pub(crate) fn fuse_half_angle<'py>(
     let mut edges = rays.edges();
     let fitted = match fit.cast::<Fit>() {
         Ok(fit) => Some(fit.get().0),
-        Err(_) => edges.given(&fit.get().0.axis, fit.get().0.cos_half_angle),
+        Err(_) => edges.fit_at(&fit.get().0.axis, fit.get().0.cos_half_angle),
     };
     let fused = fitted.and_then(|fit| edges.fuse(core, &fit, &expected.core));
     Ok(fused.map(|f| (arr1(&f.axis.xyz()).to_pyarray(py), arr2(&f.covariance.rows()).to_pyarray(py), f.cos_half_angle)))

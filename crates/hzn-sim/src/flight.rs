@@ -223,7 +223,7 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
     };
     // The values make the errors as large as their covariance: squared errors over their covariance are 1.5 to 2.7 (two
     // degrees of freedom) on pictures 960 to 1920 pixels wide. Clouds seen through the band correlate the errors.
-    sensor.covariance = covariance::Config::told(0.1, 30.0);
+    sensor.covariance = covariance::Config::given(0.1, 30.0);
     let half_s = 190.0;
     let frames = indexed_fractions(count)
         .map(|(index, fraction)| {
@@ -266,7 +266,7 @@ pub fn leo_infrared(count: usize, seed: u64) -> Flight {
     sensor.body =
         body::Config { limb_height_km: 25.0, limb_height_sigma_km: 1.0, altitude_sigma_km: 0.1, ..sensor.body };
     // Noise dominates, so errors of neighbouring points are unrelated beyond the blur.
-    sensor.covariance = covariance::Config::told(0.07, 5.0);
+    sensor.covariance = covariance::Config::given(0.07, 5.0);
     let frames = indexed_fractions(count)
         .map(|(index, fraction)| {
             let time_s = 5800.0 * fraction;

@@ -131,7 +131,7 @@ fn the_sensor_reports_what_the_design_says() {
             ..body::Config::default()
         };
         config.candidates.keep_points = 0;
-        config.covariance = covariance::Config::told(1.0, 100.0);
+        config.covariance = covariance::Config::given(1.0, 100.0);
         let promised = sigmas(&Design {
             camera: camera.clone(),
             radius_km: config.body.mean_radius_km(),

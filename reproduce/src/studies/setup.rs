@@ -43,7 +43,7 @@ pub(super) fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Con
     let covariance::Config { noise, sigma_px, correlation_px, .. } = flight.sensor.covariance;
     // If the noise comes from the residuals of the pictures, there is no given noise for a published system.
     let covariance = match noise {
-        covariance::Noise::Told => covariance::Config { sigma_px, correlation_px, ..own.covariance },
+        covariance::Noise::Given => covariance::Config { sigma_px, correlation_px, ..own.covariance },
         _ => own.covariance,
     };
     Config { body, mask: flight.sensor.mask.clone(), covariance, ..own }
@@ -60,7 +60,7 @@ pub(super) fn simulated(name: &str, count: usize) -> anyhow::Result<(Flight, Str
     let measured = |body: Kind| {
         let Some(fit) = fits.iter().find(|fit| fit.body == body) else { return "nothing could be measured".to_owned() };
         let noise = match fit.noise {
-            covariance::Noise::Told => format!("{:.2} px over {:.0} px", fit.sigma_px, fit.correlation_px),
+            covariance::Noise::Given => format!("{:.2} px over {:.0} px", fit.sigma_px, fit.correlation_px),
             _ => "edge errors by each picture's residuals".to_owned(),
         };
         let limb = (fit.limb_height_sigma_km > 0.0)

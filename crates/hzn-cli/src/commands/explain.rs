@@ -127,7 +127,7 @@ impl PictureWithPrior<'_> {
                     continue;
                 }
             };
-            let levels = config.levels_of(which as u8);
+            let levels = config.threshold_of(which as u8);
             let explained =
                 Explained { name: file, config, body, levels, data, picture, trace, report: &report, half_angle };
             tell::result(format_args!("{between}{}", explained.text(decoding, time.elapsed)))?;

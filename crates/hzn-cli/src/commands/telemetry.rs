@@ -230,7 +230,7 @@ impl StreamCounts {
 
     fn answer(&mut self, exposure: &Exposure, answer: &PictureAnswer, sink: &mut Option<Sink>) -> Result<(), Stop> {
         let time_s = exposure.exposure_us as f64 * 1e-6;
-        let Some(report) = answer.report() else {
+        let Some(report) = answer.to_report() else {
             self.note(time_s, LogLevel::Warning, &format!("picture {}: invalid numbers", exposure.picture));
             return Ok(());
         };

@@ -130,7 +130,7 @@ impl Fit {
             body: kind,
             limb_height_km: if is_disc { 0.0 } else { sensor.body.limb_height_km + height_km },
             limb_height_sigma_km: if is_disc { 0.0 } else { spread_km.max(0.2) },
-            noise: Noise::Told,
+            noise: Noise::Given,
             sigma_px: variance.sqrt().max(MIN_SIGMA_PX),
             correlation_px: f64::NAN,
             nees: f64::NAN,
@@ -139,7 +139,7 @@ impl Fit {
         // The sigma of the limb height contains the error that the points of a picture share. The only floor left is
         // the floor for rounding.
         let by_picture = Self { noise: Noise::Rms, sigma_px: MIN_SIGMA_PX, correlation_px: 0.0, ..fit };
-        let noise = if is_disc { Noise::Told } else { Noise::Rms };
+        let noise = if is_disc { Noise::Given } else { Noise::Rms };
         let by_itself = (!is_disc).then(|| by_picture.settle(scenario, one_body, pictures)).flatten();
         let by_itself = by_itself.filter(|(fit, _)| fit.nees <= MAX_NEES);
         // Errors that the residuals do not show, for example light that clips along the limb, need a floor.
@@ -192,7 +192,7 @@ impl Fit {
         let noise = covariance::Config {
             method: sensor.covariance.method,
             noise: self.noise,
-            ..covariance::Config::told(digits(self.sigma_px), digits(self.correlation_px))
+            ..covariance::Config::given(digits(self.sigma_px), digits(self.correlation_px))
         };
         let several = !sensor.bodies.is_empty();
         let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };
@@ -367,7 +367,7 @@ mod tests {
             body: sensor.body.kind,
             limb_height_km: sensor.body.limb_height_km,
             limb_height_sigma_km: 0.05,
-            noise: Noise::Told,
+            noise: Noise::Given,
             sigma_px: 4.0,
             correlation_px: 40.0,
             nees: f64::NAN,

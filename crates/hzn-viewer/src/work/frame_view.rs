@@ -243,13 +243,13 @@ pub struct FrameInput<'a> {
 
 impl FrameInput<'_> {
     /// Returns the processed picture, from the outcomes of its bodies.
-    fn finish(&self, found: Vec<BodyOutcome>) -> Finished {
+    fn finish(&self, outcomes: Vec<BodyOutcome>) -> Finished {
         Finished {
             index: self.index as u64,
             name: self.name.to_owned(),
             time_s: self.time_s,
             data: self.data.cloned(),
-            found,
+            outcomes,
             drawing: hzn_mcap::Annotations::default(),
             picture: None,
             traces: None,

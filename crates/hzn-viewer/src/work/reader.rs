@@ -30,7 +30,7 @@ impl Reader {
             Place::File(path) => Payload::File(path.clone()),
             Place::RawFile(path, raw) => Payload::RawFile(path.clone(), *raw),
             Place::Recorded(place) => match &mut self.recording {
-                Some(pictures) => pictures.read(place)?.image.map_or_else(Payload::Broken, source::recorded),
+                Some(pictures) => pictures.read(place)?.image.map_or_else(Payload::Broken, Payload::from_recorded),
                 None => Payload::Broken("the recording is not open".into()),
             },
             Place::Video(index) => self.read_video(*index)?,
