@@ -56,7 +56,7 @@ fn limbs_next_to_artefacts_are_found() {
     for (kind, seed) in
         Kind::ALL.iter().flat_map(|&k| (FIRST_SEED..FIRST_SEED + PICTURES_PER_KIND).map(move |s| (k, s)))
     {
-        let Some(trial) = Trial::beside_limb(kind, seed).unwrap() else { continue };
+        let Some(trial) = Trial::with_limb(kind, seed).unwrap() else { continue };
         for o in outcomes(&mut horizon, &trial, &[None], PriorKnowledge { attitude_sigma_deg: Some(5.0) }) {
             pictures += 1;
             answered += u32::from(o.found.is_some());

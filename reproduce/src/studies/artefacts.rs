@@ -210,7 +210,7 @@ fn add_limbs(s: &mut Section, count: usize) -> anyhow::Result<()> {
     let settings = [Setting::DEFAULT, Setting { attitude: true, ..Setting::DEFAULT }];
     // Some seeds have no room for both limb and artefact, so 50 % more seeds are tried.
     let all = for_each_trial(seeds(per_kind + per_kind / 2), |horizon, kind, seed| {
-        let Some(trial) = Trial::beside_limb(kind, seed)? else { return Ok(None) };
+        let Some(trial) = Trial::with_limb(kind, seed)? else { return Ok(None) };
         let with = process_in_settings(horizon, &trial, &settings)?;
         let alone = process_in_settings(horizon, &trial.cleaned(), &settings[..1])?;
         Ok(Some((kind, with, alone)))
