@@ -49,8 +49,8 @@ fn no_disc_is_lost_under_an_image_circle() {
             for k in 0..10 {
                 let level = disc.dark + (disc.lit - disc.dark) * (0.05 + 0.09 * f64::from(k));
                 let mut horizon =
-                    HostHorizon::boxed(&fixed_threshold_config(&under.lens, *altitude_km, level)).unwrap();
-                let report = process_picture(&mut horizon, &data, &under.lens);
+                    HostHorizon::boxed(&fixed_threshold_config(&with_discs.lens, *altitude_km, level)).unwrap();
+                let report = process_picture(&mut horizon, &data, &with_discs.lens);
                 let right = report.solution.is_some_and(|s| s.axis.angle_rad(&axis).to_degrees() < 0.2);
                 count += 1;
                 if !right {

@@ -54,7 +54,7 @@ pub(super) fn lost_discs(effort: &Effort) -> anyhow::Result<Section> {
 
 /// Returns for each disc at each threshold whether its whole outline is in view, and whether the disc was found.
 fn find_discs_under_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
-    let under = LensWithDiscs::new(number, DISCS);
+    let with_discs = LensWithDiscs::new(number, DISCS);
     let mut out = Vec::new();
     for (disc, altitude_km) in &with_discs.discs {
         let data = with_discs.canvas.paint(disc);
