@@ -244,5 +244,8 @@ fn what_looks_wrong_is_a_warning_and_the_run_goes_on() {
     place.write("in/sensor.toml", common::SENSOR.as_bytes());
     place.write("in/frames.csv", b"file,altitude_km\n0000.png,517500\n");
     place.run(&["run", "in"]).expect(0).says("frames.csv:2: 0000.png: altitude_km is 517500, which is implausibly");
-    place.run(&["run", "in", "--altitude-km", "517500"]).expect(0).says("warning: --altitude-km: 517500 km is farther");
+    place
+        .run(&["run", "in", "--altitude-km", "517500"])
+        .expect(0)
+        .says("warning: --altitude-km: 517500 km is implausibly");
 }

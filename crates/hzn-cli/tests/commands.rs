@@ -376,7 +376,7 @@ fn init_reads_the_focal_length_that_the_camera_wrote() {
     let says = "pinhole, 46.8 degrees wide, f = 370 px";
     place.run(&["init", "in/a.jpg", "-o", "s.toml"]).expect(0).says(says);
     let text = place.read("s.toml");
-    assert!(text.contains("# X-1\n") && text.contains("as 40 mm on 35 mm film"), "{text}");
+    assert!(text.contains("# X-1\n") && text.contains("equivalent to 40 mm on 35 mm film"), "{text}");
     // This field of view contradicts the EXIF.
     place.run(&["init", "in/a.jpg", "--fov", "80", "-o", "t.toml"]).expect(0).says("warning").says("contradicts");
 }

@@ -148,7 +148,7 @@ fn chart_by_fov(pitch: Curve) -> anyhow::Result<Chart> {
     add("pitch, α known", |x| x.known.pitch_deg)?;
     add("roll", |x| x.fused.roll_deg)?;
     let chart = Chart::new("3 sigma at 200 km, level camera", "field of view across the width [deg]", "deg");
-    Ok(curves.into_iter().fold(chart, Chart::with))
+    Ok(curves.into_iter().fold(chart, Chart::with_series))
 }
 
 pub(super) fn visibility(_: &Effort) -> anyhow::Result<Section> {
