@@ -183,11 +183,11 @@ mod tests {
                     section => format!("{CAMERA}[{section}]\n{} = {:?}\n", key.name(), choice.name),
                 };
                 match parse(&line, Path::new("s.toml")) {
-                    Ok(_) => assert!(choice.built, "{choice:?}"),
+                    Ok(_) => assert!(choice.is_built, "{choice:?}"),
                     Err(e) => {
                         let feature = choice.feature.unwrap_or_default();
                         assert!(
-                            !choice.built && e.to_string().contains(&format!("feature {feature:?}")),
+                            !choice.is_built && e.to_string().contains(&format!("feature {feature:?}")),
                             "{choice:?}: {e}"
                         )
                     }
