@@ -238,11 +238,11 @@ pub(crate) fn parse_log(data: &[u8]) -> Result<LogLine, prost::DecodeError> {
 
 /// Returns the calibration. Its principal point uses hzn's convention, which ROS also has: pixel centres at integers.
 pub(crate) fn calibration(c: &camera::Config, ns: u64) -> CameraCalibration {
-    let (model, coefficients) = match c.model {
+    let (model, coefficients) = match c.model.projection() {
+        camera::Projection::Angle => ("kannala_brandt", 4),
+        camera::Projection::Plane => ("plumb_bob", 5),
         // Foxglove has no name for these models, so other viewers draw without distortion.
-        camera::Model::DoubleSphere | camera::Model::Eucm => ("", 0),
-        planar if planar.is_planar() => ("plumb_bob", 5),
-        _ => ("kannala_brandt", 4),
+        camera::Projection::Own => ("", 0),
     };
     let (fx, fy, cx, cy) = (c.fx_px, c.fy_px, c.cx_px, c.cy_px);
     CameraCalibration {

@@ -38,7 +38,7 @@ fn near(sigma_deg: f64, expected_3_sigma_deg: f64) {
     assert!((ratio - 1.0).abs() < 0.02, "{} {expected_3_sigma_deg}", 3.0 * sigma_deg);
 }
 
-/// Checks a row of section 8 of the mathematics: roll, pitch (Braun & Barf 33), pitch with a known α, overbound (37).
+/// Checks a row of `reference.rs`: roll, pitch (Braun & Barf 33), pitch with a known α, overbound (37).
 #[track_caller]
 fn row(design: &Design, [roll, pitch, known, bound]: [f64; 4]) {
     let s = sigmas(design);

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use hzn_core::camera::{Config, Model};
+use hzn_core::camera::{Config, Model, Projection};
 
 /// A format of calibration files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,15 +56,18 @@ pub fn write(camera: &Config, format: Format) -> Result<String, UnsupportedLens>
             let special = match camera.model {
                 Model::DoubleSphere => Some("ds"),
                 Model::Eucm => Some("eucm"),
+                model if model.projection() == Projection::Own => return Err(unsupported_projection(camera, format)),
                 _ => None,
             };
             let mut out = format!("cam0:\n  cam_overlaps: []\n  camera_model: {}\n", special.unwrap_or("pinhole"));
             let k = if special.is_some() { Vec::new() } else { four_coefficients(camera, format)? };
             let model = match camera.model {
-                _ if special.is_some() => "none",
                 Model::Pinhole => "none",
-                planar if planar.is_planar() => "radtan",
-                _ => "equidistant",
+                model => match model.projection() {
+                    Projection::Angle => "equidistant",
+                    Projection::Plane => "radtan",
+                    Projection::Own => "none",
+                },
             };
             let _ = write!(
                 out,
@@ -109,7 +112,7 @@ fn write_sensor(c: &Config) -> String {
 
 fn write_opencv(c: &Config) -> Result<String, UnsupportedLens> {
     refuse_own_projection(c, Format::OpenCv)?;
-    let fisheye = matches!(c.model, Model::KannalaBrandt | Model::Equidistant);
+    let fisheye = c.model.projection() == Projection::Angle;
     let count = if fisheye { 4 } else { 5 };
     let k: Vec<f64> = (0..count).map(|i| c.coefficient(i)).collect();
     let [fx, fy, cx, cy] = intrinsics(c);
@@ -129,11 +132,19 @@ fn write_opencv(c: &Config) -> Result<String, UnsupportedLens> {
 
 /// Refuses the lenses that only Kalibr can express: the projections with coefficients of their own.
 fn refuse_own_projection(c: &Config, format: Format) -> Result<(), UnsupportedLens> {
-    match c.model {
-        Model::DoubleSphere => Err(UnsupportedLens { what: "the double sphere lens", format }),
-        Model::Eucm => Err(UnsupportedLens { what: "the enhanced unified camera model", format }),
-        _ => Ok(()),
+    match c.model.projection() {
+        Projection::Angle | Projection::Plane => Ok(()),
+        Projection::Own => Err(unsupported_projection(c, format)),
     }
+}
+
+fn unsupported_projection(c: &Config, format: Format) -> UnsupportedLens {
+    let what = match c.model {
+        Model::DoubleSphere => "the double sphere lens",
+        Model::Eucm => "the enhanced unified camera model",
+        other => other.name(),
+    };
+    UnsupportedLens { what, format }
 }
 
 fn intrinsics(c: &Config) -> [f64; 4] {

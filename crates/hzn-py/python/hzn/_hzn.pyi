@@ -113,7 +113,7 @@ class Camera:
         """Height of the picture, pixels."""
 
     @property
-    def model(self) -> Literal["kannala-brandt", "equidistant", "pinhole", "brown-conrady"]:
+    def model(self) -> Literal["kannala-brandt", "equidistant", "pinhole", "brown-conrady", "double-sphere", "eucm"]:
         """Projection model."""
 
     @property

@@ -25,6 +25,17 @@ choices! {
     }
 }
 
+/// Families of projections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Projection {
+    /// The image radius is a polynomial of the angle θ off axis, as in OpenCV's fisheye model.
+    Angle,
+    /// The image radius grows with tan θ, with distortion in the plane z = 1, as in OpenCV's pinhole model.
+    Plane,
+    /// The lens has equations of its own, which other formats do not have.
+    Own,
+}
+
 impl Model {
     /// Returns the names of the coefficients, in the order of `camera.k`.
     pub const fn coefficients(self) -> &'static [&'static str] {
@@ -37,10 +48,18 @@ impl Model {
         }
     }
 
-    /// Returns whether the image radius grows with tan θ, so that the lens ends before 90° off axis. Otherwise it grows
-    /// with θ.
+    /// Returns the family of the projection. Programs that treat lenses by their family need no change for a new lens.
+    pub const fn projection(self) -> Projection {
+        match self {
+            Self::KannalaBrandt | Self::Equidistant => Projection::Angle,
+            Self::Pinhole | Self::BrownConrady => Projection::Plane,
+            Self::DoubleSphere | Self::Eucm => Projection::Own,
+        }
+    }
+
+    /// Returns whether the lens ends before 90° off axis.
     pub const fn is_planar(self) -> bool {
-        matches!(self, Self::Pinhole | Self::BrownConrady)
+        matches!(self.projection(), Projection::Plane)
     }
 }
 

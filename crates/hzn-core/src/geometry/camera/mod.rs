@@ -17,7 +17,7 @@ mod shutter;
 mod uncertain;
 
 pub(crate) use config::INTRINSICS;
-pub use config::{Config, Covariance, Intrinsic, Model};
+pub use config::{Config, Covariance, Intrinsic, Model, Projection};
 use lens::Lens;
 pub use ray::Ray;
 use ray::radial_ray;
@@ -113,7 +113,7 @@ impl<T: Real> Camera<T> {
                 (Lens::Brown(lens), rho, theta)
             }
             // `Config::check` has refused a model that is not built in.
-            _ => {
+            Model::KannalaBrandt | Model::Equidistant | Model::DoubleSphere | Model::Eucm => {
                 let (lens, rho, theta) = radial::Radial::try_new(c, rho_corner)?;
                 (Lens::Radial(lens), rho, theta)
             }
