@@ -112,7 +112,7 @@ fn check_bodies(table: &DeTable<'_>, text: &str, path: &Path) -> Result<(), Prob
 
 /// Returns the preset of that name, or the reason why it cannot be used.
 fn find_preset(name: &str) -> Result<Preset, String> {
-    let preset = Preset::named(name).ok_or_else(|| {
+    let preset = Preset::from_name(name).ok_or_else(|| {
         let names: Vec<&str> = Preset::ALL.iter().map(|p| p.name()).collect();
         format!("no preset {name:?}{}", suggestion(name, &names))
     })?;

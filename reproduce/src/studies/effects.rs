@@ -174,7 +174,7 @@ fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
         |horizon, (frame, picture)| {
             let horizon = horizon.as_mut().ok()?;
             let known = frame.prior();
-            let turning = camera.turning(known.rate_rad_s);
+            let turning = camera.with_rate(known.rate_rad_s);
             let known = hzn_core::Prior { rate_rad_s: None, ..known };
             let expected = horizon.expect(&known).ok()?;
             let watch = noise::PointRecorder::default();

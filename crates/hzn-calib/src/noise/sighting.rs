@@ -92,7 +92,7 @@ impl Sighting {
             return None;
         }
         let geometry = Geometry::new(body, prior)?;
-        let camera = &camera.turning(prior.rate_rad_s);
+        let camera = &camera.with_rate(prior.rate_rad_s);
         let attitude_sigma = prior.attitude_sigma_rad.unwrap_or(ATTITUDE_SIGMA_RAD);
         let known =
             Prior { cam_to_ecef: prior.cam_to_ecef.filter(|_| attitude_sigma < USELESS_ATTITUDE_RAD), ..*prior };

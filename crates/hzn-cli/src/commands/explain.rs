@@ -132,7 +132,7 @@ impl PictureWithPrior<'_> {
                 Explained { name: file, config, body, levels, data, picture, trace, report: &report, half_angle };
             tell::result(format_args!("{between}{}", explained.text(decoding, time.elapsed)))?;
             // The camera includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
-            let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
+            let camera = sensor.camera().with_rate(data.and_then(|d| d.rate_rad_s));
             drawing.add(engine::annotate(trace, report.solution.as_ref(), &camera));
             let status = report.status;
             statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });

@@ -90,7 +90,7 @@ impl<S: Sample> Pixels for Grey<'_, S> {
         }
     }
     #[inline(always)]
-    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
-        self.data.get(index..index + count).map_or(0, |samples| S::alike(samples, level, lit))
+    fn run_length(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        self.data.get(index..index + count).map_or(0, |samples| S::run_length(samples, level, lit))
     }
 }

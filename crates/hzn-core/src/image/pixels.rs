@@ -55,7 +55,7 @@ pub trait Pixels {
     /// Counts pixels from an index to the right, up to `count`, before the first that is not as `lit` says. A pixel is
     /// lit at `level` or above.
     #[inline(always)]
-    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+    fn run_length(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
         (0..count).take_while(|k| (self.read(index + k * self.across()) >= level) == lit).count()
     }
     /// Returns the edge point of a border pixel, for a picture that arrived row by row. The point was measured while
@@ -120,7 +120,7 @@ impl<P: Pixels> Pixels for &P {
         (**self).three(index)
     }
     #[inline(always)]
-    fn alike(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
-        (**self).alike(index, count, level, lit)
+    fn run_length(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        (**self).run_length(index, count, level, lit)
     }
 }

@@ -8,7 +8,7 @@ pub trait Sample: Copy + Into<u16> {
     const ZERO: Self;
     /// Counts the samples before the first that is not as `lit` says. A sample is lit at `level` or above.
     #[inline(always)]
-    fn alike(samples: &[Self], level: u16, lit: bool) -> usize {
+    fn run_length(samples: &[Self], level: u16, lit: bool) -> usize {
         samples.iter().take_while(|&&s| (s.into() >= level) == lit).count()
     }
 }
@@ -20,7 +20,7 @@ impl Sample for u8 {
     /// those of the level. For a level with a high bit, a byte is at the level or above if both its own high bit and
     /// that of `rest` are set. For a level without a high bit, one of the two is enough.
     #[inline(always)]
-    fn alike(samples: &[Self], level: u16, lit: bool) -> usize {
+    fn run_length(samples: &[Self], level: u16, lit: bool) -> usize {
         const EACH: u64 = 0x0101_0101_0101_0101;
         const HIGH: u64 = 0x80 * EACH;
         if level > 255 {

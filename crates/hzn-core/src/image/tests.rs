@@ -15,13 +15,17 @@ fn eight_pixels_at_once_are_as_one_by_one() {
             let bytes: [u8; 21] = core::array::from_fn(near);
             let words = bytes.map(u16::from);
             for lit in [false, true] {
-                assert_eq!(u8::alike(&bytes, level, lit), u16::alike(&words, level, lit), "{bytes:?} at {level}");
+                assert_eq!(
+                    u8::run_length(&bytes, level, lit),
+                    u16::run_length(&words, level, lit),
+                    "{bytes:?} at {level}"
+                );
             }
         }
     }
     // If the pixels reach beyond the picture's end, the count is 0.
     let picture = Grey::try_new(&[9u8; 10], Layout::packed(10, 1, 1, 8)).unwrap();
-    assert_eq!([0, 2, 3, 10].map(|i| picture.alike(i, 8, 5, true)), [8, 8, 0, 0]);
+    assert_eq!([0, 2, 3, 10].map(|i| picture.run_length(i, 8, 5, true)), [8, 8, 0, 0]);
 }
 
 #[test]

@@ -107,7 +107,7 @@ impl<T: Real> ErrorBudget<T> {
     }
 
     /// Returns the contribution of a term to the covariance of the axis in the camera frame, rad².
-    pub fn of(&self, term: Term) -> Cov3<Cam, T> {
+    pub fn covariance(&self, term: Term) -> Cov3<Cam, T> {
         self.axis.get(term as usize).copied().unwrap_or(Cov3::from_upper([T::ZERO; 6]))
     }
 }

@@ -53,7 +53,7 @@ pub trait Observer<T> {
     /// The threshold is found: in counts, with the mean and the number of pixels of the sample.
     fn level(&self, _level: u16, _mean: T, _samples: u32) {}
     /// A dark frame of `px` pixels lies around the picture and does not count from now on.
-    fn frame(&self, _px: u16) {}
+    fn dark_frame(&self, _px: u16) {}
     /// A further look at a picture without an answer begins: its number (1 for the second look) and its threshold in
     /// counts.
     fn look(&self, _number: u32, _level: u16) {}

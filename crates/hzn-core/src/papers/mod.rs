@@ -41,7 +41,7 @@ choices! {
 
 impl Preset {
     /// Returns the preset with that name.
-    pub fn named(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|p| p.name() == name)
     }
 
@@ -61,7 +61,7 @@ impl Config {
     /// use hzn_core::camera::{self, Model};
     /// use hzn_core::{Config, Preset};
     ///
-    /// let preset = Preset::named("sun").expect("a preset of this name");
+    /// let preset = Preset::from_name("sun").expect("a preset of this name");
     /// let config = Config::preset(preset, camera::Config::ideal(Model::Pinhole, 640, 480, 500.0));
     /// assert!(config.body.blooms());
     /// ```
@@ -123,9 +123,9 @@ mod tests {
             let config = Config::preset(preset, camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
             // A build without the preset's methods refuses its configuration.
             assert_eq!(config.check().is_ok(), preset.check().is_ok(), "{}", preset.name());
-            assert_eq!(Preset::named(preset.name()), Some(preset));
+            assert_eq!(Preset::from_name(preset.name()), Some(preset));
         }
-        assert_eq!(Preset::named("hznn"), None);
+        assert_eq!(Preset::from_name("hznn"), None);
     }
 
     #[test]

@@ -58,8 +58,8 @@ impl<T: Real> Sensor<T> {
             if within.is_none() {
                 let frame = look(&self.region).dark_frame_px(config.recover.frame_px, &mut work);
                 if frame > 0 {
-                    observer.frame(frame);
-                    within = Some(self.region.within(frame));
+                    observer.dark_frame(frame);
+                    within = Some(self.region.without_frame(frame));
                 }
             }
             let binary = look(within.as_ref().unwrap_or(&self.region));

@@ -100,6 +100,6 @@ impl<T: Real> Sensor<T> {
     /// no rolling shutter.
     pub(super) fn turning(&self, expected: &Expected<T>) -> Option<Camera<T>> {
         let rate = expected.rate_rad_s.filter(|_| self.camera.has_rolling_shutter())?;
-        Some(self.camera.turning(Some(rate)))
+        Some(self.camera.with_rate(Some(rate)))
     }
 }

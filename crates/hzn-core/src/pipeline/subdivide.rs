@@ -214,8 +214,8 @@ impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
     fn level(&self, level: u16, mean: T, samples: u32) {
         self.observer.level(level, mean, samples);
     }
-    fn frame(&self, px: u16) {
-        self.observer.frame(px);
+    fn dark_frame(&self, px: u16) {
+        self.observer.dark_frame(px);
     }
     fn look(&self, number: u32, level: u16) {
         self.observer.look(number, level);

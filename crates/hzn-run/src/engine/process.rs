@@ -53,7 +53,7 @@ pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: It
     if let Some(traces) = traces.as_ref().filter(|_| plan.trace || plan.overlay.is_some()) {
         // The drawing is made here, because in the single writing thread it would delay all other threads. The camera
         // includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
-        let camera = sensor.camera().turning(data.and_then(|d| d.rate_rad_s));
+        let camera = sensor.camera().with_rate(data.and_then(|d| d.rate_rad_s));
         let drawing = draw(&finished.outcomes, traces, &camera);
         if let Some(folder) = &plan.overlay {
             let title = status_text(&finished.outcomes, plan);

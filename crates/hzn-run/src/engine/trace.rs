@@ -162,7 +162,7 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
     fn level(&self, level: u16, mean: T, samples: u32) {
         self.now().into_iter().for_each(|t| Observer::<T>::level(t, level, mean, samples));
     }
-    fn frame(&self, px: u16) {
+    fn dark_frame(&self, px: u16) {
         self.now().into_iter().for_each(|t| Observer::<T>::frame(t, px));
     }
     fn look(&self, number: u32, level: u16) {
@@ -200,7 +200,7 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
     fn level(&self, level: u16, mean: T, samples: u32) {
         self.level.set(Some((level, mean.into(), samples)));
     }
-    fn frame(&self, px: u16) {
+    fn dark_frame(&self, px: u16) {
         self.border_px.set(px);
     }
     fn look(&self, _: u32, level: u16) {
@@ -228,7 +228,7 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
     }
     fn budget(&self, candidate: u32, budget: &ErrorBudget<T>) {
         self.change_edge(candidate, |e| {
-            e.budget_rad = Term::ALL.map(|term| (term, budget.of(term).sigma_max_rad().into())).into();
+            e.budget_rad = Term::ALL.map(|term| (term, budget.covariance(term).sigma_max_rad().into())).into();
         });
     }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {

@@ -293,7 +293,7 @@ impl EdgeErrors {
         let readout_s = scene.motion.map_or(0.0, |motion| motion.readout_s);
         let camera = Camera::<f64>::try_new(&camera::Config { readout_s, ..scene.camera.clone() }).ok()?;
         // The rays are for the time of the middle row, because the truth holds for that time.
-        let camera = camera.turning(processed.frame.prior().rate_rad_s);
+        let camera = camera.with_rate(processed.frame.prior().rate_rad_s);
         let view = View::try_new(Globe::new(&scene.body).raised(limb_height_km * 1e3), &scene.pose)?;
         let truth = scene.body_truth(kind, "", 0.0).ok()?;
         let axis: UnitVec3<_, f64> = truth.axis()?;

@@ -279,7 +279,7 @@ pub fn process_frame(input: FrameInput<'_>, config: &Arc<Config>, sensor: &mut A
     let rows = sink::rows(&finished, config);
     let half_angles = sensor.expected_half_angles_rad(input.data);
     // The drawing takes the rotation rate into account, so every row is drawn where the sensor saw it.
-    let camera = &sensor.camera().turning(input.data.and_then(|d| d.rate_rad_s));
+    let camera = &sensor.camera().with_rate(input.data.and_then(|d| d.rate_rad_s));
     let each = bodies.iter().zip(finished.outcomes).zip(rows).zip(half_angles).zip(&watch.traces.each);
     for ((((body, found), row), expected), trace) in each {
         outcome.bodies.push(BodyResult::new(body.kind, found, row, expected.ok(), trace, camera));

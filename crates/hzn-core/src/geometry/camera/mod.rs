@@ -312,7 +312,7 @@ impl<T: Real> Camera<T> {
     /// Returns this camera with a rate of rotation. With a rolling shutter, rays and projected directions then refer to
     /// the camera frame at the time of the middle row. `rate_rad_s` is the camera's rate of rotation against the stars
     /// or the ground, in its own axes, rad/s. Without a rolling shutter the rate has no effect.
-    pub fn turning(&self, rate_rad_s: Option<[T; 3]>) -> Self {
+    pub fn with_rate(&self, rate_rad_s: Option<[T; 3]>) -> Self {
         let turning = rate_rad_s
             .filter(|_| self.has_rolling_shutter())
             .map(|rate| shutter::Turning::new(rate, self.row_s, self.middle_row));

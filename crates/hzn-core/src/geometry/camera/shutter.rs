@@ -80,7 +80,7 @@ mod tests {
         let config = Config { readout_s: 0.03, ..Config::ideal(Model::Pinhole, 1280, 960, 900.0) };
         let still = Camera::<f64>::try_new(&config).unwrap();
         let rate = [0.4, -1.1, 2.0];
-        let camera = still.turning(Some(rate));
+        let camera = still.with_rate(Some(rate));
         for (u, v) in [(10.0, 0.0), (600.0, 479.5), (1200.0, 959.0)] {
             let p = ImagePoint { u, v };
             let ray = camera.ray(p).unwrap();
@@ -97,6 +97,6 @@ mod tests {
                 assert!(((next.s - ray.s) / 1e-4 - V3::from(by)).norm() < 1e-7);
             }
         }
-        assert!(camera.has_rolling_shutter() && still.turning(None).turning.is_none());
+        assert!(camera.has_rolling_shutter() && still.with_rate(None).turning.is_none());
     }
 }

@@ -114,7 +114,7 @@ impl<T: Real> Region<T> {
 
     /// Returns the region without a frame of `px` pixels along each side of the picture. The frame must be narrower
     /// than half of the picture.
-    pub(crate) fn within(&self, px: u16) -> Self {
+    pub(crate) fn without_frame(&self, px: u16) -> Self {
         Self { frame: px, ..self.clone() }
     }
     /// Returns the first and last column, or row, that counts on a side of `length` pixels.
@@ -132,7 +132,7 @@ impl<T: Real> Region<T> {
     }
 
     /// Returns the part of the region in the first rows of the picture.
-    pub(crate) fn above(&self, rows: u16) -> Self {
+    pub(crate) fn first_rows(&self, rows: u16) -> Self {
         Self { height: rows.min(self.height), ..self.clone() }
     }
 
@@ -231,7 +231,7 @@ impl<T: Real> Region<T> {
     /// Returns whether the pixel exists, is in the region and is not masked. It is for reads that need this seldom: one
     /// copy in flash.
     #[inline(never)]
-    pub(crate) fn counts(&self, x: i32, y: i32) -> bool {
+    pub(crate) fn is_usable(&self, x: i32, y: i32) -> bool {
         let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return false };
         self.contains(x, y) && !self.masked(x, y)
     }
@@ -243,7 +243,7 @@ impl<T: Real> Region<T> {
     }
 
     /// Returns the first and last column of a row; `None` if the image circle leaves nothing of the row.
-    pub fn span(&self, y: u16) -> Option<(u16, u16)> {
+    pub fn row_span(&self, y: u16) -> Option<(u16, u16)> {
         let ((first, last), (top, bottom)) = (self.columns(), self.rows());
         if !(top..=bottom).contains(&y) {
             return None;

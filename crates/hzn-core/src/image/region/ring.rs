@@ -40,9 +40,9 @@ impl<T: Real> Region<T> {
     #[inline(always)]
     fn around(&self, visit: &mut impl FnMut(Run) -> bool) -> Option<()> {
         let (upper, lower) = self.rows();
-        let (top, (left, right)) = (upper..=lower).find_map(|y| self.span(y).map(|s| (y, s)))?;
+        let (top, (left, right)) = (upper..=lower).find_map(|y| self.row_span(y).map(|s| (y, s)))?;
         // The rows of a convex region are contiguous.
-        let (bottom, (low, _)) = (top..=lower).rev().find_map(|y| self.span(y).map(|s| (y, s)))?;
+        let (bottom, (low, _)) = (top..=lower).rev().find_map(|y| self.row_span(y).map(|s| (y, s)))?;
         if !visit(run(left, top, 1, 0, right - left + 1)) {
             return None;
         }
@@ -220,8 +220,8 @@ mod tests {
     fn ring_of_a_rectangle() {
         check(&Region::whole(7, 5));
         check(&Region::whole(2, 2));
-        check(&Region::whole(9, 8).within(2));
-        check(&Region::whole(5, 6).within(2));
+        check(&Region::whole(9, 8).without_frame(2));
+        check(&Region::whole(5, 6).without_frame(2));
     }
 
     #[test]
@@ -237,7 +237,7 @@ mod tests {
             assert!(camera.image_circle_px().is_some());
             let region = Region::new(&Config::default(), &camera);
             check(&region);
-            check(&region.within(3));
+            check(&region.without_frame(3));
         }
     }
 }

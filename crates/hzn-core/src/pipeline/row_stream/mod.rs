@@ -280,7 +280,7 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
         report.level = level;
         report.stage = Stage::Contour;
         observer.enter(Stage::Contour);
-        let region = self.sensor.region.above(self.runs.rows());
+        let region = self.sensor.region.first_rows(self.runs.rows());
         for y in self.runs.rows().saturating_sub(AHEAD)..self.runs.rows() {
             self.measure(y, level, &region);
         }

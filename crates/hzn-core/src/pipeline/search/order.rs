@@ -89,7 +89,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         }
         let mut missed = Missed::Unknown;
         for y in marks.rows(height) {
-            let Some((x0, x1)) = binary.region.span(y) else { continue };
+            let Some((x0, x1)) = binary.region.row_span(y) else { continue };
             if self.is_over() || !self.work.try_spend(work::line_cost(x0, x1)) {
                 break;
             }

@@ -27,7 +27,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     let least = config.erode_threshold;
     let around = work::square_cost(config.erode_size_px, binary.mask_cost());
     for y in 0..binary.region.height() {
-        let Some((x0, x1)) = binary.region.span(y) else { continue };
+        let Some((x0, x1)) = binary.region.row_span(y) else { continue };
         // This includes the mask reads of the previous row.
         if !work.try_spend(u32::from(x1 - x0) + binary.cost()) {
             break;

@@ -50,7 +50,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         let (right, bottom) = (self.region.width().saturating_sub(1 + px), self.region.height().saturating_sub(1 + px));
         let mut lit = 0;
         let mut look = |x: u16, y: u16| {
-            let is_lit = self.region.counts(x.into(), y.into()) && self.brightness(x, y) >= self.level;
+            let is_lit = self.region.is_usable(x.into(), y.into()) && self.brightness(x, y) >= self.level;
             lit += u32::from(is_lit);
         };
         let stride = usize::from(stride.max(1));

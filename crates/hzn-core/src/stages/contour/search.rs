@@ -231,7 +231,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
     fn count_equal_pixels(&self, x: u16, y: u16, count: u16) -> u16 {
         let index = self.picture.index(x, y);
         let lit = self.picture.read(index) >= self.level;
-        let alike = self.picture.alike(index + self.picture.across(), count.into(), self.level, lit) as u16;
+        let alike = self.picture.run_length(index + self.picture.across(), count.into(), self.level, lit) as u16;
         for dx in 0..(alike + 1).min(count) {
             self.observer.pixel(x + 1 + dx, y);
         }

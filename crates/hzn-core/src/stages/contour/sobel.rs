@@ -66,7 +66,7 @@ fn each_pixel<T: Real, P: Pixels, O: Observer<T>>(
     mut visit: impl FnMut(u16, u16, &mut WorkBudget),
 ) {
     for y in 0..binary.region.height() {
-        let Some((x0, x1)) = binary.region.span(y) else { continue };
+        let Some((x0, x1)) = binary.region.row_span(y) else { continue };
         if !work.try_spend((u32::from(x1 - x0) + 1).saturating_mul(cost)) {
             break;
         }

@@ -85,7 +85,7 @@ pub(super) fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
             break;
         }
         let (x, y) = (i32::from(p.x) + dx * (whole + moved), i32::from(p.y) + dy * (whole + moved));
-        if !binary.region.counts(x, y) {
+        if !binary.region.is_usable(x, y) {
             break;
         }
         *slow += 1;

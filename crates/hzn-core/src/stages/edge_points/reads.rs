@@ -134,7 +134,7 @@ pub(super) fn read<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     (x, y): (i32, i32),
     index: usize,
 ) -> Option<i32> {
-    if !FREE && !binary.region.counts(x, y) {
+    if !FREE && !binary.region.is_usable(x, y) {
         return None;
     }
     binary.observer.pixel(x as u16, y as u16);

@@ -199,7 +199,7 @@ fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
                 covariance::fuse(&blocks, &fit, &expected, &noise, &estimate, &camera, Some(&mut budget)).unwrap();
             let mut sum = [0.0; 6];
             for term in Term::ALL {
-                sum.iter_mut().zip(budget.of(term).upper_rad2).for_each(|(s, x)| *s += x);
+                sum.iter_mut().zip(budget.covariance(term).upper_rad2).for_each(|(s, x)| *s += x);
             }
             let (n1, n2) = basis(&fused.e);
             let whole = Cov3::<Cam, f64>::from_tangent(&n1, &n2, fused.p).upper_rad2;
