@@ -163,7 +163,7 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
         self.now().into_iter().for_each(|t| Observer::<T>::level(t, level, mean, samples));
     }
     fn dark_frame(&self, px: u16) {
-        self.now().into_iter().for_each(|t| Observer::<T>::frame(t, px));
+        self.now().into_iter().for_each(|t| Observer::<T>::dark_frame(t, px));
     }
     fn look(&self, number: u32, level: u16) {
         self.now().into_iter().for_each(|t| Observer::<T>::look(t, number, level));
