@@ -41,8 +41,8 @@ section! {
         @- method: Method = Method::Sphere, [choice];
         /// Which half-angle the fitted cone has.
         @90 half_angle: HalfAngle = HalfAngle::Fused, [choice];
-        /// For `wtls`: points are weighed where the axis is farther off the optical axis than this, degrees; 0 always
-        /// weighs them.
+        /// For `wtls`: points are weighted where the axis is farther from the optical axis than this, degrees; 0 always
+        /// weights them.
         @- weigh_above_deg: f64 = 0.0, [0.0 to 180.0] { needs: "zju" };
     }
 }

@@ -43,10 +43,11 @@ section! {
         /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has other points
         /// close to it.
         @- max_nearby: f64 = 1.0 / 3.0, [0.0 to 1e6];
-        /// An edge lies on the limb as a whole where at least this part of its points are inliers; 0 checks no edge for
-        /// `max_way`.
+        /// Where at least this part of an edge's points are inliers, the edge is not checked with `max_way`; 0 turns the
+        /// check off.
         @- whole_edge: f64 = 0.8, [0.0 to 1.0];
-        /// Longest way along the inliers of an edge that is not whole, as a multiple of the limb that they cover.
+        /// Longest path along the inliers, as a multiple of the limb that they cover, where less than `whole_edge` of the
+        /// points are inliers.
         ///
         /// A cloud's edge winds, and a part of it may lie on a limb by chance.
         @- max_way: f64 = 3.0, [1.0 to 1e6];
@@ -79,8 +80,8 @@ section! {
         ///
         /// A continuation counts where it keeps its contrast, see `departure_contrast`.
         @- max_departure: f64 = 0.2, [0.0 to 1e6];
-        /// Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb with
-        /// its contrast kept; 0 turns the gate off.
+        /// Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb without
+        /// a loss of contrast; 0 turns the gate off.
         ///
         /// The corner of an iris and the crossing of two flares end an edge in this way. The default is 0, because 0.7
         /// also refuses half-lit discs and crescents.
@@ -93,17 +94,18 @@ section! {
         ///
         /// A terminator fades; the rim of a flare does not.
         @- departure_contrast: f64 = 0.6, [0.0 to 1e6];
-        /// Largest part of the looks inwards from the limb that may end in the sky behind a second edge; 1 turns the
-        /// gate off.
+        /// Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky; 1
+        /// turns the gate off.
         ///
         /// The gate is for a body that cannot lie whole in the picture: a crescent is a band, too.
         @- max_band: f64 = 0.5, [0.0 to 1.0];
-        /// Smallest step of a second edge, as a part of the limb's step.
+        /// Smallest brightness step of a second edge, as a part of the brightness step of the limb.
         @- band_step: f64 = 0.4, [above 0.0 to 1.0];
         /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
         /// deviations.
         @- max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];
-        /// Fastest turn of the vehicle, degrees per second: an axis farther from the previous answer is refused.
+        /// Largest rate of rotation of the vehicle, degrees per second; an axis that is farther from the previous answer
+        /// is refused.
         ///
         /// Pictures are then processed in order.
         @- max_rate_deg_s: Option<f64> = None, [above 0.0 to 1e6] { unset: "any", example: "100.0" };
