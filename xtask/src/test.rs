@@ -30,6 +30,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("documents", |_| {
         steps::run(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
     });
+    all.step("packages", |_| check_packages());
     all.step("flight build", |_| flight_build::run_step());
     all.step("firmware", firmware::test);
     all.step("examples of hzn-core", |_| run_core_examples());
@@ -49,6 +50,15 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
 fn check_core_with(features: &str) -> Outcome {
     let core_alone = ["check", "--quiet", "--package", "hzn-core", "--no-default-features", "--features", features];
     steps::run(&mut cargo(&core_alone))
+}
+
+/// Packs every crate that is meant to be published, without building it again.
+fn check_packages() -> Outcome {
+    let mut cargo = cargo(&["package", "--workspace", "--no-verify", "--allow-dirty", "--quiet"]);
+    for unpublished in ["hzn-py", "hzn-tests", "hzn-reproduce", "hzn-benches", "xtask"] {
+        cargo.args(["--exclude", unpublished]);
+    }
+    steps::run(&mut cargo)
 }
 
 /// Compares the lens models with those of OpenCV.
