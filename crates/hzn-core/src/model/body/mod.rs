@@ -205,7 +205,7 @@ impl Config {
         self.kind == Kind::Sun
     }
 
-    /// Returns whether the body is seen in sunlight, as far as is known. This is false for `sunlit = false`, which
+    /// Returns whether the body is seen in sunlight. This is true except for the Sun and for `sunlit = false`, which
     /// means that the body itself emits the light, as in the thermal infrared.
     pub fn is_seen_in_sunlight(&self) -> bool {
         self.sunlit != Some(false) && self.kind != Kind::Sun
@@ -217,7 +217,7 @@ impl Config {
     }
 }
 
-/// What is known about one picture before it is processed. Every field may be missing.
+/// The data known about one picture before it is processed. Every field may be missing.
 ///
 /// # Example
 ///
@@ -272,7 +272,7 @@ pub struct Last<T> {
     pub age_s: T,
 }
 
-/// Why the prior of a picture was refused.
+/// Reason why the prior of a picture is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PriorError {
     /// The altitude is not a finite number, or is too low for any camera.
@@ -280,7 +280,7 @@ pub enum PriorError {
     /// The position is not finite, or inside the body.
     Position,
     /// The camera is not above the limb height, so that the limb surrounds it and there is no cone. A rocket flight
-    /// begins there.
+    /// begins below the limb height.
     BelowLimb {
         /// Altitude of the camera in metres.
         altitude_m: i32,

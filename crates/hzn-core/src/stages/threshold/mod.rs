@@ -23,11 +23,11 @@ pub(crate) use level::fixed_level;
 pub(crate) use sample::RowSampler;
 use sample::{SIDES_LOG2, SIGMA_PER_MEAN_DISTANCE, Sample};
 
-/// Finds the threshold. `last` is the threshold that the previous picture gives, for `track`.
+/// Finds the threshold. `last` is the threshold that the previous picture proposes, for `track`.
 ///
 /// # Errors
-/// `too-dark` or `too-bright` if the mean is outside of the gate. `no-limb` if dark and lit differ by less than 3 % of
-/// full scale and by less than the noise of the sample explains.
+/// Returns `too-dark` or `too-bright` if the mean is outside of the gate. Returns `no-limb` if dark and lit differ by
+/// less than 3 % of full scale and the noise of the sample explains the difference.
 pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,
     region: &Region<T>,
