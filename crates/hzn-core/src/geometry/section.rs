@@ -1,8 +1,8 @@
 //! The limb as a conic section of the plane z = 1, which a pinhole camera sees (Braun & Barf 2022, section 2).
 //!
 //! With the unit axis e in the camera frame, c = cos α and Δ = e_x² + e_y² − c², the picture of the cone s·e = c is an
-//! ellipse for Δ < 0 and a hyperbola for Δ > 0. In the principal frame of the curve, whose x axis points along (e_x,
-//! e_y), the equation is Δ x² − c² y² = c² sin²α/Δ. Lengths are in focal lengths.
+//! ellipse for Δ < 0 and a hyperbola for Δ > 0. In the principal frame of the curve, whose x axis points along
+//! (e_x, e_y), the equation is Δ x² − c² y² = c² sin²α/Δ. Lengths are in focal lengths.
 
 use crate::base::real::Real;
 use crate::geometry::frames::{Cam, UnitVec3};

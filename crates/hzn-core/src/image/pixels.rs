@@ -52,8 +52,8 @@ pub trait Pixels {
     fn three(&self, index: usize) -> [u16; 3] {
         [0, 1, 2].map(|k| self.read(index + k * self.across()))
     }
-    /// Counts the pixels from an index to the right, at most `count`, until the first dark pixel (with `lit`) or the
-    /// first lit pixel (without). A pixel is lit at `level` or above.
+    /// Counts the pixels from an index to the right, at most `count`, before the first dark pixel (if `lit` is true) or
+    /// the first lit pixel (if it is false). A pixel is lit at `level` or above.
     #[inline(always)]
     fn run_length(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
         (0..count).take_while(|k| (self.read(index + k * self.across()) >= level) == lit).count()

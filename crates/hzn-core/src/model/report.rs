@@ -140,8 +140,8 @@ pub struct Free<T> {
     pub cos: T,
     /// Variance of `cos`: all terms of the covariance except that of the expected half-angle.
     pub var_cos: T,
-    /// Change of `cos` when every edge point moves by one pixel across the limb, 1/px: the weighted RMS of |∂(s·e)/∂(u,
-    /// v)| over the points with a weight in the fit.
+    /// Change of `cos` when every edge point moves by one pixel across the limb, 1/px: the weighted RMS of
+    /// |∂(s·e)/∂(u, v)| over the points with a weight in the fit.
     pub cos_per_px: T,
 }
 

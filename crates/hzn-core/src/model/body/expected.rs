@@ -182,8 +182,8 @@ impl<T: Real> Expected<T> {
 
     /// Returns the expected cone for a limb of which the fraction `part`, 0 to 1, is clipped at full scale.
     ///
-    /// Full scale cuts the light off at 1/B of its peak. The limb in the picture, at half of full scale, then lies h ln
-    /// B higher than the limb at half of the peak, where h is the scale height of the air. B is unknown and varies
+    /// Full scale cuts the light off at 1/B of its peak. The limb in the picture, at half of full scale, then lies
+    /// h ln B higher than the limb at half of the peak, where h is the scale height of the air. B is unknown and varies
     /// along the limb. This variation counts as a first harmonic in azimuth, to which two sources contribute. The
     /// difference between clipped and unclipped points has the variance `part` (1 − `part`) times the height squared.
     /// If the heights at the two ends vary independently by σ each, half of their difference has the sigma σ/√2.

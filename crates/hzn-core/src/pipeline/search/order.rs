@@ -23,8 +23,8 @@ const LINE_WORDS: usize = 16384;
 /// memory.
 const BORDER_LOOKS: u16 = 128;
 
-/// Returns the spacing of search lines in rows: the usual one (1 to 64), and the largest one, which is for a lack of
-/// memory (1 to 256).
+/// Returns the spacing of search lines in rows: the usual one (1 to 64), and the largest one, for the case that memory
+/// is short (1 to 256).
 ///
 /// The largest spacing is the smallest extent of the body's disc. The usual spacing is a quarter of it if crescents
 /// occur, because search lines must cross these too; otherwise it is the same.

@@ -99,8 +99,8 @@ fn limit_px<T: Real>(threshold_px: T, free: bool, expected: &Expected<T>, focal_
     threshold_px + if free { T::ZERO } else { bend }
 }
 
-/// Returns the cones through two points with the half-angle of cosine `cos`. With a `free` half-angle, it returns the
-/// cone through three points instead.
+/// Returns the cones through two points with the half-angle of cosine `cos`. With a `free` half-angle, the result is
+/// the cone through three points.
 #[inline(always)]
 fn hypotheses<T: Real>(a: &V3<T>, b: &V3<T>, third: Option<V3<T>>, free: bool, cos: T) -> [Option<(V3<T>, T)>; 2] {
     if free {
