@@ -43,11 +43,11 @@ section! {
         /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has other points
         /// close to it.
         @- max_nearby: f64 = 1.0 / 3.0, [0.0 to 1e6];
-        /// Where at least this part of an edge's points are inliers, the edge is not checked with `max_way`; 0 turns the
-        /// check off.
+        /// Where at least this part of an edge's points are inliers, the edge is not checked with `max_way`; 0 turns
+        /// the check off.
         @- whole_edge: f64 = 0.8, [0.0 to 1.0];
-        /// Longest path along the inliers, as a multiple of the limb that they cover, where less than `whole_edge` of the
-        /// points are inliers.
+        /// Longest path along the inliers, as a multiple of the limb that they cover, where less than `whole_edge` of
+        /// the points are inliers.
         ///
         /// A cloud's edge winds, and a part of it may lie on a limb by chance.
         @- max_way: f64 = 3.0, [1.0 to 1e6];
@@ -94,8 +94,8 @@ section! {
         ///
         /// A terminator fades; the rim of a flare does not.
         @- departure_contrast: f64 = 0.6, [0.0 to 1e6];
-        /// Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky; 1
-        /// turns the gate off.
+        /// Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky;
+        /// 1 turns the gate off.
         ///
         /// The gate is only for a body that does not fit into the picture, because a crescent is a band, too.
         @- max_band: f64 = 0.5, [0.0 to 1.0];
@@ -104,8 +104,8 @@ section! {
         /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
         /// deviations.
         @- max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];
-        /// Largest rate of rotation of the vehicle, degrees per second; an axis that is farther from the previous answer
-        /// is refused.
+        /// Largest rate of rotation of the vehicle, degrees per second; an axis that is farther from the previous
+        /// answer is refused.
         ///
         /// Pictures are then processed in order.
         @- max_rate_deg_s: Option<f64> = None, [above 0.0 to 1e6] { unset: "any", example: "100.0" };
