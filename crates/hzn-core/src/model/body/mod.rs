@@ -268,7 +268,7 @@ pub struct Last<T> {
     pub axis: UnitVec3<Cam, T>,
     /// The 1-sigma of the axis in radians, 0 or more.
     pub sigma_rad: T,
-    /// Time since that picture was taken, seconds.
+    /// Time since the earlier picture was exposed, seconds.
     pub age_s: T,
 }
 

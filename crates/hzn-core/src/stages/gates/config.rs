@@ -145,7 +145,7 @@ section! {
         @- limb_in_view: bool = false, ["true or false"] { needs: "dlr" };
         /// Largest mean square distance of the points from the expected conic section, focal lengths squared.
         ///
-        /// The distance is taken along the section's principal axis.
+        /// The distance is measured along the section's principal axis.
         @- max_section_residual: Option<f64> = None, [above 0.0] { needs: "dlr", unset: "any", example: "0.025" };
         /// [lowest, highest] altitude, km: the radius of the fitted circle must be that of a limb between them.
         ///

@@ -2,7 +2,7 @@
 //!
 //! The picture is cut into equal cells, and one pixel is drawn at random in each cell. The sample is therefore both
 //! even and random. A small body may be missed: then the histogram of the sample has no second class. In this case a
-//! second sample, sixteen times finer, is taken.
+//! second sample is drawn, which is sixteen times finer.
 
 mod histogram;
 mod level;

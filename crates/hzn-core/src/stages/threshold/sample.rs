@@ -50,7 +50,7 @@ impl RowSampler {
     }
 }
 
-/// A sample that is still being taken, from one row after another.
+/// A sample that is not complete yet. Its rows come one after another.
 #[derive(Debug)]
 pub(super) struct Sample {
     pub(super) histogram: Histogram,
