@@ -1,5 +1,5 @@
-//! The horizon sensor's core: from a picture of a limb to the direction of the body, with a covariance for a
-//! navigation filter.
+//! The core of a horizon sensor. It computes the direction of a body, with a covariance for a navigation filter, from a
+//! picture of the body's limb.
 //!
 //! The crate uses no heap, a fixed amount of memory and no unsafe code. `process` returns a report for every picture
 //! and never reports NaN or infinity. Functions that IEEE 754 does not round correctly come from one library, and every
@@ -54,10 +54,10 @@
 //!
 //! # Features
 //!
-//! A feature adds code and never changes a type. `std`: the square root comes from the standard library (the same bits,
-//! vectorised). `serde`: [`Config`] can be read from files and written to files. `dlr`, `zju`, `horace`: the methods of
-//! Braun & Barf 2022, Wang et al. 2022 and HORACE, each with its [`Preset`]. `erf`: the most accurate sub-pixel points.
-//! `reml`: edge noise by restricted maximum likelihood.
+//! A feature adds code and never changes a type. `std`: the square root comes from the standard library, which gives
+//! the same bits and can be vectorised. `serde`: [`Config`] can be read from files and written to files. `dlr`, `zju`,
+//! `horace`: the methods of Braun & Barf 2022, Wang et al. 2022 and HORACE, each with its [`Preset`]. `erf`: the most
+//! accurate sub-pixel points. `reml`: edge noise by restricted maximum likelihood.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -148,8 +148,8 @@ impl Config {
         if self.bodies.is_empty() { core::slice::from_ref(&self.body) } else { &self.bodies }
     }
     /// Returns the threshold parameters of body number `which`, from 0: those of the body, or else those of the sensor.
-    /// A Sun among several bodies without its own parameters has those of the preset `sun`, because every other body in
-    /// the picture is brighter than the dark as well.
+    /// If a Sun among several bodies has no threshold parameters, it uses those of the preset `sun`, because every
+    /// other body in the picture is also brighter than the sky.
     pub fn threshold_of(&self, which: u8) -> &threshold::Config {
         let body = self.each_body().get(usize::from(which));
         match body.and_then(|b| b.binarize.as_ref()) {

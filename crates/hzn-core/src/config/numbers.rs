@@ -1,4 +1,5 @@
-//! The keys of all sections together, and the same keys by their numbers in flight.
+//! The keys of all sections together, and the same keys by their numbers in flight. A number in flight identifies a
+//! parameter of the flight computer.
 
 use super::{Config, Input, Mount, retry};
 use crate::base::keys::{Section, Table};
@@ -32,8 +33,8 @@ macro_rules! sections {
                 keys.filter_map(|(first, count)| first.map(|first| first..first + count)).flatten()
             }
 
-            /// Returns the value of a number in flight: NaN for a value that is left out, `None` for a number that no
-            /// key has.
+            /// Returns the value of the key with a number in flight: NaN for a value that is left out, `None` for a
+            /// number that no key has.
             pub fn number(&self, id: u16) -> Option<f64> {
                 $(
                     if let Some(number) = self.$field.number(id) {
@@ -44,8 +45,9 @@ macro_rules! sections {
                 Some(self.mount.as_ref().and_then(|mount| mount.number(id)).unwrap_or(f64::NAN))
             }
 
-            /// Sets the value of a number in flight: `None` for a number that no key has, `Some(false)` for a value
-            /// that its key cannot have. [`Config::check`] checks whether the values agree with each other.
+            /// Sets the value of the key with a number in flight. Returns `None` for a number that no key has,
+            /// `Some(false)` for a value that its key cannot have. [`Config::check`] checks whether the values agree
+            /// with each other.
             pub fn set_number(&mut self, id: u16, number: f64) -> Option<bool> {
                 $(
                     if let Some(taken) = self.$field.set_number(id, number) {

@@ -40,8 +40,8 @@ section! {
         @- min_sigma: f64 = 3.0, [0.0 to 100.0];
         /// Smallest fraction of an edge's points that must lie on the limb in a further look.
         ///
-        /// Every look is another chance for a false answer, from a curve through a part of something else, for example
-        /// the glow above a limb.
+        /// Every look is another chance for a false answer: a curve may fit a part of another edge by chance, for
+        /// example of the glow above a limb.
         @- min_part: f64 = 0.5, [0.0 to 1.0];
         /// Widest dark frame around the picture that is detected and left out, px; 0 turns the detection off.
         ///

@@ -5,8 +5,9 @@
 //! of x and y are then zero, and two equations remain. Without this step the closed form loses nearly all precision in
 //! f32.
 //!
-//! The paper's closed form has one denominator for all three unknowns. In the denominator of B it prints Q, a sum of
-//! the right-hand side. The solution here has no denominator of that kind.
+//! The paper's closed form has one denominator for all three unknowns. For the unknown B, the paper prints this
+//! denominator with Q, a sum of the right-hand side, in the place of P. The solution here has no denominator of that
+//! kind.
 
 use crate::base::linalg::invert_spd2;
 use crate::base::real::Real;

@@ -42,7 +42,7 @@ pub(crate) fn through_three<T: Real>(s1: &V3<T>, s2: &V3<T>, s3: &V3<T>) -> Opti
 /// cos α as a function of azimuth, for an ellipsoid whose east direction is known in the camera frame.
 ///
 /// cot²α(φ) = cot²α_E cos²φ + cot²α_M sin²φ, written as an offset from the mean cone, so that a free half-angle shifts
-/// both in the same way.
+/// α_E and α_M in the same way.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Azimuth<T> {
     pub(crate) east: V3<T>,
@@ -51,8 +51,8 @@ pub(crate) struct Azimuth<T> {
     /// cos of the mean half-angle.
     pub(crate) mean_cos: T,
     pub(crate) north: V3<T>,
-    /// First and second harmonic of cos α in azimuth, counted from north. They are added to the ellipsoid and describe
-    /// a limb height that varies with latitude.
+    /// First and second harmonic of cos α in azimuth, counted from north. They are added to the offset of the
+    /// ellipsoid, and describe a limb height that varies with latitude.
     pub(crate) harmonics_cos: [T; 2],
 }
 

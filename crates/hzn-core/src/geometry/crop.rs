@@ -18,8 +18,7 @@ pub(crate) struct Crop {
 }
 
 impl Crop {
-    /// Returns the whole of a copy with `height` rows; the whole picture itself when the picture has no more rows than
-    /// that.
+    /// Returns the whole of a copy with `height` rows, or the whole picture if it has at most `height` rows.
     pub(crate) fn whole(picture: [u16; 2], height: Option<u16>) -> Self {
         let copy = match height {
             Some(h) if h < picture[1] => {

@@ -1,5 +1,5 @@
-//! Image coordinates. **The pixel-centre rule** is written once, here: the centre of the top-left pixel is (0, 0), x
-//! points right and y down. The centre of a w×h picture is ((w − 1)/2, (h − 1)/2).
+//! Image coordinates, with **the pixel-centre rule**: the centre of the top-left pixel is (0, 0), x points right and y
+//! down. The centre of a w×h picture is ((w − 1)/2, (h − 1)/2).
 
 /// A pixel of the picture, with integer coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,8 +1,8 @@
 //! The limb as a conic section of the plane z = 1, which a pinhole camera sees (Braun & Barf 2022, section 2).
 //!
 //! With the unit axis e in the camera frame, c = cos α and Δ = e_x² + e_y² − c², the picture of the cone s·e = c is an
-//! ellipse for Δ < 0 and a hyperbola for Δ > 0. In its principal frame, whose x points along (e_x, e_y), the curve is
-//! Δ x² − c² y² = c² sin²α/Δ. Lengths are in focal lengths.
+//! ellipse for Δ < 0 and a hyperbola for Δ > 0. In the principal frame of the curve, whose x axis points along
+//! (e_x, e_y), the equation is Δ x² − c² y² = c² sin²α/Δ. Lengths are in focal lengths.
 
 use crate::base::real::Real;
 use crate::geometry::frames::{Cam, UnitVec3};
@@ -76,9 +76,10 @@ impl<T: Real> Section<T> {
     /// absolute value of x, so that points of the wrong branch pass. It also adds up the distances, so that short edges
     /// pass.
     ///
-    /// x − a √(1 ± y²/b²) is a difference of large numbers for a nearly parabolic limb. Multiplied and divided by the
-    /// sum of the two terms, it is the value of the conic over that sum, which is well-behaved there too. Where an
-    /// ellipse has no point at this principal y, the distance is the principal x itself: the ellipse ends at x = 0.
+    /// x − a √(1 ± y²/b²) is a difference of large numbers for a nearly parabolic limb. The code multiplies and divides
+    /// this difference by the sum of the two terms. The result is the value of the conic divided by that sum, which is
+    /// also accurate for a nearly parabolic limb. If an ellipse has no point at this principal y, the distance is the
+    /// principal x itself, because the ellipse ends at x = 0.
     pub fn distance(&self, [x, y]: [T; 2]) -> T {
         let [a, b] = self.along;
         let (u, v) = (a * x + b * y, a * y - b * x);

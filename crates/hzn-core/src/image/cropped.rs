@@ -3,7 +3,8 @@
 use super::Pixels;
 use crate::geometry::crop::Crop;
 
-/// A picture read through a crop. If the scale differs, each read interpolates between four pixels.
+/// A picture that is read through a crop. If the scales of the picture and of the crop differ, each read interpolates
+/// between four pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cropped<'a, P> {
     picture: &'a P,

@@ -1,8 +1,8 @@
-//! Shape of a picture in memory, and why a picture can be refused.
+//! Shape of a picture in memory, and the reasons why a picture can be refused.
 
 use core::fmt;
 
-/// Why a picture was refused.
+/// Reason why a picture is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImageError {
     /// Width or height is zero, or above 65535.

@@ -30,8 +30,8 @@ use crate::geometry::block::Lit;
 /// assert_eq!((Nibbles(&frame).at(0, 0), Nibbles(&frame).at(1, 0)), (5, 10));
 /// ```
 pub trait Pixels {
-    /// Whether the picture arrived row by row and is no longer in memory. Only [`Self::streamed_point`] then has its
-    /// edges.
+    /// Whether the picture arrived row by row and is no longer in memory. The edge points then come from
+    /// [`Self::streamed_point`] only.
     const STREAMED: bool = false;
     /// Returns the number of columns, 1 to 65535.
     fn width(&self) -> u16;
@@ -52,8 +52,8 @@ pub trait Pixels {
     fn three(&self, index: usize) -> [u16; 3] {
         [0, 1, 2].map(|k| self.read(index + k * self.across()))
     }
-    /// Counts pixels from an index to the right, up to `count`, before the first that is not as `lit` says. A pixel is
-    /// lit at `level` or above.
+    /// Counts the pixels from an index to the right, at most `count`, before the first dark pixel (if `lit` is true) or
+    /// the first lit pixel (if it is false). A pixel is lit at `level` or above.
     #[inline(always)]
     fn run_length(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
         (0..count).take_while(|k| (self.read(index + k * self.across()) >= level) == lit).count()
@@ -63,8 +63,8 @@ pub trait Pixels {
     fn streamed_point(&self, _x: u16, _y: u16) -> Option<StreamedPoint> {
         None
     }
-    /// Returns the brightness at column `x`, row `y`. The caller must stay within the picture; beyond it, the result is
-    /// some other pixel or 0.
+    /// Returns the brightness at column `x`, row `y`. The caller must stay within the picture; beyond the picture, the
+    /// result is some other pixel or 0.
     #[inline(always)]
     fn at(&self, x: u16, y: u16) -> u16 {
         self.read(self.index(x, y))
@@ -81,7 +81,7 @@ pub struct StreamedPoint {
     pub(crate) fallback: bool,
     /// Whether its lit side is clipped at full scale.
     pub(crate) clipped: bool,
-    /// Whether its plateaus were not within the rows that were held.
+    /// Whether one of its plateaus was not within the rows in memory.
     pub(crate) cut: bool,
 }
 

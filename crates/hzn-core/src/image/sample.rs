@@ -6,7 +6,8 @@ pub trait Sample: Copy + Into<u16> {
     const BITS: u8;
     /// 0.
     const ZERO: Self;
-    /// Counts the samples before the first that is not as `lit` says. A sample is lit at `level` or above.
+    /// Counts the samples before the first dark sample (if `lit` is true) or the first lit sample (if it is false). A
+    /// sample is lit at `level` or above.
     #[inline(always)]
     fn run_length(samples: &[Self], level: u16, lit: bool) -> usize {
         samples.iter().take_while(|&&s| (s.into() >= level) == lit).count()

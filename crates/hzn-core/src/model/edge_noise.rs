@@ -6,14 +6,14 @@ use crate::base::keys::{Form, Section, Value, choices, section};
 choices! {
     /// Source of the noise model of an edge.
     pub enum Noise {
-        /// The RMS of the edge's own residuals is the sigma, the common shift and the RMS of a common tilt. The
-        /// correlation length is a twelfth of the edge's length. The values of `[covariance]` are the floor of all of
-        /// them.
+        /// The sigma, the common shift and the RMS of the common tilt each equal the RMS of the edge's residuals. The
+        /// correlation length is a twelfth of the edge's length. The values of `[covariance]` are the floors of these
+        /// four numbers.
         @1 Rms = "rms";
         /// The values of `[covariance]` are used; only the sigma is raised to the RMS of the residuals if that is
         /// larger.
         ///
-        /// This is for values that were measured with the same camera and in the same kind of scene.
+        /// This choice is for values that were measured with the same camera and in the same kind of scene.
         @0 Given = "told";
         /// Restricted maximum likelihood of the residuals gives sigma, correlation length and white part, averaged over
         /// their posterior; the sigma of `[covariance]` is the floor.
@@ -45,13 +45,13 @@ section! {
         @101 correlation_px: f64 = 60.0, [0.0 to 1e6];
         /// 1σ of a shift that all points of an edge have in common, px.
         ///
-        /// Threshold, blur, and the profile of a limb that is no wider than a pixel cause it. It widens the variance of
-        /// the fitted half-angle, which then has less weight against the expected one.
+        /// Its causes are the threshold, blur, and the profile of a limb that is no wider than a pixel. The shift
+        /// widens the variance of the fitted half-angle, which then has less weight against the expected one.
         @103 bias_px: f64 = 0.3, [0.0 to 1e4];
         /// 1σ of a tilt that the whole edge has in common, px: an error that goes from −1 to 1 times this value along
         /// the edge.
         ///
-        /// Light that fades along the limb causes it. It widens the covariance of the axis.
+        /// Its cause is light that fades along the limb. The tilt widens the covariance of the axis.
         @104 tilt_px: f64 = 0.1, [0.0 to 1e4];
         /// For `braun-barf`: whether the largest variance is used in every direction.
         ///

@@ -1,4 +1,5 @@
-//! An interface to watch the pipeline: for clocks, counters and overlays. Without an observer it is compiled away.
+//! The interface of a program that watches the pipeline, for clocks, counters and overlays. Without an observer, the
+//! calls are compiled away.
 
 use crate::geometry::pixel::{ImagePoint, Pixel};
 use crate::model::error_budget::ErrorBudget;
@@ -50,14 +51,16 @@ pub trait Observer<T> {
     /// A pixel was read.
     #[inline(always)]
     fn pixel(&self, _x: u16, _y: u16) {}
-    /// The threshold is found: in counts, with the mean and the number of pixels of the sample.
+    /// The threshold is found. The arguments are the threshold in counts, the mean of the sample in counts, and its
+    /// number of pixels.
     fn level(&self, _level: u16, _mean: T, _samples: u32) {}
     /// A dark frame of `px` pixels lies around the picture and does not count from now on.
     fn dark_frame(&self, _px: u16) {}
     /// A further look at a picture without an answer begins: its number (1 for the second look) and its threshold in
     /// counts.
     fn look(&self, _number: u32, _level: u16) {}
-    /// An edge is followed and is candidate number `candidate`: every `stride`-th of its border pixels, in order.
+    /// An edge is followed and becomes candidate number `candidate`. The call receives every `stride`-th border pixel
+    /// of the edge, in order.
     fn edge(&self, _candidate: u32, _border: impl Iterator<Item = Pixel>, _stride: u32) {}
     /// Returns whether this edge goes on through the stages. If an observer always returns false, every edge is
     /// followed and there is no answer.
@@ -71,7 +74,8 @@ pub trait Observer<T> {
     /// The weight of a candidate's point after the fit is known: 0 (rejected) up to 1. This is called only after a fit.
     #[inline(always)]
     fn weight(&self, _candidate: u32, _point: u32, _weight: T) {}
-    /// Returns whether [`Self::budget`] is to be called, because the error budget costs time to compute.
+    /// Returns whether the pipeline calls [`Self::budget`]. The default is false, because the error budget takes time
+    /// to compute.
     #[inline(always)]
     fn wants_budget(&self) -> bool {
         false

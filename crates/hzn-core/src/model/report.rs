@@ -7,7 +7,7 @@ use crate::model::verdict::Verdict;
 /// Maximum number of bodies in one picture.
 pub const MAX_BODIES: usize = 3;
 
-/// Maximum number of candidates that a report lists. Further ones are only counted, except for the chosen one.
+/// Maximum number of candidates that a report lists. Further candidates are only counted, except for the chosen one.
 pub const MAX_LISTED: usize = 16;
 
 /// Reports of several bodies, in the order of the search.
@@ -103,8 +103,8 @@ pub struct Counters {
     pub fallback_points: u32,
     /// Sub-pixel points of the chosen candidate (of all candidates, when none was chosen).
     pub edge_points: u32,
-    /// For a picture that arrives row by row: edge points of candidates whose plateau is not within the rows that are
-    /// held.
+    /// For a picture that arrives row by row: edge points of the candidates with a plateau that is not within the rows
+    /// in memory.
     pub cut_points: u32,
     /// Draws of the consensus stage, for the candidates that reached a consensus.
     pub draws: u32,
@@ -141,7 +141,7 @@ pub struct Free<T> {
     /// Variance of `cos`: all terms of the covariance except that of the expected half-angle.
     pub var_cos: T,
     /// Change of `cos` when every edge point moves by one pixel across the limb, 1/px: the weighted RMS of
-    /// |∂(s·e)/∂(u, v)| over the points that carry the fit.
+    /// |∂(s·e)/∂(u, v)| over the points with a weight in the fit.
     pub cos_per_px: T,
 }
 
@@ -171,7 +171,8 @@ pub struct Solution<T> {
     pub axis: UnitVec3<Cam, T>,
     /// Covariance of `axis`, rad², rank 2.
     pub covariance: Cov3<Cam, T>,
-    /// The same direction in ECEF, from the position. A filter needs both. Only for `earth` with a position.
+    /// The same direction in ECEF, computed from the position; only for `earth` with a position. A filter needs both
+    /// directions.
     pub axis_ecef: Option<UnitVec3<Ecef, T>>,
     /// The same direction in the vehicle's body frame, when there is a mounting.
     pub axis_body: Option<UnitVec3<Body, T>>,
@@ -186,9 +187,9 @@ pub struct Solution<T> {
     pub free: Option<Free<T>>,
     /// Weighted RMS distance of the inliers from the limb in pixels.
     pub rms_px: T,
-    /// Number of edge points that carry the answer.
+    /// Number of inliers: edge points with a weight above 0 in the fit.
     pub inliers: u32,
-    /// Length of edge that the inliers cover, in pixels.
+    /// Length of the edge that the inliers cover, in pixels.
     pub arc_px: T,
     /// The number of the candidate that is the answer.
     pub candidate: u32,

@@ -1,7 +1,7 @@
 //! The verdict on a candidate.
 
 /// Declares the verdicts. One line per verdict has the documentation, the number and the name, so that no list can omit
-/// one.
+/// a verdict.
 macro_rules! verdicts {
     ($($(#[$doc:meta])* $variant:ident = $number:literal, $name:literal;)*) => {
         /// The verdict on a candidate.

@@ -141,7 +141,7 @@ impl<T: Real> Edges<T> {
         Self::from_points(camera, points.iter().map(|p| (*p, side(p))).collect())
     }
 
-    /// Same as [`Self::new`], with the direction towards the light in the picture, (u, v), for each point.
+    /// Does the same as [`Self::new`], with the direction towards the light in the picture, (u, v), for each point.
     pub fn towards(camera: &Camera<T>, points: &[(ImagePoint<T>, [T; 2])]) -> Self {
         Self::from_points(camera, points.iter().map(|(p, lit)| (*p, Lit::from_gradient(*lit))).collect())
     }

@@ -12,7 +12,7 @@ pub(super) struct FoundLimb<T> {
 }
 
 /// Points within this many thresholds of another body's limb count as points on it, because the limb at other
-/// brightness levels lies next to it.
+/// brightness levels lies next to the limb that was found.
 const TAKEN_THRESHOLDS: f64 = 3.0;
 
 impl<T: Real> FoundLimb<T> {

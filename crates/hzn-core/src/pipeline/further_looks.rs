@@ -1,9 +1,9 @@
 //! Further looks before a picture is refused: at other thresholds, and without a dark frame around the picture.
 //!
 //! Otsu's threshold follows the brightest parts of a picture. Most of the limb of a half-lit disc with clouds may lie
-//! below it, and all of a limb under a glare. A picture without an answer is therefore examined again a few times, each
-//! time at another threshold. All looks draw on the one work budget of the picture. Each look is also another chance
-//! for a false answer: all looks have the same gates, and there are few of them.
+//! below this threshold, and so may the whole of a limb under a glare. A picture without an answer is therefore
+//! examined again a few times, each time at another threshold. All looks draw on the one work budget of the picture.
+//! Each look is also another chance for a false answer: all looks have the same gates, and there are only a few looks.
 
 use super::budget;
 use super::found_limb::FoundLimb;

@@ -60,11 +60,11 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         Ok(Self { sensor: Sensor::new(config)?, workspace: Workspace::new(), levels: [None; MAX_BODIES] })
     }
-    /// Same as [`Self::new`], in a box. Another thread builds the sensor, so that it does not pass over the caller's
-    /// stack: the sensor of a workstation can be larger than the stack that a thread has left.
+    /// Does the same as [`Self::new`], in a box. Another thread builds the sensor, so that the sensor does not pass
+    /// over the caller's stack: the sensor of a workstation can be larger than the free part of a thread's stack.
     ///
     /// # Errors
-    /// Same as [`Self::new`].
+    /// Returns the same errors as [`Self::new`].
     #[cfg(feature = "std")]
     pub fn boxed(config: &Config) -> Result<std::boxed::Box<Self>, ConfigError> {
         const STACK_BYTES: usize = 16 << 20;
@@ -112,14 +112,14 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     pub fn region(&self) -> &Region<T> {
         self.sensor.region()
     }
-    /// Same as [`Sensor::expect`].
+    /// Does the same as [`Sensor::expect`].
     ///
     /// # Errors
     /// The altitude or the position is impossible.
     pub fn expect(&self, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
         self.sensor.expect(frame)
     }
-    /// Same as [`Sensor::expect_body`].
+    /// Does the same as [`Sensor::expect_body`].
     ///
     /// # Errors
     /// The altitude or the position is impossible, or there is no body of this number.
@@ -131,7 +131,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     pub fn process<P: Pixels>(&mut self, picture: &P, expected: &Expected<T>) -> Report<T> {
         self.process_observed(picture, expected, &Unobserved)
     }
-    /// Same as [`Self::process`], with an observer.
+    /// Does the same as [`Self::process`], with an observer.
     pub fn process_observed<P: Pixels, O: Observer<T>>(
         &mut self,
         picture: &P,
@@ -143,11 +143,11 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         self.remember(&expected, &report);
         report
     }
-    /// Same as [`Sensor::process_each`].
+    /// Does the same as [`Sensor::process_each`].
     pub fn process_each<P: Pixels>(&mut self, picture: &P, expected: &[Expected<T>]) -> Reports<T> {
         self.process_each_observed(picture, expected, &Unobserved)
     }
-    /// Same as [`Self::process_each`], with an observer.
+    /// Does the same as [`Self::process_each`], with an observer.
     pub fn process_each_observed<P: Pixels, O: Observer<T>>(
         &mut self,
         picture: &P,

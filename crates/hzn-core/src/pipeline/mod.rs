@@ -2,9 +2,10 @@
 //!
 //! Each candidate goes from its border to a verdict before the next one begins. Edges are examined in the order in
 //! which they are likely to be the limb: first those next to the longest dark stretches of the border, then every other
-//! edge that begins at the border, then closed edges. The search ends when an edge passes every gate and is beyond
-//! doubt. Otherwise the best of all edges that begin at the border is chosen; closed edges are examined only if there
-//! is none. A picture without an answer is examined again, at other thresholds (`[recover]`).
+//! edge that begins at the border, then closed edges. The search ends when an edge passes every gate and is certain
+//! (`select.certain_support`, `select.certain_share`). Otherwise the best of all edges that begin at the border is
+//! chosen; closed edges are examined only if none of these edges gives an answer. A picture without an answer is
+//! examined again, at other thresholds (`[recover]`).
 
 mod budget;
 #[cfg(any(test, feature = "_edges"))]

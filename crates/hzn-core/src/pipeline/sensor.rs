@@ -87,7 +87,7 @@ impl<T: Real> Sensor<T> {
         self.expect_body(0, frame)
     }
 
-    /// Same as [`Self::expect`], for the body number `which` of [`Config::each_body`], from 0.
+    /// Does the same as [`Self::expect`], for the body number `which` of [`Config::each_body`], from 0.
     ///
     /// # Errors
     /// The altitude or the position is impossible, or there is no body of this number.

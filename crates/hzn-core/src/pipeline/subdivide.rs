@@ -26,9 +26,9 @@ use crate::model::status::{Stage, Status};
 use crate::model::verdict::Verdict;
 use crate::model::work;
 
-/// Most parts that can have an answer.
+/// Largest number of parts that can have an answer.
 const ANSWERS: usize = 64;
-/// Most parts that wait at the same time: one for each halving.
+/// Largest number of parts that wait at the same time: one for each halving.
 const WAITING: usize = 16;
 
 type Answers<T> = heapless::Vec<Solution<T>, ANSWERS>;

@@ -4,9 +4,9 @@ use crate::base::real::Real;
 use crate::geometry::block::Block;
 use crate::geometry::pixel::Pixel;
 
-/// Most border pixels of one edge that a workstation stores.
+/// Largest number of border pixels of one edge that a workstation stores.
 pub(super) const HOST_POINTS: usize = 16384;
-/// Words of 32 bits in which a workstation marks search lines.
+/// Number of 32-bit words in which a workstation marks search lines.
 pub(super) const HOST_WORDS: usize = 65536;
 
 /// The lists of a workstation.

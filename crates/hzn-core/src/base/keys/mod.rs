@@ -161,7 +161,7 @@ pub trait Value: Clone + PartialEq {
     const FORM: Form;
     /// The words that the value may be.
     const CHOICES: &'static [Choice] = &[];
-    /// How many numbers the value has in flight.
+    /// Count of the numbers that the value has in flight.
     const NUMBERS: u16 = 1;
 
     /// Checks every number of the value, or that its word is in this build.
@@ -208,6 +208,6 @@ pub trait Section: Sized {
     fn set_number(&mut self, id: u16, number: f64) -> Option<bool>;
     /// Returns the first key on the ground only whose value differs from that of another configuration.
     fn differing_on_ground(&self, other: &Self) -> Option<&'static str>;
-    /// The first number in flight of each key, and how many numbers the key has.
+    /// The first number in flight of each key, and the count of its numbers.
     const NUMBERS: &'static [(Option<u16>, u16)];
 }

@@ -1,7 +1,7 @@
 //! Image radius of a radially symmetric lens: r(θ) in focal lengths, with its derivative.
 //!
-//! A lens of this kind is a variant of `Curve` and a file with its equations. Everything else (the inverse, its series,
-//! the check that the lens is monotone, rays, projection) is the same for all of them.
+//! Each lens of this kind has a variant of `Curve` and a file with its equations. Everything else (the inverse, its
+//! series, the check that the lens is monotone, rays, projection) is the same for all of them.
 
 #[cfg(feature = "kalibr")]
 use super::{double_sphere, eucm};

@@ -75,7 +75,7 @@ pub struct Camera<T> {
     /// Time from one row to the next in seconds, and the row that is exposed at the picture's time.
     row_s: T,
     middle_row: T,
-    /// How the camera turns while this picture is read out.
+    /// Rotation of the camera while this picture is read out; `None` without a rate or without a rolling shutter.
     turning: Option<shutter::Turning<T>>,
 }
 

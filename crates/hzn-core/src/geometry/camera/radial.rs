@@ -2,8 +2,8 @@
 //!
 //! The inverse θ(ρ) has no closed form. At load time Newton's method solves it at Chebyshev nodes. The quantities of a
 //! ray (sin θ/ρ, cos θ, dθ/dρ) are then kept as three polynomials in ρ², made from Chebyshev series. They are checked
-//! against Newton's method between the nodes. If they do not reach the precision of `T` (close to the end of monotony),
-//! Newton's method computes every ray.
+//! against Newton's method between the nodes. If they do not reach the precision of `T` (close to the angle from which
+//! r(θ) no longer grows), Newton's method computes every ray.
 
 use super::config::Config;
 use super::curve::Curve;

@@ -1,8 +1,8 @@
 //! The effect of calibration errors: 1-sigma modes of the intrinsic parameters, and the motion of a ray's image point
 //! with each parameter.
 //!
-//! Parameters are relative: focal lengths as fractions of themselves, the principal point in focal lengths. In these
-//! units a rectangle of the picture and a scaled picture have the same numbers.
+//! Changes of parameters are relative: those of a focal length are fractions of it, those of the principal point are in
+//! focal lengths. In these units a rectangle of the picture and a scaled picture have the same numbers.
 
 use super::config::{Config, INTRINSICS, Intrinsic, Model};
 use crate::base::error::{ConfigError, Limit, require};
@@ -62,7 +62,7 @@ pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
     Ok(modes)
 }
 
-/// A difference counts as 0 when it is below this fraction of the number that it was subtracted from.
+/// A pivot of the decomposition counts as 0 when it is at most this fraction of its diagonal element.
 const ROUNDING: f64 = 1e-9;
 
 /// Returns the columns of the lower triangle L with L Lᵀ = `rows`. A matrix that is not symmetric or not positive
@@ -105,7 +105,7 @@ fn triangle(rows: &[heapless::Vec<f64, INTRINSICS>]) -> Result<[[f64; INTRINSICS
 }
 
 impl Intrinsic {
-    /// Returns the parameter's place among those of a model; `None` if the model does not have the parameter.
+    /// Returns the index of the parameter among those of a model; `None` if the model does not have the parameter.
     fn index_in(self, model: Model) -> Option<usize> {
         match self {
             Self::FxPx => Some(0),

@@ -228,8 +228,8 @@ impl<T: Real> Region<T> {
         self.has_mask() && self.covered(x, y)
     }
 
-    /// Returns whether the pixel exists, is in the region and is not masked. It is for reads that need this seldom: one
-    /// copy in flash.
+    /// Returns whether the pixel exists, is in the region and is not masked. It is for rare reads; there is only one
+    /// copy of it in flash.
     #[inline(never)]
     pub(crate) fn is_usable(&self, x: i32, y: i32) -> bool {
         let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return false };
@@ -299,8 +299,8 @@ impl<T: Real> Outline<T> {
         let p = [T::from_i32(i32::from(x)), T::from_i32(i32::from(y))];
         (0..2).any(|k| p[k] + margin < self.low[k] || p[k] - margin > self.high[k]) || self.clear_within(p, margin)
     }
-    /// Does the same as [`Self::clear`], if the bounding box does not decide: no side crosses the square, and its
-    /// centre is outside the polygon.
+    /// Does the same as [`Self::clear`] when the bounding box does not decide. The result is true if no side of the
+    /// polygon crosses the square and the centre of the square is outside the polygon.
     #[inline(never)]
     fn clear_within(&self, p: [T; 2], margin: T) -> bool {
         let Some(&last) = self.corners.last() else { return true };

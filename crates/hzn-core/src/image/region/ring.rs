@@ -5,7 +5,7 @@ use crate::geometry::pixel::Pixel;
 
 use super::Region;
 
-/// Number of rows of the ring that are taken at once along the picture's sides.
+/// Number of rows by which the walk around the ring advances in one step along the picture's sides.
 const LEAP: u16 = 64;
 
 impl<T: Real> Region<T> {

@@ -1,4 +1,4 @@
-//! The body as it appears from the camera: its size, its limb and what is unknown about them.
+//! The body as it appears from the camera: its size, its limb, and the uncertainty of both.
 
 use crate::base::real::Real;
 use crate::geometry::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, geodetic};

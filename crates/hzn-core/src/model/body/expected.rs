@@ -8,8 +8,8 @@ use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
 use super::apparent::{ApparentBody, below_limb_error};
 use super::{Config, Kind, LOWEST_ALTITUDE_M, Last, Prior, PriorError};
 
-/// From this 1-sigma on, a prior attitude is no better than none and does not correct the shape of the limb: 30 degrees
-/// (book/theory/math.md, ellipsoid).
+/// A prior attitude with this 1-sigma or more does not correct the shape of the limb, because it is no better than an
+/// unknown attitude: 30 degrees (book/theory/math.md, ellipsoid).
 const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
 /// 1-sigma of an attitude without a sigma in the prior: 5 degrees.
 const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
@@ -182,11 +182,11 @@ impl<T: Real> Expected<T> {
 
     /// Returns the expected cone for a limb of which the fraction `part`, 0 to 1, is clipped at full scale.
     ///
-    /// Full scale cuts the light off at 1/B of its peak. Half of full scale then lies h ln B above half of the light,
-    /// where h is the height over which the air thins out to 1/e. B is unknown and varies along the limb. The variation
-    /// counts as a first harmonic in azimuth with two contributions. The difference between clipped and unclipped
-    /// points has the variance part (1 − part) times the height squared. If the heights at the two ends vary
-    /// independently by σ each, half of their difference has the sigma σ/√2.
+    /// Full scale cuts the light off at 1/B of its peak. The limb in the picture, at half of full scale, then lies
+    /// h ln B higher than the limb at half of the peak, where h is the scale height of the air. B is unknown and varies
+    /// along the limb. This variation counts as a first harmonic in azimuth, to which two sources contribute. The
+    /// difference between clipped and unclipped points has the variance `part` (1 − `part`) times the height squared.
+    /// If the heights at the two ends vary independently by σ each, half of their difference has the sigma σ/√2.
     pub(crate) fn clipped(&self, part: T) -> Self {
         if self.free || !(part > T::zero()) {
             return *self;

@@ -53,11 +53,11 @@ choices! {
     pub enum AltitudeReference {
         /// The WGS-84 ellipsoid, as in satellite navigation.
         ///
-        /// If the local radius differs from the mean one, the camera moves with the surface. The half-angle then shows
-        /// only (H − d)/(R + H) of the difference.
+        /// If the local radius differs from the mean one, the distance of the camera from the centre differs by the
+        /// same amount. The half-angle then shows only the fraction (H − d)/(R + H) of the difference.
         @0 Ellipsoid = "ellipsoid";
-        /// A sphere of 6371 km, for example for an orbit radius minus 6371 km; the local radius is then unknown by
-        /// about 17 km (1σ).
+        /// A sphere of 6371 km, for example for an altitude computed as orbit radius minus 6371 km; the local radius is
+        /// then unknown by about 17 km (1σ).
         @1 Sphere = "sphere";
     }
 }
@@ -78,30 +78,30 @@ section! {
         @33 altitude_sigma_km: f64 = 0.5, [0.0 to 1e6];
         /// For `earth`: the surface from which an altitude without a position is measured.
         @36 altitude_reference: AltitudeReference = AltitudeReference::Ellipsoid, [choice];
-        /// Height of the visible limb above the surface, km; 17 km is a cloudless limb in sunlight at 550 nm.
+        /// Height of the visible limb above the surface, km; 17 km is right for a cloudless limb in sunlight at 550 nm.
         ///
-        /// It is the height at which the limb has half of its brightness. A value that is too high makes the expected
-        /// cone too wide.
+        /// At this height the limb has half of its brightness. A value that is too high makes the expected cone too
+        /// wide.
         @34 limb_height_km: f64 = 17.0, [-50.0 to 500.0];
         /// 1σ of the limb height, km; 7 km spans the visible wavelengths and usual thresholds.
         ///
         /// The height is 24 km at 440 nm and 12 km at 650 nm. The range of thresholds is a quarter to three quarters of
-        /// the limb's brightness. The larger the sigma is, the less weight the expected half-angle has.
+        /// the limb's brightness. A larger sigma gives the expected half-angle less weight.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
         /// Height that overexposure adds to the limb, km; it is multiplied by the fraction of the limb that is clipped
         /// at full scale.
         ///
-        /// Half of full scale lies h ln B above half of the light, where h = 7.5 km is the scale height of the air and
-        /// the light exceeds full scale by the factor B. The default is the mean for B from 1 to 8, with a uniform
-        /// distribution of ln B.
+        /// If the light exceeds full scale by the factor B, the limb in the picture, at half of full scale, lies h ln B
+        /// higher than the limb at half of the light, where h = 7.5 km is the scale height of the air. The default is
+        /// the mean for B from 1 to 8, with a uniform distribution of ln B.
         @37 clipped_height_km: f64 = 7.8, [0.0 to 500.0];
         /// 1σ of `clipped_height_km`, km; the height varies along the limb.
         @38 clipped_sigma_km: f64 = 4.5, [0.0 to 1e4];
         /// Limb height by latitude instead of `limb_height_km`: rows of [geodetic latitude in degrees, height in km],
         /// with rising latitudes.
         ///
-        /// It applies to `earth` with a position. Heights are linear between rows and constant beyond the first and
-        /// last row. Without an attitude, the variation along the limb widens the covariance.
+        /// It applies to `earth` with a position. Heights are interpolated linearly between rows and are constant
+        /// beyond the first and last row. Without an attitude, the variation along the limb widens the covariance.
         @- limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES> = heapless::Vec::new(),
             ["up to 16 rows, for `earth`"] { unset: "none", example: "[[-90, 20.5], [0, 25.0], [90, 29.5]]" };
         /// Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun.
@@ -205,7 +205,7 @@ impl Config {
         self.kind == Kind::Sun
     }
 
-    /// Returns whether the body is seen in sunlight, as far as is known. This is false for `sunlit = false`, which
+    /// Returns whether the body is seen in sunlight. This is true except for the Sun and for `sunlit = false`, which
     /// means that the body itself emits the light, as in the thermal infrared.
     pub fn is_seen_in_sunlight(&self) -> bool {
         self.sunlit != Some(false) && self.kind != Kind::Sun
@@ -217,7 +217,7 @@ impl Config {
     }
 }
 
-/// What is known about one picture before it is processed. Every field may be missing.
+/// The data known about one picture before it is processed. Every field may be missing.
 ///
 /// # Example
 ///
@@ -268,11 +268,11 @@ pub struct Last<T> {
     pub axis: UnitVec3<Cam, T>,
     /// The 1-sigma of the axis in radians, 0 or more.
     pub sigma_rad: T,
-    /// Time since that picture was taken, seconds.
+    /// Time since the earlier picture was exposed, seconds.
     pub age_s: T,
 }
 
-/// Why the prior of a picture was refused.
+/// Reason why the prior of a picture is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PriorError {
     /// The altitude is not a finite number, or is too low for any camera.
@@ -280,7 +280,7 @@ pub enum PriorError {
     /// The position is not finite, or inside the body.
     Position,
     /// The camera is not above the limb height, so that the limb surrounds it and there is no cone. A rocket flight
-    /// begins there.
+    /// begins below the limb height.
     BelowLimb {
         /// Altitude of the camera in metres.
         altitude_m: i32,

@@ -1,9 +1,10 @@
 //! The difference between the flattened Earth and a sphere, for a camera with a known height but an unknown position.
 //!
 //! A plane that touches the ellipsoid, with its normal at latitude φ', lies R − k P₂(sin φ') from the centre to first
-//! order in the flattening f, with k = ⅔ a f. The limb seen from latitude φ has these normals on a circle about the
-//! nadir. By the addition theorem, their mean along the circle is P₂(sin φ) P₂(s), with s = sin α. Their second
-//! harmonic in azimuth is ¾ cos²φ cos²α. The first harmonic tilts the axis, which is already the limb axis. Therefore:
+//! order in the flattening f, with k = ⅔ a f. For a camera at latitude φ, the normals of the planes that touch the
+//! ellipsoid at the limb lie on a circle about the nadir. By the addition theorem, the mean of P₂(sin φ') along the
+//! circle is P₂(sin φ) P₂(s), with s = sin α. The second harmonic in azimuth is ¾ cos²φ cos²α. The first harmonic is a
+//! tilt of the axis, which the limb axis already includes. Therefore:
 //!
 //! - the sphere with this half-angle at this height above the ellipsoid has the radius R + k P₂(sin φ) (3 s + 1)/2,
 //! - the limb is uneven by a second harmonic of height with the amplitude ¾ k cos²φ cos²α.

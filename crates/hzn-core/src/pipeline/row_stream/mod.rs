@@ -43,8 +43,8 @@ pub use recent_rows::ROWS_HELD;
 use recent_rows::RecentRows;
 use runs::Runs;
 
-/// Rows that must follow a border pixel's row before the pixel is measured. At least as many rows before it are in
-/// memory then.
+/// Rows that must follow a border pixel's row before the pixel is measured. At least the same number of rows before the
+/// pixel's row is then in memory.
 const AHEAD: u16 = 15;
 
 /// The memory that a picture needs in addition to a [`Workspace`] when it comes row by row.
@@ -86,7 +86,7 @@ impl<S: Sample, const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, co
     }
 }
 
-/// Why a picture cannot be processed row by row.
+/// Reason why a picture cannot be processed row by row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowStreamError {
     /// The [`RowBuffers`] are too small for the picture; the fields say what it needs.

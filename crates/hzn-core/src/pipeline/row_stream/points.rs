@@ -9,7 +9,7 @@ pub(super) struct Point {
     towards_dark_px: f32,
     x: u16,
     lit: Lit,
-    /// [`FALLBACK`], [`CUT`] and [`CLIPPED`].
+    /// Sum of the flags [`FALLBACK`], [`CUT`] and [`CLIPPED`] that apply.
     marks: u8,
 }
 

@@ -47,8 +47,8 @@ struct Best<T> {
     /// Threshold for the next picture.
     level: Option<u16>,
     score: T,
-    /// The answer explains most of the limb in view, and either most points of its edge are inliers or the residuals
-    /// are small. The search can end.
+    /// Whether the search can end: the answer explains most of the limb in view, and either most points of its edge are
+    /// inliers or the residuals are small.
     certain: bool,
 }
 

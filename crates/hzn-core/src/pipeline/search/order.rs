@@ -15,7 +15,7 @@ use crate::model::work::WorkBudget;
 use crate::stages::contour;
 use crate::stages::contour::{BinaryPicture, End, Marks, Thinned};
 
-/// Most words in which search lines are marked. More search lines find nothing new.
+/// Largest number of words in which search lines are marked. More search lines find no further edges.
 const LINE_WORDS: usize = 16384;
 
 /// Approximate number of places at which the shorter side of the border is read. The dark and lit stretches that a limb
@@ -23,8 +23,8 @@ const LINE_WORDS: usize = 16384;
 /// memory.
 const BORDER_LOOKS: u16 = 128;
 
-/// Returns the spacing of search lines in rows: the usual one (1 to 64), and the largest one for when memory is short
-/// (1 to 256).
+/// Returns the spacing of search lines in rows: the usual one (1 to 64), and the largest one, for the case that memory
+/// is short (1 to 256).
 ///
 /// The largest spacing is the smallest extent of the body's disc. The usual spacing is a quarter of it if crescents
 /// occur, because search lines must cross these too; otherwise it is the same.
@@ -41,11 +41,11 @@ fn line_spacing<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> (u16, u1
 /// Whether an edge begins at the border between two pixels that were read.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Missed {
-    /// No edge shows this so far.
+    /// No edge of this kind is known so far.
     Unknown,
-    /// At least one edge does.
+    /// There is at least one edge of this kind.
     Some,
-    /// The border was searched for them pixel by pixel.
+    /// The border was searched pixel by pixel for edges of this kind.
     Found,
 }
 

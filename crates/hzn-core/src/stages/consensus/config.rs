@@ -5,8 +5,8 @@ use crate::base::keys::{choices, section};
 choices! {
     /// How the inliers are found.
     pub enum Method {
-        /// RANSAC on two points with the expected half-angle (three points where that is too uncertain); a further
-        /// point verifies a draw before it is scored.
+        /// RANSAC on two points with the expected half-angle (three points where this half-angle is too uncertain); a
+        /// further point verifies a draw before it is scored.
         @0 TwoPoint = "two-point";
         /// Every point is an inlier.
         @1 None = "none";
@@ -30,8 +30,8 @@ section! {
         /// The largest distance is at least this many times the noise from point to point; 0 leaves it at
         /// `threshold_px`.
         ///
-        /// It is at most the sigma of the limb height. A threshold that cuts into the noise keeps the points that
-        /// happen to lie near some limb. Two sigmas hold 95 % of a limb's points.
+        /// Noise raises the largest distance at most to the sigma of the limb height. With a threshold below the noise,
+        /// the inliers are points that lie near some limb by chance. Two sigmas include 95 % of a limb's points.
         @84 noise_sigma: f64 = 2.0, [0.0 to 100.0];
         /// Seed of the random draws; the same seed gives the same answer.
         @82 seed: u32 = 1, [0.0 to 4294967295.0];

@@ -1,4 +1,4 @@
-//! What counts as an inlier: the threshold for the distance, and the cone that most points agree on.
+//! The definition of an inlier: the threshold for its distance, and the cone that most points agree on.
 
 use super::config::Config;
 use super::noise;
@@ -48,7 +48,7 @@ pub(crate) struct Consensus<T> {
     pub(crate) c: T,
     /// Number of draws.
     pub(crate) draws: u32,
-    /// Every point is an inlier: the fit leaves none out.
+    /// Whether every point is an inlier, so that the fit leaves no point out.
     #[allow(dead_code, reason = "for the estimators behind features")]
     pub(crate) all: bool,
 }

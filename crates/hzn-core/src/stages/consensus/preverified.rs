@@ -1,8 +1,8 @@
 //! RANSAC with pre-verification (Wang et al. 2022, 2.3).
 //!
-//! Five points are draw_cone, and three of them define a cone. Only if the other two are also on this cone, the cone is
-//! compared with every point. Most wrong hypotheses therefore cost only two comparisons. The search ends when more than
-//! half of the points agree, or after k_max hypotheses.
+//! Five points are drawn, and three of them define a cone. The cone is compared with every point only if the other two
+//! are also on it. Most wrong hypotheses therefore cost only two comparisons. The search ends when more than half of
+//! the points agree, or after k_max hypotheses.
 //!
 //! Equation (25) gives k_max = ln(1 − p)/ln(1 − (1 − r)³). With p = 90 % and a share r = 80 % of outliers the paper
 //! prints 286; rounded up it is 287. This number can only count *accepted* hypotheses. A draw passes the test only if

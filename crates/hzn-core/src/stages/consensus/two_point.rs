@@ -21,8 +21,8 @@ pub(super) fn sigma_alpha<T: Real>(expected: &Expected<T>) -> T {
     expected.sigma_cos / expected.sin
 }
 
-/// Whether the Sun lights the body where the ray touches it. The answer is yes if the direction of the Sun is unknown.
-/// The surface normal at this place is (s cos α − e)/sin α.
+/// Returns whether the Sun lights the body where the ray touches it. The result is true if the direction of the Sun is
+/// unknown. The surface normal where the ray touches the body is (s cos α − e)/sin α.
 pub(super) fn is_lit<T: Real>(s: &V3<T>, e: &V3<T>, c: T, expected: &Expected<T>) -> bool {
     expected.sun.as_ref().is_none_or(|sun| s.dot(sun) * c - e.dot(sun) > T::ZERO)
 }
@@ -99,8 +99,8 @@ fn limit_px<T: Real>(threshold_px: T, free: bool, expected: &Expected<T>, focal_
     threshold_px + if free { T::ZERO } else { bend }
 }
 
-/// Returns the cones through two points with the half-angle of cosine `cos`, or with a `free` half-angle the one
-/// through three points.
+/// Returns the cones through two points with the half-angle of cosine `cos`. With a `free` half-angle, the result is
+/// the cone through three points.
 #[inline(always)]
 fn hypotheses<T: Real>(a: &V3<T>, b: &V3<T>, third: Option<V3<T>>, free: bool, cos: T) -> [Option<(V3<T>, T)>; 2] {
     if free {
@@ -110,7 +110,7 @@ fn hypotheses<T: Real>(a: &V3<T>, b: &V3<T>, third: Option<V3<T>>, free: bool, c
     }
 }
 
-/// Whether the lit side of a point lies towards the axis, and the Sun lights the body there.
+/// Returns whether the lit side of a point lies towards the axis and the Sun lights the body there.
 #[inline(always)]
 fn faces_light<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T, expected: &Expected<T>) -> bool {
     let lane = i as usize % LANES;

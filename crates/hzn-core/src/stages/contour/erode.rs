@@ -45,7 +45,7 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     edge
 }
 
-/// Whether fewer than `least` pixels of the neighbourhood are lit, and none is masked.
+/// Returns whether fewer than `least` pixels of the neighbourhood are lit, and none is masked.
 fn is_edge<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: u16,

@@ -126,8 +126,8 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     }
 
     /// Reduces the smallest contrast of edge points to 1/16 of `contrast`, which is the contrast between the dark and
-    /// the lit pixels of the picture in counts. It may be a small part of full scale, as in 16-bit pictures of a
-    /// thermal camera. Pictures with 8 bits keep their limit of three counts, which is small in any case.
+    /// the lit pixels of the picture in counts. This contrast may be a small part of full scale, as in 16-bit pictures
+    /// of a thermal camera. Pictures with 8 bits keep their limit of three counts, which is small in any case.
     pub(crate) fn with_contrast(self, contrast: T) -> Self {
         let own = (contrast / T::from_i32(CONTRAST_PART)).to_i32();
         let least = if own > 0 && self.picture.full_scale() > 255 { own.max(LEAST_CONTRAST) } else { i32::MAX };
@@ -138,12 +138,12 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         Self { blooms, ..self }
     }
 
-    /// Whether a pixel of the region is lit and not masked.
+    /// Returns whether a pixel of the region is lit and not masked.
     #[inline(always)]
     pub(crate) fn lit(&self, x: u16, y: u16) -> bool {
         self.brightness(x, y) >= self.level && !self.masked(x, y)
     }
-    /// Whether a polygon covers the pixel.
+    /// Returns whether a polygon covers the pixel.
     #[inline(always)]
     pub(super) fn masked(&self, x: u16, y: u16) -> bool {
         self.region.has_mask() && self.is_covered(x, y)
@@ -153,7 +153,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         self.masked.set(self.masked.get() + 1);
         self.region.masked(x, y)
     }
-    /// Cost of one read of the mask.
+    /// Returns the cost of one read of the mask.
     pub(crate) fn mask_cost(&self) -> u32 {
         self.mask
     }
@@ -266,8 +266,8 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     }
 
     /// Examines all neighbours of a pixel where more than the threshold has to be checked: at the border, at a mask, on
-    /// a search line, or at the start. It also reads the dark neighbours that are already known. `home` is set at the
-    /// start of the edge: it is the direction of the dark neighbour that closes the edge.
+    /// a search line, or at the start. The function also reads the dark neighbours that are already known. `home` is
+    /// set at the start of the edge: it is the direction of the dark neighbour that closes the edge.
     #[inline(never)]
     fn look(&self, walk: &Walk, home: Option<u8>, marks: &mut Marks<'_>) -> Seen {
         let here = walk.at;

@@ -10,7 +10,7 @@ use crate::model::work::{self, WorkBudget};
 
 /// In a ring of the frame, at most one in `SPECKS` pixels is lit. In the ring next to the frame, more than one in `LIT`
 /// is lit. Both fractions refer to the whole circumference of the picture: if an image circle leaves only few pixels of
-/// it, they prove nothing.
+/// it, these pixels do not show whether there is a frame.
 const SPECKS: u32 = 64;
 const LIT: u32 = 8;
 /// Distance in pixels between the pixels that are read first. They show for nearly every picture that it has no frame.

@@ -14,7 +14,7 @@ pub(crate) struct Marks<'a> {
     spacing: u16,
     offset: u16,
     bits: bool,
-    /// The table has no free place.
+    /// Whether the table has no free place.
     full: bool,
 }
 
@@ -42,7 +42,7 @@ impl<'a> Marks<'a> {
         Self { words, width: u32::from(width), spacing, offset: spacing / 2, bits: found.is_some(), full: false }
     }
 
-    /// Whether row `y` is a search line.
+    /// Returns whether row `y` is a search line.
     #[inline(always)]
     pub(crate) fn has_row(&self, y: u16) -> bool {
         y & (self.spacing - 1) == self.offset & (self.spacing - 1)

@@ -48,7 +48,7 @@ section! {
         @60 line_spacing_px: Option<u16> = None, [1.0 or more] { unset: "from the body's expected size", example: "8" };
         /// For `erode`: side of the square neighbourhood, px.
         @- erode_size_px: u16 = 3, ["odd, 3 to 31"] { needs: "horace" };
-        /// For `erode`: a lit pixel with fewer lit pixels in its neighbourhood, itself counted, is an edge pixel.
+        /// For `erode`: a lit pixel with fewer lit pixels in its neighbourhood, itself included, is an edge pixel.
         @- erode_threshold: u16 = 9, ["1 to the square of `erode_size_px`"] { needs: "horace" };
     }
 }

@@ -3,8 +3,8 @@
 //! The whole picture is scanned row by row. A border begins at a lit pixel with a dark one to its left, unless this
 //! border has been followed already, and unless the scan is inside another border. Pixels in a hole are therefore
 //! ignored. The original algorithm labels the picture. Here one bit per pixel replaces the labels. A bit is set for lit
-//! pixels of a followed border with a dark pixel to their left: there the scan enters. A bit is also set for dark
-//! pixels to the right of a followed border: there the scan leaves.
+//! pixels of a followed border with a dark pixel to their left: there the scan enters the border. A bit is also set for
+//! dark pixels to the right of a followed border: there the scan leaves the border.
 //!
 //! A border along the side of the picture or along a mask is no edge. The border is split into the pieces between these
 //! parts.
@@ -107,7 +107,7 @@ pub(crate) fn each_border<T: Real, P: Pixels, O: Observer<T>>(
     Scanned::All
 }
 
-/// Whether a pixel is in the region, lit, and not masked.
+/// Returns whether a pixel is in the region, lit, and not masked.
 fn is_lit_inside<T: Real, P: Pixels, O: Observer<T>>(binary: &BinaryPicture<'_, T, P, O>, x: i32, y: i32) -> bool {
     let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { return false };
     binary.region.contains(x, y) && binary.lit(x, y)
@@ -184,7 +184,7 @@ fn follow<T: Real, P: Pixels, O: Observer<T>>(
     Some(border)
 }
 
-/// Whether the pixel is beyond the region, or bright enough to be lit but masked.
+/// Returns whether the pixel is beyond the region, or bright enough to be lit but masked.
 fn is_beyond_or_masked<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: i32,

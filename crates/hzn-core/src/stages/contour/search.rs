@@ -29,8 +29,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
     /// one start.
     ///
     /// The ring is read at every `stride`-th pixel. If the pixel differs from the one read before, all pixels between
-    /// them are read. If it is lit after dark, the pixels of the stride before are read too, because noise frays the
-    /// beginning of a wide edge.
+    /// them are read. If it is lit after dark, the pixels of the stride before are read too, because noise makes the
+    /// beginning of a wide edge irregular.
     ///
     /// The stretch of the first start leaves out the dark pixels at the end of the walk. The return value is the number
     /// of these pixels.

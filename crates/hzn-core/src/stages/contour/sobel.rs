@@ -100,7 +100,8 @@ fn gradient<T: Real, P: Pixels, O: Observer<T>>(
     Some(((ne + 2 * e + se) - (nw + 2 * w + sw), (sw + 2 * s + se) - (nw + 2 * n + ne)))
 }
 
-/// Whether the gradient is a maximum along the axis on which it is larger. Of two equal neighbours the first counts.
+/// Returns whether the gradient is a maximum along the axis on which it is larger. Of two equal neighbours the first
+/// counts.
 fn is_largest<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     x: u16,

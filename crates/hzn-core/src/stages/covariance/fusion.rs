@@ -8,8 +8,8 @@ use crate::model::error_budget::ErrorBudget;
 use crate::stages::fit;
 use crate::stages::fit::Fit;
 
-/// Fuses a fit and the covariance of its (δ₁₂, δc) with the expected half-angle, unless this half-angle is not to be
-/// used.
+/// Fuses a fit and the covariance of its (δ₁₂, δc) with the expected half-angle. The cone stays as it is if its
+/// half-angle was not fitted, or if the configuration or the body leaves the half-angle free.
 pub(super) fn fused<T: Real>(
     fit: &Fit<T>,
     p: &M3<T>,
@@ -57,7 +57,8 @@ pub(super) fn fused<T: Real>(
     })
 }
 
-/// Returns the change of the axis for δc = 1 with a fixed half-angle: Σ w Bᵀs · 1 through the normal equations.
+/// Returns the change of the axis for δc = 1 with a fixed half-angle: the solution of the normal equations for the
+/// right-hand side Σ w Bᵀs.
 pub(super) fn fixed_half_angle_gain<T: Real>(fit: &Fit<T>) -> Option<[T; 2]> {
     let (sums, mean) = (&fit.sums, fit.mean);
     let n = invert_spd2(sums.normal_fixed(mean))?;

@@ -2,8 +2,8 @@
 //!
 //! A straight edge through optics with a round blur has the brightness dim + (bright − dim) Φ((x·n − ρ)/σ), where Φ is
 //! the normal distribution. Gauss-Newton fits the offset ρ and the angle of the normal n to the 49 pixels and reaches
-//! the Cramér-Rao bound of the patch. The levels are means over the plateaus on both sides. The width σ is fitted, too,
-//! at no cost in accuracy: its derivative is odd about the edge, and the derivative of the offset is even.
+//! the Cramér-Rao bound of the patch. The levels are means over the plateaus on both sides. The width σ is fitted, too.
+//! This costs no accuracy, because the derivative by σ is odd about the edge and the derivative by the offset is even.
 
 use super::patch::{HALF, Patch, brightness};
 use crate::base::linalg::{V3, invert_spd3};

@@ -99,7 +99,7 @@ pub(super) fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
     found
 }
 
-/// Whether the border of the region and all masks are more than `margin` pixels away.
+/// Returns whether the border of the region and all masks are more than `margin` pixels away.
 #[inline(always)]
 pub(super) fn is_clear<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
@@ -115,7 +115,7 @@ pub(super) struct WideCrossing<T> {
     off: T,
     fallback: bool,
     clipped: bool,
-    /// The lit side did not level off within reach.
+    /// Whether the lit side did not level off within reach.
     rising: bool,
 }
 

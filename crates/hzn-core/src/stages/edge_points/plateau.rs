@@ -18,11 +18,11 @@ pub(super) struct Crossing<T> {
     pub(super) part: T,
     /// Twice the mid-level, in units of [`Line::smoothed`].
     pub(super) mid2: i32,
-    /// The threshold of the picture replaces the local mid-level.
+    /// Whether the threshold of the picture replaces the local mid-level.
     pub(super) fallback: bool,
-    /// The lit side is clipped at full scale.
+    /// Whether the lit side is clipped at full scale.
     pub(super) clipped: bool,
-    /// The lit side did not level off within reach.
+    /// Whether the lit side did not level off within reach.
     pub(super) rising: bool,
 }
 

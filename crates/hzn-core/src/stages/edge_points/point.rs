@@ -1,4 +1,4 @@
-//! An edge point, and the side on which its light is.
+//! An edge point with its lit side.
 
 use crate::base::real::Real;
 use crate::geometry::block::Lit;
@@ -7,11 +7,11 @@ use crate::geometry::pixel::{ImagePoint, Pixel};
 /// An edge point.
 pub(super) struct EdgePoint<T> {
     pub(super) point: ImagePoint<T>,
-    /// Side on which the light is.
+    /// The side of the point that is lit.
     pub(super) lit: Lit,
-    /// The point is at the threshold of the picture, because no local mid-level was found.
+    /// Whether the point is at the threshold of the picture, because no local mid-level was found.
     pub(super) fallback: bool,
-    /// The lit side is clipped at full scale, so that half of its brightness is not half of the light.
+    /// Whether the lit side is clipped at full scale, so that half of its brightness is not half of the light.
     pub(super) clipped: bool,
 }
 
@@ -22,8 +22,8 @@ impl<T> EdgePoint<T> {
     }
 }
 
-/// Returns the side of the light along the axis of the larger component, and the step (dx, dy) towards the dark. The
-/// result is `None` if the gradient is zero.
+/// Returns the lit side along the axis of the larger component, and the step (dx, dy) towards the dark. The result is
+/// `None` if the gradient is zero.
 pub(super) fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
     if gx == 0 && gy == 0 {
         return None;

@@ -38,7 +38,7 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
         self.read(dx, dy, dx as isize * self.across + dy as isize * self.down)
     }
 
-    /// Reads the pixel at (dx, dy) from the border pixel, which is `offset` further in memory.
+    /// Reads the pixel that is (dx, dy) away from the border pixel in the picture, and `offset` away from it in memory.
     #[inline(always)]
     fn read(&self, dx: i32, dy: i32, offset: isize) -> Option<i32> {
         read::<T, P, O, FREE>(self.binary, (self.x + dx, self.y + dy), self.index.wrapping_add_signed(offset))

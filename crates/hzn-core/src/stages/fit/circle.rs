@@ -7,10 +7,10 @@
 //! counts the centre of the picture from its corner, which is half a pixel off from the centres of the pixels. Here the
 //! calibrated principal point is used.
 //!
-//! All this is right for a camera that points at the centre of the body. Off the optical axis, a limb is no circle.
-//! With an equidistant lens it is nearly one, so that the error at 25° off nadir is a tenth of a degree. In the picture
-//! of a pinhole camera it is a conic. Its circle of curvature has another centre, and the error is 6° to 25° and more,
-//! independent of noise. The method exists for comparisons.
+//! The result is right for a camera that points at the centre of the body. Off the optical axis, a limb is no circle.
+//! With an equidistant lens the limb is nearly a circle, so that the error at 25° off nadir is a tenth of a degree. In
+//! the picture of a pinhole camera the limb is a conic. Its circle of curvature has another centre, and the error is 6°
+//! to 25° and more, independent of noise. The method exists for comparisons.
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;

@@ -16,7 +16,7 @@ pub(crate) struct Fit<T> {
     pub(crate) c: T,
     /// 1 − cos of the half-angle, with the full relative precision.
     pub(crate) k: T,
-    /// The half-angle was fitted, too; otherwise it is the expected one.
+    /// Whether the half-angle was fitted, too; otherwise it is the expected one.
     pub(crate) free: bool,
     /// Weighted RMS distance of the points from the limb in pixels.
     pub(crate) rms_px: T,

@@ -4,7 +4,7 @@
 //! On the plane z = 1 the limb of a sphere is A x² + B xy + C y² + D x + E y + F = 0. Least squares give the
 //! coefficients under the constraint that the curve *is* an ellipse, 4AC − B² = 1, or a hyperbola, 4AC − B² = −1
 //! (Fitzgibbon et al. 1999; O'Leary & Zsombor-Murray 2004). One eigenvalue problem gives both, and the curve closer to
-//! the points is used. A parabola is between the two, and is fitted as either.
+//! the points is used. A parabola is between the two, and is fitted as an ellipse or as a hyperbola.
 //!
 //! As a quadratic form of rays, the conic is the cone e eᵀ − cos²α I times any factor. One eigenvalue has a sign that
 //! the other two do not have; its eigenvector is the axis. The eigenvalues have the ratio sin²α to −cos²α. The printed

@@ -7,7 +7,7 @@
 //!
 //! * `tls` (10-17): v has the length 1 and the smallest Σ (e·v)². It is the right singular vector of the smallest
 //!   singular value. Wang et al. divide by v₆ to have five unknowns, which fails for M₃₃ → 0, a limb through the image
-//!   centre. The vector v equals their solution where they have one.
+//!   centre. The vector v equals their solution where their solution exists.
 //! * `wtls` (18-21): the error of each point is weighed by the effect of one pixel on it. This minimises Σ (e·v)²/q
 //!   with q = |∂(e·v)/∂(u, v)|². Their cofactor matrix has (5n)² elements. The points are independent, so that the
 //!   matrix has one block for each point, and each iteration is one pass. It solves least squares of the rows e − δ,
@@ -32,7 +32,7 @@ pub(crate) struct Quadric<T> {
     pub(super) c: T,
     /// The six unknowns, as a vector of length 1.
     v: [T; N],
-    /// The points were weighed by the errors of their pixels.
+    /// Whether the points were weighed by the errors of their pixels.
     weighted: bool,
     /// Change of the axis (along the two vectors of `basis(e)`) and of `c` per unit of each of the six normal
     /// equations.

@@ -1,5 +1,5 @@
-//! Band gate: a band has sky on both sides, for example a ring, a streak or the frame of a window. Inside a limb is the
-//! body.
+//! Band gate: a band has sky on both sides, for example a ring, a streak or the frame of a window. A limb has the body
+//! inside. From some inliers, the gate reads the brightness along lines inwards.
 
 use super::places::{MAX_PLACES, inliers};
 use super::sky;
@@ -12,11 +12,12 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
-/// Number of places that are read from the limb inwards to the border of the region, evenly distributed.
+/// Number of places that are read along a line, evenly from the limb to the border of the region.
 const PLACES: i32 = 16;
-/// Shortest look that counts, in pixels.
+/// Shortest line that counts, in pixels.
 const SHORTEST_PX: i32 = 32;
-/// A look ends before the far side of the body's disc, at this part of the diameter.
+/// Largest length of a line as a part of the diameter of the body's disc. The line ends before the far side of the
+/// disc.
 const ACROSS: f64 = 0.8;
 /// Distance to each side over which the step of the limb, and that of the far edge of a band, is read, in pixels.
 const ASIDE_PX: i32 = 6;
@@ -27,7 +28,7 @@ const MIN_SKY_SHARE: [usize; 2] = [2, 3];
 /// allows for blur and stray light.
 const SKY_PART: f64 = 0.1;
 
-/// Returns the part of the looks inwards that come back to the sky across a second edge, 0 to 1. The step of this edge
+/// Returns the part of the lines inwards that come back to the sky across a second edge, 0 to 1. The step of this edge
 /// must be at least `step` times that of the limb. A terminator fades and is no edge. `disc_px` is the diameter of the
 /// body's disc in pixels.
 pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
@@ -48,7 +49,7 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
     T::from_i32(bands) / T::from_i32(looks.max(1))
 }
 
-/// Returns whether the look inwards from one inlier comes back to the sky across a second edge; `None` if the picture
+/// Returns whether the line inwards from one inlier comes back to the sky across a second edge; `None` if the picture
 /// does not show enough of the body there.
 #[inline(always)]
 fn comes_back<T: Real, P: Pixels, O: Observer<T>>(

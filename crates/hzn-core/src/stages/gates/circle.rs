@@ -68,7 +68,7 @@ impl<T: Real> Circle<T> {
     }
 }
 
-/// Returns the weighted RMS distance of the points from the best circle, in pixels; `None` if there is no such circle.
+/// Returns the weighted RMS distance of the points from the best circle, in pixels; `None` if no circle fits.
 pub(super) fn rms<T: Real>(shape: &Shape<T>) -> Option<T> {
     let count = shape.len();
     let at = |i: usize| shape.get(i).map(|p: &Place<T>| p.at);

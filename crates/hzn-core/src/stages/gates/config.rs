@@ -13,7 +13,7 @@ section! {
         @110 min_inliers: u16 = 24, [8.0 or more];
         /// Shortest length of edge that inliers must cover, px.
         ///
-        /// Shorter edges fit many curves.
+        /// Many curves fit a shorter edge.
         @111 min_arc_px: Option<f64> = None, [0.0 to 1e6] {
             unset: "a tenth of the diagonal, or a third of the body's circumference if less",
             example: "60.0",
@@ -43,11 +43,11 @@ section! {
         /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has other points
         /// close to it.
         @- max_nearby: f64 = 1.0 / 3.0, [0.0 to 1e6];
-        /// Where at least this part of an edge's points are inliers, the edge is not checked with `max_way`; 0 turns the
-        /// check off.
+        /// Where at least this part of an edge's points are inliers, the edge is not checked with `max_way`; 0 turns
+        /// the check off.
         @- whole_edge: f64 = 0.8, [0.0 to 1.0];
-        /// Longest path along the inliers, as a multiple of the limb that they cover, where less than `whole_edge` of the
-        /// points are inliers.
+        /// Longest path along the inliers, as a multiple of the limb that they cover, where less than `whole_edge` of
+        /// the points are inliers.
         ///
         /// A cloud's edge winds, and a part of it may lie on a limb by chance.
         @- max_way: f64 = 3.0, [1.0 to 1e6];
@@ -70,10 +70,10 @@ section! {
         @- min_evidence: f64 = 9.0, [-1e6 to 1e6];
         /// Residuals below this count as equal, px.
         ///
-        /// Sampling and interpolation leave about this residual of a perfect edge.
+        /// Sampling and interpolation cause about this residual even for a perfect edge.
         @- rival_floor_px: f64 = 0.03, [above 0.0 to 1e4];
-        /// Smallest noise of an edge in the gate of the half-angle, where its residuals are smaller than the given
-        /// noise, px; 1e4 leaves the gate to the given noise.
+        /// Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the given
+        /// noise, px; with 1e4 the gate uses the given noise.
         @- residual_floor_px: f64 = 0.1, [0.0 to 1e4];
         /// Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
         /// turns the gate off.
@@ -88,24 +88,24 @@ section! {
         @- min_support_abrupt: f64 = 0.0, [0.0 to 1.0];
         /// Largest turn between two lengths of 16 px of edge that counts as smooth, degrees.
         ///
-        /// 8 degrees are a curve of 115 px radius; corners of clouds are sharper. Room for the noise is added.
+        /// 8 degrees are a curve of 115 px radius; corners of clouds are sharper. An allowance for the noise is added.
         @- departure_turn_deg: f64 = 8.0, [0.0 to 90.0];
         /// Smallest contrast of a continuation that counts, as a part of the limb's contrast.
         ///
         /// A terminator fades; the rim of a flare does not.
         @- departure_contrast: f64 = 0.6, [0.0 to 1e6];
-        /// Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky; 1
-        /// turns the gate off.
+        /// Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky;
+        /// 1 turns the gate off.
         ///
-        /// The gate is for a body that cannot lie whole in the picture: a crescent is a band, too.
+        /// The gate is only for a body that does not fit into the picture, because a crescent is a band, too.
         @- max_band: f64 = 0.5, [0.0 to 1.0];
         /// Smallest brightness step of a second edge, as a part of the brightness step of the limb.
         @- band_step: f64 = 0.4, [above 0.0 to 1.0];
         /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
         /// deviations.
         @- max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];
-        /// Largest rate of rotation of the vehicle, degrees per second; an axis that is farther from the previous answer
-        /// is refused.
+        /// Largest rate of rotation of the vehicle, degrees per second; an axis that is farther from the previous
+        /// answer is refused.
         ///
         /// Pictures are then processed in order.
         @- max_rate_deg_s: Option<f64> = None, [above 0.0 to 1e6] { unset: "any", example: "100.0" };
@@ -141,18 +141,18 @@ section! {
         @- moon_size: [f64; 2] = [0.5, 1.1], [above 0.0 to 1e6];
         /// Largest blooming by which a Moon may exceed `moon_size`, px.
         @- moon_bloom_px: f64 = 10.0, [0.0 to 1e6];
-        /// Some of the limb of the expected half-angle about the fitted axis must lie in the picture.
+        /// Whether a part of the limb with the expected half-angle about the fitted axis must lie in the picture.
         @- limb_in_view: bool = false, ["true or false"] { needs: "dlr" };
         /// Largest mean square distance of the points from the expected conic section, focal lengths squared.
         ///
-        /// The distance is taken along the section's principal axis.
+        /// The distance is measured along the section's principal axis.
         @- max_section_residual: Option<f64> = None, [above 0.0] { needs: "dlr", unset: "any", example: "0.025" };
         /// [lowest, highest] altitude, km: the radius of the fitted circle must be that of a limb between them.
         ///
         /// At altitude 0 the limb is infinitely wide.
         @- altitude_limits_km: Option<[f64; 2]> = None, [0.0 to 1e9]
             { needs: "horace", unset: "any", example: "[0.0, 1000.0]" };
-        /// With `altitude_limits_km`: the radius may lie beyond its limits by this part of them.
+        /// With `altitude_limits_km`: the radius may lie beyond its limits by this fraction of the limits.
         @- radius_margin: f64 = 0.1, [0.0 to 1000.0] { needs: "horace" };
         /// With `altitude_limits_km`: the radius may lie beyond its limits by this length, px.
         ///

@@ -167,7 +167,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
     }
 }
 
-/// Whether the edge continues next to the cone and keeps its contrast there. There are two cases. Either the
+/// Returns whether the edge continues next to the cone and keeps its contrast there. There are two cases. Either the
 /// continuation is smooth and longer than `select.max_departure` of the longest run of inliers. Or edge points cover
 /// less than `select.min_support_abrupt` of the limb in view; then any continuation counts. `noise_px` is the noise
 /// from point to point. `support` is the part of the limb in view that edge points cover.

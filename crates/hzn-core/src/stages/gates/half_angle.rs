@@ -8,8 +8,8 @@ use crate::model::body::Expected;
 use crate::stages::covariance::{self, Fused};
 use crate::stages::fit::Fit;
 
-/// Whether the half-angles differ by more than the residuals allow. If an edge is smoother than the given noise says,
-/// its curvature is also more accurate than the given noise allows.
+/// Returns whether the half-angles differ by more than the residuals allow. If an edge is smoother than the given noise
+/// says, its curvature is also more accurate than the given noise allows.
 ///
 /// The test is (c₀ − ĉ)² / (P₃₃ + σ_c² + other given variances). P₃₃ uses the RMS of the residuals, at least
 /// `select.residual_floor_px`, and the correlation length from the length of the edge

@@ -97,13 +97,13 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support }
 }
 
-/// Whether only a part of a winding edge is on the cone: this may happen by chance.
+/// Returns whether only a part of a winding edge is on the cone; this may happen by chance.
 fn is_by_chance<T: Real>(fit: &Fit<T>, points: u32, covered_px: T, config: &Config) -> bool {
     let whole = T::from_i32(fit.inliers as i32) >= T::from_i32(points as i32) * T::from_f64(config.whole_edge);
     !whole && fit.arc_px > covered_px * T::from_f64(config.max_way)
 }
 
-/// Tests whether the sky is beyond the fitted limb, and the body is inside.
+/// Tests whether the sky is beyond the fitted limb and the body is inside it.
 fn check_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     fused: &Fused<T>,
     expected: &Expected<T>,

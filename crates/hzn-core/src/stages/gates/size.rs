@@ -17,8 +17,8 @@ pub(super) fn min_support<T>(config: &Config, expected: &Expected<T>) -> f64 {
     if whole { config.min_support.max(config.min_support_whole) } else { config.min_support }
 }
 
-/// Whether a body with a free half-angle can appear with the half-angle of cosine `c`. Other bodies always pass,
-/// because another gate compares them with the expected half-angle.
+/// Returns whether a body with a free half-angle can appear with the half-angle of cosine `c`. Other bodies always
+/// pass, because another gate compares them with the expected half-angle.
 pub(super) fn is_possible_size<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>, config: &Config) -> bool {
     let sin = (T::one() - *c * *c).max(T::ZERO).sqrt();
     let (fx, fy) = camera.focal_px();
@@ -43,8 +43,8 @@ pub(crate) fn small_disc_points<T: Real>(sin: T, camera: &Camera<T>, part: i32) 
     (around / T::from_i32(part)).to_i32().clamp(8, i32::from(u16::MAX)) as u16
 }
 
-/// Pictures with shorter sides than this are small, in pixels: an edge has fewer points there than the defaults
-/// require.
+/// A picture is small if its shorter side is below this length, in pixels. Its edges have fewer points than the
+/// defaults require.
 pub(super) const SMALL_PICTURE: u16 = 80;
 
 /// Returns one `part`-th of the shorter side of a small picture in pixels, at least 8. In a thermal array of 24 rows, a

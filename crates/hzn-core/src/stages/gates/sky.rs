@@ -11,9 +11,9 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
-/// Distance of the nearest look from the limb, in pixels; each further look is twice as far.
+/// Distance from the limb to the nearest place beyond it that is read, in pixels; each further place is twice as far.
 const NEAREST_PX: f64 = 16.0;
-/// Number of looks outwards from each inlier.
+/// Number of places that are read outwards from each inlier; the first place is the inlier itself.
 const OUTWARDS: usize = 11;
 
 /// The sky beyond a limb.

@@ -12,7 +12,8 @@ pub(super) const LEAST_CONTRAST: f64 = 0.03;
 
 pub(super) const LEAST_SPREADS: f64 = 4.0;
 
-/// Smallest contrast between the classes in counts, where `LEAST_SPREADS` decides. A smaller contrast can be rounding.
+/// Smallest contrast between the classes in counts, where `LEAST_SPREADS` decides. A smaller contrast can result from
+/// rounding.
 pub(super) const LEAST_COUNTS: f64 = 4.0;
 
 /// Number of pixels per brightness. The bins are as narrow as the range of the sample allows, because a picture with 16

@@ -2,7 +2,7 @@
 //!
 //! The picture is cut into equal cells, and one pixel is drawn at random in each cell. The sample is therefore both
 //! even and random. A small body may be missed: then the histogram of the sample has no second class. In this case a
-//! second sample, sixteen times finer, is taken.
+//! second sample is drawn, which is sixteen times finer.
 
 mod histogram;
 mod level;
@@ -23,11 +23,11 @@ pub(crate) use level::fixed_level;
 pub(crate) use sample::RowSampler;
 use sample::{SIDES_LOG2, SIGMA_PER_MEAN_DISTANCE, Sample};
 
-/// Finds the threshold. `last` is the threshold that the previous picture gives, for `track`.
+/// Finds the threshold. `last` is the threshold that the previous picture proposes, for `track`.
 ///
 /// # Errors
-/// `too-dark` or `too-bright` if the mean is outside of the gate. `no-limb` if dark and lit differ by less than 3 % of
-/// full scale and by less than the noise of the sample explains.
+/// Returns `too-dark` or `too-bright` if the mean is outside of the gate. Returns `no-limb` if dark and lit differ by
+/// less than 3 % of full scale and the noise of the sample explains the difference.
 pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,
     region: &Region<T>,

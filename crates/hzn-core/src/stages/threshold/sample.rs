@@ -1,4 +1,4 @@
-//! The sparse sample of a picture, of a whole picture or row by row.
+//! The sparse sample of a picture that is in memory or arrives row by row.
 
 use super::histogram::{BINS, Histogram};
 use super::level::{Level, counts, fixed_level};
@@ -50,7 +50,7 @@ impl RowSampler {
     }
 }
 
-/// A sample that is still being taken, from one row after another.
+/// A sample that is not complete yet. Its rows come one after another.
 #[derive(Debug)]
 pub(super) struct Sample {
     pub(super) histogram: Histogram,
@@ -81,8 +81,8 @@ impl Sample {
         (self.cells < 1 << self.side_log2).then_some(self.y)
     }
 
-    /// Samples that row. All cells of a row of cells use one row of the picture, because each row of the picture is on
-    /// another page of memory.
+    /// Samples the row that [`Self::row`] returns. All cells of a row of cells use one row of the picture, because each
+    /// row of the picture is on another page of memory.
     pub(super) fn take<T: Real, O: Observer<T>>(
         &mut self,
         region: &Region<T>,
