@@ -86,7 +86,6 @@ fn run(options: &Options) -> Result<(), String> {
     let json = serde_json::to_string_pretty(&results).map_err(|e| e.to_string())?;
     std::fs::write(folder.join("results.json"), json).map_err(text)?;
     if options.only.is_none() {
-        std::fs::create_dir_all("docs").map_err(text)?;
         std::fs::write("book/results/benchmarks.md", table::markdown(&results)).map_err(text)?;
     }
     Ok(())
