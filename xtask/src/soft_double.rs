@@ -26,24 +26,24 @@ const STAGES: [&str; 11] = [
 /// Functions that convert values of the configuration to single precision, once per picture or per candidate. Each has
 /// the number of places that may do so.
 const ALLOWED_CONVERSIONS: [(&str, usize); 15] = [
-    ("hzn_core::pipeline::search::Search<T,O>::candidate::{{closure}}", 34),
-    ("hzn_core::pipeline::search::Search<T,O>::piece", 36),
-    ("hzn_core::stages::consensus::Threshold<T>::new", 3),
-    ("hzn_core::stages::consensus::keep", 2),
+    ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::candidate::{{closure}}", 34),
+    ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::judge_edge", 36),
+    ("hzn_core::stages::consensus::inliers::Threshold<T>::new", 3),
+    ("hzn_core::stages::consensus::find", 2),
     ("hzn_core::stages::covariance::fuse", 5),
     ("hzn_core::stages::fit::fit", 4),
     ("hzn_core::stages::gates::attitude::verdict", 4),
-    ("hzn_core::stages::gates::blooms_to", 7),
     ("hzn_core::stages::gates::judge", 18),
-    ("hzn_core::stages::gates::min_arc", 1),
-    ("hzn_core::stages::gates::rivals", 14),
-    ("hzn_core::stages::gates::surroundings", 7),
-    ("hzn_core::stages::threshold::Histogram::mean", 2),
-    ("hzn_core::stages::threshold::Histogram::otsu", 3),
-    ("hzn_core::stages::threshold::fixed_level", 4),
+    ("hzn_core::stages::gates::judge_rivals", 14),
+    ("hzn_core::stages::gates::judge_surroundings", 7),
+    ("hzn_core::stages::gates::size::is_possible_size", 7),
+    ("hzn_core::stages::gates::size::min_arc", 1),
+    ("hzn_core::stages::threshold::histogram::Histogram::mean", 2),
+    ("hzn_core::stages::threshold::histogram::Histogram::otsu", 3),
+    ("hzn_core::stages::threshold::level::fixed_level", 4),
 ];
 /// Loops that must be found in the image; without them the check would prove nothing.
-const LOOPS: [&str; 3] = ["contour::follow", "edge_points::", "fit::pass"];
+const LOOPS: [&str; 3] = ["contour::follow", "edge_points::", "fit::sums::pass"];
 
 /// Checks an image for a core that has single precision only.
 pub(crate) fn check(image: &Path) -> Outcome {
@@ -100,11 +100,11 @@ mod tests {
 
     #[test]
     fn calls_are_counted_by_function() {
-        let text = "00000400 <hzn_core::consensus::keep>:\n     400:\tbl\t28642 <__aeabi_dmul>\n     404:\tb.w\t100 \
+        let text = "00000400 <hzn_core::consensus::find>:\n     400:\tbl\t28642 <__aeabi_dmul>\n     404:\tb.w\t100 \
                     <__aeabi_f2d>\n\
-                    \n00000500 <other>:\n     500:\tbl\t400 <hzn_core::consensus::keep>\n     504:\tbl\t3 \
+                    \n00000500 <other>:\n     500:\tbl\t400 <hzn_core::consensus::find>\n     504:\tbl\t3 \
                     <__aeabi_fadd>\n";
         let calls = calls_by_function(text);
-        assert_eq!(calls, [("hzn_core::consensus::keep".to_owned(), 2), ("other".to_owned(), 0)].into());
+        assert_eq!(calls, [("hzn_core::consensus::find".to_owned(), 2), ("other".to_owned(), 0)].into());
     }
 }

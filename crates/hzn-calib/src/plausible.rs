@@ -184,8 +184,8 @@ fn half_width_deg(c: &camera::Config) -> Option<f64> {
     }
 }
 
-/// Returns the same as [`half_width_deg`], for a lens without coefficients. A lens with equations of its own counts as one
-/// that is linear in the angle.
+/// Returns the same as [`half_width_deg`], for a lens without coefficients. A lens with equations of its own counts as
+/// one that is linear in the angle.
 fn linear_half_width_deg(c: &camera::Config) -> f64 {
     let half = f64::from(c.width) / 2.0 / c.fx_px;
     if c.model.is_planar() { half.atan().to_degrees() } else { half.to_degrees() }

@@ -81,7 +81,7 @@ fn recover_on_a_full_disk_says_what_there_is() {
     let before = std::fs::read(place.path("a.mcap.part")).unwrap();
     std::os::unix::fs::symlink("/dev/full", place.path("a.recovering.mcap.part")).unwrap();
     let ran = place.run(&["recover", "a.mcap.part"]).expect(1);
-    assert!(ran.err.contains("no space left") && ran.err.contains("a.mcap.part is unchanged"), "{}", ran.err);
+    assert!(ran.err.contains("no space is left") && ran.err.contains("a.mcap.part is unchanged"), "{}", ran.err);
     assert!(!ran.err.contains("--resume"));
     assert_eq!(std::fs::read(place.path("a.mcap.part")).unwrap(), before);
 }

@@ -13,7 +13,7 @@ fn a_full_disk_is_reported() {
     std::os::unix::fs::symlink("/dev/full", place.path("a.csv.part")).unwrap();
     place.run(&["run", "in", "-o", "a.csv", "--force"]).expect(1).says("the disk is full");
     std::os::unix::fs::symlink("/dev/full", place.path("a.mcap.part")).unwrap();
-    place.run(&["run", "in", "-o", "a.mcap", "--force"]).expect(1).says("no space left").says("--resume");
+    place.run(&["run", "in", "-o", "a.mcap", "--force"]).expect(1).says("no space is left").says("resume the run");
     std::os::unix::fs::symlink("/dev/full", place.path("o.png")).unwrap();
     place.run(&["explain", "in/0000.png", "--overlay", "o.png", "--force"]).expect(1).says("the disk is full");
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();

@@ -21,7 +21,7 @@ pub enum Error {
     /// The disk is full.
     #[error(
         "no space is left on the disk of {}: free some space, or write elsewhere; finished frames are kept in {}, and \
-         --resume continues from there",
+         resume the run to continue from there",
         folder.display(), part.display()
     )]
     DiskFull {

@@ -157,8 +157,8 @@ pub(super) fn flight(effort: &Effort) -> anyhow::Result<Section> {
          off nadir: 384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb \
          half-level 25 km ± 4.5 km over latitude with a scale of 4 km, cold clouds, blur 1 px, noise 2 %, 16 bits. \
          Goals: 0.04° RMS to 90°, 0.08° beyond; with the height by latitude and an attitude to 5°, 0.015° and 0.03°; \
-         NEES 1 to 4. The sensor has values that were measured on {FIT_PICTURES} pictures of other seeds: {measured}; a \
-         sensor with one height has ± {COMMON_HEIGHT_SIGMA_KM} km. The sensor.toml of the scene has the height by \
+         NEES 1 to 4. The sensor has values that were measured on {FIT_PICTURES} pictures of other seeds: {measured}; \
+         a sensor with one height has ± {COMMON_HEIGHT_SIGMA_KM} km. The sensor.toml of the scene has the height by \
          latitude."
     ));
     s.text(OTHER_SEEDS);

@@ -78,7 +78,7 @@ fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> 
         hzn_mcap::Error::DiskFull { folder, .. } => {
             let what = "free some space, or choose another folder with -o";
             failed(format!(
-                "no space left on the disk of {}: {what}; {} is unchanged",
+                "no space is left on the disk of {}: {what}; {} is unchanged",
                 folder.display(),
                 file.display()
             ))

@@ -61,8 +61,8 @@ impl fmt::Display for Limit {
             Self::Between(a, b) => write!(f, "must be between {a} and {b}"),
             Self::Monotone(deg) => write!(
                 f,
-                "the lens is monotone only up to {deg:.2} degrees off axis, and pixels beyond that angle have no unique \
-                 ray; set camera.theta_max_deg to {:.2} or less, or correct camera.k",
+                "the lens is monotone only up to {deg:.2} degrees off axis, and pixels beyond that angle have no \
+                 unique ray; set camera.theta_max_deg to {:.2} or less, or correct camera.k",
                 deg - 2.0
             ),
             Self::Rule(text) => f.write_str(text),

@@ -187,8 +187,8 @@ impl Scenario {
         }
         let name = kind.name();
         let what = format!(
-            "no picture shows a lit limb of the {name}: check the off-nadir angle, the field of view, and the time of day \
-             (utc)"
+            "no picture shows a lit limb of the {name}: check the off-nadir angle, the field of view, and the time of \
+             day (utc)"
         );
         Err(ScenarioError::new("[attitude]", what))
     }

@@ -101,7 +101,7 @@ mod tests {
         let mut store = Store::default();
         let place = Place::File(path.clone());
         let why = store.get(0, &place).unwrap_err();
-        assert!(why.contains("no picture"), "{why}");
+        assert!(why.contains("not a picture"), "{why}");
         assert!(store.has(0));
         assert_eq!(store.get(1, &Place::File(dir.path().join("b.png"))).unwrap_err(), "no such file");
         assert!(store.get(2, &Place::Nowhere).is_err());

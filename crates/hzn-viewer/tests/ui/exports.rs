@@ -186,7 +186,7 @@ fn a_full_disk_is_said_and_the_rest_goes_on() {
         path(window, &dir.path().join(name), "Write");
         said(window, words);
         let bad: Vec<String> = window.state().messages().filter(|m| m.contains(name)).map(str::to_owned).collect();
-        assert!(bad.iter().any(|m| m.contains("full") || m.contains("no space left")), "{bad:?}");
+        assert!(bad.iter().any(|m| m.contains("full") || m.contains("no space is left")), "{bad:?}");
     };
 
     full("a.part.png");
@@ -207,7 +207,7 @@ fn a_full_disk_is_said_and_the_rest_goes_on() {
     // A recording keeps its finished pictures, and the message says where.
     full("e.mcap.part");
     window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::P);
-    write(&mut window, "e.mcap", "no space left on the disk");
+    write(&mut window, "e.mcap", "no space is left on the disk");
     assert!(!dir.path().join("e.mcap").exists());
 
     window.key_press(Key::ArrowRight);
@@ -228,7 +228,7 @@ fn what_cannot_be_recovered_for_want_of_space_stays_open() {
     settled(&mut window);
     std::os::unix::fs::symlink("/dev/full", dir.path().join("cut-recovered.mcap.part")).unwrap();
     window.get_by_label("Recover it").click();
-    said(&mut window, "no space left on the disk");
+    said(&mut window, "no space is left on the disk");
     assert_eq!(window.state().sequence().title, "cut.mcap");
     assert_eq!(files(dir.path()), ["cut.mcap", "pictures", "run.mcap"]);
     // If the name is taken, recovery takes another name.

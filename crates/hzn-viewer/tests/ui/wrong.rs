@@ -25,7 +25,7 @@ fn wrong_files_are_said_and_the_rest_goes_on() {
     assert_eq!(answer(&window).0, Status::Ok);
     window.key_press(Key::ArrowRight);
     settled(&mut window);
-    assert!(frame_view(&window).picture.as_ref().is_err_and(|why| why.contains("no picture")));
+    assert!(frame_view(&window).picture.as_ref().is_err_and(|why| why.contains("not a picture")));
     assert!(window.query_by_label("unreadable").is_some());
     window.key_press(Key::ArrowRight);
     settled(&mut window);

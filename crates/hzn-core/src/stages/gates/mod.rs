@@ -84,14 +84,14 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     {
         Verdict::Indistinct
     } else {
-        check_surroundings(fused, expected, blocks, binary, camera, config)
+        judge_surroundings(fused, expected, blocks, binary, camera, config)
     };
     let verdict = match verdict {
         Verdict::Passed => attitude::verdict(&fused.e, sigma_max_rad, expected, config),
         failed => failed,
     };
     let verdict = match verdict {
-        Verdict::Passed => check_rivals(fit, fused, expected, blocks, points, support, binary, camera, config),
+        Verdict::Passed => judge_rivals(fit, fused, expected, blocks, points, support, binary, camera, config),
         failed => failed,
     };
     Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support }
@@ -104,7 +104,7 @@ fn is_by_chance<T: Real>(fit: &Fit<T>, points: u32, covered_px: T, config: &Conf
 }
 
 /// Tests whether the sky is beyond the fitted limb and the body is inside it.
-fn check_surroundings<T: Real, P: Pixels, O: Observer<T>>(
+fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     fused: &Fused<T>,
     expected: &Expected<T>,
     blocks: &[Block<T>],
@@ -133,7 +133,7 @@ fn check_surroundings<T: Real, P: Pixels, O: Observer<T>>(
 
 /// Tests whether the points belong to another curve. They pass if they fit the cone as well as other shapes, if they
 /// agree with its half-angle within their own noise, and if the edge does not continue next to the cone.
-fn check_rivals<T: Real, P: Pixels, O: Observer<T>>(
+fn judge_rivals<T: Real, P: Pixels, O: Observer<T>>(
     fit: &Fit<T>,
     fused: &Fused<T>,
     expected: &Expected<T>,
