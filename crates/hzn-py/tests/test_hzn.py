@@ -381,5 +381,5 @@ def test_a_camera_below_the_limb_height_gets_a_report():
 def test_unused_bits_of_an_array_warn(sensor):
     words = limb().astype(np.uint16)
     assert sensor.process(words).ok and sensor.process(words, bits=8).ok
-    with pytest.warns(UserWarning, match="samples reach 200 of 65535"):
+    with pytest.warns(UserWarning, match="the largest sample is 200 of 65535"):
         assert not sensor.process(np.full_like(words, 200)).ok

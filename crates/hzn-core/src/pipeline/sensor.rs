@@ -9,7 +9,7 @@ use crate::image::region::Region;
 use crate::model::body::{Expected, Prior, PriorError};
 
 /// A checked configuration with everything that follows from it: lens, region, mounting. It takes some kilobytes. The
-/// lists that a picture needs are in a [`Workspace`]; [`Horizon`](super::Horizon) holds both.
+/// lists that a picture needs are in a [`Workspace`](super::Workspace); [`Horizon`](super::Horizon) holds both.
 ///
 /// # Frames and units
 ///
