@@ -20,7 +20,7 @@ pub enum Error {
     },
     /// The disk is full.
     #[error(
-        "no space is left on the disk of {}: free some space, or write elsewhere; finished frames are kept in {}, and \
+        "no space is left on the disk of {}: free some space, or write elsewhere; finished frames are kept in {}; \
          resume the run to continue from there",
         folder.display(), part.display()
     )]

@@ -278,7 +278,7 @@ fn a_full_disk_is_reported_and_nothing_else_happens() {
     std::os::unix::fs::symlink("/dev/full", part_path(&path)).unwrap();
     let e = Writer::create(&path, &Options { force: true, ..options() }).unwrap_err();
     assert!(matches!(e, Error::DiskFull { .. }), "{e}");
-    assert!(e.to_string().contains("--resume") && e.to_string().contains(&*dir.path().to_string_lossy()), "{e}");
+    assert!(e.to_string().contains("resume the run") && e.to_string().contains(&*dir.path().to_string_lossy()), "{e}");
 }
 
 #[test]
