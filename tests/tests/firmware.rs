@@ -286,7 +286,7 @@ fn assert_events(printed: &str) {
         printed.contains("picture of wrong size (1000, 307200)") && printed.contains("pictures lost (3, 0)"),
         "{printed}"
     );
-    assert!(printed.contains("(set): value refused, nothing changed"), "{printed}");
+    assert!(printed.contains("(set): value refused; nothing changed"), "{printed}");
     assert!(printed.contains("standby to shut-down mode"), "{printed}");
     assert!(!printed.contains("broken packets") && !printed.contains("lost on the way"), "{printed}");
 }
