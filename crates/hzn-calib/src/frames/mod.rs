@@ -1,4 +1,4 @@
-//! `frames.csv`: what is known about every picture before it is processed.
+//! `frames.csv`: the prior of every picture.
 //!
 //! Columns are found by name. Only `file` is required; an empty cell is an unknown value.
 //!

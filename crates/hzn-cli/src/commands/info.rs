@@ -36,7 +36,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
 }
 
-/// The description of a file, and what is missing in it.
+/// The description of a file, and the parts that are missing.
 type Described = (String, Option<String>);
 
 fn recording(file: &Path) -> Result<Described, Stop> {

@@ -6,7 +6,7 @@
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
-use crate::geometry::camera::Ray;
+use crate::geometry::camera::ray::Ray;
 use crate::geometry::pixel::ImagePoint;
 
 /// Number of lanes of a block.

@@ -12,7 +12,7 @@ mod double_sphere;
 mod eucm;
 mod lens;
 mod radial;
-mod ray;
+pub(in crate::geometry) mod ray;
 mod shutter;
 mod uncertain;
 

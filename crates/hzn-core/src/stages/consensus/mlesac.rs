@@ -7,7 +7,8 @@
 
 use super::config::Config;
 use super::inliers::{Consensus, Threshold};
-use super::sampled::{MIN_DRAWS, conclude, distances2, draw_cone, required_draws};
+use super::sampled::{conclude, distances2, draw_cone, required_draws};
+use super::two_point::MIN_DRAWS;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::base::rng::Rng;

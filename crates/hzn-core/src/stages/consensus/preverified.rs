@@ -62,7 +62,7 @@ pub(super) fn find<T: Real>(
 /// Returns the cone through the first three points if the other two are on it, too.
 fn verified<T: Real>(blocks: &[Block<T>], sample: [u32; SAMPLE], limit2: T) -> Option<(V3<T>, T)> {
     let [i, j, k, m, n] = sample;
-    // A point that is draw_cone twice verifies nothing.
+    // A point that is drawn twice verifies nothing.
     if m == n || [i, j, k].contains(&m) || [i, j, k].contains(&n) {
         return None;
     }

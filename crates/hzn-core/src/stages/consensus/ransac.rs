@@ -7,7 +7,8 @@
 
 use super::config::Config;
 use super::inliers::{Consensus, Threshold};
-use super::sampled::{MIN_DRAWS, conclude, count_inliers, draw_cone, required_draws};
+use super::sampled::{conclude, count_inliers, draw_cone, required_draws};
+use super::two_point::MIN_DRAWS;
 use crate::base::real::Real;
 use crate::base::rng::Rng;
 use crate::geometry::block::Block;

@@ -1,14 +1,12 @@
 //! Common parts of the published samplers: cones through three points that are compared with every point.
 
 use super::inliers::Consensus;
+use super::two_point::MIN_DRAWS;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::base::rng::Rng;
 use crate::geometry::block::{Block, LANES, sum};
 use crate::geometry::cone::through_three;
-
-/// Smallest number of draws, even if the first one fits well.
-pub(super) const MIN_DRAWS: u32 = 6;
 
 /// Largest value of `max_draws`.
 const MOST: u32 = 100_000;

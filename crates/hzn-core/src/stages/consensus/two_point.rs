@@ -11,13 +11,13 @@ use crate::model::body::Expected;
 use crate::model::work::{DRAW, SCORE, WorkBudget};
 
 /// Largest number of blocks that are scored.
-pub(super) const SCORED: usize = 20;
+const SCORED: usize = 20;
 
 /// Smallest number of draws, even if the first one fits well.
 pub(super) const MIN_DRAWS: u32 = 6;
 
 /// Sigma of the expected half-angle in radians.
-pub(super) fn sigma_alpha<T: Real>(expected: &Expected<T>) -> T {
+fn sigma_alpha<T: Real>(expected: &Expected<T>) -> T {
     expected.sigma_cos / expected.sin
 }
 
@@ -129,7 +129,7 @@ fn required_draws<T: Real>(p: T) -> u32 {
 }
 
 /// Returns the squared distance of a point from the limb, in px².
-pub(super) fn distance2<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T) -> T {
+fn distance2<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T) -> T {
     let Some(block) = blocks.get(i as usize / LANES) else { return T::from_f64(1e30) };
     let lane = i as usize % LANES;
     let r = c - block.ray(lane).dot(e);
@@ -139,7 +139,7 @@ pub(super) fn distance2<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T) -
 
 /// Returns the sum of the squared distances, each at most `limit2`, over every `scored`-th block, in px². Empty lanes
 /// count as outliers.
-pub(super) fn score<T: Real>(blocks: &[Block<T>], scored: usize, e: &V3<T>, c: T, limit2: T) -> T {
+fn score<T: Real>(blocks: &[Block<T>], scored: usize, e: &V3<T>, c: T, limit2: T) -> T {
     let mut total = [T::ZERO; LANES];
     for b in blocks.iter().step_by(scored) {
         let g = b.gradient(e);

@@ -10,17 +10,17 @@ use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
 /// Longest step of a profile, in pixels.
-pub(super) const WIDEST: i32 = 6;
+const WIDEST: i32 = 6;
 
 /// All reads are within this distance from a border pixel, in steps.
 pub(super) const MARGIN: i32 = REACH + 3;
 
 /// Distance from the border pixel towards the dark, in pixels. There, an edge at most four pixels wide has faded to
 /// half of the threshold.
-pub(super) const FADED: i32 = 3;
+const FADED: i32 = 3;
 
 /// More than the largest distance of an edge point from its border pixel, in pixels.
-pub(super) const FARTHEST: i32 = 1024;
+const FARTHEST: i32 = 1024;
 
 /// Locates the crossing of the mid-level along the axis of the larger gradient.
 #[inline(always)]
@@ -64,13 +64,13 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
 }
 
 /// Largest number of times that a profile is read again about its crossing.
-pub(super) const CLIMBS: u32 = 4;
+const CLIMBS: u32 = 4;
 
 /// Reads a profile again about its crossing, until the crossing is in the middle of the profile. This is necessary if
 /// the lit side still rises at the end of the reach. There is no plateau then, and the mid-level depends on the
 /// threshold that determined the border pixel.
 #[inline(never)]
-pub(super) fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
+fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
     (dx, dy): (i32, i32),
@@ -111,7 +111,7 @@ pub(super) fn is_clear<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 /// Crossing of the mid-level on a wide edge; `off` is its distance from the border pixel towards the dark, in pixels.
-pub(super) struct WideCrossing<T> {
+struct WideCrossing<T> {
     off: T,
     fallback: bool,
     clipped: bool,
@@ -121,7 +121,7 @@ pub(super) struct WideCrossing<T> {
 
 /// Locates the crossing like [`linear`], with steps of `step` pixels.
 #[inline(never)]
-pub(super) fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
+fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
     (dx, dy): (i32, i32),

@@ -10,7 +10,7 @@ pub(super) const REACH: i32 = 10;
 
 /// A lit plateau counts as clipped if it is at most 1/128 of full scale below full scale. This leaves room for JPEG
 /// artefacts. A bright, noisy plateau that is not clipped seldom comes so near to full scale.
-pub(super) const CLIPPED_PART: i32 = 128;
+const CLIPPED_PART: i32 = 128;
 
 /// Crossing of an edge with the mid-level.
 pub(super) struct Crossing<T> {

@@ -13,15 +13,15 @@ use crate::model::edge_noise;
 use crate::stages::consensus::Consensus;
 
 /// Tukey's constant: it gives 95 % efficiency for Gaussian errors.
-pub(super) const TUKEY: f64 = 4.685;
+const TUKEY: f64 = 4.685;
 
 /// Largest number of robust iterations. `SETTLE` is the largest number of iterations with fixed weights.
-pub(super) const ROBUST: usize = 10;
+const ROBUST: usize = 10;
 
 /// Number of blocks that the first robust iterations use.
-pub(super) const PART: usize = 24;
+const PART: usize = 24;
 
-pub(super) const SETTLE: usize = 5;
+const SETTLE: usize = 5;
 
 /// Fits the cone in robust iterations with the expected half-angle, then fits the half-angle freely with the weights
 /// that were found.
@@ -112,7 +112,7 @@ pub(super) fn robust<T: Real>(
 /// Iterates with fixed weights until convergence, and returns the normal equations there with the means about which
 /// they are formed. The result is `None` if the points do not determine the cone; for a free half-angle, this happens
 /// if the arc is too short. `first` are the sums at the start, if they are known.
-pub(super) fn settle<T: Real>(
+fn settle<T: Real>(
     blocks: &mut [Block<T>],
     start: State<T>,
     mut first: Option<Sums<T>>,
@@ -144,6 +144,6 @@ pub(super) fn settle<T: Real>(
 }
 
 /// Limits 1 − cos to its valid range.
-pub(super) fn clamp<T: Real>(k: T) -> T {
+fn clamp<T: Real>(k: T) -> T {
     k.max(T::from_f64(1e-9)).min(T::from_f64(2.0 - 1e-6))
 }

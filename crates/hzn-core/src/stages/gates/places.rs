@@ -21,7 +21,7 @@ pub(super) const MAX_PLACES: usize = 12;
 
 /// Distance from the limb at which the brightness on both sides is read for the threshold of the next picture, in
 /// pixels.
-pub(super) const PLATEAU_PX: i32 = 6;
+const PLATEAU_PX: i32 = 6;
 
 /// Returns the brightness halfway between both sides of the limb, in counts; `None` if the body is not brighter than
 /// the sky.

@@ -109,7 +109,7 @@ pub(super) fn local_noise<T: Real>(shape: &Shape<T>) -> T {
 
 /// Returns the arc over which the residuals are correlated, in points of the shape: 1 + 2 Σ ρ_k up to the first below
 /// 0.05.
-pub(super) fn correlated_points<T: Real>(shape: &Shape<T>) -> T {
+fn correlated_points<T: Real>(shape: &Shape<T>) -> T {
     let products = |lag: usize| {
         let (mut sum, mut count) = (T::ZERO, 0);
         for (a, b) in shape.iter().zip(shape.iter().skip(lag)) {

@@ -45,7 +45,7 @@ pub(crate) fn small_disc_points<T: Real>(sin: T, camera: &Camera<T>, part: i32) 
 
 /// A picture is small if its shorter side is below this length, in pixels. Its edges have fewer points than the
 /// defaults require.
-pub(super) const SMALL_PICTURE: u16 = 80;
+const SMALL_PICTURE: u16 = 80;
 
 /// Returns one `part`-th of the shorter side of a small picture in pixels, at least 8. In a thermal array of 24 rows, a
 /// limb has no more points. Other pictures have no limit.

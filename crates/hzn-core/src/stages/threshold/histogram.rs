@@ -8,13 +8,13 @@ pub(super) const BINS: usize = 256;
 /// Smallest contrast between the dark and the lit class, as a fraction of full scale. A smaller contrast also suffices
 /// if it is at least `LEAST_SPREADS` standard deviations of the dark class. Pure noise that is cut at its middle gives
 /// classes 2.7 standard deviations apart; a ramp gives 3.5.
-pub(super) const LEAST_CONTRAST: f64 = 0.03;
+const LEAST_CONTRAST: f64 = 0.03;
 
-pub(super) const LEAST_SPREADS: f64 = 4.0;
+const LEAST_SPREADS: f64 = 4.0;
 
 /// Smallest contrast between the classes in counts, where `LEAST_SPREADS` decides. A smaller contrast can result from
 /// rounding.
-pub(super) const LEAST_COUNTS: f64 = 4.0;
+const LEAST_COUNTS: f64 = 4.0;
 
 /// Number of pixels per brightness. The bins are as narrow as the range of the sample allows, because a picture with 16
 /// bits may use only a thousand counts.
