@@ -15,11 +15,19 @@ pub(super) struct Brown<T> {
     k3: T,
 }
 
+impl Brown<f64> {
+    /// Returns the lens of a calibration, which is not checked.
+    pub(super) fn of_config(config: &Config) -> Self {
+        let k = |i| config.coefficient(i);
+        Self { k1: k(0), k2: k(1), p1: k(2), p2: k(3), k3: k(4) }
+    }
+}
+
 impl<T: Real> Brown<T> {
     /// Returns the lens, ρ_max (distorted) and θ_max in radians.
     pub(super) fn try_new(config: &Config, rho_corner: f64) -> Result<(Self, f64, f64), ConfigError> {
         let k = |i| config.coefficient(i);
-        let lens = Brown { k1: k(0), k2: k(1), p1: k(2), p2: k(3), k3: k(4) };
+        let lens = Brown::of_config(config);
         // `radius` is the distorted radius as a function of the undistorted one, and `slope` is its derivative. The
         // lens ends where the slope is not positive.
         let radius = |t: f64| t * lens.factor(t * t);
@@ -67,7 +75,7 @@ impl<T: Real> Brown<T> {
     }
 
     /// Returns the derivative of [`Self::distort`]: xx, xy, yx, yy.
-    fn slope(&self, x: T, y: T) -> [T; 4] {
+    pub(super) fn slope(&self, x: T, y: T) -> [T; 4] {
         let (two, six) = (T::from_f64(2.0), T::from_f64(6.0));
         let q = x * x + y * y;
         let f = self.factor(q);
@@ -78,6 +86,20 @@ impl<T: Real> Brown<T> {
             xy,
             xy,
             f + g * y * y + six * self.p1 * y + two * self.p2 * x,
+        ]
+    }
+
+    /// Returns the derivatives of [`Self::distort`] by k1, k2, p1, p2, k3; they do not depend on the coefficients.
+    #[inline(always)]
+    pub(super) fn by_coefficients(x: T, y: T) -> [[T; 2]; 5] {
+        let two = T::from_f64(2.0);
+        let q = x * x + y * y;
+        [
+            [x * q, y * q],
+            [x * q * q, y * q * q],
+            [two * x * y, q + two * y * y],
+            [q + two * x * x, two * x * y],
+            [x * q * q * q, y * q * q * q],
         ]
     }
 

@@ -1,11 +1,8 @@
 //! `[camera]` of sensor.toml.
 
+use super::intrinsic::{Covariance, Intrinsic};
 use crate::base::error::{ConfigError, Limit, between, require};
-use crate::base::keys::{Form, Section, Value, choices, section};
-
-/// Maximum number of intrinsic parameters: two focal lengths, two coordinates of the principal point, five
-/// coefficients.
-pub(crate) const INTRINSICS: usize = 9;
+use crate::base::keys::{Section, choices, section};
 
 choices! {
     /// The projection of the lens.
@@ -48,6 +45,19 @@ impl Model {
         }
     }
 
+    /// Returns the intrinsic parameters of the lens: `fx_px`, `fy_px`, `cx_px`, `cy_px`, then the coefficients in the
+    /// order of `camera.k`.
+    pub const fn intrinsics(self) -> &'static [Intrinsic] {
+        use Intrinsic::{Alpha, Beta, CxPx, CyPx, FxPx, FyPx, K1, K2, K3, K4, P1, P2, Xi};
+        match self {
+            Self::KannalaBrandt => &[FxPx, FyPx, CxPx, CyPx, K1, K2, K3, K4],
+            Self::BrownConrady => &[FxPx, FyPx, CxPx, CyPx, K1, K2, P1, P2, K3],
+            Self::DoubleSphere => &[FxPx, FyPx, CxPx, CyPx, Xi, Alpha],
+            Self::Eucm => &[FxPx, FyPx, CxPx, CyPx, Alpha, Beta],
+            Self::Equidistant | Self::Pinhole => &[FxPx, FyPx, CxPx, CyPx],
+        }
+    }
+
     /// Returns the family of the projection. Programs that treat lenses by their family need no change for a new lens.
     pub const fn projection(self) -> Projection {
         match self {
@@ -61,38 +71,6 @@ impl Model {
     pub const fn is_planar(self) -> bool {
         matches!(self.projection(), Projection::Plane)
     }
-}
-
-/// An intrinsic parameter, with its name in sensor.toml.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-#[allow(missing_docs, reason = "the names are those of the keys")]
-pub enum Intrinsic {
-    FxPx,
-    FyPx,
-    CxPx,
-    CyPx,
-    K1,
-    K2,
-    K3,
-    K4,
-    P1,
-    P2,
-    Xi,
-    Alpha,
-    Beta,
-}
-
-/// `[camera.covariance]`: covariance of the intrinsic parameters, as a calibration program reports it.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Covariance {
-    /// The parameters of the rows and columns: `fx_px`, `fy_px`, `cx_px`, `cy_px`, and the coefficients by their names,
-    /// `k1` to `k4` of `kannala-brandt`, `k1, k2, p1, p2, k3` of `brown-conrady`. Parameters that are left out count as
-    /// exact.
-    pub order: heapless::Vec<Intrinsic, INTRINSICS>,
-    /// The matrix row by row, symmetric and positive semidefinite; in px² and the units of the coefficients.
-    pub rows: heapless::Vec<heapless::Vec<f64, INTRINSICS>, INTRINSICS>,
 }
 
 section! {
@@ -147,10 +125,6 @@ section! {
     }
 }
 
-impl Value for Covariance {
-    const FORM: Form = Form::Table;
-}
-
 /// Returns whether a value is 0; zero sigmas and a zero readout time are not written to files.
 #[cfg(feature = "serde")]
 fn is_zero(x: &f64) -> bool {
@@ -188,6 +162,35 @@ impl Config {
     /// Returns coefficient `i` (from 0), or 0 if the list ends before it.
     pub fn coefficient(&self, i: usize) -> f64 {
         self.k.get(i).copied().unwrap_or(0.0)
+    }
+
+    /// Returns an intrinsic parameter; `None` if the model does not have it.
+    pub fn intrinsic(&self, which: Intrinsic) -> Option<f64> {
+        let index = which.index_in(self.model)?;
+        Some(match index {
+            0 => self.fx_px,
+            1 => self.fy_px,
+            2 => self.cx_px,
+            3 => self.cy_px,
+            _ => self.coefficient(index - 4),
+        })
+    }
+
+    /// Sets an intrinsic parameter. A parameter that the model does not have is ignored.
+    pub fn set_intrinsic(&mut self, which: Intrinsic, value: f64) {
+        match which.index_in(self.model) {
+            Some(0) => self.fx_px = value,
+            Some(1) => self.fy_px = value,
+            Some(2) => self.cx_px = value,
+            Some(3) => self.cy_px = value,
+            Some(index) => {
+                while self.k.len() < index - 3 && self.k.push(0.0).is_ok() {}
+                if let Some(k) = self.k.get_mut(index - 4) {
+                    *k = value;
+                }
+            }
+            None => {}
+        }
     }
 
     pub(super) fn check(&self) -> Result<(), ConfigError> {

@@ -16,7 +16,7 @@ impl<T: Real> Lens<T> {
     /// derivatives by the coefficients of the lens.
     #[inline(always)]
     pub(super) fn by_coefficients(&self, s: &V3<T>) -> (T, T, [[T; 2]; 5]) {
-        let (one, two, zero) = (T::one(), T::from_f64(2.0), T::ZERO);
+        let (one, zero) = (T::one(), T::ZERO);
         match self {
             Self::Radial(lens) => {
                 let h = (s.x * s.x + s.y * s.y).sqrt();
@@ -29,16 +29,8 @@ impl<T: Real> Lens<T> {
             Self::Pinhole => (s.x / s.z, s.y / s.z, [[zero; 2]; 5]),
             Self::Brown(lens) => {
                 let (x, y) = (s.x / s.z, s.y / s.z);
-                let q = x * x + y * y;
                 let (dx, dy) = lens.distort(x, y);
-                let by_k = [
-                    [x * q, y * q],
-                    [x * q * q, y * q * q],
-                    [two * x * y, q + two * y * y],
-                    [q + two * x * x, two * x * y],
-                    [x * q * q * q, y * q * q * q],
-                ];
-                (dx, dy, by_k)
+                (dx, dy, brown::Brown::by_coefficients(x, y))
             }
         }
     }

@@ -8,16 +8,20 @@ mod config;
 mod curve;
 #[cfg(feature = "kalibr")]
 mod double_sphere;
+mod equation;
 #[cfg(feature = "kalibr")]
 mod eucm;
+mod intrinsic;
 mod lens;
 mod radial;
 pub(in crate::geometry) mod ray;
 mod shutter;
 mod uncertain;
 
-pub(crate) use config::INTRINSICS;
-pub use config::{Config, Covariance, Intrinsic, Model, Projection};
+pub use config::{Config, Model, Projection};
+pub use equation::{Equation, Projected};
+pub(crate) use intrinsic::INTRINSICS;
+pub use intrinsic::{Covariance, Intrinsic};
 use lens::Lens;
 pub use ray::Ray;
 use ray::radial_ray;

@@ -159,3 +159,39 @@ fn nonsense_is_refused_by_field() {
     assert_eq!(refused(|c| c.k.push(0.1).unwrap()), "camera.k");
     assert_eq!(refused(|c| c.theta_max_deg = Some(89.5)), "camera.theta_max_deg");
 }
+
+/// Compares the equation with the checked camera, and its derivatives with differences.
+#[test]
+fn the_equation_agrees_with_the_camera() {
+    for config in lenses() {
+        let camera = Camera::<f64>::try_new(&config).unwrap();
+        let lens = Equation::new(&config);
+        for direction in [[0.0, 0.0, 2.0], [0.3, -0.2, 1.0], [-0.4, 0.1, 0.9], [0.0, 1e-9, 1.0], [0.9, 0.4, 1.1]] {
+            let Some(point) = camera.project(&UnitVec3::try_new(direction).unwrap()) else { continue };
+            let projected = lens.project(direction).unwrap();
+            assert!((projected.point.u - point.u).abs() < 1e-9 && (projected.point.v - point.v).abs() < 1e-9);
+            let difference = |changed: &Equation, moved: [f64; 3], step: f64| {
+                let p = changed.project(moved).unwrap().point;
+                [(p.u - point.u) / step, (p.v - point.v) / step]
+            };
+            let agrees = |by: [f64; 2], expected: [f64; 2]| {
+                let error = (by[0] - expected[0]).hypot(by[1] - expected[1]);
+                assert!(error < 1e-3 * (1.0 + by[0].hypot(by[1])), "{config:?} {direction:?}: {by:?} {expected:?}");
+            };
+            for axis in 0..3 {
+                let mut moved = direction;
+                moved[axis] += 1e-6;
+                agrees([0, 1].map(|row| projected.by_direction[row][axis]), difference(&lens, moved, 1e-6));
+            }
+            for (place, which) in config.model.intrinsics().iter().enumerate() {
+                let mut changed = config.clone();
+                changed.set_intrinsic(*which, config.intrinsic(*which).unwrap() + 1e-6);
+                agrees(
+                    [0, 1].map(|row| projected.by_intrinsics[row][place]),
+                    difference(&Equation::new(&changed), direction, 1e-6),
+                );
+            }
+        }
+        assert!(lens.project([0.0; 3]).is_none());
+    }
+}

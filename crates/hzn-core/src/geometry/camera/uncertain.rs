@@ -4,7 +4,8 @@
 //! Changes of parameters are relative: those of a focal length are fractions of it, those of the principal point are in
 //! focal lengths. In these units a rectangle of the picture and a scaled picture have the same numbers.
 
-use super::config::{Config, INTRINSICS, Intrinsic, Model};
+use super::config::Config;
+use super::intrinsic::INTRINSICS;
 use crate::base::error::{ConfigError, Limit, require};
 use crate::base::real::Real;
 
@@ -102,45 +103,4 @@ fn triangle(rows: &[heapless::Vec<f64, INTRINSICS>]) -> Result<[[f64; INTRINSICS
         }
     }
     Ok(columns)
-}
-
-impl Intrinsic {
-    /// Returns the index of the parameter among those of a model; `None` if the model does not have the parameter.
-    fn index_in(self, model: Model) -> Option<usize> {
-        match self {
-            Self::FxPx => Some(0),
-            Self::FyPx => Some(1),
-            Self::CxPx => Some(2),
-            Self::CyPx => Some(3),
-            _ => model.coefficients().iter().position(|name| *name == self.name()).map(|place| 4 + place),
-        }
-    }
-
-    /// Returns the parameter's name in sensor.toml.
-    const fn name(self) -> &'static str {
-        match self {
-            Self::FxPx => "fx_px",
-            Self::FyPx => "fy_px",
-            Self::CxPx => "cx_px",
-            Self::CyPx => "cy_px",
-            Self::K1 => "k1",
-            Self::K2 => "k2",
-            Self::K3 => "k3",
-            Self::K4 => "k4",
-            Self::P1 => "p1",
-            Self::P2 => "p2",
-            Self::Xi => "xi",
-            Self::Alpha => "alpha",
-            Self::Beta => "beta",
-        }
-    }
-
-    /// Returns the size of one relative unit in the parameter's own unit.
-    fn unit(self, config: &Config) -> f64 {
-        match self {
-            Self::FxPx | Self::CxPx => config.fx_px,
-            Self::FyPx | Self::CyPx => config.fy_px,
-            _ => 1.0,
-        }
-    }
 }
