@@ -14,6 +14,7 @@
 //! suggests the nearest valid one. [`template`] is a commented sensor.toml to start from; [`keys`] describes every key.
 //! [`noise`] measures limb height and noise on the pictures of a flight.
 
+pub mod board;
 pub mod camera_file;
 mod camera_section;
 pub mod document;

@@ -1,0 +1,5 @@
+//! Calibration of a camera from pictures of a chessboard.
+
+mod layout;
+
+pub use layout::{Board, Corner, View};
