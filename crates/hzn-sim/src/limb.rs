@@ -151,11 +151,15 @@ impl<'a> ProjectedLimb<'a> {
         self.camera.project(&self.painter.to_camera(self.ray(azimuth_rad))?)
     }
 
-    /// Returns true if the point is in the picture, lit, and not behind the vehicle.
+    /// Returns true if the point is in the picture, lit, neither in the blind centre of the lens nor behind the
+    /// vehicle.
     fn is_visible(&self, azimuth_rad: f64, p: ImagePoint<f64>) -> bool {
         let (w, h) = (f64::from(self.camera.width()), f64::from(self.camera.height()));
         let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
+        let blind =
+            self.camera.blind_centre_px().is_some_and(|(c, a, b)| ((p.u - c.u) / a).hypot((p.v - c.v) / b) < 1.0);
         inside
+            && !blind
             && !self.scene.foreground.iter().any(|f| f.contains([p.u, p.v]))
             && self.painter.lit_share(self.ray(azimuth_rad)) > 0.5
     }

@@ -58,6 +58,11 @@ impl Model {
         }
     }
 
+    /// Returns the index of a parameter in [`Self::intrinsics`]; `None` if the model does not have the parameter.
+    pub(super) fn index_of(self, which: Intrinsic) -> Option<usize> {
+        self.intrinsics().iter().position(|intrinsic| *intrinsic == which)
+    }
+
     /// Returns the family of the projection. Programs that treat lenses by their family need no change for a new lens.
     pub const fn projection(self) -> Projection {
         match self {
@@ -104,6 +109,12 @@ section! {
         /// The lens must be monotone up to 2° beyond the smaller of this angle and the farthest corner.
         @13 theta_max_deg: Option<f64>, serde(default, skip_serializing_if = "Option::is_none"), [0.1 to 175.0]
             { unset: "none", example: "54.0" };
+        /// Radius of the blind centre, degrees off the optical axis; pixels nearer to the axis count as masked.
+        ///
+        /// A panoramic annular lens has one. It must be smaller than `theta_max_deg` and the angle of the farthest
+        /// corner.
+        @17 theta_min_deg: Option<f64>, serde(default, skip_serializing_if = "Option::is_none"), [0.1 to 175.0]
+            { unset: "none", example: "30.0" };
         /// 1σ of the focal length, the same for both axes, in percent; it widens the covariance.
         @14 focal_sigma_percent: f64, serde(default, skip_serializing_if = "is_zero"), [0.0 to 100.0]
             { unset: "0", example: "0.1" };
@@ -152,6 +163,7 @@ impl Config {
             cy_px: (f64::from(height) - 1.0) / 2.0,
             k: heapless::Vec::new(),
             theta_max_deg: None,
+            theta_min_deg: None,
             focal_sigma_percent: 0.0,
             centre_sigma_px: 0.0,
             covariance: None,
@@ -166,7 +178,7 @@ impl Config {
 
     /// Returns an intrinsic parameter; `None` if the model does not have it.
     pub fn intrinsic(&self, which: Intrinsic) -> Option<f64> {
-        let index = which.index_in(self.model)?;
+        let index = self.model.index_of(which)?;
         Some(match index {
             0 => self.fx_px,
             1 => self.fy_px,
@@ -178,7 +190,7 @@ impl Config {
 
     /// Sets an intrinsic parameter. A parameter that the model does not have is ignored.
     pub fn set_intrinsic(&mut self, which: Intrinsic, value: f64) {
-        match which.index_in(self.model) {
+        match self.model.index_of(which) {
             Some(0) => self.fx_px = value,
             Some(1) => self.fy_px = value,
             Some(2) => self.cx_px = value,

@@ -8,9 +8,9 @@ use crate::geometry::pixel::ImagePoint;
 
 /// The equation of a lens: from a direction to an image point, with all derivatives.
 ///
-/// A [`Camera`](super::Camera) is checked and has limits: its lens must be monotone, and it has no rays beyond the image
-/// circle. The steps of a fit may leave these limits and return, so a fit needs the equation alone. Build a `Camera`
-/// from the result to check it.
+/// A [`Camera`](super::Camera) is checked and has limits: its lens must be monotone, and it has no rays beyond the
+/// image circle. The steps of a fit may leave these limits and return, so a fit needs the equation alone. Build a
+/// `Camera` from the result to check it.
 ///
 /// # Example
 ///

@@ -1,6 +1,5 @@
 //! The intrinsic parameters of a lens, and their covariance.
 
-use super::config::{Config, Model};
 use crate::base::keys::{Form, Value};
 
 /// Maximum number of intrinsic parameters: two focal lengths, two coordinates of the principal point, five
@@ -44,11 +43,6 @@ impl Value for Covariance {
 }
 
 impl Intrinsic {
-    /// Returns the index of the parameter among those of a model; `None` if the model does not have the parameter.
-    pub(super) fn index_in(self, model: Model) -> Option<usize> {
-        model.intrinsics().iter().position(|intrinsic| *intrinsic == self)
-    }
-
     /// Returns the parameter's name in sensor.toml.
     pub const fn name(self) -> &'static str {
         match self {
@@ -65,15 +59,6 @@ impl Intrinsic {
             Self::Xi => "xi",
             Self::Alpha => "alpha",
             Self::Beta => "beta",
-        }
-    }
-
-    /// Returns the size of one relative unit in the parameter's own unit.
-    pub(super) fn unit(self, config: &Config) -> f64 {
-        match self {
-            Self::FxPx | Self::CxPx => config.fx_px,
-            Self::FyPx | Self::CyPx => config.fy_px,
-            _ => 1.0,
         }
     }
 }

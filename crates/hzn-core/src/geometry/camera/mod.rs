@@ -73,6 +73,9 @@ pub struct Camera<T> {
     /// Largest angle off axis at which the lens is used, radians.
     theta_max: T,
     circle: bool,
+    /// Distance from the principal point up to which the centre is blind, in units of the focal length; 0 for a lens
+    /// without a blind centre.
+    rho_min: T,
     lens: Lens<T>,
     /// Uncertainty of the calibration, as 1-sigma modes.
     modes: uncertain::Modes<T>,
@@ -122,6 +125,13 @@ impl<T: Real> Camera<T> {
                 (Lens::Radial(lens), rho, theta)
             }
         };
+        let rho_min = c.theta_min_deg.map_or(Ok(0.0), |deg| {
+            let rule = Limit::Rule("must be smaller than theta_max_deg and than the angle of the farthest corner");
+            require(deg.to_radians() < theta_max, "camera.theta_min_deg", deg, rule)?;
+            let (sin, cos) = libm::sincos(deg.to_radians());
+            let edge = Equation::new(c).project([sin, 0.0, cos]);
+            Ok(edge.map_or(0.0, |edge| ((edge.point.u - c.cx_px) / c.fx_px).abs()))
+        })?;
         Ok(Self {
             width: c.width,
             height: c.height,
@@ -134,6 +144,7 @@ impl<T: Real> Camera<T> {
             rho_max: T::from_f64(rho_max),
             theta_max: T::from_f64(theta_max),
             circle: rho_max < rho_corner * (1.0 - 1e-6),
+            rho_min: T::from_f64(rho_min),
             lens,
             modes: uncertain::modes(c)?,
             row_s: T::from_f64(c.readout_s / (f64::from(c.height) - 1.0)),
@@ -177,6 +188,11 @@ impl<T: Real> Camera<T> {
     /// Returns the image circle when it cuts the picture: centre (u, v) and semi-axes along x and y, in pixels.
     pub fn image_circle_px(&self) -> Option<(ImagePoint<T>, T, T)> {
         self.circle.then(|| (ImagePoint { u: self.cx, v: self.cy }, self.rho_max * self.fx, self.rho_max * self.fy))
+    }
+    /// Returns the blind centre of the lens (`theta_min_deg`), if it has one: centre (u, v) and semi-axes along x and
+    /// y, in pixels. A panoramic annular lens shows nothing there, or a picture that does not follow its equation.
+    pub fn blind_centre_px(&self) -> Option<(ImagePoint<T>, T, T)> {
+        (self.rho_min > T::ZERO).then(|| (self.principal_point(), self.rho_min * self.fx, self.rho_min * self.fy))
     }
     /// Returns the focal lengths (fx, fy) in pixels.
     pub fn focal_px(&self) -> (T, T) {

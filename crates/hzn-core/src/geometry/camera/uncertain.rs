@@ -5,7 +5,7 @@
 //! focal lengths. In these units a rectangle of the picture and a scaled picture have the same numbers.
 
 use super::config::Config;
-use super::intrinsic::INTRINSICS;
+use super::intrinsic::{INTRINSICS, Intrinsic};
 use crate::base::error::{ConfigError, Limit, require};
 use crate::base::real::Real;
 
@@ -20,7 +20,7 @@ pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
     if let Some(given) = &config.covariance {
         let order = &given.order;
         let field = "camera.covariance.order";
-        let places = order.iter().map(|i| i.index_in(config.model));
+        let places = order.iter().map(|i| config.model.index_of(*i));
         for (n, place) in places.clone().enumerate() {
             let rule = "this lens model does not have the parameter";
             require(place.is_some(), field, n as f64, Limit::Rule(rule))?;
@@ -40,7 +40,7 @@ pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
             let mut mode = [T::ZERO; INTRINSICS];
             for ((value, intrinsic), place) in column.iter().zip(order).zip(places.clone()) {
                 if let Some(slot) = place.and_then(|p| mode.get_mut(p)) {
-                    *slot = T::from_f64(value / intrinsic.unit(config));
+                    *slot = T::from_f64(value / unit(*intrinsic, config));
                 }
             }
             // There is room for one mode per parameter.
@@ -103,4 +103,13 @@ fn triangle(rows: &[heapless::Vec<f64, INTRINSICS>]) -> Result<[[f64; INTRINSICS
         }
     }
     Ok(columns)
+}
+
+/// Returns the size of one relative unit of a parameter, in the parameter's own unit.
+fn unit(which: Intrinsic, config: &Config) -> f64 {
+    match which {
+        Intrinsic::FxPx | Intrinsic::CxPx => config.fx_px,
+        Intrinsic::FyPx | Intrinsic::CyPx => config.fy_px,
+        _ => 1.0,
+    }
 }

@@ -1,4 +1,5 @@
-//! The region of a picture that counts: the picture, cut by the image circle and by masked polygons.
+//! The region of a picture that counts: the picture, cut by the image circle, by the blind centre of a panoramic lens
+//! and by masked polygons.
 
 mod ring;
 
@@ -10,7 +11,6 @@ use crate::base::real::Real;
 use crate::geometry::camera::{self, Camera};
 #[cfg(feature = "horace")]
 use crate::geometry::crop::Crop;
-#[cfg(feature = "horace")]
 use crate::geometry::pixel::ImagePoint;
 
 /// Maximum number of corners of one polygon.
@@ -18,7 +18,8 @@ pub const MAX_CORNERS: usize = 16;
 /// Maximum number of polygons.
 pub const MAX_POLYGONS: usize = 8;
 
-/// Width of the rim of the image circle that does not count, in pixels: blur makes the rim neither lit nor dark.
+/// Width of the rim of the image circle, and of the blind centre, that does not count, in pixels: blur makes the rim
+/// neither lit nor dark.
 const RIM_PX: f64 = 3.0;
 
 /// Corners (x, y) of a polygon in pixels; the last is joined to the first.
@@ -52,7 +53,8 @@ impl Config {
 
 /// The picture cut by the image circle, with the polygons of the mask.
 ///
-/// An edge ends where the region ends. Under a polygon no pixel is lit, and the outline of the polygon is not an edge.
+/// An edge ends where the region ends. Under a polygon and in the blind centre no pixel is lit, and the outline of both
+/// is not an edge.
 #[derive(Debug, Clone)]
 pub struct Region<T> {
     width: u16,
@@ -60,10 +62,12 @@ pub struct Region<T> {
     /// Pixels along each side of the picture that do not count.
     frame: u16,
     circle: Option<Circle<T>>,
+    /// The blind centre. Its pixels are masked.
+    blind: Option<Circle<T>>,
     polygons: heapless::Vec<Outline<T>, MAX_POLYGONS>,
 }
 
-/// The image circle: an ellipse along the axes, because fx and fy may differ.
+/// The image circle, or the blind centre: an ellipse along the axes, because fx and fy may differ.
 #[derive(Debug, Clone, Copy)]
 struct Circle<T> {
     cx: T,
@@ -83,11 +87,12 @@ struct Outline<T> {
 impl<T: Real> Region<T> {
     /// Makes the region of a checked configuration.
     pub fn new(config: &Config, camera: &Camera<T>) -> Self {
+        let rim = T::from_f64(RIM_PX);
         let circle = camera
             .image_circle_px()
-            .map(|(c, x, y)| (c, x - T::from_f64(RIM_PX), y - T::from_f64(RIM_PX)))
-            .filter(|(_, x, y)| *x > T::one() && *y > T::one())
-            .map(|(c, x, y)| Circle { cx: c.u, cy: c.v, semi_x: x, inv_x: T::one() / x, inv_y: T::one() / y });
+            .filter(|(_, x, y)| *x > rim + T::one() && *y > rim + T::one())
+            .map(|(c, x, y)| Circle::new(c, x - rim, y - rim));
+        let blind = camera.blind_centre_px().map(|(c, x, y)| Circle::new(c, x + rim, y + rim));
         let mut polygons = heapless::Vec::new();
         for polygon in &config.polygons_px {
             // The items are pushed one by one: both lists have the capacity of the configuration's lists, and `collect`
@@ -104,12 +109,12 @@ impl<T: Real> Region<T> {
             }
             let _ = polygons.push(outline);
         }
-        Self { width: camera.width(), height: camera.height(), frame: 0, circle, polygons }
+        Self { width: camera.width(), height: camera.height(), frame: 0, circle, blind, polygons }
     }
 
     /// Makes the region of a whole picture without mask.
     pub fn whole(width: u16, height: u16) -> Self {
-        Self { width, height, frame: 0, circle: None, polygons: heapless::Vec::new() }
+        Self { width, height, frame: 0, circle: None, blind: None, polygons: heapless::Vec::new() }
     }
 
     /// Returns the region without a frame of `px` pixels along each side of the picture. The frame must be narrower
@@ -150,14 +155,16 @@ impl<T: Real> Region<T> {
             corners.iter_mut().for_each(|c| *c = place(*c));
             let _ = polygons.push(Outline { low: place(o.low), high: place(o.high), corners });
         }
+        let place_circle = |c: Circle<T>| {
+            let [cx, cy] = place([c.cx, c.cy]);
+            Circle { cx, cy, semi_x: c.semi_x / sx, inv_x: c.inv_x * sx, inv_y: c.inv_y * sy }
+        };
         Self {
             width: crop.width,
             height: crop.height,
             frame: 0,
-            circle: self.circle.map(|c| {
-                let [cx, cy] = place([c.cx, c.cy]);
-                Circle { cx, cy, semi_x: c.semi_x / sx, inv_x: c.inv_x * sx, inv_y: c.inv_y * sy }
-            }),
+            circle: self.circle.map(place_circle),
+            blind: self.blind.map(place_circle),
             polygons,
         }
     }
@@ -194,7 +201,7 @@ impl<T: Real> Region<T> {
     }
 
     /// Returns the number of pixels, up to `most`, that can be walked from here in any direction without leaving the
-    /// region or meeting a masked polygon. It may be lower than the true number, where a test would take longer than
+    /// region or meeting a masked pixel. It may be lower than the true number, where a test would take longer than
     /// the walk.
     #[inline(always)]
     pub(crate) fn clearance(&self, x: u16, y: u16, most: u16) -> u16 {
@@ -207,22 +214,29 @@ impl<T: Real> Region<T> {
         let clear = |n: u16| {
             let margin = T::from_i32(i32::from(n));
             self.circle.as_ref().is_none_or(|c| c.clear(x, y, margin))
-                && (self.polygons.is_empty() || self.polygons.iter().all(|p| p.clear(x, y, margin)))
+                && (!self.has_mask() || self.is_unmasked_by(x, y, margin))
         };
         [most, most / 4].into_iter().find(|&n| clear(n)).unwrap_or(0)
     }
 
-    /// Returns whether there is a polygon.
+    /// Returns whether no pixel of the square of `margin` pixels to each side is masked.
+    fn is_unmasked_by(&self, x: u16, y: u16, margin: T) -> bool {
+        self.blind.as_ref().is_none_or(|c| c.is_outside(x, y, margin))
+            && self.polygons.iter().all(|p| p.clear(x, y, margin))
+    }
+
+    /// Returns whether there is a polygon or a blind centre.
     pub(crate) fn has_mask(&self) -> bool {
-        !self.polygons.is_empty()
+        !self.polygons.is_empty() || self.blind.is_some()
     }
     /// Returns the largest cost to test whether a pixel is masked, in the unit of [`crate::model::work`]. One unit is
     /// four sides of a polygon.
     pub(crate) fn mask_cost(&self) -> u32 {
-        self.polygons.iter().map(|p| 1 + p.corners.len() as u32 / 4).sum()
+        let polygons: u32 = self.polygons.iter().map(|p| 1 + p.corners.len() as u32 / 4).sum();
+        polygons + u32::from(self.blind.is_some())
     }
 
-    /// Returns whether a polygon covers the pixel.
+    /// Returns whether a polygon or the blind centre covers the pixel.
     #[inline(always)]
     pub fn masked(&self, x: u16, y: u16) -> bool {
         self.has_mask() && self.covered(x, y)
@@ -239,7 +253,7 @@ impl<T: Real> Region<T> {
     #[inline(never)]
     fn covered(&self, x: u16, y: u16) -> bool {
         let p = [T::from_i32(i32::from(x)), T::from_i32(i32::from(y))];
-        self.polygons.iter().any(|polygon| polygon.covers(p))
+        self.blind.as_ref().is_some_and(|c| c.contains(x, y)) || self.polygons.iter().any(|polygon| polygon.covers(p))
     }
 
     /// Returns the first and last column of a row; `None` if the image circle leaves nothing of the row.
@@ -280,6 +294,9 @@ impl<T: Real> Region<T> {
 }
 
 impl<T: Real> Circle<T> {
+    fn new(centre: ImagePoint<T>, semi_x: T, semi_y: T) -> Self {
+        Self { cx: centre.u, cy: centre.v, semi_x, inv_x: T::one() / semi_x, inv_y: T::one() / semi_y }
+    }
     #[inline(always)]
     fn contains(&self, x: u16, y: u16) -> bool {
         self.clear(x, y, T::ZERO)
@@ -290,6 +307,13 @@ impl<T: Real> Circle<T> {
         let dx = ((T::from_i32(i32::from(x)) - self.cx).abs() + margin) * self.inv_x;
         let dy = ((T::from_i32(i32::from(y)) - self.cy).abs() + margin) * self.inv_y;
         dx * dx + dy * dy <= T::one()
+    }
+    /// Returns whether the square of `margin` pixels to each side lies outside the circle.
+    #[inline(never)]
+    fn is_outside(&self, x: u16, y: u16, margin: T) -> bool {
+        let dx = ((T::from_i32(i32::from(x)) - self.cx).abs() - margin).max(T::ZERO) * self.inv_x;
+        let dy = ((T::from_i32(i32::from(y)) - self.cy).abs() - margin).max(T::ZERO) * self.inv_y;
+        dx * dx + dy * dy > T::one()
     }
 }
 
@@ -364,6 +388,27 @@ mod tests {
         // There is clearance also between the polygons and the corners of their bounding boxes, which cover most of the
         // picture.
         assert!(clear > 400, "{clear}");
+    }
+
+    #[test]
+    fn the_blind_centre_is_masked() {
+        let lens =
+            CameraConfig { theta_min_deg: Some(20.0), ..CameraConfig::ideal(Model::Equidistant, 200, 160, 60.0) };
+        let region = Region::new(&Config::default(), &Camera::<f64>::try_new(&lens).unwrap());
+        let radius = 60.0 * 20f64.to_radians() + RIM_PX;
+        for (x, y) in (0..160u16).flat_map(|y| (0..200u16).map(move |x| (x, y))) {
+            let distance = (f64::from(x) - 99.5).hypot(f64::from(y) - 79.5);
+            assert_eq!(region.masked(x, y), distance <= radius, "{x} {y}");
+            let n = region.clearance(x, y, 6);
+            for (i, j) in (0..=2 * n).flat_map(|j| (0..=2 * n).map(move |i| (i, j))) {
+                assert!(n == 0 || !region.masked(x + i - n, y + j - n), "{x} {y}: {n}");
+            }
+        }
+        let refused = |deg| {
+            let lens = CameraConfig { theta_min_deg: Some(deg), ..lens.clone() };
+            Camera::<f64>::try_new(&lens).unwrap_err().field
+        };
+        assert_eq!([refused(150.0), refused(0.0)], ["camera.theta_min_deg"; 2]);
     }
 
     #[test]
