@@ -21,10 +21,10 @@ pub(crate) fn camera_from_file(table: &mut DeTable<'_>, text: &str, path: &Path)
         return Err(refused("must be the path of a camera file, in quotes".into()));
     };
     let name = take(camera, "camera");
-    let theta_max = take(camera, "theta_max_deg");
+    let angles = ["theta_max_deg", "theta_min_deg"].map(|key| (key, take(camera, key)));
     if let Some((key, _)) = camera.iter().find(|(key, _)| !KEYS_ALLOWED_WITH_FILE.contains(&&**key.get_ref())) {
-        let what = "cannot be next to `file`, which has the whole calibration; only camera, theta_max_deg, readout_s, \
-                    covariance and the calibration's sigmas may be";
+        let what = "cannot be next to `file`, which has the whole calibration; only camera, theta_max_deg, \
+                    theta_min_deg, readout_s, covariance and the calibration's sigmas may be";
         let field = format!("[camera] {}", key.get_ref());
         return Err(Problem::new(path, what).at_offset(text, key.span().start).in_field(field));
     }
@@ -33,7 +33,8 @@ pub(crate) fn camera_from_file(table: &mut DeTable<'_>, text: &str, path: &Path)
         return Err(refused(format!("{}: no such file (paths are relative to the sensor.toml)", file.display())));
     }
     let mut config = camera_file::load(&file, name.as_ref().and_then(|(n, _)| n.as_str()))?;
-    if let Some((value, span)) = theta_max {
+    for (key, taken) in angles {
+        let Some((value, span)) = taken else { continue };
         let number = match &value {
             DeValue::Float(x) => x.as_str().replace('_', "").parse().ok(),
             DeValue::Integer(x) => x.as_str().replace('_', "").parse().ok(),
@@ -41,9 +42,12 @@ pub(crate) fn camera_from_file(table: &mut DeTable<'_>, text: &str, path: &Path)
         };
         let Some(deg) = number else {
             let what = "must be a number of degrees";
-            return Err(Problem::new(path, what).at_offset(text, span.start).in_field("[camera] theta_max_deg"));
+            return Err(Problem::new(path, what).at_offset(text, span.start).in_field(format!("[camera] {key}")));
         };
-        config.theta_max_deg = Some(deg);
+        match key {
+            "theta_max_deg" => config.theta_max_deg = Some(deg),
+            _ => config.theta_min_deg = Some(deg),
+        }
     }
     Ok(Some(config))
 }

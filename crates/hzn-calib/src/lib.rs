@@ -14,19 +14,31 @@
 //! suggests the nearest valid one. [`template`] is a commented sensor.toml to start from; [`keys`] describes every key.
 //! [`noise`] measures limb height and noise on the pictures of a flight.
 
+mod adjust;
 pub mod board;
+mod calibrated;
 pub mod camera_file;
 mod camera_section;
+pub mod corners;
 pub mod document;
+#[cfg(test)]
+mod draws;
+mod finish;
 pub mod frames;
+mod ideal;
 pub mod keys;
+pub mod lens_error;
 mod located;
 mod merge;
 mod nearest;
 pub mod noise;
 pub mod plausible;
+pub mod points;
 mod problem;
+mod robust;
 pub mod sensor;
+pub mod sky;
+mod staged;
 pub mod start;
 pub mod template;
 pub mod time;

@@ -43,3 +43,29 @@ impl Board {
         [f64::from(column) * self.square_mm, f64::from(row) * self.square_mm]
     }
 }
+
+/// A point of a flat target in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanarPoint {
+    /// Place on the target (x, y), in millimetres. When x points right and y down, the target is seen from the front.
+    pub place_mm: [f64; 2],
+    /// Place in the picture (u, v), in pixels.
+    pub at_px: [f64; 2],
+}
+
+/// The points of a flat target that one picture shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanarView {
+    /// Name of the picture.
+    pub name: String,
+    /// The points.
+    pub points: Vec<PlanarPoint>,
+}
+
+impl View {
+    /// Returns the view with the places of the corners on the board.
+    pub fn to_planar(&self, board: &Board) -> PlanarView {
+        let point = |c: &Corner| PlanarPoint { place_mm: board.place_mm(c.column, c.row), at_px: c.at_px };
+        PlanarView { name: self.name.clone(), points: self.corners.iter().map(point).collect() }
+    }
+}

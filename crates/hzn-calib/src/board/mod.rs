@@ -1,5 +1,16 @@
 //! Calibration of a camera from pictures of a chessboard.
+//!
+//! ```text
+//! corners ─► guess: one focal length, poses ─► robust adjustment, stage by stage ─► without outliers ─► Calibrated
+//! ```
 
+mod calibrate;
+mod fit;
 mod layout;
+mod pose;
+#[cfg(test)]
+mod tests;
 
-pub use layout::{Board, Corner, View};
+pub use crate::calibrated::{Calibrated, Dropped, Refusal, Residual, ViewResult, Warning};
+pub use calibrate::{calibrate, calibrate_planar};
+pub use layout::{Board, Corner, PlanarPoint, PlanarView, View};

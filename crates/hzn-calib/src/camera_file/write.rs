@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use hzn_core::camera::{Config, Model, Projection};
+use hzn_core::camera::{Config, Covariance, Model, Projection};
 
 /// A format of calibration files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,7 +45,8 @@ impl fmt::Display for UnsupportedLens {
 
 impl std::error::Error for UnsupportedLens {}
 
-/// Writes a calibration as text. Only a sensor.toml has `theta_max_deg`; the other formats omit it.
+/// Writes a calibration as text. Only a sensor.toml has `theta_max_deg`, `theta_min_deg` and the
+/// covariance; the other formats omit them.
 ///
 /// # Errors
 /// The format does not have the lens.
@@ -107,7 +108,24 @@ fn write_sensor(c: &Config) -> String {
     if let Some(deg) = c.theta_max_deg {
         let _ = writeln!(out, "theta_max_deg = {}", format_number(deg));
     }
+    if let Some(deg) = c.theta_min_deg {
+        let _ = writeln!(out, "theta_min_deg = {}", format_number(deg));
+    }
+    if let Some(covariance) = &c.covariance {
+        write_covariance(&mut out, covariance);
+    }
     out
+}
+
+/// Writes `[camera.covariance]`. It is a table, so it comes after all other keys of `[camera]`.
+fn write_covariance(out: &mut String, covariance: &Covariance) {
+    let names: Vec<String> = covariance.order.iter().map(|i| format!("\"{}\"", i.name())).collect();
+    let _ = writeln!(out, "\n[camera.covariance]\norder = [{}]\nrows = [", names.join(", "));
+    for row in &covariance.rows {
+        let numbers: Vec<String> = row.iter().map(|x| format!("{x:e}")).collect();
+        let _ = writeln!(out, "    [{}],", numbers.join(", "));
+    }
+    out.push_str("]\n");
 }
 
 fn write_opencv(c: &Config) -> Result<String, UnsupportedLens> {

@@ -1,8 +1,10 @@
 //! The keys of sensor.toml: those of hzn-core, and those that exist only in the file.
 //!
-//! Three documents are generated from the keys: the [table](table::markdown) of the documentation, the commented
-//! [template](template::text), and the [JSON schema](schema::json) for editors. `cargo xtask keys` writes all three.
+//! Four files are generated from the keys: the [table](table::markdown) of the documentation, the commented
+//! [template](template::text), the [JSON schema](schema::json) for editors, and the [types](python::module) of the
+//! Python package. `cargo xtask keys` writes all four.
 
+pub mod python;
 pub mod schema;
 pub mod table;
 pub mod template;
@@ -28,7 +30,8 @@ const CAMERA_FILE: [Key; 2] = [
     Key {
         path: "camera.file",
         doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file with the calibration; its path is relative to this \
-              file, and only `camera`, `theta_max_deg`, `readout_s`, the sigmas and `covariance` may be next to it.\n",
+              file, and only `camera`, `theta_max_deg`, `theta_min_deg`, `readout_s`, the sigmas and `covariance` may \
+              be next to it.\n",
         form: Form::Word,
         limits: Limits::Rule("a path"),
         choices: &[],

@@ -115,6 +115,8 @@ fn documents_are_as_the_keys_say() {
     let page = std::fs::read_to_string(root.join("book/reference/sensor-toml.md")).unwrap();
     assert!(table::insert_table(&page).as_ref() == Some(&page), "{say}");
     assert!(crate::template::SENSOR_TOML == template::text(), "{say}");
+    let types = std::fs::read_to_string(root.join("crates/hzn-py/python/hzn/keys.py")).unwrap();
+    assert!(types == python::module(), "{say}");
     let schema = std::fs::read_to_string(root.join("book/reference/sensor.schema.json")).unwrap();
     assert!(serde_json::from_str::<serde_json::Value>(&schema).unwrap() == schema::json(), "{say}");
 }

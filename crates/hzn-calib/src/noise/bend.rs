@@ -10,10 +10,10 @@
 use super::cone::Cone;
 
 /// Number of shapes that are examined in the mean residuals.
-pub(super) const SHAPES: usize = 3;
+pub(crate) const SHAPES: usize = 3;
 
 /// Returns the Legendre polynomials of the degrees 3 to 5 at x from −1 to 1, scaled to an RMS of 1.
-fn next_shapes(x: f64) -> [f64; SHAPES] {
+pub(crate) fn next_shapes(x: f64) -> [f64; SHAPES] {
     let x2 = x * x;
     [
         7.0f64.sqrt() * 0.5 * x * (5.0 * x2 - 3.0),
@@ -23,12 +23,12 @@ fn next_shapes(x: f64) -> [f64; SHAPES] {
 }
 
 /// Returns the Legendre polynomial of degree 2 at x from −1 to 1, scaled to an RMS of 1.
-pub(super) fn bend_shape(x: f64) -> f64 {
+pub(crate) fn bend_shape(x: f64) -> f64 {
     5.0f64.sqrt() * 0.5 * (3.0 * x * x - 1.0)
 }
 
 /// Returns the amplitude of each next shape in the residuals, in pixels.
-pub(super) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
+pub(crate) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
     let mut sums = [0.0; SHAPES];
     for row in &cone.rows {
         for (sum, shape) in sums.iter_mut().zip(next_shapes(row.along)) {
@@ -41,7 +41,7 @@ pub(super) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
 /// Returns the RMS in pixels of the bend that all edges may have in common: the amplitude of the strongest next shape
 /// in the mean of their residuals, or its standard error if that is larger. `edges` has the amplitudes of each edge
 /// ([`shapes_px`]).
-pub(super) fn common_bend_px<'a>(edges: impl ExactSizeIterator<Item = &'a [f64; SHAPES]> + Clone) -> f64 {
+pub(crate) fn common_bend_px<'a>(edges: impl ExactSizeIterator<Item = &'a [f64; SHAPES]> + Clone) -> f64 {
     let n = edges.len().max(1) as f64;
     let amplitude = |k: usize| {
         let values = || edges.clone().filter_map(move |shapes| shapes.get(k));

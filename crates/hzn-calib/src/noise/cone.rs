@@ -32,46 +32,46 @@ struct EdgePoint {
 
 /// Row of the normal equations for one point.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Row {
+pub(crate) struct Row {
     /// h, per pixel.
-    pub(super) h: Vector3<f64>,
+    pub(crate) h: Vector3<f64>,
     /// Distance r from the limb, in pixels.
-    pub(super) r_px: f64,
+    pub(crate) r_px: f64,
     /// Slope g, per pixel.
-    pub(super) slope: f64,
+    pub(crate) slope: f64,
     /// Weight of the fit, 0 to 1.
-    pub(super) weight: f64,
+    pub(crate) weight: f64,
     /// Distance to the next point along the edge, in pixels.
-    pub(super) step_px: f64,
+    pub(crate) step_px: f64,
     /// Position along the edge, from −1 at its beginning to 1 at its end.
-    pub(super) along: f64,
+    pub(crate) along: f64,
     /// Azimuth about the axis in the tangent basis, in radians.
-    pub(super) azimuth_rad: f64,
+    pub(crate) azimuth_rad: f64,
     /// Change of r per relative change of the focal length, in pixels.
-    pub(super) by_focal_px: f64,
+    pub(crate) by_focal_px: f64,
 }
 
 /// A fitted cone.
 #[derive(Debug, Clone)]
-pub(super) struct Cone {
+pub(crate) struct Cone {
     /// Cosine of the (mean) half-angle.
-    pub(super) cos: f64,
-    pub(super) rows: Vec<Row>,
+    pub(crate) cos: f64,
+    pub(crate) rows: Vec<Row>,
     /// Rays of the rows.
-    pub(super) rays: Vec<Vector3<f64>>,
+    pub(crate) rays: Vec<Vector3<f64>>,
     /// Inverse of Σ w h hᵀ, px².
-    pub(super) inverse: Matrix3<f64>,
+    pub(crate) inverse: Matrix3<f64>,
     /// a: the change of c is a·δ.
-    pub(super) to_cos: Vector3<f64>,
+    pub(crate) to_cos: Vector3<f64>,
     /// Σ w.
-    pub(super) weight: f64,
+    pub(crate) weight: f64,
 }
 
 impl Cone {
     /// Fits the cone to weighted points (pixels). The fit starts at the pipeline's axis (camera frame) and cos α.
     /// `azimuth` is the offset of cos α for a limb that is not a circle. The result is `None` if the points do not
     /// determine the cone.
-    pub(super) fn fit(
+    pub(crate) fn fit(
         camera: &Camera<f64>,
         points: &[([f64; 2], f64)],
         axis: [f64; 3],
@@ -143,37 +143,37 @@ impl Cone {
     }
 
     /// Returns the weighted RMS distance of the points from the limb, in pixels.
-    pub(super) fn rms_px(&self) -> f64 {
+    pub(crate) fn rms_px(&self) -> f64 {
         (self.rows.iter().map(|r| r.weight * r.r_px * r.r_px).sum::<f64>() / self.weight).sqrt()
     }
 
     /// Returns the length of the edge that the points cover, in pixels.
-    pub(super) fn arc_px(&self) -> f64 {
+    pub(crate) fn arc_px(&self) -> f64 {
         self.rows.iter().map(|r| r.step_px).sum()
     }
 
     /// Returns the change of cos α per pixel: the root of the weighted harmonic mean of the squared slopes.
-    pub(super) fn cos_per_px(&self) -> f64 {
+    pub(crate) fn cos_per_px(&self) -> f64 {
         let inverse_squares: f64 = self.rows.iter().map(|r| r.weight / (r.slope * r.slope)).sum();
         (self.weight / inverse_squares.max(1e-300)).sqrt()
     }
 
     /// Returns the change of the fitted cos α if every r grows by `signal` (pixels).
-    pub(super) fn change_of_cos(&self, signal: impl Fn(&Row) -> f64) -> f64 {
+    pub(crate) fn change_of_cos(&self, signal: impl Fn(&Row) -> f64) -> f64 {
         let sum: Vector3<f64> = self.rows.iter().map(|r| r.h * (r.weight * signal(r))).sum();
         self.to_cos.dot(&(self.inverse * sum))
     }
 
     /// Returns the share of each point in the fitted cos α: the change of the fitted value if cos α of the limb grows
     /// by 1 at this point alone. The shares of all points sum to 1.
-    pub(super) fn shares(&self) -> Vec<f64> {
+    pub(crate) fn shares(&self) -> Vec<f64> {
         let a = self.inverse * self.to_cos;
         self.rows.iter().map(|r| -r.weight * a.dot(&r.h) / r.slope).collect()
     }
 
     /// Returns the variance of the fitted cos α if the errors along the limb are a Gauss-Markov process with `sigma_px`
     /// and the length `correlation_px`. The fraction `white` of its variance is independent from point to point.
-    pub(super) fn variance_of_cos(&self, sigma_px: f64, correlation_px: f64, white: f64) -> f64 {
+    pub(crate) fn variance_of_cos(&self, sigma_px: f64, correlation_px: f64, white: f64) -> f64 {
         let a = self.inverse * self.to_cos;
         let (mut own, mut pairs, mut carried) = (0.0, 0.0, 0.0);
         for row in &self.rows {
@@ -187,7 +187,7 @@ impl Cone {
 }
 
 /// Returns exp(−step/length); 0 for white errors, which have length 0.
-pub(super) fn decay(step_px: f64, length_px: f64) -> f64 {
+pub(crate) fn decay(step_px: f64, length_px: f64) -> f64 {
     if length_px > 0.0 { (-step_px / length_px).exp() } else { 0.0 }
 }
 
@@ -213,7 +213,7 @@ fn locate_edge_points(camera: &Camera<f64>, points: &[([f64; 2], f64)]) -> Vec<E
 }
 
 /// Returns two unit vectors that are perpendicular to `e` and to each other.
-pub(super) fn basis(e: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+pub(crate) fn basis(e: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let b1 = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
     (b1, e.cross(&b1))
 }
@@ -221,7 +221,7 @@ pub(super) fn basis(e: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
 /// The cosine of the half-angle by azimuth about the axis, for an ellipsoid whose north is known in the camera frame.
 /// The pipeline has the same model.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Azimuth {
+pub(crate) struct Azimuth {
     east: Vector3<f64>,
     cot2_east: f64,
     cot2_meridian: f64,
@@ -230,7 +230,7 @@ pub(super) struct Azimuth {
 
 impl Azimuth {
     /// Creates the offsets for a limb cone from the camera's attitude; `None` without an attitude.
-    pub(super) fn new(cone: &LimbCone<f64>, prior: &Prior<f64>) -> Option<Self> {
+    pub(crate) fn new(cone: &LimbCone<f64>, prior: &Prior<f64>) -> Option<Self> {
         let east: UnitVec3<_, f64> = prior.cam_to_ecef?.inverse().apply(&cone.east);
         Some(Self {
             east: Vector3::from(east.xyz()),
@@ -240,7 +240,8 @@ impl Azimuth {
         })
     }
 
-    fn offset(&self, ray: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
+    /// Returns the offset of cos α for a ray.
+    pub(crate) fn offset(&self, ray: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
         let d = ray.dot(axis);
         let along = ray.dot(&self.east) - d * axis.dot(&self.east);
         let cos2 = (along * along / (1.0 - d * d).max(1e-12)).min(1.0);

@@ -11,9 +11,9 @@ use nalgebra::{Matrix3, Vector3};
 use super::cone::{Cone, Row, decay};
 
 /// Lengths L that are tried, in pixels.
-pub(super) const LENGTHS_PX: [f64; 10] = [2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 1280.0];
+pub(crate) const LENGTHS_PX: [f64; 10] = [2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 1280.0];
 /// White parts ν that are tried.
-pub(super) const WHITE: [f64; 7] = [0.0, 0.25, 0.5, 0.7, 0.85, 0.95, 0.99];
+pub(crate) const WHITE: [f64; 7] = [0.0, 0.25, 0.5, 0.7, 0.85, 0.95, 0.99];
 /// Centre of the prior of the length, as a fraction of the arc.
 const PRIOR_LENGTH_ARC: f64 = 0.25;
 /// 1-sigma of that prior, in the natural logarithm of the length.
@@ -25,24 +25,24 @@ const SENSOR_ARC: f64 = 1.0 / 12.0;
 /// Points with a smaller weight are skipped: at half weight they are about 2.7 sigma off.
 const MIN_WEIGHT: f64 = 0.5;
 /// Floor of the sigma of an edge point, in pixels.
-pub(super) const MIN_SIGMA_PX: f64 = 0.03;
+pub(crate) const MIN_SIGMA_PX: f64 = 0.03;
 /// Largest variance of a model, in mean squares of the residuals. The residuals do not support a larger one.
 const MAX_VARIANCE: f64 = 4.0;
 
 /// The result of one noise model for one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Score {
+pub(crate) struct Score {
     /// −2 ln of the restricted likelihood, up to a constant.
-    pub(super) minus_two_ln_likelihood: f64,
+    pub(crate) minus_two_ln_likelihood: f64,
     /// σ², px².
-    pub(super) variance_px2: f64,
+    pub(crate) variance_px2: f64,
 }
 
 /// The scores of every model of the grid for one picture, indexed by length and then by white part.
-pub(super) type Scores = [[Score; WHITE.len()]; LENGTHS_PX.len()];
+pub(crate) type Scores = [[Score; WHITE.len()]; LENGTHS_PX.len()];
 
 /// Returns the scores of a picture's residuals; `None` if there are too few or all are zero.
-pub(super) fn score_models(cone: &Cone) -> Option<Scores> {
+pub(crate) fn score_models(cone: &Cone) -> Option<Scores> {
     let mut scores =
         [[Score { minus_two_ln_likelihood: f64::INFINITY, variance_px2: f64::NAN }; WHITE.len()]; LENGTHS_PX.len()];
     for (scores, length) in scores.iter_mut().zip(LENGTHS_PX) {
@@ -95,7 +95,7 @@ fn score_model(rows: &[Row], decays: &[f64], white: f64) -> Option<Score> {
 
 /// Returns the shortest correlation length, in pixels, at which an exponential process with `sigma_px` gives the fitted
 /// cos α at least this `variance`. If no length does, the result is the length with the largest variance.
-pub(super) fn equivalent_length_px(cone: &Cone, sigma_px: f64, variance: f64) -> f64 {
+pub(crate) fn equivalent_length_px(cone: &Cone, sigma_px: f64, variance: f64) -> f64 {
     let max_px = PRIOR_LENGTH_ARC * cone.arc_px();
     let mut nearest = (0.0, 0.0);
     for k in 0..=EQUIVALENT_STEPS {
@@ -115,7 +115,7 @@ pub(super) fn equivalent_length_px(cone: &Cone, sigma_px: f64, variance: f64) ->
 /// for a correlation length of a twelfth of the arc, which is the sensor's default. The floor is needed because a
 /// brightness that changes along the limb shifts the limb smoothly. The fit takes this error for curvature, so the
 /// residuals do not show it.
-pub(super) fn variance_of_cos(cone: &Cone, scores: &Scores) -> f64 {
+pub(crate) fn variance_of_cos(cone: &Cone, scores: &Scores) -> f64 {
     let (arc, mean_square) = (cone.arc_px(), cone.rms_px().powi(2));
     let prior = |length: f64| {
         let deviation = (length / (PRIOR_LENGTH_ARC * arc)).ln() / PRIOR_LENGTH_SIGMA;

@@ -11,18 +11,18 @@
 //!                            └─► limb height ──────────────────────────────────────────────────────┴─► Calibration
 //! ```
 
-mod bend;
+pub(crate) mod bend;
 mod calibration;
-mod cone;
-mod edge;
+pub(crate) mod cone;
+pub(crate) mod edge;
 mod height;
 mod lag;
 mod latitude;
 mod points;
 mod refusal;
-mod sighting;
+pub(crate) mod sighting;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod write;
 
 pub use calibration::{Calibration, Edge, Focal, Height, MIN_PICTURES, Picture, config_for_calibration};

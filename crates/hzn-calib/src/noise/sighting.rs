@@ -17,9 +17,9 @@ use super::lag::Lags;
 
 /// Attitudes with a larger sigma, in radians (30 degrees), are not used: they do not show which part of the limb is
 /// visible.
-const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
+pub(crate) const USELESS_ATTITUDE_RAD: f64 = core::f64::consts::FRAC_PI_6;
 /// 1-sigma of an attitude without a sigma, radians (5 degrees); the sensor uses the same value.
-const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
+pub(crate) const ATTITUDE_SIGMA_RAD: f64 = core::f64::consts::PI / 36.0;
 /// Number of points on the limb at which latitudes are computed if the visible part is unknown.
 const RING: usize = 24;
 /// Number of latitudes, evenly from pole to pole, over which an unknown position is averaged.
@@ -62,17 +62,21 @@ pub struct Sighting {
 }
 
 /// The camera's position relative to the body; distances in metres.
-struct Geometry {
+#[derive(Debug, Clone)]
+pub(crate) struct Geometry {
     /// R + H of the sphere that replaces the body.
-    distance_m: f64,
-    sin_expected: f64,
-    limb_m: f64,
-    cone: Option<LimbCone<f64>>,
+    pub(crate) distance_m: f64,
+    /// Sine of the half-angle for a limb of the height `limb_m`.
+    pub(crate) sin_expected: f64,
+    /// Limb height of the sensor's configuration.
+    pub(crate) limb_m: f64,
+    /// Limb cone of the ellipsoid, with a position.
+    pub(crate) cone: Option<LimbCone<f64>>,
     position_m: Option<[f64; 3]>,
     /// 1-sigma of the limb height from the unknown radius, in metres.
-    radius_sigma_m: f64,
+    pub(crate) radius_sigma_m: f64,
     /// Half the difference of the cosines of the half-angles along the meridian and east.
-    second_harmonic_cos: f64,
+    pub(crate) second_harmonic_cos: f64,
 }
 
 impl Sighting {
@@ -94,8 +98,7 @@ impl Sighting {
         let geometry = Geometry::new(body, prior)?;
         let camera = &camera.with_rate(prior.rate_rad_s);
         let attitude_sigma = prior.attitude_sigma_rad.unwrap_or(ATTITUDE_SIGMA_RAD);
-        let known =
-            Prior { cam_to_ecef: prior.cam_to_ecef.filter(|_| attitude_sigma < USELESS_ATTITUDE_RAD), ..*prior };
+        let known = with_useful_attitude(prior);
         let azimuth = geometry.cone.as_ref().and_then(|cone| Azimuth::new(cone, &known));
         let cone = Cone::fit(camera, points, solution.axis.xyz(), solution.half_angle_rad.cos(), azimuth.as_ref())?;
         let sin = (1.0 - cone.cos * cone.cos).sqrt();
@@ -105,13 +108,8 @@ impl Sighting {
         let height_m = geometry.limb_m + geometry.distance_m * (sin - geometry.sin_expected);
         let by_cos_m = -geometry.distance_m * cone.cos / sin;
         let scores = edge::score_models(&cone)?;
-        // If north is unknown, the full second harmonic of the limb is an error; with an attitude only a part of it is.
-        let unknown = if azimuth.is_some() { (2.0 * attitude_sigma).min(1.0) } else { 1.0 };
-        let harmonic_cos = unknown * geometry.second_harmonic_cos;
-        let harmonic = |wave: fn(f64) -> f64| cone.change_of_cos(|row| wave(2.0 * row.azimuth_rad) / row.slope);
-        let (c, s) = (harmonic(f64::cos), harmonic(f64::sin));
         let noise = edge::variance_of_cos(&cone, &scores);
-        let variance_cos = noise + 0.5 * harmonic_cos * harmonic_cos * (c * c + s * s);
+        let variance_cos = noise + geometry.variance_of_harmonic(&cone, azimuth.as_ref().map(|_| attitude_sigma));
         Some(Self {
             name: name.to_owned(),
             limb_height_km: height_m / 1e3,
@@ -131,6 +129,12 @@ impl Sighting {
     }
 }
 
+/// Returns the prior without its attitude if that is too uncertain to show which part of the limb is visible.
+pub(crate) fn with_useful_attitude(prior: &Prior<f64>) -> Prior<f64> {
+    let sigma = prior.attitude_sigma_rad.unwrap_or(ATTITUDE_SIGMA_RAD);
+    Prior { cam_to_ecef: prior.cam_to_ecef.filter(|_| sigma < USELESS_ATTITUDE_RAD), ..*prior }
+}
+
 /// Returns the rays of the edge points (camera frame), each with its share of the picture's limb height. The shares sum
 /// to 1. On a short arc the height comes from the curvature. The shares of the ends and of the middle are then large
 /// and have opposite signs, so that a height which varies along the limb has an enlarged effect. The arguments are
@@ -146,7 +150,8 @@ pub fn shares(
 }
 
 impl Geometry {
-    fn new(body: &body::Config, prior: &Prior<f64>) -> Option<Self> {
+    /// Returns the geometry of a picture; `None` without an altitude and for a camera below the limb.
+    pub(crate) fn new(body: &body::Config, prior: &Prior<f64>) -> Option<Self> {
         let limb_m = body.limb_height_km * 1e3;
         let altitude_m = prior.altitude_m.or(body.altitude_km.map(|km| km * 1e3));
         let radius_m = body.mean_radius_km() * 1e3;
@@ -192,8 +197,19 @@ impl Geometry {
         };
         (geometry.sin_expected < 1.0 && geometry.sin_expected > 0.0).then_some(geometry)
     }
+
+    /// Returns the variance of the fitted cos α from the second harmonic of the limb. If north is unknown, the full
+    /// harmonic is an error. With the sigma of an attitude (radians) only a part of it is.
+    pub(crate) fn variance_of_harmonic(&self, cone: &Cone, attitude_sigma_rad: Option<f64>) -> f64 {
+        let unknown = attitude_sigma_rad.map_or(1.0, |sigma| (2.0 * sigma).min(1.0));
+        let harmonic_cos = unknown * self.second_harmonic_cos;
+        let harmonic = |wave: fn(f64) -> f64| cone.change_of_cos(|row| wave(2.0 * row.azimuth_rad) / row.slope);
+        let (c, s) = (harmonic(f64::cos), harmonic(f64::sin));
+        0.5 * harmonic_cos * harmonic_cos * (c * c + s * s)
+    }
 }
 
+/// Returns the limb cone of the Earth for a limb of the height `limb_m`.
 fn limb_cone(position_m: [f64; 3], limb_m: f64) -> Option<LimbCone<f64>> {
     LimbCone::try_new(position_m, WGS84_A_M + limb_m, WGS84_B_M + limb_m)
 }

@@ -8,35 +8,23 @@ use hzn_core::{Config, Prior, Solution};
 use nalgebra::Vector3;
 
 use super::{Calibration, Refusal, Sighting, WeightedPoints, cone, edge, into_sensor_toml};
-
-/// A generator of normal random numbers that gives the same sequence on every machine.
-struct Draws(u64);
-
-impl Draws {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-    }
-    fn normal(&mut self) -> f64 {
-        (-2.0 * self.uniform().ln()).sqrt() * (core::f64::consts::TAU * self.uniform()).cos()
-    }
-}
+use crate::draws::Draws;
 
 /// Edge noise: its sigma and correlation length in pixels, and its white part.
 #[derive(Clone, Copy)]
-struct Noise(f64, f64, f64);
+pub(crate) struct Noise(pub(crate) f64, pub(crate) f64, pub(crate) f64);
 
 fn camera(fov_deg: f64) -> camera::Config {
     camera::Config::ideal(Model::Equidistant, 960, 720, 960.0 / fov_deg.to_radians())
 }
 
-fn earth() -> body::Config {
+pub(crate) fn earth() -> body::Config {
     body::Config { kind: Kind::EarthSphere, limb_height_km: 15.0, limb_height_sigma_km: 30.0, ..Default::default() }
 }
 
 /// Returns edge points of a limb in the picture of `camera`, with noise across the limb. The limb is a cone with the
 /// axis `axis` (camera frame); `cos` gives cos α by the direction from the axis.
-fn limb(
+pub(crate) fn limb(
     camera: &Camera<f64>,
     axis: Vector3<f64>,
     cos: &dyn Fn(&Vector3<f64>) -> f64,
@@ -73,7 +61,7 @@ fn limb(
     points
 }
 
-fn solution(axis: Vector3<f64>, half_angle_rad: f64) -> Solution<f64> {
+pub(crate) fn solution(axis: Vector3<f64>, half_angle_rad: f64) -> Solution<f64> {
     Solution {
         axis: UnitVec3::try_new([axis.x, axis.y, axis.z]).unwrap(),
         covariance: Cov3::from_upper([1e-8, 0.0, 0.0, 1e-8, 0.0, 1e-8]),

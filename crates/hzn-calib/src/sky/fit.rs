@@ -1,0 +1,257 @@
+//! Fits lens and limb height to the pictures of a flight: Gauss-Newton steps, each linearised anew.
+
+use hzn_core::body;
+use hzn_core::camera::Camera;
+use nalgebra::{DMatrix, DVector};
+
+use super::layout::{COMMON, Layout};
+use super::linear::{self, EdgeNoise, Model, Reduced};
+use super::refusal::Refusal;
+use super::system::{self, PriorEquations, Solution};
+use super::unknowns::{LimbPrior, Unknowns};
+use super::view::View;
+use crate::noise::bend::common_bend_px;
+use crate::noise::sighting::Geometry;
+
+/// Smallest number of pictures from which the scatter of the limb height is measured. With fewer pictures it is not
+/// known to a quarter, and the 1-sigma of the limb height stands for it.
+pub const MIN_PICTURES: usize = 12;
+/// Largest number of Gauss-Newton steps.
+const STEPS: usize = 12;
+/// The edge noise is measured anew during these first steps, because errors of the lens add to the residuals.
+const NOISE_STEPS: usize = 4;
+/// A fit has converged if no unknown moves by more than this fraction of its sigma.
+const CONVERGED: f64 = 0.02;
+/// Number of halvings of a step that leaves the limits of the lens or of the limb.
+const HALVINGS: usize = 8;
+/// Sigma of a limb height that is not known, in kilometres: far larger than any limb height.
+const FREE_KM: f64 = 1e3;
+/// Floor of the common shift of an edge, in pixels. Blur and threshold move the middle of an edge by fractions of a
+/// pixel, even if the edge is smooth.
+const MIN_SHIFT_PX: f64 = 0.1;
+/// Largest distance of a picture's limb height from the fitted one, in sigmas. A picture farther away has another edge.
+const MAX_DEVIATION_SIGMAS: f64 = 6.0;
+/// Largest fraction of such pictures.
+const MAX_INCONSISTENT: f64 = 0.2;
+
+/// One picture of a fit.
+#[derive(Debug, Clone)]
+pub(super) struct Fitted {
+    /// Its place in the list of views.
+    pub(super) view: usize,
+    geometry: Geometry,
+    noise: EdgeNoise,
+    pub(super) reduced: Reduced,
+    /// Limb height of this picture with the fitted lens, and its 1-sigma from edge noise, in kilometres.
+    pub(super) height_km: [f64; 2],
+    pub(super) counts: bool,
+}
+
+/// A fit that has converged.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    pub(super) layout: Layout,
+    pub(super) pictures: Vec<Fitted>,
+    pub(super) solution: Solution,
+    /// The limb height with its prior, in kilometres.
+    pub(super) limb: LimbPrior,
+    /// Sigmas of the common shapes, in pixels.
+    pub(super) common_px: [f64; COMMON],
+}
+
+impl Fit {
+    /// Fits the unknowns to the views.
+    ///
+    /// # Errors
+    /// The pictures are too few, or the fit does not converge: see [`Refusal`].
+    pub(super) fn new(
+        unknowns: &Unknowns,
+        body: &body::Config,
+        views: &[View],
+        limb: LimbPrior,
+    ) -> Result<Self, Refusal> {
+        let mut state = State::new(unknowns, body, views, limb)?;
+        for step in 0..STEPS {
+            if step > 0 && step < NOISE_STEPS {
+                state.measure_noise(unknowns, views);
+            }
+            let fit = state.solve(unknowns)?;
+            let moved = state.advance(unknowns, views, &fit)?;
+            if step + 1 >= NOISE_STEPS && moved < CONVERGED {
+                return state.solve(unknowns);
+            }
+        }
+        Err(Refusal::NotConverged { steps: STEPS })
+    }
+
+    /// Solves the same pictures with another prior of the intrinsic parameters and of the limb height, and with the
+    /// scatter of this fit.
+    pub(super) fn solve_again(&self, lens: &DMatrix<f64>, limb: LimbPrior) -> Option<Solution> {
+        let prior = prior_equations(self.layout, lens, limb, &self.common_px)?;
+        system::solve(&self.counted(), &prior, self.solution.scatter_km)
+    }
+
+    /// Returns the pictures that count.
+    pub(super) fn counted(&self) -> Vec<&Reduced> {
+        self.pictures.iter().filter(|p| p.counts).map(|p| &p.reduced).collect()
+    }
+
+    /// Returns the changes of the intrinsic parameters.
+    pub(super) fn changes(&self) -> DVector<f64> {
+        self.solution.values.rows(self.layout.first_intrinsic(), self.layout.intrinsics).into_owned()
+    }
+}
+
+/// The state between two steps.
+struct State {
+    layout: Layout,
+    limb: LimbPrior,
+    changes: DVector<f64>,
+    height_km: f64,
+    pictures: Vec<Fitted>,
+}
+
+impl State {
+    fn new(unknowns: &Unknowns, body: &body::Config, views: &[View], limb: LimbPrior) -> Result<Self, Refusal> {
+        let camera = Camera::try_new(&unknowns.before).map_err(|why| Refusal::Lens { why: why.to_string() })?;
+        let changes = DVector::zeros(unknowns.list.len());
+        let height_km = limb.km;
+        let model = Model::new(&camera, &unknowns.before, &unknowns.list, changes.clone(), height_km);
+        let picture = |(view, of): (usize, &View)| {
+            let geometry = linear::geometry(body, of)?;
+            let noise = linear::measure_noise(&model, &geometry, of)?;
+            let reduced = linear::reduce(&model, &geometry, of, noise)?;
+            Some(Fitted { view, geometry, noise, reduced, height_km: [f64::NAN; 2], counts: true })
+        };
+        let pictures: Vec<Fitted> = views.iter().enumerate().filter_map(picture).collect();
+        if pictures.is_empty() || (pictures.len() < MIN_PICTURES && !limb.sigma_km.is_finite()) {
+            return Err(Refusal::TooFew { answered: pictures.len(), min_pictures: MIN_PICTURES });
+        }
+        Ok(Self { layout: model.layout, limb, changes, height_km, pictures })
+    }
+
+    fn solve(&mut self, unknowns: &Unknowns) -> Result<Fit, Refusal> {
+        let counted: Vec<&Fitted> = self.pictures.iter().filter(|p| p.counts).collect();
+        let common_px = common_sigmas_px(&counted);
+        let prior = prior_equations(self.layout, &unknowns.covariance, self.limb, &common_px);
+        let reduced: Vec<&Reduced> = counted.iter().map(|p| &p.reduced).collect();
+        let solved = prior.and_then(|prior| {
+            if reduced.len() < MIN_PICTURES {
+                system::solve(&reduced, &prior, 0.0)
+            } else {
+                system::solve_with_scatter(&reduced, &prior)
+            }
+        });
+        let solution = solved.ok_or(Refusal::Singular)?;
+        self.find_heights(&solution);
+        Ok(Fit { layout: self.layout, pictures: self.pictures.clone(), solution, limb: self.limb, common_px })
+    }
+
+    /// Computes the limb height of each picture with the fitted lens.
+    fn find_heights(&mut self, solution: &Solution) {
+        for picture in &mut self.pictures {
+            let (n, b) = (&picture.reduced.information, &picture.reduced.right);
+            let own = n[(Layout::HEIGHT, Layout::HEIGHT)];
+            let others = n.row(Layout::HEIGHT).transpose().dot(&solution.values) - own * solution.values[0];
+            picture.height_km = [(b[Layout::HEIGHT] - others) / own, 1.0 / own.sqrt()];
+        }
+    }
+
+    /// Moves to the solution and linearises the pictures there. Returns the largest move in sigmas.
+    fn advance(&mut self, unknowns: &Unknowns, views: &[View], fit: &Fit) -> Result<f64, Refusal> {
+        let (from, from_km) = (self.changes.clone(), self.height_km);
+        let target = fit.changes();
+        let target_km = fit.solution.values[Layout::HEIGHT];
+        let mut part = 1.0;
+        for _ in 0..HALVINGS {
+            self.changes = &from + (&target - &from) * part;
+            self.height_km = from_km + (target_km - from_km) * part;
+            if self.linearise(unknowns, views) {
+                self.exclude_inconsistent(&fit.solution)?;
+                let sigma = |place: usize| fit.solution.covariance[(place, place)].sqrt();
+                let lens = (0..target.len()).map(|i| (target[i] - from[i]).abs() / sigma(1 + i));
+                return Ok(lens.fold((target_km - from_km).abs() / sigma(Layout::HEIGHT), f64::max));
+            }
+            part *= 0.5;
+        }
+        Err(Refusal::NotConverged { steps: STEPS })
+    }
+
+    /// Linearises all pictures at the state. Returns `false` if the lens or the limb height is outside its limits.
+    fn linearise(&mut self, unknowns: &Unknowns, views: &[View]) -> bool {
+        let config = unknowns.changed_by(self.changes.as_slice());
+        let Ok(camera) = Camera::try_new(&config) else { return false };
+        let model = Model::new(&camera, &config, &unknowns.list, self.changes.clone(), self.height_km);
+        let each = self.pictures.iter().map(|picture| {
+            views.get(picture.view).and_then(|view| linear::reduce(&model, &picture.geometry, view, picture.noise))
+        });
+        let Some(reduced) = each.collect::<Option<Vec<_>>>() else { return false };
+        for (picture, reduced) in self.pictures.iter_mut().zip(reduced) {
+            picture.reduced = reduced;
+        }
+        true
+    }
+
+    /// Measures the edge noise again, with the lens of the state.
+    fn measure_noise(&mut self, unknowns: &Unknowns, views: &[View]) {
+        let config = unknowns.changed_by(self.changes.as_slice());
+        let Ok(camera) = Camera::try_new(&config) else { return };
+        let model = Model::new(&camera, &config, &unknowns.list, self.changes.clone(), self.height_km);
+        for picture in &mut self.pictures {
+            let Some(view) = views.get(picture.view) else { continue };
+            if let Some(noise) = linear::measure_noise(&model, &picture.geometry, view) {
+                picture.noise = noise;
+            }
+        }
+        self.linearise(unknowns, views);
+    }
+
+    /// Marks the pictures whose limb height disagrees with the fitted one.
+    fn exclude_inconsistent(&mut self, solution: &Solution) -> Result<(), Refusal> {
+        self.find_heights(solution);
+        let median = |values: &mut Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+        };
+        let middle = median(&mut self.pictures.iter().map(|p| p.height_km[0]).collect());
+        let typical = 1.4826 * median(&mut self.pictures.iter().map(|p| (p.height_km[0] - middle).abs()).collect());
+        for picture in &mut self.pictures {
+            let [km, sigma] = picture.height_km;
+            picture.counts = (km - middle).abs() <= MAX_DEVIATION_SIGMAS * typical.hypot(sigma).max(0.1);
+        }
+        let inconsistent = self.pictures.iter().filter(|p| !p.counts).count();
+        if inconsistent as f64 > MAX_INCONSISTENT * self.pictures.len() as f64 {
+            return Err(Refusal::Inconsistent { inconsistent, pictures: self.pictures.len() });
+        }
+        Ok(())
+    }
+}
+
+/// Returns the sigmas of the common shapes: for the shift the RMS of the residuals, for all others the strongest shape
+/// in the mean of the residuals.
+fn common_sigmas_px(pictures: &[&Fitted]) -> [f64; COMMON] {
+    let n = pictures.len().max(1) as f64;
+    let rms = (pictures.iter().map(|p| p.noise.rms_px.powi(2)).sum::<f64>() / n).sqrt();
+    let bend = common_bend_px(pictures.iter().map(|p| &p.noise.shapes_px)).max(1e-4);
+    let mut sigmas = [bend; COMMON];
+    sigmas[0] = rms.max(MIN_SHIFT_PX);
+    sigmas
+}
+
+/// Returns the prior of all unknowns; `None` if the covariance of the lens is singular.
+fn prior_equations(
+    layout: Layout,
+    lens: &DMatrix<f64>,
+    limb: LimbPrior,
+    common_px: &[f64; COMMON],
+) -> Option<PriorEquations> {
+    let mut prior = PriorEquations::new(layout.len());
+    let sigma = limb.sigma_km.clamp(1e-6, FREE_KM);
+    prior.add(Layout::HEIGHT, &DVector::from_element(1, limb.km), &DMatrix::from_element(1, 1, sigma * sigma))?;
+    prior.add(layout.first_intrinsic(), &DVector::zeros(layout.intrinsics), lens)?;
+    for (i, sigma) in common_px.iter().enumerate() {
+        prior.add_zero(layout.first_common() + i, *sigma);
+    }
+    prior.add_zero(layout.radius(), 1.0);
+    Some(prior)
+}

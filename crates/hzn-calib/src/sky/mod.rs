@@ -1,0 +1,38 @@
+//! The camera's calibration from limb pictures of a flight: `hzn calibrate sky` and `hzn calibrate check`.
+//!
+//! The pictures measure the intrinsic parameters of the lens jointly with the limb height. Each picture has an axis of
+//! its own, which is eliminated. The limb heights of the pictures scatter about one height; the scatter is estimated. A
+//! shift and a bend that all edges have in common are unknowns too, with priors from the residuals.
+//!
+//! ```text
+//! View (edge points, prior) ─► linear::reduce (axis eliminated, edge noise) ─► Reduced ─┐
+//!      ▲                                                                                 ▼
+//!      └──────────── lens, limb height ◄─── system::System (scatter by REML, priors) ◄───┘
+//! ```
+//!
+//! [`estimate()`] repeats this until the lens no longer changes. [`check`] tests a calibration with the same system.
+
+mod check;
+mod estimate;
+mod fit;
+mod layout;
+mod linear;
+mod mount;
+mod normal_law;
+mod observable;
+mod refusal;
+mod system;
+#[cfg(test)]
+mod tests;
+mod unknowns;
+mod view;
+mod write;
+
+pub use check::{Check, DEFAULT_DETECT_PERCENT, Deviation, Verdict, check};
+pub use estimate::{Determined, Estimate, MIN_PICTURES, Picture, estimate};
+pub use mount::{Mount, MountRefusal, estimate_mount};
+pub use observable::Observability;
+pub use refusal::Refusal;
+pub use unknowns::{LimbPrior, Parameter, Unknowns};
+pub use view::View;
+pub use write::{Written, into_sensor_toml};
