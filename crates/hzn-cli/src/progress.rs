@@ -36,9 +36,9 @@ impl Progress {
                 None => ProgressBar::no_length(),
             };
             let form = if total.is_some() {
-                "{bar:30} {pos}/{len} frames, {per_sec}, {eta} left  {msg}"
+                "{bar:30} {pos}/{len} pictures, {per_sec}, {eta} left  {msg}"
             } else {
-                "{spinner} {pos} frames, {per_sec}  {msg}"
+                "{spinner} {pos} pictures, {per_sec}  {msg}"
             };
             if let Ok(style) = ProgressStyle::with_template(form) {
                 bar.set_style(style);
@@ -66,7 +66,7 @@ impl Progress {
             self.last_line = Instant::now();
             let done = self.before + self.frames;
             let of = self.total.map(|n| format!(" of {n}")).unwrap_or_default();
-            tell::line(format_args!("{done}{of} frames, {:.1} a second", self.rate()));
+            tell::line(format_args!("{done}{of} pictures, {:.1} a second", self.rate()));
         }
     }
 
@@ -94,14 +94,14 @@ impl Progress {
         self.frames as f64 / self.start.elapsed().as_secs_f64().max(1e-9)
     }
 
-    /// Removes the bar and returns a summary: `123 frames: 120 ok, 2 no-limb, 1 unreadable; 85.2 frames a second`. With
-    /// several bodies it is `4 frames: sun 3 ok, 1 rejected; moon 4 no-limb; 85.2 frames a second`.
+    /// Removes the bar and returns a summary: `123 pictures: 120 ok, 2 no-limb, 1 unreadable; 85.2 pictures a second`.
+    /// With several bodies it is `4 pictures: sun 3 ok, 1 rejected; moon 4 no-limb; 85.2 pictures a second`.
     pub(crate) fn summary(&self, bodies: &[&str]) -> String {
         self.finish();
         let frames = match self.frames {
-            0 => return "no frames".to_owned(),
-            1 => "1 frame".to_owned(),
-            n => format!("{n} frames"),
+            0 => return "no pictures".to_owned(),
+            1 => "1 picture".to_owned(),
+            n => format!("{n} pictures"),
         };
         let parts: Vec<String> = self.bodies.iter().map(count_text).collect();
         let found = match parts.as_slice() {
@@ -112,7 +112,7 @@ impl Progress {
                 named.join("; ")
             }
         };
-        format!("{frames}: {found}; {:.1} frames a second", self.rate())
+        format!("{frames}: {found}; {:.1} pictures a second", self.rate())
     }
 
     /// Removes the bar.

@@ -28,7 +28,7 @@ fn earth_and_sun(n: usize) -> Place {
 #[test]
 fn each_body_has_its_row() {
     let place = earth_and_sun(3);
-    let rows = without_time(&place.run(&["run", "in"]).expect(0).says("3 frames: earth-sphere 3 ok; sun 3 ok").out);
+    let rows = without_time(&place.run(&["run", "in"]).expect(0).says("3 pictures: earth-sphere 3 ok; sun 3 ok").out);
     assert_eq!(rows.len(), 6);
     for (i, row) in rows.iter().enumerate() {
         let body = ["earth-sphere", "sun"][i % 2];
@@ -85,7 +85,7 @@ fn frames_of_several_bodies_are_kept_whole() {
     let rows = without_time(&place.read("a.csv"));
     for name in ["a.csv", "a.mcap"] {
         let info = place.run(&["info", name]).expect(0).out;
-        assert!(info.contains("frames           3\n"), "{info}");
+        assert!(info.contains("pictures         3\n"), "{info}");
         assert_eq!(info.matches("ok               3 (100.0 %)").count(), 2, "{info}");
     }
     place.run(&["export", "a.mcap", "-o", "b.csv"]).expect(0);

@@ -90,6 +90,32 @@ fn info_claims_no_more_than_it_knows() {
 }
 
 #[test]
+fn info_knows_results_of_other_versions() {
+    let place = Place::with_pictures(2);
+    place.run(&["run", "in", "-o", "a.csv"]).expect(0);
+    let table = std::fs::read_to_string(place.path("a.csv")).unwrap();
+    let without = |column: &str| -> String {
+        let place = table.lines().next().unwrap().split(',').position(|c| c == column).unwrap();
+        let mut rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+        for row in &mut rows {
+            row.remove(place);
+        }
+        rows.iter().map(|row| row.join(",") + "\n").collect()
+    };
+    assert!(!place.run(&["info", "a.csv"]).expect(0).out.contains("columns"));
+    std::fs::write(place.path("old.csv"), without("pitch_deg")).unwrap();
+    let out = place.run(&["info", "old.csv"]).expect(0).out;
+    assert!(out.contains("results of hzn run") && out.contains("ok               2 (100.0 %)"), "{out}");
+    assert!(out.contains("columns missing  pitch_deg ("), "{out}");
+    std::fs::write(place.path("new.csv"), table.replace("pitch_deg", "pitch_of_tomorrow")).unwrap();
+    let out = place.run(&["info", "new.csv"]).expect(0).out;
+    assert!(out.contains("columns missing  pitch_deg (") && out.contains("unknown  pitch_of_tomorrow ("), "{out}");
+    // Without a column that every row needs, the rows cannot be read; the message lists the columns.
+    std::fs::write(place.path("short.csv"), without("detail")).unwrap();
+    place.run(&["info", "short.csv"]).expect(1).says("columns missing  detail (");
+}
+
+#[test]
 fn overlays_of_a_run() {
     let place = Place::with_pictures(2);
     place.run(&["run", "in", "--overlay", "drawn", "-q"]).expect(0);
@@ -218,7 +244,7 @@ fn wrong_usage_is_2() {
 fn demo_compares_with_the_truth() {
     let place = Place::new();
     let out = place.run(&["demo", "d", "--count", "3"]).expect(0).out;
-    assert!(out.contains("3 of 3 frames with a limb in view (100.0 %)"), "{out}");
+    assert!(out.contains("3 of 3 pictures with a limb in view (100.0 %)"), "{out}");
     assert!(out.contains("Photograph from the ISS") && out.contains("altitude from the limb"), "{out}");
     for file in ["flight/sensor.toml", "flight/frames.csv", "flight/truth.csv", "flight.mcap", "flight.csv", "iss.mcap"]
     {

@@ -29,7 +29,7 @@ fn a_run_against_its_truth_as_text_json_and_page() {
     let place = place();
     let args = ["evaluate", "out.mcap", "--truth", "in/truth.csv", "-o", "r.json", "-o", "r.html"];
     let ran = place.run(&args).expect(0);
-    for text in ["answered           5 of 5 frames", "false answers      0 of 1 frames", "HORACE criteria"] {
+    for text in ["answered           5 of 5 pictures", "false answers      0 of 1 pictures", "HORACE criteria"] {
         assert!(ran.out.contains(text), "{text} in {}", ran.out);
     }
     // The folder of the truth is sufficient, and a table gives the same report as the recording.

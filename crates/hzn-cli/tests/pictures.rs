@@ -137,11 +137,11 @@ fn bits_of_headerless_words_and_of_transparent_ones() {
     let grey = words(0.0, |v| v << 4);
     let clear = image::ImageBuffer::from_fn(320, 240, |x, y| image::LumaA([grey.get_pixel(x, y).0[0], u16::MAX]));
     DynamicImage::ImageLumaA16(clear).save(place.path("in/a.png")).unwrap();
-    place.run(&["run", "in"]).expect(0).says("assumed to have 12 bits").says("1 frame: 1 ok");
+    place.run(&["run", "in"]).expect(0).says("assumed to have 12 bits").says("1 picture: 1 ok");
     std::fs::remove_file(place.path("in/a.png")).unwrap();
     let big_endian = grey.into_raw().iter().flat_map(|w| w.to_be_bytes()).collect::<Vec<u8>>();
     place.write("in/a.pgm", &[b"P5 320 240 4095\n".to_vec(), big_endian].concat());
-    let ran = place.run(&["run", "in"]).expect(0).says("1 frame: 1 ok");
+    let ran = place.run(&["run", "in"]).expect(0).says("1 picture: 1 ok");
     assert!(!ran.err.contains("assumed to have"), "{}", ran.err);
 }
 
@@ -262,7 +262,7 @@ fn the_first_picture_of_an_animation_is_processed_and_the_others_are_reported() 
     // The file is a stack of pages, one after another.
     std::fs::remove_file(place.path("in/film.png")).unwrap();
     place.write("in/stack.tif", &two_pages(&limb(320, 240, 0.0)));
-    place.run(&["run", "in"]).expect(3).says("stack.tif with 2 pictures").says("1 frame: 1 ok");
+    place.run(&["run", "in"]).expect(3).says("stack.tif with 2 pictures").says("1 picture: 1 ok");
 }
 
 /// Returns a TIFF with two pages of the same picture.
@@ -307,7 +307,7 @@ fn an_edge_that_comes_late_is_listed_as_chosen() {
     assert!(chosen.len() == 1 && told.contains("further edges are not listed"), "{told}");
     let number: u32 = chosen[0].split_whitespace().next().unwrap().parse().unwrap();
     assert!(number >= 16, "{told}");
-    place.run(&["run", "in", "-o", "a.mcap"]).expect(0).says("1 frame: 1 ok");
+    place.run(&["run", "in", "-o", "a.mcap"]).expect(0).says("1 picture: 1 ok");
     let mut recorded = hzn_mcap::Reader::open(place.path("a.mcap"), hzn_mcap::Contents::All).unwrap();
     let frame = recorded.next().unwrap().unwrap();
     assert_eq!(frame.candidates.iter().filter(|c| c.verdict == "chosen").count(), 1);

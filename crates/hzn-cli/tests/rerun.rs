@@ -36,7 +36,7 @@ fn place() -> Place {
 #[test]
 fn a_recording_is_run_again_with_all_that_it_holds() {
     let place = place();
-    place.run(&["run", "out.mcap", "-o", "again.mcap"]).expect(0).says("4 frames: 4 ok");
+    place.run(&["run", "out.mcap", "-o", "again.mcap"]).expect(0).says("4 pictures: 4 ok");
     place.run(&["export", "again.mcap", "-o", "again.csv"]).expect(0);
     let rows = without_time(&place.read("out.csv"));
     assert_eq!((cell(&rows[0], "altitude_km"), &cell(&rows[1], "altitude_km")[..5]), ("390.0", "400.0"));
@@ -59,8 +59,8 @@ fn several_bodies_are_one_frame() {
     let place = place();
     let bodies = SENSOR.replace("[body]", "[[bodies]]") + "\n[[bodies]]\nkind = \"moon\"\n";
     place.write("two.toml", bodies.as_bytes());
-    place.run(&["run", "in", "-s", "two.toml", "-o", "two.mcap"]).expect(0).says("4 frames: ");
-    place.run(&["run", "two.mcap", "-o", "again.csv"]).expect(0).says("4 frames: ");
+    place.run(&["run", "in", "-s", "two.toml", "-o", "two.mcap"]).expect(0).says("4 pictures: ");
+    place.run(&["run", "two.mcap", "-o", "again.csv"]).expect(0).says("4 pictures: ");
     place.run(&["export", "two.mcap", "-o", "two.csv"]).expect(0);
     assert_eq!(without_time(&place.read("again.csv")), without_time(&place.read("two.csv")));
 }
@@ -83,7 +83,7 @@ fn missing_content_of_a_recording_is_reported() {
     place.write("damaged.mcap", &damaged);
     place.run(&["run", "damaged.mcap"]).expect(3).says("1 damaged part was left out");
     place.write("cut.mcap", &whole[..at + picture.len() + 100]);
-    place.run(&["run", "cut.mcap"]).expect(3).says("was cut off").says("no frames");
+    place.run(&["run", "cut.mcap"]).expect(3).says("was cut off").says("no pictures");
 }
 
 #[test]

@@ -40,7 +40,7 @@ fn a_disk_that_fills_up_keeps_what_is_finished() {
             .says("resume the run to");
         assert!(!place.path(out).exists());
         let info = place.run(&["info", &format!("{out}.part")]).expect(0).out;
-        assert!(!info.contains("frames           0"), "{out}: {info}");
+        assert!(!info.contains("pictures         0"), "{out}: {info}");
         place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("that were finished before");
         place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
         assert_eq!(without_time(&place.read("rows.csv")), whole, "{out}");
@@ -150,6 +150,6 @@ fn another_sensor_is_not_appended() {
         let ran = place.run(&["run", "in", "-o", out, "--resume", "-s", "other.toml"]);
         assert!(ran.code == 2 && ran.err.contains("--force"), "{out}: {}", ran.err);
         assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
-        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("2 frames: 2 ok");
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("2 pictures: 2 ok");
     }
 }

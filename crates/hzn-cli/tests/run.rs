@@ -23,7 +23,7 @@ fn a_folder_gives_a_table_in_order_with_every_number_of_threads() {
 fn all_outputs_hold_the_same_rows() {
     let place = Place::with_pictures(6);
     for name in ["a.csv", "a.jsonl", "a.mcap"] {
-        place.run(&["run", "in", "-o", name]).expect(0).says("6 frames: 6 ok");
+        place.run(&["run", "in", "-o", name]).expect(0).says("6 pictures: 6 ok");
         assert!(!place.path(&format!("{name}.part")).exists());
     }
     place.run(&["export", "a.mcap", "-o", "b.csv"]).expect(0);
@@ -36,7 +36,7 @@ fn all_outputs_hold_the_same_rows() {
     assert_eq!(std::fs::read(place.path("pics/0000.png")).unwrap(), std::fs::read(place.path("in/0000.png")).unwrap());
     assert!(place.path("drawn/0005.png").exists());
     let info = place.run(&["info", "a.mcap"]).expect(0).out;
-    assert!(info.contains("frames           6") && info.contains("ok               6 (100.0 %)"), "{info}");
+    assert!(info.contains("pictures         6") && info.contains("ok               6 (100.0 %)"), "{info}");
     // A recording can be an input.
     let again = place.run(&["run", "a.mcap", "-s", "in/sensor.toml"]).expect(0);
     let axis = |r: &Vec<(String, String)>| cell(r, "axis_y").to_owned();
@@ -49,7 +49,7 @@ fn times_and_altitudes_come_from_frames_csv() {
     let place = Place::with_pictures(3);
     place.write("in/frames.csv", b"file,time_s,altitude_km\n0001.png,77.5,390\n");
     let ran = place.run(&["run", "in", "--fps", "4"]).expect(0);
-    let ran = ran.says("warning: of 3 frames: 2 without a row in in/frames.csv; 2 without a time\n");
+    let ran = ran.says("warning: of 3 pictures: 2 without a row in in/frames.csv; 2 without a time\n");
     let rows = without_time(&ran.out);
     assert_eq!((cell(&rows[1], "time_s"), cell(&rows[1], "altitude_km")), ("77.5", "390.0"));
     // The table is the only clock.
@@ -66,9 +66,9 @@ fn a_frame_without_altitude_is_a_row_that_says_so() {
     place.write("in/sensor.toml", common::SENSOR.replace("altitude_km = 400.0\n", "").as_bytes());
     place.write("in/frames.csv", b"file,time_s,altitude_km\n0000.png,10,400\n0001.png,11,\n0003.png,,400\n");
     for out in ["a.csv", "a.jsonl", "a.mcap"] {
-        let ran = place.run(&["run", "in", "-o", out]).expect(3).says("4 frames: 2 ok, 2 no-altitude");
+        let ran = place.run(&["run", "in", "-o", out]).expect(3).says("4 pictures: 2 ok, 2 no-altitude");
         let ran =
-            ran.says("of 4 frames: 1 without a row in in/frames.csv; 2 without a time; 2 without an altitude, not");
+            ran.says("of 4 pictures: 1 without a row in in/frames.csv; 2 without a time; 2 without an altitude, not");
         assert_eq!(ran.err.lines().filter(|l| l.contains("altitude:")).count(), 0, "{}", ran.err);
         place.run(&["info", out]).expect(0);
         place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
@@ -95,8 +95,10 @@ fn a_rocket_begins_below_the_limb_height() {
     place.write("in/sensor.toml", sensor.as_bytes());
     place.write("in/frames.csv", b"file,altitude_km\n0000.png,-0.02\n0001.png,3.2\n0002.png,400\n");
     for out in ["a.csv", "a.mcap"] {
-        let ran = place.run(&["run", "in", "-o", out]).expect(3).says("3 frames: 1 ok, 2 no-altitude");
-        ran.says("of 3 frames: 2 below the limb height, where no limb can be seen, not processed (status no-altitude)");
+        let ran = place.run(&["run", "in", "-o", out]).expect(3).says("3 pictures: 1 ok, 2 no-altitude");
+        ran.says(
+            "of 3 pictures: 2 below the limb height, where no limb can be seen, not processed (status no-altitude)",
+        );
     }
     let rows = place.rows("a.csv");
     assert_eq!(cell(&rows[1], "detail"), "altitude 3.2 km is below the limb height 17 km");

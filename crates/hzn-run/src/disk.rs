@@ -21,6 +21,20 @@ pub fn refuse_existing(path: &Path, force: bool) -> Result<(), Error> {
     Ok(())
 }
 
+/// Writes a text file completely or not at all: into `NAME.part`, which is then renamed.
+///
+/// # Errors
+/// The file cannot be written. An earlier file of the name is then unchanged.
+pub fn write_whole(path: &Path, text: &str) -> Result<(), Error> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));
+    written.map_err(|e| {
+        let _ = std::fs::remove_file(&part);
+        cannot_write(path, &e)
+    })
+}
+
 /// Returns the error for a file that cannot be written, with advice.
 pub fn cannot_write(path: &Path, error: &std::io::Error) -> Error {
     failed(advice(path, error))

@@ -83,7 +83,7 @@ fn item(source: &mut dyn Source, index: u64) -> Result<Item, Stop> {
     for n in 0..=index {
         item = source.next().transpose()?;
         if item.is_none() {
-            return Err(usage(format!("--index {index}: the sequence has {n} frames, numbered from 0")));
+            return Err(usage(format!("--index {index}: the sequence has {n} pictures, numbered from 0")));
         }
     }
     item.ok_or_else(|| usage("the sequence is empty"))
@@ -205,7 +205,7 @@ impl Explained<'_> {
             );
         }
         if self.trace.border_px() > 0 {
-            line("frame", format!("a dark border of {} px around the picture is left out", self.trace.border_px()));
+            line("border", format!("a dark border of {} px around the picture is left out", self.trace.border_px()));
         }
     }
 

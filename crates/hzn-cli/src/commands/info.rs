@@ -92,44 +92,66 @@ fn foreign(file: &Path) -> Result<Described, Stop> {
     Ok((out, lost))
 }
 
+/// The first columns of results in every version of hzn; later versions only append columns.
+const FIRST_COLUMNS: &[&str] = &["index", "file", "time_s", "body", "status"];
+
 fn table(file: &Path, kind: &str) -> Result<String, Stop> {
-    let mut summary = Summary::default();
+    let mut notes = String::new();
     if kind == "csv" {
         let header = csv::Reader::from_path(file).and_then(|mut r| r.headers().cloned()).map_err(failed)?;
-        if header.iter().any(|column| column == "limb") {
-            return truth(file);
+        let has = |name: &str| header.iter().any(|column| column == name);
+        if !header.iter().take(FIRST_COLUMNS.len()).eq(FIRST_COLUMNS.iter().copied()) {
+            return match () {
+                () if has("limb") => truth(file),
+                () if has("file") => priors(file),
+                () => series(file, &header),
+            };
         }
-        if !header.iter().any(|column| column == "file") {
-            return series(file, &header);
-        }
-        if !header.iter().eq(Row::COLUMNS) {
-            let frames = hzn_calib::frames::load(file)?;
-            let with = |has: fn(&hzn_calib::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
-            let mut out = kind_line("frames.csv, the priors of pictures");
-            out.push_str(&format!("pictures         {}\n", frames.rows.len()));
-            for (name, n) in [
-                ("time", with(|r| r.time_s.is_some())),
-                ("UTC", with(|r| r.utc_s.is_some())),
-                ("altitude", with(|r| r.altitude_km.is_some())),
-                ("position", with(|r| r.position_km.is_some())),
-                ("attitude", with(|r| r.camera_to_ecef_wxyz.is_some())),
-                ("Sun", with(|r| r.sun_camera.is_some())),
-            ] {
-                out.push_str(&format!("{:<16} {n}\n", format!("with {name}")));
-            }
-            let unused: Vec<&str> = frames.warnings.iter().filter_map(|w| w.field.as_deref()).collect();
-            if !unused.is_empty() {
-                out.push_str(&format!("columns not used {}\n", unused.join(", ")));
-            }
-            return Ok(out);
-        }
+        notes = other_columns(&header);
     }
+    let mut summary = Summary::default();
     for row in hzn_run::results::rows(file, kind)? {
-        summary.add(&row?);
+        summary.add(&row.map_err(|e| if notes.is_empty() { e.into() } else { failed(format!("{e}\n{notes}")) })?);
     }
-    let mut out = kind_line("results of hzn run") + &summary.text();
+    let mut out = kind_line("results of hzn run") + &summary.text() + &notes;
     if ending(file) == "part" {
         out.push_str(&unfinished(file));
+    }
+    Ok(out)
+}
+
+/// Returns lines about the columns in which results of another version differ; nothing for results of this version.
+fn other_columns(header: &csv::StringRecord) -> String {
+    let missing: Vec<&str> = Row::COLUMNS.into_iter().filter(|name| !header.iter().any(|c| c == *name)).collect();
+    let unknown: Vec<&str> = header.iter().filter(|column| !Row::COLUMNS.contains(column)).collect();
+    let mut out = String::new();
+    for (title, columns) in [("columns missing", missing), ("columns unknown", unknown)] {
+        if !columns.is_empty() {
+            out.push_str(&format!("{title:<16} {} (the file is of another version of hzn)\n", columns.join(", ")));
+        }
+    }
+    out
+}
+
+/// Describes a frames.csv.
+fn priors(file: &Path) -> Result<String, Stop> {
+    let frames = hzn_calib::frames::load(file)?;
+    let with = |has: fn(&hzn_calib::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
+    let mut out = kind_line("frames.csv, the priors of pictures");
+    out.push_str(&format!("pictures         {}\n", frames.rows.len()));
+    for (name, n) in [
+        ("time", with(|r| r.time_s.is_some())),
+        ("UTC", with(|r| r.utc_s.is_some())),
+        ("altitude", with(|r| r.altitude_km.is_some())),
+        ("position", with(|r| r.position_km.is_some())),
+        ("attitude", with(|r| r.camera_to_ecef_wxyz.is_some())),
+        ("Sun", with(|r| r.sun_camera.is_some())),
+    ] {
+        out.push_str(&format!("{:<16} {n}\n", format!("with {name}")));
+    }
+    let unused: Vec<&str> = frames.warnings.iter().filter_map(|w| w.field.as_deref()).collect();
+    if !unused.is_empty() {
+        out.push_str(&format!("columns not used {}\n", unused.join(", ")));
     }
     Ok(out)
 }
@@ -280,7 +302,7 @@ impl Summary {
     }
 
     fn text(self) -> String {
-        let mut out = format!("frames           {}\n", self.frames);
+        let mut out = format!("pictures         {}\n", self.frames);
         let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {value}\n"));
         if let Some((a, b)) = self.time {
             line("time", format!("{a:.3} to {b:.3} s"));

@@ -258,7 +258,7 @@ fn tell_interruption(done: u64, total: Option<u64>, path: Option<&Path>) {
         Some(path) => format!("; {} is valid, and --resume continues it", path.display()),
         None => String::new(),
     };
-    tell::line(format_args!("interrupted after {done}{of} frames{next}"));
+    tell::line(format_args!("interrupted after {done}{of} pictures{next}"));
 }
 
 /// Returns the command that explains a picture of this run, ready to be typed.
@@ -409,7 +409,7 @@ impl MissingPriors {
             parts.push(format!("{} {what}", self.below_limb));
         }
         if !parts.is_empty() {
-            tell::warning(format_args!("of {}: {}", explain::counted(self.frames, "frame"), parts.join("; ")));
+            tell::warning(format_args!("of {}: {}", explain::counted(self.frames, "picture"), parts.join("; ")));
         }
     }
 }

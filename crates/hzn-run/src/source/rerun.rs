@@ -114,7 +114,7 @@ pub fn describe_loss(reader: &Reader, path: &Path, done: &str) -> Option<String>
     let name = path.display();
     match reader.broken_chunks() {
         0 if reader.is_complete() => None,
-        0 => Some(format!("{name}: was cut off; its finished frames were {done} (`hzn recover` closes it)")),
+        0 => Some(format!("{name}: was cut off; its finished pictures were {done} (`hzn recover` closes it)")),
         1 => Some(format!("{name}: 1 damaged part was left out; its content is missing")),
         n => Some(format!("{name}: {n} damaged parts were left out; their content is missing")),
     }

@@ -1,7 +1,17 @@
 //! `hzn calibrate`: measures values of a sensor.toml on pictures.
 
+mod board;
+mod board_search;
+mod check;
+mod flight;
+mod lens_output;
+mod lens_page;
+mod lens_text;
 mod noise;
 mod page;
+mod points;
+mod sky;
+mod sky_text;
 mod text;
 
 use crate::exit::Outcome;
@@ -15,11 +25,19 @@ pub(super) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
+    Board(board::Args),
+    Points(points::Args),
+    Sky(sky::Args),
+    Check(check::Args),
     Noise(noise::Args),
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
     match &args.command {
+        Command::Board(args) => board::run(args),
+        Command::Points(args) => points::run(args),
+        Command::Sky(args) => sky::run(args),
+        Command::Check(args) => check::run(args),
         Command::Noise(args) => noise::run(args),
     }
 }

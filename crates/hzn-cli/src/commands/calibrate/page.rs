@@ -5,11 +5,24 @@ use hzn_calib::noise::Calibration;
 use super::text;
 use crate::plot::{Chart, Series, Style};
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;padding:0 \
+pub(super) const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;padding:0 \
                      1rem;color:#222}\
 h1{font-size:1.5rem}td{padding:.2rem .8rem;border-bottom:1px solid #eee}\
 .plots{display:grid;gap:1rem;grid-template-columns:repeat(auto-fit,minmax(420px,1fr))}.plots \
 svg{width:100%;height:auto}";
+
+/// Returns a page with a title, lines of name and value, and plots.
+pub(super) fn simple(title: &str, lines: &[(String, String)], charts: &[Chart]) -> anyhow::Result<String> {
+    let row =
+        |(name, value): &(String, String)| format!("<tr><td>{}</td><td>{}</td></tr>", escape(name), escape(value));
+    let rows: String = lines.iter().map(row).collect();
+    let plots = charts.iter().map(Chart::svg).collect::<anyhow::Result<String>>()?;
+    Ok(format!(
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{STYLE}</style>\
+         <h1>{0}</h1><table>{rows}</table><div class=\"plots\">{plots}</div></html>\n",
+        escape(title)
+    ))
+}
 
 pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str) -> anyhow::Result<String> {
     let rows: String = text::lines(calibration, pictures)
@@ -55,6 +68,6 @@ fn correlation(calibration: &Calibration) -> Chart {
         .with_series(Series::new("residuals", Style::Line, calibration.correlation.iter().copied()))
 }
 
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -44,7 +44,7 @@ pub(super) fn html(report: &Report, worst: &[Drawn]) -> anyhow::Result<String> {
         }
     }
     if !worst.is_empty() {
-        body.push_str("<h2>Worst frames</h2><div class=\"worst\">");
+        body.push_str("<h2>Worst pictures</h2><div class=\"worst\">");
         for frame in worst {
             let picture = match &frame.jpeg {
                 Some(jpeg) => {

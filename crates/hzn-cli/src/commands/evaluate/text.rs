@@ -18,7 +18,7 @@ pub(super) fn report(report: &Report, worst: &[&Case]) -> String {
         out.push('\n');
     }
     if !worst.is_empty() {
-        out.push_str("worst frames\n");
+        out.push_str("worst pictures\n");
         for case in worst {
             out.push_str(&format!("  {}\n", worst_line(case)));
         }
@@ -30,7 +30,7 @@ pub(super) fn report(report: &Report, worst: &[&Case]) -> String {
 pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
     let mut out = Vec::new();
     let mut line = |name, value| out.push((name, value));
-    let mut answered = format!("{} of {} frames with a limb in view", e.answered, e.with_limb);
+    let mut answered = format!("{} of {} pictures with a limb in view", e.answered, e.with_limb);
     if e.with_limb > 0 {
         answered.push_str(&format!(" ({})", percent(e.answered_share())));
     }
@@ -43,8 +43,8 @@ pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
     line(
         "false answers",
         match without {
-            0 => "no frame is without a limb".into(),
-            n => format!("{} of {n} frames without a limb", e.false_answers),
+            0 => "no picture is without a limb".into(),
+            n => format!("{} of {n} pictures without a limb", e.false_answers),
         },
     );
     if let Some(x) = &e.errors {
@@ -99,7 +99,7 @@ fn nees(h: &Honesty) -> String {
 }
 
 /// Columns of a group's table.
-pub(super) const COLUMNS: [&str; 7] = ["frames", "answered", "RMS deg", "median", "95 %", "worst", "NEES (95 %)"];
+pub(super) const COLUMNS: [&str; 7] = ["pictures", "answered", "RMS deg", "median", "95 %", "worst", "NEES (95 %)"];
 
 /// Returns the rows of a group: the range, then the cells of [`COLUMNS`].
 pub(super) fn cells(group: &Group) -> Vec<(String, [String; 7])> {

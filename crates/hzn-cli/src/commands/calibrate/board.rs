@@ -1,0 +1,106 @@
+//! `hzn calibrate board`: calibrates a camera from pictures of a chessboard.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use hzn_calib::board::{self, Board};
+use hzn_core::camera::Model;
+use hzn_run::source::{self, Raw};
+
+use super::board_search;
+use super::lens_output::{check_outputs, write_all};
+use crate::exit::{Exit, Outcome, failed, usage};
+use crate::setup::stop_flag;
+use crate::tell;
+
+/// Calibrate a camera from pictures of a chessboard
+///
+/// Print a chessboard, fix it to something flat, and take 10 to 20 pictures: the board tilted by 30 to 45 degrees in
+/// different directions, and near each corner of the picture in some of them. No first guess is needed. A board that
+/// the border of the picture cuts counts as well.
+///
+/// The report goes to stdout. `-o camera.toml` writes the section [camera] with the covariance of its parameters, ready
+/// for a sensor.toml; `-o report.html` writes plots. `hzn camera convert` turns the file into the form of another tool.
+///
+///   hzn calibrate board boards/*.png --board 9x6 --square-mm 30 -o camera.toml
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// Pictures, a folder, a pattern in quotes, a video, or an MCAP
+    #[arg(required = true, value_name = "PICTURES")]
+    input: Vec<PathBuf>,
+    /// Inner corners of the board, along its rows and its columns: one less than its squares
+    #[arg(long, value_name = "COLUMNSxROWS")]
+    board: BoardSize,
+    /// Side of a square of the board; it sets the scale of the poses and has no effect on the lens
+    #[arg(long, value_name = "MM", default_value_t = 1.0)]
+    square_mm: f64,
+    /// Model of the lens: kannala-brandt, brown-conrady, equidistant, pinhole, double-sphere, eucm
+    #[arg(long, value_name = "MODEL", default_value = "kannala-brandt", value_parser = parse_model)]
+    model: Model,
+    /// Size and format of headerless pictures, as in `hzn run`
+    #[arg(long, value_name = "WIDTHxHEIGHT:FORMAT")]
+    raw: Option<Raw>,
+    /// Also write the camera (.toml) or a report with plots (.html); may be given twice
+    #[arg(short, long, value_name = "FILE")]
+    output: Vec<PathBuf>,
+    /// Replace files that exist
+    #[arg(long)]
+    force: bool,
+    /// Number of threads; without it, all cores
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Print no notes on stderr
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Columns and rows of inner corners.
+#[derive(Debug, Clone, Copy)]
+struct BoardSize([u16; 2]);
+
+impl FromStr for BoardSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let sides = text.split_once('x').and_then(|(a, b)| Some([a.parse().ok()?, b.parse().ok()?]));
+        let expected = "COLUMNSxROWS of inner corners is expected, for example 9x6";
+        let sides = sides.ok_or_else(|| expected.to_owned())?;
+        if sides.iter().all(|n| (3..=100).contains(n)) {
+            Ok(Self(sides))
+        } else {
+            Err(format!("{expected}; each side has 3 to 100"))
+        }
+    }
+}
+
+/// Reads the name of a lens model.
+pub(super) fn parse_model(name: &str) -> Result<Model, String> {
+    let model = Model::ALL.iter().copied().find(|m| m.name() == name);
+    model.ok_or_else(|| {
+        let names: Vec<&str> = Model::ALL.iter().map(|m| m.name()).collect();
+        format!("the models are {}", names.join(", "))
+    })
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    check_outputs(&args.output, args.force)?;
+    if !(args.square_mm > 0.0 && args.square_mm.is_finite()) {
+        return Err(usage("--square-mm: must be above 0"));
+    }
+    let board = Board { columns: args.board.0[0], rows: args.board.0[1], square_mm: args.square_mm };
+    let mut source = source::open(&args.input, args.raw, None)?;
+    if !args.quiet {
+        source.notes().iter().for_each(|note| tell::line(format_args!("note: {note}")));
+    }
+    let Some(pictures) = board_search::search(source.as_mut(), &board, args.jobs, &stop_flag(), args.quiet)? else {
+        tell::line("interrupted; nothing was calibrated");
+        return Ok(Exit::Interrupted);
+    };
+    pictures.reasons.iter().for_each(|(name, why)| tell::warning(format_args!("{name}: {why}")));
+    pictures.notes.iter().for_each(tell::warning);
+    let name = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
+    let calibrated = board::calibrate(args.model, pictures.size_px, &board, &pictures.views)
+        .map_err(|why| failed(format!("no camera is written: {why}")))?;
+    write_all(&calibrated, &pictures.reasons, &args.output, &name, args.quiet)?;
+    Ok(if pictures.unreadable > 0 { Exit::SomeUnreadable } else { Exit::Done })
+}

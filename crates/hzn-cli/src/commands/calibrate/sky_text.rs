@@ -1,0 +1,221 @@
+//! A calibration from the sky in words and numbers.
+
+use hzn_calib::sky::{Check, Deviation, Estimate, Mount, MountRefusal, Observability, Verdict};
+use hzn_run::explain::counted;
+
+use crate::plot::{Chart, Series, Style};
+
+/// A mount, or why there is none.
+type MountResult = Result<Mount, MountRefusal>;
+
+/// Returns the report of an estimate.
+pub(super) fn report(estimate: &Estimate, pictures: u64, mount: Option<&MountResult>) -> String {
+    join(&lines(estimate, pictures, mount))
+}
+
+fn join(lines: &[(String, String)]) -> String {
+    lines.iter().map(|(name, value)| format!("{name:<14} {value}\n")).collect()
+}
+
+/// Returns the lines of the report: name and value.
+pub(super) fn lines(estimate: &Estimate, pictures: u64, mount: Option<&MountResult>) -> Vec<(String, String)> {
+    let outliers: Vec<&str> = estimate.pictures.iter().filter(|p| !p.counts).map(|p| p.name.as_str()).collect();
+    let left_out = match outliers.as_slice() {
+        [] => String::new(),
+        several => format!(", {} outliers left out: {}", several.len(), several.join(", ")),
+    };
+    let answered = estimate.pictures.len();
+    let mut lines = Lines::default();
+    lines.add("pictures", format!("{}, {answered} with a limb{left_out}", counted(pictures, "picture")));
+    let [percent, sigma] = estimate.focal_percent;
+    lines.add("focal length", format!("{percent:+.3} % ± {sigma:.3} % against sensor.toml"));
+    for p in &estimate.parameters {
+        let by = if p.stated { "stated" } else { "assumed" };
+        let what = if p.determined {
+            format!(
+                "{} ± {} (before {} ± {}, {by}); 1 sigma moves the corner by {:.2} px",
+                number(p.value, p.sigma),
+                number(p.sigma, p.sigma),
+                number(p.before, p.sigma),
+                number(p.sigma_before, p.sigma_before),
+                p.corner_px
+            )
+        } else {
+            format!(
+                "not determined: ± {} after the flight, ± {} before ({by}); it keeps {}",
+                number(p.sigma, p.sigma),
+                number(p.sigma_before, p.sigma_before),
+                number(p.before, p.sigma)
+            )
+        };
+        lines.add(p.which.name(), what);
+    }
+    add_limb(&mut lines, estimate);
+    add_observability(&mut lines, &estimate.observability);
+    if let Some(mount) = mount {
+        add_mount(&mut lines, mount);
+    }
+    lines.0
+}
+
+/// Lines of a report.
+#[derive(Default)]
+struct Lines(Vec<(String, String)>);
+
+impl Lines {
+    fn add(&mut self, name: &str, value: String) {
+        self.0.push((name.to_owned(), value));
+    }
+}
+
+fn add_limb(lines: &mut Lines, estimate: &Estimate) {
+    let [km, sigma] = estimate.height_km;
+    let before = estimate.limb_before;
+    let known = if before.sigma_km.is_finite() {
+        format!("{:.2} km ± {:.2} km before, with the error of the altitude", before.km, before.sigma_km)
+    } else {
+        "free".to_owned()
+    };
+    lines.add("limb height", format!("{km:.2} km ± {sigma:.2} km ({known})"));
+    lines.add(
+        "",
+        match estimate.scatter_km {
+            Some(km) => format!("{km:.2} km of scatter between pictures beyond edge noise"),
+            None => "too few pictures to measure the scatter between them; the sigma of the limb height stands for it"
+                .to_owned(),
+        },
+    );
+    let [before_px, after_px] = estimate.shift_sigma_px;
+    lines
+        .add("common shift", format!("of all edges: ± {before_px:.2} px assumed, ± {after_px:.2} px after the flight"));
+    if let Some(chi2) = estimate.chi2 {
+        lines.add("chi-square", format!("{chi2:.2} a degree of freedom; 1 is ideal, a value above 2 is an alarm"));
+    }
+}
+
+fn add_observability(lines: &mut Lines, o: &Observability) {
+    lines.add("observability", format!("focal length ± {:.3} % if the limb height is known", o.known_limb_percent));
+    lines.add(
+        "",
+        format!(
+            "focal length ± {:.3} % and limb height ± {:.2} km if both are free; their correlation is {:+.2}",
+            o.free_limb_percent, o.free_limb_km, o.correlation
+        ),
+    );
+    lines.add("", format!("1 km of limb height looks like {:+.3} % of focal length", o.percent_per_km));
+}
+
+fn add_mount(lines: &mut Lines, mount: &MountResult) {
+    match mount {
+        Ok(m) => {
+            let [x, y, z] = m.correction_deg;
+            let [sx, sy, sz] = m.sigma_deg;
+            lines.add(
+                "mount",
+                format!("rotated by ({x:+.3}, {y:+.3}, {z:+.3})° ± ({sx:.3}, {sy:.3}, {sz:.3})° in the camera frame"),
+            );
+            lines.add(
+                "",
+                format!("{}, {:.3}° RMS after the correction", counted(m.pictures as u64, "picture"), m.residual_deg),
+            );
+        }
+        Err(why) => lines.add("mount", why.to_string()),
+    }
+}
+
+/// Returns the report of a check. Its first line is the verdict.
+pub(super) fn check_report(check: &Check, pictures: u64) -> String {
+    let mut lines = Lines::default();
+    let focal = &check.focal;
+    let verdict = check.verdict.name();
+    lines.add(
+        "verdict",
+        match check.verdict {
+            Verdict::Holds => format!(
+                "{verdict}: no difference is significant, and {:.2} % of focal length would have been found",
+                check.detect_percent
+            ),
+            Verdict::DoesNotHold => format!("{verdict}: {}", significant(check)),
+            Verdict::CannotTell => format!(
+                "{verdict}: no difference is significant, but only {:.2} % of focal length would have been found; {}",
+                focal.detectable,
+                remedy(check)
+            ),
+        },
+    );
+    lines.add("focal length", format!("{}, found from {:.3} % on", describe(focal, "%"), focal.detectable));
+    for (name, deviation) in ["cx_px", "cy_px"].into_iter().zip(&check.centre_px) {
+        lines.add(name, describe(deviation, "px"));
+    }
+    let [counted_pictures, left_out] = check.pictures;
+    let all = counted(pictures, "picture");
+    lines.add("pictures", format!("{all}, {counted_pictures} count, {left_out} outliers left out"));
+    let [km, sigma] = check.height_km;
+    lines.add("limb height", format!("{km:.2} km ± {sigma:.2} km after the flight"));
+    add_observability(&mut lines, &check.observability);
+    join(&lines.0)
+}
+
+fn describe(d: &Deviation, unit: &str) -> String {
+    format!(
+        "{:+.3} {unit} ± {:.3} {unit} (calibration ± {:.3} {unit}): {:.1} sigmas, p = {:.2e}",
+        d.value,
+        d.sigma,
+        d.calibration_sigma,
+        d.sigmas.abs(),
+        d.p_value
+    )
+}
+
+/// Names the most significant difference.
+fn significant(check: &Check) -> String {
+    let [u, v] = &check.centre_px;
+    let each = [("the focal length", "%", &check.focal), ("cx_px", "px", u), ("cy_px", "px", v)];
+    let strongest = each.into_iter().max_by(|a, b| a.2.sigmas.abs().total_cmp(&b.2.sigmas.abs()));
+    strongest.map_or_else(String::new, |(name, unit, d)| {
+        let how = if d.value > 0.0 { "larger" } else { "smaller" };
+        format!(
+            "{name} is {how} in flight by {:.3} {unit} ± {:.3} {unit} ({:.1} sigmas, p = {:.1e})",
+            d.value.abs(),
+            d.sigma,
+            d.sigmas.abs(),
+            d.p_value
+        )
+    })
+}
+
+/// Says what would help a flight that cannot tell.
+fn remedy(check: &Check) -> String {
+    let (focal, o) = (&check.focal, &check.observability);
+    let needed = check.detect_percent * focal.sigma / focal.detectable;
+    let what = if focal.calibration_sigma > needed {
+        "the calibration itself is not better known (focal_sigma_percent, covariance)".to_owned()
+    } else if o.known_limb_percent < needed {
+        let km = (needed * needed - o.known_limb_percent.powi(2)).sqrt() / o.percent_per_km.abs().max(1e-12);
+        format!("state the limb height to ± {km:.1} km, or use a wider range of altitudes and directions")
+    } else {
+        "use more pictures, or pictures with a longer limb".to_owned()
+    };
+    format!("the sigma is {:.3} %, and {needed:.3} % is needed: {what}", focal.sigma)
+}
+
+/// Formats a value with two digits of its sigma.
+fn number(value: f64, sigma: f64) -> String {
+    let decimals = if sigma > 0.0 { (1 - sigma.log10().floor() as i32).clamp(0, 12) as usize } else { 3 };
+    format!("{value:.decimals$}")
+}
+
+/// Plots the limb height of each picture with its errors.
+pub(super) fn heights(estimate: &Estimate) -> Chart {
+    let each = || estimate.pictures.iter().enumerate().map(|(i, p)| (i as f64, p));
+    let bars = each().flat_map(|(x, p)| [(x, p.km - p.sigma_km), (x, p.km + p.sigma_km), (x, f64::NAN)]);
+    let dots = |counts: bool| each().filter(move |(_, p)| p.counts == counts).map(|(x, p)| (x, p.km));
+    let mut chart = Chart::new("Limb height of each picture with the new lens", "picture", "limb height [km]")
+        .with_series(Series::new("1 sigma from edge noise", Style::Ideal, bars))
+        .with_series(Series::new("measured", Style::Dots, dots(true)))
+        .with_series(Series::new("fitted", Style::Line, each().map(|(x, _)| (x, estimate.height_km[0]))));
+    if estimate.pictures.iter().any(|p| !p.counts) {
+        chart = chart.with_series(Series::new("left out", Style::Dots, dots(false)));
+    }
+    chart
+}
