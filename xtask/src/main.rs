@@ -5,7 +5,8 @@
 //! cargo xtask bench      compares hzn-core with the OpenCV recipe, in one run
 //! cargo xtask reproduce  compares our numbers with the published ones and writes book/results/reproduction.md
 //! cargo xtask firmware   builds the images for the flight computer and counts their instructions
-//! cargo xtask keys       writes the files that follow from the keys of sensor.toml: table, template, JSON schema
+//! cargo xtask keys       writes the files that follow from the keys of sensor.toml: table, template, JSON schema,
+//!                        types of Python
 //! cargo xtask viewer     makes the picture of the viewer's window in the documents
 //! ```
 #![forbid(unsafe_code)]
@@ -41,8 +42,8 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware|keys|view
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into book/results/firmware-cost.md;
                      --by-feature prints only how much flash the methods of published systems take
-  keys               writes the table of book/reference/sensor-toml.md, the template and the JSON schema from the
-                     keys in hzn-core
+  keys               writes the table of book/reference/sensor-toml.md, the template, the JSON schema and the
+                     Python types (hzn.keys) from the keys in hzn-core
   viewer             makes book/images/viewer.png again; needs `cargo xtask test demo` first";
 
 fn main() -> ExitCode {

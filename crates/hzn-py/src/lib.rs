@@ -11,6 +11,7 @@ macro_rules! doc {
     };
 }
 
+mod calibration;
 mod camera;
 mod drawing;
 mod errors;
@@ -30,6 +31,8 @@ mod state;
 /// The module `hzn._hzn`.
 #[pyo3::pymodule(gil_used = false)]
 mod _hzn {
+    #[pymodule_export]
+    use crate::calibration::{Calibration, calibrate, calibrate_points, find_corners};
     #[pymodule_export]
     use crate::camera::Camera;
     #[pymodule_export]

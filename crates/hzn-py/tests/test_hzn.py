@@ -6,6 +6,7 @@ import pickle
 import subprocess
 import sys
 import tempfile
+import typing
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -130,6 +131,14 @@ def test_a_sensor_of_keywords(sensor):
     assert sun.parameters["body"]["kind"] == "sun"
     with pytest.raises(hzn.ConfigError, match="rejct"):
         hzn.Sensor(camera=sensor.camera, rejct={})
+
+
+def test_every_key_has_a_type(sensor):
+    sections = typing.get_type_hints(hzn.keys.Parameters)
+    assert typing.get_type_hints(hzn.keys.Sections).keys() == sections.keys()
+    for name, values in sensor.parameters.items():
+        assert values.keys() <= typing.get_type_hints(sections[name]).keys(), name
+    assert "altitude_km" in typing.get_type_hints(hzn.keys.Body)
 
 
 def test_several_bodies_in_one_picture(sensor):

@@ -53,7 +53,7 @@ def test_a_recording_that_was_cut_off_warns(recording):
     whole = recording.read_bytes()
     cut = recording.with_name("cut.mcap")
     cut.write_bytes(whole[:-20_000])
-    with pytest.warns(UserWarning, match="was cut off; its finished frames were read"):
+    with pytest.warns(UserWarning, match="was cut off; its finished pictures were read"):
         table = hzn.read_mcap(cut)
     assert 0 < len(table["file"]) < 50
     with pytest.warns(UserWarning, match="was cut off"), hzn.open_mcap(cut) as opened:

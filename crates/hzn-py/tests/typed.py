@@ -37,6 +37,30 @@ def sequence(folder: str) -> list[str]:
     return found
 
 
+def keys(body: hzn.keys.Body) -> float:
+    reject: hzn.keys.Reject = {"method": "ransac", "threshold_px": 2, "seed": 3}
+    camera = hzn.Camera(width=4, height=4, fx_px=3.0, fy_px=3.0, cx_px=1.5, cy_px=1.5, k=np.zeros(4))
+    sensor = hzn.Sensor(camera=camera, preset="hzn", body=body, reject=reject, mask={"polygons_px": [[(0, 0), (1, 1)]]})
+    sensor = hzn.Sensor(**sensor.parameters, flight=True)
+    hzn.Sensor(camera={"file": "camchain.yaml"}, bodies=[body, {"kind": "sun", "binarize": {"method": "fixed"}}])
+    parameters = sensor.parameters
+    parameters["reject"]["threshold_px"] = 2.0
+    sensor.parameters = parameters
+    return parameters["camera"]["fx_px"]
+
+
+def wrong_keys(camera: hzn.Camera) -> None:
+    # Each line is an error of the type checker. A line without its error fails the check, because its comment is unused.
+    hzn.Sensor(camera=camera, rejct={})  # type: ignore[call-arg]
+    hzn.Sensor(camera=camera, reject={"treshold_px": 2.0})  # type: ignore[typeddict-unknown-key]
+    hzn.Sensor(camera=camera, reject={"threshold_px": "2"})  # type: ignore[typeddict-item]
+    hzn.Sensor(camera=camera, body={"kind": "mars"})  # type: ignore[typeddict-item]
+    hzn.Sensor(camera=camera, preset="dlr")  # type: ignore[arg-type]
+    hzn.Sensor(body={"altitude_km": 230.0})  # type: ignore[call-arg]
+    hzn.Camera(widht=4)  # type: ignore[call-arg]
+    hzn.Sensor(camera=camera).parameters["reject"]["treshold_px"] = 2.0  # type: ignore[typeddict-unknown-key]
+
+
 def simulated() -> float:
     flight = hzn.simulate("horace", frames=3)
     reports = [flight.sensor.process(frame.image, **frame.known) for frame in flight]

@@ -102,12 +102,12 @@ impl Measure {
     fn start(&mut self, viewer: &Viewer) -> bool {
         let ms = self.began.elapsed().as_secs_f64() * 1e3;
         if self.seen && self.changed.is_none() {
-            println!("start to the first frame on the screen: {ms:.0} ms");
+            println!("start to the first picture on the screen: {ms:.0} ms");
             self.changed = Some(self.began);
         }
         let is_finished = self.changed.is_some() && viewer.sequence().complete;
         if is_finished {
-            println!("until all {} frames are known: {ms:.0} ms", viewer.sequence().len());
+            println!("until all {} pictures are known: {ms:.0} ms", viewer.sequence().len());
         }
         is_finished
     }
@@ -180,7 +180,7 @@ impl Measure {
             (self.shown, self.frames) = (index, self.frames + 1);
             if self.frames.is_power_of_two() || index == Some(count - 1) {
                 println!(
-                    "{} frames played: {} MB resident, {} MB at most",
+                    "{} pictures played: {} MB resident, {} MB at most",
                     self.frames,
                     memory("VmRSS"),
                     memory("VmHWM")
@@ -189,7 +189,7 @@ impl Measure {
         }
         let is_finished = index == Some(count - 1);
         if let (true, Some(began)) = (is_finished, self.changed) {
-            println!("{:.1} frames a second", self.frames as f64 / began.elapsed().as_secs_f64());
+            println!("{:.1} pictures a second", self.frames as f64 / began.elapsed().as_secs_f64());
         }
         is_finished
     }

@@ -12,8 +12,10 @@ from . import consensus as consensus
 from . import contour as contour
 from . import covariance as covariance
 from . import fit as fit
+from . import keys as keys
 from . import rays as rays
 from . import threshold as threshold
+from ._hzn import Calibration as Calibration
 from ._hzn import Camera as Camera
 from ._hzn import ConfigError as ConfigError
 from ._hzn import Expected as Expected
@@ -26,6 +28,9 @@ from ._hzn import Sensor as Sensor
 from ._hzn import SimulatedFrame as SimulatedFrame
 from ._hzn import Simulation as Simulation
 from ._hzn import __version__ as __version__
+from ._hzn import calibrate as calibrate
+from ._hzn import calibrate_points as calibrate_points
+from ._hzn import find_corners as find_corners
 from ._hzn import open_mcap as open_mcap
 from ._hzn import overlay as overlay
 from ._hzn import read_mcap as read_mcap

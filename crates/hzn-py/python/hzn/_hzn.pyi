@@ -7,7 +7,9 @@ from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from typing_extensions import disjoint_base
+from typing_extensions import Unpack, disjoint_base
+
+from . import keys
 
 _Path: TypeAlias = str | PathLike[str]
 _Image: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16]
@@ -44,7 +46,7 @@ class Camera:
     ``[camera]`` in sensor.toml.
     """
 
-    def __new__(cls, **keys: Any) -> Camera: ...
+    def __new__(cls, **keys: Unpack[keys.Camera]) -> Camera: ...
     @staticmethod
     def from_toml(path: _Path) -> Camera:
         """Read ``[camera]`` of a sensor.toml.
@@ -101,7 +103,7 @@ class Camera:
         """
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> keys.Camera:
         """Copy of the keys of ``[camera]`` in sensor.toml."""
 
     @property
@@ -207,10 +209,10 @@ class Camera:
 class Sensor:
     """A horizon sensor.
 
-    ``Sensor(camera=..., body=..., preset=...)`` takes the sections of a sensor.toml as dictionaries. Only ``camera`` is
-    required; it may also be a `Camera`. ``preset`` is ``"hzn"``, ``"dlr-2022"``, ``"zju-2022"``, ``"horace-2015"``,
-    ``"sun"`` or ``"moon"``. ``flight=True`` computes in single precision with 2048 points, as on the flight computer. A
-    key or value that is refused raises `ConfigError` with its name and limit.
+    ``Sensor(camera=..., body=..., preset=...)`` takes the sections of a sensor.toml as dictionaries; `hzn.keys` has
+    their types. Only ``camera`` is required; it may also be a `Camera`. ``preset`` is ``"hzn"``, ``"dlr-2022"``,
+    ``"zju-2022"``, ``"horace-2015"``, ``"sun"`` or ``"moon"``. ``flight=True`` computes in single precision with 2048
+    points, as on the flight computer. A key or value that is refused raises `ConfigError` with its name and limit.
 
     A sensor may be used from several threads at the same time; the answers are the same as with one thread. It can be
     copied and pickled.
@@ -220,7 +222,7 @@ class Sensor:
     >>> sensor = hzn.Sensor(camera=hzn.Camera.from_kalibr("camchain.yaml"), body={"altitude_km": 230.0})
     """
 
-    def __new__(cls, *, flight: bool = False, **sections: Any) -> Sensor: ...
+    def __new__(cls, *, flight: bool = False, **sections: Unpack[keys.Sections]) -> Sensor: ...
     @staticmethod
     def from_toml(path: _Path, *, flight: bool = False) -> Sensor:
         """Read a sensor.toml.
@@ -232,7 +234,7 @@ class Sensor:
         """
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> keys.Parameters:
         """All parameters, as sections and keys of sensor.toml.
 
         Reading returns a copy: change the copy and set it again. If the new parameters are refused (`ConfigError`),
@@ -246,7 +248,7 @@ class Sensor:
         """
 
     @parameters.setter
-    def parameters(self, sections: dict[str, Any], /) -> None: ...
+    def parameters(self, sections: keys.Sections | keys.Parameters, /) -> None: ...
     @property
     def camera(self) -> Camera:
         """The camera with its lens."""
@@ -509,6 +511,136 @@ class Report:
 
     def __copy__(self) -> Report: ...
     def __deepcopy__(self, _memo: Any, /) -> Report: ...
+
+@final
+class Calibration:
+    """Result of `calibrate` and `calibrate_points`: a lens with its covariance, and the residuals of every point."""
+
+    @property
+    def camera(self) -> Camera:
+        """The lens."""
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the intrinsic parameters: ``fx_px``, ``fy_px``, ``cx_px``, ``cy_px``, then the coefficients."""
+
+    @property
+    def values(self) -> list[float]:
+        """Values of the parameters, in the order of `names`; focal lengths and principal point in pixels."""
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the parameters in the order of `names`, shape (n, n), in their units squared."""
+
+    @property
+    def rms_px(self) -> float:
+        """RMS distance between measured and projected points, pixels, as OpenCV reports it."""
+
+    @property
+    def sigma_px(self) -> float:
+        """1-sigma of a measured coordinate, pixels, from the residuals."""
+
+    @property
+    def held_out_rms_px(self) -> float | None:
+        """RMS distance in views that took no part in the fit of the lens, pixels; None with too few views."""
+
+    @property
+    def residuals_px(self) -> list[NDArray[np.float64]]:
+        """Measured minus projected points of each view, shape (n, 2), pixels; shape (0, 2) for a dropped view."""
+
+    @property
+    def outliers(self) -> list[list[int]]:
+        """For each view the indices of the points that do not count, because they disagree with all others."""
+
+    @property
+    def dropped(self) -> list[str | None]:
+        """For each view the reason why it does not count; None for a view that counts."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """Doubts about the result, for example corners of the picture that no point reaches."""
+
+    def to_toml(self) -> str:
+        """Return ``[camera]`` of a sensor.toml, with the covariance."""
+
+def calibrate(
+    object_points: Sequence[ArrayLike],
+    image_points: Sequence[ArrayLike],
+    size: tuple[int, int],
+    *,
+    model: str = "kannala-brandt",
+) -> Calibration:
+    """Calibrate a camera from views of a flat target, without a first guess.
+
+    Parameters
+    ----------
+    object_points
+        For each view the points on the target: shape (n, 2), or (n, 3) with z = 0, in any unit. Seen from the front, x
+        points right and y down.
+    image_points
+        For each view their places in the picture: shape (n, 2) or (n, 1, 2), pixels, pixel centres at integers.
+    size
+        Width and height of the pictures, pixels.
+    model
+        ``kannala-brandt`` (cv2.fisheye), ``brown-conrady`` (cv2.calibrateCamera), ``equidistant``, ``pinhole``,
+        ``double-sphere`` or ``eucm``.
+
+    Raises
+    ------
+    ConfigError
+        The views do not determine the lens; the message says what to do.
+    """
+
+def calibrate_points(
+    directions: Sequence[ArrayLike],
+    image_points: Sequence[ArrayLike],
+    size: tuple[int, int],
+    *,
+    model: str = "kannala-brandt",
+) -> Calibration:
+    """Calibrate a camera from points with known directions: a collimator on a rotator, or stars.
+
+    Parameters
+    ----------
+    directions
+        For each picture the directions of the points: shape (n, 3), in any frame. Each picture has a rotation of its
+        own from this frame to the camera, which is estimated.
+    image_points
+        For each picture their places: shape (n, 2), pixels, pixel centres at integers.
+    size
+        Width and height of the pictures, pixels.
+    model
+        The lens model, as for `calibrate`.
+
+    Raises
+    ------
+    ConfigError
+        The points do not determine the lens, or they fit only after a change, for example a mirrored azimuth.
+    """
+
+def find_corners(
+    picture: _Image, board: tuple[int, int]
+) -> tuple[NDArray[np.uint16], NDArray[np.float64]] | None:
+    """Find the inner corners of a chessboard, with sub-pixel places.
+
+    Parameters
+    ----------
+    picture
+        The picture, as for `Sensor.process`.
+    board
+        Inner corners along the rows and the columns of the board, for example (9, 6).
+
+    Returns
+    -------
+    tuple of numpy.ndarray or None
+        Column and row of each corner, shape (n, 2), and its place, shape (n, 2), pixels. A part of a board has fewer
+        corners. None if there is no board of this size.
+
+    Raises
+    ------
+    ImageError
+        The array is no picture.
+    """
 
 def overlay(image: _Image, report: Report, *, bits: int | None = None) -> NDArray[np.uint8]:
     """Draw limb and axis of a report over its picture; with ``detail=True`` also edges and points.

@@ -172,7 +172,7 @@ _SIGMAS = {
 }
 
 
-def _ideal(lens: str, size: tuple[int, int], fov_deg: float) -> Camera:
+def _ideal(lens: Literal["pinhole", "equidistant"], size: tuple[int, int], fov_deg: float) -> Camera:
     """Return a camera with an ideal lens and this field of view across the width."""
     max_fov_deg = {"pinhole": 175.0, "equidistant": 350.0}.get(lens)
     if max_fov_deg is None:
@@ -183,8 +183,14 @@ def _ideal(lens: str, size: tuple[int, int], fov_deg: float) -> Camera:
     half = math.radians(fov_deg / 2)
     f_px = width / 2 / (math.tan(half) if lens == "pinhole" else half)
     # The image circle of an equidistant lens ends at 175 degrees off axis; corners beyond it are not used.
-    circle = {"theta_max_deg": 175.0} if math.degrees(math.hypot(width, height) / 2 / f_px) > 175 else {}
-    if lens == "pinhole":
-        circle = {}
-    centre = {"cx_px": (width - 1) / 2, "cy_px": (height - 1) / 2}
-    return Camera(width=width, height=height, model=lens, fx_px=f_px, fy_px=f_px, **centre, **circle)
+    is_cut = lens == "equidistant" and math.degrees(math.hypot(width, height) / 2 / f_px) > 175
+    return Camera(
+        width=width,
+        height=height,
+        model=lens,
+        fx_px=f_px,
+        fy_px=f_px,
+        cx_px=(width - 1) / 2,
+        cy_px=(height - 1) / 2,
+        theta_max_deg=175.0 if is_cut else None,
+    )

@@ -122,7 +122,7 @@ pub const QUANTITIES: &[Quantity] = &[
         unit: "km",
         lines: &[("estimated", |r, _| r.altitude_est_km), ("given", |r, _| r.altitude_km)],
     },
-    Quantity { name: "Level", unit: "counts", lines: &[("level", |r, _| r.level.map(f64::from))] },
+    Quantity { name: "Threshold", unit: "counts", lines: &[("threshold", |r, _| r.level.map(f64::from))] },
     Quantity { name: "Roll, pitch", unit: "deg", lines: &[("roll", |r, _| r.roll_deg), ("pitch", |r, _| r.pitch_deg)] },
     Quantity { name: "Time", unit: "µs", lines: &[("processing", |r, _| r.elapsed_us)] },
 ];

@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// Number of recent files that are offered.
 const MAX_RECENT: usize = 8;
+/// Titles of plots in settings of older versions, and their titles now.
+const OLD_PLOTS: [(&str, &str); 1] = [("Level", "Threshold")];
 
 /// Display of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -28,7 +30,7 @@ impl Look {
         match self {
             Self::Colour => "Colour",
             Self::Grey => "Grey",
-            Self::Level => "Level",
+            Self::Level => "Threshold",
         }
     }
 }
@@ -78,7 +80,7 @@ impl Layer {
         match self {
             Self::Touched => "Touched pixels",
             Self::Edges => "Candidate edges",
-            Self::Rejected => "Rejected points",
+            Self::Rejected => "Outliers",
             Self::Inliers => "Inliers",
             Self::Limb => "Fitted limb",
             Self::Axis => "Axis and 3σ",
@@ -176,9 +178,16 @@ impl Settings {
         Some(config.or_else(home)?.join("hzn").join("viewer.json"))
     }
     /// Reads the settings. A missing setting has its default. If the file cannot be read, all settings have their
-    /// defaults.
+    /// defaults. A plot that was stored under an old title has its new title.
     pub fn load(path: &Path) -> Self {
-        std::fs::read_to_string(path).ok().and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default()
+        let mut settings: Self =
+            std::fs::read_to_string(path).ok().and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
+        for title in &mut settings.plotted {
+            if let Some((_, now)) = OLD_PLOTS.iter().find(|(old, _)| old == title) {
+                *title = (*now).to_owned();
+            }
+        }
+        settings
     }
     /// Writes the settings.
     ///
@@ -208,6 +217,12 @@ mod tests {
         assert_eq!(Settings::load(&path), settings);
         std::fs::write(&path, "{\"dark\": false, \"unknown\": 3}").unwrap();
         assert_eq!(Settings::load(&path), Settings { dark: false, ..Settings::default() });
+        std::fs::write(&path, "{\"look\": \"level\", \"plotted\": [\"Level\", \"RMS\"]}").unwrap();
+        let old = Settings::load(&path);
+        assert_eq!((old.look, old.plotted), (Look::Level, vec!["Threshold".to_owned(), "RMS".to_owned()]));
+        for (_, now) in OLD_PLOTS {
+            assert!(crate::model::rows::QUANTITIES.iter().any(|q| q.name == now), "{now}");
+        }
         std::fs::write(&path, "no json").unwrap();
         assert_eq!(Settings::load(&path), Settings::default());
     }

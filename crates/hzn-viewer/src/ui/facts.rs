@@ -22,17 +22,17 @@ const fn card(title: &'static str, stage: Option<Stage>, sections: &'static [&'s
 pub(super) const CARDS: &[Card] = &[
     card("Picture", None, &["input", "gate"], false),
     card("Body", None, &["body"], false),
-    card("Level", Some(Stage::Binarize), &["binarize"], true),
+    card("Threshold", Some(Stage::Binarize), &["binarize"], true),
     card("Mask", None, &["mask"], false),
     card("Contour", Some(Stage::Contour), &["contour"], false),
-    card("Candidates", Some(Stage::Candidates), &["candidates"], true),
-    card("Undistort", Some(Stage::Undistort), &["camera"], false),
-    card("Reject", Some(Stage::Reject), &["reject"], true),
-    card("Estimate", Some(Stage::Estimate), &["estimate"], false),
+    card("Edge points", Some(Stage::Candidates), &["candidates"], true),
+    card("Rays", Some(Stage::Undistort), &["camera"], false),
+    card("Consensus", Some(Stage::Reject), &["reject"], true),
+    card("Fit", Some(Stage::Estimate), &["estimate"], false),
     card("Covariance", Some(Stage::Covariance), &["covariance"], false),
-    card("Select", Some(Stage::Select), &["select"], false),
-    card("Recover", None, &["recover"], false),
-    card("Limits", None, &["limits"], false),
+    card("Gates", Some(Stage::Select), &["select"], false),
+    card("Further looks", None, &["recover"], false),
+    card("Work budget", None, &["limits"], false),
 ];
 
 /// Returns lines about the input of a stage, its output, and the points that it dropped.
@@ -43,21 +43,21 @@ pub(super) fn lines(card: &Card, frame_view: &FrameView, outcome: &Outcome, answ
     match card.title {
         "Picture" => picture(frame_view, config),
         "Body" => expected(answer),
-        "Level" => level(answer, config),
+        "Threshold" => threshold(answer, config),
         "Mask" => vec![match config.mask.polygons_px.len() {
             0 => "nothing is masked".into(),
             1 => "1 area is masked".into(),
             n => format!("{n} areas are masked"),
         }],
         "Contour" if reached(Stage::Contour) => contour(report, outcome),
-        "Recover" if c.looks > 1 => vec![format!("{} looks, each with another threshold", c.looks)],
-        "Limits" => vec![format!("{} steps of work", c.work)],
-        "Candidates" if reached(Stage::Contour) => edge_points(report, config),
-        "Undistort" if reached(Stage::Undistort) => vec![format!("{} points became rays", c.edge_points)],
-        "Reject" if reached(Stage::Reject) => consensus(report, answer),
-        "Estimate" => answer.solution().map_or_else(Vec::new, |s| fit(s, answer)),
+        "Further looks" if c.looks > 1 => vec![format!("{} looks, each with another threshold", c.looks)],
+        "Work budget" => vec![format!("{} steps of work", c.work)],
+        "Edge points" if reached(Stage::Contour) => edge_points(report, config),
+        "Rays" if reached(Stage::Undistort) => vec![format!("{} points became rays", c.edge_points)],
+        "Consensus" if reached(Stage::Reject) => consensus(report, answer),
+        "Fit" => answer.solution().map_or_else(Vec::new, |s| fit(s, answer)),
         "Covariance" => answer.solution().map_or_else(Vec::new, covariance),
-        "Select" => gates(report),
+        "Gates" => gates(report),
         _ => Vec::new(),
     }
 }
@@ -88,7 +88,7 @@ fn expected(answer: &BodyResult) -> Vec<String> {
     out
 }
 
-fn level(answer: &BodyResult, config: &Config) -> Vec<String> {
+fn threshold(answer: &BodyResult, config: &Config) -> Vec<String> {
     let Ok(report) = &answer.report else { return Vec::new() };
     match (report.status, answer.sample) {
         (Status::TooDark | Status::TooBright, _) => vec![format!(
@@ -127,7 +127,7 @@ fn consensus(report: &Report<f64>, answer: &BodyResult) -> Vec<String> {
     let mut out = vec![format!("{} draws", report.counters.draws)];
     if let Some(edge) = answer.chosen() {
         let kept = edge.weights.iter().filter(|w| **w > 0.0).count();
-        out.push(format!("{kept} of {} points kept, {} rejected", edge.points.len(), edge.points.len() - kept));
+        out.push(format!("{kept} inliers of {} edge points, {} outliers", edge.points.len(), edge.points.len() - kept));
     }
     out
 }

@@ -28,7 +28,7 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
         ui.separator();
         for line in [
             "Wheel: zoom about the pointer, to single pixels with values. Drag: move. Double click: zoom in or out.",
-            "Click in a plot or in the time line: go to that frame. Drag in a plot: move it; double click: show all.",
+            "Click in a plot or in the time line: go to that picture. Drag in a plot: move it; double click: show all.",
             "Click on the residuals: the picture shows the nearest edge point.",
             "Hover over a candidate in the column of stages: the picture highlights it.",
             "Drop a recording, a folder, a picture, a video or a sensor.toml on the window: the window opens it.",

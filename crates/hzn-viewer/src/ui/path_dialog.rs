@@ -25,7 +25,7 @@ impl Purpose {
             Self::Picture => "Save picture with overlays",
             Self::Video => "Save video with overlays",
             Self::Table => "Save results",
-            Self::Rerun => "Run all frames into a new recording",
+            Self::Rerun => "Run all pictures into a new recording",
         }
     }
     pub(super) fn hint(self) -> &'static str {

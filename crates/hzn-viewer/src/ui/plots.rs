@@ -266,13 +266,13 @@ fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
         all.iter().filter(|r| (r.weight > 0.0) == kept).map(|r| [r.azimuth_deg, r.distance_px]).collect()
     };
     if all.is_empty() {
-        ui.weak("This plot shows the residuals along the limb if the frame has an answer.");
+        ui.weak("This plot shows the residuals along the limb if the picture has an answer.");
         return None;
     }
     heading(
         ui,
         "Residual [px] by azimuth about the axis",
-        &[("inliers", theme::INLIER), ("rejected", theme::REJECTED)],
+        &[("inliers", theme::INLIER), ("outliers", theme::REJECTED)],
     );
     let plot = shared_plot("residuals", ui.available_height())
         .set_margin_fraction(vec2(0.01, 0.1))
@@ -285,7 +285,7 @@ fn residuals(viewer: &Viewer, ui: &mut Ui) -> Option<[f64; 2]> {
                 ui.hline(HLine::new("threshold", y).color(theme::REJECTED.gamma_multiply(0.5)).allow_hover(false));
             }
         }
-        ui.points(Points::new("rejected", points(false)).color(theme::REJECTED).radius(1.8));
+        ui.points(Points::new("outliers", points(false)).color(theme::REJECTED).radius(1.8));
         ui.points(Points::new("inliers", points(true)).color(theme::INLIER).radius(1.5));
     });
     set_label(&shown.response, RESIDUALS);

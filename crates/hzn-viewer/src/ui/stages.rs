@@ -139,7 +139,7 @@ fn show_card(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Out
                 ui.add(egui::Label::new(RichText::new(line).size(12.5)).wrap());
             }
         }
-        if card.title == "Candidates"
+        if card.title == "Edge points"
             && let Some(answer) = answer
         {
             candidates(viewer, ui, answer);

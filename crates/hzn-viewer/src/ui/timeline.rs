@@ -26,11 +26,11 @@ fn controls(viewer: &mut Viewer, ui: &mut Ui) {
         let hint = |ui: &Ui, c: Command| format!("{} ({})", c.name(), c.key(ui.ctx()));
         let play = if viewer.playback.is_playing() { (Icon::Pause, "Pause") } else { (Icon::Play, "Play") };
         for (c, icon, name) in [
-            (Command::First, Icon::First, "First frame"),
-            (Command::Back, Icon::Back, "Previous frame"),
+            (Command::First, Icon::First, "First picture"),
+            (Command::Back, Icon::Back, "Previous picture"),
             (Command::Play, play.0, play.1),
-            (Command::Next, Icon::Next, "Next frame"),
-            (Command::Last, Icon::Last, "Last frame"),
+            (Command::Next, Icon::Next, "Next picture"),
+            (Command::Last, Icon::Last, "Last picture"),
         ] {
             if icon_button(ui, icon, name).on_hover_text(hint(ui, c)).clicked() {
                 command = Some(c);
@@ -115,7 +115,7 @@ fn place(viewer: &Viewer, ui: &mut Ui) {
     }
     let frame = viewer.playback.frame();
     let more = if viewer.sequence.complete { "" } else { "…" };
-    ui.label(format!("frame {} of {count}{more}", frame + 1));
+    ui.label(format!("picture {} of {count}{more}", frame + 1));
     if let Some(entry) = viewer.sequence.entries.get(frame) {
         let time = entry.time_s.map_or("no time".to_owned(), |t| format!("{t:.3} s"));
         ui.label(RichText::new(time).monospace().size(12.0));
@@ -141,7 +141,7 @@ fn work(viewer: &mut Viewer, ui: &mut Ui) {
         );
     } else if viewer.sequence.len() > 1 && viewer.session.is_some() {
         let hint = format!(
-            "Process every frame with the current parameters, for the plots ({})",
+            "Process every picture with the current parameters, for the plots ({})",
             Command::ProcessAll.key(ui.ctx())
         );
         if ui.button("Process all").on_hover_text(hint).clicked() {

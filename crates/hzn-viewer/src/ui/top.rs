@@ -62,7 +62,7 @@ fn menu_entry(viewer: &mut Viewer, ui: &mut Ui, command: Command, on: bool) {
 fn menus(viewer: &mut Viewer, ui: &mut Ui) {
     ui.menu_button("File", |ui| file_menu(viewer, ui));
     ui.menu_button("Edit", |ui| edit_menu(viewer, ui));
-    ui.menu_button("Frames", |ui| frames_menu(viewer, ui));
+    ui.menu_button("Pictures", |ui| frames_menu(viewer, ui));
     ui.menu_button("Compare", |ui| compare_menu(viewer, ui));
     ui.menu_button("Export", |ui| export_menu(viewer, ui));
 }

@@ -172,7 +172,7 @@ impl Video {
         let mut source = SequenceSource::new(self.sequence)?;
         for (index, data) in known.iter().enumerate() {
             progress.report(index as u64, total)?;
-            let item = source.next().ok_or_else(|| "the sequence ends before its last frame".to_owned())?;
+            let item = source.next().ok_or_else(|| "the sequence ends before its last picture".to_owned())?;
             let item = item.map_err(|e| format!("{e:#}"))?;
             // A picture that cannot be read or has another size becomes a black picture, so that the times stay right.
             let image = match item.payload.decode(Some(&self.config)) {

@@ -235,7 +235,7 @@ fn open_recording(path: &Path, request: &Request, events: &EventSender) -> Resul
         events.send(Event::Frames(vec![last]));
     }
     let broken = index.broken_chunks();
-    let note = (broken > 0).then(|| format!("{broken} parts of the recording are damaged; their frames are missing"));
+    let note = (broken > 0).then(|| format!("{broken} parts of the recording are damaged; their pictures are missing"));
     events.send(Event::End { cut_off: !index.is_complete(), note });
     Ok(())
 }

@@ -34,7 +34,7 @@ impl Reader {
                 None => Payload::Broken("the recording is not open".into()),
             },
             Place::Video(index) => self.read_video(*index)?,
-            Place::Nowhere => Payload::Broken("the recording contains no picture of this frame".into()),
+            Place::Nowhere => Payload::Broken("the recording does not contain this picture".into()),
         })
     }
 
@@ -50,6 +50,6 @@ impl Reader {
                 return Ok(item.payload);
             }
         }
-        Ok(Payload::Broken("the video ends before this frame".into()))
+        Ok(Payload::Broken("the video ends before this picture".into()))
     }
 }

@@ -237,6 +237,6 @@ fn what_cannot_be_recovered_for_want_of_space_stays_open() {
     settled(&mut window);
     std::fs::write(dir.path().join("cut-recovered.mcap"), b"mine").unwrap();
     window.get_by_label("Recover it").click();
-    said(&mut window, "4 frames recovered");
+    said(&mut window, "4 pictures recovered");
     until(&mut window, "not opened", |v| v.sequence().title == "cut-recovered-2.mcap");
 }

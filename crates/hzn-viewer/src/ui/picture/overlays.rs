@@ -1,6 +1,7 @@
 //! The overlays of the picture.
 
 use egui::{Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
+use hzn_core::pixel::ImagePoint;
 
 use crate::model::Plane;
 use crate::model::settings::Layer;
@@ -27,19 +28,12 @@ pub(super) fn draw(
         }
     }
     if on(Layer::Circle)
-        && let Some((centre, a, b)) = placement.camera.and_then(|c| c.image_circle_px())
+        && let Some(camera) = placement.camera
         && placement.plane == Plane::Camera
     {
-        let at = |i: usize| {
-            let (s, c) = (i as f64 * std::f64::consts::TAU / 256.0).sin_cos();
-            placement.to_screen([centre.u + a * c, centre.v + b * s])
-        };
-        painter.add(Shape::dashed_line(
-            &(0..=256).filter_map(at).collect::<Vec<_>>(),
-            Stroke::new(1.5, theme::CIRCLE),
-            7.0,
-            5.0,
-        ));
+        for ellipse in [camera.image_circle_px(), camera.blind_centre_px()] {
+            dashed_ellipse(painter, ellipse, placement);
+        }
     }
     for answer in &outcome.bodies {
         body(viewer, painter, answer, placement);
@@ -247,6 +241,21 @@ fn hatch(painter: &Painter, outline: &[Pos2]) {
         y += 9.0;
     }
     painter.add(Shape::closed_line(outline.to_vec(), Stroke::new(1.5, theme::MASK)));
+}
+
+/// Draws an ellipse of the picture, given by its centre and its semi-axes along x and y in pixels.
+fn dashed_ellipse(painter: &Painter, ellipse: Option<(ImagePoint<f64>, f64, f64)>, placement: &Placement<'_>) {
+    let Some((centre, a, b)) = ellipse else { return };
+    let at = |i: usize| {
+        let (s, c) = (i as f64 * std::f64::consts::TAU / 256.0).sin_cos();
+        placement.to_screen([centre.u + a * c, centre.v + b * s])
+    };
+    painter.add(Shape::dashed_line(
+        &(0..=256).filter_map(at).collect::<Vec<_>>(),
+        Stroke::new(1.5, theme::CIRCLE),
+        7.0,
+        5.0,
+    ));
 }
 
 #[cfg(test)]

@@ -55,7 +55,7 @@ impl Viewer {
                 }
             }
             Command::ExportPicture => {
-                let name = hzn_run::overlay::file_name(self.frame_view.as_ref().map_or("frame", |s| &s.name));
+                let name = hzn_run::overlay::file_name(self.frame_view.as_ref().map_or("picture", |s| &s.name));
                 let name = format!("overlay-{name}");
                 self.path_dialog = Some(PathDialog::new(Purpose::Picture, &self.sequence.default_output_path(&name)));
             }
@@ -88,7 +88,7 @@ impl Viewer {
     fn go_refused(&mut self, back: bool) {
         match self.rows.next_refused(self.playback.frame(), back, self.body) {
             Some(frame) => self.playback.go(frame, self.sequence.len()),
-            None => self.add_note("All processed frames have an answer."),
+            None => self.add_note("All processed pictures have an answer."),
         }
     }
 

@@ -83,7 +83,7 @@ impl Viewer {
                 Ok(Done::Written(path)) => self.add_note(format!("Written: {}", path.display())),
                 Ok(Done::Recovered { path, frames }) => {
                     self.open_paths(vec![path.clone()]);
-                    self.add_note(format!("{frames} frames recovered into {}", path.display()));
+                    self.add_note(format!("{frames} pictures recovered into {}", path.display()));
                 }
                 Err(JobError::Stopped) => self.add_note(format!("{name} was stopped; no file was written.")),
                 Err(JobError::Failed(why)) => self.add_problem(why),

@@ -127,7 +127,7 @@ impl Viewer {
             let path = self.request.inputs.first().cloned();
             self.add_message(Message {
                 text: "This recording was not closed: its run was interrupted, or the file was cut off. All complete \
-                       frames are shown."
+                       pictures are shown."
                     .into(),
                 bad: true,
                 recover: path,

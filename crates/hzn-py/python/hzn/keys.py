@@ -1,0 +1,443 @@
+"""Types of the sections of a sensor.toml, as dictionaries, for type checkers and editors.
+
+``body: hzn.keys.Body = {"altitude_km": 230.0}`` is a dictionary whose keys a type checker compares with those of
+``[body]``. The sensor itself checks names, values and limits in any case. A key that is None counts as left out.
+
+`cargo xtask keys` writes this file from the table of keys.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Literal, TypeAlias, TypedDict
+
+from numpy.typing import NDArray
+
+from . import _hzn
+
+_Numbers: TypeAlias = Sequence[float] | NDArray[Any]
+_Rows: TypeAlias = Sequence[Sequence[float]] | Sequence[NDArray[Any]] | NDArray[Any]
+_Polygons: TypeAlias = Sequence[_Rows] | NDArray[Any]
+
+
+class CameraCovariance(TypedDict):
+    """Covariance of the intrinsic parameters of a camera, as a calibration program reports it."""
+
+    order: Sequence[str]
+    """The parameters of the rows and columns, by their names (``fx_px``, ``k1``)."""
+    rows: _Rows
+    """The matrix row by row, symmetric and positive semidefinite; in px² and the units of the coefficients."""
+
+
+class Camera(TypedDict, total=False):
+    """The calibration. Pixel centres are at integers, x points right, y down, z forward, as in OpenCV."""
+
+    width: int
+    """Columns of the picture, px. Values: 2 to 65535."""
+    height: int
+    """Rows of the picture, px. Values: 2 to 65535."""
+    model: Literal["kannala-brandt", "equidistant", "pinhole", "brown-conrady", "double-sphere", "eucm"] | None
+    """Projection of the lens. Default: ``kannala-brandt``."""
+    fx_px: float
+    """Focal length along x, px. Values: above 0 px."""
+    fy_px: float
+    """Focal length along y, px. Values: above 0 px."""
+    cx_px: float
+    """Column of the principal point, px. Values: −1 to 2 times the width."""
+    cy_px: float
+    """Row of the principal point, px. Values: −1 to 2 times the height."""
+    k: _Numbers | None
+    """Coefficients: k1 to k4 of ``kannala-brandt``, k1, k2, p1, p2, k3 of ``brown-conrady``, ξ, α of
+    ``double-sphere``, α, β of ``eucm``. Values: at most as many as the model has; the lens must be monotone."""
+    theta_max_deg: float | None
+    """Radius of the image circle, degrees off the optical axis; pixels beyond it count as masked. Values: 0.1 to 175
+    deg."""
+    theta_min_deg: float | None
+    """Radius of the blind centre, degrees off the optical axis; pixels nearer to the axis count as masked. Values:
+    0.1 to 175 deg."""
+    focal_sigma_percent: float | None
+    """1σ of the focal length, the same for both axes, in percent; it widens the covariance. Values: 0 to 100 %.
+    Default: 0."""
+    centre_sigma_px: float | None
+    """1σ of each coordinate of the principal point, px; it widens the covariance. Values: 0 to 1e6 px. Default: 0."""
+    covariance: CameraCovariance | None
+    """Covariance of the intrinsic parameters, used instead of the two sigmas; ``order`` names rows and columns
+    (``fx_px``, ``fy_px``, ``cx_px``, ``cy_px``, ``k1`` ...), ``rows`` is the matrix. Values: symmetric, positive
+    semidefinite."""
+    readout_s: float | None
+    """Rolling shutter: time from the exposure of the first row to that of the last row, s; 0 for a global shutter,
+    negative if the last row comes first. Values: −10 to 10 s. Default: 0."""
+    file: str | None
+    """A Kalibr, OpenCV, EuRoC or ROS camera_info file with the calibration; its path is relative to this file, and
+    only ``camera``, ``theta_max_deg``, ``theta_min_deg``, ``readout_s``, the sigmas and ``covariance`` may be next
+    to it. Values: a path."""
+    camera: str | None
+    """Name of the camera in ``file``. Values: a name in the file. Default: the first one."""
+
+
+class Mount(TypedDict):
+    """How the camera is mounted in the vehicle."""
+
+    q_body_from_camera_wxyz: _Numbers
+    """Quaternion that converts camera coordinates to vehicle coordinates, scalar first; with it the results have
+    roll and pitch. Values: unit quaternion. Default: no mounting."""
+
+
+class Input(TypedDict, total=False):
+    """Conversion of a pixel to one brightness."""
+
+    channel: Literal["mean", "red", "green", "blue"]
+    """The brightness of a colour pixel. Default: "mean"."""
+    bits: int | None
+    """Significant bits of a sample, if the file's words have room for more. Values: 8 to 16. Default: from the file;
+    for 16-bit words, determined from the pictures."""
+    orient: Literal["as-stored", "exif", "rotate-90", "rotate-180", "rotate-270"]
+    """Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
+    picture. Default: "as-stored"."""
+    scale_to_height: int | None
+    """Number of rows of a smaller copy of the picture, which is processed instead; lengths are then in pixels of the
+    copy. Values: 16 to ``height``."""
+
+
+class Gate(TypedDict, total=False):
+    """The brightness that a picture must have to be processed."""
+
+    min_mean: float
+    """Smallest mean brightness of the picture, as a fraction of full scale. Values: 0 to 1. Default: 0.0."""
+    max_mean: float
+    """Largest mean brightness of the picture, as a fraction of full scale; not below ``min_mean``. Values: 0 to 1.
+    Default: 0.98."""
+
+
+class Binarize(TypedDict, total=False):
+    """The threshold between dark and lit."""
+
+    method: Literal["otsu", "fixed", "dynamic", "track"]
+    """Method that finds the threshold. Default: "otsu"."""
+    level: float
+    """For ``fixed``: a pixel is lit at this value or above, in the picture's own counts; a value below 1 is a
+    fraction of full scale. Values: above 0 to 65535. Default: 64.0."""
+    factor: float
+    """For ``dynamic``: the threshold is this factor times the mean of the sample. Values: above 0 to 100. Default:
+    1.0."""
+    scale: float
+    """For ``otsu``: factor by which the threshold is multiplied. Values: 0.1 to 10. Default: 1.0."""
+
+
+class Mask(TypedDict, total=False):
+    """Parts of the vehicle in view."""
+
+    polygons_px: _Polygons
+    """Areas that never count, as polygons of corners [x, y], px; no pixel in them is lit, and their outline is not
+    an edge. Values: up to 8 polygons of 3 to 16 corners."""
+
+
+class Contour(TypedDict, total=False):
+    """The search for edges."""
+
+    method: Literal["border-following", "raster", "erode", "sobel"]
+    """How edges are found. Default: "border-following"."""
+    line_spacing_px: int | None
+    """Rows between two search lines for closed edges, px. Values: 1 or more px. Default: from the body's expected
+    size."""
+    erode_size_px: int
+    """For ``erode``: side of the square neighbourhood, px. Values: odd, 3 to 31. Default: 3."""
+    erode_threshold: int
+    """For ``erode``: a lit pixel with fewer lit pixels in its neighbourhood, itself included, is an edge pixel.
+    Values: 1 to the square of ``erode_size_px``. Default: 9."""
+
+
+class Candidates(TypedDict, total=False):
+    """Edges that are candidates for the limb, and their edge points."""
+
+    min_points: int
+    """Shortest edge, border pixels; a small body or picture needs fewer. Values: 8 or more. Default: 40."""
+    keep_points: int
+    """Points kept per edge, evenly along it; 0 keeps all that fit into memory. Values: 0 (all) or 16 to 65535.
+    Default: 600."""
+    sub_pixel: Literal["linear", "none", "erf", "zernike"]
+    """How a border pixel becomes an edge point. Default: "linear"."""
+
+
+class Reject(TypedDict, total=False):
+    """The cone that most edge points agree on, and their outliers."""
+
+    method: Literal["two-point", "none", "ransac", "ransac-preverify", "mlesac"]
+    """How the inliers are found. Default: "two-point"."""
+    threshold_px: float
+    """Largest distance of an inlier from the limb, px. Values: above 0 to 1000 px. Default: 3.0."""
+    noise_sigma: float
+    """The largest distance is at least this many times the noise from point to point; 0 leaves it at
+    ``threshold_px``. Values: 0 to 100. Default: 2.0."""
+    seed: int
+    """Seed of the random draws; the same seed gives the same answer. Values: 0 to 4294967295. Default: 1."""
+    max_draws: int
+    """Largest number of draws; 800 find the limb among 80 % of outliers. Values: 1 to 100000. Default: 800."""
+
+
+class Estimate(TypedDict, total=False):
+    """The fit of the cone."""
+
+    method: Literal["sphere", "direct", "conic", "tls", "wtls", "circle"]
+    """How the cone is fitted. Default: "sphere"."""
+    half_angle: Literal["fused", "known", "free"]
+    """Which half-angle the fitted cone has. Default: "fused"."""
+    weigh_above_deg: float
+    """For ``wtls``: points are weighted where the axis is farther from the optical axis than this, degrees; 0 always
+    weights them. Values: 0 to 180 deg. Default: 0.0."""
+
+
+class Covariance(TypedDict, total=False):
+    """The errors of edge points as a Gauss-Markov process along the limb."""
+
+    method: Literal["sandwich", "braun-barf"]
+    """Method that computes the covariance. Default: "sandwich"."""
+    noise: Literal["rms", "told", "reml"]
+    """Whether the values below are used as they are, or are the floor of values that are measured in each picture.
+    Default: "rms"."""
+    sigma_px: float
+    """1σ of an edge point, px; raised to the RMS of the residuals if that is larger. Values: above 0 to 10000 px.
+    Default: 0.1."""
+    correlation_px: float
+    """Correlation length of edge point errors along the edge, px; 0 for white errors. Values: 0 to 1e6 px. Default:
+    60.0."""
+    bias_px: float
+    """1σ of a shift that all points of an edge have in common, px. Values: 0 to 10000 px. Default: 0.3."""
+    tilt_px: float
+    """1σ of a tilt that the whole edge has in common, px: an error that goes from −1 to 1 times this value along the
+    edge. Values: 0 to 10000 px. Default: 0.1."""
+    overbound: bool
+    """For ``braun-barf``: whether the largest variance is used in every direction. Values: true or false. Default:
+    false."""
+
+
+class Select(TypedDict, total=False):
+    """The gates that an answer must pass, and the choice among answers."""
+
+    min_inliers: int
+    """Fewest inliers; a small body or picture needs fewer. Values: 8 or more. Default: 24."""
+    min_arc_px: float | None
+    """Shortest length of edge that inliers must cover, px. Values: 0 to 1e6 px. Default: a tenth of the diagonal, or
+    a third of the body's circumference if less."""
+    max_rms_px: float
+    """Largest weighted RMS distance of the inliers from the limb, px; it grows as ``reject.noise_sigma`` raises the
+    largest distance of an inlier. Values: above 0 px. Default: 2.0."""
+    max_half_angle_sigma: float
+    """Largest difference between the fitted and the expected half-angle, in standard deviations. Values: above 0.
+    Default: 3.0."""
+    max_sigma_deg: float
+    """Largest standard deviation of an answer, degrees. Values: above 0 to 180 deg. Default: 10.0."""
+    min_support: float
+    """Smallest part of the fitted limb in view that edge points must cover. Values: 0 to 1. Default: 0.4."""
+    max_lit_sky: float
+    """Largest part of the sky beyond the fitted limb that may be lit. Values: 0 to 1. Default: 0.3."""
+    min_inlier_share: float
+    """Smallest part of an edge's points that must be inliers. Values: 0 to 1. Default: 0.05."""
+    max_nearby: float
+    """Largest number of points close to the fitted limb that are no inliers, as a part of the inliers. Values: 0 to
+    1e6. Default: 0.3333333333333333."""
+    whole_edge: float
+    """Where at least this part of an edge's points are inliers, the edge is not checked with ``max_way``; 0 turns
+    the check off. Values: 0 to 1. Default: 0.8."""
+    max_way: float
+    """Longest path along the inliers, as a multiple of the limb that they cover, where less than ``whole_edge`` of
+    the points are inliers. Values: 1 to 1e6. Default: 3.0."""
+    min_support_whole: float
+    """For the Sun: smallest part of the fitted limb in view that edge points must cover, where ``min_support`` is
+    above 0. Values: 0 to 1. Default: 0.7."""
+    max_rival_ratio: float
+    """Largest ratio of the cone's residual to that of a circle of the image or of four straight pieces; 1e6 turns
+    the gate off. Values: 1 to 1e6. Default: 2.0."""
+    min_evidence: float
+    """Smallest evidence for the limb over a straight line, and largest evidence for a rival shape over the limb:
+    twice the logarithm of the likelihood ratio; −1e6 turns the gate off. Values: −1e6 to 1e6. Default: 9.0."""
+    rival_floor_px: float
+    """Residuals below this count as equal, px. Values: above 0 to 10000 px. Default: 0.03."""
+    residual_floor_px: float
+    """Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the given noise,
+    px; with 1e4 the gate uses the given noise. Values: 0 to 10000 px. Default: 0.1."""
+    max_departure: float
+    """Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
+    turns the gate off. Values: 0 to 1e6. Default: 0.2."""
+    min_support_abrupt: float
+    """Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb without a
+    loss of contrast; 0 turns the gate off. Values: 0 to 1. Default: 0.0."""
+    departure_turn_deg: float
+    """Largest turn between two lengths of 16 px of edge that counts as smooth, degrees. Values: 0 to 90 deg.
+    Default: 8.0."""
+    departure_contrast: float
+    """Smallest contrast of a continuation that counts, as a part of the limb's contrast. Values: 0 to 1e6. Default:
+    0.6."""
+    max_band: float
+    """Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky; 1
+    turns the gate off. Values: 0 to 1. Default: 0.5."""
+    band_step: float
+    """Smallest brightness step of a second edge, as a part of the brightness step of the limb. Values: above 0 to 1.
+    Default: 0.4."""
+    max_attitude_sigma: float
+    """Largest angle between the axis and the axis that a given attitude and position predict, in standard
+    deviations. Values: above 0 to 1e6. Default: 4.0."""
+    max_rate_deg_s: float | None
+    """Largest rate of rotation of the vehicle, degrees per second; an axis that is farther from the previous answer
+    is refused. Values: above 0 to 1e6 deg/s. Default: any."""
+    max_unlit: float
+    """Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does ``body.sunlit
+    = false``. Values: 0 to 1. Default: 0.5."""
+    min_sun_elevation_deg: float
+    """Lowest elevation of the Sun that lights a limb, degrees; −18 is the end of twilight. Values: −90 to 90 deg.
+    Default: -18.0."""
+    min_side_sigma: float
+    """Smallest distance of the fitted half-angle from that of a body on the other side of the edge, in standard
+    deviations. Values: 0 to 1e6. Default: 4.0."""
+    ambiguous_deg: float
+    """Answers farther apart than this contradict each other, degrees. Values: 0 to 180 deg. Default: 5.0."""
+    ambiguous_score: float
+    """Of answers that contradict each other, the better one counts where its score is better by this factor. Values:
+    1 to 1e6. Default: 2.0."""
+    certain_support: float
+    """An answer ends the search where its edge covers more than this part of the limb in view; ``certain_share``
+    must hold, too. Values: 0 to 1. Default: 0.5."""
+    certain_share: float
+    """An answer ends the search where more than this part of its edge's points are inliers; ``certain_support`` must
+    hold, too. Values: 0 to 1. Default: 0.8."""
+    sun_size: _Numbers
+    """[smallest, largest] half-angle of a Sun, as multiples of its true one. Values: above 0 to 1e6. Default: [0.9,
+    12.0]."""
+    moon_size: _Numbers
+    """[smallest, largest] half-angle of a Moon, as multiples of its mean one. Values: above 0 to 1e6. Default: [0.5,
+    1.1]."""
+    moon_bloom_px: float
+    """Largest blooming by which a Moon may exceed ``moon_size``, px. Values: 0 to 1e6 px. Default: 10.0."""
+    limb_in_view: bool
+    """Whether a part of the limb with the expected half-angle about the fitted axis must lie in the picture. Values:
+    true or false. Default: false."""
+    max_section_residual: float | None
+    """Largest mean square distance of the points from the expected conic section, focal lengths squared. Values:
+    above 0. Default: any."""
+    altitude_limits_km: _Numbers | None
+    """[lowest, highest] altitude, km: the radius of the fitted circle must be that of a limb between them. Values: 0
+    to 1e9 km. Default: any."""
+    radius_margin: float
+    """With ``altitude_limits_km``: the radius may lie beyond its limits by this fraction of the limits. Values: 0 to
+    1000. Default: 0.1."""
+    radius_margin_px: float
+    """With ``altitude_limits_km``: the radius may lie beyond its limits by this length, px. Values: 0 to 1e6 px.
+    Default: 0.0."""
+
+
+class Recover(TypedDict, total=False):
+    """Further looks at a picture without an answer."""
+
+    levels: _Numbers
+    """Thresholds of further looks, on a scale from the mean of the dark pixels (0) to the first look's threshold
+    (1); ``[]`` allows only one look. Values: 0.05 to 4. Default: [0.5, 0.25, 2.0]."""
+    min_sigma: float
+    """Lowest threshold of a further look, in standard deviations of the dark pixels' noise above their mean. Values:
+    0 to 100. Default: 3.0."""
+    min_part: float
+    """Smallest fraction of an edge's points that must lie on the limb in a further look. Values: 0 to 1. Default:
+    0.5."""
+    frame_px: int
+    """Widest dark frame around the picture that is detected and left out, px; 0 turns the detection off. Values: 0
+    to 64 px. Default: 8."""
+    method: Literal["none", "division"]
+    """The step that follows when no edge of the whole picture gives an answer. Default: "none"."""
+    least_part: float
+    """For ``division``: parts below this fraction of the picture's area are not cut again. Values: 0.015625 to 1.
+    Default: 0.1."""
+    combine: Literal["median", "mean"]
+    """For ``division``: method that combines the answers of several parts. Default: "median"."""
+
+
+class Limits(TypedDict, total=False):
+    """The bound on the time of the worst picture."""
+
+    max_work: int | None
+    """Largest cost of one picture and body, in steps of the border follower; when it is used up, the best answer so
+    far counts. Values: 10000 to 1e9. Default: 245 760 on a flight computer, 1 966 080 on the host."""
+
+
+class Body(TypedDict, total=False):
+    """The body that the sensor searches for; each of several ``[[bodies]]`` has the same keys."""
+
+    kind: Literal["earth", "earth-sphere", "sun", "moon", "sphere"]
+    """The body that the sensor searches for. Default: "earth"."""
+    radius_km: float | None
+    """Radius of a ``sphere``, km; not allowed for other bodies. Values: above 0, for ``sphere`` only."""
+    altitude_km: float | None
+    """Altitude of the camera for pictures without an altitude in their prior, km; above WGS-84 for ``earth``, else
+    above the radius. Values: above 0 km."""
+    altitude_sigma_km: float
+    """1σ of the altitude, km. Values: 0 to 1e6 km. Default: 0.5."""
+    altitude_reference: Literal["ellipsoid", "sphere"]
+    """For ``earth``: the surface from which an altitude without a position is measured. Default: "ellipsoid"."""
+    limb_height_km: float
+    """Height of the visible limb above the surface, km; 17 km is right for a cloudless limb in sunlight at 550 nm.
+    Values: −50 to 500 km. Default: 17.0."""
+    limb_height_sigma_km: float
+    """1σ of the limb height, km; 7 km spans the visible wavelengths and usual thresholds. Values: 0 to 10000 km.
+    Default: 7.0."""
+    clipped_height_km: float
+    """Height that overexposure adds to the limb, km; it is multiplied by the fraction of the limb that is clipped at
+    full scale. Values: 0 to 500 km. Default: 7.8."""
+    clipped_sigma_km: float
+    """1σ of ``clipped_height_km``, km; the height varies along the limb. Values: 0 to 10000 km. Default: 4.5."""
+    limb_height_by_latitude_km: _Rows | None
+    """Limb height by latitude instead of ``limb_height_km``: rows of [geodetic latitude in degrees, height in km],
+    with rising latitudes. Values: up to 16 rows, for ``earth``."""
+    sunlit: bool | None
+    """Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun. Values: true or
+    false. Default: true for ``moon`` and ``sphere``."""
+    binarize: Binarize | None
+    """Threshold for this body, as a table with the keys of ``[binarize]``. Values: the keys of ``[binarize]``.
+    Default: ``[binarize]``; ``fixed`` at 0.9 for a ``sun`` among several bodies."""
+    covariance: Covariance | None
+    """Noise model of edge points for this body, as a table with the keys of ``[covariance]``. Values: the keys of
+    ``[covariance]``. Default: ``[covariance]``."""
+
+
+class _Optional(TypedDict, total=False):
+    """The sections that may be left out."""
+
+    preset: Literal["hzn", "sun", "moon", "dlr-2022", "zju-2022", "horace-2015"] | None
+    """Starting values; keys in the file override them. Default: ``hzn``."""
+    mount: Mount
+    """How the camera is mounted in the vehicle."""
+    body: Body
+    """The body that the sensor searches for; each of several ``[[bodies]]`` has the same keys."""
+    bodies: Sequence[Body]
+    """Several bodies in one picture, instead of ``body``. The sensor searches in this order."""
+    input: Input
+    """Conversion of a pixel to one brightness."""
+    gate: Gate
+    """The brightness that a picture must have to be processed."""
+    binarize: Binarize
+    """The threshold between dark and lit."""
+    mask: Mask
+    """Parts of the vehicle in view."""
+    contour: Contour
+    """The search for edges."""
+    candidates: Candidates
+    """Edges that are candidates for the limb, and their edge points."""
+    reject: Reject
+    """The cone that most edge points agree on, and their outliers."""
+    estimate: Estimate
+    """The fit of the cone."""
+    covariance: Covariance
+    """The errors of edge points as a Gauss-Markov process along the limb."""
+    select: Select
+    """The gates that an answer must pass, and the choice among answers."""
+    recover: Recover
+    """Further looks at a picture without an answer."""
+    limits: Limits
+    """The bound on the time of the worst picture."""
+
+
+class Sections(_Optional):
+    """The sections of a sensor.toml: the keyword arguments of `hzn.Sensor`. Only ``camera`` is required."""
+
+    camera: _hzn.Camera | Camera
+
+
+class Parameters(_Optional):
+    """All parameters of a sensor: `hzn.Sensor.parameters`."""
+
+    camera: Camera
