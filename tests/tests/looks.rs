@@ -36,8 +36,9 @@ fn process_picture(horizon: &mut HostHorizon, data: &[u8], lens: &camera::Config
     horizon.process(&picture, &expected)
 }
 
-/// Tests discs whose edge touches the image circle over fewer pixels than the strides along the border. Only a search
-/// line meets this edge at first, and it gives only a part of the edge. The sensor must find the disc all the same.
+/// Tests random discs under an image circle, each at ten thresholds; at least half of the outline is in view. A disc
+/// may touch the image circle over fewer pixels than the strides along the border. Then only a search line meets its
+/// edge at first, and it gives only a part of the edge. The sensor must find every disc within 0.2°.
 #[test]
 fn no_disc_is_lost_under_an_image_circle() {
     let (mut count, mut lost) = (0, Vec::new());
@@ -62,9 +63,9 @@ fn no_disc_is_lost_under_an_image_circle() {
     assert!(count == 600 && lost.is_empty(), "{} of {count}: {lost:#?}", lost.len());
 }
 
-/// Tests a picture with a black frame of one pixel, which demosaicing left, and with wide haze. The haze fades over a
-/// hundred pixels of the full picture, which are 25 pixels of this one. The answers may differ by four of these. (In
-/// the full picture they differ by at most 0.035°.)
+/// Tests a picture with a black frame of one pixel, which demosaicing left, and with wide haze. The haze fades over 25
+/// pixels of this reduced picture. At every threshold the sensor answers, both precisions agree within 0.001°, and the
+/// answers differ by less than their sigma. (The largest difference is 0.11°, which is 4.6 pixels.)
 #[test]
 fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     let mut p = Photograph::load("opssat-2020-08-16.png");
@@ -99,8 +100,8 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
         assert!(difference_deg < found.sigma_deg(), "level {level}: {difference_deg}, sigma {}", found.sigma_deg());
         axes.push(found.axis);
     }
-    // If the frame is not left out, the picture's own outline belongs to the edge. The sensor then has fewer inliers or
-    // no answer.
+    // If the frame is not left out, the picture's own outline belongs to the edge. The sensor then has no answer, or
+    // fewer than half of the points are inliers.
     p.sensor.recover.frame_px = 0;
     p.sensor.binarize = threshold::Config { method: Method::Fixed, level: 0.08, ..p.sensor.binarize };
     let with = process(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default());
@@ -110,8 +111,9 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     );
 }
 
-/// Tests discs that are seen from far above and lit from the side, with bright clouds over dark ground: Otsu's
-/// threshold follows the clouds.
+/// Tests discs that are seen from far above and lit from the side, with bright clouds over dark ground. Otsu's
+/// threshold may follow the clouds, so the first look does not answer every picture. After the further looks every
+/// picture has an answer, with an error below five sigma.
 #[test]
 fn half_lit_discs_are_looked_at_again() {
     let (mut answered, mut at_once) = (0, 0);
@@ -170,7 +172,8 @@ fn half_lit_discs_are_looked_at_again() {
 }
 
 /// Tests a limb through a lens of 55 degrees on an array of 32×24. Of the 16 bits, a range of 1200 counts above a sky
-/// at 7000 is used. The sensor knows only the camera and the altitude.
+/// at 7000 is used. The sensor knows only the camera and the altitude. It answers every picture, and the RMS of its
+/// errors is below twice the bound.
 #[test]
 fn a_thermal_array_answers_by_default() {
     let camera = camera::Config::ideal(Model::Equidistant, 32, 24, 33.0);
