@@ -1,0 +1,142 @@
+//! Directions: the limb axis, the Sun, the Moon.
+//!
+//! With the reference direction d in ECEF the camera sees ê = R_bcᵀ R_ebᵀ d. Its derivatives are R_bcᵀ R_ebᵀ [d×] by
+//! the attitude error, [ê×] by the misalignment, and 1 by the slow error. The covariance of the direction belongs to
+//! the slow error alone, or it would count twice. The innovation has the two components across ê.
+
+use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
+
+use super::predict::rate_of;
+use super::update::Innovation;
+use super::{Camera, Filter};
+use crate::gravity::earth_rate;
+use crate::layout::Layout;
+
+/// Added to the covariance of the slow error, rad²: the covariance of a direction has rank 2.
+const EPSILON_RAD2: f64 = 1e-14;
+
+/// A direction that a camera measures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DirectionMeasurement {
+    /// Number of the camera, from 0.
+    pub camera: usize,
+    /// Unit vector in the camera frame.
+    pub measured: Vector3<f64>,
+    /// The same direction in ECEF, a unit vector.
+    pub reference: Vector3<f64>,
+    /// Covariance of the measured direction in the camera frame, rad², of rank 2. It belongs to the slow error.
+    pub covariance_rad2: Matrix3<f64>,
+    /// Derivative of the measured direction by the limb height, per km (camera frame); zero for the Sun.
+    pub by_limb_height: Vector3<f64>,
+}
+
+/// Returns the predicted direction in the camera frame with its derivatives by the attitude error (ECEF) and by the
+/// misalignment (camera frame).
+pub fn predict_direction(
+    attitude: &UnitQuaternion<f64>,
+    mount: &UnitQuaternion<f64>,
+    reference: &Vector3<f64>,
+) -> (Vector3<f64>, Matrix3<f64>, Matrix3<f64>) {
+    let to_camera = (attitude * mount).inverse().to_rotation_matrix().into_inner();
+    let predicted = to_camera * reference;
+    (predicted, to_camera * reference.cross_matrix(), predicted.cross_matrix())
+}
+
+impl<const N: usize> Filter<N> {
+    /// Takes a direction at the time of the state. `None` if there is no such camera or a number is not finite; nothing
+    /// changes then.
+    pub fn update_direction(&mut self, m: &DirectionMeasurement) -> Option<Innovation<2>> {
+        let finite = m.measured.iter().chain(&m.reference).chain(&m.covariance_rad2).chain(&m.by_limb_height);
+        if !finite.copied().all(f64::is_finite) {
+            return None;
+        }
+        let (measured, reference) = (m.measured.try_normalize(1e-6)?, m.reference.try_normalize(1e-6)?);
+        let camera = *self.cameras.get(m.camera)?.as_ref()?;
+        let places = *self.layout.cameras.get(m.camera)?;
+        self.set_slow_covariance(m.camera, &m.covariance_rad2)?;
+        let (rate, attitude) = self.at_clock(&camera);
+        let (predicted, by_attitude, by_mount) = predict_direction(&attitude, &camera.mount, &reference);
+        let mut by_errors = SMatrix::<f64, 3, N>::zeros();
+        by_errors.fixed_view_mut::<3, 3>(0, Layout::ATTITUDE).copy_from(&by_attitude);
+        if let Some(place) = places.misalignment {
+            by_errors.fixed_view_mut::<3, 3>(0, place.first).copy_from(&by_mount);
+        }
+        let mut slow = Vector3::zeros();
+        if let Some(place) = places.slow_error {
+            by_errors.fixed_view_mut::<3, 3>(0, place.first).copy_from(&Matrix3::identity());
+            slow = camera.slow_error;
+        }
+        if let Some(place) = places.clock {
+            let body = attitude.inverse() * reference;
+            by_errors.column_mut(place.first).copy_from(&(camera.mount.inverse() * rate_of(&body, &rate)));
+        }
+        let mut height = Vector3::zeros();
+        if let Some(place) = self.layout.limb_height {
+            by_errors.column_mut(place.first).copy_from(&m.by_limb_height);
+            height = m.by_limb_height * self.corrections.limb_height_km;
+        }
+        let across = basis(&predicted);
+        let value = across * (measured - predicted - slow - height);
+        let white = camera.options.white_rad;
+        let mut noise = SMatrix::<f64, 2, 2>::identity() * (white * white);
+        if places.slow_error.is_none() {
+            // Without a slow error, the covariance is noise of each direction.
+            noise += across * m.covariance_rad2 * across.transpose();
+        }
+        self.update(value, &(across * by_errors), &noise)
+    }
+
+    /// Returns the rate relative to the Earth (body frame) and the attitude at the time of the camera's clock.
+    fn at_clock(&self, camera: &Camera) -> (Vector3<f64>, UnitQuaternion<f64>) {
+        let inertial = self.last_imu.map_or_else(Vector3::zeros, |imu| self.corrections.correct(&imu).gyro_rad_s);
+        let rate = inertial - self.nominal.attitude.inverse() * earth_rate();
+        (rate, self.nominal.attitude * UnitQuaternion::from_scaled_axis(rate * camera.clock_s))
+    }
+
+    /// Gives the slow error the covariance of a new direction: ζ' = T ζ with T = √P_new √P_old⁻¹. The roots are the
+    /// symmetric ones. Those of Cholesky turn the error within the plane across the direction when the direction moves
+    /// through the picture, and the innovations are then larger than their covariance. The error begins independent of
+    /// all others.
+    fn set_slow_covariance(&mut self, which: usize, covariance_rad2: &Matrix3<f64>) -> Option<()> {
+        let Some(place) = self.layout.cameras.get(which)?.slow_error else { return Some(()) };
+        let camera = self.cameras.get_mut(which)?.as_mut()?;
+        let new = (covariance_rad2 + covariance_rad2.transpose()) * 0.5 + Matrix3::identity() * EPSILON_RAD2;
+        let new_root = root(&new, 1)?;
+        match camera.slow_covariance {
+            None => self.covariance.fixed_view_mut::<3, 3>(place.first, place.first).copy_from(&new),
+            Some(old) => {
+                let change = new_root * root(&old, -1)?;
+                camera.slow_error = change * camera.slow_error;
+                let rows: SMatrix<f64, 3, N> = change * self.covariance.fixed_view::<3, N>(place.first, 0);
+                self.covariance.fixed_view_mut::<3, N>(place.first, 0).copy_from(&rows);
+                let columns: SMatrix<f64, N, 3> =
+                    self.covariance.fixed_view::<N, 3>(0, place.first) * change.transpose();
+                self.covariance.fixed_view_mut::<N, 3>(0, place.first).copy_from(&columns);
+            }
+        }
+        camera.slow_covariance = Some(new);
+        Some(())
+    }
+}
+
+/// Returns the symmetric root of a positive definite matrix, or its inverse with −1. `None` if an eigenvalue is not
+/// positive.
+fn root(matrix: &Matrix3<f64>, sign: i32) -> Option<Matrix3<f64>> {
+    let eigen = matrix.symmetric_eigen();
+    let mut values = eigen.eigenvalues;
+    for value in values.iter_mut() {
+        if !(*value > 0.0) {
+            return None;
+        }
+        *value = if sign < 0 { 1.0 / libm::sqrt(*value) } else { libm::sqrt(*value) };
+    }
+    Some(eigen.eigenvectors * Matrix3::from_diagonal(&values) * eigen.eigenvectors.transpose())
+}
+
+/// Returns two unit vectors across a direction, as rows.
+fn basis(direction: &Vector3<f64>) -> SMatrix<f64, 2, 3> {
+    let helper = if libm::fabs(direction.x) < 0.6 { Vector3::x() } else { Vector3::y() };
+    let first = direction.cross(&helper).normalize();
+    let second = direction.cross(&first);
+    SMatrix::<f64, 2, 3>::from_rows(&[first.transpose(), second.transpose()])
+}

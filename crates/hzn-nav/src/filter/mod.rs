@@ -1,0 +1,233 @@
+//! The error-state Schmidt-Kalman filter.
+//!
+//! The nominal state (attitude, velocity, position, and the corrections of the instruments) is integrated with the
+//! inertial samples. The filter holds the covariance of its errors: truth minus estimate, the attitude as a rotation
+//! vector in ECEF. Errors that are *considered* keep their estimate, and their rows of the gain are 0 (Schmidt 1966).
+//! The covariance is updated in Joseph's form.
+
+mod chi2;
+mod direction;
+mod predict;
+mod update;
+
+use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
+
+use crate::layout::{Layout, MAX_CAMERAS, Place};
+use crate::options::{CameraOptions, Options};
+use crate::strapdown::{Imu, Nominal};
+
+pub use chi2::chi2_limit;
+pub use direction::{DirectionMeasurement, predict_direction};
+pub use predict::Step;
+pub use update::Innovation;
+
+/// Corrections of the instruments: the estimates of their errors.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Corrections {
+    /// Bias of the accelerometers, m/s².
+    pub accel_bias: Vector3<f64>,
+    /// Scale factor errors of the accelerometers.
+    pub accel_scale: Vector3<f64>,
+    /// Rotation of the accelerometers' axes, rad.
+    pub accel_misalignment: Vector3<f64>,
+    /// Bias of the gyros, rad/s.
+    pub gyro_bias: Vector3<f64>,
+    /// Scale factor errors of the gyros.
+    pub gyro_scale: Vector3<f64>,
+    /// Rotation of the gyros' axes, rad.
+    pub gyro_misalignment: Vector3<f64>,
+    /// Error of the limb height, km.
+    pub limb_height_km: f64,
+}
+
+/// A camera in the filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Its options.
+    pub options: CameraOptions,
+    /// The mount with the estimated misalignment: rotation from the camera to the body frame.
+    pub mount: UnitQuaternion<f64>,
+    /// Estimate of the slow error of a direction (camera frame).
+    pub slow_error: Vector3<f64>,
+    /// Estimate of the clock offset, s.
+    pub clock_s: f64,
+    /// Covariance of the slow error of the last direction, rad²; `None` before the first one.
+    slow_covariance: Option<nalgebra::Matrix3<f64>>,
+}
+
+/// Why a filter cannot be made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FilterError {
+    /// The vector has more components than the filter has memory for.
+    TooManyStates {
+        /// Number of components that the options need.
+        needed: usize,
+        /// Number that the filter has.
+        memory: usize,
+    },
+    /// There are more than [`MAX_CAMERAS`] cameras.
+    TooManyCameras,
+    /// A number of the start or of the options is not finite, or a sigma is negative.
+    NotFinite,
+}
+
+impl core::fmt::Display for FilterError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::TooManyStates { needed, memory } => {
+                write!(f, "the options need {needed} states, but the filter has memory for {memory}")
+            }
+            Self::TooManyCameras => write!(f, "the filter has memory for {MAX_CAMERAS} cameras"),
+            Self::NotFinite => {
+                f.write_str("a number of the start or of the options is not finite, or a sigma is below 0")
+            }
+        }
+    }
+}
+
+impl core::error::Error for FilterError {}
+
+/// The filter, with memory for N components of the error.
+#[derive(Debug, Clone)]
+pub struct Filter<const N: usize> {
+    nominal: Nominal,
+    corrections: Corrections,
+    cameras: [Option<Camera>; MAX_CAMERAS],
+    options: Options,
+    layout: Layout,
+    covariance: SMatrix<f64, N, N>,
+    last_imu: Option<Imu>,
+}
+
+impl<const N: usize> Filter<N> {
+    /// Makes a filter that begins at a nominal state.
+    ///
+    /// # Errors
+    /// See [`FilterError`].
+    pub fn new(start: Nominal, options: &Options, cameras: &[CameraOptions]) -> Result<Self, FilterError> {
+        if cameras.len() > MAX_CAMERAS {
+            return Err(FilterError::TooManyCameras);
+        }
+        let layout = Layout::new(options, cameras);
+        if layout.len > N {
+            return Err(FilterError::TooManyStates { needed: layout.len, memory: N });
+        }
+        let mut filter = Self {
+            nominal: start,
+            corrections: Corrections::default(),
+            cameras: [None; MAX_CAMERAS],
+            options: *options,
+            layout,
+            covariance: SMatrix::zeros(),
+            last_imu: None,
+        };
+        for (slot, options) in filter.cameras.iter_mut().zip(cameras) {
+            *slot = Some(Camera {
+                options: *options,
+                mount: options.mount,
+                slow_error: Vector3::zeros(),
+                clock_s: 0.0,
+                slow_covariance: None,
+            });
+        }
+        filter.fill_covariance(cameras);
+        let finite = filter.covariance.iter().all(|x| x.is_finite() && *x >= 0.0)
+            && start.attitude.coords.iter().chain(&start.velocity_m_s).chain(&start.position_m).all(|x| x.is_finite())
+            && start.time_s.is_finite();
+        if finite { Ok(filter) } else { Err(FilterError::NotFinite) }
+    }
+
+    /// Fills the diagonal with the variances of the start.
+    fn fill_covariance(&mut self, cameras: &[CameraOptions]) {
+        let (layout, start, imu) = (self.layout, self.options.start, self.options.imu);
+        let mut fill = |place: Place, sigma: f64| {
+            for i in place.first..place.first + place.len {
+                self.covariance[(i, i)] = sigma * libm::fabs(sigma);
+            }
+        };
+        let vehicle = |first| Place { first, len: 3, considered: false };
+        fill(vehicle(Layout::ATTITUDE), start.attitude_rad);
+        fill(vehicle(Layout::VELOCITY), start.velocity_m_s);
+        fill(vehicle(Layout::POSITION), start.position_m);
+        let blocks = [
+            (layout.accel_bias, imu.accel_bias),
+            (layout.accel_scale, imu.accel_scale),
+            (layout.accel_misalignment, imu.accel_misalignment),
+            (layout.gyro_bias, imu.gyro_bias),
+            (layout.gyro_scale, imu.gyro_scale),
+            (layout.gyro_misalignment, imu.gyro_misalignment),
+            (layout.limb_height, self.options.limb_height),
+        ];
+        for (place, block) in blocks {
+            place.into_iter().for_each(|place| fill(place, block.sigma));
+        }
+        for (places, camera) in layout.cameras.iter().zip(cameras) {
+            places.misalignment.into_iter().for_each(|place| fill(place, camera.misalignment.sigma));
+            places.clock.into_iter().for_each(|place| fill(place, camera.clock.sigma));
+        }
+    }
+
+    /// Returns the estimated state.
+    pub fn nominal(&self) -> &Nominal {
+        &self.nominal
+    }
+
+    /// Returns the last inertial sample, without corrections.
+    pub fn last_imu(&self) -> Option<Imu> {
+        self.last_imu
+    }
+
+    /// Returns the state and the covariance to be changed.
+    pub(crate) fn parts_mut(&mut self) -> (&mut Nominal, &mut SMatrix<f64, N, N>) {
+        (&mut self.nominal, &mut self.covariance)
+    }
+
+    /// Returns the estimated errors of the instruments.
+    pub fn corrections(&self) -> &Corrections {
+        &self.corrections
+    }
+
+    /// Returns a camera with its estimated errors.
+    pub fn camera(&self, which: usize) -> Option<&Camera> {
+        self.cameras.get(which)?.as_ref()
+    }
+
+    /// Returns the places of the errors in the covariance.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Returns the covariance of the errors: rad² (ECEF), m²/s², m², then the units of the blocks.
+    pub fn covariance(&self) -> &SMatrix<f64, N, N> {
+        &self.covariance
+    }
+
+    /// Returns the 1-sigma of three components, for example of the attitude with [`Layout::ATTITUDE`].
+    pub fn sigmas(&self, first: usize) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| self.covariance.get((first + i, first + i)).map_or(0.0, |v| libm::sqrt(v.max(0.0))))
+    }
+
+    /// Moves the estimates by the errors, which become 0.
+    fn apply(&mut self, error: &SVector<f64, N>) {
+        let three = |first: usize| Vector3::new(error[first], error[first + 1], error[first + 2]);
+        let of = |place: Option<Place>| place.map_or_else(Vector3::zeros, |p| three(p.first));
+        let turn = UnitQuaternion::from_scaled_axis(three(Layout::ATTITUDE));
+        self.nominal.attitude = UnitQuaternion::new_normalize((turn * self.nominal.attitude).into_inner());
+        self.nominal.velocity_m_s += three(Layout::VELOCITY);
+        self.nominal.position_m += three(Layout::POSITION);
+        let (layout, c) = (self.layout, &mut self.corrections);
+        c.accel_bias += of(layout.accel_bias);
+        c.accel_scale += of(layout.accel_scale);
+        c.accel_misalignment += of(layout.accel_misalignment);
+        c.gyro_bias += of(layout.gyro_bias);
+        c.gyro_scale += of(layout.gyro_scale);
+        c.gyro_misalignment += of(layout.gyro_misalignment);
+        c.limb_height_km += layout.limb_height.map_or(0.0, |p| error[p.first]);
+        for (camera, places) in self.cameras.iter_mut().flatten().zip(&layout.cameras) {
+            let turn = UnitQuaternion::from_scaled_axis(of(places.misalignment));
+            camera.mount = UnitQuaternion::new_normalize((camera.mount * turn).into_inner());
+            camera.slow_error += of(places.slow_error);
+            camera.clock_s += places.clock.map_or(0.0, |p| error[p.first]);
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Prediction: the nominal state by the strapdown equations, the covariance by their linearisation.
+//!
+//! The measured rate is ω̃ = ω + b + S ω + m × ω + noise, so that the estimate ω̂ = ω̃ − b − S ω̃ − m × ω̃ has the
+//! error δω = −δb − diag(ω̃) δs + [ω̃×] δm − noise; the same holds for the specific force. With ψ in ECEF, ψ̇ = −ω_ie ×
+//! ψ + R δω, δv̇ = −[R f̂×] ψ + R δf + ∂g/∂x δx − 2 ω_ie × δv, δẋ = δv.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use super::{Corrections, Filter};
+use crate::gravity::{earth_rate, gradient};
+use crate::layout::Layout;
+use crate::strapdown::Imu;
+
+/// Number of vehicle components.
+const V: usize = Layout::VEHICLE;
+
+/// What became of an inertial sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// The first sample; the state is at its time.
+    First,
+    /// The state is at the time of the sample.
+    Taken,
+    /// The same, and the time since the last sample was too long, or the sample was saturated.
+    TakenWithGap,
+    /// The sample has the time of the last one, and is ignored.
+    Duplicate,
+    /// The sample is older than the last one, and is ignored.
+    OutOfOrder,
+    /// A number of the sample is not finite, and it is ignored.
+    NotFinite,
+}
+
+impl Corrections {
+    /// Returns the sample without the estimated errors.
+    pub fn correct(&self, imu: &Imu) -> Imu {
+        let (gyro, accel) = (&imu.gyro_rad_s, &imu.accel_m_s2);
+        Imu {
+            time_s: imu.time_s,
+            gyro_rad_s: gyro
+                - self.gyro_bias
+                - self.gyro_scale.component_mul(gyro)
+                - self.gyro_misalignment.cross(gyro),
+            accel_m_s2: accel
+                - self.accel_bias
+                - self.accel_scale.component_mul(accel)
+                - self.accel_misalignment.cross(accel),
+        }
+    }
+}
+
+impl<const N: usize> Filter<N> {
+    /// Moves the state to the time of a sample of the inertial unit. `saturated` says that a channel was at its limit.
+    pub fn predict(&mut self, imu: &Imu, saturated: bool) -> Step {
+        if !imu.is_finite() {
+            return Step::NotFinite;
+        }
+        let Some(last) = self.last_imu else {
+            self.nominal.time_s = imu.time_s;
+            self.last_imu = Some(*imu);
+            return Step::First;
+        };
+        let dt = imu.time_s - self.nominal.time_s;
+        if !(dt > 0.0) {
+            return if imu.time_s == last.time_s { Step::Duplicate } else { Step::OutOfOrder };
+        }
+        let gap = saturated || dt > self.options.imu.max_step_s;
+        self.propagate_covariance(&last, imu, dt, gap);
+        let (from, to) = (self.corrections.correct(&last), self.corrections.correct(imu));
+        self.nominal = self.nominal.step(&from, &to);
+        self.last_imu = Some(*imu);
+        if gap { Step::TakenWithGap } else { Step::Taken }
+    }
+
+    fn propagate_covariance(&mut self, last: &Imu, imu: &Imu, dt: f64, gap: bool) {
+        let (own, others) = self.linearise(last, imu);
+        let half = own * (0.5 * dt);
+        let mean = SMatrix::<f64, V, V>::identity() * dt + half * dt;
+        let mut rows: SMatrix<f64, V, N> = mean * others;
+        let transition = SMatrix::<f64, V, V>::identity() + own * dt + half * own * dt;
+        rows.fixed_view_mut::<V, V>(0, 0).copy_from(&transition);
+        let moved: SMatrix<f64, V, N> = rows * self.covariance;
+        let noise = self.process_noise(dt, gap);
+        // The noise enters during the step: half before it, half after it.
+        let noise = (transition * noise * transition.transpose() + noise) * 0.5;
+        let vehicle = moved * rows.transpose() + noise;
+        self.covariance.fixed_view_mut::<V, N>(0, 0).copy_from(&moved);
+        for i in 0..V {
+            for j in V..N {
+                self.covariance[(j, i)] = moved[(i, j)];
+            }
+            for j in 0..V {
+                self.covariance[(i, j)] = 0.5 * (vehicle[(i, j)] + vehicle[(j, i)]);
+            }
+        }
+        self.fade_slow_errors(dt);
+    }
+
+    /// Returns the derivatives of the vehicle's errors by themselves and by all others.
+    fn linearise(&self, last: &Imu, imu: &Imu) -> (SMatrix<f64, V, V>, SMatrix<f64, V, N>) {
+        let (a, v, x) = (Layout::ATTITUDE, Layout::VELOCITY, Layout::POSITION);
+        let layout = &self.layout;
+        let (gyro, accel) = ((last.gyro_rad_s + imu.gyro_rad_s) * 0.5, (last.accel_m_s2 + imu.accel_m_s2) * 0.5);
+        let middle = Imu { time_s: imu.time_s, gyro_rad_s: gyro, accel_m_s2: accel };
+        let corrected = self.corrections.correct(&middle);
+        // The attitude in the middle of the step.
+        let dt = imu.time_s - self.nominal.time_s;
+        let turn = nalgebra::UnitQuaternion::from_scaled_axis(corrected.gyro_rad_s * (0.5 * dt));
+        let rotation = (self.nominal.attitude * turn).to_rotation_matrix().into_inner();
+        let spin = earth_rate().cross_matrix();
+        let mut own = SMatrix::<f64, V, V>::zeros();
+        own.fixed_view_mut::<3, 3>(a, a).copy_from(&-spin);
+        own.fixed_view_mut::<3, 3>(v, a).copy_from(&-(rotation * corrected.accel_m_s2).cross_matrix());
+        own.fixed_view_mut::<3, 3>(v, v).copy_from(&(spin * -2.0));
+        own.fixed_view_mut::<3, 3>(v, x).copy_from(&gradient(&self.nominal.position_m));
+        own.fixed_view_mut::<3, 3>(x, v).copy_from(&Matrix3::identity());
+        let mut others = SMatrix::<f64, V, N>::zeros();
+        let mut put = |row: usize, place: Option<crate::layout::Place>, block: Matrix3<f64>| {
+            if let Some(place) = place {
+                others.fixed_view_mut::<3, 3>(row, place.first).copy_from(&block);
+            }
+        };
+        put(a, layout.gyro_bias, -rotation);
+        put(a, layout.gyro_scale, -rotation * Matrix3::from_diagonal(&gyro));
+        put(a, layout.gyro_misalignment, rotation * gyro.cross_matrix());
+        put(v, layout.accel_bias, -rotation);
+        put(v, layout.accel_scale, -rotation * Matrix3::from_diagonal(&accel));
+        put(v, layout.accel_misalignment, rotation * accel.cross_matrix());
+        (own, others)
+    }
+
+    /// Returns the covariance that the noise of the instruments adds in a step.
+    fn process_noise(&self, dt: f64, gap: bool) -> SMatrix<f64, V, V> {
+        let imu = &self.options.imu;
+        let sum = |[white, tuning]: [f64; 2]| (white * white + tuning * tuning) * dt;
+        // A wrong rate is the same during the whole gap.
+        let constant = |sigma: f64| if gap { (sigma * dt) * (sigma * dt) } else { 0.0 };
+        let (turn, speed) =
+            (sum(imu.gyro_noise) + constant(imu.gap_rate_rad_s), sum(imu.accel_noise) + constant(imu.gap_accel_m_s2));
+        let mut noise = SMatrix::<f64, V, V>::zeros();
+        for i in 0..3 {
+            noise[(Layout::ATTITUDE + i, Layout::ATTITUDE + i)] = turn;
+            noise[(Layout::VELOCITY + i, Layout::VELOCITY + i)] = speed;
+        }
+        noise
+    }
+
+    /// Lets the slow errors of the cameras forget: Φ = exp(−Δt/T), Q = (1 − Φ²) P_c.
+    fn fade_slow_errors(&mut self, dt: f64) {
+        for (camera, places) in self.cameras.iter_mut().flatten().zip(&self.layout.cameras) {
+            let (Some(place), Some(target)) = (places.slow_error, camera.slow_covariance) else { continue };
+            let keep = libm::exp(-dt / camera.options.slow_error_time_s);
+            camera.slow_error *= keep;
+            for i in place.first..place.first + place.len {
+                self.covariance.row_mut(i).scale_mut(keep);
+                self.covariance.column_mut(i).scale_mut(keep);
+            }
+            let mut block = self.covariance.fixed_view_mut::<3, 3>(place.first, place.first);
+            block += target * (1.0 - keep * keep);
+        }
+    }
+}
+
+/// Returns the derivative of a vector in the body frame that is fixed in ECEF, for the clock offset.
+pub(super) fn rate_of(body: &Vector3<f64>, rate_rad_s: &Vector3<f64>) -> Vector3<f64> {
+    -rate_rad_s.cross(body)
+}

@@ -1,0 +1,76 @@
+//! Updates: gates, gain with considered errors, Joseph's form.
+
+use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
+
+use super::Filter;
+use super::chi2::chi2_limit;
+use crate::layout::Layout;
+
+/// An innovation: measured minus predicted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Innovation<const M: usize> {
+    /// The innovation.
+    pub value: SVector<f64, M>,
+    /// Its covariance.
+    pub covariance: SMatrix<f64, M, M>,
+    /// The square of the innovation over its covariance: chi-square with M degrees of freedom.
+    pub nis: f64,
+    /// Whether it passed the gate and moved the state.
+    pub taken: bool,
+}
+
+impl<const N: usize> Filter<N> {
+    /// Takes a measurement of M numbers with an innovation, its derivative by the errors, and its noise. `None` if the
+    /// covariance of the innovation is not positive definite, or a number is not finite; the state is then unchanged.
+    pub(super) fn update<const M: usize>(
+        &mut self,
+        value: SVector<f64, M>,
+        by_errors: &SMatrix<f64, M, N>,
+        noise: &SMatrix<f64, M, M>,
+    ) -> Option<Innovation<M>> {
+        let cross: SMatrix<f64, N, M> = self.covariance * by_errors.transpose();
+        let covariance = by_errors * cross + noise;
+        let inverse = covariance.cholesky()?.inverse();
+        let nis = value.dot(&(inverse * value));
+        if !nis.is_finite() {
+            return None;
+        }
+        let taken = nis <= chi2_limit(M, self.options.gate_probability);
+        if taken {
+            let mut gain: SMatrix<f64, N, M> = cross * inverse;
+            for i in (0..self.layout.len).filter(|i| self.layout.is_considered(*i)) {
+                gain.row_mut(i).fill(0.0);
+            }
+            self.apply(&(gain * value));
+            // (I − K H) P (I − K H)ᵀ + K R Kᵀ, factor by factor.
+            let left = self.covariance - gain * cross.transpose();
+            let joseph = left - (left * by_errors.transpose()) * gain.transpose() + gain * noise * gain.transpose();
+            self.covariance = (joseph + joseph.transpose()) * 0.5;
+        }
+        Some(Innovation { value, covariance, nis, taken })
+    }
+
+    /// Takes a position in ECEF (m) with the 1-sigma of each component.
+    pub fn update_position(&mut self, position_m: &Vector3<f64>, sigma_m: f64) -> Option<Innovation<3>> {
+        self.update_three(position_m - self.nominal.position_m, Layout::POSITION, sigma_m)
+    }
+
+    /// Takes a velocity in ECEF (m/s) with the 1-sigma of each component.
+    pub fn update_velocity(&mut self, velocity_m_s: &Vector3<f64>, sigma_m_s: f64) -> Option<Innovation<3>> {
+        self.update_three(velocity_m_s - self.nominal.velocity_m_s, Layout::VELOCITY, sigma_m_s)
+    }
+
+    /// Takes an attitude (body to ECEF), for example of a star tracker, with the 1-sigma about each axis.
+    pub fn update_attitude(&mut self, attitude: &UnitQuaternion<f64>, sigma_rad: f64) -> Option<Innovation<3>> {
+        let error = (attitude * self.nominal.attitude.inverse()).scaled_axis();
+        self.update_three(error, Layout::ATTITUDE, sigma_rad)
+    }
+
+    fn update_three(&mut self, value: Vector3<f64>, first: usize, sigma: f64) -> Option<Innovation<3>> {
+        let mut by_errors = SMatrix::<f64, 3, N>::zeros();
+        for i in 0..3 {
+            by_errors[(i, first + i)] = 1.0;
+        }
+        self.update(value, &by_errors, &(SMatrix::<f64, 3, 3>::identity() * (sigma * sigma)))
+    }
+}
