@@ -19,6 +19,7 @@ pub mod board;
 mod calibrated;
 pub mod camera_file;
 mod camera_section;
+pub mod conversion;
 pub mod corners;
 pub mod document;
 #[cfg(test)]

@@ -1,29 +1,50 @@
-//! Camera calibrations of other tools: Kalibr camchains, OpenCV YAML, EuRoC `sensor.yaml`, ROS's camera_info.
+//! Camera calibrations of other tools: Kalibr camchains, OpenCV's YAML, XML and JSON, EuRoC `sensor.yaml`, ROS's
+//! camera_info, Foxglove's CameraCalibration.
 //!
 //! | file | lens there | in hzn |
 //! |---|---|---|
 //! | Kalibr, EuRoC | `pinhole` + `equidistant` | `kannala-brandt` |
 //! | Kalibr, EuRoC | `pinhole` + `radtan`, `radial-tangential`, `plumb_bob` | `brown-conrady` |
 //! | Kalibr, EuRoC | `pinhole` + `none` | `pinhole` |
+//! | Kalibr | `ds`, `eucm` + `none` | `double-sphere`, `eucm` |
+//! | Kalibr | `omni` + `none` | `eucm` with β = 1 |
 //! | OpenCV | `camera_matrix` or `K`, `distortion_coefficients` or `D`, `fisheye_model: 1` | `kannala-brandt` |
+//! | OpenCV | the same with a column of four coefficients | `kannala-brandt` |
 //! | OpenCV | the same with `fisheye_model: 0`, or with five coefficients | `brown-conrady` |
-//! | ROS | the same with `distortion_model`: `plumb_bob`, `rational_polynomial` with k4 to k6 = 0 | `brown-conrady` |
-//! | ROS | the same with `distortion_model`: `equidistant`, `fisheye` | `kannala-brandt` |
+//! | ROS, Foxglove | `distortion_model`: `plumb_bob`, or `rational_polynomial` with k4 to k6 = 0 | `brown-conrady` |
+//! | ROS, Foxglove | the same with `distortion_model`: `equidistant`, `fisheye`, `kannala_brandt` | `kannala-brandt` |
 //!
-//! A file with four coefficients and without either word is ambiguous. It is refused, unless its file name contains
-//! `fisheye`.
+//! Four coefficients in a row or in a plain list, without either word, are ambiguous. Such a file is refused. The text
+//! tells the format, and the name of the file tells nothing.
 //!
-//! [`load`] reads a file, [`write()`] writes one; [`from_braun_barf`] converts the five coefficients of that paper.
+//! [`load`] reads a file, [`load_any`] one whose lens hzn may not have, [`write()`] writes one; [`from_braun_barf`]
+//! converts the five coefficients of that paper.
 
+mod camera_matrix;
+mod document;
+mod format;
+mod kalibr;
 mod lens;
+mod loaded;
+mod numbers;
+mod omni;
+mod opencv;
 mod read;
+mod reader;
 mod values;
 mod write;
+mod write_kalibr;
+mod write_opencv;
+mod write_ros;
 
 use hzn_core::camera::{Config, Model};
 
-pub use read::{load, parse};
-pub use write::{Format, UnsupportedLens, write};
+pub use camera_matrix::camera_matrix;
+pub use format::{Format, UnsupportedLens};
+pub use loaded::Loaded;
+pub use omni::Omni;
+pub use read::{load, load_any, parse};
+pub use write::write;
 
 /// Returns the lens of Braun & Barf 2022, (13), with the distance from the centre in pixels
 /// r = κ₁θ + κ₂θ³ + κ₃θ⁵ + κ₄θ⁷ + κ₅θ⁹ and θ in radians.

@@ -1,4 +1,4 @@
-//! Numbers, lists and matrices as YAML writers write them.
+//! Numbers, lists and matrices as the writers of camera files form them.
 
 use serde_json::Value;
 
@@ -8,9 +8,9 @@ pub(super) fn numbers(value: &Value) -> Option<Vec<f64>> {
 }
 
 /// Reads a number. YAML 1.1 writers may omit the decimal point, as in `1e-05`. A stricter reader takes this for a text,
-/// so a text with a number is accepted too.
+/// so a text with a number is accepted too. A number must be finite.
 pub(super) fn number(value: &Value) -> Option<f64> {
-    value.as_f64().or_else(|| value.as_str()?.trim().parse().ok())
+    value.as_f64().or_else(|| value.as_str()?.trim().parse().ok()).filter(|x: &f64| x.is_finite())
 }
 
 /// Reads an OpenCV matrix (its `data`), a list, or a list of rows, and flattens it.

@@ -123,10 +123,11 @@ pub fn check(
     let (first, n) = (fit.layout.first_intrinsic(), fit.layout.intrinsics);
     let percent = unknowns.scale_weights() * 100.0;
     let variance = |c: &DMatrix<f64>, along: &DVector<f64>| (along.transpose() * c * along)[(0, 0)];
-    let flown = fit.solution.covariance.view((first, first), (n, n)).into_owned();
+    let systematic = fit.systematic(&unknowns);
+    let flown = fit.solution.covariance.view((first, first), (n, n)) + &systematic;
     let value = percent.dot(&fit.changes());
     let focal = Deviation::new(value, variance(&flown, &percent), variance(&claimed.covariance, &percent), freedom);
-    let centre_px = test_centre(&claimed, &fit, freedom).ok_or(Refusal::Singular)?;
+    let centre_px = test_centre(&claimed, &fit, &systematic, freedom).ok_or(Refusal::Singular)?;
     let verdict = if focal.is_significant() || centre_px.iter().any(Deviation::is_significant) {
         Verdict::DoesNotHold
     } else if focal.detectable <= detect_percent {
@@ -147,13 +148,18 @@ pub fn check(
 }
 
 /// Tests the principal point with the focal length of the calibration.
-fn test_centre(claimed: &Unknowns, fit: &Fit, freedom: f64) -> Option<[Deviation; 2]> {
+fn test_centre(claimed: &Unknowns, fit: &Fit, systematic: &DMatrix<f64>, freedom: f64) -> Option<[Deviation; 2]> {
     let solution = fit.solve_again(&claimed.with_free_centre(), fit.limb)?;
     let deviation = |place: Option<usize>| {
         let place = place?;
         let at = fit.layout.first_intrinsic() + place;
         let calibration = claimed.covariance[(place, place)];
-        Some(Deviation::new(solution.values[at], solution.covariance[(at, at)], calibration, freedom))
+        Some(Deviation::new(
+            solution.values[at],
+            solution.covariance[(at, at)] + systematic[(place, place)],
+            calibration,
+            freedom,
+        ))
     };
     let [u, v] = claimed.centre();
     Some([deviation(u)?, deviation(v)?])

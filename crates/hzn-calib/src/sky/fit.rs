@@ -1,7 +1,7 @@
 //! Fits lens and limb height to the pictures of a flight: Gauss-Newton steps, each linearised anew.
 
 use hzn_core::body;
-use hzn_core::camera::Camera;
+use hzn_core::camera::{Camera, Config};
 use nalgebra::{DMatrix, DVector};
 
 use super::layout::{COMMON, Layout};
@@ -57,6 +57,8 @@ pub(super) struct Fit {
     pub(super) limb: LimbPrior,
     /// Sigmas of the common shapes, in pixels.
     pub(super) common_px: [f64; COMMON],
+    /// RMS distance of the edge points from the principal point, in pixels.
+    distance_px: f64,
 }
 
 impl Fit {
@@ -91,6 +93,25 @@ impl Fit {
         system::solve(&self.counted(), &prior, self.solution.scatter_km)
     }
 
+    /// Returns the covariance that the errors have in common which edges have in every picture: threshold and blur move
+    /// an edge by fractions of a pixel, in a way that depends on its direction and on its place in the picture. A shift
+    /// of 0.1 px moves the principal point, and a stretch of 0.1 px at the distance of the edges scales the picture.
+    pub(super) fn systematic(&self, unknowns: &Unknowns) -> DMatrix<f64> {
+        let part = MIN_SHIFT_PX / self.distance_px.max(1.0);
+        let stretch = unknowns.scale_direction() * part;
+        let mut covariance = &stretch * stretch.transpose();
+        for place in unknowns.centre().into_iter().flatten() {
+            covariance[(place, place)] += MIN_SHIFT_PX * MIN_SHIFT_PX;
+        }
+        covariance
+    }
+
+    /// Returns the RMS residual of the pictures that count, in pixels.
+    pub(super) fn rms_px(&self) -> f64 {
+        let counted: Vec<f64> = self.pictures.iter().filter(|p| p.counts).map(|p| p.noise.rms_px.powi(2)).collect();
+        (counted.iter().sum::<f64>() / counted.len().max(1) as f64).sqrt()
+    }
+
     /// Returns the pictures that count.
     pub(super) fn counted(&self) -> Vec<&Reduced> {
         self.pictures.iter().filter(|p| p.counts).map(|p| &p.reduced).collect()
@@ -109,6 +130,7 @@ struct State {
     changes: DVector<f64>,
     height_km: f64,
     pictures: Vec<Fitted>,
+    distance_px: f64,
 }
 
 impl State {
@@ -127,7 +149,9 @@ impl State {
         if pictures.is_empty() || (pictures.len() < MIN_PICTURES && !limb.sigma_km.is_finite()) {
             return Err(Refusal::TooFew { answered: pictures.len(), min_pictures: MIN_PICTURES });
         }
-        Ok(Self { layout: model.layout, limb, changes, height_km, pictures })
+        let used = pictures.iter().filter_map(|p| views.get(p.view));
+        let distance_px = distance_px(&unknowns.before, used);
+        Ok(Self { layout: model.layout, limb, changes, height_km, pictures, distance_px })
     }
 
     fn solve(&mut self, unknowns: &Unknowns) -> Result<Fit, Refusal> {
@@ -144,7 +168,14 @@ impl State {
         });
         let solution = solved.ok_or(Refusal::Singular)?;
         self.find_heights(&solution);
-        Ok(Fit { layout: self.layout, pictures: self.pictures.clone(), solution, limb: self.limb, common_px })
+        Ok(Fit {
+            layout: self.layout,
+            pictures: self.pictures.clone(),
+            solution,
+            limb: self.limb,
+            common_px,
+            distance_px: self.distance_px,
+        })
     }
 
     /// Computes the limb height of each picture with the fitted lens.
@@ -225,6 +256,16 @@ impl State {
         }
         Ok(())
     }
+}
+
+/// Returns the RMS distance of the edge points from the principal point, in pixels.
+fn distance_px<'a>(lens: &Config, views: impl Iterator<Item = &'a View>) -> f64 {
+    let (mut square, mut total) = (0.0, 0.0);
+    for ([u, v], weight) in views.flat_map(|view| &view.points) {
+        square += weight * ((u - lens.cx_px).powi(2) + (v - lens.cy_px).powi(2));
+        total += weight;
+    }
+    (square / f64::max(total, 1e-12)).sqrt()
 }
 
 /// Returns the sigmas of the common shapes: for the shift the RMS of the residuals, for all others the strongest shape

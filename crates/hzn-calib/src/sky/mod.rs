@@ -1,4 +1,4 @@
-//! The camera's calibration from limb pictures of a flight: `hzn calibrate sky` and `hzn calibrate check`.
+//! The camera's calibration from pictures of a flight: `hzn calibrate sky` and `hzn calibrate check`.
 //!
 //! The pictures measure the intrinsic parameters of the lens jointly with the limb height. Each picture has an axis of
 //! its own, which is eliminated. The limb heights of the pictures scatter about one height; the scatter is estimated. A
@@ -11,6 +11,7 @@
 //! ```
 //!
 //! [`estimate()`] repeats this until the lens no longer changes. [`check`] tests a calibration with the same system.
+//! [`estimate_track`] estimates the lens from the track of the Sun or the Moon instead.
 
 mod check;
 mod estimate;
@@ -20,19 +21,25 @@ mod linear;
 mod mount;
 mod normal_law;
 mod observable;
+mod parameters;
 mod refusal;
 mod system;
 #[cfg(test)]
 mod tests;
+mod track;
+#[cfg(test)]
+mod track_tests;
 mod unknowns;
 mod view;
 mod write;
 
 pub use check::{Check, DEFAULT_DETECT_PERCENT, Deviation, Verdict, check};
-pub use estimate::{Determined, Estimate, MIN_PICTURES, Picture, estimate};
+pub use estimate::{Estimate, MIN_PICTURES, Picture, estimate};
 pub use mount::{Mount, MountRefusal, estimate_mount};
 pub use observable::Observability;
+pub use parameters::Determined;
 pub use refusal::Refusal;
+pub use track::{Sight, Track, TrackRefusal, estimate_track};
 pub use unknowns::{LimbPrior, Parameter, Unknowns};
 pub use view::View;
-pub use write::{Written, into_sensor_toml};
+pub use write::{Found, FoundMount, Written, into_sensor_toml};

@@ -10,7 +10,7 @@ use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::fmt;
 
-use super::estimate::Estimate;
+use super::estimate::{Estimate, Picture};
 use super::view::View;
 
 /// Largest 1-sigma of each component of the rotation, in degrees: the attitude of a sensor without a calibration of its
@@ -92,13 +92,22 @@ struct Pair {
 /// # Errors
 /// The pictures do not determine three axes: see [`MountRefusal`].
 pub fn estimate_mount(estimate: &Estimate, body: &body::Config, views: &[View]) -> Result<Mount, MountRefusal> {
-    let pairs: Vec<Pair> = estimate
-        .pictures
+    from_pictures(&estimate.pictures, estimate.height_km[0], body, views)
+}
+
+/// Estimates the correction from the axes of the pictures, with the limb height in kilometres.
+pub(super) fn from_pictures(
+    pictures: &[Picture],
+    limb_km: f64,
+    body: &body::Config,
+    views: &[View],
+) -> Result<Mount, MountRefusal> {
+    let pairs: Vec<Pair> = pictures
         .iter()
         .filter(|p| p.counts)
         .filter_map(|p| {
             let view = views.iter().find(|v| v.name == p.name)?;
-            let predicted = predict_axis(estimate.height_km[0], body, view)?;
+            let predicted = predict_axis(limb_km, body, view)?;
             let sigma = view.prior.attitude_sigma_rad.unwrap_or(MIN_SIGMA_RAD).max(MIN_SIGMA_RAD);
             Some(Pair { measured: Vector3::from(p.axis), predicted, variance_rad2: sigma * sigma })
         })

@@ -4,8 +4,7 @@ use hzn_core::camera::{Config, Covariance, Intrinsic};
 use nalgebra::{Quaternion, UnitQuaternion};
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
-use super::estimate::{Determined, Estimate};
-use super::mount::Mount;
+use super::parameters::Determined;
 
 /// Comments of a calibration begin with this mark; the next calibration replaces them.
 const MARK: &str = "# calibrated:";
@@ -19,12 +18,36 @@ pub struct Written {
     pub keys: Vec<String>,
 }
 
-/// Writes the determined parameters and their covariance into the text of a sensor.toml. `source` names the pictures,
-/// for the comments. A `[camera]` that refers to a `file` gets all keys of the lens instead of the reference.
+/// The lens that is written, and where it comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct Found<'a> {
+    /// The calibration with the covariance of its parameters.
+    pub camera: &'a Config,
+    /// The parameters that took part.
+    pub parameters: &'a [Determined],
+    /// The pictures, for example `38 limb pictures of flight`.
+    pub source: &'a str,
+}
+
+/// The mount that is written, and where it comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct FoundMount<'a> {
+    /// The mount with which the attitudes were computed: rotation from the camera to the body frame, scalar first.
+    pub nominal_wxyz: [f64; 4],
+    /// Rotation from the real to the nominal camera frame, scalar first.
+    pub correction_wxyz: [f64; 4],
+    /// 1-sigma about each axis of the camera, in degrees.
+    pub sigma_deg: [f64; 3],
+    /// The pictures, for example `38 limb pictures of flight`.
+    pub source: &'a str,
+}
+
+/// Writes the determined parameters and their covariance into the text of a sensor.toml. A `[camera]` that refers to a
+/// `file` gets all keys of the lens instead of the reference.
 ///
 /// # Errors
 /// The text is not valid TOML, or `[camera]` is not a section.
-pub fn into_sensor_toml(text: &str, estimate: &Estimate, source: &str) -> Result<Written, String> {
+pub fn into_sensor_toml(text: &str, found: Found<'_>) -> Result<Written, String> {
     let mut document: DocumentMut = text.parse().map_err(|e| format!("is not valid TOML: {e}"))?;
     let item = document.entry("camera").or_insert_with(|| Item::Table(Table::new()));
     if let Item::Value(Value::InlineTable(table)) = item {
@@ -32,12 +55,11 @@ pub fn into_sensor_toml(text: &str, estimate: &Estimate, source: &str) -> Result
     }
     let camera = item.as_table_like_mut().ok_or("camera is not a section")?;
     if camera.contains_key("file") {
-        replace_file(camera, &estimate.camera);
+        replace_file(camera, found.camera);
     }
-    let counted = estimate.pictures.iter().filter(|p| p.counts).count();
     let mut keys = Vec::new();
-    for parameter in estimate.parameters.iter().filter(|p| p.determined && !is_coefficient(p.which)) {
-        let why = comment(parameter, counted, source);
+    for parameter in found.parameters.iter().filter(|p| p.determined && !is_coefficient(p.which)) {
+        let why = comment(parameter, found.source);
         set(
             camera,
             "[camera]",
@@ -48,39 +70,38 @@ pub fn into_sensor_toml(text: &str, estimate: &Estimate, source: &str) -> Result
         );
     }
     let coefficients: Vec<&Determined> =
-        estimate.parameters.iter().filter(|p| p.determined && is_coefficient(p.which)).collect();
+        found.parameters.iter().filter(|p| p.determined && is_coefficient(p.which)).collect();
     if !coefficients.is_empty() {
-        let why: Vec<String> = coefficients.iter().map(|p| comment(p, counted, source)).collect();
-        let values = Array::from_iter(estimate.camera.k.iter().copied());
+        let why: Vec<String> = coefficients.iter().map(|p| comment(p, found.source)).collect();
+        let values = Array::from_iter(found.camera.k.iter().copied());
         set(camera, "[camera]", "k", values.into(), &why.join("; "), &mut keys);
     }
-    if let Some(covariance) = &estimate.camera.covariance {
+    if let Some(covariance) = &found.camera.covariance {
         camera.remove("focal_sigma_percent");
         camera.remove("centre_sigma_px");
         camera.remove("covariance");
-        let why = "covariance of the parameters above, for the limb height and its sigma in [body]";
+        let why = "covariance of the parameters above, by `hzn calibrate sky`";
         set(camera, "[camera]", "covariance", covariance_value(covariance), why, &mut keys);
     }
     Ok(Written { text: document.to_string(), keys })
 }
 
 impl Written {
-    /// Writes the mount into the text as well: `nominal_wxyz` is the mount with which the attitudes were computed.
+    /// Writes a mount into the text as well.
     ///
     /// # Errors
     /// `[mount]` is not a section.
-    pub fn with_mount(self, mount: &Mount, nominal_wxyz: [f64; 4], source: &str) -> Result<Self, String> {
+    pub fn with_mount(self, mount: &FoundMount<'_>) -> Result<Self, String> {
         let mut document: DocumentMut = self.text.parse().map_err(|e| format!("is not valid TOML: {e}"))?;
         let item = document.entry("mount").or_insert_with(|| Item::Table(Table::new()));
         let table = item.as_table_like_mut().ok_or("mount is not a section")?;
         let of = |[w, i, j, k]: [f64; 4]| UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
-        let q = of(nominal_wxyz) * of(mount.correction_wxyz);
+        let q = of(mount.nominal_wxyz) * of(mount.correction_wxyz);
         let value = Array::from_iter([q.w, q.i, q.j, q.k].map(|x| (x * 1e9).round() / 1e9));
         let [x, y, z] = mount.sigma_deg.map(two_digits);
         let why = format!(
-            "from {} limb pictures of {source} with an attitude by `hzn calibrate sky`; 1 sigma about x, y, z of the \
-             camera: {x}°, {y}°, {z}°",
-            mount.pictures
+            "from {} with an attitude by `hzn calibrate sky`; 1 sigma about x, y, z of the camera: {x}°, {y}°, {z}°",
+            mount.source
         );
         let mut keys = self.keys;
         set(table, "[mount]", "q_body_from_camera_wxyz", value.into(), &why, &mut keys);
@@ -92,13 +113,9 @@ fn is_coefficient(which: Intrinsic) -> bool {
     !matches!(which, Intrinsic::FxPx | Intrinsic::FyPx | Intrinsic::CxPx | Intrinsic::CyPx)
 }
 
-fn comment(parameter: &Determined, pictures: usize, source: &str) -> String {
+fn comment(parameter: &Determined, source: &str) -> String {
     let Determined { which, sigma, before, .. } = parameter;
-    format!(
-        "{} ± {} from {pictures} limb pictures of {source} by `hzn calibrate sky`; it was {before}",
-        which.name(),
-        two_digits(*sigma)
-    )
+    format!("{} ± {} from {source} by `hzn calibrate sky`; it was {before}", which.name(), two_digits(*sigma))
 }
 
 /// Rounds a value to a hundredth of its sigma.

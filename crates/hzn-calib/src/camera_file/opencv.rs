@@ -1,0 +1,109 @@
+//! Reads OpenCV's files, ROS's camera_info and Foxglove's CameraCalibration.
+
+use hzn_core::camera::Config;
+use serde_json::{Map, Value};
+
+use super::camera_matrix::camera_matrix;
+use super::lens::{Coefficients, Lens};
+use super::reader::Reader;
+use super::values::{matrix, number, numbers};
+use crate::Problem;
+
+/// Names of the camera matrix, in the form of [`plain`].
+pub(super) const MATRIX: &[&str] = &["cameramatrix", "k", "mtx", "intrinsicmatrix"];
+const DISTORTION: &[&str] = &["distortioncoefficients", "d", "distcoeffs", "distcoefs", "dist"];
+const WIDTH: &[&str] = &["imagewidth", "width"];
+const HEIGHT: &[&str] = &["imageheight", "height"];
+const SIZE: &[&str] = &["imagesize", "size", "resolution"];
+
+/// Reads a file with a camera matrix.
+pub(super) fn read(reader: &Reader<'_>, top: &Map<String, Value>) -> Result<Config, Problem> {
+    let (key, value) = find(reader, top, MATRIX)?.unwrap_or(("camera_matrix", &Value::Null));
+    let intrinsics = read_matrix(reader, value, key)?;
+    let (key, value) = find(reader, top, DISTORTION)?.unwrap_or(("distortion_coefficients", &Value::Null));
+    let coefficients = Coefficients { values: reader.coefficients(Some(value), key)?, field: key.to_owned() };
+    let size = read_size(reader, top)?;
+    let word = find(reader, top, &["distortionmodel"])?;
+    let stated = reader.lens(word.map(|(_, value)| value), "distortion_model")?;
+    let flag = find(reader, top, &["fisheyemodel"])?.map(|(_, value)| read_flag(reader, value)).transpose()?;
+    let lens = match (stated, flag) {
+        (Some(lens), Some(flag)) if flag != (lens == Lens::Fisheye) => {
+            let what = "contradicts distortion_model; remove the wrong one of the two";
+            return Err(reader.problem("fisheye_model", what));
+        }
+        (Some(lens), _) => lens,
+        (None, Some(true)) => Lens::Fisheye,
+        (None, Some(false)) => Lens::PlumbBob,
+        (None, None) => lens_of_shape(reader, value, &coefficients)?,
+    };
+    let model = reader.model(lens, &coefficients)?;
+    reader.config(model, size, intrinsics, coefficients.values.as_deref().unwrap_or_default())
+}
+
+/// Returns the lens that the shape of the coefficients tells. `cv2.fisheye.calibrate` returns a column of four.
+/// `cv2.calibrateCamera` returns at least five. A row or a plain list of four may be either.
+fn lens_of_shape(reader: &Reader<'_>, value: &Value, coefficients: &Coefficients) -> Result<Lens, Problem> {
+    if coefficients.values.as_ref().is_none_or(|k| k.len() != 4) {
+        return Ok(Lens::PlumbBob);
+    }
+    let side = |key: &str| value.get(key).and_then(Value::as_u64);
+    let column_of_rows = value.as_array().is_some_and(|rows| rows.len() == 4 && rows.iter().all(Value::is_array));
+    if (side("rows") == Some(4) && side("cols") == Some(1)) || column_of_rows {
+        return Ok(Lens::Fisheye);
+    }
+    let what = "four coefficients are k1 to k4 of a fisheye lens (cv2.fisheye) or k1, k2, p1, p2 of Brown-Conrady \
+                (cv2.calibrateCamera): add `fisheye_model: 1` or `fisheye_model: 0` to the file";
+    Err(reader.problem(&coefficients.field, what))
+}
+
+/// Finds the value whose name is one of these.
+fn find<'a>(
+    reader: &Reader<'_>,
+    top: &'a Map<String, Value>,
+    names: &[&str],
+) -> Result<Option<(&'a str, &'a Value)>, Problem> {
+    let mut found = top.iter().filter(|(key, _)| names.contains(&plain(key).as_str()));
+    let first = found.next().map(|(key, value)| (key.as_str(), value));
+    match (first, found.next()) {
+        (Some((one, _)), Some((other, _))) => {
+            Err(reader.problem(other, format!("means the same as {one}; remove the wrong one of the two")))
+        }
+        (first, _) => Ok(first),
+    }
+}
+
+/// Returns a name in small letters without `_` and `-`: OpenCV's samples changed `Camera_Matrix` to `camera_matrix`,
+/// and programs write `cameraMatrix`.
+pub(super) fn plain(name: &str) -> String {
+    name.chars().filter(|c| !matches!(c, '_' | '-')).map(|c| c.to_ascii_lowercase()).collect()
+}
+
+/// Returns width and height.
+fn read_size(reader: &Reader<'_>, top: &Map<String, Value>) -> Result<[f64; 2], Problem> {
+    if let Some((key, value)) = find(reader, top, SIZE)? {
+        let pair = numbers(value).and_then(|v| <[f64; 2]>::try_from(v).ok());
+        return pair.ok_or_else(|| reader.problem(key, "two numbers, width and height, are expected"));
+    }
+    let side = |names: &[&str], name: &str| match find(reader, top, names)? {
+        Some((key, value)) => number(value).ok_or_else(|| reader.problem(key, "a number of pixels is expected")),
+        None => Err(reader.problem(name, "missing: add the picture's size in pixels to the file")),
+    };
+    Ok([side(WIDTH, "image_width")?, side(HEIGHT, "image_height")?])
+}
+
+/// Returns whether `fisheye_model` is 1.
+fn read_flag(reader: &Reader<'_>, value: &Value) -> Result<bool, Problem> {
+    match (value.as_bool(), number(value)) {
+        (Some(flag), _) => Ok(flag),
+        (_, Some(x)) if x == 0.0 || x == 1.0 => Ok(x == 1.0),
+        _ => Err(reader.problem("fisheye_model", format!("is {value}; 1 or 0 is expected"))),
+    }
+}
+
+/// Returns fx, fy, cx, cy of a camera matrix, in pixels.
+fn read_matrix(reader: &Reader<'_>, value: &Value, key: &str) -> Result<[f64; 4], Problem> {
+    let Some(Ok(m)) = matrix(value).map(<[f64; 9]>::try_from) else {
+        return Err(reader.problem(key, "a 3x3 matrix of finite numbers is expected"));
+    };
+    camera_matrix(m).map_err(|what| reader.problem(key, what))
+}
