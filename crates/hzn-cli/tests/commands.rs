@@ -254,43 +254,6 @@ fn demo_compares_with_the_truth() {
 }
 
 #[test]
-fn calibrations_of_other_tools_come_and_go() {
-    let place = Place::new();
-    let fisheye = common::SENSOR.replace("\"pinhole\"", "\"kannala-brandt\"\nk = [0.01, 2e-5, -1e-6, 0.0]");
-    place.write("a.toml", fisheye.as_bytes());
-    for (form, word) in
-        [("kalibr", "distortion_model: equidistant"), ("opencv", "fisheye_model: 1"), ("euroc", "sensor_type: camera")]
-    {
-        let file = format!("{form}.yaml");
-        let ran = place.run(&["camera", "convert", "a.toml", "--to", form, "-o", &file]).expect(0);
-        ran.says("hzn camera show");
-        assert!(place.read(&file).contains(word), "{}", place.read(&file));
-        let back = place.run(&["camera", "convert", &file]).expect(0).out;
-        let straight = place.run(&["camera", "convert", "a.toml"]).expect(0).out;
-        assert_eq!(back, straight);
-        let refused = place.run(&["camera", "convert", "a.toml", "--to", form, "-o", &file]);
-        refused.expect(2).says("--force replaces it");
-    }
-    place.run(&["camera", "convert", "kalibr.yaml", "-o", "b.toml"]).expect(0);
-    place.run(&["camera", "show", "b.toml"]).expect(0);
-    place.run(&["camera", "convert", "kalibr.yaml", "-o", "b.yaml"]).expect(2).says("--to kalibr, opencv or euroc");
-    place.run(&["camera", "convert", "kalibr.yaml", "--camera", "cam7"]).expect(2).says("did you mean cam0?");
-    place.run(&["camera", "convert", "nowhere.yaml"]).expect(2).says("cannot be read");
-}
-
-#[test]
-fn the_coefficients_of_braun_and_barf() {
-    let place = Place::new();
-    let lens = ["--size", "1920x1080", "--centre", "963.2,536.7", "--braun-barf"];
-    let convert = |kappa: &str| place.run(&[&["camera", "convert"], &lens[..], &[kappa]].concat());
-    let out = convert("1000,-55,11,-3.5,0.25").expect(0).out;
-    assert!(out.contains("fx_px = 1000.0\n") && out.contains("k = [-0.055, 0.011, -0.0035, 0.00025]"), "{out}");
-    convert("1000,-55").expect(2).says("5 numbers with commas");
-    convert("-1,0,0,0,0").expect(2).says("above 0");
-    convert("1000,-900,0,0,0").expect(2).says("monotone");
-}
-
-#[test]
 fn a_telecommand_has_values_that_can_be() {
     let place = Place::new();
     let set = |pair: &str| place.command(&["telecommand", &format!("set {pair}")]).output().unwrap();
@@ -319,49 +282,6 @@ fn a_telecommand_has_values_that_can_be() {
     for pair in ["camera.theta_max_deg NaN", "1000 -3.5", "camera.k -0.1", "200 4 201 3 body.kind moon"] {
         assert!(set(pair).status.success(), "{pair}");
     }
-}
-
-#[test]
-fn the_farthest_corner_of_any_lens() {
-    let place = Place::new();
-    let corner = |sensor: &str| {
-        place.write("c.toml", sensor.as_bytes());
-        let shown = place.run(&["camera", "show", "c.toml"]).expect(0).out;
-        let text = shown.split("farthest corner ").nth(1).unwrap().split(' ').next().unwrap().to_owned();
-        let last = shown.trim_end().lines().last().unwrap().split_whitespace().next().unwrap().to_owned();
-        assert_eq!(text, last, "{shown}");
-        text.parse::<f64>().unwrap()
-    };
-    // The picture has 320 x 240 px, with a focal length of 300 px.
-    let exact = (200.0f64 / 300.0).atan().to_degrees();
-    assert!((corner(common::SENSOR) - exact).abs() < 0.006);
-    let brown = common::SENSOR.replace("\"pinhole\"", "\"brown-conrady\"\nk = [0.0, 0.0, 0.0, 0.0, 0.0]");
-    assert!((corner(&brown) - exact).abs() < 0.006);
-}
-
-/// Returns a JPEG of the limb with a focal length in its EXIF, in millimetres and as on 35 mm film.
-fn jpeg_with_exif(focal_mm: u32, on_film_mm: u16) -> Vec<u8> {
-    let mut jpeg = std::io::Cursor::new(Vec::new());
-    common::limb(320, 240, 0.0).write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
-    let jpeg = jpeg.into_inner();
-    // One directory has the model and the offset of another: FocalLength (a fraction at its end),
-    // FocalLengthIn35mmFilm.
-    let entry = |tag: u16, kind: u16, count: u32, value: u32| {
-        [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
-    };
-    let directory =
-        |entries: &[Vec<u8>]| [&(entries.len() as u16).to_le_bytes()[..], &entries.concat(), &[0; 4]].concat();
-    let model = u32::from_le_bytes(*b"X-1\0");
-    let tiff = [
-        &b"II*\0\x08\0\0\0"[..],
-        &directory(&[entry(0x110, 2, 4, model), entry(0x8769, 4, 1, 38)]),
-        &directory(&[entry(0x920a, 5, 1, 68), entry(0xa405, 3, 1, on_film_mm.into())]),
-        &(10 * focal_mm).to_le_bytes(),
-        &10u32.to_le_bytes(),
-    ]
-    .concat();
-    let length = u16::try_from(tiff.len() + 8).unwrap().to_be_bytes();
-    [&jpeg[..2], &[0xff, 0xe1], &length, b"Exif\0\0", &tiff, &jpeg[2..]].concat()
 }
 
 #[test]
@@ -414,4 +334,29 @@ fn init_wants_pictures_of_one_size() {
     let ran = place.run(&["init", "in", "--fov", "56", "-o", "s.toml"]).expect(2);
     ran.says("320x240").says("small.png").says("160x120");
     assert!(!place.path("s.toml").exists());
+}
+
+/// Returns a JPEG of the limb with a focal length in its EXIF, in millimetres and as on 35 mm film.
+fn jpeg_with_exif(focal_mm: u32, on_film_mm: u16) -> Vec<u8> {
+    let mut jpeg = std::io::Cursor::new(Vec::new());
+    common::limb(320, 240, 0.0).write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+    let jpeg = jpeg.into_inner();
+    // One directory has the model and the offset of another: FocalLength (a fraction at its end),
+    // FocalLengthIn35mmFilm.
+    let entry = |tag: u16, kind: u16, count: u32, value: u32| {
+        [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
+    };
+    let directory =
+        |entries: &[Vec<u8>]| [&(entries.len() as u16).to_le_bytes()[..], &entries.concat(), &[0; 4]].concat();
+    let model = u32::from_le_bytes(*b"X-1\0");
+    let tiff = [
+        &b"II*\0\x08\0\0\0"[..],
+        &directory(&[entry(0x110, 2, 4, model), entry(0x8769, 4, 1, 38)]),
+        &directory(&[entry(0x920a, 5, 1, 68), entry(0xa405, 3, 1, on_film_mm.into())]),
+        &(10 * focal_mm).to_le_bytes(),
+        &10u32.to_le_bytes(),
+    ]
+    .concat();
+    let length = u16::try_from(tiff.len() + 8).unwrap().to_be_bytes();
+    [&jpeg[..2], &[0xff, 0xe1], &length, b"Exif\0\0", &tiff, &jpeg[2..]].concat()
 }

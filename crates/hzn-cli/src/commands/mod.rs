@@ -9,6 +9,7 @@ mod explain;
 mod export;
 mod info;
 mod init;
+mod lens_model;
 mod recover;
 mod run;
 mod sensitivity;

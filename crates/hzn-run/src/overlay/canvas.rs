@@ -3,16 +3,17 @@
 use image::{Rgb, RgbImage};
 
 /// A colour: red, green, blue.
-pub(super) type Colour = [u8; 3];
+pub type Colour = [u8; 3];
 
 /// An RGB picture to draw on, with round pens. Everything is clipped at the picture's border.
-pub(super) struct Canvas {
-    pub(super) image: RgbImage,
+pub struct Canvas {
+    /// The picture.
+    pub image: RgbImage,
 }
 
 impl Canvas {
     /// Draws a filled disc; centre and radius are in pixels.
-    pub(super) fn disc(&mut self, [u, v]: [f64; 2], radius_px: f64, colour: Colour) {
+    pub fn disc(&mut self, [u, v]: [f64; 2], radius_px: f64, colour: Colour) {
         let (w, h) = (f64::from(self.image.width()), f64::from(self.image.height()));
         let (x0, x1) = ((u - radius_px).ceil().max(0.0), (u + radius_px).floor().min(w - 1.0));
         let (y0, y1) = ((v - radius_px).ceil().max(0.0), (v + radius_px).floor().min(h - 1.0));
@@ -30,7 +31,7 @@ impl Canvas {
     }
 
     /// Draws a straight line with round ends; all lengths are in pixels.
-    pub(super) fn line(&mut self, a: [f64; 2], b: [f64; 2], width_px: f64, colour: Colour) {
+    pub fn line(&mut self, a: [f64; 2], b: [f64; 2], width_px: f64, colour: Colour) {
         let length = (b[0] - a[0]).hypot(b[1] - a[1]);
         // A line far outside the picture would cost many steps without effect; limbs are clipped to the picture before.
         if !(length <= 1e5) {
@@ -45,14 +46,14 @@ impl Canvas {
     }
 
     /// Draws a line through several points.
-    pub(super) fn polyline(&mut self, points: &[[f64; 2]], width_px: f64, colour: Colour) {
+    pub fn polyline(&mut self, points: &[[f64; 2]], width_px: f64, colour: Colour) {
         for pair in points.windows(2) {
             self.line(pair[0], pair[1], width_px, colour);
         }
     }
 
     /// Darkens a rectangle; the picture remains visible in it.
-    pub(super) fn shade(&mut self, x: u32, y: u32, width: u32, height: u32) {
+    pub fn shade(&mut self, x: u32, y: u32, width: u32, height: u32) {
         for y in y..(y + height).min(self.image.height()) {
             for x in x..(x + width).min(self.image.width()) {
                 let p = self.image.get_pixel_mut(x, y);
@@ -62,7 +63,7 @@ impl Canvas {
     }
 
     /// Draws letters of 8 × 8 dots; each dot is `scale` pixels wide.
-    pub(super) fn text(&mut self, x: u32, y: u32, text: &str, scale: u32, colour: Colour) {
+    pub fn text(&mut self, x: u32, y: u32, text: &str, scale: u32, colour: Colour) {
         use font8x8::UnicodeFonts;
         for (i, letter) in text.chars().enumerate() {
             let Some(rows) = font8x8::BASIC_FONTS.get(letter) else { continue };

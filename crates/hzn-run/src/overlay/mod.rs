@@ -2,7 +2,7 @@
 //!
 //! The colours are those of a recording's annotations.
 
-mod canvas;
+pub mod canvas;
 pub mod limb;
 
 use std::path::Path;

@@ -9,6 +9,7 @@ use hzn_run::source::{self, Raw};
 
 use super::board_search;
 use super::lens_output::{check_outputs, write_all};
+use crate::commands::lens_model;
 use crate::exit::{Exit, Outcome, failed, usage};
 use crate::setup::stop_flag;
 use crate::tell;
@@ -35,7 +36,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     square_mm: f64,
     /// Model of the lens: kannala-brandt, brown-conrady, equidistant, pinhole, double-sphere, eucm
-    #[arg(long, value_name = "MODEL", default_value = "kannala-brandt", value_parser = parse_model)]
+    #[arg(long, value_name = "MODEL", default_value = "kannala-brandt", value_parser = lens_model::parse)]
     model: Model,
     /// Size and format of headerless pictures, as in `hzn run`
     #[arg(long, value_name = "WIDTHxHEIGHT:FORMAT")]
@@ -71,15 +72,6 @@ impl FromStr for BoardSize {
             Err(format!("{expected}; each side has 3 to 100"))
         }
     }
-}
-
-/// Reads the name of a lens model.
-pub(super) fn parse_model(name: &str) -> Result<Model, String> {
-    let model = Model::ALL.iter().copied().find(|m| m.name() == name);
-    model.ok_or_else(|| {
-        let names: Vec<&str> = Model::ALL.iter().map(|m| m.name()).collect();
-        format!("the models are {}", names.join(", "))
-    })
 }
 
 pub(super) fn run(args: &Args) -> Outcome {

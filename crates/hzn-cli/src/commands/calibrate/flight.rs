@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use hzn_calib::Sensor;
 use hzn_calib::noise::{self, WeightedPoints};
+use hzn_calib::{FrameData, Sensor};
 use hzn_core::{Prior, Solution};
 use hzn_run::disk;
 use hzn_run::engine::{self, End, Finished, Plan, Sink};
@@ -38,7 +38,15 @@ impl Sink for NoSink {
     }
 }
 
-/// Returns the plan of the run. Its sensor has a very wide prior of the limb height.
+/// Returns the sensor with a very wide prior of the limb height.
+pub(super) fn with_wide_limb(sensor: &Sensor) -> Result<Sensor, Stop> {
+    let Some(config) = noise::config_for_calibration(&sensor.config) else {
+        return Err(usage("the sensor looks only for Sun and Moon, which have no limb height to measure"));
+    };
+    Ok(Sensor { config, ..sensor.clone() })
+}
+
+/// Returns the plan of the run.
 pub(super) fn plan(
     input: &InputArgs,
     flight: bool,
@@ -46,15 +54,11 @@ pub(super) fn plan(
     source: &dyn Source,
     sensor: &Sensor,
 ) -> Result<Plan, Stop> {
-    let Some(config) = noise::config_for_calibration(&sensor.config) else {
-        return Err(usage("the sensor looks only for Sun and Moon, which have no limb height to measure"));
-    };
-    let sensor = Sensor { config, ..sensor.clone() };
-    let frames = input.frames(source, &sensor, flight)?;
-    check_altitude(&sensor, source, frames.as_ref())?;
+    let frames = input.frames(source, sensor, flight)?;
+    check_altitude(sensor, source, frames.as_ref())?;
     let threads = if sensor.config.tracks() { 1 } else { jobs.map_or_else(cores, usize::from) };
     Ok(Plan {
-        config: sensor.config,
+        config: sensor.config.clone(),
         flight,
         threads,
         frames,
@@ -71,15 +75,20 @@ pub(super) fn plan(
 pub(super) struct Answered<'a> {
     /// Name of the picture.
     pub(super) name: &'a str,
+    /// Number of the body, from 0.
+    pub(super) which: usize,
     /// Edge points of the answer with their weights.
     pub(super) points: WeightedPoints,
     /// The prior of the picture, without defaults of the sensor.
     pub(super) prior: Prior<f64>,
+    /// The row of the picture in frames.csv.
+    pub(super) data: Option<&'a FrameData>,
     /// The answer.
     pub(super) solution: &'a Solution<f64>,
 }
 
-/// Processes the flight and measures each picture that is answered. Returns `None` if the run was interrupted.
+/// Processes the flight and measures each answer: one for a body and picture. Returns `None` if the run was
+/// interrupted.
 pub(super) fn measure_answers<T>(
     plan: &Plan,
     source: &mut dyn Source,
@@ -89,22 +98,24 @@ pub(super) fn measure_answers<T>(
     let mut measured = Vec::new();
     let mut seen = |frame: &Finished| {
         progress.count(frame.outcomes.iter().map(engine::BodyOutcome::status));
-        measured.extend(answer(frame).and_then(&mut measure));
+        measured.extend((0..frame.outcomes.len()).filter_map(|which| measure(answer(frame, which)?)));
     };
     let end = engine::run(plan, source, 0, &stop_flag(), &mut NoSink, &mut seen)?;
     progress.finish();
     Ok((end == End::Complete).then_some(measured))
 }
 
-/// Returns the answer of a picture; `None` without one.
-fn answer(frame: &Finished) -> Option<Answered<'_>> {
-    let report = frame.outcomes.first()?.report.as_ref().ok()?;
+/// Returns the answer of a picture for one body, from 0; `None` without one.
+fn answer(frame: &Finished, which: usize) -> Option<Answered<'_>> {
+    let report = frame.outcomes.get(which)?.report.as_ref().ok()?;
     let solution = report.solution.as_ref()?;
-    let edges = frame.traces.as_ref()?.each.first()?.edges();
+    let edges = frame.traces.as_ref()?.each.get(which)?.edges();
     let edge = edges.iter().find(|e| e.candidate == solution.candidate)?;
     Some(Answered {
         name: &frame.name,
+        which,
         points: edge.points.iter().copied().zip(edge.weights.iter().copied()).collect(),
+        data: frame.data.as_ref(),
         prior: frame.data.as_ref().map_or_else(Prior::default, |d| d.to_prior(None)),
         solution,
     })

@@ -11,8 +11,10 @@ mod noise;
 mod page;
 mod points;
 mod sky;
+mod sky_args;
 mod sky_text;
 mod text;
+mod track;
 
 use crate::exit::Outcome;
 
@@ -27,7 +29,7 @@ pub(super) struct Args {
 enum Command {
     Board(board::Args),
     Points(points::Args),
-    Sky(sky::Args),
+    Sky(sky_args::Args),
     Check(check::Args),
     Noise(noise::Args),
 }

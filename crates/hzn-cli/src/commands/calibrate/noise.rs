@@ -52,7 +52,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut notes = source.notes();
     notes.extend(find_input(source.as_mut(), &mut sensor)?);
     check_size(source.as_ref(), &sensor)?;
-    let plan = flight::plan(&args.source, args.sensor.flight, args.jobs, source.as_ref(), &sensor)?;
+    let plan =
+        flight::plan(&args.source, args.sensor.flight, args.jobs, source.as_ref(), &flight::with_wide_limb(&sensor)?)?;
     let camera = Camera::try_new(&plan.config.camera).map_err(usage)?;
     if !args.quiet {
         notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));

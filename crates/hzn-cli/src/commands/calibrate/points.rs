@@ -6,9 +6,9 @@ use std::str::FromStr;
 use hzn_calib::points;
 use hzn_core::camera::Model;
 
-use super::board::parse_model;
 use super::lens_output::{check_outputs, write_all};
 use super::lens_text::Reasons;
+use crate::commands::lens_model;
 use crate::exit::{Exit, Outcome, failed};
 
 /// Calibrate a camera from points with known directions: a rotator with a collimator, or stars
@@ -31,7 +31,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "WIDTHxHEIGHT")]
     size: Size,
     /// Model of the lens: kannala-brandt, brown-conrady, equidistant, pinhole, double-sphere, eucm
-    #[arg(long, value_name = "MODEL", default_value = "kannala-brandt", value_parser = parse_model)]
+    #[arg(long, value_name = "MODEL", default_value = "kannala-brandt", value_parser = lens_model::parse)]
     model: Model,
     /// Also write the camera (.toml) or a report with plots (.html); may be given twice
     #[arg(short, long, value_name = "FILE")]

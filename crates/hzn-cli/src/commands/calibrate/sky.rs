@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 
 use hzn_calib::Sensor;
-use hzn_calib::sky::{self, Estimate, LimbPrior, Mount, MountRefusal, Parameter, Unknowns, View};
+use hzn_calib::sky::{self, Estimate, Found, FoundMount, LimbPrior, Mount, MountRefusal, Unknowns, View};
 use hzn_run::disk;
 use hzn_run::engine::Plan;
 use hzn_run::explain::counted;
 use hzn_run::source::ending;
 
 use super::flight::{self, check_outputs};
-use super::{page, sky_text};
+use super::sky_args::{Args, unknowns, write_sensors};
+use super::{page, sky_text, track};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::progress::Progress;
 use crate::setup::{InputArgs, SensorArgs, check_size, find_input};
@@ -22,69 +23,6 @@ const PASSES: usize = 3;
 /// The pictures are processed again if the focal length changes by more than this, in percent: the edge points at the
 /// border of a wide picture then move by about a pixel.
 const PROCESS_AGAIN_PERCENT: f64 = 0.2;
-
-/// Measure focal length and principal point on the limb pictures of a flight
-///
-/// The flight needs an altitude or a position for each picture (frames.csv, --altitude-km, body.altitude_km), but no
-/// truth. The lens is estimated together with the limb height, whose value and sigma in [body] are the prior. The
-/// range of altitudes and directions separates the two; the report says how well. The sigmas of the calibration in
-/// [camera] are the prior of the lens; without them, the focal length is free within 10 %. The report goes to stdout.
-/// `-o sensor.toml` writes the determined parameters with their covariance into a copy of the sensor.toml; `-o
-/// report.html` writes plots. A parameter is written only if the flight halves its sigma at least. If it halves none,
-/// the exit code is 1 and the message has the measured numbers.
-#[derive(Debug, clap::Args)]
-pub(super) struct Args {
-    /// A folder, a pattern in quotes, pictures, a video, or an MCAP
-    #[arg(required = true, value_name = "FLIGHT")]
-    input: Vec<PathBuf>,
-    #[command(flatten)]
-    sensor: SensorArgs,
-    #[command(flatten)]
-    source: InputArgs,
-    /// Also estimate this parameter; may be given twice
-    #[arg(long, value_enum, value_name = "PARAMETER")]
-    also: Vec<Also>,
-    /// Ignore the sigmas of the calibration in [camera], for example after damage
-    #[arg(long)]
-    ignore_sigmas: bool,
-    /// Ignore the limb height in [body]; the altitude span alone then separates it from the focal length
-    #[arg(long)]
-    free_limb_height: bool,
-    /// Also measure the mounting of the camera; needs a position and an attitude (computed with the nominal mounting)
-    /// for each picture
-    #[arg(long)]
-    mount: bool,
-    /// Also write the sensor (.toml) or a report with plots (.html); may be given twice
-    #[arg(short, long, value_name = "FILE")]
-    output: Vec<PathBuf>,
-    /// Replace files that exist
-    #[arg(long)]
-    force: bool,
-    /// Number of threads; without it, all cores
-    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
-    /// Print no progress on stderr
-    #[arg(short, long)]
-    quiet: bool,
-}
-
-/// A parameter that is estimated on request.
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum Also {
-    /// The first coefficient of the lens
-    K1,
-    /// fx and fy separately
-    Aspect,
-}
-
-impl From<Also> for Parameter {
-    fn from(also: Also) -> Self {
-        match also {
-            Also::K1 => Self::K1,
-            Also::Aspect => Self::Aspect,
-        }
-    }
-}
 
 /// The pictures of a flight for `sky` and `check`, and the number of all pictures.
 pub(super) struct Pictures {
@@ -98,6 +36,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     let (sensor, notes) = load(&args.input, &args.sensor, &args.source)?;
     if !args.quiet {
         notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
+    }
+    if track::is_track(&sensor) {
+        return track::run(args, &sensor);
     }
     let limb = limb_prior(&sensor, args.free_limb_height)?;
     let input = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
@@ -135,16 +76,6 @@ pub(super) fn limb_prior(sensor: &Sensor, free: bool) -> Result<LimbPrior, Stop>
     };
     let sigma_km = body.limb_height_sigma_km.hypot(spread_km).hypot(body.altitude_sigma_km);
     Ok(LimbPrior { km, sigma_km: if free { f64::INFINITY } else { sigma_km } })
-}
-
-/// Returns the parameters to estimate.
-fn unknowns(args: &Args, sensor: &Sensor) -> Unknowns {
-    let also: Vec<Parameter> = args.also.iter().map(|a| (*a).into()).collect();
-    if args.ignore_sigmas {
-        Unknowns::ignoring_sigmas(&sensor.config.camera, &also)
-    } else {
-        Unknowns::new(&sensor.config.camera, &also)
-    }
 }
 
 /// Processes the pictures and estimates the lens, with the estimated lens again if it differs. `None` if interrupted.
@@ -195,7 +126,7 @@ pub(super) fn views(
 ) -> Result<Option<Pictures>, Stop> {
     let mut source = source_args.open(input)?;
     source.want_channel(sensor.config.input.channel)?;
-    let plan = flight::plan(source_args, flight, jobs, source.as_ref(), sensor)?;
+    let plan = flight::plan(source_args, flight, jobs, source.as_ref(), &flight::with_wide_limb(sensor)?)?;
     let mut progress = Progress::new(source.total(), 0, quiet);
     let view = |a: flight::Answered<'_>| Some(View::new(a.name, a.points, a.prior, a.solution));
     let views = flight::measure_answers(&plan, source.as_mut(), &mut progress, view)?;
@@ -216,27 +147,25 @@ fn write(
             &sky_text::lines(estimate, estimate.pictures.len() as u64, mount.as_ref()),
             &[sky_text::heights(estimate)],
         )?;
-        std::fs::write(path, html).map_err(|e| disk::cannot_write(path, &e))?;
+        disk::write_whole(path, &html)?;
     }
-    if let Some(alarm) = estimate.alarm() {
-        return Err(failed(format!("{input}: no sensor.toml is written: {alarm}")));
+    if let Some(why) = estimate.alarm().or_else(|| estimate.undetermined()) {
+        return Err(failed(format!("{input}: no sensor.toml is written: {why}")));
     }
-    let mut written = sky::into_sensor_toml(&sensor.text, estimate, input).map_err(failed)?;
+    let count = estimate.pictures.iter().filter(|p| p.counts).count() as u64;
+    let source = &format!("{} of {input}", counted(count, "limb picture"));
+    let found = Found { camera: &estimate.camera, parameters: &estimate.parameters, source };
+    let mut written = sky::into_sensor_toml(&sensor.text, found).map_err(failed)?;
     match mount {
         Some(Ok(mount)) => {
-            let nominal = sensor.config.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
-            written = written.with_mount(&mount, nominal, input).map_err(failed)?;
+            let nominal_wxyz = sensor.config.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
+            let source = &format!("{} of {input}", counted(mount.pictures as u64, "limb picture"));
+            let Mount { correction_wxyz, sigma_deg, .. } = mount;
+            let mount = FoundMount { nominal_wxyz, correction_wxyz, sigma_deg, source };
+            written = written.with_mount(&mount).map_err(failed)?;
         }
         Some(Err(why)) => return Err(failed(format!("{input}: no sensor.toml is written: --mount: {why}"))),
         None => {}
     }
-    tell::result(format_args!("\n{}\n", written.keys.join("\n")))?;
-    let sensors: Vec<_> = args.output.iter().filter(|p| ending(p) == "toml").collect();
-    for path in &sensors {
-        std::fs::write(path, &written.text).map_err(|e| disk::cannot_write(path, &e))?;
-    }
-    if sensors.is_empty() && !args.quiet {
-        tell::line("note: -o sensor.toml writes these keys into a copy of the sensor.toml");
-    }
-    Ok(Exit::Done)
+    write_sensors(args, &written)
 }

@@ -1,6 +1,9 @@
 //! A calibration from the sky in words and numbers.
 
-use hzn_calib::sky::{Check, Deviation, Estimate, Mount, MountRefusal, Observability, Verdict};
+use hzn_calib::sky::{
+    Check, Determined, Deviation, Estimate, MIN_PICTURES, Mount, MountRefusal, Observability, Track, Verdict,
+};
+use hzn_core::camera::Intrinsic;
 use hzn_run::explain::counted;
 
 use crate::plot::{Chart, Series, Style};
@@ -13,7 +16,7 @@ pub(super) fn report(estimate: &Estimate, pictures: u64, mount: Option<&MountRes
     join(&lines(estimate, pictures, mount))
 }
 
-fn join(lines: &[(String, String)]) -> String {
+pub(super) fn join(lines: &[(String, String)]) -> String {
     lines.iter().map(|(name, value)| format!("{name:<14} {value}\n")).collect()
 }
 
@@ -28,8 +31,45 @@ pub(super) fn lines(estimate: &Estimate, pictures: u64, mount: Option<&MountResu
     let mut lines = Lines::default();
     lines.add("pictures", format!("{}, {answered} with a limb{left_out}", counted(pictures, "picture")));
     let [percent, sigma] = estimate.focal_percent;
-    lines.add("focal length", format!("{percent:+.3} % ± {sigma:.3} % against sensor.toml"));
-    for p in &estimate.parameters {
+    lines.add(
+        "focal length",
+        format!(
+            "{percent:+.3} % ± {sigma:.3} % against sensor.toml{}",
+            focal_px(&estimate.parameters, estimate.focal_percent)
+        ),
+    );
+    add_parameters(&mut lines, &estimate.parameters);
+    add_limb(&mut lines, estimate);
+    add_observability(&mut lines, &estimate.observability);
+    if let Some(mount) = mount {
+        add_mount(&mut lines, mount);
+    }
+    lines.0
+}
+
+/// Returns the focal length in pixels with its sigma.
+fn focal_px(parameters: &[Determined], [percent, sigma]: [f64; 2]) -> String {
+    let before = parameters.iter().find(|p| p.which == Intrinsic::FxPx).map(|p| p.before);
+    before.map_or_else(String::new, |fx| {
+        let sigma_px = 0.01 * sigma * fx;
+        let fx_px = fx * (1.0 + 0.01 * percent);
+        format!(", fx = {} px ± {} px", number(fx_px, sigma_px), number(sigma_px, sigma_px))
+    })
+}
+
+/// Lines of a report.
+#[derive(Default)]
+struct Lines(Vec<(String, String)>);
+
+impl Lines {
+    fn add(&mut self, name: &str, value: String) {
+        self.0.push((name.to_owned(), value));
+    }
+}
+
+/// Adds a line for each parameter.
+fn add_parameters(lines: &mut Lines, parameters: &[Determined]) {
+    for p in parameters {
         let by = if p.stated { "stated" } else { "assumed" };
         let what = if p.determined {
             format!(
@@ -50,22 +90,27 @@ pub(super) fn lines(estimate: &Estimate, pictures: u64, mount: Option<&MountResu
         };
         lines.add(p.which.name(), what);
     }
-    add_limb(&mut lines, estimate);
-    add_observability(&mut lines, &estimate.observability);
-    if let Some(mount) = mount {
-        add_mount(&mut lines, mount);
-    }
-    lines.0
 }
 
-/// Lines of a report.
-#[derive(Default)]
-struct Lines(Vec<(String, String)>);
-
-impl Lines {
-    fn add(&mut self, name: &str, value: String) {
-        self.0.push((name.to_owned(), value));
-    }
+/// Returns the lines of the report on a track.
+pub(super) fn track_lines(track: &Track, pictures: &str) -> Vec<(String, String)> {
+    let mut lines = Lines::default();
+    let left_out = match track.left_out.as_slice() {
+        [] => String::new(),
+        several => format!(", {} outliers left out: {}", several.len(), several.join(", ")),
+    };
+    lines.add("pictures", format!("{pictures}, {} discs with a direction{left_out}", track.pictures));
+    let [percent, sigma] = track.focal_percent;
+    let px = focal_px(&track.parameters, track.focal_percent);
+    lines.add("focal length", format!("{percent:+.3} % ± {sigma:.3} % against sensor.toml{px}"));
+    add_parameters(&mut lines, &track.parameters);
+    lines.add("discs", format!("± {:.3} px for each coordinate of a centre", track.sigma_px));
+    let [[x, sx], [y, sy], [z, sz]] = track.correction_deg;
+    lines.add(
+        "mount",
+        format!("rotated by ({x:+.3}, {y:+.3}, {z:+.3})° ± ({sx:.3}, {sy:.3}, {sz:.3})° in the camera frame"),
+    );
+    lines.0
 }
 
 fn add_limb(lines: &mut Lines, estimate: &Estimate) {
@@ -137,13 +182,14 @@ pub(super) fn check_report(check: &Check, pictures: u64) -> String {
             ),
             Verdict::DoesNotHold => format!("{verdict}: {}", significant(check)),
             Verdict::CannotTell => format!(
-                "{verdict}: no difference is significant, but only {:.2} % of focal length would have been found; {}",
-                focal.detectable,
+                "{verdict}: no difference is significant, but only an error of {} of the focal length would have been \
+                 found; {}",
+                detectable(focal),
                 remedy(check)
             ),
         },
     );
-    lines.add("focal length", format!("{}, found from {:.3} % on", describe(focal, "%"), focal.detectable));
+    lines.add("focal length", format!("{}; an error is found from {} on", describe(focal, "%"), detectable(focal)));
     for (name, deviation) in ["cx_px", "cy_px"].into_iter().zip(&check.centre_px) {
         lines.add(name, describe(deviation, "px"));
     }
@@ -167,6 +213,11 @@ fn describe(d: &Deviation, unit: &str) -> String {
     )
 }
 
+/// Returns the smallest error of the focal length that is found with a probability of 95 %.
+fn detectable(focal: &Deviation) -> String {
+    if focal.detectable < 100.0 { format!("{:.2} %", focal.detectable) } else { "100 %".to_owned() }
+}
+
 /// Names the most significant difference.
 fn significant(check: &Check) -> String {
     let [u, v] = &check.centre_px;
@@ -187,6 +238,12 @@ fn significant(check: &Check) -> String {
 /// Says what would help a flight that cannot tell.
 fn remedy(check: &Check) -> String {
     let (focal, o) = (&check.focal, &check.observability);
+    let [counted, _] = check.pictures;
+    if counted < MIN_PICTURES {
+        return format!(
+            "the number of pictures that count is {counted}, and their scatter needs at least {MIN_PICTURES}"
+        );
+    }
     let needed = check.detect_percent * focal.sigma / focal.detectable;
     let what = if focal.calibration_sigma > needed {
         "the calibration itself is not better known (focal_sigma_percent, covariance)".to_owned()

@@ -3,26 +3,30 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use hzn_calib::camera_file::{self, Format};
-use hzn_core::camera::{self, Camera};
+use hzn_calib::camera_file::{self, Format, Loaded};
+use hzn_calib::conversion;
+use hzn_core::camera::{self, Camera, Model};
 use hzn_run::disk;
 use hzn_run::source::ending;
 
 use crate::exit::{Stop, usage};
 use crate::tell;
 
-/// Convert a calibration: sensor.toml, Kalibr, OpenCV, EuRoC, or the coefficients of Braun & Barf
+/// Convert a calibration: sensor.toml, Kalibr, OpenCV, EuRoC, ROS, Foxglove, or the coefficients of Braun & Barf
 ///
-/// The form of the input is detected; numbers keep their last bit. Examples:
+/// The form of the input is detected from its text; numbers keep their last bit. --model fits another lens over the
+/// picture and prints the error. Examples:
 ///
 ///   hzn camera convert camchain.yaml --camera cam1 -o sensor.toml
 ///
-///   hzn camera convert sensor.toml --to opencv -o fisheye.yaml
+///   hzn camera convert sensor.toml --to opencv -o camera.xml
+///
+///   hzn camera convert omni.yaml --model kannala-brandt -o sensor.toml
 ///
 ///   hzn camera convert --braun-barf 1235,-67.9,13.6,-4.3,0.25 --size 1920x1080 --centre 963.2,536.7
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A sensor.toml, or a camera file of Kalibr, OpenCV or EuRoC (.yaml)
+    /// A sensor.toml, or a camera file of Kalibr, OpenCV, EuRoC, ROS or Foxglove (YAML, XML, JSON)
     #[arg(required_unless_present = "braun_barf")]
     file: Option<PathBuf>,
     /// Name of the camera in a Kalibr camchain; without it, the first
@@ -38,6 +42,9 @@ pub(super) struct Args {
     /// Principal point in pixels, pixel centres at integers, for --braun-barf
     #[arg(long, value_name = "U,V", allow_hyphen_values = true, requires = "braun_barf")]
     centre: Option<Numbers<2>>,
+    /// Fit a lens of this model over the picture
+    #[arg(long, value_name = "MODEL", value_parser = crate::commands::lens_model::parse)]
+    model: Option<Model>,
     /// Form of the result; without it, sensor
     #[arg(long, value_name = "FORM")]
     to: Option<To>,
@@ -55,10 +62,40 @@ enum To {
     Sensor,
     /// A Kalibr camchain with one camera
     Kalibr,
-    /// OpenCV's YAML
+    /// OpenCV's FileStorage: YAML, or XML or JSON if the output ends in .xml or .json
     Opencv,
     /// A sensor.yaml of EuRoC
     Euroc,
+    /// ROS's camera_info (YAML)
+    Ros,
+    /// Foxglove's CameraCalibration (JSON)
+    Foxglove,
+}
+
+impl To {
+    /// Returns the endings that a file of this form may have; the first one is usual.
+    fn endings(self) -> &'static [&'static str] {
+        match self {
+            Self::Sensor => &["toml"],
+            Self::Opencv => &["yaml", "yml", "xml", "json"],
+            Self::Foxglove => &["json"],
+            Self::Kalibr | Self::Euroc | Self::Ros => &["yaml", "yml"],
+        }
+    }
+
+    /// Returns the format for an output with this ending.
+    fn format(self, ending: &str) -> Format {
+        match (self, ending) {
+            (Self::Sensor, _) => Format::Sensor,
+            (Self::Kalibr, _) => Format::Kalibr,
+            (Self::Opencv, "xml") => Format::OpenCvXml,
+            (Self::Opencv, "json") => Format::OpenCvJson,
+            (Self::Opencv, _) => Format::OpenCv,
+            (Self::Euroc, _) => Format::Euroc,
+            (Self::Ros, _) => Format::Ros,
+            (Self::Foxglove, _) => Format::Foxglove,
+        }
+    }
 }
 
 /// Numbers with commas between them.
@@ -87,37 +124,87 @@ impl FromStr for Size {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
-    let camera = read(args)?;
+    let (camera, comment) = read(args)?;
     // A lens that hzn refuses is of no use in another form either.
     Camera::<f64>::try_new(&camera).map_err(|e| usage(format!("{}: {e}", source(args))))?;
     let to = args.to.unwrap_or(To::Sensor);
-    let format = match to {
-        To::Sensor => Format::Sensor,
-        To::Kalibr => Format::Kalibr,
-        To::Opencv => Format::OpenCv,
-        To::Euroc => Format::Euroc,
-    };
-    let mut text = camera_file::write(&camera, format).map_err(|e| usage(format!("{}: {e}", source(args))))?;
-    if let (Some(deg), true) = (camera.theta_max_deg, to != To::Sensor) {
-        let what = "has no place in the result; put it into the [camera] section that names this file";
-        tell::warning(format_args!("theta_max_deg = {deg} {what}"));
+    if let Some(path) = &args.output {
+        check_ending(path, to)?;
+    }
+    let format = to.format(&args.output.as_deref().map(ending).unwrap_or_default());
+    let mut text = camera_file::write(&camera, format).map_err(|e| {
+        let remedy = "--model fits a lens that it can express, for example --model kannala-brandt";
+        usage(format!("{}: {e}; {remedy}", source(args)))
+    })?;
+    let lost = lost_keys(&camera);
+    if to != To::Sensor && !lost.is_empty() {
+        let what = "no place in the result; put it into the [camera] section that names this file";
+        tell::warning(format_args!("{} has {what}", lost.join(", ")));
     }
     let Some(path) = &args.output else { return Ok(tell::result(text)?) };
-    check_ending(path, to)?;
-    if path.exists() && !args.force {
-        return Err(usage(format!("{}: exists already; choose another name, or --force replaces it", path.display())));
-    }
+    disk::refuse_existing(path, args.force)?;
     if to == To::Sensor {
-        text = format!("# From {}. Every other key: hzn init.\npreset = \"hzn\"\n\n{text}", source(args));
+        let comment = comment.map(|c| format!("# {c}\n")).unwrap_or_default();
+        text = format!("# From {}. Every other key: hzn init.\n{comment}preset = \"hzn\"\n\n{text}", source(args));
     }
-    std::fs::write(path, text).map_err(|e| disk::cannot_write(path, &e))?;
+    disk::write_whole(path, &text)?;
     tell::line(format_args!("{} written; look at it with  hzn camera show {0}", path.display()));
     Ok(())
 }
 
-fn read(args: &Args) -> Result<camera::Config, Stop> {
+/// Returns the keys of a sensor.toml that the forms of other tools do not have.
+fn lost_keys(camera: &camera::Config) -> Vec<String> {
+    let mut lost = Vec::new();
+    let mut add = |key: &str, value: f64| lost.push(format!("{key} = {value}"));
+    camera.theta_max_deg.into_iter().for_each(|deg| add("theta_max_deg", deg));
+    camera.theta_min_deg.into_iter().for_each(|deg| add("theta_min_deg", deg));
+    let others = [
+        ("focal_sigma_percent", camera.focal_sigma_percent),
+        ("centre_sigma_px", camera.centre_sigma_px),
+        ("readout_s", camera.readout_s),
+    ];
+    others.into_iter().filter(|(_, value)| *value != 0.0).for_each(|(key, value)| add(key, value));
+    if camera.covariance.is_some() {
+        lost.push("covariance".to_owned());
+    }
+    lost
+}
+
+/// Reads the calibration, and fits the model to it that is asked for. Returns the fit in words as well.
+fn read(args: &Args) -> Result<(camera::Config, Option<String>), Stop> {
+    let loaded = load(args)?;
+    let Some(model) = args.model else {
+        return match loaded {
+            Loaded::Lens(config) => Ok((config, None)),
+            Loaded::Omni(_) => Err(usage(format!(
+                "{}: omni with distortion is a lens that hzn does not have; --model kannala-brandt fits one of hzn's",
+                source(args)
+            ))),
+        };
+    };
+    let fitted = conversion::convert(&loaded, model).map_err(|why| usage(format!("{}: {why}", source(args))))?;
+    let [u, v] = fitted.max_at_px;
+    let words = format!(
+        "{} fitted over the picture up to {:.1}° off axis: RMS {:.4} px, maximum error {:.4} px at ({u:.0}, {v:.0})",
+        fitted.camera.model.name(),
+        fitted.off_axis_deg,
+        fitted.rms_px,
+        fitted.max_px
+    );
+    tell::line(format_args!("{}: {words}", source(args)));
+    if fitted.max_px > 1.0 {
+        tell::warning("the two lenses differ by more than a pixel; directions have this error");
+    }
+    if matches!(&loaded, Loaded::Lens(c) if c.covariance.is_some() && fitted.camera.covariance.is_none()) {
+        tell::warning("the covariance belongs to the parameters of the other model and is left out");
+    }
+    Ok((fitted.camera, Some(words)))
+}
+
+/// Reads the calibration in any form.
+fn load(args: &Args) -> Result<Loaded, Stop> {
     if let (Some(kappa), Some(size), Some(centre)) = (args.braun_barf, args.size, args.centre) {
-        return camera_file::from_braun_barf(kappa.0, size.0, centre.0).ok_or_else(|| {
+        return camera_file::from_braun_barf(kappa.0, size.0, centre.0).map(Loaded::Lens).ok_or_else(|| {
             usage("--braun-barf: the first coefficient is the focal length in pixels and must be above 0")
         });
     }
@@ -126,8 +213,8 @@ fn read(args: &Args) -> Result<camera::Config, Stop> {
         "toml" if args.camera.is_some() => {
             Err(usage(format!("--camera: {} contains one camera; leave out --camera", file.display())))
         }
-        "toml" => Ok(hzn_calib::sensor::load(file)?.config.camera),
-        _ => Ok(camera_file::load(file, args.camera.as_deref())?),
+        "toml" => Ok(Loaded::Lens(hzn_calib::sensor::load(file)?.config.camera)),
+        _ => Ok(camera_file::load_any(file, args.camera.as_deref())?),
     }
 }
 
@@ -140,16 +227,15 @@ fn source(args: &Args) -> String {
 }
 
 fn check_ending(path: &Path, to: To) -> Result<(), Stop> {
-    let fits = match to {
-        To::Sensor => ending(path) == "toml",
-        _ => matches!(ending(path).as_str(), "yaml" | "yml"),
-    };
-    if fits {
+    let endings = to.endings();
+    if endings.contains(&ending(path).as_str()) {
         return Ok(());
     }
     let what = match to {
-        To::Sensor => "a sensor.toml ends in .toml; for a .yaml choose its form: --to kalibr, opencv or euroc",
-        _ => "this form ends in .yaml",
+        To::Sensor => "a sensor.toml ends in .toml; for another file choose its form: --to kalibr, opencv, euroc, ros \
+                       or foxglove"
+            .to_owned(),
+        _ => format!("this form ends in .{}", endings.join(" or .")),
     };
     Err(usage(format!("{}: {what}", path.display())))
 }

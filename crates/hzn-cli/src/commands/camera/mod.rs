@@ -1,16 +1,20 @@
 //! `hzn camera`: describes a calibration, or converts it into the form of another tool.
 
 mod convert;
+mod field;
+mod map;
+mod monotone;
 
 use std::path::{Path, PathBuf};
 
 use hzn_core::Config;
-use hzn_core::camera::{self, Camera, Model};
+use hzn_core::camera::{self, Camera};
 use hzn_core::frames::UnitVec3;
-use hzn_core::pixel::ImagePoint;
 use hzn_run::engine::AnySensor;
 use hzn_run::source::ending;
+use hzn_run::{disk, overlay};
 
+use self::field::{end_rad, field_of_view};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
 
@@ -25,33 +29,53 @@ pub(super) struct Args {
 enum Command {
     /// Print lens table, field of view, image circle, and the expected size of the limb
     Show {
-        /// A sensor.toml, or a camera file of Kalibr, OpenCV, EuRoC or ROS (.yaml)
+        /// A sensor.toml, or a camera file of Kalibr, OpenCV, EuRoC, ROS or Foxglove (YAML, XML, JSON)
         file: PathBuf,
+        /// Also draw a map of the picture: degrees a pixel, angles off axis, image circle, monotone limit
+        #[arg(long, value_name = "PNG")]
+        picture: Option<PathBuf>,
+        /// Replace a map that exists
+        #[arg(long, requires = "picture")]
+        force: bool,
     },
     Convert(convert::Args),
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
     match &args.command {
-        Command::Show { file } => {
+        Command::Show { file, picture, force } => {
+            if let Some(path) = picture {
+                check_map(path, *force)?;
+            }
             let config = load(file)?;
             for doubt in hzn_calib::plausible::find_implausible(&config) {
                 tell::warning(format_args!("{}: {}: {}", file.display(), doubt.key, doubt.what));
             }
             tell::result(describe(&config)?)?;
+            if let Some(path) = picture {
+                overlay::save(&map::draw(&config.camera, &file.display().to_string())?, path)?;
+            }
         }
         Command::Convert(args) => convert::run(args)?,
     }
     Ok(Exit::Done)
 }
 
+/// Refuses the map's file if it is no PNG or exists.
+fn check_map(path: &Path, force: bool) -> Result<(), Stop> {
+    if ending(path) != "png" {
+        return Err(usage(format!("{}: a map ends in .png", path.display())));
+    }
+    Ok(disk::refuse_existing(path, force)?)
+}
+
 fn load(file: &Path) -> Result<Config, Stop> {
     match ending(file).as_str() {
-        "yaml" | "yml" => Ok(Config::new(hzn_calib::camera_file::load(file, None)?)),
+        "toml" => Ok(hzn_calib::sensor::load(file)?.config),
         "csv" | "jsonl" | "mcap" => {
-            Err(usage(format!("{}: a sensor.toml or a camera file (.yaml) is expected", file.display())))
+            Err(usage(format!("{}: a sensor.toml or a camera file (YAML, XML, JSON) is expected", file.display())))
         }
-        _ => Ok(hzn_calib::sensor::load(file)?.config),
+        _ => Ok(Config::new(hzn_calib::camera_file::load(file, None)?)),
     }
 }
 
@@ -81,9 +105,13 @@ pub(super) fn describe(config: &Config) -> Result<String, Stop> {
             None => format!("does not cut the picture (farthest corner {:.2} deg off axis)", end.to_degrees()),
         },
     );
+    if let Some((_, a, b)) = camera.blind_centre_px() {
+        let deg = c.theta_min_deg.unwrap_or_default();
+        line("blind centre", format!("{deg:.2} deg off axis, {a:.1} x {b:.1} px about the centre"));
+    }
     line(
         "monotone",
-        match monotone_limit_deg(c) {
+        match monotone::limit_deg(c) {
             Some(deg) => format!("up to {deg:.2} deg off axis"),
             None => "everywhere".into(),
         },
@@ -121,36 +149,6 @@ fn radius_px(camera: &Camera<f64>, theta: f64) -> f64 {
     point.map_or(f64::NAN, |p| (p.u - centre.u).hypot(p.v - centre.v))
 }
 
-/// Slightly inside the picture's outer corner, in pixels: without an image circle the lens ends at the farthest corner.
-const SIDE_PX: f64 = -0.5 + 1e-6;
-
-/// Returns the largest angle off axis that the picture shows, in radians: the image circle, or the farthest corner.
-fn end_rad(c: &camera::Config, camera: &Camera<f64>) -> f64 {
-    let (right, bottom) = (f64::from(c.width) - 1.0 - SIDE_PX, f64::from(c.height) - 1.0 - SIDE_PX);
-    let corners = [(SIDE_PX, SIDE_PX), (right, SIDE_PX), (SIDE_PX, bottom), (right, bottom)];
-    let off_axis = |(u, v)| camera.unproject(ImagePoint { u, v }).map(|ray| ray.xyz()[2].clamp(-1.0, 1.0).acos());
-    match camera.image_circle_px() {
-        Some(_) => camera.theta_max_rad(),
-        None => corners.into_iter().filter_map(off_axis).reduce(f64::max).unwrap_or(camera.theta_max_rad()),
-    }
-}
-
-fn field_of_view(c: &camera::Config, camera: &Camera<f64>) -> String {
-    let side = SIDE_PX;
-    let (right, bottom) = (f64::from(c.width) - 1.0 - side, f64::from(c.height) - 1.0 - side);
-    let angle = |a: (f64, f64), b: (f64, f64)| {
-        let ray = |(u, v)| camera.unproject(ImagePoint { u, v });
-        Some(ray(a)?.angle_rad(&ray(b)?).to_degrees())
-    };
-    let text = |deg: Option<f64>| deg.map_or("beyond the image circle".to_owned(), |d| format!("{d:.2} deg"));
-    format!(
-        "{} horizontally, {} vertically, {} from corner to corner",
-        text(angle((side, c.cy_px), (right, c.cy_px))),
-        text(angle((c.cx_px, side), (c.cx_px, bottom))),
-        text(angle((side, side), (right, bottom)))
-    )
-}
-
 fn limb_size(half_angle: f64, camera: &Camera<f64>, c: &camera::Config) -> String {
     let (fx, fy) = camera.focal_px();
     if half_angle < camera.theta_max_rad() {
@@ -164,30 +162,4 @@ fn limb_size(half_angle: f64, camera: &Camera<f64>, c: &camera::Config) -> Strin
         "wider than the field of view: an arc, 1 deg at its middle is about {:.1} px",
         (fx + fy) / 2.0 * 1f64.to_radians()
     )
-}
-
-/// Returns the angle off axis in degrees where the lens stops being monotone: dr/dθ = 0 for radial lenses (for
-/// brown-conrady without its tangential part). Returns `None` if the lens is monotone everywhere.
-fn monotone_limit_deg(c: &camera::Config) -> Option<f64> {
-    let k = |i: usize| c.coefficient(i);
-    let slope: Box<dyn Fn(f64) -> f64> = match c.model {
-        Model::KannalaBrandt => {
-            let k = [k(0), k(1), k(2), k(3)];
-            Box::new(move |t| {
-                let t2 = t * t;
-                1.0 + t2 * (3.0 * k[0] + t2 * (5.0 * k[1] + t2 * (7.0 * k[2] + t2 * 9.0 * k[3])))
-            })
-        }
-        Model::BrownConrady => {
-            let k = [k(0), k(1), k(4)];
-            Box::new(move |t| {
-                let r2 = t.tan() * t.tan();
-                1.0 + r2 * (3.0 * k[0] + r2 * (5.0 * k[1] + r2 * 7.0 * k[2]))
-            })
-        }
-        _ => return None,
-    };
-    let end = if c.model == Model::BrownConrady { 89.9 } else { 180.0 };
-    let steps = 18_000;
-    (1..=steps).map(|i| end * f64::from(i) / f64::from(steps)).find(|deg| slope(deg.to_radians()) <= 0.0)
 }

@@ -1,0 +1,95 @@
+//! `hzn calibrate sky` for a sensor that looks for the Sun or the Moon: the lens from the track of the disc.
+
+use hzn_calib::sky::{self, Found, FoundMount, Sight, Track};
+use hzn_calib::{FrameData, Sensor};
+use hzn_core::body::Kind;
+use hzn_core::camera::Camera;
+use hzn_core::frames::{Rotation, UnitVec3};
+use hzn_nav::ephemeris;
+use hzn_run::explain::counted;
+use hzn_run::source::ending;
+
+use super::flight::{self, Answered};
+use super::sky_args::{Args, unknowns, write_sensors};
+use super::{page, sky_text};
+use crate::exit::{Exit, Outcome, failed, usage};
+use crate::progress::Progress;
+use crate::tell;
+
+/// Returns whether the sensor looks for nothing but Sun and Moon.
+pub(super) fn is_track(sensor: &Sensor) -> bool {
+    sensor.config.each_body().iter().all(|b| matches!(b.kind, Kind::Sun | Kind::Moon))
+}
+
+/// Measures the lens on the track.
+pub(super) fn run(args: &Args, sensor: &Sensor) -> Outcome {
+    if args.free_limb_height {
+        return Err(usage("--free-limb-height: the Sun and the Moon have no limb height"));
+    }
+    let input = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
+    let unknowns = unknowns(args, sensor);
+    let mut used = sensor.clone();
+    used.config.camera.covariance = None;
+    used.config.camera.focal_sigma_percent = unknowns.focal_sigma_percent();
+    let camera = Camera::<f64>::try_new(&used.config.camera).map_err(usage)?;
+    let mut source = args.source.open(&args.input)?;
+    source.want_channel(used.config.input.channel)?;
+    let plan = flight::plan(&args.source, args.sensor.flight, args.jobs, source.as_ref(), &used)?;
+    let mut progress = Progress::new(source.total(), 0, args.quiet);
+    let kinds: Vec<Kind> = used.config.each_body().iter().map(|b| b.kind).collect();
+    let sight = |a: Answered<'_>| {
+        let kind = *kinds.get(a.which)?;
+        let point = camera.project(&a.solution.axis)?;
+        let name = format!("{} ({})", a.name, kind.name());
+        Some(Sight { name, point_px: [point.u, point.v], direction: direction(kind, a.data?)? })
+    };
+    let Some(sights) = flight::measure_answers(&plan, source.as_mut(), &mut progress, sight)? else {
+        tell::line("interrupted; nothing was measured");
+        return Ok(Exit::Interrupted);
+    };
+    let pictures = counted(progress.frames(), "picture");
+    let track =
+        sky::estimate_track(&unknowns, &sights).map_err(|why| failed(format!("{input}: of {pictures}: {why}")))?;
+    let lines = sky_text::track_lines(&track, &pictures);
+    tell::result(sky_text::join(&lines))?;
+    for path in args.output.iter().filter(|p| ending(p) == "html") {
+        let title = format!("Lens from the track of Sun or Moon: {input}");
+        hzn_run::disk::write_whole(path, &page::simple(&title, &lines, &[])?)?;
+    }
+    write(args, sensor, &track, &input)
+}
+
+/// Returns the direction to the body in the nominal camera frame: the column of the Sun, or the ephemeris with the
+/// attitude. The Moon is near, so that its direction needs a position too.
+fn direction(kind: Kind, data: &FrameData) -> Option<[f64; 3]> {
+    let given = data.sun_camera.filter(|_| kind == Kind::Sun).and_then(UnitVec3::<hzn_core::frames::Cam, f64>::try_new);
+    if let Some(given) = given {
+        return Some(given.xyz());
+    }
+    let unix_s = data.utc_s?;
+    let position_m = data.position_km.map(|p| p.map(|km| km * 1e3));
+    let place = match kind {
+        Kind::Moon => ephemeris::moon(unix_s).seen_from(position_m?),
+        _ => position_m.map_or_else(|| ephemeris::sun(unix_s), |at| ephemeris::sun(unix_s).seen_from(at)),
+    };
+    let attitude = Rotation::<hzn_core::frames::Cam, hzn_core::frames::Ecef, f64>::assume_from_quaternion(
+        data.camera_to_ecef_wxyz?,
+    )?;
+    Some(attitude.inverse().apply(&UnitVec3::try_new(place.direction)?).xyz())
+}
+
+fn write(args: &Args, sensor: &Sensor, track: &Track, input: &str) -> Outcome {
+    if let Some(why) = track.undetermined() {
+        return Err(failed(format!("{input}: no sensor.toml is written: {why}")));
+    }
+    let source = &format!("{} of Sun or Moon in {input}", counted(track.pictures as u64, "disc"));
+    let found = Found { camera: &track.camera, parameters: &track.parameters, source };
+    let mut written = sky::into_sensor_toml(&sensor.text, found).map_err(failed)?;
+    if args.mount {
+        let nominal_wxyz = sensor.config.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
+        let sigma_deg = track.correction_deg.map(|[_, sigma]| sigma);
+        let mount = FoundMount { nominal_wxyz, correction_wxyz: track.correction_wxyz, sigma_deg, source };
+        written = written.with_mount(&mount).map_err(failed)?;
+    }
+    write_sensors(args, &written)
+}
