@@ -81,6 +81,9 @@ impl Camera {
         if m.nrows() != 3 {
             return Err(errors::config("camera matrix: shape (3, 3) is expected"));
         }
+        let rows: [f64; 9] = core::array::from_fn(|i| m[(i / 3, i % 3)]);
+        let [fx_px, fy_px, cx_px, cy_px] =
+            camera_file::camera_matrix(rows).map_err(|what| errors::config(format!("camera matrix: {what}")))?;
         let (width, height) =
             size.ok_or_else(|| errors::config("size: is required with a camera matrix; pass size=(width, height)"))?;
         let k: Vec<f64> = match distortion {
@@ -96,9 +99,12 @@ impl Camera {
                 return Err(errors::config(format!("distortion: {n} coefficients; {allowed} are expected")));
             }
         };
-        let ideal = Config::ideal(model, width, height, m[(0, 0)]);
+        if let Some(bad) = k.iter().find(|k| !k.is_finite()) {
+            return Err(errors::config(format!("distortion: {bad} is not a finite number")));
+        }
+        let ideal = Config::ideal(model, width, height, fx_px);
         let k = k.into_iter().collect();
-        Self::from_config(Config { fx_px: m[(0, 0)], fy_px: m[(1, 1)], cx_px: m[(0, 2)], cy_px: m[(1, 2)], k, ..ideal })
+        Self::from_config(Config { fx_px, fy_px, cx_px, cy_px, k, ..ideal })
     }
 
     #[doc = doc!("Camera.parameters")]

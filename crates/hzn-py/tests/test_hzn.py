@@ -264,6 +264,14 @@ def test_camera_by_opencvs_rules():
         hzn.Camera.from_opencv(k, d)
     with pytest.raises(hzn.ConfigError, match="8 coefficients"):
         hzn.Camera.from_opencv(k, [0.0] * 8, size=(640, 480))
+    skewed = np.array(k, dtype=float)
+    skewed[0, 1] = 0.5
+    with pytest.raises(hzn.ConfigError, match="camera matrix: has a skew of 0.5 px"):
+        hzn.Camera.from_opencv(skewed, d, size=(640, 480))
+    with pytest.raises(hzn.ConfigError, match="it is transposed"):
+        hzn.Camera.from_opencv(np.array(k, dtype=float).T, d, size=(640, 480))
+    with pytest.raises(hzn.ConfigError, match="finite"):
+        hzn.Camera.from_opencv(k, [np.nan, 0.0, 0.0, 0.0], size=(640, 480))
 
 
 def test_jacobian_is_the_derivative():

@@ -6,6 +6,7 @@ mod design;
 mod effects;
 mod horace;
 mod infrared;
+mod lens;
 mod looks;
 mod presets;
 mod scenes;
@@ -40,6 +41,7 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("scenes", "Accuracy and honesty: the other scenes", scenes::others),
     reproduced("artefacts", "False answers: artefacts instead of a limb", artefacts::campaign),
     reproduced("defaults", "Honesty with default settings", defaults::default_settings),
+    reproduced("lens-from-limb", "The lens from the limb", lens::from_the_limb),
     reproduced("effects", "What moves the limb in the scenes", effects::switched_off_effects),
     reproduced("lost-discs", "Discs under an image circle", looks::lost_discs),
     reproduced("second-look", "One look and several", looks::second_look),

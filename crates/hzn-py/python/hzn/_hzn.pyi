@@ -82,12 +82,14 @@ class Camera:
         size: tuple[int, int] | None = None,
         fisheye: bool = False,
     ) -> Camera:
-        """Take an OpenCV calibration: its YAML file, or the camera matrix and the coefficients.
+        """Take an OpenCV calibration: its file, or the camera matrix and the coefficients.
+
+        A file may be YAML, XML or JSON of OpenCV's FileStorage, ROS's camera_info, or Foxglove's CameraCalibration.
 
         Parameters
         ----------
         source
-            Path of the YAML file, or the camera matrix K, shape (3, 3), pixels.
+            Path of the file, or the camera matrix K without skew, shape (3, 3), pixels.
         distortion
             D: 4 or 5 coefficients k1, k2, p1, p2, k3; with ``fisheye`` k1 to k4. Without it, the lens is an ideal
             pinhole.
