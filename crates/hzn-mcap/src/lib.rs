@@ -12,6 +12,7 @@
 //!   end.
 //! - [`Reader`] reads the frames, also from broken files; [`recover`] closes a broken file, [`resume`] continues it.
 //! - [`ImageReader`] reads pictures from MCAP files of any writer, as an input.
+//! - [`SeriesWriter`] writes series over time, for example of a navigation filter.
 //! - [`Index`] finds pictures and reports without reading the pictures; [`Pictures`] then reads any one of them.
 //!
 //! # The file
@@ -48,6 +49,8 @@ mod part;
 mod reader;
 mod recover;
 mod row;
+mod series;
+mod status_name;
 mod topics;
 mod writer;
 
@@ -61,6 +64,7 @@ pub use part::{create_part, open_part, part_path};
 pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};
 pub use row::{Row, RowMeta, roll_pitch_deg};
+pub use series::{Placed, SeriesWriter};
 pub use topics::{IMAGE_TOPIC, report_schema};
 pub use writer::{FLUSH_INTERVAL, Options, Writer};
 

@@ -6,6 +6,8 @@ use hzn_core::status::Status;
 use hzn_core::{Report, Solution};
 use serde::{Deserialize, Serialize};
 
+use crate::status_name;
+
 /// The data of a picture before it is processed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RowMeta {
@@ -109,7 +111,7 @@ columns! {
         /// Outcome, by its name, for example `no-limb`.
         status: Status as "status_name",
         /// Unit vector to the body in the camera frame, x; only with the status `ok`. This also holds for the columns
-        /// up to `rms_px` (except `altitude_km`), `inliers`, `roll_deg` and `pitch_deg`.
+        /// up to `rms_px` (except `altitude_km`), `inliers`, `roll_deg`, `pitch_deg` and those after `detail`.
         axis_x: Option<f64>,
         /// Unit vector to the body in the camera frame, y.
         axis_y: Option<f64>,
@@ -163,6 +165,55 @@ columns! {
         elapsed_us: Option<f64>,
         /// Why there is no answer, in words; empty with the status `ok`.
         detail: String,
+        /// Axis of the fit with a free half-angle (camera frame, unit vector), x; only if the half-angle was fitted.
+        axis_free_x: Option<f64>,
+        /// Axis of the fit with a free half-angle, y.
+        axis_free_y: Option<f64>,
+        /// Axis of the fit with a free half-angle, z.
+        axis_free_z: Option<f64>,
+        /// Covariance of that axis, xx, rad²: all terms except that of the expected half-angle.
+        cov_free_xx: Option<f64>,
+        /// Covariance of that axis, xy, rad².
+        cov_free_xy: Option<f64>,
+        /// Covariance of that axis, xz, rad².
+        cov_free_xz: Option<f64>,
+        /// Covariance of that axis, yy, rad².
+        cov_free_yy: Option<f64>,
+        /// Covariance of that axis, yz, rad².
+        cov_free_yz: Option<f64>,
+        /// Covariance of that axis, zz, rad².
+        cov_free_zz: Option<f64>,
+        /// Derivative of the axis by the cosine of the expected half-angle (camera frame), x. A wrong limb height moves
+        /// this cosine in all pictures alike.
+        axis_by_cos_x: Option<f64>,
+        /// Derivative of the axis by the cosine of the expected half-angle, y.
+        axis_by_cos_y: Option<f64>,
+        /// Derivative of the axis by the cosine of the expected half-angle, z.
+        axis_by_cos_z: Option<f64>,
+        /// Position of the body's centre in the camera frame, x, kilometres; only with `position`.
+        position_x_km: Option<f64>,
+        /// Position of the body's centre in the camera frame, y, kilometres; only with `position`.
+        position_y_km: Option<f64>,
+        /// Position of the body's centre in the camera frame, z, kilometres; only with `position`.
+        position_z_km: Option<f64>,
+        /// Covariance of that position, xx, km².
+        pos_cov_xx_km2: Option<f64>,
+        /// Covariance of that position, xy, km².
+        pos_cov_xy_km2: Option<f64>,
+        /// Covariance of that position, xz, km².
+        pos_cov_xz_km2: Option<f64>,
+        /// Covariance of that position, yy, km².
+        pos_cov_yy_km2: Option<f64>,
+        /// Covariance of that position, yz, km².
+        pos_cov_yz_km2: Option<f64>,
+        /// Covariance of that position, zz, km².
+        pos_cov_zz_km2: Option<f64>,
+        /// Position of the camera in the axes of the body, x, kilometres.
+        body_fixed_x_km: Option<f64>,
+        /// Position of the camera in the axes of the body, y, kilometres.
+        body_fixed_y_km: Option<f64>,
+        /// Position of the camera in the axes of the body, z, kilometres.
+        body_fixed_z_km: Option<f64>,
     }
 }
 
@@ -219,6 +270,20 @@ impl Row {
             let km = |x: T| finite(x.to_f64() / 1e3);
             (self.altitude_est_km, self.altitude_est_sigma_km) = (km(altitude_m), km(sigma_m));
         }
+        if let Some(free) = &s.free {
+            [self.axis_free_x, self.axis_free_y, self.axis_free_z] = free.axis.xyz().map(number);
+            [
+                self.cov_free_xx,
+                self.cov_free_xy,
+                self.cov_free_xz,
+                self.cov_free_yy,
+                self.cov_free_yz,
+                self.cov_free_zz,
+            ] = free.covariance.upper_rad2.map(number);
+        }
+        if let Some(by) = s.axis_by_cos {
+            [self.axis_by_cos_x, self.axis_by_cos_y, self.axis_by_cos_z] = by.map(number);
+        }
         self.rms_px = number(s.rms_px);
         self.inliers = Some(s.inliers);
         if let Some(body) = &s.axis_body {
@@ -261,22 +326,6 @@ fn describe<T: Real>(report: &Report<T>) -> String {
     text
 }
 
-/// Writes and reads a status by its name.
-mod status_name {
-    use hzn_core::status::Status;
-    use serde::{Deserialize, Deserializer, Serializer, de};
-
-    pub(super) fn serialize<S: Serializer>(status: &Status, s: S) -> Result<S::Ok, S::Error> {
-        s.serialize_str(status.name())
-    }
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<Status, D::Error> {
-        let name = String::deserialize(d)?;
-        Status::ALL.into_iter().find(|s| s.name() == name).ok_or_else(|| {
-            de::Error::invalid_value(de::Unexpected::Str(&name), &"the name of a status, for example ok")
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -306,6 +355,7 @@ mod tests {
             fused_half_angle_rad: number(1.3),
             altitude_m: Some((number(240e3), number(1e3))),
             free: None,
+            axis_by_cos: None,
             rms_px: number(f64::NAN),
             inliers: 500,
             arc_px: number(900.0),

@@ -74,7 +74,7 @@ pub trait Pixels {
 /// An edge point that is stored with its border pixel, see [`Pixels::streamed_point`].
 #[derive(Debug, Clone, Copy)]
 pub struct StreamedPoint {
-    /// Distance from the pixel's centre, away from the light, px.
+    /// Distance from the pixel's centre, away from the light, px; NaN if no point was found.
     pub(crate) towards_dark_px: f32,
     pub(crate) lit: Lit,
     /// Whether the point is located at the picture's threshold, because no local mid-level was found.
@@ -83,6 +83,12 @@ pub struct StreamedPoint {
     pub(crate) clipped: bool,
     /// Whether one of its plateaus was not within the rows in memory.
     pub(crate) cut: bool,
+}
+
+impl StreamedPoint {
+    /// No point was found, because its search left the rows in memory.
+    pub(crate) const LOST: Self =
+        Self { towards_dark_px: f32::NAN, lit: Lit::Right, fallback: false, clipped: false, cut: true };
 }
 
 impl<P: Pixels> Pixels for &P {

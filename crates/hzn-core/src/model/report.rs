@@ -136,6 +136,8 @@ pub struct Candidate<T> {
 pub struct Free<T> {
     /// Axis of the freely fitted cone in the camera frame.
     pub axis: UnitVec3<Cam, T>,
+    /// Covariance of `axis`, rad²: all terms except that of the expected half-angle.
+    pub covariance: Cov3<Cam, T>,
     /// cos of the half-angle.
     pub cos: T,
     /// Variance of `cos`: all terms of the covariance except that of the expected half-angle.
@@ -185,6 +187,10 @@ pub struct Solution<T> {
     /// The fit with a free half-angle in cosines; `None` when the half-angle was not fitted, or when the answer came by
     /// telemetry.
     pub free: Option<Free<T>>,
+    /// Derivative of `axis` by the cosine of the expected half-angle (camera frame); zero if the axis does not depend
+    /// on it. A wrong limb height moves the cosines of all pictures alike, so that a filter needs this derivative.
+    /// `None` when the answer came by telemetry.
+    pub axis_by_cos: Option<[T; 3]>,
     /// Weighted RMS distance of the inliers from the limb in pixels.
     pub rms_px: T,
     /// Number of inliers: edge points with a weight above 0 in the fit.

@@ -30,18 +30,16 @@ pub(super) fn widen_candidate<T: Real + Into<f64>>(c: &Candidate<T>) -> Candidat
 }
 
 pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Solution<f64>> {
-    let [xx, xy, xz] = s.covariance.rows()[0].map(Into::into);
-    let [_, yy, yz] = s.covariance.rows()[1].map(Into::into);
-    let zz = s.covariance.rows()[2][2].into();
     Some(Solution {
         axis: UnitVec3::try_new(s.axis.xyz().map(Into::into))?,
-        covariance: Cov3::from_upper([xx, xy, xz, yy, yz, zz]),
+        covariance: Cov3::from_upper(s.covariance.upper_rad2.map(Into::into)),
         axis_ecef: s.axis_ecef.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
         axis_body: s.axis_body.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
         half_angle_rad: s.half_angle_rad.into(),
         fused_half_angle_rad: s.fused_half_angle_rad.into(),
         altitude_m: s.altitude_m.map(|(h, sigma)| (h.into(), sigma.into())),
         free: s.free.as_ref().and_then(widen_free),
+        axis_by_cos: s.axis_by_cos.map(|by| by.map(Into::into)),
         rms_px: s.rms_px.into(),
         inliers: s.inliers,
         arc_px: s.arc_px.into(),
@@ -52,6 +50,7 @@ pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Sol
 fn widen_free<T: Real + Into<f64>>(f: &Free<T>) -> Option<Free<f64>> {
     Some(Free {
         axis: UnitVec3::try_new(f.axis.xyz().map(Into::into))?,
+        covariance: Cov3::from_upper(f.covariance.upper_rad2.map(Into::into)),
         cos: f.cos.into(),
         var_cos: f.var_cos.into(),
         cos_per_px: f.cos_per_px.into(),

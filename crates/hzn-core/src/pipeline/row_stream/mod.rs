@@ -310,11 +310,13 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
         let config = &self.sensor.config.candidates;
         let binary = BinaryPicture::new(&self.window, region, level, &Unobserved).with_blooming(self.expected.blooms());
         self.runs.each_border(y, |x| {
-            if region.contains(x, y)
-                && self.points.wants(x, y)
-                && let Some(found) = edge_points::locate_streamed_point(&binary, config, Pixel { x, y })
-            {
-                self.points.push(x, StreamedPoint { cut: self.window.went_beyond(), ..found });
+            if region.contains(x, y) && self.points.wants(x, y) {
+                let found = edge_points::locate_streamed_point(&binary, config, Pixel { x, y });
+                let cut = self.window.went_beyond();
+                // A point that was lost because rows are missing is counted, too.
+                if let Some(found) = found.or(cut.then_some(StreamedPoint::LOST)) {
+                    self.points.push(x, StreamedPoint { cut, ..found });
+                }
             }
         });
         self.points.end_row();

@@ -226,6 +226,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
     ) -> Solution<T> {
         let axis = UnitVec3::assume_unit(fused.e);
         let one = T::one();
+        let (b1, b2) = basis(&fit.e);
+        let [by_1, by_2] = fused.by_cos;
         let half_angle = |k: T| (k * (one + one - k)).max(T::ZERO).sqrt().atan2(one - k);
         Solution {
             axis,
@@ -237,10 +239,12 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             altitude_m: fused.var_free_cos.and_then(|v| expected.altitude(fit.c, v)),
             free: fused.var_free_cos.map(|var_cos| Free {
                 axis: UnitVec3::assume_unit(fit.e),
+                covariance: Cov3::from_tangent(&b1, &b2, fused.free_p),
                 cos: fit.c,
                 var_cos,
                 cos_per_px: fit.sums.cos_per_px(),
             }),
+            axis_by_cos: Some((b1 * by_1 + b2 * by_2).into()),
             rms_px: fit.rms_px,
             inliers: fit.inliers,
             arc_px: fit.arc_px,

@@ -11,6 +11,10 @@ pub(crate) struct Fused<T> {
     pub(crate) c: T,
     /// Covariance (11, 12, 22) on the tangent basis of `e`, rad².
     pub(crate) p: [T; 3],
+    /// Covariance (11, 12, 22) of the freely fitted axis on its own tangent basis, rad².
+    pub(crate) free_p: [T; 3],
+    /// Derivative of the axis by the cosine of the expected half-angle, on the tangent basis of the fitted axis.
+    pub(crate) by_cos: [T; 2],
     /// Variance of the freely fitted cos α; `None` when it was not fitted.
     pub(crate) var_free_cos: Option<T>,
     /// (ĉ − c₀)²/(P₃₃ + σ_c²): a χ² of one degree of freedom when the candidate is the body's limb.

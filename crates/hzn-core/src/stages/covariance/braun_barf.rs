@@ -29,10 +29,13 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
         * T::from_f64(config.sigma_px * config.sigma_px);
     // The length of the unnormalised vector is the assumed cos α divided by the measured one.
     let var_c = fit.c * fit.c * fit.e.dot(&(p * fit.e));
+    let across = project(&p, &fit.e, config.overbound);
     Some(Fused {
         e: fit.e,
         c: fit.c,
-        p: project(&p, &fit.e, config.overbound),
+        p: across,
+        free_p: across,
+        by_cos: [T::ZERO; 2],
         var_free_cos: Some(var_c),
         chi2: T::ZERO,
         edge: EdgeNoise {

@@ -21,6 +21,7 @@ pub(super) fn fused<T: Real>(
     let (b1, b2) = basis(&fit.e);
     let var_c = expected.sigma_cos * expected.sigma_cos;
     let var_free = fit.free.then_some(p.m33);
+    let free_p = [p.m11, p.m12, p.m22];
     if !fit.free || estimate.half_angle == fit::HalfAngle::Free || expected.free {
         // If the half-angle is fixed at the expected one, its error causes a proportional error of the axis.
         let k = fixed_half_angle_gain(fit);
@@ -30,7 +31,7 @@ pub(super) fn fused<T: Real>(
             budget.project(&b1, &b2, [T::ZERO; 2], k.map(|k| k * var_c.sqrt()), expected);
         }
         let p = [p.m11 + k[0] * k[0] * var_c, p.m12 + k[0] * k[1] * var_c, p.m22 + k[1] * k[1] * var_c];
-        return Some(Fused { e: fit.e, c: fit.c, p, var_free_cos: var_free, chi2: T::ZERO, edge });
+        return Some(Fused { e: fit.e, c: fit.c, p, free_p, by_cos: k, var_free_cos: var_free, chi2: T::ZERO, edge });
     }
     let total = p.m33 + var_c;
     let difference = expected.cos - fit.c;
@@ -51,6 +52,8 @@ pub(super) fn fused<T: Real>(
         e,
         c: fit.c + k.z * difference,
         p: [form(r1, r1), form(r1, r2), form(r2, r2)],
+        free_p,
+        by_cos: [k.x, k.y],
         var_free_cos: var_free,
         chi2: difference * difference / total,
         edge,

@@ -52,7 +52,8 @@ pub(crate) struct Points {
     pub(crate) clipped: u32,
     /// Number of border pixels that cost more: next to a mask or the border of the picture, or on a wide edge.
     pub(crate) slow: u32,
-    /// In a picture that arrives row by row: number of points with plateaus outside of the rows that are kept.
+    /// In a picture that arrives row by row: number of points, also of lost ones, with plateaus outside of the rows
+    /// that are kept.
     pub(crate) cut: u32,
 }
 
@@ -81,7 +82,7 @@ pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
         let found = if P::STREAMED {
             let found = binary.picture.streamed_point(pixel.x, pixel.y);
             made.cut += u32::from(found.is_some_and(|f| f.cut));
-            found.map(|f| {
+            found.filter(|f| !f.towards_dark_px.is_nan()).map(|f| {
                 let point = point_off(pixel, f.lit.towards_dark(), T::from_f64(f.towards_dark_px.into()));
                 EdgePoint { point, lit: f.lit, fallback: f.fallback, clipped: f.clipped }
             })
