@@ -33,6 +33,12 @@ pub(crate) enum Stream {
     Artefact,
     /// Painted discs.
     Painted,
+    /// Constant errors of gyroscopes and accelerometers besides their biases.
+    ImuErrors,
+    /// Errors of the cameras' mounts.
+    Mount,
+    /// Jitter of the cameras' clocks.
+    Clock,
 }
 
 /// A sequence of random numbers, read by index.

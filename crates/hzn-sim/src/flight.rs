@@ -41,6 +41,19 @@ pub struct FlightFrame {
     pub scene: Scene,
     /// Quality of the JPEG file of the picture, 1 to 100; `None` for a lossless file.
     pub jpeg_quality: Option<u8>,
+    /// The time stamp of the picture; `None` if the camera's clock is right.
+    pub stamp: Option<Stamp>,
+}
+
+/// A time stamp from a clock that is not right, and the position that belongs to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stamp {
+    /// Time of the stamp, seconds.
+    pub time_s: f64,
+    /// The same as ISO 8601 in UTC.
+    pub utc: String,
+    /// Position of the vehicle at the time of the stamp, ECEF, metres.
+    pub position_m: [f64; 3],
 }
 
 /// A row of frames.csv: the prior of one picture. The fields are the file's columns, in this order.
@@ -86,13 +99,14 @@ impl FlightFrame {
 
     /// Returns the row of frames.csv for the picture: time and position, no attitude.
     pub fn row(&self) -> FrameRow {
-        let [x_km, y_km, z_km] = self.scene.pose.position_m.map(|m| m * 1e-3);
-        let altitude_km = Globe::new(&self.scene.body).altitude_m(self.scene.pose.position_m) * 1e-3;
+        let position_m = self.stamp.as_ref().map_or(self.scene.pose.position_m, |stamp| stamp.position_m);
+        let [x_km, y_km, z_km] = position_m.map(|m| m * 1e-3);
+        let altitude_km = Globe::new(&self.scene.body).altitude_m(position_m) * 1e-3;
         let rate = self.rate_rad_s();
         FrameRow {
             file: self.file.clone(),
-            time_s: self.time_s,
-            utc: self.utc.clone(),
+            time_s: self.stamp.as_ref().map_or(self.time_s, |stamp| stamp.time_s),
+            utc: self.stamp.as_ref().map(|stamp| stamp.utc.clone()).or_else(|| self.utc.clone()),
             altitude_km,
             x_km,
             y_km,
@@ -250,7 +264,14 @@ pub fn rocket(width: u16, height: u16, count: usize, seed: u64) -> Flight {
                 seed: noise_seed(seed, index),
                 ..Scene::new(camera.clone(), Pose::looking(position, look))
             };
-            FlightFrame { file: format!("rocket-{index:04}.png"), time_s, utc: None, scene, jpeg_quality: None }
+            FlightFrame {
+                file: format!("rocket-{index:04}.png"),
+                time_s,
+                utc: None,
+                scene,
+                jpeg_quality: None,
+                stamp: None,
+            }
         })
         .collect();
     Flight { name: "rocket".into(), sensor, frames }
@@ -283,7 +304,14 @@ pub fn leo_infrared(count: usize, seed: u64) -> Flight {
                 seed: noise_seed(seed, index),
                 ..Scene::new(camera.clone(), Pose::looking(position_m(lat_deg, lon_deg, 600.0), look))
             };
-            FlightFrame { file: format!("leo-infrared-{index:04}.png"), time_s, utc: None, scene, jpeg_quality: None }
+            FlightFrame {
+                file: format!("leo-infrared-{index:04}.png"),
+                time_s,
+                utc: None,
+                scene,
+                jpeg_quality: None,
+                stamp: None,
+            }
         })
         .collect();
     Flight { name: "leo-infrared".into(), sensor, frames }

@@ -71,6 +71,7 @@ impl Scenario {
         {
             return Err(ScenarioError::new("bodies", "must be one to three of \"earth\", \"sun\", \"moon\""));
         }
+        self.check_cameras()?;
         self.limits().into_iter().try_for_each(Limit::check)?;
         if c.format == Format::Jpeg && self.detector.bits != 8 {
             return refuse(
@@ -89,7 +90,7 @@ impl Scenario {
             }
         }
         self.imu.map_or(Ok(()), |imu| imu.check())?;
-        self.gnss.map_or(Ok(()), |gnss| gnss.check())?;
+        self.gnss.as_ref().map_or(Ok(()), |gnss| gnss.check())?;
         Ok(())
     }
 
@@ -118,6 +119,10 @@ impl Scenario {
             Limit::new("[detector] offset_pattern", detector.offset_pattern, share),
             Limit::new("[detector] gain_pattern", detector.gain_pattern, share),
             Limit::new("[detector] bits", detector.bits.into(), [8.0, 16.0]),
+            Limit::new("mount_error_deg", self.mount_error_deg, [0.0, 45.0]),
+            Limit::new("[clock] offset_s", self.clock.offset_s, [-1e6, 1e6]),
+            Limit::new("[clock] latency_s", self.clock.latency_s, [0.0, 1e3]),
+            Limit::new("[clock] jitter_s", self.clock.jitter_s, [0.0, 1e3]),
             Limit::new("[known] position_sigma_km", known.position_sigma_km, [0.0, UNLIMITED]),
             Limit::new("[known] attitude_sigma_deg", known.attitude_sigma_deg.unwrap_or(1.0), [ABOVE_ZERO, 180.0]),
         ];

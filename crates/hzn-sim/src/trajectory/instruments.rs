@@ -12,8 +12,15 @@ use crate::counter::{Counter, Stream};
 pub struct Imu {
     /// Samples per second.
     pub rate_hz: f64,
+    /// Time of the first sample, seconds; without it, that of the first picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from_s: Option<f64>,
     /// Standard deviation of the gyroscopes' constant errors, degrees per second.
     pub gyro_bias_deg_s: f64,
+    /// Standard deviation of the gyroscopes' scale factor errors, parts per million.
+    pub gyro_scale_ppm: f64,
+    /// Standard deviation of the rotation of the gyroscopes' axes against the vehicle's about each axis, mrad.
+    pub gyro_misalignment_mrad: f64,
     /// Standard deviation of the noise of a gyroscope sample, degrees per second.
     pub gyro_noise_deg_s: f64,
     /// Quantisation step of the gyroscopes, degrees per second; 0 means no quantisation.
@@ -22,6 +29,10 @@ pub struct Imu {
     pub gyro_range_deg_s: f64,
     /// Standard deviation of the accelerometers' constant errors, m/s².
     pub accel_bias_mps2: f64,
+    /// Standard deviation of the accelerometers' scale factor errors, parts per million.
+    pub accel_scale_ppm: f64,
+    /// Standard deviation of the rotation of the accelerometers' axes against the vehicle's about each axis, mrad.
+    pub accel_misalignment_mrad: f64,
     /// Standard deviation of the noise of an accelerometer sample, m/s².
     pub accel_noise_mps2: f64,
     /// Quantisation step of the accelerometers, m/s²; 0 means no quantisation.
@@ -35,11 +46,16 @@ impl Default for Imu {
     fn default() -> Self {
         Self {
             rate_hz: 100.0,
+            from_s: None,
             gyro_bias_deg_s: 0.05,
+            gyro_scale_ppm: 0.0,
+            gyro_misalignment_mrad: 0.0,
             gyro_noise_deg_s: 0.03,
             gyro_step_deg_s: 0.005,
             gyro_range_deg_s: 2000.0,
             accel_bias_mps2: 0.02,
+            accel_scale_ppm: 0.0,
+            accel_misalignment_mrad: 0.0,
             accel_noise_mps2: 0.02,
             accel_step_mps2: 0.005,
             accel_range_mps2: 160.0,
@@ -69,7 +85,7 @@ pub struct ImuRow {
 }
 
 /// A satellite navigation receiver.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Gnss {
     /// Fixes per second.
@@ -78,11 +94,30 @@ pub struct Gnss {
     pub position_noise_m: f64,
     /// Standard deviation of every component of the velocity, m/s.
     pub velocity_noise_mps: f64,
+    /// Time of the first fix, seconds; without it, that of the first picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from_s: Option<f64>,
+    /// Times without fixes, as [from, to] in seconds.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outages_s: Vec<[f64; 2]>,
+    /// Times with wrong positions, as [from, to] in seconds. The receiver does not know that they are wrong.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub jumps_s: Vec<[f64; 2]>,
+    /// Error of the position during `jumps_s`, metres, in a random direction.
+    pub jump_m: f64,
 }
 
 impl Default for Gnss {
     fn default() -> Self {
-        Self { rate_hz: 1.0, position_noise_m: 5.0, velocity_noise_mps: 0.1 }
+        Self {
+            rate_hz: 1.0,
+            position_noise_m: 5.0,
+            velocity_noise_mps: 0.1,
+            from_s: None,
+            outages_s: Vec::new(),
+            jumps_s: Vec::new(),
+            jump_m: 1000.0,
+        }
     }
 }
 
@@ -103,12 +138,38 @@ pub struct GnssRow {
     pub vy_mps: f64,
     /// Third component of the velocity, m/s.
     pub vz_mps: f64,
+    /// 1-sigma of every component of the position, metres.
+    pub position_sigma_m: f64,
+    /// 1-sigma of every component of the velocity, m/s.
+    pub velocity_sigma_mps: f64,
 }
 
 /// Returns numbers and times of the samples from `from_s` to `to_s`. The last sample can be exactly at `to_s`.
-fn times(rate_hz: f64, [from_s, to_s]: [f64; 2]) -> impl Iterator<Item = (u64, f64)> {
+pub(super) fn times(rate_hz: f64, [from_s, to_s]: [f64; 2]) -> impl Iterator<Item = (u64, f64)> {
     let count = ((to_s - from_s) * rate_hz + 1e-9).floor().max(0.0) as u64;
     (0..=count).map(move |i| (i, from_s + i as f64 / rate_hz))
+}
+
+/// Constant errors of an inertial measurement unit. It measures ω̃ = ω + b + S ω + m × ω.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImuErrors {
+    /// Biases of the gyroscopes, rad/s.
+    pub gyro_bias_radps: [f64; 3],
+    /// Scale factor errors of the gyroscopes.
+    pub gyro_scale: [f64; 3],
+    /// Rotation of the gyroscopes' axes, rad.
+    pub gyro_misalignment_rad: [f64; 3],
+    /// Biases of the accelerometers, m/s².
+    pub accel_bias_mps2: [f64; 3],
+    /// Scale factor errors of the accelerometers.
+    pub accel_scale: [f64; 3],
+    /// Rotation of the accelerometers' axes, rad.
+    pub accel_misalignment_rad: [f64; 3],
+}
+
+/// Returns a vector as an instrument with these errors measures it.
+fn measured(truth: &Vector3<f64>, bias: [f64; 3], scale: [f64; 3], misalignment: [f64; 3]) -> Vector3<f64> {
+    truth + Vector3::from(bias) + Vector3::from(scale).component_mul(truth) + Vector3::from(misalignment).cross(truth)
 }
 
 impl Imu {
@@ -121,6 +182,16 @@ impl Imu {
             ("accel_range_mps2", self.accel_range_mps2, self.accel_range_mps2 > 0.0, "above 0"),
             ("gyro_noise_deg_s", self.gyro_noise_deg_s, self.gyro_noise_deg_s >= 0.0, "0 or more"),
             ("accel_noise_mps2", self.accel_noise_mps2, self.accel_noise_mps2 >= 0.0, "0 or more"),
+            ("gyro_scale_ppm", self.gyro_scale_ppm, self.gyro_scale_ppm.is_finite(), "finite"),
+            ("gyro_misalignment_mrad", self.gyro_misalignment_mrad, self.gyro_misalignment_mrad.is_finite(), "finite"),
+            ("accel_scale_ppm", self.accel_scale_ppm, self.accel_scale_ppm.is_finite(), "finite"),
+            (
+                "accel_misalignment_mrad",
+                self.accel_misalignment_mrad,
+                self.accel_misalignment_mrad.is_finite(),
+                "finite",
+            ),
+            ("from_s", self.from_s.unwrap_or(0.0), self.from_s.is_none_or(f64::is_finite), "finite"),
         ];
         match all.into_iter().find(|(.., is_valid, _)| !is_valid) {
             Some((key, value, _, rule)) => Err((format!("[imu] {key}"), format!("{value} is refused: must be {rule}"))),
@@ -128,12 +199,26 @@ impl Imu {
         }
     }
 
+    /// Returns the constant errors of the unit in a flight.
+    pub fn errors(&self, seed: u64) -> ImuErrors {
+        let three = |draws: Counter, first: u64, sigma: f64| [0, 1, 2].map(|i| sigma * draws.normal(first + i));
+        let (biases, others) = (Counter::new(seed, Stream::Imu), Counter::new(seed, Stream::ImuErrors));
+        ImuErrors {
+            gyro_bias_radps: three(biases, 0, self.gyro_bias_deg_s.to_radians()),
+            gyro_scale: three(others, 0, self.gyro_scale_ppm * 1e-6),
+            gyro_misalignment_rad: three(others, 3, self.gyro_misalignment_mrad * 1e-3),
+            accel_bias_mps2: three(biases, 3, self.accel_bias_mps2),
+            accel_scale: three(others, 6, self.accel_scale_ppm * 1e-6),
+            accel_misalignment_rad: three(others, 9, self.accel_misalignment_mrad * 1e-3),
+        }
+    }
+
     /// Returns the samples of a flight.
-    pub fn rows(&self, path: &Path, span_s: [f64; 2], seed: u64) -> impl Iterator<Item = ImuRow> {
+    pub fn rows(&self, path: &Path, [from_s, to_s]: [f64; 2], seed: u64) -> impl Iterator<Item = ImuRow> {
         let (imu, path, draws) = (*self, path.clone(), Counter::new(seed, Stream::Imu));
         let rad = f64::to_radians;
-        let bias = |first: u64, sigma: f64| Vector3::from([0, 1, 2].map(|i| sigma * draws.normal(first + i)));
-        let (gyro_bias, accel_bias) = (bias(0, rad(imu.gyro_bias_deg_s)), bias(3, imu.accel_bias_mps2));
+        let errors = self.errors(seed);
+        let span_s = [self.from_s.unwrap_or(from_s), to_s];
         times(imu.rate_hz, span_s).map(move |(i, time_s)| {
             let state = path.state(time_s);
             let force = state.body_to_ecef.inverse_transform_vector(&state.specific_force_mps2);
@@ -148,14 +233,19 @@ impl Imu {
                 })
             };
             let gyro = measure(
-                state.rate_radps + gyro_bias,
+                measured(&state.rate_radps, errors.gyro_bias_radps, errors.gyro_scale, errors.gyro_misalignment_rad),
                 first,
                 rad(imu.gyro_noise_deg_s),
                 rad(imu.gyro_step_deg_s),
                 rad(imu.gyro_range_deg_s),
             );
-            let accel =
-                measure(force + accel_bias, first + 3, imu.accel_noise_mps2, imu.accel_step_mps2, imu.accel_range_mps2);
+            let accel = measure(
+                measured(&force, errors.accel_bias_mps2, errors.accel_scale, errors.accel_misalignment_rad),
+                first + 3,
+                imu.accel_noise_mps2,
+                imu.accel_step_mps2,
+                imu.accel_range_mps2,
+            );
             ImuRow {
                 time_s,
                 gyro_x_radps: gyro[0],
@@ -172,24 +262,50 @@ impl Imu {
 
 impl Gnss {
     pub(crate) fn check(&self) -> Result<(), (String, String)> {
-        if self.rate_hz > 0.0 && self.rate_hz <= 1000.0 {
-            return Ok(());
+        let refuse = |key: &str, what: String| Err((format!("[gnss] {key}"), what));
+        if !(self.rate_hz > 0.0 && self.rate_hz <= 1000.0) {
+            return refuse("rate_hz", format!("{} is refused: must be above 0, at most 1000", self.rate_hz));
         }
-        Err(("[gnss] rate_hz".into(), format!("{} is refused: must be above 0, at most 1000", self.rate_hz)))
+        for (key, spans) in [("outages_s", &self.outages_s), ("jumps_s", &self.jumps_s)] {
+            if let Some([from_s, to_s]) = spans.iter().find(|[from_s, to_s]| !(from_s < to_s)) {
+                return refuse(key, format!("[{from_s}, {to_s}] is refused: the second time must be the later one"));
+            }
+        }
+        Ok(())
     }
 
     /// Returns the fixes of a flight.
-    pub fn rows(&self, path: &Path, span_s: [f64; 2], seed: u64) -> impl Iterator<Item = GnssRow> {
-        let (gnss, path, draws) = (*self, path.clone(), Counter::new(seed, Stream::Gnss));
-        times(gnss.rate_hz, span_s).map(move |(i, time_s)| {
+    pub fn rows(&self, path: &Path, [from_s, to_s]: [f64; 2], seed: u64) -> impl Iterator<Item = GnssRow> {
+        let (gnss, path, draws) = (self.clone(), path.clone(), Counter::new(seed, Stream::Gnss));
+        let jump = Vector3::from([0, 1, 2].map(|a| draws.normal(u64::MAX - a))).normalize() * self.jump_m;
+        times(self.rate_hz, [self.from_s.unwrap_or(from_s), to_s]).filter_map(move |(i, time_s)| {
+            if is_within(&gnss.outages_s, time_s) {
+                return None;
+            }
             let point = path.point(time_s);
             let noise =
                 |first: u64, sigma: f64| Vector3::from([0, 1, 2].map(|a| sigma * draws.normal(6 * i + first + a)));
-            let x = point.position_m + noise(0, gnss.position_noise_m);
+            let jump = if is_within(&gnss.jumps_s, time_s) { jump } else { Vector3::zeros() };
+            let x = point.position_m + noise(0, gnss.position_noise_m) + jump;
             let v = point.velocity_mps + noise(3, gnss.velocity_noise_mps);
-            GnssRow { time_s, x_m: x.x, y_m: x.y, z_m: x.z, vx_mps: v.x, vy_mps: v.y, vz_mps: v.z }
+            Some(GnssRow {
+                time_s,
+                x_m: x.x,
+                y_m: x.y,
+                z_m: x.z,
+                vx_mps: v.x,
+                vy_mps: v.y,
+                vz_mps: v.z,
+                position_sigma_m: gnss.position_noise_m,
+                velocity_sigma_mps: gnss.velocity_noise_mps,
+            })
         })
     }
+}
+
+/// Returns whether a time lies in one of these spans.
+fn is_within(spans_s: &[[f64; 2]], time_s: f64) -> bool {
+    spans_s.iter().any(|[from_s, to_s]| (*from_s..=*to_s).contains(&time_s))
 }
 
 #[cfg(test)]

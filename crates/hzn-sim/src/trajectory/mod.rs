@@ -10,6 +10,7 @@
 //! | `point` | a point of a trajectory |
 //! | `attitude` | the rotation of the vehicle |
 //! | `earth` | rotation and gravity of the Earth |
+//! | `vehicle` | the truth about the vehicle, for vehicle.csv |
 //! | [`instruments`] | gyroscopes, accelerometers, satellite navigation receiver |
 
 mod attitude;
@@ -21,6 +22,7 @@ mod point;
 mod position;
 mod rocket;
 mod table;
+mod vehicle;
 
 pub use attitude::{Attitude, Pointing, Spin, Towards, Tumble};
 pub use orbit::Orbit;
@@ -28,3 +30,4 @@ pub use path::{Path, State};
 pub use position::Trajectory;
 pub use rocket::Rocket;
 pub use table::Table;
+pub use vehicle::{MAX_RATE_HZ, VehicleRow};

@@ -28,6 +28,8 @@ pub struct State {
 pub struct Path {
     trajectory: PreparedTrajectory,
     attitude: PreparedAttitude,
+    /// The mount that the attitude control of the vehicle knows.
+    told_to_body: UnitQuaternion<f64>,
     camera_to_body: UnitQuaternion<f64>,
 }
 
@@ -51,7 +53,14 @@ impl Path {
         let attitude = PreparedAttitude::try_new(attitude, &trajectory, [from_s, to_s], seed)?;
         let [w, x, y, z] = camera_to_body_wxyz;
         let camera_to_body = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
-        Ok(Self { trajectory, attitude, camera_to_body })
+        Ok(Self { trajectory, attitude, told_to_body: camera_to_body, camera_to_body })
+    }
+
+    /// Returns the same flight of the vehicle with a camera that is mounted like this.
+    #[must_use]
+    pub fn with_camera(mut self, [w, x, y, z]: [f64; 4]) -> Self {
+        self.camera_to_body = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        self
     }
 
     /// Returns UTC in seconds since 1970.
@@ -69,7 +78,7 @@ impl Path {
     }
 
     fn body_to_ecef(&self, time_s: f64) -> UnitQuaternion<f64> {
-        self.attitude.body_to_ecef(&self.trajectory, &self.camera_to_body, time_s)
+        self.attitude.body_to_ecef(&self.trajectory, &self.told_to_body, time_s)
     }
 
     /// Returns the state of the vehicle at a time in seconds.

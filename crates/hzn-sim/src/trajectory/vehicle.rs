@@ -1,0 +1,61 @@
+//! The truth about the vehicle, for vehicle.csv.
+
+use serde::{Deserialize, Serialize};
+
+use super::path::Path;
+
+/// Most rows a second in vehicle.csv.
+pub const MAX_RATE_HZ: f64 = 10.0;
+
+/// A row of vehicle.csv: the true state of the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct VehicleRow {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// First component of the position in ECEF, metres.
+    pub x_m: f64,
+    /// Second component of the position.
+    pub y_m: f64,
+    /// Third component of the position.
+    pub z_m: f64,
+    /// First component of the velocity relative to the Earth in ECEF, m/s.
+    pub vx_mps: f64,
+    /// Second component of the velocity.
+    pub vy_mps: f64,
+    /// Third component of the velocity.
+    pub vz_mps: f64,
+    /// Attitude as a quaternion from the vehicle's axes to ECEF, scalar part.
+    pub qw: f64,
+    /// First vector component of the attitude.
+    pub qx: f64,
+    /// Second vector component of the attitude.
+    pub qy: f64,
+    /// Third vector component of the attitude.
+    pub qz: f64,
+}
+
+impl Path {
+    /// Returns the truth about the vehicle at a time in seconds.
+    pub fn vehicle(&self, time_s: f64) -> VehicleRow {
+        let state = self.state(time_s);
+        let (x, v, q) = (state.position_m, state.velocity_mps, state.body_to_ecef);
+        VehicleRow {
+            time_s,
+            x_m: x.x,
+            y_m: x.y,
+            z_m: x.z,
+            vx_mps: v.x,
+            vy_mps: v.y,
+            vz_mps: v.z,
+            qw: q.w,
+            qx: q.i,
+            qy: q.j,
+            qz: q.k,
+        }
+    }
+
+    /// Returns the truth about the vehicle from the first to the last time, at most [`MAX_RATE_HZ`] times a second.
+    pub fn vehicle_rows(&self, span_s: [f64; 2], rate_hz: f64) -> impl Iterator<Item = VehicleRow> {
+        super::instruments::times(rate_hz.min(MAX_RATE_HZ), span_s).map(|(_, time_s)| self.vehicle(time_s))
+    }
+}
