@@ -182,10 +182,12 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
         }
         // Sorted by time; measurements of one time keep their order.
         let place = self.measurements.iter().take(self.listed).flatten().filter(|(t, _)| *t <= time_s).count();
-        self.measurements.copy_within(place..self.listed, place + 1);
-        if let Some(slot) = self.measurements.get_mut(place) {
-            *slot = Some((time_s, measurement));
-            self.listed += 1;
+        if let Some(later @ [_, ..]) = self.measurements.get_mut(place..=self.listed) {
+            later.rotate_right(1);
+            if let Some(slot) = later.first_mut() {
+                *slot = Some((time_s, measurement));
+                self.listed += 1;
+            }
         }
         Ok(())
     }
@@ -204,8 +206,7 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
 
     fn take_oldest(&mut self, done: &mut impl FnMut(f64, &Measurement, Outcome)) {
         let Some((imu, saturated)) = self.samples.first().copied().flatten() else { return };
-        self.samples.copy_within(1..self.waiting, 0);
-        self.waiting -= 1;
+        remove_first(&mut self.samples, &mut self.waiting);
         self.step_to(&imu, saturated, done);
     }
 
@@ -215,8 +216,7 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
             if self.listed == 0 || time_s > imu.time_s {
                 break;
             }
-            self.measurements.copy_within(1..self.listed, 0);
-            self.listed -= 1;
+            remove_first(&mut self.measurements, &mut self.listed);
             if let Some(last) = self.filter.last_imu()
                 && time_s > last.time_s
                 && time_s < imu.time_s
@@ -262,6 +262,14 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
                 Outcome::Unusable
             }
         }
+    }
+}
+
+/// Removes the first of the entries, whose number this is.
+fn remove_first<T>(list: &mut [T], entries: &mut usize) {
+    if let Some(filled @ [_, ..]) = list.get_mut(..*entries) {
+        filled.rotate_left(1);
+        *entries -= 1;
     }
 }
 

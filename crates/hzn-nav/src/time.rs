@@ -1,5 +1,15 @@
 //! Time scales. UTC is counted in seconds since 1970-01-01T00:00:00 without leap seconds, as Unix does.
 
+/// Time in UTC until which the leap seconds are known: 2026-06-28, the expiry of the list of the IERS that this version
+/// holds. Later dates count as if no leap second came; each one that does moves Sun and Moon by 0.004°, and positions
+/// of a receiver in GPS time by a second.
+pub const LEAP_SECONDS_EXPIRE_UNIX_S: f64 = 1_782_604_800.0;
+
+/// Returns whether the leap seconds up to a time in UTC are known; see [`LEAP_SECONDS_EXPIRE_UNIX_S`].
+pub fn are_leap_seconds_known(unix_s: f64) -> bool {
+    unix_s < LEAP_SECONDS_EXPIRE_UNIX_S
+}
+
 /// Returns TAI − UTC in seconds at a time in UTC. Dates before 1999 count as 1999, and no leap second after 2017 is
 /// known.
 pub fn tai_minus_utc_s(unix_s: f64) -> f64 {
@@ -28,6 +38,13 @@ mod tests {
         assert_eq!(tai_minus_utc_s(1_483_228_799.0), 36.0);
         assert_eq!(tai_minus_utc_s(1_483_228_800.0), 37.0);
         assert_eq!(tai_minus_utc_s(0.0), 32.0);
+    }
+
+    #[test]
+    fn leap_seconds_expire() {
+        // `date -u -d 2026-06-28 +%s`
+        assert!(are_leap_seconds_known(1_782_604_799.0) && !are_leap_seconds_known(1_782_604_800.0));
+        assert!(!are_leap_seconds_known(f64::NAN));
     }
 
     #[test]

@@ -271,7 +271,7 @@ fn a_large_first_error_converges() {
     }
 }
 
-/// The covariance stays symmetric and positive definite over a million updates and predictions.
+/// The covariance stays symmetric and positive definite over a million predictions and 150 000 updates.
 #[test]
 fn the_covariance_stays_positive_definite() {
     let mut flight = Flight::new(5);
@@ -279,7 +279,7 @@ fn the_covariance_stays_positive_definite() {
     let mut filter = Filter::<STATES>::new(flight.told, &options, &cameras()).unwrap();
     let n = filter.layout().len;
     let at = flight.truth.position_m;
-    for step in 0..200_000u32 {
+    for step in 0..1_000_000u32 {
         let imu = Imu {
             time_s: DT_S * f64::from(step),
             gyro_rad_s: Vector3::new(0.01, -0.02, 0.3),
@@ -295,7 +295,7 @@ fn the_covariance_stays_positive_definite() {
             let position = filter.nominal().position_m;
             filter.update_position(&position, 5.0).unwrap();
         }
-        if step % 10_000 == 9_999 {
+        if step % 50_000 == 49_999 {
             let p = filter.covariance().view((0, 0), (n, n)).into_owned();
             assert_eq!(p, p.transpose());
             let scale = p.map_diagonal(|d| 1.0 / d.sqrt());

@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
+use super::blocks::{put, root, three_columns, three_rows};
 use super::predict::rate_of;
 use super::update::Innovation;
 use super::{Camera, Filter};
@@ -42,37 +43,45 @@ pub fn predict_direction(
     (predicted, to_camera * reference.cross_matrix(), predicted.cross_matrix())
 }
 
+impl DirectionMeasurement {
+    /// Returns whether all numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        let numbers =
+            self.measured.iter().chain(&self.reference).chain(&self.covariance_rad2).chain(&self.by_limb_height);
+        numbers.copied().all(f64::is_finite)
+    }
+}
+
 impl<const N: usize> Filter<N> {
     /// Takes a direction at the time of the state. `None` if there is no such camera or a number is not finite; nothing
     /// changes then.
     pub fn update_direction(&mut self, m: &DirectionMeasurement) -> Option<Innovation<2>> {
-        let finite = m.measured.iter().chain(&m.reference).chain(&m.covariance_rad2).chain(&m.by_limb_height);
-        if !finite.copied().all(f64::is_finite) {
+        if !m.is_finite() {
             return None;
         }
         let (measured, reference) = (m.measured.try_normalize(1e-6)?, m.reference.try_normalize(1e-6)?);
         let camera = *self.cameras.get(m.camera)?.as_ref()?;
         let places = *self.layout.cameras.get(m.camera)?;
-        self.set_slow_covariance(m.camera, &m.covariance_rad2)?;
+        self.set_slow_covariance(m.camera, &m.covariance_rad2, None)?;
         let (rate, attitude) = self.at_clock(&camera);
         let (predicted, by_attitude, by_mount) = predict_direction(&attitude, &camera.mount, &reference);
         let mut by_errors = SMatrix::<f64, 3, N>::zeros();
-        by_errors.fixed_view_mut::<3, 3>(0, Layout::ATTITUDE).copy_from(&by_attitude);
+        put(&mut by_errors, (0, Layout::ATTITUDE), &by_attitude);
         if let Some(place) = places.misalignment {
-            by_errors.fixed_view_mut::<3, 3>(0, place.first).copy_from(&by_mount);
+            put(&mut by_errors, (0, place.first), &by_mount);
         }
         let mut slow = Vector3::zeros();
         if let Some(place) = places.slow_error {
-            by_errors.fixed_view_mut::<3, 3>(0, place.first).copy_from(&Matrix3::identity());
+            put(&mut by_errors, (0, place.first), &Matrix3::identity());
             slow = camera.slow_error;
         }
         if let Some(place) = places.clock {
             let body = attitude.inverse() * reference;
-            by_errors.column_mut(place.first).copy_from(&(camera.mount.inverse() * rate_of(&body, &rate)));
+            put(&mut by_errors, (0, place.first), &(camera.mount.inverse() * rate_of(&body, &rate)));
         }
         let mut height = Vector3::zeros();
         if let Some(place) = self.layout.limb_height {
-            by_errors.column_mut(place.first).copy_from(&m.by_limb_height);
+            put(&mut by_errors, (0, place.first), &m.by_limb_height);
             height = m.by_limb_height * self.corrections.limb_height_km;
         }
         let across = basis(&predicted);
@@ -97,40 +106,34 @@ impl<const N: usize> Filter<N> {
     /// symmetric ones. Those of Cholesky turn the error within the plane across the direction when the direction moves
     /// through the picture, and the innovations are then larger than their covariance. The error begins independent of
     /// all others.
-    fn set_slow_covariance(&mut self, which: usize, covariance_rad2: &Matrix3<f64>) -> Option<()> {
+    pub(super) fn set_slow_covariance(
+        &mut self,
+        which: usize,
+        covariance_rad2: &Matrix3<f64>,
+        recorded: Option<&mut SMatrix<f64, N, N>>,
+    ) -> Option<()> {
         let Some(place) = self.layout.cameras.get(which)?.slow_error else { return Some(()) };
         let camera = self.cameras.get_mut(which)?.as_mut()?;
         let new = (covariance_rad2 + covariance_rad2.transpose()) * 0.5 + Matrix3::identity() * EPSILON_RAD2;
         let new_root = root(&new, 1)?;
         match camera.slow_covariance {
-            None => self.covariance.fixed_view_mut::<3, 3>(place.first, place.first).copy_from(&new),
+            None => put(&mut self.covariance, (place.first, place.first), &new),
             Some(old) => {
                 let change = new_root * root(&old, -1)?;
                 camera.slow_error = change * camera.slow_error;
-                let rows: SMatrix<f64, 3, N> = change * self.covariance.fixed_view::<3, N>(place.first, 0);
-                self.covariance.fixed_view_mut::<3, N>(place.first, 0).copy_from(&rows);
-                let columns: SMatrix<f64, N, 3> =
-                    self.covariance.fixed_view::<N, 3>(0, place.first) * change.transpose();
-                self.covariance.fixed_view_mut::<N, 3>(0, place.first).copy_from(&columns);
+                if let Some(recorded) = recorded {
+                    let rows = change * three_rows(recorded, place.first);
+                    put(recorded, (place.first, 0), &rows);
+                }
+                let rows = change * three_rows(&self.covariance, place.first);
+                put(&mut self.covariance, (place.first, 0), &rows);
+                let columns = three_columns(&self.covariance, place.first) * change.transpose();
+                put(&mut self.covariance, (0, place.first), &columns);
             }
         }
         camera.slow_covariance = Some(new);
         Some(())
     }
-}
-
-/// Returns the symmetric root of a positive definite matrix, or its inverse with −1. `None` if an eigenvalue is not
-/// positive.
-fn root(matrix: &Matrix3<f64>, sign: i32) -> Option<Matrix3<f64>> {
-    let eigen = matrix.symmetric_eigen();
-    let mut values = eigen.eigenvalues;
-    for value in values.iter_mut() {
-        if !(*value > 0.0) {
-            return None;
-        }
-        *value = if sign < 0 { 1.0 / libm::sqrt(*value) } else { libm::sqrt(*value) };
-    }
-    Some(eigen.eigenvectors * Matrix3::from_diagonal(&values) * eigen.eigenvectors.transpose())
 }
 
 /// Returns two unit vectors across a direction, as rows.

@@ -5,9 +5,12 @@
 //! vector in ECEF. Errors that are *considered* keep their estimate, and their rows of the gain are 0 (Schmidt 1966).
 //! The covariance is updated in Joseph's form.
 
+mod blocks;
+mod centre;
 mod chi2;
 mod direction;
 mod predict;
+mod states;
 mod update;
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
@@ -15,6 +18,8 @@ use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use crate::layout::{Layout, MAX_CAMERAS, Place};
 use crate::options::{CameraOptions, Options};
 use crate::strapdown::{Imu, Nominal};
+
+use blocks::{set, three};
 
 pub use chi2::chi2_limit;
 pub use direction::{DirectionMeasurement, predict_direction};
@@ -142,7 +147,7 @@ impl<const N: usize> Filter<N> {
         let (layout, start, imu) = (self.layout, self.options.start, self.options.imu);
         let mut fill = |place: Place, sigma: f64| {
             for i in place.first..place.first + place.len {
-                self.covariance[(i, i)] = sigma * libm::fabs(sigma);
+                set(&mut self.covariance, (i, i), sigma * libm::fabs(sigma));
             }
         };
         let vehicle = |first| Place { first, len: 3, considered: false };
@@ -209,12 +214,12 @@ impl<const N: usize> Filter<N> {
 
     /// Moves the estimates by the errors, which become 0.
     fn apply(&mut self, error: &SVector<f64, N>) {
-        let three = |first: usize| Vector3::new(error[first], error[first + 1], error[first + 2]);
-        let of = |place: Option<Place>| place.map_or_else(Vector3::zeros, |p| three(p.first));
-        let turn = UnitQuaternion::from_scaled_axis(three(Layout::ATTITUDE));
+        let one = |place: Option<Place>| place.and_then(|p| error.get(p.first).copied()).unwrap_or(0.0);
+        let of = |place: Option<Place>| place.map_or_else(Vector3::zeros, |p| three(error, p.first));
+        let turn = UnitQuaternion::from_scaled_axis(three(error, Layout::ATTITUDE));
         self.nominal.attitude = UnitQuaternion::new_normalize((turn * self.nominal.attitude).into_inner());
-        self.nominal.velocity_m_s += three(Layout::VELOCITY);
-        self.nominal.position_m += three(Layout::POSITION);
+        self.nominal.velocity_m_s += three(error, Layout::VELOCITY);
+        self.nominal.position_m += three(error, Layout::POSITION);
         let (layout, c) = (self.layout, &mut self.corrections);
         c.accel_bias += of(layout.accel_bias);
         c.accel_scale += of(layout.accel_scale);
@@ -222,12 +227,12 @@ impl<const N: usize> Filter<N> {
         c.gyro_bias += of(layout.gyro_bias);
         c.gyro_scale += of(layout.gyro_scale);
         c.gyro_misalignment += of(layout.gyro_misalignment);
-        c.limb_height_km += layout.limb_height.map_or(0.0, |p| error[p.first]);
+        c.limb_height_km += one(layout.limb_height);
         for (camera, places) in self.cameras.iter_mut().flatten().zip(&layout.cameras) {
             let turn = UnitQuaternion::from_scaled_axis(of(places.misalignment));
             camera.mount = UnitQuaternion::new_normalize((camera.mount * turn).into_inner());
             camera.slow_error += of(places.slow_error);
-            camera.clock_s += places.clock.map_or(0.0, |p| error[p.first]);
+            camera.clock_s += one(places.clock);
         }
     }
 }

@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
+use super::blocks::{put, scale_column, scale_row, set, three_columns, three_rows};
 use super::{Corrections, Filter};
 use crate::gravity::{earth_rate, gradient};
 use crate::layout::Layout;
@@ -52,6 +53,15 @@ impl Corrections {
 impl<const N: usize> Filter<N> {
     /// Moves the state to the time of a sample of the inertial unit. `saturated` says that a channel was at its limit.
     pub fn predict(&mut self, imu: &Imu, saturated: bool) -> Step {
+        self.predict_into(imu, saturated, None)
+    }
+
+    pub(super) fn predict_into(
+        &mut self,
+        imu: &Imu,
+        saturated: bool,
+        transition: Option<&mut SMatrix<f64, N, N>>,
+    ) -> Step {
         if !imu.is_finite() {
             return Step::NotFinite;
         }
@@ -65,14 +75,21 @@ impl<const N: usize> Filter<N> {
             return if imu.time_s == last.time_s { Step::Duplicate } else { Step::OutOfOrder };
         }
         let gap = saturated || dt > self.options.imu.max_step_s;
-        self.propagate_covariance(&last, imu, dt, gap);
+        self.propagate_covariance(&last, imu, dt, gap, transition);
         let (from, to) = (self.corrections.correct(&last), self.corrections.correct(imu));
         self.nominal = self.nominal.step(&from, &to);
         self.last_imu = Some(*imu);
         if gap { Step::TakenWithGap } else { Step::Taken }
     }
 
-    fn propagate_covariance(&mut self, last: &Imu, imu: &Imu, dt: f64, gap: bool) {
+    fn propagate_covariance(
+        &mut self,
+        last: &Imu,
+        imu: &Imu,
+        dt: f64,
+        gap: bool,
+        mut recorded: Option<&mut SMatrix<f64, N, N>>,
+    ) {
         let (own, others) = self.linearise(last, imu);
         let half = own * (0.5 * dt);
         let mean = SMatrix::<f64, V, V>::identity() * dt + half * dt;
@@ -80,6 +97,10 @@ impl<const N: usize> Filter<N> {
         let transition = SMatrix::<f64, V, V>::identity() + own * dt + half * own * dt;
         rows.fixed_view_mut::<V, V>(0, 0).copy_from(&transition);
         let moved: SMatrix<f64, V, N> = rows * self.covariance;
+        if let Some(recorded) = &mut recorded {
+            let vehicle: SMatrix<f64, V, N> = rows * **recorded;
+            recorded.fixed_view_mut::<V, N>(0, 0).copy_from(&vehicle);
+        }
         let noise = self.process_noise(dt, gap);
         // The noise enters during the step: half before it, half after it.
         let noise = (transition * noise * transition.transpose() + noise) * 0.5;
@@ -87,13 +108,13 @@ impl<const N: usize> Filter<N> {
         self.covariance.fixed_view_mut::<V, N>(0, 0).copy_from(&moved);
         for i in 0..V {
             for j in V..N {
-                self.covariance[(j, i)] = moved[(i, j)];
+                set(&mut self.covariance, (j, i), moved.get((i, j)).copied().unwrap_or(0.0));
             }
             for j in 0..V {
                 self.covariance[(i, j)] = 0.5 * (vehicle[(i, j)] + vehicle[(j, i)]);
             }
         }
-        self.fade_slow_errors(dt);
+        self.fade_slow_errors(dt, recorded);
     }
 
     /// Returns the derivatives of the vehicle's errors by themselves and by all others.
@@ -117,7 +138,7 @@ impl<const N: usize> Filter<N> {
         let mut others = SMatrix::<f64, V, N>::zeros();
         let mut put = |row: usize, place: Option<crate::layout::Place>, block: Matrix3<f64>| {
             if let Some(place) = place {
-                others.fixed_view_mut::<3, 3>(row, place.first).copy_from(&block);
+                super::blocks::put(&mut others, (row, place.first), &block);
             }
         };
         put(a, layout.gyro_bias, -rotation);
@@ -146,17 +167,20 @@ impl<const N: usize> Filter<N> {
     }
 
     /// Lets the slow errors of the cameras forget: Φ = exp(−Δt/T), Q = (1 − Φ²) P_c.
-    fn fade_slow_errors(&mut self, dt: f64) {
+    fn fade_slow_errors(&mut self, dt: f64, mut recorded: Option<&mut SMatrix<f64, N, N>>) {
         for (camera, places) in self.cameras.iter_mut().flatten().zip(&self.layout.cameras) {
             let (Some(place), Some(target)) = (places.slow_error, camera.slow_covariance) else { continue };
             let keep = libm::exp(-dt / camera.options.slow_error_time_s);
             camera.slow_error *= keep;
             for i in place.first..place.first + place.len {
-                self.covariance.row_mut(i).scale_mut(keep);
-                self.covariance.column_mut(i).scale_mut(keep);
+                scale_row(&mut self.covariance, i, keep);
+                scale_column(&mut self.covariance, i, keep);
+                if let Some(recorded) = &mut recorded {
+                    scale_row(recorded, i, keep);
+                }
             }
-            let mut block = self.covariance.fixed_view_mut::<3, 3>(place.first, place.first);
-            block += target * (1.0 - keep * keep);
+            let own = three_rows(&three_columns(&self.covariance, place.first), place.first);
+            put(&mut self.covariance, (place.first, place.first), &(own + target * (1.0 - keep * keep)));
         }
     }
 }

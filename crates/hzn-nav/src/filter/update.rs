@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::Filter;
+use super::blocks::{scale_row, set};
 use super::chi2::chi2_limit;
 use crate::layout::Layout;
 
@@ -39,15 +40,38 @@ impl<const N: usize> Filter<N> {
         if taken {
             let mut gain: SMatrix<f64, N, M> = cross * inverse;
             for i in (0..self.layout.len).filter(|i| self.layout.is_considered(*i)) {
-                gain.row_mut(i).fill(0.0);
+                scale_row(&mut gain, i, 0.0);
             }
             self.apply(&(gain * value));
-            // (I − K H) P (I − K H)ᵀ + K R Kᵀ, factor by factor.
-            let left = self.covariance - gain * cross.transpose();
-            let joseph = left - (left * by_errors.transpose()) * gain.transpose() + gain * noise * gain.transpose();
-            self.covariance = (joseph + joseph.transpose()) * 0.5;
+            self.reduce_covariance(&gain, &cross, by_errors, noise);
         }
         Some(Innovation { value, covariance, nis, taken })
+    }
+
+    /// P ← (I − K H) P (I − K H)ᵀ + K R Kᵀ, factor by factor and in place: a copy of P would not fit the stack of a
+    /// flight computer.
+    fn reduce_covariance<const M: usize>(
+        &mut self,
+        gain: &SMatrix<f64, N, M>,
+        cross: &SMatrix<f64, N, M>,
+        by_errors: &SMatrix<f64, M, N>,
+        noise: &SMatrix<f64, M, M>,
+    ) {
+        for (mut column, cross) in self.covariance.column_iter_mut().zip(cross.row_iter()) {
+            column -= gain * cross.transpose();
+        }
+        let right: SMatrix<f64, N, M> = gain * noise - self.covariance * by_errors.transpose();
+        for (mut column, gain) in self.covariance.column_iter_mut().zip(gain.row_iter()) {
+            column += right * gain.transpose();
+        }
+        for i in 0..N {
+            for j in 0..i {
+                let at = |a: usize, b: usize| self.covariance.get((a, b)).copied().unwrap_or(0.0);
+                let mean = 0.5 * (at(i, j) + at(j, i));
+                set(&mut self.covariance, (i, j), mean);
+                set(&mut self.covariance, (j, i), mean);
+            }
+        }
     }
 
     /// Takes a position in ECEF (m) with the 1-sigma of each component.
@@ -69,7 +93,7 @@ impl<const N: usize> Filter<N> {
     fn update_three(&mut self, value: Vector3<f64>, first: usize, sigma: f64) -> Option<Innovation<3>> {
         let mut by_errors = SMatrix::<f64, 3, N>::zeros();
         for i in 0..3 {
-            by_errors[(i, first + i)] = 1.0;
+            set(&mut by_errors, (i, first + i), 1.0);
         }
         self.update(value, &by_errors, &(SMatrix::<f64, 3, 3>::identity() * (sigma * sigma)))
     }

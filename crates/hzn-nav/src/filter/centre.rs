@@ -1,0 +1,51 @@
+//! The position of the Earth's centre in the camera frame, from its limb.
+//!
+//! The camera sees r = −R_bcᵀ R_ebᵀ x. Its derivatives are R_bcᵀ R_ebᵀ [−x×] by the attitude error, [r×] by the
+//! misalignment, and −R_bcᵀ R_ebᵀ by the position. A limb that is higher by δ than the told one makes the distance too
+//! short by the share δ/a.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use super::blocks::put;
+use super::update::Innovation;
+use super::{Filter, predict_direction};
+use crate::layout::Layout;
+
+/// Mean radius of the Earth, km.
+const RADIUS_KM: f64 = 6371.0;
+
+impl<const N: usize> Filter<N> {
+    /// Takes the position of the Earth's centre in the camera frame (m) with its covariance (m²), without the part of
+    /// the limb height. `None` if there is no such camera or a number is not finite; nothing changes then. The axis of
+    /// the same picture must not be taken too.
+    pub fn update_centre(
+        &mut self,
+        camera: usize,
+        centre_m: &Vector3<f64>,
+        covariance_m2: &Matrix3<f64>,
+    ) -> Option<Innovation<3>> {
+        if !centre_m.iter().chain(covariance_m2).copied().all(f64::is_finite) {
+            return None;
+        }
+        let places = *self.layout.cameras.get(camera)?;
+        let own = *self.cameras.get(camera)?.as_ref()?;
+        let to_centre = -self.nominal.position_m;
+        let (predicted, by_attitude, by_mount) = predict_direction(&self.nominal.attitude, &own.mount, &to_centre);
+        let to_camera = (self.nominal.attitude * own.mount).inverse().to_rotation_matrix().into_inner();
+        let mut by_errors = SMatrix::<f64, 3, N>::zeros();
+        put(&mut by_errors, (0, Layout::ATTITUDE), &by_attitude);
+        put(&mut by_errors, (0, Layout::POSITION), &-to_camera);
+        if let Some(place) = places.misalignment {
+            put(&mut by_errors, (0, place.first), &by_mount);
+        }
+        let mut height = Vector3::zeros();
+        if let Some(place) = self.layout.limb_height {
+            let by_height = predicted * (-1.0 / RADIUS_KM);
+            put(&mut by_errors, (0, place.first), &by_height);
+            height = by_height * self.corrections.limb_height_km;
+        }
+        let white = own.options.white_rad * libm::sqrt(predicted.norm_squared());
+        let noise = (covariance_m2 + covariance_m2.transpose()) * 0.5 + Matrix3::identity() * (white * white);
+        self.update(centre_m - predicted - height, &by_errors, &noise)
+    }
+}
