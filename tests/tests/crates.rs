@@ -13,9 +13,10 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("hzn-flight", &["hzn-core", "hzn-nav"]),
     ("hzn-mcap", &["hzn-core", "hzn-nav"]),
     ("hzn-run", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap"]),
-    ("hzn-cli", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run"]),
-    ("hzn-py", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run"]),
-    ("hzn-viewer", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run"]),
+    ("hzn-fuse", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-mcap", "hzn-run"]),
+    ("hzn-cli", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run", "hzn-fuse"]),
+    ("hzn-py", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run", "hzn-fuse"]),
+    ("hzn-viewer", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run", "hzn-fuse"]),
 ];
 
 /// Returns the crates of this project that a Cargo.toml lists in `[dependencies]`. Dependencies for tests and builds

@@ -15,7 +15,7 @@ const BOARDS: [(&str, &str); 2] = [("an386", ""), (M7, M7_FLAGS)];
 const M7: &str = "an500";
 const M7_FLAGS: &str = "-C target-cpu=cortex-m7";
 /// Images of each board.
-const IMAGES: [&str; 4] = ["chain", "flight", "measure", "rows"];
+const IMAGES: [&str; 5] = ["chain", "flight", "measure", "nav", "rows"];
 /// Document with the costs.
 const COSTS: &str = "book/results/firmware-cost.md";
 
@@ -45,7 +45,7 @@ pub(crate) fn test(steps: &mut Steps) -> Outcome {
     lint_and_document()?;
     build_tests()?;
     // `--workspace` avoids a second build with other features.
-    steps.cargo_test(&["--workspace", "--test", "firmware", "--", "--ignored"])?;
+    steps.cargo_test(&["--workspace", "--test", "firmware", "--test", "navigation", "--", "--ignored"])?;
     steps::run(Command::new(target().join("debug/examples/firmware_cost")).args(["--check", COSTS]))?;
     check_c_interface()
 }

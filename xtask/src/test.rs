@@ -102,5 +102,8 @@ fn read_files_with_other_readers() -> Outcome {
     steps::run(Command::new(target().join("debug/examples/sample")).arg(&sample))?;
     let mut files = find_recordings(&demo_dir());
     files.push(sample);
-    steps::run(Command::new(python).arg("tests/python/check_mcap.py").args(files))
+    steps::run(Command::new(&python).arg("tests/python/check_mcap.py").args(files))?;
+    let folder = target().join("xtask").join("navigation");
+    let programs = ["debug/hzn", "debug/examples/flight"].map(|program| target().join(program));
+    steps::run(Command::new(python).arg("tests/python/check_nav.py").args(programs).arg(folder))
 }

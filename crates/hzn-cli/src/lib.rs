@@ -9,6 +9,7 @@
 
 pub mod commands;
 pub mod exit;
+mod html;
 pub mod plot;
 mod progress;
 mod refusals;

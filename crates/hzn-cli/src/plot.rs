@@ -66,6 +66,12 @@ impl Chart {
         let size = (640, 360);
         Self { title: title.into(), x: x.into(), y: y.into(), series: Vec::new(), size }
     }
+    /// Changes width and height, in pixels.
+    #[must_use]
+    pub fn sized(mut self, size: (u32, u32)) -> Self {
+        self.size = size;
+        self
+    }
     /// Adds a series.
     #[must_use]
     pub fn with_series(mut self, series: Series) -> Self {
@@ -181,6 +187,8 @@ fn margin((low, high): (f64, f64)) -> (f64, f64) {
 fn number(v: f64) -> String {
     let digits = format!("{v:.4e}");
     let v: f64 = digits.parse().unwrap_or(v);
+    // Differences of ticks are not exact.
+    let v = if v.abs() < 1e-14 { 0.0 } else { v };
     if v != 0.0 && (v.abs() < 1e-3 || v.abs() >= 1e6) { format!("{v:e}") } else { format!("{v}") }
 }
 

@@ -228,10 +228,40 @@ fn radiances_of_ones_own() {
 fn built_in_scenes_can_be_listed_and_printed() {
     let at = tempfile::tempdir().unwrap();
     let (code, list, _) = hzn(at.path(), "1", &["simulate", "--list"]);
-    assert_eq!((code, list.lines().count()), (0, 8));
+    assert_eq!((code, list.lines().count()), (0, 9));
     for line in list.lines() {
         let name = line.split_whitespace().next().unwrap();
         let (code, text, _) = hzn(at.path(), "1", &["simulate", name, "--show"]);
         assert!(code == 0 && text.contains(&format!("name = \"{name}\"")), "{text}");
     }
+}
+
+#[test]
+fn each_camera_of_a_scene_has_a_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let camera = |name: &str, q: &str| {
+        format!(
+            "[[cameras]]\nname = \"{name}\"\nmount_error_deg = 0.5\nclock.offset_s = \
+             0.2\nmount.q_body_from_camera_wxyz = {q}\n"
+        )
+    };
+    let cameras = camera("fore", "[1, 0, 0, 0]") + &camera("aft", "[0, 0, 1, 0]");
+    // Camera aft looks the other way, so it looks away from the Earth here and there.
+    let scene = SCENE.replace("[trajectory.rocket]", &(cameras + "[trajectory.rocket]"));
+    let scene = scene.replace("[75.0, 80.0]", "[85.0, 95.0]");
+    std::fs::write(at.join("two.toml"), scene).unwrap();
+    let (code, stdout, stderr) = hzn(at, "2", &["simulate", "two.toml", "-o", "out", "-q"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("hzn run out/fore -o out/fore.csv"), "{stdout}");
+    for file in
+        ["imu.csv", "gnss.csv", "vehicle.csv", "scene.toml", "fore/sensor.toml", "aft/frames.csv", "aft/truth.csv"]
+    {
+        assert!(at.join("out").join(file).is_file(), "{file}");
+    }
+    let (code, _, stderr) = hzn(at, "2", &["run", "out/aft", "-o", "aft.csv", "-q"]);
+    assert_eq!(code, 0, "{stderr}");
+    std::fs::remove_file(at.join("out/aft/aft-00002.png")).unwrap();
+    let (code, _, stderr) = hzn(at, "2", &["simulate", "two.toml", "-o", "out", "-q", "--resume"]);
+    assert!(code == 0 && at.join("out/aft/aft-00002.png").is_file(), "{stderr}");
 }

@@ -17,6 +17,7 @@ mod drawing;
 mod errors;
 mod expected;
 mod image;
+mod nav;
 mod notebook;
 mod overlay;
 mod parameters;
@@ -39,6 +40,8 @@ mod _hzn {
     use crate::errors::{ConfigError, HznError, ImageError, panic_within};
     #[pymodule_export]
     use crate::expected::Expected;
+    #[pymodule_export]
+    use crate::nav::{Filter, celestial, fuse, triad_of, wahba_of};
     #[pymodule_export]
     use crate::overlay::overlay;
     #[pymodule_export]

@@ -248,6 +248,24 @@ impl Report {
     fn half_angle_deg(&self) -> Option<f64> {
         self.row.half_angle_deg
     }
+    #[doc = doc!("Report.axis_free")]
+    #[getter]
+    fn axis_free<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        vector(py, [self.row.axis_free_x, self.row.axis_free_y, self.row.axis_free_z])
+    }
+    #[doc = doc!("Report.covariance_free")]
+    #[getter]
+    fn covariance_free<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        let r = &self.row;
+        let (xx, xy, xz) = (r.cov_free_xx?, r.cov_free_xy?, r.cov_free_xz?);
+        let (yy, yz, zz) = (r.cov_free_yy?, r.cov_free_yz?, r.cov_free_zz?);
+        Some(arr2(&[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).to_pyarray(py))
+    }
+    #[doc = doc!("Report.axis_by_cos")]
+    #[getter]
+    fn axis_by_cos<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        vector(py, [self.row.axis_by_cos_x, self.row.axis_by_cos_y, self.row.axis_by_cos_z])
+    }
     #[doc = doc!("Report.altitude_km")]
     #[getter]
     fn altitude_km(&self) -> Option<f64> {

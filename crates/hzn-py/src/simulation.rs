@@ -32,8 +32,14 @@ pub(crate) struct Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scene, *, frames = None, seed = None))]
-    fn new(py: Python<'_>, scene: &Bound<'_, PyAny>, frames: Option<u32>, seed: Option<u64>) -> PyResult<Self> {
+    #[pyo3(signature = (scene, *, frames = None, seed = None, camera = None))]
+    fn new(
+        py: Python<'_>,
+        scene: &Bound<'_, PyAny>,
+        frames: Option<u32>,
+        seed: Option<u64>,
+        camera: Option<&str>,
+    ) -> PyResult<Self> {
         let scenario = if let Ok(name) = scene.extract::<PathBuf>() {
             scene::load(&name.to_string_lossy(), frames, seed)
         } else {
@@ -41,7 +47,10 @@ impl Simulation {
             // JSON has no dates, but the start time in a scene.toml is a date and not text.
             scene::parse(&unquoted_date(&text), Path::new("scene"), frames, seed)
         };
-        let scenario = scenario.map_err(to_exception)?;
+        let mut scenario = scenario.map_err(to_exception)?;
+        if let Some(name) = camera {
+            scenario = scenario.with_camera(name).map_err(errors::config)?;
+        }
         let flight = errors::detached(py, || scenario.flight())?.map_err(errors::config)?;
         Ok(Self { scenario, flight, sensor: PyOnceLock::new() })
     }

@@ -1,6 +1,7 @@
 //! Lists the studies in the order of the document.
 
 mod artefacts;
+mod atek;
 mod defaults;
 mod design;
 mod effects;
@@ -42,6 +43,7 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("artefacts", "False answers: artefacts instead of a limb", artefacts::campaign),
     reproduced("defaults", "Honesty with default settings", defaults::default_settings),
     reproduced("lens-from-limb", "The lens from the limb", lens::from_the_limb),
+    reproduced("atek", "Navigation: the flight of ATEK, [BB] figures 37 to 44", atek::navigation),
     reproduced("effects", "What moves the limb in the scenes", effects::switched_off_effects),
     reproduced("lost-discs", "Discs under an image circle", looks::lost_discs),
     reproduced("second-look", "One look and several", looks::second_look),

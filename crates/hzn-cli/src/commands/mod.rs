@@ -7,6 +7,7 @@ mod demo;
 mod evaluate;
 mod explain;
 mod export;
+mod fuse;
 mod info;
 mod init;
 mod lens_model;
@@ -42,6 +43,7 @@ enum Command {
     Info(info::Args),
     Export(export::Args),
     Recover(recover::Args),
+    Fuse(Box<fuse::Args>),
     Simulate(simulate::Args),
     Init(init::Args),
     Evaluate(evaluate::Args),
@@ -66,6 +68,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Info(args) => info::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Recover(args) => recover::run(&args),
+        Command::Fuse(args) => fuse::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),

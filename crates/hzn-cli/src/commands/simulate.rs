@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use hzn_core::status::Status;
 use hzn_run::{disk, explain, scene};
@@ -18,11 +18,12 @@ use crate::tell;
 /// Render a sequence of pictures with truth, and write a sensor.toml that fits it
 ///
 /// Writes pictures, frames.csv (the prior of each picture), truth.csv, scene.toml and sensor.toml, and imu.csv and
-/// gnss.csv if the scene has such instruments. The limb height and noise model in sensor.toml are measured on other
+/// gnss.csv if the scene has such instruments; vehicle.csv has the true state of the vehicle then. A scene with several
+/// cameras has a folder for each of them. The limb height and noise model in sensor.toml are measured on other
 /// pictures of the scene.
 ///
-/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble. `hzn simulate
-/// SCENE --show` prints one; change it and give it as a file.
+/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble, atek. `hzn
+/// simulate SCENE --show` prints one; change it and give it as a file.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A built-in scene, or a scene.toml
@@ -71,6 +72,43 @@ pub(super) fn run(args: &Args) -> Outcome {
     let folder = args.output.clone().unwrap_or_default();
     let text = toml::to_string(&scenario).map_err(failed)?;
     let scene_toml = folder.join("scene.toml");
+    check_folder(args, &folder, &text, &files)?;
+    // All errors of the scene are reported before anything is written.
+    let mut cameras = Vec::new();
+    for one in scenario.by_camera() {
+        let flight = one.flight().map_err(|e| scene::refused(name, &e))?;
+        let folder = if scenario.cameras.is_empty() { folder.clone() } else { folder.join(&one.name) };
+        cameras.push(Sequence { scenario: one, flight, folder });
+    }
+    std::fs::create_dir_all(&folder).map_err(|e| disk::cannot_write(&folder, &e))?;
+    write(&scene_toml, &text)?;
+    for folder in cameras.iter().map(|one| &one.folder).chain([&folder]) {
+        std::fs::create_dir_all(folder).map_err(|e| disk::cannot_write(folder, &e))?;
+        files.iter().try_for_each(|(file, bytes)| write(&folder.join(file), bytes))?;
+    }
+    instruments(&scenario, &folder)?;
+    let sensors_exist = cameras.iter().all(|one| one.folder.join("sensor.toml").exists());
+    if !(args.resume && sensors_exist) {
+        sensors(&cameras, name, args)?;
+    }
+    let stop = stop_flag();
+    for one in &cameras {
+        if !args.resume {
+            clear_rendered(&one.folder)?;
+        }
+        one.tables()?;
+        if one.pictures(args, &stop)? == Exit::Interrupted {
+            return Ok(Exit::Interrupted);
+        }
+    }
+    cameras.iter().try_for_each(Sequence::summary)?;
+    next(&cameras)?;
+    Ok(Exit::Done)
+}
+
+/// Refuses a folder that exists without `--resume` or `--force`, and a resumed one of another scene.
+fn check_folder(args: &Args, folder: &Path, text: &str, files: &[(String, Vec<u8>)]) -> Result<(), Stop> {
+    let scene_toml = folder.join("scene.toml");
     if args.resume {
         match std::fs::read_to_string(&scene_toml) {
             Ok(before) if before == text => {}
@@ -90,24 +128,14 @@ pub(super) fn run(args: &Args) -> Outcome {
         let what = "exists already; choose another folder, --resume continues it, or --force writes into it";
         return Err(usage(format!("{}: {what}", folder.display())));
     }
-    // All errors of the scene are reported before anything is written.
-    let flight = scenario.flight().map_err(|e| scene::refused(name, &e))?;
-    std::fs::create_dir_all(&folder).map_err(|e| disk::cannot_write(&folder, &e))?;
-    if !args.resume {
-        clear_rendered(&folder)?;
-    }
-    write(&scene_toml, &text)?;
-    files.iter().try_for_each(|(file, bytes)| write(&folder.join(file), bytes))?;
-    let sensor_toml = folder.join("sensor.toml");
-    if !(args.resume && sensor_toml.exists()) {
-        write(&sensor_toml, &sensor(&scenario, &flight, name, args.quiet)?)?;
-    }
-    tables(&scenario, &flight, &folder)?;
-    let end = pictures(&flight, &folder, args)?;
-    if end == Exit::Done {
-        summary(&scenario, &flight, &folder)?;
-    }
-    Ok(end)
+    Ok(())
+}
+
+/// The pictures of one camera.
+struct Sequence {
+    scenario: Scenario,
+    flight: Flight,
+    folder: PathBuf,
 }
 
 /// Returns the files that a scene names (maps, tables), with their names in the folder. The scene is changed to these
@@ -128,17 +156,26 @@ fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Stop> {
     std::fs::write(path, text).map_err(|e| disk::cannot_write(path, &e).into())
 }
 
-/// Returns the text of the sensor.toml: the values that differ from the defaults, with a measured noise model.
-fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Result<String, Stop> {
-    if !quiet {
+/// Writes the sensor.toml of every camera. All have the same lens and world, so that the noise is measured once.
+fn sensors(cameras: &[Sequence], name: &str, args: &Args) -> Result<(), Stop> {
+    let Some(first) = cameras.first() else { return Ok(()) };
+    if !args.quiet {
         tell::line(format_args!("measuring limb height and noise on other pictures of the scene ..."));
     }
-    let progress = Mutex::new(Progress::new(Some(FIT_PICTURES.into()), 0, quiet));
+    let progress = Mutex::new(Progress::new(Some(FIT_PICTURES.into()), 0, args.quiet));
     let seen = |_: usize, _: usize| progress.lock().map(|mut p| p.count([Status::Ok])).unwrap_or(());
-    let fits = Fit::measure(scenario, FIT_PICTURES, &seen).map_err(|e| scene::refused(name, &e))?;
+    let fits = Fit::measure(&first.scenario, FIT_PICTURES, &seen).map_err(|e| scene::refused(name, &e))?;
     if let Ok(p) = progress.into_inner() {
         p.finish();
     }
+    for one in cameras {
+        write(&one.folder.join("sensor.toml"), &sensor(&one.scenario, &one.flight, &fits)?)?;
+    }
+    Ok(())
+}
+
+/// Returns the text of a sensor.toml: the values that differ from the defaults, with a measured noise model.
+fn sensor(scenario: &Scenario, flight: &Flight, fits: &[Fit]) -> Result<String, Stop> {
     let mut sensor = flight.sensor.clone();
     let mut how = String::new();
     for &body in &scenario.bodies {
@@ -179,63 +216,109 @@ fn sensor(scenario: &Scenario, flight: &Flight, name: &str, quiet: bool) -> Resu
     Ok(format!("# The sensor of the simulated scene {}.\n{how}preset = \"hzn\"\n\n{table}", scenario.name))
 }
 
-/// Writes frames.csv, truth.csv, imu.csv and gnss.csv.
-fn tables(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Stop> {
-    let table = |name: &str| csv::Writer::from_path(folder.join(name)).map_err(failed);
-    let mut known = table("frames.csv")?;
-    let mut truth = table("truth.csv")?;
-    for frame in &flight.frames {
-        known.serialize(scenario.frame_row(frame)).map_err(failed)?;
-        for &kind in &scenario.bodies {
-            truth
-                .serialize(frame.scene.body_truth(kind, &frame.file, frame.time_s).map_err(failed)?)
-                .map_err(failed)?;
-        }
-    }
-    known.flush()?;
-    truth.flush()?;
+/// Makes a table in a folder.
+fn table(folder: &Path, name: &str) -> Result<csv::Writer<std::fs::File>, Stop> {
+    csv::Writer::from_path(folder.join(name)).map_err(failed)
+}
+
+/// Writes imu.csv, gnss.csv and vehicle.csv.
+fn instruments(scenario: &Scenario, folder: &Path) -> Result<(), Stop> {
     let path = scenario.path().map_err(failed)?;
-    let span = scenario.span_s();
+    let [from_s, to_s] = scenario.span_s();
     if let Some(imu) = &scenario.imu {
-        let mut rows = table("imu.csv")?;
-        imu.rows(&path, span, scenario.seed).try_for_each(|row| rows.serialize(row)).map_err(failed)?;
+        let mut rows = table(folder, "imu.csv")?;
+        imu.rows(&path, [from_s, to_s], scenario.seed).try_for_each(|row| rows.serialize(row)).map_err(failed)?;
+        rows.flush()?;
+        let mut rows = table(folder, "vehicle.csv")?;
+        let span_s = [imu.from_s.unwrap_or(from_s), to_s];
+        path.vehicle_rows(span_s, imu.rate_hz).try_for_each(|row| rows.serialize(row)).map_err(failed)?;
         rows.flush()?;
     }
     if let Some(gnss) = &scenario.gnss {
-        let mut rows = table("gnss.csv")?;
-        gnss.rows(&path, span, scenario.seed).try_for_each(|row| rows.serialize(row)).map_err(failed)?;
+        let mut rows = table(folder, "gnss.csv")?;
+        gnss.rows(&path, [from_s, to_s], scenario.seed).try_for_each(|row| rows.serialize(row)).map_err(failed)?;
         rows.flush()?;
     }
     Ok(())
 }
 
-/// Renders the missing pictures.
-fn pictures(flight: &Flight, folder: &Path, args: &Args) -> Outcome {
-    let missing: Vec<&FlightFrame> =
-        flight.frames.iter().filter(|f| !(args.resume && folder.join(&f.file).exists())).collect();
-    let before = flight.frames.len() - missing.len();
-    let stop = stop_flag();
-    let total = flight.frames.len() as u64;
-    let progress = Mutex::new(Progress::new(Some(total), before as u64, args.quiet));
-    let done = AtomicUsize::new(before);
-    missing.par_iter().try_for_each(|frame| {
-        if stop.load(Ordering::SeqCst) {
-            return Ok(());
+impl Sequence {
+    /// Writes scene.toml, frames.csv and truth.csv.
+    fn tables(&self) -> Result<(), Stop> {
+        let Self { scenario, flight, folder } = self;
+        write(&folder.join("scene.toml"), &toml::to_string(scenario).map_err(failed)?)?;
+        let mut known = table(folder, "frames.csv")?;
+        let mut truth = table(folder, "truth.csv")?;
+        for frame in &flight.frames {
+            known.serialize(scenario.frame_row(frame)).map_err(failed)?;
+            for &kind in &scenario.bodies {
+                truth
+                    .serialize(frame.scene.body_truth(kind, &frame.file, frame.time_s).map_err(failed)?)
+                    .map_err(failed)?;
+            }
         }
-        render(frame, folder)?;
-        done.fetch_add(1, Ordering::SeqCst);
-        progress.lock().map(|mut p| p.count([Status::Ok])).unwrap_or(());
-        Ok::<(), Stop>(())
-    })?;
-    if let Ok(p) = progress.into_inner() {
-        p.finish();
+        known.flush()?;
+        truth.flush()?;
+        Ok(())
     }
-    let done = done.into_inner();
-    if done < flight.frames.len() {
-        tell::line(format_args!("interrupted after {done} of {total} pictures; --resume continues"));
-        return Ok(Exit::Interrupted);
+
+    /// Renders the missing pictures.
+    fn pictures(&self, args: &Args, stop: &AtomicBool) -> Outcome {
+        let Self { flight, folder, .. } = self;
+        let missing: Vec<&FlightFrame> =
+            flight.frames.iter().filter(|f| !(args.resume && folder.join(&f.file).exists())).collect();
+        let before = flight.frames.len() - missing.len();
+        let total = flight.frames.len() as u64;
+        let progress = Mutex::new(Progress::new(Some(total), before as u64, args.quiet));
+        let done = AtomicUsize::new(before);
+        missing.par_iter().try_for_each(|frame| {
+            if stop.load(Ordering::SeqCst) {
+                return Ok(());
+            }
+            render(frame, folder)?;
+            done.fetch_add(1, Ordering::SeqCst);
+            progress.lock().map(|mut p| p.count([Status::Ok])).unwrap_or(());
+            Ok::<(), Stop>(())
+        })?;
+        if let Ok(p) = progress.into_inner() {
+            p.finish();
+        }
+        let done = done.into_inner();
+        if done < flight.frames.len() {
+            tell::line(format_args!("interrupted after {done} of {total} pictures; --resume continues"));
+            return Ok(Exit::Interrupted);
+        }
+        Ok(Exit::Done)
     }
-    Ok(Exit::Done)
+
+    /// Prints how many pictures show which body.
+    fn summary(&self) -> Result<(), Stop> {
+        let Self { scenario, flight, folder } = self;
+        let pictures = explain::counted(flight.frames.len() as u64, "picture");
+        tell::result(format_args!("{}: {pictures} of {}\n", folder.display(), scenario.name))?;
+        for &kind in &scenario.bodies {
+            let mut seen = 0;
+            let mut body = String::new();
+            for frame in &flight.frames {
+                let truth = frame.scene.body_truth(kind, &frame.file, frame.time_s).map_err(failed)?;
+                seen += usize::from(truth.has_limb());
+                body = truth.body;
+            }
+            tell::result(format_args!("  limb of the {body} in view in {seen}\n"))?;
+        }
+        Ok(())
+    }
+}
+
+/// Prints the commands that come next.
+fn next(cameras: &[Sequence]) -> Result<(), Stop> {
+    tell::result("\n")?;
+    for (i, one) in cameras.iter().enumerate() {
+        let shown = one.folder.display();
+        let begin = if i == 0 { "Next:  " } else { "       " };
+        tell::result(format_args!("{begin}hzn run {shown} -o {shown}.csv\n"))?;
+    }
+    Ok(())
 }
 
 /// Renders one picture. Its file gets its name when it is complete.
@@ -249,22 +332,4 @@ fn render(frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
     };
     saved.map_err(|e| disk::cannot_save(&path, &e))?;
     std::fs::rename(&part, &path).map_err(|e| disk::cannot_write(&path, &e).into())
-}
-
-fn summary(scenario: &Scenario, flight: &Flight, folder: &Path) -> Result<(), Stop> {
-    let shown = folder.display();
-    let pictures = explain::counted(flight.frames.len() as u64, "picture");
-    tell::result(format_args!("{shown}: {pictures} of {}\n", scenario.name))?;
-    for &kind in &scenario.bodies {
-        let mut seen = 0;
-        let mut body = String::new();
-        for frame in &flight.frames {
-            let truth = frame.scene.body_truth(kind, &frame.file, frame.time_s).map_err(failed)?;
-            seen += usize::from(truth.has_limb());
-            body = truth.body;
-        }
-        tell::result(format_args!("  limb of the {body} in view in {seen}\n"))?;
-    }
-    tell::result(format_args!("\nNext:  hzn run {shown} -o {shown}.csv\n"))?;
-    Ok(())
 }

@@ -13,6 +13,7 @@ from . import contour as contour
 from . import covariance as covariance
 from . import fit as fit
 from . import keys as keys
+from . import nav as nav
 from . import rays as rays
 from . import threshold as threshold
 from ._hzn import Calibration as Calibration

@@ -437,6 +437,21 @@ class Report:
         """Half-angle of the body from the free fit, degrees."""
 
     @property
+    def axis_free(self) -> NDArray[np.float64] | None:
+        """Axis of the fit with a free half-angle, unit vector in the camera frame, shape (3,); None if it was not fitted."""
+
+    @property
+    def covariance_free(self) -> NDArray[np.float64] | None:
+        """Covariance of `axis_free`, shape (3, 3) of rank 2, rad²: all terms except that of the expected half-angle."""
+
+    @property
+    def axis_by_cos(self) -> NDArray[np.float64] | None:
+        """Derivative of `axis` by the cosine of the expected half-angle, camera frame, shape (3,).
+
+        A wrong limb height moves this cosine in all pictures alike; a filter needs the derivative.
+        """
+
+    @property
     def altitude_km(self) -> float | None:
         """The given altitude, or the altitude of the position, kilometres."""
 
@@ -752,7 +767,12 @@ class Simulation:
     """A simulated flight, from `simulate`: a sequence of `SimulatedFrame`, each rendered when it is accessed."""
 
     def __new__(
-        cls, scene: _Path | Mapping[str, Any], *, frames: int | None = None, seed: int | None = None
+        cls,
+        scene: _Path | Mapping[str, Any],
+        *,
+        frames: int | None = None,
+        seed: int | None = None,
+        camera: str | None = None,
     ) -> Simulation: ...
     @property
     def parameters(self) -> dict[str, Any]:
@@ -899,3 +919,46 @@ def _design(
     correlation_px: float,
 ) -> dict[str, Any] | None: ...
 def _panic() -> None: ...
+
+_Three: TypeAlias = list[float]
+_Rows: TypeAlias = list[list[float]]
+_Taken: TypeAlias = tuple[list[float], list[list[float]], float, bool]
+
+def _triad(first: list[_Three], second: list[_Three]) -> _Rows | None: ...
+def _wahba(directions: list[tuple[_Three, _Three, float]]) -> tuple[_Rows, _Rows, float] | None: ...
+def _celestial(moon: bool, unix_s: float) -> _Three: ...
+def _fuse_flight(
+    recordings: list[str],
+    imu: str,
+    gnss: str,
+    attitude: str | None,
+    mounts: dict[str, _Rows],
+    clocks: dict[str, float],
+    given: dict[str, Any],
+    smooth: bool,
+    rate_hz: float,
+) -> dict[str, Any]: ...
+
+@final
+class _Filter:
+    def __new__(
+        cls,
+        time_s: float,
+        attitude: _Rows,
+        velocity: _Three,
+        position: _Three,
+        sigmas: _Three,
+        mounts: list[_Rows],
+        given: dict[str, Any],
+    ) -> _Filter: ...
+    def predict(self, time_s: float, gyro: _Three, accel: _Three, saturated: bool) -> str: ...
+    def update_direction(
+        self, camera: int, measured: _Three, reference: _Three, covariance: _Rows, by_limb_height: _Three
+    ) -> _Taken | None: ...
+    def update_position(self, position: _Three, sigma: float) -> _Taken | None: ...
+    def update_velocity(self, velocity: _Three, sigma: float) -> _Taken | None: ...
+    def update_attitude(self, attitude: _Rows, sigma: float) -> _Taken | None: ...
+    def state(self) -> tuple[float, _Rows, _Three, _Three]: ...
+    def covariance(self) -> _Rows: ...
+    def mount(self, camera: int) -> _Rows | None: ...
+    def biases(self) -> tuple[_Three, _Three]: ...

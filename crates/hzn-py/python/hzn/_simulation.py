@@ -15,7 +15,11 @@ from ._hzn import Camera, ConfigError, Report, Simulation, _design, _evaluate
 
 
 def simulate(
-    scene: str | PathLike[str] | Mapping[str, Any], *, frames: int | None = None, seed: int | None = None
+    scene: str | PathLike[str] | Mapping[str, Any],
+    *,
+    frames: int | None = None,
+    seed: int | None = None,
+    camera: str | None = None,
 ) -> Simulation:
     """Simulate a flight: pictures with exact truth, and the matching sensor.
 
@@ -23,11 +27,13 @@ def simulate(
     ----------
     scene
         A built-in scene (``rocket``, ``rocket-clean``, ``leo-infrared``, ``horace``, ``horace-wide``,
-        ``full-disc``, ``sun-moon``, ``tumble``), the path of a scene.toml, or its sections and keys as a dictionary.
+        ``full-disc``, ``sun-moon``, ``tumble``, ``atek``), the path of a scene.toml, or its sections and keys as a dictionary.
     frames
         Number of pictures; it replaces the number in the scene.
     seed
         Seed of all random numbers; it replaces the seed in the scene.
+    camera
+        Name of a camera, if the scene has several (``[[cameras]]``).
 
     Returns
     -------
@@ -45,7 +51,7 @@ def simulate(
     >>> reports = [flight.sensor.process(frame.image, **frame.known) for frame in flight]
     >>> hzn.evaluate(reports, flight)["evaluations"][0]["errors"]["rms_deg"]
     """
-    return Simulation(scene, frames=frames, seed=seed)
+    return Simulation(scene, frames=frames, seed=seed, camera=camera)
 
 
 def evaluate(

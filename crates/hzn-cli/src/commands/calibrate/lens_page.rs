@@ -6,7 +6,7 @@ use hzn_calib::board::{Calibrated, Residual, ViewResult};
 use hzn_core::camera::{Config, Equation, Intrinsic};
 
 use super::lens_text::{self, Reasons};
-use super::page::{STYLE, escape};
+use crate::html::{STYLE, escape};
 use crate::plot::{Chart, Series, Style};
 
 /// Width of the pictures of the frame, in pixels of the page.

@@ -3,13 +3,8 @@
 use hzn_calib::noise::Calibration;
 
 use super::text;
+use crate::html::{STYLE, escape};
 use crate::plot::{Chart, Series, Style};
-
-pub(super) const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;padding:0 \
-                     1rem;color:#222}\
-h1{font-size:1.5rem}td{padding:.2rem .8rem;border-bottom:1px solid #eee}\
-.plots{display:grid;gap:1rem;grid-template-columns:repeat(auto-fit,minmax(420px,1fr))}.plots \
-svg{width:100%;height:auto}";
 
 /// Returns a page with a title, lines of name and value, and plots.
 pub(super) fn simple(title: &str, lines: &[(String, String)], charts: &[Chart]) -> anyhow::Result<String> {
@@ -66,8 +61,4 @@ fn correlation(calibration: &Calibration) -> Chart {
     Chart::new("Correlation of the residuals along the limb", "distance [px]", "correlation")
         .with_series(Series::new("model, before three parameters are fitted", Style::Ideal, model))
         .with_series(Series::new("residuals", Style::Line, calibration.correlation.iter().copied()))
-}
-
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

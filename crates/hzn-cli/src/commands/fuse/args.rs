@@ -1,0 +1,89 @@
+//! The arguments of `hzn fuse`.
+
+use std::path::PathBuf;
+
+use hzn_fuse::input::Inputs;
+
+/// Fuse the results of `hzn run` with inertial unit and receiver: attitude and position with covariance
+///
+/// The filter of a flight computer runs over a recorded flight. It begins with the first attitude from two directions,
+/// for example limb and Sun, or from a star tracker. fuse.toml says what the filter estimates, considers or leaves out;
+/// `--show-config` prints it with all defaults.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Results of `hzn run` of one camera (.mcap, .csv, .jsonl); once for each camera. The name of a camera is that of
+    /// its file without the ending
+    #[arg(long, value_name = "FILE", required_unless_present = "show_config")]
+    pub(super) nadir: Vec<PathBuf>,
+    /// Samples of the inertial unit: time_s, gyro_{x,y,z}_radps, accel_{x,y,z}_mps2, saturated
+    #[arg(long, value_name = "CSV", required_unless_present = "show_config")]
+    pub(super) imu: Option<PathBuf>,
+    /// Fixes of the receiver: time_s, x_m, y_m, z_m, vx_mps, vy_mps, vz_mps, position_sigma_m, velocity_sigma_mps
+    #[arg(long, value_name = "CSV", required_unless_present = "show_config")]
+    pub(super) gnss: Option<PathBuf>,
+    /// Attitudes of a star tracker: time_s, qw, qx, qy, qz (body to ECEF), sigma_deg
+    #[arg(long, value_name = "CSV")]
+    pub(super) attitude: Option<PathBuf>,
+    /// The mount of a camera, instead of that in its recording: a TOML file with the table [mount]
+    #[arg(long, value_name = "CAMERA=FILE", value_parser = pair)]
+    pub(super) mount: Vec<(String, String)>,
+    /// Seconds to add to the times of a camera, if its clock has another epoch than the inertial unit
+    #[arg(long, value_name = "CAMERA=SECONDS", value_parser = pair, allow_hyphen_values = true)]
+    pub(super) clock: Vec<(String, String)>,
+    /// Settings of the filter: a fuse.toml
+    #[arg(long, value_name = "FILE")]
+    pub(super) config: Option<PathBuf>,
+    /// The results: .mcap for Foxglove, or .csv with NAME.innovations.csv next to it
+    #[arg(short, long, value_name = "FILE", required_unless_present = "show_config")]
+    pub(super) output: Option<PathBuf>,
+    /// A report with plots, as one page of HTML
+    #[arg(long, value_name = "HTML")]
+    pub(super) report: Option<PathBuf>,
+    /// The attitude as a CCSDS attitude ephemeris message; it needs --utc
+    #[arg(long, value_name = "FILE", requires = "utc")]
+    pub(super) aem: Option<PathBuf>,
+    /// The attitude as a SPICE CK of type 3 (FILE.bc), with FILE.tsc and FILE.tf next to it; it needs --utc
+    #[arg(long, value_name = "FILE", requires = "utc")]
+    pub(super) ck: Option<PathBuf>,
+    /// UTC of time 0 of the inertial unit, for example 2019-06-13T04:00:00Z
+    #[arg(long, value_name = "TIME")]
+    pub(super) utc: Option<String>,
+    /// Name of the vehicle in the AEM
+    #[arg(long, value_name = "NAME", default_value = "VEHICLE")]
+    pub(super) object: String,
+    /// SPICE's number of the vehicle in the CK
+    #[arg(long, value_name = "NUMBER", default_value_t = -999, allow_hyphen_values = true)]
+    pub(super) spacecraft: i32,
+    /// A frames.csv with the attitude of a camera, for a second `hzn run --frames`
+    #[arg(long, value_name = "CAMERA=FILE", value_parser = pair)]
+    pub(super) write_frames: Vec<(String, String)>,
+    /// Also smooth: the solution at every measurement from all measurements, also later ones
+    #[arg(long)]
+    pub(super) smooth: bool,
+    /// Most solutions a second in the results
+    #[arg(long, value_name = "HZ", default_value_t = 10.0)]
+    pub(super) rate: f64,
+    /// Compare with the truth of `hzn simulate`: its vehicle.csv
+    #[arg(long, value_name = "CSV")]
+    pub(super) truth: Option<PathBuf>,
+    /// Replace outputs that exist
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Print a fuse.toml with all defaults and do nothing else
+    #[arg(long)]
+    pub(super) show_config: bool,
+}
+
+/// Parses NAME=VALUE.
+fn pair(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.is_empty() && !value.is_empty() => Ok((name.to_owned(), value.to_owned())),
+        _ => Err("CAMERA=VALUE is expected".into()),
+    }
+}
+
+/// Returns the names of the cameras in words.
+pub(super) fn names(inputs: &Inputs) -> String {
+    let names: Vec<&str> = inputs.recordings.iter().map(|r| r.name.as_str()).collect();
+    format!("the cameras are {}", names.join(", "))
+}

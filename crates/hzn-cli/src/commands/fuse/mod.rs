@@ -1,0 +1,87 @@
+//! `hzn fuse`: attitude and position from horizon sensors, Sun, inertial unit and receiver.
+
+mod args;
+mod output;
+mod page;
+mod summary;
+
+use std::path::Path;
+
+use hzn_fuse::flight::Wanted;
+use hzn_fuse::input::{self, Inputs};
+use hzn_fuse::{Settings, truth};
+
+use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::tell;
+pub(super) use args::Args;
+use args::names;
+use output::Outputs;
+
+impl From<hzn_fuse::Error> for Stop {
+    fn from(error: hzn_fuse::Error) -> Self {
+        let exit = match error {
+            hzn_fuse::Error::Unusable(_) => Exit::Usage,
+            hzn_fuse::Error::Failed(_) => Exit::Failed,
+        };
+        Self { exit, error: error.into() }
+    }
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    if args.show_config {
+        tell::result(toml::to_string(&Settings::default()).map_err(crate::exit::failed)?)?;
+        return Ok(Exit::Done);
+    }
+    let settings = args.config.as_deref().map_or_else(|| Ok(Settings::default()), Settings::load)?;
+    if !(args.rate > 0.0) {
+        return Err(usage(format!("--rate {}: must be above 0", args.rate)));
+    }
+    let outputs = Outputs::new(args)?;
+    let inputs = inputs(args)?;
+    let unknown = settings.cameras.keys().find(|name| inputs.recordings.iter().all(|r| r.name != **name));
+    if let Some(name) = unknown {
+        return Err(usage(format!("[cameras.{name}]: there is no recording of this name; {}", names(&inputs))));
+    }
+    let truth = args.truth.as_deref().map(truth::read).transpose()?;
+    let wanted = Wanted { smoothed: args.smooth, rate_hz: Some(args.rate) };
+    let fused = hzn_fuse::fuse(&inputs, &settings, wanted)?;
+    if let Some(warning) = outputs.leap_seconds(&fused) {
+        tell::line(format_args!("note: {warning}"));
+    }
+    let written = outputs.write(&fused, &inputs, &settings)?;
+    summary::print(&fused, truth.as_deref())?;
+    tell::result(format_args!("\n{}\n", written.join("\n")))?;
+    Ok(Exit::Done)
+}
+
+/// Reads all inputs.
+fn inputs(args: &Args) -> Result<Inputs, Stop> {
+    let mut inputs = Inputs::default();
+    for path in &args.nadir {
+        inputs.recordings.push(input::recording(path)?);
+    }
+    let known = names(&inputs);
+    for (name, file) in &args.mount {
+        let found = inputs.recordings.iter_mut().find(|r| r.name == *name);
+        let recording = found.ok_or_else(|| usage(format!("--mount {name}: no such camera; {known}")))?;
+        recording.mount = Some(input::mount(Path::new(file))?);
+    }
+    for (name, seconds) in &args.clock {
+        let found = inputs.recordings.iter_mut().find(|r| r.name == *name);
+        let recording = found.ok_or_else(|| usage(format!("--clock {name}: no such camera; {known}")))?;
+        recording.clock_offset_s = match seconds.parse::<f64>() {
+            Ok(offset) if offset.is_finite() => offset,
+            _ => return Err(usage(format!("--clock {name}={seconds}: a number of seconds is expected"))),
+        };
+    }
+    if let Some(path) = &args.imu {
+        inputs.imu = input::imu(path)?;
+    }
+    if let Some(path) = &args.gnss {
+        inputs.gnss = input::gnss(path)?;
+    }
+    if let Some(path) = &args.attitude {
+        inputs.attitudes = input::attitudes(path)?;
+    }
+    Ok(inputs)
+}

@@ -1,0 +1,110 @@
+//! The files that `hzn fuse` writes.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use hzn_fuse::input::Inputs;
+use hzn_fuse::sink::{self, AemOptions, CkOptions, Utc};
+use hzn_fuse::{Fused, Settings};
+use hzn_nav::time::are_leap_seconds_known;
+use hzn_run::disk;
+
+use super::args::{Args, names};
+use super::page;
+use crate::exit::{Stop, failed, usage};
+
+/// The files that are written.
+pub(super) struct Outputs<'a> {
+    args: &'a Args,
+    results: PathBuf,
+    utc: Option<Utc>,
+}
+
+impl<'a> Outputs<'a> {
+    /// Chooses the files, and refuses those that exist.
+    pub(super) fn new(args: &'a Args) -> Result<Self, Stop> {
+        let results = args.output.clone().unwrap_or_default();
+        let outputs = Self { args, results, utc: args.utc.as_deref().map(Utc::parse).transpose()? };
+        if !matches!(outputs.ending().as_str(), "csv" | "mcap") {
+            return Err(usage(format!("{}: .mcap or .csv is expected", outputs.results.display())));
+        }
+        for path in outputs.all() {
+            if path.exists() && !args.force {
+                return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
+            }
+        }
+        Ok(outputs)
+    }
+
+    fn ending(&self) -> String {
+        self.results.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+    }
+
+    /// Returns the table of the innovations, next to the CSV of the solutions.
+    fn innovations(&self) -> PathBuf {
+        self.results.with_extension("innovations.csv")
+    }
+
+    /// Returns every file that will be written.
+    fn all(&self) -> Vec<PathBuf> {
+        let args = self.args;
+        let mut all = vec![self.results.clone()];
+        if self.ending() == "csv" {
+            all.push(self.innovations());
+        }
+        all.extend([&args.report, &args.aem].into_iter().flatten().cloned());
+        if let Some(ck) = &args.ck {
+            all.extend([ck.clone(), ck.with_extension("tsc"), ck.with_extension("tf")]);
+        }
+        all.extend(args.write_frames.iter().map(|(_, file)| PathBuf::from(file)));
+        all
+    }
+
+    /// Returns a warning if the UTC of the flight is later than the list of leap seconds.
+    pub(super) fn leap_seconds(&self, fused: &Fused) -> Option<String> {
+        let end_s = fused.epochs.last().map(|e| e.state.time_s)?;
+        let unix_s = self.utc?.unix_s + end_s;
+        (!are_leap_seconds_known(unix_s)).then(|| {
+            "the flight is later than 2026-06-28, when the list of leap seconds of this version expires; a leap second \
+             after that day is not known, and would shift the clock kernel by a second"
+                .to_owned()
+        })
+    }
+
+    /// Writes everything, and returns the names of the files.
+    pub(super) fn write(&self, fused: &Fused, inputs: &Inputs, settings: &Settings) -> Result<Vec<String>, Stop> {
+        let args = self.args;
+        let settings_toml = toml::to_string(settings).map_err(failed)?;
+        if self.ending() == "mcap" {
+            sink::write_mcap(fused, &settings_toml, &self.results)?;
+        } else {
+            sink::write_states(fused, create(&self.results)?)?;
+            sink::write_innovations(fused, create(&self.innovations())?)?;
+        }
+        if let Some(path) = &args.report {
+            let page = page::html(fused, &self.results.display().to_string())?;
+            std::fs::write(path, page).map_err(|e| Stop::from(disk::cannot_write(path, &e)))?;
+        }
+        if let (Some(path), Some(utc)) = (&args.aem, self.utc) {
+            let created = Utc::now().iso(0.0);
+            let object_name = args.object.clone();
+            let options = AemOptions { utc, object_id: object_name.clone(), object_name, created };
+            sink::write_aem(fused, &options, create(path)?)?;
+        }
+        if let (Some(path), Some(utc)) = (&args.ck, self.utc) {
+            sink::write_ck(fused, &CkOptions { utc, spacecraft: args.spacecraft }, path)?;
+        }
+        for (camera, file) in &args.write_frames {
+            let found = inputs.recordings.iter().find(|r| r.name == *camera);
+            let recording =
+                found.ok_or_else(|| usage(format!("--write-frames {camera}: no such camera; {}", names(inputs))))?;
+            sink::write_frames(fused, recording, self.utc, create(Path::new(file))?)?;
+        }
+        Ok(self.all().iter().map(|path| path.display().to_string()).collect())
+    }
+}
+
+fn create(path: &Path) -> Result<BufWriter<File>, Stop> {
+    File::create(path).map(BufWriter::new).map_err(|e| Stop::from(disk::cannot_write(path, &e)))
+}

@@ -1,0 +1,151 @@
+//! What `hzn fuse` prints.
+
+use std::collections::BTreeMap;
+
+use hzn_fuse::Fused;
+use hzn_fuse::results::{Counts, Epoch, Kind};
+use hzn_fuse::truth::{self, Miss};
+use hzn_sim::trajectory::VehicleRow;
+
+use crate::exit::Stop;
+use crate::tell;
+
+/// Prints what happened.
+pub(super) fn print(fused: &Fused, truth: Option<&[VehicleRow]>) -> Result<(), Stop> {
+    for (name, value) in lines(fused, truth) {
+        tell::result(format_args!("{name:<22} {value}\n"))?;
+    }
+    for note in &fused.notes {
+        tell::line(format_args!("note: {note}"));
+    }
+    Ok(())
+}
+
+/// Returns what happened: names and values.
+pub(super) fn lines(fused: &Fused, truth: Option<&[VehicleRow]>) -> Vec<(String, String)> {
+    let mut out = Vec::new();
+    let mut line = |name: &str, value: String| out.push((name.to_owned(), value));
+    if let (Some(begin), Some(last)) = (fused.begin, fused.epochs.last()) {
+        let from = match begin.directions {
+            0 => "an attitude of the star tracker".to_owned(),
+            n => format!("{n} directions"),
+        };
+        line("start", format!("{:.2} s, from {from}", begin.time_s));
+        line("end", format!("{:.2} s", last.state.time_s));
+        line("attitude, 3 sigma", format!("{} deg at the end, about x, y, z of the vehicle", three(last)));
+        for (name, camera) in fused.cameras.iter().zip(&last.cameras) {
+            let [a, b] = [camera.misalignment_rad, camera.misalignment_sigma_rad].map(|v| v.map(f64::to_degrees));
+            line(
+                &format!("mount of {name}"),
+                format!(
+                    "{:+.3} {:+.3} {:+.3} deg, 3 sigma {:.3} {:.3} {:.3}",
+                    a.x,
+                    a.y,
+                    a.z,
+                    3.0 * b.x,
+                    3.0 * b.y,
+                    3.0 * b.z
+                ),
+            );
+            if camera.clock_sigma_s > 0.0 {
+                line(
+                    &format!("clock of {name}"),
+                    format!("{:+.3} s, 3 sigma {:.3}", camera.clock_s, 3.0 * camera.clock_sigma_s),
+                );
+            }
+        }
+    }
+    for (name, Tally { taken, refused, nis, freedom }) in tallies(fused) {
+        let mean = nis / taken.max(1) as f64;
+        line(
+            &name,
+            format!(
+                "{taken} taken, {refused} refused; squared innovation over its covariance {mean:.2} (ideal {freedom})"
+            ),
+        );
+    }
+    for (name, value) in counts(&fused.counts) {
+        line(name, value);
+    }
+    if let Some(truth) = truth {
+        for (name, epochs) in [("filter", &fused.epochs), ("smoother", &fused.smoothed)] {
+            let misses = truth::compare(epochs, truth);
+            if let Some(text) = errors(&misses) {
+                line(&format!("error of the {name}"), text);
+            }
+        }
+    }
+    out
+}
+
+fn three(epoch: &Epoch) -> String {
+    let sigma = epoch.attitude_sigma_rad().map(|s| 3.0 * s.to_degrees());
+    format!("{:.3} {:.3} {:.3}", sigma.x, sigma.y, sigma.z)
+}
+
+/// What became of the measurements of one source.
+#[derive(Default)]
+struct Tally {
+    taken: usize,
+    refused: usize,
+    /// Sum of the squares of the innovations over their covariance, of the taken ones.
+    nis: f64,
+    /// Numbers in an innovation: the ideal mean of those squares.
+    freedom: usize,
+}
+
+/// Returns the name and the tally of each source.
+fn tallies(fused: &Fused) -> Vec<(String, Tally)> {
+    let mut all: BTreeMap<(Option<usize>, Kind), Tally> = BTreeMap::new();
+    for i in &fused.innovations {
+        let tally = all.entry((i.camera, i.kind)).or_default();
+        tally.taken += usize::from(i.taken);
+        tally.refused += usize::from(!i.taken);
+        tally.nis += if i.taken { i.nis } else { 0.0 };
+        tally.freedom = i.value.len();
+    }
+    let name = |camera: Option<usize>, kind: Kind| match camera.and_then(|c| fused.cameras.get(c)) {
+        Some(camera) => format!("{camera}, {}", kind.name()),
+        None => kind.name().to_owned(),
+    };
+    all.into_iter().map(|((camera, kind), tally)| (name(camera, kind), tally)).collect()
+}
+
+fn counts(counts: &Counts) -> Vec<(&'static str, String)> {
+    let all = [
+        ("samples", counts.samples),
+        ("  not finite", counts.samples_not_finite),
+        ("  duplicate", counts.samples_duplicate),
+        ("  out of order", counts.samples_out_of_order),
+        ("  gaps before them", counts.gaps),
+        ("  saturated", counts.saturated),
+        ("before the start", counts.before_start),
+        ("outside the samples", counts.outside),
+        ("not usable", counts.unusable),
+        ("without a reference", counts.without_reference),
+        ("while unknown", counts.waiting),
+        ("new starts", counts.restarts),
+    ];
+    let shown = all.into_iter().filter(|(name, count)| *count > 0 || *name == "samples");
+    shown.map(|(name, count)| (name, count.to_string())).collect()
+}
+
+/// Returns the errors against the truth in words.
+fn errors(misses: &[Miss]) -> Option<String> {
+    let n = misses.len() as f64;
+    if misses.is_empty() {
+        return None;
+    }
+    let rms = |axis: usize| (misses.iter().map(|m| m.attitude_rad[axis].powi(2)).sum::<f64>() / n).sqrt().to_degrees();
+    let nees = misses.iter().map(|m| m.nees).sum::<f64>() / n;
+    let worst = misses.iter().map(|m| m.attitude_rad.norm()).fold(0.0, f64::max).to_degrees();
+    let last = misses.last()?.attitude_rad.norm().to_degrees();
+    let position = (misses.iter().map(|m| m.position_m.norm_squared()).sum::<f64>() / n).sqrt();
+    Some(format!(
+        "{:.3} {:.3} {:.3} deg RMS, largest {worst:.3}, at the end {last:.3}; NEES {nees:.2} (ideal 3); position \
+         {position:.1} m",
+        rms(0),
+        rms(1),
+        rms(2)
+    ))
+}

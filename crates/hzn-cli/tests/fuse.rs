@@ -1,0 +1,123 @@
+//! `hzn fuse`, from beginning to end through the binary, on a flight without pictures.
+
+use std::path::Path;
+
+use hzn_fuse::simulated::{Errors, Moment, inputs, write};
+use hzn_sim::Scenario;
+use nalgebra::{Matrix3, Vector3};
+
+/// Directions without errors that claim 0.05°.
+struct Exact;
+
+impl Errors for Exact {
+    fn draw(&mut self, _: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+        (Vector3::zeros(), (Matrix3::identity() - axis * axis.transpose()) * 0.05f64.to_radians().powi(2))
+    }
+    fn by_limb_height(&mut self, _: &Moment, _: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::zeros()
+    }
+}
+
+fn flight(folder: &Path) {
+    let mut scene = Scenario::builtin("atek").unwrap();
+    scene.capture.frames = 75;
+    write(&scene, &inputs(&scene, &mut Exact, 0.0).unwrap(), folder).unwrap();
+}
+
+/// Runs `hzn fuse` in a folder with these arguments after the two cameras.
+fn fuse(folder: &Path, args: &[&str]) -> (i32, String, String) {
+    let cameras = ["--nadir", "left.csv", "--nadir", "right.csv", "--imu", "imu.csv", "--gnss", "gnss.csv"];
+    let out = assert_cmd::Command::cargo_bin("hzn")
+        .expect("the binary is built")
+        .current_dir(folder)
+        .arg("fuse")
+        .args(cameras)
+        .args(args)
+        .output()
+        .expect("hzn starts");
+    let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+    (out.status.code().unwrap_or(-1), text(&out.stdout), text(&out.stderr))
+}
+
+const MOUNTS: [&str; 4] = ["--mount", "left=left.toml", "--mount", "right=right.toml"];
+
+#[test]
+fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    flight(at);
+    let more = ["--truth", "vehicle.csv", "--smooth", "--report", "nav.html", "--utc", "2019-06-13T04:00:00Z"];
+    let files = ["-o", "nav.csv", "--aem", "nav.aem", "--ck", "nav.bc", "--write-frames", "left=left-frames.csv"];
+    let args = [&MOUNTS[..], &more, &files].concat();
+    let (code, stdout, stderr) = fuse(at, &args);
+    assert_eq!(code, 0, "{stderr}");
+    for text in ["mount of left", "clock of right", "error of the filter", "error of the smoother", "nav.tsc"] {
+        assert!(stdout.contains(text), "{text} in {stdout}");
+    }
+    let read = |name: &str| std::fs::read_to_string(at.join(name)).unwrap();
+    assert!(read("nav.csv").starts_with("time_s,phase,qw,qx,qy,qz,sigma_x_deg"));
+    assert!(read("nav.innovations.csv").lines().count() > 500);
+    assert!(read("nav.html").contains("Mount of left") && !read("nav.html").contains("NaN"));
+    assert!(read("nav.aem").contains("ATTITUDE_DIR = A2B") && read("nav.tf").contains("HZN_BODY"));
+    let frames = read("left-frames.csv");
+    let with_attitude = frames.lines().filter(|line| !line.ends_with(",,,")).count();
+    assert!((50..75).contains(&with_attitude), "{with_attitude} of {}", frames.lines().count());
+    // Nothing is replaced without --force.
+    let (code, _, stderr) = fuse(at, &args);
+    assert!(code == 2 && stderr.contains("nav.csv: exists already; --force"), "{stderr}");
+    let (code, _, stderr) = fuse(at, &[&MOUNTS[..], &["-o", "nav.mcap"]].concat());
+    assert!(code == 0 && at.join("nav.mcap").is_file() && !at.join("nav.mcap.part").exists(), "{stderr}");
+}
+
+#[test]
+fn wrong_inputs_are_refused_in_words() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    flight(at);
+    let refused = |args: &[&str]| {
+        let (code, _, stderr) = fuse(at, &[args, &["-o", "nav.csv"]].concat());
+        assert!(code == 2 && !at.join("nav.csv").exists(), "{stderr}");
+        stderr
+    };
+    assert!(refused(&[]).contains("left: nobody says how the camera is mounted; give --mount left=FILE"));
+    let mirror = "[mount]\nbody_from_camera = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]\n";
+    std::fs::write(at.join("mirror.toml"), mirror).unwrap();
+    let text = refused(&["--mount", "left=mirror.toml", "--mount", "right=right.toml"]);
+    assert!(
+        text.contains("mirror.toml: [mount] body_from_camera: the determinant is -1, so the matrix mirrors"),
+        "{text}"
+    );
+    let text = refused(&["--mount", "left=left.toml", "--mount", "right=left.toml"]);
+    assert!(text.contains("left and right have the same mount"), "{text}");
+    let text = refused(&["--mount", "middle=left.toml"]);
+    assert!(text.contains("--mount middle: no such camera; the cameras are left, right"), "{text}");
+    let text = refused(&[&MOUNTS[..], &["--clock", "left=1000000"]].concat());
+    assert!(text.contains("left: its times 10000") && text.contains("--clock left=SECONDS"), "{text}");
+    std::fs::write(at.join("f.toml"), "[imu]\ngyro_bias_deg_h = { mode = \"estimated\", sigma = -1 }\n").unwrap();
+    let text = refused(&[&MOUNTS[..], &["--config", "f.toml"]].concat());
+    assert!(text.contains("f.toml:2") && text.contains("gyro_bias_deg_h") && text.contains("0 or more"), "{text}");
+    std::fs::write(at.join("f.toml"), "[cameras.lefft]\nwhite_rad = 0.001\n").unwrap();
+    let text = refused(&[&MOUNTS[..], &["--config", "f.toml"]].concat());
+    assert!(text.contains("[cameras.lefft]: there is no recording of this name"), "{text}");
+    std::fs::write(at.join("imu.csv"), "time_s,gyro_x_radps\n0,1\n").unwrap();
+    let text = refused(&MOUNTS);
+    assert!(text.contains("imu.csv: the column gyro_y_radps is missing; the file has time_s, gyro_x_radps"), "{text}");
+    std::fs::write(at.join("gnss.csv"), "time_s,x_m,y_m,z_m\n0,1,2,three\n").unwrap();
+    let (_, _, text) = fuse(at, &[&MOUNTS[..], &["-o", "nav.csv"]].concat());
+    assert!(text.contains("imu.csv"), "{text}");
+}
+
+#[test]
+fn settings_are_printed_with_their_defaults_and_read_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = assert_cmd::Command::cargo_bin("hzn").unwrap().args(["fuse", "--show-config"]).output().unwrap();
+    let text = String::from_utf8(out.stdout).unwrap();
+    assert!(text.contains("gyro_scale_ppm") && text.contains("slow_error_time_s = 20.0"), "{text}");
+    flight(dir.path());
+    std::fs::write(dir.path().join("fuse.toml"), text).unwrap();
+    let (code, _, stderr) = fuse(dir.path(), &[&MOUNTS[..], &["--config", "fuse.toml", "-o", "a.csv"]].concat());
+    assert_eq!(code, 0, "{stderr}");
+    assert_eq!(fuse(dir.path(), &[&MOUNTS[..], &["-o", "b.csv"]].concat()).0, 0);
+    let read = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
+    assert!(read("a.csv") == read("b.csv"), "the printed defaults are the defaults");
+}

@@ -1,0 +1,30 @@
+//! The reasons why a flight cannot be fused.
+
+/// An error, in words that name the file, the line or the key.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// An input cannot be used. Nothing was written.
+    #[error("{0}")]
+    Unusable(String),
+    /// Something failed, for example a disk.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl Error {
+    pub(crate) fn unusable(message: impl std::fmt::Display) -> Self {
+        Self::Unusable(message.to_string())
+    }
+    pub(crate) fn failed(message: impl std::fmt::Display) -> Self {
+        Self::Failed(message.to_string())
+    }
+}
+
+impl From<hzn_run::Error> for Error {
+    fn from(error: hzn_run::Error) -> Self {
+        match error.kind() {
+            hzn_run::Kind::Unusable => Self::unusable(error),
+            hzn_run::Kind::Failed => Self::failed(error),
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Samples and measurements in the order of time.
+
+use crate::error::Error;
+use crate::input::{Inputs, Sample};
+use crate::results::Counts;
+
+/// A measurement, by its place in the inputs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Event {
+    /// Time by the clock of the inertial unit, s.
+    pub(super) time_s: f64,
+    pub(super) source: Source,
+}
+
+/// The source of a measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    /// A direction: the number of the recording, and its place there.
+    Camera(usize, usize),
+    /// A fix of the receiver.
+    Gnss(usize),
+    /// An attitude of the star tracker.
+    Attitude(usize),
+}
+
+/// Returns the samples whose numbers are finite and whose times rise, and counts the others.
+pub(super) fn clean(samples: &[Sample], max_step_s: f64, counts: &mut Counts) -> Vec<Sample> {
+    let mut out: Vec<Sample> = Vec::with_capacity(samples.len());
+    counts.samples = samples.len();
+    for sample in samples {
+        if !sample.imu.is_finite() {
+            counts.samples_not_finite += 1;
+            continue;
+        }
+        if let Some(last) = out.last() {
+            let dt = sample.imu.time_s - last.imu.time_s;
+            if !(dt > 0.0) {
+                *(if dt == 0.0 { &mut counts.samples_duplicate } else { &mut counts.samples_out_of_order }) += 1;
+                continue;
+            }
+            counts.gaps += usize::from(dt > max_step_s);
+        }
+        counts.saturated += usize::from(sample.saturated);
+        out.push(*sample);
+    }
+    out
+}
+
+/// Returns all measurements in the order of time.
+pub(super) fn events(
+    inputs: &Inputs,
+    [from_s, to_s]: [f64; 2],
+    counts: &mut Counts,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Event>, Error> {
+    let mut all: Vec<Event> = Vec::new();
+    let mut add = |name: &str, events: Vec<Event>, notes: &mut Vec<String>| {
+        let (total, times) = (events.len(), events.iter().map(|e| e.time_s).filter(|t| t.is_finite()));
+        let (first, last) =
+            times.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b): (f64, f64), t| (a.min(t), b.max(t)));
+        counts.unusable += events.iter().filter(|e| !e.time_s.is_finite()).count();
+        let inside: Vec<Event> = events.into_iter().filter(|e| (from_s..=to_s).contains(&e.time_s)).collect();
+        counts.outside += total - inside.len();
+        if inside.is_empty() && total > 0 {
+            return Err(Error::unusable(format!(
+                "{name}: its times {first:.3} to {last:.3} s lie outside those of the inertial unit, {from_s:.3} to \
+                 {to_s:.3} s. If the clock has another epoch, give the difference: --clock {name}=SECONDS (it is added)"
+            )));
+        }
+        if inside.len() < total {
+            notes.push(format!(
+                "{} of {total} measurements of {name} lie outside the time of the inertial unit and are not used",
+                total - inside.len()
+            ));
+        }
+        all.extend(inside);
+        Ok(())
+    };
+    for (number, one) in inputs.recordings.iter().enumerate() {
+        let event = |(i, seen): (usize, &crate::input::Seen)| Event {
+            time_s: seen.time_s + one.clock_offset_s,
+            source: Source::Camera(number, i),
+        };
+        add(&one.name, one.seen.iter().enumerate().map(event).collect(), notes)?;
+    }
+    let gnss = inputs.gnss.iter().enumerate();
+    add("gnss", gnss.map(|(i, fix)| Event { time_s: fix.time_s, source: Source::Gnss(i) }).collect(), notes)?;
+    let attitudes = inputs.attitudes.iter().enumerate();
+    let attitudes = attitudes.map(|(i, a)| Event { time_s: a.time_s, source: Source::Attitude(i) });
+    add("attitude", attitudes.collect(), notes)?;
+    all.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    Ok(all)
+}

@@ -1,0 +1,169 @@
+//! The state at the start: an attitude from directions or a star tracker, position and velocity from the receiver.
+
+use hzn_nav::options::CameraOptions;
+use hzn_nav::strapdown::Nominal;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use super::data::Flight;
+use super::events::Source;
+use super::reference::limb_axis;
+use crate::error::Error;
+use crate::input::{Body, Fix, Seen};
+use crate::results::Begin;
+use crate::settings::Settings;
+use crate::start::{DeadReckoning, Sight, Sighted, attitude};
+
+/// Longest time from a fix to the start, s.
+const FIX_S: f64 = 5.0;
+
+/// The state at the start.
+pub(super) struct Found {
+    pub(super) state: Nominal,
+    pub(super) covariance_rad2: Matrix3<f64>,
+    pub(super) position_sigma_m: f64,
+    pub(super) velocity_sigma_m_s: f64,
+    pub(super) begin: Begin,
+}
+
+/// Looks for the first attitude: a star tracker's, or that of the directions in a window.
+pub(super) fn first_attitude(
+    flight: &Flight<'_>,
+    settings: &Settings,
+    cameras: &[CameraOptions],
+    reckoning: &DeadReckoning,
+) -> Result<Found, Error> {
+    let mut sights: Vec<Sight> = Vec::new();
+    let mut bodies: Vec<Body> = Vec::new();
+    let mut contradicts = false;
+    for event in flight.events {
+        let Some(fix) = fix_near(&flight.inputs.gnss, event.time_s) else { continue };
+        let found = match event.source {
+            Source::Gnss(_) => None,
+            Source::Attitude(index) => {
+                let seen = flight.inputs.attitudes.get(index);
+                seen.and_then(|a| Some((a.body_to_ecef?, Matrix3::identity() * a.sigma_rad.powi(2), 0, 0.0)))
+            }
+            Source::Camera(camera, index) => {
+                let seen = flight.inputs.recordings.get(camera).and_then(|r| r.seen.get(index));
+                let sight = seen.and_then(|seen| {
+                    let options = cameras.get(camera)?;
+                    let reference = seen.reference.or_else(|| limb_axis(seen.body, &fix.position_m))?;
+                    let sigma_rad = sight_sigma(seen, Some(options));
+                    let on_vehicle = options.mount * seen.axis;
+                    Some(Sight { time_s: event.time_s, camera, body: seen.body, on_vehicle, reference, sigma_rad })
+                });
+                let Some(sight) = sight.filter(|s| s.on_vehicle.iter().all(|x| x.is_finite())) else { continue };
+                if !bodies.contains(&sight.body) {
+                    bodies.push(sight.body);
+                }
+                sights.retain(|s| s.time_s > event.time_s - settings.start.window_s);
+                sights.push(sight);
+                match without_one_camera(&sights, reckoning) {
+                    Sighted::Attitude(w, count) => Some((w.attitude, w.covariance_rad2, count, w.chi2)),
+                    Sighted::Contradiction => {
+                        contradicts = true;
+                        None
+                    }
+                    Sighted::Nothing => None,
+                }
+            }
+        };
+        let Some((attitude, covariance_rad2, directions, chi2)) = found else { continue };
+        let begin = Begin { time_s: event.time_s, directions, chi2 };
+        return Ok(found_at(begin, attitude, covariance_rad2, &fix, settings));
+    }
+    Err(no_attitude(&bodies, contradicts, settings))
+}
+
+/// Says why there is no first attitude.
+fn no_attitude(bodies: &[Body], contradicts: bool, settings: &Settings) -> Error {
+    if contradicts {
+        return Error::unusable(
+            "no first attitude: the directions contradict each other by more than their sigmas. Are the mounts right \
+             (also their signs), the clocks, and the UTC that the recordings were made with?",
+        );
+    }
+    let seen = bodies.iter().map(|b| b.name()).collect::<Vec<_>>().join(" and ");
+    let seen =
+        if seen.is_empty() { "no direction at a time with a position".to_owned() } else { format!("only {seen}") };
+    Error::unusable(format!(
+        "no first attitude: within {} s the recordings have {seen}. Two directions are needed, for example limb and \
+         Sun (bodies = [\"earth\", \"sun\"] in sensor.toml), or a star tracker (--attitude FILE); a longer window is \
+         [start] window_s in fuse.toml",
+        settings.start.window_s
+    ))
+}
+
+/// Returns the state at the start, with position and velocity of a fix near it.
+fn found_at(
+    begin: Begin,
+    attitude: UnitQuaternion<f64>,
+    covariance_rad2: Matrix3<f64>,
+    fix: &Fix,
+    settings: &Settings,
+) -> Found {
+    let dt = begin.time_s - fix.time_s;
+    let [position, velocity] = sigmas(fix, settings);
+    let moved = if fix.velocity_m_s.iter().all(|x| x.is_finite()) { fix.velocity_m_s } else { Vector3::zeros() };
+    let state =
+        Nominal { time_s: begin.time_s, attitude, velocity_m_s: moved, position_m: fix.position_m + moved * dt };
+    // The vehicle may accelerate by 10 g in between.
+    let g = 100.0;
+    Found {
+        state,
+        covariance_rad2,
+        position_sigma_m: position.hypot(0.5 * g * dt * dt),
+        velocity_sigma_m_s: velocity.hypot(g * dt.abs()),
+        begin,
+    }
+}
+
+/// Returns the attitude of all sights; if they contradict each other, that of all but one camera's.
+fn without_one_camera(sights: &[Sight], reckoning: &DeadReckoning) -> Sighted {
+    let all = attitude(sights, reckoning);
+    if !matches!(all, Sighted::Contradiction) {
+        return all;
+    }
+    for camera in 0..hzn_nav::layout::MAX_CAMERAS {
+        let rest: Vec<Sight> = sights.iter().copied().filter(|s| s.camera != camera).collect();
+        let is_other = rest.len() < sights.len();
+        if let (true, found @ Sighted::Attitude(..)) = (is_other, attitude(&rest, reckoning)) {
+            return found;
+        }
+    }
+    all
+}
+
+/// Returns the fix that is nearest to a time and agrees with a neighbour.
+fn fix_near(fixes: &[Fix], time_s: f64) -> Option<Fix> {
+    let agrees = |a: &Fix, b: &Fix| {
+        let dt = b.time_s - a.time_s;
+        let velocity = if a.velocity_m_s.iter().all(|x| x.is_finite()) { a.velocity_m_s } else { Vector3::zeros() };
+        let slack = if velocity == Vector3::zeros() { 1e4 * dt.abs() } else { 60.0 * dt * dt };
+        (a.position_m + velocity * dt - b.position_m).norm() < 200.0 + slack
+    };
+    let is_usable = |i: usize, fix: &Fix| {
+        let neighbours = [i.checked_sub(1), Some(i + 1)].into_iter().flatten().filter_map(|j| fixes.get(j));
+        fix.position_m.iter().all(|x| x.is_finite()) && neighbours.into_iter().any(|other| agrees(fix, other))
+    };
+    let near = fixes.iter().enumerate().filter(|(_, fix)| (fix.time_s - time_s).abs() <= FIX_S);
+    let usable = near.filter(|(i, fix)| is_usable(*i, fix)).map(|(_, fix)| *fix);
+    usable.min_by(|a, b| (a.time_s - time_s).abs().total_cmp(&(b.time_s - time_s).abs()))
+}
+
+/// Returns the sigmas of a fix: its own, else those of the settings.
+pub(super) fn sigmas(fix: &Fix, settings: &Settings) -> [f64; 2] {
+    let or = |own: f64, default: f64| if own > 0.0 && own.is_finite() { own } else { default };
+    [
+        or(fix.position_sigma_m, settings.gnss.position_sigma_m),
+        or(fix.velocity_sigma_m_s, settings.gnss.velocity_sigma_mps),
+    ]
+}
+
+/// Returns the 1-sigma of a direction on the vehicle, with the errors of mount and limb height.
+pub(super) fn sight_sigma(seen: &Seen, camera: Option<&CameraOptions>) -> f64 {
+    let own = seen.covariance_rad2.symmetric_eigenvalues().max().max(0.0).sqrt();
+    let (mount, white) = camera.map_or((0.0, 0.0), |c| (c.misalignment.sigma, c.white_rad));
+    // The limb height is known to some kilometres.
+    own.hypot(seen.by_limb_height.norm() * 7.0).hypot(mount).hypot(white)
+}

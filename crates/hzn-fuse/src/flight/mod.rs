@@ -1,0 +1,172 @@
+//! The replay of a flight.
+
+mod data;
+mod events;
+mod first;
+mod reference;
+mod runner;
+
+use hzn_nav::layout::MAX_CAMERAS;
+use nalgebra::UnitQuaternion;
+
+use crate::error::Error;
+use crate::input::{Inputs, Recording};
+use crate::results::{Counts, Fused, Kind};
+use crate::settings::{ErrorSetting, Settings, Treatment};
+use crate::smooth::{MAX_EPOCHS, smooth};
+use data::Flight;
+use events::{clean, events};
+use runner::Runner;
+
+pub(crate) use reference::limb_axis;
+
+/// Most components of the error: the vehicle's 28, and 7 of each camera.
+const STATES: usize = 28 + 7 * MAX_CAMERAS;
+
+/// Smallest angle between two mounts that count as different, rad.
+const SAME_MOUNT_RAD: f64 = 1e-4;
+
+/// What a replay makes besides the solution.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Wanted {
+    /// The smoothed solution.
+    pub smoothed: bool,
+    /// Most solutions a second; `None` for one at each sample.
+    pub rate_hz: Option<f64>,
+}
+
+/// Fuses everything that a flight recorded.
+///
+/// # Errors
+/// An input is missing or contradicts another one, no two directions give a first attitude, or there are more
+/// measurements than a smoother can keep.
+pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fused, Error> {
+    let mounts = mounts(&inputs.recordings)?;
+    let mut counts = Counts::default();
+    let samples = clean(&inputs.imu, settings.imu.max_step_s, &mut counts);
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
+        return Err(Error::unusable("the inertial unit has no finite sample"));
+    };
+    let span_s = [first.imu.time_s, last.imu.time_s];
+    let mut notes = Vec::new();
+    let events = events(inputs, span_s, &mut counts, &mut notes)?;
+    let flight = Flight { inputs, mounts: &mounts, samples: &samples, events: &events };
+    let mut fused = Runner::<STATES>::new(&flight, settings, false)?.run(wanted.rate_hz)?.0;
+    if wanted.smoothed {
+        if events.len() > MAX_EPOCHS {
+            let what = "measurements, more than a smoother can keep";
+            return Err(Error::unusable(format!("{} {what} ({MAX_EPOCHS}); leave the smoother out", events.len())));
+        }
+        let all = estimate_all(settings);
+        let (_, recorded) = Runner::<STATES>::new(&flight, &all, true)?.run(wanted.rate_hz)?;
+        fused.smoothed = smooth(&recorded);
+    }
+    fused.back = flight.back(&fused);
+    fused.cameras = inputs.recordings.iter().map(|r| r.name.clone()).collect();
+    counts.before_start = fused.counts.before_start;
+    counts.restarts = fused.counts.restarts;
+    counts.waiting = fused.counts.waiting;
+    counts.without_reference = fused.counts.without_reference;
+    counts.unusable += fused.counts.unusable;
+    fused.counts = counts;
+    notes.append(&mut fused.notes);
+    fused.notes = notes;
+    fused.notes.extend(doubts(&fused));
+    Ok(fused)
+}
+
+/// Returns the mounts of all recordings.
+fn mounts(recordings: &[Recording]) -> Result<Vec<UnitQuaternion<f64>>, Error> {
+    if recordings.len() > MAX_CAMERAS {
+        let what = "recordings of cameras; the filter has memory for";
+        return Err(Error::unusable(format!("{} {what} {MAX_CAMERAS}", recordings.len())));
+    }
+    let mut mounts: Vec<UnitQuaternion<f64>> = Vec::new();
+    for (i, one) in recordings.iter().enumerate() {
+        let name = &one.name;
+        let Some(mount) = one.mount else {
+            let what = "nobody says how the camera is mounted; give --mount";
+            return Err(Error::unusable(format!("{name}: {what} {name}=FILE, a TOML file with the table [mount]")));
+        };
+        for (other, known) in recordings.iter().zip(&mounts) {
+            if other.name == *name {
+                return Err(Error::unusable(format!("{name}: two recordings have this name; rename one of the files")));
+            }
+            if known.angle_to(&mount) < SAME_MOUNT_RAD && overlap(other, one) {
+                let what =
+                    "have the same mount, but took pictures at the same time: two cameras cannot. Correct one with";
+                return Err(Error::unusable(format!("{} and {name} {what} --mount {name}=FILE", other.name)));
+            }
+        }
+        debug_assert_eq!(i, mounts.len());
+        mounts.push(mount);
+    }
+    Ok(mounts)
+}
+
+/// Returns whether two recordings cover a common time.
+fn overlap(a: &Recording, b: &Recording) -> bool {
+    let span = |r: &Recording| {
+        let times = || r.seen.iter().map(|s| s.time_s + r.clock_offset_s);
+        (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max))
+    };
+    let ((a0, a1), (b0, b1)) = (span(a), span(b));
+    a0 < b1 && b0 < a1
+}
+
+/// Returns the settings with every considered error estimated instead.
+fn estimate_all(settings: &Settings) -> Settings {
+    let mut all = settings.clone();
+    let estimate = |error: &mut ErrorSetting| {
+        if error.mode == Treatment::Considered {
+            error.mode = Treatment::Estimated;
+        }
+    };
+    let imu = &mut all.imu;
+    for error in [
+        &mut imu.accel_bias_mg,
+        &mut imu.accel_scale_ppm,
+        &mut imu.accel_misalignment_mrad,
+        &mut imu.gyro_bias_deg_h,
+        &mut imu.gyro_scale_ppm,
+        &mut imu.gyro_misalignment_mrad,
+    ] {
+        estimate(error);
+    }
+    for camera in all.cameras.values_mut().chain([&mut all.camera]) {
+        estimate(&mut camera.misalignment_deg);
+        estimate(&mut camera.clock_s);
+        if camera.slow_error == Treatment::Considered {
+            camera.slow_error = Treatment::Estimated;
+        }
+    }
+    if all.limb_height.mode == Treatment::Considered {
+        all.limb_height.mode = Treatment::Estimated;
+    }
+    all
+}
+
+/// Returns notes about sources that the filter refuses almost always.
+fn doubts(fused: &Fused) -> Vec<String> {
+    let mut notes = Vec::new();
+    let share = |of: &dyn Fn(&crate::results::Innovation) -> bool| {
+        let all = fused.innovations.iter().filter(|i| of(i)).count();
+        let refused = fused.innovations.iter().filter(|i| of(i) && !i.taken).count();
+        (refused * 2 > all && all >= 5).then_some((refused, all))
+    };
+    for (camera, name) in fused.cameras.iter().enumerate() {
+        if let Some((refused, all)) = share(&|i| i.camera == Some(camera)) {
+            notes.push(format!(
+                "{refused} of {all} directions of {name} were refused: are its mount (also its sign), its clock and \
+                 its lens right?"
+            ));
+        }
+    }
+    if let Some((refused, all)) = share(&|i| matches!(i.kind, Kind::Position | Kind::Velocity)) {
+        notes.push(format!(
+            "{refused} of {all} positions and velocities were refused: is their clock that of the inertial unit? GPS \
+             time is ahead of UTC by whole leap seconds"
+        ));
+    }
+    notes
+}

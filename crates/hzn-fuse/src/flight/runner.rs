@@ -1,0 +1,342 @@
+//! The filter over the samples and measurements of a flight.
+
+use hzn_nav::filter::{DirectionMeasurement, Filter};
+use hzn_nav::layout::Layout;
+use hzn_nav::options::{CameraOptions, StartSigmas};
+use hzn_nav::strapdown::{Imu, Nominal};
+use hzn_nav::vectors::{Direction, triad};
+use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
+
+use super::data::Flight;
+use super::events::{Event, Source};
+use super::first::{first_attitude, sight_sigma, sigmas};
+use super::reference::limb_axis;
+use crate::error::Error;
+use crate::input::{Body, Sample, Seen};
+use crate::results::{Begin, Epoch, Fused, Innovation, Kind, Triad};
+use crate::settings::{Limb, Settings};
+use crate::smooth::Recorded;
+use crate::start::{DeadReckoning, Sight, Sighted, attitude};
+
+/// Longest time between limb and Sun for a pair without the filter, s.
+const PAIR_S: f64 = 0.6;
+/// Fewest directions to one body in a row whose refusal shows that the attitude is lost.
+const FEWEST_REFUSED: usize = 5;
+/// 1-sigma of the attitude above which directions are not taken one by one, rad (15°).
+const LARGE_RAD: f64 = 0.26;
+
+/// A filter on its way through a flight.
+pub(super) struct Runner<'a, const N: usize> {
+    flight: Flight<'a>,
+    settings: &'a Settings,
+    cameras: Vec<CameraOptions>,
+    filter: Filter<N>,
+    begin: Begin,
+    reckoning: DeadReckoning,
+    /// The strapdown solution without any aid.
+    unaided: Nominal,
+    last: Option<Imu>,
+    /// The last sights, for a new start.
+    sights: Vec<Sight>,
+    /// Directions since the last (new) start: their body, and whether the gate took them.
+    verdicts: Vec<(Body, bool)>,
+    record: bool,
+    recorded: Vec<Recorded<N>>,
+    transition: SMatrix<f64, N, N>,
+    begins: bool,
+    out: Fused,
+}
+
+impl<'a, const N: usize> Runner<'a, N> {
+    /// Finds the first attitude and makes a filter there.
+    pub(super) fn new(flight: &Flight<'a>, settings: &'a Settings, record: bool) -> Result<Self, Error> {
+        let recordings = &flight.inputs.recordings;
+        let cameras: Vec<CameraOptions> =
+            recordings.iter().zip(flight.mounts).map(|(r, mount)| settings.camera_options(&r.name, *mount)).collect();
+        let reckoning = DeadReckoning::new(flight.samples);
+        let found = first_attitude(flight, settings, &cameras, &reckoning)?;
+        let limb_sigma_km = recordings.iter().filter_map(|r| r.limb_sigma_km).reduce(f64::max);
+        let sigmas = StartSigmas {
+            attitude_rad: settings.start.attitude_deg.to_radians(),
+            velocity_m_s: found.velocity_sigma_m_s,
+            position_m: found.position_sigma_m,
+        };
+        let mut filter = Filter::<N>::new(found.state, &settings.options(limb_sigma_km, sigmas), &cameras)
+            .map_err(Error::unusable)?;
+        let least = Matrix3::identity() * sigmas.attitude_rad.powi(2);
+        filter.set_attitude(&found.state.attitude, &(found.covariance_rad2 + least));
+        Ok(Self {
+            flight: *flight,
+            settings,
+            cameras,
+            unaided: found.state,
+            filter,
+            begin: found.begin,
+            reckoning,
+            last: None,
+            sights: Vec::new(),
+            verdicts: Vec::new(),
+            record,
+            recorded: Vec::new(),
+            transition: SMatrix::identity(),
+            begins: true,
+            out: Fused::default(),
+        })
+    }
+
+    /// Runs to the end.
+    pub(super) fn run(mut self, rate_hz: Option<f64>) -> Result<(Fused, Vec<Recorded<N>>), Error> {
+        let (samples, events) = (self.flight.samples, self.flight.events);
+        let begin_s = self.begin.time_s;
+        let first = samples.partition_point(|s| s.imu.time_s <= begin_s);
+        let mut pending = events.iter().skip_while(|e| e.time_s <= begin_s).peekable();
+        self.out.counts.before_start = events.iter().filter(|e| e.time_s <= begin_s).count();
+        // The sample at the start lies between two samples.
+        let around = |i: usize| samples.get(i).copied();
+        if let Some(before) = first.checked_sub(1).and_then(around) {
+            let at = around(first).map_or(before.imu, |after| mix(&before.imu, &after.imu, begin_s));
+            self.predict(&Imu { time_s: begin_s, ..at }, before.saturated);
+        }
+        self.push_epoch();
+        let mut due_s = begin_s;
+        for sample in samples.iter().skip(first) {
+            while let Some(event) = pending.next_if(|e| e.time_s <= sample.imu.time_s) {
+                self.advance(sample, event.time_s);
+                self.measure(event);
+            }
+            self.advance(sample, sample.imu.time_s);
+            if rate_hz.is_none_or(|hz| sample.imu.time_s >= due_s + 1.0 / hz - 1e-6) {
+                due_s = sample.imu.time_s;
+                self.push_epoch();
+            }
+        }
+        self.out.begin = Some(self.begin);
+        Ok((self.out, self.recorded))
+    }
+
+    /// Moves the filter to a time up to that of the next sample.
+    fn advance(&mut self, next: &Sample, time_s: f64) {
+        let imu = match self.last {
+            Some(last) if time_s <= last.time_s => return,
+            Some(last) if time_s < next.imu.time_s => mix(&last, &next.imu, time_s),
+            _ => next.imu,
+        };
+        self.predict(&imu, next.saturated);
+    }
+
+    fn predict(&mut self, imu: &Imu, saturated: bool) {
+        if self.record {
+            self.filter.predict_recorded(imu, saturated, &mut self.transition);
+        } else {
+            self.filter.predict(imu, saturated);
+        }
+        if let Some(last) = self.last {
+            self.unaided = self.unaided.step(&last, imu);
+        }
+        self.last = Some(*imu);
+    }
+
+    fn push_epoch(&mut self) {
+        self.out.epochs.push(Epoch::of(&self.filter, Some(self.unaided.attitude)));
+    }
+
+    /// Takes a measurement at the time of the filter.
+    fn measure(&mut self, event: &Event) {
+        if let (true, Some((_, measurement))) = (self.record, self.direction(event)) {
+            // The covariance before the update already has the slow error of this direction.
+            let _ = self.filter.prepare_direction(&measurement, &mut self.transition);
+        }
+        let before = self.record.then(|| self.filter.clone());
+        let is_used = match event.source {
+            Source::Camera(camera, index) => self.measure_camera(event, camera, index),
+            Source::Gnss(index) => self.measure_fix(event.time_s, index),
+            Source::Attitude(index) => self.measure_attitude(event.time_s, index),
+        };
+        if !is_used {
+            self.out.counts.unusable += 1;
+        }
+        if let Some(before) = before {
+            self.recorded.push(Recorded {
+                before,
+                after: self.filter.clone(),
+                transition: self.transition,
+                begins: self.begins,
+                unaided: Some(self.unaided.attitude),
+            });
+            self.transition = SMatrix::identity();
+            self.begins = false;
+        }
+    }
+
+    /// Returns the direction of an event, and how the filter takes it; `None` for a source without a direction.
+    fn direction(&self, event: &Event) -> Option<(Seen, DirectionMeasurement)> {
+        let Source::Camera(camera, index) = event.source else { return None };
+        let recording = self.flight.inputs.recordings.get(camera)?;
+        let seen = *recording.seen.get(index)?;
+        if seen.centre.is_some() && self.settings.camera(&recording.name).limb == Limb::Position {
+            return None;
+        }
+        let measurement = DirectionMeasurement {
+            camera,
+            measured: seen.axis,
+            reference: seen.reference.or_else(|| limb_axis(seen.body, &self.filter.nominal().position_m))?,
+            covariance_rad2: seen.covariance_rad2,
+            by_limb_height: seen.by_limb_height,
+        };
+        Some((seen, measurement))
+    }
+
+    fn measure_camera(&mut self, event: &Event, camera: usize, index: usize) -> bool {
+        let time_s = event.time_s;
+        let Some((seen, measurement)) = self.direction(event) else {
+            return self.measure_centre(time_s, camera, index);
+        };
+        let reference = measurement.reference;
+        if !measurement.is_finite() {
+            return false;
+        }
+        let told = self.cameras.get(camera).map_or_else(UnitQuaternion::identity, |c| c.mount);
+        let mount = self.filter.camera(camera).map_or(told, |c| c.mount);
+        let angle = (self.filter.nominal().attitude * mount * seen.axis).angle(&reference);
+        let unaided = (self.unaided.attitude * told * seen.axis).angle(&reference);
+        let sigma_rad = sight_sigma(&seen, self.cameras.get(camera));
+        let sight = Sight { time_s, camera, body: seen.body, on_vehicle: mount * seen.axis, reference, sigma_rad };
+        self.pair(&sight);
+        self.sights.push(sight);
+        self.sights.retain(|s| s.time_s > time_s - self.settings.start.window_s);
+        if self.is_attitude_unknown() {
+            // The equations of the update hold for small angles; they would spoil the mounts.
+            self.out.counts.waiting += 1;
+            self.begin_again(time_s, "the attitude was not known any more");
+            return true;
+        }
+        let Some(done) = self.filter.update_direction(&measurement) else { return false };
+        self.keep(time_s, Some(camera), Kind::Direction(seen.body), &done);
+        if let Some(innovation) = self.out.innovations.last_mut() {
+            innovation.angle_rad = Some(angle);
+            innovation.unaided_rad = Some(unaided);
+            innovation.sensor_sigma_rad = Some(seen.covariance_rad2.symmetric_eigenvalues().max().max(0.0).sqrt());
+        }
+        self.verdicts.push((seen.body, done.taken));
+        self.restart_if_lost(time_s, seen.body);
+        true
+    }
+
+    /// Returns whether the attitude is less well known than the filter's equations can take.
+    fn is_attitude_unknown(&self) -> bool {
+        self.filter.sigmas(Layout::ATTITUDE).max() > LARGE_RAD
+    }
+
+    /// Takes the position of the body's centre.
+    fn measure_centre(&mut self, time_s: f64, camera: usize, index: usize) -> bool {
+        let seen = self.flight.inputs.recordings.get(camera).and_then(|r| r.seen.get(index));
+        let Some(centre) = seen.and_then(|seen| seen.centre) else {
+            self.out.counts.without_reference += 1;
+            return true;
+        };
+        let Some(done) = self.filter.update_centre(camera, &centre.position_m, &centre.covariance_m2) else {
+            return false;
+        };
+        self.keep(time_s, Some(camera), Kind::Centre, &done);
+        true
+    }
+
+    /// Makes an attitude of two directions at almost one time, without the filter.
+    fn pair(&mut self, sight: &Sight) {
+        let other = self.sights.iter().rev().find(|s| s.body != sight.body && sight.time_s - s.time_s < PAIR_S);
+        let Some(other) = other else { return };
+        let earlier = self.reckoning.at(sight.time_s).inverse() * self.reckoning.at(other.time_s);
+        let direction =
+            |s: &Sight, body: Vector3<f64>| Direction { body, reference: s.reference, sigma_rad: s.sigma_rad };
+        let mut both = [direction(sight, sight.on_vehicle), direction(other, earlier * other.on_vehicle)];
+        both.sort_by(|a, b| a.sigma_rad.total_cmp(&b.sigma_rad));
+        let [first, second] = both;
+        if let Some(attitude) = triad(&first, &second) {
+            let angle_rad = attitude.angle_to(&self.filter.nominal().attitude);
+            let unaided_rad = attitude.angle_to(&self.unaided.attitude);
+            self.out.triads.push(Triad { time_s: sight.time_s, attitude, angle_rad, unaided_rad });
+        }
+    }
+
+    /// Begins again if the gate refuses almost everything, or every direction to one body. A false first attitude can
+    /// agree with all limbs: only the Sun shows then that the third axis is wrong.
+    fn restart_if_lost(&mut self, time_s: f64, body: Body) {
+        let many = self.settings.restart_after as usize;
+        if let Some(recent) = self.verdicts.len().checked_sub(many).and_then(|from| self.verdicts.get(from..)) {
+            let refused = recent.iter().filter(|(_, taken)| !*taken).count();
+            if refused * 5 >= many * 4 {
+                return self.begin_again(time_s, &format!("{refused} of {many} directions were refused"));
+            }
+        }
+        let own = || self.verdicts.iter().rev().filter(|(b, _)| *b == body);
+        let in_a_row = own().take_while(|(_, taken)| !taken).count();
+        // The more often this body confirmed the attitude, the more it takes to give the attitude up.
+        let confirmed = own().filter(|(_, taken)| *taken).count();
+        if in_a_row >= confirmed.clamp(FEWEST_REFUSED, many.max(FEWEST_REFUSED)) {
+            self.begin_again(time_s, &format!("{in_a_row} directions in a row to the {} were refused", body.name()));
+        }
+    }
+
+    /// Begins again with the attitude of the last directions, if they determine one and agree on it.
+    fn begin_again(&mut self, time_s: f64, why: &str) {
+        let Sighted::Attitude(wahba, _) = attitude(&self.sights, &self.reckoning) else { return };
+        let least = Matrix3::identity() * self.settings.start.attitude_deg.to_radians().powi(2);
+        self.filter.set_attitude(&wahba.attitude, &(wahba.covariance_rad2 + least));
+        self.verdicts.clear();
+        self.begins = true;
+        self.out.counts.restarts += 1;
+        self.out.notes.push(format!("at {time_s:.1} s the filter began again: {why}"));
+    }
+
+    fn measure_fix(&mut self, time_s: f64, index: usize) -> bool {
+        let Some(fix) = self.flight.inputs.gnss.get(index) else { return false };
+        let [position_sigma, velocity_sigma] = sigmas(fix, self.settings);
+        let Some(done) = self.filter.update_position(&fix.position_m, position_sigma) else { return false };
+        self.keep(time_s, None, Kind::Position, &done);
+        if fix.velocity_m_s.iter().all(|x| x.is_finite())
+            && let Some(done) = self.filter.update_velocity(&fix.velocity_m_s, velocity_sigma)
+        {
+            self.keep(time_s, None, Kind::Velocity, &done);
+        }
+        true
+    }
+
+    fn measure_attitude(&mut self, time_s: f64, index: usize) -> bool {
+        let Some(seen) = self.flight.inputs.attitudes.get(index) else { return false };
+        let Some(attitude) = seen.body_to_ecef else { return false };
+        let Some(done) = self.filter.update_attitude(&attitude, seen.sigma_rad) else { return false };
+        self.keep(time_s, None, Kind::Attitude, &done);
+        true
+    }
+
+    fn keep<const M: usize>(
+        &mut self,
+        time_s: f64,
+        camera: Option<usize>,
+        kind: Kind,
+        done: &hzn_nav::filter::Innovation<M>,
+    ) {
+        self.out.innovations.push(Innovation {
+            time_s,
+            camera,
+            kind,
+            value: done.value.iter().copied().collect(),
+            sigma: done.covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect(),
+            nis: done.nis,
+            taken: done.taken,
+            angle_rad: None,
+            unaided_rad: None,
+            sensor_sigma_rad: None,
+        });
+    }
+}
+
+/// Returns the sample at a time between two samples.
+fn mix(from: &Imu, to: &Imu, time_s: f64) -> Imu {
+    let part = (time_s - from.time_s) / (to.time_s - from.time_s);
+    Imu {
+        time_s,
+        gyro_rad_s: from.gyro_rad_s + (to.gyro_rad_s - from.gyro_rad_s) * part,
+        accel_m_s2: from.accel_m_s2 + (to.accel_m_s2 - from.accel_m_s2) * part,
+    }
+}

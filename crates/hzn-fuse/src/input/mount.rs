@@ -1,0 +1,67 @@
+//! The mount of a camera on the vehicle.
+
+use std::path::Path;
+
+use hzn_core::config::Mount;
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
+use serde::Deserialize;
+
+use crate::error::Error;
+
+/// Largest error of a matrix that counts as a rotation.
+const TOLERANCE: f64 = 1e-3;
+
+/// A file with a mount: the table `[mount]`, other tables are ignored.
+#[derive(Debug, Deserialize)]
+struct File {
+    mount: Table,
+}
+
+/// `[mount]`: a quaternion, as in sensor.toml, or a matrix.
+#[derive(Debug, Deserialize)]
+struct Table {
+    q_body_from_camera_wxyz: Option<[f64; 4]>,
+    /// Rows of the rotation from the camera to the body frame.
+    body_from_camera: Option<[[f64; 3]; 3]>,
+}
+
+/// Reads the mount (camera to body) from the table `[mount]` of a TOML file: `q_body_from_camera_wxyz`, or
+/// `body_from_camera` as a matrix with its rows.
+///
+/// # Errors
+/// The file cannot be read, has no such table, or the numbers are not a rotation.
+pub fn mount(path: &Path) -> Result<UnitQuaternion<f64>, Error> {
+    let shown = path.display();
+    let text = std::fs::read_to_string(path).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
+    let file: File = toml::from_str(&text).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
+    let refuse = |what: String| Error::unusable(format!("{shown}: [mount] {what}"));
+    match (file.mount.q_body_from_camera_wxyz, file.mount.body_from_camera) {
+        (Some(wxyz), None) => of_quaternion(wxyz).map_err(refuse),
+        (None, Some(rows)) => of_matrix(rows).map_err(refuse),
+        _ => Err(refuse("must have either q_body_from_camera_wxyz or body_from_camera".into())),
+    }
+}
+
+/// Returns the mount of a sensor.toml.
+pub(super) fn of_config(mount: Mount) -> Result<UnitQuaternion<f64>, String> {
+    of_quaternion(mount.q_body_from_camera_wxyz)
+}
+
+fn of_quaternion([w, x, y, z]: [f64; 4]) -> Result<UnitQuaternion<f64>, String> {
+    let q = Quaternion::new(w, x, y, z);
+    if (q.norm() - 1.0).abs() < 0.01 {
+        return Ok(UnitQuaternion::from_quaternion(q));
+    }
+    Err(format!("q_body_from_camera_wxyz: the length is {:.4}, but must be 1", q.norm()))
+}
+
+fn of_matrix(rows: [[f64; 3]; 3]) -> Result<UnitQuaternion<f64>, String> {
+    let m = Matrix3::from_fn(|i, j| rows[i][j]);
+    if !((m * m.transpose() - Matrix3::identity()).amax() < TOLERANCE) {
+        return Err("body_from_camera: the rows must be perpendicular unit vectors".into());
+    }
+    if m.determinant() < 0.0 {
+        return Err("body_from_camera: the determinant is -1, so the matrix mirrors; check the sign of one axis".into());
+    }
+    Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m)))
+}

@@ -1,0 +1,223 @@
+//! The results of `hzn run` of one camera.
+
+use std::path::Path;
+
+use hzn_core::status::Status;
+use hzn_core::{Config, camera};
+use hzn_mcap::Row;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use super::mount;
+use crate::error::Error;
+
+/// A body that a camera sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Body {
+    /// The axis of the Earth's limb.
+    Limb,
+    /// The Sun.
+    Sun,
+    /// The Moon.
+    Moon,
+}
+
+impl Body {
+    /// Returns the word for messages and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Limb => "limb",
+            Self::Sun => "sun",
+            Self::Moon => "moon",
+        }
+    }
+}
+
+/// The position of a body's centre.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Centre {
+    /// Position in the camera frame, m.
+    pub position_m: Vector3<f64>,
+    /// Its covariance, m².
+    pub covariance_m2: Matrix3<f64>,
+}
+
+/// A direction that a camera measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Time by the clock of the recording, s.
+    pub time_s: f64,
+    /// The body.
+    pub body: Body,
+    /// Unit vector in the camera frame.
+    pub axis: Vector3<f64>,
+    /// Its covariance without the error of the limb height, rad².
+    pub covariance_rad2: Matrix3<f64>,
+    /// The same direction in ECEF, if the recording has it.
+    pub reference: Option<Vector3<f64>>,
+    /// Derivative of the axis by the error of the limb height, 1/km (camera frame).
+    pub by_limb_height: Vector3<f64>,
+    /// The position of the body's centre, if the recording has it.
+    pub centre: Option<Centre>,
+    /// Index of the row in the recording.
+    pub row: usize,
+}
+
+/// A recording.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    /// Name of the camera: that of the file without its ending.
+    pub name: String,
+    /// The mount (camera to body); `None` if the recording does not have it.
+    pub mount: Option<UnitQuaternion<f64>>,
+    /// The lens, if the recording has a sensor.toml.
+    pub camera: Option<camera::Config>,
+    /// 1-sigma of the limb height that the sensor was told, km.
+    pub limb_sigma_km: Option<f64>,
+    /// Seconds that are added to the times of the recording to get those of the inertial unit.
+    pub clock_offset_s: f64,
+    /// The directions, in the order of the recording.
+    pub seen: Vec<Seen>,
+    /// All rows, for frames.csv.
+    pub rows: Vec<Row>,
+    /// Rows with an answer that are not used, because they have no time.
+    pub without_time: usize,
+    /// Rows with an answer that are not used, because nobody knows where their body is.
+    pub other_bodies: usize,
+}
+
+/// Reads a recording of `hzn run`: .mcap, .csv or .jsonl.
+///
+/// # Errors
+/// The file is not a recording, or its mount is not a rotation.
+pub fn recording(path: &Path) -> Result<Recording, Error> {
+    let (rows, sensor_toml) = hzn_run::results::read(path)?;
+    let config = match &sensor_toml {
+        None => None,
+        Some(text) => Some(hzn_calib::sensor::parse(text, Path::new("sensor.toml")).map_err(Error::unusable)?.config),
+    };
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let shown = path.display();
+    let recording =
+        Recording::new(name, rows, config.as_ref()).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
+    if recording.seen.is_empty() && recording.without_time > 0 {
+        let what = "no picture has a time; a filter needs one: give the sequence a frames.csv with times";
+        return Err(Error::unusable(format!("{shown}: {what}")));
+    }
+    Ok(recording)
+}
+
+impl Recording {
+    /// Makes a recording from the rows of a camera, with the sensor.toml that they were made with, if it is known.
+    ///
+    /// # Errors
+    /// The mount is not a rotation.
+    pub fn new(name: String, rows: Vec<Row>, config: Option<&Config>) -> Result<Self, Error> {
+        let told = config.and_then(|c| c.mount).map(mount::of_config).transpose();
+        let mount = told.map_err(|e| Error::unusable(format!("sensor.toml: [mount] {e}")))?;
+        let limb_sigma_km = config.map(|c| {
+            let bodies = c.each_body().iter().filter(|b| is_earth(b.kind.name()));
+            bodies.map(|b| b.limb_height_sigma_km).fold(0.0, f64::max)
+        });
+        let mut recording = Self {
+            name,
+            mount,
+            camera: config.map(|c| c.camera.clone()),
+            limb_sigma_km,
+            clock_offset_s: 0.0,
+            seen: Vec::new(),
+            rows: Vec::new(),
+            without_time: 0,
+            other_bodies: 0,
+        };
+        for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.status == Status::Ok) {
+            let body = match row.body.as_str() {
+                "sun" => Body::Sun,
+                "moon" => Body::Moon,
+                name if is_earth(name) => Body::Limb,
+                _ => {
+                    recording.other_bodies += 1;
+                    continue;
+                }
+            };
+            let Some(time_s) = row.time_s else {
+                recording.without_time += 1;
+                continue;
+            };
+            recording.seen.extend(seen(row, index, time_s, body, limb_sigma_km));
+        }
+        recording.rows = rows;
+        Ok(recording)
+    }
+}
+
+fn is_earth(name: &str) -> bool {
+    name.starts_with("earth")
+}
+
+/// Returns the direction of a row; `None` if a number is missing.
+fn seen(row: &Row, index: usize, time_s: f64, body: Body, limb_sigma_km: Option<f64>) -> Option<Seen> {
+    let axis = Vector3::from(row.axis()?);
+    let symmetric = |[xx, xy, xz, yy, yz, zz]: [f64; 6]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    let cov = [row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?];
+    let three = |x: [Option<f64>; 3]| Some(Vector3::new(x[0]?, x[1]?, x[2]?));
+    let mut seen = Seen {
+        time_s,
+        body,
+        axis,
+        covariance_rad2: symmetric(cov),
+        reference: three([row.axis_e_x, row.axis_e_y, row.axis_e_z]),
+        by_limb_height: Vector3::zeros(),
+        centre: None,
+        row: index,
+    };
+    if body == Body::Limb {
+        seen.separate_limb_height(row, limb_sigma_km);
+        if let Some(position_km) = three([row.position_x_km, row.position_y_km, row.position_z_km]) {
+            let covariance_km2 = symmetric([
+                row.pos_cov_xx_km2?,
+                row.pos_cov_xy_km2?,
+                row.pos_cov_xz_km2?,
+                row.pos_cov_yy_km2?,
+                row.pos_cov_yz_km2?,
+                row.pos_cov_zz_km2?,
+            ]);
+            seen.centre = Some(Centre { position_m: position_km * 1e3, covariance_m2: covariance_km2 * 1e6 });
+        }
+    }
+    Some(seen)
+}
+
+impl Seen {
+    /// Takes the error of the limb height out of the covariance, because the filter holds it as one error that all
+    /// pictures share. With the derivative k of the axis by the expected cos α, a limb that is higher by δ than the
+    /// told one moves the axis by k tan α / (R + H) δ.
+    fn separate_limb_height(&mut self, row: &Row, limb_sigma_km: Option<f64>) {
+        let by_cos = [row.axis_by_cos_x, row.axis_by_cos_y, row.axis_by_cos_z];
+        let (Some(free), Some(x), Some(y), Some(z), Some(half_angle_deg), Some(altitude_km)) =
+            (row.axis_free_x, by_cos[0], by_cos[1], by_cos[2], row.half_angle_deg, row.altitude_km)
+        else {
+            return;
+        };
+        let k = Vector3::new(x, y, z);
+        if !(k.norm_squared() > 0.0) {
+            return;
+        }
+        // axis = unit(axis_free + k (c₀ − ĉ)) gives the expected cosine c₀.
+        let axis_free = Vector3::new(free, row.axis_free_y.unwrap_or(0.0), row.axis_free_z.unwrap_or(0.0));
+        let moved = self.axis / self.axis.dot(&axis_free) - axis_free;
+        let cos = half_angle_deg.to_radians().cos() + moved.dot(&k) / k.norm_squared();
+        if !(cos > 0.0 && cos < 1.0) {
+            return;
+        }
+        let tan = (1.0 - cos * cos).sqrt() / cos;
+        let by_limb_height = k * (tan / (hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M / 1e3 + altitude_km));
+        let own = by_limb_height * by_limb_height.transpose() * limb_sigma_km.unwrap_or(0.0).powi(2);
+        let mut rest = (self.covariance_rad2 - own).symmetric_eigen();
+        // A sensor that was told less would make the rest negative; its covariance then stays whole.
+        if rest.eigenvalues.min() > -1e-3 * own.trace() {
+            rest.eigenvalues.apply(|v| *v = v.max(0.0));
+            self.covariance_rad2 = rest.recompose();
+        }
+        self.by_limb_height = by_limb_height;
+    }
+}

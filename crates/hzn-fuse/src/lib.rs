@@ -1,0 +1,31 @@
+#![doc = include_str!("../README.md")]
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`input`] | the files: inertial unit, receiver, star tracker, recordings of `hzn run`, mounts |
+//! | [`settings`] | fuse.toml: what the filter estimates, considers, or leaves out |
+//! | [`flight`] | the replay of a flight |
+//! | [`truth`] | errors against the truth of a simulated flight |
+//! | [`start`] | the first attitude from directions in a window of time |
+//! | [`smooth`] | the smoothed solution |
+//! | [`results`] | what comes out |
+//! | [`simulated`] | recordings of simulated flights without pictures |
+//! | [`sink`] | results as files: CSV, MCAP, AEM, CK, frames.csv |
+
+#![forbid(unsafe_code)]
+
+mod error;
+pub mod flight;
+pub mod input;
+pub mod results;
+pub mod settings;
+pub mod simulated;
+pub mod sink;
+pub mod smooth;
+pub mod start;
+pub mod truth;
+
+pub use error::Error;
+pub use flight::fuse;
+pub use results::Fused;
+pub use settings::Settings;

@@ -1,0 +1,242 @@
+//! What comes out of a flight.
+
+use hzn_nav::filter::{Corrections, Filter};
+use hzn_nav::gravity::earth_rate;
+use hzn_nav::layout::{Layout, Place};
+use hzn_nav::strapdown::Nominal;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use crate::input::Body;
+
+/// The estimated errors of a camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraState {
+    /// Rotation vector from the told mount to the estimated one (camera frame), rad.
+    pub misalignment_rad: Vector3<f64>,
+    /// Its 1-sigma, rad.
+    pub misalignment_sigma_rad: Vector3<f64>,
+    /// Time that the camera's clock is late, s.
+    pub clock_s: f64,
+    /// Its 1-sigma, s; 0 if it does not exist.
+    pub clock_sigma_s: f64,
+    /// The estimated mount: rotation from the camera to the body frame.
+    pub mount: UnitQuaternion<f64>,
+    /// Largest 1-sigma of the attitude of the camera against ECEF about any axis, rad.
+    pub camera_sigma_rad: f64,
+}
+
+/// The solution at a time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Epoch {
+    /// Time, attitude (body to ECEF), velocity and position in ECEF.
+    pub state: Nominal,
+    /// Covariance of the attitude: rotation vector in the body frame, rad².
+    pub attitude_covariance_rad2: Matrix3<f64>,
+    /// 1-sigma of the velocity (ECEF), m/s.
+    pub velocity_sigma_m_s: Vector3<f64>,
+    /// 1-sigma of the position (ECEF), m.
+    pub position_sigma_m: Vector3<f64>,
+    /// Estimated errors of the instruments.
+    pub corrections: Corrections,
+    /// 1-sigma of the gyros' biases, rad/s; 0 if they do not exist.
+    pub gyro_bias_sigma_rad_s: Vector3<f64>,
+    /// 1-sigma of the accelerometers' biases, m/s²; 0 if they do not exist.
+    pub accel_bias_sigma_m_s2: Vector3<f64>,
+    /// 1-sigma of the limb height, km; 0 if it does not exist.
+    pub limb_height_sigma_km: f64,
+    /// The cameras, in the order of the recordings.
+    pub cameras: Vec<CameraState>,
+    /// Rate of the vehicle against the Earth (body frame), rad/s.
+    pub rate_rad_s: Vector3<f64>,
+    /// Attitude of the strapdown solution from the start on without any aid.
+    pub unaided: Option<UnitQuaternion<f64>>,
+}
+
+impl Epoch {
+    /// Returns the solution of a filter.
+    pub(crate) fn of<const N: usize>(filter: &Filter<N>, unaided: Option<UnitQuaternion<f64>>) -> Self {
+        let layout = filter.layout();
+        let sigmas = |place: Option<Place>| place.map_or_else(Vector3::zeros, |p| filter.sigmas(p.first));
+        let one = |place: Option<Place>| place.map_or(0.0, |p| filter.sigmas(p.first).x);
+        let to_body = filter.nominal().attitude.inverse().to_rotation_matrix().into_inner();
+        let ecef = filter.covariance().fixed_view::<3, 3>(Layout::ATTITUDE, Layout::ATTITUDE).into_owned();
+        let inertial = filter.last_imu().map(|imu| filter.corrections().correct(&imu).gyro_rad_s);
+        let rate = inertial.unwrap_or_default() - filter.nominal().attitude.inverse() * earth_rate();
+        let camera = |which: usize| {
+            let (camera, places) = (filter.camera(which)?, layout.cameras.get(which)?);
+            Some(CameraState {
+                misalignment_rad: (camera.options.mount.inverse() * camera.mount).scaled_axis(),
+                misalignment_sigma_rad: sigmas(places.misalignment),
+                clock_s: camera.clock_s,
+                clock_sigma_s: one(places.clock),
+                mount: camera.mount,
+                camera_sigma_rad: camera_sigma_rad(filter, &camera.mount, places.misalignment),
+            })
+        };
+        Self {
+            state: *filter.nominal(),
+            attitude_covariance_rad2: to_body * ecef * to_body.transpose(),
+            velocity_sigma_m_s: filter.sigmas(Layout::VELOCITY),
+            position_sigma_m: filter.sigmas(Layout::POSITION),
+            corrections: *filter.corrections(),
+            gyro_bias_sigma_rad_s: sigmas(layout.gyro_bias),
+            accel_bias_sigma_m_s2: sigmas(layout.accel_bias),
+            limb_height_sigma_km: one(layout.limb_height),
+            cameras: (0..).map_while(camera).collect(),
+            rate_rad_s: rate,
+            unaided,
+        }
+    }
+
+    /// Returns the 1-sigma of the attitude about the axes of the body, rad.
+    pub fn attitude_sigma_rad(&self) -> Vector3<f64> {
+        self.attitude_covariance_rad2.diagonal().map(|v| v.max(0.0).sqrt())
+    }
+}
+
+/// Returns the largest 1-sigma of the attitude of a camera: attitude and misalignment have common errors.
+fn camera_sigma_rad<const N: usize>(
+    filter: &Filter<N>,
+    mount: &UnitQuaternion<f64>,
+    misalignment: Option<Place>,
+) -> f64 {
+    let p = filter.covariance();
+    let part = |i: usize, j: usize| p.fixed_view::<3, 3>(i, j).into_owned();
+    let attitude = part(Layout::ATTITUDE, Layout::ATTITUDE);
+    let to_camera = (filter.nominal().attitude * mount).inverse().to_rotation_matrix().into_inner();
+    let mut total = to_camera * attitude * to_camera.transpose();
+    if let Some(place) = misalignment {
+        let cross = to_camera * part(Layout::ATTITUDE, place.first);
+        total += cross + cross.transpose() + part(place.first, place.first);
+    }
+    total.symmetric_eigenvalues().max().max(0.0).sqrt()
+}
+
+/// The kind of a measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Kind {
+    /// A direction of a camera, rad.
+    Direction(Body),
+    /// A position from the limb, m.
+    Centre,
+    /// A position of the receiver, m.
+    Position,
+    /// A velocity of the receiver, m/s.
+    Velocity,
+    /// An attitude of a star tracker, rad.
+    Attitude,
+}
+
+impl Kind {
+    /// Returns the word for messages and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Direction(body) => body.name(),
+            Self::Centre => "limb-position",
+            Self::Position => "position",
+            Self::Velocity => "velocity",
+            Self::Attitude => "attitude",
+        }
+    }
+}
+
+/// The difference of a measurement from the solution before it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Innovation {
+    /// Time, s.
+    pub time_s: f64,
+    /// Number of the camera; `None` for receiver and star tracker.
+    pub camera: Option<usize>,
+    /// The kind of the measurement.
+    pub kind: Kind,
+    /// The innovation: two numbers for a direction, three for others, in the unit of the kind.
+    pub value: Vec<f64>,
+    /// Its 1-sigma.
+    pub sigma: Vec<f64>,
+    /// The square of the innovation over its covariance.
+    pub nis: f64,
+    /// Whether it passed the gate.
+    pub taken: bool,
+    /// Angle of a direction from the solution, rad.
+    pub angle_rad: Option<f64>,
+    /// Angle of a direction from the unaided solution, rad.
+    pub unaided_rad: Option<f64>,
+    /// Largest 1-sigma of a direction by the sensor itself, rad.
+    pub sensor_sigma_rad: Option<f64>,
+}
+
+/// An attitude from two directions at one time, without the filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Triad {
+    /// Time, s.
+    pub time_s: f64,
+    /// Attitude (body to ECEF).
+    pub attitude: UnitQuaternion<f64>,
+    /// Its angle from the filter's attitude, rad.
+    pub angle_rad: f64,
+    /// Its angle from the unaided attitude, rad.
+    pub unaided_rad: f64,
+}
+
+/// How the filter began.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Begin {
+    /// Time, s.
+    pub time_s: f64,
+    /// Number of directions in the first attitude; 0 for a star tracker.
+    pub directions: usize,
+    /// Angle of the misfit over its sigma, squared and summed.
+    pub chi2: f64,
+}
+
+/// Counts of what happened to the data.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Samples of the inertial unit.
+    pub samples: usize,
+    /// Samples with a number that is not finite.
+    pub samples_not_finite: usize,
+    /// Samples with the time of the sample before.
+    pub samples_duplicate: usize,
+    /// Samples that are older than the sample before.
+    pub samples_out_of_order: usize,
+    /// Gaps between samples.
+    pub gaps: usize,
+    /// Samples with a channel at its limit.
+    pub saturated: usize,
+    /// Measurements before the start.
+    pub before_start: usize,
+    /// Measurements outside the time of the inertial unit.
+    pub outside: usize,
+    /// Measurements with a number that is not finite.
+    pub unusable: usize,
+    /// Directions whose reference is not known.
+    pub without_reference: usize,
+    /// Directions while the attitude was not known well enough for the filter.
+    pub waiting: usize,
+    /// How often the filter began again.
+    pub restarts: usize,
+}
+
+/// The results of a flight.
+#[derive(Debug, Clone, Default)]
+pub struct Fused {
+    /// Names of the cameras.
+    pub cameras: Vec<String>,
+    /// How the filter began.
+    pub begin: Option<Begin>,
+    /// The solution from the start on.
+    pub epochs: Vec<Epoch>,
+    /// The solution from the first sample to the start: the strapdown solution, integrated back.
+    pub back: Vec<Nominal>,
+    /// The smoothed solution at the measurements; empty without a smoother.
+    pub smoothed: Vec<Epoch>,
+    /// Every innovation, in the order of time.
+    pub innovations: Vec<Innovation>,
+    /// Attitudes from pairs of directions.
+    pub triads: Vec<Triad>,
+    /// What happened to the data.
+    pub counts: Counts,
+    /// What the reader of the results should know.
+    pub notes: Vec<String>,
+}

@@ -1,0 +1,221 @@
+//! Recordings of simulated flights without pictures: true directions with drawn errors.
+//!
+//! Studies fly many flights. Rendering takes a second a picture; a drawn error takes none.
+
+use std::path::Path;
+
+use hzn_core::body::Kind;
+use hzn_core::status::Status;
+use hzn_mcap::{Row, RowMeta};
+use hzn_nav::ephemeris;
+use hzn_sim::{FlightFrame, Scenario, ScenarioError};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+
+use crate::error::Error;
+use crate::flight::limb_axis;
+use crate::input::{Body, Fix, Inputs, Recording, Sample, Seen};
+
+/// A source of random numbers and errors.
+pub trait Errors {
+    /// Returns the error of a direction and the covariance that the sensor would tell, both in the camera frame. `axis`
+    /// is the true direction.
+    fn draw(&mut self, at: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>);
+    /// Returns the derivative of the measured axis by the limb height, 1/km (camera frame).
+    fn by_limb_height(&mut self, at: &Moment, axis: &Vector3<f64>) -> Vector3<f64>;
+}
+
+/// What is known about a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Number of the camera.
+    pub camera: usize,
+    /// The body.
+    pub body: Body,
+    /// True time, s.
+    pub time_s: f64,
+    /// Altitude of the vehicle above the ellipsoid, km.
+    pub altitude_km: f64,
+}
+
+/// Returns the inputs of a simulated flight: inertial unit and receiver as `hzn simulate` writes them, and a recording
+/// for each camera. `limb_height_km` is the error of the limb height that all cameras are told.
+///
+/// # Errors
+/// The scene is refused.
+pub fn inputs(scenario: &Scenario, errors: &mut dyn Errors, limb_height_km: f64) -> Result<Inputs, ScenarioError> {
+    let mut inputs = instruments(scenario)?;
+    for (number, one) in scenario.by_camera().iter().enumerate() {
+        inputs.recordings.push(recording(one, number, errors, limb_height_km)?);
+    }
+    Ok(inputs)
+}
+
+/// Returns the samples of the inertial unit and the fixes of the receiver.
+///
+/// # Errors
+/// The scene is refused.
+pub fn instruments(scenario: &Scenario) -> Result<Inputs, ScenarioError> {
+    let path = scenario.path()?;
+    let [from_s, to_s] = [scenario.capture.from_s, scenario.capture.to_s];
+    let mut inputs = Inputs::default();
+    if let Some(imu) = &scenario.imu {
+        inputs.imu = imu.rows(&path, [from_s, to_s], scenario.seed).map(|row| sample(&row)).collect();
+    }
+    if let Some(gnss) = &scenario.gnss {
+        inputs.gnss = gnss.rows(&path, [from_s, to_s], scenario.seed).map(|row| fix(&row)).collect();
+    }
+    Ok(inputs)
+}
+
+fn sample(row: &hzn_sim::trajectory::instruments::ImuRow) -> Sample {
+    let imu = hzn_nav::strapdown::Imu {
+        time_s: row.time_s,
+        gyro_rad_s: Vector3::new(row.gyro_x_radps, row.gyro_y_radps, row.gyro_z_radps),
+        accel_m_s2: Vector3::new(row.accel_x_mps2, row.accel_y_mps2, row.accel_z_mps2),
+    };
+    Sample { imu, saturated: row.saturated > 0 }
+}
+
+fn fix(row: &hzn_sim::trajectory::instruments::GnssRow) -> Fix {
+    Fix {
+        time_s: row.time_s,
+        position_m: Vector3::new(row.x_m, row.y_m, row.z_m),
+        velocity_m_s: Vector3::new(row.vx_mps, row.vy_mps, row.vz_mps),
+        position_sigma_m: row.position_sigma_m,
+        velocity_sigma_m_s: row.velocity_sigma_mps,
+    }
+}
+
+/// Returns the recording of one camera.
+fn recording(
+    one: &Scenario,
+    number: usize,
+    errors: &mut dyn Errors,
+    limb_height_km: f64,
+) -> Result<Recording, ScenarioError> {
+    let flight = one.flight()?;
+    let told = one.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
+    let mut seen = Vec::new();
+    for (row, frame) in flight.frames.iter().enumerate() {
+        let known = one.frame_row(frame);
+        let pose = &frame.scene.pose;
+        let to_camera = rotation(pose.cam_to_ecef_wxyz).inverse();
+        for &kind in &one.bodies {
+            // A tenth of the picture's height of limb, or most of the Sun.
+            let enough = if kind == Kind::Earth { f64::from(one.camera.height) / 10.0 } else { 20.0 };
+            let visible = frame
+                .scene
+                .visible_px(kind)
+                .map_err(|e| ScenarioError { field: "[[cameras]]".into(), what: e.to_string() })?;
+            if visible < enough {
+                continue;
+            }
+            let Some((body, reference)) = true_direction(one, frame, kind) else { continue };
+            let moment = Moment { camera: number, body, time_s: frame.time_s, altitude_km: known.altitude_km };
+            let axis = to_camera * reference;
+            // The sensor knows the position at the time of the stamp.
+            let told_m = Vector3::new(known.x_km, known.y_km, known.z_km) * 1e3;
+            let reference = limb_axis(body, &told_m).unwrap_or(reference);
+            let (error, covariance_rad2) = errors.draw(&moment, &axis);
+            let by_limb_height =
+                if body == Body::Limb { errors.by_limb_height(&moment, &axis) } else { Vector3::zeros() };
+            seen.push(Seen {
+                time_s: known.time_s,
+                body,
+                axis: (axis + error + by_limb_height * limb_height_km).normalize(),
+                covariance_rad2,
+                reference: Some(reference),
+                by_limb_height,
+                centre: None,
+                row,
+            });
+        }
+    }
+    Ok(Recording {
+        name: one.name.clone(),
+        mount: Some(rotation(told)),
+        camera: Some(one.camera.clone()),
+        limb_sigma_km: None,
+        clock_offset_s: 0.0,
+        seen,
+        rows: Vec::new(),
+        without_time: 0,
+        other_bodies: 0,
+    })
+}
+
+/// Returns the true direction of a body in ECEF; `None` if the picture has none.
+fn true_direction(one: &Scenario, frame: &FlightFrame, kind: Kind) -> Option<(Body, Vector3<f64>)> {
+    let position = Vector3::from(frame.scene.pose.position_m);
+    let unix_s = one.start_unix_s() + frame.time_s;
+    Some(match kind {
+        Kind::Sun => (Body::Sun, celestial(ephemeris::sun(unix_s), &position)),
+        Kind::Moon => (Body::Moon, celestial(ephemeris::moon(unix_s), &position)),
+        _ => {
+            let truth = frame.scene.body_truth(kind, "", frame.time_s).ok()?;
+            let axis = Vector3::new(truth.axis_x, truth.axis_y, truth.axis_z);
+            (Body::Limb, rotation(frame.scene.pose.cam_to_ecef_wxyz) * axis)
+        }
+    })
+}
+
+fn rotation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+}
+
+fn celestial(place: ephemeris::Place, from_m: &Vector3<f64>) -> Vector3<f64> {
+    Vector3::from(place.seen_from((*from_m).into()).direction)
+}
+
+/// Writes the inputs of a simulated flight as files: imu.csv, gnss.csv, vehicle.csv with the truth, and for each camera
+/// NAME.csv as `hzn run` writes it and NAME.toml with its mount.
+///
+/// # Errors
+/// The folder cannot be written to.
+pub fn write(scenario: &Scenario, inputs: &Inputs, folder: &Path) -> Result<(), Error> {
+    let path = scenario.path().map_err(Error::unusable)?;
+    let span_s = scenario.span_s();
+    let table = |name: &str| csv::Writer::from_path(folder.join(name)).map_err(Error::failed);
+    if let Some(imu) = &scenario.imu {
+        let mut out = table("imu.csv")?;
+        imu.rows(&path, span_s, scenario.seed).try_for_each(|row| out.serialize(row)).map_err(Error::failed)?;
+        let mut out = table("vehicle.csv")?;
+        let span_s = [imu.from_s.unwrap_or(span_s[0]), span_s[1]];
+        path.vehicle_rows(span_s, imu.rate_hz).try_for_each(|row| out.serialize(row)).map_err(Error::failed)?;
+    }
+    if let Some(gnss) = &scenario.gnss {
+        let mut out = table("gnss.csv")?;
+        gnss.rows(&path, span_s, scenario.seed).try_for_each(|row| out.serialize(row)).map_err(Error::failed)?;
+    }
+    for recording in &inputs.recordings {
+        let mut out = table(&format!("{}.csv", recording.name))?;
+        for seen in &recording.seen {
+            out.serialize(row(seen)).map_err(Error::failed)?;
+        }
+        if let Some(q) = recording.mount {
+            let text = format!("[mount]\nq_body_from_camera_wxyz = [{}, {}, {}, {}]\n", q.w, q.i, q.j, q.k);
+            std::fs::write(folder.join(format!("{}.toml", recording.name)), text).map_err(Error::failed)?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns a direction as a row of results.
+fn row(seen: &Seen) -> Row {
+    let meta = RowMeta {
+        index: seen.row as u64,
+        file: format!("{:05}.png", seen.row),
+        time_s: Some(seen.time_s),
+        body: if seen.body == Body::Limb { "earth" } else { seen.body.name() }.into(),
+        altitude_km: None,
+    };
+    let mut row = Row::unprocessed(&meta, Status::Ok, "");
+    let (a, p) = (seen.axis, seen.covariance_rad2);
+    [row.axis_x, row.axis_y, row.axis_z] = [a.x, a.y, a.z].map(Some);
+    [row.cov_xx, row.cov_xy, row.cov_xz] = [p.m11, p.m12, p.m13].map(Some);
+    [row.cov_yy, row.cov_yz, row.cov_zz] = [p.m22, p.m23, p.m33].map(Some);
+    if let Some(e) = seen.reference {
+        [row.axis_e_x, row.axis_e_y, row.axis_e_z] = [e.x, e.y, e.z].map(Some);
+    }
+    row
+}

@@ -1,0 +1,68 @@
+//! CCSDS attitude ephemeris message (AEM), version 1.0, in keyword = value notation.
+//!
+//! Source: CCSDS 504.0-B-1, section 4. The quaternion turns the axes of frame A onto those of frame B; it is that of
+//! the rotation from the body frame to ECEF, scalar last.
+
+use std::io::Write;
+
+use super::Utc;
+use crate::error::Error;
+use crate::results::{Epoch, Fused};
+
+/// Header of a message.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AemOptions {
+    /// UTC of time 0.
+    pub utc: Utc,
+    /// Name of the vehicle.
+    pub object_name: String,
+    /// International designator of the vehicle.
+    pub object_id: String,
+    /// UTC at which the message is made.
+    pub created: String,
+}
+
+/// Writes the attitude as an AEM: the smoothed solution if there is one, else the filter's.
+///
+/// # Errors
+/// There is no solution, or the output cannot be written.
+pub fn write_aem(fused: &Fused, options: &AemOptions, mut out: impl Write) -> Result<(), Error> {
+    let epochs = rising(best(fused));
+    let (Some(first), Some(last)) = (epochs.first(), epochs.last()) else {
+        return Err(Error::unusable("there is no solution to write as an AEM"));
+    };
+    let iso = |epoch: &Epoch| options.utc.iso(epoch.state.time_s);
+    let AemOptions { object_name, object_id, created, .. } = options;
+    let mut text = format!(
+        "CCSDS_AEM_VERS = 1.0\nCREATION_DATE = {created}\nORIGINATOR = HZN\n\nMETA_START\nOBJECT_NAME = \
+         {object_name}\nOBJECT_ID = {object_id}\nCENTER_NAME = EARTH\nREF_FRAME_A = ITRF-97\nREF_FRAME_B = \
+         SC_BODY_1\nATTITUDE_DIR = A2B\nTIME_SYSTEM = UTC\nSTART_TIME = {}\nSTOP_TIME = {}\nATTITUDE_TYPE = \
+         QUATERNION\nQUATERNION_TYPE = LAST\nINTERPOLATION_METHOD = LINEAR\nINTERPOLATION_DEGREE = 1\nMETA_STOP\n\n\
+         DATA_START\n",
+        iso(first),
+        iso(last)
+    );
+    for epoch in epochs {
+        let q = epoch.state.attitude;
+        text.push_str(&format!("{} {:.12} {:.12} {:.12} {:.12}\n", iso(epoch), q.i, q.j, q.k, q.w));
+    }
+    text.push_str("DATA_STOP\n");
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(Error::failed)
+}
+
+/// Returns the best solution: the smoothed one if there is one.
+pub(super) fn best(fused: &Fused) -> &[Epoch] {
+    if fused.smoothed.is_empty() { &fused.epochs } else { &fused.smoothed }
+}
+
+/// Returns the solutions whose times rise by at least a microsecond. Of several at one time it is the last.
+pub(super) fn rising(epochs: &[Epoch]) -> Vec<&Epoch> {
+    let mut out: Vec<&Epoch> = Vec::with_capacity(epochs.len());
+    for epoch in epochs {
+        match out.last_mut() {
+            Some(last) if epoch.state.time_s - last.state.time_s < 2e-6 => *last = epoch,
+            _ => out.push(epoch),
+        }
+    }
+    out
+}

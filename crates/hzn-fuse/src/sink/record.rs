@@ -1,0 +1,250 @@
+//! One record for each solution and each innovation, the same in every kind of file.
+
+use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
+use hzn_nav::strapdown::Nominal;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use serde::Serialize;
+
+use crate::results::{CameraState, Epoch, Fused, Innovation};
+
+/// The origin of a solution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Phase {
+    /// Integrated back from the start.
+    Back,
+    /// The filter, in real time.
+    Filter,
+    /// The smoother.
+    Smoothed,
+}
+
+/// A solution.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StateRecord {
+    /// Time, s.
+    pub time_s: f64,
+    /// The origin of the solution.
+    pub phase: Phase,
+    /// Attitude as a quaternion from the vehicle's axes to ECEF, scalar part.
+    pub qw: f64,
+    /// First vector component of the attitude.
+    pub qx: f64,
+    /// Second vector component of the attitude.
+    pub qy: f64,
+    /// Third vector component of the attitude.
+    pub qz: f64,
+    /// 1-sigma of the attitude about the vehicle's x axis, degrees.
+    pub sigma_x_deg: Option<f64>,
+    /// 1-sigma about the y axis.
+    pub sigma_y_deg: Option<f64>,
+    /// 1-sigma about the z axis.
+    pub sigma_z_deg: Option<f64>,
+    /// Yaw, pitch and roll of the vehicle against north, east and down at its position, degrees.
+    pub yaw_deg: f64,
+    /// Pitch, degrees.
+    pub pitch_deg: f64,
+    /// Roll, degrees.
+    pub roll_deg: f64,
+    /// First component of the position in ECEF, m.
+    pub x_m: f64,
+    /// Second component of the position.
+    pub y_m: f64,
+    /// Third component of the position.
+    pub z_m: f64,
+    /// First component of the velocity in ECEF, m/s.
+    pub vx_mps: f64,
+    /// Second component of the velocity.
+    pub vy_mps: f64,
+    /// Third component of the velocity.
+    pub vz_mps: f64,
+    /// Largest 1-sigma of a component of the position, m.
+    pub position_sigma_m: Option<f64>,
+    /// Largest 1-sigma of a component of the velocity, m/s.
+    pub velocity_sigma_mps: Option<f64>,
+    /// Bias of the gyros, degrees per hour: x, y, z.
+    pub gyro_bias_deg_h: Option<[f64; 3]>,
+    /// Its 1-sigma.
+    pub gyro_bias_sigma_deg_h: Option<[f64; 3]>,
+    /// Bias of the accelerometers, m/s²: x, y, z.
+    pub accel_bias_mps2: Option<[f64; 3]>,
+    /// Its 1-sigma.
+    pub accel_bias_sigma_mps2: Option<[f64; 3]>,
+    /// Error of the limb height, km.
+    pub limb_height_km: Option<f64>,
+    /// Its 1-sigma.
+    pub limb_height_sigma_km: Option<f64>,
+    /// The cameras, in the order of the recordings.
+    pub cameras: Vec<CameraRecord>,
+}
+
+/// The estimated errors of a camera.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CameraRecord {
+    /// Name of the camera.
+    pub name: String,
+    /// Rotation from the told mount to the estimated one, about the axes of the camera, degrees.
+    pub misalignment_deg: [f64; 3],
+    /// Its 1-sigma.
+    pub misalignment_sigma_deg: [f64; 3],
+    /// Time that the clock of the camera differs, s.
+    pub clock_s: f64,
+    /// Its 1-sigma.
+    pub clock_sigma_s: f64,
+}
+
+/// An innovation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InnovationRecord {
+    /// Time, s.
+    pub time_s: f64,
+    /// Name of the camera, `gnss`, or `star-tracker`.
+    pub source: String,
+    /// `limb`, `sun`, `moon`, `limb-position`, `position`, `velocity` or `attitude`.
+    pub kind: &'static str,
+    /// First component, in `unit`.
+    pub first: f64,
+    /// Second component.
+    pub second: f64,
+    /// Third component; a direction has two.
+    pub third: Option<f64>,
+    /// 1-sigma of the first component.
+    pub first_sigma: f64,
+    /// 1-sigma of the second component.
+    pub second_sigma: f64,
+    /// 1-sigma of the third component.
+    pub third_sigma: Option<f64>,
+    /// `deg`, `m` or `m/s`.
+    pub unit: &'static str,
+    /// The square of the innovation over its covariance: chi-square with two or three degrees of freedom.
+    pub nis: f64,
+    /// Whether the filter took the measurement.
+    pub taken: bool,
+    /// Angle of a direction from the solution, degrees.
+    pub angle_deg: Option<f64>,
+    /// Angle of a direction from the unaided solution, degrees.
+    pub unaided_deg: Option<f64>,
+    /// Largest 1-sigma of the direction that the sensor tells, degrees.
+    pub sensor_sigma_deg: Option<f64>,
+}
+
+/// Returns all solutions: back to the first sample, the filter's, the smoother's.
+pub fn states(fused: &Fused) -> impl Iterator<Item = StateRecord> + '_ {
+    let back = fused.back.iter().take(fused.back.len().saturating_sub(1)).map(bare);
+    let record = |phase| move |epoch: &Epoch| full(fused, epoch, phase);
+    back.chain(fused.epochs.iter().map(record(Phase::Filter))).chain(fused.smoothed.iter().map(record(Phase::Smoothed)))
+}
+
+/// Returns all innovations.
+pub fn innovations(fused: &Fused) -> impl Iterator<Item = InnovationRecord> + '_ {
+    fused.innovations.iter().map(|i| innovation(fused, i))
+}
+
+fn bare(state: &Nominal) -> StateRecord {
+    let (x, v, q) = (state.position_m, state.velocity_m_s, state.attitude);
+    let [yaw_deg, pitch_deg, roll_deg] = yaw_pitch_roll_deg(&q, &x);
+    StateRecord {
+        time_s: state.time_s,
+        phase: Phase::Back,
+        qw: q.w,
+        qx: q.i,
+        qy: q.j,
+        qz: q.k,
+        sigma_x_deg: None,
+        sigma_y_deg: None,
+        sigma_z_deg: None,
+        yaw_deg,
+        pitch_deg,
+        roll_deg,
+        x_m: x.x,
+        y_m: x.y,
+        z_m: x.z,
+        vx_mps: v.x,
+        vy_mps: v.y,
+        vz_mps: v.z,
+        position_sigma_m: None,
+        velocity_sigma_mps: None,
+        gyro_bias_deg_h: None,
+        gyro_bias_sigma_deg_h: None,
+        accel_bias_mps2: None,
+        accel_bias_sigma_mps2: None,
+        limb_height_km: None,
+        limb_height_sigma_km: None,
+        cameras: Vec::new(),
+    }
+}
+
+fn full(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
+    let deg = |v: Vector3<f64>| -> [f64; 3] { v.map(f64::to_degrees).into() };
+    let per_hour = |v: Vector3<f64>| deg(v * 3600.0);
+    let sigma = deg(epoch.attitude_sigma_rad());
+    let camera = |(name, state): (&String, &CameraState)| CameraRecord {
+        name: name.clone(),
+        misalignment_deg: deg(state.misalignment_rad),
+        misalignment_sigma_deg: deg(state.misalignment_sigma_rad),
+        clock_s: state.clock_s,
+        clock_sigma_s: state.clock_sigma_s,
+    };
+    StateRecord {
+        phase,
+        sigma_x_deg: Some(sigma[0]),
+        sigma_y_deg: Some(sigma[1]),
+        sigma_z_deg: Some(sigma[2]),
+        position_sigma_m: Some(epoch.position_sigma_m.max()),
+        velocity_sigma_mps: Some(epoch.velocity_sigma_m_s.max()),
+        gyro_bias_deg_h: Some(per_hour(epoch.corrections.gyro_bias)),
+        gyro_bias_sigma_deg_h: Some(per_hour(epoch.gyro_bias_sigma_rad_s)),
+        accel_bias_mps2: Some(epoch.corrections.accel_bias.into()),
+        accel_bias_sigma_mps2: Some(epoch.accel_bias_sigma_m_s2.into()),
+        limb_height_km: Some(epoch.corrections.limb_height_km),
+        limb_height_sigma_km: Some(epoch.limb_height_sigma_km),
+        cameras: fused.cameras.iter().zip(&epoch.cameras).map(camera).collect(),
+        ..bare(&epoch.state)
+    }
+}
+
+fn innovation(fused: &Fused, i: &Innovation) -> InnovationRecord {
+    use crate::results::Kind;
+    let (unit, scale) = match i.kind {
+        Kind::Direction(_) | Kind::Attitude => ("deg", 1f64.to_degrees()),
+        Kind::Centre | Kind::Position => ("m", 1.0),
+        Kind::Velocity => ("m/s", 1.0),
+    };
+    let at = |list: &[f64], k: usize| list.get(k).map(|x| x * scale);
+    let source = match (i.camera.and_then(|c| fused.cameras.get(c)), i.kind) {
+        (Some(name), _) => name.clone(),
+        (None, Kind::Attitude) => "star-tracker".into(),
+        (None, _) => "gnss".into(),
+    };
+    InnovationRecord {
+        time_s: i.time_s,
+        source,
+        kind: i.kind.name(),
+        first: at(&i.value, 0).unwrap_or(f64::NAN),
+        second: at(&i.value, 1).unwrap_or(f64::NAN),
+        third: at(&i.value, 2),
+        first_sigma: at(&i.sigma, 0).unwrap_or(f64::NAN),
+        second_sigma: at(&i.sigma, 1).unwrap_or(f64::NAN),
+        third_sigma: at(&i.sigma, 2),
+        unit,
+        nis: i.nis,
+        taken: i.taken,
+        angle_deg: i.angle_rad.map(f64::to_degrees),
+        unaided_deg: i.unaided_rad.map(f64::to_degrees),
+        sensor_sigma_deg: i.sensor_sigma_rad.map(f64::to_degrees),
+    }
+}
+
+/// Returns yaw, pitch and roll against north, east and down (geodetic), degrees.
+fn yaw_pitch_roll_deg(body_to_ecef: &UnitQuaternion<f64>, position_m: &Vector3<f64>) -> [f64; 3] {
+    let (lat, _) = geodetic((*position_m).into(), WGS84_A_M, WGS84_B_M);
+    let lon = position_m.y.atan2(position_m.x);
+    let ((sl, cl), (so, co)) = (lat.sin_cos(), lon.sin_cos());
+    let north = Vector3::new(-sl * co, -sl * so, cl);
+    let east = Vector3::new(-so, co, 0.0);
+    let down = Vector3::new(-cl * co, -cl * so, -sl);
+    let ned = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[north, east, down]));
+    let to_ned = UnitQuaternion::from_rotation_matrix(&ned).inverse() * body_to_ecef;
+    let (roll, pitch, yaw) = to_ned.euler_angles();
+    [yaw, pitch, roll].map(f64::to_degrees)
+}

@@ -1,0 +1,63 @@
+//! A flight with drawn errors.
+
+mod draws;
+
+pub(crate) use draws::Draws;
+
+use hzn_fuse::input::Inputs;
+use hzn_fuse::simulated::{Errors, Moment, inputs};
+use hzn_sim::Scenario;
+use nalgebra::{Matrix3, Vector3};
+
+/// Slow errors of limb and Sun with a time constant of 20 s, and a small white part.
+pub(crate) struct Slow {
+    pub(crate) draws: Draws,
+    /// 1-sigma, rad.
+    pub(crate) sigma_rad: f64,
+    last: Vec<(Moment, Vector3<f64>)>,
+}
+
+impl Slow {
+    pub(crate) fn new(seed: u64, sigma_deg: f64) -> Self {
+        Self { draws: Draws(seed), sigma_rad: sigma_deg.to_radians(), last: Vec::new() }
+    }
+
+    fn three(&mut self, sigma: f64) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| sigma * self.draws.normal())
+    }
+}
+
+impl Errors for Slow {
+    fn draw(&mut self, at: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+        let sigma = self.sigma_rad;
+        let place = self.last.iter().position(|(m, _)| (m.camera, m.body) == (at.camera, at.body));
+        let error = match place.map(|i| self.last.swap_remove(i)) {
+            Some((before, error)) => {
+                let keep = (-(at.time_s - before.time_s) / 20.0).exp();
+                error * keep + self.three(sigma * (1.0 - keep * keep).sqrt())
+            }
+            None => self.three(sigma),
+        };
+        self.last.push((*at, error));
+        let covariance = (Matrix3::identity() - axis * axis.transpose()) * sigma.powi(2);
+        (error + self.three(2e-4), covariance)
+    }
+
+    fn by_limb_height(&mut self, _: &Moment, axis: &Vector3<f64>) -> Vector3<f64> {
+        // The limb pulls the axis towards the boresight, by about 0.02 degrees per km.
+        (Vector3::z() - axis * axis.z).normalize() * 3e-4
+    }
+}
+
+/// The scene `atek` with another seed, and pictures every two seconds.
+pub(crate) fn scene(seed: u64) -> Scenario {
+    let mut scene = Scenario::builtin("atek").unwrap();
+    scene.seed = seed;
+    scene.capture.frames = 186;
+    scene
+}
+
+/// The inputs of a flight; its cameras are told a limb height that is 0.5 km too low.
+pub(crate) fn flight(scene: &Scenario) -> Inputs {
+    inputs(scene, &mut Slow::new(scene.seed, 0.1), 0.5).unwrap()
+}

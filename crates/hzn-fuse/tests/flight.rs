@@ -1,0 +1,262 @@
+//! Simulated flights through `fuse`: right ones, and ones whose data misbehave.
+
+mod common;
+
+use common::{flight, scene};
+use hzn_fuse::flight::Wanted;
+use hzn_fuse::input::{Attitude, Body, Centre, Inputs};
+use hzn_fuse::results::Kind;
+use hzn_fuse::settings::Limb;
+use hzn_fuse::{Fused, Settings, fuse, truth};
+use hzn_sim::Scenario;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+/// A seed whose flight shows the Sun from T+111 s on.
+const SEED: u64 = 1;
+
+/// Settings whose noise is that of the simulation.
+fn settings() -> Settings {
+    let mut settings = Settings::default();
+    settings.imu.gyro_noise_deg_rth[1] = 0.3;
+    settings.imu.accel_noise_mg_rthz[1] = 0.3;
+    settings.camera.white_rad = 4e-4;
+    settings.limb_height.sigma_km = Some(0.5);
+    settings
+}
+
+fn misses(fused: &Fused, scene: &Scenario) -> Vec<truth::Miss> {
+    let path = scene.path().unwrap();
+    let rows: Vec<_> = path.vehicle_rows([0.0, 430.0], 10.0).collect();
+    truth::compare(&fused.epochs, &rows)
+}
+
+/// Returns the largest error of the attitude after a time, degrees.
+fn worst_deg(fused: &Fused, scene: &Scenario, from_s: f64) -> f64 {
+    let all = misses(fused, scene);
+    assert!(all.len() > 100);
+    all.iter().filter(|m| m.time_s > from_s).map(|m| m.attitude_rad.norm().to_degrees()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_flight_gives_attitude_mounts_clocks_and_the_way_back() {
+    let scene = scene(SEED);
+    let fused = fuse(&flight(&scene), &settings(), Wanted { smoothed: true, rate_hz: Some(5.0) }).unwrap();
+    let begin = fused.begin.unwrap();
+    assert!((100.0..130.0).contains(&begin.time_s) && begin.directions >= 2, "{begin:?}");
+    assert!(worst_deg(&fused, &scene, 200.0) < 1.0);
+    let nees = |epochs: &[hzn_fuse::results::Epoch]| {
+        let rows: Vec<_> = scene.path().unwrap().vehicle_rows([0.0, 430.0], 10.0).collect();
+        let all = truth::compare(epochs, &rows);
+        all.iter().map(|m| m.nees).sum::<f64>() / all.len() as f64
+    };
+    // The errors of one flight are hardly independent.
+    assert!((0.1..9.0).contains(&nees(&fused.epochs)), "{}", nees(&fused.epochs));
+    assert!((0.1..9.0).contains(&nees(&fused.smoothed)), "{}", nees(&fused.smoothed));
+    // A smoother knows more than a filter at the start, and the same at the end.
+    let sigma = |e: &hzn_fuse::results::Epoch| e.attitude_sigma_rad().norm();
+    assert!(sigma(&fused.smoothed[2]) < 0.7 * sigma(&fused.epochs[2]));
+    let last = fused.epochs.last().unwrap();
+    for (one, state) in scene.by_camera().iter().zip(&last.cameras) {
+        let rotation = |[w, x, y, z]: [f64; 4]| UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let error = (state.mount.inverse() * rotation(one.true_mount_wxyz())).scaled_axis();
+        let sigmas = error.component_div(&state.misalignment_sigma_rad).amax();
+        assert!(sigmas < 3.5, "{}: {error} {}", one.name, state.misalignment_sigma_rad);
+        let late_s = -(one.clock.offset_s + one.clock.latency_s);
+        assert!((state.clock_s - late_s).abs() < 3.5 * state.clock_sigma_s, "{} {late_s}", state.clock_s);
+        assert!(state.clock_sigma_s < 0.15);
+    }
+    // Back to the first sample, through the saturated spin: position and velocity are those of the pad.
+    let back = fused.back.first().unwrap();
+    assert_eq!(back.time_s, 0.0);
+    let pad = scene.path().unwrap().state(0.0);
+    assert!((back.position_m - pad.position_m).norm() < 30e3, "{}", (back.position_m - pad.position_m).norm());
+    let at_end = fused.back.last().unwrap();
+    assert_eq!((at_end.time_s, at_end.attitude), (begin.time_s, fused.epochs[0].state.attitude));
+    assert!(fused.triads.len() > 30 && fused.notes.len() <= 1, "{:?}", fused.notes);
+}
+
+#[test]
+fn samples_that_misbehave_are_counted_and_do_no_harm() {
+    let scene = scene(SEED);
+    let mut inputs = flight(&scene);
+    inputs.imu[3000].imu.gyro_rad_s.x = f64::NAN;
+    inputs.imu[3100] = inputs.imu[3099];
+    inputs.imu[3200].imu.time_s = 100.0;
+    inputs.imu.drain(5000..5040);
+    inputs.gnss[150].position_m.x = f64::INFINITY;
+    inputs.recordings[0].seen[40].axis.x = f64::NAN;
+    let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
+    let c = &fused.counts;
+    assert_eq!((c.samples_not_finite, c.samples_duplicate, c.samples_out_of_order, c.gaps), (1, 1, 1, 1));
+    assert_eq!(c.unusable, 2);
+    assert!(c.saturated > 100, "the spin saturates the gyros");
+    // A gap of two seconds is a rotation that nobody measured: the sigma says so.
+    let sigma = |t: f64| fused.epochs.iter().find(|e| e.state.time_s > t).unwrap().attitude_sigma_rad().norm();
+    assert!(sigma(252.06) > 3.0 * sigma(249.9), "{} {}", sigma(252.06), sigma(249.9));
+    // Without the Sun nobody knows the third axis. It comes back, and the filter begins again.
+    assert_eq!(fused.counts.restarts, 1, "{:?}", fused.notes);
+    assert!(misses(&fused, &scene).iter().all(|m| m.nees < 25.0));
+    assert!(worst_deg(&fused, &scene, 370.0) < 2.5);
+}
+
+#[test]
+fn outages_and_jumps_of_the_receiver_are_bridged_and_refused() {
+    let mut scene = scene(SEED);
+    let gnss = scene.gnss.as_mut().unwrap();
+    gnss.outages_s = vec![[200.0, 230.0]];
+    gnss.jumps_s = vec![[300.0, 305.0]];
+    let fused = fuse(&flight(&scene), &settings(), Wanted::default()).unwrap();
+    let refused: Vec<f64> =
+        fused.innovations.iter().filter(|i| i.kind == Kind::Position && !i.taken).map(|i| i.time_s).collect();
+    assert_eq!(refused, [300.0, 301.0, 302.0, 303.0, 304.0, 305.0]);
+    let worst = misses(&fused, &scene).iter().map(|m| m.position_m.norm()).fold(0.0, f64::max);
+    assert!(worst < 400.0, "{worst} m");
+}
+
+/// One limb in 25 is 52 degrees wrong and claims 0.2 degrees.
+fn with_false_limbs(inputs: &mut Inputs) -> usize {
+    let mut count = 0;
+    for recording in &mut inputs.recordings {
+        for seen in recording.seen.iter_mut().filter(|s| s.body == Body::Limb).step_by(25) {
+            let turn =
+                UnitQuaternion::from_scaled_axis(seen.axis.cross(&Vector3::z()).normalize() * 52f64.to_radians());
+            seen.axis = turn * seen.axis;
+            count += 1;
+        }
+    }
+    count
+}
+
+#[test]
+fn confident_false_answers_are_refused() {
+    let scene = scene(SEED);
+    let mut inputs = flight(&scene);
+    let count = with_false_limbs(&mut inputs);
+    let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
+    let refused = fused.innovations.iter().filter(|i| !i.taken && i.kind == Kind::Direction(Body::Limb)).count();
+    assert!(count > 10 && refused + 6 >= count, "{refused} of {count}");
+    assert!(worst_deg(&fused, &scene, 150.0) < 1.5);
+}
+
+#[test]
+fn a_lost_filter_begins_again() {
+    let scene = scene(SEED);
+    let mut inputs = flight(&scene);
+    // A star tracker that is 40 degrees wrong, and says 0.1 degrees.
+    let truth = scene.path().unwrap().state(130.0).body_to_ecef;
+    let wrong = truth * UnitQuaternion::from_scaled_axis(Vector3::x() * 40f64.to_radians());
+    inputs.attitudes = vec![Attitude { time_s: 70.0, body_to_ecef: Some(wrong), sigma_rad: 0.1f64.to_radians() }];
+    let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
+    assert_eq!((fused.begin.unwrap().directions, fused.counts.restarts), (0, 1), "{:?}", fused.notes);
+    assert!(fused.notes.iter().any(|n| n.contains("began again")), "{:?}", fused.notes);
+    assert!(worst_deg(&fused, &scene, 250.0) < 1.5);
+}
+
+/// The first Suns are false, at the right angle from the limb: the filter begins with a wrong third axis, and all limbs
+/// agree with it. The right Suns show that it is wrong.
+#[test]
+fn a_false_first_sun_is_found_out() {
+    let scene = scene(SEED);
+    let mut inputs = flight(&scene);
+    let path = scene.path().unwrap();
+    for (one, recording) in scene.by_camera().iter().zip(&mut inputs.recordings) {
+        let [w, x, y, z] = one.true_mount_wxyz();
+        let mount = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        for seen in recording.seen.iter_mut().filter(|s| s.body == Body::Sun && s.time_s < 118.0) {
+            let state = path.state(seen.time_s);
+            let nadir = (state.body_to_ecef * mount).inverse() * -state.position_m.normalize();
+            seen.axis = UnitQuaternion::from_scaled_axis(nadir * 0.7) * seen.axis;
+        }
+    }
+    let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
+    assert!(fused.begin.unwrap().time_s < 118.0 && fused.counts.restarts >= 1, "{:?}", fused.notes);
+    assert!(worst_deg(&fused, &scene, 150.0) < 3.0);
+}
+
+#[test]
+fn inputs_that_contradict_each_other_are_refused_in_words() {
+    let scene = scene(SEED);
+    let good = flight(&scene);
+    let error = |change: &dyn Fn(&mut Inputs)| {
+        let mut inputs = good.clone();
+        change(&mut inputs);
+        fuse(&inputs, &settings(), Wanted::default()).unwrap_err().to_string()
+    };
+    let same = error(&|i| i.recordings[1].mount = i.recordings[0].mount);
+    assert!(same.contains("left and right have the same mount") && same.contains("--mount right=FILE"), "{same}");
+    let none = error(&|i| i.recordings[1].mount = None);
+    assert!(none.contains("right: nobody says how the camera is mounted"), "{none}");
+    let epoch = error(&|i| i.recordings[0].seen.iter_mut().for_each(|s| s.time_s += 1.56e9));
+    assert!(epoch.contains("left: its times 1560000") && epoch.contains("--clock left=SECONDS"), "{epoch}");
+    let dark = error(&|i| i.recordings.iter_mut().for_each(|r| r.seen.retain(|s| s.body == Body::Limb)));
+    assert!(dark.contains("only limb") && dark.contains("--attitude FILE"), "{dark}");
+    let name = error(&|i| i.recordings[1].name = "left".into());
+    assert!(name.contains("two recordings have this name"), "{name}");
+    // The told offset of a clock puts them together again.
+    let mut moved = good.clone();
+    moved.recordings[0].seen.iter_mut().for_each(|s| s.time_s += 1.56e9);
+    moved.recordings[0].clock_offset_s = -1.56e9;
+    assert!(fuse(&moved, &settings(), Wanted::default()).is_ok());
+}
+
+/// A mount that looks the other way: the gates refuse the camera, and a note says which one.
+#[test]
+fn a_wrong_mount_is_named() {
+    let scene = scene(SEED);
+    let mut inputs = flight(&scene);
+    let turned = UnitQuaternion::from_scaled_axis(Vector3::y() * 3.0);
+    inputs.recordings[0].mount = inputs.recordings[0].mount.map(|m| m * turned);
+    let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
+    assert!(fused.notes.iter().any(|n| n.contains("of left were refused")), "{:?}", fused.notes);
+    assert!(worst_deg(&fused, &scene, 250.0) < 3.0);
+}
+
+/// GPS time instead of UTC: the positions belong to another time.
+#[test]
+fn wrong_leap_seconds_are_seen() {
+    let scene = scene(SEED);
+    let mut inputs = flight(&scene);
+    inputs.gnss.iter_mut().for_each(|fix| fix.time_s += 18.0);
+    let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
+    let off = misses(&fused, &scene).iter().map(|m| m.position_m.norm()).fold(0.0, f64::max);
+    // The positions agree with each other, so that nothing but the directions could contradict them.
+    assert!(off > 1000.0 || !fused.notes.is_empty(), "{off}");
+}
+
+/// The position of the Earth's centre from the limb replaces the axis, and aids the attitude as before. The receiver
+/// fails for 280 s.
+#[test]
+fn positions_from_the_limb_are_taken_where_they_are_asked_for() {
+    let mut scene = scene(SEED);
+    scene.gnss.as_mut().unwrap().outages_s = vec![[150.0, 430.0]];
+    let mut inputs = flight(&scene);
+    let path = scene.path().unwrap();
+    let mut draws = common::Draws(11);
+    for (one, recording) in scene.by_camera().iter().zip(&mut inputs.recordings) {
+        let [w, x, y, z] = one.true_mount_wxyz();
+        let mount = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let late_s = one.clock.offset_s + one.clock.latency_s;
+        for seen in recording.seen.iter_mut().filter(|s| s.body == Body::Limb) {
+            let state = path.state(seen.time_s - late_s);
+            let centre = (state.body_to_ecef * mount).inverse() * -state.position_m;
+            let noise = Vector3::from_fn(|_, _| 300.0 * draws.normal());
+            let covariance_m2 = nalgebra::Matrix3::identity() * 300f64.powi(2);
+            seen.centre = Some(Centre { position_m: centre + noise, covariance_m2 });
+        }
+    }
+    let mut settings = settings();
+    settings.camera.limb = Limb::Position;
+    let fused = fuse(&inputs, &settings, Wanted::default()).unwrap();
+    let taken = fused.innovations.iter().filter(|i| i.kind == Kind::Centre && i.taken).count();
+    assert!(taken > 200, "{taken}");
+    // A picture gives its axis or its position, not both.
+    assert!(fused.innovations.iter().all(|i| i.kind != Kind::Direction(Body::Limb)));
+    let nis = fused.innovations.iter().filter(|i| i.kind == Kind::Centre).map(|i| i.nis).sum::<f64>();
+    assert!(nis / (taken as f64) < 4.0, "{}", nis / taken as f64);
+    settings.camera.limb = Limb::Axis;
+    let axes = fuse(&inputs, &settings, Wanted::default()).unwrap();
+    assert!(axes.innovations.iter().all(|i| i.kind != Kind::Centre));
+    let last = misses(&fused, &scene).last().unwrap().position_m.norm();
+    assert!(last < 300.0, "{last} m");
+    assert!(worst_deg(&fused, &scene, 300.0) < 2.0);
+}

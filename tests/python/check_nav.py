@@ -1,0 +1,105 @@
+"""Reads the attitude files of ``hzn fuse`` with other libraries: SPICE (CK, SCLK, FK), ccsds-ndm (AEM), mcap.
+
+Usage: check_nav.py HZN EXAMPLE FOLDER. EXAMPLE writes a flight without pictures.
+
+Orekit reads the AEM too, but not without its own data (the history of UTC - TAI), so ccsds-ndm reads it here.
+"""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import spiceypy as spice
+from ccsds_ndm.ndm_io import NdmIo
+from mcap.reader import make_reader
+
+SPACECRAFT = -999
+UTC = "2019-06-13T04:00:00Z"
+
+
+def rotation(w: float, x: float, y: float, z: float) -> np.ndarray:
+    """Return the matrix of a unit quaternion."""
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])
+
+
+def fuse(hzn: str, folder: Path, output: str) -> None:
+    """Run ``hzn fuse`` on the flight."""
+    command = [hzn, "fuse", "--imu", folder / "imu.csv", "--gnss", folder / "gnss.csv", "-o", folder / output]
+    for camera in ("left", "right"):
+        command += ["--nadir", folder / f"{camera}.csv", "--mount", f"{camera}={folder / camera}.toml"]
+    command += ["--utc", UTC, "--aem", folder / "nav.aem", "--ck", folder / "nav.bc", "--force", "--smooth"]
+    subprocess.run(command, check=True, capture_output=True)
+
+
+def check_ck(folder: Path, rows: list[dict[str, str]]) -> None:
+    """Compare the CK with the CSV, as SPICE reads it."""
+    for kind in ("tsc", "tf", "bc"):
+        spice.furnsh(str(folder / f"nav.{kind}"))
+    assert list(spice.ckobj(str(folder / "nav.bc"))) == [1000 * SPACECRAFT]
+    assert spice.frmnam(1000 * SPACECRAFT) == "HZN_BODY"
+    begin = float(rows[0]["time_s"])
+    worst = 0.0
+    for row in rows:
+        ticks = round((float(row["time_s"]) - begin) * 1e6)
+        matrix, _ = spice.ckgp(1000 * SPACECRAFT, ticks, 0.0, "ITRF93")
+        # SPICE's matrix turns vectors from ITRF93 into the frame of the vehicle.
+        body_to_ecef = rotation(*(float(row[name]) for name in ("qw", "qx", "qy", "qz")))
+        worst = max(worst, np.abs(matrix - body_to_ecef.T).max())
+    assert worst < 1e-8, worst
+    print(f"CK: {len(rows)} attitudes, differences below {worst:.1e}")
+
+
+def check_aem(folder: Path, rows: list[dict[str, str]]) -> None:
+    """Compare the AEM with the CSV, as ccsds-ndm reads it."""
+    message = NdmIo().from_path(folder / "nav.aem")
+    (segment,) = message.body.segment
+    meta, states = segment.metadata, segment.data.attitude_state
+    told = (meta.ref_frame_a, meta.ref_frame_b, meta.time_system)
+    assert [str(getattr(x, "value", x)) for x in told] == ["ITRF-97", "SC_BODY_1", "UTC"], told
+    worst = 0.0
+    by_time = {row["time_s"]: row for row in rows}
+    assert len(states) == len(by_time), (len(states), len(by_time))
+    for state, row in zip(states, by_time.values(), strict=True):
+        q = state.quaternion_state.quaternion
+        told = [float(row[name]) for name in ("qw", "qx", "qy", "qz")]
+        worst = max(worst, np.abs(np.array([q.qc, q.q1, q.q2, q.q3], float) - told).max())
+    assert worst < 1e-11, worst
+    assert states[0].quaternion_state.epoch.startswith("2019-06-13T04:0"), states[0].quaternion_state.epoch
+    print(f"AEM: {len(states)} attitudes, differences below {worst:.1e}")
+
+
+def check_mcap(folder: Path) -> None:
+    """Read the recording."""
+    with (folder / "nav.mcap").open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        topics = {channel.topic for _, channel, _ in reader.iter_messages()}
+        attached = [a.name for a in reader.iter_attachments()]
+    expected = {"/nav/state", "/nav/back", "/nav/smoothed", "/nav/pose", "/tf", "/nav/innovation/left/limb"}
+    assert expected <= topics, topics
+    assert attached == ["fuse.toml"], attached
+    print(f"MCAP: {len(topics)} topics")
+
+
+def main() -> None:
+    """Make a flight, fuse it, and read everything."""
+    hzn, example, folder = sys.argv[1], sys.argv[2], Path(sys.argv[3])
+    subprocess.run([example, folder], check=True)
+    fuse(hzn, folder, "nav.mcap")
+    fuse(hzn, folder, "nav.csv")
+    with (folder / "nav.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["phase"] == "smoothed"]
+    # Several measurements can have one time; the last of them counts.
+    rows = list({row["time_s"]: row for row in rows}.values())
+    check_ck(folder, rows)
+    check_aem(folder, rows)
+    check_mcap(folder)
+
+
+if __name__ == "__main__":
+    main()
