@@ -35,7 +35,7 @@ const ALLOWED_CONVERSIONS: [(&str, usize); 15] = [
     ("hzn_core::stages::gates::attitude::verdict", 4),
     ("hzn_core::stages::gates::judge", 18),
     ("hzn_core::stages::gates::judge_rivals", 14),
-    ("hzn_core::stages::gates::judge_surroundings", 7),
+    ("hzn_core::stages::gates::judge_surroundings", 8),
     ("hzn_core::stages::gates::size::is_possible_size", 7),
     ("hzn_core::stages::gates::size::min_arc", 1),
     ("hzn_core::stages::threshold::histogram::Histogram::mean", 2),

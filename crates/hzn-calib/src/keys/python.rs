@@ -70,7 +70,10 @@ pub fn module() -> String {
         out += &format!("    {}: {name}\n{}", table.name, docstring(&about(table)));
         if table.name == "body" {
             out += &format!("    bodies: Sequence[{name}]\n");
-            out += &docstring("Several bodies in one picture, instead of `body`. The sensor searches in this order.");
+            out += &docstring(
+                "Several bodies in one picture, instead of `body`. The sensor searches in this order, for Sun \
+                 and Moon last.",
+            );
         }
     }
     out + FILE

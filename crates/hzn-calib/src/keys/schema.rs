@@ -18,7 +18,8 @@ pub fn json() -> Value {
             "type": "array",
             "maxItems": hzn_core::report::MAX_BODIES,
             "items": {"$ref": "#/properties/body"},
-            "description": "Several bodies in one picture, instead of [body]. The sensor looks for them in this order.",
+            "description": "Several bodies in one picture, instead of [body]. The sensor looks for them in this order, \
+                            for Sun and Moon last.",
         }),
     );
     json!({

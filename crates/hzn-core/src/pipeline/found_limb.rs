@@ -15,7 +15,16 @@ pub(super) struct FoundLimb<T> {
 /// brightness levels lies next to the limb that was found.
 const TAKEN_THRESHOLDS: f64 = 3.0;
 
+/// Half-angle of the Earth from half of the way to the Moon, degrees.
+const NEAR_DEG: f64 = 1.9;
+
 impl<T: Real> FoundLimb<T> {
+    /// Returns whether this body hides a Sun or Moon in a direction. The Earth looks smaller than [`NEAR_DEG`] from
+    /// beyond half of the way to the Moon; only from there the Moon can be in front of it.
+    pub(super) fn hides(&self, direction: &V3<T>) -> bool {
+        let (_, near) = T::from_f64(NEAR_DEG.to_radians()).sin_cos();
+        self.c < near && self.e.dot(direction) > self.c
+    }
     /// Removes the points on this limb and returns their number.
     pub(super) fn withdraw(&self, blocks: &mut [Block<T>], threshold_px: T) -> u32 {
         let limit = threshold_px * T::from_f64(TAKEN_THRESHOLDS);

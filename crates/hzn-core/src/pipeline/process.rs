@@ -29,8 +29,9 @@ impl<T: Real> Sensor<T> {
         self.process_excluding(workspace.lists(), picture, expected, &[], observer)
     }
 
-    /// Finds several bodies in one picture, at most [`MAX_BODIES`], one after the other in the order of `expected`. An
-    /// edge on the limb of a body that was found is not used for another body.
+    /// Finds several bodies in one picture, at most [`MAX_BODIES`], one after the other in the order of `expected`, but
+    /// Sun and Moon after all others. An edge on the limb of a body that was found is not used for another body, and
+    /// Sun and Moon are never in front of a body. The reports have the order of `expected`.
     pub fn process_each<P: Pixels, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
         &self,
         workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
@@ -38,16 +39,16 @@ impl<T: Real> Sensor<T> {
         expected: &[Expected<T>],
         observer: &O,
     ) -> Reports<T> {
-        let mut reports = Reports::new();
+        let mut reports: Reports<T> = expected.iter().take(MAX_BODIES).map(|_| Report::empty()).collect();
         let mut taken = heapless::Vec::<FoundLimb<T>, MAX_BODIES>::new();
-        for one in expected {
-            observer.body(one.which);
-            let report = self.process_excluding(workspace.lists(), picture, one, &taken, observer);
-            let found = report.solution.as_ref();
-            let found = found.map(|s| FoundLimb { e: *s.axis.v(), c: s.fused_half_angle_rad.sin_cos().1 });
-            // Both lists have room for the largest number of bodies.
-            if reports.push(report).is_err() || found.is_some_and(|f| taken.push(f).is_err()) {
-                break;
+        for is_free in [false, true] {
+            for (one, report) in expected.iter().zip(&mut reports).filter(|(one, _)| one.free == is_free) {
+                observer.body(one.which);
+                *report = self.process_excluding(workspace.lists(), picture, one, &taken, observer);
+                let found = report.solution.as_ref();
+                let found = found.map(|s| FoundLimb { e: *s.axis.v(), c: s.fused_half_angle_rad.sin_cos().1 });
+                // The list has room for the largest number of bodies.
+                found.and_then(|f| taken.push(f).ok());
             }
         }
         reports

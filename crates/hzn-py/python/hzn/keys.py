@@ -229,6 +229,9 @@ class Select(TypedDict, total=False):
     """Smallest part of the fitted limb in view that edge points must cover. Values: 0 to 1. Default: 0.4."""
     max_lit_sky: float
     """Largest part of the sky beyond the fitted limb that may be lit. Values: 0 to 1. Default: 0.3."""
+    dark_sky: float
+    """For Sun and Moon: a place in the sky counts as lit from this part of the threshold on. Values: above 0 to 1.
+    Default: 0.25."""
     min_inlier_share: float
     """Smallest part of an edge's points that must be inliers. Values: 0 to 1. Default: 0.05."""
     max_nearby: float
@@ -404,7 +407,7 @@ class _Optional(TypedDict, total=False):
     body: Body
     """The body that the sensor searches for; each of several ``[[bodies]]`` has the same keys."""
     bodies: Sequence[Body]
-    """Several bodies in one picture, instead of ``body``. The sensor searches in this order."""
+    """Several bodies in one picture, instead of ``body``. The sensor searches in this order, for Sun and Moon last."""
     input: Input
     """Conversion of a pixel to one brightness."""
     gate: Gate

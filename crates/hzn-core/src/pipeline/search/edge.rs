@@ -186,6 +186,9 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             outcome.verdict = Verdict::NoConsensus;
             return None;
         }
+        if outcome.verdict == Verdict::Passed && expected.free && self.taken.iter().any(|t| t.hides(&fused.e)) {
+            outcome.verdict = Verdict::NoSky;
+        }
         if outcome.verdict != Verdict::Passed || !sigma.is_finite() {
             return None;
         }
@@ -199,7 +202,9 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number);
         let share = T::from_i32(fit.inliers as i32)
             > T::from_i32(points.count as i32) * T::from_f64(config.select.certain_share);
-        let certain = judged.support > T::from_f64(config.select.certain_support)
+        // The reflection of a Sun in the lens may look as good as the Sun, so every edge is examined.
+        let certain = !expected.free
+            && judged.support > T::from_f64(config.select.certain_support)
             && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
         let next =
             (self.needs_next_threshold && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));

@@ -101,8 +101,13 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             self.best = Some(new);
             return;
         };
-        let apart = new.solution.axis.angle_rad(&old.solution.axis)
-            > T::from_f64(self.sensor.config.select.ambiguous_deg.to_radians());
+        // Two edges of one Sun or Moon are closer together than its half-angle.
+        let limit = if self.expected.free {
+            new.solution.half_angle_rad.max(old.solution.half_angle_rad)
+        } else {
+            T::from_f64(self.sensor.config.select.ambiguous_deg.to_radians())
+        };
+        let apart = new.solution.axis.angle_rad(&old.solution.axis) > limit;
         let (better, other) = if new.score < old.score { (new, old) } else { (old, new) };
         if apart {
             self.rival = Some(self.rival.map_or(other.score, |r| r.min(other.score)));
@@ -117,7 +122,8 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         report.counters.looks += 1;
         if let Some(best) = self.best {
             let factor = T::from_f64(self.sensor.config.select.ambiguous_score);
-            if !best.certain && self.rival.is_some_and(|r| r < best.score * factor) {
+            let is_close = |rival: T| rival < best.score * factor || self.expected.free;
+            if !best.certain && self.rival.is_some_and(is_close) {
                 report.status = Status::Ambiguous;
                 return work;
             }

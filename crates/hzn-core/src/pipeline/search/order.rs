@@ -84,7 +84,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
                 !self.is_over()
             });
         }
-        if self.best.is_some() {
+        if self.best.is_some() && !self.expected.free {
             return;
         }
         let mut missed = Missed::Unknown;

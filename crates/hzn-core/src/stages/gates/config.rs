@@ -33,6 +33,11 @@ section! {
         ///
         /// Beyond the edge of a cloud are other clouds. Ghosts in the sky next to a limb light up to a quarter of it.
         @116 max_lit_sky: f64 = 0.3, [0.0 to 1.0];
+        /// For Sun and Moon: a place in the sky counts as lit from this part of the threshold on.
+        ///
+        /// Sun and Moon stand in a dark sky. A glare fades outwards and does not count. A bright spot of a cloud has
+        /// the same size, but it lies among other clouds.
+        @- dark_sky: f64 = 0.25, [above 0.0 to 1.0];
         /// Smallest part of an edge's points that must be inliers.
         ///
         /// With one inlier in 20 points and a threshold of three pixels, a cone that is free to turn passes through
@@ -122,6 +127,9 @@ section! {
         /// Answers farther apart than this contradict each other, degrees.
         @- ambiguous_deg: f64 = 5.0, [0.0 to 180.0];
         /// Of answers that contradict each other, the better one counts where its score is better by this factor.
+        ///
+        /// Two Suns, or two Moons, always contradict each other: the reflection of a Sun in the lens is often rounder
+        /// than the Sun.
         @- ambiguous_score: f64 = 2.0, [1.0 to 1e6];
         /// An answer ends the search where its edge covers more than this part of the limb in view; `certain_share`
         /// must hold, too.

@@ -112,7 +112,12 @@ fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     camera: &Camera<T>,
     config: &Config,
 ) -> Verdict {
-    let sky = sky::measure_sky(&fused.e, blocks, binary, camera);
+    let lit_from = if expected.free {
+        (T::from_i32(binary.level.into()) * T::from_f64(config.dark_sky)).to_i32().max(1) as u16
+    } else {
+        binary.level
+    };
+    let sky = sky::measure_sky(&fused.e, blocks, binary, camera, lit_from);
     if sky.lit > T::from_f64(config.max_lit_sky) {
         return Verdict::NoSky;
     }

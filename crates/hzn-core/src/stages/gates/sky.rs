@@ -26,12 +26,13 @@ pub(super) struct Sky<T> {
     pub(super) spread: T,
 }
 
-/// Reads the brightness from the limb outwards to the border of the region.
+/// Reads the brightness from the limb outwards to the border of the region. Sky counts as lit from `lit_from` on.
 pub(super) fn measure_sky<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],
     binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
+    lit_from: u16,
 ) -> Sky<T> {
     let (mut looks, mut lit) = (0, 0);
     let mut seen = heapless::Vec::<u16, { MAX_PLACES * OUTWARDS }>::new();
@@ -52,7 +53,7 @@ pub(super) fn measure_sky<T: Real, P: Pixels, O: Observer<T>>(
                 fading = fading.filter(|&before| brightness < before).map(|_| brightness);
                 if distance > T::ZERO {
                     looks += 1;
-                    lit += i32::from(fading.is_none() && brightness >= binary.level);
+                    lit += i32::from(fading.is_none() && brightness >= lit_from);
                     let _ = seen.push(brightness);
                 }
             }
