@@ -97,6 +97,7 @@ impl Recorded {
                         reference: three(6),
                         covariance_rad2,
                         by_limb_height: three(18),
+                        is_limb: true,
                     };
                     flight.push(time_s, Measurement::Direction(direction)).unwrap();
                 }

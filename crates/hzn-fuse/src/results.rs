@@ -44,6 +44,8 @@ pub struct Epoch {
     pub accel_bias_sigma_m_s2: Vector3<f64>,
     /// 1-sigma of the limb height, km; 0 if it does not exist.
     pub limb_height_sigma_km: f64,
+    /// 1-sigma of the coefficients of its change with the latitude, km; 0 if they do not exist.
+    pub limb_latitude_sigma_km: [f64; 2],
     /// The cameras, in the order of the recordings.
     pub cameras: Vec<CameraState>,
     /// Rate of the vehicle against the Earth (body frame), rad/s.
@@ -82,6 +84,10 @@ impl Epoch {
             gyro_bias_sigma_rad_s: sigmas(layout.gyro_bias),
             accel_bias_sigma_m_s2: sigmas(layout.accel_bias),
             limb_height_sigma_km: one(layout.limb_height),
+            limb_latitude_sigma_km: {
+                let sigma = sigmas(layout.limb_latitude);
+                [sigma.x, sigma.y]
+            },
             cameras: (0..).map_while(camera).collect(),
             rate_rad_s: rate,
             unaided,

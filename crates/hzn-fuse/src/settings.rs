@@ -163,11 +163,14 @@ pub struct LimbHeight {
     pub mode: Treatment,
     /// 1-sigma, km.
     pub sigma_km: Option<f64>,
+    /// 1-sigma of its change with the latitude φ of the limb, km: of c₁ and c₂ in c₁ sin φ + c₂ (3 sin² φ − 1)/2. With
+    /// 0 the error is the same at all latitudes.
+    pub latitude_sigma_km: f64,
 }
 
 impl Default for LimbHeight {
     fn default() -> Self {
-        Self { mode: Treatment::Considered, sigma_km: None }
+        Self { mode: Treatment::Considered, sigma_km: None, latitude_sigma_km: 0.0 }
     }
 }
 
@@ -266,6 +269,7 @@ impl Settings {
             above("[start] window_s", self.start.window_s),
             above("[start] attitude_deg", self.start.attitude_deg),
             sigma("[limb_height] sigma_km", self.limb_height.sigma_km.unwrap_or(0.0)),
+            sigma("[limb_height] latitude_sigma_km", self.limb_height.latitude_sigma_km),
             above("[gnss] position_sigma_m", self.gnss.position_sigma_m),
             above("[gnss] velocity_sigma_mps", self.gnss.velocity_sigma_mps),
         ];
@@ -310,6 +314,11 @@ impl Settings {
             },
             start,
             limb_height: Block { mode: mode(self.limb_height.mode), sigma: limb_sigma_km },
+            limb_latitude: if self.limb_height.latitude_sigma_km > 0.0 {
+                Block { mode: mode(self.limb_height.mode), sigma: self.limb_height.latitude_sigma_km }
+            } else {
+                Block { mode: Mode::Off, sigma: 0.0 }
+            },
             gate_probability: self.gate_probability,
         }
     }

@@ -15,6 +15,9 @@ use crate::error::Error;
 use crate::flight::limb_axis;
 use crate::input::{Body, Fix, Inputs, Recording, Sample, Seen};
 
+/// Half-angle of the discs of Sun and Moon, rad.
+const DISC_RAD: f64 = 0.00465;
+
 /// A source of random numbers and errors.
 pub trait Errors {
     /// Returns the error of a direction and the covariance that the sensor would tell, both in the camera frame. `axis`
@@ -22,6 +25,10 @@ pub trait Errors {
     fn draw(&mut self, at: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>);
     /// Returns the derivative of the measured axis by the limb height, 1/km (camera frame).
     fn by_limb_height(&mut self, at: &Moment, axis: &Vector3<f64>) -> Vector3<f64>;
+    /// Returns whether there is enough light for the body that is in view.
+    fn has_light(&mut self, _at: &Moment) -> bool {
+        true
+    }
 }
 
 /// What is known about a picture.
@@ -35,6 +42,10 @@ pub struct Moment {
     pub time_s: f64,
     /// Altitude of the vehicle above the ellipsoid, km.
     pub altitude_km: f64,
+    /// Position of the vehicle in ECEF, m.
+    pub position_m: Vector3<f64>,
+    /// Rotation from the camera frame to ECEF.
+    pub to_ecef: UnitQuaternion<f64>,
 }
 
 /// Returns the inputs of a simulated flight: inertial unit and receiver as `hzn simulate` writes them, and a recording
@@ -101,17 +112,21 @@ fn recording(
         let pose = &frame.scene.pose;
         let to_camera = rotation(pose.cam_to_ecef_wxyz).inverse();
         for &kind in &one.bodies {
-            // A tenth of the picture's height of limb, or most of the Sun.
-            let enough = if kind == Kind::Earth { f64::from(one.camera.height) / 10.0 } else { 20.0 };
-            let visible = frame
-                .scene
-                .visible_px(kind)
-                .map_err(|e| ScenarioError { field: "[[cameras]]".into(), what: e.to_string() })?;
-            if visible < enough {
+            if !is_in_view(one, frame, kind)? {
                 continue;
             }
             let Some((body, reference)) = true_direction(one, frame, kind) else { continue };
-            let moment = Moment { camera: number, body, time_s: frame.time_s, altitude_km: known.altitude_km };
+            let moment = Moment {
+                camera: number,
+                body,
+                time_s: frame.time_s,
+                altitude_km: known.altitude_km,
+                position_m: pose.position_m.into(),
+                to_ecef: to_camera.inverse(),
+            };
+            if !errors.has_light(&moment) {
+                continue;
+            }
             let axis = to_camera * reference;
             // The sensor knows the position at the time of the stamp.
             let told_m = Vector3::new(known.x_km, known.y_km, known.z_km) * 1e3;
@@ -142,6 +157,15 @@ fn recording(
         without_time: 0,
         other_bodies: 0,
     })
+}
+
+/// Returns whether a picture has a tenth of its height of limb, or most of the disc of Sun or Moon.
+fn is_in_view(one: &Scenario, frame: &FlightFrame, kind: Kind) -> Result<bool, ScenarioError> {
+    let disc_px = core::f64::consts::TAU * DISC_RAD * one.camera.fx_px;
+    let enough_px = if kind == Kind::Earth { f64::from(one.camera.height) / 10.0 } else { 0.8 * disc_px };
+    let visible_px =
+        frame.scene.visible_px(kind).map_err(|e| ScenarioError { field: "[[cameras]]".into(), what: e.to_string() })?;
+    Ok(visible_px >= enough_px)
 }
 
 /// Returns the true direction of a body in ECEF; `None` if the picture has none.

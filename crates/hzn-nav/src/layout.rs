@@ -44,6 +44,8 @@ pub struct Layout {
     pub gyro_misalignment: Option<Place>,
     /// Limb height, km.
     pub limb_height: Option<Place>,
+    /// Change of the limb height with the latitude, km.
+    pub limb_latitude: Option<Place>,
     /// Errors of the cameras.
     pub cameras: [CameraPlaces; MAX_CAMERAS],
     /// Number of components.
@@ -71,6 +73,7 @@ impl Layout {
         layout.gyro_scale = layout.place(imu.gyro_scale, 3);
         layout.gyro_misalignment = layout.place(imu.gyro_misalignment, 3);
         layout.limb_height = layout.place(options.limb_height, 1);
+        layout.limb_latitude = layout.place(options.limb_latitude, 2);
         for (i, camera) in cameras.iter().take(MAX_CAMERAS).enumerate() {
             let misalignment = layout.place(camera.misalignment, 3);
             let slow_error = layout.place(Block { mode: camera.slow_error, sigma: 1.0 }, 3);
@@ -105,6 +108,7 @@ impl Layout {
             self.gyro_scale,
             self.gyro_misalignment,
             self.limb_height,
+            self.limb_latitude,
         ];
         let cameras = self.cameras.iter().flat_map(|c| [c.misalignment, c.slow_error, c.clock]);
         imu.into_iter().chain(cameras).flatten()

@@ -145,6 +145,10 @@ pub struct Options {
     pub start: StartSigmas,
     /// Error of the limb height, km. It is common to all cameras and constant.
     pub limb_height: Block,
+    /// Change of the limb height with the latitude φ of the limb, km: two coefficients c₁ and c₂ with the same sigma.
+    /// The height is c₁ sin φ + c₂ (3 sin² φ − 1)/2 above the constant one. The infrared limb is lower over the winter
+    /// pole, and often lower over both poles.
+    pub limb_latitude: Block,
     /// A measurement is refused if the square of its innovation over its covariance is above the value that a right one
     /// exceeds with this probability.
     pub gate_probability: f64,
@@ -156,6 +160,7 @@ impl Default for Options {
             imu: ImuOptions::default(),
             start: StartSigmas::default(),
             limb_height: Block::considered(7.0),
+            limb_latitude: Block { mode: Mode::Off, sigma: 0.0 },
             gate_probability: 1e-4,
         }
     }

@@ -49,6 +49,7 @@ fn direction(truth: &Nominal, sun: bool) -> Measurement {
         reference,
         covariance_rad2,
         by_limb_height: Vector3::zeros(),
+        is_limb: true,
     })
 }
 

@@ -201,6 +201,7 @@ impl Filter {
         reference: Three,
         covariance: Rows,
         by_limb_height: Three,
+        is_limb: bool,
     ) -> Option<Taken> {
         let covariance_rad2 = Matrix3::from_fn(|i, j| covariance[i][j]);
         let measurement = DirectionMeasurement {
@@ -209,6 +210,7 @@ impl Filter {
             reference: reference.into(),
             covariance_rad2,
             by_limb_height: by_limb_height.into(),
+            is_limb,
         };
         self.filter.update_direction(&measurement).map(taken)
     }

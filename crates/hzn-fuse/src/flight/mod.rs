@@ -21,7 +21,7 @@ use runner::Runner;
 pub(crate) use reference::limb_axis;
 
 /// Most components of the error: the vehicle's 28, and 7 of each camera.
-const STATES: usize = 28 + 7 * MAX_CAMERAS;
+const STATES: usize = 30 + 7 * MAX_CAMERAS;
 
 /// Smallest angle between two mounts that count as different, rad.
 const SAME_MOUNT_RAD: f64 = 1e-4;

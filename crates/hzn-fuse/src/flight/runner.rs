@@ -176,12 +176,14 @@ impl<'a, const N: usize> Runner<'a, N> {
         if seen.centre.is_some() && self.settings.camera(&recording.name).limb == Limb::Position {
             return None;
         }
+        let nominal = self.filter.nominal();
         let measurement = DirectionMeasurement {
             camera,
             measured: seen.axis,
-            reference: seen.reference.or_else(|| limb_axis(seen.body, &self.filter.nominal().position_m))?,
+            reference: seen.reference.or_else(|| limb_axis(seen.body, &nominal.position_m))?,
             covariance_rad2: seen.covariance_rad2,
             by_limb_height: seen.by_limb_height,
+            is_limb: seen.body == Body::Limb,
         };
         Some((seen, measurement))
     }

@@ -62,6 +62,8 @@ fn header(fused: &Fused) -> Vec<String> {
     three("accel_bias", "mps2");
     three("accel_bias_sigma", "mps2");
     names.extend(["limb_height_km", "limb_height_sigma_km"].map(str::to_owned));
+    names.extend(["limb_latitude_1_km", "limb_latitude_2_km"].map(str::to_owned));
+    names.extend(["limb_latitude_sigma_1_km", "limb_latitude_sigma_2_km"].map(str::to_owned));
     for name in &fused.cameras {
         let mut three = |begin: &str| names.extend(["x", "y", "z"].map(|axis| format!("{name}_{begin}_{axis}_deg")));
         three("misalignment");
@@ -84,6 +86,9 @@ fn cells(fused: &Fused, s: &StateRecord) -> Vec<String> {
         out.extend([0, 1, 2].map(|i| maybe(three.map(|x| x[i]))));
     }
     out.extend([s.limb_height_km, s.limb_height_sigma_km].map(maybe));
+    for two in [s.limb_latitude_km, s.limb_latitude_sigma_km] {
+        out.extend([0, 1].map(|i| maybe(two.map(|x| x[i]))));
+    }
     for camera in 0..fused.cameras.len() {
         let camera = s.cameras.get(camera);
         out.extend([0, 1, 2].map(|i| maybe(camera.map(|c| c.misalignment_deg[i]))));

@@ -74,6 +74,10 @@ pub struct StateRecord {
     pub limb_height_km: Option<f64>,
     /// Its 1-sigma.
     pub limb_height_sigma_km: Option<f64>,
+    /// Coefficients of its change with the latitude φ of the limb, km: of sin φ, and of (3 sin² φ − 1)/2.
+    pub limb_latitude_km: Option<[f64; 2]>,
+    /// Their 1-sigma.
+    pub limb_latitude_sigma_km: Option<[f64; 2]>,
     /// The cameras, in the order of the recordings.
     pub cameras: Vec<CameraRecord>,
 }
@@ -170,6 +174,8 @@ fn bare(state: &Nominal) -> StateRecord {
         accel_bias_sigma_mps2: None,
         limb_height_km: None,
         limb_height_sigma_km: None,
+        limb_latitude_km: None,
+        limb_latitude_sigma_km: None,
         cameras: Vec::new(),
     }
 }
@@ -198,6 +204,8 @@ fn full(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
         accel_bias_sigma_mps2: Some(epoch.accel_bias_sigma_m_s2.into()),
         limb_height_km: Some(epoch.corrections.limb_height_km),
         limb_height_sigma_km: Some(epoch.limb_height_sigma_km),
+        limb_latitude_km: Some(epoch.corrections.limb_latitude_km),
+        limb_latitude_sigma_km: Some(epoch.limb_latitude_sigma_km),
         cameras: fused.cameras.iter().zip(&epoch.cameras).map(camera).collect(),
         ..bare(&epoch.state)
     }

@@ -7,12 +7,10 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::blocks::put;
+use super::limb_latitude::RADIUS_KM;
 use super::update::Innovation;
 use super::{Filter, predict_direction};
 use crate::layout::Layout;
-
-/// Mean radius of the Earth, km.
-const RADIUS_KM: f64 = 6371.0;
 
 impl<const N: usize> Filter<N> {
     /// Takes the position of the Earth's centre in the camera frame (m) with its covariance (m²), without the part of
@@ -43,6 +41,14 @@ impl<const N: usize> Filter<N> {
             let by_height = predicted * (-1.0 / RADIUS_KM);
             put(&mut by_errors, (0, place.first), &by_height);
             height = by_height * self.corrections.limb_height_km;
+        }
+        if let Some((place, terms)) = self.limb_latitude() {
+            let range_m = libm::sqrt(predicted.norm_squared());
+            for (i, (term, coefficient)) in terms.iter().zip(self.corrections.limb_latitude_km).enumerate() {
+                let by_coefficient = predicted * (-term.height / RADIUS_KM) + to_camera * term.tilt * range_m;
+                put(&mut by_errors, (0, place.first + i), &by_coefficient);
+                height += by_coefficient * coefficient;
+            }
         }
         let white = own.options.white_rad * libm::sqrt(predicted.norm_squared());
         let noise = (covariance_m2 + covariance_m2.transpose()) * 0.5 + Matrix3::identity() * (white * white);

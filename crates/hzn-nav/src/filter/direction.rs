@@ -29,6 +29,9 @@ pub struct DirectionMeasurement {
     pub covariance_rad2: Matrix3<f64>,
     /// Derivative of the measured direction by the limb height, per km (camera frame); zero for the Sun.
     pub by_limb_height: Vector3<f64>,
+    /// Whether it is the axis of the Earth's limb. A limb height that changes with the latitude
+    /// ([`Options::limb_latitude`](crate::options::Options::limb_latitude)) moves such a direction alone.
+    pub is_limb: bool,
 }
 
 /// Returns the predicted direction in the camera frame with its derivatives by the attitude error (ECEF) and by the
@@ -83,6 +86,14 @@ impl<const N: usize> Filter<N> {
         if let Some(place) = self.layout.limb_height {
             put(&mut by_errors, (0, place.first), &m.by_limb_height);
             height = m.by_limb_height * self.corrections.limb_height_km;
+        }
+        if let Some((place, terms)) = self.limb_latitude().filter(|_| m.is_limb) {
+            let to_camera = (attitude * camera.mount).inverse();
+            for (i, (term, coefficient)) in terms.iter().zip(self.corrections.limb_latitude_km).enumerate() {
+                let by_coefficient = m.by_limb_height * term.height + to_camera * term.tilt;
+                put(&mut by_errors, (0, place.first + i), &by_coefficient);
+                height += by_coefficient * coefficient;
+            }
         }
         let across = basis(&predicted);
         let value = across * (measured - predicted - slow - height);

@@ -9,6 +9,7 @@ mod blocks;
 mod centre;
 mod chi2;
 mod direction;
+mod limb_latitude;
 mod predict;
 mod states;
 mod update;
@@ -20,6 +21,7 @@ use crate::options::{CameraOptions, Options};
 use crate::strapdown::{Imu, Nominal};
 
 use blocks::{set, three};
+use limb_latitude::LatitudeTerm;
 
 pub use chi2::chi2_limit;
 pub use direction::{DirectionMeasurement, predict_direction};
@@ -43,6 +45,17 @@ pub struct Corrections {
     pub gyro_misalignment: Vector3<f64>,
     /// Error of the limb height, km.
     pub limb_height_km: f64,
+    /// Coefficients of its change with the latitude, km: see [`Options::limb_latitude`].
+    pub limb_latitude_km: [f64; 2],
+}
+
+impl Corrections {
+    /// Returns the error of the limb height at a latitude (rad), km.
+    pub fn limb_height_at_km(&self, latitude_rad: f64) -> f64 {
+        let sine = libm::sin(latitude_rad);
+        let [first, second] = self.limb_latitude_km;
+        self.limb_height_km + first * sine + second * (3.0 * sine * sine - 1.0) / 2.0
+    }
 }
 
 /// A camera in the filter.
@@ -142,6 +155,11 @@ impl<const N: usize> Filter<N> {
         if finite { Ok(filter) } else { Err(FilterError::NotFinite) }
     }
 
+    /// Returns the place of the change of the limb height with the latitude, and its effect from here.
+    fn limb_latitude(&self) -> Option<(Place, [LatitudeTerm; 2])> {
+        Some((self.layout.limb_latitude?, LatitudeTerm::both(&self.nominal.position_m)?))
+    }
+
     /// Fills the diagonal with the variances of the start.
     fn fill_covariance(&mut self, cameras: &[CameraOptions]) {
         let (layout, start, imu) = (self.layout, self.options.start, self.options.imu);
@@ -162,6 +180,7 @@ impl<const N: usize> Filter<N> {
             (layout.gyro_scale, imu.gyro_scale),
             (layout.gyro_misalignment, imu.gyro_misalignment),
             (layout.limb_height, self.options.limb_height),
+            (layout.limb_latitude, self.options.limb_latitude),
         ];
         for (place, block) in blocks {
             place.into_iter().for_each(|place| fill(place, block.sigma));
@@ -228,6 +247,11 @@ impl<const N: usize> Filter<N> {
         c.gyro_scale += of(layout.gyro_scale);
         c.gyro_misalignment += of(layout.gyro_misalignment);
         c.limb_height_km += one(layout.limb_height);
+        if let Some(place) = layout.limb_latitude {
+            for (i, coefficient) in c.limb_latitude_km.iter_mut().enumerate() {
+                *coefficient += error.get(place.first + i).copied().unwrap_or(0.0);
+            }
+        }
         for (camera, places) in self.cameras.iter_mut().flatten().zip(&layout.cameras) {
             let turn = UnitQuaternion::from_scaled_axis(of(places.misalignment));
             camera.mount = UnitQuaternion::new_normalize((camera.mount * turn).into_inner());

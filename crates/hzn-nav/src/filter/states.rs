@@ -35,6 +35,11 @@ impl<const N: usize> Filter<N> {
         if let Some(place) = layout.limb_height {
             set(&mut error, (place.first, 0), a.limb_height_km - b.limb_height_km);
         }
+        if let Some(place) = layout.limb_latitude {
+            for (i, (a, b)) in a.limb_latitude_km.iter().zip(b.limb_latitude_km).enumerate() {
+                set(&mut error, (place.first + i, 0), a - b);
+            }
+        }
         for ((a, b), places) in cameras() {
             if let Some(place) = places.clock {
                 set(&mut error, (place.first, 0), a.clock_s - b.clock_s);

@@ -162,6 +162,7 @@ class Filter:
         reference: ArrayLike,
         covariance: ArrayLike,
         by_limb_height: ArrayLike = (0.0, 0.0, 0.0),
+        is_limb: bool = False,
     ) -> Innovation | None:
         """Take a direction of a camera at the time of the state.
 
@@ -177,6 +178,9 @@ class Filter:
             Its covariance, shape (3, 3), rad².
         by_limb_height
             Derivative of the measured direction by the limb height, 1/km.
+        is_limb
+            Whether it is the axis of the Earth's limb; it matters only if the settings have
+            ``limb_height.latitude_sigma_km``.
 
         Returns
         -------
@@ -190,6 +194,7 @@ class Filter:
                 _list(reference, (3,), "reference"),
                 _list(covariance, (3, 3), "covariance"),
                 _list(by_limb_height, (3,), "by_limb_height"),
+                is_limb,
             )
         )
 

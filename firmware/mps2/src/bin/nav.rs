@@ -94,6 +94,7 @@ fn push(flight: &mut Flight, record: &Record) {
             reference: three(record, 6),
             covariance_rad2,
             by_limb_height: three(record, 18),
+            is_limb: three(record, 18) != Vector3::zeros(),
         };
         let _ = flight.push(time_s, Measurement::Direction(direction));
     } else {
