@@ -28,6 +28,10 @@ struct Args {
     /// Frames per scene instead of each study's own number, for a quick look; no document is written then
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
+    /// Folder that keeps the results of the pictures of atek and orbit. A flight that is there is not rendered again:
+    /// use it to change the filter, never after a change of the sensor or of the simulator
+    #[arg(long, value_name = "DIR")]
+    recordings: Option<PathBuf>,
     /// List the names and titles of the studies
     #[arg(long)]
     list: bool,
@@ -50,7 +54,7 @@ fn main() -> anyhow::Result<()> {
     if args.frames == Some(0) {
         bail!("--frames: must be 1 or more");
     }
-    let effort = Effort { frames: args.frames };
+    let effort = Effort { frames: args.frames, recordings: args.recordings.clone() };
     for study in ALL.iter().filter(|s| args.studies.is_empty() || args.studies.iter().any(|n| n == s.name)) {
         println!("{} ...", study.title);
         let section = (study.run)(&effort).with_context(|| study.name)?;

@@ -9,9 +9,13 @@ mod horace;
 mod infrared;
 mod lens;
 mod looks;
+mod orbit;
 mod presets;
+mod recordings;
+mod residuals;
 mod scenes;
 mod setup;
+mod suns;
 
 use crate::document::Document;
 use crate::section::Section;
@@ -41,9 +45,11 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("rocket", "Accuracy and honesty: sounding rocket", scenes::rocket),
     reproduced("scenes", "Accuracy and honesty: the other scenes", scenes::others),
     reproduced("artefacts", "False answers: artefacts instead of a limb", artefacts::campaign),
+    reproduced("suns", "False answers: clouds and reflections instead of the Sun", suns::false_suns),
     reproduced("defaults", "Honesty with default settings", defaults::default_settings),
     reproduced("lens-from-limb", "The lens from the limb", lens::from_the_limb),
     reproduced("atek", "Navigation: the flight of ATEK, [BB] figures 37 to 44", atek::navigation),
+    reproduced("orbit", "Navigation: orbits through eclipse and infrared orbits", orbit::navigation),
     reproduced("effects", "What moves the limb in the scenes", effects::switched_off_effects),
     reproduced("lost-discs", "Discs under an image circle", looks::lost_discs),
     reproduced("second-look", "One look and several", looks::second_look),

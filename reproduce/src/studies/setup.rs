@@ -1,5 +1,7 @@
 //! Setup of the studies: number of pictures, scenes with their sensors, presets.
 
+use std::path::PathBuf;
+
 use anyhow::{Context, anyhow};
 use hzn_core::Preset;
 use hzn_core::body::Kind;
@@ -16,6 +18,8 @@ pub(super) const OTHER_SEEDS: &str = "**In-sample for the scene, out of sample f
 pub(crate) struct Effort {
     /// Frames per scene instead of the study's own number.
     pub(crate) frames: Option<usize>,
+    /// Folder that keeps the results of long rendered flights for another run.
+    pub(crate) recordings: Option<PathBuf>,
 }
 
 impl Effort {

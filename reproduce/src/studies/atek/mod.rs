@@ -1,7 +1,5 @@
 //! The flight of ATEK through the navigation filter: flights through pictures, and many flights with their errors.
 
-mod pictures;
-mod residuals;
 mod score;
 
 use hzn_core::body::Kind;
@@ -11,9 +9,10 @@ use hzn_fuse::{Fused, Settings, fuse, simulated};
 use hzn_sim::Scenario;
 use rayon::prelude::*;
 
+use super::recordings::{self, untold};
+use super::residuals::{self, Donors, Residuals};
 use super::setup::Effort;
 use crate::section::Section;
-use residuals::{Donors, Residuals};
 use score::{LATEST_START_S, Score, Table};
 
 /// First seed of the flights through pictures, and their number.
@@ -45,7 +44,7 @@ fn with_sun(first_seed: u64, flights: usize, count: usize) -> anyhow::Result<Vec
         for one in scene(seed, LOOKS)?.by_camera() {
             let looks = one.flight()?;
             let mut early = looks.frames.iter().filter(|f| f.time_s < LATEST_START_S);
-            if early.any(|f| f.scene.visible_px(Kind::Sun).is_ok_and(|px| px > 20.0)) {
+            if early.any(|f| f.scene.visible_px(Kind::Sun).is_ok_and(|px| px > 27.0)) {
                 found.push(scene(seed, count)?);
                 break;
             }
@@ -106,7 +105,7 @@ pub(super) fn navigation(effort: &Effort) -> anyhow::Result<Section> {
     let mut donors = Vec::new();
     let mut rows = Vec::new();
     for scene in with_sun(PICTURE_FLIGHTS.0, PICTURE_FLIGHTS.1, count)? {
-        let inputs = pictures::inputs(&scene)?;
+        let inputs = recordings::inputs(&scene, untold, effort.recordings.as_deref())?;
         donors.push(Residuals::new(&scene, &inputs)?);
         for (name, settings) in settings() {
             let head = vec![scene.seed.to_string(), name.to_owned()];

@@ -211,10 +211,9 @@ impl Table {
     pub(super) fn verdict(&self) -> String {
         let met = |is_met: bool| if is_met { "met" } else { "**not met**" };
         format!(
-            "Goals: at most 0.1° RMS about each axis at T+300 s: {} ({:.2}°). A lost flight dominates this figure. In \
-             the others the error is that of the mounts: attitude and mounts separate only while the vehicle turns \
-             against the directions, and under rate control it turns by less than 0.9°/s. No flight lost with false \
-             answers: {} ({} lost).",
+            "Goals: at most 0.1° RMS about each axis at T+300 s: {} ({:.2}°). The error is that of the mounts: \
+             attitude and mounts separate only while the vehicle turns against the directions, and under rate control \
+             it turns by less than 0.9°/s. No flight lost with false answers: {} ({} lost).",
             met(self.best_deg <= 0.1),
             self.best_deg,
             met(self.lost == 0),

@@ -48,7 +48,7 @@ impl Residuals {
             for seen in &recording.seen {
                 let Some(row) = recording.rows.get(seen.row) else { continue };
                 let Some(frame_of) = flight.frames.get(row.index as usize) else { continue };
-                let kinds = one.bodies.iter().filter(|k| super::pictures::is_earth(**k) == (seen.body == Body::Limb));
+                let kinds = one.bodies.iter().filter(|k| super::recordings::is_earth(**k) == (seen.body == Body::Limb));
                 let Some(&kind) = kinds.clone().next() else { continue };
                 let truth: Truth = frame_of.scene.body_truth(kind, &frame_of.file, frame_of.time_s)?;
                 let axis = Vector3::new(truth.axis_x, truth.axis_y, truth.axis_z);

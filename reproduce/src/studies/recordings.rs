@@ -1,48 +1,78 @@
-//! Flights through pictures: rendering, horizon sensor with default settings, recordings.
+//! Recordings of simulated flights through pictures.
+
+use std::path::Path;
 
 use anyhow::anyhow;
-use hzn_calib::frames::FrameData;
+use hzn_calib::frames::{FrameData, Frames};
 use hzn_core::Config;
 use hzn_core::body::{self, Kind};
 use hzn_fuse::input::{Inputs, Recording};
 use hzn_fuse::simulated;
 use hzn_mcap::{Row, RowMeta};
 use hzn_run::engine::AnySensor;
+use hzn_run::sink::{Existing, RowFile};
 use hzn_sim::{FlightFrame, Scenario};
 use rayon::prelude::*;
 
 /// Pictures that are rendered before they are processed.
 const BATCH: usize = 32;
 
-/// Returns everything that the flight records.
-pub(super) fn inputs(scene: &Scenario) -> anyhow::Result<Inputs> {
+/// Returns everything that a flight records. `told` gives the sensor of a camera. Recordings are read from the folder
+/// `kept` if they are there, and written to it if not.
+pub(super) fn inputs(
+    scene: &Scenario,
+    told: impl Fn(&Scenario) -> Config,
+    kept: Option<&Path>,
+) -> anyhow::Result<Inputs> {
     let mut inputs = simulated::instruments(scene)?;
     for one in scene.by_camera() {
-        inputs.recordings.push(recording(&one)?);
+        let config = told(&one);
+        let name = format!("{}-{}-{}-{}.jsonl", scene.name, scene.seed, one.capture.frames, one.name);
+        let file = kept.map(|dir| dir.join(name));
+        let rows = match &file {
+            Some(file) if file.exists() => hzn_run::results::read(file).map_err(|e| anyhow!("{e}"))?.0,
+            _ => process(&one, &config, None)?,
+        };
+        if let Some(file) = file.filter(|file| !file.exists()) {
+            keep(&file, &rows)?;
+        }
+        inputs.recordings.push(Recording::new(one.name.clone(), rows, Some(&config))?);
     }
     Ok(inputs)
 }
 
+fn keep(file: &Path, rows: &[Row]) -> anyhow::Result<()> {
+    std::fs::create_dir_all(file.parent().unwrap_or(Path::new(".")))?;
+    let mut out = RowFile::create(file, Existing::Refuse).map_err(|e| anyhow!("{e}"))?;
+    rows.iter().try_for_each(|row| out.write(row))?;
+    out.finish().map_err(|e| anyhow!("{e}"))
+}
+
 /// Returns the sensor that knows camera, mount and bodies, and has defaults for everything else.
-fn sensor(one: &Scenario) -> Config {
+pub(super) fn untold(one: &Scenario) -> Config {
     let mut sensor = one.sensor();
+    sensor.covariance = hzn_core::covariance::Config::default();
     for body in &mut sensor.bodies {
         *body = body::Config { kind: body.kind, binarize: body.binarize, ..body::Config::default() };
     }
     sensor
 }
 
-fn recording(one: &Scenario) -> anyhow::Result<Recording> {
+/// Renders the pictures of a camera and runs the sensor on them. `given` replaces the rows of frames.csv.
+pub(super) fn process(one: &Scenario, config: &Config, given: Option<&Frames>) -> anyhow::Result<Vec<Row>> {
     let flight = one.flight()?;
-    let config = sensor(one);
-    let mut sensor = AnySensor::new(&config, false)?;
+    let mut sensor = AnySensor::new(config, false)?;
+    let kinds: Vec<Kind> = match config.bodies.as_slice() {
+        [] => vec![config.body.kind],
+        several => several.iter().map(|body| body.kind).collect(),
+    };
     let mut rows = Vec::new();
     for (batch, frames) in flight.frames.chunks(BATCH).enumerate() {
         let pictures: Vec<_> = frames.par_iter().map(FlightFrame::render).collect::<Result<_, _>>()?;
         for (k, (frame, picture)) in frames.iter().zip(&pictures).enumerate() {
             let index = (batch * BATCH + k) as u64;
-            let data = known(one, frame);
-            for (kind, done) in one.bodies.iter().zip(sensor.process(&picture.view(), Some(&data), None)) {
+            let data = given.and_then(|g| g.get(&frame.file)).cloned().unwrap_or_else(|| known(one, frame));
+            for (kind, done) in kinds.iter().zip(sensor.process(&picture.view(), Some(&data), None)) {
                 let report = done.report.map_err(|e| anyhow!("{}: {e}", frame.file))?;
                 let meta = RowMeta {
                     index,
@@ -55,7 +85,7 @@ fn recording(one: &Scenario) -> anyhow::Result<Recording> {
             }
         }
     }
-    Ok(Recording::new(one.name.clone(), rows, Some(&config))?)
+    Ok(rows)
 }
 
 /// Returns the row of frames.csv.
