@@ -171,6 +171,38 @@ impl Config {
         }
         (0..self.each_body().len()).any(|which| self.threshold_of(which as u8).method == threshold::Method::Track)
     }
+    /// Returns whether the fit gives the position of a body of this sensor: `estimate.position`, which by default is
+    /// true for `ellipsoid` and the planets with a name. The Sun has no position, because its limb blooms.
+    pub fn fits_position(&self, body: &body::Config) -> bool {
+        cfg!(feature = "position")
+            && body.kind != body::Kind::Sun
+            && self.estimate.position.unwrap_or_else(|| body.is_ellipsoid())
+    }
+    /// Refuses methods that do not work in the scaled space of a body.
+    fn check_position(&self) -> Result<(), ConfigError> {
+        if !self.each_body().iter().any(|body| self.fits_position(body)) {
+            return Ok(());
+        }
+        let rule = |holds: bool, field, rule| require(holds, field, f64::NAN, Limit::Rule(rule));
+        rule(
+            self.estimate.half_angle != fit::HalfAngle::Known,
+            "estimate.half_angle",
+            "a position needs the half-angle: write \"fused\" or \"free\", or estimate.position = false",
+        )?;
+        rule(
+            matches!(
+                self.estimate.method,
+                fit::Method::Sphere | fit::Method::LeastSquares | fit::Method::GeneralisedTls
+            ),
+            "estimate.method",
+            "a position needs \"sphere\", \"least-squares\" or \"generalised-tls\", or estimate.position = false",
+        )?;
+        rule(
+            self.covariance.method == covariance::Method::Sandwich,
+            "covariance.method",
+            "a position needs \"sandwich\", or estimate.position = false",
+        )
+    }
     /// Returns the same bodies as [`Self::each_body`], for changes.
     pub fn each_body_mut(&mut self) -> &mut [body::Config] {
         if self.bodies.is_empty() { core::slice::from_mut(&mut self.body) } else { &mut self.bodies }
@@ -210,6 +242,7 @@ impl Config {
         self.candidates.check()?;
         self.reject.check_keys()?;
         self.estimate.check_keys()?;
+        self.check_position()?;
         self.covariance.check_keys()?;
         self.recover.check_keys()?;
         self.limits.check_keys()?;

@@ -129,6 +129,12 @@ impl<T: Real> Block<T> {
         V3::new(self.s[0][l], self.s[1][l], self.s[2][l])
     }
 
+    /// Returns the ray with its derivative.
+    #[cfg(feature = "position")]
+    pub(crate) fn ray_with_derivative(&self, lane: usize) -> Ray<T> {
+        Ray { s: self.ray(lane), m: self.m.map(|m| m[lane & 7]) }
+    }
+
     /// Returns the derivative of s·e by (u, v) for each lane, in radians per pixel.
     #[inline(always)]
     pub(crate) fn gradient(&self, e: &V3<T>) -> [[T; LANES]; 2] {

@@ -13,6 +13,8 @@
 
 use core::marker::PhantomData;
 
+#[cfg(feature = "position")]
+use crate::base::linalg::M3;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 
@@ -215,6 +217,11 @@ impl<A, B, T: Real> Rotation<A, B, T> {
     pub fn apply(&self, d: &UnitVec3<A, T>) -> UnitVec3<B, T> {
         let [a, b, c] = &self.rows;
         UnitVec3::assume_unit(V3::new(a.dot(&d.v), b.dot(&d.v), c.dot(&d.v)))
+    }
+    /// Returns the rotation as a matrix. Its columns are the axes of `A` in the frame `B`.
+    #[cfg(feature = "position")]
+    pub(crate) fn to_matrix(self) -> M3<T> {
+        M3::from_rows(&self.rows.map(|row| row.transpose()))
     }
     /// Returns the inverse rotation.
     pub fn inverse(&self) -> Rotation<B, A, T> {

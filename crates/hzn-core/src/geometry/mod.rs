@@ -10,4 +10,6 @@ pub(crate) mod crop;
 pub mod ellipsoid;
 pub mod frames;
 pub mod pixel;
+#[cfg(feature = "position")]
+pub(crate) mod scaling;
 pub mod section;

@@ -1,6 +1,12 @@
 //! The report that `process` returns.
 
+#[cfg(feature = "position")]
+use crate::base::linalg::basis;
+#[cfg(feature = "position")]
+use crate::base::real::Real;
 use crate::geometry::frames::{Body, Cam, Cov3, Ecef, UnitVec3};
+#[cfg(feature = "position")]
+use crate::geometry::scaling::ScaledCone;
 use crate::model::status::{Stage, Status};
 use crate::model::verdict::Verdict;
 
@@ -147,6 +153,44 @@ pub struct Free<T> {
     pub cos_per_px: T,
 }
 
+/// The position of a body's centre, from the limb alone or with a known distance.
+///
+/// Position and axis of one picture hold the same information: a filter must use only one of them.
+///
+/// # Frames and units
+///
+/// The position goes from the camera to the centre of the body, in the camera frame, metres. Its covariance is a full
+/// 3×3 matrix: on a short arc, direction and distance are known only together, along a straight ridge. A filter must not
+/// split them.
+#[derive(Debug, Clone, Copy)]
+pub struct Position<T> {
+    /// From the camera to the centre of the body in the camera frame, metres.
+    pub centre_m: [T; 3],
+    /// Covariance of `centre_m`: the upper triangle xx, xy, xz, yy, yz, zz, in m².
+    pub covariance_m2: [T; 6],
+    /// Distance from the centre before the known distance was fused, and its 1-sigma, metres.
+    pub free_range_m: (T, T),
+    /// Position of the camera in the axes of the body, metres; `None` without an attitude. Its error contains the whole
+    /// error of the attitude.
+    pub body_fixed_m: Option<[T; 3]>,
+    /// The limb of the body in its scaled space.
+    #[cfg(feature = "position")]
+    pub(crate) limb: ScaledCone<T>,
+}
+
+#[cfg(feature = "position")]
+impl<T: Real> Position<T> {
+    /// Returns a direction along the limb of the body, for an angle about its axis, in radians.
+    pub fn limb_direction(&self, angle_rad: T) -> UnitVec3<Cam, T> {
+        let ScaledCone { e, c, scaling } = &self.limb;
+        let (b1, b2) = basis(e);
+        let sin_half_angle = (T::one() - *c * *c).max(T::ZERO).sqrt();
+        let (sin, cos) = angle_rad.sin_cos();
+        let ray = e * *c + (b1 * cos + b2 * sin) * sin_half_angle;
+        UnitVec3::assume_unit(scaling.as_ref().map_or(ray, |scaling| scaling.unscale(&ray)))
+    }
+}
+
 /// A direction with its covariance.
 ///
 /// # Frames and units
@@ -191,6 +235,8 @@ pub struct Solution<T> {
     /// on it. A wrong limb height moves the cosines of all pictures alike, so that a filter needs this derivative.
     /// `None` when the answer came by telemetry.
     pub axis_by_cos: Option<[T; 3]>,
+    /// The position of the body's centre, with `estimate.position`; `None` if the arc is too short for a position.
+    pub position: Option<Position<T>>,
     /// Weighted RMS distance of the inliers from the limb in pixels.
     pub rms_px: T,
     /// Number of inliers: edge points with a weight above 0 in the fit.

@@ -18,7 +18,7 @@ use crate::geometry::pixel::{ImagePoint, Pixel};
 use crate::image::Pixels;
 use crate::model::body::Expected;
 use crate::model::observer::{Observer, Unobserved};
-use crate::model::report::Report;
+use crate::model::report::{Position, Report};
 use crate::model::status::Status;
 use crate::model::work::WorkBudget;
 use crate::stages::consensus;
@@ -37,6 +37,8 @@ use std::vec::Vec;
 pub struct Edges<T> {
     pub(crate) blocks: Vec<Block<T>>,
     points: Vec<(ImagePoint<T>, Lit)>,
+    /// The camera whose rays the points have.
+    camera: Camera<T>,
     focal_px: T,
     /// Fraction of the points whose lit side is clipped; 0 unless the points were picked from a picture.
     clipped: T,
@@ -57,7 +59,7 @@ pub struct ConsensusCone<T> {
 
 /// A fitted cone with its normal equations.
 #[derive(Debug, Clone, Copy)]
-pub struct Fitted<T>(fit::Fit<T>);
+pub struct Fitted<T>(pub(super) fit::Fit<T>);
 
 impl<T: Real> Fitted<T> {
     /// Returns the axis of the cone, towards the body, in the camera frame.
@@ -78,7 +80,7 @@ impl<T: Real> Fitted<T> {
     }
 }
 
-/// The answer: a fit with the expected half-angle fused.
+/// The answer: a fit with the expected half-angle, or the known distance, fused.
 #[derive(Debug, Clone, Copy)]
 pub struct Fused<T> {
     /// Axis, towards the body, in the camera frame.
@@ -87,6 +89,8 @@ pub struct Fused<T> {
     pub covariance: Cov3<Cam, T>,
     /// cos of the half-angle.
     pub cos_half_angle: T,
+    /// The position of the body, if the points are those of [`Edges::for_body`].
+    pub position: Option<Position<T>>,
 }
 
 impl<T: Real> Sensor<T> {
@@ -158,14 +162,14 @@ impl<T: Real> Edges<T> {
         Self { clipped, ..Self::from_points(sensor.camera(), (0..made.count as usize).map(point).collect()) }
     }
 
-    fn from_points(camera: &Camera<T>, points: Vec<(ImagePoint<T>, Lit)>) -> Self {
+    pub(super) fn from_points(camera: &Camera<T>, points: Vec<(ImagePoint<T>, Lit)>) -> Self {
         let mut blocks = vec![Block::<T>::default(); points.len().div_ceil(LANES)];
         for (i, &(point, lit)) in points.iter().enumerate() {
             blocks[i / LANES].set_point(i % LANES, point, lit);
         }
         rays::to_rays(camera, &mut blocks);
         let (fx, fy) = camera.focal_px();
-        Self { blocks, points, focal_px: (fx + fy) * T::from_f64(0.5), clipped: T::ZERO }
+        Self { blocks, points, camera: camera.clone(), focal_px: (fx + fy) * T::from_f64(0.5), clipped: T::ZERO }
     }
 
     /// Returns the points in the picture, and the lit side of each as a step of ±1 along u or v.
@@ -197,8 +201,8 @@ impl<T: Real> Edges<T> {
     /// Removes the points on the limb of another body that was found before, and returns their number. The pipeline
     /// drops an edge if more than half of its points are removed.
     pub fn withdraw(&mut self, axis: &UnitVec3<Cam, T>, cos_half_angle: T, config: &consensus::Config) -> u32 {
-        let taken = FoundLimb { e: *axis.v(), c: cos_half_angle };
-        taken.withdraw(&mut self.blocks, T::from_f64(config.threshold_px))
+        let taken = FoundLimb::circular(*axis.v(), cos_half_angle);
+        taken.withdraw(&mut self.blocks, &self.camera, T::from_f64(config.threshold_px))
     }
 
     /// Returns the largest distance of an inlier from the limb. The distance comes from the noise between neighbouring
@@ -225,7 +229,7 @@ impl<T: Real> Edges<T> {
             consensus::Consensus { e: *start.axis.v(), c: start.cos_half_angle, draws: start.draws, all: start.all };
         let threshold = self.threshold(expected, &config.reject).px;
         let noise = sensor.config.noise_model_of(expected.which);
-        fit::fit(&mut self.blocks, &start, expected, sensor.camera(), threshold, &config.estimate, noise).map(Fitted)
+        fit::fit(&mut self.blocks, &start, expected, &self.camera, threshold, &config.estimate, noise).map(Fitted)
     }
 
     /// Makes a fit of a cone that was fitted elsewhere: computes the normal equations of the weighted points at this
@@ -238,13 +242,27 @@ impl<T: Real> Edges<T> {
     pub fn fuse(&self, sensor: &Sensor<T>, fit: &Fitted<T>, expected: &Expected<T>) -> Option<Fused<T>> {
         let noise = sensor.config.noise_model_of(expected.which);
         let expected = &expected.clipped(self.clipped);
+        #[cfg(feature = "position")]
+        let expected = &expected.seen_along(&fit.0.e);
         let fused =
-            covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().estimate, sensor.camera(), None)?;
-        let (b1, b2) = basis(&fused.e);
-        Some(Fused {
+            covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().estimate, &self.camera, None)?;
+        let answer = Fused {
             axis: UnitVec3::assume_unit(fused.e),
-            covariance: Cov3::from_tangent(&b1, &b2, fused.p),
+            covariance: Cov3::from_tangent(&basis(&fused.e).0, &basis(&fused.e).1, fused.p),
             cos_half_angle: fused.c,
-        })
+            position: None,
+        };
+        #[cfg(feature = "position")]
+        if let Some(target) = &expected.target {
+            let placed = covariance::place(&fused, target, expected.radius_m)?;
+            let (b1, b2) = basis(&placed.axis);
+            return Some(Fused {
+                axis: UnitVec3::assume_unit(placed.axis),
+                covariance: Cov3::from_tangent(&b1, &b2, placed.p),
+                cos_half_angle: placed.half_angles_rad[1].sin_cos().1,
+                position: placed.position,
+            });
+        }
+        Some(answer)
     }
 }

@@ -3,12 +3,19 @@
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
+use crate::geometry::camera::Camera;
+#[cfg(feature = "position")]
+use crate::geometry::scaling::ScaledCone;
+use crate::model::report::Solution;
 
 /// The limb of a body that was found before in the same picture.
 pub(super) struct FoundLimb<T> {
     /// Axis of the limb in the camera frame, and the cosine of its half-angle.
-    pub(super) e: V3<T>,
-    pub(super) c: T,
+    e: V3<T>,
+    c: T,
+    /// The limb in scaled space, if the position of the body was fitted.
+    #[cfg(feature = "position")]
+    scaled: Option<ScaledCone<T>>,
 }
 
 /// Points within this many thresholds of another body's limb count as points on it, because the limb at other
@@ -19,20 +26,39 @@ const TAKEN_THRESHOLDS: f64 = 3.0;
 const NEAR_DEG: f64 = 1.9;
 
 impl<T: Real> FoundLimb<T> {
+    /// Takes the limb of an answer.
+    pub(super) fn new(solution: &Solution<T>) -> Self {
+        Self {
+            e: *solution.axis.v(),
+            c: solution.fused_half_angle_rad.sin_cos().1,
+            #[cfg(feature = "position")]
+            scaled: solution.position.as_ref().map(|position| position.limb),
+        }
+    }
+    /// Makes a limb that is circular in the camera frame.
+    #[cfg(feature = "_edges")]
+    pub(super) fn circular(e: V3<T>, c: T) -> Self {
+        Self {
+            e,
+            c,
+            #[cfg(feature = "position")]
+            scaled: None,
+        }
+    }
     /// Returns whether this body hides a Sun or Moon in a direction. The Earth looks smaller than [`NEAR_DEG`] from
     /// beyond half of the way to the Moon; only from there the Moon can be in front of it.
     pub(super) fn hides(&self, direction: &V3<T>) -> bool {
         let (_, near) = T::from_f64(NEAR_DEG.to_radians()).sin_cos();
         self.c < near && self.e.dot(direction) > self.c
     }
-    /// Removes the points on this limb and returns their number.
-    pub(super) fn withdraw(&self, blocks: &mut [Block<T>], threshold_px: T) -> u32 {
+    /// Removes the points on this limb and returns their number. The points are rays of `camera`.
+    pub(super) fn withdraw(&self, blocks: &mut [Block<T>], camera: &Camera<T>, threshold_px: T) -> u32 {
         let limit = threshold_px * T::from_f64(TAKEN_THRESHOLDS);
         let mut count = 0;
         for block in blocks {
             for lane in 0..LANES {
-                let [gu, gv] = block.gradient_at(lane, &self.e);
-                let r = self.c - block.ray(lane).dot(&self.e);
+                let (r, gradient) = self.offset(&block.ray(lane), camera);
+                let [gu, gv] = block.gradient_at(lane, &gradient);
                 if block.weight[lane] > T::ZERO && r * r <= limit * limit * (gu * gu + gv * gv) {
                     block.clear(lane);
                     count += 1;
@@ -40,5 +66,18 @@ impl<T: Real> FoundLimb<T> {
             }
         }
         count
+    }
+
+    /// Returns cos α − s·e for a ray of `camera`, and the vector v with d(s·e) = v·ds.
+    #[inline(always)]
+    fn offset(&self, ray: &V3<T>, camera: &Camera<T>) -> (T, V3<T>) {
+        #[cfg(feature = "position")]
+        if self.scaled.is_some() || camera.scaling().is_some() {
+            let limb = self.scaled.unwrap_or(ScaledCone { e: self.e, c: self.c, scaling: None });
+            return limb.offset_from(ray, camera.scaling());
+        }
+        #[cfg(not(feature = "position"))]
+        let _ = camera;
+        (self.c - ray.dot(&self.e), self.e)
     }
 }

@@ -10,6 +10,8 @@
 mod budget;
 #[cfg(any(test, feature = "_edges"))]
 pub mod edges;
+#[cfg(all(feature = "position", any(test, feature = "_edges")))]
+pub mod edge_position;
 mod found_limb;
 mod further_looks;
 mod horizon;

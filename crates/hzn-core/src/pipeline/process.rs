@@ -46,7 +46,7 @@ impl<T: Real> Sensor<T> {
                 observer.body(one.which);
                 *report = self.process_excluding(workspace.lists(), picture, one, &taken, observer);
                 let found = report.solution.as_ref();
-                let found = found.map(|s| FoundLimb { e: *s.axis.v(), c: s.fused_half_angle_rad.sin_cos().1 });
+                let found = found.map(FoundLimb::new);
                 // The list has room for the largest number of bodies.
                 found.and_then(|f| taken.push(f).ok());
             }
@@ -117,8 +117,8 @@ impl<T: Real> Sensor<T> {
         let config = &self.config;
         report.stage = report.stage.max(Stage::Contour);
         binary.observer.enter(Stage::Contour);
-        let turning = self.turning(expected);
-        let camera = turning.as_ref().unwrap_or(&self.camera);
+        let own = self.camera_for(expected);
+        let camera = own.as_ref().unwrap_or(&self.camera);
         let mut search = Search::new(self, camera, expected, taken, binary.observer, lists.blocks, work, report);
         match config.contour.method {
             #[cfg(feature = "horace")]

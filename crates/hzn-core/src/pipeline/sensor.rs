@@ -8,6 +8,11 @@ use crate::geometry::frames::{Body, Cam, Rotation};
 use crate::image::region::Region;
 use crate::model::body::{Expected, Prior, PriorError};
 
+/// Diameter of the smallest disc whose position is fitted, pixels.
+const SMALLEST_DISC_PX: f64 = 8.0;
+/// Without a known distance, the search finds discs down to this part of the picture's shorter side.
+const SIDES: f64 = 40.0;
+
 /// A checked configuration with everything that follows from it: lens, region, mounting. It takes some kilobytes. The
 /// lists that a picture needs are in a [`Workspace`](super::Workspace); [`Horizon`](super::Horizon) holds both.
 ///
@@ -93,13 +98,41 @@ impl<T: Real> Sensor<T> {
     /// The altitude or the position is impossible, or there is no body of this number.
     pub fn expect_body(&self, which: usize, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
         let body = self.config.each_body().get(which).ok_or(PriorError::NoBody)?;
-        Ok(Expected { which: which as u8, ..Expected::new(body, frame)? })
+        let smallest = self.config.fits_position(body).then(|| self.smallest_half_angle_rad());
+        let expected = Expected { which: which as u8, ..Expected::try_new(body, frame, smallest)? };
+        #[cfg(feature = "position")]
+        self.check_disc(&expected)?;
+        Ok(expected)
     }
 
-    /// Returns the camera as it turns while a picture is read out row by row; `None` if the rate is unknown or there is
-    /// no rolling shutter.
-    pub(super) fn turning(&self, expected: &Expected<T>) -> Option<Camera<T>> {
-        let rate = expected.rate_rad_s.filter(|_| self.camera.has_rolling_shutter())?;
-        Some(self.camera.with_rate(Some(rate)))
+    /// Returns the half-angle of the smallest disc that the search finds without a known distance, radians.
+    fn smallest_half_angle_rad(&self) -> T {
+        let side = self.camera.width().min(self.camera.height());
+        let (fx, fy) = self.camera.focal_px();
+        let diameter_px = (T::from_i32(i32::from(side)) / T::from_f64(SIDES)).max(T::from_f64(SMALLEST_DISC_PX));
+        diameter_px / (fx + fy)
+    }
+
+    /// Refuses a body that is too small in the picture.
+    #[cfg(feature = "position")]
+    fn check_disc(&self, expected: &Expected<T>) -> Result<(), PriorError> {
+        let (fx, fy) = self.camera.focal_px();
+        let diameter_px = expected.half_angle_rad() * (fx + fy);
+        let is_small = expected.target.is_some_and(|t| t.range.is_some()) && diameter_px < T::from_f64(SMALLEST_DISC_PX);
+        match is_small {
+            true => Err(PriorError::TooSmall { diameter_px_100: (diameter_px * T::from_f64(100.0)).to_i32() }),
+            false => Ok(()),
+        }
+    }
+
+    /// Returns the camera for one picture, if it differs from the camera of the sensor: it turns while the picture is
+    /// read out row by row, or its rays are in the scaled space of the body.
+    pub(super) fn camera_for(&self, expected: &Expected<T>) -> Option<Camera<T>> {
+        let rate = expected.rate_rad_s.filter(|_| self.camera.has_rolling_shutter());
+        #[cfg(feature = "position")]
+        if let Some(target) = &expected.target {
+            return Some(self.camera.with_rate(rate).with_scaling(target.scaling));
+        }
+        Some(self.camera.with_rate(Some(rate?)))
     }
 }

@@ -34,6 +34,8 @@ use crate::geometry::block::{Block, LANES};
 use crate::geometry::crop::Crop;
 use crate::geometry::frames::{Cam, UnitVec3};
 use crate::geometry::pixel::ImagePoint;
+#[cfg(feature = "position")]
+use crate::geometry::scaling::Scaling;
 
 /// A lens that is checked and ready. All of its functions are total.
 ///
@@ -84,6 +86,9 @@ pub struct Camera<T> {
     middle_row: T,
     /// Rotation of the camera while this picture is read out; `None` without a rate or without a rolling shutter.
     turning: Option<shutter::Turning<T>>,
+    /// The scaled space in which all rays are given; `None` for rays in the camera frame.
+    #[cfg(feature = "position")]
+    scaling: Option<Scaling<T>>,
 }
 
 impl<T: Real> Camera<T> {
@@ -150,6 +155,8 @@ impl<T: Real> Camera<T> {
             row_s: T::from_f64(c.readout_s / (f64::from(c.height) - 1.0)),
             middle_row: T::from_f64((f64::from(c.height) - 1.0) * 0.5),
             turning: None,
+            #[cfg(feature = "position")]
+            scaling: None,
         })
     }
 
@@ -207,10 +214,15 @@ impl<T: Real> Camera<T> {
     #[inline]
     pub fn ray(&self, p: ImagePoint<T>) -> Option<Ray<T>> {
         let ray = self.ray_in_row_frame(p)?;
-        Some(match &self.turning {
+        let ray = match &self.turning {
             None => ray,
             Some(turning) => turning.to_frame_time(&ray, p.v),
-        })
+        };
+        #[cfg(feature = "position")]
+        if let Some(scaling) = &self.scaling {
+            return Some(scaling.scale_ray(&ray));
+        }
+        Some(ray)
     }
 
     /// Does the same as [`Self::ray`], in the camera frame at the time when the point's row is exposed.
@@ -258,6 +270,10 @@ impl<T: Real> Camera<T> {
                     block.m[3][l] = or_zero(d[l] * self.inv_fy);
                     block.weight[l] = if counts { block.weight[l] } else { T::ZERO };
                 }
+                #[cfg(feature = "position")]
+                if let Some(scaling) = &self.scaling {
+                    scaling.scale_block(block);
+                }
                 return;
             }
         }
@@ -304,6 +320,17 @@ impl<T: Real> Camera<T> {
 
     /// Returns the image point of a direction; `None` beyond the image circle. The point may lie outside the picture.
     pub fn project(&self, d: &UnitVec3<Cam, T>) -> Option<ImagePoint<T>> {
+        #[cfg(feature = "position")]
+        if let Some(scaling) = &self.scaling {
+            let d = UnitVec3::assume_unit(scaling.unscale(d.v()));
+            return self.project_from_camera(&d);
+        }
+        self.project_from_camera(d)
+    }
+
+    /// Does the same as [`Self::project`], for a direction in the camera frame.
+    #[inline(always)]
+    fn project_from_camera(&self, d: &UnitVec3<Cam, T>) -> Option<ImagePoint<T>> {
         match &self.turning {
             None => self.project_in_row_frame(d.v()),
             Some(turning) => turning.project(d.v(), |s| self.project_in_row_frame(s)),
@@ -339,6 +366,19 @@ impl<T: Real> Camera<T> {
         Self { turning, ..self.clone() }
     }
 
+    /// Returns this camera with its rays in the scaled space of an ellipsoid. [`Self::project`] then takes scaled
+    /// directions.
+    #[cfg(feature = "position")]
+    pub(crate) fn with_scaling(self, scaling: Scaling<T>) -> Self {
+        Self { scaling: Some(scaling), ..self }
+    }
+
+    /// Returns the scaled space of the rays; `None` for rays in the camera frame.
+    #[cfg(feature = "position")]
+    pub(crate) fn scaling(&self) -> Option<&Scaling<T>> {
+        self.scaling.as_ref()
+    }
+
     /// Returns whether rows are exposed one after the other, so that a rate of rotation has an effect.
     pub fn has_rolling_shutter(&self) -> bool {
         self.row_s != T::ZERO
@@ -353,6 +393,8 @@ impl<T: Real> Camera<T> {
     /// by 1 in the relative units.
     pub(crate) fn shift_by_intrinsics(&self, s: &V3<T>) -> [[T; 2]; INTRINSICS] {
         let (one, zero) = (T::one(), T::ZERO);
+        #[cfg(feature = "position")]
+        let s = &self.scaling.as_ref().map_or(*s, |scaling| scaling.unscale(s));
         let (x, y, [k1, k2, k3, k4, k5]) = self.lens.by_coefficients(s);
         [[x, zero], [zero, y], [one, zero], [zero, one], k1, k2, k3, k4, k5].map(|[u, v]| [u * self.fx, v * self.fy])
     }

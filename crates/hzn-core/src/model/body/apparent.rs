@@ -82,7 +82,7 @@ impl<T: Real> ApparentBody<T> {
         let given = prior.altitude_m.or(body.altitude_km.map(|h| T::from_f64(h) * km));
         let r = T::from_f64(body.mean_radius_km()) * km;
         let altitude = match (prior.position_m, given, body.kind) {
-            (Some([x, y, z]), _, Kind::EarthSphere | Kind::Sphere) => {
+            (Some([x, y, z]), _, kind) if !matches!(kind, Kind::Earth | Kind::Sun | Kind::Moon) => {
                 let h = (x * x + y * y + z * z).sqrt() - r;
                 if !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite()) {
                     return Err(PriorError::Position);
@@ -96,14 +96,19 @@ impl<T: Real> ApparentBody<T> {
         };
         let sin = (r + limb) / (r + altitude);
         let (mut unknown_m, mut unknown_second_m) = (T::zero(), T::zero());
+        if body.is_ellipsoid() {
+            // The distance is from the centre, so that all of the difference between the axes counts.
+            unknown_m = shape::radius_sigma_m(sin, k_m(body));
+            unknown_second_m = shape::second_harmonic_m(sin, k_m(body));
+        }
         if body.kind == Kind::Earth {
             // A height above the ellipsoid rises with the local radius, so most of the error of the radius cancels.
             let counts = match body.altitude_reference {
                 AltitudeReference::Ellipsoid => (altitude - limb) / (r + altitude),
                 AltitudeReference::Sphere => T::one(),
             };
-            unknown_m = shape::radius_sigma_m(sin) * counts;
-            unknown_second_m = shape::second_harmonic_m(sin);
+            unknown_m = shape::radius_sigma_m(sin, shape::EARTH_K_M) * counts;
+            unknown_second_m = shape::second_harmonic_m(sin, shape::EARTH_K_M);
         }
         let harmonics = [T::zero(); 2];
         Ok(Self { radius: r, altitude, sin, limb, harmonics, ellipsoid: None, unknown_m, unknown_second_m })
@@ -113,10 +118,17 @@ impl<T: Real> ApparentBody<T> {
     pub(super) fn axis_ecef(&self, body: &Config, prior: &Prior<T>) -> Option<UnitVec3<Ecef, T>> {
         match (&self.ellipsoid, prior.position_m, body.kind) {
             (Some(cone), ..) => Some(cone.axis),
-            (None, Some(p), Kind::EarthSphere | Kind::Sphere) => UnitVec3::try_new(p.map(|x| -x)),
+            (None, Some(p), kind) if !matches!(kind, Kind::Earth | Kind::Sun | Kind::Moon) => {
+                UnitVec3::try_new(p.map(|x| -x))
+            }
             _ => None,
         }
     }
+}
+
+/// Returns ⅔ of the difference between the largest and the smallest semi-axis of an ellipsoid, metres.
+fn k_m(body: &Config) -> f64 {
+    body.figure_km().map_or(0.0, |[a, b, c]| (a.max(b).max(c) - a.min(b).min(c)) * 2e3 / 3.0)
 }
 
 /// Rounds a length to the nearest metre, for messages.

@@ -6,6 +6,8 @@ use crate::geometry::ellipsoid::LimbCone;
 use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
 
 use super::apparent::{ApparentBody, below_limb_error};
+#[cfg(feature = "position")]
+use super::position::Target;
 use super::{Config, Kind, LOWEST_ALTITUDE_M, Last, Prior, PriorError};
 
 /// A prior attitude with this 1-sigma or more does not correct the shape of the limb, because it is no better than an
@@ -81,6 +83,10 @@ pub struct Expected<T> {
     pub(crate) phases: bool,
     /// Number of the body among those of the sensor, from 0.
     pub(crate) which: u8,
+    /// The body in scaled space, if its position is fitted. The cone, its harmonics and the directions above are then
+    /// those of scaled space.
+    #[cfg(feature = "position")]
+    pub(crate) target: Option<Target<T>>,
 }
 
 /// Refuses impossible numbers of a prior, and returns the 1-sigma of its attitude in radians.
@@ -114,11 +120,29 @@ impl<T: Real> Expected<T> {
         self.sin.atan2(self.cos)
     }
 
-    /// Computes the expected cone: sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
+    /// Computes the expected cone of a body whose position is not fitted.
+    #[cfg(test)]
     pub(crate) fn new(body: &Config, prior: &Prior<T>) -> Result<Self, PriorError> {
+        Self::try_new(body, prior, None)
+    }
+
+    /// Computes the expected cone: sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
+    ///
+    /// With `smallest_rad`, the position of the body is fitted if it can be; the value is the half-angle of the smallest
+    /// disc that the search must find, which counts if nothing is known of the distance.
+    pub(crate) fn try_new(body: &Config, prior: &Prior<T>, smallest_rad: Option<T>) -> Result<Self, PriorError> {
         let attitude_sigma = check(prior)?;
         let km = T::from_f64(1000.0);
         let limb_sigma = T::from_f64(body.limb_height_sigma_km) * km;
+        #[cfg(feature = "position")]
+        if let Some(smallest) = smallest_rad {
+            let attitude = prior.cam_to_ecef.filter(|_| attitude_sigma < T::from_f64(USELESS_ATTITUDE_RAD));
+            if let Some(target) = Target::new(body, prior, attitude, attitude_sigma)? {
+                return Self::in_scaled_space(body, prior, target, smallest);
+            }
+        }
+        #[cfg(not(feature = "position"))]
+        let _ = smallest_rad;
         let seen = ApparentBody::new(body, prior)?;
         let ApparentBody { sin, limb, .. } = seen;
         let cos2 = T::one() - sin * sin;
@@ -171,6 +195,8 @@ impl<T: Real> Expected<T> {
             free,
             phases: body.kind != Kind::Sun,
             which: 0,
+            #[cfg(feature = "position")]
+            target: None,
         })
     }
 
@@ -203,7 +229,12 @@ impl<T: Real> Expected<T> {
         let apart = self.clipped_m[0] * (part * (one - part)).max(T::zero()).sqrt();
         let root = |parts: &[T]| parts.iter().fold(T::zero(), |sum, s| sum + *s * *s).sqrt();
         let [first, second] = self.unknown_harmonics_cos;
+        #[cfg(feature = "position")]
+        let target =
+            self.target.map(|t| Target { raised_m: height, limb_sigma_m: root(&[t.limb_sigma_m, sigma]), ..t });
         Self {
+            #[cfg(feature = "position")]
+            target,
             cos,
             sin,
             sigma_cos: scale * root(&limb_sigma_parts_m),
@@ -249,6 +280,11 @@ impl<T: Real> Expected<T> {
 
     /// Returns the limb axis in ECEF, when the position is known.
     pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
+        #[cfg(feature = "position")]
+        if let Some(target) = &self.target {
+            let axis = target.axis(target.predicted_m.as_ref()?)?;
+            return Some(UnitVec3::assume_unit(target.body_to_cam.transpose() * axis));
+        }
         self.ellipsoid.as_ref().map(|c| c.axis)
     }
 }

@@ -2,17 +2,28 @@
 
 mod apparent;
 mod expected;
+mod kind;
+mod planets;
+#[cfg(feature = "position")]
+mod position;
+mod prior;
+#[cfg(feature = "position")]
+mod scaled;
 mod shape;
 
 use crate::base::error::{ConfigError, Limit, above, between, require};
-use crate::base::keys::{Section, choices, section};
+use crate::base::keys::{Section, section};
 use crate::base::real::Real;
-use crate::geometry::ellipsoid::EARTH_MEAN_RADIUS_M;
-use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
+use crate::geometry::ellipsoid::{EARTH_MEAN_RADIUS_M, WGS84_A_M, WGS84_B_M};
 use crate::model::edge_noise;
 use crate::model::threshold;
 
 pub use expected::Expected;
+pub use kind::{AltitudeReference, Kind};
+pub use planets::Planet;
+#[cfg(feature = "position")]
+pub(crate) use position::Target;
+pub use prior::{Last, Prior, PriorError};
 
 /// Radius of the Sun's photosphere in kilometres (IAU 2015).
 pub const SUN_RADIUS_KM: f64 = 695_700.0;
@@ -26,41 +37,13 @@ pub const MOON_DISTANCE_KM: f64 = 384_400.0;
 /// Lowest altitude of a camera above its body, in metres: the lowest dry land is 0.4 km below WGS-84.
 pub const LOWEST_ALTITUDE_M: f64 = -1000.0;
 
+/// Scale height of the Earth's air at the limb, kilometres.
+const EARTH_SCALE_HEIGHT_KM: f64 = 7.5;
+
 /// Maximum number of rows of a limb height by latitude.
 pub const MAX_LATITUDES: usize = 16;
 /// Number of points on one half of the limb at which a height by latitude is evaluated.
 const LIMB_SAMPLES: usize = 8;
-
-choices! {
-    /// The kind of body.
-    pub enum Kind {
-        /// The Earth as the WGS-84 ellipsoid. Without a position it is a sphere of the mean radius, and the covariance
-        /// includes the unknown latitude.
-        @0 Earth = "earth";
-        /// A sphere of 6371.0088 km.
-        @1 EarthSphere = "earth-sphere";
-        /// A disc of 0.2666° half-angle at 1 au; it blooms, so its half-angle is free.
-        @2 Sun = "sun";
-        /// A disc of about 0.26° half-angle; its half-angle is free.
-        @3 Moon = "moon";
-        /// A sphere of `radius_km`.
-        @4 Sphere = "sphere";
-    }
-}
-
-choices! {
-    /// The surface from which an altitude without a position is measured.
-    pub enum AltitudeReference {
-        /// The WGS-84 ellipsoid, as in satellite navigation.
-        ///
-        /// If the local radius differs from the mean one, the distance of the camera from the centre differs by the
-        /// same amount. The half-angle then shows only the fraction (H − d)/(R + H) of the difference.
-        @0 Ellipsoid = "ellipsoid";
-        /// A sphere of 6371 km, for example for an altitude computed as orbit radius minus 6371 km; the local radius is
-        /// then unknown by about 17 km (1σ).
-        @1 Sphere = "sphere";
-    }
-}
 
 section! {
     /// `[body]` of sensor.toml: the body that the sensor searches for; each of several `[[bodies]]` has the same keys.
@@ -69,8 +52,21 @@ section! {
         @30 kind: Kind = Kind::Earth, [choice];
         /// Radius of a `sphere`, km; not allowed for other bodies.
         @31 radius_km: Option<f64> = None, ["above 0, for `sphere` only"] { unset: "none", example: "1188.3" };
+        /// Semi-axes of an `ellipsoid` along its own x, y and z axes (z to the north pole), km; not allowed for other
+        /// bodies, because a planet with a name has its own.
+        @- radii_km: Option<[f64; 3]> = None, ["three lengths above 0, for `ellipsoid` only"]
+            { needs: "position", unset: "none", example: "[71492.0, 71492.0, 66854.0]" };
+        /// 1σ of each semi-axis, km, with `estimate.position`.
+        @- radii_sigma_km: f64 = 0.0, [0.0 to 1e5] { needs: "position" };
+        /// Distance of the camera from the body's centre for pictures without one in their prior, km, with
+        /// `estimate.position`; it needs `range_sigma_km`.
+        ///
+        /// Without any distance, the position comes from the limb alone.
+        @- range_km: Option<f64> = None, [above 0.0] { needs: "position", unset: "none", example: "5986000.0" };
+        /// 1σ of `range_km`, and of the column `range_km` of frames.csv if that has no `range_sigma_km`, km.
+        @- range_sigma_km: Option<f64> = None, [0.0 to 1e12] { needs: "position", unset: "none", example: "1000.0" };
         /// Altitude of the camera for pictures without an altitude in their prior, km; above WGS-84 for `earth`, else
-        /// above the radius.
+        /// above the radius, which is the mean of the three semi-axes for an ellipsoid.
         ///
         /// `sun` and `moon` do not use it. For a camera in orbit about the Moon, use a `sphere` of 1737.4 km.
         @32 altitude_km: Option<f64> = None, [above 0.0] { unset: "none", example: "400.0" };
@@ -105,7 +101,7 @@ section! {
         @- limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES> = heapless::Vec::new(),
             ["up to 16 rows, for `earth`"] { unset: "none", example: "[[-90, 20.5], [0, 25.0], [90, 29.5]]" };
         /// Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun.
-        @- sunlit: Option<bool> = None, ["true or false"] { unset: "true for `moon` and `sphere`", example: "true" };
+        @- sunlit: Option<bool> = None, ["true or false"] { unset: "true for all but `earth`, `earth-sphere` and `sun`", example: "true" };
         /// Threshold for this body, as a table with the keys of `[binarize]`.
         @- binarize: Option<threshold::Config> = None, ["the keys of `[binarize]`"]
             { unset: "`[binarize]`; `fixed` at 0.9 for a `sun` among several bodies" };
@@ -126,6 +122,7 @@ impl Config {
             }
             (_, None) => {}
         }
+        self.check_figure()?;
         self.check_keys()?;
         let rows = &self.limb_height_by_latitude_km;
         let field = "body.limb_height_by_latitude_km";
@@ -152,7 +149,90 @@ impl Config {
             Kind::Sun => SUN_RADIUS_KM,
             Kind::Moon => MOON_RADIUS_KM,
             Kind::Sphere => self.radius_km.unwrap_or(f64::NAN),
+            _ => self.figure_km().map_or(f64::NAN, |[a, b, c]| (a + b + c) / 3.0),
         }
+    }
+
+    /// Returns the semi-axes of the body, kilometres; `None` for the Sun, whose limb blooms.
+    pub fn figure_km(&self) -> Option<[f64; 3]> {
+        let sphere = |r: f64| Some([r; 3]);
+        match self.kind {
+            Kind::Earth => Some([WGS84_A_M, WGS84_A_M, WGS84_B_M].map(|x| x / 1e3)),
+            Kind::EarthSphere | Kind::Moon => sphere(self.mean_radius_km()),
+            Kind::Sphere => self.radius_km.and_then(sphere),
+            Kind::Sun => None,
+            Kind::Ellipsoid => self.radii_km,
+            // Without the feature no such body is accepted, and a flight computer keeps no table of them.
+            named if cfg!(feature = "position") => named.planet().map(|planet| planet.radii_km),
+            _ => None,
+        }
+    }
+
+    /// Checks the keys of shape and distance.
+    fn check_figure(&self) -> Result<(), ConfigError> {
+        let field = "body.radii_km";
+        match (self.kind, self.radii_km) {
+            (Kind::Ellipsoid, Some(radii)) => radii.iter().try_for_each(|r| above(field, *r, 0.0))?,
+            (Kind::Ellipsoid, None) => {
+                require(false, field, f64::NAN, Limit::Rule("an ellipsoid needs its three semi-axes in km"))?
+            }
+            (_, Some([a, ..])) => {
+                require(false, field, a, Limit::Rule("only body.kind = \"ellipsoid\" may have semi-axes"))?
+            }
+            (_, None) => {}
+        }
+        require(
+            self.range_km.is_none() || self.range_sigma_km.is_some(),
+            "body.range_sigma_km",
+            f64::NAN,
+            Limit::Rule("body.range_km needs its 1-sigma in km"),
+        )
+    }
+
+    /// Returns the limb height in kilometres, or the mean over the latitudes if it is given by latitude.
+    #[cfg(feature = "position")]
+    pub(crate) fn mean_limb_height_km(&self) -> f64 {
+        let rows = &self.limb_height_by_latitude_km;
+        if rows.is_empty() {
+            return self.limb_height_km;
+        }
+        const LATITUDES: i32 = 18;
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for i in 0..LATITUDES {
+            let latitude = (f64::from(i) + 0.5) * 180.0 / f64::from(LATITUDES) - 90.0;
+            let area = libm::cos(latitude.to_radians());
+            sum += area * self.limb_height_km(latitude);
+            weight += area;
+        }
+        sum / weight
+    }
+
+    /// Returns a body of this kind with the values that fit it where no key says otherwise. `radii_km` is for
+    /// [`Kind::Ellipsoid`].
+    ///
+    /// The limb height of the Earth, 17 km ± 7 km, is wrong for every other body. A planet with a name has its own
+    /// ([`Planet`]); an ellipsoid without a name counts as a body without air, ± 0.3 % of its mean radius.
+    pub fn of_kind(kind: Kind, radii_km: Option<[f64; 3]>) -> Self {
+        let mut body = Self { kind, radii_km, ..Self::default() };
+        let unnamed = || {
+            let [a, b, c] = radii_km.filter(|_| kind == Kind::Ellipsoid)?;
+            Some((0.0, (a + b + c) * 1e-3, 0.0))
+        };
+        let named = kind.planet().map(|p| (p.limb_height_km, p.limb_height_sigma_km, p.scale_height_km));
+        if let Some((height, sigma, scale_height)) = named.or_else(unnamed) {
+            let earth = Self::default();
+            (body.limb_height_km, body.limb_height_sigma_km) = (height, sigma);
+            // The height that overexposure adds is proportional to the scale height of the air, 7.5 km for the Earth.
+            body.clipped_height_km = earth.clipped_height_km * scale_height / EARTH_SCALE_HEIGHT_KM;
+            body.clipped_sigma_km = earth.clipped_sigma_km * scale_height / EARTH_SCALE_HEIGHT_KM;
+        }
+        body
+    }
+
+    /// Returns whether the body is given as an ellipsoid of its own: `ellipsoid`, or a planet with a name.
+    pub fn is_ellipsoid(&self) -> bool {
+        // Without the feature no such body is accepted.
+        cfg!(feature = "position") && (self.kind == Kind::Ellipsoid || self.kind.planet().is_some())
     }
 
     /// Returns the limb height in kilometres at a geodetic latitude in degrees.
@@ -213,110 +293,9 @@ impl Config {
 
     /// Returns whether only the sunlit limb counts as limb, when the Sun's direction is known.
     pub fn is_sunlit(&self) -> bool {
-        self.sunlit.unwrap_or(matches!(self.kind, Kind::Moon | Kind::Sphere))
+        self.sunlit.unwrap_or(matches!(self.kind, Kind::Moon | Kind::Sphere) || self.is_ellipsoid())
     }
 }
-
-/// The data known about one picture before it is processed. Every field may be missing.
-///
-/// # Example
-///
-/// A position in ECEF determines the cone of the ellipsoid. An attitude, good to a few degrees, corrects its shape:
-///
-/// ```
-/// use hzn_core::Prior;
-/// use hzn_core::frames::Rotation;
-///
-/// let prior = Prior::<f64> {
-///     position_m: Some([6_771e3, 0.0, 0.0]),
-///     // The quaternion is scalar first, and takes coordinates from the camera to ECEF.
-///     cam_to_ecef: Rotation::assume_from_quaternion([0.5, 0.5, 0.5, 0.5]),
-///     attitude_sigma_rad: Some(3f64.to_radians()),
-///     ..Prior::default()
-/// };
-/// assert!(prior.altitude_m.is_none() && prior.cam_to_ecef.is_some());
-/// ```
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Prior<T> {
-    /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. It must be above the limb height.
-    pub altitude_m: Option<T>,
-    /// Position of the camera in ECEF, metres. A known position replaces the altitude.
-    pub position_m: Option<[T; 3]>,
-    /// A prior attitude, camera to ECEF; an accuracy of a few degrees is enough. It gives the azimuth for the
-    /// ellipsoid's correction. With a position it is also a gate, see `select.max_attitude_sigma`.
-    pub cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
-    /// Threshold that the previous picture proposes, in counts: the `next_level` of its report, for
-    /// `binarize.method = "track"`. A [`Horizon`](crate::Horizon) stores this value between pictures.
-    pub level: Option<u16>,
-    /// Direction to the Sun in the camera frame. It is used by a gate, see `select.max_unlit`.
-    pub sun: Option<UnitVec3<Cam, T>>,
-    /// 1-sigma of the prior attitude about the axis in radians, 0 or more; 5 degrees if it is left out. It widens the
-    /// covariance by the part of the ellipsoid's shape that then remains uncertain. From 30 degrees on, the attitude
-    /// does not correct the shape at all.
-    pub attitude_sigma_rad: Option<T>,
-    /// The last answer, for `select.max_rate_deg_s`.
-    pub last: Option<Last<T>>,
-    /// The camera's rate of rotation in its own axes, rad/s, up to 1000. It is for a camera with a rolling shutter
-    /// (`camera.readout_s`), whose rows are exposed at different times. The picture's time is that of its middle row.
-    pub rate_rad_s: Option<[T; 3]>,
-}
-
-/// The answer to an earlier picture.
-#[derive(Debug, Clone, Copy)]
-pub struct Last<T> {
-    /// The axis in the camera frame.
-    pub axis: UnitVec3<Cam, T>,
-    /// The 1-sigma of the axis in radians, 0 or more.
-    pub sigma_rad: T,
-    /// Time since the earlier picture was exposed, seconds.
-    pub age_s: T,
-}
-
-/// Reason why the prior of a picture is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PriorError {
-    /// The altitude is not a finite number, or is too low for any camera.
-    Altitude,
-    /// The position is not finite, or inside the body.
-    Position,
-    /// The camera is not above the limb height, so that the limb surrounds it and there is no cone. A rocket flight
-    /// begins below the limb height.
-    BelowLimb {
-        /// Altitude of the camera in metres.
-        altitude_m: i32,
-        /// Limb height in metres.
-        limb_m: i32,
-    },
-    /// Neither the prior nor the configuration has an altitude.
-    NoAltitude,
-    /// The sigma of the attitude is not a finite number, or is negative.
-    AttitudeSigma,
-    /// The rate of rotation is not finite, or is too large.
-    Rate,
-    /// The sensor has no body with that number.
-    NoBody,
-}
-
-impl core::fmt::Display for PriorError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Altitude => "altitude_km must be a finite number above -1 (kilometres)",
-            Self::Position => "x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres)",
-            Self::BelowLimb { altitude_m, limb_m } => {
-                let [altitude, limb] = [altitude_m, limb_m].map(|m| f64::from(*m) / 1e3);
-                let place = if altitude < limb { "below" } else { "not above" };
-                return write!(f, "altitude {altitude} km is {place} the limb height {limb} km");
-            }
-            Self::AttitudeSigma => "attitude_sigma_deg must be a finite number, 0 or more",
-            Self::Rate => "rate_x, rate_y, rate_z must be finite and at most 1000 (rad/s)",
-            Self::NoAltitude => {
-                "no altitude: set body.altitude_km, or give altitude_km or x_km, y_km, z_km with the frame"
-            }
-            Self::NoBody => "the sensor has no body with this number",
-        })
-    }
-}
-impl core::error::Error for PriorError {}
 
 #[cfg(test)]
 mod tests {

@@ -1,4 +1,4 @@
-//! The difference between the flattened Earth and a sphere, for a camera with a known height but an unknown position.
+//! The difference between a flattened body and a sphere, for a camera with a known height but an unknown position.
 //!
 //! A plane that touches the ellipsoid, with its normal at latitude φ', lies R − k P₂(sin φ') from the centre to first
 //! order in the flattening f, with k = ⅔ a f. For a camera at latitude φ, the normals of the planes that touch the
@@ -17,8 +17,8 @@
 use crate::base::real::Real;
 use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M};
 
-/// ⅔ a f.
-const K_M: f64 = (WGS84_A_M - WGS84_B_M) * 2.0 / 3.0;
+/// k of the Earth in metres.
+pub(super) const EARTH_K_M: f64 = (WGS84_A_M - WGS84_B_M) * 2.0 / 3.0;
 /// RMS of P₂(sin φ) over evenly distributed latitudes: √(11/32).
 const RADIUS_RMS: f64 = 0.586_301_969_977_929_6;
 /// RMS of cos²φ over the globe: √(8/15).
@@ -26,14 +26,14 @@ const SECOND_RMS: f64 = 0.730_296_743_340_221_5;
 
 /// Returns the 1-sigma of the radius of the equivalent sphere (with the same half-angle) about the mean radius, metres:
 /// 16.7 km at low altitude, 6 km far away.
-pub(super) fn radius_sigma_m<T: Real>(sin: T) -> T {
-    (T::from_f64(3.0) * sin + T::one()) * T::from_f64(0.5 * K_M * RADIUS_RMS)
+pub(super) fn radius_sigma_m<T: Real>(sin: T, k_m: f64) -> T {
+    (T::from_f64(3.0) * sin + T::one()) * T::from_f64(0.5 * k_m * RADIUS_RMS)
 }
 
 /// Returns the 1-sigma amplitude of the second harmonic of the limb's height in azimuth, metres: 0.15 km at 60 km,
 /// 1.3 km at 600 km.
-pub(super) fn second_harmonic_m<T: Real>(sin: T) -> T {
-    (T::one() - sin * sin) * T::from_f64(0.75 * K_M * SECOND_RMS)
+pub(super) fn second_harmonic_m<T: Real>(sin: T, k_m: f64) -> T {
+    (T::one() - sin * sin) * T::from_f64(0.75 * k_m * SECOND_RMS)
 }
 
 #[cfg(test)]
@@ -70,7 +70,10 @@ mod tests {
             let radius = mean_square(&|l| exact(l, altitude).0 - EARTH_MEAN_RADIUS_M, &|_| 1.0);
             let second = mean_square(&|l| exact(l, altitude).1, &|l| libm::cos(l.to_radians()));
             for (got, want, rounded) in
-                [(radius_sigma_m(sin), radius, radius_km), (second_harmonic_m(sin), second, second_km)]
+                [
+                    (radius_sigma_m(sin, EARTH_K_M), radius, radius_km),
+                    (second_harmonic_m(sin, EARTH_K_M), second, second_km),
+                ]
             {
                 assert!((got / want - 1.0).abs() < 0.03, "{km} km: {got} {want}");
                 assert!((got * 1e-3 / rounded - 1.0).abs() < 0.06, "{km} km: {got} {rounded}");

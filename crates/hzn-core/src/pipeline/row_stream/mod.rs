@@ -289,8 +289,8 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
         if picture.height > 1 {
             let binary = BinaryPicture::new(&picture, &region, 1, observer).with_blooming(self.expected.blooms());
             let work = budget::new(&self.sensor.config, lists.border.len());
-            let turning = self.sensor.turning(self.expected);
-            let camera = turning.as_ref().unwrap_or(&self.sensor.camera);
+            let own = self.sensor.camera_for(self.expected);
+            let camera = own.as_ref().unwrap_or(&self.sensor.camera);
             let mut judge = Search::new(self.sensor, camera, self.expected, &[], observer, lists.blocks, work, report);
             judge.border_following(&binary, lists.border, lists.marks);
             judge.conclude();

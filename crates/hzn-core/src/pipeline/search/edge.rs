@@ -8,6 +8,8 @@ use crate::geometry::frames::{Cam, Cov3, UnitVec3};
 use crate::geometry::pixel::Pixel;
 use crate::image::Pixels;
 use crate::model::body::Expected;
+#[cfg(feature = "position")]
+use crate::model::body::Target;
 use crate::model::error_budget::ErrorBudget;
 use crate::model::observer::Observer;
 use crate::model::report::{Candidate, Free, Report, Solution};
@@ -123,7 +125,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
 
         enter(self.report, self.observer, Stage::Reject);
         let configured_px = T::from_f64(config.reject.threshold_px);
-        let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, configured_px)).sum();
+        let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, camera, configured_px)).sum();
         if on_another * 2 > points.count {
             outcome.verdict = Verdict::Taken;
             return None;
@@ -165,6 +167,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let (config, camera) = (&self.sensor.config, self.camera);
         let blocks = self.blocks.get(..(points.count as usize).div_ceil(LANES))?;
         enter(self.report, self.observer, Stage::Covariance);
+        #[cfg(feature = "position")]
+        let (expected, _) = (&expected.seen_along(&fit.e), outcome.verdict = Verdict::Uncertain);
         let mut budget = self.observer.wants_budget().then(ErrorBudget::new);
         let fused = covariance::fuse(blocks, fit, expected, self.noise, &config.estimate, camera, budget.as_mut())?;
         if let Some(budget) = &budget {
@@ -199,7 +203,16 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             outcome.verdict = Verdict::Straight;
             return None;
         }
+        #[cfg(not(feature = "position"))]
         let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number);
+        #[cfg(feature = "position")]
+        let solution = {
+            let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number);
+            match &expected.target {
+                None => solution,
+                Some(target) => self.place(solution, &fused, target, expected)?,
+            }
+        };
         let share = T::from_i32(fit.inliers as i32)
             > T::from_i32(points.count as i32) * T::from_f64(config.select.certain_share);
         // The reflection of a Sun in the lens may look as good as the Sun, so every edge is examined.
@@ -250,11 +263,39 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
                 cos_per_px: fit.sums.cos_per_px(),
             }),
             axis_by_cos: Some((b1 * by_1 + b2 * by_2).into()),
+            position: None,
             rms_px: fit.rms_px,
             inliers: fit.inliers,
             arc_px: fit.arc_px,
             candidate: number,
         }
+    }
+
+    /// Replaces what is in scaled space by the same in the camera frame, and adds the position.
+    #[cfg(feature = "position")]
+    fn place(
+        &self,
+        solution: Solution<T>,
+        fused: &Fused<T>,
+        target: &Target<T>,
+        expected: &Expected<T>,
+    ) -> Option<Solution<T>> {
+        let placed = covariance::place(fused, target, expected.radius_m)?;
+        let axis = UnitVec3::assume_unit(placed.axis);
+        let (b1, b2) = basis(&placed.axis);
+        let [half_angle_rad, fused_half_angle_rad] = placed.half_angles_rad;
+        Some(Solution {
+            axis,
+            covariance: Cov3::from_tangent(&b1, &b2, placed.p),
+            axis_body: self.sensor.cam_to_body.as_ref().map(|r| r.apply(&axis)),
+            half_angle_rad,
+            fused_half_angle_rad,
+            altitude_m: placed.altitude_m,
+            free: None,
+            axis_by_cos: None,
+            position: placed.position,
+            ..solution
+        })
     }
 
     fn enter(&mut self, stage: Stage) {

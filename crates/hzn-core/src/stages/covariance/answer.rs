@@ -1,5 +1,7 @@
 //! The answer of a fit with its covariance.
 
+#[cfg(feature = "position")]
+use crate::base::linalg::M3;
 use crate::base::linalg::V3;
 
 /// The answer of a fit with its covariance.
@@ -21,6 +23,22 @@ pub(crate) struct Fused<T> {
     pub(crate) chi2: T,
     /// Errors of the edge points in this answer.
     pub(crate) edge: EdgeNoise<T>,
+    /// The position of the body, if it was fitted.
+    #[cfg(feature = "position")]
+    pub(crate) located: Option<Located<T>>,
+}
+
+/// The position of a body with its covariance.
+#[cfg(feature = "position")]
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Located<T> {
+    /// From the camera to the centre of the body in the camera frame, in units of the target's mean semi-axis.
+    pub(crate) r: V3<T>,
+    /// Covariance of `r` in the same units.
+    pub(crate) p: M3<T>,
+    /// The same before the known distance was fused.
+    pub(crate) free_r: V3<T>,
+    pub(crate) free_p: M3<T>,
 }
 
 /// Errors of the edge points that a covariance includes.

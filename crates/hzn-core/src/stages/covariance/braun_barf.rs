@@ -43,6 +43,8 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
             sigma_px: T::from_f64(config.sigma_px),
             length_px: T::from_f64(config.correlation_px),
         },
+        #[cfg(feature = "position")]
+        located: None,
     })
 }
 

@@ -68,6 +68,54 @@ pub(super) fn add_terms<T: Real>(
     Some(())
 }
 
+/// A point of the part, as a row of the normal equations.
+pub(super) struct Row<T> {
+    /// The ray, and its components on the tangent basis.
+    s: V3<T>,
+    pub(super) x: T,
+    pub(super) y: T,
+    /// Derivative of s·e by (u, v), and its square.
+    gradient: [T; 2],
+    g2: T,
+    /// w h.
+    pub(super) h: V3<T>,
+    /// The first two components of h, and w.
+    h12: [T; 2],
+    w: T,
+    /// Robust weight and number of the point.
+    weight: T,
+    place: usize,
+}
+
+impl<T: Real> Row<T> {
+    /// Adds w h hᵀ to the upper triangle of the normal matrix.
+    pub(super) fn add_to(&self, normal: &mut [T; 6]) {
+        let (Self { h, w, .. }, [h1, h2]) = (self, self.h12);
+        let terms = [h.x * h1, h.x * h2, -h.x, h.y * h2, -h.y, *w];
+        normal.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+    }
+}
+
+/// Returns the rows of a part of the points.
+pub(super) fn part<'a, T: Real>(blocks: &'a [Block<T>], fit: &'a Fit<T>) -> impl Iterator<Item = Row<T>> + 'a {
+    let (b1, b2) = basis(&fit.e);
+    let [m1, m2] = fit.mean;
+    let points = blocks.iter().flat_map(|block| (0..LANES).map(move |l| (block, l))).enumerate();
+    let carrying = points.filter(|(_, (block, l))| block.weight[l & 7] > T::ZERO);
+    // The points are in the middle of each stretch.
+    let every = (fit.inliers as usize).div_ceil(PART).max(1);
+    carrying.skip(every / 2).step_by(every).map(move |(place, (block, l))| {
+        let s = block.ray(l);
+        let [gu, gv] = block.gradient_at(l, &fit.e);
+        let g2 = (gu * gu + gv * gv).max(T::from_f64(1e-20));
+        let w = block.weight[l & 7] / g2;
+        let (x, y) = (s.dot(&b1), s.dot(&b2));
+        let (h1, h2) = (x - m1, y - m2);
+        let h = V3::new(h1, h2, -T::one()) * w;
+        Row { s, x, y, gradient: [gu, gv], g2, h, h12: [h1, h2], w, weight: block.weight[l & 7], place }
+    })
+}
+
 /// Sums Σ w h x over a part of the points, for each signal x.
 struct Sums<T> {
     /// Upper triangle of Σ w h hᵀ.
@@ -85,8 +133,6 @@ struct Sums<T> {
 
 impl<T: Real> Sums<T> {
     fn new(blocks: &[Block<T>], fit: &Fit<T>, camera: &Camera<T>) -> Self {
-        let (b1, b2) = basis(&fit.e);
-        let [m1, m2] = fit.mean;
         let zero = V3::zeros();
         let mut sums = Self {
             normal: [T::ZERO; 6],
@@ -97,27 +143,16 @@ impl<T: Real> Sums<T> {
             lens: [zero; INTRINSICS],
         };
         let is_uncertain = camera.intrinsic_modes().is_some();
-        let points = blocks.iter().flat_map(|block| (0..LANES).map(move |l| (block, l))).enumerate();
-        let carrying = points.filter(|(_, (block, l))| block.weight[l & 7] > T::ZERO);
-        // The points are in the middle of each stretch.
-        let every = (fit.inliers as usize).div_ceil(PART).max(1);
-        for (place, (block, l)) in carrying.skip(every / 2).step_by(every) {
-            let s = block.ray(l);
-            let [gu, gv] = block.gradient_at(l, &fit.e);
-            let g2 = (gu * gu + gv * gv).max(T::from_f64(1e-20));
-            let w = block.weight[l & 7] / g2;
-            let (x, y) = (s.dot(&b1), s.dot(&b2));
-            let (h1, h2) = (x - m1, y - m2);
-            let h = V3::new(h1, h2, -T::one()) * w;
-            let terms = [h.x * h1, h.x * h2, -h.x, h.y * h2, -h.y, w];
-            sums.normal.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-            let shift = h * g2.sqrt();
+        for row in part(blocks, fit) {
+            let Row { s, gradient: [gu, gv], h, weight, place, x, y, .. } = row;
+            row.add_to(&mut sums.normal);
+            let shift = h * row.g2.sqrt();
             sums.shift += shift;
             let i = T::from_i32(place as i32);
             sums.by_number += shift * i;
-            sums.numbers[0] += block.weight[l & 7];
-            sums.numbers[1] += block.weight[l & 7] * i;
-            sums.numbers[2] += block.weight[l & 7] * i * i;
+            sums.numbers[0] += weight;
+            sums.numbers[1] += weight * i;
+            sums.numbers[2] += weight * i * i;
             let per = T::one() / (x * x + y * y).max(T::from_f64(1e-20)).sqrt();
             let (c, s_) = (x * per, y * per);
             sums.harmonics[0][0] += h * c;

@@ -31,7 +31,18 @@ pub(super) fn fused<T: Real>(
             budget.project(&b1, &b2, [T::ZERO; 2], k.map(|k| k * var_c.sqrt()), expected);
         }
         let p = [p.m11 + k[0] * k[0] * var_c, p.m12 + k[0] * k[1] * var_c, p.m22 + k[1] * k[1] * var_c];
-        return Some(Fused { e: fit.e, c: fit.c, p, free_p, by_cos: k, var_free_cos: var_free, chi2: T::ZERO, edge });
+        return Some(Fused {
+            e: fit.e,
+            c: fit.c,
+            p,
+            free_p,
+            by_cos: k,
+            var_free_cos: var_free,
+            chi2: T::ZERO,
+            edge,
+            #[cfg(feature = "position")]
+            located: None,
+        });
     }
     let total = p.m33 + var_c;
     let difference = expected.cos - fit.c;
@@ -57,6 +68,8 @@ pub(super) fn fused<T: Real>(
         var_free_cos: var_free,
         chi2: difference * difference / total,
         edge,
+        #[cfg(feature = "position")]
+        located: None,
     })
 }
 

@@ -13,11 +13,15 @@ mod answer;
 #[cfg(feature = "dlr")]
 pub(crate) mod braun_barf;
 mod common;
+#[cfg(feature = "position")]
+pub(crate) mod consider;
 #[cfg(feature = "zju")]
 mod elliptic;
 mod fusion;
 mod gauss_markov;
 mod noise;
+#[cfg(feature = "position")]
+pub(crate) mod position;
 #[cfg(feature = "reml")]
 pub mod reml;
 mod sandwich;
@@ -32,9 +36,13 @@ use crate::stages::fit::{self, Fit};
 pub use crate::model::edge_noise::{Config, Method, Noise};
 pub use crate::model::error_budget::{ErrorBudget, Term};
 pub(crate) use answer::Fused;
+#[cfg(all(test, feature = "position"))]
+pub(crate) use answer::Located;
 use fusion::fused;
 pub(crate) use gauss_markov::correlated;
 pub(crate) use noise::measured_length_px;
+#[cfg(feature = "position")]
+pub(crate) use position::place;
 pub(crate) use sandwich::{response, sandwich};
 
 /// Computes the covariance of the fit from all sources of error, and then fuses the expected half-angle. The noise is
@@ -71,5 +79,9 @@ pub(crate) fn fuse<T: Real>(
         p += more;
         add(term, more);
     })?;
+    #[cfg(feature = "position")]
+    if let Some(target) = expected.target.as_ref().filter(|_| fit.free) {
+        return position::fused(blocks, fit, &p, edge, expected, target, estimate, budget);
+    }
     fused(fit, &p, edge, expected, estimate, budget)
 }

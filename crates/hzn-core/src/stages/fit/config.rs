@@ -29,6 +29,10 @@ choices! {
         /// An elliptic cone by total least squares; every point is weighed by the angle of a pixel at its place (Wang
         /// et al. 2022, (18) to (21)).
         @- Wtls = "wtls" needs "zju";
+        /// Linear least squares in scaled space (Christian & Robinson 2016), for comparison: biased on short arcs.
+        @- LeastSquares = "least-squares" needs "position";
+        /// Generalised total least squares in scaled space, closed and without bias (math.md, 13.9).
+        @- GeneralisedTls = "generalised-tls" needs "position";
         /// Centre and radius of a circle, right for a camera that points at the body (Barf 2014, 2.2.4).
         @- Circle = "circle" needs "horace";
     }
@@ -41,6 +45,12 @@ section! {
         @- method: Method = Method::Sphere, [choice];
         /// Which half-angle the fitted cone has.
         @90 half_angle: HalfAngle = HalfAngle::Fused, [choice];
+        /// Whether the fit gives the position of the body's centre: the whole vector with its covariance. The limb of an
+        /// ellipsoid must then have an orientation: an attitude, or for a body of revolution its pole.
+        ///
+        /// The position and the axis of one picture hold the same information. A filter must use only one of them.
+        @- position: Option<bool> = None, ["true or false"]
+            { needs: "position", unset: "true for `ellipsoid` and the planets with a name", example: "true" };
         /// For `wtls`: points are weighted where the axis is farther from the optical axis than this, degrees; 0 always
         /// weights them.
         @- weigh_above_deg: f64 = 0.0, [0.0 to 180.0] { needs: "zju" };

@@ -7,27 +7,42 @@ use super::sums::{Weights, means, pass};
 use crate::base::linalg::{V3, basis, unit};
 use crate::base::real::Real;
 use crate::geometry::block::Block;
+#[cfg(all(feature = "position", any(test, feature = "_edges")))]
+use crate::geometry::scaling::Scaling;
 
 /// Returns the fit at a given cone, with the weights that the points have.
 #[cfg(any(test, feature = "_edges"))]
 #[allow(dead_code, reason = "behind a feature")]
 pub(crate) fn fit_at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Fit<T>> {
-    let cone = cone_at(blocks, e, c)?;
+    let cone = cone_at(blocks, e, T::one() - c)?;
     Some(count_points(blocks, cone))
 }
 
-/// Returns a cone with the normal equations at it.
-pub(super) fn cone_at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Cone<T>> {
+/// Fits axis and half-angle of a position with the weights that the points have, from a start: axis and 1 − cos of the
+/// half-angle.
+#[cfg(all(feature = "position", any(test, feature = "_edges")))]
+pub(crate) fn fit_position_from<T: Real>(
+    blocks: &mut [Block<T>],
+    (e, k): (V3<T>, T),
+    scaling: &Scaling<T>,
+) -> Option<Fit<T>> {
+    let start = cone_at(blocks, e, k)?.at;
+    let cone = super::angle::settle(blocks, start, scaling)?;
+    Some(count_points(blocks, cone))
+}
+
+/// Returns a cone, given by axis and 1 − cos of the half-angle, with the normal equations at it.
+pub(super) fn cone_at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, k: T) -> Option<Cone<T>> {
     let e = unit(&e)?;
-    if !(c.abs() < T::one()) {
+    if !(k > T::ZERO && k < T::from_f64(2.0)) {
         return None;
     }
     let (b1, b2) = basis(&e);
     let mean = means(blocks, &b1, &b2);
-    let sums = pass(blocks, &e, &b1, &b2, T::one() - c, mean, &Weights::Kept, None);
+    let sums = pass(blocks, &e, &b1, &b2, k, mean, &Weights::Kept, None);
     // This test also refuses NaN.
     (sums.weight > T::from_f64(2.5) && sums.cost >= T::ZERO).then_some(Cone {
-        at: State { e, k: T::one() - c, mean, nearby: 0 },
+        at: State { e, k, mean, nearby: 0 },
         mean,
         sums,
         free: true,

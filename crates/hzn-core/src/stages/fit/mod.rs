@@ -11,24 +11,30 @@
 //! the edge are *correlated*. Then the half-angle is fitted freely with the weights that were found: for the
 //! covariance, for the altitude estimate, and for the test of the candidate. `covariance` fuses the two half-angles.
 
+#[cfg(feature = "position")]
+mod angle;
 mod azimuth;
 #[cfg(feature = "horace")]
 mod circle;
+#[cfg(feature = "position")]
+pub(crate) mod closed;
 mod cone;
 mod config;
 #[cfg(feature = "dlr")]
 pub(crate) mod conic;
 #[cfg(feature = "dlr")]
 pub(crate) mod direct;
-#[cfg(any(test, feature = "dlr", feature = "zju", feature = "horace", feature = "_edges"))]
+#[cfg(any(test, feature = "dlr", feature = "zju", feature = "horace", feature = "position", feature = "_edges"))]
 mod given;
-#[cfg(any(feature = "dlr", feature = "zju", feature = "horace"))]
+#[cfg(any(feature = "dlr", feature = "zju", feature = "horace", feature = "position"))]
 mod published;
 #[cfg(feature = "zju")]
 mod quadric;
 mod sphere;
 mod sums;
 
+#[cfg(any(feature = "dlr", feature = "horace"))]
+use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::Block;
 use crate::geometry::camera::Camera;
@@ -42,7 +48,9 @@ pub use config::{Config, HalfAngle, Method};
 #[cfg(any(test, feature = "_edges"))]
 #[allow(unused_imports, reason = "for the tests of methods behind features")]
 pub(crate) use given::fit_at;
-#[cfg(any(feature = "dlr", feature = "horace"))]
+#[cfg(all(feature = "position", any(test, feature = "_edges")))]
+pub(crate) use given::fit_position_from;
+#[cfg(any(feature = "dlr", feature = "horace", feature = "position"))]
 use published::fit_by;
 #[cfg(feature = "zju")]
 use published::{HALF_TURN_RAD, elliptic};
@@ -71,17 +79,27 @@ pub(crate) fn fit<T: Real>(
     let _ = camera;
     let cone = match config.method {
         #[cfg(feature = "dlr")]
-        Method::Direct => fit_by(blocks, start, threshold_px, direct::fit)?,
+        Method::Direct => fit_by(blocks, start, threshold_px, |blocks| direct::fit(blocks).map(with_k))?,
         #[cfg(feature = "dlr")]
-        Method::Conic => fit_by(blocks, start, threshold_px, conic::fit)?,
+        Method::Conic => fit_by(blocks, start, threshold_px, |blocks| conic::fit(blocks).map(with_k))?,
         #[cfg(feature = "zju")]
         Method::Tls => elliptic(blocks, start, threshold_px, HALF_TURN_RAD)?,
         #[cfg(feature = "zju")]
         Method::Wtls => elliptic(blocks, start, threshold_px, config.weigh_above_deg.to_radians())?,
         #[cfg(feature = "horace")]
-        Method::Circle => fit_by(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera))?,
+        Method::Circle => fit_by(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera).map(with_k))?,
+        #[cfg(feature = "position")]
+        Method::LeastSquares => fit_by(blocks, start, threshold_px, |blocks| closed::least_squares(blocks))?,
+        #[cfg(feature = "position")]
+        Method::GeneralisedTls => fit_by(blocks, start, threshold_px, |blocks| closed::generalised_tls(blocks))?,
         // `Config::check` refuses a method that is not built in.
         _ => sphere(blocks, start, expected, threshold_px, config, noise)?,
     };
     Some(count_points(blocks, cone))
+}
+
+/// Converts the cosine of a half-angle to 1 − cos.
+#[cfg(any(feature = "dlr", feature = "horace"))]
+fn with_k<T: Real>((e, c): (V3<T>, T)) -> (V3<T>, T) {
+    (e, T::one() - c)
 }

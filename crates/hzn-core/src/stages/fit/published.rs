@@ -14,8 +14,8 @@ use crate::stages::consensus::Consensus;
 
 /// Fits the cone by another method, `find`, and adds the normal equations at this cone. Weights, gates and covariance
 /// are therefore the same as for the default method. The method uses the points within `threshold_px` of the consensus,
-/// or all points if `start.all` is set. `find` receives the blocks with weights 0 and 1, and returns the axis and the
-/// cos of the half-angle.
+/// or all points if `start.all` is set. `find` receives the blocks with weights 0 and 1, and returns the axis and 1 − cos
+/// of the half-angle.
 #[allow(dead_code, reason = "for the estimators behind features")]
 pub(super) fn fit_by<T: Real>(
     blocks: &mut [Block<T>],
@@ -35,8 +35,8 @@ pub(super) fn fit_by<T: Real>(
             }
         }
     }
-    let (e, c) = find(blocks)?;
-    cone_at(blocks, e, c)
+    let (e, k) = find(blocks)?;
+    cone_at(blocks, e, k)
 }
 
 /// Largest possible angle between the axis and the optical axis, in radians.
@@ -56,7 +56,7 @@ pub(super) fn elliptic<T: Real>(
     let cone = fit_by(blocks, start, threshold_px, |blocks| {
         let found = Quadric::fit(blocks, T::from_f64(weigh_above_rad))?;
         quadric = Some(found);
-        Some((found.e, found.c))
+        Some((found.e, T::one() - found.c))
     })?;
     let found = quadric?;
     let sums = Sums { weight: found.weight, cost: found.cost, ..cone.sums };

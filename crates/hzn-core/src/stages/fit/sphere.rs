@@ -37,6 +37,21 @@ pub(super) fn sphere<T: Real>(
     let azimuth = azimuth.as_ref();
     let known = config.half_angle == HalfAngle::Known && !expected.free;
     let (robust, sums) = robust(blocks, start, expected, threshold_px, known, config, noise, azimuth)?;
+    #[cfg(feature = "position")]
+    let refined = expected.seen_along(&robust.e);
+    #[cfg(feature = "position")]
+    let expected = &refined;
+    #[cfg(feature = "position")]
+    if let Some(target) = &expected.target
+        && let Some(cone) = super::angle::settle(blocks, robust, &target.scaling)
+    {
+        return Some(cone);
+    }
+    // Without a known distance there is no expected half-angle to use instead.
+    #[cfg(feature = "position")]
+    if expected.target.is_some_and(|target| target.range.is_none()) {
+        return None;
+    }
     let freely = if known { None } else { settle(blocks, robust, Some(sums), true, azimuth) };
     let ((at, mean, sums), free) = match freely {
         Some(settled) => (settled, true),

@@ -10,6 +10,8 @@ mod fits;
 mod horace;
 mod lens;
 mod monte_carlo;
+#[cfg(feature = "position")]
+mod position;
 mod projection;
 #[cfg(feature = "zju")]
 mod zju;

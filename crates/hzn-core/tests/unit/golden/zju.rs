@@ -27,7 +27,7 @@ fn fit<T: Real>(blocks: &mut [Block<T>], method: Method, weigh_above_deg: f64) -
     let zero = T::ZERO;
     let start = Consensus { e: V3::new(zero, zero, T::one()), c: T::from_f64(0.5), draws: 1, all: true };
     let expected = expected();
-    let config = fit::Config { method, half_angle: HalfAngle::Free, weigh_above_deg };
+    let config = fit::Config { method, half_angle: HalfAngle::Free, weigh_above_deg, ..fit::Config::default() };
     let camera = Camera::try_new(&CameraConfig::ideal(Model::Pinhole, 2, 2, 1.0)).unwrap();
     fit::fit(blocks, &start, &expected, &camera, T::from_f64(3.0), &config, &covariance::Config::default())
 }

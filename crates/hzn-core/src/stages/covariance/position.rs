@@ -1,0 +1,216 @@
+//! From the fit in scaled space to the position of the body (math.md, 13.1, 13.4, 13.5).
+//!
+//! The centre of the body is r = U⁻¹e/sin α (13.3). Its covariance is G P Gᵀ (13.12), with the errors of limb height,
+//! orientation and semi-axes added ([`super::consider`]). A known distance is fused after that, in three iterations,
+//! because the uncertainty of a short arc is a ridge along which direction and distance change together. One linear
+//! update would be off by many sigmas there.
+//!
+//! Lengths are in units of the mean semi-axis, so that single precision suffices at any distance.
+
+use super::answer::{EdgeNoise, Fused, Located};
+use super::consider::Sensitivity;
+use super::fusion;
+use crate::base::linalg::{M3, V3, basis, unit};
+use crate::base::real::Real;
+use crate::geometry::block::{Block, LANES};
+use crate::geometry::scaling::ScaledCone;
+use crate::model::body::{Expected, Target};
+use crate::model::error_budget::ErrorBudget;
+use crate::model::report::Position;
+use crate::stages::fit::{self, Fit, HalfAngle};
+
+/// A fitted half-angle counts if it is this many of its sigmas away from 0° and from 90°. Nearer than that, no
+/// covariance describes the position (math.md, 13.5).
+const GATE_SIGMAS: f64 = 5.0;
+/// Iterations of the fusion with a known distance.
+const ITERATIONS: usize = 3;
+
+/// Computes the position, and fuses the known distance. If the arc is too short for a position, the answer is the
+/// direction that a known distance gives, and there is none without a known distance.
+pub(super) fn fused<T: Real>(
+    blocks: &[Block<T>],
+    fit: &Fit<T>,
+    p: &M3<T>,
+    edge: EdgeNoise<T>,
+    expected: &Expected<T>,
+    target: &Target<T>,
+    estimate: &fit::Config,
+    budget: Option<&mut ErrorBudget<T>>,
+) -> Option<Fused<T>> {
+    let by_direction = fusion::fused(fit, p, edge, expected, estimate, budget)?;
+    let sin = (fit.k * (T::one() + fit.c)).max(T::ZERO).sqrt();
+    if !is_determined(fit, sin, p.m33) || !is_lit_inside(blocks, &fit.e) {
+        return target.range.map(|_| by_direction);
+    }
+    let free = located(blocks, fit, sin, p, target)?;
+    let range = target.range.filter(|_| estimate.half_angle != HalfAngle::Free);
+    let (found, chi2) = match range {
+        None => (free, T::ZERO),
+        Some(range) => with_range(&free, target, range.sigma_m / target.unit_m)?,
+    };
+    answer(&by_direction, found, chi2, target)
+}
+
+/// Returns whether the half-angle is far enough from 0° and from 90°: α > 5 σ_α and 90° − α > 5 σ_α.
+fn is_determined<T: Real>(fit: &Fit<T>, sin: T, var_cos: T) -> bool {
+    let limit = T::from_f64(GATE_SIGMAS) * var_cos.sqrt() / sin;
+    let alpha = sin.atan2(fit.c);
+    alpha > limit && T::from_f64(core::f64::consts::FRAC_PI_2) - alpha > limit
+}
+
+/// Returns whether most of the edge is lit on the side of the axis. Noise can turn the curvature of a short arc over,
+/// and the fitted body is then on the dark side.
+fn is_lit_inside<T: Real>(blocks: &[Block<T>], e: &V3<T>) -> bool {
+    let (mut inside, mut all) = (T::ZERO, T::ZERO);
+    for block in blocks {
+        for lane in 0..LANES {
+            all += block.weight[lane];
+            if block.weight[lane] > T::ZERO && block.is_lit_towards(lane, e) {
+                inside += block.weight[lane];
+            }
+        }
+    }
+    inside + inside > all
+}
+
+/// Returns the position that the fit gives, with all errors of the given shape and orientation.
+fn located<T: Real>(
+    blocks: &[Block<T>],
+    fit: &Fit<T>,
+    sin: T,
+    p: &M3<T>,
+    target: &Target<T>,
+) -> Option<Located<T>> {
+    let from = &target.scaling.from;
+    // A limb that is clipped everywhere stands higher; the shape stays the same.
+    let grown = T::one() + target.raised_m / target.unit_m;
+    let r = from * fit.e * (grown / sin);
+    let g = by_cone(target, &fit.e, sin, fit.c) * grown;
+    let mut errors = *p;
+    let given = Sensitivity::new(blocks, fit, target)?;
+    let mut add = |v: &V3<T>, sigma: T| errors += v * v.transpose() * (sigma * sigma);
+    add(&given.by_limb, target.limb_sigma_m / target.unit_m);
+    given.by_rotation.iter().for_each(|v| add(v, target.attitude_sigma_rad));
+    given.by_axis.iter().for_each(|v| add(v, target.radii_sigma_m / target.unit_m));
+    let covariance = g * errors * g.transpose();
+    Some(Located { r, p: covariance, free_r: r, free_p: covariance })
+}
+
+/// Returns the derivative of U⁻¹ e/sin α by (δ₁₂, δc): (13.12) with δα = −δc/sin α.
+pub(crate) fn by_cone<T: Real>(target: &Target<T>, e: &V3<T>, sin: T, cos: T) -> M3<T> {
+    let from = target.scaling.from;
+    let (b1, b2) = basis(e);
+    let per = T::one() / sin;
+    M3::from_columns(&[from * b1 * per, from * b2 * per, from * e * (cos * per * per * per)])
+}
+
+/// Fuses the known distance, as (13.14), written with the gain so that no matrix is inverted. Returns χ² of one degree
+/// of freedom, too.
+pub(crate) fn with_range<T: Real>(free: &Located<T>, target: &Target<T>, sigma: T) -> Option<(Located<T>, T)> {
+    let Located { r: start, p, .. } = *free;
+    let (mut x, mut chi2) = (start, T::ZERO);
+    let mut covariance = p;
+    for _ in 0..ITERATIONS {
+        let u = unit(&x)?;
+        let distance = target.range_m(&u)? / target.unit_m;
+        let pu = p * u;
+        let total = u.dot(&pu) + sigma * sigma;
+        let innovation = distance - x.dot(&u) - u.dot(&(start - x));
+        x = start + pu * (innovation / total);
+        covariance = p - pu * pu.transpose() * (T::one() / total);
+        chi2 = innovation * innovation / total;
+    }
+    Some((Located { r: x, p: covariance, ..*free }, chi2))
+}
+
+/// Returns the answer in scaled space for the gates: axis, half-angle and covariance that belong to a position.
+fn answer<T: Real>(fitted: &Fused<T>, found: Located<T>, chi2: T, target: &Target<T>) -> Option<Fused<T>> {
+    let y = target.scaling.to * found.r;
+    let length2 = y.dot(&y);
+    let grown = T::one() + target.raised_m / target.unit_m;
+    let per_length = T::one() / length2.sqrt();
+    let e = y * per_length;
+    let sin = grown * per_length;
+    let c = (T::one() - sin * sin).max(T::ZERO).sqrt();
+    if !(sin > T::ZERO && c > T::ZERO) {
+        return None;
+    }
+    let (b1, b2) = basis(&e);
+    // δe = (I − e eᵀ) U δr/‖U r‖.
+    let (g1, g2) = (target.scaling.to * b1 * per_length, target.scaling.to * b2 * per_length);
+    let form = |a: &V3<T>, b: &V3<T>| a.dot(&(found.p * b));
+    Some(Fused {
+        e,
+        c,
+        p: [form(&g1, &g1), form(&g1, &g2), form(&g2, &g2)],
+        by_cos: [T::ZERO; 2],
+        chi2,
+        located: Some(found),
+        ..*fitted
+    })
+}
+
+/// The parts of a solution that depend on the position.
+pub(crate) struct Placed<T> {
+    /// Axis in the camera frame with its covariance on the tangent basis.
+    pub(crate) axis: V3<T>,
+    pub(crate) p: [T; 3],
+    /// Half-angles of the limb in the camera frame: before and after the known distance was fused; radians.
+    pub(crate) half_angles_rad: [T; 2],
+    /// Altitude before the known distance was fused, and its 1-sigma, metres; `None` if there is only a direction.
+    pub(crate) altitude_m: Option<(T, T)>,
+    pub(crate) position: Option<Position<T>>,
+}
+
+/// Converts an answer in scaled space to the camera frame. `None` if it has no direction.
+pub(crate) fn place<T: Real>(fused: &Fused<T>, target: &Target<T>, mean_radius_m: T) -> Option<Placed<T>> {
+    let Some(found) = &fused.located else { return direction(fused, target) };
+    let unit_m = target.unit_m;
+    let (r, free_r) = (found.r * unit_m, found.free_r * unit_m);
+    let axis = target.axis(&r)?;
+    let length = |v: &V3<T>| v.dot(v).sqrt();
+    let per = T::one() / length(&found.r);
+    let (b1, b2) = basis(&axis);
+    let form = |a: &V3<T>, b: &V3<T>| a.dot(&(found.p * b)) * per * per;
+    let free_u = unit(&free_r)?;
+    let sigma_m = free_u.dot(&(found.free_p * free_u)).max(T::ZERO).sqrt() * unit_m;
+    let p = found.p * (unit_m * unit_m);
+    let body_fixed = target.body_fixed(&r);
+    Some(Placed {
+        axis,
+        p: [form(&b1, &b1), form(&b1, &b2), form(&b2, &b2)],
+        half_angles_rad: [target.half_angle_rad(&free_r), target.half_angle_rad(&r)],
+        altitude_m: Some((target.altitude_m(&free_r, mean_radius_m), sigma_m)),
+        position: Some(Position {
+            centre_m: r.into(),
+            covariance_m2: [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33],
+            free_range_m: (length(&free_r), sigma_m),
+            body_fixed_m: target.has_attitude.then(|| body_fixed.into()),
+            limb: ScaledCone { e: fused.e, c: fused.c, scaling: Some(target.scaling) },
+        }),
+    })
+}
+
+/// Converts an answer without a position: the direction of a body at the known distance.
+fn direction<T: Real>(fused: &Fused<T>, target: &Target<T>) -> Option<Placed<T>> {
+    let long = target.scaling.from * fused.e;
+    let per_length = T::one() / long.dot(&long).sqrt();
+    let u = long * per_length;
+    let r = u * target.range_m(&u)?;
+    let axis = target.axis(&r)?;
+    let (e1, e2) = basis(&fused.e);
+    let (b1, b2) = basis(&axis);
+    // du = (I − u uᵀ) U⁻¹ de/‖U⁻¹ e‖; the small angle between u and the limb axis does not matter.
+    let by = |b: &V3<T>| [&e1, &e2].map(|e| b.dot(&(target.scaling.from * e)) * per_length);
+    let (g1, g2) = (by(&b1), by(&b2));
+    let [p11, p12, p22] = fused.p;
+    let form = |a: [T; 2], b: [T; 2]| a[0] * (p11 * b[0] + p12 * b[1]) + a[1] * (p12 * b[0] + p22 * b[1]);
+    let half_angle = target.half_angle_rad(&r);
+    Some(Placed {
+        axis,
+        p: [form(g1, g1), form(g1, g2), form(g2, g2)],
+        half_angles_rad: [half_angle; 2],
+        altitude_m: None,
+        position: None,
+    })
+}
