@@ -16,6 +16,7 @@
 
 mod adjust;
 pub mod board;
+mod body_defaults;
 mod calibrated;
 pub mod camera_file;
 mod camera_section;
@@ -44,7 +45,7 @@ pub mod start;
 pub mod template;
 pub mod time;
 
-pub use frames::{FrameData, Frames};
+pub use frames::{FrameData, Frames, Orientation};
 pub use nearest::nearest;
 pub use problem::Problem;
 pub use sensor::Sensor;

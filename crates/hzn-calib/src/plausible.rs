@@ -64,7 +64,9 @@ pub fn find_implausible(config: &Config) -> Vec<Implausible> {
 pub(crate) fn max_altitude_km(body: body::Kind, radius_km: f64) -> f64 {
     match body {
         body::Kind::Earth | body::Kind::EarthSphere => MAX_ALTITUDE_KM,
-        _ => MAX_ALTITUDE_RADII * radius_km,
+        body::Kind::Sphere | body::Kind::Sun | body::Kind::Moon => MAX_ALTITUDE_RADII * radius_km,
+        // A spacecraft sees a planet from any distance.
+        _ => f64::INFINITY,
     }
 }
 

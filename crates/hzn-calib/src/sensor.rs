@@ -18,6 +18,7 @@ use crate::located::{
     check_list_lengths, find_places, problem_at_key, translate_config_error, translate_serde_error,
     translate_syntax_error,
 };
+use crate::body_defaults::{body_defaults, merge_body_defaults};
 use crate::merge::{merge_missing, take};
 use crate::nearest::suggestion;
 use crate::{Problem, plausible};
@@ -63,6 +64,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
             .map_err(|what| Problem::new(path, what).at_offset(text, span.start).in_field("preset"))?,
     };
     let starting_values = starting_values(preset);
+    let body_defaults = body_defaults(table.get_ref());
     check_bodies(table.get_ref(), text, path)?;
     check_list_lengths(text, path, &places)?;
     let from_file = camera_from_file(table.get_mut(), text, path)?;
@@ -76,6 +78,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
             merge_missing(own, stand_in.into_inner());
         }
     }
+    merge_body_defaults(table.get_mut(), &body_defaults);
     if let Ok(values) = DeTable::parse(&starting_values) {
         merge_missing(table.get_mut(), values.into_inner());
     }

@@ -169,6 +169,7 @@ impl PictureAnswer {
                 altitude_m: (!d.altitude_m.is_nan()).then(|| (d.altitude_m.into(), d.altitude_sigma_m.into())),
                 free: None,
                 axis_by_cos: None,
+                position: None,
                 rms_px: d.rms_px.into(),
                 inliers: d.inliers,
                 arc_px: d.arc_px.into(),

@@ -153,7 +153,7 @@ pub struct Attitude {
 }
 
 /// The prior of a picture: the columns of frames.csv as numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PicturePrior {
     /// UTC in seconds since 1970.
@@ -177,6 +177,32 @@ pub struct PicturePrior {
     /// Rate of rotation of the camera in the camera frame, rad/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_rad_s: Option<[f64; 3]>,
+    /// Direction of the body's north pole in the camera frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pole_camera: Option<[f64; 3]>,
+    /// Distance from the body's centre, kilometres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_km: Option<f64>,
+    /// 1-sigma of that distance, kilometres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_sigma_km: Option<f64>,
+    /// Orientations of further bodies.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub other_bodies: Vec<BodyOrientation>,
+}
+
+/// The orientation of a body that is not the first one of the sensor.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct BodyOrientation {
+    /// Name of the body.
+    pub body: String,
+    /// Rotation from the camera to the axes of the body, scalar first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub q_body_from_camera_wxyz: Option<[f64; 4]>,
+    /// Direction of its north pole in the camera frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pole_camera: Option<[f64; 3]>,
 }
 
 /// Severity of a message.

@@ -44,7 +44,7 @@ pub(crate) fn report(frame: &FrameRecord) -> Vec<u8> {
     map.retain(|_, v| !v.is_null());
     map.insert("candidate_edges".into(), serde_json::to_value(&frame.candidates).unwrap_or_default());
     if frame.prior != PicturePrior::default() {
-        map.insert("given".into(), serde_json::to_value(frame.prior).unwrap_or_default());
+        map.insert("given".into(), serde_json::to_value(&frame.prior).unwrap_or_default());
     }
     serde_json::to_vec(&map).unwrap_or_default()
 }

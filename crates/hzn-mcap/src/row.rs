@@ -2,6 +2,7 @@
 
 use hzn_core::frames::{Body, UnitVec3};
 use hzn_core::real::Real;
+use hzn_core::report::Position;
 use hzn_core::status::Status;
 use hzn_core::{Report, Solution};
 use serde::{Deserialize, Serialize};
@@ -106,7 +107,7 @@ columns! {
         file: String,
         /// Time in seconds, if it is known.
         time_s: Option<f64>,
-        /// Name of the body: `earth`, `earth-sphere`, `sun`, `moon`, `sphere`.
+        /// Name of the body: a value of `body.kind`, for example `earth`.
         body: String,
         /// Outcome, by its name, for example `no-limb`.
         status: Status as "status_name",
@@ -190,11 +191,14 @@ columns! {
         axis_by_cos_y: Option<f64>,
         /// Derivative of the axis by the cosine of the expected half-angle, z.
         axis_by_cos_z: Option<f64>,
-        /// Position of the body's centre in the camera frame, x, kilometres; only with `position`.
+        /// Position of the body's centre in the camera frame, x, kilometres; only with
+        /// `estimate.position`.
         position_x_km: Option<f64>,
-        /// Position of the body's centre in the camera frame, y, kilometres; only with `position`.
+        /// Position of the body's centre in the camera frame, y, kilometres; only with
+        /// `estimate.position`.
         position_y_km: Option<f64>,
-        /// Position of the body's centre in the camera frame, z, kilometres; only with `position`.
+        /// Position of the body's centre in the camera frame, z, kilometres; only with
+        /// `estimate.position`.
         position_z_km: Option<f64>,
         /// Covariance of that position, xx, km².
         pos_cov_xx_km2: Option<f64>,
@@ -284,11 +288,30 @@ impl Row {
         if let Some(by) = s.axis_by_cos {
             [self.axis_by_cos_x, self.axis_by_cos_y, self.axis_by_cos_z] = by.map(number);
         }
+        if let Some(position) = &s.position {
+            self.set_position(position);
+        }
         self.rms_px = number(s.rms_px);
         self.inliers = Some(s.inliers);
         if let Some(body) = &s.axis_body {
             let [roll, pitch] = roll_pitch_deg(body);
             (self.roll_deg, self.pitch_deg) = (finite(roll), finite(pitch));
+        }
+    }
+
+    fn set_position<T: Real>(&mut self, p: &Position<T>) {
+        let km = |x: T| finite(x.to_f64() / 1e3);
+        [self.position_x_km, self.position_y_km, self.position_z_km] = p.centre_m.map(km);
+        [
+            self.pos_cov_xx_km2,
+            self.pos_cov_xy_km2,
+            self.pos_cov_xz_km2,
+            self.pos_cov_yy_km2,
+            self.pos_cov_yz_km2,
+            self.pos_cov_zz_km2,
+        ] = p.covariance_m2.map(|x| finite(x.to_f64() / 1e6));
+        if let Some(body_fixed) = p.body_fixed_m {
+            [self.body_fixed_x_km, self.body_fixed_y_km, self.body_fixed_z_km] = body_fixed.map(km);
         }
     }
 
@@ -356,6 +379,7 @@ mod tests {
             altitude_m: Some((number(240e3), number(1e3))),
             free: None,
             axis_by_cos: None,
+            position: None,
             rms_px: number(f64::NAN),
             inliers: 500,
             arc_px: number(900.0),

@@ -37,7 +37,19 @@ impl Frames {
                 }
             }
         }
+        warnings.extend(self.explain_unused_columns(config));
         warnings
+    }
+
+    /// Returns one warning if the rows have columns that only the fit of a position uses, and no position is fitted.
+    fn explain_unused_columns(&self, config: &Config) -> Option<Problem> {
+        if config.each_body().iter().any(|body| config.fits_position(body)) {
+            return None;
+        }
+        let row = self.rows.iter().find(|row| row.range_km.is_some() || row.pole_camera.is_some())?;
+        let column = if row.range_km.is_some() { "range_km" } else { "pole_x, pole_y, pole_z" };
+        let what = format!("{column} is used only for a position; set estimate.position = true in sensor.toml");
+        Some(self.problem(row, what))
     }
 
     /// Returns warnings for values that are possible but look wrong: altitude and position of a row that differ by more
@@ -45,7 +57,8 @@ impl Frames {
     pub fn check_altitudes(&self, kind: Kind, radius_km: f64) -> Vec<Problem> {
         let contradiction = |row: &FrameData| {
             let km = altitude_at_km(row.position_km?, kind, radius_km)?;
-            if km > MAX_DISTANCE_RADII * radius_km {
+            // A spacecraft sees a planet from any distance.
+            if km > MAX_DISTANCE_RADII * radius_km && kind.planet().is_none() && kind != Kind::Ellipsoid {
                 let what = format!(
                     "the position is at {km:.0} km; x_km, y_km, z_km are kilometres: are the values in metres?"
                 );

@@ -1,10 +1,11 @@
 //! The rows of a frames.csv.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use hzn_core::Prior;
-use hzn_core::body::PriorError;
+use hzn_core::body::{self, PriorError};
 use hzn_core::frames::{Rotation, UnitVec3};
 use hzn_core::real::Real;
 
@@ -33,7 +34,29 @@ pub struct FrameData {
     pub sun_camera: Option<[f64; 3]>,
     /// Rate of rotation of the camera in the camera frame, rad/s.
     pub rate_rad_s: Option<[f64; 3]>,
+    /// Direction of the body's north pole in the camera frame, for a body whose position is fitted.
+    pub pole_camera: Option<[f64; 3]>,
+    /// Distance of the camera from the body's centre, kilometres.
+    pub range_km: Option<f64>,
+    /// 1-sigma of that distance, kilometres.
+    pub range_sigma_km: Option<f64>,
+    /// Orientations of the second and third body, by name.
+    pub other_bodies: Vec<Orientation>,
 }
+
+/// The orientation of a body that is not the first one of the sensor.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Orientation {
+    /// Name of the body, see [`Kind::name`](hzn_core::body::Kind::name).
+    pub body: String,
+    /// Rotation from the camera to the axes of the body, scalar first.
+    pub camera_to_body_wxyz: Option<[f64; 4]>,
+    /// Direction of its north pole in the camera frame.
+    pub pole_camera: Option<[f64; 3]>,
+}
+
+/// Largest difference of a quaternion's length from 1.
+const MAX_LENGTH_ERROR: f64 = 0.01;
 
 impl FrameData {
     /// Converts the row to a prior of the pipeline, in metres and radians. `altitude_km` of the row overrides
@@ -48,6 +71,39 @@ impl FrameData {
             sun: self.sun_camera.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))),
             last: None,
             rate_rad_s: self.rate_rad_s.map(|rate| rate.map(T::from_f64)),
+            pole: self.pole_camera.and_then(|pole| UnitVec3::try_new(pole.map(T::from_f64))),
+            range_m: self.range_km.map(|km| T::from_f64(km * 1e3)),
+            range_sigma_m: self.range_sigma_km.map(|km| T::from_f64(km * 1e3)),
+        }
+    }
+
+    /// Returns the row as the body number `which` of a sensor uses it. Position, distance and attitude belong to the
+    /// first body; an ellipsoid further back has only the orientation of its own columns.
+    ///
+    /// # Errors
+    /// The attitude of that body is not a rotation.
+    pub fn for_body(&self, which: usize, body: &body::Config) -> Result<Cow<'_, Self>, PriorError> {
+        if which == 0 || !body.is_ellipsoid() {
+            return self.check_attitude().map(|()| Cow::Borrowed(self));
+        }
+        let own = self.other_bodies.iter().find(|other| other.body == body.kind.name()).cloned().unwrap_or_default();
+        let row = Self {
+            camera_to_ecef_wxyz: own.camera_to_body_wxyz,
+            pole_camera: own.pole_camera,
+            position_km: None,
+            altitude_km: None,
+            range_km: None,
+            range_sigma_km: None,
+            ..self.clone()
+        };
+        row.check_attitude().map(|()| Cow::Owned(row))
+    }
+
+    fn check_attitude(&self) -> Result<(), PriorError> {
+        let length = |q: [f64; 4]| q.iter().map(|x| x * x).sum::<f64>().sqrt();
+        match self.camera_to_ecef_wxyz {
+            Some(q) if (length(q) - 1.0).abs() > MAX_LENGTH_ERROR => Err(PriorError::Attitude),
+            _ => Ok(()),
         }
     }
 }
@@ -93,7 +149,10 @@ impl Frames {
             PriorError::Position => row.position_km.map(|[x, y, z]| format!("{x}, {y}, {z}")),
             PriorError::AttitudeSigma => row.attitude_sigma_deg.map(|deg| format!("{deg}")),
             PriorError::Rate => row.rate_rad_s.map(|[x, y, z]| format!("{x}, {y}, {z}")),
-            PriorError::NoAltitude | PriorError::BelowLimb { .. } | PriorError::NoBody => None,
+            PriorError::Attitude => row.camera_to_ecef_wxyz.map(|[w, x, y, z]| format!("{w}, {x}, {y}, {z}")),
+            PriorError::Range => row.range_km.map(|km| format!("{km}")),
+            PriorError::RangeSigma => row.range_sigma_km.map(|km| format!("{km}")),
+            _ => None,
         };
         let refused = value.map(|value| format!(", not {value}")).unwrap_or_default();
         self.problem(row, format!("{error}{refused}"))

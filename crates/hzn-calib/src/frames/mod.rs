@@ -19,5 +19,5 @@ mod data;
 mod read;
 
 pub use check::altitude_at_km;
-pub use data::{FrameData, Frames};
+pub use data::{FrameData, Frames, Orientation};
 pub use read::{COLUMNS, load, parse};

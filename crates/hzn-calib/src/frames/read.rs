@@ -4,8 +4,9 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use csv::StringRecord;
+use hzn_core::body::Kind;
 
-use super::data::{FrameData, Frames};
+use super::data::{FrameData, Frames, Orientation};
 use crate::nearest::nearest;
 use crate::{Problem, time};
 
@@ -29,7 +30,23 @@ pub const COLUMNS: &[&str] = &[
     "rate_x",
     "rate_y",
     "rate_z",
+    "pole_x",
+    "pole_y",
+    "pole_z",
+    "range_km",
+    "range_sigma_km",
 ];
+
+/// Returns the name under which a column is kept, for a known column and for those of a further body: `q_BODY_w` to
+/// `q_BODY_z` and `pole_BODY_x` to `pole_BODY_z`, with the name of a kind of body.
+fn known_column(name: &str) -> Option<String> {
+    let is_body = |rest: &str, ends: &[&str]| {
+        ends.iter().any(|end| rest.strip_suffix(end).is_some_and(|body| Kind::ALL.iter().any(|k| k.name() == body)))
+    };
+    let of_body = name.strip_prefix("q_").is_some_and(|rest| is_body(rest, &["_w", "_x", "_y", "_z"]))
+        || name.strip_prefix("pole_").is_some_and(|rest| is_body(rest, &["_x", "_y", "_z"]));
+    (COLUMNS.contains(&name) || of_body).then(|| name.to_owned())
+}
 
 /// Reads a frames.csv.
 ///
@@ -85,14 +102,14 @@ fn translate_csv_error(error: &csv::Error, path: &Path) -> Problem {
 }
 
 /// The known columns of a file: their names and places.
-struct Columns(HashMap<&'static str, usize>);
+struct Columns(HashMap<String, usize>);
 
 impl Columns {
     /// Finds the columns by the header. Unknown columns give warnings.
     fn find(header: &StringRecord, path: &Path, warnings: &mut Vec<Problem>) -> Result<Self, Problem> {
         let mut columns = HashMap::new();
         for (i, name) in header.iter().enumerate() {
-            let Some(&known) = COLUMNS.iter().find(|known| **known == name) else {
+            let Some(known) = known_column(name) else {
                 let hint =
                     nearest(name, COLUMNS.iter().copied()).map(|n| format!("; did you mean {n}?")).unwrap_or_default();
                 let what = format!("unknown column, not used{hint}");
@@ -143,7 +160,7 @@ impl<'a> Row<'a> {
         Ok(row)
     }
 
-    /// Reads the cells. A quaternion must have the length 1, and the direction to the Sun a length above 0.
+    /// Reads the cells. The direction to the Sun and the pole must have a length above 0.
     fn read(&self) -> Result<FrameData, Problem> {
         let data = FrameData {
             file: self.file.clone(),
@@ -156,17 +173,39 @@ impl<'a> Row<'a> {
             attitude_sigma_deg: self.number("attitude_sigma_deg")?,
             sun_camera: self.vector(["sun_x", "sun_y", "sun_z"])?,
             rate_rad_s: self.vector(["rate_x", "rate_y", "rate_z"])?,
+            pole_camera: self.vector(["pole_x", "pole_y", "pole_z"])?,
+            range_km: self.number("range_km")?,
+            range_sigma_km: self.number("range_sigma_km")?,
+            other_bodies: self.other_bodies()?,
         };
         let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if data.camera_to_ecef_wxyz.is_some_and(|q| (length(&q) - 1.0).abs() > 0.01) {
-            return Err(self.problem("qw, qx, qy, qz", "the quaternion's length must be 1"));
-        }
-        if data.sun_camera.is_some_and(|s| length(&s) < 1e-9) {
-            return Err(
-                self.problem("sun_x, sun_y, sun_z", "has no direction; leave the cells empty if it is not known")
-            );
+        for (columns, v) in [("sun_x, sun_y, sun_z", data.sun_camera), ("pole_x, pole_y, pole_z", data.pole_camera)] {
+            if v.is_some_and(|v| length(&v) < 1e-9) {
+                return Err(self.problem(columns, "has no direction; leave the cells empty if it is not known"));
+            }
         }
         Ok(data)
+    }
+
+    /// Reads the orientations of further bodies.
+    fn other_bodies(&self) -> Result<Vec<Orientation>, Problem> {
+        let mut found = Vec::new();
+        for kind in Kind::ALL {
+            let body = kind.name();
+            let names = |prefix: &str, ends: &[&str]| -> Vec<String> {
+                ends.iter().map(|end| format!("{prefix}_{body}_{end}")).collect()
+            };
+            let (q, pole) = (names("q", &["w", "x", "y", "z"]), names("pole", &["x", "y", "z"]));
+            if !q.iter().chain(&pole).any(|name| self.columns.0.contains_key(name)) {
+                continue;
+            }
+            found.push(Orientation {
+                body: body.to_owned(),
+                camera_to_body_wxyz: self.vector([&*q[0], &*q[1], &*q[2], &*q[3]])?,
+                pole_camera: self.vector([&*pole[0], &*pole[1], &*pole[2]])?,
+            });
+        }
+        Ok(found)
     }
 
     fn cell(&self, column: &str) -> Option<&'a str> {

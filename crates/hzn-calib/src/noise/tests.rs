@@ -72,6 +72,7 @@ pub(crate) fn solution(axis: Vector3<f64>, half_angle_rad: f64) -> Solution<f64>
         altitude_m: None,
         free: None,
         axis_by_cos: None,
+        position: None,
         rms_px: 0.1,
         inliers: 400,
         arc_px: 800.0,

@@ -100,6 +100,13 @@ impl<T: Real> ScaledCone<T> {
         self.c - self.scaling.as_ref().map_or(*s, |scaling| scaling.scale(s)).dot(&self.e)
     }
 
+    /// Converts the cone to double precision.
+    pub(crate) fn to_f64(self) -> ScaledCone<f64> {
+        let double = |m: M3<T>| m.map(Real::to_f64);
+        let scaling = self.scaling.map(|s| Scaling { to: double(s.to), from: double(s.from) });
+        ScaledCone { e: self.e.map(Real::to_f64), c: self.c.to_f64(), scaling }
+    }
+
     /// Returns the vector v with d(σ·e) = v·ds for a direction in the camera frame.
     pub(crate) fn gradient(&self, s: &V3<T>) -> V3<T> {
         let Some(scaling) = &self.scaling else { return self.e };

@@ -2,7 +2,6 @@
 
 #[cfg(feature = "position")]
 use crate::base::linalg::basis;
-#[cfg(feature = "position")]
 use crate::base::real::Real;
 use crate::geometry::frames::{Body, Cam, Cov3, Ecef, UnitVec3};
 #[cfg(feature = "position")]
@@ -178,9 +177,21 @@ pub struct Position<T> {
     pub(crate) limb: ScaledCone<T>,
 }
 
-#[cfg(feature = "position")]
 impl<T: Real> Position<T> {
+    /// Converts the position to double precision.
+    pub fn to_f64(&self) -> Position<f64> {
+        Position {
+            centre_m: self.centre_m.map(Real::to_f64),
+            covariance_m2: self.covariance_m2.map(Real::to_f64),
+            free_range_m: (self.free_range_m.0.to_f64(), self.free_range_m.1.to_f64()),
+            body_fixed_m: self.body_fixed_m.map(|x| x.map(Real::to_f64)),
+            #[cfg(feature = "position")]
+            limb: self.limb.to_f64(),
+        }
+    }
+
     /// Returns a direction along the limb of the body, for an angle about its axis, in radians.
+    #[cfg(feature = "position")]
     pub fn limb_direction(&self, angle_rad: T) -> UnitVec3<Cam, T> {
         let ScaledCone { e, c, scaling } = &self.limb;
         let (b1, b2) = basis(e);

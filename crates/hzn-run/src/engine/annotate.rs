@@ -20,7 +20,7 @@ pub fn annotate(trace: &Trace, solution: Option<&Solution<f64>>, camera: &Camera
         }
     }
     if let Some(s) = solution {
-        out.add(overlay::draw_cone(&s.axis, s.fused_half_angle_rad, camera));
+        out.add(overlay::draw_limb(s, camera));
     }
     out
 }

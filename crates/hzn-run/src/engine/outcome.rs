@@ -77,8 +77,13 @@ pub struct Unprocessed {
 impl From<PriorError> for Unprocessed {
     fn from(error: PriorError) -> Self {
         let status = match error {
-            PriorError::NoAltitude | PriorError::BelowLimb { .. } => Status::NoAltitude,
-            _ => Status::Unreadable,
+            PriorError::Altitude
+            | PriorError::Position
+            | PriorError::AttitudeSigma
+            | PriorError::Rate
+            | PriorError::NoBody => Status::Unreadable,
+            // Nothing can be expected of the body: no distance is known, or what is known contradicts itself.
+            _ => Status::NoAltitude,
         };
         Self { status, why: error.to_string(), below_limb: matches!(error, PriorError::BelowLimb { .. }) }
     }

@@ -204,12 +204,15 @@ fn half_angles<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, co
     horizon: &Horizon<T, POINTS, BLOCKS, WORDS>,
     data: Option<&FrameData>,
 ) -> Vec<Result<f64, PriorError>> {
-    let expect = |which| Ok(horizon.expect_body(which, &prior(data))?.half_angle_rad().into());
-    (0..horizon.config().each_body().len()).map(expect).collect()
+    let expect = |(which, body)| {
+        let prior = prior(data, which, body)?;
+        Ok(horizon.expect_body(which, &prior)?.half_angle_rad().into())
+    };
+    horizon.config().each_body().iter().enumerate().map(expect).collect()
 }
 
-fn prior<T: Real>(data: Option<&FrameData>) -> Prior<T> {
-    data.map(|d| d.to_prior(None)).unwrap_or_default()
+fn prior<T: Real>(data: Option<&FrameData>, which: usize, body: &body::Config) -> Result<Prior<T>, PriorError> {
+    data.map_or(Ok(Prior::default()), |d| Ok(d.for_body(which, body)?.to_prior(None)))
 }
 
 fn run<
@@ -229,7 +232,8 @@ fn run<
 ) -> Vec<Processed> {
     let expect = |(which, last): (usize, &Option<LastAnswer>)| {
         let last = last.zip(now_s).and_then(|(last, now_s)| last.to_last(now_s));
-        horizon.expect_body(which, &Prior { last, ..prior(data) })
+        let body = horizon.config().each_body().get(which).ok_or(PriorError::NoBody)?;
+        horizon.expect_body(which, &Prior { last, ..prior(data, which, body)? })
     };
     let expected: Vec<_> = last.iter().enumerate().map(expect).collect();
     let known: Vec<_> = expected.iter().filter_map(|e| e.as_ref().ok().copied()).collect();
@@ -246,13 +250,17 @@ fn run<
 
 /// Checks every row of frames.csv against the sensor, before the first picture is processed. A row without an altitude,
 /// or with one below the limb height, is not refused: its picture gets
-/// [`Status::NoAltitude`](hzn_core::status::Status::NoAltitude). If the sensor itself is refused, nothing is checked.
+/// [`Status::NoAltitude`](hzn_core::status::Status::NoAltitude); so does every impossible row of a sensor that fits
+/// positions. If the sensor itself is refused, nothing is checked.
 ///
 /// # Errors
 /// The row, the picture and the column with an impossible value.
 pub fn check_frames(config: &Config, flight: bool, frames: Option<&Frames>) -> Result<(), Problem> {
     let Some(frames) = frames else { return Ok(()) };
     let Ok(sensor) = AnySensor::new(config, flight) else { return Ok(()) };
+    if config.each_body().iter().any(|body| config.fits_position(body)) {
+        return Ok(());
+    }
     for row in &frames.rows {
         for half_angle in sensor.expected_half_angles_rad(Some(row)) {
             match half_angle {

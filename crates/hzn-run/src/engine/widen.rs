@@ -2,7 +2,7 @@
 
 use hzn_core::frames::{Cov3, UnitVec3};
 use hzn_core::real::Real;
-use hzn_core::report::{Candidate, Free};
+use hzn_core::report::{Candidate, Free, Position};
 use hzn_core::{Report, Solution};
 
 /// Converts a report to f64.
@@ -40,6 +40,7 @@ pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Sol
         altitude_m: s.altitude_m.map(|(h, sigma)| (h.into(), sigma.into())),
         free: s.free.as_ref().and_then(widen_free),
         axis_by_cos: s.axis_by_cos.map(|by| by.map(Into::into)),
+        position: s.position.as_ref().map(Position::to_f64),
         rms_px: s.rms_px.into(),
         inliers: s.inliers,
         arc_px: s.arc_px.into(),

@@ -1,7 +1,7 @@
 //! Draws the limb of a cone in the picture.
 
 use hzn_core::camera::Camera;
-use hzn_core::frames::UnitVec3;
+use hzn_core::frames::{Cam, UnitVec3};
 
 /// Number of steps around the cone in the search for the parts in view.
 const STEPS: usize = 4096;
@@ -11,11 +11,22 @@ const STEPS: usize = 4096;
 pub fn lines(axis: [f64; 3], half_angle_rad: f64, camera: &Camera<f64>) -> Vec<Vec<[f64; 2]>> {
     let (b1, b2) = basis(axis);
     let (sin, cos) = half_angle_rad.sin_cos();
+    let ray = |angle_rad: f64| {
+        let (s, c) = angle_rad.sin_cos();
+        UnitVec3::try_new(std::array::from_fn(|i| cos * axis[i] + sin * (c * b1[i] + s * b2[i])))
+    };
+    lines_along(ray, camera)
+}
+
+/// Returns any closed limb as lines in pixels, as [`lines`]. `direction` gives its direction (camera frame) for an angle
+/// about its axis in radians.
+pub fn lines_along(
+    direction: impl Fn(f64) -> Option<UnitVec3<Cam, f64>>,
+    camera: &Camera<f64>,
+) -> Vec<Vec<[f64; 2]>> {
     let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
     let point = |step: usize| -> Option<[f64; 2]> {
-        let (s, c) = (step as f64 * std::f64::consts::TAU / STEPS as f64).sin_cos();
-        let ray = std::array::from_fn(|i| cos * axis[i] + sin * (c * b1[i] + s * b2[i]));
-        let p = camera.project(&UnitVec3::try_new(ray)?)?;
+        let p = camera.project(&direction(step as f64 * std::f64::consts::TAU / STEPS as f64)?)?;
         // Half a pixel around the picture is included, because the edge of a line is still visible there.
         ((-1.0..=w).contains(&p.u) && (-1.0..=h).contains(&p.v)).then_some([p.u, p.v])
     };

@@ -7,6 +7,7 @@ pub mod limb;
 
 use std::path::Path;
 
+use hzn_core::Solution;
 use hzn_core::camera::Camera;
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pixel::ImagePoint;
@@ -67,12 +68,27 @@ pub fn draw_with_truth(image: RgbImage, drawing: &Annotations, true_limb: &[Vec<
 /// Returns the drawing for a fitted cone: its limb as lines, broken where it leaves the picture, and its axis.
 /// Coordinates are in pixels.
 pub fn draw_cone(axis: &UnitVec3<Cam, f64>, half_angle_rad: f64, camera: &Camera<f64>) -> Annotations {
+    draw_axis_and(axis, limb::lines(axis.xyz(), half_angle_rad, camera), camera)
+}
+
+/// Returns the drawing for an answer, as [`draw_cone`]. If the answer has a position, the limb is that of the ellipsoid.
+pub fn draw_limb(solution: &Solution<f64>, camera: &Camera<f64>) -> Annotations {
+    match &solution.position {
+        None => draw_cone(&solution.axis, solution.fused_half_angle_rad, camera),
+        Some(position) => {
+            let lines = limb::lines_along(|angle_rad| Some(position.limb_direction(angle_rad)), camera);
+            draw_axis_and(&solution.axis, lines, camera)
+        }
+    }
+}
+
+fn draw_axis_and(axis: &UnitVec3<Cam, f64>, limb: Vec<Vec<[f64; 2]>>, camera: &Camera<f64>) -> Annotations {
     let inside = |p: &ImagePoint<f64>| {
         (-0.5..=f64::from(camera.width()) - 0.5).contains(&p.u)
             && (-0.5..=f64::from(camera.height()) - 0.5).contains(&p.v)
     };
     Annotations {
-        limb: limb::lines(axis.xyz(), half_angle_rad, camera),
+        limb,
         axes: camera.project(axis).filter(inside).map(|p| [p.u, p.v]).into_iter().collect(),
         ..Annotations::default()
     }

@@ -1,10 +1,10 @@
 //! Converts a processed picture to the rows and records of files.
 
-use hzn_calib::FrameData;
+use hzn_calib::{FrameData, Orientation};
 use hzn_core::status::Status;
 use hzn_core::{Config, body};
 use hzn_mcap::{
-    Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, PicturePrior, Row, RowMeta,
+    Attitude, BodyOrientation, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, PicturePrior, Row, RowMeta,
 };
 use hzn_sim::evaluate;
 
@@ -91,5 +91,17 @@ fn to_picture_prior(data: &FrameData) -> PicturePrior {
         attitude_sigma_deg: data.attitude_sigma_deg,
         sun_camera: data.sun_camera,
         rate_rad_s: data.rate_rad_s,
+        pole_camera: data.pole_camera,
+        range_km: data.range_km,
+        range_sigma_km: data.range_sigma_km,
+        other_bodies: data.other_bodies.iter().map(to_recorded_orientation).collect(),
+    }
+}
+
+fn to_recorded_orientation(other: &Orientation) -> BodyOrientation {
+    BodyOrientation {
+        body: other.body.clone(),
+        q_body_from_camera_wxyz: other.camera_to_body_wxyz,
+        pole_camera: other.pole_camera,
     }
 }

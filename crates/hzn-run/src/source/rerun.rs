@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_calib::FrameData;
-use hzn_mcap::{Contents, FrameRecord, Index, IndexEntry, PicturePrior, Reader, Row};
+use hzn_calib::{FrameData, Orientation};
+use hzn_mcap::{BodyOrientation, Contents, FrameRecord, Index, IndexEntry, PicturePrior, Reader, Row};
 
 use super::item::{Item, TimeSource};
 use super::payload::Payload;
@@ -133,5 +133,17 @@ pub fn recorded_prior(row: &Row, given: &PicturePrior) -> FrameData {
         attitude_sigma_deg: given.attitude_sigma_deg,
         sun_camera: given.sun_camera,
         rate_rad_s: given.rate_rad_s,
+        pole_camera: given.pole_camera,
+        range_km: given.range_km,
+        range_sigma_km: given.range_sigma_km,
+        other_bodies: given.other_bodies.iter().map(from_recorded_orientation).collect(),
+    }
+}
+
+fn from_recorded_orientation(other: &BodyOrientation) -> Orientation {
+    Orientation {
+        body: other.body.clone(),
+        camera_to_body_wxyz: other.q_body_from_camera_wxyz,
+        pole_camera: other.pole_camera,
     }
 }

@@ -3,6 +3,7 @@
 mod apparent;
 mod expected;
 mod kind;
+mod lit;
 mod planets;
 #[cfg(feature = "position")]
 mod position;

@@ -82,6 +82,8 @@ pub enum PriorError {
     },
     /// Neither the prior nor the configuration has an altitude.
     NoAltitude,
+    /// The attitude is not a rotation.
+    Attitude,
     /// The sigma of the attitude is not a finite number, or is negative.
     AttitudeSigma,
     /// The rate of rotation is not finite, or is too large.
@@ -125,6 +127,7 @@ impl core::fmt::Display for PriorError {
                 let place = if altitude < limb { "below" } else { "not above" };
                 return write!(f, "altitude {altitude} km is {place} the limb height {limb} km");
             }
+            Self::Attitude => "qw, qx, qy, qz must be a rotation: the quaternion's length must be 1",
             Self::AttitudeSigma => "attitude_sigma_deg must be a finite number, 0 or more",
             Self::Rate => "rate_x, rate_y, rate_z must be finite and at most 1000 (rad/s)",
             Self::NoAltitude => {

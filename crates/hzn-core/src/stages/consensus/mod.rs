@@ -23,7 +23,7 @@ use crate::geometry::block::{Block, LANES};
 use crate::geometry::cone::through_three;
 use crate::model::body::Expected;
 use crate::model::work::WorkBudget;
-use two_point::{is_lit, ray, search};
+use two_point::{ray, search};
 
 pub use config::{Config, Method};
 pub(crate) use inliers::{Consensus, Threshold};
@@ -58,7 +58,7 @@ pub(crate) fn find<T: Real>(
     for block in blocks {
         let g = block.gradient(&best.e);
         for lane in 0..LANES {
-            let lit = || is_lit(&block.ray(lane), &best.e, best.c, expected);
+            let lit = || expected.is_lit(&block.ray(lane), &best.e, best.c, focal_px);
             if !(block.is_lit_along(lane, [g[0][lane], g[1][lane]]) && lit()) {
                 block.weight[lane] = T::ZERO;
             }

@@ -21,12 +21,6 @@ fn sigma_alpha<T: Real>(expected: &Expected<T>) -> T {
     expected.sigma_cos / expected.sin
 }
 
-/// Returns whether the Sun lights the body where the ray touches it. The result is true if the direction of the Sun is
-/// unknown. The surface normal where the ray touches the body is (s cos α − e)/sin α.
-pub(super) fn is_lit<T: Real>(s: &V3<T>, e: &V3<T>, c: T, expected: &Expected<T>) -> bool {
-    expected.sun.as_ref().is_none_or(|sun| s.dot(sun) * c - e.dot(sun) > T::ZERO)
-}
-
 pub(super) fn ray<T: Real>(blocks: &[Block<T>], i: u32) -> Option<V3<T>> {
     blocks.get(i as usize / LANES).map(|b| b.ray(i as usize % LANES))
 }
@@ -68,7 +62,7 @@ pub(super) fn search<T: Real>(
         let third = if free { ray(blocks, k) } else { None };
         let hypotheses = hypotheses(&a, &b, third, free, expected.cos);
         for (e, c) in hypotheses.into_iter().flatten() {
-            let faces = |i: u32| faces_light(blocks, i, &e, c, expected);
+            let faces = |i: u32| faces_light(blocks, i, &e, c, expected, focal_px);
             if !(faces(i) && faces(j) && faces(check)) || distance2(blocks, check, &e, c) > limit2 {
                 continue;
             }
@@ -112,10 +106,17 @@ fn hypotheses<T: Real>(a: &V3<T>, b: &V3<T>, third: Option<V3<T>>, free: bool, c
 
 /// Returns whether the lit side of a point lies towards the axis and the Sun lights the body there.
 #[inline(always)]
-fn faces_light<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T, expected: &Expected<T>) -> bool {
+fn faces_light<T: Real>(
+    blocks: &[Block<T>],
+    i: u32,
+    e: &V3<T>,
+    c: T,
+    expected: &Expected<T>,
+    focal_px: T,
+) -> bool {
     let lane = i as usize % LANES;
     let block = blocks.get(i as usize / LANES);
-    block.is_some_and(|b| b.is_lit_towards(lane, e) && is_lit(&b.ray(lane), e, c, expected))
+    block.is_some_and(|b| b.is_lit_towards(lane, e) && expected.is_lit(&b.ray(lane), e, c, focal_px))
 }
 
 /// Returns the number of draws that give 99 % probability of a success, if one draw succeeds with the probability `p`.

@@ -4,11 +4,13 @@
 use super::config::Config;
 use super::places::{MAX_PLACES, inliers};
 use super::shape::Curve;
+use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::geometry::camera::Camera;
 use crate::geometry::frames::UnitVec3;
 use crate::image::Pixels;
+use crate::model::body::Expected;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
@@ -80,6 +82,7 @@ struct Edge<'a, 'b, T, P, O> {
     curve: &'a Curve<T>,
     camera: &'a Camera<T>,
     binary: &'a BinaryPicture<'b, T, P, O>,
+    expected: &'a Expected<T>,
 }
 
 impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
@@ -88,12 +91,28 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
         Some((self.blocks.get(place / LANES)?, place % LANES))
     }
 
+    /// Returns whether a point cannot be on the limb because the Sun does not light the limb there. The edge then
+    /// continues as the terminator, which says nothing about the limb. This is known only for a position.
+    fn is_terminator(&self, ray: &V3<T>) -> bool {
+        #[cfg(feature = "position")]
+        if self.expected.target.is_some() {
+            let (fx, fy) = self.camera.focal_px();
+            let focal_px = (fx + fy) * T::from_f64(0.5);
+            return !self.expected.is_lit(ray, self.curve.axis(), T::one() - self.curve.k(), focal_px);
+        }
+        let _ = (ray, self.expected);
+        false
+    }
+
     /// Averages the points from `place` on over one box, in the direction `ahead`, and moves `place` past them.
     fn stretch(&self, place: &mut Option<usize>, ahead: bool) -> Option<Stretch<T>> {
         let mut sum = Stretch { at: [T::ZERO; 2], off: T::ZERO, length: T::ZERO, points: 0 };
         while sum.length < T::from_f64(BOX_PX) || sum.points == 0 {
             let here = (*place)?;
             let Some((block, lane)) = self.block(here) else { break };
+            if self.is_terminator(&block.ray(lane)) {
+                break;
+            }
             let Some(at) = self.camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { break };
             // The step from the previous point in the order of the walk.
             let step = if ahead { Some((block, lane)) } else { self.block(here + 1) };
@@ -182,9 +201,10 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
     support: T,
     binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
+    expected: &Expected<T>,
     config: &Config,
 ) -> bool {
-    let edge = Edge { blocks, points: points as usize, curve, camera, binary };
+    let edge = Edge { blocks, points: points as usize, curve, camera, binary, expected };
     let Some(run) = longest(blocks) else { return false };
     let mut found = Continuation { away: T::ZERO, smooth: Mean::default(), near: Mean::default() };
     for ahead in [false, true] {

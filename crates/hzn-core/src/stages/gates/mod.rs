@@ -186,7 +186,7 @@ fn judge_rivals<T: Real, P: Pixels, O: Observer<T>>(
     }
     if !P::STREAMED
         && fit.inliers < points
-        && departure::departs(blocks, points, &curve, noise, support, binary, camera, config)
+        && departure::departs(blocks, points, &curve, noise, support, binary, camera, expected, config)
     {
         return Verdict::Departure;
     }

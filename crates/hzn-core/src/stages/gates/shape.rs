@@ -43,6 +43,11 @@ impl<T: Real> Curve<T> {
     pub(super) fn axis(&self) -> &V3<T> {
         &self.e
     }
+    /// Returns 1 − cos of the half-angle of the cone.
+    #[cfg(feature = "position")]
+    pub(super) fn k(&self) -> T {
+        self.k
+    }
     /// Returns the signed distance of a point in pixels, positive outside of the cone.
     pub(super) fn distance(&self, block: &Block<T>, lane: usize) -> T {
         let s = block.ray(lane);

@@ -1,0 +1,82 @@
+//! The values of `[body]` that depend on the kind of body: a planet has another limb height than the Earth.
+
+use hzn_core::body::{Config, Kind};
+use toml::de::{DeTable, DeValue};
+
+use crate::merge::merge_missing;
+
+/// Returns for each body of the file, in order, the limb height that fits its kind as TOML; empty for a body with the
+/// limb height of the Earth.
+pub(crate) fn body_defaults(sensor: &DeTable<'_>) -> Vec<String> {
+    let of = |body: &DeValue<'_>| body.as_table().and_then(defaults).unwrap_or_default();
+    match (sensor.get("body"), sensor.get("bodies").and_then(|bodies| bodies.get_ref().as_array())) {
+        (Some(body), _) => vec![of(body.get_ref())],
+        (None, Some(bodies)) => bodies.iter().map(|body| of(body.get_ref())).collect(),
+        (None, None) => Vec::new(),
+    }
+}
+
+/// Adds these values to `[body]` or to each of `[[bodies]]`, where the file does not have them.
+pub(crate) fn merge_body_defaults<'i>(sensor: &mut DeTable<'i>, values: &'i [String]) {
+    let merge = |body: &mut DeValue<'i>, values: &'i str| {
+        if let (DeValue::Table(body), Ok(values)) = (body, DeTable::parse(values)) {
+            merge_missing(body, values.into_inner());
+        }
+    };
+    if let (Some(body), Some(values)) = (sensor.get_mut("body"), values.first()) {
+        merge(body.get_mut(), values);
+    } else if let Some(DeValue::Array(bodies)) = sensor.get_mut("bodies").map(toml::Spanned::get_mut) {
+        bodies.iter_mut().zip(values).for_each(|(body, values)| merge(body.get_mut(), values));
+    }
+}
+
+/// Returns the values as TOML; `None` for a body with the limb height of the Earth. Wrong values are left to the reader
+/// of the section.
+fn defaults(body: &DeTable<'_>) -> Option<String> {
+    let kind = body.get("kind")?.get_ref().as_str()?;
+    let kind = *Kind::ALL.iter().find(|k| k.name() == kind)?;
+    let config = Config::of_kind(kind, radii_km(body));
+    let values = [
+        ("limb_height_km", config.limb_height_km),
+        ("limb_height_sigma_km", config.limb_height_sigma_km),
+        ("clipped_height_km", config.clipped_height_km),
+        ("clipped_sigma_km", config.clipped_sigma_km),
+    ];
+    config.is_ellipsoid().then(|| values.iter().map(|(key, value)| format!("{key} = {value:?}\n")).collect())
+}
+
+fn radii_km(body: &DeTable<'_>) -> Option<[f64; 3]> {
+    let radii = body.get("radii_km")?.get_ref().as_array()?;
+    let number = |value: &DeValue<'_>| match value {
+        DeValue::Float(x) => x.as_str().parse().ok(),
+        DeValue::Integer(x) => x.as_str().parse().ok(),
+        _ => None,
+    };
+    let radii: Vec<f64> = radii.iter().filter_map(|value| number(value.get_ref())).collect();
+    radii.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    fn body(text: &str) -> hzn_core::body::Config {
+        let camera = "[camera]\nwidth = 64\nheight = 48\nmodel = \"pinhole\"\nfx_px = 60.0\nfy_px = 60.0\ncx_px = 31.5\n\
+                      cy_px = 23.5\n";
+        crate::sensor::parse(&format!("{camera}{text}"), Path::new("sensor.toml")).unwrap().config.each_body()[0].clone()
+    }
+
+    #[test]
+    fn a_planet_has_its_own_limb_height_unless_the_file_says_another() {
+        let jupiter = body("[body]\nkind = \"jupiter\"\n");
+        assert_eq!((jupiter.limb_height_km, jupiter.limb_height_sigma_km), (80.0, 80.0));
+        assert!((jupiter.clipped_height_km - 7.8 * 27.0 / 7.5).abs() < 1e-9);
+        let told = body("[body]\nkind = \"jupiter\"\nlimb_height_km = 150\n");
+        assert_eq!((told.limb_height_km, told.limb_height_sigma_km), (150.0, 80.0));
+        let own = body("[[bodies]]\nkind = \"ellipsoid\"\nradii_km = [13, 11.4, 9.1]\n");
+        assert_eq!((own.limb_height_km, own.clipped_height_km), (0.0, 0.0));
+        assert!((own.limb_height_sigma_km - 33.5e-3).abs() < 1e-9);
+        let earth = body("[body]\nkind = \"earth\"\n");
+        assert_eq!((earth.limb_height_km, earth.limb_height_sigma_km), (17.0, 7.0));
+    }
+}

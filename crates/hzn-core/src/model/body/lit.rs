@@ -1,0 +1,47 @@
+//! Whether the Sun lights the limb at a point.
+
+use super::Expected;
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+
+/// cos 75°: the part of the largest elevation of the Sun along the limb that a point needs.
+#[cfg(feature = "position")]
+const CUSP: f64 = 0.258_819_045_102_520_76;
+/// Distance between terminator and limb that does not matter, pixels.
+#[cfg(feature = "position")]
+const TERMINATOR_PX: f64 = 0.05;
+
+impl<T: Real> Expected<T> {
+    /// Returns whether the Sun lights the body where the ray `s` touches it, on the cone (e, c). The result is true if
+    /// the direction of the Sun is unknown. The surface normal there is (s cos α − e)/sin α.
+    ///
+    /// For a position, every point matters. Near the cusps, where the terminator meets the limb, the edge fades and
+    /// moves; there a point does not count ([`Self::lowest_sun`]).
+    pub(crate) fn is_lit(&self, s: &V3<T>, e: &V3<T>, c: T, focal_px: T) -> bool {
+        let lowest = |sun: &V3<T>| self.lowest_sun(sun, e, c, focal_px);
+        self.sun.as_ref().is_none_or(|sun| s.dot(sun) * c - e.dot(sun) > lowest(sun))
+    }
+
+    /// Returns sin α times the lowest sine of the Sun's elevation at which a limb point counts.
+    ///
+    /// With the phase angle φ, the elevation at the azimuth ψ from the Sun is asin(cos ψ sin φ). Within the last pixel of
+    /// a disc of the radius ρ pixels, the surface turns by √(2/ρ). A Sun that is lower than this does not light the whole
+    /// pixel. A thin crescent has no higher Sun; there the points within 75° of the Sun's azimuth count. If the
+    /// terminator is nearer to the limb than a part of a pixel, ρ φ²/2, the whole limb is lit.
+    #[inline(always)]
+    fn lowest_sun(&self, sun: &V3<T>, e: &V3<T>, c: T, focal_px: T) -> T {
+        #[cfg(feature = "position")]
+        if self.target.is_some() {
+            let sin = (T::one() - c * c).max(T::ZERO).sqrt();
+            let along = e.dot(sun);
+            let sin_phase2 = (T::one() - along * along).max(T::ZERO);
+            let radius_px = focal_px * sin;
+            let is_full = along < T::ZERO && radius_px * sin_phase2 < T::from_f64(2.0 * TERMINATOR_PX);
+            let last_pixel = (T::from_f64(2.0) / radius_px.max(T::one())).sqrt();
+            let lowest = sin * last_pixel.min(sin_phase2.sqrt() * T::from_f64(CUSP));
+            return if is_full { -T::one() } else { lowest };
+        }
+        let _ = (sun, e, c, focal_px);
+        T::ZERO
+    }
+}
