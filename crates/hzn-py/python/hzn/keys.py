@@ -176,10 +176,14 @@ class Reject(TypedDict, total=False):
 class Estimate(TypedDict, total=False):
     """The fit of the cone."""
 
-    method: Literal["sphere", "direct", "conic", "tls", "wtls", "circle"]
+    method: Literal["sphere", "direct", "conic", "tls", "wtls", "least-squares", "generalised-tls", "circle"]
     """How the cone is fitted. Default: "sphere"."""
     half_angle: Literal["fused", "known", "free"]
     """Which half-angle the fitted cone has. Default: "fused"."""
+    position: bool | None
+    """Whether the fit gives the position of the body's centre: the whole vector with its covariance. The limb of an
+    ellipsoid must then have an orientation: an attitude, or for a body of revolution its pole. Values: true or
+    false. Default: true for ``ellipsoid`` and the planets with a name."""
     weigh_above_deg: float
     """For ``wtls``: points are weighted where the axis is farther from the optical axis than this, degrees; 0 always
     weights them. Values: 0 to 180 deg. Default: 0.0."""
@@ -361,13 +365,24 @@ class Limits(TypedDict, total=False):
 class Body(TypedDict, total=False):
     """The body that the sensor searches for; each of several ``[[bodies]]`` has the same keys."""
 
-    kind: Literal["earth", "earth-sphere", "sun", "moon", "sphere"]
+    kind: Literal["earth", "earth-sphere", "sun", "moon", "sphere", "ellipsoid", "mercury", "venus", "mars", "jupiter", "saturn", "uranus", "neptune", "pluto", "ceres", "vesta", "phobos", "deimos", "io", "europa", "ganymede", "callisto", "mimas", "enceladus", "tethys", "dione", "rhea", "titan", "iapetus", "miranda", "ariel", "umbriel", "titania", "oberon", "triton", "charon"]
     """The body that the sensor searches for. Default: "earth"."""
     radius_km: float | None
     """Radius of a ``sphere``, km; not allowed for other bodies. Values: above 0, for ``sphere`` only."""
+    radii_km: _Numbers | None
+    """Semi-axes of an ``ellipsoid`` along its own x, y and z axes (z to the north pole), km; not allowed for other
+    bodies, because a planet with a name has its own. Values: three lengths above 0, for ``ellipsoid`` only."""
+    radii_sigma_km: float
+    """1σ of each semi-axis, km, with ``estimate.position``. Values: 0 to 100000 km. Default: 0.0."""
+    range_km: float | None
+    """Distance of the camera from the body's centre for pictures without one in their prior, km, with
+    ``estimate.position``; it needs ``range_sigma_km``. Values: above 0 km."""
+    range_sigma_km: float | None
+    """1σ of ``range_km``, and of the column ``range_km`` of frames.csv if that has no ``range_sigma_km``, km.
+    Values: 0 to 1e12 km."""
     altitude_km: float | None
     """Altitude of the camera for pictures without an altitude in their prior, km; above WGS-84 for ``earth``, else
-    above the radius. Values: above 0 km."""
+    above the radius, which is the mean of the three semi-axes for an ellipsoid. Values: above 0 km."""
     altitude_sigma_km: float
     """1σ of the altitude, km. Values: 0 to 1e6 km. Default: 0.5."""
     altitude_reference: Literal["ellipsoid", "sphere"]
@@ -388,7 +403,7 @@ class Body(TypedDict, total=False):
     with rising latitudes. Values: up to 16 rows, for ``earth``."""
     sunlit: bool | None
     """Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun. Values: true or
-    false. Default: true for ``moon`` and ``sphere``."""
+    false. Default: true for all but ``earth``, ``earth-sphere`` and ``sun``."""
     binarize: Binarize | None
     """Threshold for this body, as a table with the keys of ``[binarize]``. Values: the keys of ``[binarize]``.
     Default: ``[binarize]``; ``fixed`` at 0.9 for a ``sun`` among several bodies."""

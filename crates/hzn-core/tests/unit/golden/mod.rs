@@ -12,6 +12,8 @@ mod lens;
 mod monte_carlo;
 #[cfg(feature = "position")]
 mod position;
+#[cfg(feature = "position")]
+mod position_runs;
 mod projection;
 #[cfg(feature = "zju")]
 mod zju;
