@@ -61,9 +61,10 @@ mod tests {
     use std::path::Path;
 
     fn body(text: &str) -> hzn_core::body::Config {
-        let camera = "[camera]\nwidth = 64\nheight = 48\nmodel = \"pinhole\"\nfx_px = 60.0\nfy_px = 60.0\ncx_px = 31.5\n\
-                      cy_px = 23.5\n";
-        crate::sensor::parse(&format!("{camera}{text}"), Path::new("sensor.toml")).unwrap().config.each_body()[0].clone()
+        let camera = "[camera]\nwidth = 64\nheight = 48\nmodel = \"pinhole\"\nfx_px = 60.0\nfy_px = 60.0\n\
+                      cx_px = 31.5\ncy_px = 23.5\n";
+        crate::sensor::parse(&format!("{camera}{text}"), Path::new("sensor.toml")).unwrap().config.each_body()[0]
+            .clone()
     }
 
     #[test]

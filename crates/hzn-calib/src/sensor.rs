@@ -13,12 +13,12 @@ use hzn_core::{Config, Preset};
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
 
+use crate::body_defaults::{body_defaults, merge_body_defaults};
 use crate::camera_section::camera_from_file;
 use crate::located::{
     check_list_lengths, find_places, problem_at_key, translate_config_error, translate_serde_error,
     translate_syntax_error,
 };
-use crate::body_defaults::{body_defaults, merge_body_defaults};
 use crate::merge::{merge_missing, take};
 use crate::nearest::suggestion;
 use crate::{Problem, plausible};

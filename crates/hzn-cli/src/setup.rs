@@ -189,9 +189,7 @@ pub(crate) fn check_size(source: &dyn Source, sensor: &Sensor) -> Result<(), Sto
 /// Checks that an altitude is known from any source. Without one, every picture would fail.
 pub(crate) fn check_altitude(sensor: &Sensor, source: &dyn Source, frames: Option<&Frames>) -> Result<(), Stop> {
     // A position can come from the limb alone.
-    let known = |b: &body::Config| {
-        b.half_angle_is_free() || b.altitude_km.is_some() || sensor.config.fits_position(b)
-    };
+    let known = |b: &body::Config| b.half_angle_is_free() || b.altitude_km.is_some() || sensor.config.fits_position(b);
     let has_altitude =
         |row: &FrameData| row.altitude_km.is_some() || row.position_km.is_some() || row.range_km.is_some();
     let rows = frames.map_or(source.sensor_toml().is_some(), |f| f.rows.iter().any(has_altitude));

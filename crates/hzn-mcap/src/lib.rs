@@ -56,7 +56,8 @@ mod writer;
 
 pub use error::Error;
 pub use frame::{
-    Annotations, Attitude, BodyOrientation, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, PicturePrior,
+    Annotations, Attitude, BodyOrientation, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine,
+    PicturePrior,
 };
 pub use images::{ImageReader, InputImage};
 pub use index::{Index, IndexEntry, Pictures, Place};

@@ -21,8 +21,8 @@ pub(crate) struct Scaling<T> {
 }
 
 impl<T: Real> Scaling<T> {
-    /// Makes the map for an ellipsoid with the given semi-axes, in units of their mean. The columns of `body_to_cam` are
-    /// the axes of the body in the camera frame.
+    /// Makes the map for an ellipsoid with the given semi-axes, in units of their mean. The columns of `body_to_cam`
+    /// are the axes of the body in the camera frame.
     pub(crate) fn new(semi_axes: [T; 3], body_to_cam: &M3<T>) -> Self {
         let [a, b, c] = semi_axes;
         let one = T::one();
@@ -31,8 +31,7 @@ impl<T: Real> Scaling<T> {
         }
         // R D Rᵀ = c I + (a − c) x xᵀ + (b − c) y yᵀ keeps small differences between the axes exact.
         let (x, y) = (body_to_cam.column(0).into_owned(), body_to_cam.column(1).into_owned());
-        let root =
-            |a: T, b: T, c: T| M3::identity() * c + x * x.transpose() * (a - c) + y * y.transpose() * (b - c);
+        let root = |a: T, b: T, c: T| M3::identity() * c + x * x.transpose() * (a - c) + y * y.transpose() * (b - c);
         Self { to: root(one / a, one / b, one / c), from: root(a, b, c) }
     }
 
@@ -64,7 +63,8 @@ impl<T: Real> Scaling<T> {
         let scaled = self.to * ray.s;
         let per_length = T::one() / scaled.dot(&scaled).sqrt();
         let s = scaled * per_length;
-        // Both derivatives are in tangent bases, which are perpendicular to the rays, so that the projection is implicit.
+        // Both derivatives are in tangent bases, which are perpendicular to the rays, so that the projection is
+        // implicit.
         let ([a, b], [c, d]) = (tangent(&ray.s), tangent(&s));
         let (a, b) = (self.to * a * per_length, self.to * b * per_length);
         let [au, av, bu, bv] = ray.m;
@@ -157,7 +157,8 @@ mod tests {
 
     #[test]
     fn scaled_rays_have_the_derivatives_of_finite_differences() {
-        let camera = Camera::<f64>::try_new(&camera::Config::ideal(camera::Model::Equidistant, 640, 480, 200.0)).unwrap();
+        let camera =
+            Camera::<f64>::try_new(&camera::Config::ideal(camera::Model::Equidistant, 640, 480, 200.0)).unwrap();
         let scaling = Scaling::new([1.2, 1.0, 0.8], &rotation());
         for (u, v) in [(10.0, 20.0), (319.5, 239.5), (600.0, 100.0)] {
             let at = |u: f64, v: f64| scaling.scale_ray(&camera.ray(ImagePoint { u, v }).unwrap());

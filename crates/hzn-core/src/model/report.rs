@@ -159,8 +159,8 @@ pub struct Free<T> {
 /// # Frames and units
 ///
 /// The position goes from the camera to the centre of the body, in the camera frame, metres. Its covariance is a full
-/// 3×3 matrix: on a short arc, direction and distance are known only together, along a straight ridge. A filter must not
-/// split them.
+/// 3×3 matrix: on a short arc, direction and distance are known only together, along a straight ridge. A filter must
+/// not split them.
 #[derive(Debug, Clone, Copy)]
 pub struct Position<T> {
     /// From the camera to the centre of the body in the camera frame, metres.

@@ -33,8 +33,8 @@ impl<T: Real> Edges<T> {
         Self::new(&camera, points, &lit)
     }
 
-    /// Returns the position by plain least squares (Christian & Robinson 2016) with its covariance, (13.7). It is biased
-    /// on short arcs. `None` if the points do not determine a position, or if no position is fitted.
+    /// Returns the position by plain least squares (Christian & Robinson 2016) with its covariance, (13.7). It is
+    /// biased on short arcs. `None` if the points do not determine a position, or if no position is fitted.
     pub fn least_squares(&self, expected: &Expected<T>) -> Option<PlainPosition<T>> {
         let target = expected.target.as_ref()?;
         let (e, k) = fit::closed::least_squares(&self.blocks)?;

@@ -8,10 +8,10 @@
 //! examined again, at other thresholds (`[recover]`).
 
 mod budget;
-#[cfg(any(test, feature = "_edges"))]
-pub mod edges;
 #[cfg(all(feature = "position", any(test, feature = "_edges")))]
 pub mod edge_position;
+#[cfg(any(test, feature = "_edges"))]
+pub mod edges;
 mod found_limb;
 mod further_looks;
 mod horizon;

@@ -118,7 +118,8 @@ impl<T: Real> Sensor<T> {
     fn check_disc(&self, expected: &Expected<T>) -> Result<(), PriorError> {
         let (fx, fy) = self.camera.focal_px();
         let diameter_px = expected.half_angle_rad() * (fx + fy);
-        let is_small = expected.target.is_some_and(|t| t.range.is_some()) && diameter_px < T::from_f64(SMALLEST_DISC_PX);
+        let is_small =
+            expected.target.is_some_and(|t| t.range.is_some()) && diameter_px < T::from_f64(SMALLEST_DISC_PX);
         match is_small {
             true => Err(PriorError::TooSmall { diameter_px_100: (diameter_px * T::from_f64(100.0)).to_i32() }),
             false => Ok(()),

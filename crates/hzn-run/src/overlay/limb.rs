@@ -18,12 +18,9 @@ pub fn lines(axis: [f64; 3], half_angle_rad: f64, camera: &Camera<f64>) -> Vec<V
     lines_along(ray, camera)
 }
 
-/// Returns any closed limb as lines in pixels, as [`lines`]. `direction` gives its direction (camera frame) for an angle
-/// about its axis in radians.
-pub fn lines_along(
-    direction: impl Fn(f64) -> Option<UnitVec3<Cam, f64>>,
-    camera: &Camera<f64>,
-) -> Vec<Vec<[f64; 2]>> {
+/// Returns any closed limb as lines in pixels, as [`lines`]. `direction` gives its direction (camera frame) for an
+/// angle about its axis in radians.
+pub fn lines_along(direction: impl Fn(f64) -> Option<UnitVec3<Cam, f64>>, camera: &Camera<f64>) -> Vec<Vec<[f64; 2]>> {
     let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
     let point = |step: usize| -> Option<[f64; 2]> {
         let p = camera.project(&direction(step as f64 * std::f64::consts::TAU / STEPS as f64)?)?;

@@ -71,7 +71,8 @@ pub fn draw_cone(axis: &UnitVec3<Cam, f64>, half_angle_rad: f64, camera: &Camera
     draw_axis_and(axis, limb::lines(axis.xyz(), half_angle_rad, camera), camera)
 }
 
-/// Returns the drawing for an answer, as [`draw_cone`]. If the answer has a position, the limb is that of the ellipsoid.
+/// Returns the drawing for an answer, as [`draw_cone`]. If the answer has a position, the limb is that of the
+/// ellipsoid.
 pub fn draw_limb(solution: &Solution<f64>, camera: &Camera<f64>) -> Annotations {
     match &solution.position {
         None => draw_cone(&solution.axis, solution.fused_half_angle_rad, camera),

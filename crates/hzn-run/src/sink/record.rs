@@ -4,7 +4,8 @@ use hzn_calib::{FrameData, Orientation};
 use hzn_core::status::Status;
 use hzn_core::{Config, body};
 use hzn_mcap::{
-    Attitude, BodyOrientation, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, PicturePrior, Row, RowMeta,
+    Attitude, BodyOrientation, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, PicturePrior,
+    Row, RowMeta,
 };
 use hzn_sim::evaluate;
 

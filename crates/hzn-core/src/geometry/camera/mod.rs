@@ -106,18 +106,7 @@ impl<T: Real> Camera<T> {
             corner(-0.5, -0.5).max(corner(right, -0.5)).max(corner(-0.5, bottom)).max(corner(right, bottom));
         let (lens, rho_max, theta_max) = match c.model {
             Model::Pinhole => {
-                let theta = match c.theta_max_deg {
-                    Some(deg) => {
-                        require(
-                            deg < 89.0,
-                            "camera.theta_max_deg",
-                            deg,
-                            Limit::Rule("must be below 89 degrees for a pinhole"),
-                        )?;
-                        deg.to_radians().min(libm::atan(rho_corner))
-                    }
-                    None => libm::atan(rho_corner),
-                };
+                let theta = pinhole_limit_rad(c, rho_corner)?;
                 (Lens::Pinhole, libm::tan(theta), theta)
             }
             Model::BrownConrady => {
@@ -398,6 +387,15 @@ impl<T: Real> Camera<T> {
         let (x, y, [k1, k2, k3, k4, k5]) = self.lens.by_coefficients(s);
         [[x, zero], [zero, y], [one, zero], [zero, one], k1, k2, k3, k4, k5].map(|[u, v]| [u * self.fx, v * self.fy])
     }
+}
+
+/// Returns the largest angle off axis of a pinhole, radians: the image circle or the farthest corner.
+fn pinhole_limit_rad(c: &Config, rho_corner: f64) -> Result<f64, ConfigError> {
+    let corner = libm::atan(rho_corner);
+    let Some(deg) = c.theta_max_deg else { return Ok(corner) };
+    let rule = Limit::Rule("must be below 89 degrees for a pinhole");
+    require(deg < 89.0, "camera.theta_max_deg", deg, rule)?;
+    Ok(deg.to_radians().min(corner))
 }
 
 /// `hypot` for the checks at load time, from the same library on every target.

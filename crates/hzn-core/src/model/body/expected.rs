@@ -107,6 +107,11 @@ fn check<T: Real>(prior: &Prior<T>) -> Result<T, PriorError> {
     Ok(attitude_sigma)
 }
 
+/// Returns the prior attitude, if it is better than an unknown one.
+fn useful_attitude<T: Real>(prior: &Prior<T>, sigma_rad: T) -> Option<Rotation<Cam, Ecef, T>> {
+    prior.cam_to_ecef.filter(|_| sigma_rad < T::from_f64(USELESS_ATTITUDE_RAD))
+}
+
 impl<T> Expected<T> {
     /// Returns the same as [`Config::blooms`].
     pub(crate) fn blooms(&self) -> bool {
@@ -128,21 +133,25 @@ impl<T: Real> Expected<T> {
 
     /// Computes the expected cone: sin α = (R + d)/(R + H), with σ_cos² = sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
     ///
-    /// With `smallest_rad`, the position of the body is fitted if it can be; the value is the half-angle of the smallest
-    /// disc that the search must find, which counts if nothing is known of the distance.
+    /// With `smallest_rad`, the position of the body is fitted if it can be. The value is the half-angle of the
+    /// smallest disc that the search must find; it counts if nothing is known of the distance.
     pub(crate) fn try_new(body: &Config, prior: &Prior<T>, smallest_rad: Option<T>) -> Result<Self, PriorError> {
         let attitude_sigma = check(prior)?;
-        let km = T::from_f64(1000.0);
-        let limb_sigma = T::from_f64(body.limb_height_sigma_km) * km;
         #[cfg(feature = "position")]
-        if let Some(smallest) = smallest_rad {
-            let attitude = prior.cam_to_ecef.filter(|_| attitude_sigma < T::from_f64(USELESS_ATTITUDE_RAD));
-            if let Some(target) = Target::new(body, prior, attitude, attitude_sigma)? {
-                return Self::in_scaled_space(body, prior, target, smallest);
-            }
+        if let Some(smallest_rad) = smallest_rad
+            && let Some(target) = Target::new(body, prior, useful_attitude(prior, attitude_sigma), attitude_sigma)?
+        {
+            return Self::in_scaled_space(body, prior, target, smallest_rad);
         }
         #[cfg(not(feature = "position"))]
         let _ = smallest_rad;
+        Self::of_limb(body, prior, attitude_sigma)
+    }
+
+    /// Computes the expected cone of the limb, from the altitude or the position of the camera.
+    fn of_limb(body: &Config, prior: &Prior<T>, attitude_sigma: T) -> Result<Self, PriorError> {
+        let km = T::from_f64(1000.0);
+        let limb_sigma = T::from_f64(body.limb_height_sigma_km) * km;
         let seen = ApparentBody::new(body, prior)?;
         let ApparentBody { sin, limb, .. } = seen;
         let cos2 = T::one() - sin * sin;
@@ -155,7 +164,7 @@ impl<T: Real> Expected<T> {
         // ∂cos/∂d = −sin·∂α/∂d = −tan/(R + H), ∂cos/∂H = sin tan/(R + H).
         let tan = sin / cos;
         let scale = tan / (seen.radius + seen.altitude);
-        let known = prior.cam_to_ecef.filter(|_| attitude_sigma < T::from_f64(USELESS_ATTITUDE_RAD));
+        let known = useful_attitude(prior, attitude_sigma);
         // A higher limb makes the cone wider. The shape of the ellipsoid adds half the difference between the cosines
         // of its two half-angles.
         let harmonics_cos = seen.harmonics.map(|h| -scale * h);

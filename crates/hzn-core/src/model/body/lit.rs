@@ -24,9 +24,9 @@ impl<T: Real> Expected<T> {
 
     /// Returns sin α times the lowest sine of the Sun's elevation at which a limb point counts.
     ///
-    /// With the phase angle φ, the elevation at the azimuth ψ from the Sun is asin(cos ψ sin φ). Within the last pixel of
-    /// a disc of the radius ρ pixels, the surface turns by √(2/ρ). A Sun that is lower than this does not light the whole
-    /// pixel. A thin crescent has no higher Sun; there the points within 75° of the Sun's azimuth count. If the
+    /// With the phase angle φ, the elevation at the azimuth ψ from the Sun is asin(cos ψ sin φ). Within the last pixel
+    /// of a disc of the radius ρ pixels, the surface turns by √(2/ρ). A Sun that is lower than this does not light the
+    /// whole pixel. A thin crescent has no higher Sun; there the points within 75° of the Sun's azimuth count. If the
     /// terminator is nearer to the limb than a part of a pixel, ρ φ²/2, the whole limb is lit.
     #[inline(always)]
     fn lowest_sun(&self, sun: &V3<T>, e: &V3<T>, c: T, focal_px: T) -> T {

@@ -102,7 +102,8 @@ section! {
         @- limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES> = heapless::Vec::new(),
             ["up to 16 rows, for `earth`"] { unset: "none", example: "[[-90, 20.5], [0, 25.0], [90, 29.5]]" };
         /// Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun.
-        @- sunlit: Option<bool> = None, ["true or false"] { unset: "true for all but `earth`, `earth-sphere` and `sun`", example: "true" };
+        @- sunlit: Option<bool> = None, ["true or false"]
+            { unset: "true for all but `earth`, `earth-sphere` and `sun`", example: "true" };
         /// Threshold for this body, as a table with the keys of `[binarize]`.
         @- binarize: Option<threshold::Config> = None, ["the keys of `[binarize]`"]
             { unset: "`[binarize]`; `fixed` at 0.9 for a `sun` among several bodies" };

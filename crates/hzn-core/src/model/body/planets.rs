@@ -8,8 +8,9 @@
 //! - A body without air has its limb at the ellipsoid. The sigma is 0.3 % of the mean radius, or the RMS deviation of
 //!   the surface from the ellipsoid (the same report) where that is larger. Vesta and Phobos get 5 %: their ellipsoids
 //!   leave out whole mountains.
-//! - In the air of a giant planet the slant path along the limb is √(2πRh) long, over a hundred scale heights h, so that
-//!   the limb is seen three scale heights above the level of 1 bar, ± 3.
+//! - In the air of a giant planet the slant path along the limb is √(2πRh) long, over a hundred scale heights h. The
+//!   limb
+//!   is therefore seen three scale heights above the level of 1 bar, ± 3.
 //! - Venus shows its haze above the clouds, Mars its dust, Titan its haze.
 //!
 //! The scale height of the air gives the height that overexposure adds, as for the Earth.

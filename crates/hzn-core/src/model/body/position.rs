@@ -189,8 +189,8 @@ impl<T: Real> Target<T> {
 
 impl<T: Real> Target<T> {
     /// Returns the half-angle of the limb in the camera frame for the centre `r` (camera frame, metres), radians. The
-    /// limb is an elliptic cone, sᵀ M s = 0 with M = A r rᵀ A − (rᵀ A r − 1) A; cot² of the result is the mean of its two
-    /// half-angles, −λ/λ₁ for the two negative eigenvalues λ and the positive one λ₁.
+    /// limb is an elliptic cone, sᵀ M s = 0 with M = A r rᵀ A − (rᵀ A r − 1) A; cot² of the result is the mean of its
+    /// two half-angles, −λ/λ₁ for the two negative eigenvalues λ and the positive one λ₁.
     pub(crate) fn half_angle_rad(&self, r: &V3<T>) -> T {
         // Double precision: for a small disc the eigenvalues differ by many orders of magnitude.
         let grown = 1.0 + (self.raised_m / self.unit_m).to_f64();

@@ -147,9 +147,7 @@ impl core::fmt::Display for PriorError {
                 let [distance, limit] = [distance_m, limit_m].map(|m| *m as f64 / 1e3);
                 return write!(f, "the camera is {distance} km from the centre, inside the body ({limit} km)");
             }
-            Self::Pole => {
-                "pole_x, pole_y, pole_z do not orient a body with three different radii; give qw, qx, qy, qz"
-            }
+            Self::Pole => "pole_x, pole_y, pole_z do not orient a body with three different radii; give qw, qx, qy, qz",
             Self::TooSmall { diameter_px_100 } => {
                 let diameter = f64::from(*diameter_px_100) / 100.0;
                 return write!(f, "the body is {diameter} px wide at this distance; the smallest is 8 px");

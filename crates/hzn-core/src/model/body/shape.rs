@@ -69,12 +69,10 @@ mod tests {
             };
             let radius = mean_square(&|l| exact(l, altitude).0 - EARTH_MEAN_RADIUS_M, &|_| 1.0);
             let second = mean_square(&|l| exact(l, altitude).1, &|l| libm::cos(l.to_radians()));
-            for (got, want, rounded) in
-                [
-                    (radius_sigma_m(sin, EARTH_K_M), radius, radius_km),
-                    (second_harmonic_m(sin, EARTH_K_M), second, second_km),
-                ]
-            {
+            for (got, want, rounded) in [
+                (radius_sigma_m(sin, EARTH_K_M), radius, radius_km),
+                (second_harmonic_m(sin, EARTH_K_M), second, second_km),
+            ] {
                 assert!((got / want - 1.0).abs() < 0.03, "{km} km: {got} {want}");
                 assert!((got * 1e-3 / rounded - 1.0).abs() < 0.06, "{km} km: {got} {rounded}");
             }

@@ -203,16 +203,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             outcome.verdict = Verdict::Straight;
             return None;
         }
-        #[cfg(not(feature = "position"))]
-        let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number);
-        #[cfg(feature = "position")]
-        let solution = {
-            let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number);
-            match &expected.target {
-                None => solution,
-                Some(target) => self.place(solution, &fused, target, expected)?,
-            }
-        };
+        let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number)?;
         let share = T::from_i32(fit.inliers as i32)
             > T::from_i32(points.count as i32) * T::from_f64(config.select.certain_share);
         // The reflection of a Sun in the lens may look as good as the Sun, so every edge is examined.
@@ -241,13 +232,13 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         covariance: Cov3<Cam, T>,
         expected: &Expected<T>,
         number: u32,
-    ) -> Solution<T> {
+    ) -> Option<Solution<T>> {
         let axis = UnitVec3::assume_unit(fused.e);
         let one = T::one();
         let (b1, b2) = basis(&fit.e);
         let [by_1, by_2] = fused.by_cos;
         let half_angle = |k: T| (k * (one + one - k)).max(T::ZERO).sqrt().atan2(one - k);
-        Solution {
+        let solution = Solution {
             axis,
             covariance,
             axis_ecef: expected.axis_ecef(),
@@ -268,7 +259,12 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             inliers: fit.inliers,
             arc_px: fit.arc_px,
             candidate: number,
+        };
+        #[cfg(feature = "position")]
+        if let Some(target) = &expected.target {
+            return self.place(solution, fused, target, expected);
         }
+        Some(solution)
     }
 
     /// Replaces what is in scaled space by the same in the camera frame, and adds the position.

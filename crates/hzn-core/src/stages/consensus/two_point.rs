@@ -106,14 +106,7 @@ fn hypotheses<T: Real>(a: &V3<T>, b: &V3<T>, third: Option<V3<T>>, free: bool, c
 
 /// Returns whether the lit side of a point lies towards the axis and the Sun lights the body there.
 #[inline(always)]
-fn faces_light<T: Real>(
-    blocks: &[Block<T>],
-    i: u32,
-    e: &V3<T>,
-    c: T,
-    expected: &Expected<T>,
-    focal_px: T,
-) -> bool {
+fn faces_light<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T, expected: &Expected<T>, focal_px: T) -> bool {
     let lane = i as usize % LANES;
     let block = blocks.get(i as usize / LANES);
     block.is_some_and(|b| b.is_lit_towards(lane, e) && expected.is_lit(&b.ray(lane), e, c, focal_px))

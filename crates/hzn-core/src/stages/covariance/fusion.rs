@@ -23,26 +23,7 @@ pub(super) fn fused<T: Real>(
     let var_free = fit.free.then_some(p.m33);
     let free_p = [p.m11, p.m12, p.m22];
     if !fit.free || estimate.half_angle == fit::HalfAngle::Free || expected.free {
-        // If the half-angle is fixed at the expected one, its error causes a proportional error of the axis.
-        let k = fixed_half_angle_gain(fit);
-        let var_c = if estimate.half_angle == fit::HalfAngle::Known { T::ZERO } else { var_c };
-        let (k, var_c) = k.filter(|_| !fit.free).map_or(([T::ZERO; 2], T::ZERO), |k| (k, var_c));
-        if let Some(budget) = budget {
-            budget.project(&b1, &b2, [T::ZERO; 2], k.map(|k| k * var_c.sqrt()), expected);
-        }
-        let p = [p.m11 + k[0] * k[0] * var_c, p.m12 + k[0] * k[1] * var_c, p.m22 + k[1] * k[1] * var_c];
-        return Some(Fused {
-            e: fit.e,
-            c: fit.c,
-            p,
-            free_p,
-            by_cos: k,
-            var_free_cos: var_free,
-            chi2: T::ZERO,
-            edge,
-            #[cfg(feature = "position")]
-            located: None,
-        });
+        return Some(unfused(fit, p, edge, expected, estimate, budget));
     }
     let total = p.m33 + var_c;
     let difference = expected.cos - fit.c;
@@ -71,6 +52,40 @@ pub(super) fn fused<T: Real>(
         #[cfg(feature = "position")]
         located: None,
     })
+}
+
+/// Returns the answer of a fit whose half-angle is not fused with the expected one.
+fn unfused<T: Real>(
+    fit: &Fit<T>,
+    p: &M3<T>,
+    edge: EdgeNoise<T>,
+    expected: &Expected<T>,
+    estimate: &fit::Config,
+    budget: Option<&mut ErrorBudget<T>>,
+) -> Fused<T> {
+    let (b1, b2) = basis(&fit.e);
+    let var_c = expected.sigma_cos * expected.sigma_cos;
+    let (var_free, free_p) = (fit.free.then_some(p.m33), [p.m11, p.m12, p.m22]);
+    // If the half-angle is fixed at the expected one, its error causes a proportional error of the axis.
+    let k = fixed_half_angle_gain(fit);
+    let var_c = if estimate.half_angle == fit::HalfAngle::Known { T::ZERO } else { var_c };
+    let (k, var_c) = k.filter(|_| !fit.free).map_or(([T::ZERO; 2], T::ZERO), |k| (k, var_c));
+    if let Some(budget) = budget {
+        budget.project(&b1, &b2, [T::ZERO; 2], k.map(|k| k * var_c.sqrt()), expected);
+    }
+    let p = [p.m11 + k[0] * k[0] * var_c, p.m12 + k[0] * k[1] * var_c, p.m22 + k[1] * k[1] * var_c];
+    Fused {
+        e: fit.e,
+        c: fit.c,
+        p,
+        free_p,
+        by_cos: k,
+        var_free_cos: var_free,
+        chi2: T::ZERO,
+        edge,
+        #[cfg(feature = "position")]
+        located: None,
+    }
 }
 
 /// Returns the change of the axis for δc = 1 with a fixed half-angle: the solution of the normal equations for the

@@ -74,13 +74,7 @@ fn is_lit_inside<T: Real>(blocks: &[Block<T>], e: &V3<T>) -> bool {
 }
 
 /// Returns the position that the fit gives, with all errors of the given shape and orientation.
-fn located<T: Real>(
-    blocks: &[Block<T>],
-    fit: &Fit<T>,
-    sin: T,
-    p: &M3<T>,
-    target: &Target<T>,
-) -> Option<Located<T>> {
+fn located<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, sin: T, p: &M3<T>, target: &Target<T>) -> Option<Located<T>> {
     let from = &target.scaling.from;
     // A limb that is clipped everywhere stands higher; the shape stays the same.
     let grown = T::one() + target.raised_m / target.unit_m;

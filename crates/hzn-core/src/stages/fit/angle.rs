@@ -3,8 +3,8 @@
 //! The cosine form of the robust fit takes the direction of each row from the point, which has the same error as the
 //! residual. Their product does not vanish on average, and on a short arc the half-angle has a bias of several sigmas.
 //! Here the residual is the angle ρ = θ − α from the limb, and the row h = [Bᵀu, 1] contains the point only through its
-//! azimuth, which does not depend on the error across the limb. So the fit is without bias, and it is as good for a disc
-//! of a milliradian as for the whole sky.
+//! azimuth, which does not depend on the error across the limb. So the fit is without bias, and it is as good for a
+//! disc of a milliradian as for the whole sky.
 //!
 //! With d = σ − e, 1 − σ·e is |d|²/2 and |e × σ| is |e × d|. The sine of ρ, |e × σ| cos α − (σ·e) sin α, is small, so
 //! that its arc sine is a short series.

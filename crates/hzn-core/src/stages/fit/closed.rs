@@ -1,8 +1,8 @@
 //! Closed forms of the fit of a position (math.md, 13.3): the vector n with σ·n = 1 for every limb ray, n = e/cos α.
 //!
 //! [`least_squares`] is the method of Christian & Robinson (2016). It takes the errors for errors of the right-hand
-//! side, and is biased on short arcs: the disc seems too small and the range too long. [`generalised_tls`] knows that the
-//! rays have the errors, and in which directions; it has no bias.
+//! side, and is biased on short arcs: the disc seems too small and the range too long. [`generalised_tls`] knows that
+//! the rays have the errors, and in which directions; it has no bias.
 
 use crate::base::linalg::{M3, Triangle, V3, basis, symmetric_eigen, unit};
 use crate::base::real::Real;
@@ -25,8 +25,11 @@ pub(crate) fn least_squares<T: Real>(blocks: &[Block<T>]) -> AxisAndK<T> {
     axis_of(&n, kappa)
 }
 
-/// Solves (13.8): b, β, and the basis to which they belong.
-fn solve_rows<T: Real>(blocks: &[Block<T>]) -> Option<([T; 2], T, V3<T>, [V3<T>; 2])> {
+/// Solution of (13.8): b and β, and the mean ray ẑ with its tangent basis, to which they belong.
+type Rows<T> = ([T; 2], T, V3<T>, [V3<T>; 2]);
+
+/// Solves (13.8).
+fn solve_rows<T: Real>(blocks: &[Block<T>]) -> Option<Rows<T>> {
     let mean = weighted(blocks).fold(V3::zeros(), |sum, (block, lane)| sum + block.ray(lane));
     let z = unit(&mean)?;
     let (b1, b2) = basis(&z);
@@ -113,7 +116,8 @@ fn inverse_root<T: Real>(c: &M3<T>) -> Option<M3<T>> {
     let (i21, i32) = (-l21 * i11 * i22, -l32 * i22 * i33);
     let i31 = -(l31 * i11 + l32 * i21) * i33;
     let zero = T::ZERO;
-    (i11.is_finite() && i22.is_finite() && i33.is_finite()).then(|| M3::new(i11, zero, zero, i21, i22, zero, i31, i32, i33))
+    (i11.is_finite() && i22.is_finite() && i33.is_finite())
+        .then(|| M3::new(i11, zero, zero, i21, i22, zero, i31, i32, i33))
 }
 
 /// Returns the covariance of the least-squares n per square pixel of white noise, as (13.7), with the weights that the

@@ -45,8 +45,8 @@ section! {
         @- method: Method = Method::Sphere, [choice];
         /// Which half-angle the fitted cone has.
         @90 half_angle: HalfAngle = HalfAngle::Fused, [choice];
-        /// Whether the fit gives the position of the body's centre: the whole vector with its covariance. The limb of an
-        /// ellipsoid must then have an orientation: an attitude, or for a body of revolution its pole.
+        /// Whether the fit gives the position of the body's centre: the whole vector with its covariance. The limb of
+        /// an ellipsoid must then have an orientation: an attitude, or for a body of revolution its pole.
         ///
         /// The position and the axis of one picture hold the same information. A filter must use only one of them.
         @- position: Option<bool> = None, ["true or false"]

@@ -14,8 +14,8 @@ use crate::stages::consensus::Consensus;
 
 /// Fits the cone by another method, `find`, and adds the normal equations at this cone. Weights, gates and covariance
 /// are therefore the same as for the default method. The method uses the points within `threshold_px` of the consensus,
-/// or all points if `start.all` is set. `find` receives the blocks with weights 0 and 1, and returns the axis and 1 − cos
-/// of the half-angle.
+/// or all points if `start.all` is set. `find` receives the blocks with weights 0 and 1, and returns the axis and 1 −
+/// cos of the half-angle.
 #[allow(dead_code, reason = "for the estimators behind features")]
 pub(super) fn fit_by<T: Real>(
     blocks: &mut [Block<T>],

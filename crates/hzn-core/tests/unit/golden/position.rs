@@ -26,12 +26,8 @@ impl<T: Real> Case<T> {
         let model = if camera["model"] == "pinhole" { Model::Pinhole } else { Model::Equidistant };
         let theta_max_deg = (model == Model::Equidistant).then_some(170.0);
         // The points lie about the principal point at (0, 0), and only the distance from it matters.
-        let config = CameraConfig {
-            cx_px: 0.0,
-            cy_px: 0.0,
-            theta_max_deg,
-            ..CameraConfig::ideal(model, 65_000, 65_000, f)
-        };
+        let config =
+            CameraConfig { cx_px: 0.0, cy_px: 0.0, theta_max_deg, ..CameraConfig::ideal(model, 65_000, 65_000, f) };
         let mut config = crate::Config::new(config);
         config.body = body::Config {
             limb_height_km: 0.0,

@@ -1,5 +1,5 @@
-//! Bias, spread and covariance of the position over many fits to noisy limb points: sphere, oblate and tri-axial bodies,
-//! arcs of every length.
+//! Bias, spread and covariance of the position over many fits to noisy limb points: sphere, oblate and tri-axial
+//! bodies, arcs of every length.
 
 use super::*;
 use crate::base::linalg::M3;
@@ -92,10 +92,8 @@ impl Scene {
         let mut gauss = Gauss(crate::base::rng::Rng::new(11));
         let mut out = Outcome { sigma, ..Outcome::default() };
         for _ in 0..runs {
-            let noisy: Vec<_> = exact
-                .iter()
-                .map(|&(u, v)| (u + sigma_px * gauss.next(), v + sigma_px * gauss.next()))
-                .collect();
+            let noisy: Vec<_> =
+                exact.iter().map(|&(u, v)| (u + sigma_px * gauss.next(), v + sigma_px * gauss.next())).collect();
             let Some((r, p)) = self.fit(&noisy, sigma_px) else {
                 out.outside += 1;
                 continue;
