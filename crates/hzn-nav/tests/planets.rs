@@ -21,7 +21,7 @@ fn wrapped_deg(deg: f64) -> f64 {
 fn jupiter_from_sun(t: f64) -> Vector3<f64> {
     let e = 0.048_386_24 - 0.000_132_53 * t;
     let inclination = (1.304_396_95 - 0.001_837_14 * t).to_radians();
-    let mean_longitude = 34.396_440_51 + 3034.746_127_75 * t;
+    let mean_longitude = 34.396_440_51 + 3_034.746_127_75 * t;
     let (perihelion, node) = (14.728_479_83 + 0.212_526_68 * t, 100.473_909_09 + 0.204_691_06 * t);
     let mean = (mean_longitude - perihelion).to_radians();
     let mut eccentric = mean;
@@ -81,8 +81,8 @@ fn jupiter_is_as_cassini_saw_it() {
     }
 }
 
-/// Seen from the Earth, the Moon turns by its optical librations only: at most 8 degrees in longitude and 6.9 degrees in
-/// latitude, and zero on average.
+/// Seen from the Earth, the Moon turns by its optical librations only: at most 8 degrees in longitude and 6.9 degrees
+/// in latitude, and zero on average.
 #[test]
 fn the_moon_shows_its_near_side() {
     let moon = planets::find("moon").unwrap();
@@ -120,8 +120,8 @@ fn mars_has_the_pole_of_the_report_before() {
     }
 }
 
-/// Sidereal periods of rotation in hours, from the planetary fact sheets of NASA's NSSDCA; negative is retrograde. Pluto
-/// and the satellites turn with their orbits.
+/// Sidereal periods of rotation in hours, from the planetary fact sheets of NASA's NSSDCA; negative is retrograde.
+/// Pluto and the satellites turn with their orbits.
 #[test]
 fn bodies_turn_in_their_periods() {
     let hours = [

@@ -180,8 +180,8 @@ fn rendered_limb_is_the_exact_limb() {
     }
 }
 
-/// Lambert's law at full phase: the brightness μ = √(1 − (ρ/R)²) falls to zero at the limb. The area of light is that of
-/// the integral, 2/3 of the disc.
+/// Lambert's law at full phase: the brightness μ = √(1 − (ρ/R)²) falls to zero at the limb. The area of light is that
+/// of the integral, 2/3 of the disc.
 #[test]
 fn a_matt_body_darkens_towards_its_limb() {
     let camera = Config::ideal(Model::Pinhole, 256, 256, 4000.0);

@@ -43,6 +43,7 @@ fn scenes_have_the_sizes_and_phases_that_they_promise() {
             let phase_deg = truths[i].phase_deg.unwrap();
             assert!((phase_deg - phases_deg[k]).abs() < 1e-6, "{name} {phase_deg}");
         }
+        assert!(truths.iter().all(hzn_sim::Truth::has_limb), "{name}");
         assert_eq!(truths[0].body, if name == "geo" { "ellipsoid" } else { name });
     }
 }

@@ -9,8 +9,8 @@
 //!
 //! α₀ = a + b T + Σ a_i sin θ_i, δ₀ = c + e T + Σ d_i cos θ_i, W = w₀ + w₁ d + w₂ T² + Σ w_i sin θ_i.
 //!
-//! Each periodic term that is left out is below 0.01°. The rotation of Jupiter and Saturn is that of the magnetic field;
-//! clouds turn up to 1 % faster.
+//! Each periodic term that is left out is below 0.01°. The rotation of Jupiter and Saturn is that of the magnetic
+//! field; clouds turn up to 1 % faster.
 
 mod table;
 

@@ -1,15 +1,16 @@
 //! The numbers of [`super::BODIES`].
 //!
-//! Source of every row: Archinal et al. 2018, "Report of the IAU Working Group on Cartographic Coordinates and Rotational
-//! Elements: 2015", Celestial Mechanics and Dynamical Astronomy 130:22, with its correction of 2019 (131:61). Tables 1
-//! and 4 have the planets, table 2 the satellites, table 3 the dwarf planets and the asteroids, tables 5 and 6 the radii
-//! of satellites and small bodies.
+//! Source of every row: Archinal et al. 2018, "Report of the IAU Working Group on Cartographic Coordinates and
+//! Rotational Elements: 2015", Celestial Mechanics and Dynamical Astronomy 130:22, with its correction of 2019
+//! (131:61). Tables 1 and 4 have the planets, table 2 the satellites, table 3 the dwarf planets and the asteroids,
+//! tables 5 and 6 the radii of satellites and small bodies.
 //!
 //! Terms whose three amplitudes are below 0.01° are left out, except for the Moon.
 
 use super::Planet;
 
 /// Bodies with a name, in the order of their distance from the Sun; satellites after all planets.
+#[expect(clippy::approx_constant, reason = "one published amplitude is -6.28")]
 pub const BODIES: [Planet; 31] = [
     Planet {
         name: "mercury",

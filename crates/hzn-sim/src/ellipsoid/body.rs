@@ -21,7 +21,8 @@ pub struct Ellipsoid {
     pub surface_height_km: f64,
     /// 1-sigma of the limb height that sensor.toml tells, kilometres.
     pub limb_height_sigma_km: f64,
-    /// Direction to the Sun, body-fixed, for a trajectory that does not have it (`table`). It need not have unit length.
+    /// Direction to the Sun, body-fixed, for a trajectory that does not have it (`table`). It need not have unit
+    /// length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sun: Option<[f64; 3]>,
     /// Light over the whole picture, in front of sky and night side: stray light, or an offset of the detector. It is a

@@ -9,8 +9,8 @@ use crate::pose::Pose;
 
 /// The exact limb of an ellipsoid, as rays in the camera frame.
 ///
-/// A ray s touches the ellipsoid x'Ax = 1 with its centre at r if s'Ms = 0, with M = A r r'A − (r'Ar − 1) A (book/theory/
-/// math.md, 13.2). All rays form an elliptic cone.
+/// A ray s touches the ellipsoid x'Ax = 1 with its centre at r if s'Ms = 0, with M = A r r'A − (r'Ar − 1) A
+/// (book/theory/ math.md, 13.2). All rays form an elliptic cone.
 ///
 /// # Example
 ///
@@ -95,8 +95,8 @@ impl EllipsoidLimb {
         let centre = self.to_centre_m.normalize();
         let ([right, down], (sin, cos)) = (self.across(), libm::sincos(azimuth_rad));
         let outward = right * cos + down * sin;
-        // With s = c·centre + outward, s'Ms = 0 is quadratic in c, the cotangent of the angle from the centre. The larger
-        // root is the limb; the smaller one is its mirror on the other side.
+        // With s = c·centre + outward, s'Ms = 0 is quadratic in c, the cotangent of the angle from the centre. The
+        // larger root is the limb; the smaller one is its mirror on the other side.
         let [mcc, mco, moo] =
             [(centre, centre), (centre, outward), (outward, outward)].map(|(x, y)| x.dot(&(self.m * y)));
         let root = (mco * mco - mcc * moo).max(0.0).sqrt();
@@ -134,8 +134,8 @@ impl EllipsoidLimb {
         points
     }
 
-    /// Returns the outward normal (body-fixed, unit) where a limb ray touches the ellipsoid, and that point (body-fixed,
-    /// metres).
+    /// Returns the outward normal (body-fixed, unit) where a limb ray touches the ellipsoid, and that point
+    /// (body-fixed, metres).
     pub(super) fn touch(&self, ray: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         let (s, r) = (self.camera_to_body * ray, self.camera_to_body * self.to_centre_m);
         let weighted = self.inverse_squares.component_mul(&s);
@@ -144,7 +144,8 @@ impl EllipsoidLimb {
         (self.inverse_squares.component_mul(&point).normalize(), point)
     }
 
-    /// Returns the axis of the elliptic cone (camera frame, unit) and the mean of cot² over its two principal half-angles.
+    /// Returns the axis of the elliptic cone (camera frame, unit) and the mean of cot² over its two principal
+    /// half-angles.
     pub(crate) fn axis_and_cot2(&self) -> ([f64; 3], f64) {
         let eigen = self.m.symmetric_eigen();
         let axis = eigen.eigenvalues.imax();

@@ -35,8 +35,9 @@ impl<'a> EllipsoidOutline<'a> {
         UnitVec3::try_new(self.limb.ray(azimuth_rad))
     }
 
-    /// Returns whether the limb at an azimuth gets sunlight and is not behind a ring. On a body without air the Sun must
-    /// be above the horizon there. Haze still shines beyond the terminator: it counts while it gets half of the sunlight.
+    /// Returns whether the limb at an azimuth gets sunlight and is not behind a ring. On a body without air the Sun
+    /// must be above the horizon there. Haze still shines beyond the terminator: it counts while it gets half of the
+    /// sunlight.
     pub(crate) fn is_visible(&self, azimuth_rad: f64) -> bool {
         let (normal, point) = self.limb.touch(&self.limb.ray(azimuth_rad).into());
         let mu0 = normal.dot(&self.sun);

@@ -83,9 +83,12 @@ impl EllipsoidPainter {
         let ring = self.ring_hit(&hit);
         // Off the axis a pixel can cover a larger angle than in the middle.
         let near_m = 2.0 * NEAR_PX * self.pixel_rad * self.view.approach_distance_m(&hit);
-        if self.view.tangent_height_m(&hit).abs() > near_m
-            && !ring.is_some_and(|r| r.from_edge_m < 2.0 * self.pixel_rad * r.range_m)
-        {
+        let height_m = self.view.tangent_height_m(&hit);
+        let top_m = self.haze.map_or(0.0, |(_, air)| air.top_m);
+        if ring.is_none() && height_m > near_m.max(top_m) {
+            return 0.0;
+        }
+        if height_m.abs() > near_m && !ring.is_some_and(|r| r.from_edge_m < 2.0 * self.pixel_rad * r.range_m) {
             let share = if hit.miss <= 0.0 { 1.0 } else { 0.0 };
             return self.light(&hit, share, ring, caches);
         }

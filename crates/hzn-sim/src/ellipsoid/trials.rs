@@ -42,16 +42,16 @@ pub struct Trials {
     pub camera: camera::Config,
     /// The detector.
     pub detector: Detector,
-    /// Smallest and largest diameter of the disc in pixels; every factor between them is equally likely. The focal length
-    /// in the middle of the picture counts.
+    /// Smallest and largest diameter of the disc in pixels; every factor between them is equally likely. The focal
+    /// length in the middle of the picture counts.
     pub diameter_px: [f64; 2],
     /// Smallest and largest phase angle, degrees; every angle between them is equally likely.
     pub phase_deg: [f64; 2],
 }
 
 impl Trials {
-    /// Returns the scene of a seed. The camera sees the body from a random direction. The whole disc is in the picture if
-    /// it fits; otherwise the middle of the picture is near the sunlit limb.
+    /// Returns the scene of a seed. The camera sees the body from a random direction. The whole disc is in the picture
+    /// if it fits; otherwise the middle of the picture is near the sunlit limb.
     ///
     /// # Errors
     /// Fails if the camera is invalid, or if a disc of the drawn diameter cannot be seen: the camera would be inside.
@@ -66,7 +66,8 @@ impl Trials {
         let [small, large] = self.diameter_px;
         let diameter_px = small * libm::pow(large / small, draw(0));
         let radius_m = self.body.mean_radius_km() * 1e3;
-        // The half-angle of a pinhole's disc of this size in the middle of the picture; the sine keeps the camera outside.
+        // The half-angle of a pinhole's disc of this size in the middle of the picture; the sine keeps the camera
+        // outside.
         let half_angle = libm::atan(0.5 * diameter_px / focal_px);
         let range_m = radius_m / libm::sin(half_angle);
         let z = 2.0 * draw(1) - 1.0;

@@ -193,7 +193,8 @@ impl Scenario {
             return Ok(());
         }
         let what = format!(
-            "at {time_s:.1} s the camera is at {altitude_km:.1} km, inside the {name} or below its limb at {limb_km:.1} km"
+            "at {time_s:.1} s the camera is at {altitude_km:.1} km, inside the {name} or below its limb at \
+             {limb_km:.1} km"
         );
         Err(ScenarioError::new("[trajectory]", what))
     }

@@ -10,8 +10,8 @@ use crate::flight::FlightFrame;
 use crate::scene::World;
 use crate::trajectory::{Attitude, Path, Trajectory};
 
-/// A row of frames.csv for a scene with an ellipsoid: what the camera knows about one picture. The fields are the file's
-/// columns, in this order; columns that the scene does not know are left out.
+/// A row of frames.csv for a scene with an ellipsoid: what the camera knows about one picture. The fields are the
+/// file's columns, in this order; columns that the scene does not know are left out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BodyFrameRow {
     /// Name of the picture's file.

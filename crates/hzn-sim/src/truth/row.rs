@@ -12,7 +12,8 @@ pub struct Truth {
     pub time_s: f64,
     /// The body's kind as in sensor.toml.
     pub body: String,
-    /// 1 when at least 50 px of lit limb are in view and not behind the vehicle, else 0.
+    /// 1 when at least 50 px of lit limb are in view and not behind the vehicle, else 0. For the small disc of an
+    /// ellipsoid a quarter of its outline is enough.
     pub limb: u8,
     /// Limb axis in the camera frame, first component of the unit vector. For spheres it is the direction to the
     /// centre.
@@ -46,8 +47,8 @@ pub struct Truth {
     pub qy: f64,
     /// Third vector component of the attitude.
     pub qz: f64,
-    /// Vector from the camera to the centre of the body in the camera frame, first component, kilometres; empty in files
-    /// of older versions.
+    /// Vector from the camera to the centre of the body in the camera frame, first component, kilometres; empty in
+    /// files of older versions.
     #[serde(default)]
     pub position_x_km: Option<f64>,
     /// Second component of the vector to the centre.
@@ -56,8 +57,8 @@ pub struct Truth {
     /// Third component of the vector to the centre.
     #[serde(default)]
     pub position_z_km: Option<f64>,
-    /// Angle between the directions from the body to the Sun and to the camera, degrees: 0 is a full disc. Empty for the
-    /// Sun itself, if the scene has no Sun, and in files of older versions.
+    /// Angle between the directions from the body to the Sun and to the camera, degrees: 0 is a full disc. Empty for
+    /// the Sun itself, if the scene has no Sun, and in files of older versions.
     #[serde(default)]
     pub phase_deg: Option<f64>,
 }

@@ -39,8 +39,8 @@ impl Aimed {
         Ok(())
     }
 
-    /// Returns the attitude of the camera (camera to body-fixed) at a fraction of the time, 0 to 1. `phase` is the start
-    /// of the motion around the aim, radians.
+    /// Returns the attitude of the camera (camera to body-fixed) at a fraction of the time, 0 to 1. `phase` is the
+    /// start of the motion around the aim, radians.
     pub(super) fn camera_to_body_fixed(&self, sight: &Sight, fraction: f64, phase: f64) -> UnitQuaternion<f64> {
         let at = |[first, last]: [f64; 2]| first + (last - first) * fraction;
         let side = |v: &Vector3<f64>, deg: f64| {
