@@ -264,7 +264,7 @@ fn haze_is_as_high_as_told() {
         let heights = crossings.map(|w| w[0].0 + (half - w[0].1) / (w[1].1 - w[0].1) * (w[1].0 - w[0].0));
         let height_km = heights.fold(f64::NEG_INFINITY, f64::max);
         println!("told {told_km:.1} km, seen {height_km:.1} km");
-        assert!((height_km - told_km).abs() < 0.2 * scale_height_km, "{height_km} {told_km}");
+        assert!((height_km - told_km).abs() < 0.02 * scale_height_km, "{height_km} {told_km}");
     }
 }
 
