@@ -265,3 +265,29 @@ fn each_camera_of_a_scene_has_a_folder() {
     let (code, _, stderr) = hzn(at, "2", &["simulate", "two.toml", "-o", "out", "-q", "--resume"]);
     assert!(code == 0 && at.join("out/aft/aft-00002.png").is_file(), "{stderr}");
 }
+
+#[test]
+fn a_planet_has_frames_with_attitude_and_truth_with_position() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let (code, stdout, stderr) = hzn(at, "2", &["simulate", "saturn", "-o", "out", "--frames", "2"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("limb of the saturn in view in 2"), "{stdout}");
+    let read = |name: &str| std::fs::read_to_string(at.join("out").join(name)).unwrap();
+    assert!(read("frames.csv").starts_with("file,time_s,qw,qx,qy,qz,attitude_sigma_deg,sun_x,sun_y,sun_z\n"));
+    let truth = read("truth.csv");
+    assert!(truth.lines().next().unwrap().ends_with("position_x_km,position_y_km,position_z_km,phase_deg"), "{truth}");
+    assert_eq!(truth.matches(",saturn,1,").count(), 2, "{truth}");
+    let sensor: toml::Table = read("sensor.toml").parse().unwrap();
+    let body = sensor["body"].as_table().unwrap();
+    assert_eq!((body["kind"].as_str(), body["limb_height_sigma_km"].as_float()), (Some("saturn"), Some(60.0)));
+    assert!(body["limb_height_km"].as_float().unwrap() > 100.0 && !body.contains_key("radii_km"));
+    // scene.toml gives the same pictures, another seed other ones.
+    let picture = |folder: &str| std::fs::read(at.join(folder).join("saturn-00001.png")).unwrap();
+    assert_eq!(hzn(at, "1", &["simulate", "out/scene.toml", "-o", "again", "-q"]).0, 0);
+    assert_eq!(picture("again"), picture("out"));
+    assert_eq!(hzn(at, "1", &["simulate", "saturn", "-o", "other", "--frames", "2", "--seed", "2", "-q"]).0, 0);
+    assert_ne!(picture("other"), picture("out"));
+    let (_, info, _) = hzn(at, "1", &["info", "out/scene.toml"]);
+    assert!(info.contains("bodies           saturn\n"), "{info}");
+}

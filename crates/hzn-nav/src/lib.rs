@@ -10,6 +10,7 @@
 //! | [`options`], [`layout`] | what the filter estimates, and the order of its states |
 //! | [`vectors`] | attitude from two or more directions: TRIAD, Wahba's problem |
 //! | [`ephemeris`] | positions of Sun and Moon |
+//! | [`planets`] | shape and rotation of planets, moons and dwarf planets |
 //! | [`time`] | leap seconds, and days in the time scales of an ephemeris |
 
 #![cfg_attr(not(test), no_std)]
@@ -21,6 +22,7 @@ pub mod filter;
 pub mod gravity;
 pub mod layout;
 pub mod options;
+pub mod planets;
 pub mod start;
 pub mod strapdown;
 pub mod time;

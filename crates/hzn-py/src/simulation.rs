@@ -101,11 +101,21 @@ impl Simulation {
 
 /// Returns the keyword arguments of `Sensor.process` for a picture.
 fn known_arguments(scenario: &Scenario, frame: &FlightFrame) -> Value {
+    let time_s = scenario.start_unix_s() + frame.time_s;
+    // The position of a camera at a planet or moon is what the sensor measures.
+    if let Some(row) = scenario.body_frame_row(frame) {
+        let mut known = json!({ "time_s": time_s });
+        if let (Some(w), Some(x), Some(y), Some(z)) = (row.qw, row.qx, row.qy, row.qz) {
+            known["attitude"] = json!([w, x, y, z]);
+            known["attitude_sigma_deg"] = json!(row.attitude_sigma_deg);
+        }
+        return known;
+    }
     let row = scenario.frame_row(frame);
     let mut known = json!({
         "altitude_km": row.altitude_km,
         "position_km": [row.x_km, row.y_km, row.z_km],
-        "time_s": scenario.start_unix_s() + frame.time_s,
+        "time_s": time_s,
     });
     if let (Some(w), Some(x), Some(y), Some(z)) = (row.qw, row.qx, row.qy, row.qz) {
         known["attitude"] = json!([w, x, y, z]);

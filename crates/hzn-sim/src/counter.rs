@@ -39,6 +39,10 @@ pub(crate) enum Stream {
     Mount,
     /// Jitter of the cameras' clocks.
     Clock,
+    /// Random pictures of a body.
+    Trials,
+    /// Random part of an encounter with a body, and the error of its range.
+    Encounter,
 }
 
 /// A sequence of random numbers, read by index.

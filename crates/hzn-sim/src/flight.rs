@@ -151,13 +151,19 @@ impl FlightFrame {
     /// Returns [`FlightFrame::prior`] with an attitude that has a random error of `sigma_rad` (1-sigma, about each
     /// axis).
     pub fn prior_with_attitude(&self, sigma_rad: f64) -> hzn_core::Prior<f64> {
-        let draws = Counter::new(self.scene.seed, Stream::AttitudePrior);
-        let error_rad = [0, 1, 2].map(|i| sigma_rad * draws.normal(i));
         hzn_core::Prior {
-            cam_to_ecef: self.scene.pose.disturbed(error_rad).cam_to_ecef(),
+            cam_to_ecef: self.disturbed_pose(sigma_rad).cam_to_ecef(),
             attitude_sigma_rad: Some(sigma_rad),
             ..self.prior()
         }
+    }
+    /// Returns the attitude that a navigation system with this error (1-sigma, about each axis) would report.
+    pub(crate) fn told_attitude_wxyz(&self, sigma_rad: f64) -> [f64; 4] {
+        self.disturbed_pose(sigma_rad).cam_to_ecef_wxyz
+    }
+    fn disturbed_pose(&self, sigma_rad: f64) -> Pose {
+        let draws = Counter::new(self.scene.seed, Stream::AttitudePrior);
+        self.scene.pose.disturbed([0, 1, 2].map(|i| sigma_rad * draws.normal(i)))
     }
 }
 

@@ -1,4 +1,4 @@
-//! The body as an ellipsoid of revolution, and its intersection with a ray.
+//! The body as an ellipsoid, and its intersection with a ray.
 
 use hzn_core::body::{self, Kind};
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
@@ -37,16 +37,17 @@ impl Globe {
     }
 }
 
-/// A globe as seen by one camera. All lengths are divided by the semi-axes, so the globe is the unit sphere.
+/// An ellipsoid as seen by one camera. All lengths are divided by the semi-axes, so the ellipsoid is the unit sphere.
+/// Below, ECEF stands for the body-fixed frame of any body.
 #[derive(Debug, Clone)]
 pub(crate) struct View {
-    /// Matrix from the camera frame to scaled ECEF: diag(1/a, 1/a, 1/b) times the rotation.
+    /// Matrix from the camera frame to scaled ECEF: diag(1/a, 1/b, 1/c) times the rotation.
     cam_to_scaled: Matrix3<f64>,
     /// Position in scaled ECEF.
     y: Vector3<f64>,
     /// |y|² − 1, in a form that loses little precision close to the surface.
     outside: f64,
-    /// 1/a, 1/a, 1/b in 1/m.
+    /// 1/a, 1/b, 1/c in 1/m.
     inverse_axes: Vector3<f64>,
 }
 
@@ -75,6 +76,17 @@ impl View {
         let cam_to_scaled = Matrix3::from_diagonal(&inverse_axes) * pose.matrix();
         let ok = outside > 1e-9 && outside.is_finite() && cam_to_scaled.iter().all(|v| v.is_finite());
         ok.then(|| Self { cam_to_scaled, y: Vector3::new(x / a, y / a, z / b), outside, inverse_axes })
+    }
+
+    /// Returns the view of an ellipsoid with three semi-axes in metres; `None` if the position is not outside it.
+    pub(crate) fn from_semi_axes(semi_axes_m: [f64; 3], pose: &Pose) -> Option<Self> {
+        let axes = Vector3::from(semi_axes_m);
+        let y = Vector3::from(pose.position_m).component_div(&axes);
+        let outside = y.norm_squared() - 1.0;
+        let inverse_axes = axes.map(|a| 1.0 / a);
+        let cam_to_scaled = Matrix3::from_diagonal(&inverse_axes) * pose.matrix();
+        let ok = outside > 1e-9 && outside.is_finite() && cam_to_scaled.iter().all(|v| v.is_finite());
+        ok.then_some(Self { cam_to_scaled, y, outside, inverse_axes })
     }
 
     /// Returns the unit direction away from the body's centre (scaled ECEF), roughly up.
@@ -130,6 +142,11 @@ impl View {
             return 1.0 / self.inverse_axes.x;
         }
         (n2 / q.component_mul(&self.inverse_axes).norm_squared()).sqrt()
+    }
+
+    /// Returns the distance along the ray from the camera to the closest approach, metres.
+    pub(crate) fn approach_distance_m(&self, hit: &RayHit) -> f64 {
+        hit.m.max(0.0) / hit.s2
     }
 
     /// Returns the derivative of the tangent height by (u, v) in metres per pixel. `jacobian` is the derivative of the

@@ -8,6 +8,7 @@
 //! | [`scene`] | the camera and the world in front of it |
 //! | [`pose`] | position and attitude of the camera |
 //! | [`globe`] | the body as an ellipsoid, and its intersection with a ray |
+//! | [`ellipsoid`] | planets and moons as ellipsoids: surface, haze, rings, exact limb, random scenes |
 //! | [`texture`] | clouds |
 //! | [`visible`] | the Earth in sunlight: ground, clouds, air, Sun, Moon |
 //! | [`infrared`] | the Earth at 15 µm |
@@ -22,6 +23,7 @@
 //! | [`detector`] | blur, noise, quantisation |
 //! | [`picture`] | the rendered picture, and its file |
 //! | [`limb`] | the limb as a line in the picture, and edge points on it |
+//! | `edge_errors` | the errors of edge points |
 //! | [`truth`] | the truth about a scene |
 //! | [`scenario`] | a whole sequence in one description: scene.toml |
 //! | [`trajectory`] | rocket, orbit, table; attitude; inertial sensors and satellite navigation receiver |
@@ -34,6 +36,8 @@
 pub mod artefact;
 mod counter;
 pub mod detector;
+mod edge_errors;
+pub mod ellipsoid;
 pub mod error;
 pub mod evaluate;
 pub mod flight;
@@ -61,6 +65,7 @@ pub mod utc;
 pub mod visible;
 
 pub use detector::{Detector, Tone};
+pub use ellipsoid::{Ellipsoid, EllipsoidLimb, Haze, LimbArc, Reflection, Ring, Surface, Trials};
 pub use error::SceneError;
 pub use flight::{Flight, FlightFrame};
 pub use foreground::Foreground;

@@ -2,34 +2,17 @@
 
 use hzn_core::camera::Camera;
 use hzn_core::ellipsoid::LimbCone;
+use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pixel::ImagePoint;
 use nalgebra::Vector3;
 
-use crate::counter::{Counter, Stream};
+use crate::edge_errors::EdgeErrors;
+pub use crate::edge_errors::{EdgeNoise, LimbPoint};
+use crate::ellipsoid::EllipsoidOutline;
 use crate::error::SceneError;
 use crate::globe::{Globe, View};
 use crate::painter::Painter;
-use crate::scene::Scene;
-
-/// Errors of edge points in pixels. Errors along u and along v are independent.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum EdgeNoise {
-    /// All points are exactly on the limb.
-    #[default]
-    None,
-    /// All points have independent errors.
-    White {
-        /// Standard deviation along u and along v in pixels.
-        sigma_px: f64,
-    },
-    /// Errors are a Gauss-Markov process along each segment of limb, with correlation exp(−arc/`correlation_px`).
-    GaussMarkov {
-        /// Variance along u and along v in px²; the R of the covariance model.
-        variance_px2: f64,
-        /// Correlation length in pixels along the limb; the L of the covariance model.
-        correlation_px: f64,
-    },
-}
+use crate::scene::{Scene, World};
 
 impl Scene {
     /// Returns the tangent heights above the ellipsoid in kilometres, for rays in the camera frame. The camera has its
@@ -38,21 +21,6 @@ impl Scene {
         let Some(view) = View::try_new(Globe::new(&self.body), &self.pose) else { return Vec::new() };
         rays.into_iter().map(|ray| view.tangent_height_m(&view.intersect(ray)) * 1e-3).collect()
     }
-}
-
-/// A point of the visible limb.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LimbPoint {
-    /// Measured position in the picture, with its error.
-    pub point: ImagePoint<f64>,
-    /// Exact position in the picture.
-    pub exact: ImagePoint<f64>,
-    /// Azimuth about the limb axis in radians: 0 is east of the position, π/2 is the direction axis × east.
-    pub azimuth_rad: f64,
-    /// Number of the uninterrupted segment of limb, from 0.
-    pub segment: usize,
-    /// Arc length in pixels from the start of the segment.
-    pub arc_px: f64,
 }
 
 /// The exact limb of a scene, without a lens.
@@ -117,20 +85,14 @@ impl Segment {
     }
 }
 
-/// The limb of a scene through its lens.
-pub(crate) struct ProjectedLimb<'a> {
+/// The limb of the Earth or of a sphere, with its light.
+struct GlobeOutline<'a> {
     scene: &'a Scene,
-    camera: Camera<f64>,
     circle: LimbCircle,
     painter: Painter,
 }
 
-impl<'a> ProjectedLimb<'a> {
-    pub(crate) fn try_new(scene: &'a Scene) -> Result<Self, SceneError> {
-        let camera = Camera::try_new(&scene.camera)?;
-        Ok(Self { scene, camera, circle: LimbCircle::new(scene)?, painter: Painter::try_new(scene)? })
-    }
-
+impl GlobeOutline<'_> {
     /// Returns the ray (ECEF, unit) of the limb at an azimuth.
     fn ray(&self, azimuth_rad: f64) -> [f64; 3] {
         let mut ray = self.circle.ray_ecef(azimuth_rad);
@@ -144,11 +106,60 @@ impl<'a> ProjectedLimb<'a> {
         }
         ray
     }
+}
+
+/// The limb of a scene's body.
+enum Outline<'a> {
+    Globe(Box<GlobeOutline<'a>>),
+    Ellipsoid(Box<EllipsoidOutline<'a>>),
+}
+
+impl Outline<'_> {
+    /// Returns the direction of the limb at an azimuth.
+    fn ray(&self, azimuth_rad: f64) -> Option<UnitVec3<Cam, f64>> {
+        match self {
+            Self::Globe(globe) => globe.painter.to_camera(globe.ray(azimuth_rad)),
+            Self::Ellipsoid(ellipsoid) => ellipsoid.ray(azimuth_rad),
+        }
+    }
+
+    /// Returns whether the limb at an azimuth is in sunlight and not hidden by rings.
+    fn is_lit(&self, azimuth_rad: f64) -> bool {
+        match self {
+            Self::Globe(globe) => globe.painter.lit_share(globe.ray(azimuth_rad)) > 0.5,
+            Self::Ellipsoid(ellipsoid) => ellipsoid.is_visible(azimuth_rad),
+        }
+    }
+}
+
+/// The limb of a scene through its lens.
+pub(crate) struct ProjectedLimb<'a> {
+    scene: &'a Scene,
+    camera: Camera<f64>,
+    outline: Outline<'a>,
+}
+
+impl<'a> ProjectedLimb<'a> {
+    pub(crate) fn try_new(scene: &'a Scene) -> Result<Self, SceneError> {
+        let camera = Camera::try_new(&scene.camera)?;
+        let outline = match &scene.world {
+            World::Ellipsoid(body) => {
+                let sun = scene.sun_direction()?;
+                let outline = EllipsoidOutline::try_new(body, &scene.pose, sun).ok_or(SceneError::Pose)?;
+                Outline::Ellipsoid(Box::new(outline))
+            }
+            World::Plain | World::Visible(_) | World::Infrared(_) => {
+                let (circle, painter) = (LimbCircle::new(scene)?, Painter::try_new(scene)?);
+                Outline::Globe(Box::new(GlobeOutline { scene, circle, painter }))
+            }
+        };
+        Ok(Self { scene, camera, outline })
+    }
 
     /// Returns the position of the limb at an azimuth in the plane of the picture; `None` if the lens does not reach
     /// there.
     fn project(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
-        self.camera.project(&self.painter.to_camera(self.ray(azimuth_rad))?)
+        self.camera.project(&self.outline.ray(azimuth_rad)?)
     }
 
     /// Returns true if the point is in the picture, lit, neither in the blind centre of the lens nor behind the
@@ -161,7 +172,7 @@ impl<'a> ProjectedLimb<'a> {
         inside
             && !blind
             && !self.scene.foreground.iter().any(|f| f.contains([p.u, p.v]))
-            && self.painter.lit_share(self.ray(azimuth_rad)) > 0.5
+            && self.outline.is_lit(azimuth_rad)
     }
 
     fn project_visible(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
@@ -235,7 +246,7 @@ impl Scene {
         }
         let spacing = total / count.max(1) as f64;
         let mut points: Vec<LimbPoint> = Vec::with_capacity(count);
-        let mut errors = Errors::new(self.seed, noise);
+        let mut errors = EdgeErrors::new(self.seed, noise);
         let mut before = 0.0;
         let mut number = 0;
         for (index, segment) in segments.iter().enumerate() {
@@ -244,8 +255,7 @@ impl Scene {
                 let arc_px = (number as f64 + 0.5) * spacing - before;
                 let azimuth_rad = segment.azimuth_rad(arc_px);
                 if let Some(exact) = limb.project(azimuth_rad) {
-                    let [du, dv] = errors.next(index, arc_px);
-                    let point = ImagePoint { u: exact.u + du, v: exact.v + dv };
+                    let point = errors.disturbed(exact, index, arc_px);
                     points.push(LimbPoint { point, exact, azimuth_rad, segment: index, arc_px });
                 }
                 number += 1;
@@ -261,42 +271,6 @@ impl Scene {
     /// Fails if the camera, the position or the light is invalid.
     pub fn visible_limb_px(&self) -> Result<f64, SceneError> {
         Ok(ProjectedLimb::try_new(self)?.visible_segments().iter().map(Segment::length_px).sum())
-    }
-}
-
-/// The errors of successive points.
-struct Errors {
-    noise: EdgeNoise,
-    u: Counter,
-    v: Counter,
-    index: u64,
-    /// Segment, arc length and error of the point before.
-    last: Option<(usize, f64, [f64; 2])>,
-}
-
-impl Errors {
-    fn new(seed: u64, noise: EdgeNoise) -> Self {
-        Self { noise, u: Counter::new(seed, Stream::EdgeU), v: Counter::new(seed, Stream::EdgeV), index: 0, last: None }
-    }
-
-    fn next(&mut self, segment: usize, arc_px: f64) -> [f64; 2] {
-        let normal = [self.u.normal(self.index), self.v.normal(self.index)];
-        self.index += 1;
-        match self.noise {
-            EdgeNoise::None => [0.0; 2],
-            EdgeNoise::White { sigma_px } => normal.map(|n| n * sigma_px),
-            EdgeNoise::GaussMarkov { variance_px2, correlation_px } => {
-                let sigma = variance_px2.max(0.0).sqrt();
-                let (rho, before) = match self.last {
-                    Some((p, arc, e)) if p == segment => (libm::exp(-(arc_px - arc) / correlation_px), e),
-                    _ => (0.0, [0.0; 2]),
-                };
-                let fresh = sigma * (1.0 - rho * rho).sqrt();
-                let error = [0, 1].map(|i| rho * before[i] + fresh * normal[i]);
-                self.last = Some((segment, arc_px, error));
-                error
-            }
-        }
     }
 }
 

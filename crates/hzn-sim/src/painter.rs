@@ -21,6 +21,8 @@ use crate::scene::{Band, Profile, Scene, Sky, World};
 use crate::texture::{CellCache, CloudField, smoothstep};
 use crate::visible::air::PreparedAir;
 
+pub(crate) use edge::half_plane_share;
+
 use edge::Edge;
 use light::PreparedLight;
 
@@ -74,7 +76,7 @@ impl Painter {
             light: PreparedLight::try_new(scene, globe)?,
             air: match &scene.world {
                 World::Visible(world) => Some(PreparedAir::new(&world.air, globe.a_m)),
-                World::Plain | World::Infrared(_) => None,
+                World::Plain | World::Infrared(_) | World::Ellipsoid(_) => None,
             },
             surface: scene.disc.surface as f32,
             clouds: scene.disc.clouds.map(|c| CloudField::new(&c, globe.a_m)),

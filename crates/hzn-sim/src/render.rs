@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::detector::Plane;
+use crate::ellipsoid::{Ellipsoid, EllipsoidPainter};
 use crate::error::SceneError;
 use crate::globe::Globe;
 use crate::image_circle::{apply_image_circle, lens_without_circle};
@@ -45,6 +46,7 @@ impl Scene {
             World::Plain => vec![self.render_plain(&camera, motion.as_ref())?],
             World::Infrared(world) => vec![self.render_infrared(world, camera, motion.as_ref())?],
             World::Visible(world) => self.render_visible(world, camera, motion.as_ref())?,
+            World::Ellipsoid(body) => vec![self.render_ellipsoid(body, camera, motion.as_ref())?],
         };
         self.draw_foreground(&mut planes);
         if let World::Visible(world) = &self.world
@@ -87,6 +89,28 @@ impl Scene {
         let pixel_rad = pixel_rad(&camera);
         let globe = Globe::new(&self.body);
         let painter = InfraredPainter::try_new(world, camera, globe, &self.pose).ok_or(SceneError::Pose)?;
+        let mut data = vec![0.0f32; w * h];
+        data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
+            None => painter.render_row(y as f64, 1.0, row),
+            Some(motion) => {
+                let poses = motion.poses(&self.pose, y as f64, h, pixel_rad);
+                poses.iter().for_each(|p| painter.with_pose(p).render_row(y as f64, 1.0 / poses.len() as f32, row));
+            }
+        });
+        Ok(Plane { width: w, data })
+    }
+
+    /// Renders an ellipsoid in sunlight.
+    fn render_ellipsoid(
+        &self,
+        body: &Ellipsoid,
+        camera: Camera<f64>,
+        motion: Option<&Motion>,
+    ) -> Result<Plane, SceneError> {
+        let (w, h) = self.size();
+        let pixel_rad = pixel_rad(&camera);
+        let painter =
+            EllipsoidPainter::try_new(body, camera, &self.pose, self.sun_direction()?).ok_or(SceneError::Pose)?;
         let mut data = vec![0.0f32; w * h];
         data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
             None => painter.render_row(y as f64, 1.0, row),

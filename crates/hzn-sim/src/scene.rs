@@ -1,9 +1,12 @@
 //! The camera and the world in front of it.
 
 use hzn_core::{body, camera};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;
+use crate::ellipsoid::Ellipsoid;
+use crate::error::SceneError;
 use crate::foreground::Foreground;
 use crate::infrared::Infrared;
 use crate::motion::Motion;
@@ -82,6 +85,9 @@ pub enum World {
     Visible(Box<Visible>),
     /// The Earth in the infrared.
     Infrared(Infrared),
+    /// A planet or moon as an ellipsoid in sunlight. It replaces the scene's `body`, of which only the limb height and
+    /// its sigma count. The pose and the direction to the Sun are body-fixed.
+    Ellipsoid(Box<Ellipsoid>),
 }
 
 /// Brightness profile outside the limb.
@@ -176,6 +182,17 @@ impl Default for Sky {
 }
 
 impl Scene {
+    /// Returns the direction to the Sun (ECEF or body-fixed, unit length).
+    ///
+    /// # Errors
+    /// Fails if the scene has no Sun, or if its direction has no length.
+    pub(crate) fn sun_direction(&self) -> Result<Vector3<f64>, SceneError> {
+        match self.light {
+            Light::Sun { direction, .. } => Vector3::from(direction).try_normalize(1e-12).ok_or(SceneError::Sun),
+            Light::Full | Light::Sector { .. } => Err(SceneError::Sun),
+        }
+    }
+
     /// Returns a uniformly bright Earth with a sharp limb at the default height, 17 km, in a dark sky. The detector has
     /// no noise.
     pub fn new(camera: camera::Config, pose: Pose) -> Self {

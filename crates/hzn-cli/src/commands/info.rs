@@ -228,7 +228,7 @@ fn scene(scenario: &Scenario) -> Result<String, Stop> {
     line("name", scenario.name.clone());
     line("pictures", format!("{}, at {} to {} s from {}", capture.frames, capture.from_s, capture.to_s, scenario.utc));
     line("camera", format!("{} x {} px, {}", camera.width, camera.height, camera.model.name()));
-    line("bodies", scenario.bodies.iter().map(|b| b.name()).collect::<Vec<_>>().join(", "));
+    line("bodies", scenario.body_names().join(", "));
     let instruments = [("imu.csv", scenario.imu.is_some()), ("gnss.csv", scenario.gnss.is_some())];
     let written: Vec<&str> = instruments.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
     line("instruments", if written.is_empty() { "none".to_owned() } else { written.join(", ") });

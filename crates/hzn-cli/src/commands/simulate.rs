@@ -20,10 +20,10 @@ use crate::tell;
 /// Writes pictures, frames.csv (the prior of each picture), truth.csv, scene.toml and sensor.toml, and imu.csv and
 /// gnss.csv if the scene has such instruments; vehicle.csv has the true state of the vehicle then. A scene with several
 /// cameras has a folder for each of them. The limb height and noise model in sensor.toml are measured on other
-/// pictures of the scene.
+/// pictures of the scene; for a planet or moon (`[world.ellipsoid]`) the limb height is the scene's own.
 ///
-/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble, atek. `hzn
-/// simulate SCENE --show` prints one; change it and give it as a file.
+/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble, atek,
+/// jupiter, enceladus, saturn, geo. `hzn simulate SCENE --show` prints one; change it and give it as a file.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A built-in scene, or a scene.toml
@@ -159,6 +159,11 @@ fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Stop> {
 /// Writes the sensor.toml of every camera. All have the same lens and world, so that the noise is measured once.
 fn sensors(cameras: &[Sequence], name: &str, args: &Args) -> Result<(), Stop> {
     let Some(first) = cameras.first() else { return Ok(()) };
+    if first.scenario.ellipsoid().is_some() {
+        return cameras
+            .iter()
+            .try_for_each(|one| write(&one.folder.join("sensor.toml"), sensor(&one.scenario, &one.flight, &[])?));
+    }
     if !args.quiet {
         tell::line(format_args!("measuring limb height and noise on other pictures of the scene ..."));
     }
@@ -178,7 +183,10 @@ fn sensors(cameras: &[Sequence], name: &str, args: &Args) -> Result<(), Stop> {
 fn sensor(scenario: &Scenario, flight: &Flight, fits: &[Fit]) -> Result<String, Stop> {
     let mut sensor = flight.sensor.clone();
     let mut how = String::new();
-    for &body in &scenario.bodies {
+    if scenario.ellipsoid().is_some() {
+        how += "# The limb height is that of the scene; the noise comes from the residuals of each picture.\n";
+    }
+    for &body in scenario.bodies.iter().filter(|_| scenario.ellipsoid().is_none()) {
         let name = body.name();
         let Some(fit) = fits.iter().find(|fit| fit.body == body) else {
             let why = "too few pictures were answered to measure limb height and noise";
@@ -196,6 +204,9 @@ fn sensor(scenario: &Scenario, flight: &Flight, fits: &[Fit]) -> Result<String, 
     }
     let mut table = toml::Table::try_from(&sensor).map_err(failed)?;
     let defaults = toml::Table::try_from(hzn_core::Config::new(sensor.camera.clone())).map_err(failed)?;
+    if let Some(body) = scenario.body_table() {
+        table.insert("body".into(), body.into());
+    }
     let several = table.get("bodies").is_some();
     for key in defaults.keys() {
         // The camera is always written, and so is a single body.
@@ -250,7 +261,11 @@ impl Sequence {
         let mut known = table(folder, "frames.csv")?;
         let mut truth = table(folder, "truth.csv")?;
         for frame in &flight.frames {
-            known.serialize(scenario.frame_row(frame)).map_err(failed)?;
+            match scenario.body_frame_row(frame) {
+                Some(row) => known.serialize(row),
+                None => known.serialize(scenario.frame_row(frame)),
+            }
+            .map_err(failed)?;
             for &kind in &scenario.bodies {
                 truth
                     .serialize(frame.scene.body_truth(kind, &frame.file, frame.time_s).map_err(failed)?)

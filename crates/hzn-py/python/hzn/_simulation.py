@@ -27,7 +27,8 @@ def simulate(
     ----------
     scene
         A built-in scene (``rocket``, ``rocket-clean``, ``leo-infrared``, ``horace``, ``horace-wide``,
-        ``full-disc``, ``sun-moon``, ``tumble``, ``atek``), the path of a scene.toml, or its sections and keys as a dictionary.
+        ``full-disc``, ``sun-moon``, ``tumble``, ``atek``, ``jupiter``, ``enceladus``, ``saturn``, ``geo``), the path of a
+        scene.toml, or its sections and keys as a dictionary.
     frames
         Number of pictures; it replaces the number in the scene.
     seed

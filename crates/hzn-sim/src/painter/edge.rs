@@ -39,14 +39,7 @@ impl Edge {
     /// Returns the mean share over a pixel with this height in its middle and this gradient in metres per pixel.
     pub(super) fn mean_share(&self, height_m: f64, [gu, gv]: [f64; 2]) -> f32 {
         match self {
-            Self::Sharp => {
-                let slope = libm::hypot(gu, gv);
-                if slope > 0.0 {
-                    half_plane(-height_m / slope, gu / slope, gv / slope) as f32
-                } else {
-                    self.share(height_m)
-                }
-            }
+            Self::Sharp => half_plane_share(height_m, [gu, gv]),
             Self::Exponential { .. } => {
                 let mut sum = 0.0;
                 for i in 0..SAMPLES {
@@ -58,6 +51,17 @@ impl Edge {
                 sum / (SAMPLES * SAMPLES) as f32
             }
         }
+    }
+}
+
+/// Returns the share of a pixel that is below the limb. Its middle has this height above the limb, in metres, with this
+/// gradient in metres per pixel.
+pub(crate) fn half_plane_share(height_m: f64, [gu, gv]: [f64; 2]) -> f32 {
+    let slope = libm::hypot(gu, gv);
+    if slope > 0.0 {
+        half_plane(-height_m / slope, gu / slope, gv / slope) as f32
+    } else {
+        f32::from(u8::from(height_m <= 0.0))
     }
 }
 

@@ -71,6 +71,7 @@ impl Scenario {
         {
             return Err(ScenarioError::new("bodies", "must be one to three of \"earth\", \"sun\", \"moon\""));
         }
+        self.check_ellipsoid()?;
         self.check_cameras()?;
         self.limits().into_iter().try_for_each(Limit::check)?;
         if c.format == Format::Jpeg && self.detector.bits != 8 {
@@ -124,6 +125,7 @@ impl Scenario {
             Limit::new("[clock] latency_s", self.clock.latency_s, [0.0, 1e3]),
             Limit::new("[clock] jitter_s", self.clock.jitter_s, [0.0, 1e3]),
             Limit::new("[known] position_sigma_km", known.position_sigma_km, [0.0, UNLIMITED]),
+            Limit::new("[known] range_sigma_km", known.range_sigma_km.unwrap_or(1.0), [ABOVE_ZERO, UNLIMITED]),
             Limit::new("[known] attitude_sigma_deg", known.attitude_sigma_deg.unwrap_or(1.0), [ABOVE_ZERO, 180.0]),
         ];
         for part in &self.vehicle {
@@ -134,7 +136,8 @@ impl Scenario {
         match &self.world {
             World::Visible(world) => all.extend(visible_limits(world)),
             World::Infrared(world) => all.extend(infrared_limits(world)),
-            World::Plain => {}
+            // An ellipsoid checks itself.
+            World::Plain | World::Ellipsoid(_) => {}
         }
         all
     }

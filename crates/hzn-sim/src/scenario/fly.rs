@@ -6,6 +6,7 @@ use hzn_core::region;
 
 use super::{Format, Scenario, ScenarioError};
 use crate::counter::{Counter, Stream};
+use crate::ellipsoid::EllipsoidLimb;
 use crate::flight::{Flight, FlightFrame};
 use crate::foreground::Foreground;
 use crate::motion::Motion;
@@ -135,14 +136,7 @@ impl Scenario {
         let mut scene = Scene::new(self.camera.clone(), pose);
         // The camera flies around the Earth for every body that it looks for.
         scene.body = self.body_config(Kind::Earth);
-        let altitude_km = crate::Globe::new(&scene.body).altitude_m(pose.position_m) * 1e-3;
-        if !(altitude_km > scene.body.limb_height_km) {
-            let what = format!(
-                "at {time_s:.1} s the camera is at {altitude_km:.1} km, inside the Earth or below its limb at {:.1} km",
-                scene.body.limb_height_km
-            );
-            return Err(ScenarioError::new("[trajectory]", what));
-        }
+        self.check_outside(&scene, time_s)?;
         scene.world = self.world.clone();
         match &mut scene.world {
             World::Visible(world) => {
@@ -157,6 +151,10 @@ impl Scenario {
                 }
                 *world = world.with_season(unix_s);
                 scene.limb_height_by_latitude_km = world.half_level_by_latitude_km();
+            }
+            World::Ellipsoid(body) => {
+                scene.light = Light::Sun { direction: self.body_sun(body, path, time_s), twilight_rad: 0.0 };
+                body.surface.seed = body.surface.seed.wrapping_add(self.seed);
             }
             World::Plain => {}
         }
@@ -177,6 +175,30 @@ impl Scenario {
         Ok(scene)
     }
 
+    /// Refuses a camera that is not above the limb.
+    fn check_outside(&self, scene: &Scene, time_s: f64) -> Result<(), ScenarioError> {
+        let limb_km = scene.body.limb_height_km;
+        let (altitude_km, is_outside, name) = match self.ellipsoid() {
+            Some(body) => {
+                let range_km = scene.pose.position_m.iter().map(|x| x * x).sum::<f64>().sqrt() * 1e-3;
+                let is_outside = EllipsoidLimb::try_new(body.limb_m(), &scene.pose).is_some();
+                (range_km - body.mean_radius_km(), is_outside, "body")
+            }
+            None => {
+                let altitude_km = crate::Globe::new(&scene.body).altitude_m(scene.pose.position_m) * 1e-3;
+                (altitude_km, altitude_km > limb_km, "Earth")
+            }
+        };
+        if is_outside {
+            return Ok(());
+        }
+        let what = format!(
+            "at {time_s:.1} s the camera is at {altitude_km:.1} km, inside the {name} or below its limb at \
+             {limb_km:.1} km"
+        );
+        Err(ScenarioError::new("[trajectory]", what))
+    }
+
     /// Refuses a scenario in which the sensor's first body is never in view.
     fn check_visible(&self, scenes: &[(f64, Scene)]) -> Result<(), ScenarioError> {
         let kind = self.bodies.first().copied().unwrap_or_default();
@@ -187,7 +209,7 @@ impl Scenario {
                 return Ok(());
             }
         }
-        let name = kind.name();
+        let name = self.body_names().first().copied().unwrap_or_default();
         let what = format!(
             "no picture shows a lit limb of the {name}: check the off-nadir angle, the field of view, and the time of \
              day (utc)"
@@ -205,9 +227,7 @@ impl Scenario {
         (0..3).for_each(|i| position_m[i] += error_m[i]);
         let mut row = measured.row();
         if let Some(sigma_deg) = self.known.attitude_sigma_deg {
-            let draws = Counter::new(frame.scene.seed, Stream::AttitudePrior);
-            let error_rad = [0, 1, 2].map(|i| sigma_deg.to_radians() * draws.normal(i));
-            let [w, x, y, z] = frame.scene.pose.disturbed(error_rad).cam_to_ecef_wxyz;
+            let [w, x, y, z] = frame.told_attitude_wxyz(sigma_deg.to_radians());
             (row.qw, row.qx, row.qy, row.qz) = (Some(w), Some(x), Some(y), Some(z));
             row.attitude_sigma_deg = Some(sigma_deg);
         }

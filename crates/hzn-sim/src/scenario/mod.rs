@@ -9,10 +9,12 @@ mod check;
 mod exposure;
 mod fly;
 mod noise;
+mod planet;
 
 pub use cameras::{CameraOnVehicle, Clock};
 pub use exposure::Exposure;
 pub use noise::{FIT_PICTURES, Fit};
+pub use planet::BodyFrameRow;
 
 use std::path::{Path as FilePath, PathBuf};
 
@@ -30,7 +32,7 @@ use crate::trajectory::{Attitude, Path, Trajectory};
 use crate::utc;
 
 /// Scenes that come with hzn: name, description, text of the scene.toml.
-pub const BUILTIN: [(&str, &str, &str); 9] = [
+pub const BUILTIN: [(&str, &str, &str); 13] = [
     (
         "rocket",
         "sounding rocket with the Sun, lens ghosts and payload in view, colour JPEG 1920x1080",
@@ -68,6 +70,22 @@ pub const BUILTIN: [(&str, &str, &str); 9] = [
         "the rocket with two cameras that nobody synchronised, inertial unit and receiver, 1920x1080",
         include_str!("builtin/atek.toml"),
     ),
+    (
+        "jupiter",
+        "approach to Jupiter, from a disc of 8 px to one wider than the picture, 1024x1024",
+        include_str!("builtin/jupiter.toml"),
+    ),
+    (
+        "enceladus",
+        "tri-axial Enceladus from full disc to a crescent at phase 165 degrees, 1024x1024",
+        include_str!("builtin/enceladus.toml"),
+    ),
+    ("saturn", "Saturn with rings in front of its limb, 1024x1024", include_str!("builtin/saturn.toml")),
+    (
+        "geo",
+        "the Earth as an ellipsoid from geostationary range, full and gibbous, 1024x1024",
+        include_str!("builtin/geo.toml"),
+    ),
 ];
 
 /// A simulated sequence.
@@ -81,7 +99,8 @@ pub struct Scenario {
     pub seed: u64,
     /// UTC of time 0, as a TOML date and time. It sets the positions of Sun and Moon, and the season.
     pub utc: toml::value::Datetime,
-    /// Bodies that the sensor looks for and that truth.csv lists: `earth`, `sun`, `moon`.
+    /// Bodies that the sensor looks for and that truth.csv lists: `earth`, `sun`, `moon`. A scene with
+    /// `[world.ellipsoid]` has that body only.
     #[serde(default = "earth")]
     pub bodies: Vec<Kind>,
     /// Times and file format of the pictures.
@@ -217,7 +236,7 @@ pub struct Part {
 }
 
 /// `[known]`: errors of the prior in frames.csv and sensor.toml.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Known {
     /// 1-sigma error of every component of the position, kilometres.
@@ -226,12 +245,9 @@ pub struct Known {
     /// attitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attitude_sigma_deg: Option<f64>,
-}
-
-impl Default for Known {
-    fn default() -> Self {
-        Self { position_sigma_km: 0.0, attitude_sigma_deg: None }
-    }
+    /// 1-sigma error of the distance to the centre of an ellipsoid, kilometres. Without it frames.csv has no range.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_sigma_km: Option<f64>,
 }
 
 /// The reason why a scenario is invalid.
@@ -288,11 +304,11 @@ impl Scenario {
         let world = match &mut self.world {
             World::Visible(world) => world.ground.map.as_mut().map(|map| ("map", map)),
             World::Infrared(world) => world.table.as_mut().map(|table| ("radiance", table)),
-            World::Plain => None,
+            World::Plain | World::Ellipsoid(_) => None,
         };
         let trajectory = match &mut self.trajectory {
             Trajectory::Table(table) => Some(("trajectory", &mut table.file)),
-            Trajectory::Rocket(_) | Trajectory::Orbit(_) => None,
+            Trajectory::Rocket(_) | Trajectory::Orbit(_) | Trajectory::Encounter(_) => None,
         };
         world.into_iter().chain(trajectory).collect()
     }
@@ -318,22 +334,25 @@ impl Scenario {
         // A table covers only its rows; the other trajectories need a span above zero.
         let span = match self.trajectory {
             Trajectory::Table(_) => [from_s, to_s],
-            Trajectory::Rocket(_) | Trajectory::Orbit(_) => [from_s, to_s.max(from_s + 1e-3)],
+            _ => [from_s, to_s.max(from_s + 1e-3)],
         };
         let told = self.cameras.first().map_or(self.mount, |first| Some(first.mount));
         let told = told.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
         let start_unix_s = self.start_unix_s();
-        let path = Path::try_new(&self.trajectory, &self.attitude, told, span, start_unix_s, self.seed)?;
+        let path = Path::try_new(&self.sized_trajectory(), &self.attitude, told, span, start_unix_s, self.seed)?;
         Ok(path.with_camera(self.true_mount_wxyz()))
     }
 
     /// Returns the sensor's configuration of a body, with the limb height of the simulated limb.
     pub fn body_config(&self, kind: Kind) -> body::Config {
+        if let Some(body) = self.ellipsoid() {
+            return Self::ellipsoid_config(body);
+        }
         let limb_height_km = match (&self.world, kind) {
             (_, Kind::Sun | Kind::Moon) => 0.0,
             (World::Visible(w), _) => w.air.half_height_km([1.0 / 3.0; 3], EARTH_MEAN_RADIUS_M / 1e3),
             (World::Infrared(w), _) => w.with_season(self.start_unix_s()).mean_half_level_km(),
-            (World::Plain, _) => body::Config::default().limb_height_km,
+            (World::Plain | World::Ellipsoid(_), _) => body::Config::default().limb_height_km,
         };
         let by_latitude = match (&self.world, kind) {
             (World::Infrared(w), Kind::Earth) => w.with_season(self.start_unix_s()).half_level_by_latitude_km(),

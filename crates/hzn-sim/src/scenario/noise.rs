@@ -68,7 +68,8 @@ const GROSS_RAD: f64 = std::f64::consts::PI / 90.0;
 
 impl Fit {
     /// Measures the noise model on `pictures` pictures of the scenario, spread over sixteen other seeds. `progress` is
-    /// called after every picture. There is one fit per body, except for bodies with too few answered pictures.
+    /// called after every picture. There is one fit per body, except for bodies with too few answered pictures. A scene
+    /// with an ellipsoid has no fit: the limb height follows from the scene, and the noise from each picture.
     ///
     /// # Errors
     /// Fails like [`crate::Scene::render`].
@@ -78,6 +79,9 @@ impl Fit {
         progress: &dyn Fn(usize, usize),
     ) -> Result<Vec<Self>, ScenarioError> {
         let mut flights = Vec::new();
+        if scenario.ellipsoid().is_some() {
+            return Ok(Vec::new());
+        }
         for i in 1..=SEEDS {
             let other = Scenario { seed: scenario.seed.wrapping_add(i * OTHER_SEED), ..scenario.clone() };
             // With another drift the limb may stay out of view; such a seed is skipped.
@@ -301,7 +305,7 @@ impl EdgeErrors {
         // `higher_km` is the height of the scene's limb at a latitude above the mean limb.
         let levels = match &scene.world {
             World::Infrared(world) => Some((world.half_levels(), world.mean_half_level_km())),
-            World::Plain | World::Visible(_) => None,
+            World::Plain | World::Visible(_) | World::Ellipsoid(_) => None,
         };
         let higher_km = |up: &Vector3<f64>| {
             let latitude_deg = libm::asin(up.z.clamp(-1.0, 1.0)).to_degrees();

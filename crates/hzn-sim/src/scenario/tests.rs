@@ -119,7 +119,7 @@ fn frames_csv_says_what_is_known_and_no_more() {
     let flight = s.flight().unwrap();
     let row = s.frame_row(&flight.frames[1]);
     assert!(row.qw.is_none() && row.utc.as_deref() == Some("2021-07-15T00:48:20.000Z"), "{:?}", row.utc);
-    s.known = Known { position_sigma_km: 0.1, attitude_sigma_deg: Some(5.0) };
+    s.known = Known { position_sigma_km: 0.1, attitude_sigma_deg: Some(5.0), ..Known::default() };
     let noisy = s.frame_row(&flight.frames[1]);
     assert!(noisy.x_km != row.x_km && (noisy.x_km - row.x_km).abs() < 0.5);
     let [w, x, y, z] = flight.frames[1].scene.pose.cam_to_ecef_wxyz;

@@ -1,4 +1,4 @@
-//! Position and attitude of the vehicle over time in the Earth-fixed frame, and the signals of its sensors.
+//! Position and attitude of the vehicle over time in the body-fixed frame, and the signals of its sensors.
 //!
 //! | module | content |
 //! |---|---|
@@ -6,6 +6,7 @@
 //! | `position` | the choice of the trajectory |
 //! | `rocket` | a sounding rocket: two stages, then free fall |
 //! | `orbit` | Kepler's ellipse |
+//! | `encounter` | a planet or moon from a given range and side |
 //! | `table` | positions and attitudes from a CSV file |
 //! | `point` | a point of a trajectory |
 //! | `attitude` | the rotation of the vehicle |
@@ -15,6 +16,7 @@
 
 mod attitude;
 mod earth;
+mod encounter;
 pub mod instruments;
 mod orbit;
 mod path;
@@ -24,7 +26,8 @@ mod rocket;
 mod table;
 mod vehicle;
 
-pub use attitude::{Attitude, Pointing, Spin, Towards, Tumble};
+pub use attitude::{Aimed, Attitude, Pointing, Spin, Towards, Tumble};
+pub use encounter::Encounter;
 pub use orbit::Orbit;
 pub use path::{Path, State};
 pub use position::Trajectory;

@@ -49,7 +49,7 @@ impl Path {
         start_unix_s: f64,
         seed: u64,
     ) -> Result<Self, (String, String)> {
-        let trajectory = PreparedTrajectory::try_new(trajectory, [from_s, to_s], start_unix_s)?;
+        let trajectory = PreparedTrajectory::try_new(trajectory, [from_s, to_s], start_unix_s, seed)?;
         let attitude = PreparedAttitude::try_new(attitude, &trajectory, [from_s, to_s], seed)?;
         let [w, x, y, z] = camera_to_body_wxyz;
         let camera_to_body = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
@@ -66,6 +66,11 @@ impl Path {
     /// Returns UTC in seconds since 1970.
     pub fn unix_s(&self, time_s: f64) -> f64 {
         self.trajectory.unix_s(time_s)
+    }
+
+    /// Returns the direction to the Sun (body-fixed, unit) in an encounter; `None` for other trajectories.
+    pub(crate) fn sun(&self, time_s: f64) -> Option<[f64; 3]> {
+        self.trajectory.sight(time_s).map(|sight| sight.sun.into())
     }
 
     #[cfg(test)]

@@ -1,9 +1,10 @@
-//! The position of the vehicle over time: a rocket, an orbit, or the rows of a table.
+//! The position of the vehicle over time: a rocket, an orbit, an encounter, or the rows of a table.
 
 use serde::{Deserialize, Serialize};
 
 use hzn_nav::ephemeris;
 
+use super::encounter::{Encounter, PreparedEncounter, Sight};
 use super::orbit::{Ellipse, Orbit};
 use super::point::Point;
 use super::rocket::{Ascent, Rocket};
@@ -17,6 +18,8 @@ pub enum Trajectory {
     Rocket(Rocket),
     /// An orbit of the Earth.
     Orbit(Orbit),
+    /// A planet or moon from a given range and side; for `[world.ellipsoid]`.
+    Encounter(Encounter),
     /// Rows of a CSV file.
     Table(Table),
 }
@@ -32,6 +35,7 @@ pub(super) struct PreparedTrajectory {
 enum Curve {
     Rocket(Ascent),
     Orbit(Ellipse),
+    Encounter(PreparedEncounter),
     Table(TableRows),
 }
 
@@ -42,10 +46,14 @@ impl PreparedTrajectory {
         trajectory: &Trajectory,
         [from_s, to_s]: [f64; 2],
         start_unix_s: f64,
+        seed: u64,
     ) -> Result<Self, (String, String)> {
         let curve = match trajectory {
             Trajectory::Rocket(rocket) => Curve::Rocket(Ascent::try_new(rocket, to_s, start_unix_s)?),
             Trajectory::Orbit(orbit) => Curve::Orbit(Ellipse::try_new(orbit, start_unix_s)?),
+            Trajectory::Encounter(encounter) => {
+                Curve::Encounter(PreparedEncounter::try_new(encounter, [from_s, to_s], seed)?)
+            }
             Trajectory::Table(table) => Curve::Table(table.parse_rows([from_s, to_s])?),
         };
         Ok(Self { curve, start_unix_s })
@@ -65,6 +73,7 @@ impl PreparedTrajectory {
         match &self.curve {
             Curve::Rocket(ascent) => ascent.point(time_s),
             Curve::Orbit(ellipse) => ellipse.point(time_s),
+            Curve::Encounter(encounter) => encounter.point(time_s),
             Curve::Table(rows) => rows.point(time_s),
         }
     }
@@ -73,7 +82,7 @@ impl PreparedTrajectory {
     pub(super) fn ascent(&self) -> Option<&Ascent> {
         match &self.curve {
             Curve::Rocket(ascent) => Some(ascent),
-            Curve::Orbit(_) | Curve::Table(_) => None,
+            Curve::Orbit(_) | Curve::Encounter(_) | Curve::Table(_) => None,
         }
     }
 
@@ -81,7 +90,15 @@ impl PreparedTrajectory {
     pub(super) fn rows(&self) -> Option<&TableRows> {
         match &self.curve {
             Curve::Table(rows) => Some(rows),
-            Curve::Rocket(_) | Curve::Orbit(_) => None,
+            Curve::Rocket(_) | Curve::Orbit(_) | Curve::Encounter(_) => None,
+        }
+    }
+
+    /// Returns the directions of an encounter at a time; `None` for other trajectories.
+    pub(super) fn sight(&self, time_s: f64) -> Option<Sight> {
+        match &self.curve {
+            Curve::Encounter(encounter) => Some(encounter.sight(time_s)),
+            Curve::Rocket(_) | Curve::Orbit(_) | Curve::Table(_) => None,
         }
     }
 }

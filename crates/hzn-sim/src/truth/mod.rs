@@ -1,5 +1,6 @@
 //! The truth about a scene: a row of truth.csv, and the file.
 
+mod ellipsoid;
 mod file;
 mod row;
 mod scene;

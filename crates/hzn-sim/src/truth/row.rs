@@ -12,7 +12,8 @@ pub struct Truth {
     pub time_s: f64,
     /// The body's kind as in sensor.toml.
     pub body: String,
-    /// 1 when at least 50 px of lit limb are in view and not behind the vehicle, else 0.
+    /// 1 when at least 50 px of lit limb are in view and not behind the vehicle, else 0. For the small disc of an
+    /// ellipsoid a quarter of its outline is enough.
     pub limb: u8,
     /// Limb axis in the camera frame, first component of the unit vector. For spheres it is the direction to the
     /// centre.
@@ -38,7 +39,7 @@ pub struct Truth {
     pub moon_y: Option<f64>,
     /// Third component of the direction to the Moon.
     pub moon_z: Option<f64>,
-    /// Attitude as a quaternion from camera to ECEF: scalar part.
+    /// Attitude as a quaternion from camera to ECEF (to body-fixed axes for an ellipsoid): scalar part.
     pub qw: f64,
     /// First vector component of the attitude.
     pub qx: f64,
@@ -46,12 +47,39 @@ pub struct Truth {
     pub qy: f64,
     /// Third vector component of the attitude.
     pub qz: f64,
+    /// Vector from the camera to the centre of the body in the camera frame, first component, kilometres; empty in
+    /// files of older versions.
+    #[serde(default)]
+    pub position_x_km: Option<f64>,
+    /// Second component of the vector to the centre.
+    #[serde(default)]
+    pub position_y_km: Option<f64>,
+    /// Third component of the vector to the centre.
+    #[serde(default)]
+    pub position_z_km: Option<f64>,
+    /// Angle between the directions from the body to the Sun and to the camera, degrees: 0 is a full disc. Empty for
+    /// the Sun itself, if the scene has no Sun, and in files of older versions.
+    #[serde(default)]
+    pub phase_deg: Option<f64>,
 }
 
 impl Truth {
     /// Returns the limb axis in the camera frame; `None` if the row holds no direction.
     pub fn axis(&self) -> Option<UnitVec3<Cam, f64>> {
         UnitVec3::try_new([self.axis_x, self.axis_y, self.axis_z])
+    }
+    /// Returns the vector from the camera to the centre of the body in the camera frame, kilometres.
+    pub fn position_km(&self) -> Option<[f64; 3]> {
+        Some([self.position_x_km?, self.position_y_km?, self.position_z_km?])
+    }
+    /// Returns the same row with the vector to the centre, and with the phase that follows from the Sun in the row.
+    pub(super) fn with_position_km(self, [x, y, z]: [f64; 3]) -> Self {
+        let range = (x * x + y * y + z * z).sqrt();
+        let phase_deg = self.sun_x.zip(self.sun_y).zip(self.sun_z).map(|((sx, sy), sz)| {
+            let cos = -(x * sx + y * sy + z * sz) / range;
+            libm::acos(cos.clamp(-1.0, 1.0)).to_degrees()
+        });
+        Self { position_x_km: Some(x), position_y_km: Some(y), position_z_km: Some(z), phase_deg, ..self }
     }
     /// Returns true if the picture shows enough limb for an answer.
     pub fn has_limb(&self) -> bool {

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use super::row::Truth;
 use crate::error::SceneError;
 use crate::globe::{Globe, View};
-use crate::scene::{Light, Scene};
+use crate::scene::{Light, Scene, World};
 
 /// Smallest length of visible limb with which a picture counts as showing a limb, in pixels.
 pub const LIMB_IN_VIEW_PX: f64 = 50.0;
@@ -21,6 +21,9 @@ impl Scene {
     /// # Errors
     /// Fails if the camera, the position or the light is invalid.
     pub fn truth(&self, file: &str, time_s: f64) -> Result<Truth, SceneError> {
+        if let World::Ellipsoid(body) = &self.world {
+            return self.ellipsoid_truth(body, file, time_s);
+        }
         let globe = Globe::new(&self.body);
         let raised = globe.raised(self.body.limb_height_km * 1e3);
         let cone = LimbCone::try_new(self.pose.position_m, raised.a_m, raised.b_m).ok_or(SceneError::Pose)?;
@@ -38,7 +41,8 @@ impl Scene {
             Light::Full | Light::Sector { .. } => None,
         };
         let [qw, qx, qy, qz] = self.pose.unit_quaternion_wxyz();
-        Ok(Truth {
+        let to_centre_km = self.pose.matrix().transpose() * -Vector3::from(self.pose.position_m) * 1e-3;
+        let truth = Truth {
             file: file.to_owned(),
             time_s,
             body: self.body.kind.name().to_owned(),
@@ -58,7 +62,9 @@ impl Scene {
             qx,
             qy,
             qz,
-        })
+            ..Truth::default()
+        };
+        Ok(truth.with_position_km(to_centre_km.into()))
     }
 
     /// Returns the truth about Sun or Moon in a scene whose camera flies around the Earth. For every other kind it is
@@ -72,7 +78,7 @@ impl Scene {
         let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
         let direction = UnitVec3::<Ecef, f64>::try_new(disc.direction).ok_or(SceneError::Sun)?;
         let [axis_x, axis_y, axis_z] = ecef_to_cam.apply(&direction).xyz();
-        Ok(Truth {
+        let seen = Truth {
             body: kind.name().to_owned(),
             limb: u8::from(self.visible_px(kind)? >= LIMB_IN_VIEW_PX),
             axis_x,
@@ -81,7 +87,9 @@ impl Scene {
             half_angle_deg: disc.half_angle_rad.to_degrees(),
             altitude_km: disc.distance_m * 1e-3 - disc.radius_km,
             ..truth
-        })
+        };
+        let seen = seen.with_position_km([axis_x, axis_y, axis_z].map(|x| x * disc.distance_m * 1e-3));
+        Ok(Truth { phase_deg: seen.phase_deg.filter(|_| kind != Kind::Sun), ..seen })
     }
 
     /// Returns the length in pixels of the limb that is in the picture, lit and not hidden. `kind` selects the scene's

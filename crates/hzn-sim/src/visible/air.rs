@@ -23,7 +23,7 @@ impl Default for Air {
 
 impl Air {
     /// Returns the length of a grazing path from the ground to space divided by the path to the zenith: √(π R / 2 H).
-    fn grazing(&self, radius_km: f64) -> f64 {
+    pub(crate) fn grazing(&self, radius_km: f64) -> f64 {
         (core::f64::consts::FRAC_PI_2 * radius_km / self.scale_height_km).sqrt()
     }
 

@@ -3,11 +3,13 @@
 //! The x axis of the vehicle points forward, along a rocket; y and z are lateral. The scene's `[mount]` has the
 //! attitude of the camera on the vehicle.
 
+mod aimed;
 mod pointing;
 mod spin;
 mod steps;
 mod tumble;
 
+pub use aimed::Aimed;
 pub use pointing::{Pointing, Towards};
 pub use spin::Spin;
 pub use tumble::Tumble;
@@ -33,6 +35,8 @@ pub enum Attitude {
     Towards(Towards),
     /// A rigid body without torque.
     Tumble(Tumble),
+    /// The camera is aimed at a planet or moon; for `[trajectory.encounter]`.
+    Aimed(Aimed),
     /// The attitude comes from `[trajectory] table`.
     Table,
 }
@@ -43,6 +47,7 @@ pub(super) enum PreparedAttitude {
     Steps(AttitudeSteps),
     Pointing { pointing: Pointing, span_s: [f64; 2] },
     Towards { towards: Towards, span_s: [f64; 2], phase: f64 },
+    Aimed { aimed: Aimed, span_s: [f64; 2], phase: f64 },
     Table,
 }
 
@@ -83,6 +88,12 @@ impl PreparedAttitude {
                 let phase = Counter::new(seed, Stream::Drift).uniform(0) * TAU;
                 Ok(Self::Towards { towards: towards.clone(), span_s, phase })
             }
+            Attitude::Aimed(aimed) => {
+                aimed.check()?;
+                trajectory.sight(span_s[0]).ok_or(("aimed", "is allowed only with [trajectory.encounter]"))?;
+                let phase = Counter::new(seed, Stream::Drift).uniform(0) * TAU;
+                Ok(Self::Aimed { aimed: *aimed, span_s, phase })
+            }
             Attitude::Table => match trajectory.rows() {
                 Some(rows) if rows.has_attitudes() => Ok(Self::Table),
                 Some(_) => Err(("table", "the file of [trajectory] table has no columns qw, qx, qy, qz")),
@@ -110,6 +121,12 @@ impl PreparedAttitude {
             Self::Towards { towards, span_s, phase } => {
                 let times_s = [time_s, trajectory.unix_s(time_s)];
                 towards.camera_to_ecef(trajectory.point(time_s).position_m, *span_s, times_s, *phase)
+            }
+            Self::Aimed { aimed, span_s: [from_s, to_s], phase } => {
+                let fraction = ((time_s - from_s) / (to_s - from_s).max(1e-9)).clamp(0.0, 1.0);
+                let aim = |sight| aimed.camera_to_body_fixed(&sight, fraction, *phase);
+                // An aimed attitude was prepared only for an encounter.
+                trajectory.sight(time_s).map_or_else(UnitQuaternion::identity, aim)
             }
             // The attitude of a table was prepared only for a table with attitudes.
             Self::Table => trajectory.rows().map_or_else(UnitQuaternion::identity, |rows| rows.camera_to_ecef(time_s)),
