@@ -101,7 +101,8 @@ impl Sensor {
 
     #[doc = doc!("Sensor.process")]
     #[pyo3(signature = (image, *, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
-                        rate_rad_s = None, time_s = None, bits = None, detail = false))]
+                        rate_rad_s = None, range_km = None, range_sigma_km = None, pole = None, sun = None, time_s = None,
+                        bits = None, detail = false))]
     fn process(
         &self,
         py: Python<'_>,
@@ -111,11 +112,21 @@ impl Sensor {
         attitude: Option<[f64; 4]>,
         attitude_sigma_deg: Option<f64>,
         rate_rad_s: Option<[f64; 3]>,
+        range_km: Option<f64>,
+        range_sigma_km: Option<f64>,
+        pole: Option<[f64; 3]>,
+        sun: Option<[f64; 3]>,
         time_s: Option<f64>,
         bits: Option<u8>,
         detail: bool,
     ) -> PyResult<Report> {
-        let data = collect_prior(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?;
+        let data = FrameData {
+            range_km,
+            range_sigma_km,
+            pole_camera: direction("pole", pole)?,
+            sun_camera: direction("sun", sun)?,
+            ..collect_prior(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?
+        };
         let state = self.state();
         let array = Array::from_object(image)?;
         state.check_size(&array)?;
@@ -203,6 +214,15 @@ fn read_sections(sections: &Bound<'_, PyDict>) -> PyResult<Config> {
         sections.set_item("camera", parameters::to_python(sections.py(), &camera.get().config)?)?;
     }
     parameters::config(&sections)
+}
+
+/// Checks a direction in the camera frame.
+fn direction(name: &str, v: Option<[f64; 3]>) -> PyResult<Option<[f64; 3]>> {
+    let is_direction = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>() > 1e-18 && v.iter().all(|x| x.is_finite());
+    match v {
+        Some(v) if !is_direction(&v) => Err(errors::config(format!("{name}: three finite numbers that are not all 0"))),
+        v => Ok(v),
+    }
 }
 
 /// Collects the prior of a picture, with the checks that the core cannot make.

@@ -109,6 +109,11 @@ fn known_arguments(scenario: &Scenario, frame: &FlightFrame) -> Value {
             known["attitude"] = json!([w, x, y, z]);
             known["attitude_sigma_deg"] = json!(row.attitude_sigma_deg);
         }
+        if let (Some(range_km), Some(sigma_km)) = (row.range_km, row.range_sigma_km) {
+            known["range_km"] = json!(range_km);
+            known["range_sigma_km"] = json!(sigma_km);
+        }
+        known["sun"] = json!([row.sun_x, row.sun_y, row.sun_z]);
         return known;
     }
     let row = scenario.frame_row(frame);

@@ -13,7 +13,7 @@ use crate::foreground::Foreground;
 use crate::globe::Globe;
 use crate::picture::Picture;
 use crate::pose::{Look, Pose, position_m};
-use crate::scene::{Band, Disc, Profile, Scene, Sky};
+use crate::scene::{Band, Disc, Profile, Scene, Sky, World};
 use crate::texture::Clouds;
 use crate::truth::Truth;
 
@@ -139,8 +139,12 @@ impl FlightFrame {
     pub fn truth(&self) -> Result<Truth, SceneError> {
         self.scene.truth(&self.file, self.time_s)
     }
-    /// Returns the prior that a navigation system would give the sensor: the position, no attitude.
+    /// Returns the prior that a navigation system would give the sensor: the position, no attitude. At another body than
+    /// the Earth it is the attitude and the direction to the Sun, because the position is what the sensor measures.
     pub fn prior(&self) -> hzn_core::Prior<f64> {
+        if matches!(self.scene.world, World::Ellipsoid(_)) {
+            return self.scene.body_prior();
+        }
         hzn_core::Prior {
             altitude_m: Some(Globe::new(&self.scene.body).altitude_m(self.scene.pose.position_m)),
             position_m: Some(self.scene.pose.position_m),

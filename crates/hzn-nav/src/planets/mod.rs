@@ -1,8 +1,7 @@
 //! Shape and rotation of planets, moons and dwarf planets.
 //!
 //! The body-fixed frame of a body has its z axis along the pole and its x axis on the prime meridian, both as the
-//! International Astronomical Union defines them. The radii are the semi-axes along x, y and z. [`BODIES`] has the
-//! numbers; its file names their source.
+//! International Astronomical Union defines them. [`BODIES`] has the numbers; its file names their source.
 //!
 //! The pole has the right ascension α₀ and the declination δ₀ in the ICRF, and W is the angle from the node of the
 //! equator to the prime meridian. With T in Julian centuries and d in days of barycentric dynamical time since J2000:
@@ -16,6 +15,7 @@ mod table;
 
 pub use table::BODIES;
 
+use hzn_core::body::{Kind, MOON_RADIUS_KM};
 use nalgebra::Matrix3;
 
 /// Shape and rotation of a body. Angles are in degrees.
@@ -23,8 +23,6 @@ use nalgebra::Matrix3;
 pub struct Planet {
     /// Name in lower case, as in `kind` of sensor.toml.
     pub name: &'static str,
-    /// Semi-axes along the body-fixed x, y and z axis, kilometres.
-    pub radii_km: [f64; 3],
     /// Right ascension of the pole at J2000, and its rate per century.
     pub right_ascension: [f64; 2],
     /// Declination of the pole at J2000, and its rate per century.
@@ -53,6 +51,13 @@ pub fn find(name: &str) -> Option<&'static Planet> {
 }
 
 impl Planet {
+    /// Returns the semi-axes along the body-fixed x, y and z axis, kilometres: those of the sensor
+    /// ([`hzn_core::body::Planet`]).
+    pub fn radii_km(&self) -> [f64; 3] {
+        let kind = Kind::ALL.iter().find(|kind| kind.name() == self.name);
+        kind.and_then(|kind| kind.planet()).map_or([MOON_RADIUS_KM; 3], |planet| planet.radii_km)
+    }
+
     /// Returns the orientation at a time. `tdb_days` counts days of barycentric dynamical time since J2000; terrestrial
     /// time ([`crate::time::tt_days_since_j2000`]) differs by less than 2 ms.
     pub fn orientation(&self, tdb_days: f64) -> Orientation {

@@ -1,9 +1,8 @@
 //! The numbers of [`super::BODIES`].
 //!
 //! Source of every row: Archinal et al. 2018, "Report of the IAU Working Group on Cartographic Coordinates and
-//! Rotational Elements: 2015", Celestial Mechanics and Dynamical Astronomy 130:22, with its correction of 2019
-//! (131:61). Tables 1 and 4 have the planets, table 2 the satellites, table 3 the dwarf planets and the asteroids,
-//! tables 5 and 6 the radii of satellites and small bodies.
+//! Rotational Elements: 2015", Celestial Mechanics and Dynamical Astronomy 130:22.
+//! The numbers were copied from public code that transcribes the report.
 //!
 //! Terms whose three amplitudes are below 0.01° are left out, except for the Moon.
 
@@ -14,7 +13,6 @@ use super::Planet;
 pub const BODIES: [Planet; 31] = [
     Planet {
         name: "mercury",
-        radii_km: [2440.53, 2440.53, 2438.26],
         right_ascension: [281.0103, -0.0328],
         declination: [61.4155, -0.0049],
         meridian: [329.5988, 6.1385108, 0.0],
@@ -22,7 +20,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "venus",
-        radii_km: [6051.8, 6051.8, 6051.8],
         right_ascension: [272.76, 0.0],
         declination: [67.16, 0.0],
         meridian: [160.2, -1.4813688, 0.0],
@@ -30,7 +27,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "mars",
-        radii_km: [3396.19, 3396.19, 3376.2],
         right_ascension: [317.269202, -0.10927547],
         declination: [54.432516, -0.05827105],
         meridian: [176.049863, 350.891982443297, 0.0],
@@ -42,7 +38,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "jupiter",
-        radii_km: [71492.0, 71492.0, 66854.0],
         right_ascension: [268.056595, -0.006499],
         declination: [64.495303, 0.002413],
         meridian: [284.95, 870.536, 0.0],
@@ -50,7 +45,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "saturn",
-        radii_km: [60268.0, 60268.0, 54364.0],
         right_ascension: [40.589, -0.036],
         declination: [83.537, -0.004],
         meridian: [38.9, 810.7939024, 0.0],
@@ -58,7 +52,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "uranus",
-        radii_km: [25559.0, 25559.0, 24973.0],
         right_ascension: [257.311, 0.0],
         declination: [-15.175, 0.0],
         meridian: [203.81, -501.1600928, 0.0],
@@ -66,7 +59,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "neptune",
-        radii_km: [24764.0, 24764.0, 24341.0],
         right_ascension: [299.36, 0.0],
         declination: [43.46, 0.0],
         meridian: [249.978, 541.1397757, 0.0],
@@ -74,7 +66,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "pluto",
-        radii_km: [1188.3, 1188.3, 1188.3],
         right_ascension: [132.993, 0.0],
         declination: [-6.163, 0.0],
         meridian: [302.695, 56.3625225, 0.0],
@@ -82,7 +73,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "moon",
-        radii_km: [1737.4, 1737.4, 1737.4],
         right_ascension: [269.9949, 0.0031],
         declination: [66.5392, 0.013],
         meridian: [38.3213, 13.17635815, -0.001867706],
@@ -104,7 +94,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "phobos",
-        radii_km: [13.0, 11.4, 9.1],
         right_ascension: [317.67071657, -0.10844326],
         declination: [52.88627266, -0.06134706],
         meridian: [35.1877444, 1128.84475928, 12.72192797],
@@ -117,7 +106,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "deimos",
-        radii_km: [7.8, 6.0, 5.1],
         right_ascension: [316.65705808, -0.10518014],
         declination: [53.50992033, -0.05979094],
         meridian: [79.39932954, 285.16188899, 0.0],
@@ -131,7 +119,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "io",
-        radii_km: [1829.4, 1819.4, 1815.7],
         right_ascension: [268.05, -0.009],
         declination: [64.5, 0.003],
         meridian: [200.39, 203.4889538, 0.0],
@@ -139,7 +126,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "europa",
-        radii_km: [1562.6, 1560.3, 1559.5],
         right_ascension: [268.08, -0.009],
         declination: [64.51, 0.003],
         meridian: [36.022, 101.3747235, 0.0],
@@ -151,7 +137,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "ganymede",
-        radii_km: [2631.2, 2631.2, 2631.2],
         right_ascension: [268.2, -0.009],
         declination: [64.57, 0.003],
         meridian: [44.064, 50.3176081, 0.0],
@@ -163,7 +148,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "callisto",
-        radii_km: [2410.3, 2410.3, 2410.3],
         right_ascension: [268.72, -0.009],
         declination: [64.83, 0.003],
         meridian: [259.51, 21.5710715, 0.0],
@@ -175,7 +159,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "mimas",
-        radii_km: [207.8, 196.7, 190.6],
         right_ascension: [40.66, -0.036],
         declination: [83.52, -0.004],
         meridian: [333.46, 381.994555, 0.0],
@@ -183,7 +166,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "enceladus",
-        radii_km: [256.6, 251.4, 248.3],
         right_ascension: [40.66, -0.036],
         declination: [83.52, -0.004],
         meridian: [6.32, 262.7318996, 0.0],
@@ -191,7 +173,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "tethys",
-        radii_km: [538.4, 528.3, 526.3],
         right_ascension: [40.66, -0.036],
         declination: [83.52, -0.004],
         meridian: [8.95, 190.6979085, 0.0],
@@ -199,7 +180,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "dione",
-        radii_km: [563.4, 561.3, 559.6],
         right_ascension: [40.66, -0.036],
         declination: [83.52, -0.004],
         meridian: [357.6, 131.5349316, 0.0],
@@ -207,7 +187,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "rhea",
-        radii_km: [765.0, 763.1, 762.4],
         right_ascension: [40.38, -0.036],
         declination: [83.55, -0.004],
         meridian: [235.16, 79.6900478, 0.0],
@@ -215,7 +194,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "titan",
-        radii_km: [2575.15, 2574.78, 2574.47],
         right_ascension: [39.4827, 0.0],
         declination: [83.4279, 0.0],
         meridian: [186.5855, 22.5769768, 0.0],
@@ -223,7 +201,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "iapetus",
-        radii_km: [745.7, 745.7, 712.1],
         right_ascension: [318.16, -3.949],
         declination: [75.03, -1.143],
         meridian: [355.2, 4.5379572, 0.0],
@@ -231,7 +208,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "ariel",
-        radii_km: [581.1, 577.9, 577.7],
         right_ascension: [257.43, 0.0],
         declination: [-15.1, 0.0],
         meridian: [156.22, -142.8356681, 0.0],
@@ -239,7 +215,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "umbriel",
-        radii_km: [584.7, 584.7, 584.7],
         right_ascension: [257.43, 0.0],
         declination: [-15.1, 0.0],
         meridian: [108.05, -86.8688923, 0.0],
@@ -247,7 +222,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "titania",
-        radii_km: [788.9, 788.9, 788.9],
         right_ascension: [257.43, 0.0],
         declination: [-15.1, 0.0],
         meridian: [77.74, -41.3514316, 0.0],
@@ -255,7 +229,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "oberon",
-        radii_km: [761.4, 761.4, 761.4],
         right_ascension: [257.43, 0.0],
         declination: [-15.1, 0.0],
         meridian: [6.77, -26.7394932, 0.0],
@@ -263,7 +236,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "miranda",
-        radii_km: [240.4, 234.2, 232.9],
         right_ascension: [257.43, 0.0],
         declination: [-15.08, 0.0],
         meridian: [30.7, -254.6906892, 0.0],
@@ -276,7 +248,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "triton",
-        radii_km: [1352.6, 1352.6, 1352.6],
         right_ascension: [299.36, 0.0],
         declination: [41.17, 0.0],
         meridian: [296.53, -61.2572637, 0.0],
@@ -294,7 +265,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "charon",
-        radii_km: [606.0, 606.0, 606.0],
         right_ascension: [132.993, 0.0],
         declination: [-6.163, 0.0],
         meridian: [122.695, 56.3625225, 0.0],
@@ -302,7 +272,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "ceres",
-        radii_km: [487.3, 487.3, 446.0],
         right_ascension: [291.418, 0.0],
         declination: [66.764, 0.0],
         meridian: [170.65, 952.1532, 0.0],
@@ -310,7 +279,6 @@ pub const BODIES: [Planet; 31] = [
     },
     Planet {
         name: "vesta",
-        radii_km: [286.3, 278.6, 223.2],
         right_ascension: [309.031, 0.0],
         declination: [42.235, 0.0],
         meridian: [285.39, 1617.3329428, 0.0],

@@ -51,7 +51,7 @@ impl Ellipsoid {
 
     /// Returns the semi-axes without any height, kilometres. [`Ellipsoid::check`] refuses a body without semi-axes.
     pub fn radii_km(&self) -> [f64; 3] {
-        let by_name = || self.name.as_deref().and_then(planets::find).map(|body| body.radii_km);
+        let by_name = || self.name.as_deref().and_then(planets::find).map(|body| body.radii_km());
         self.radii_km.or_else(by_name).unwrap_or([f64::NAN; 3])
     }
 

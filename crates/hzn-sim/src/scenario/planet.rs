@@ -106,14 +106,18 @@ impl Scenario {
         })
     }
 
-    /// Returns the sensor's configuration of an ellipsoid: the sphere of its mean radius.
+    /// Returns the sensor's configuration of an ellipsoid.
     pub(super) fn ellipsoid_config(body: &Ellipsoid) -> body::Config {
+        let named = body.name.as_deref().and_then(|name| Kind::ALL.iter().find(|kind| kind.name() == name));
+        let config = match named {
+            // A Moon by name is the one that is seen from the Earth; here it is a body to measure.
+            Some(Kind::Moon) | None => body::Config::of_kind(Kind::Ellipsoid, Some(body.radii_km())),
+            Some(kind) => body::Config::of_kind(*kind, None),
+        };
         body::Config {
-            kind: Kind::Sphere,
-            radius_km: Some(body.mean_radius_km()),
             limb_height_km: body.limb_height_km(),
             limb_height_sigma_km: body.limb_height_sigma_km,
-            ..body::Config::default()
+            ..config
         }
     }
 

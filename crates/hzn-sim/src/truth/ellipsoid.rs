@@ -48,6 +48,17 @@ impl Scene {
         Ok(truth.with_position_km(limb.position_km()))
     }
 
+    /// Returns what a navigation system would tell the sensor about an ellipsoid: the attitude and the Sun.
+    pub(crate) fn body_prior(&self) -> hzn_core::Prior<f64> {
+        let sun = self.sun_direction().ok().map(|sun| self.pose.matrix().transpose() * sun);
+        hzn_core::Prior {
+            cam_to_ecef: self.pose.cam_to_ecef(),
+            attitude_sigma_rad: Some(0.0),
+            sun: sun.and_then(|sun| UnitVec3::try_new(sun.into())),
+            ..hzn_core::Prior::default()
+        }
+    }
+
     /// Returns the length of the outline of a disc in the middle of the picture, pixels.
     fn outline_px(&self, half_angle_rad: f64) -> Result<f64, SceneError> {
         let (fx, fy) = Camera::<f64>::try_new(&self.camera)?.focal_px();

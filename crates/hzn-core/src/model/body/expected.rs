@@ -291,7 +291,7 @@ impl<T: Real> Expected<T> {
     pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
         #[cfg(feature = "position")]
         if let Some(target) = &self.target {
-            let axis = target.axis(target.predicted_m.as_ref()?)?;
+            let (axis, _) = target.limb_cone(target.predicted_m.as_ref()?)?;
             return Some(UnitVec3::assume_unit(target.body_to_cam.transpose() * axis));
         }
         self.ellipsoid.as_ref().map(|c| c.axis)

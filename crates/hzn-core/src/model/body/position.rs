@@ -1,8 +1,8 @@
 //! What is known about a body whose position is fitted: its shape, its orientation, its distance (math.md, 13).
 
-use crate::base::linalg::{M3, V3, basis, symmetric_eigen, unit};
+use crate::base::linalg::{M3, V3, basis, symmetric_eigen};
 use crate::base::real::Real;
-use crate::geometry::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
+use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
 use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
 use crate::geometry::scaling::Scaling;
 
@@ -52,7 +52,7 @@ pub(crate) struct Target<T> {
     pub(crate) radii_sigma_m: T,
     /// The distance, if it is known.
     pub(crate) range: Option<Range<T>>,
-    /// Whether the body is the Earth, whose axis is the limb axis.
+    /// Whether the body is the Earth, whose altitudes are geodetic.
     pub(crate) is_earth: bool,
     /// The centre of the body in the camera frame, metres, if attitude and position are known.
     pub(crate) predicted_m: Option<V3<T>>,
@@ -173,25 +173,14 @@ impl<T: Real> Target<T> {
     pub(crate) fn body_fixed(&self, r: &V3<T>) -> V3<T> {
         -(self.body_to_cam.transpose() * r)
     }
-
-    /// Returns the axis that the sensor reports for the centre `r` (camera frame, metres): the limb axis for the Earth,
-    /// else the direction to the centre.
-    pub(crate) fn axis(&self, r: &V3<T>) -> Option<V3<T>> {
-        if !self.is_earth {
-            return unit(r);
-        }
-        let x = self.body_fixed(r);
-        let [a, _, b] = self.semi_axes.map(|s| s * self.unit_m);
-        let cone = LimbCone::try_new([x.x, x.y, x.z], a, b)?;
-        unit(&(self.body_to_cam * cone.axis.v()))
-    }
 }
 
 impl<T: Real> Target<T> {
-    /// Returns the half-angle of the limb in the camera frame for the centre `r` (camera frame, metres), radians. The
-    /// limb is an elliptic cone, sᵀ M s = 0 with M = A r rᵀ A − (rᵀ A r − 1) A; cot² of the result is the mean of its
-    /// two half-angles, −λ/λ₁ for the two negative eigenvalues λ and the positive one λ₁.
-    pub(crate) fn half_angle_rad(&self, r: &V3<T>) -> T {
+    /// Returns axis and half-angle (radians) of the limb in the camera frame for the centre `r` (camera frame, metres).
+    /// The limb is an elliptic cone, sᵀ M s = 0 with M = A r rᵀ A − (rᵀ A r − 1) A. Its axis is the eigenvector of the
+    /// positive eigenvalue λ₁; cot² of the half-angle is the mean of −λ/λ₁ over the two negative eigenvalues λ. `None`
+    /// if there is no cone.
+    pub(crate) fn limb_cone(&self, r: &V3<T>) -> Option<(V3<T>, T)> {
         // Double precision: for a small disc the eigenvalues differ by many orders of magnitude.
         let grown = 1.0 + (self.raised_m / self.unit_m).to_f64();
         let u = self.scaling.to.map(|x| x.to_f64() / grown);
@@ -200,9 +189,12 @@ impl<T: Real> Target<T> {
         let ar = u * y;
         let m: M3<f64> = ar * ar.transpose() - a * (y.dot(&y) - 1.0);
         let rows = [[m.m11, m.m12, m.m13], [m.m12, m.m22, m.m23], [m.m13, m.m23, m.m33]];
-        let ([one, two, positive], _) = symmetric_eigen(rows);
+        let ([one, two, positive], [.., axis]) = symmetric_eigen(rows);
         let cot2 = -(one + two) / (positive + positive);
-        T::from_f64(libm::atan2(1.0, libm::sqrt(cot2)))
+        let axis = V3::from(axis);
+        let axis = if axis.dot(&r) < 0.0 { -axis } else { axis };
+        let half_angle = libm::atan2(1.0, libm::sqrt(cot2));
+        half_angle.is_finite().then(|| (axis.map(T::from_f64), T::from_f64(half_angle)))
     }
 
     /// Returns the altitude of the camera for the centre `r` (camera frame, metres): geodetic for the Earth, else above

@@ -161,7 +161,8 @@ pub(crate) fn place<T: Real>(fused: &Fused<T>, target: &Target<T>, mean_radius_m
     let Some(found) = &fused.located else { return direction(fused, target) };
     let unit_m = target.unit_m;
     let (r, free_r) = (found.r * unit_m, found.free_r * unit_m);
-    let axis = target.axis(&r)?;
+    let (axis, half_angle) = target.limb_cone(&r)?;
+    let (_, free_half_angle) = target.limb_cone(&free_r)?;
     let length = |v: &V3<T>| v.dot(v).sqrt();
     let per = T::one() / length(&found.r);
     let (b1, b2) = basis(&axis);
@@ -173,7 +174,7 @@ pub(crate) fn place<T: Real>(fused: &Fused<T>, target: &Target<T>, mean_radius_m
     Some(Placed {
         axis,
         p: [form(&b1, &b1), form(&b1, &b2), form(&b2, &b2)],
-        half_angles_rad: [target.half_angle_rad(&free_r), target.half_angle_rad(&r)],
+        half_angles_rad: [free_half_angle, half_angle],
         altitude_m: Some((target.altitude_m(&free_r, mean_radius_m), sigma_m)),
         position: Some(Position {
             centre_m: r.into(),
@@ -191,7 +192,7 @@ fn direction<T: Real>(fused: &Fused<T>, target: &Target<T>) -> Option<Placed<T>>
     let per_length = T::one() / long.dot(&long).sqrt();
     let u = long * per_length;
     let r = u * target.range_m(&u)?;
-    let axis = target.axis(&r)?;
+    let (axis, half_angle) = target.limb_cone(&r)?;
     let (e1, e2) = basis(&fused.e);
     let (b1, b2) = basis(&axis);
     // du = (I − u uᵀ) U⁻¹ de/‖U⁻¹ e‖; the small angle between u and the limb axis does not matter.
@@ -199,7 +200,6 @@ fn direction<T: Real>(fused: &Fused<T>, target: &Target<T>) -> Option<Placed<T>>
     let (g1, g2) = (by(&b1), by(&b2));
     let [p11, p12, p22] = fused.p;
     let form = |a: [T; 2], b: [T; 2]| a[0] * (p11 * b[0] + p12 * b[1]) + a[1] * (p12 * b[0] + p22 * b[1]);
-    let half_angle = target.half_angle_rad(&r);
     Some(Placed {
         axis,
         p: [form(g1, g1), form(g1, g2), form(g2, g2)],
