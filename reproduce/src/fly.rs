@@ -147,6 +147,7 @@ fn process_picture(
             covariance_rad2: s.covariance.upper_rad2,
             half_angle_deg: Some(s.half_angle_rad.to_degrees()),
         }),
+        position: None,
     };
     Ok((reports.iter().zip(truths).map(answer).collect(), elapsed_us))
 }

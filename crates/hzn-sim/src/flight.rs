@@ -143,7 +143,7 @@ impl FlightFrame {
     /// the Earth it is the attitude and the direction to the Sun, because the position is what the sensor measures.
     pub fn prior(&self) -> hzn_core::Prior<f64> {
         if matches!(self.scene.world, World::Ellipsoid(_)) {
-            return self.scene.body_prior();
+            return self.scene.told_prior();
         }
         hzn_core::Prior {
             altitude_m: Some(Globe::new(&self.scene.body).altitude_m(self.scene.pose.position_m)),

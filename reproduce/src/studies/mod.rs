@@ -10,6 +10,7 @@ mod infrared;
 mod lens;
 mod looks;
 mod orbit;
+mod position;
 mod presets;
 mod recordings;
 mod residuals;
@@ -44,6 +45,7 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("leo-infrared", "Accuracy and honesty: infrared in low orbit", infrared::flight),
     reproduced("rocket", "Accuracy and honesty: sounding rocket", scenes::rocket),
     reproduced("scenes", "Accuracy and honesty: the other scenes", scenes::others),
+    reproduced("position", "Positions: rendered bodies of every size and phase", position::rendered),
     reproduced("artefacts", "False answers: artefacts instead of a limb", artefacts::campaign),
     reproduced("suns", "False answers: clouds and reflections instead of the Sun", suns::false_suns),
     reproduced("defaults", "Honesty with default settings", defaults::default_settings),

@@ -9,6 +9,7 @@ use hzn_core::status::Status;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
+use super::position::{MeasuredPosition, PositionMiss};
 use crate::truth::Truth;
 
 /// The sensor's answer about one body in one picture.
@@ -22,6 +23,8 @@ pub struct Answer {
     pub status: Status,
     /// The direction, if the status is `ok`.
     pub found: Option<MeasuredDirection>,
+    /// The position of the body, if the answer has one.
+    pub position: Option<MeasuredPosition>,
 }
 
 /// A direction with its covariance.
@@ -61,6 +64,8 @@ pub struct Case {
     pub limb_in_view_px: Option<f64>,
     /// Error of the answer; `None` without an answer.
     pub miss: Option<Miss>,
+    /// Error of the position; `None` without a position, or if the truth has none.
+    pub position_miss: Option<PositionMiss>,
 }
 
 impl Case {
@@ -221,6 +226,7 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
                 let half_angle_deg = f.half_angle_deg.filter(|_| t.body != Kind::Sun.name());
                 Miss::new(&MeasuredDirection { half_angle_deg, ..f }, axis, t.half_angle_deg)
             }),
+            position_miss: answer.position.zip(t.position_km()).and_then(|(p, truth)| PositionMiss::new(&p, truth)),
         });
     }
     Ok(cases)

@@ -12,11 +12,15 @@
 //! answer.
 
 mod case;
+mod classes;
 mod honesty;
+mod position;
 mod summary;
 
 pub use case::{Answer, Case, MeasuredDirection, Mismatch, Miss, limb_in_view_px, pair};
+pub use classes::{ErrorClasses, WINDOW};
 pub use honesty::{Honesty, Within};
+pub use position::{MeasuredPosition, PositionErrors, PositionMiss};
 pub use summary::{Errors, Evaluation, Group, GroupRow, Horace};
 
 #[cfg(test)]

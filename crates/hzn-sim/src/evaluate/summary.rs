@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::case::Case;
+use super::classes::ErrorClasses;
 use super::honesty::Honesty;
+use super::position::PositionErrors;
 
 /// HORACE counts an answer as a success if radius and centre are right within this fraction of the radius.
 const HORACE_TOLERANCE: f64 = 0.1;
@@ -31,6 +33,10 @@ pub struct Evaluation {
     pub errors: Option<Errors>,
     /// Comparison of these errors with their covariances; `None` if there are no answers.
     pub honesty: Option<Honesty>,
+    /// Errors of the positions; `None` if there are none.
+    pub position: Option<PositionErrors>,
+    /// The error classes of ECSS-E-ST-60-20C about the camera's x and y axes; `None` for a short sequence.
+    pub classes: Option<[ErrorClasses; 2]>,
     /// Result by the criteria of HORACE.
     pub horace: Horace,
     /// Results by altitude, by angle off nadir (off axis for Sun and Moon), and by length of limb in view. A quantity
@@ -130,6 +136,8 @@ impl Evaluation {
             false_answers,
             errors: Errors::new(&with_limb),
             honesty: honesty(&with_limb),
+            position: PositionErrors::new(&with_limb),
+            classes: ErrorClasses::about_x_and_y(&with_limb),
             horace: Horace {
                 success,
                 false_negatives: 1.0 - success,

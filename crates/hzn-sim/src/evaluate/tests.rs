@@ -1,6 +1,7 @@
 use super::honesty::interval;
 use super::summary::{nice_step, quantile};
 use super::*;
+use crate::counter::{Counter, Stream};
 use crate::truth::Truth;
 use hzn_core::camera::{Camera, Config, Model};
 use hzn_core::status::Status;
@@ -29,7 +30,7 @@ fn answer(file: &str, x_deg: f64, z_deg: f64) -> Answer {
     // A turn about z moves the x component, and a turn about x moves the z component.
     let covariance_rad2 = [b * b, 0.0, 0.0, 0.0, 0.0, a * a];
     let found = MeasuredDirection { axis, covariance_rad2, half_angle_deg: Some(60.0) };
-    Answer { file: file.into(), body: "earth".into(), status: Status::Ok, found: Some(found) }
+    Answer { file: file.into(), body: "earth".into(), status: Status::Ok, found: Some(found), position: None }
 }
 
 fn none(file: &str, status: Status) -> Answer {
@@ -180,4 +181,37 @@ fn limb_in_view_is_the_circumference_of_a_whole_disc() {
     // Half of the disc is beyond the left border; a pinhole camera stretches the picture towards its corners.
     let half = limb_in_view_px(&camera, [-320.0, 0.0, 500.0], 0.1);
     assert!(half > 0.55 * whole && half < 0.7 * whole, "{half} {whole}");
+}
+
+#[test]
+fn a_position_has_range_and_cross_range() {
+    let position = MeasuredPosition { centre_km: [3.0, 0.0, 1004.0], covariance_km2: [9.0, 0.0, 0.0, 9.0, 0.0, 16.0] };
+    let miss = PositionMiss::new(&position, [0.0, 0.0, 1000.0]).unwrap();
+    assert!((miss.cross_range_km - 3.0).abs() < 1e-9 && (miss.nees.unwrap() - 2.0).abs() < 1e-9);
+    assert!((miss.range_km - 4.0045).abs() < 1e-3 && (miss.range_sigmas - 1.0).abs() < 0.01, "{miss:?}");
+    let mut a = answer("a", 0.0, 0.0);
+    a.position = Some(position);
+    let [x, y, z] = [0.0, 0.0, 1000.0].map(Some);
+    let t = Truth { position_x_km: x, position_y_km: y, position_z_km: z, ..truth("a", 1) };
+    let cases = pair(&[a], &[t], None).unwrap();
+    let found = Evaluation::new(&[&cases[0]]).position.unwrap();
+    assert!((found.nees - 2.0).abs() < 1e-9 && found.positions == 1 && found.nees_interval[0] < 1.0);
+}
+
+#[test]
+fn the_classes_are_those_that_were_put_in() {
+    // A wave over 400 pictures, one over 8, and an alternating error, whose differences are twice its size.
+    let wave = |i: usize, period: f64| (i as f64 * core::f64::consts::TAU / period).sin() * 2f64.sqrt();
+    let slow: Vec<f64> = (0..1200).map(|i| 0.5 + 0.3 * wave(i, 400.0)).collect();
+    let classes = ErrorClasses::new(&slow).unwrap();
+    assert!((classes.bias_deg - 0.5).abs() < 1e-9 && (classes.field_of_view_deg - 0.3).abs() < 0.01);
+    assert!(classes.temporal_deg < 0.01 && classes.pixel_deg < 0.03, "{classes:?}");
+    let middle: Vec<f64> = (0..1200).map(|i| 0.3 * wave(i, 16.0)).collect();
+    let classes = ErrorClasses::new(&middle).unwrap();
+    assert!(classes.pixel_deg > classes.field_of_view_deg && classes.pixel_deg > classes.temporal_deg, "{classes:?}");
+    let draws = Counter::new(7, Stream::Encounter);
+    let noise: Vec<f64> = (0..1200).map(|i| 0.2 * draws.normal(i)).collect();
+    let classes = ErrorClasses::new(&noise).unwrap();
+    assert!((classes.temporal_deg - 0.2).abs() < 0.02 && classes.field_of_view_deg < 0.05, "{classes:?}");
+    assert!(ErrorClasses::new(&noise[..20]).is_none());
 }

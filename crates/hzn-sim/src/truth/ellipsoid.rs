@@ -49,7 +49,7 @@ impl Scene {
     }
 
     /// Returns what a navigation system would tell the sensor about an ellipsoid: the attitude and the Sun.
-    pub(crate) fn body_prior(&self) -> hzn_core::Prior<f64> {
+    pub fn told_prior(&self) -> hzn_core::Prior<f64> {
         let sun = self.sun_direction().ok().map(|sun| self.pose.matrix().transpose() * sun);
         hzn_core::Prior {
             cam_to_ecef: self.pose.cam_to_ecef(),

@@ -70,6 +70,8 @@ pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
         let ideal = h.within.map(|w| format!("{:.1}", 100.0 * w.expected)).join(", ");
         line("sigma", format!("{} ({ideal} % when right)", parts.join(", ")));
     }
+    out.extend(position_lines(e));
+    let mut line = |name, value| out.push((name, value));
     if e.with_limb > 0 {
         let positives = e.horace.false_positives.map(|p| format!(", false positives {}", percent(p)));
         line(
@@ -81,6 +83,49 @@ pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
                 positives.unwrap_or_default()
             ),
         );
+    }
+    out
+}
+
+/// Returns the numbers about the position and the error classes of star sensors with their names.
+fn position_lines(e: &Evaluation) -> Vec<(&'static str, String)> {
+    let mut out = Vec::new();
+    if let Some(p) = &e.position {
+        let share = |x: f64| format!("{:+.3} %", 100.0 * x);
+        out.push((
+            "range",
+            format!(
+                "{:.3} % RMS ({:.3} km), mean {}, {:.3} % at worst; {:.2} sigma RMS, mean {:+.2}",
+                100.0 * p.range_share_rms,
+                p.range_rms_km,
+                share(p.range_share_mean),
+                100.0 * p.range_share_worst,
+                p.range_sigmas_rms,
+                p.range_sigmas_mean
+            ),
+        ));
+        out.push(("cross-range", format!("{:.3} km RMS, {:.3} median", p.cross_range_rms_km, p.cross_range_median_km)));
+        let [low, high] = p.nees_interval;
+        out.push((
+            "position (NEES)",
+            format!(
+                "{:.2} of {} positions; expected mean {low:.2} to {high:.2} (95 %), 3 is ideal",
+                p.nees, p.positions
+            ),
+        ));
+    }
+    if let Some([x, y]) = &e.classes {
+        let both = |f: fn(&hzn_sim::evaluate::ErrorClasses) -> f64| format!("{}, {}", deg(f(x)), deg(f(y)));
+        out.push((
+            "ECSS classes",
+            format!(
+                "bias {}; field of view {}; pixel {}; temporal {} deg about x, y",
+                both(|c| c.bias_deg),
+                both(|c| c.field_of_view_deg),
+                both(|c| c.pixel_deg),
+                both(|c| c.temporal_deg)
+            ),
+        ));
     }
     out
 }
