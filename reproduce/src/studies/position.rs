@@ -10,10 +10,10 @@ use crate::section::Section;
 
 /// Bodies, the first seed of each, and the focal length of the camera in pixels.
 const BODIES: [(&str, u64, f64); 4] = [
-    ("callisto", 41_000, 3000.0),
-    ("jupiter", 42_000, 6000.0),
-    ("enceladus", 43_000, 2500.0),
-    ("phobos", 44_000, 900.0),
+    ("callisto", 51_000, 3000.0),
+    ("jupiter", 52_000, 6000.0),
+    ("enceladus", 53_000, 2500.0),
+    ("phobos", 54_000, 900.0),
 ];
 const PICTURES: usize = 500;
 /// 1-sigma of the attitude that the sensor is told, degrees.
@@ -115,8 +115,9 @@ pub(super) fn rendered(effort: &Effort) -> anyhow::Result<Section> {
         "{pictures} pictures of each body, 640×640 pixels with 1 % noise: discs from 9 px across to wider than the \
          picture, phase angles from 0° to 150°, every direction. The sensor is told the camera, the body by its name, the \
          attitude within {ATTITUDE_SIGMA_DEG}° and the direction to the Sun; it has no distance. The surface of each \
-         picture lies higher or lower than told, by the default sigma of the limb height. An answer needs a limb in \
-         view; range errors are in sigmas, NEES has three degrees of freedom (3 is ideal)."
+         picture lies higher or lower than told, by the default sigma of the limb height. NEES has \
+         three degrees of freedom (3 is ideal). The term for light that changes along the limb was added after a look at \
+         other seeds of the same bodies; the seeds here were not used before."
     ));
     let mut rows = Vec::new();
     for (name, first_seed, focal_px) in BODIES {

@@ -241,6 +241,11 @@ impl<T: Real> Expected<T> {
         #[cfg(feature = "position")]
         let target =
             self.target.map(|t| Target { raised_m: height, limb_sigma_m: root(&[t.limb_sigma_m, sigma]), ..t });
+        // Without a known distance there is no expected half-angle that a higher limb could change.
+        #[cfg(feature = "position")]
+        if target.is_some_and(|target| target.range.is_none()) {
+            return Self { target, ..*self };
+        }
         Self {
             #[cfg(feature = "position")]
             target,

@@ -49,4 +49,7 @@ pub(crate) struct EdgeNoise<T> {
     /// 1-sigma of an edge point in pixels. `length_px` is the correlation length, in pixels.
     pub(crate) sigma_px: T,
     pub(crate) length_px: T,
+    /// 1-sigma of the shift that all points share, in pixels.
+    #[cfg(feature = "position")]
+    pub(crate) shift_px: T,
 }

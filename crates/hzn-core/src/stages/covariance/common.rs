@@ -88,6 +88,10 @@ pub(super) struct Row<T> {
 }
 
 impl<T: Real> Row<T> {
+    /// Returns w h x for the shift of this point by one pixel across the limb.
+    pub(super) fn shift(&self) -> V3<T> {
+        self.h * self.g2.sqrt()
+    }
     /// Adds w h hᵀ to the upper triangle of the normal matrix.
     pub(super) fn add_to(&self, normal: &mut [T; 6]) {
         let (Self { h, w, .. }, [h1, h2]) = (self, self.h12);
@@ -146,7 +150,7 @@ impl<T: Real> Sums<T> {
         for row in part(blocks, fit) {
             let Row { s, gradient: [gu, gv], h, weight, place, x, y, .. } = row;
             row.add_to(&mut sums.normal);
-            let shift = h * row.g2.sqrt();
+            let shift = row.shift();
             sums.shift += shift;
             let i = T::from_i32(place as i32);
             sums.by_number += shift * i;

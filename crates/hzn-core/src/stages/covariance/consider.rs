@@ -10,6 +10,10 @@
 //! | rotation ψ of the body | (q × U q')·ψ |
 //! | semi-axis a_i | (U q')_i q_i/a_i in the axes of the body |
 //!
+//! The edge of a sunlit body stands at half of the brightness inside of it. That brightness changes from the azimuth of
+//! the Sun to the cusps, so that the shift that all points share (`covariance.bias_px`) changes along the limb, too. The
+//! term is a first harmonic in the azimuth from the Sun, of the size of the shift.
+//!
 //! These are the terms of (13.5), written as residuals of the fit in scaled space. The fit converts the residual
 //! cos α − σ·e = sin α dθ into errors of axis and half-angle, and those are errors of the position.
 
@@ -28,6 +32,8 @@ pub(crate) struct Sensitivity<T> {
     pub(crate) by_rotation: [V3<T>; 3],
     /// By each semi-axis.
     pub(crate) by_axis: [V3<T>; 3],
+    /// By a shift of one pixel that changes with the azimuth along the limb: its cosine and sine on the tangent basis.
+    pub(crate) by_light: [V3<T>; 2],
 }
 
 impl<T: Real> Sensitivity<T> {
@@ -38,13 +44,16 @@ impl<T: Real> Sensitivity<T> {
         let (tan, zero) = (sin / fit.c, V3::zeros());
         let to_body = target.body_to_cam.transpose();
         let mut normal = [T::ZERO; 6];
-        let (mut limb, mut rotation, mut axes) = (zero, [zero; 3], [zero; 3]);
+        let (mut limb, mut rotation, mut axes, mut light) = (zero, [zero; 3], [zero; 3], [zero; 2]);
         for row in part(blocks, fit) {
             row.add_to(&mut normal);
             let per = T::one() / (row.x * row.x + row.y * row.y).max(T::from_f64(1e-20)).sqrt();
             let outward = (b1 * row.x + b2 * row.y) * (per * fit.c) - fit.e * sin;
             let n = target.scaling.to * outward;
             let q = target.scaling.from * outward;
+            let across = row.shift();
+            light[0] += across * (row.x * per);
+            light[1] += across * (row.y * per);
             let h = row.h * (tan * sin);
             limb += h * n.dot(&n).sqrt();
             let turn = q.cross(&n);
@@ -56,6 +65,11 @@ impl<T: Real> Sensitivity<T> {
         }
         let response: M3<T> = response(&fit.sums.with_normal(normal), fit.mean, true)?;
         let error = |sum: V3<T>| response * sum;
-        Some(Self { by_limb: error(limb), by_rotation: rotation.map(error), by_axis: axes.map(error) })
+        Some(Self {
+            by_limb: error(limb),
+            by_rotation: rotation.map(error),
+            by_axis: axes.map(error),
+            by_light: light.map(error),
+        })
     }
 }

@@ -42,7 +42,10 @@ pub(super) fn fused<T: Real>(
     if !is_determined(fit, sin, p.m33) || !is_lit_inside(blocks, &fit.e) {
         return target.range.map(|_| by_direction);
     }
-    let free = located(blocks, fit, sin, p, target)?;
+    let given = Sensitivity::new(blocks, fit, target)?;
+    let light_px = if target.is_in_sunlight { edge.shift_px } else { T::ZERO };
+    let lights = light(&given, expected, &fit.e).map(|v| v * light_px);
+    let free = located(fit, sin, p, target, &given, &lights);
     let range = target.range.filter(|_| estimate.half_angle != HalfAngle::Free);
     let (found, chi2) = match range {
         None => (free, T::ZERO),
@@ -74,20 +77,39 @@ fn is_lit_inside<T: Real>(blocks: &[Block<T>], e: &V3<T>) -> bool {
 }
 
 /// Returns the position that the fit gives, with all errors of the given shape and orientation.
-fn located<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, sin: T, p: &M3<T>, target: &Target<T>) -> Option<Located<T>> {
+fn located<T: Real>(
+    fit: &Fit<T>,
+    sin: T,
+    p: &M3<T>,
+    target: &Target<T>,
+    given: &Sensitivity<T>,
+    lights: &[V3<T>; 2],
+) -> Located<T> {
     let from = &target.scaling.from;
     // A limb that is clipped everywhere stands higher; the shape stays the same.
     let grown = T::one() + target.raised_m / target.unit_m;
     let r = from * fit.e * (grown / sin);
     let g = by_cone(target, &fit.e, sin, fit.c) * grown;
     let mut errors = *p;
-    let given = Sensitivity::new(blocks, fit, target)?;
     let mut add = |v: &V3<T>, sigma: T| errors += v * v.transpose() * (sigma * sigma);
     add(&given.by_limb, target.limb_sigma_m / target.unit_m);
     given.by_rotation.iter().for_each(|v| add(v, target.attitude_sigma_rad));
     given.by_axis.iter().for_each(|v| add(v, target.radii_sigma_m / target.unit_m));
+    lights.iter().for_each(|v| add(v, T::one()));
     let covariance = g * errors * g.transpose();
-    Some(Located { r, p: covariance, free_r: r, free_p: covariance })
+    Located { r, p: covariance, free_r: r, free_p: covariance }
+}
+
+/// Returns the errors by light that changes along the limb, for a shift of one pixel. Without the direction to the Sun,
+/// its azimuth is unknown, and each of the two components has half of the variance.
+fn light<T: Real>(given: &Sensitivity<T>, expected: &Expected<T>, e: &V3<T>) -> [V3<T>; 2] {
+    let (b1, b2) = basis(e);
+    let [x, y] = given.by_light;
+    let towards_sun = expected.sun_seen.as_ref().map(|sun| [sun.dot(&b1), sun.dot(&b2)]);
+    match towards_sun.map(|[a, b]| (a, b, (a * a + b * b).sqrt())) {
+        Some((a, b, length)) if length > T::from_f64(1e-6) => [(x * a + y * b) / length, V3::zeros()],
+        _ => [x, y].map(|v| v * T::from_f64(core::f64::consts::FRAC_1_SQRT_2)),
+    }
 }
 
 /// Returns the derivative of U⁻¹ e/sin α by (δ₁₂, δc): (13.12) with δα = −δc/sin α.

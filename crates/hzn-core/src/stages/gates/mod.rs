@@ -25,7 +25,7 @@ use crate::stages::contour::BinaryPicture;
 use crate::stages::covariance::Fused;
 use crate::stages::fit::{self, Fit};
 use places::inliers;
-use size::{disc_px, is_possible_size, min_arc, min_support};
+use size::{disc_px, is_possible_size, lit_share, min_arc, min_support, sin_for_points};
 
 pub use config::Config;
 pub(crate) use places::middle_level;
@@ -63,13 +63,17 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     let support = (covered_px / limb_px.max(T::one())).min(T::one());
     let sigma_limit = T::from_f64(config.max_sigma_deg.to_radians());
     let chi = T::from_f64(config.max_half_angle_sigma);
-    let least = config.min_inliers.min(small_disc_points(expected.sin, camera, 3)).min(small_picture_points(camera, 3));
+    let lit = T::from_f64(lit_share(expected));
+    let least = config
+        .min_inliers
+        .min(small_disc_points(sin_for_points(fused, expected), camera, 3))
+        .min(small_picture_points(camera, 3));
     let counts = |n: u32| T::from_i32(n as i32);
     let verdict = if counts(fit.inliers) < counts(points) * T::from_f64(config.min_inlier_share) {
         Verdict::NoConsensus
     } else if fit.inliers < u32::from(least) {
         Verdict::FewInliers
-    } else if covered_px < min_arc(&fused.c, camera, config) {
+    } else if covered_px < min_arc(&fused.c, camera, config) * lit {
         Verdict::ShortArc
     } else if !(fit.rms_px <= T::from_f64(config.max_rms_px) * raised) {
         Verdict::Residuals
@@ -77,7 +81,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         Verdict::HalfAngle
     } else if !(sigma_max_rad <= sigma_limit) {
         Verdict::Uncertain
-    } else if support < T::from_f64(min_support(config, expected)) {
+    } else if support < T::from_f64(min_support(config, expected)) * lit {
         Verdict::Unsupported
     } else if counts(fit.nearby) > counts(fit.inliers) * T::from_f64(config.max_nearby)
         || is_by_chance(fit, points, covered_px, config)

@@ -4,11 +4,34 @@ use super::config::Config;
 use crate::base::real::Real;
 use crate::geometry::camera::Camera;
 use crate::model::body::Expected;
+use crate::stages::covariance::Fused;
 
 /// Returns the diameter of the body's disc, 2 α f, in pixels.
 pub(super) fn disc_px<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> T {
     let (fx, fy) = camera.focal_px();
     expected.half_angle_rad() * (fx + fy)
+}
+
+/// Returns the part of a limb that counts as limb at most. For a position with a known Sun, the points within 75° of the
+/// Sun's azimuth count ([`Expected::is_lit`]), 150° of 360°.
+pub(super) fn lit_share<T>(expected: &Expected<T>) -> f64 {
+    #[cfg(feature = "position")]
+    if expected.target.is_some() && expected.sun.is_some() {
+        return 150.0 / 360.0;
+    }
+    let _ = expected;
+    1.0
+}
+
+/// Returns the sine of the half-angle from which the number of points of a small disc follows: the expected one. For a
+/// position without a known distance it is the fitted one.
+pub(super) fn sin_for_points<T: Real>(fused: &Fused<T>, expected: &Expected<T>) -> T {
+    #[cfg(feature = "position")]
+    if expected.target.is_some() {
+        return (T::one() - fused.c * fused.c).max(T::ZERO).sqrt();
+    }
+    let _ = fused;
+    expected.sin
 }
 
 /// Returns the smallest part of the limb in view that edge points must cover; 0 means no minimum for any body.
