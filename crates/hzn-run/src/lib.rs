@@ -11,6 +11,7 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "a library prints nothing; the caller does")]
 
+pub mod checked_row;
 pub mod disk;
 pub mod engine;
 mod error;
