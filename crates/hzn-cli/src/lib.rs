@@ -37,8 +37,8 @@ pub fn main() -> Exit {
     }
 }
 
-/// Makes a write beyond the limit of the file size (`ulimit -f`) an error with a message. Without this, a signal ends the
-/// program without a word. The threads that are started later inherit the setting.
+/// Makes a write beyond the limit of the file size (`ulimit -f`) an error with a message. Without this, a signal ends
+/// the program without a word. The threads that are started later inherit the setting.
 fn report_file_size_limit() {
     #[cfg(unix)]
     {

@@ -8,17 +8,35 @@ fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
+/// Starts a run, kills it after `wait_us`, and returns the number of pictures that are finished in the unfinished file.
+/// Returns `None` if the run ended before.
+#[cfg(unix)]
+fn kill(place: &Place, args: &[&str], out: &str, wait_us: u64) -> Option<u64> {
+    let mut child = place.command(args).stderr(std::process::Stdio::null()).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_micros(wait_us));
+    child.kill().unwrap();
+    let killed = child.wait().unwrap().code().is_none();
+    // The run may have ended just before, and the name is given at its very end.
+    if !killed || place.path(out).exists() {
+        return None;
+    }
+    let part = format!("{out}.part");
+    if std::fs::metadata(place.path(&part)).map_or(0, |info| info.len()) == 0 {
+        return Some(0);
+    }
+    let said = place.run(&["info", &part]).out;
+    let pictures = said.lines().find_map(|line| line.strip_prefix("pictures"));
+    Some(pictures.map_or(0, |text| text.trim().parse().unwrap()))
+}
+
 /// Kills runs at random moments, some of them again while they are continued. Every finished picture is kept, and the
 /// continued run gives the same results as a run that was not killed.
 #[cfg(unix)]
 #[test]
 fn killed_at_random_moments() {
-    use std::process::Stdio;
-    use std::time::{Duration, Instant};
-
-    let kills = number("HZN_KILLS", 12);
+    let runs = number("HZN_KILLS", 12);
     let place = Place::with_pictures(300);
-    let begin = Instant::now();
+    let begin = std::time::Instant::now();
     place.run(&["run", "in", "-o", "whole.csv", "-q", "-j", "1"]).expect(0);
     let whole = without_time(&place.read("whole.csv"));
     let longest_us = begin.elapsed().as_micros() as u64 * 5 / 4;
@@ -27,52 +45,32 @@ fn killed_at_random_moments() {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) % below.max(1)
     };
-    let kinds = ["a.csv", "a.jsonl", "a.mcap"];
-    // Kills before the end, kills of a continued run, and pictures that were finished when they were killed.
+    // Kills before the end, kills of a continued run, and pictures that were finished when their run was killed.
     let (mut early, mut again, mut kept) = (0u64, 0u64, 0u64);
-    for n in 0..kills {
-        let (out, durable) = (kinds[n as usize % 3], n / 3 % 2 == 1);
+    for n in 0..runs {
+        let (out, durable) = (["a.csv", "a.jsonl", "a.mcap"][n as usize % 3], n / 3 % 2 == 1);
         let mut finished = 0;
         for attempt in 0..1 + draw(2) {
             let mut args = vec!["run", "in", "-o", out, "-q", "-j", "1"];
             args.extend(durable.then_some("--durable"));
             args.extend((attempt > 0).then_some("--resume"));
-            let mut child = place.command(&args).stderr(Stdio::null()).spawn().unwrap();
-            std::thread::sleep(Duration::from_micros(draw(longest_us)));
-            child.kill().unwrap();
-            let killed = child.wait().unwrap().code().is_none();
-            // The run may have ended just before, and the name is given at its very end.
-            if !killed || place.path(out).exists() {
-                break;
-            }
-            early += 1;
-            again += u64::from(attempt > 0);
-            let part = format!("{out}.part");
-            let Ok(info) = std::fs::metadata(place.path(&part)) else { continue };
-            if info.len() > 0 {
-                let said = place.run(&["info", &part]).out;
-                let pictures = said.lines().find_map(|line| line.strip_prefix("pictures"));
-                let now = pictures.map_or(0, |text| text.trim().parse::<u64>().unwrap());
-                assert!(now >= finished, "{n}: {now} of {finished} pictures are left");
-                finished = now;
-            }
+            let Some(now) = kill(&place, &args, out, draw(longest_us)) else { break };
+            (early, again) = (early + 1, again + u64::from(attempt > 0));
+            assert!(now >= finished, "{n}: {now} of {finished} pictures are left");
+            finished = now;
         }
         kept += finished;
         if !place.path(out).exists() {
             let ran = place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
-            let before = ran
-                .err
-                .split("(after ")
-                .nth(1)
-                .map_or(0, |rest| rest.split(' ').next().unwrap().parse::<u64>().unwrap());
-            assert!(before >= finished, "{n}: {before} of {finished} pictures were continued");
+            let before = ran.err.split("(after ").nth(1).and_then(|rest| rest.split(' ').next()?.parse::<u64>().ok());
+            assert!(before.unwrap_or(0) >= finished, "{n}: {before:?} of {finished} pictures were continued");
         }
         place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
         assert!(without_time(&place.read("rows.csv")) == whole, "{n}: {out} differs");
         std::fs::remove_file(place.path(out)).unwrap();
     }
-    println!("{kills} runs: {early} kills, {again} of them of a continued run; {kept} finished pictures, none lost");
-    assert!(early * 2 > kills, "{early} of {kills} runs were killed before their end");
+    println!("{runs} runs: {early} kills, {again} of them of a continued run; {kept} finished pictures, none lost");
+    assert!(early * 2 > runs, "{early} of {runs} runs were killed before their end");
 }
 
 /// Runs many pictures: the memory does not grow, the answers repeat, and the rate is steady.
@@ -118,8 +116,8 @@ fn a_long_run() {
         let (early, late) = (memory(0.1, 0.3), memory(0.8, 1.0));
         let steady = rate(0.7, 0.95) / rate(0.1, 0.35);
         println!(
-            "{out}: {pictures} pictures in {seconds:.0} s, {:.0} a second; memory {early} kB early, {late} kB late; late \
-             rate {steady:.2} of the early one",
+            "{out}: {pictures} pictures in {seconds:.0} s, {:.0} a second; memory {early} kB early, {late} kB late; \
+             late rate {steady:.2} of the early one",
             pictures as f64 / seconds
         );
         // The index of a recording's chunks grows, with a hundred bytes for each flush.

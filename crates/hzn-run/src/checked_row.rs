@@ -5,8 +5,8 @@
 //! because it differs from run to run, and two runs with the same answers must have the same column.
 //!
 //! The column belongs to the text and not to [`Row`]. It is the last, so readers that find columns by name or by place
-//! are not disturbed, and the checksum stays with its row if rows are sorted, selected or joined. A second file could be
-//! lost or be older than the table, and a last line would be a broken row for other readers.
+//! are not disturbed, and the checksum stays with its row if rows are sorted, selected or joined. A second file could
+//! be lost or be older than the table, and a last line would be a broken row for other readers.
 
 use hzn_mcap::Row;
 

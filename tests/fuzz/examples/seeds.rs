@@ -35,9 +35,8 @@ fn kind(name: &str, which: u8, bytes: &[u8]) -> (String, Vec<u8>) {
 fn pictures() -> Seeds {
     let mut seeds = Seeds::new();
     for preset in 0..6u8 {
-        for (shape, pixels) in
-            [("step", vec![10; 900]), ("noise", (0..900u32).map(|i| (i * i * 31 >> 3) as u8).collect())]
-        {
+        let noise: Vec<u8> = (0..900u32).map(|i| (i * i * 31 >> 3) as u8).collect();
+        for (shape, pixels) in [("step", vec![10; 900]), ("noise", noise)] {
             let mut bytes = vec![63, 0, 47, 0, preset % 4, 0, 60, preset, 0, 0, 0, 24, 0, 0, 1, 0, 1, 0, 0, 0];
             bytes.extend(&pixels);
             bytes.extend(vec![200u8; 900]);
@@ -48,51 +47,14 @@ fn pictures() -> Seeds {
     seeds
 }
 
+/// Returns the texts that the program itself has. Texts of other kinds are seeds without a generator.
 fn texts() -> Seeds {
-    let mut seeds: Seeds = vec![
-        ("sensor_toml/seed-template".into(), hzn_calib::template::SENSOR_TOML.replace("file", "fil").into()),
-        (
-            "sensor_toml/seed-small".into(),
-            b"preset = \"moon\"\n[camera]\nwidth = 64\nheight = 48\nfx_px = 60\nfy_px = 60\ncx_px = 31.5\ncy_px = 23.5\n".into(),
-        ),
-        (
-            "sensor_toml/seed-bodies".into(),
-            b"[camera]\nwidth = 9\nheight = 9\nmodel = \"equidistant\"\nfx_px = 6\nfy_px = 6\ncx_px = 4\ncy_px = 4\n[[bodies]]\nkind = \"sun\"\n[[bodies]]\naltitude_km = 300\n[mask]\npolygons_px = [[[1, 2], [3, 4], [5, 1]]]\n".into(),
-        ),
-        (
-            "frames_csv/seed-all".into(),
-            b"file,time_s,utc,altitude_km,x_km,y_km,z_km,qw,qx,qy,qz,attitude_sigma_deg,sun_x,sun_y,sun_z,rate_x,rate_y,rate_z\na.png,1.5,2020-11-20T08:30:00Z,400,6778,0,0,1,0,0,0,5,0,0,1,0.1,0,0\nb.png,,,,,,,,,,,,,,,,,\n".into(),
-        ),
-        ("frames_csv/seed-few".into(), b"file,altitude_km\n\"a, \"\"b\"\".png\",230\nc,1e3\n# a comment\nd,\n".into()),
-        ("frames_csv/seed-wrong".into(), b"name;altitude\na;1\n".into()),
-    ];
+    // The targets leave out texts that name another file.
+    let without_files = |text: &str| text.replace("file", "fil").into_bytes();
+    let mut seeds = vec![("sensor_toml/seed-template".into(), without_files(hzn_calib::template::SENSOR_TOML))];
     for (name, _, text) in hzn_sim::scenario::BUILTIN {
-        seeds.push((format!("scene_toml/seed-{name}"), text.replace("file", "fil").into()));
+        seeds.push((format!("scene_toml/seed-{name}"), without_files(text)));
     }
-    let kalibr = "cam0:\n  camera_model: pinhole\n  intrinsics: [300.0, 301.0, 320.0, 240.0]\n  distortion_model: equidistant\n  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]\n  resolution: [640, 480]\ncam1:\n  camera_model: ds\n  intrinsics: [-0.2, 0.6, 300, 300, 320, 240]\n  distortion_model: none\n  distortion_coeffs: []\n  resolution: [640, 480]\n";
-    let opencv = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n  rows: 3\n  cols: 3\n  dt: d\n  data: [300., 0., 320., 0., 300., 240., 0., 0., 1.]\ndistortion_coefficients: !!opencv-matrix\n  rows: 1\n  cols: 5\n  dt: d\n  data: [0.1, 0., 0., 0., 0.]\n";
-    let xml = "<?xml version=\"1.0\"?>\n<opencv_storage><image_width>64</image_width><image_height>48</image_height><camera_matrix type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt><data>60 0 32 0 60 24 0 0 1</data></camera_matrix></opencv_storage>\n";
-    let json =
-        "{\"image_width\": 64, \"image_height\": 48, \"camera_matrix\": [[60, 0, 32], [0, 60, 24], [0, 0, 1]]}\n";
-    let cameras = [("kalibr", kalibr), ("opencv", opencv), ("xml", xml), ("json", json)];
-    seeds.extend(cameras.map(|(name, text)| (format!("camera_file/seed-{name}"), text.into())));
-    let tables = [
-        (
-            "imu",
-            "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2,saturated\n0,0,0,0,0,0,9.8,0\n0.01,0,0,0.1,0,0,9.8,0\n",
-        ),
-        ("gnss", "time_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps\n0,6.4e6,0,0,0,0,0\n1,6.4e6,1,0,,,\n"),
-        ("attitudes", "time_s,qw,qx,qy,qz,sigma_deg\n0,1,0,0,0,0.1\n"),
-        (
-            "truth",
-            "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,qw,qx,qy,qz\na.png,0,earth,1,0,0,1,70,400,1,0,0,0\n",
-        ),
-        ("points", "file,u_px,v_px,azimuth_deg,elevation_deg\na,1,2,3,4\n"),
-        ("fuse", "[imu]\n"),
-    ];
-    seeds.extend(
-        (0..).zip(tables).map(|(which, (name, text))| kind(&format!("tables/seed-{name}"), which, text.as_bytes())),
-    );
     seeds
 }
 

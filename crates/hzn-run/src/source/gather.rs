@@ -22,8 +22,8 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Everything that is no folder counts as a file. A link into an archive that is not mounted, a device or a pipe with
-    /// the name of a picture is a picture that cannot be read.
+    /// Everything that is no folder counts as a file. A link into an archive that is not mounted, a device or a pipe
+    /// with the name of a picture is a picture that cannot be read.
     fn from_path(path: &Path) -> Self {
         if path.is_dir() { Self::Folder } else { Self::File }
     }
