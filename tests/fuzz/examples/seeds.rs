@@ -35,7 +35,7 @@ fn kind(name: &str, which: u8, bytes: &[u8]) -> (String, Vec<u8>) {
 fn pictures() -> Seeds {
     let mut seeds = Seeds::new();
     for preset in 0..6u8 {
-        let noise: Vec<u8> = (0..900u32).map(|i| (i * i * 31 >> 3) as u8).collect();
+        let noise: Vec<u8> = (0..900u32).map(|i| ((i * i * 31) >> 3) as u8).collect();
         for (shape, pixels) in [("step", vec![10; 900]), ("noise", noise)] {
             let mut bytes = vec![63, 0, 47, 0, preset % 4, 0, 60, preset, 0, 0, 0, 24, 0, 0, 1, 0, 1, 0, 0, 0];
             bytes.extend(&pixels);

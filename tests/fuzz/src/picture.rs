@@ -28,7 +28,7 @@ fn config(input: &mut Input<'_>, width: u16, height: u16) -> Config {
     for _ in 0..input.below(5) {
         let before = config.clone();
         let number = numbers[input.below(numbers.len())];
-        let value = if input.byte() % 2 == 0 { input.number() } else { f64::from(input.byte()) / 4.0 };
+        let value = if input.byte().is_multiple_of(2) { input.number() } else { f64::from(input.byte()) / 4.0 };
         // A refused value, or values that contradict each other, leave the configuration as it was.
         if config.set_number(number, value) != Some(true) || config.check().is_err() {
             config = before;
@@ -48,11 +48,12 @@ fn check<T: Real>(report: &Report<T>) {
 }
 
 fn prior<T: Real>(input: &mut Input<'_>) -> Prior<T> {
-    let some = |input: &mut Input<'_>| (input.byte() % 4 == 0).then(|| T::from_f64(input.number()));
+    let some = |input: &mut Input<'_>| input.byte().is_multiple_of(4).then(|| T::from_f64(input.number()));
     let altitude_m = some(input);
     let attitude_sigma_rad = some(input);
-    let vector =
-        |input: &mut Input<'_>| (input.byte() % 4 == 0).then(|| std::array::from_fn(|_| T::from_f64(input.number())));
+    let vector = |input: &mut Input<'_>| {
+        input.byte().is_multiple_of(4).then(|| std::array::from_fn(|_| T::from_f64(input.number())))
+    };
     Prior { altitude_m, attitude_sigma_rad, position_m: vector(input), rate_rad_s: vector(input), ..Prior::default() }
 }
 
