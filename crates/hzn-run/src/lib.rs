@@ -2,7 +2,8 @@
 //! can read.
 //!
 //! A [`source`] hands out pictures in order. The [`engine`] processes them with the sensor on all cores. A [`sink`]
-//! takes the results in order. [`results`] reads the files that a sink wrote. [`overlay`] draws the result over a
+//! takes the results in order. [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of
+//! their rows. [`overlay`] draws the result over a
 //! picture, and [`explain`] describes in words what happened to it. [`scene`] reads the scenes for the simulator.
 //! [`disk`] has the errors of files that cannot be written.
 //!
