@@ -16,11 +16,18 @@ pub(crate) fn call(data: &[u8]) {
     unsafe {
         let memory = alloc(layout);
         let mut sensor = ptr::null_mut();
-        assert_eq!(hzn_open(ptr::null_mut(), layout.size(), &mut sensor), hzn_open(memory, layout.size(), ptr::null_mut()));
+        assert_eq!(
+            hzn_open(ptr::null_mut(), layout.size(), &mut sensor),
+            hzn_open(memory, layout.size(), ptr::null_mut())
+        );
         if hzn_open(memory, layout.size() - short, &mut sensor) == 0 {
             for _ in 0..byte() % 8 {
                 let number = u16::from_le_bytes([byte(), byte() % 2]);
-                let value = if byte() % 2 == 0 { f64::from(byte()) } else { f64::from_le_bytes(std::array::from_fn(|_| byte())) };
+                let value = if byte() % 2 == 0 {
+                    f64::from(byte())
+                } else {
+                    f64::from_le_bytes(std::array::from_fn(|_| byte()))
+                };
                 if hzn_set(sensor, number, value) == 0 {
                     let mut found = f64::NAN;
                     assert_eq!(hzn_get(sensor, number, &mut found), 0);
@@ -28,7 +35,8 @@ pub(crate) fn call(data: &[u8]) {
                 hzn_get(sensor, number, ptr::null_mut());
             }
             hzn_apply(sensor);
-            let pixels: Vec<u8> = data.iter().cycle().take(if data.is_empty() { 0 } else { 640 * 480 }).copied().collect();
+            let pixels: Vec<u8> =
+                data.iter().cycle().take(if data.is_empty() { 0 } else { 640 * 480 }).copied().collect();
             let less = usize::from(byte() % 3);
             let picture = HznPicture {
                 pixels: pixels.as_ptr(),
