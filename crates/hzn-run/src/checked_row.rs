@@ -130,9 +130,11 @@ mod tests {
             for at in (0..line.len()).filter(|at| line[*at].is_ascii_digit() && !(time..time + 4).contains(at)) {
                 let mut changed = line.clone();
                 changed[at] = if changed[at] == b'9' { b'8' } else { changed[at] + 1 };
-                // A digit of a key makes an unknown key, and then the value is missing.
-                let key = String::from_utf8_lossy(line)[..at].ends_with("crc") || read(&changed).is_ok();
-                assert!(!key || line == &json && read(&changed).is_ok_and(|r| r == row), "{at}");
+                // The last digit of a number may stand for the same number, and a digit of a key makes an unknown key.
+                // The row is then the same, or is refused.
+                if let Ok(read) = read(&changed) {
+                    assert_eq!(read, row, "{at}");
+                }
             }
         }
     }
