@@ -5,6 +5,7 @@
 //! cargo xtask bench      compares hzn-core with the OpenCV recipe, in one run
 //! cargo xtask reproduce  compares our numbers with the published ones and writes book/results/reproduction.md
 //! cargo xtask firmware   builds the images for the flight computer and counts their instructions
+//! cargo xtask campaign   looks for faults: fuzzing, killed runs, long runs
 //! cargo xtask keys       writes the files that follow from the keys of sensor.toml: table, template, JSON schema,
 //!                        types of Python
 //! cargo xtask viewer     makes the picture of the viewer's window in the documents
@@ -12,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod campaign;
 mod demo;
 mod firmware;
 mod flight_build;
@@ -27,7 +29,7 @@ mod wheel;
 
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware|keys|viewer> [OPTION]...
+const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|keys|viewer> [OPTION]...
 
   test [STEP]...     runs all steps, or those whose name contains one of the words;
                      CI=true turns a step that cannot run into a failure
@@ -39,6 +41,8 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|firmware|keys|view
                      compares samplers of outliers on simulated edge points
   reproduce [STUDY]...
                      measures the numbers of book/results/reproduction.md again and writes the file (see --help there)
+  campaign <fuzz|kill|long|parts> [ARG]...
+                     looks for faults, and lists what hzn is built from (see book/results/reliability.md)
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into book/results/firmware-cost.md;
                      --by-feature prints only how much flash the methods of published systems take
@@ -56,6 +60,7 @@ fn main() -> ExitCode {
         "test" => test::run(rest),
         "bench" => bench::run(rest),
         "reproduce" => reproduce::run(rest),
+        "campaign" => campaign::run(rest),
         "firmware" => firmware::run(rest),
         "keys" => write_keys(),
         "viewer" => viewer::run(),

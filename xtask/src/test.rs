@@ -55,7 +55,7 @@ fn check_core_with(features: &str) -> Outcome {
 /// Packs every crate that is meant to be published, without building it again.
 fn check_packages() -> Outcome {
     let mut cargo = cargo(&["package", "--workspace", "--no-verify", "--allow-dirty", "--quiet"]);
-    for unpublished in ["hzn-py", "hzn-tests", "hzn-reproduce", "hzn-benches", "xtask"] {
+    for unpublished in ["hzn-py", "hzn-tests", "hzn-fuzz", "hzn-reproduce", "hzn-benches", "xtask"] {
         cargo.args(["--exclude", unpublished]);
     }
     steps::run(&mut cargo)

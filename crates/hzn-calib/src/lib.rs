@@ -30,6 +30,7 @@ pub mod frames;
 mod ideal;
 pub mod keys;
 pub mod lens_error;
+pub mod limited;
 mod located;
 mod merge;
 mod nearest;

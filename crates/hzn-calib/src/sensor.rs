@@ -21,7 +21,7 @@ use crate::located::{
 };
 use crate::merge::{merge_missing, take};
 use crate::nearest::suggestion;
-use crate::{Problem, plausible};
+use crate::{Problem, limited, plausible};
 
 /// A sensor.toml that was read and checked.
 #[derive(Debug, Clone)]
@@ -39,7 +39,7 @@ pub struct Sensor {
 /// # Errors
 /// The first error in the file.
 pub fn load(path: &Path) -> Result<Sensor, Problem> {
-    let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
+    let text = limited::read_text(path, limited::SETTINGS_BYTES).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => {
             Problem::new(path, "no such file; `hzn init` writes a commented sensor.toml to start from")
         }

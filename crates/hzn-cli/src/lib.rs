@@ -22,6 +22,7 @@ use exit::Exit;
 
 /// Runs the command line and returns how it ended. Errors are printed on stderr.
 pub fn main() -> Exit {
+    report_file_size_limit();
     // clap itself prints help and usage errors, and exits with 0 or 2.
     let cli = commands::Cli::parse();
     match commands::run(cli) {
@@ -33,6 +34,17 @@ pub fn main() -> Exit {
             }
             stop.exit
         }
+    }
+}
+
+/// Makes a write beyond the limit of the file size (`ulimit -f`) an error with a message. Without this, a signal ends
+/// the program without a word. The threads that are started later inherit the setting.
+fn report_file_size_limit() {
+    #[cfg(unix)]
+    {
+        use nix::sys::signal::{SigSet, Signal};
+        // If it fails, the program ends by the signal as before.
+        let _ = SigSet::from(Signal::SIGXFSZ).thread_block();
     }
 }
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use hzn_calib::limited;
 use hzn_nav::options::{Block, CameraOptions, ImuOptions, Mode, Options, StartSigmas};
 use serde::{Deserialize, Serialize};
 
@@ -237,7 +238,8 @@ impl Settings {
     /// # Errors
     /// The file cannot be read, or a key or value is refused; the message has the line and the key.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::unusable(format!("{}: {e}", path.display())))?;
+        let text = limited::read_text(path, limited::SETTINGS_BYTES)
+            .map_err(|e| Error::unusable(format!("{}: {e}", path.display())))?;
         hzn_calib::document::parse(&text, path, Self::check).map_err(Error::unusable)
     }
 

@@ -1,15 +1,12 @@
 //! Reads pictures from MCAP files of any writer, as an input.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use mcap::McapError;
-use mcap::sans_io::linear_reader::LinearReaderOptions;
-
 use crate::cdr;
-use crate::container::MAX_RECORD_BYTES;
+use crate::container::{Chunk, Fields, Inflation, MAGIC, Message, Op, Record, Scanner};
 use crate::error::Error;
 use crate::frame::EncodedImage;
 use crate::messages;
@@ -29,12 +26,25 @@ pub struct InputImage {
 /// `sensor_msgs/msg/CompressedImage` in CDR. Chunks may be uncompressed or compressed with zstd. A file that was cut
 /// off gives all complete pictures.
 pub struct ImageReader {
-    messages: mcap::io::MessageReader<BufReader<File>>,
+    scanner: Scanner<BufReader<File>>,
     path: PathBuf,
     topic: Option<String>,
     others: BTreeSet<String>,
+    schemas: BTreeMap<u16, String>,
+    channels: BTreeMap<u16, Channel>,
+    inflation: Inflation,
+    /// Pictures of the chunk that was read last.
+    ready: VecDeque<InputImage>,
     done: bool,
     broken: Option<String>,
+}
+
+/// A channel of any kind of messages.
+#[derive(Debug, Clone)]
+struct Channel {
+    topic: String,
+    schema: String,
+    encoding: String,
 }
 
 impl std::fmt::Debug for ImageReader {
@@ -47,19 +57,21 @@ impl ImageReader {
     /// Opens an MCAP. Without a `topic`, the topic of the first picture is used.
     ///
     /// # Errors
-    /// The file cannot be read.
+    /// The file cannot be read or is not an MCAP.
     pub fn open(path: impl AsRef<Path>, topic: Option<&str>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let file = File::open(path).map_err(|source| Error::Read { path: path.to_path_buf(), source })?;
-        let options = LinearReaderOptions::default()
-            .with_skip_end_magic(true)
-            .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(MAX_RECORD_BYTES as usize);
+        let read = |source| Error::Read { path: path.to_path_buf(), source };
+        let file = File::open(path).map_err(read)?;
+        let scanner = Scanner::try_new(BufReader::with_capacity(1 << 16, file)).map_err(read)?;
         Ok(Self {
-            messages: mcap::io::MessageReader::new_with_options(BufReader::with_capacity(1 << 16, file), options),
+            scanner: scanner.ok_or_else(|| Error::NotMcap { path: path.to_path_buf() })?,
             path: path.to_path_buf(),
             topic: topic.map(str::to_owned),
             others: BTreeSet::new(),
+            schemas: BTreeMap::new(),
+            channels: BTreeMap::new(),
+            inflation: Inflation::default(),
+            ready: VecDeque::new(),
             done: false,
             broken: None,
         })
@@ -80,6 +92,71 @@ impl ImageReader {
     pub fn other_topics(&self) -> impl Iterator<Item = &str> {
         self.others.iter().map(String::as_str)
     }
+
+    /// Reads the next record. Returns `false` at the end, and sets [`Self::broken`] if the end is not that of a
+    /// recording.
+    fn step(&mut self) -> std::io::Result<bool> {
+        let Some(record) = self.scanner.next()? else {
+            let damaged = ends_as_mcap(&self.path);
+            self.broken = Some(if damaged { "is damaged (a record is not valid)" } else { CUT_OFF }.to_owned());
+            return Ok(false);
+        };
+        match record.op {
+            Op::DATA_END => return Ok(false),
+            Op::CHUNK => match Chunk::parse(&record, &mut self.inflation) {
+                Ok((chunk, plain)) => {
+                    chunk.index.declared.iter().for_each(|(op, _, content)| self.declare(*op, content));
+                    Chunk::messages(&plain).for_each(|message| self.add(&message));
+                }
+                Err(why) => {
+                    let cut = !ends_as_mcap(&self.path);
+                    self.broken = Some(if cut { CUT_OFF.to_owned() } else { format!("is damaged ({why})") });
+                    return Ok(false);
+                }
+            },
+            Op::MESSAGE => Message::parse(&record.content).iter().for_each(|message| self.add(message)),
+            _ => {
+                let Record { op, content } = record;
+                self.declare(op, &content);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Reads a schema or channel.
+    fn declare(&mut self, op: u8, content: &[u8]) {
+        let mut f = Fields(content);
+        match op {
+            Op::SCHEMA => {
+                if let (Some(id), Some(name)) = (f.u16(), f.text()) {
+                    self.schemas.insert(id, name.to_owned());
+                }
+            }
+            Op::CHANNEL => {
+                if let (Some(id), Some(schema), Some(topic), Some(encoding)) = (f.u16(), f.u16(), f.text(), f.text()) {
+                    let schema = self.schemas.get(&schema).cloned().unwrap_or_default();
+                    let channel = Channel { topic: topic.to_owned(), schema, encoding: encoding.to_owned() };
+                    self.channels.insert(id, channel);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Decodes the picture of a message, if the message has one and its topic is wanted.
+    fn add(&mut self, message: &Message<'_>) {
+        let Some(channel) = self.channels.get(&message.channel) else { return };
+        let Some(decode) = decoder(&channel.schema, &channel.encoding) else { return };
+        if *self.topic.get_or_insert_with(|| channel.topic.clone()) != channel.topic {
+            self.others.insert(channel.topic.clone());
+            return;
+        }
+        let log_time_s = message.log_time_ns as f64 * 1e-9;
+        self.ready.push_back(match decode(&channel.schema, message.data) {
+            Ok((image, time_s)) => InputImage { time_s: time_s.unwrap_or(log_time_s), image: Ok(image) },
+            Err(reason) => InputImage { time_s: log_time_s, image: Err(reason) },
+        });
+    }
 }
 
 /// Reason for a recording whose end is missing.
@@ -94,7 +171,7 @@ fn ends_as_mcap(path: &Path) -> bool {
         file.read_exact(&mut last)?;
         Ok(last)
     };
-    last().is_ok_and(|last| last == *mcap::MAGIC)
+    last().is_ok_and(|last| last == MAGIC)
 }
 
 /// Returns the decoder for a channel's pictures; `None` for other messages.
@@ -116,40 +193,20 @@ impl Iterator for ImageReader {
     type Item = Result<InputImage, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        while !self.done {
-            let Some(message) = self.messages.next() else {
-                self.done = true;
-                // The file may be cut off between two records.
-                self.broken = (!ends_as_mcap(&self.path)).then(|| CUT_OFF.to_owned());
-                return None;
-            };
-            let message = match message {
-                Ok(message) => message,
-                Err(e) => {
-                    self.done = true;
-                    // All complete pictures were returned before.
-                    self.broken = match e {
-                        McapError::BadMagic => return Some(Err(Error::NotMcap { path: self.path.clone() })),
-                        McapError::UnexpectedEof | McapError::UnexpectedEoc => Some(CUT_OFF.to_owned()),
-                        _ if !ends_as_mcap(&self.path) => Some(CUT_OFF.to_owned()),
-                        e => Some(format!("is damaged ({e})")),
-                    };
-                    return None;
-                }
-            };
-            let channel = &message.channel;
-            let schema = channel.schema.as_ref().map_or("", |s| s.name.as_str());
-            let Some(decode) = decoder(schema, &channel.message_encoding) else { continue };
-            if *self.topic.get_or_insert_with(|| channel.topic.clone()) != channel.topic {
-                self.others.insert(channel.topic.clone());
-                continue;
+        loop {
+            if let Some(image) = self.ready.pop_front() {
+                return Some(Ok(image));
             }
-            let log_time_s = message.log_time as f64 * 1e-9;
-            return Some(Ok(match decode(schema, &message.data) {
-                Ok((image, time_s)) => InputImage { time_s: time_s.unwrap_or(log_time_s), image: Ok(image) },
-                Err(reason) => InputImage { time_s: log_time_s, image: Err(reason) },
-            }));
+            if self.done {
+                return None;
+            }
+            match self.step() {
+                Ok(more) => self.done = !more,
+                Err(source) => {
+                    self.done = true;
+                    return Some(Err(Error::Read { path: self.path.clone(), source }));
+                }
+            }
         }
-        None
     }
 }

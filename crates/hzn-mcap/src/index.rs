@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use crate::container::{Chunk, Fields, MAGIC, MAX_RECORD_BYTES, Message, Op, Record};
+use crate::container::{Chunk, Fields, Inflation, MAGIC, MAX_RECORD_BYTES, Message, Op, Record};
 use crate::error::Error;
 use crate::frame::{CandidateEdge, PicturePrior};
 use crate::images::{InputImage, decoder};
@@ -70,6 +70,7 @@ pub struct Index {
     pictures: BTreeMap<u16, Kind>,
     reports: Option<u16>,
     complete: bool,
+    inflation: Inflation,
     broken_chunks: u64,
 }
 
@@ -95,6 +96,7 @@ impl Index {
             pictures: BTreeMap::new(),
             reports: None,
             complete: false,
+            inflation: Inflation::default(),
             broken_chunks: 0,
         };
         while let Some((op, length)) = index.read_head().map_err(read)? {
@@ -179,7 +181,7 @@ impl Index {
     fn read_compressed_chunk(&mut self, length: u64, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
         let start = self.position;
         let Some(content) = self.read_content(length)? else { return Ok(Ok(false)) };
-        let Some((chunk, plain)) = Chunk::parse(&Record { op: Op::CHUNK, content }) else {
+        let Ok((chunk, plain)) = Chunk::parse(&Record { op: Op::CHUNK, content }, &mut self.inflation) else {
             self.broken_chunks += 1;
             return Ok(Ok(true));
         };
@@ -413,7 +415,9 @@ fn read_message_in_chunk(file: &mut File, chunk: u64, message: u64) -> io::Resul
     if length == [0; 4] {
         return Ok(read_record(file, message)?.map(|r| r.content));
     }
-    let Some((_, plain)) = read_record(file, chunk)?.as_ref().and_then(Chunk::parse) else { return Ok(None) };
+    // One chunk is read at a time, so only the limit of a chunk matters.
+    let parsed = read_record(file, chunk)?.and_then(|r| Chunk::parse(&r, &mut Inflation::default()).ok());
+    let Some((_, plain)) = parsed else { return Ok(None) };
     let mut rest = Fields(plain.get(message as usize..).unwrap_or_default());
     Ok(next_record(&mut rest, plain.len()).map(|(_, _, content)| content.to_vec()))
 }

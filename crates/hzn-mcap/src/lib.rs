@@ -61,7 +61,7 @@ pub use frame::{
 };
 pub use images::{ImageReader, InputImage};
 pub use index::{Index, IndexEntry, Pictures, Place};
-pub use part::{create_part, open_part, part_path};
+pub use part::{create_part, is_being_written, open_part, part_path, publish, rename, sync, sync_name};
 pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};
 pub use row::{Row, RowMeta, roll_pitch_deg};

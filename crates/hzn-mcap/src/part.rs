@@ -1,8 +1,10 @@
 //! The file of unfinished results. Only one run at a time may write it.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
+
+use crate::error::parent_folder;
 
 /// Returns the name of a recording until it is finished: `out.mcap.part`.
 pub fn part_path(path: &Path) -> PathBuf {
@@ -39,4 +41,62 @@ pub fn create_part(part: &Path) -> io::Result<File> {
         file.set_len(0)?;
     }
     Ok(file)
+}
+
+/// Returns whether another run is writing this unfinished file now.
+pub fn is_being_written(part: &Path) -> bool {
+    // Only a regular file is opened, because to open a pipe would wait for its other end.
+    let is_file = fs::metadata(part).is_ok_and(|meta| meta.is_file());
+    is_file && open_part(part).is_err_and(|e| e.kind() == io::ErrorKind::ResourceBusy)
+}
+
+/// Passes the content of a file to the disk: a power cut can no longer lose it.
+///
+/// # Errors
+/// The disk fails. It is no error if the file is on a device or a file system that cannot do this.
+pub fn sync(file: &File) -> io::Result<()> {
+    ignore_impossible(file.sync_data())
+}
+
+/// Gives a finished file its final name. After a power cut, either the earlier file of that name is there, or this file
+/// with all of its content.
+///
+/// # Errors
+/// The disk fails.
+pub fn publish(file: &File, part: &Path, path: &Path) -> io::Result<()> {
+    // Without this order the disk may have the new name before it has the content.
+    sync(file)?;
+    rename(part, path)
+}
+
+/// Renames a file whose content is on the disk already, and passes the new name to the disk.
+///
+/// # Errors
+/// The disk fails.
+pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    fs::rename(from, to)?;
+    sync_name(to)
+}
+
+/// Passes the entry of a file in its folder to the disk. Only Unix systems can do this; on others it does nothing.
+///
+/// # Errors
+/// The disk fails.
+pub fn sync_name(path: &Path) -> io::Result<()> {
+    if !cfg!(unix) {
+        return Ok(());
+    }
+    match File::open(parent_folder(path)) {
+        Ok(folder) => ignore_impossible(folder.sync_all()),
+        // A folder may be writable and not readable; then its entries cannot be passed on.
+        Err(e) if e.kind() == io::ErrorKind::PermissionDenied => Ok(()),
+        Err(e) => Err(e),
+    }
+}
+
+fn ignore_impossible(synced: io::Result<()>) -> io::Result<()> {
+    synced.or_else(|e| match e.kind() {
+        io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported => Ok(()),
+        _ => Err(e),
+    })
 }

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use crate::container::{Chunk, Fields, Message, Op, Record, Scanner};
+use crate::container::{Chunk, Fields, Inflation, Message, Op, Record, Scanner};
 use crate::drawing;
 use crate::error::Error;
 use crate::frame::{Annotations, Attitude, EncodedImage, FrameRecord, LogLine};
@@ -39,6 +39,7 @@ pub struct Reader {
     images: Parts<EncodedImage>,
     ready: VecDeque<FrameRecord>,
     complete: bool,
+    inflation: Inflation,
     broken_chunks: u64,
     done: bool,
 }
@@ -79,6 +80,7 @@ impl Reader {
             images: BTreeMap::new(),
             ready: VecDeque::new(),
             complete: false,
+            inflation: Inflation::default(),
             broken_chunks: 0,
             done: false,
         };
@@ -144,7 +146,7 @@ impl Reader {
 
     /// Assembles frames from the messages of a chunk.
     fn read_chunk(&mut self, record: &Record) -> Result<(), Error> {
-        let Some((chunk, plain)) = Chunk::parse(record) else {
+        let Ok((chunk, plain)) = Chunk::parse(record, &mut self.inflation) else {
             self.broken_chunks += 1;
             return Ok(());
         };

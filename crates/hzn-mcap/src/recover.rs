@@ -4,9 +4,9 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Read};
 use std::path::{Path, PathBuf};
 
-use crate::container::{Chunk, Container, Fields, MAGIC, Op, Record, Scanner};
+use crate::container::{Chunk, Container, Fields, Inflation, MAGIC, Op, Record, Scanner};
 use crate::error::{Error, while_writing};
-use crate::part::{open_part, part_path};
+use crate::part::{open_part, part_path, publish};
 use crate::reader::{Contents, Reader, count_reports};
 use crate::topics::Topic;
 use crate::writer::{LIBRARY, Options, Writer, open_container, refuse_existing};
@@ -59,8 +59,8 @@ pub fn recover_while(
     let part = part_path(output);
     let mut out = open_container(&part).map_err(|e| while_writing(&part, e))?;
     let closed = copy_frames(input, &mut out, &part, &mut wanted).and_then(|found| {
-        out.finish().map_err(|e| while_writing(&part, e))?;
-        fs::rename(&part, output).map_err(|e| while_writing(output, e))?;
+        let file = out.finish().map_err(|e| while_writing(&part, e))?;
+        publish(file.get_ref(), &part, output).map_err(|e| while_writing(output, e))?;
         Ok(found)
     });
     if closed.is_err() {
@@ -122,7 +122,7 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     let copied = open_container(&copy_path).map_err(failed).and_then(|mut out| {
         let found = copy_frames(&part, &mut out, &part, &mut |_, _| true)?;
         out.flush().map_err(failed)?;
-        fs::rename(&copy_path, &part).map_err(failed)?;
+        publish(out.output().get_ref(), &copy_path, &part).map_err(failed)?;
         Ok((found, out))
     });
     if copied.is_err() {
@@ -172,7 +172,13 @@ fn copy_frames(
     let mut scanner = scanner.ok_or_else(|| Error::NotMcap { path: input.to_path_buf() })?;
     let write = |e| while_writing(part, e);
 
-    let mut copier = FrameCopier { out, found: Recovered::default(), report_channel: None, waiting: Vec::new() };
+    let mut copier = FrameCopier {
+        out,
+        found: Recovered::default(),
+        report_channel: None,
+        waiting: Vec::new(),
+        inflation: Inflation::default(),
+    };
     let mut kept_to = scanner.position();
     while let Some(record) = scanner.next().map_err(read)? {
         if !wanted(scanner.position(), size) {
@@ -199,15 +205,16 @@ struct FrameCopier<'a> {
     report_channel: Option<u16>,
     /// Chunks with pictures, which wait for their reports.
     waiting: Vec<Chunk>,
+    inflation: Inflation,
 }
 
 impl FrameCopier<'_> {
     /// Adds a record that is not the end of the data. It returns `false` if the record waits for another.
     fn add(&mut self, record: &Record) -> io::Result<bool> {
         match record.op {
-            Op::CHUNK => match Chunk::parse(record) {
-                Some((chunk, plain)) => return self.add_chunk(chunk, &plain),
-                None => self.found.broken_chunks += 1,
+            Op::CHUNK => match Chunk::parse(record, &mut self.inflation) {
+                Ok((chunk, plain)) => return self.add_chunk(chunk, &plain),
+                Err(_) => self.found.broken_chunks += 1,
             },
             // The message indexes are written again.
             Op::MESSAGE_INDEX => {}

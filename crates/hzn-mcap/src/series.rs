@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use crate::error::Error;
 use crate::messages::{stamp, time_ns};
-use crate::part::part_path;
+use crate::part::{part_path, publish};
 
 /// A place and an attitude relative to a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,7 +120,9 @@ impl SeriesWriter {
     /// The disk is full or broken.
     pub fn finish(mut self) -> Result<(), Error> {
         self.writer.finish().map_err(to_io).map_err(|e| self.refuse(e))?;
-        std::fs::rename(part_path(&self.path), &self.path).map_err(|e| self.refuse(e))
+        let refuse = |source| Error::Write { path: self.path.clone(), source };
+        let file = self.writer.into_inner();
+        publish(file.get_ref(), &part_path(&self.path), &self.path).map_err(refuse)
     }
 
     fn protobuf<M: Message + Encode>(&mut self, topic: &str, time_s: f64, message: &M) -> Result<(), Error> {

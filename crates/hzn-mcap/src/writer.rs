@@ -1,7 +1,7 @@
 //! Writes a recording that stays readable if the program ends at any moment.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use crate::drawing;
 use crate::error::{Error, while_writing};
 use crate::frame::FrameRecord;
 use crate::messages;
-use crate::part::{create_part, part_path};
+use crate::part::{create_part, part_path, publish, sync, sync_name};
 use crate::topics::Topic;
 
 /// Longest time from a frame until it is finished, as long as further frames come.
@@ -37,6 +37,9 @@ pub struct Options {
     pub camera: Option<camera::Config>,
     /// Whether an existing output, or the remains of a run, may be replaced.
     pub force: bool,
+    /// Whether a finished frame is on the disk, so that also a power cut cannot lose it. Otherwise the operating system
+    /// may still keep it in its memory.
+    pub durable: bool,
 }
 
 /// A recording that is being written. If it is dropped without [`Writer::finish`], its `.part` file stays with every
@@ -55,6 +58,7 @@ pub struct Writer {
     /// Log time of the last frame.
     last_ns: u64,
     frames: u64,
+    durable: bool,
 }
 
 impl Writer {
@@ -93,6 +97,7 @@ impl Writer {
             last_calibration_ns: None,
             last_ns: 0,
             frames: 0,
+            durable: options.durable,
         }
     }
 
@@ -219,7 +224,7 @@ impl Writer {
         let Some(mut container) = self.container.take() else {
             return Err(Error::AfterFailure { path: self.part.clone() });
         };
-        let (images, data) = (&mut self.images, &mut self.data);
+        let (images, data, durable) = (&mut self.images, &mut self.data, self.durable);
         let mut write = || -> std::io::Result<()> {
             // Pictures come first: a frame with a report is complete.
             if !images.is_empty() {
@@ -230,7 +235,8 @@ impl Writer {
             if !data.is_empty() {
                 container.chunk(&data.take(true)?)?;
             }
-            container.flush()
+            container.flush()?;
+            if durable { sync(container.output().get_ref()) } else { Ok(()) }
         };
         match write() {
             Ok(()) => {
@@ -252,8 +258,8 @@ impl Writer {
             return Err(Error::AfterFailure { path: self.part.clone() });
         };
         let failed = |e| while_writing(&self.part, e);
-        container.finish().map_err(failed)?;
-        fs::rename(&self.part, &self.path).map_err(|e| while_writing(&self.path, e))?;
+        let file = container.finish().map_err(failed)?;
+        publish(file.get_ref(), &self.part, &self.path).map_err(|e| while_writing(&self.path, e))?;
         Ok(self.path.clone())
     }
 }
@@ -288,6 +294,10 @@ fn begin_recording(part: &Path, options: &Options) -> std::io::Result<Container<
     metadata.insert("hzn_mcap_version".into(), env!("CARGO_PKG_VERSION").into());
     container.metadata("hzn", &metadata)?;
     container.flush()?;
+    if options.durable {
+        sync(container.output().get_ref())?;
+        sync_name(part)?;
+    }
     Ok(container)
 }
 

@@ -20,6 +20,7 @@ fn options() -> Options {
         metadata: BTreeMap::from([("hzn_version".to_owned(), "0.0.0".to_owned())]),
         camera: Some(camera::Config::ideal(camera::Model::Pinhole, 640, 480, 400.0)),
         force: false,
+        durable: false,
     }
 }
 
@@ -266,7 +267,7 @@ fn errors_name_the_place_and_the_way_out() {
     let text = dir.path().join("a.txt");
     fs::write(&text, "not an mcap at all").unwrap();
     assert!(matches!(Reader::open(&text, Contents::All), Err(Error::NotMcap { .. })));
-    assert!(matches!(ImageReader::open(&text, None).unwrap().next(), Some(Err(Error::NotMcap { .. }))));
+    assert!(matches!(ImageReader::open(&text, None), Err(Error::NotMcap { .. })));
 }
 
 /// A full disk, simulated by the system's `/dev/full`.

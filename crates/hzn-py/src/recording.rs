@@ -184,7 +184,8 @@ pub(crate) fn write_mcap(py: Python<'_>, path: PathBuf, sensor: &Sensor, reports
     errors::detached(py, || {
         let sensor_toml = toml::to_string(&config).map_err(errors::other)?;
         let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
-        let options = hzn_mcap::Options { sensor_toml, metadata, camera: Some(config.camera), force: true };
+        let camera = Some(config.camera);
+        let options = hzn_mcap::Options { sensor_toml, metadata, camera, force: true, durable: false };
         let mut writer = hzn_mcap::Writer::create(&path, &options).map_err(errors::other)?;
         frames.iter().try_for_each(|bodies| writer.write_bodies(bodies)).map_err(errors::other)?;
         writer.finish().map(drop).map_err(errors::other)

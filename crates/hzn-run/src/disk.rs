@@ -1,5 +1,6 @@
 //! Paths and errors of files that are written, with advice for the user.
 
+use std::io::Write;
 use std::path::Path;
 
 use crate::error::{Error, Remedy, failed, unusable};
@@ -28,9 +29,12 @@ pub fn refuse_existing(path: &Path, force: bool) -> Result<(), Error> {
 pub fn write_whole(path: &Path, text: &str) -> Result<(), Error> {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
-    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));
+    let part = Path::new(&part);
+    let written = std::fs::File::create(part)
+        .and_then(|mut file| file.write_all(text.as_bytes()).map(|()| file))
+        .and_then(|file| hzn_mcap::publish(&file, part, path));
     written.map_err(|e| {
-        let _ = std::fs::remove_file(&part);
+        let _ = std::fs::remove_file(part);
         cannot_write(path, &e)
     })
 }

@@ -2,15 +2,16 @@
 //! can read.
 //!
 //! A [`source`] hands out pictures in order. The [`engine`] processes them with the sensor on all cores. A [`sink`]
-//! takes the results in order. [`results`] reads the files that a sink wrote. [`overlay`] draws the result over a
-//! picture, and [`explain`] describes in words what happened to it. [`scene`] reads the scenes for the simulator.
-//! [`disk`] has the errors of files that cannot be written.
+//! takes the results in order. [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of
+//! their rows. [`overlay`] draws the result over a picture, and [`explain`] describes in words what happened to it.
+//! [`scene`] reads the scenes for the simulator. [`disk`] has the errors of files that cannot be written.
 //!
 //! The command line, the Python package and the viewer are built on this crate. It prints nothing, and its [`Error`]
 //! contains no exit code and no name of an option.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "a library prints nothing; the caller does")]
 
+pub mod checked_row;
 pub mod disk;
 pub mod engine;
 mod error;

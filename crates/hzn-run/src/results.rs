@@ -5,6 +5,7 @@ use std::path::Path;
 
 use hzn_mcap::{Contents, Reader, Row};
 
+use crate::checked_row::{from_csv, from_json};
 use crate::error::{Error, failed, unusable};
 use crate::source::ending;
 
@@ -40,19 +41,18 @@ pub fn rows(file: &Path, kind: &str) -> Result<AllRows, Error> {
     let refuse = move |line: u64, why: String| failed(format!("{name}:{line}: not a row of hzn results: {why}"));
     match kind {
         "csv" => {
-            let reader = csv::Reader::from_path(file).map_err(failed)?;
-            let why = |e: csv::Error| match e.kind() {
-                // The line number is already in the message.
-                csv::ErrorKind::Deserialize { err, .. } => err.kind().to_string(),
-                _ => e.to_string(),
+            let mut reader = csv::Reader::from_path(file).map_err(failed)?;
+            let header = reader.headers().map_err(failed)?.clone();
+            let row = move |(i, record): (usize, csv::Result<csv::StringRecord>)| {
+                let read = record.map_err(|e| e.to_string()).and_then(|record| from_csv(&record, &header));
+                read.map_err(|why| refuse(i as u64 + 2, why))
             };
-            let row = move |(i, r): (usize, csv::Result<Row>)| r.map_err(|e| refuse(i as u64 + 2, why(e)));
-            Ok(drop_incomplete(Box::new(reader.into_deserialize().enumerate().map(row)), file))
+            Ok(drop_incomplete(Box::new(reader.into_records().enumerate().map(row)), file))
         }
         "jsonl" => {
             let lines = std::io::BufReader::new(std::fs::File::open(file)?).lines();
             let row = move |(i, line): (usize, std::io::Result<String>)| {
-                serde_json::from_str(&line?).map_err(|e| refuse(i as u64 + 1, e.to_string()))
+                from_json(line?.as_bytes()).map_err(|why| refuse(i as u64 + 1, why))
             };
             Ok(drop_incomplete(Box::new(lines.enumerate().map(row)), file))
         }

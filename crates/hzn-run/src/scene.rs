@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use hzn_calib::limited;
 use hzn_sim::scenario::BUILTIN;
 use hzn_sim::{Scenario, ScenarioError};
 
-use crate::disk;
 use crate::error::{Error, unusable};
 
 /// Returns the path and the text of a scene. `name` is one of [`BUILTIN`], or the path of a scene.toml.
@@ -17,12 +17,12 @@ pub fn source(name: &str) -> Result<(PathBuf, String), Error> {
         return Ok((PathBuf::from(name), (*text).to_owned()));
     }
     let path = PathBuf::from(name);
-    let text = std::fs::read_to_string(&path).map_err(|e| {
+    let text = limited::read_text(&path, limited::SETTINGS_BYTES).map_err(|e| {
         let names: Vec<&str> = BUILTIN.iter().map(|b| b.0).collect();
         match hzn_calib::nearest(name, names.iter().copied()) {
             Some(near) if !path.exists() => unusable(format!("{name}: no such scene or file; did you mean {near}?")),
             _ if !path.exists() => unusable(format!("{name}: no such file; built-in scenes are {}", names.join(", "))),
-            _ => disk::cannot_write(&path, &e),
+            _ => unusable(format!("{name}: cannot be read: {e}")),
         }
     })?;
     Ok((path, text))

@@ -12,6 +12,7 @@ use crate::globe::{Globe, RayHit, View};
 use crate::pose::Pose;
 use crate::radiance::{Grid, Radiance, mean_over_globe};
 use crate::texture::{CellCache, CloudField, Clouds};
+use hzn_calib::limited;
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
 use std::path::{Path, PathBuf};
@@ -107,7 +108,7 @@ impl Infrared {
             return Err(format!("{key} has no effect with a table: remove {key} or the table"));
         }
         let path = folder.join(table);
-        let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let text = limited::read_text(&path, limited::TABLE_BYTES).map_err(|e| format!("{}: {e}", path.display()))?;
         let radiance = Radiance::parse(&text).map_err(|e| format!("{}: {e}", path.display()))?;
         self.radiance = Some(Arc::new(radiance));
         Ok(())

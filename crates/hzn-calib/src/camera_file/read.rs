@@ -8,8 +8,8 @@ use serde_json::Value;
 use super::loaded::Loaded;
 use super::reader::Reader;
 use super::{document, kalibr, opencv};
-use crate::Problem;
 use crate::nearest::suggestion;
+use crate::{Problem, limited};
 
 /// Reads a camera file. `name` selects one camera of a camchain, for example `cam1`; without it the first is used.
 ///
@@ -32,7 +32,8 @@ pub fn parse(text: &str, path: &Path, name: Option<&str>) -> Result<Config, Prob
 /// # Errors
 /// The errors are those of [`load`].
 pub fn load_any(path: &Path, name: Option<&str>) -> Result<Loaded, Problem> {
-    let bytes = std::fs::read(path).map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
+    let bytes = limited::read(path, limited::CAMERA_FILE_BYTES)
+        .map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
     let text =
         String::from_utf8(bytes).map_err(|_| Problem::new(path, "is not a text in UTF-8, so it is no camera file"))?;
     parse_any(&text, path, name)

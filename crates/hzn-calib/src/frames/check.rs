@@ -12,6 +12,9 @@ const MAX_DISTANCE_RADII: f64 = 120.0;
 /// Largest plausible rate of the altitude, in km/s. Objects that fly by the Earth reach 11 to 20 km/s.
 const MAX_CLIMB_KM_S: f64 = 30.0;
 
+/// Number of warnings of a kind that are listed one by one; the others are only counted.
+const MAX_LISTED: usize = 3;
+
 /// Returns the altitude in kilometres of a position (ECEF, kilometres): above WGS-84 for `earth`, else above the
 /// radius. The result is `None` for Sun and Moon, because a position relative to the Earth does not give their
 /// distance.
@@ -68,7 +71,12 @@ impl Frames {
             let what = format!("altitude_km is {altitude_km} but the position is at {km:.3} km; the position is used");
             ((km - altitude_km).abs() > 0.1).then(|| self.problem(row, what))
         };
-        let mut warnings: Vec<Problem> = self.rows.iter().filter_map(contradiction).collect();
+        let mut all = self.rows.iter().filter_map(contradiction);
+        let mut warnings: Vec<Problem> = all.by_ref().take(MAX_LISTED).collect();
+        match all.count() {
+            0 => {}
+            more => warnings.push(Problem::new(&self.path, format!("{more} further rows with a warning of this kind"))),
+        }
         warnings.extend(self.suspect_metres(kind, radius_km));
         if let (Some(what), Some(row)) =
             (plausible::explain_unused_altitude(kind), self.rows.iter().find(|r| r.altitude_km.is_some()))

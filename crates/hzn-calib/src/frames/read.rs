@@ -8,7 +8,7 @@ use hzn_core::body::Kind;
 
 use super::data::{FrameData, Frames, Orientation};
 use crate::nearest::nearest;
-use crate::{Problem, time};
+use crate::{Problem, limited, time};
 
 /// Names of the columns that are read.
 pub const COLUMNS: &[&str] = &[
@@ -48,13 +48,16 @@ fn known_column(name: &str) -> Option<String> {
     (COLUMNS.contains(&name) || of_body).then(|| name.to_owned())
 }
 
+/// Largest number of rows: 18 hours at 30 pictures a second. They need less than 1 GB of memory.
+const MAX_ROWS: usize = 2_000_000;
+
 /// Reads a frames.csv.
 ///
 /// # Errors
 /// The file cannot be read, the column `file` is missing, a cell is not a finite number, a vector is incomplete, or a
 /// picture has two rows.
 pub fn load(path: &Path) -> Result<Frames, Problem> {
-    let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
+    let text = limited::read_text(path, limited::TABLE_BYTES).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Problem::new(path, "no such file"),
         _ => Problem::new(path, format!("cannot be read: {e}")),
     })?;
@@ -73,6 +76,12 @@ pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
     let mut frames = Frames::new(path);
     let columns = Columns::find(&header, path, &mut frames.warnings)?;
     for record in reader.records() {
+        if frames.rows.len() == MAX_ROWS {
+            return Err(Problem::new(
+                path,
+                format!("has more than {MAX_ROWS} rows; divide the pictures into several runs"),
+            ));
+        }
         let record = record.map_err(|e| translate_csv_error(&e, path))?;
         let row = Row::new(&record, &columns, path)?;
         let data = row.read()?;

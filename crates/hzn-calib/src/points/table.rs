@@ -14,8 +14,8 @@ use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
-use crate::Problem;
 use crate::nearest::suggestion;
+use crate::{Problem, limited};
 
 /// Largest difference of the length of a unit vector from 1.
 const MAX_LENGTH_ERROR: f64 = 0.01;
@@ -53,7 +53,8 @@ enum Direction {
 /// The file cannot be read, a column is missing, or a row has an impossible value. The error names the line and the
 /// column.
 pub fn load(path: &Path, size_px: [u16; 2]) -> Result<Vec<Points>, Problem> {
-    let text = std::fs::read_to_string(path).map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
+    let text = limited::read_text(path, limited::TABLE_BYTES)
+        .map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
     parse(&text, path, size_px)
 }
 

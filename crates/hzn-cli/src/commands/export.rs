@@ -117,7 +117,7 @@ fn decode(image: &hzn_mcap::EncodedImage, name: &str) -> Result<hzn_run::source:
 
 /// Returns the file name for a picture: its own name, with an ending that fits its bytes.
 fn picture_name(name: &str, ending: &str) -> String {
-    let flat = name.replace(['/', '\\', ':'], "_");
+    let flat = overlay::flat_name(name);
     let same = |e: &str| e == ending || (ending == "jpg" && matches!(e, "jpeg" | "jpe"));
     if same(&self::ending(Path::new(&flat))) { flat } else { format!("{flat}.{ending}") }
 }

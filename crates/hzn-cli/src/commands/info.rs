@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::status::Status;
 use hzn_mcap::{Contents, Reader, Row};
-use hzn_run::explain;
 use hzn_run::source::{self, decode, ending};
+use hzn_run::{checked_row, explain};
 use hzn_sim::Scenario;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
@@ -123,7 +123,8 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
 /// Returns lines about the columns in which results of another version differ; nothing for results of this version.
 fn other_columns(header: &csv::StringRecord) -> String {
     let missing: Vec<&str> = Row::COLUMNS.into_iter().filter(|name| !header.iter().any(|c| c == *name)).collect();
-    let unknown: Vec<&str> = header.iter().filter(|column| !Row::COLUMNS.contains(column)).collect();
+    let unknown: Vec<&str> =
+        header.iter().filter(|column| !Row::COLUMNS.contains(column) && *column != checked_row::COLUMN).collect();
     let mut out = String::new();
     for (title, columns) in [("columns missing", missing), ("columns unknown", unknown)] {
         if !columns.is_empty() {
@@ -210,7 +211,8 @@ fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
         let camera = hzn_calib::camera_file::load(file, None)?;
         return Ok(kind_line("camera file") + &super::camera::describe(&hzn_core::Config::new(camera))?);
     }
-    let text = std::fs::read_to_string(file).map_err(|e| failed(format!("{}: cannot be read: {e}", file.display())))?;
+    let text = hzn_calib::limited::read_text(file, hzn_calib::limited::SETTINGS_BYTES)
+        .map_err(|e| failed(format!("{}: cannot be read: {e}", file.display())))?;
     // The function that reads the text below reports its errors.
     let table = text.parse::<toml::Table>().unwrap_or_default();
     if table.contains_key("trajectory") && table.contains_key("capture") {

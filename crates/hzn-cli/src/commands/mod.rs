@@ -23,13 +23,26 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::exit::Outcome;
 
+/// The version with what is needed to build the same program again. The methods are features of `hzn-core` that the
+/// manifest of this crate turns on; a test compares them.
+const LONG_VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\ncommit   ",
+    env!("HZN_BUILD_COMMIT"),
+    "\ntarget   ",
+    env!("HZN_BUILD_TARGET"),
+    "\nprofile  ",
+    env!("HZN_BUILD_PROFILE"),
+    "\nfeatures dlr, erf, horace, reml, zju"
+);
+
 /// Find the limb of a planet in pictures, and measure the direction to the body with its covariance.
 ///
 /// Exit codes: 0 every picture was read and processed; 1 failed; 2 wrong usage or configuration; 3 finished, but some
 /// pictures could not be read or had no altitude; 130 interrupted (the output is valid and can be continued with
 /// --resume).
 #[derive(Debug, Parser)]
-#[command(name = "hzn", version, max_term_width = 100)]
+#[command(name = "hzn", version, long_version = LONG_VERSION, max_term_width = 100)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,

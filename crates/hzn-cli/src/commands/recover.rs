@@ -53,10 +53,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let (rows, lost) = match target {
         sink::Target::Mcap => recording(file, &path)?,
-        target => sink::recover_text(file, &path, target).map_err(|e| match e.kind() {
-            std::io::ErrorKind::InvalidData => failed(format!("{}: {e}", file.display())),
-            _ => disk::cannot_write(&path, &e).into(),
-        })?,
+        target => table(file, &path, target)?,
     };
     let dropped = if lost > 0 { format!(", {lost} bytes of unfinished pictures dropped") } else { String::new() };
     tell::line(format_args!("{}: {} kept{dropped}", path.display(), explain::counted(rows, "row")));
@@ -65,6 +62,18 @@ pub(super) fn run(args: &Args) -> Outcome {
         std::fs::remove_file(file)?;
     }
     Ok(Exit::Done)
+}
+
+/// Recovers a table. Returns the number of rows kept and of bytes dropped.
+fn table(file: &Path, path: &Path, target: sink::Target) -> Result<(u64, u64), crate::exit::Stop> {
+    let found = sink::recover_text(file, path, target).map_err(|e| match e.kind() {
+        std::io::ErrorKind::InvalidData => failed(format!("{}: {e}", file.display())),
+        _ => disk::cannot_write(path, &e).into(),
+    })?;
+    if let Some(damage) = found.damage {
+        tell::warning(format_args!("{}: {damage}; only the rows before it are kept", file.display()));
+    }
+    Ok((found.rows, found.dropped_bytes))
 }
 
 /// Recovers a recording. Returns the number of rows kept and of bytes dropped.
@@ -85,7 +94,7 @@ fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> 
         }
         e => failed(e),
     })?;
-    std::fs::rename(&recovering, path)?;
+    hzn_mcap::rename(&recovering, path)?;
     if found.broken_chunks > 0 {
         tell::warning(format_args!("{} damaged parts were left out; their pictures are missing", found.broken_chunks));
     }

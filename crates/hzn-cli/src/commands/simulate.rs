@@ -110,7 +110,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn check_folder(args: &Args, folder: &Path, text: &str, files: &[(String, Vec<u8>)]) -> Result<(), Stop> {
     let scene_toml = folder.join("scene.toml");
     if args.resume {
-        match std::fs::read_to_string(&scene_toml) {
+        match hzn_calib::limited::read_text(&scene_toml, hzn_calib::limited::SETTINGS_BYTES) {
             Ok(before) if before == text => {}
             Ok(_) => {
                 let what = "is another scene, or another number of pictures or seed; --force starts over";

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use hzn_calib::limited;
 use hzn_core::body::Kind;
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::Reader;
@@ -79,6 +80,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
+/// Largest stream that is read, in bytes.
+const MAX_BYTES: u64 = 1 << 30;
+
 /// Number of bytes of a packet without its user data.
 const OVERHEAD: usize = 20;
 
@@ -88,7 +92,7 @@ fn read(path: &Path) -> Result<Vec<u8>, Stop> {
         std::io::stdin().read_to_end(&mut bytes)?;
         return Ok(bytes);
     }
-    std::fs::read(path).map_err(|e| usage(format!("{}: {e}", path.display())))
+    limited::read(path, MAX_BYTES).map_err(|e| usage(format!("{}: {e}", path.display())))
 }
 
 fn table(path: &Path, force: bool) -> Result<csv::Writer<std::fs::File>, Stop> {

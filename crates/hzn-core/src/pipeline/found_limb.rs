@@ -36,7 +36,7 @@ impl<T: Real> FoundLimb<T> {
         }
     }
     /// Makes a limb that is circular in the camera frame.
-    #[cfg(feature = "_edges")]
+    #[cfg(any(test, feature = "_edges"))]
     pub(super) fn circular(e: V3<T>, c: T) -> Self {
         Self {
             e,

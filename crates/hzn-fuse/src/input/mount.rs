@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use hzn_calib::limited;
 use hzn_core::config::Mount;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use serde::Deserialize;
@@ -32,7 +33,8 @@ struct Table {
 /// The file cannot be read, has no such table, or the numbers are not a rotation.
 pub fn mount(path: &Path) -> Result<UnitQuaternion<f64>, Error> {
     let shown = path.display();
-    let text = std::fs::read_to_string(path).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
+    let text =
+        limited::read_text(path, limited::SETTINGS_BYTES).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
     let file: File = toml::from_str(&text).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
     let refuse = |what: String| Error::unusable(format!("{shown}: [mount] {what}"));
     match (file.mount.q_body_from_camera_wxyz, file.mount.body_from_camera) {

@@ -2,7 +2,12 @@
 
 use std::path::Path;
 
+use hzn_calib::limited;
+
 use crate::error::Error;
+
+/// Largest table in bytes: three hours of an IMU at 1 kHz.
+const MAX_BYTES: u64 = 1 << 30;
 
 /// A table of numbers.
 pub(super) struct Table {
@@ -18,8 +23,8 @@ impl Table {
             csv::ErrorKind::Io(e) => Error::unusable(format!("{shown}: {e}")),
             _ => Error::unusable(format!("{shown}: {e}")),
         };
-        let mut reader =
-            csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).map_err(refuse)?;
+        let file = limited::open(path, MAX_BYTES).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
         let header = reader.headers().map_err(refuse)?.clone();
         let columns: Vec<Option<usize>> = names.iter().map(|name| header.iter().position(|c| c == *name)).collect();
         if let Some((name, _)) = names.iter().zip(&columns).take(required).find(|(_, place)| place.is_none()) {

@@ -1,10 +1,9 @@
 //! Chunks: groups of messages, compressed or not, with a CRC.
 
 use std::collections::BTreeMap;
-use std::io::Read;
 
 use super::op::{Fields, Op, Put};
-use super::{MAX_RECORD_BYTES, Record};
+use super::{Inflation, Record};
 
 /// Compression level: the fastest useful one. The data are small compared with the pictures.
 const ZSTD_LEVEL: i32 = 1;
@@ -118,32 +117,42 @@ pub(crate) struct Chunk {
 }
 
 impl Chunk {
-    /// Parses a chunk record, checks its CRC and reads its records. It returns the chunk and its uncompressed records;
-    /// `None` if anything is not valid.
-    pub(crate) fn parse(record: &Record) -> Option<(Self, Vec<u8>)> {
+    /// Parses a chunk record, checks its CRC and reads its records. It returns the chunk and its uncompressed records.
+    ///
+    /// # Errors
+    /// The reason why it is not valid.
+    pub(crate) fn parse(record: &Record, inflation: &mut Inflation) -> Result<(Self, Vec<u8>), String> {
         let mut f = Fields(&record.content);
-        let (_first, _last, size, crc) = (f.u64()?, f.u64()?, f.u64()?, f.u32()?);
-        let compression = f.text()?.to_owned();
-        let length = f.u64()?;
-        let records = f.bytes(usize::try_from(length).ok()?)?.to_vec();
-        if size > MAX_RECORD_BYTES {
-            return None;
-        }
+        let mut head = || {
+            let (_first, _last, size, crc) = (f.u64()?, f.u64()?, f.u64()?, f.u32()?);
+            let compression = f.text()?.to_owned();
+            let length = f.u64()?;
+            Some((size, crc, compression, f.bytes(usize::try_from(length).ok()?)?.to_vec()))
+        };
+        let (size, crc, compression, records) = head().ok_or("a chunk is not valid")?;
         let plain = match compression.as_str() {
             "" => records.clone(),
-            "zstd" => {
-                let mut plain = Vec::new();
-                // One byte more than the stated size reveals a wrong size without filling the memory.
-                zstd::Decoder::new(records.as_slice()).ok()?.take(size + 1).read_to_end(&mut plain).ok()?;
-                plain
+            "zstd" if !inflation.admit(records.len() as u64, size) => {
+                return Err(format!(
+                    "a chunk of {} bytes claims to have {size} when it is uncompressed",
+                    records.len()
+                ));
             }
-            _ => return None,
+            // A wrong size is an error of the decoder, which never writes beyond it.
+            "zstd" => {
+                let size = usize::try_from(size).map_err(|e| e.to_string())?;
+                zstd::bulk::decompress(&records, size).map_err(|e| format!("a chunk cannot be uncompressed: {e}"))?
+            }
+            other => return Err(format!("chunks compressed with {other} are not supported; use zstd")),
         };
-        if plain.len() as u64 != size || (crc != 0 && crc32fast::hash(&plain) != crc) {
-            return None;
+        if plain.len() as u64 != size {
+            return Err(format!("a chunk has {} bytes instead of {size}", plain.len()));
         }
-        let index = Index::read(&plain)?;
-        Some((Self { compression, size, crc, records, index }, plain))
+        if crc != 0 && crc32fast::hash(&plain) != crc {
+            return Err("the CRC of a chunk is wrong".to_owned());
+        }
+        let index = Index::read(&plain).ok_or("the records of a chunk are not valid")?;
+        Ok((Self { compression, size, crc, records, index }, plain))
     }
 
     /// Iterates over the messages of uncompressed records, in order.

@@ -5,11 +5,13 @@
 //! The layout is that of the MCAP specification; the tests read it back with independent readers.
 
 mod chunk;
+mod inflation;
 mod op;
 mod scan;
 mod write;
 
 pub(crate) use chunk::{Chunk, ChunkBuilder, Message};
+pub(crate) use inflation::Inflation;
 pub(crate) use op::{Fields, Op};
 pub(crate) use scan::{Record, Scanner};
 pub(crate) use write::Container;

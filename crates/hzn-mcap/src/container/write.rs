@@ -207,6 +207,11 @@ impl<W: Write> Container<W> {
         self.out.flush()
     }
 
+    /// Returns the output.
+    pub(crate) fn output(&self) -> &W {
+        &self.out
+    }
+
     /// Closes the file: end of data, summary, footer.
     pub(crate) fn finish(mut self) -> io::Result<W> {
         let mut end = Vec::new();

@@ -19,10 +19,22 @@ use hzn_mcap::palette::{AXIS, EDGE, INLIER, LIMB, REJECTED};
 
 const TRUTH: Colour = [230, 159, 0];
 
-/// Returns the file name of the overlay of a picture.
+/// Returns the file name of the overlay of a picture: its name, with `.png` added unless it ends in it. Two pictures
+/// never get the same name, so what separates folders, and `%` itself, is written as `%` and two hexadecimal digits.
 pub fn file_name(name: &str) -> String {
-    let flat = name.replace(['/', '\\', ':'], "_");
-    if flat.to_lowercase().ends_with(".png") { flat } else { format!("{flat}.png") }
+    let flat = flat_name(name);
+    match flat.rsplit_once('.') {
+        // A second ending, as in `a.jpg.png`, would be that of the overlay of `a.jpg`.
+        Some((stem, ending)) if ending.eq_ignore_ascii_case("png") && !stem.contains('.') => flat,
+        Some(_) => format!("{flat}.png"),
+        // The overlay of `a` must not be that of `a.png`.
+        None => format!("{flat}%.png"),
+    }
+}
+
+/// Returns the name of a picture without separators of folders. Different names stay different.
+pub fn flat_name(name: &str) -> String {
+    name.replace('%', "%25").replace('/', "%2F").replace('\\', "%5C").replace(':', "%3A")
 }
 
 /// Draws annotations (pixel centres at integers) with a legend that begins with `title`.
@@ -142,4 +154,26 @@ pub fn png(image: &RgbImage) -> anyhow::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     image.write_with_encoder(PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub))?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn different_pictures_have_different_overlays() {
+        assert_eq!(file_name("0001.png"), "0001.png");
+        assert_eq!(file_name("0001.jpg"), "0001.jpg.png");
+        assert_eq!(file_name("a/x.png"), "a%2Fx.png");
+        let parts = ["a", "a_", "a/", "a\\", "a:", "a%2F", "a%", ""];
+        let ends = ["x.png", "x.PNG", "x.jpg", "x.jpg.png", "x", "x%.png", "x..png", ".png", "_x.png"];
+        let names: Vec<String> = parts.iter().flat_map(|p| ends.iter().map(move |e| format!("{p}{e}"))).collect();
+        let mut given: Vec<String> = names.clone();
+        given.sort();
+        given.dedup();
+        let mut drawn: Vec<String> = given.iter().map(|name| file_name(name)).collect();
+        drawn.sort();
+        drawn.dedup();
+        assert_eq!(drawn.len(), given.len());
+    }
 }

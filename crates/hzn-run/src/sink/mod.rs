@@ -19,7 +19,7 @@ use crate::disk::{advice, cannot_write, refuse_existing};
 use crate::engine::{Finished, Sink};
 use crate::error::{Error, Remedy, failed, unusable};
 use crate::source::ending;
-use text::{Form, Text};
+use text::{Damage, Form, Text};
 
 /// The treatment of an output that exists already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +37,8 @@ pub struct Output {
     kind: Kind,
     path: Option<PathBuf>,
     config: Config,
+    /// The file had its final name before it was opened.
+    was_final: bool,
 }
 
 enum Kind {
@@ -68,18 +70,27 @@ pub fn target(path: &Path) -> Result<Target, Error> {
     }
 }
 
+/// The sensor of an output, and how the output is written.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings<'a> {
+    /// The configuration of the sensor.
+    pub config: &'a Config,
+    /// The sensor.toml that a recording stores.
+    pub sensor_toml: &'a str,
+    /// Whether every flush waits until the results are on the disk, so that a power cut cannot lose them.
+    pub durable: bool,
+}
+
 /// Opens an output; without a path, CSV on stdout. Also returns the results that it contains already.
 ///
 /// # Errors
 /// It exists and must not, belongs to another sensor, or cannot be written.
-pub fn open(
-    path: Option<&Path>,
-    existing: Existing,
-    config: &Config,
-    sensor_toml: &str,
-) -> Result<(Output, StoredResults), Error> {
-    let output = |kind, stored| Ok((Output { kind, path: path.map(Path::to_owned), config: config.clone() }, stored));
-    let Some(path) = path else { return output(Kind::Text(Text::stdout()?), StoredResults::default()) };
+pub fn open(path: Option<&Path>, existing: Existing, settings: Settings<'_>) -> Result<(Output, StoredResults), Error> {
+    let output = |kind, stored, was_final| {
+        let (path, config) = (path.map(Path::to_owned), settings.config.clone());
+        Ok((Output { kind, path, config, was_final }, stored))
+    };
+    let Some(path) = path else { return output(Kind::Text(Text::stdout()?), StoredResults::default(), false) };
     let target = target(path)?;
     if path.is_dir() {
         return Err(unusable(format!("{}: is a folder", path.display())));
@@ -96,9 +107,9 @@ pub fn open(
                     let _ = std::fs::rename(&part, path);
                     stop
                 };
-                return resume(path, &part, target, config, sensor_toml)
+                return resume(path, &part, target, settings)
                     .map_err(restore)
-                    .and_then(|(kind, stored)| output(kind, stored));
+                    .and_then(|(kind, stored)| output(kind, stored, true));
             }
             if path.exists() {
                 // This fails if the unfinished file is still being written.
@@ -106,23 +117,30 @@ pub fn open(
                 let what = "exists together with the file of an unfinished run; remove one of them";
                 return Err(unusable(format!("{}: {what} ({})", path.display(), part.display())));
             }
-            let (kind, stored) = resume(path, &part, target, config, sensor_toml)?;
-            return output(kind, stored);
+            let (kind, stored) = resume(path, &part, target, settings)?;
+            return output(kind, stored, false);
         }
     }
     let kind = match text_form(target) {
         None => {
-            let options = options(config, sensor_toml, existing == Existing::Replace);
+            let options = options(settings, existing == Existing::Replace);
             Kind::Mcap(Box::new(hzn_mcap::Writer::create(path, &options).map_err(failed)?))
         }
-        Some(form) => Kind::Text(Text::create(path, &part, form).map_err(|e| cannot_write(&part, &e))?),
+        Some(form) => {
+            let text = Text::create(path, &part, form).and_then(|text| text.with_durability(settings.durable));
+            Kind::Text(text.map_err(|e| cannot_write(&part, &e))?)
+        }
     };
-    output(kind, StoredResults::default())
+    output(kind, StoredResults::default(), false)
 }
 
 fn refuse(path: &Path, part: &Path) -> Result<(), Error> {
     if path.exists() {
         return Err(unusable(format!("{}: exists already", path.display())).with_remedy(Remedy::ReplaceOrResume));
+    }
+    if hzn_mcap::is_being_written(part) {
+        let what = "another run is writing it; wait until that run ends, or choose another name for the output";
+        return Err(unusable(format!("{}: {what}", part.display())));
     }
     if std::fs::symlink_metadata(part).is_ok() {
         let what = format!("{}: was left by a run that did not end", part.display());
@@ -139,37 +157,34 @@ fn text_form(target: Target) -> Option<Form> {
     }
 }
 
-fn options(config: &Config, sensor_toml: &str, force: bool) -> Options {
+fn options(settings: Settings<'_>, force: bool) -> Options {
+    let Settings { config, sensor_toml, durable } = settings;
     let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
-    Options { sensor_toml: sensor_toml.to_owned(), metadata, camera: Some(config.camera.clone()), force }
+    Options { sensor_toml: sensor_toml.to_owned(), metadata, camera: Some(config.camera.clone()), force, durable }
 }
 
-fn resume(
-    path: &Path,
-    part: &Path,
-    target: Target,
-    config: &Config,
-    sensor_toml: &str,
-) -> Result<(Kind, StoredResults), Error> {
+fn resume(path: &Path, part: &Path, target: Target, settings: Settings<'_>) -> Result<(Kind, StoredResults), Error> {
+    let bodies = settings.config.each_body().len();
     match text_form(target) {
         Some(form) => {
-            let resumed = Text::resume(path, part, form, Some(config.each_body().len())).map_err(|e| match e.kind() {
+            let resumed = Text::resume(path, part, form, Some(bodies), Damage::Refuse)
+                .and_then(|(text, stored, _)| Ok((text.with_durability(settings.durable)?, stored)));
+            let (text, stored) = resumed.map_err(|e| match e.kind() {
                 std::io::ErrorKind::InvalidData => {
                     unusable(format!("{}: {e}", part.display())).with_remedy(Remedy::Restart)
                 }
                 _ => cannot_write(part, &e),
-            });
-            let (text, stored) = resumed?;
+            })?;
             Ok((Kind::Text(text), stored))
         }
         None => {
             let before = read_stored(part);
-            let resumed = hzn_mcap::resume(path, &options(config, sensor_toml, false)).map_err(|e| match e {
+            let resumed = hzn_mcap::resume(path, &options(settings, false)).map_err(|e| match e {
                 hzn_mcap::Error::OtherSensor { .. } => unusable(e).with_remedy(Remedy::Restart),
                 hzn_mcap::Error::Foreign { .. } => unusable(e),
                 e => failed(e),
             })?;
-            let frames = resumed.frames / config.each_body().len() as u64;
+            let frames = resumed.frames / bodies as u64;
             let stored = match resumed.frames {
                 0 => StoredResults::default(),
                 rows => StoredResults { frames, rows, ..before },
@@ -208,6 +223,18 @@ impl Output {
                 text.finish().map_err(|e| cannot_write(self.path.as_deref().unwrap_or(Path::new("stdout")), &e))
             }
         }
+    }
+
+    /// Closes an output that was opened to be continued, without further results. It keeps the name that it had: an
+    /// unfinished file stays unfinished.
+    ///
+    /// # Errors
+    /// The disk fails.
+    pub fn put_back(mut self) -> Result<(), Error> {
+        if self.was_final {
+            return self.finish();
+        }
+        self.flush().map_err(Error::from)
     }
 
     /// Removes the unfinished file. A file that already has the final name is not changed.
@@ -292,23 +319,35 @@ impl RowFile {
     }
 }
 
-/// Keeps the complete rows of a truncated table. Returns their number and the number of bytes that were dropped.
+/// What [`recover_text`] did with a table.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RecoveredTable {
+    /// Number of rows that are kept.
+    pub rows: u64,
+    /// Number of bytes at the end that are not kept.
+    pub dropped_bytes: u64,
+    /// The first row that was changed or is damaged, with the reason. Only the rows before it are kept.
+    pub damage: Option<String>,
+}
+
+/// Keeps the complete rows of a truncated table, up to the first damaged one.
 ///
 /// # Errors
 /// The file has other columns, or the disk fails.
-pub fn recover_text(file: &Path, path: &Path, target: Target) -> std::io::Result<(u64, u64)> {
+pub fn recover_text(file: &Path, path: &Path, target: Target) -> std::io::Result<RecoveredTable> {
     let part = part_path(path);
     let size = std::fs::metadata(file)?.len();
     let form = if target == Target::Jsonl { Form::Jsonl } else { Form::Csv };
     if file != part {
         std::fs::copy(file, &part)?;
     }
-    let resumed = Text::resume(path, &part, form, None);
+    let resumed = Text::resume(path, &part, form, None, Damage::KeepBefore);
     if resumed.is_err() && file != part {
         // An incomplete copy is of no use.
         let _ = std::fs::remove_file(&part);
     }
-    let (text, stored) = resumed?;
+    let (text, stored, damage) = resumed?;
     text.finish()?;
-    Ok((stored.rows, size.saturating_sub(std::fs::metadata(path)?.len())))
+    let dropped_bytes = size.saturating_sub(std::fs::metadata(path)?.len());
+    Ok(RecoveredTable { rows: stored.rows, dropped_bytes, damage })
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use hzn_mcap::Row;
 
 use super::stored::StoredResults;
+use crate::checked_row::{csv_line, from_csv, from_json, header, json_line};
 use crate::disk::run_advice;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,109 +18,153 @@ pub(crate) enum Form {
 
 /// A text output with its final name.
 pub(crate) struct Text {
-    out: BufWriter<Box<dyn Write>>,
+    out: Out,
     form: Form,
-    /// `(path, part)`: the final and the unfinished file; `None` for stdout.
-    names: Option<(PathBuf, PathBuf)>,
+    /// Whether every flush waits for the disk.
+    durable: bool,
+}
+
+enum Out {
+    Stdout(BufWriter<io::Stdout>),
+    File {
+        file: BufWriter<File>,
+        path: PathBuf,
+        /// The name of the file until it is finished.
+        part: PathBuf,
+    },
+}
+
+impl Out {
+    fn writer(&mut self) -> &mut dyn Write {
+        match self {
+            Self::Stdout(out) => out,
+            Self::File { file, .. } => file,
+        }
+    }
 }
 
 /// The beginning of each row of JSON Lines.
 const JSON_HEAD: &[u8] = b"{\"index\":";
 
-fn header() -> String {
-    Row::COLUMNS.join(",") + "\n"
-}
-
 impl Text {
     pub(crate) fn stdout() -> io::Result<Self> {
-        let mut text = Self { out: BufWriter::new(Box::new(io::stdout())), form: Form::Csv, names: None };
-        text.out.write_all(header().as_bytes())?;
+        let mut text = Self { out: Out::Stdout(BufWriter::new(io::stdout())), form: Form::Csv, durable: false };
+        text.out.writer().write_all(header().as_bytes())?;
         Ok(text)
     }
 
     fn from_file(file: File, path: &Path, part: &Path, form: Form) -> Self {
-        let out = BufWriter::with_capacity(1 << 16, Box::new(file) as Box<dyn Write>);
-        Self { out, form, names: Some((path.to_owned(), part.to_owned())) }
+        let file = BufWriter::with_capacity(1 << 16, file);
+        let out = Out::File { file, path: path.to_owned(), part: part.to_owned() };
+        Self { out, form, durable: false }
+    }
+
+    /// Decides whether every flush waits until the rows are on the disk.
+    ///
+    /// # Errors
+    /// The disk fails.
+    pub(crate) fn with_durability(mut self, durable: bool) -> io::Result<Self> {
+        self.durable = durable;
+        if let (true, Out::File { part, .. }) = (durable, &self.out) {
+            hzn_mcap::sync_name(part)?;
+            self.flush()?;
+        }
+        Ok(self)
     }
 
     pub(crate) fn create(path: &Path, part: &Path, form: Form) -> io::Result<Self> {
         let mut text = Self::from_file(hzn_mcap::create_part(part)?, path, part, form);
         if form == Form::Csv {
-            text.out.write_all(header().as_bytes())?;
-            text.out.flush()?;
+            text.out.writer().write_all(header().as_bytes())?;
+            text.flush()?;
         }
         Ok(text)
     }
 
     /// Continues after the last picture that has all of its rows. This number is `bodies`, or that of the first
-    /// picture. Without an unfinished file, begins a new one.
+    /// picture. Without an unfinished file, begins a new one. Also returns what is known about a damaged row.
     pub(crate) fn resume(
         path: &Path,
         part: &Path,
         form: Form,
         bodies: Option<usize>,
-    ) -> io::Result<(Self, StoredResults)> {
+        damage: Damage,
+    ) -> io::Result<(Self, StoredResults, Option<String>)> {
         if !part.exists() {
-            return Ok((Self::create(path, part, form)?, StoredResults::default()));
+            return Ok((Self::create(path, part, form)?, StoredResults::default(), None));
         }
         let mut file = hzn_mcap::open_part(part)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
-        let (stored, end) = find_complete(&bytes, form, bodies)?;
-        if end == 0 {
+        let found = find_complete(&bytes, form, bodies)?;
+        if let (Some(why), Damage::Refuse) = (&found.damage, damage) {
+            return Err(io::Error::new(io::ErrorKind::InvalidData, why.clone()));
+        }
+        if found.end == 0 {
             drop(file);
-            return Ok((Self::create(path, part, form)?, StoredResults::default()));
+            return Ok((Self::create(path, part, form)?, found.stored, found.damage));
         }
         // The rest of the file is an incomplete row or picture.
-        file.set_len(end as u64)?;
+        file.set_len(found.end as u64)?;
         file.seek(SeekFrom::End(0))?;
-        Ok((Self::from_file(file, path, part, form), stored))
+        Ok((Self::from_file(file, path, part, form), found.stored, found.damage))
     }
 
     pub(crate) fn write(&mut self, row: &Row) -> io::Result<()> {
         let line = match self.form {
-            Form::Csv => csv_line(row).map_err(io::Error::other)?,
-            Form::Jsonl => {
-                let mut line = serde_json::to_vec(row)?;
-                line.push(b'\n');
-                line
-            }
+            Form::Csv => csv_line(row),
+            Form::Jsonl => json_line(row),
         };
-        self.out.write_all(&line)
+        self.out.writer().write_all(&line.map_err(io::Error::other)?)
     }
 
     pub(crate) fn flush(&mut self) -> io::Result<()> {
-        self.out.flush()
+        self.out.writer().flush()?;
+        match &self.out {
+            Out::File { file, .. } if self.durable => hzn_mcap::sync(file.get_ref()),
+            _ => Ok(()),
+        }
     }
 
     /// Returns the error for a failed write of a run's results, with advice.
     pub(crate) fn write_error(&self, error: io::Error) -> anyhow::Error {
-        match &self.names {
-            Some((_, part)) => anyhow::anyhow!(run_advice(part, &error)),
-            None if error.kind() == io::ErrorKind::BrokenPipe => error.into(),
-            None => anyhow::anyhow!("results cannot be written to stdout: {error}"),
+        match &self.out {
+            Out::File { part, .. } => anyhow::anyhow!(run_advice(part, &error)),
+            Out::Stdout(_) if error.kind() == io::ErrorKind::BrokenPipe => error.into(),
+            Out::Stdout(_) => anyhow::anyhow!("results cannot be written to stdout: {error}"),
         }
     }
 
     pub(crate) fn finish(mut self) -> io::Result<()> {
-        self.out.flush()?;
-        match self.names {
-            Some((path, part)) => std::fs::rename(part, path),
-            None => Ok(()),
+        self.out.writer().flush()?;
+        match &self.out {
+            Out::File { file, path, part } => hzn_mcap::publish(file.get_ref(), part, path),
+            Out::Stdout(_) => Ok(()),
         }
     }
 }
 
-/// Returns one row as a line of CSV.
-pub(crate) fn csv_line(row: &Row) -> anyhow::Result<Vec<u8>> {
-    let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
-    writer.serialize(row)?;
-    writer.into_inner().map_err(|e| anyhow::anyhow!("{e}"))
+/// The treatment of a table with a row that was changed or is damaged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Damage {
+    /// The table is refused and stays as it is.
+    Refuse,
+    /// The rows before the damaged one are kept.
+    KeepBefore,
 }
 
-/// Returns the complete pictures of `bodies` rows each, and the offset of their end. If the number of bodies is
-/// unknown, it is the number of rows of the first picture.
-fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<(StoredResults, usize)> {
+/// The complete pictures of a table.
+struct Complete {
+    stored: StoredResults,
+    /// Offset of their end in bytes.
+    end: usize,
+    /// The row that was changed or is damaged, with the reason. The complete pictures end before it.
+    damage: Option<String>,
+}
+
+/// Finds the complete pictures of `bodies` rows each. If the number of bodies is unknown, it is the number of rows of
+/// the first picture.
+fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<Complete> {
     let bodies = match bodies {
         Some(bodies) => bodies,
         None => {
@@ -133,7 +178,7 @@ fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<
         }
     };
     let (mut stored, mut end, mut frame) = (StoredResults::default(), 0, Vec::new());
-    each_row(bytes, form, |row, to| {
+    let damage = each_row(bytes, form, |row, to| {
         frame.push(row);
         if frame.len() == bodies {
             stored.record_answers(&frame);
@@ -145,52 +190,72 @@ fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<
         }
         true
     })?;
-    Ok((stored, end))
+    Ok(Complete { stored, end, damage })
 }
 
 /// Calls `visit` with every complete row and the offset of its end. Stops if `visit` returns false or a row is
-/// incomplete.
-fn each_row(bytes: &[u8], form: Form, mut visit: impl FnMut(Row, usize) -> bool) -> io::Result<()> {
-    let other = || {
-        let what = "does not have the columns of results of this version";
-        Err(io::Error::new(io::ErrorKind::InvalidData, what))
-    };
-    if form == Form::Jsonl {
-        if !(bytes.starts_with(JSON_HEAD) || JSON_HEAD.starts_with(bytes)) {
-            return other();
-        }
-        let mut to = 0;
-        for line in bytes.split_inclusive(|&b| b == b'\n').take_while(|line| line.ends_with(b"\n")) {
-            let begins = to == 0;
-            to += line.len();
-            let row = match serde_json::from_slice::<Row>(line) {
-                Ok(row) => row,
-                // This is a complete row that is not one of ours.
-                Err(_) if begins => return other(),
-                Err(_) => break,
-            };
-            if !visit(row, to) {
-                break;
-            }
-        }
-        return Ok(());
+/// incomplete. A row that is complete but is not a row of results is returned with the reason.
+fn each_row(bytes: &[u8], form: Form, visit: impl FnMut(Row, usize) -> bool) -> io::Result<Option<String>> {
+    match form {
+        Form::Csv => each_csv_row(bytes, visit),
+        Form::Jsonl => each_json_row(bytes, visit),
     }
+}
+
+fn other_table() -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, "does not have the columns of results of this version")
+}
+
+fn each_json_row(bytes: &[u8], mut visit: impl FnMut(Row, usize) -> bool) -> io::Result<Option<String>> {
+    if !(bytes.starts_with(JSON_HEAD) || JSON_HEAD.starts_with(bytes)) {
+        return Err(other_table());
+    }
+    let lines = bytes.split_inclusive(|&b| b == b'\n').take_while(|line| line.ends_with(b"\n"));
+    let mut to = 0;
+    for (i, line) in lines.enumerate() {
+        to += line.len();
+        match from_json(line) {
+            Ok(row) => {
+                if !visit(row, to) {
+                    break;
+                }
+            }
+            Err(_) if i == 0 && serde_json::from_slice::<Row>(line).is_err() => return Err(other_table()),
+            Err(why) => return Ok(Some(format!("row {}: {why}", i + 1))),
+        }
+    }
+    Ok(None)
+}
+
+fn each_csv_row(bytes: &[u8], mut visit: impl FnMut(Row, usize) -> bool) -> io::Result<Option<String>> {
     let header = header();
     if header.as_bytes().starts_with(bytes) {
-        return Ok(());
+        return Ok(None);
     }
-    let Some(rest) = bytes.strip_prefix(header.as_bytes()) else {
-        return other();
-    };
+    if !bytes.starts_with(header.as_bytes()) {
+        return Err(other_table());
+    }
     // A row may contain line breaks within quotes, so only the reader knows where it ends.
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(rest);
+    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
+    let columns = reader.headers().map_err(io::Error::other)?.clone();
     let mut record = csv::StringRecord::new();
-    while let Ok(true) = reader.read_record(&mut record) {
-        let to = header.len() + reader.position().byte() as usize;
-        let Ok(row) = record.deserialize::<Row>(None) else { break };
-        if bytes.get(to - 1) != Some(&b'\n') || !visit(row, to) {
+    for i in 1.. {
+        let read = reader.read_record(&mut record);
+        let to = reader.position().byte() as usize;
+        // The last row may be incomplete.
+        if matches!(read, Ok(false)) || to.checked_sub(1).and_then(|last| bytes.get(last)) != Some(&b'\n') {
             break;
         }
+        match read.map_err(|e| e.to_string()).and_then(|_| from_csv(&record, &columns)) {
+            Ok(row) => {
+                if !visit(row, to) {
+                    break;
+                }
+            }
+            // The file ends in a cell with line breaks.
+            Err(_) if to == bytes.len() && record.len() < columns.len() => break,
+            Err(why) => return Ok(Some(format!("row {i}: {why}"))),
+        }
     }
-    Ok(())
+    Ok(None)
 }

@@ -1,12 +1,13 @@
 //! Reads and decodes picture files, with limits.
 
-use std::io::Cursor;
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 use hzn_core::image::Layout;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
+use super::paths::open_file;
 use super::picture::{Picture, Samples};
 use super::{exif, pages};
 
@@ -30,20 +31,17 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
             Ok(there) => format!("is a link to {}, which does not exist", there.display()),
             Err(_) => "no such file".to_owned(),
         },
+        std::io::ErrorKind::IsADirectory | std::io::ErrorKind::InvalidInput => e.to_string(),
         _ => format!("cannot be read: {e}"),
     };
-    let meta = std::fs::metadata(path).map_err(refuse)?;
-    if meta.is_dir() {
-        return Err("is a folder".into());
+    let file = open_file(path).map_err(refuse)?;
+    let size = file.metadata().map_err(refuse)?.len();
+    if size > 2 * MAX_BYTES {
+        return Err(format!("file of {} MB is larger than the limit of {} MB", size >> 20, (2 * MAX_BYTES) >> 20));
     }
-    if meta.len() > 2 * MAX_BYTES {
-        return Err(format!(
-            "file of {} MB is larger than the limit of {} MB",
-            meta.len() >> 20,
-            (2 * MAX_BYTES) >> 20
-        ));
-    }
-    let bytes = std::fs::read(path).map_err(refuse)?;
+    let mut bytes = Vec::with_capacity(size as usize);
+    // The file may grow while it is read.
+    file.take(2 * MAX_BYTES).read_to_end(&mut bytes).map_err(refuse)?;
     if bytes.is_empty() { Err("file is empty".into()) } else { Ok(bytes) }
 }
 

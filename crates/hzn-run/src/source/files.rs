@@ -158,7 +158,6 @@ impl Source for Files {
             let what = match kind {
                 Kind::File => "file",
                 Kind::Folder => "folder",
-                Kind::Special => "special file",
             };
             let name = if ending.is_empty() { "without an ending".to_owned() } else { format!("ending in .{ending}") };
             let were = if *n == 1 { "was" } else { "were" };

@@ -19,19 +19,13 @@ pub(super) type LeftOut = BTreeMap<(Kind, String), usize>;
 pub(super) enum Kind {
     File,
     Folder,
-    /// A device, a pipe, a socket.
-    Special,
 }
 
 impl Kind {
-    /// A path without metadata counts as a file: it is a picture that cannot be read, such as a link into an archive
-    /// that is not mounted.
+    /// Everything that is no folder counts as a file. A link into an archive that is not mounted, a device or a pipe
+    /// with the name of a picture is a picture that cannot be read.
     fn from_path(path: &Path) -> Self {
-        match std::fs::metadata(path) {
-            Ok(meta) if meta.is_dir() => Self::Folder,
-            Ok(meta) if !meta.is_file() => Self::Special,
-            _ => Self::File,
-        }
+        if path.is_dir() { Self::Folder } else { Self::File }
     }
 }
 

@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 
 pub use bits::{FoundBits, find_bits, with_key};
 pub use item::{Item, TimeSource};
-pub use paths::{check_exists, ending};
+pub use paths::{check_exists, ending, open_file};
 pub use payload::Payload;
 pub use picture::Picture;
 pub use raw::Raw;

@@ -1,5 +1,7 @@
 //! Checks of input paths, and their endings.
 
+use std::fs::File;
+use std::io;
 use std::path::Path;
 
 use crate::error::{Error, unusable};
@@ -21,4 +23,17 @@ pub fn check_exists(file: &Path) -> Result<(String, bool), Error> {
 /// Returns the file's ending in lower case, without the dot.
 pub fn ending(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+}
+
+/// Opens a regular file. A device can have no end, and to open a pipe waits for its other end, so these are refused.
+///
+/// # Errors
+/// It cannot be opened, or is not a regular file.
+pub fn open_file(path: &Path) -> io::Result<File> {
+    let meta = std::fs::metadata(path)?;
+    match (meta.is_file(), meta.is_dir()) {
+        (true, _) => File::open(path),
+        (_, true) => Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder")),
+        _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "is a device, a pipe or a socket, not a file")),
+    }
 }

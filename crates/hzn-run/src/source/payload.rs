@@ -7,6 +7,7 @@ use hzn_core::config::Orient;
 use hzn_core::image::Layout;
 use hzn_mcap::{EncodedImage, ImageFormat};
 
+use super::paths::open_file;
 use super::picture::{Picture, Samples};
 use super::raw::Raw;
 use super::{decode, header};
@@ -72,7 +73,7 @@ impl Payload {
     /// Returns the largest sample of a picture of 16-bit words. Returns `None` for any other or unreadable picture.
     pub(super) fn largest_word(self) -> Option<u16> {
         match &self {
-            Self::File(path) if !header::has_words(std::fs::File::open(path).ok()?) => return None,
+            Self::File(path) if !header::has_words(open_file(path).ok()?) => return None,
             Self::File(path) if header::has_white_value(path) => return Some(u16::MAX),
             Self::Encoded(bytes) if !header::has_words(std::io::Cursor::new(bytes)) => return None,
             _ => {}

@@ -10,6 +10,7 @@ use super::payload::Payload;
 use super::recording::{SAMPLE_EVERY, known_size};
 use super::sequence::{MAX_SIZES_READ, Source};
 use crate::error::{Error, unusable};
+use crate::explain;
 
 /// Pictures as they were recorded: with their names, times, priors, and the sensor.
 pub(super) struct Rerun {
@@ -32,6 +33,11 @@ impl Rerun {
                 let what = "contains results without their pictures; give the pictures themselves";
                 return Err(unusable(format!("{}: {what}", path.display())));
             }
+            RecordedPictures::Damaged(parts) => {
+                let parts = explain::counted(parts, "damaged part");
+                let what = format!("no picture is left: the file has {parts}; give the pictures themselves");
+                return Err(unusable(format!("{}: {what}", path.display())));
+            }
             RecordedPictures::Lost => {
                 let what = "ends before its first picture is complete; give the pictures themselves";
                 return Err(unusable(format!("{}: {what}", path.display())));
@@ -49,6 +55,8 @@ enum RecordedPictures {
     Present,
     /// The file has only results.
     LeftOut,
+    /// The file has damaged parts, and no picture outside of them.
+    Damaged(u64),
     /// The file contains nothing that is complete.
     Lost,
 }
@@ -63,6 +71,9 @@ fn find_pictures(path: &Path) -> Result<RecordedPictures, hzn_mcap::Error> {
             return Ok(RecordedPictures::Present);
         }
         any |= !part.is_empty();
+    }
+    if index.broken_chunks() > 0 {
+        return Ok(RecordedPictures::Damaged(index.broken_chunks()));
     }
     Ok(if any || index.is_complete() { RecordedPictures::LeftOut } else { RecordedPictures::Lost })
 }

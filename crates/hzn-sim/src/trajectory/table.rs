@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use hzn_calib::limited;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -39,7 +40,7 @@ impl Table {
     /// Fails if the file cannot be read.
     pub fn read(&mut self, folder: &Path) -> Result<(), String> {
         let path = folder.join(&self.file);
-        let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let text = limited::read_text(&path, limited::TABLE_BYTES).map_err(|e| format!("{}: {e}", path.display()))?;
         self.text = Some(text);
         Ok(())
     }

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use hzn_calib::limited;
+
 use super::row::Truth;
 
 /// The reason why a truth.csv cannot be used, displayed as `truth.csv:3: axis_x: …`.
@@ -39,7 +41,7 @@ impl core::error::Error for TruthError {}
 /// Fails if the file cannot be read or has no rows, if a column is missing, or if a cell is not a finite number. Also
 /// fails if an axis or a quaternion does not have unit length, or if a half-angle is not above 0° and below 90°.
 pub fn load(path: &Path) -> Result<Vec<Truth>, TruthError> {
-    let text = std::fs::read_to_string(path).map_err(|e| {
+    let text = limited::read_text(path, limited::TABLE_BYTES).map_err(|e| {
         let what = match e.kind() {
             std::io::ErrorKind::NotFound => "no such file".to_owned(),
             _ => format!("cannot be read: {e}"),

@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 /// An error of `write` is returned. If the renaming fails, the message says why and what to do.
 pub fn replace<E: From<String>>(path: &Path, write: impl FnOnce(&Path) -> Result<(), E>) -> Result<(), E> {
     let part = part(path);
-    let written =
-        write(&part).and_then(|()| std::fs::rename(&part, path).map_err(|e| E::from(hzn_run::disk::advice(path, &e))));
+    let publish =
+        || std::fs::OpenOptions::new().write(true).open(&part).and_then(|file| hzn_mcap::publish(&file, &part, path));
+    let written = write(&part).and_then(|()| publish().map_err(|e| E::from(hzn_run::disk::advice(path, &e))));
     if written.is_err() {
         let _ = std::fs::remove_file(&part);
     }

@@ -137,7 +137,7 @@ fn read_companions(request: &Request, folder: &Path, recorded_sensor: Option<Sen
     let mut opened = Opened { folder: folder.to_owned(), ..Opened::default() };
     let file =
         |named: &Option<PathBuf>, name: &str| named.clone().or_else(|| Some(folder.join(name)).filter(|p| p.exists()));
-    let mut sensor_file = |path: &Path| match std::fs::read_to_string(path) {
+    let mut sensor_file = |path: &Path| match hzn_calib::limited::read_text(path, hzn_calib::limited::SETTINGS_BYTES) {
         Ok(text) => Some(SensorText { text, home: path.to_owned(), is_file: true }),
         Err(e) => {
             opened.notes.push(format!("{}: cannot be read: {e}", path.display()));

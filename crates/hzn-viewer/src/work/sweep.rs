@@ -129,9 +129,10 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
         last: Vec::new(),
     };
     let mut source = SequenceSource::new(sequence)?;
+    let settings = sink::Settings { config: &config, sensor_toml: &sensor_toml, durable: false };
     let mut file = match &output {
         Some(path) => {
-            let opened = sink::open(Some(path), Existing::Replace, &config, &sensor_toml);
+            let opened = sink::open(Some(path), Existing::Replace, settings);
             Some(opened.map_err(|e| e.to_string())?.0)
         }
         None => None,

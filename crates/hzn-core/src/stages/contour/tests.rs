@@ -3,10 +3,13 @@ use crate::geometry::pixel::Pixel;
 use crate::image::region::Region;
 use crate::image::{Grey, Layout};
 use crate::model::observer::Unobserved;
+use crate::model::work;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::vec;
 use std::vec::Vec;
+
+mod reference;
 
 type Points = Vec<(u16, u16)>;
 

@@ -14,7 +14,7 @@ mod tool;
 
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
 
 use hzn_core::image::{Channel, Layout};
@@ -27,7 +27,7 @@ use super::sequence::Source;
 use crate::error::{Error, unusable};
 use crate::explain;
 use times::Times;
-use tool::{Running, ToolErrors, cannot_start, tool};
+use tool::{Running, ToolErrors, add_input, cannot_start, tool};
 
 pub(super) const ENDINGS: &[&str] = &[
     "mp4", "m4v", "mov", "avi", "mkv", "webm", "mpg", "mpeg", "ts", "mts", "m2ts", "wmv", "flv", "y4m", "mjpeg", "mj2",
@@ -62,18 +62,16 @@ pub(super) struct Video {
 impl Video {
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let name = path.display();
-        let probe = tool("ffprobe")
-            .args([
-                "-select_streams",
-                "v:0",
-                "-show_entries",
-                "stream=width,height,pix_fmt,nb_frames:stream_side_data=rotation:stream_tags=rotate",
-                "-of",
-                "default=nw=1",
-            ])
-            .arg(path)
-            .output()
-            .map_err(|e| cannot_start("ffprobe", &e))?;
+        let mut command = tool("ffprobe");
+        command.args([
+            "-select_streams",
+            "v:0",
+            "-show_entries",
+            "stream=width,height,pix_fmt,nb_frames:stream_side_data=rotation:stream_tags=rotate",
+            "-of",
+            "default=nw=1",
+        ]);
+        let probe = add_input(&mut command, path).and_then(Command::output).map_err(|e| cannot_start("ffprobe", &e))?;
         if !probe.status.success() {
             let why = String::from_utf8_lossy(&probe.stderr);
             return Err(unusable(format!("{name}: ffprobe cannot read it: {}", why.trim())));
@@ -178,9 +176,9 @@ type Pixels = BufReader<Box<dyn Read + Send>>;
 /// Starts ffmpeg on a video.
 fn start(path: &Path, arguments: &[String]) -> Result<(Running, Pixels, JoinHandle<ToolErrors>), Error> {
     let mut command = tool("ffmpeg");
-    command
-        .args(["-nostdin", "-noautorotate", "-i"])
-        .arg(path)
+    command.args(["-nostdin", "-noautorotate"]);
+    add_input(&mut command, path)
+        .map_err(|e| cannot_start("ffmpeg", &e))?
         .args(["-map", "0:v:0", "-fps_mode", "passthrough"])
         .args(arguments)
         .args(["-f", "rawvideo", "-"])

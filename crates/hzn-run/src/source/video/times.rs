@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::Stdio;
 
-use super::tool::{Running, tool};
+use super::tool::{Running, add_input, cannot_start, tool};
 use crate::error::Error;
 use crate::source::item::TimeSource;
 
@@ -32,9 +32,9 @@ impl Times {
                 "-of",
                 "default=nw=1",
             ])
-            .arg(path)
             // ffmpeg reports the same errors.
             .stderr(Stdio::null());
+        add_input(&mut command, path).map_err(|e| cannot_start("ffprobe", &e))?;
         let (probe, lines) = Running::start("ffprobe", &mut command)?;
         let lines = BufReader::new(Box::new(lines) as Box<dyn Read + Send>);
         let mut times = Self { lines, ahead: VecDeque::new(), in_container: false, _probe: probe };

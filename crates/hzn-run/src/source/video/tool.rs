@@ -1,6 +1,8 @@
 //! The programs that read videos, as child processes.
 
+use std::ffi::OsString;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
+use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::JoinHandle;
 
@@ -18,6 +20,14 @@ pub(super) fn tool(name: &str) -> Command {
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command
+}
+
+/// Adds a file as the input. Its name alone could be an option (`-y.mp4`) or a protocol (`pipe:0.mp4`), and a play list
+/// can name other places; therefore only the absolute path of a file and the protocol for files are allowed.
+pub(super) fn add_input<'a>(command: &'a mut Command, path: &Path) -> std::io::Result<&'a mut Command> {
+    let mut file = OsString::from("file:");
+    file.push(std::path::absolute(path)?);
+    Ok(command.args(["-protocol_whitelist", "file", "-i"]).arg(file))
 }
 
 /// Returns the error for a program that cannot be started.

@@ -71,7 +71,8 @@ impl Session {
     /// # Errors
     /// The file cannot be read. An error in its text is not an error here but a [`Session::problem`].
     pub fn open(path: &Path) -> Result<Self, Problem> {
-        let text = std::fs::read_to_string(path).map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
+        let text = hzn_calib::limited::read_text(path, hzn_calib::limited::SETTINGS_BYTES)
+            .map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
         Ok(Self::new(&text, path, true))
     }
 

@@ -1,0 +1,155 @@
+//! Rows of results as text, each with a checksum.
+//!
+//! MCAP has CRCs of its own. A table gets a last column `crc32`: the CRC-32 (as in PNG and zip) of the row as a line of
+//! CSV, without its line end, without this column, and with an empty cell `elapsed_us`. The processing time is left out
+//! because it differs from run to run, and two runs with the same answers must have the same column.
+//!
+//! The column belongs to the text and not to [`Row`]. It is the last, so readers that find columns by name or by place
+//! are not disturbed, and the checksum stays with its row if rows are sorted, selected or joined. A second file could
+//! be lost or be older than the table, and a last line would be a broken row for other readers.
+
+use hzn_mcap::Row;
+
+/// Name of the column with the checksum.
+pub const COLUMN: &str = "crc32";
+
+/// Returns the first line of a CSV.
+pub(crate) fn header() -> String {
+    format!("{},{COLUMN}\n", Row::COLUMNS.join(","))
+}
+
+/// Returns a row as a line of CSV without its checksum and line end.
+fn to_csv(row: &Row) -> anyhow::Result<Vec<u8>> {
+    let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+    writer.serialize(row)?;
+    let mut line = writer.into_inner().map_err(|e| anyhow::anyhow!("{e}"))?;
+    line.truncate(line.trim_ascii_end().len());
+    Ok(line)
+}
+
+/// Returns the checksum of a row, as eight hexadecimal digits.
+///
+/// # Errors
+/// The row cannot be written as CSV.
+pub fn checksum(row: &Row) -> anyhow::Result<String> {
+    let line = to_csv(&Row { elapsed_us: None, ..row.clone() })?;
+    Ok(format!("{:08x}", crc32fast::hash(&line)))
+}
+
+/// Returns one row as a line of CSV.
+pub(crate) fn csv_line(row: &Row) -> anyhow::Result<Vec<u8>> {
+    let mut line = to_csv(row)?;
+    line.extend_from_slice(format!(",{}\n", checksum(row)?).as_bytes());
+    Ok(line)
+}
+
+/// Returns one row as a line of JSON.
+pub(crate) fn json_line(row: &Row) -> anyhow::Result<Vec<u8>> {
+    let mut line = serde_json::to_vec(row)?;
+    // The closing brace.
+    line.pop();
+    line.extend_from_slice(format!(",\"{COLUMN}\":\"{}\"}}\n", checksum(row)?).as_bytes());
+    Ok(line)
+}
+
+/// Reads a line of JSON.
+///
+/// # Errors
+/// The reason why it is not a row, or why it is not the row that was written.
+pub(crate) fn from_json(line: &[u8]) -> Result<Row, String> {
+    #[derive(serde::Deserialize)]
+    struct Sum {
+        crc32: Option<String>,
+    }
+    let row: Row = serde_json::from_slice(line).map_err(|e| e.to_string())?;
+    let sum: Sum = serde_json::from_slice(line).map_err(|e| e.to_string())?;
+    check(row, sum.crc32.as_deref())
+}
+
+/// Reads a row of CSV, whose columns are found by their names.
+///
+/// # Errors
+/// The reason why it is not a row, or why it is not the row that was written.
+pub(crate) fn from_csv(record: &csv::StringRecord, header: &csv::StringRecord) -> Result<Row, String> {
+    let why = |e: csv::Error| match e.kind() {
+        // The caller knows the line.
+        csv::ErrorKind::Deserialize { err, .. } => err.kind().to_string(),
+        _ => e.to_string(),
+    };
+    let row = record.deserialize::<Row>(Some(header)).map_err(why)?;
+    let place = header.iter().position(|name| name == COLUMN);
+    check(row, place.and_then(|i| record.get(i)))
+}
+
+/// Returns the row if its checksum is right. Results of earlier versions have none.
+fn check(row: Row, sum: Option<&str>) -> Result<Row, String> {
+    let Some(sum) = sum else { return Ok(row) };
+    let own = checksum(&row).map_err(|e| e.to_string())?;
+    if own == sum { Ok(row) } else { Err(format!("{WRONG_SUM} ({sum}, but its values give {own})")) }
+}
+
+/// Beginning of the reason for a row that was changed.
+const WRONG_SUM: &str = "the checksum does not fit the row, so it was changed or is damaged";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hzn_core::status::Status;
+
+    fn row() -> Row {
+        let meta = hzn_mcap::RowMeta {
+            index: 7,
+            file: "a \"b\", c.png".into(),
+            time_s: Some(0.1 + 0.2),
+            body: "earth".into(),
+            altitude_km: Some(1e-7),
+        };
+        let row = Row::unprocessed(&meta, Status::Unreadable, "two\nlines");
+        Row { axis_x: Some(-0.0), axis_y: Some(1.0 / 3.0), elapsed_us: Some(12.5), ..row }
+    }
+
+    fn read_csv(line: &[u8]) -> Result<Row, String> {
+        let text = [header().as_bytes(), line].concat();
+        let mut reader = csv::Reader::from_reader(text.as_slice());
+        let header = reader.headers().unwrap().clone();
+        let record = reader.records().next().unwrap().map_err(|e| e.to_string())?;
+        from_csv(&record, &header)
+    }
+
+    #[test]
+    fn rows_come_back_and_changed_ones_do_not() {
+        let row = row();
+        let (csv, json) = (csv_line(&row).unwrap(), json_line(&row).unwrap());
+        assert_eq!(read_csv(&csv).as_ref(), Ok(&row));
+        assert_eq!(from_json(&json).as_ref(), Ok(&row));
+        let other = Row { elapsed_us: Some(99.0), ..row.clone() };
+        assert_eq!(checksum(&other).unwrap(), checksum(&row).unwrap());
+        // Every changed digit is found, except those of the processing time, which is left out.
+        for (line, read) in [(&csv, &read_csv as &dyn Fn(&[u8]) -> Result<Row, String>), (&json, &from_json)] {
+            let time = line.windows(4).position(|w| w == b"12.5").unwrap();
+            for at in (0..line.len()).filter(|at| line[*at].is_ascii_digit() && !(time..time + 4).contains(at)) {
+                let mut changed = line.clone();
+                changed[at] = if changed[at] == b'9' { b'8' } else { changed[at] + 1 };
+                // The last digit of a number may stand for the same number, and a digit of a key makes an unknown key.
+                // The row is then the same, or is refused.
+                if let Ok(read) = read(&changed) {
+                    assert_eq!(read, row, "{at}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_checksum_is_that_of_the_documented_line() {
+        let csv = String::from_utf8(csv_line(&row()).unwrap()).unwrap();
+        let (line, sum) = csv.trim_end().rsplit_once(',').unwrap();
+        let line = line.replace(",12.5,", ",,");
+        assert_eq!(format!("{:08x}", crc32fast::hash(line.as_bytes())), sum);
+    }
+
+    #[test]
+    fn rows_without_a_checksum_are_read() {
+        let line = serde_json::to_vec(&row()).unwrap();
+        assert_eq!(from_json(&line), Ok(row()));
+    }
+}

@@ -1,0 +1,67 @@
+//! What hzn is built from: licences, sources, and the list of its parts.
+
+use std::collections::BTreeSet;
+
+use hzn_fuzz::supply::{self, Package};
+
+/// Returns whether an SPDX expression allows one of these licences: every part that `AND` joins needs one choice.
+fn is_allowed(expression: &str, allowed: &BTreeSet<String>) -> bool {
+    // Older manifests write a slash instead of OR.
+    let text = expression.replace('/', " OR ").replace(['(', ')'], " ");
+    let choice = |part: &str| part.split(" OR ").any(|licence| allowed.contains(licence.trim()));
+    text.split(" AND ").all(choice)
+}
+
+#[test]
+fn licences_and_sources_are_allowed() {
+    let rules: toml::Table = std::fs::read_to_string(supply::root().join("deny.toml")).unwrap().parse().unwrap();
+    let list = rules["licenses"]["allow"].as_array().unwrap();
+    let allowed: BTreeSet<String> = list.iter().map(|name| name.as_str().unwrap().to_owned()).collect();
+    assert!(!is_allowed("GPL-3.0-only", &allowed) && !is_allowed("MIT AND GPL-2.0", &allowed));
+    assert!(is_allowed("GPL-3.0 OR MIT", &allowed) && is_allowed("(MIT OR Apache-2.0) AND Unicode-3.0", &allowed));
+    let exceptions = rules["licenses"]["exceptions"].as_array().unwrap();
+    let is_exception = |name: &str, license: &str| {
+        exceptions.iter().any(|e| e["crate"].as_str() == Some(name) && e["allow"][0].as_str() == Some(license))
+    };
+    let mut seen = 0;
+    for manifest in ["Cargo.toml", "firmware/Cargo.toml", "fuzz/Cargo.toml"] {
+        for Package { name, version, license, source, .. } in supply::packages(manifest) {
+            let license = license.unwrap_or_else(|| panic!("{name} {version} has no licence in its manifest"));
+            let is_fine = is_allowed(&license, &allowed) || is_exception(&name, &license);
+            assert!(is_fine, "{name} {version}: {license} is not in deny.toml");
+            let known = source.as_deref().is_none_or(|source| source.starts_with("registry+"));
+            assert!(known, "{name} {version} comes from {source:?}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 200, "{seen}");
+}
+
+#[test]
+fn the_list_of_parts_is_complete() {
+    for (manifest, package) in supply::PRODUCTS {
+        let sbom = supply::sbom(manifest, package);
+        assert_eq!((&sbom["bomFormat"], &sbom["specVersion"]), (&"CycloneDX".into(), &"1.5".into()));
+        assert_eq!(sbom["metadata"]["component"]["name"], *package);
+        let parts = sbom["components"].as_array().unwrap();
+        assert!(parts.iter().any(|part| part["name"] == "hzn-core"), "{package}");
+        for part in parts {
+            assert!(part["purl"].as_str().unwrap().starts_with("pkg:cargo/"), "{part}");
+            let is_ours = part["name"].as_str().unwrap().starts_with("hzn");
+            assert!(is_ours || part["hashes"][0]["alg"] == "SHA-256", "{part} has no checksum");
+        }
+    }
+}
+
+/// The binary does not know the features that its library was built with, so the text names them.
+#[test]
+fn the_version_names_the_features_that_the_manifest_turns_on() {
+    let root = supply::root();
+    let manifest: toml::Table =
+        std::fs::read_to_string(root.join("crates/hzn-cli/Cargo.toml")).unwrap().parse().unwrap();
+    let all = manifest["dependencies"]["hzn-core"]["features"].as_array().unwrap();
+    let methods: Vec<&str> =
+        all.iter().map(|f| f.as_str().unwrap()).filter(|f| !["serde", "std"].contains(f)).collect();
+    let source = std::fs::read_to_string(root.join("crates/hzn-cli/src/commands/mod.rs")).unwrap();
+    assert!(source.contains(&format!("features {}\"", methods.join(", "))), "{methods:?}");
+}

@@ -1,0 +1,206 @@
+//! Runs the large campaigns that look for faults. `cargo xtask test` runs a small part of each.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::machine::{has, root, target};
+use crate::steps::{self, Outcome, Trouble, cargo};
+
+/// The triple that the fuzzing program is built for. With a named target, build scripts are not instrumented.
+const HOST: &str = "x86_64-unknown-linux-gnu";
+/// Coverage for libFuzzer and the address sanitizer, as `cargo fuzz` sets them.
+const FLAGS: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
+                     -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
+                     -Cllvm-args=-sanitizer-coverage-pc-table -Cllvm-args=-sanitizer-coverage-trace-compares \
+                     --cfg fuzzing -Zsanitizer=address";
+/// Largest input in bytes: valid files of every kind are smaller.
+const MAX_INPUT_BYTES: u32 = 8192;
+
+const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TARGET]...
+       cargo xtask campaign kill [RUNS]
+       cargo xtask campaign long [PICTURES]
+       cargo xtask campaign parts [FOLDER]
+
+  fuzz  runs every target (or those that are named) under libFuzzer for N seconds (60); --keep adds the inputs with
+        new coverage to fuzz/corpus
+  kill  kills RUNS (1000) runs of hzn at random moments and continues them
+  long  processes PICTURES (100000) with hzn run, and ten times as many in one process
+  parts writes the CycloneDX lists of parts (SBOM) of command, wheel and firmware into FOLDER (target/sbom), and runs
+        cargo-deny if it is installed";
+
+/// Runs one campaign.
+pub(crate) fn run(args: &[String]) -> Result<(), String> {
+    std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
+    let number = |default: u64| match args.get(1).map(|text| text.parse::<u64>()) {
+        None => Ok(default),
+        Some(number) => number.map_err(|_| format!("{}: a number is expected\n{USAGE}", args[1])),
+    };
+    let done = match args.first().map(String::as_str) {
+        Some("fuzz") => Request::parse(&args[1..]).and_then(|request| request.run().map_err(Trouble::into_message)),
+        Some("kill") => kill(number(1000)?).map_err(Trouble::into_message),
+        Some("long") => long(number(100_000)?).map_err(Trouble::into_message),
+        Some("parts") => parts(args.get(1).map_or("target/sbom", String::as_str)).map_err(Trouble::into_message),
+        _ => Err(USAGE.to_owned()),
+    };
+    done.map_err(|e| format!("campaign: {e}"))
+}
+
+/// Returns the call of a test that prints its figures. It is built as the gate builds it.
+fn test(package: &str, file: &str, name: &str) -> Command {
+    let mut command = cargo(&["test", "--package", package, "--test", file]);
+    command.args(["--", "--nocapture", "--include-ignored", name]);
+    command
+}
+
+fn kill(runs: u64) -> Outcome {
+    steps::run(test("hzn-cli", "campaign", "killed_at_random_moments").env("HZN_KILLS", runs.to_string()))
+}
+
+fn long(pictures: u64) -> Outcome {
+    steps::run(test("hzn-core", "long", "the_answers_repeat").env("HZN_FRAMES", (10 * pictures).to_string()))?;
+    steps::run(test("hzn-cli", "campaign", "a_long_run").env("HZN_PICTURES", pictures.to_string()))
+}
+
+fn parts(folder: &str) -> Outcome {
+    let sbom = ["run", "--quiet", "--package", "hzn-fuzz", "--example", "sbom"];
+    steps::run(cargo(&sbom).args(["--", folder]))?;
+    if has("cargo-deny") {
+        return steps::run(Command::new(steps::cargo_program()).args(["deny", "check", "licenses", "bans", "sources"]));
+    }
+    println!("cargo-deny is not installed; the test `supply` checks licences and sources");
+    Ok(())
+}
+
+/// A campaign of libFuzzer.
+#[derive(Default)]
+struct Request {
+    seconds: u64,
+    keep: bool,
+    targets: Vec<String>,
+}
+
+/// What libFuzzer says about a target.
+#[derive(Default)]
+struct Figures {
+    executions: u64,
+    /// Edges of the program that were reached, and all edges.
+    edges: [u64; 2],
+}
+
+impl Request {
+    fn parse(args: &[String]) -> Result<Self, String> {
+        let mut request = Self { seconds: 60, ..Self::default() };
+        let mut words = args.iter();
+        while let Some(word) = words.next() {
+            match word.as_str() {
+                "--seconds" => {
+                    let number = words.next().and_then(|text| text.parse().ok());
+                    request.seconds = number.ok_or(format!("--seconds: a number is expected\n{USAGE}"))?;
+                }
+                "--keep" => request.keep = true,
+                name if name.starts_with('-') => return Err(USAGE.to_owned()),
+                name => request.targets.push(name.to_owned()),
+            }
+        }
+        Ok(request)
+    }
+
+    fn run(mut self) -> Outcome {
+        let program = build()?;
+        if self.targets.is_empty() {
+            let folders =
+                fs::read_dir("fuzz/corpus")?.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+            self.targets = folders.collect::<std::io::Result<_>>()?;
+            self.targets.sort();
+        }
+        let mut rows = Vec::new();
+        for name in &self.targets {
+            let figures = self.run_target(&program, name)?;
+            let [reached, all] = figures.edges;
+            rows.push(format!("| `{name}` | {} | {reached} of {all} |", figures.executions));
+        }
+        println!("\n| target | executions | edges reached |\n|---|---|---|\n{}", rows.join("\n"));
+        Ok(())
+    }
+
+    fn run_target(&self, program: &Path, name: &str) -> Result<Figures, Trouble> {
+        let committed = PathBuf::from("fuzz/corpus").join(name);
+        let [found, finding] = ["corpus", "artifacts"].map(|kind| target().join("fuzz").join(kind).join(name));
+        [&committed, &found, &finding].into_iter().try_for_each(fs::create_dir_all)?;
+        let mut command = Command::new(program);
+        command.env("HZN_FUZZ_TARGET", name).env("ASAN_OPTIONS", "detect_leaks=0").arg(&found).arg(&committed);
+        command.arg(format!("-max_total_time={}", self.seconds)).arg(format!("-max_len={MAX_INPUT_BYTES}"));
+        command.arg(format!("-artifact_prefix={}/", finding.display()));
+        command.args(["-print_final_stats=1", "-timeout=20", "-rss_limit_mb=2048"]);
+        steps::show(&command);
+        let mut child = command.stdin(Stdio::null()).stderr(Stdio::piped()).spawn()?;
+        let errors = child.stderr.take().ok_or_else(|| Trouble::Failed("libFuzzer has no output".into()))?;
+        let (mut figures, mut last) = (Figures::default(), Vec::new());
+        for line in BufReader::new(errors).lines() {
+            let line = line?;
+            figures.read(&line);
+            last.push(line);
+            if last.len() > 40 {
+                last.remove(0);
+            }
+        }
+        if !child.wait()?.success() {
+            println!("{}", last.join("\n"));
+            return Err(Trouble::Failed(format!(
+                "{name}: a finding, see above; its input is in {}",
+                finding.display()
+            )));
+        }
+        if self.keep {
+            let mut merge = Command::new(program);
+            merge.env("HZN_FUZZ_TARGET", name).env("ASAN_OPTIONS", "detect_leaks=0");
+            merge.arg("-merge=1").arg(format!("-max_len={MAX_INPUT_BYTES}")).arg(&committed).arg(&found);
+            steps::run(merge.stderr(Stdio::null()))?;
+        }
+        Ok(figures)
+    }
+}
+
+impl Figures {
+    /// Reads a line of libFuzzer.
+    fn read(&mut self, line: &str) {
+        let number = |text: &str| text.split_whitespace().next()?.trim_matches(['(', ')']).parse::<u64>().ok();
+        let after = |word: &str| line.split_once(word).and_then(|(_, rest)| number(rest));
+        self.executions = after("stat::number_of_executed_units:").unwrap_or(self.executions);
+        self.edges[0] = after(" cov: ").unwrap_or(self.edges[0]);
+        if line.contains("PC tables (") {
+            self.edges[1] = after("PC tables (").unwrap_or(self.edges[1]);
+        }
+    }
+}
+
+/// Builds the fuzzing program and returns its path.
+fn build() -> Result<PathBuf, Trouble> {
+    let folder = target().join("fuzz");
+    let mut command = cargo(&["build", "--release", "--manifest-path", "fuzz/Cargo.toml", "--target", HOST]);
+    // With RUSTC_BOOTSTRAP a stable compiler takes the flag of the sanitizer.
+    command.env("RUSTC_BOOTSTRAP", "1").env("RUSTFLAGS", FLAGS).env("CARGO_TARGET_DIR", &folder);
+    steps::run(&mut command)?;
+    Ok(folder.join(HOST).join("release/hzn-libfuzzer"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_come_from_the_lines_of_libfuzzer() {
+        let mut figures = Figures::default();
+        for line in [
+            "INFO: Loaded 1 PC tables (152310 PCs): 152310 [0x55,0x56),",
+            "#2	INITED cov: 402 ft: 403 corp: 1/1b exec/s: 0 rss: 40Mb",
+            "#262144	pulse  cov: 1234 ft: 5678 corp: 99/1Kb lim: 4096 exec/s: 1000 rss: 99Mb",
+            "stat::number_of_executed_units: 300000",
+        ] {
+            figures.read(line);
+        }
+        assert_eq!((figures.executions, figures.edges), (300_000, [1234, 152_310]));
+    }
+}
