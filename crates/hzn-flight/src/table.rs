@@ -135,7 +135,7 @@ mod tests {
     fn the_largest_table_fits() {
         let mut p = Parameters::defaults();
         for _ in 0..8 {
-            let polygon = (0..16).map(|i| [f64::from(i), 1.0]).collect();
+            let polygon = (0..16).map(|i| [f64::from(i), f64::from(i * i)]).collect();
             p.sensor.mask.polygons_px.push(polygon).unwrap();
         }
         let mut bytes = [0; MAX_BYTES];

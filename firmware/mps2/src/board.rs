@@ -121,6 +121,39 @@ pub struct Watchdog {
 static RUNNING: AtomicU32 = AtomicU32::new(0);
 const WAS_RUNNING: u32 = 0x5AFE_C0DE;
 
+/// Words for the flight software, in the same kind of memory.
+#[unsafe(link_section = ".uninit.RETAINED")]
+static RETAINED: [AtomicU32; 4] = [const { AtomicU32::new(0) }; 4];
+
+/// Returns the words that a reset leaves unchanged.
+pub fn read_retained() -> [u32; 4] {
+    RETAINED.each_ref().map(|word| word.load(Ordering::Relaxed))
+}
+/// Keeps words for the time after a reset.
+pub fn write_retained(words: [u32; 4]) {
+    for (place, word) in RETAINED.iter().zip(words) {
+        place.store(word, Ordering::Relaxed);
+    }
+}
+
+unsafe extern "C" {
+    /// Begin of the vector table, which is the begin of the image.
+    static __vector_table: u8;
+    /// End of the constants in flash; the initial values of variables follow.
+    static __sidata: u8;
+    static __sdata: u8;
+    static __edata: u8;
+}
+
+/// Returns the program image in flash, as `objcopy -O binary` writes it.
+pub fn image() -> &'static [u8] {
+    let (begin, constants_end) = (&raw const __vector_table, &raw const __sidata);
+    let variables = (&raw const __edata as usize).saturating_sub(&raw const __sdata as usize);
+    let length = (constants_end as usize).saturating_sub(begin as usize) + variables;
+    // SAFETY: the linker places the image in flash without gaps that are not mapped, and nothing writes to it.
+    unsafe { core::slice::from_raw_parts(begin, length) }
+}
+
 impl Watchdog {
     fn new() -> Self {
         Self { running: false, was_reset: RUNNING.swap(WAS_RUNNING, Ordering::Relaxed) == WAS_RUNNING }
