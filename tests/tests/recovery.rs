@@ -29,8 +29,8 @@ fn a_loop_of_resets_ends_in_safe_mode() {
         bench.write_copy_of(1, &parameters, 1);
         bench.write_copy_of(2, &parameters, 2);
         std::fs::write(bench.path("frames.bin"), [*b"HANG", [0; 4], [0; 4], [0; 4]].concat()).unwrap();
-        // The watchdog's two seconds are 31 million instructions at this shift.
-        assert_eq!(bench.run_with_shift(&shut_down_after_starts(&bench), 6), 0);
+        // The watchdog's two seconds are eight million instructions at this shift.
+        assert_eq!(bench.run_with_shift(&shut_down_after_starts(&bench), 8), 0);
         let printed = hzn_run(bench.dir(), &["telemetry", "sent.bin", "--housekeeping", "hk.csv"]);
         let count = |text: &str| printed.matches(text).count();
         assert_eq!(count("started with copy 2 of the parameters"), 3, "{printed}");
@@ -66,15 +66,16 @@ fn a_loop_of_resets_ends_in_safe_mode() {
 #[ignore = "needs the images: cargo xtask firmware"]
 fn a_bad_parameter_in_memory_heals_itself() {
     let bench = Bench::new(Board::An500);
-    let stripes = (0..1920 * 1080).map(|i| 255 * (((i % 1920) + (i / 1920) / 500) % 2) as u8).collect();
+    let stripes = (0..640 * 480).map(|i| 255 * (((i % 640) + (i / 640) / 500) % 2) as u8).collect();
     bench.write_frames(&[(stripes, 0)]);
-    let mut parameters = Parameters::new(rocket(1920, 1080, 1, 1).sensor);
+    let mut parameters = Parameters::new(rocket(640, 480, 1, 1).sensor);
     parameters.sensor.body.altitude_km = Some(150.0);
     parameters.sensor.contour.line_spacing_px = Some(2);
     parameters.operations.boot_mode = 1;
     bench.write_copy_of(1, &parameters, 1);
     parameters.sensor.limits.max_work = Some(hzn_flight::parameters::MAX_WORK);
     bench.write_copy_of(2, &parameters, 2);
+    // The watchdog's two seconds are 31 million instructions at this shift: twice the default `limits.max_work`.
     assert_eq!(bench.run_with_shift(&shut_down_after_starts(&bench), 6), 0);
     let printed = hzn_run(bench.dir(), &["telemetry", "sent.bin", "-o", "sent.csv"]);
     assert_eq!(printed.matches("started with copy 2 of the parameters").count(), 3, "{printed}");

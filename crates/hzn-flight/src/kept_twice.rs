@@ -7,19 +7,29 @@
 #[derive(Debug)]
 pub(crate) struct KeptTwice<T> {
     value: T,
-    copy: T,
+    copy: Option<T>,
 }
 
 impl<T: Clone + PartialEq> KeptTwice<T> {
+    /// Makes a value. Its copy is made later, because the start has no stack for it.
     pub(crate) fn new(value: T) -> Self {
-        Self { copy: value.clone(), value }
+        Self { value, copy: None }
     }
-    /// Replaces the value and its copy.
-    // Not inlined: the temporary values must not lie on the caller's stack.
+    /// Makes the copy.
+    // Not inlined: the temporary copy must not lie on the caller's stack.
     #[inline(never)]
+    pub(crate) fn keep(&mut self) {
+        self.copy = Some(self.value.clone());
+    }
+    /// Makes the copy if there is none.
+    pub(crate) fn complete(&mut self) {
+        if self.copy.is_none() {
+            self.keep();
+        }
+    }
+    /// Replaces the value. Call [`Self::complete`] soon: until then a change is not noticed.
     pub(crate) fn set(&mut self, value: T) {
-        self.copy.clone_from(&value);
-        self.value = value;
+        (self.value, self.copy) = (value, None);
     }
     pub(crate) fn get(&self) -> &T {
         &self.value
@@ -27,8 +37,9 @@ impl<T: Clone + PartialEq> KeptTwice<T> {
     /// Returns whether the value and its copy are equal. The comparison of a number that is NaN would fail: the values
     /// that are kept twice have none.
     #[inline(never)]
-    pub(crate) fn is_intact(&self) -> bool {
-        core::hint::black_box(&self.value) == core::hint::black_box(&self.copy)
+    pub(crate) fn is_intact(&mut self) -> bool {
+        self.complete();
+        core::hint::black_box(&self.copy).as_ref() == Some(&self.value)
     }
     /// Changes the value but not its copy, as a memory error does.
     #[cfg(test)]

@@ -79,6 +79,8 @@ numbered_enum! {
         Report = 12 => "report",
         /// Allows the mode shut-down for ten seconds.
         ArmShutDown = 13 => "arm",
+        /// Sets the values from navigation as [`Self::SetKnown`], with their time, velocity and expiry: [`Navigation`].
+        Navigate = 14 => "navigate",
     }
 }
 
@@ -133,6 +135,8 @@ numbered_enum! {
         /// The watchdog reset the computer also with the older parameters, so it stays in safe mode. a: number of
         /// resets. b: 0.
         SafeAfterResets = 16 => "safe mode after resets by the watchdog",
+        /// The values from navigation have expired and are not used. a: their age, ms. b: 0.
+        KnownExpired = 17 => "the values from navigation have expired",
     }
 }
 
@@ -147,6 +151,7 @@ impl Event {
             | Self::Overrun
             | Self::KnownRefused
             | Self::CameraSilent
+            | Self::KnownExpired
             | Self::Repaired => Severity::Warning,
             Self::Defaults
             | Self::SelfCheck
@@ -300,6 +305,37 @@ record! {
         a: u32,
         /// Second number of the event.
         b: u32,
+    }
+}
+
+record! {
+    /// Arguments of [`Function::Navigate`]. NaN means that a value is not known; all three numbers of a vector are known,
+    /// or none.
+    Navigation {
+        /// Time of the values, µs since the start of the computer.
+        epoch_us: u64,
+        /// The values are not used for exposures that are further from `epoch_us` than this, s; NaN: they do not expire.
+        expires_s: f32,
+        /// Altitude, m.
+        altitude_m: f32,
+        /// Position in ECEF, m.
+        position_x_m: f32,
+        /// y of the position.
+        position_y_m: f32,
+        /// z of the position.
+        position_z_m: f32,
+        /// Velocity in ECEF, m/s: the position is moved to the exposure.
+        velocity_x_m_s: f32,
+        /// y of the velocity.
+        velocity_y_m_s: f32,
+        /// z of the velocity.
+        velocity_z_m_s: f32,
+        /// Rate of rotation of the camera in its own axes, rad/s.
+        rate_x_rad_s: f32,
+        /// y of the rate.
+        rate_y_rad_s: f32,
+        /// z of the rate.
+        rate_z_rad_s: f32,
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_calib::keys::Limits;
 use hzn_flight::bytes::Writer;
-use hzn_flight::messages::{Function, Mode};
+use hzn_flight::messages::{Function, Mode, Navigation};
 use hzn_flight::operations::Operations;
 use hzn_flight::packet::{self, Apid};
 use hzn_flight::{Parameters, parameters};
@@ -24,6 +24,8 @@ use crate::exit::{Exit, Outcome, Stop, usage};
 ///   "load sensor.toml"                 every parameter of a sensor; all or none, in as many packets as needed
 ///   "read NAME [NAME]..."
 ///   "known ALTITUDE_KM [X_KM Y_KM Z_KM [RATE_X RATE_Y RATE_Z]]"   rates in rad/s; NaN: not known
+///   "navigate EPOCH_S EXPIRES_S ALTITUDE_KM X_KM Y_KM Z_KM VX_M_S VY_M_S VZ_M_S [RATE_X RATE_Y RATE_Z]"
+///                                      as known, with time, velocity and expiry; NaN: not known
 ///   "process-once", "dump-edges", "reset-counters", "ping", "report" (sends housekeeping)
 ///   "arm"                              allows "mode shut-down" for ten seconds
 /// The bytes go to standard output unless -o is given. book/reference/telemetry.md describes the format.
@@ -96,6 +98,7 @@ fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
         Function::SetParameters | Function::TryParameters => command.set_parameters()?,
         Function::ReadParameters => command.read_parameters()?,
         Function::SetKnown => command.set_known()?,
+        Function::Navigate => command.navigate()?,
         _ => command.without_arguments()?,
     };
     Ok(vec![user])
@@ -164,9 +167,58 @@ impl Command<'_> {
         })
     }
 
-    fn set_known(&self) -> Result<Vec<u8>, Stop> {
+    /// Returns the arguments as numbers.
+    fn numbers(&self) -> Result<Vec<f64>, Stop> {
         let number = |word: &str| word.parse::<f64>().map_err(|_| self.refuse(&format!("{word:?} is not a number")));
-        let numbers = self.arguments.iter().map(|w| number(w)).collect::<Result<Vec<_>, _>>()?;
+        self.arguments.iter().map(|w| number(w)).collect()
+    }
+
+    fn navigate(&self) -> Result<Vec<u8>, Stop> {
+        let (values, rate) = match self.numbers()?[..] {
+            [e, t, h, x, y, z, u, v, w] => ([e, t, h, x, y, z, u, v, w], [f64::NAN; 3]),
+            [e, t, h, x, y, z, u, v, w, p, q, r] => ([e, t, h, x, y, z, u, v, w], [p, q, r]),
+            _ => {
+                let what = "navigate takes time and expiry in seconds, altitude and ECEF position in kilometres, \
+                            velocity in m/s, and the rate of rotation in rad/s if it is known: 9 or 12 numbers";
+                return Err(self.refuse(what));
+            }
+        };
+        let [epoch_s, expires_s, altitude_km, km @ .., vx, vy, vz] = values;
+        // The clock of the computer begins with its start.
+        if !(0.0..1e12).contains(&epoch_s) {
+            return Err(self.refuse(&format!("the time {epoch_s} s is refused: seconds since the computer's start")));
+        }
+        if let Some(x) = values.iter().chain(&rate).find(|x| x.is_infinite() || (**x * 1e3).abs() > f64::from(f32::MAX))
+        {
+            return Err(self.refuse(&format!("{x} is not a finite number")));
+        }
+        let vectors = [("position", km), ("velocity", [vx, vy, vz]), ("rate of rotation", rate)];
+        let is_partly_known = |v: [f64; 3]| matches!(v.iter().filter(|x| x.is_nan()).count(), 1 | 2);
+        if let Some((name, _)) = vectors.iter().find(|(_, v)| is_partly_known(*v)) {
+            return Err(self.refuse(&format!("all three numbers of the {name} must be known, or none")));
+        }
+        let m = |km: f64| (km * 1e3) as f32;
+        let [x, y, z] = km;
+        let [rate_x, rate_y, rate_z] = rate.map(|x| x as f32);
+        let values = Navigation {
+            epoch_us: (epoch_s * 1e6) as u64,
+            expires_s: expires_s as f32,
+            altitude_m: m(altitude_km),
+            position_x_m: m(x),
+            position_y_m: m(y),
+            position_z_m: m(z),
+            velocity_x_m_s: vx as f32,
+            velocity_y_m_s: vy as f32,
+            velocity_z_m_s: vz as f32,
+            rate_x_rad_s: rate_x,
+            rate_y_rad_s: rate_y,
+            rate_z_rad_s: rate_z,
+        };
+        self.user_data(|w| values.write(w))
+    }
+
+    fn set_known(&self) -> Result<Vec<u8>, Stop> {
+        let numbers = self.numbers()?;
         let (km, rate) = numbers.split_at(numbers.len().min(4));
         if let Some(x) = km.iter().find(|km| !((**km * 1e3) as f32).is_finite()) {
             return Err(self.refuse(&format!("{x} is not a finite number of kilometres")));

@@ -3,7 +3,7 @@
 //! A packet that is no telecommand for this computer is counted and gets no answer, because another computer on the line
 //! may own it, and because the line may return the packets of this computer.
 
-use super::Flight;
+use super::{Buffers, Flight};
 use crate::board::Board;
 use crate::bytes::Reader;
 use crate::messages::{Acknowledge, Code, Event, Function};
@@ -53,8 +53,10 @@ impl<B: Board> Flight<'_, B> {
     /// Handles a packet that has arrived. Returns whether it was a telecommand; `None` if there is no packet.
     fn handle_packet(&mut self, now_us: u64) -> Option<bool> {
         let base = self.buffers.line.base();
-        let room = &mut self.buffers.command;
-        let received = self.buffers.inbox.next(now_us, |packet| {
+        // The memory for packets that are sent is free now.
+        let Buffers { line, inbox, .. } = &mut *self.buffers;
+        let room = &mut line.out;
+        let received = inbox.next(now_us, |packet| {
             let Some(packet) = packet else { return Received::Broken };
             if base.subject(&packet) != Some(Apid::Command) {
                 return Received::Foreign;
@@ -78,11 +80,11 @@ impl<B: Board> Flight<'_, B> {
         Some(false)
     }
 
-    /// Carries out and acknowledges a telecommand, whose user data are in the buffer of telecommands.
+    /// Carries out and acknowledges a telecommand, whose user data are in the memory for packets that are sent.
     #[inline(never)]
     fn handle_command(&mut self, sequence: u16, bytes: usize) {
         // The data are copied, because the command may use every buffer.
-        let user = self.buffers.command;
+        let user = self.buffers.line.out;
         let mut from = Reader::new(user.get(..bytes).unwrap_or_default());
         let number = from.u8().unwrap_or(0);
         let code = match Function::from_number(number) {

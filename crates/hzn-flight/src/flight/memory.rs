@@ -1,9 +1,9 @@
 //! Bits that changed in memory: the values are made anew, and an answer that was calculated with them is not sent.
 
-use hzn_core::Sensor;
 use hzn_core::body::Expected;
 
-use super::{Flight, Known};
+use super::Flight;
+use super::navigation::Known;
 use crate::board::Board;
 use crate::kept_twice::KeptTwice;
 use crate::messages::Event;
@@ -17,7 +17,7 @@ impl<B: Board> Flight<'_, B> {
     /// Returns whether no bit changed in the values of a picture: sensor, values from navigation, expected limb if there
     /// is one. Changed values are made anew.
     #[inline(never)]
-    pub(super) fn check_memory(&mut self, expected: Option<&KeptTwice<Expected<f32>>>) -> bool {
+    pub(super) fn check_memory(&mut self, expected: Option<&mut KeptTwice<Expected<f32>>>) -> bool {
         let is_sensor_intact = self.sensor.is_intact();
         let is_known_intact = self.known.is_intact() && expected.is_none_or(KeptTwice::is_intact);
         if is_sensor_intact && is_known_intact {
@@ -29,6 +29,7 @@ impl<B: Board> Flight<'_, B> {
         }
         if !is_known_intact {
             self.known.set(Known::default());
+            self.known.complete();
             self.report_repair(KNOWN);
         }
         false
@@ -42,8 +43,8 @@ impl<B: Board> Flight<'_, B> {
         self.staged = 0;
         let loaded = store::load(&mut self.board, &mut self.buffers.table, choice);
         // The parameters were checked when they were read, so they make a sensor.
-        if let Ok(sensor) = Sensor::new(&loaded.parameters.sensor) {
-            self.sensor.set(sensor);
+        if self.renew_sensor(&loaded.parameters) {
+            self.sensor.complete();
             self.operations = loaded.parameters.operations;
             self.state.parameter_copy = loaded.copy;
             self.is_not_stored = loaded.copy == 0;
@@ -61,7 +62,7 @@ mod tests {
     use std::boxed::Box;
     use std::vec::Vec;
 
-    use hzn_core::Prior;
+    use hzn_core::{Prior, Sensor};
 
     use super::*;
     use crate::answer::PictureAnswer;
@@ -169,8 +170,8 @@ mod tests {
     fn a_changed_bit_is_repaired_before_the_next_picture() {
         let (mut buffers, mut lists) = (Box::new(Buffers::new()), Box::new(Lists::new()));
         let mut flight = Flight::start(board(), &mut buffers, &mut lists).unwrap();
-        assert_eq!(flight.mode, Mode::Flight);
         let right = turn(&mut flight).0;
+        assert_eq!(flight.mode, Mode::Flight);
         assert!(right.is_some());
         let mut flips = 0u16;
         for id in small().sensor_numbers() {
@@ -202,8 +203,9 @@ mod tests {
         let mut flight = Flight::start(board(), &mut buffers, &mut lists).unwrap();
         let expect = |h: f32| flight.sensor.get().expect(&Prior { altitude_m: Some(h), ..Prior::default() }).unwrap();
         let (mut expected, other) = (KeptTwice::new(expect(230e3)), expect(231e3));
-        assert!(flight.check_memory(Some(&expected)));
+        expected.keep();
+        assert!(flight.check_memory(Some(&mut expected)));
         expected.damage(|e| *e = other);
-        assert!(!flight.check_memory(Some(&expected)));
+        assert!(!flight.check_memory(Some(&mut expected)));
     }
 }

@@ -9,20 +9,19 @@
 //! | `parameter_commands` | the functions that read and change parameters |
 //! | `pictures` | the way of a picture to its science packet |
 //! | `memory` | bits that changed in memory |
+//! | `navigation` | position, velocity and rate, with time and expiry |
 //! | `camera_watch` | pictures that do not come |
 //! | `longest_edge` | the edge that a command asks for |
 //! | `reports` | housekeeping and events |
 //! | `line` | packets on the line, with their counts |
 
-use hzn_core::body::Last;
-use hzn_core::{Prior, Sensor, Workspace};
+use hzn_core::{Sensor, Workspace};
 
 use crate::board::Board;
 use crate::inbox::Inbox;
 use crate::kept_twice::KeptTwice;
 use crate::messages::{Event, Housekeeping, Mode};
 use crate::operations::Operations;
-use crate::packet::MAX_BYTES;
 use crate::store::{self, Loaded};
 use crate::table::{self, TableError};
 
@@ -31,6 +30,7 @@ mod line;
 mod listen;
 mod longest_edge;
 mod memory;
+mod navigation;
 mod parameter_commands;
 mod pictures;
 mod recovery;
@@ -41,6 +41,7 @@ mod telecommands;
 use camera_watch::CameraWatch;
 use line::Line;
 use longest_edge::LongestEdge;
+use navigation::Known;
 use recovery::Recovery;
 use reports::Limiter;
 
@@ -54,8 +55,6 @@ pub type Lists = Workspace<f32, 2048, 76, 512>;
 pub struct Buffers {
     line: Line,
     inbox: Inbox,
-    /// User data of the telecommand that is carried out.
-    command: [u8; MAX_BYTES],
     /// A table of parameters on its way from or to memory, or parameters that wait for their commit.
     table: [u8; table::MAX_BYTES],
     edge: LongestEdge,
@@ -70,28 +69,15 @@ impl Default for Buffers {
 impl Buffers {
     /// Makes buffers of all zeros.
     pub const fn new() -> Self {
-        Self {
-            line: Line::new(),
-            inbox: Inbox::new(),
-            command: [0; MAX_BYTES],
-            table: [0; table::MAX_BYTES],
-            edge: LongestEdge::NONE,
-        }
+        Self { line: Line::new(), inbox: Inbox::new(), table: [0; table::MAX_BYTES], edge: LongestEdge::NONE }
     }
-}
-
-/// What is known when a picture comes.
-#[derive(Debug, Clone, Default, PartialEq)]
-struct Known {
-    /// The prior of the pictures, from navigation.
-    prior: Prior<f32>,
-    /// The last answer, and the time when its picture was exposed, µs since the start.
-    last: Option<(Last<f32>, u64)>,
 }
 
 /// The flight software.
 #[derive(Debug)]
 pub struct Flight<'a, B> {
+    /// What the first turn reports: why copies 1 and 2 of the parameters cannot be used.
+    start: Option<[u32; 2]>,
     board: B,
     buffers: &'a mut Buffers,
     workspace: &'a mut Lists,
@@ -102,6 +88,8 @@ pub struct Flight<'a, B> {
     /// Number of parameters that are kept for a commit; they are in the buffer of the table.
     staged: u16,
     known: KeptTwice<Known>,
+    /// Whether an event said that the values from navigation have expired.
+    has_expired: bool,
     mode: Mode,
     state: Housekeeping,
     recovery: Recovery,
@@ -121,14 +109,36 @@ pub struct Flight<'a, B> {
 }
 
 impl<'a, B: Board> Flight<'a, B> {
-    /// Loads the parameters, runs the self-checks and waits in standby, or in safe mode if a check fails. `None` cannot
-    /// occur: stored parameters are checked, and a test shows that the defaults are valid.
+    /// Loads the parameters. The first turn runs the self-checks and waits in standby, or in safe mode if a check fails.
+    /// `None` cannot occur: stored parameters are checked, and a test shows that the defaults are valid.
+    ///
+    /// Keep the flight software where it is: it has two sensors, 15 KB, and a copy needs that much of the stack.
     // Not inlined, like the other large functions, so that each can use the same part of the stack.
     #[inline(never)]
     pub fn start(mut board: B, buffers: &'a mut Buffers, workspace: &'a mut Lists) -> Option<Self> {
         let recovery = Recovery::begin(&mut board);
         let loaded = store::load(&mut board, &mut buffers.table, recovery.choice());
-        let sensor = Sensor::new(&loaded.parameters.sensor).ok()?;
+        Self::new(board, buffers, workspace, recovery, &loaded)
+    }
+
+    /// Sends the events of the start, runs the self-checks and enters the first mode.
+    #[inline(never)]
+    fn begin(&mut self, broken: [u32; 2]) {
+        self.report_start(broken);
+        self.run_self_checks(self.state.parameter_copy != 0);
+        self.enter_first_mode();
+        self.send_housekeeping();
+    }
+
+    /// Makes the flight software with the parameters that were loaded.
+    #[inline(never)]
+    fn new(
+        mut board: B,
+        buffers: &'a mut Buffers,
+        workspace: &'a mut Lists,
+        recovery: Recovery,
+        loaded: &Loaded,
+    ) -> Option<Self> {
         let image = board.image();
         let state = Housekeeping {
             parameter_copy: loaded.copy,
@@ -141,15 +151,22 @@ impl<'a, B: Board> Flight<'a, B> {
             ..Housekeeping::default()
         };
         buffers.line.set_base(loaded.parameters.operations.base());
-        let mut flight = Self {
+        Some(Self {
+            start: Some(loaded.broken.each_ref().map(|broken| match broken {
+                None => 0,
+                Some(TableError::Header) => 1,
+                Some(TableError::Checksum) => 2,
+                Some(TableError::Refused(_)) => 3,
+            })),
+            sensor: KeptTwice::new(Sensor::new(&loaded.parameters.sensor).ok()?),
             board,
             buffers,
             workspace,
-            sensor: KeptTwice::new(sensor),
             operations: loaded.parameters.operations.clone(),
             is_not_stored: loaded.copy == 0,
             staged: 0,
             known: KeptTwice::new(Known::default()),
+            has_expired: false,
             mode: Mode::Standby,
             state,
             recovery,
@@ -161,30 +178,20 @@ impl<'a, B: Board> Flight<'a, B> {
             last_sequence: None,
             process_once: false,
             dump_edges: false,
-        };
-        flight.report_start(&loaded);
-        flight.run_self_checks(loaded.copy != 0);
-        flight.enter_first_mode();
-        flight.send_housekeeping();
-        Some(flight)
+        })
     }
 
-    /// Sends the events of the start.
-    fn report_start(&mut self, loaded: &Loaded) {
-        self.send_event(Event::Started, u32::from(loaded.copy), loaded.generation);
+    /// Sends the events of the start. `broken` says why copies 1 and 2 of the parameters cannot be used; 0: they can.
+    fn report_start(&mut self, broken: [u32; 2]) {
+        let (copy, generation) = (self.state.parameter_copy, self.state.parameter_generation);
+        self.send_event(Event::Started, u32::from(copy), generation);
         if self.recovery.watchdog_resets > 0 {
             self.send_event(Event::Watchdog, u32::from(self.recovery.watchdog_resets), 0);
         }
-        for (copy, broken) in (1u32..).zip(&loaded.broken) {
-            let why = match broken {
-                None => continue,
-                Some(TableError::Header) => 1,
-                Some(TableError::Checksum) => 2,
-                Some(TableError::Refused(_)) => 3,
-            };
+        for (copy, why) in (1u32..).zip(broken).filter(|(_, why)| *why > 0) {
             self.send_event(Event::CopyBroken, copy, why);
         }
-        if loaded.copy == 0 {
+        if copy == 0 {
             self.send_event(Event::Defaults, 0, 0);
         }
     }
@@ -201,6 +208,11 @@ impl<'a, B: Board> Flight<'a, B> {
     /// Runs one turn of the loop, with at most one telecommand and one picture. Call it for ever.
     pub fn turn(&mut self) {
         self.board.feed_watchdog();
+        if let Some(broken) = self.start.take() {
+            self.begin(broken);
+        }
+        self.sensor.complete();
+        self.known.complete();
         let now_us = self.board.now_us();
         if self.mode == Mode::ShutDown || self.follow_vehicle(now_us) {
             return;

@@ -34,7 +34,11 @@ impl<B: Board> Flight<'_, B> {
         if from.rest().len() != ENTRY * usize::from(count) {
             return Code::Arguments;
         }
-        self.use_parameters(merge(self.parameters(), *from), keep)
+        let mut parameters = self.parameters();
+        match merge(&mut parameters, *from) {
+            Ok(()) => self.use_parameters(&parameters, keep),
+            Err(code) => code,
+        }
     }
 
     /// Keeps parameters for a commit. They are checked only there, because a mask is complete only with all its corners.
@@ -64,28 +68,41 @@ impl<B: Board> Flight<'_, B> {
             return Code::Arguments;
         }
         let entries = self.buffers.table.get(..ENTRY * usize::from(staged)).unwrap_or_default();
-        self.use_parameters(merge(self.parameters(), Reader::new(entries)), Keep::Stored)
+        let mut parameters = self.parameters();
+        match merge(&mut parameters, Reader::new(entries)) {
+            Ok(()) => self.use_parameters(&parameters, Keep::Stored),
+            Err(code) => code,
+        }
     }
 
-    /// Puts parameters to use, or answers with the code of their refusal.
-    fn use_parameters(&mut self, parameters: Result<Parameters, Code>, keep: Keep) -> Code {
-        let parameters = match parameters {
-            Ok(parameters) => parameters,
-            Err(code) => return code,
-        };
-        if parameters != self.parameters() {
-            if parameters.check().is_err() {
+    /// Puts parameters to use.
+    fn use_parameters(&mut self, parameters: &Parameters, keep: Keep) -> Code {
+        let is_sensor_new = parameters.sensor != *self.sensor.get().config();
+        if is_sensor_new || parameters.operations != self.operations {
+            if parameters.check().is_err() || is_sensor_new && !self.renew_sensor(parameters) {
                 return Code::Refused;
             }
-            let Ok(sensor) = Sensor::new(&parameters.sensor) else { return Code::Refused };
-            self.sensor.set(sensor);
+            self.sensor.complete();
             self.operations = parameters.operations.clone();
             self.is_not_stored = true;
         }
         // Memory wears out: it is written only if this changes something.
-        if keep == Keep::UntilReset || !self.is_not_stored { Code::Done } else { self.store(&parameters) }
+        if keep == Keep::UntilReset || !self.is_not_stored { Code::Done } else { self.store(parameters) }
     }
 
+    /// Makes the sensor of the parameters. Returns false if they are refused.
+    // Not inlined, like the other functions with a sensor on the stack, so that each can use the same part of it.
+    #[inline(never)]
+    pub(super) fn renew_sensor(&mut self, parameters: &Parameters) -> bool {
+        let sensor = Sensor::new(&parameters.sensor);
+        let is_accepted = sensor.is_ok();
+        if let Ok(sensor) = sensor {
+            self.sensor.set(sensor);
+        }
+        is_accepted
+    }
+
+    #[inline(never)]
     fn store(&mut self, parameters: &Parameters) -> Code {
         let (copy, generation) = (self.state.parameter_copy, self.state.parameter_generation);
         // The buffer of the table is written.
@@ -131,12 +148,12 @@ impl<B: Board> Flight<'_, B> {
 }
 
 /// Sets parameters to the numbers and values in `from`.
-fn merge(mut parameters: Parameters, mut from: Reader<'_>) -> Result<Parameters, Code> {
+fn merge(parameters: &mut Parameters, mut from: Reader<'_>) -> Result<(), Code> {
     while let (Some(id), Some(value)) = (from.u16(), from.f64()) {
         parameters.set(id, value).map_err(|refused| match refused {
             Refused::Unknown(_) => Code::UnknownParameter,
             _ => Code::Refused,
         })?;
     }
-    Ok(parameters)
+    Ok(())
 }

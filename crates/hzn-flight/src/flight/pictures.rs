@@ -2,10 +2,10 @@
 
 use core::cell::RefCell;
 
+use hzn_core::Report;
 use hzn_core::body::{Expected, Last};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
-use hzn_core::{Prior, Report};
 
 use super::longest_edge::EdgeWatch;
 use super::{Buffers, Flight, Known};
@@ -28,7 +28,7 @@ impl<B: Board> Flight<'_, B> {
         // What changed since the last picture is made anew in time for this one.
         self.check_memory(None);
         let Some(layout) = self.check_size(picture.bytes) else { return };
-        let Some(expected) = self.expect_limb(picture.exposure_us) else { return };
+        let Some(mut expected) = self.expect_limb(picture.exposure_us) else { return };
         let start = self.board.now_us();
         let wanted = core::mem::take(&mut self.dump_edges);
         let bytes = self.board.pixels().get(..picture.bytes).unwrap_or_default();
@@ -37,13 +37,14 @@ impl<B: Board> Flight<'_, B> {
         let watch = EdgeWatch { wanted, longest: RefCell::new(&mut self.buffers.edge) };
         let report = self.sensor.get().process(self.workspace, &grey, expected.get(), &watch);
         // A bit may have changed during the calculation.
-        if !self.check_memory(Some(&expected)) {
+        if !self.check_memory(Some(&mut expected)) {
             self.state.refused = self.state.refused.saturating_add(1);
             return;
         }
         if let Some(s) = &report.solution {
             let last = Last { axis: s.axis, sigma_rad: s.covariance.sigma_max_rad(), age_s: 0.0 };
             self.known.set(Known { last: Some((last, picture.exposure_us)), ..self.known.get().clone() });
+            self.known.complete();
         }
         let done_us = self.board.now_us();
         let calculation_us = u32::try_from(done_us.saturating_sub(start)).unwrap_or(u32::MAX);
@@ -74,15 +75,15 @@ impl<B: Board> Flight<'_, B> {
     /// Returns the expected limb of a picture, from the values of navigation and the last answer. Refuses the picture
     /// if these are impossible.
     fn expect_limb(&mut self, exposure_us: u64) -> Option<KeptTwice<Expected<f32>>> {
-        let Known { prior, last } = self.known.get();
-        let age_s = |last_us: u64| exposure_us.saturating_sub(last_us) as f32 * 1e-6;
-        let last = last.map(|(last, last_us)| Last { age_s: age_s(last_us), ..last });
-        let expected = self.sensor.get().expect(&Prior { last, ..*prior }).ok();
+        let prior = self.prior_at(exposure_us);
+        let expected = self.sensor.get().expect(&prior).ok();
         if expected.is_none() {
             self.state.refused = self.state.refused.saturating_add(1);
             self.send_event(Event::KnownRefused, 0, 0);
         }
-        expected.map(KeptTwice::new)
+        let mut expected = KeptTwice::new(expected?);
+        expected.keep();
+        Some(expected)
     }
 
     /// Adds a processed picture to the counters.
@@ -99,7 +100,12 @@ impl<B: Board> Flight<'_, B> {
     /// Sends the answer to the picture that was counted last.
     fn send_answer(&mut self, report: &Report<f32>, exposure_us: u64, done_us: u64) {
         let config = self.sensor.get().config();
-        let altitude_m = self.known.get().prior.altitude_m.or(config.body.altitude_km.map(|h| (h * 1000.0) as f32));
+        let altitude_m = self
+            .known
+            .get()
+            .at(exposure_us)
+            .and_then(|prior| prior.altitude_m)
+            .or(config.body.altitude_km.map(|h| (h * 1000.0) as f32));
         let exposure = Exposure {
             picture: self.number,
             exposure_us,

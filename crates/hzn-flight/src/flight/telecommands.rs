@@ -1,9 +1,8 @@
 //! The functions of telecommands. Those that read and change parameters are in `parameter_commands`.
 
-use hzn_core::Prior;
-
+use super::Flight;
+use super::navigation::{read_navigation, read_prior};
 use super::parameter_commands::Keep;
-use super::{Flight, Known};
 use crate::board::Board;
 use crate::bytes::Reader;
 use crate::messages::{Code, Function, Housekeeping, Mode};
@@ -17,7 +16,11 @@ impl<B: Board> Flight<'_, B> {
             Function::StageParameters => self.stage_parameters(from),
             Function::CommitParameters => self.commit_parameters(from),
             Function::ReadParameters => self.read_parameters(from),
-            Function::SetKnown => self.set_prior(from),
+            Function::SetKnown => self.set_known(read_prior(from)),
+            Function::Navigate => {
+                let now_us = self.board.now_us();
+                self.set_known(read_navigation(from, now_us))
+            }
             // The other functions have no arguments.
             _ if !from.rest().is_empty() => Code::Arguments,
             Function::ProcessOnce if self.mode != Mode::Standby => Code::Mode,
@@ -77,47 +80,5 @@ impl<B: Board> Flight<'_, B> {
             withheld: 0,
             ..self.state
         };
-    }
-
-    /// Sets the prior of the pictures that follow.
-    fn set_prior(&mut self, from: &mut Reader<'_>) -> Code {
-        let prior = match read_prior(from) {
-            Ok(prior) => prior,
-            Err(code) => return code,
-        };
-        if self.sensor.get().expect(&prior).is_err() {
-            return Code::Refused;
-        }
-        self.known.set(Known { prior, ..self.known.get().clone() });
-        Code::Done
-    }
-}
-
-/// Reads the arguments of [`Function::SetKnown`].
-fn read_prior(from: &mut Reader<'_>) -> Result<Prior<f32>, Code> {
-    let numbers = from.f32().zip(from.floats());
-    let (altitude_m, position_m) = numbers.ok_or(Code::Arguments)?;
-    let rate_rad_s = match from.rest() {
-        [] => None,
-        _ => known_vector(from.floats().ok_or(Code::Arguments)?)?,
-    };
-    if !from.rest().is_empty() {
-        return Err(Code::Arguments);
-    }
-    Ok(Prior {
-        altitude_m: (!altitude_m.is_nan()).then_some(altitude_m),
-        position_m: known_vector(position_m)?,
-        rate_rad_s,
-        ..Prior::default()
-    })
-}
-
-/// Returns a vector; `None` if all of its numbers are NaN, which means that it is not known. One NaN is an error of the
-/// sender.
-fn known_vector(v: [f32; 3]) -> Result<Option<[f32; 3]>, Code> {
-    match v.iter().filter(|x| x.is_nan()).count() {
-        0 => Ok(Some(v)),
-        3 => Ok(None),
-        _ => Err(Code::Missing),
     }
 }

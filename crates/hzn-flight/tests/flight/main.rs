@@ -2,6 +2,7 @@
 
 mod bench;
 mod line;
+mod navigation;
 mod parameters;
 mod recovery;
 mod silence;
