@@ -8,10 +8,12 @@
 //! | [`table`] | accuracy by altitude, noise, visible arc and lens |
 //! | [`disc`] | discs of Sun and Moon |
 //! | [`emulated`] | the firmware in QEMU |
+//! | [`flight_image`] | the flight image in QEMU, with its camera, its flash and its serial line |
 //! | [`real`] | photographs with their sensor.toml, and the fitted limb drawn over them |
 
 pub mod disc;
 pub mod emulated;
+pub mod flight_image;
 pub mod real;
 pub mod sensors;
 pub mod table;

@@ -2,17 +2,16 @@
 //! and the watchdog. The tests need the images that `cargo xtask firmware` builds; `cargo xtask test firmware` builds
 //! the images and runs the tests.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
 
 use hzn_core::image::{Grey, Layout, Pixels};
 use hzn_core::status::Status;
 use hzn_core::threshold;
 use hzn_core::{Config, FlightHorizon, Prior, camera};
 use hzn_flight::flight::{Buffers, Lists};
-use hzn_flight::{Parameters, table};
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_tests::emulated::{Board, Case, answer_bytes, measure, measure_rows, run_chain};
+use hzn_tests::flight_image::{Bench, hzn_run};
 use hzn_tests::real::Photograph;
 
 /// Returns the pictures: rendered flights, payload in view, 8 bits of an infrared sensor, photographs, and patterns
@@ -117,91 +116,6 @@ fn rows_have_the_bits_of_the_picture() {
     }
 }
 
-/// Flight image of a board, with its files.
-struct Bench {
-    board: Board,
-    dir: tempfile::TempDir,
-}
-
-impl Bench {
-    fn new(board: Board) -> Self {
-        Self { board, dir: tempfile::tempdir().unwrap() }
-    }
-    fn path(&self, name: &str) -> PathBuf {
-        self.dir.path().join(name)
-    }
-    fn write_parameter_copy(&self, number: u8, config: &Config, generation: u32) {
-        let mut bytes = vec![0; table::MAX_BYTES];
-        let n = table::write(&Parameters::new(config.clone()), generation, &mut bytes).unwrap();
-        std::fs::write(self.path(&format!("copy{number}.bin")), &bytes[..n]).unwrap();
-    }
-    fn write_frames(&self, pictures: &[(Vec<u8>, u32)]) {
-        let mut out = Vec::new();
-        for (bytes, lost) in pictures {
-            out.extend_from_slice(b"FRAM");
-            for word in [bytes.len() as u32, *lost, 0] {
-                out.extend_from_slice(&word.to_le_bytes());
-            }
-            out.extend_from_slice(bytes);
-        }
-        std::fs::write(self.path("frames.bin"), out).unwrap();
-    }
-    /// Runs the image until it ends by itself and returns its exit status. What the image sends is in `sent.bin`.
-    fn run(&self, line: &[u8]) -> i32 {
-        self.run_with_shift(line, 0)
-    }
-    /// Does the same as `run`, with an instruction that takes `2^shift` ns.
-    fn run_with_shift(&self, line: &[u8], shift: u32) -> i32 {
-        std::fs::write(self.path("line.bin"), line).unwrap();
-        let sent = std::fs::File::create(self.path("sent.bin")).unwrap();
-        let mut command = self.board.qemu(&self.board.image("flight"), shift);
-        let mut child = command
-            .args(["-serial", "stdio"])
-            .current_dir(self.dir.path())
-            .stdin(Stdio::piped())
-            .stdout(sent)
-            .spawn()
-            .unwrap();
-        let mut stdin = child.stdin.take().unwrap();
-        let line = line.to_vec();
-        // The line stays open until the image ends, because QEMU would end with the line.
-        let feed = std::thread::spawn(move || {
-            use std::io::Write;
-            let _ = stdin.write_all(&line);
-            let _ = stdin.flush();
-            stdin
-        });
-        let deadline = std::time::Instant::now() + std::time::Duration::from_secs(120);
-        let code = loop {
-            if let Some(status) = child.try_wait().unwrap() {
-                break status.code().unwrap_or(-1);
-            }
-            if std::time::Instant::now() > deadline {
-                let _ = child.kill();
-                panic!("{}: the image did not end", self.board.name());
-            }
-            std::thread::sleep(std::time::Duration::from_millis(20));
-        };
-        drop(feed.join());
-        code
-    }
-}
-
-/// Returns a call of the `hzn` that the tests have built.
-fn hzn() -> Command {
-    let mut path = std::env::current_exe().unwrap();
-    path.pop();
-    path.pop();
-    Command::new(path.join("hzn"))
-}
-
-fn hzn_run(dir: &Path, args: &[&str]) -> String {
-    let out = hzn().current_dir(dir).args(args).output().expect("hzn was built with the tests");
-    let text = String::from_utf8_lossy(&out.stderr).into_owned();
-    assert!(out.status.success(), "hzn {args:?}: {text}");
-    text
-}
-
 /// Returns the cells of a table, row by row, without the columns that name the picture or the clock, and without those
 /// after `detail`, which telemetry does not carry.
 fn answers(path: &Path) -> Vec<Vec<String>> {
@@ -233,7 +147,7 @@ fn an_exchange_over_the_line() {
     flight.sensor.body.altitude_sigma_km = 60.0;
     for board in Board::ALL {
         let bench = Bench::new(board);
-        let dir = bench.dir.path();
+        let dir = bench.dir();
         let mut pictures = save_pictures(&flight, &bench.path("pictures"));
         // In between, one picture has the wrong size and three are lost.
         pictures.insert(4, (vec![7; 1000], 3));
@@ -246,7 +160,7 @@ fn an_exchange_over_the_line() {
             vec!["set reject.threshold_px 2.5 covariance.sigma_px 0.2", "read reject.threshold_px", "dump-edges"];
         commands.extend(["process-once"; 11]);
         // This is more than `gate.max_mean`, whose value only the flight computer knows.
-        commands.extend(["set gate.min_mean 0.99", "mode shut-down"]);
+        commands.extend(["set gate.min_mean 0.99", "arm", "mode shut-down"]);
         let mut args = vec!["telecommand", "-o", "commands.bin"];
         args.extend(commands);
         hzn_run(dir, &args);
@@ -306,7 +220,7 @@ fn assert_housekeeping(bench: &Bench) {
     assert_eq!((last[column("pictures")], last[column("lost")], last[column("refused")]), ("10", "3", "1"));
     // Besides the pictures, RAM holds the lists, the buffers and the stack.
     let stack: usize = last[column("stack_bytes")].parse().unwrap();
-    println!("{}: most stack {stack} bytes", bench.board.name());
+    println!("most stack {stack} bytes");
     assert!(size_of::<Lists>() + size_of::<Buffers>() + stack < 96 * 1024);
 }
 
@@ -321,15 +235,15 @@ fn a_power_cut_in_the_middle_of_a_parameter_write() {
     bench.write_parameter_copy(1, &sensor, 1);
     bench.write_parameter_copy(2, &sensor, 2);
     std::fs::write(bench.path("cut.bin"), 200u32.to_le_bytes()).unwrap();
-    hzn_run(bench.dir.path(), &["telecommand", "set body.altitude_km 99", "-o", "one.bin"]);
+    hzn_run(bench.dir(), &["telecommand", "set body.altitude_km 99", "-o", "one.bin"]);
     let line = std::fs::read(bench.path("one.bin")).unwrap();
     assert_eq!(bench.run(&line), 99, "power was cut");
     assert_eq!(std::fs::metadata(bench.path("copy1.bin")).unwrap().len(), 200);
     std::fs::remove_file(bench.path("cut.bin")).unwrap();
-    hzn_run(bench.dir.path(), &["telecommand", "read body.altitude_km", "mode shut-down", "-o", "two.bin"]);
+    hzn_run(bench.dir(), &["telecommand", "read body.altitude_km", "arm", "mode shut-down", "-o", "two.bin"]);
     let line = std::fs::read(bench.path("two.bin")).unwrap();
     assert_eq!(bench.run(&line), 0);
-    let printed = hzn_run(bench.dir.path(), &["telemetry", "sent.bin"]);
+    let printed = hzn_run(bench.dir(), &["telemetry", "sent.bin"]);
     assert!(printed.contains("started with copy 2 of the parameters, generation 2"), "{printed}");
     assert!(printed.contains("a copy of the parameters cannot be used (1, 2)"), "{printed}");
     assert!(printed.contains("parameter 32 body.altitude_km = NaN"), "{printed}");
@@ -347,12 +261,13 @@ fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
         std::fs::write(bench.path("frames.bin"), hangs).unwrap();
         // Commands that were received before the reset are lost with it.
         let mut args = vec!["telecommand", "-o", "commands.bin", "process-once"];
-        args.extend(["mode shut-down"; 8]);
-        hzn_run(bench.dir.path(), &args);
+        args.extend(["arm", "mode shut-down"].repeat(8));
+        hzn_run(bench.dir(), &args);
         let line = std::fs::read(bench.path("commands.bin")).unwrap();
-        // The watchdog's two seconds are 31 million instructions at this shift.
-        assert_eq!(bench.run_with_shift(&line, 6), 0);
-        let printed = hzn_run(bench.dir.path(), &["telemetry", "sent.bin"]);
+        // The watchdog's two seconds are 125 million instructions at this shift. With fewer, a busy machine might feed the
+        // line too slowly: a telecommand must be complete within a second.
+        assert_eq!(bench.run_with_shift(&line, 4), 0);
+        let printed = hzn_run(bench.dir(), &["telemetry", "sent.bin"]);
         println!("{printed}");
         assert_eq!(printed.matches("started with copy 1 of the parameters").count(), 2, "{printed}");
         assert_eq!(printed.matches("reset by the watchdog").count(), 1, "{printed}");

@@ -45,7 +45,8 @@ pub(crate) fn test(steps: &mut Steps) -> Outcome {
     lint_and_document()?;
     build_tests()?;
     // `--workspace` avoids a second build with other features.
-    steps.cargo_test(&["--workspace", "--test", "firmware", "--test", "navigation", "--", "--ignored"])?;
+    let tests = ["--test", "firmware", "--test", "navigation", "--test", "recovery"];
+    steps.cargo_test(&[&["--workspace"], &tests[..], &["--", "--ignored"]].concat())?;
     steps::run(Command::new(target().join("debug/examples/firmware_cost")).args(["--check", COSTS]))?;
     check_c_interface()
 }

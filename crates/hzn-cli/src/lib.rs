@@ -7,6 +7,7 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic when the output is closed; `tell` does not")]
 
+mod apid;
 pub mod commands;
 pub mod exit;
 mod html;

@@ -1,5 +1,7 @@
 //! The functions that a board provides. A port is one implementation of this trait.
 
+use crate::table::CRC32;
+
 /// A picture that the camera has written to memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Picture {
@@ -10,6 +12,23 @@ pub struct Picture {
     /// Pictures lost since the last one, because both buffers were full.
     pub lost: u32,
 }
+
+/// The program in memory, as the board knows it; 0 means unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Image {
+    /// Number of the build.
+    pub build: u32,
+    /// CRC-32 of the program image, as zlib computes it.
+    pub crc: u32,
+}
+
+/// Returns the CRC-32 of a program image, as zlib and `crc32` compute it.
+pub fn image_crc(image: &[u8]) -> u32 {
+    CRC32.checksum(image)
+}
+
+/// Number of words that a reset leaves unchanged.
+pub const RETAINED_WORDS: usize = 4;
 
 /// A board: clock, line, camera, memory, watchdog.
 pub trait Board {
@@ -40,4 +59,14 @@ pub trait Board {
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool;
     /// Returns the largest use of the stack since the start in bytes; 0 if unknown.
     fn stack_bytes(&mut self) -> u32;
+    /// Returns the program in memory. Called once, at the start.
+    fn image(&mut self) -> Image {
+        Image::default()
+    }
+    /// Returns words that a reset leaves unchanged and power-on does not; any words if there is no such memory.
+    fn read_retained(&mut self) -> [u32; RETAINED_WORDS] {
+        [0; RETAINED_WORDS]
+    }
+    /// Keeps words for the time after a reset.
+    fn write_retained(&mut self, _words: [u32; RETAINED_WORDS]) {}
 }

@@ -6,9 +6,11 @@
 //! | module | idea |
 //! |---|---|
 //! | [`parameters`] | every parameter by number, and its limits |
+//! | [`operations`] | the parameters of the flight software itself |
 //! | [`bytes`] | conversion of numbers to bytes and back |
 //! | [`answer`] | a report with every bit |
 //! | [`packet`] | space packets on a serial line |
+//! | [`inbox`] | whole packets from a line that is not perfect |
 //! | [`messages`] | the contents of packets |
 //! | [`board`] | the functions that a board provides |
 //! | [`store`] | two copies of the parameters |
@@ -25,8 +27,11 @@ pub mod answer;
 pub mod board;
 pub mod bytes;
 pub mod flight;
+pub mod inbox;
+mod kept_twice;
 pub mod messages;
 mod numbered;
+pub mod operations;
 pub mod packet;
 pub mod parameters;
 pub mod store;

@@ -37,6 +37,12 @@ numbered_enum! {
         Refused = 6 => "value refused; nothing changed",
         /// The parameters are in use, but the memory did not keep them: they are lost at the next reset.
         NotStored = 7 => "in use, but not stored",
+        /// The shut-down was not armed within the last ten seconds.
+        NotArmed = 8 => "shut-down is not armed",
+        /// The sequence count is not within the window: the telecommand is a replay, or earlier ones were lost.
+        Sequence = 9 => "sequence count outside of the window",
+        /// A number is missing: all three of a vector are needed, or none.
+        Missing = 10 => "a number of the position or the rate is not a number",
     }
 }
 
@@ -59,6 +65,22 @@ numbered_enum! {
         /// Sets the prior of the pictures that follow: altitude in metres and ECEF position in metres (4 × f32, NaN if
         /// not known). The rate of rotation of the camera may follow (3 × f32, rad/s, camera frame).
         SetKnown = 7 => "known",
+        /// Sets parameters as [`Self::SetParameters`], without storing them: a reset brings the stored ones back.
+        TryParameters = 8 => "try",
+        /// Keeps parameters for [`Self::CommitParameters`], after those that are kept already. A count of 0 removes all
+        /// that are kept.
+        StageParameters = 9 => "stage",
+        /// Sets and stores all parameters that are kept, or none. The argument is their number (u16), so that a lost
+        /// packet is noticed.
+        CommitParameters = 10 => "commit",
+        /// Does nothing, and is acknowledged.
+        Ping = 11 => "ping",
+        /// Sends a housekeeping packet.
+        Report = 12 => "report",
+        /// Allows the mode shut-down for ten seconds.
+        ArmShutDown = 13 => "arm",
+        /// Sets the values from navigation as [`Self::SetKnown`], with their time, velocity and expiry: [`Navigation`].
+        Navigate = 14 => "navigate",
     }
 }
 
@@ -102,6 +124,19 @@ numbered_enum! {
         StoreFailed = 11 => "parameters not stored",
         /// The sensor refused the prior: its altitude or position is missing or impossible. a: 0. b: 0.
         KnownRefused = 12 => "the altitude or position is missing or impossible",
+        /// The camera sends no pictures. a: time since the last one, ms. b: number of the last one.
+        CameraSilent = 13 => "the camera sends no pictures",
+        /// A bit of the sensor or of the values from navigation changed in memory. a: 1 sensor, which was made anew from
+        /// the stored parameters; 2 values from navigation, which were removed. b: how often since the start.
+        Repaired = 14 => "a memory error was repaired",
+        /// The watchdog reset the computer several times in a row, so the older parameters are in use. a: their copy
+        /// (0: there is none). b: number of resets.
+        OlderParameters = 15 => "the older parameters are in use after resets by the watchdog",
+        /// The watchdog reset the computer also with the older parameters, so it stays in safe mode. a: number of
+        /// resets. b: 0.
+        SafeAfterResets = 16 => "safe mode after resets by the watchdog",
+        /// The values from navigation have expired and are not used. a: their age, ms. b: 0.
+        KnownExpired = 17 => "the values from navigation have expired",
     }
 }
 
@@ -110,10 +145,20 @@ impl Event {
     pub const fn severity(self) -> Severity {
         match self {
             Self::Started | Self::ModeChanged | Self::Stored => Severity::Information,
-            Self::CopyBroken | Self::CommandRejected | Self::WrongSize | Self::Overrun | Self::KnownRefused => {
-                Severity::Warning
-            }
-            Self::Defaults | Self::SelfCheck | Self::Watchdog | Self::StoreFailed => Severity::Error,
+            Self::CopyBroken
+            | Self::CommandRejected
+            | Self::WrongSize
+            | Self::Overrun
+            | Self::KnownRefused
+            | Self::CameraSilent
+            | Self::KnownExpired
+            | Self::Repaired => Severity::Warning,
+            Self::Defaults
+            | Self::SelfCheck
+            | Self::Watchdog
+            | Self::StoreFailed
+            | Self::OlderParameters
+            | Self::SafeAfterResets => Severity::Error,
         }
     }
 }
@@ -128,6 +173,8 @@ macro_rules! record {
         impl $name {
             /// The names of the fields, in the order of the packet.
             pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
+            /// Number of bytes of the fields.
+            pub const BYTES: usize = 0 $(+ size_of::<$t>())*;
             /// Appends the fields.
             pub fn write(&self, out: &mut Writer<'_>) {
                 $(out.$t(self.$field);)*
@@ -175,6 +222,45 @@ record! {
         longest_us: u32,
         /// Largest use of the stack since the start, bytes.
         stack_bytes: u32,
+        /// Version of the flight software: major, minor and patch in one byte each, from the second byte on.
+        version: u32,
+        /// Number of the build; 0 if unknown.
+        build: u32,
+        /// CRC-32 of the program image in memory, as zlib computes it; 0 if unknown.
+        image_crc: u32,
+        /// Number of starts since power came on; 0 if unknown.
+        starts: u16,
+        /// Number of resets by the watchdog in a row.
+        watchdog_resets: u8,
+        /// Bits: 1 the parameters in use are not stored, 2 the shut-down is armed, 4 lift-off was seen, 8 the camera is
+        /// silent, 16 parameters are kept for a commit.
+        flags: u8,
+        /// Number of memory errors that were repaired.
+        repairs: u16,
+        /// Sequence count of the last telecommand that was taken; 65535 before the first.
+        last_sequence: u16,
+        /// Packets on the line that are no telecommands for this computer.
+        foreign: u32,
+        /// Broken packets on the line.
+        broken: u32,
+        /// Events and acknowledgements that were not sent, because there were too many.
+        withheld: u32,
+        /// Time since lift-off, s; 4294967295 before it.
+        since_lift_off_s: u32,
+    }
+}
+
+impl Housekeeping {
+    /// Number of bytes of the first version of the packet, which ends with `stack_bytes`.
+    pub const FIRST_BYTES: usize = 40;
+
+    /// Reads the packet or its first version, whose later fields are then 0; `None` if it is cut off.
+    pub fn read_any(user: &[u8]) -> Option<Self> {
+        let mut whole = [0; Self::BYTES];
+        let known = user.len().min(Self::BYTES);
+        let is_whole = known == Self::BYTES || user.len() == Self::FIRST_BYTES;
+        whole.get_mut(..known)?.copy_from_slice(user.get(..known)?);
+        Self::read(&mut Reader::new(&whole)).filter(|_| is_whole)
     }
 }
 
@@ -223,6 +309,37 @@ record! {
 }
 
 record! {
+    /// Arguments of [`Function::Navigate`]. NaN means that a value is not known; all three numbers of a vector are known,
+    /// or none.
+    Navigation {
+        /// Time of the values, µs since the start of the computer.
+        epoch_us: u64,
+        /// The values are not used for exposures that are further from `epoch_us` than this, s; NaN: they do not expire.
+        expires_s: f32,
+        /// Altitude, m.
+        altitude_m: f32,
+        /// Position in ECEF, m.
+        position_x_m: f32,
+        /// y of the position.
+        position_y_m: f32,
+        /// z of the position.
+        position_z_m: f32,
+        /// Velocity in ECEF, m/s: the position is moved to the exposure.
+        velocity_x_m_s: f32,
+        /// y of the velocity.
+        velocity_y_m_s: f32,
+        /// z of the velocity.
+        velocity_z_m_s: f32,
+        /// Rate of rotation of the camera in its own axes, rad/s.
+        rate_x_rad_s: f32,
+        /// y of the rate.
+        rate_y_rad_s: f32,
+        /// z of the rate.
+        rate_z_rad_s: f32,
+    }
+}
+
+record! {
     /// The data before the pixels (x and y as u16) of a part of an edge.
     EdgePart {
         /// Number of the picture.
@@ -263,11 +380,15 @@ mod tests {
     #[test]
     fn records_survive() {
         let h = Housekeeping { mode: 1, pictures: 70_000, longest_us: 9, stack_bytes: 5, ..Housekeeping::default() };
-        let mut bytes = [0; 64];
+        let mut bytes = [0; 128];
         let mut out = Writer::new(&mut bytes);
         h.write(&mut out);
-        assert_eq!(out.finish(), Some(40));
+        assert_eq!(out.finish(), Some(Housekeeping::BYTES));
         assert_eq!(Housekeeping::read(&mut Reader::new(&bytes)), Some(h));
-        assert_eq!(Housekeeping::read(&mut Reader::new(&bytes[..39])), None);
+        for length in 0..Housekeeping::BYTES {
+            assert_eq!(Housekeeping::read(&mut Reader::new(&bytes[..length])), None);
+            let is_version = length == Housekeeping::FIRST_BYTES;
+            assert_eq!(Housekeeping::read_any(&bytes[..length]), is_version.then_some(h), "{length}");
+        }
     }
 }

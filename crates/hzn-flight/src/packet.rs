@@ -17,14 +17,20 @@ use crate::numbered::numbered_enum;
 pub const SYNC: [u8; 4] = [0x1A, 0xCF, 0xFC, 0x1D];
 /// Most bytes of a packet, including the sync marker.
 pub const MAX_BYTES: usize = 1024;
-const HEADER: usize = 6;
+/// Number of bytes of a packet without its user data: marker, both headers, checksum.
+pub const OVERHEAD: usize = SYNC.len() + HEADER + TIME + CRC;
+pub(crate) const HEADER: usize = 6;
 const TIME: usize = 8;
 const CRC: usize = 2;
 
-const CRC16: crc::Crc<u16, crc::NoTable> = crc::Crc::<u16, crc::NoTable>::new(&crc::CRC_16_IBM_3740);
+/// The sequence flags of a packet that is not a segment of a larger one.
+const UNSEGMENTED: u16 = 0b11;
+/// The table makes a byte cost eight instructions; without it a byte costs about fifty.
+const CRC16: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_IBM_3740);
 
 numbered_enum! {
-    /// The subject of a packet: its application process identifier (APID). The numbers are frozen.
+    /// The subject of a packet: its application process identifier (APID). The numbers are frozen. They are those of
+    /// the base 0x100; see [`ApidBase`].
     pub enum Apid: u16 {
         /// State of the computer.
         Housekeeping = 0x100 => "housekeeping",
@@ -43,10 +49,48 @@ numbered_enum! {
     }
 }
 
+/// The APID of housekeeping. The other APIDs have fixed distances from it, so that several computers can share a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ApidBase(u16);
+
+impl Default for ApidBase {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+impl ApidBase {
+    /// The base of a computer whose parameters do not name another.
+    pub const DEFAULT: Self = Self(Apid::Housekeeping as u16);
+    /// Distance between two bases: a computer has at most 16 subjects.
+    pub const STEP: u16 = 16;
+    /// Largest base: the APIDs of telecommands must be below 0x7FF, which marks idle packets.
+    pub const MAX: u16 = 0x700;
+
+    /// Makes a base; `None` if the number is above [`Self::MAX`] or not a multiple of [`Self::STEP`].
+    pub const fn try_new(number: u16) -> Option<Self> {
+        if number <= Self::MAX && number.is_multiple_of(Self::STEP) { Some(Self(number)) } else { None }
+    }
+    /// Returns the number of the base, which is the APID of housekeeping.
+    pub const fn number(self) -> u16 {
+        self.0
+    }
+    /// Returns the number of an APID.
+    pub const fn apid(self, apid: Apid) -> u16 {
+        self.0 + (apid as u16 - Self::DEFAULT.0)
+    }
+    /// Returns the subject of a packet; `None` if the packet belongs to something else on the line.
+    pub fn subject(self, packet: &Packet<'_>) -> Option<Apid> {
+        let apid = Apid::ALL.iter().copied().find(|&a| self.apid(a) == packet.apid)?;
+        (packet.is_command == (apid == Apid::Command) && packet.is_whole).then_some(apid)
+    }
+}
+
 /// Writes a packet with `user` as its user data into `out`. Returns its length; `None` if it does not fit into `out` or
 /// into [`MAX_BYTES`].
 pub fn write(
     out: &mut [u8],
+    base: ApidBase,
     apid: Apid,
     sequence: u16,
     time_us: u64,
@@ -59,8 +103,8 @@ pub fn write(
     let command = u16::from(apid == Apid::Command);
     let mut head = Writer::new(out);
     head.bytes(&SYNC);
-    head.u16(command << 12 | 1 << 11 | apid as u16);
-    head.u16(0b11 << 14 | sequence & 0x3FFF);
+    head.u16(command << 12 | 1 << 11 | base.apid(apid));
+    head.u16(UNSEGMENTED << 14 | sequence & 0x3FFF);
     head.u16(u16::try_from(len + CRC - 1).ok()?);
     head.finish()?;
     let end = SYNC.len() + HEADER + len;
@@ -74,12 +118,51 @@ pub fn write(
 pub struct Packet<'a> {
     /// Number of the APID.
     pub apid: u16,
+    /// Whether the type of the packet is telecommand.
+    pub is_command: bool,
+    /// Whether the packet is whole: false for a segment of a larger one.
+    pub is_whole: bool,
     /// Sequence count of this APID, 0 to 16383.
     pub sequence: u16,
     /// Time in microseconds since the start of the computer.
     pub time_us: u64,
     /// User data.
     pub user: &'a [u8],
+}
+
+/// Returns the length of the packet that begins with this marker and this header, including the marker; `None` if no
+/// packet has such a header.
+pub(crate) fn length(header: &[u8; SYNC.len() + HEADER]) -> Option<usize> {
+    let [.., i0, i1, _, _, n0, n1] = *header;
+    let id = u16::from_be_bytes([i0, i1]);
+    let following = usize::from(u16::from_be_bytes([n0, n1])) + 1;
+    let whole = SYNC.len() + HEADER + following;
+    let is_possible = id >> 13 == 0 && id & 1 << 11 != 0 && following >= TIME + CRC && whole <= MAX_BYTES;
+    is_possible.then_some(whole)
+}
+
+/// Reads a packet from its marker to its checksum; `None` if the checksum is wrong.
+pub(crate) fn read(bytes: &[u8]) -> Option<Packet<'_>> {
+    let (checked, crc) = bytes.get(SYNC.len()..)?.split_last_chunk::<CRC>()?;
+    if CRC16.checksum(checked) != u16::from_be_bytes(*crc) {
+        return None;
+    }
+    parse(bytes)
+}
+
+/// Reads the fields of a packet whose checksum is known to be right.
+pub(crate) fn parse(bytes: &[u8]) -> Option<Packet<'_>> {
+    let (checked, _) = bytes.get(SYNC.len()..)?.split_last_chunk::<CRC>()?;
+    let mut from = Reader::new(checked);
+    let (id, sequence, _, time_us) = (from.u16()?, from.u16()?, from.u16()?, from.u64()?);
+    Some(Packet {
+        apid: id & 0x7FF,
+        is_command: id & 1 << 12 != 0,
+        is_whole: sequence >> 14 == UNSEGMENTED,
+        sequence: sequence & 0x3FFF,
+        time_us,
+        user: from.rest(),
+    })
 }
 
 /// The result of a search for a packet in received bytes.
@@ -104,103 +187,32 @@ pub enum Scan<'a> {
     },
 }
 
-/// Searches for the first packet in `bytes`.
+/// Searches for the first packet in `bytes`, as a receiver on the ground does. A flight computer is stricter: see
+/// [`crate::inbox`].
 pub fn scan(bytes: &[u8]) -> Scan<'_> {
     let Some(marker) = bytes.windows(SYNC.len()).position(|w| w == SYNC) else {
         // The last bytes may be the beginning of a marker.
         return Scan::More { skip: bytes.len().saturating_sub(SYNC.len() - 1) };
     };
-    let begin = marker + SYNC.len();
-    let bad = Scan::Bad { skip: begin };
-    let mut from = Reader::new(bytes.get(begin..).unwrap_or_default());
-    let (Some(id), Some(sequence), Some(len)) = (from.u16(), from.u16(), from.u16()) else {
-        return Scan::More { skip: marker };
-    };
-    let len = usize::from(len) + 1;
-    if id >> 13 != 0 || id & 1 << 11 == 0 || len < TIME + CRC || SYNC.len() + HEADER + len > MAX_BYTES {
-        return bad;
-    }
-    let end = begin + HEADER + len;
-    let Some(packet_bytes) = bytes.get(begin..end) else { return Scan::More { skip: marker } };
-    let Some((checked, crc)) = packet_bytes.split_last_chunk::<CRC>() else { return bad };
-    if CRC16.checksum(checked) != u16::from_be_bytes(*crc) {
-        return bad;
-    }
-    let mut from = Reader::new(checked.get(HEADER..).unwrap_or_default());
-    let Some(time_us) = from.u64() else { return bad };
-    let packet = Packet { apid: id & 0x7FF, sequence: sequence & 0x3FFF, time_us, user: from.rest() };
-    Scan::Packet { end, packet }
-}
-
-/// Collects bytes as they come in.
-#[derive(Debug)]
-pub struct Inbox {
-    bytes: [u8; MAX_BYTES],
-    len: usize,
-}
-
-impl Default for Inbox {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Inbox {
-    /// Makes an empty inbox.
-    pub const fn new() -> Self {
-        Self { bytes: [0; MAX_BYTES], len: 0 }
-    }
-    /// Adds a byte. Returns false if there is no room; [`Self::next`] makes room.
-    pub fn push(&mut self, byte: u8) -> bool {
-        match self.bytes.get_mut(self.len) {
-            Some(place) => {
-                *place = byte;
-                self.len += 1;
-                true
-            }
-            None => false,
-        }
-    }
-    /// Returns whether there are bytes that are not a packet yet.
-    pub fn is_waiting(&self) -> bool {
-        self.len > 0
-    }
-    /// Passes the next packet to `handle`, or `None` for a broken packet. Returns the result of `handle`; `None` if
-    /// there is no packet yet.
-    pub fn next<R>(&mut self, handle: impl FnOnce(Option<Packet<'_>>) -> R) -> Option<R> {
-        let (used, result) = match scan(self.bytes.get(..self.len).unwrap_or_default()) {
-            // A full inbox without a packet cannot become one.
-            Scan::More { skip } => (if self.len == MAX_BYTES { skip.max(1) } else { skip }, None),
-            Scan::Packet { end, packet } => (end, Some(handle(Some(packet)))),
-            Scan::Bad { skip } => (skip, Some(handle(None))),
-        };
-        self.remove(used);
-        result
-    }
-    /// Gives up the packet that has begun. The bytes after its sync marker may contain another packet.
-    pub fn give_up(&mut self) {
-        self.remove(SYNC.len());
-    }
-    fn remove(&mut self, count: usize) {
-        let count = count.min(self.len);
-        if let Some(bytes) = self.bytes.get_mut(..self.len)
-            && count <= bytes.len()
-        {
-            bytes.rotate_left(count);
-        }
-        self.len -= count;
+    let bad = Scan::Bad { skip: marker + SYNC.len() };
+    let from = bytes.get(marker..).unwrap_or_default();
+    let Some(header) = from.first_chunk() else { return Scan::More { skip: marker } };
+    let Some(length) = length(header) else { return bad };
+    let Some(packet) = from.get(..length) else { return Scan::More { skip: marker } };
+    match read(packet) {
+        Some(packet) => Scan::Packet { end: marker + length, packet },
+        None => bad,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
     use std::vec::Vec;
 
     fn sample(apid: Apid, data: &[u8]) -> Vec<u8> {
         let mut out = [0; MAX_BYTES];
-        let n = write(&mut out, apid, 77, 123_456_789_012, |w| w.bytes(data)).unwrap();
+        let n = write(&mut out, ApidBase::DEFAULT, apid, 77, 123_456_789_012, |w| w.bytes(data)).unwrap();
         out[..n].to_vec()
     }
 
@@ -236,14 +248,17 @@ mod tests {
         stream.extend(&b);
         stream.extend([0x1A; 7]);
         stream.extend(&b);
-        let mut inbox = Inbox::new();
-        let (mut good, mut bad) = (Vec::new(), 0);
-        for byte in stream {
-            assert!(inbox.push(byte));
-            while let Some(apid) = inbox.next(|p| p.map(|p| (p.apid, p.user.len()))) {
-                match apid {
-                    Some(found) => good.push(found),
-                    None => bad += 1,
+        let (mut rest, mut good, mut bad) = (&stream[..], Vec::new(), 0);
+        loop {
+            match scan(rest) {
+                Scan::More { .. } => break,
+                Scan::Packet { end, packet } => {
+                    good.push((packet.apid, packet.user.len()));
+                    rest = &rest[end..];
+                }
+                Scan::Bad { skip } => {
+                    bad += 1;
+                    rest = &rest[skip..];
                 }
             }
         }
@@ -253,28 +268,26 @@ mod tests {
     }
 
     #[test]
-    fn a_packet_that_does_not_fit_is_not_written() {
-        let mut out = [0; 40];
-        assert_eq!(write(&mut out, Apid::Event, 0, 0, |w| w.bytes(&[0; 30])), None);
-        let mut out = [0; 2000];
-        assert_eq!(write(&mut out, Apid::Event, 0, 0, |w| w.bytes(&[0; 1500])), None);
+    fn a_base_gives_every_subject_its_number() {
+        assert_eq!([0x10F, 0x701, 0x710].map(ApidBase::try_new), [None; 3]);
+        let base = ApidBase::try_new(0x230).unwrap();
+        assert_eq!((base.apid(Apid::Event), base.apid(Apid::Command)), (0x232, 0x2F0));
+        let mut out = [0; MAX_BYTES];
+        let n = write(&mut out, base, Apid::Event, 0, 0, |_| ()).unwrap();
+        let Scan::Packet { packet, .. } = scan(&out[..n]) else { panic!() };
+        assert_eq!((base.subject(&packet), ApidBase::DEFAULT.subject(&packet)), (Some(Apid::Event), None));
+        // A telemetry packet with the APID of telecommands is no telecommand, and a segment is no packet.
+        let command = Packet { apid: 0x2F0, is_command: true, is_whole: true, sequence: 0, time_us: 0, user: &[] };
+        assert_eq!(base.subject(&command), Some(Apid::Command));
+        assert_eq!(base.subject(&Packet { is_command: false, ..command }), None);
+        assert_eq!(base.subject(&Packet { is_whole: false, ..command }), None);
     }
 
-    proptest! {
-        #[test]
-        fn any_bytes_are_survived(
-            bytes in proptest::collection::vec(
-                prop_oneof![Just(0x1Au8), Just(0xCF), Just(0xFC), Just(0x1D), any::<u8>()],
-                0..3000,
-            ),
-        ) {
-            let mut inbox = Inbox::new();
-            for byte in bytes {
-                prop_assert!(inbox.push(byte));
-                while inbox.next(|_| ()).is_some() {}
-                // A full inbox is emptied.
-                prop_assert!(inbox.len < MAX_BYTES);
-            }
-        }
+    #[test]
+    fn a_packet_that_does_not_fit_is_not_written() {
+        let mut out = [0; 40];
+        assert_eq!(write(&mut out, ApidBase::DEFAULT, Apid::Event, 0, 0, |w| w.bytes(&[0; 30])), None);
+        let mut out = [0; 2000];
+        assert_eq!(write(&mut out, ApidBase::DEFAULT, Apid::Event, 0, 0, |w| w.bytes(&[0; 1500])), None);
     }
 }

@@ -10,13 +10,15 @@ use hzn_core::error::ConfigError;
 use hzn_core::keys::Value;
 use hzn_core::region::{MAX_CORNERS, MAX_POLYGONS, Polygon};
 
-/// The parameters of a flight computer: the sensor, and the rate of housekeeping packets.
+use crate::operations::Operations;
+
+/// The parameters of a flight computer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     /// The sensor.
     pub sensor: Config,
-    /// Number of pictures from one housekeeping packet to the next, 1 to 65535.
-    pub housekeeping_every: u16,
+    /// The flight software itself.
+    pub operations: Operations,
 }
 
 /// Why a parameter was refused.
@@ -41,8 +43,11 @@ impl core::fmt::Display for Refused {
 }
 impl core::error::Error for Refused {}
 
-/// Pictures from one housekeeping packet to the next. Every other number is a key of sensor.toml, see [`Config::path`].
-const HOUSEKEEPING: u16 = 300;
+/// Largest `limits.max_work` of a flight computer: four times the default. A unit costs at most 80 instructions, so a
+/// picture ends after 79 million instructions, which is 0.2 s on a processor with 400 million instructions a second.
+/// Otherwise the watchdog could reset the computer in every picture.
+pub const MAX_WORK: u32 = 983_040;
+const WORK: u16 = 120;
 /// Number of corners of polygon 0; the polygons after it follow. Setting it adds or removes corners; new corners are at
 /// the origin.
 const CORNERS: u16 = 200;
@@ -54,16 +59,15 @@ const POLYGON: u16 = 2 * MAX_CORNERS as u16;
 pub fn name(id: u16) -> Option<&'static str> {
     Config::path(id).or(match id {
         200..=207 => Some("mask corners"),
-        HOUSEKEEPING => Some("telemetry.housekeeping_every"),
         1000..=1255 => Some("mask.polygons_px"),
-        _ => None,
+        _ => Operations::name(id),
     })
 }
 
 impl Parameters {
     /// Makes the default parameters for a sensor.
     pub fn new(sensor: Config) -> Self {
-        Self { sensor, housekeeping_every: 10 }
+        Self { sensor, operations: Operations::default() }
     }
 
     /// Makes the default parameters before any are loaded: an ideal lens of 640×480 pixels at 230 km above the Earth.
@@ -88,23 +92,27 @@ impl Parameters {
     /// Returns the number of a parameter by its name in sensor.toml. If the name has several numbers, returns the
     /// first.
     pub fn number_of(name: &str) -> Option<u16> {
-        Config::numbers().chain([HOUSEKEEPING]).find(|&id| self::name(id) == Some(name))
+        Config::numbers().chain(Operations::NUMBERS.iter().copied()).find(|&id| self::name(id) == Some(name))
     }
 
     /// Returns the numbers of all parameters that have a value now, in the order in which they must be set.
     pub fn numbers(&self) -> impl Iterator<Item = u16> + '_ {
+        self.sensor_numbers().chain(Operations::NUMBERS.iter().copied())
+    }
+
+    /// Returns the numbers of the parameters of the sensor, without those of the flight software.
+    pub fn sensor_numbers(&self) -> impl Iterator<Item = u16> + '_ {
         let polygons = &self.sensor.mask.polygons_px;
         let corners = (CORNER..).step_by(usize::from(POLYGON)).zip(polygons);
         Config::numbers()
-            .chain([HOUSEKEEPING])
             .chain(CORNERS..CORNERS + MAX_POLYGONS as u16)
             .chain(corners.flat_map(|(first, polygon)| first..first + 2 * polygon.len() as u16))
     }
 
     /// Returns the value of a parameter; `None` if there is no such parameter.
     pub fn get(&self, id: u16) -> Option<f64> {
-        if id == HOUSEKEEPING {
-            return Some(f64::from(self.housekeeping_every));
+        if let Some(value) = self.operations.get(id) {
+            return Some(value);
         }
         let c = &self.sensor;
         if let Some(value) = c.number(id) {
@@ -125,8 +133,8 @@ impl Parameters {
     pub fn set(&mut self, id: u16, value: f64) -> Result<(), Refused> {
         let refused = Refused::Value(id, value);
         let c = &mut self.sensor;
-        if id == HOUSEKEEPING {
-            return self.housekeeping_every.set_number(0, value).ok_or(refused);
+        if let Some(accepted) = self.operations.set(id, value) {
+            return if accepted { Ok(()) } else { Err(refused) };
         }
         if let Some(accepted) = c.set_number(id, value) {
             return if accepted { Ok(()) } else { Err(refused) };
@@ -162,8 +170,8 @@ impl Parameters {
     /// # Errors
     /// Returns the first key that a flight computer cannot take.
     pub fn check_flyable(&self) -> Result<(), &'static str> {
-        let mut flown =
-            Self { sensor: Config::new(self.sensor.camera.clone()), housekeeping_every: self.housekeeping_every };
+        let sensor = Config::new(self.sensor.camera.clone());
+        let mut flown = Self { sensor, operations: self.operations.clone() };
         for id in self.numbers() {
             let value = self.get(id).unwrap_or(f64::NAN);
             if flown.set(id, value).is_err() {
@@ -184,8 +192,11 @@ impl Parameters {
     /// # Errors
     /// Returns the first field that is out of its limits.
     pub fn check(&self) -> Result<(), Refused> {
-        if self.housekeeping_every == 0 {
-            return Err(Refused::Value(HOUSEKEEPING, 0.0));
+        if let Some((id, value)) = self.operations.check() {
+            return Err(Refused::Value(id, value));
+        }
+        if let Some(work) = self.sensor.limits.max_work.filter(|&work| work > MAX_WORK) {
+            return Err(Refused::Value(WORK, f64::from(work)));
         }
         self.sensor.check().map_err(Refused::Config)?;
         Camera::<f32>::try_new(&self.sensor.camera).map(drop).map_err(Refused::Config)
@@ -211,10 +222,11 @@ mod tests {
         p.sensor.mount = Some(Mount { q_body_from_camera_wxyz: [0.6, 0.0, 0.8, 0.0] });
         p.sensor.select.min_arc_px = Some(55.5);
         for n in [3usize, 16, 4] {
-            let polygon = (0..n).map(|i| [i as f64 * 7.5, 3.0 - i as f64]).collect();
+            let polygon = (0..n).map(|i| [i as f64 * 7.5, 3.0 - (i * i) as f64]).collect();
             p.sensor.mask.polygons_px.push(polygon).unwrap();
         }
-        p.housekeeping_every = 3;
+        p.operations.housekeeping_every = 3;
+        p.operations.shut_down_after_s = Some(590.0);
         p
     }
 
@@ -259,6 +271,9 @@ mod tests {
         assert_eq!(p.set(999, 1.0), Err(Refused::Unknown(999)));
         assert_eq!(p, before);
         // A value of the right type that is out of its limits is refused by `check` only.
+        let mut dear = p.clone();
+        dear.set(120, 983_041.0).unwrap();
+        assert_eq!(dear.check(), Err(Refused::Value(120, 983_041.0)));
         p.set(4, -5.0).unwrap();
         assert!(matches!(p.check(), Err(Refused::Config(e)) if e.field == "camera.fx_px"));
     }

@@ -18,17 +18,34 @@ pub struct Loaded {
     pub broken: [Option<TableError>; 2],
 }
 
-/// Reads both copies by way of `buffer` and returns the newer valid one.
+/// Which of two valid copies is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Choice {
+    /// The newer one.
+    Newer,
+    /// The older one, because the computer does not run with the newer one.
+    Older,
+    /// This one, 1 or 2. Any other number means the defaults.
+    Copy(u8),
+}
+
+/// Reads both copies by way of `buffer` and returns the chosen one of those that are valid.
 #[inline(never)]
-pub fn load(board: &mut impl Board, buffer: &mut [u8]) -> Loaded {
+pub fn load(board: &mut impl Board, buffer: &mut [u8], choice: Choice) -> Loaded {
     let mut out = Loaded { parameters: Parameters::defaults(), copy: 0, generation: 0, broken: [None; 2] };
     for (copy, broken) in (1u8..).zip(&mut out.broken) {
         board.read_copy(copy, buffer);
         match table::read(buffer) {
-            Ok((parameters, generation)) if out.copy == 0 || generation > out.generation => {
-                (out.parameters, out.copy, out.generation) = (parameters, copy, generation);
+            Ok((parameters, generation)) => {
+                let is_chosen = match choice {
+                    Choice::Newer => out.copy == 0 || generation > out.generation,
+                    Choice::Older => out.copy == 0 || generation < out.generation,
+                    Choice::Copy(chosen) => copy == chosen,
+                };
+                if is_chosen {
+                    (out.parameters, out.copy, out.generation) = (parameters, copy, generation);
+                }
             }
-            Ok(_) => {}
             Err(e) => *broken = Some(e),
         }
     }

@@ -1,6 +1,6 @@
 //! The board: external memory, timer, serial line and watchdog.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, Ordering};
 
 /// External memory (PSRAM).
 #[cfg(feature = "an500")]
@@ -116,14 +116,58 @@ pub struct Watchdog {
     was_reset: bool,
 }
 
-/// Shows that the program was running. The word is in memory that a reset leaves unchanged and power-on does not.
-#[unsafe(link_section = ".uninit.RUNNING")]
-static RUNNING: AtomicU32 = AtomicU32::new(0);
+/// Backup memory, which a reset leaves unchanged and power-on does not. It is at the end of the board's RAM, behind the
+/// RAM of `memory.x`. It is in no section of the image: the emulator clears all sections at a reset.
+const BACKUP: *mut u32 = 0x203F_FF00 as *mut u32;
+/// Words of the backup memory for the flight software; the word after them shows that the program was running.
+const RETAINED_WORDS: usize = 4;
 const WAS_RUNNING: u32 = 0x5AFE_C0DE;
+
+/// Reads a word of the backup memory.
+fn read_backup(word: usize) -> u32 {
+    // SAFETY: the board has RAM at BACKUP, and only `read_backup` and `write_backup` use it. Every word is a valid u32.
+    unsafe { BACKUP.add(word).read_volatile() }
+}
+/// Writes a word of the backup memory.
+fn write_backup(word: usize, value: u32) {
+    // SAFETY: as in `read_backup`.
+    unsafe { BACKUP.add(word).write_volatile(value) };
+}
+
+/// Returns the words that a reset leaves unchanged.
+pub fn read_retained() -> [u32; RETAINED_WORDS] {
+    core::array::from_fn(read_backup)
+}
+/// Keeps words for the time after a reset.
+pub fn write_retained(words: [u32; RETAINED_WORDS]) {
+    for (place, word) in words.into_iter().enumerate() {
+        write_backup(place, word);
+    }
+}
+
+unsafe extern "C" {
+    /// Begin of the vector table, which is the begin of the image.
+    static __vector_table: u8;
+    /// End of the constants in flash; the initial values of variables follow.
+    static __sidata: u8;
+    static __sdata: u8;
+    static __edata: u8;
+}
+
+/// Returns the program image in flash, as `objcopy -O binary` writes it.
+pub fn image() -> &'static [u8] {
+    let (begin, constants_end) = (&raw const __vector_table, &raw const __sidata);
+    let variables = (&raw const __edata as usize).saturating_sub(&raw const __sdata as usize);
+    let length = (constants_end as usize).saturating_sub(begin as usize) + variables;
+    // SAFETY: the linker places the image in flash without gaps that are not mapped, and nothing writes to it.
+    unsafe { core::slice::from_raw_parts(begin, length) }
+}
 
 impl Watchdog {
     fn new() -> Self {
-        Self { running: false, was_reset: RUNNING.swap(WAS_RUNNING, Ordering::Relaxed) == WAS_RUNNING }
+        let was_reset = read_backup(RETAINED_WORDS) == WAS_RUNNING;
+        write_backup(RETAINED_WORDS, WAS_RUNNING);
+        Self { running: false, was_reset }
     }
 
     /// Starts the watchdog, or restarts its time.

@@ -1,6 +1,6 @@
 //! The port of the flight software: the only file, besides `board`, that a new board rewrites.
 
-use hzn_flight::board::{Board, Picture};
+use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS, image_crc};
 
 use crate::board::{self, FRAME_BYTES, Timer, Uart, Watchdog};
 use crate::host::{File, exit};
@@ -8,6 +8,15 @@ use crate::watermark;
 
 /// Ticks of the timer per microsecond.
 const TICKS_PER_US: u64 = 25;
+
+/// Number of the build, from the variable `HZN_BUILD` of the environment; 0 without it.
+const BUILD: u32 = match option_env!("HZN_BUILD") {
+    Some(digits) => match u32::from_str_radix(digits, 10) {
+        Ok(build) => build,
+        Err(_) => panic!("HZN_BUILD must be a whole number"),
+    },
+    None => 0,
+};
 
 /// The board for the flight software.
 #[derive(Debug)]
@@ -133,5 +142,14 @@ impl Board for Mps2 {
     }
     fn stack_bytes(&mut self) -> u32 {
         watermark::stack_bytes()
+    }
+    fn image(&mut self) -> Image {
+        Image { build: BUILD, crc: image_crc(board::image()) }
+    }
+    fn read_retained(&mut self) -> [u32; RETAINED_WORDS] {
+        board::read_retained()
+    }
+    fn write_retained(&mut self, words: [u32; RETAINED_WORDS]) {
+        board::write_retained(words);
     }
 }

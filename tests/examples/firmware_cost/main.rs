@@ -1,8 +1,10 @@
 //! Measures what the firmware costs in QEMU: instructions by stage, and memory. It prints
 //! book/results/firmware-cost.md. `--check FILE` compares the result with an earlier one and fails if instructions,
 //! flash, static RAM or stack grew by more than 5 %. `--search FROM TO` prints the most expensive of the pictures made
-//! with these seeds.
+//! with these seeds. `--hostile FROM TO` does the same with sensors that vary, too, on both boards, and fails if one of
+//! the pictures takes more than 20 million instructions.
 
+mod hostile;
 mod pictures;
 mod report;
 
@@ -10,6 +12,7 @@ use std::process::ExitCode;
 
 use hzn_tests::emulated::{Board, measure};
 
+use hostile::hostile_pictures;
 use pictures::{Sensors, largest_mask, moon, paint_expensive_pictures, usual_sensors};
 use report::{lines, read_figures, report};
 
@@ -27,8 +30,36 @@ fn search(seeds: std::ops::Range<u32>, sensors: &Sensors) {
     }
 }
 
+/// Most instructions of a picture.
+const MOST: f64 = 20e6;
+
+/// Prints the most expensive hostile pictures of both boards. Returns whether all of them keep the limit.
+fn search_hostile(seeds: std::ops::Range<u32>) -> bool {
+    let mut keeps = true;
+    for board in Board::ALL {
+        let mut found = Vec::new();
+        for from in seeds.clone().step_by(16) {
+            let cases = hostile_pictures(from..(from + 16).min(seeds.end));
+            found.extend(lines(&cases, &measure(board, &cases)));
+        }
+        found.sort_by(|a, b| b.total.total_cmp(&a.total));
+        println!("{}: {} pictures", board.core(), found.len());
+        for line in found.iter().take(10) {
+            let per_unit = line.total / line.work.max(1.0);
+            println!("{:8.0} {:6.0} {per_unit:6.1} {}", line.total, line.work, line.name);
+        }
+        keeps &= found.iter().all(|line| line.total * 1e3 <= MOST);
+    }
+    keeps
+}
+
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
+    if let [flag, from, to] = &args[..]
+        && let ("--hostile", Ok(from), Ok(to)) = (flag.as_str(), from.parse(), to.parse())
+    {
+        return if search_hostile(from..to) { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+    }
     if let [flag, from, to] = &args[..]
         && let ("--search", Ok(from), Ok(to)) = (flag.as_str(), from.parse(), to.parse())
     {

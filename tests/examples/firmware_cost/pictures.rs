@@ -7,6 +7,8 @@ use hzn_sim::flight::rocket;
 use hzn_sim::{Disc, FlightFrame, Sky};
 use hzn_tests::emulated::Case;
 
+use crate::hostile::hostile_pictures;
+
 /// Number of expensive pictures for the table; `--search` takes others.
 const EXPENSIVE_PICTURES: u32 = 64;
 
@@ -14,8 +16,8 @@ const EXPENSIVE_PICTURES: u32 = 64;
 pub(crate) struct Pictures {
     /// Frames of a rocket, and the Moon at the bottom of a dark sky.
     pub(crate) usual: Vec<Case>,
-    /// Expensive pictures of three sensors, each with the number of rows in the table.
-    pub(crate) expensive: [(Vec<Case>, usize); 3],
+    /// Expensive pictures of three sensors and of sensors that vary, each with the number of rows in the table.
+    pub(crate) expensive: [(Vec<Case>, usize); 4],
     /// Frames for the sensor that takes rows, each group with its name.
     pub(crate) by_rows: [(&'static str, Vec<Case>); 2],
 }
@@ -32,8 +34,13 @@ impl Pictures {
             usual.extend(frames(1920, 1080, clean, 3).into_iter().map(with_fewer_points));
         }
         usual.push(moon_at_the_bottom());
-        let expensive = [(usual_sensors(), 3), (largest_mask(), 1), (moon(), 1)]
-            .map(|(sensors, shown)| (paint_expensive_pictures(0..EXPENSIVE_PICTURES, &sensors), shown));
+        let paint = |sensors: &Sensors| paint_expensive_pictures(0..EXPENSIVE_PICTURES, sensors);
+        let expensive = [
+            (paint(&usual_sensors()), 3),
+            (paint(&largest_mask()), 1),
+            (paint(&moon()), 1),
+            (hostile_pictures(0..EXPENSIVE_PICTURES), 2),
+        ];
         let by_rows = [("clean", true), ("cloudy", false)].map(|(kind, clean)| {
             let mut cases = frames(640, 480, clean, 3);
             for case in &mut cases {
@@ -71,7 +78,7 @@ fn with_fewer_points(mut case: Case) -> Case {
     Case { name: format!("{}, keep_points = 200", case.name), ..case }
 }
 
-fn lens(width: u16, height: u16) -> camera::Config {
+pub(crate) fn lens(width: u16, height: u16) -> camera::Config {
     let (w, h) = (f64::from(width), f64::from(height));
     let focal_px = 1233.0 * w.hypot(h) / 1920f64.hypot(1080.0);
     let k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
@@ -156,7 +163,7 @@ const PATTERNS: [Pattern; 8] = [
 ];
 
 /// Hashes two numbers to one number that looks random.
-fn hash_two(a: u32, b: u32) -> u32 {
+pub(crate) fn hash_two(a: u32, b: u32) -> u32 {
     let n = a.wrapping_mul(0x9E37_79B1) ^ b.wrapping_mul(0x85EB_CA77).rotate_left(13);
     let n = (n ^ n >> 15).wrapping_mul(0x2C1B_3C6D);
     let n = (n ^ n >> 12).wrapping_mul(0x297A_2D39);

@@ -38,7 +38,7 @@ struct Measurement<'a> {
     board: Board,
     pictures: &'a Pictures,
     usual: Vec<Measured>,
-    expensive: [Vec<Measured>; 3],
+    expensive: [Vec<Measured>; 4],
     by_rows: [(&'static str, Vec<Measured>); 2],
 }
 

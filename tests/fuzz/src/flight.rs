@@ -5,7 +5,7 @@ use hzn_flight::board::{Board, Picture};
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::flight::{Buffers, Flight, Lists};
 use hzn_flight::messages::{Acknowledge, EdgePart, EventRecord, Exposure, Housekeeping};
-use hzn_flight::packet::{self, Apid, Scan};
+use hzn_flight::packet::{self, Apid, ApidBase, Scan};
 use hzn_flight::{Parameters, table};
 
 use crate::input::Input;
@@ -113,7 +113,7 @@ pub(crate) fn telecommand(bytes: &[u8]) {
         let (user, rest) = input.0.split_at(length);
         input.0 = rest;
         let mut out = [0; packet::MAX_BYTES];
-        let n = packet::write(&mut out, Apid::Command, sequence, 0, |w| w.bytes(user));
+        let n = packet::write(&mut out, ApidBase::default(), Apid::Command, sequence, 0, |w| w.bytes(user));
         line.extend_from_slice(&out[..n.unwrap_or(0)]);
     }
     line.extend_from_slice(input.rest());

@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 
 use hzn_calib::keys::Limits;
 use hzn_flight::bytes::Writer;
-use hzn_flight::messages::{Function, Mode};
+use hzn_flight::messages::{Function, Mode, Navigation};
+use hzn_flight::operations::Operations;
 use hzn_flight::packet::{self, Apid};
 use hzn_flight::{Parameters, parameters};
 use hzn_run::disk;
 
+use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome, Stop, usage};
 
 /// Write commands for a flight computer
@@ -18,10 +20,14 @@ use crate::exit::{Exit, Outcome, Stop, usage};
 ///   "mode standby|flight|safe|shut-down"
 ///   "set NAME VALUE [NAME VALUE]..."   names as in sensor.toml, or numbers; all or none
 ///                                      (NaN: left out)
-///   "load sensor.toml"                 every parameter of a sensor
+///   "try NAME VALUE [NAME VALUE]..."   as set, but a reset brings the stored values back
+///   "load sensor.toml"                 every parameter of a sensor; all or none, in as many packets as needed
 ///   "read NAME [NAME]..."
 ///   "known ALTITUDE_KM [X_KM Y_KM Z_KM [RATE_X RATE_Y RATE_Z]]"   rates in rad/s; NaN: not known
-///   "process-once", "dump-edges", "reset-counters"
+///   "navigate EPOCH_S EXPIRES_S ALTITUDE_KM X_KM Y_KM Z_KM VX_M_S VY_M_S VZ_M_S [RATE_X RATE_Y RATE_Z]"
+///                                      as known, with time, velocity and expiry; NaN: not known
+///   "process-once", "dump-edges", "reset-counters", "ping", "report" (sends housekeeping)
+///   "arm"                              allows "mode shut-down" for ten seconds
 /// The bytes go to standard output unless -o is given. book/reference/telemetry.md describes the format.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -35,6 +41,8 @@ pub(super) struct Args {
     /// Sequence count of the first command, 0 to 16383
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(..16384))]
     sequence: u16,
+    #[command(flatten)]
+    apids: ApidArgs,
     /// Replace an output that exists
     #[arg(long)]
     force: bool,
@@ -46,7 +54,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     for command in &args.commands {
         for user in encode(command)? {
             let mut bytes = [0; packet::MAX_BYTES];
-            let n = packet::write(&mut bytes, Apid::Command, sequence, 0, |w| w.bytes(&user))
+            let n = packet::write(&mut bytes, args.apids.apid_base, Apid::Command, sequence, 0, |w| w.bytes(&user))
                 .ok_or_else(|| usage(format!("{command:?}: too long for one packet; split it")))?;
             out.extend_from_slice(&bytes[..n]);
             sequence = (sequence + 1) & 0x3FFF;
@@ -65,7 +73,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
 }
 
-/// Returns the user data of each packet of a command. At present every command has one packet.
+/// Returns the user data of each packet of a command.
 fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
     let words: Vec<&str> = text.split_whitespace().collect();
     let Some((&verb, arguments)) = words.split_first() else { return Err(refuse(text, "is empty")) };
@@ -73,8 +81,11 @@ fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
         let [path] = arguments else { return Err(refuse(text, "load takes one file, a sensor.toml")) };
         return load(Path::new(path));
     }
-    let Some(function) = Function::ALL.iter().copied().find(|f| f.name() == verb) else {
-        let names: Vec<&str> = Function::ALL.iter().map(|f| f.name()).chain(["load"]).collect();
+    // `load` makes the packets that keep parameters and commit them.
+    let is_command = |f: &Function| !matches!(f, Function::StageParameters | Function::CommitParameters);
+    let commands = || Function::ALL.iter().copied().filter(is_command);
+    let Some(function) = commands().find(|f| f.name() == verb) else {
+        let names: Vec<&str> = commands().map(Function::name).chain(["load"]).collect();
         let hint = match hzn_calib::nearest(verb, names.iter().copied()) {
             Some(near) => format!("did you mean {near:?}?"),
             None => format!("there are {}", names.join(", ")),
@@ -84,10 +95,11 @@ fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
     let command = Command { text, function, arguments };
     let user = match function {
         Function::SetMode => command.set_mode()?,
-        Function::SetParameters => command.set_parameters()?,
+        Function::SetParameters | Function::TryParameters => command.set_parameters()?,
         Function::ReadParameters => command.read_parameters()?,
         Function::SetKnown => command.set_known()?,
-        Function::ProcessOnce | Function::DumpEdges | Function::ResetCounters => command.without_arguments()?,
+        Function::Navigate => command.navigate()?,
+        _ => command.without_arguments()?,
     };
     Ok(vec![user])
 }
@@ -131,7 +143,8 @@ impl Command<'_> {
     fn set_parameters(&self) -> Result<Vec<u8>, Stop> {
         let words = self.arguments;
         if words.is_empty() || !words.len().is_multiple_of(2) || words.len() > 160 {
-            return Err(self.refuse("set takes pairs of a name and a value, up to 80"));
+            let what = format!("{} takes pairs of a name and a value, up to 80", self.function.name());
+            return Err(self.refuse(&what));
         }
         let mut pairs = Vec::new();
         for pair in words.chunks(2) {
@@ -154,9 +167,58 @@ impl Command<'_> {
         })
     }
 
-    fn set_known(&self) -> Result<Vec<u8>, Stop> {
+    /// Returns the arguments as numbers.
+    fn numbers(&self) -> Result<Vec<f64>, Stop> {
         let number = |word: &str| word.parse::<f64>().map_err(|_| self.refuse(&format!("{word:?} is not a number")));
-        let numbers = self.arguments.iter().map(|w| number(w)).collect::<Result<Vec<_>, _>>()?;
+        self.arguments.iter().map(|w| number(w)).collect()
+    }
+
+    fn navigate(&self) -> Result<Vec<u8>, Stop> {
+        let (values, rate) = match self.numbers()?[..] {
+            [e, t, h, x, y, z, u, v, w] => ([e, t, h, x, y, z, u, v, w], [f64::NAN; 3]),
+            [e, t, h, x, y, z, u, v, w, p, q, r] => ([e, t, h, x, y, z, u, v, w], [p, q, r]),
+            _ => {
+                let what = "navigate takes time and expiry in seconds, altitude and ECEF position in kilometres, \
+                            velocity in m/s, and the rate of rotation in rad/s if it is known: 9 or 12 numbers";
+                return Err(self.refuse(what));
+            }
+        };
+        let [epoch_s, expires_s, altitude_km, km @ .., vx, vy, vz] = values;
+        // The clock of the computer begins with its start.
+        if !(0.0..1e12).contains(&epoch_s) {
+            return Err(self.refuse(&format!("the time {epoch_s} s is refused: seconds since the computer's start")));
+        }
+        if let Some(x) = values.iter().chain(&rate).find(|x| x.is_infinite() || (**x * 1e3).abs() > f64::from(f32::MAX))
+        {
+            return Err(self.refuse(&format!("{x} is not a finite number")));
+        }
+        let vectors = [("position", km), ("velocity", [vx, vy, vz]), ("rate of rotation", rate)];
+        let is_partly_known = |v: [f64; 3]| matches!(v.iter().filter(|x| x.is_nan()).count(), 1 | 2);
+        if let Some((name, _)) = vectors.iter().find(|(_, v)| is_partly_known(*v)) {
+            return Err(self.refuse(&format!("all three numbers of the {name} must be known, or none")));
+        }
+        let m = |km: f64| (km * 1e3) as f32;
+        let [x, y, z] = km;
+        let [rate_x, rate_y, rate_z] = rate.map(|x| x as f32);
+        let values = Navigation {
+            epoch_us: (epoch_s * 1e6) as u64,
+            expires_s: expires_s as f32,
+            altitude_m: m(altitude_km),
+            position_x_m: m(x),
+            position_y_m: m(y),
+            position_z_m: m(z),
+            velocity_x_m_s: vx as f32,
+            velocity_y_m_s: vy as f32,
+            velocity_z_m_s: vz as f32,
+            rate_x_rad_s: rate_x,
+            rate_y_rad_s: rate_y,
+            rate_z_rad_s: rate_z,
+        };
+        self.user_data(|w| values.write(w))
+    }
+
+    fn set_known(&self) -> Result<Vec<u8>, Stop> {
+        let numbers = self.numbers()?;
         let (km, rate) = numbers.split_at(numbers.len().min(4));
         if let Some(x) = km.iter().find(|km| !((**km * 1e3) as f32).is_finite()) {
             return Err(self.refuse(&format!("{x} is not a finite number of kilometres")));
@@ -225,9 +287,12 @@ fn parse_value(id: u16, word: &str) -> Result<f64, String> {
         return cannot(format!("one of {}", each.join(", ")));
     }
     let limits = match hzn_calib::keys::find(name).map(|key| &key.limits) {
+        // The watchdog sets the limit of a flight computer.
+        Some(Limits::Number { low, above, .. }) if name == "limits.max_work" => {
+            Some((*low, *above, f64::from(parameters::MAX_WORK)))
+        }
         Some(Limits::Number { low, above, high }) => Some((*low, *above, *high)),
-        _ if name == "telemetry.housekeeping_every" => Some((1.0, false, 65535.0)),
-        _ => None,
+        _ => Operations::limits(id).map(|(low, high)| (low, false, high)),
     };
     let within = |x: f64| limits.is_none_or(|(low, above, high)| x <= high && if above { x > low } else { x >= low });
     // The corners of a mask are set one after another. The earlier corners are not known here, so a corner is not
@@ -256,7 +321,11 @@ fn choices(name: &str) -> Vec<(&'static str, f64)> {
     choices.iter().filter_map(|choice| Some((choice.name, f64::from(choice.flight?)))).collect()
 }
 
-/// Returns one command with every parameter of a sensor, so that either all are accepted or none.
+/// Number of parameters in one packet of a load.
+const LOADED_AT_ONCE: usize = 80;
+
+/// Returns packets with every parameter of a sensor, and the packet that sets and stores all of them, or none. The
+/// parameters of the flight software itself stay as they are.
 fn load(path: &Path) -> Result<Vec<Vec<u8>>, Stop> {
     let sensor = hzn_calib::sensor::load(path)?;
     let parameters = Parameters::new(sensor.config);
@@ -267,15 +336,15 @@ fn load(path: &Path) -> Result<Vec<Vec<u8>>, Stop> {
             path.display()
         ))
     })?;
-    let pairs: Vec<_> = parameters.numbers().filter_map(|id| Some((id, parameters.get(id)?))).collect();
-    let mut bytes = vec![0; packet::MAX_BYTES];
-    let mut out = Writer::new(&mut bytes);
-    out.u8(Function::SetParameters as u8);
-    write_pairs(&mut out, &pairs);
-    let n = out.finish().filter(|&n| n + 20 <= packet::MAX_BYTES).ok_or_else(|| {
-        let text = format!("{}: {} parameters are too many for one command (99)", path.display(), pairs.len());
-        usage(format!("{text}; give the mask fewer corners"))
-    })?;
-    bytes.truncate(n);
-    Ok(vec![bytes])
+    let pairs: Vec<_> = parameters.sensor_numbers().filter_map(|id| Some((id, parameters.get(id)?))).collect();
+    let text = path.display().to_string();
+    let packet =
+        |function, fill: &dyn Fn(&mut Writer<'_>)| Command { text: &text, function, arguments: &[] }.user_data(fill);
+    // An empty packet removes what an earlier load has left.
+    let mut packets = vec![packet(Function::StageParameters, &|w| w.u8(0))?];
+    for part in pairs.chunks(LOADED_AT_ONCE) {
+        packets.push(packet(Function::StageParameters, &|w| write_pairs(w, part))?);
+    }
+    packets.push(packet(Function::CommitParameters, &|w| w.u16(pairs.len() as u16))?);
+    Ok(packets)
 }

@@ -11,12 +11,13 @@ use hzn_flight::bytes::Reader;
 use hzn_flight::messages::{
     Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode, Severity,
 };
-use hzn_flight::packet::{self, Apid, Packet, Scan};
+use hzn_flight::packet::{self, Apid, ApidBase, OVERHEAD, Packet, Scan};
 use hzn_flight::{Parameters, parameters};
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, RowMeta};
 use hzn_run::disk;
 use hzn_run::sink::{self, Existing, RowFile, Target};
 
+use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
 
@@ -34,6 +35,8 @@ pub(super) struct Args {
     /// The file for the housekeeping, as a table: .csv
     #[arg(long, value_name = "FILE")]
     housekeeping: Option<PathBuf>,
+    #[command(flatten)]
+    apids: ApidArgs,
     /// Replace outputs that exist
     #[arg(long)]
     force: bool,
@@ -44,7 +47,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
     let mut sink = args.output.as_deref().map(|path| Sink::create(path, existing)).transpose()?;
     let mut housekeeping = args.housekeeping.as_deref().map(|path| table(path, args.force)).transpose()?;
-    let mut counts = StreamCounts::default();
+    let mut counts = StreamCounts { base: args.apids.apid_base, ..StreamCounts::default() };
     let mut rest = &bytes[..];
     loop {
         match packet::scan(rest) {
@@ -82,9 +85,6 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 /// Largest stream that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 30;
-
-/// Number of bytes of a packet without its user data.
-const OVERHEAD: usize = 20;
 
 fn read(path: &Path) -> Result<Vec<u8>, Stop> {
     let mut bytes = Vec::new();
@@ -136,6 +136,7 @@ impl Sink {
 /// Counts of a stream, and the log lines for the next answer.
 #[derive(Default)]
 struct StreamCounts {
+    base: ApidBase,
     packets: u64,
     answers: u64,
     cut: u64,
@@ -157,7 +158,7 @@ impl StreamCounts {
         self.count_lost(packet);
         let time_s = packet.time_us as f64 * 1e-6;
         let from = &mut Reader::new(packet.user);
-        let is_understood = match Apid::from_number(packet.apid) {
+        let is_understood = match self.base.subject(packet) {
             Some(Apid::Science) => match (Exposure::read(from), PictureAnswer::read(from)) {
                 (Some(exposure), Some(answer)) => {
                     self.answer(&exposure, &answer, sink)?;
@@ -165,7 +166,7 @@ impl StreamCounts {
                 }
                 _ => false,
             },
-            Some(Apid::Housekeeping) => match Housekeeping::read(from) {
+            Some(Apid::Housekeeping) => match Housekeeping::read_any(packet.user) {
                 Some(record) => {
                     write_housekeeping(time_s, &record, housekeeping)?;
                     true
@@ -182,7 +183,7 @@ impl StreamCounts {
             Some(Apid::Command) | None => false,
         };
         if !is_understood {
-            let name = Apid::from_number(packet.apid).map_or(String::new(), |a| format!(" ({})", a.name()));
+            let name = self.base.subject(packet).map_or(String::new(), |a| format!(" ({})", a.name()));
             let what = format!("a packet of APID {:#x}{name} with {} bytes", packet.apid, packet.user.len());
             self.note(time_s, LogLevel::Warning, &format!("{what} is not understood"));
         }
@@ -299,6 +300,13 @@ fn describe_event(record: &EventRecord) -> String {
             format!("telecommand rejected: {code} (function {b})")
         }
         Some(Event::Stored) => format!("parameters stored in copy {a}, generation {b}"),
+        Some(Event::CameraSilent) => {
+            format!("the camera sends no pictures: the last one, number {b}, came {:.1} s ago", f64::from(a) * 1e-3)
+        }
+        Some(Event::Repaired) => {
+            let what = if a == 1 { "sensor, made anew from the stored parameters" } else { "values from navigation" };
+            format!("memory error number {b} was repaired: {what}")
+        }
         Some(e) => format!("{} ({a}, {b})", e.name()),
         None => format!("event {number} ({a}, {b})"),
     }

@@ -25,7 +25,7 @@ pub const EARTH_MEAN_RADIUS_M: f64 = 6_371_008.8;
 /// let (east, meridian) = cone.half_angles_rad();
 /// assert!(east > meridian && cone.axis.xyz()[0] == -1.0);
 /// ```
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimbCone<T> {
     /// Axis of the cone, towards the body.
     pub axis: UnitVec3<Ecef, T>,

@@ -50,7 +50,7 @@ impl<F, T: Clone> Clone for UnitVec3<F, T> {
     }
 }
 impl<F, T: Copy> Copy for UnitVec3<F, T> {}
-impl<F, T: PartialEq + Real> PartialEq for UnitVec3<F, T> {
+impl<F, T: PartialEq> PartialEq for UnitVec3<F, T> {
     fn eq(&self, other: &Self) -> bool {
         self.v == other.v
     }
@@ -186,6 +186,11 @@ impl<F, T: Real> Cov3<F, T> {
 pub struct Rotation<A, B, T> {
     rows: [V3<T>; 3],
     frames: PhantomData<(A, B)>,
+}
+impl<A, B, T: PartialEq> PartialEq for Rotation<A, B, T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.rows == other.rows
+    }
 }
 impl<A, B, T: Clone> Clone for Rotation<A, B, T> {
     fn clone(&self) -> Self {

@@ -12,7 +12,7 @@ use crate::geometry::block::Block;
 use crate::geometry::camera::ray::{Ray, tangent};
 
 /// The map between the camera frame and the scaled space of one ellipsoid.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scaling<T> {
     /// U, symmetric; lengths that it maps are in units of the mean semi-axis.
     pub(crate) to: M3<T>,

@@ -1,8 +1,8 @@
 //! The work budget of a picture. All stages spend from one budget, so that the cost of the worst picture has a bound.
 //!
-//! The unit is a step of the border follower, about fifty instructions of a Cortex-M7. Each stage pays its largest cost
-//! in advance, from the amount of data that it will examine, so that the sum does not depend on the machine. The sample
-//! for the threshold is free. The border of the picture is free too, except for mask tests.
+//! The unit is a step of the border follower, about fifty instructions of a Cortex-M7; no unit is more than eighty. Most
+//! stages pay their largest cost in advance, from the amount of data that they will examine, so that the sum does not
+//! depend on the machine. Reads of single pixels and of the mask are counted and paid for after a few of them.
 
 use crate::base::keys::section;
 
@@ -24,18 +24,20 @@ const DEFAULT_PER_PIXEL: u32 = 120;
 
 /// Cost to begin to follow an edge.
 pub(crate) const EDGE: u32 = 20;
-/// Returns the cost of a step of the border follower that tests all neighbours, including the mask.
-pub(crate) fn follow_step_cost(mask: u32) -> u32 {
-    5 + mask * 5 / 2
-}
+/// Cost of a single read of a pixel.
+pub(crate) const READ: u32 = 1;
+/// Cost of a step of the border follower that tests all neighbours. The reads of the mask come on top.
+pub(crate) const LOOK_AROUND: u32 = 5;
+/// Cost to begin a run of steps that test only the threshold. The distance to the masks comes on top.
+pub(crate) const RUN: u32 = 4;
 /// Returns the cost of a search line from one column to another. A pixel takes few instructions, but the search for a
 /// small body has lines on every row.
 pub(crate) fn line_cost(from: u16, to: u16) -> u32 {
     u32::from(to.saturating_sub(from)) / 15
 }
-/// Returns the cost to scan the picture's border pixel by pixel, beyond the few pixels that are free.
-pub(crate) fn ring_cost(width: u16, height: u16) -> u32 {
-    (u32::from(width) + u32::from(height)) / 2
+/// Returns the cost to scan the picture's border at every `stride`-th pixel, each with a read of the mask.
+pub(crate) fn ring_cost(width: u16, height: u16, stride: u16, mask: u32) -> u32 {
+    2 * (u32::from(width) + u32::from(height)) / u32::from(stride.max(1)) * (READ + mask)
 }
 /// Cost of a further look at a picture, before anything is found.
 pub(crate) const LOOK: u32 = 1000;
@@ -120,6 +122,7 @@ impl WorkBudget {
 
     /// Spends `cost` for work that is done already, down to 0.
     pub(crate) fn charge(&mut self, cost: u32) {
+        self.truncated |= cost > self.remaining;
         self.remaining = self.remaining.saturating_sub(cost);
     }
     /// Returns whether nothing is left.

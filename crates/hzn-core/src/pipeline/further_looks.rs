@@ -44,7 +44,8 @@ impl<T: Real> Sensor<T> {
         // A `fixed` threshold is kept: there are no other thresholds.
         let fixed = config.threshold_of(expected.which).method == threshold::Method::Fixed;
         let mut others = if fixed { [].iter() } else { config.recover.levels.iter() };
-        let mut work = budget::new(config, lists.border.len());
+        let (mut work, read) = (budget::new(config, lists.border.len()), work::READ + self.region.mask_cost());
+        work.charge(first.drawn * read);
         let mut within = None;
         let mut status = None;
         let mut lowest = None;
@@ -74,6 +75,7 @@ impl<T: Real> Sensor<T> {
                 break;
             }
             let lowest = *lowest.get_or_insert_with(|| {
+                work.charge(threshold::NOISE_READS * read);
                 let noise = threshold::dark_noise(picture, &self.region, first.level, config.reject.seed, observer);
                 first.dark + noise * T::from_f64(config.recover.min_sigma)
             });

@@ -43,7 +43,7 @@ const SIDES: f64 = 40.0;
 /// assert!(report.solution.is_none());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Sensor<T> {
     pub(super) config: Config,
     pub(super) camera: Camera<T>,

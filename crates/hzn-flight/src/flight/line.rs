@@ -2,7 +2,7 @@
 
 use crate::board::Board;
 use crate::bytes::Writer;
-use crate::packet::{self, Apid, MAX_BYTES};
+use crate::packet::{self, Apid, ApidBase, MAX_BYTES};
 
 /// The line for telemetry, with a sequence count for each APID.
 #[derive(Debug)]
@@ -10,11 +10,21 @@ pub(super) struct Line {
     /// Memory for the packet that is sent.
     pub(super) out: [u8; MAX_BYTES],
     sequences: [u16; Apid::ALL.len()],
+    /// The APIDs of this computer; `None` until the parameters are loaded.
+    base: Option<ApidBase>,
 }
 
 impl Line {
+    /// Makes a line. It is all zeros, so that it takes no flash.
     pub(super) const fn new() -> Self {
-        Self { out: [0; MAX_BYTES], sequences: [0; Apid::ALL.len()] }
+        Self { out: [0; MAX_BYTES], sequences: [0; Apid::ALL.len()], base: None }
+    }
+
+    pub(super) fn base(&self) -> ApidBase {
+        self.base.unwrap_or_default()
+    }
+    pub(super) fn set_base(&mut self, base: ApidBase) {
+        self.base = Some(base);
     }
 
     /// Sends a packet. `user` writes its user data.
@@ -25,8 +35,9 @@ impl Line {
             *n = n.wrapping_add(1);
             now
         });
-        let time_us = board.now_us();
-        if let Some(bytes) = packet::write(&mut self.out, apid, sequence, time_us, user).and_then(|n| self.out.get(..n))
+        let (time_us, base) = (board.now_us(), self.base());
+        if let Some(bytes) =
+            packet::write(&mut self.out, base, apid, sequence, time_us, user).and_then(|n| self.out.get(..n))
         {
             board.send(bytes);
         }

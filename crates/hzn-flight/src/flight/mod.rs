@@ -3,29 +3,47 @@
 //! | part | idea |
 //! |---|---|
 //! | `self_check` | the checks at the start |
-//! | `telecommands` | telecommands, from the line to their acknowledgement |
+//! | `recovery` | resets, lift-off, shut-down |
+//! | `listen` | the telecommand that arrives, and its acknowledgement |
+//! | `telecommands` | the functions of telecommands |
+//! | `parameter_commands` | the functions that read and change parameters |
 //! | `pictures` | the way of a picture to its science packet |
+//! | `memory` | bits that changed in memory |
+//! | `navigation` | position, velocity and rate, with time and expiry |
+//! | `camera_watch` | pictures that do not come |
 //! | `longest_edge` | the edge that a command asks for |
+//! | `reports` | housekeeping and events |
 //! | `line` | packets on the line, with their counts |
 
-use hzn_core::body::Last;
-use hzn_core::{Prior, Sensor, Workspace};
+use hzn_core::{Sensor, Workspace};
 
 use crate::board::Board;
-use crate::bytes::Writer;
-use crate::messages::{Event, EventRecord, Housekeeping, Mode};
-use crate::packet::{Apid, Inbox};
-use crate::store;
+use crate::inbox::Inbox;
+use crate::kept_twice::KeptTwice;
+use crate::messages::{Event, Housekeeping, Mode};
+use crate::operations::Operations;
+use crate::store::{self, Loaded};
 use crate::table::{self, TableError};
 
+mod camera_watch;
 mod line;
+mod listen;
 mod longest_edge;
+mod memory;
+mod navigation;
+mod parameter_commands;
 mod pictures;
+mod recovery;
+mod reports;
 mod self_check;
 mod telecommands;
 
+use camera_watch::CameraWatch;
 use line::Line;
 use longest_edge::LongestEdge;
+use navigation::Known;
+use recovery::Recovery;
+use reports::Limiter;
 
 /// The lists that a picture needs; keep them in a `static`. They are those of `hzn run --flight`, except that at most
 /// 608 points are kept per edge. The default `candidates.keep_points` needs no more; `keep_points = 0` (all) also means
@@ -37,6 +55,7 @@ pub type Lists = Workspace<f32, 2048, 76, 512>;
 pub struct Buffers {
     line: Line,
     inbox: Inbox,
+    /// A table of parameters on its way from or to memory, or parameters that wait for their commit.
     table: [u8; table::MAX_BYTES],
     edge: LongestEdge,
 }
@@ -57,75 +76,124 @@ impl Buffers {
 /// The flight software.
 #[derive(Debug)]
 pub struct Flight<'a, B> {
+    /// What the first turn reports: why copies 1 and 2 of the parameters cannot be used.
+    start: Option<[u32; 2]>,
     board: B,
     buffers: &'a mut Buffers,
     workspace: &'a mut Lists,
-    sensor: Sensor<f32>,
-    housekeeping_every: u16,
-    /// The prior of the pictures, from navigation.
-    prior: Prior<f32>,
-    /// The last answer, and the time when its picture was exposed, µs since the start.
-    last: Option<(Last<f32>, u64)>,
+    sensor: KeptTwice<Sensor<f32>>,
+    operations: Operations,
+    /// Whether the parameters in use differ from the stored ones.
+    is_not_stored: bool,
+    /// Number of parameters that are kept for a commit; they are in the buffer of the table.
+    staged: u16,
+    known: KeptTwice<Known>,
+    /// Whether an event said that the values from navigation have expired.
+    has_expired: bool,
     mode: Mode,
     state: Housekeeping,
-    /// Number of pictures since the last housekeeping packet.
+    recovery: Recovery,
+    camera: CameraWatch,
+    limiter: Limiter,
+    /// Number of the last picture, from 1.
+    number: u32,
+    /// Number of pictures since the last housekeeping packet, and its time.
     since_housekeeping: u16,
+    housekeeping_us: u64,
+    /// Sequence count of the last telecommand that was taken.
+    last_sequence: Option<u16>,
     /// Whether a command asked for the next picture to be processed.
     process_once: bool,
     /// Whether a command asked for the edges of the next picture.
     dump_edges: bool,
-    /// Time when the last byte arrived, µs since the start.
-    last_byte_us: u64,
 }
 
 impl<'a, B: Board> Flight<'a, B> {
-    /// Loads the parameters, runs the self-checks and waits in standby, or in safe mode if a check fails. `None` cannot
-    /// occur: stored parameters are checked, and a test shows that the defaults are valid.
+    /// Loads the parameters. The first turn runs the self-checks and waits in standby, or in safe mode if a check fails.
+    /// `None` cannot occur: stored parameters are checked, and a test shows that the defaults are valid.
+    ///
+    /// Keep the flight software where it is: it has two sensors, 15 KB, and a copy needs that much of the stack.
     // Not inlined, like the other large functions, so that each can use the same part of the stack.
     #[inline(never)]
     pub fn start(mut board: B, buffers: &'a mut Buffers, workspace: &'a mut Lists) -> Option<Self> {
-        let loaded = store::load(&mut board, &mut buffers.table);
-        let sensor = Sensor::new(&loaded.parameters.sensor).ok()?;
+        let recovery = Recovery::begin(&mut board);
+        let loaded = store::load(&mut board, &mut buffers.table, recovery.choice());
+        Self::new(board, buffers, workspace, recovery, &loaded)
+    }
+
+    /// Sends the events of the start, runs the self-checks and enters the first mode.
+    #[inline(never)]
+    fn begin(&mut self, broken: [u32; 2]) {
+        self.report_start(broken);
+        self.run_self_checks(self.state.parameter_copy != 0);
+        self.enter_first_mode();
+        self.send_housekeeping();
+    }
+
+    /// Makes the flight software with the parameters that were loaded.
+    #[inline(never)]
+    fn new(
+        mut board: B,
+        buffers: &'a mut Buffers,
+        workspace: &'a mut Lists,
+        recovery: Recovery,
+        loaded: &Loaded,
+    ) -> Option<Self> {
+        let image = board.image();
         let state = Housekeeping {
             parameter_copy: loaded.copy,
             parameter_generation: loaded.generation,
             last_status: u8::MAX,
+            build: image.build,
+            image_crc: image.crc,
+            starts: recovery.starts,
+            watchdog_resets: recovery.watchdog_resets,
             ..Housekeeping::default()
         };
-        let mut flight = Self {
-            board,
-            buffers,
-            workspace,
-            sensor,
-            housekeeping_every: loaded.parameters.housekeeping_every,
-            prior: Prior::default(),
-            last: None,
-            mode: Mode::Standby,
-            state,
-            since_housekeeping: 0,
-            process_once: false,
-            dump_edges: false,
-            last_byte_us: 0,
-        };
-        flight.send_event(Event::Started, u32::from(loaded.copy), loaded.generation);
-        if flight.board.was_watchdog_reset() {
-            flight.send_event(Event::Watchdog, 0, 0);
-        }
-        for (copy, broken) in (1u32..).zip(&loaded.broken) {
-            let why = match broken {
-                None => continue,
+        buffers.line.set_base(loaded.parameters.operations.base());
+        Some(Self {
+            start: Some(loaded.broken.each_ref().map(|broken| match broken {
+                None => 0,
                 Some(TableError::Header) => 1,
                 Some(TableError::Checksum) => 2,
                 Some(TableError::Refused(_)) => 3,
-            };
-            flight.send_event(Event::CopyBroken, copy, why);
+            })),
+            sensor: KeptTwice::new(Sensor::new(&loaded.parameters.sensor).ok()?),
+            board,
+            buffers,
+            workspace,
+            operations: loaded.parameters.operations.clone(),
+            is_not_stored: loaded.copy == 0,
+            staged: 0,
+            known: KeptTwice::new(Known::default()),
+            has_expired: false,
+            mode: Mode::Standby,
+            state,
+            recovery,
+            camera: CameraWatch::new(),
+            limiter: Limiter::new(),
+            number: 0,
+            since_housekeeping: 0,
+            housekeeping_us: 0,
+            last_sequence: None,
+            process_once: false,
+            dump_edges: false,
+        })
+    }
+
+    /// Sends the events of the start. `broken` says why copies 1 and 2 of the parameters cannot be used; 0: they can.
+    fn report_start(&mut self, broken: [u32; 2]) {
+        let (copy, generation) = (self.state.parameter_copy, self.state.parameter_generation);
+        self.send_event(Event::Started, u32::from(copy), generation);
+        if self.recovery.watchdog_resets > 0 {
+            self.send_event(Event::Watchdog, u32::from(self.recovery.watchdog_resets), 0);
         }
-        if loaded.copy == 0 {
-            flight.send_event(Event::Defaults, 0, 0);
+        for (copy, why) in (1u32..).zip(broken).filter(|(_, why)| *why > 0) {
+            self.send_event(Event::CopyBroken, copy, why);
         }
-        flight.run_self_checks(loaded.copy != 0);
-        flight.send_housekeeping();
-        Some(flight)
+        if copy == 0 {
+            self.send_event(Event::Defaults, 0, 0);
+        }
     }
 
     /// Returns the mode.
@@ -140,22 +208,28 @@ impl<'a, B: Board> Flight<'a, B> {
     /// Runs one turn of the loop, with at most one telecommand and one picture. Call it for ever.
     pub fn turn(&mut self) {
         self.board.feed_watchdog();
-        if self.mode == Mode::ShutDown {
-            return;
+        if let Some(broken) = self.start.take() {
+            self.begin(broken);
         }
-        if self.board.power_fails() {
-            self.enter_mode(Mode::ShutDown);
+        self.sensor.complete();
+        self.known.complete();
+        let now_us = self.board.now_us();
+        if self.mode == Mode::ShutDown || self.follow_vehicle(now_us) {
             return;
-        }
-        if self.mode == Mode::Standby && self.board.lift_off() {
-            self.enter_mode(Mode::Flight);
         }
         self.listen();
         let wanted = self.mode == Mode::Flight || self.mode == Mode::Standby && self.process_once;
-        if wanted && let Some(picture) = self.board.next_picture() {
-            self.process_once = false;
-            self.process_picture(picture);
+        if wanted {
+            match self.board.next_picture() {
+                Some(picture) => {
+                    self.process_once = false;
+                    self.camera.note(&picture, now_us);
+                    self.process_picture(picture);
+                }
+                None => self.watch_camera(now_us),
+            }
         }
+        self.report_by_time(now_us);
     }
 
     fn enter_mode(&mut self, mode: Mode) {
@@ -164,24 +238,9 @@ impl<'a, B: Board> Flight<'a, B> {
         }
         let from = core::mem::replace(&mut self.mode, mode);
         self.process_once = false;
+        let now_us = self.board.now_us();
+        self.camera.start(now_us);
         self.send_event(Event::ModeChanged, from as u32, mode as u32);
         self.send_housekeeping();
-    }
-
-    fn send_housekeeping(&mut self) {
-        self.since_housekeeping = 0;
-        self.state.mode = self.mode as u8;
-        self.state.stack_bytes = self.board.stack_bytes();
-        let state = self.state;
-        self.send(Apid::Housekeeping, |out| state.write(out));
-    }
-
-    fn send_event(&mut self, event: Event, a: u32, b: u32) {
-        let record = EventRecord { number: event as u16, severity: event.severity() as u8, a, b };
-        self.send(Apid::Event, |out| record.write(out));
-    }
-
-    fn send(&mut self, apid: Apid, user: impl FnOnce(&mut Writer<'_>)) {
-        self.buffers.line.send(&mut self.board, apid, user);
     }
 }

@@ -2,15 +2,16 @@
 
 use core::cell::RefCell;
 
+use hzn_core::Report;
 use hzn_core::body::{Expected, Last};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
-use hzn_core::{Prior, Report};
 
 use super::longest_edge::EdgeWatch;
-use super::{Buffers, Flight};
+use super::{Buffers, Flight, Known};
 use crate::answer::PictureAnswer;
 use crate::board::{Board, Picture};
+use crate::kept_twice::KeptTwice;
 use crate::messages::{Event, Exposure};
 use crate::packet::Apid;
 use crate::parameters::Parameters;
@@ -24,18 +25,26 @@ impl<B: Board> Flight<'_, B> {
             self.state.lost = self.state.lost.saturating_add(picture.lost);
             self.send_event(Event::Overrun, picture.lost, 0);
         }
+        // What changed since the last picture is made anew in time for this one.
+        self.check_memory(None);
         let Some(layout) = self.check_size(picture.bytes) else { return };
-        let Some(expected) = self.expect_limb(picture.exposure_us) else { return };
+        let Some(mut expected) = self.expect_limb(picture.exposure_us) else { return };
         let start = self.board.now_us();
         let wanted = core::mem::take(&mut self.dump_edges);
         let bytes = self.board.pixels().get(..picture.bytes).unwrap_or_default();
         let Ok(grey) = Grey::try_new(bytes, layout) else { return };
         self.buffers.edge.clear();
         let watch = EdgeWatch { wanted, longest: RefCell::new(&mut self.buffers.edge) };
-        let report = self.sensor.process(self.workspace, &grey, &expected, &watch);
+        let report = self.sensor.get().process(self.workspace, &grey, expected.get(), &watch);
+        // A bit may have changed during the calculation.
+        if !self.check_memory(Some(&mut expected)) {
+            self.state.refused = self.state.refused.saturating_add(1);
+            return;
+        }
         if let Some(s) = &report.solution {
             let last = Last { axis: s.axis, sigma_rad: s.covariance.sigma_max_rad(), age_s: 0.0 };
-            self.last = Some((last, picture.exposure_us));
+            self.known.set(Known { last: Some((last, picture.exposure_us)), ..self.known.get().clone() });
+            self.known.complete();
         }
         let done_us = self.board.now_us();
         let calculation_us = u32::try_from(done_us.saturating_sub(start)).unwrap_or(u32::MAX);
@@ -43,17 +52,17 @@ impl<B: Board> Flight<'_, B> {
         self.send_answer(&report, picture.exposure_us, done_us);
         if wanted {
             let Buffers { line, edge, .. } = &mut *self.buffers;
-            edge.send(line, &mut self.board, self.state.pictures);
+            edge.send(line, &mut self.board, self.number);
         }
         self.since_housekeeping = self.since_housekeeping.saturating_add(1);
-        if self.since_housekeeping >= self.housekeeping_every {
+        if self.since_housekeeping >= self.operations.housekeeping_every {
             self.send_housekeeping();
         }
     }
 
     /// Returns the layout of a picture with this number of bytes. Refuses the picture if the camera has another size.
     fn check_size(&mut self, bytes: usize) -> Option<Layout> {
-        let camera = self.sensor.camera();
+        let camera = self.sensor.get().camera();
         let expected_bytes = usize::from(camera.width()) * usize::from(camera.height());
         if bytes == expected_bytes {
             return Some(Layout::packed(camera.width().into(), camera.height().into(), 1, 8));
@@ -65,21 +74,23 @@ impl<B: Board> Flight<'_, B> {
 
     /// Returns the expected limb of a picture, from the values of navigation and the last answer. Refuses the picture
     /// if these are impossible.
-    fn expect_limb(&mut self, exposure_us: u64) -> Option<Expected<f32>> {
-        let age_s = |last_us: u64| exposure_us.saturating_sub(last_us) as f32 * 1e-6;
-        let last = self.last.map(|(last, last_us)| Last { age_s: age_s(last_us), ..last });
-        let expected = self.sensor.expect(&Prior { last, ..self.prior }).ok();
+    fn expect_limb(&mut self, exposure_us: u64) -> Option<KeptTwice<Expected<f32>>> {
+        let prior = self.prior_at(exposure_us);
+        let expected = self.sensor.get().expect(&prior).ok();
         if expected.is_none() {
             self.state.refused = self.state.refused.saturating_add(1);
             self.send_event(Event::KnownRefused, 0, 0);
         }
-        expected
+        let mut expected = KeptTwice::new(expected?);
+        expected.keep();
+        Some(expected)
     }
 
     /// Adds a processed picture to the counters.
     fn count_picture(&mut self, status: Status, calculation_us: u32) {
         let state = &mut self.state;
-        state.pictures = state.pictures.wrapping_add(1);
+        self.number = self.number.wrapping_add(1);
+        state.pictures = state.pictures.saturating_add(1);
         state.answers = state.answers.saturating_add(u32::from(status == Status::Ok));
         state.last_status = status as u8;
         state.last_us = calculation_us;
@@ -88,10 +99,15 @@ impl<B: Board> Flight<'_, B> {
 
     /// Sends the answer to the picture that was counted last.
     fn send_answer(&mut self, report: &Report<f32>, exposure_us: u64, done_us: u64) {
-        let config = self.sensor.config();
-        let altitude_m = self.prior.altitude_m.or(config.body.altitude_km.map(|h| (h * 1000.0) as f32));
+        let config = self.sensor.get().config();
+        let altitude_m = self
+            .known
+            .get()
+            .at(exposure_us)
+            .and_then(|prior| prior.altitude_m)
+            .or(config.body.altitude_km.map(|h| (h * 1000.0) as f32));
         let exposure = Exposure {
-            picture: self.state.pictures,
+            picture: self.number,
             exposure_us,
             done_us,
             calculation_us: self.state.last_us,

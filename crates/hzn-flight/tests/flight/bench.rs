@@ -3,11 +3,11 @@
 use std::collections::VecDeque;
 
 use hzn_core::pixel;
-use hzn_flight::board::{Board, Picture};
+use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::flight::{Buffers, Flight, Lists};
 use hzn_flight::messages::{Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping};
-use hzn_flight::packet::{self, Apid, Scan};
+use hzn_flight::packet::{self, Apid, ApidBase, Scan};
 use hzn_flight::{Parameters, answer::PictureAnswer, table};
 
 pub(crate) const WIDTH: usize = 640;
@@ -27,6 +27,10 @@ pub(crate) struct Bench {
     pub(crate) power_fails: bool,
     pub(crate) camera_is_dead: bool,
     pub(crate) fed: u32,
+    pub(crate) watchdog_reset: bool,
+    pub(crate) retained: [u32; RETAINED_WORDS],
+    /// Number of writes of a copy of the parameters.
+    pub(crate) writes: u32,
 }
 
 impl Board for Bench {
@@ -47,7 +51,7 @@ impl Board for Bench {
         self.power_fails
     }
     fn was_watchdog_reset(&mut self) -> bool {
-        false
+        self.watchdog_reset
     }
     fn feed_watchdog(&mut self) {
         self.fed += 1;
@@ -70,12 +74,22 @@ impl Board for Bench {
     }
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool {
         let n = self.power.unwrap_or(bytes.len()).min(bytes.len());
+        self.writes += 1;
         // The memory is erased before it is written.
         self.copies[usize::from(copy) - 1] = bytes[..n].to_vec();
         n == bytes.len()
     }
     fn stack_bytes(&mut self) -> u32 {
         1234
+    }
+    fn image(&mut self) -> Image {
+        Image { build: 7, crc: 0xCAFE_F00D }
+    }
+    fn read_retained(&mut self) -> [u32; RETAINED_WORDS] {
+        self.retained
+    }
+    fn write_retained(&mut self, words: [u32; RETAINED_WORDS]) {
+        self.retained = words;
     }
 }
 
@@ -109,7 +123,13 @@ pub(crate) fn ready() -> Bench {
 
 pub(crate) fn fly<R>(bench: Bench, turns: impl FnOnce(&mut Flight<'_, Bench>) -> R) -> R {
     let (mut buffers, mut workspace) = (Box::new(Buffers::new()), Box::new(Lists::new()));
-    turns(&mut Flight::start(bench, &mut buffers, &mut workspace).unwrap())
+    let mut flight = Flight::start(bench, &mut buffers, &mut workspace).unwrap();
+    // The line is silent for a while, so that a packet after it is trusted at once.
+    flight.board().now_us += 200_000;
+    let pictures = std::mem::take(&mut flight.board().pictures);
+    flight.turn();
+    flight.board().pictures = pictures;
+    turns(&mut flight)
 }
 
 pub(crate) fn command(sequence: u16, function: Function, arguments: impl FnOnce(&mut Writer<'_>)) -> Vec<u8> {
@@ -118,7 +138,7 @@ pub(crate) fn command(sequence: u16, function: Function, arguments: impl FnOnce(
         w.u8(function as u8);
         arguments(w);
     };
-    let n = packet::write(&mut out, Apid::Command, sequence, 0, user).unwrap();
+    let n = packet::write(&mut out, ApidBase::DEFAULT, Apid::Command, sequence, 0, user).unwrap();
     out[..n].to_vec()
 }
 

@@ -26,7 +26,8 @@ static BUFFERS: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
 fn main() -> ! {
     let parts = (Mps2::take(), BUFFERS.try_take(), WORKSPACE.try_take());
     let (Some(board), Some(buffers), Some(workspace)) = parts else { exit(1) };
-    let Some(mut flight) = Flight::start(board, buffers, workspace) else { exit(1) };
+    // A reference: moving the flight software would need its size twice on the stack.
+    let Some(flight) = &mut Flight::start(board, buffers, workspace) else { exit(1) };
     while flight.mode() != Mode::ShutDown {
         flight.turn();
     }

@@ -6,7 +6,7 @@ use crate::base::error::{ConfigError, Limit};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Brown<T> {
     k1: T,
     k2: T,

@@ -10,7 +10,7 @@ use crate::geometry::camera::Config;
 use crate::geometry::camera::Model;
 
 /// r(θ) of a lens.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Curve<T> {
     /// θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸).
     KannalaBrandt([T; 4]),

@@ -4,7 +4,7 @@ use super::{brown, radial};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Lens<T> {
     Radial(radial::Radial<T>),
     Pinhole,

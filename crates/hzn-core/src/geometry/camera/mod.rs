@@ -60,7 +60,7 @@ use crate::geometry::scaling::Scaling;
 /// assert!((back.u - corner.u).abs() < 1e-9 && (back.v - corner.v).abs() < 1e-9);
 /// # Ok::<(), hzn_core::error::ConfigError>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Camera<T> {
     width: u16,
     height: u16,

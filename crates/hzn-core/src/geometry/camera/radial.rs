@@ -16,7 +16,7 @@ use crate::geometry::block::LANES;
 /// Maximum number of terms of each series; the number in use depends on the precision of `T`.
 const TERMS: usize = 24;
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Radial<T> {
     curve: Curve<T>,
     theta_max: T,
@@ -24,7 +24,7 @@ pub(super) struct Radial<T> {
     inverse: Inverse<T>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 enum Inverse<T> {
     Newton,
     /// ρ² is mapped to −1…1 by `scale`·ρ² − 1. Each entry holds the coefficients of one power for the three polynomials

@@ -10,7 +10,7 @@ use crate::base::real::Real;
 use crate::geometry::pixel::ImagePoint;
 
 /// The rotation of the camera from row to row.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Turning<T> {
     /// Rotation from one row to the next, radians, in the camera's axes.
     per_row: V3<T>,

@@ -46,16 +46,26 @@ impl Config {
                 between("mask.polygons_px", corner[0], -reach, reach)?;
                 between("mask.polygons_px", corner[1], -reach, reach)?;
             }
+            let rule = Limit::Rule("the corners of a polygon must not all lie on one line");
+            require(encloses_area(polygon), "mask.polygons_px", n as f64, rule)?;
         }
         Ok(())
     }
+}
+
+/// Returns whether three corners of the polygon make a triangle.
+fn encloses_area(polygon: &Polygon) -> bool {
+    let Some((first, others)) = polygon.split_first() else { return false };
+    let from_first = |corner: &[f64; 2]| [corner[0] - first[0], corner[1] - first[1]];
+    let Some(side) = others.iter().map(from_first).find(|side| *side != [0.0; 2]) else { return false };
+    others.iter().map(from_first).any(|other| side[0] * other[1] != side[1] * other[0])
 }
 
 /// The picture cut by the image circle, with the polygons of the mask.
 ///
 /// An edge ends where the region ends. Under a polygon and in the blind centre no pixel is lit, and the outline of both
 /// is not an edge.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Region<T> {
     width: u16,
     height: u16,
@@ -68,7 +78,7 @@ pub struct Region<T> {
 }
 
 /// The image circle, or the blind centre: an ellipse along the axes, because fx and fy may differ.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Circle<T> {
     cx: T,
     cy: T,
@@ -77,7 +87,7 @@ struct Circle<T> {
     inv_y: T,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 struct Outline<T> {
     low: [T; 2],
     high: [T; 2],
@@ -202,27 +212,29 @@ impl<T: Real> Region<T> {
 
     /// Returns the number of pixels, up to `most`, that can be walked from here in any direction without leaving the
     /// region or meeting a masked pixel. It may be lower than the true number, where a test would take longer than
-    /// the walk.
+    /// the walk. The cost of the tests is added to `cost`, in the unit of [`crate::model::work`].
     #[inline(always)]
-    pub(crate) fn clearance(&self, x: u16, y: u16, most: u16) -> u16 {
+    pub(crate) fn clearance(&self, x: u16, y: u16, most: u16, cost: &mut u32) -> u16 {
         let sides = x
             .min(y)
             .min(self.width.saturating_sub(1).saturating_sub(x))
             .min(self.height.saturating_sub(1).saturating_sub(y))
             .saturating_sub(self.frame);
         let most = most.min(sides);
-        let clear = |n: u16| {
+        let mut clear = |n: u16| {
             let margin = T::from_i32(i32::from(n));
             self.circle.as_ref().is_none_or(|c| c.clear(x, y, margin))
-                && (!self.has_mask() || self.is_unmasked_by(x, y, margin))
+                && (!self.has_mask() || self.is_unmasked_by(x, y, margin, cost))
         };
         [most, most / 4].into_iter().find(|&n| clear(n)).unwrap_or(0)
     }
 
     /// Returns whether no pixel of the square of `margin` pixels to each side is masked.
-    fn is_unmasked_by(&self, x: u16, y: u16, margin: T) -> bool {
+    fn is_unmasked_by(&self, x: u16, y: u16, margin: T, cost: &mut u32) -> bool {
+        // A comparison with a bounding box costs half a unit.
+        *cost += self.polygons.len() as u32 / 2 + 1;
         self.blind.as_ref().is_none_or(|c| c.is_outside(x, y, margin))
-            && self.polygons.iter().all(|p| p.clear(x, y, margin))
+            && self.polygons.iter().all(|p| p.clear(x, y, margin, cost))
     }
 
     /// Returns whether there is a polygon or a blind centre.
@@ -232,7 +244,7 @@ impl<T: Real> Region<T> {
     /// Returns the largest cost to test whether a pixel is masked, in the unit of [`crate::model::work`]. One unit is
     /// four sides of a polygon.
     pub(crate) fn mask_cost(&self) -> u32 {
-        let polygons: u32 = self.polygons.iter().map(|p| 1 + p.corners.len() as u32 / 4).sum();
+        let polygons: u32 = self.polygons.iter().map(Outline::cost).sum();
         polygons + u32::from(self.blind.is_some())
     }
 
@@ -318,10 +330,20 @@ impl<T: Real> Circle<T> {
 }
 
 impl<T: Real> Outline<T> {
-    /// Returns whether the polygon lies outside the square of `margin` pixels to each side of the pixel.
-    fn clear(&self, x: u16, y: u16, margin: T) -> bool {
+    /// Returns the cost to compare a point with all sides, in the unit of [`crate::model::work`].
+    fn cost(&self) -> u32 {
+        1 + self.corners.len() as u32 / 4
+    }
+    /// Returns whether the polygon lies outside the square of `margin` pixels to each side of the pixel. The cost of a
+    /// test of all sides is added to `cost`.
+    fn clear(&self, x: u16, y: u16, margin: T, cost: &mut u32) -> bool {
         let p = [T::from_i32(i32::from(x)), T::from_i32(i32::from(y))];
-        (0..2).any(|k| p[k] + margin < self.low[k] || p[k] - margin > self.high[k]) || self.clear_within(p, margin)
+        if (0..2).any(|k| p[k] + margin < self.low[k] || p[k] - margin > self.high[k]) {
+            return true;
+        }
+        // Each side is compared with the square, and then with its centre.
+        *cost += 2 * self.cost();
+        self.clear_within(p, margin)
     }
     /// Does the same as [`Self::clear`] when the bounding box does not decide. The result is true if no side of the
     /// polygon crosses the square and the centre of the square is outside the polygon.
@@ -379,7 +401,7 @@ mod tests {
         let region = Region::new(&config, &camera);
         let mut clear = 0;
         for (x, y) in (0..48u16).flat_map(|y| (0..64u16).map(move |x| (x, y))) {
-            let n = region.clearance(x, y, 6);
+            let n = region.clearance(x, y, 6, &mut 0);
             clear += u32::from(n == 6);
             for (i, j) in (0..=2 * n).flat_map(|j| (0..=2 * n).map(move |i| (i, j))) {
                 assert!(n == 0 || !region.masked(x + i - n, y + j - n), "{x} {y}: {n}");
@@ -399,7 +421,7 @@ mod tests {
         for (x, y) in (0..160u16).flat_map(|y| (0..200u16).map(move |x| (x, y))) {
             let distance = (f64::from(x) - 99.5).hypot(f64::from(y) - 79.5);
             assert_eq!(region.masked(x, y), distance <= radius, "{x} {y}");
-            let n = region.clearance(x, y, 6);
+            let n = region.clearance(x, y, 6, &mut 0);
             for (i, j) in (0..=2 * n).flat_map(|j| (0..=2 * n).map(move |i| (i, j))) {
                 assert!(n == 0 || !region.masked(x + i - n, y + j - n), "{x} {y}: {n}");
             }

@@ -37,7 +37,7 @@ const MAX_RATE_RAD_S: f64 = 1000.0;
 /// assert!((expected.half_angle_rad().sin() - 6388.0 / 6771.0).abs() < 1e-4);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Expected<T> {
     /// cos α₀ of the best single cone.
     pub(crate) cos: T,

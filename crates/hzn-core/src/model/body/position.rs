@@ -19,7 +19,7 @@ fn rounded_m<T: Real>(m: T) -> i64 {
 }
 
 /// The distance of the camera from the body's centre, as it is known before the picture.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Range<T> {
     /// Distance from the centre, or, for `is_height`, height above WGS-84; metres.
     length_m: T,
@@ -30,7 +30,7 @@ pub(crate) struct Range<T> {
 }
 
 /// A body whose position is fitted, as one picture sees it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Target<T> {
     /// The scaled space of the body, in units of `unit_m`.
     pub(crate) scaling: Scaling<T>,

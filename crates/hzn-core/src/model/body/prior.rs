@@ -21,7 +21,7 @@ use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
 /// };
 /// assert!(prior.altitude_m.is_none() && prior.cam_to_ecef.is_some());
 /// ```
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Prior<T> {
     /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. It must be above the limb height.
     pub altitude_m: Option<T>,
@@ -55,7 +55,7 @@ pub struct Prior<T> {
 }
 
 /// The answer to an earlier picture.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Last<T> {
     /// The axis in the camera frame.
     pub axis: UnitVec3<Cam, T>,

@@ -100,7 +100,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             self.work.charge(crossings * work::CROSSING + binary.cost());
             if missed == Missed::Some {
                 missed = Missed::Found;
-                if !self.work.try_spend(work::ring_cost(width, height)) {
+                if !self.work.try_spend(work::ring_cost(width, height, 1, 0)) {
                     break;
                 }
                 binary.each_narrow_start(stride, &mut |start| {
@@ -131,6 +131,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             Some(_) => self.judge_edge(binary, &edge),
             None => {}
         }
+        self.work.charge(binary.cost());
     }
 
     /// Examines every outer border of the picture.
@@ -178,6 +179,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         if self.follow(binary, pixel, dark, &mut edge, marks).is_some() {
             self.judge_edge(binary, &edge);
         }
+        // The gates have read pixels, too.
+        self.work.charge(binary.cost());
     }
 
     /// Follows one edge and returns how it ended; `None` if the edge is a hole, or if the work budget does not allow

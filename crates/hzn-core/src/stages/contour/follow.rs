@@ -42,11 +42,10 @@ pub(crate) struct BinaryPicture<'a, T, P, O> {
     pub(crate) blooms: bool,
     /// Smallest local contrast, in counts, for which an edge point has its own mid-level.
     pub(crate) least_contrast: i32,
-    /// Cost of a read of the mask, and of a look at all neighbours, in the unit of the work budget.
+    /// Cost of a read of the mask, in the unit of the work budget.
     mask: u32,
-    look: u32,
-    /// Number of mask reads outside of the follower that are not yet paid for.
-    masked: Cell<u32>,
+    /// Cost of reads that are not yet paid for.
+    owed: Cell<u32>,
     /// The eight moves, twice: a search over eight directions can begin at any of the first eight without wrapping.
     moves: [Move; 16],
 }
@@ -109,20 +108,9 @@ const RUN: usize = 32;
 impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     pub(crate) fn new(picture: &'a P, region: &'a Region<T>, level: u16, observer: &'a O) -> Self {
         let moves = core::array::from_fn(|i| Move::new(i as u8, picture));
-        let (mask, masked) = (region.mask_cost(), Cell::new(0));
+        let mask = region.mask_cost();
         let least_contrast = (i32::from(picture.full_scale()) / FULL_SCALE_PART).max(LEAST_CONTRAST);
-        Self {
-            picture,
-            region,
-            level,
-            observer,
-            blooms: false,
-            least_contrast,
-            mask,
-            look: work::follow_step_cost(mask),
-            masked,
-            moves,
-        }
+        Self { picture, region, level, observer, blooms: false, least_contrast, mask, owed: Cell::new(0), moves }
     }
 
     /// Reduces the smallest contrast of edge points to 1/16 of `contrast`, which is the contrast between the dark and
@@ -143,23 +131,37 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     pub(crate) fn lit(&self, x: u16, y: u16) -> bool {
         self.brightness(x, y) >= self.level && !self.masked(x, y)
     }
+    /// Does the same as [`Self::lit`], and counts the read. A search over many pixels uses it.
+    #[inline(always)]
+    pub(super) fn lit_counted(&self, x: u16, y: u16) -> bool {
+        self.owed.set(self.owed.get() + work::READ);
+        self.lit(x, y)
+    }
     /// Returns whether a polygon covers the pixel.
     #[inline(always)]
-    pub(super) fn masked(&self, x: u16, y: u16) -> bool {
+    pub(crate) fn masked(&self, x: u16, y: u16) -> bool {
         self.region.has_mask() && self.is_covered(x, y)
     }
     #[inline(never)]
     fn is_covered(&self, x: u16, y: u16) -> bool {
-        self.masked.set(self.masked.get() + 1);
+        self.owed.set(self.owed.get() + self.mask);
         self.region.masked(x, y)
+    }
+    /// Returns the clearance of a pixel, see [`Region::clearance`], and counts its cost.
+    #[inline(always)]
+    pub(crate) fn clearance(&self, x: u16, y: u16, most: u16) -> u16 {
+        let mut cost = 0;
+        let clear = self.region.clearance(x, y, most, &mut cost);
+        self.owed.set(self.owed.get() + cost);
+        clear
     }
     /// Returns the cost of one read of the mask.
     pub(crate) fn mask_cost(&self) -> u32 {
         self.mask
     }
-    /// Returns the cost of [`Self::lit`] since the last call.
+    /// Returns the cost of [`Self::masked`], [`Self::clearance`] and [`Self::lit_counted`] since the last call.
     pub(crate) fn cost(&self) -> u32 {
-        self.masked.take() * self.mask
+        self.owed.take()
     }
 
     /// Reads the brightness of a pixel in counts.
@@ -184,17 +186,18 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         loop {
             let free = self.free_steps(walk.at, start, marks).min(*steps);
             if free > 0 {
-                *steps -= free;
+                *steps = steps.saturating_sub(free + work::RUN + self.cost());
                 self.run(&mut walk, free as usize, edge);
                 continue;
             }
             if *steps == 0 {
                 return End::OutOfSteps;
             }
-            *steps = steps.saturating_sub(self.look);
             let home = (away && walk.at == start).then_some(dark);
             away = true;
-            match self.look(&walk, home, marks) {
+            let seen = self.look(&walk, home, marks);
+            *steps = steps.saturating_sub(work::LOOK_AROUND + self.cost());
+            match seen {
                 Seen::Lit { direction, cut } => {
                     if !cut {
                         edge.push(walk.at);
@@ -227,7 +230,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
             return 0;
         }
         // The last step reads one pixel further.
-        u32::from(self.region.clearance(here.x, here.y, most + 1).saturating_sub(1))
+        u32::from(self.clearance(here.x, here.y, most + 1).saturating_sub(1))
     }
 
     /// Does `n` free steps, at most [`RUN`].
@@ -291,7 +294,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
             let (x, y) = (nx as u16, ny as u16);
             self.observer.pixel(x, y);
             if self.picture.read(walk.index.wrapping_add_signed(step.offset)) >= self.level {
-                if !self.region.masked(x, y) {
+                if !self.masked(x, y) {
                     return Seen::Lit { direction, cut };
                 }
                 cut = true;

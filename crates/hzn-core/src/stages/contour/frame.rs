@@ -26,11 +26,12 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         let around = 2 * (u32::from(w) + u32::from(h));
         let is_dark = |lit: u32, stride: u16| lit * SPECKS * u32::from(stride) <= around;
         let is_lit = |lit: u32, stride: u16| lit * LIT * u32::from(stride) > around;
+        work.charge(work::ring_cost(w, h, COARSE, self.mask_cost()));
         if most == 0 || !is_dark(self.count_ring(0, COARSE), COARSE) || !is_lit(self.count_ring(most, COARSE), COARSE) {
             return 0;
         }
         for px in 0..=most {
-            if !work.try_spend(work::ring_cost(w, h)) {
+            if !work.try_spend(work::ring_cost(w, h, 1, self.mask_cost())) {
                 return 0;
             }
             let lit = self.count_ring(px, 1);

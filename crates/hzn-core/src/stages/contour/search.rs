@@ -48,7 +48,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
             };
             if lit {
                 *stretch = 0;
-            } else if !self.region.masked(pixel.x, pixel.y) {
+            } else if !self.masked(pixel.x, pixel.y) {
                 *stretch += 1;
             }
             *before = Some((pixel, lit));
@@ -62,10 +62,10 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
             while k < run.len {
                 let next = (k + stride).min(run.len) - 1;
                 let Pixel { x, y } = run.at(next);
-                let lit = self.lit(x, y);
+                let lit = self.lit_counted(x, y);
                 match before {
                     Some((_, same)) if same == lit => {
-                        let counted = if lit || self.region.masked(x, y) { 0 } else { u32::from(next + 1 - k) };
+                        let counted = if lit || self.masked(x, y) { 0 } else { u32::from(next + 1 - k) };
                         stretch += counted;
                         passed = (if lit { 0 } else { next + 1 - k }, counted, before);
                         before = Some((Pixel { x, y }, lit));
@@ -89,7 +89,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
                         }
                         for i in k..=next {
                             let pixel = run.at(i);
-                            let lit = if i == next { lit } else { self.lit(pixel.x, pixel.y) };
+                            let lit = if i == next { lit } else { self.lit_counted(pixel.x, pixel.y) };
                             if first.is_none() {
                                 first = Some((pixel, lit));
                             }
@@ -147,7 +147,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
             self.region.each_run(|run| {
                 for k in 0..run.len {
                     let pixel = run.at(k);
-                    let lit = self.lit(pixel.x, pixel.y);
+                    let lit = self.lit_counted(pixel.x, pixel.y);
                     if lit {
                         if let Some((dark, false)) = before
                             && starts
@@ -207,13 +207,13 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
         marks: &mut Marks<'m>,
         mut found: impl FnMut(Pixel, u8, &mut Marks<'m>) -> bool,
     ) -> u32 {
-        let (mut x, mut lit, mut crossings) = (x0, self.lit(x0, y), 0);
+        let (mut x, mut lit, mut crossings) = (x0, self.lit_counted(x0, y), 0);
         while x < x1 {
             if !self.region.has_mask() {
                 x += self.count_equal_pixels(x, y, x1 - x);
             }
             x += 1;
-            let now = x <= x1 && self.lit(x, y);
+            let now = x <= x1 && self.lit_counted(x, y);
             if now && !lit {
                 crossings += 1;
                 if !marks.get(x, y) && !found(Pixel { x, y }, WEST, marks) {

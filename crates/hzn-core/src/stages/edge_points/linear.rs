@@ -107,7 +107,7 @@ pub(super) fn is_clear<T: Real, P: Pixels, O: Observer<T>>(
     margin: u16,
 ) -> bool {
     let region = binary.region;
-    region.is_inside_by(p.x, p.y, margin) && (!region.has_mask() || region.clearance(p.x, p.y, margin) == margin)
+    region.is_inside_by(p.x, p.y, margin) && (!region.has_mask() || binary.clearance(p.x, p.y, margin) == margin)
 }
 
 /// Crossing of the mid-level on a wide edge; `off` is its distance from the border pixel towards the dark, in pixels.

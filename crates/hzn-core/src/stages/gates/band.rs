@@ -72,7 +72,7 @@ fn comes_back<T: Real, P: Pixels, O: Observer<T>>(
         binary.region.contains(x, y).then_some((x, y))
     };
     let seen = |px: i32| {
-        at(px).filter(|&(x, y)| !binary.region.masked(x, y)).map(|(x, y)| T::from_i32(binary.brightness(x, y).into()))
+        at(px).filter(|&(x, y)| !binary.masked(x, y)).map(|(x, y)| T::from_i32(binary.brightness(x, y).into()))
     };
     let most = i32::from(binary.region.width()) + i32::from(binary.region.height());
     let end = inside(&at, most.min((disc_px * T::from_f64(ACROSS)).to_i32()));

@@ -179,7 +179,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
             let x = (at[0] - dy / norm * T::from_i32(px) + half).to_i32();
             let y = (at[1] + dx / norm * T::from_i32(px) + half).to_i32();
             let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
-            let counts = self.binary.region.contains(x, y) && !self.binary.region.masked(x, y);
+            let counts = self.binary.region.contains(x, y) && !self.binary.masked(x, y);
             counts.then(|| i32::from(self.binary.brightness(x, y)))
         };
         Some((side(ASIDE_PX)? - side(-ASIDE_PX)?).abs())

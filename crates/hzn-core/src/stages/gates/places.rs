@@ -40,7 +40,7 @@ pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
             let px = T::from_i32(px);
             let (x, y) = ((from.u + gu / norm * px).to_i32(), (from.v + gv / norm * px).to_i32());
             let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
-            (binary.region.contains(x, y) && !binary.region.masked(x, y)).then(|| u32::from(binary.brightness(x, y)))
+            (binary.region.contains(x, y) && !binary.masked(x, y)).then(|| u32::from(binary.brightness(x, y)))
         };
         if let (Some(d), Some(l)) = (at(-PLATEAU_PX), at(PLATEAU_PX)) {
             (dark, lit, looks) = (dark + d, lit + l, looks + 1);

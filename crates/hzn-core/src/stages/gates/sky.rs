@@ -48,7 +48,7 @@ pub(super) fn measure_sky<T: Real, P: Pixels, O: Observer<T>>(
             if !binary.region.contains(x, y) {
                 break;
             }
-            if !binary.region.masked(x, y) {
+            if !binary.masked(x, y) {
                 let brightness = binary.brightness(x, y);
                 fading = fading.filter(|&before| brightness < before).map(|_| brightness);
                 if distance > T::ZERO {

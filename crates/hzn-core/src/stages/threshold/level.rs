@@ -22,6 +22,8 @@ pub struct Level<T> {
     pub dark: T,
     /// Mean of the lit pixels of the sample minus the mean of the dark ones, in counts; 0 if one class is empty.
     pub contrast: T,
+    /// Number of places that were drawn, in all samples: those that the region leaves out, too.
+    pub(crate) drawn: u32,
 }
 
 impl<T: Real> Level<T> {

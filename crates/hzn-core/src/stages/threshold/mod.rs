@@ -49,6 +49,9 @@ pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     Err(Status::NoLimb)
 }
 
+/// Number of reads of [`dark_noise`]: two neighbours in each cell of the coarse sample.
+pub(crate) const NOISE_READS: u32 = 2 << (2 * SIDES_LOG2[0]);
+
 /// Returns the 1-sigma noise of the dark pixels in counts, from the differences of neighbours below the threshold
 /// `level`. The result is 0 if there are no dark neighbours. If the noise is clipped at 0 counts, the result is too
 /// small.

@@ -129,6 +129,8 @@ impl Sample {
         let level = level?;
         observer.level(level, mean, sample.count);
         let (dark, contrast) = sample.classes(level, mean);
-        Some(Ok(Level { level, mean, samples: sample.count, dark, contrast }))
+        let sides = SIDES_LOG2.iter().take_while(|&&side| side <= self.side_log2);
+        let drawn = sides.map(|side| 1 << (2 * side)).sum();
+        Some(Ok(Level { level, mean, samples: sample.count, dark, contrast, drawn }))
     }
 }

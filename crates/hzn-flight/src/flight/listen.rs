@@ -1,0 +1,125 @@
+//! The telecommand that arrives, and its acknowledgement.
+//!
+//! A packet that is no telecommand for this computer is counted and gets no answer, because another computer on the line
+//! may own it, and because the line may return the packets of this computer.
+
+use super::{Buffers, Flight};
+use crate::board::Board;
+use crate::bytes::Reader;
+use crate::messages::{Acknowledge, Code, Event, Function};
+use crate::packet::{Apid, MAX_BYTES};
+
+/// Most bytes that are read in a turn. More bytes wait in the memory of the serial port.
+const MAX_READ: u16 = 1024;
+/// Most work of a turn, in examined bytes: two of the longest packets. Packets inside of packets could otherwise make a
+/// thousand times the work of their bytes.
+const MAX_EFFORT: usize = 2 * MAX_BYTES;
+
+/// A packet that was received.
+enum Received {
+    Broken,
+    Foreign,
+    /// A telecommand whose user data have this length.
+    Command {
+        sequence: u16,
+        bytes: usize,
+    },
+}
+
+impl<B: Board> Flight<'_, B> {
+    /// Takes the bytes that have arrived, and handles at most one telecommand.
+    pub(super) fn listen(&mut self) {
+        let now_us = self.board.now_us();
+        self.buffers.inbox.reset_effort();
+        let (mut bytes, mut is_ready) = (0, false);
+        while bytes < MAX_READ && self.buffers.inbox.effort() < MAX_EFFORT {
+            if is_ready && let Some(is_command) = self.handle_packet(now_us) {
+                if is_command {
+                    break;
+                }
+                continue;
+            }
+            let Some(byte) = self.board.receive() else {
+                // Only now it is known whether the line pauses.
+                while self.buffers.inbox.effort() < MAX_EFFORT && self.handle_packet(now_us) == Some(false) {}
+                break;
+            };
+            bytes += 1;
+            is_ready = self.buffers.inbox.push(byte, now_us);
+        }
+        self.limiter.add_received(bytes);
+    }
+
+    /// Handles a packet that has arrived. Returns whether it was a telecommand; `None` if there is no packet.
+    fn handle_packet(&mut self, now_us: u64) -> Option<bool> {
+        let base = self.buffers.line.base();
+        // The memory for packets that are sent is free now.
+        let Buffers { line, inbox, .. } = &mut *self.buffers;
+        let room = &mut line.out;
+        let received = inbox.next(now_us, |packet| {
+            let Some(packet) = packet else { return Received::Broken };
+            if base.subject(&packet) != Some(Apid::Command) {
+                return Received::Foreign;
+            }
+            if let Some(room) = room.get_mut(..packet.user.len()) {
+                room.copy_from_slice(packet.user);
+            }
+            Received::Command { sequence: packet.sequence, bytes: packet.user.len() }
+        })?;
+        match received {
+            Received::Broken => {
+                self.state.broken = self.state.broken.saturating_add(1);
+                self.send_event(Event::CommandRejected, Code::Broken as u32, 0);
+            }
+            Received::Foreign => self.state.foreign = self.state.foreign.saturating_add(1),
+            Received::Command { sequence, bytes } => {
+                self.handle_command(sequence, bytes);
+                return Some(true);
+            }
+        }
+        Some(false)
+    }
+
+    /// Carries out and acknowledges a telecommand, whose user data are in the memory for packets that are sent.
+    #[inline(never)]
+    fn handle_command(&mut self, sequence: u16, bytes: usize) {
+        // The data are copied, because the command may use every buffer.
+        let user = self.buffers.line.out;
+        let mut from = Reader::new(user.get(..bytes).unwrap_or_default());
+        let number = from.u8().unwrap_or(0);
+        let code = match Function::from_number(number) {
+            _ if !self.is_in_sequence(sequence) => Code::Sequence,
+            Some(function) => {
+                self.last_sequence = Some(sequence);
+                self.carry_out(function, &mut from)
+            }
+            None => Code::Unknown,
+        };
+        self.acknowledge(number, sequence, code);
+        // A new base is valid from the next packet on, so that the acknowledgement comes from the old one.
+        self.buffers.line.set_base(self.operations.base());
+    }
+
+    /// Returns whether a sequence count is within the window after that of the last telecommand that was taken.
+    fn is_in_sequence(&self, sequence: u16) -> bool {
+        let window = self.operations.sequence_window;
+        let Some(last) = self.last_sequence.filter(|_| window > 0) else { return true };
+        let ahead = sequence.wrapping_sub(last) & 0x3FFF;
+        (1..=window).contains(&ahead)
+    }
+
+    fn acknowledge(&mut self, function: u8, sequence: u16, code: Code) {
+        if matches!(code, Code::Done | Code::NotStored) {
+            self.state.commands = self.state.commands.saturating_add(1);
+            self.limiter.charge_answer(Acknowledge::BYTES);
+        } else {
+            self.state.rejected = self.state.rejected.saturating_add(1);
+            self.send_event(Event::CommandRejected, code as u32, u32::from(function));
+            if !self.may_answer(Acknowledge::BYTES) {
+                return;
+            }
+        }
+        let record = Acknowledge { function, sequence, code: code as u8 };
+        self.send(Apid::Acknowledge, |out| record.write(out));
+    }
+}

@@ -1,0 +1,211 @@
+//! Bits that changed in memory: the values are made anew, and an answer that was calculated with them is not sent.
+
+use hzn_core::body::Expected;
+
+use super::Flight;
+use super::navigation::Known;
+use crate::board::Board;
+use crate::kept_twice::KeptTwice;
+use crate::messages::Event;
+use crate::store::{self, Choice};
+
+/// What changed, as in [`Event::Repaired`].
+const SENSOR: u32 = 1;
+const KNOWN: u32 = 2;
+
+impl<B: Board> Flight<'_, B> {
+    /// Returns whether no bit changed in the values of a picture: sensor, values from navigation, expected limb if there
+    /// is one. Changed values are made anew.
+    #[inline(never)]
+    pub(super) fn check_memory(&mut self, expected: Option<&mut KeptTwice<Expected<f32>>>) -> bool {
+        let is_sensor_intact = self.sensor.is_intact();
+        let is_known_intact = self.known.is_intact() && expected.is_none_or(KeptTwice::is_intact);
+        if is_sensor_intact && is_known_intact {
+            return true;
+        }
+        if !is_sensor_intact {
+            self.reload_sensor();
+            self.report_repair(SENSOR);
+        }
+        if !is_known_intact {
+            self.known.set(Known::default());
+            self.known.complete();
+            self.report_repair(KNOWN);
+        }
+        false
+    }
+
+    /// Makes the sensor anew from the stored parameters. Parameters that were not stored are lost.
+    #[inline(never)]
+    fn reload_sensor(&mut self) {
+        let choice = Choice::Copy(self.state.parameter_copy);
+        // The buffer of the table is written.
+        self.staged = 0;
+        let loaded = store::load(&mut self.board, &mut self.buffers.table, choice);
+        // The parameters were checked when they were read, so they make a sensor.
+        if self.renew_sensor(&loaded.parameters) {
+            self.sensor.complete();
+            self.operations = loaded.parameters.operations;
+            self.state.parameter_copy = loaded.copy;
+            self.is_not_stored = loaded.copy == 0;
+        }
+    }
+
+    fn report_repair(&mut self, what: u32) {
+        self.state.repairs = self.state.repairs.saturating_add(1);
+        self.send_event(Event::Repaired, what, self.state.repairs.into());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    use hzn_core::{Prior, Sensor};
+
+    use super::*;
+    use crate::answer::PictureAnswer;
+    use crate::board::Picture;
+    use crate::bytes::Reader;
+    use crate::flight::{Buffers, Lists};
+    use crate::messages::{Exposure, Mode};
+    use crate::packet::{self, Apid, Scan};
+    use crate::parameters::Parameters;
+    use crate::table;
+
+    /// A board that has a picture of a limb at every turn.
+    struct Still {
+        now_us: u64,
+        picture: Vec<u8>,
+        copy: Vec<u8>,
+        sent: Vec<u8>,
+    }
+
+    impl Board for Still {
+        fn now_us(&mut self) -> u64 {
+            self.now_us += 1000;
+            self.now_us
+        }
+        fn receive(&mut self) -> Option<u8> {
+            None
+        }
+        fn send(&mut self, bytes: &[u8]) {
+            self.sent.extend(bytes);
+        }
+        fn lift_off(&mut self) -> bool {
+            false
+        }
+        fn power_fails(&mut self) -> bool {
+            false
+        }
+        fn was_watchdog_reset(&mut self) -> bool {
+            false
+        }
+        fn feed_watchdog(&mut self) {}
+        fn camera_answers(&mut self) -> bool {
+            true
+        }
+        fn next_picture(&mut self) -> Option<Picture> {
+            Some(Picture { bytes: self.picture.len(), exposure_us: self.now_us, lost: 0 })
+        }
+        fn pixels(&self) -> &[u8] {
+            &self.picture
+        }
+        fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
+            into.fill(0xFF);
+            if copy == 1 {
+                into[..self.copy.len()].copy_from_slice(&self.copy);
+            }
+        }
+        fn write_copy(&mut self, _copy: u8, _bytes: &[u8]) -> bool {
+            false
+        }
+        fn stack_bytes(&mut self) -> u32 {
+            0
+        }
+    }
+
+    fn small() -> Parameters {
+        let mut p = Parameters::defaults();
+        for (id, value) in [(1, 160.0), (2, 120.0), (4, 150.0), (5, 150.0), (6, 79.5), (7, 59.5), (304, 1.0)] {
+            p.set(id, value).unwrap();
+        }
+        p
+    }
+
+    fn board() -> Still {
+        let mut copy = std::vec![0; table::MAX_BYTES];
+        let n = table::write(&small(), 1, &mut copy).unwrap();
+        copy.truncate(n);
+        // The limb of a body as wide as the Earth at 230 km, 75 degrees below the optical axis.
+        let pixel = |i: i32| {
+            let (x, y) = ((f64::from(i % 160) - 79.5) / 150.0, (f64::from(i / 160) - 59.5) / 150.0);
+            let (sin, cos) = 75f64.to_radians().sin_cos();
+            let along = (y * sin + cos) / (x * x + y * y + 1.0).sqrt();
+            (100.0 + 90.0 * ((along - 74.8f64.to_radians().cos()) * 150.0).clamp(-1.0, 1.0)) as u8
+        };
+        let picture = (0..160 * 120).map(pixel).collect();
+        Still { now_us: 0, picture, copy, sent: Vec::new() }
+    }
+
+    /// Runs a turn. Returns the axis, if there is an answer, and whether there is an event.
+    fn turn(flight: &mut Flight<'_, Still>) -> (Option<[f32; 3]>, bool) {
+        flight.board().sent.clear();
+        flight.turn();
+        let (mut rest, mut axis, mut event) = (&flight.board.sent[..], None, false);
+        while let Scan::Packet { end, packet } = packet::scan(rest) {
+            event |= packet.apid == Apid::Event as u16;
+            if packet.apid == Apid::Science as u16 {
+                let from = &mut Reader::new(packet.user);
+                Exposure::read(from).unwrap();
+                axis = Some(PictureAnswer::read(from).unwrap().direction.unwrap().axis);
+            }
+            rest = &rest[end..];
+        }
+        (axis, event)
+    }
+
+    #[test]
+    fn a_changed_bit_is_repaired_before_the_next_picture() {
+        let (mut buffers, mut lists) = (Box::new(Buffers::new()), Box::new(Lists::new()));
+        let mut flight = Flight::start(board(), &mut buffers, &mut lists).unwrap();
+        let right = turn(&mut flight).0;
+        assert_eq!(flight.mode, Mode::Flight);
+        assert!(right.is_some());
+        let mut flips = 0u16;
+        for id in small().sensor_numbers() {
+            for bit in 0..64 {
+                let mut changed = small();
+                let value = changed.get(id).unwrap();
+                let flipped = f64::from_bits(value.to_bits() ^ 1 << bit);
+                if changed.set(id, flipped).is_err() || changed == small() {
+                    continue;
+                }
+                let Ok(sensor) = Sensor::new(&changed.sensor) else { continue };
+                flight.sensor.damage(|s| *s = sensor);
+                flight.limiter = crate::flight::Limiter::new();
+                assert_eq!(turn(&mut flight), (right, true), "parameter {id}, bit {bit}");
+                flips += 1;
+                assert_eq!(flight.state.repairs, flips);
+            }
+        }
+        assert!(flips > 400, "{flips}");
+        // Wrong values from navigation are not used; the altitude of the parameters replaces them.
+        flight.known.damage(|known| known.prior.altitude_m = Some(5e5));
+        assert_eq!(turn(&mut flight), (right, true));
+        assert_eq!(turn(&mut flight), (right, false));
+    }
+
+    #[test]
+    fn an_expected_limb_that_changed_is_noticed() {
+        let (mut buffers, mut lists) = (Box::new(Buffers::new()), Box::new(Lists::new()));
+        let mut flight = Flight::start(board(), &mut buffers, &mut lists).unwrap();
+        let expect = |h: f32| flight.sensor.get().expect(&Prior { altitude_m: Some(h), ..Prior::default() }).unwrap();
+        let (mut expected, other) = (KeptTwice::new(expect(230e3)), expect(231e3));
+        expected.keep();
+        assert!(flight.check_memory(Some(&mut expected)));
+        expected.damage(|e| *e = other);
+        assert!(!flight.check_memory(Some(&mut expected)));
+    }
+}

@@ -1,0 +1,159 @@
+//! Telecommands that read and change parameters.
+
+use hzn_core::Sensor;
+
+use super::Flight;
+use crate::board::Board;
+use crate::bytes::Reader;
+use crate::messages::{Code, Event};
+use crate::packet::Apid;
+use crate::parameters::{Parameters, Refused};
+use crate::store;
+
+/// How long new parameters are kept.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Keep {
+    UntilReset,
+    Stored,
+}
+
+/// Bytes of a parameter that waits for the commit: its number and its value.
+const ENTRY: usize = 10;
+/// Most parameters that are read in one packet.
+const MAX_READ: u8 = 96;
+
+impl<B: Board> Flight<'_, B> {
+    fn parameters(&self) -> Parameters {
+        Parameters { sensor: self.sensor.get().config().clone(), operations: self.operations.clone() }
+    }
+
+    /// Sets all parameters, or none.
+    #[inline(never)]
+    pub(super) fn set_parameters(&mut self, from: &mut Reader<'_>, keep: Keep) -> Code {
+        let Some(count) = from.u8().filter(|&count| count > 0) else { return Code::Arguments };
+        if from.rest().len() != ENTRY * usize::from(count) {
+            return Code::Arguments;
+        }
+        let mut parameters = self.parameters();
+        match merge(&mut parameters, *from) {
+            Ok(()) => self.use_parameters(&parameters, keep),
+            Err(code) => code,
+        }
+    }
+
+    /// Keeps parameters for a commit. They are checked only there, because a mask is complete only with all its corners.
+    pub(super) fn stage_parameters(&mut self, from: &mut Reader<'_>) -> Code {
+        let Some(count) = from.u8() else { return Code::Arguments };
+        let new = from.rest();
+        if new.len() != ENTRY * usize::from(count) {
+            return Code::Arguments;
+        }
+        if count == 0 {
+            self.staged = 0;
+            return Code::Done;
+        }
+        let end = ENTRY * usize::from(self.staged);
+        let Some(room) = self.buffers.table.get_mut(end..end + new.len()) else { return Code::Refused };
+        room.copy_from_slice(new);
+        self.staged += u16::from(count);
+        Code::Done
+    }
+
+    /// Sets and stores the parameters that are kept.
+    #[inline(never)]
+    pub(super) fn commit_parameters(&mut self, from: &mut Reader<'_>) -> Code {
+        let Some(count) = from.u16().filter(|_| from.rest().is_empty()) else { return Code::Arguments };
+        let staged = core::mem::take(&mut self.staged);
+        if count == 0 || count != staged {
+            return Code::Arguments;
+        }
+        let entries = self.buffers.table.get(..ENTRY * usize::from(staged)).unwrap_or_default();
+        let mut parameters = self.parameters();
+        match merge(&mut parameters, Reader::new(entries)) {
+            Ok(()) => self.use_parameters(&parameters, Keep::Stored),
+            Err(code) => code,
+        }
+    }
+
+    /// Puts parameters to use.
+    fn use_parameters(&mut self, parameters: &Parameters, keep: Keep) -> Code {
+        let is_sensor_new = parameters.sensor != *self.sensor.get().config();
+        if is_sensor_new || parameters.operations != self.operations {
+            if parameters.check().is_err() || is_sensor_new && !self.renew_sensor(parameters) {
+                return Code::Refused;
+            }
+            self.sensor.complete();
+            self.operations = parameters.operations.clone();
+            self.is_not_stored = true;
+        }
+        // Memory wears out: it is written only if this changes something.
+        if keep == Keep::UntilReset || !self.is_not_stored { Code::Done } else { self.store(parameters) }
+    }
+
+    /// Makes the sensor of the parameters. Returns false if they are refused.
+    // Not inlined, like the other functions with a sensor on the stack, so that each can use the same part of it.
+    #[inline(never)]
+    pub(super) fn renew_sensor(&mut self, parameters: &Parameters) -> bool {
+        let sensor = Sensor::new(&parameters.sensor);
+        let is_accepted = sensor.is_ok();
+        if let Ok(sensor) = sensor {
+            self.sensor.set(sensor);
+        }
+        is_accepted
+    }
+
+    #[inline(never)]
+    fn store(&mut self, parameters: &Parameters) -> Code {
+        let (copy, generation) = (self.state.parameter_copy, self.state.parameter_generation);
+        // The buffer of the table is written.
+        self.staged = 0;
+        match store::save(&mut self.board, parameters, copy, generation, &mut self.buffers.table) {
+            Ok((copy, generation)) => {
+                (self.state.parameter_copy, self.state.parameter_generation) = (copy, generation);
+                self.state.self_check &= !4;
+                self.is_not_stored = false;
+                self.send_event(Event::Stored, u32::from(copy), generation);
+                Code::Done
+            }
+            Err(copy) => {
+                self.send_event(Event::StoreFailed, u32::from(copy), 0);
+                Code::NotStored
+            }
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn read_parameters(&mut self, from: &mut Reader<'_>) -> Code {
+        let Some(count) = from.u8() else { return Code::Arguments };
+        if from.rest().len() != 2 * usize::from(count) || count > MAX_READ {
+            return Code::Arguments;
+        }
+        let parameters = self.parameters();
+        let ids = *from;
+        for _ in 0..count {
+            if from.u16().and_then(|id| parameters.get(id)).is_none() {
+                return Code::UnknownParameter;
+            }
+        }
+        self.send(Apid::Parameters, |out| {
+            out.u8(count);
+            let mut ids = ids;
+            while let Some(id) = ids.u16() {
+                out.u16(id);
+                out.f64(parameters.get(id).unwrap_or(f64::NAN));
+            }
+        });
+        Code::Done
+    }
+}
+
+/// Sets parameters to the numbers and values in `from`.
+fn merge(parameters: &mut Parameters, mut from: Reader<'_>) -> Result<(), Code> {
+    while let (Some(id), Some(value)) = (from.u16(), from.f64()) {
+        parameters.set(id, value).map_err(|refused| match refused {
+            Refused::Unknown(_) => Code::UnknownParameter,
+            _ => Code::Refused,
+        })?;
+    }
+    Ok(())
+}

@@ -1,0 +1,158 @@
+//! What survives a reset: how often the watchdog reset the computer, and when it lifted off.
+//!
+//! | resets by the watchdog in a row | what the computer does |
+//! |---|---|
+//! | 1, 2 | it starts as usual |
+//! | 3 to 5 | it uses the older parameters, because the newer ones may be the cause |
+//! | 6 and more | it stays in safe mode |
+//!
+//! After a minute without a reset the count starts again.
+
+use super::Flight;
+use crate::board::{Board, RETAINED_WORDS};
+use crate::messages::{Event, Mode};
+use crate::store::Choice;
+use crate::table::CRC32;
+
+/// Resets in a row after which the older parameters are used.
+const OLDER_AFTER: u8 = 3;
+/// Resets in a row after which the computer stays in safe mode.
+const SAFE_AFTER: u8 = 6;
+/// A computer that runs this long is not in a loop of resets.
+const STABLE_US: u64 = 60_000_000;
+/// Time for which the shut-down is armed.
+const ARMED_US: u64 = 10_000_000;
+/// The value of "since lift-off" before lift-off.
+const ON_THE_GROUND: u32 = u32::MAX;
+
+/// Starts, resets and lift-off.
+#[derive(Debug)]
+pub(super) struct Recovery {
+    pub(super) starts: u16,
+    pub(super) watchdog_resets: u8,
+    /// Time of the start minus the time since lift-off that was known then, µs. Negative if lift-off was before the
+    /// start.
+    lift_off_us: Option<i64>,
+    /// Whether the lift-off line showed lift-off at the last turn.
+    line_was_off: bool,
+    armed_until_us: u64,
+    /// Seconds since lift-off that are kept for a reset.
+    kept_s: Option<u32>,
+    is_stable: bool,
+}
+
+impl Recovery {
+    /// Reads what the last run left, and counts this start.
+    pub(super) fn begin(board: &mut impl Board) -> Self {
+        let now_us = board.now_us();
+        let [counts, since_ms, spare, check] = board.read_retained();
+        let is_kept = counts != 0 && check == checksum([counts, since_ms, spare]);
+        let (starts, resets) = if is_kept { ((counts >> 16) as u16, counts as u8) } else { (0, 0) };
+        let lift_off_us = (is_kept && since_ms != ON_THE_GROUND)
+            .then(|| now_us.cast_signed().saturating_sub(i64::from(since_ms) * 1000));
+        let mut recovery = Self {
+            starts: starts.saturating_add(1),
+            watchdog_resets: if board.was_watchdog_reset() { resets.saturating_add(1) } else { 0 },
+            lift_off_us,
+            line_was_off: false,
+            armed_until_us: 0,
+            kept_s: None,
+            is_stable: false,
+        };
+        recovery.keep(board, now_us);
+        recovery
+    }
+
+    /// Returns which parameters to use.
+    pub(super) fn choice(&self) -> Choice {
+        if self.watchdog_resets >= OLDER_AFTER { Choice::Older } else { Choice::Newer }
+    }
+
+    /// Keeps the counts and the time since lift-off for the time after a reset.
+    fn keep(&mut self, board: &mut impl Board, now_us: u64) {
+        let since_us = self.lift_off_us.map(|at| now_us.cast_signed().saturating_sub(at));
+        let since_ms = since_us.map_or(ON_THE_GROUND, |us| u32::try_from(us / 1000).unwrap_or(ON_THE_GROUND - 1));
+        let resets = if self.is_stable { 0 } else { self.watchdog_resets };
+        let words = [u32::from(self.starts) << 16 | u32::from(resets), since_ms, 0];
+        let [counts, since_ms, spare] = words;
+        let kept: [u32; RETAINED_WORDS] = [counts, since_ms, spare, checksum(words)];
+        board.write_retained(kept);
+        self.kept_s = self.since_lift_off_s(now_us);
+    }
+
+    /// Writes what has changed since the last turn.
+    pub(super) fn keep_up(&mut self, board: &mut impl Board, now_us: u64) {
+        let is_stable = now_us >= STABLE_US;
+        if is_stable != self.is_stable || self.since_lift_off_s(now_us) != self.kept_s {
+            self.is_stable = is_stable;
+            self.keep(board, now_us);
+        }
+    }
+
+    /// Returns whether the lift-off line has changed to lift-off since the last turn. The first turn after the start
+    /// counts a line that shows lift-off as a change: a reset during flight must not end the flight.
+    fn sees_lift_off(&mut self, line_is_off: bool, now_us: u64) -> bool {
+        let is_edge = line_is_off && !self.line_was_off;
+        self.line_was_off = line_is_off;
+        if is_edge && self.lift_off_us.is_none() {
+            self.lift_off_us = Some(now_us.cast_signed());
+        }
+        is_edge
+    }
+
+    pub(super) fn has_lifted_off(&self) -> bool {
+        self.lift_off_us.is_some()
+    }
+    /// Returns the whole seconds since lift-off.
+    pub(super) fn since_lift_off_s(&self, now_us: u64) -> Option<u32> {
+        let since_us = now_us.cast_signed().saturating_sub(self.lift_off_us?);
+        u32::try_from(since_us / 1_000_000).ok()
+    }
+    /// Allows the mode shut-down from now on for ten seconds.
+    pub(super) fn arm(&mut self, now_us: u64) {
+        self.armed_until_us = now_us + ARMED_US;
+    }
+    pub(super) fn is_armed(&self, now_us: u64) -> bool {
+        now_us < self.armed_until_us
+    }
+}
+
+/// Returns the checksum of the words that a reset leaves unchanged. After power-on they are random.
+fn checksum(words: [u32; RETAINED_WORDS - 1]) -> u32 {
+    let mut digest = CRC32.digest();
+    words.iter().for_each(|word| digest.update(&word.to_le_bytes()));
+    digest.finalize()
+}
+
+impl<B: Board> Flight<'_, B> {
+    /// Enters the mode for the time after the start. The self-checks have been done.
+    pub(super) fn enter_first_mode(&mut self) {
+        let resets = self.recovery.watchdog_resets;
+        if resets >= OLDER_AFTER {
+            self.send_event(Event::OlderParameters, self.state.parameter_copy.into(), resets.into());
+        }
+        if resets >= SAFE_AFTER {
+            self.send_event(Event::SafeAfterResets, resets.into(), 0);
+            self.enter_mode(Mode::Safe);
+        } else if self.mode == Mode::Standby && (self.operations.boot_mode == 1 || self.recovery.has_lifted_off()) {
+            self.enter_mode(Mode::Flight);
+        }
+    }
+
+    /// Follows the lines of the vehicle. Returns whether the computer has shut down.
+    pub(super) fn follow_vehicle(&mut self, now_us: u64) -> bool {
+        let line_is_off = self.board.lift_off();
+        if self.recovery.sees_lift_off(line_is_off, now_us) && self.mode == Mode::Standby {
+            self.enter_mode(Mode::Flight);
+        }
+        self.recovery.keep_up(&mut self.board, now_us);
+        let is_over = match (self.operations.shut_down_after_s, self.recovery.since_lift_off_s(now_us)) {
+            (Some(limit_s), Some(since_s)) => f64::from(since_s) >= limit_s,
+            _ => false,
+        };
+        if is_over || self.board.power_fails() {
+            self.enter_mode(Mode::ShutDown);
+        }
+        self.mode == Mode::ShutDown
+    }
+}

@@ -1,0 +1,254 @@
+//! The receiver of telecommands: it finds whole packets among the bytes of a line that is not perfect.
+//!
+//! | danger | rule |
+//! |---|---|
+//! | a packet inside the data of another packet | the outer packet is taken or given up as a whole |
+//! | a packet inside the data of a damaged packet | see below |
+//! | a damaged length that claims many bytes | a packet is complete one second after its marker, or it is given up |
+//! | bytes that make much work | [`Inbox::effort`] counts the work, and the loop limits it |
+//!
+//! A damaged packet does not say where it ends. For [`MAX_BYTES`] bytes after its marker, a packet is therefore taken
+//! only if its end is confirmed: by the marker of the next packet, or by a pause of the line. A packet inside the
+//! damaged one has neither, because the rest of the damaged packet follows it without a pause. A marker with a few wrong
+//! bits, or without one of its bytes, also begins a damaged packet.
+
+use crate::packet::{self, HEADER, MAX_BYTES, Packet, SYNC};
+
+/// A pause of the line, which no sender makes inside a packet.
+const PAUSE_US: u64 = 100_000;
+/// Time from the marker of a packet to its end, after which it is given up: a line must carry [`MAX_BYTES`] in less.
+const COMPLETE_US: u64 = 1_000_000;
+/// Arrival times are kept in units of 2^14 µs, modulo 256: about four seconds.
+const TICK_LOG2: u32 = 14;
+const PAUSE_TICKS: u8 = (PAUSE_US >> TICK_LOG2) as u8 + 1;
+const COMPLETE_TICKS: u8 = (COMPLETE_US >> TICK_LOG2) as u8;
+
+/// The longest packet, and the bytes after it that may confirm its end.
+const CAPACITY: usize = MAX_BYTES + SYNC.len() + 1;
+
+/// Most wrong bits of a marker that counts as damaged. Of random bytes, one in 800 000 is the end of such a marker.
+const WRONG_BITS: u32 = 3;
+
+/// Collects bytes as they come in. If it is not empty, it begins with a sync marker.
+#[derive(Debug)]
+pub struct Inbox {
+    bytes: [u8; CAPACITY],
+    /// Time of arrival of each byte, in ticks.
+    arrived: [u8; CAPACITY],
+    start: usize,
+    end: usize,
+    /// Number of bytes from which on [`Self::next`] has something to do.
+    need: usize,
+    /// The last four bytes outside a packet.
+    window: u32,
+    /// Number of bytes since the marker of the last damaged packet, up to [`MAX_BYTES`]; fewer bytes may belong to it.
+    since_damage: usize,
+    /// Whether the checksum of the packet at the start is known to be right.
+    intact: bool,
+    last_us: u64,
+    effort: usize,
+}
+
+impl Default for Inbox {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The state of the packet at the start.
+enum Step {
+    More,
+    Broken,
+    Packet(usize),
+}
+
+impl Inbox {
+    /// Makes an empty inbox, of all zeros. The line may be in the middle of a packet, so the end of the first packet must
+    /// be confirmed.
+    pub const fn new() -> Self {
+        Self {
+            bytes: [0; CAPACITY],
+            arrived: [0; CAPACITY],
+            start: 0,
+            end: 0,
+            need: 0,
+            window: 0,
+            since_damage: 0,
+            intact: false,
+            last_us: 0,
+            effort: 0,
+        }
+    }
+
+    /// Adds a byte that arrived at `now_us`. Returns whether [`Self::next`] has something to do. A byte for which there
+    /// is no room is lost; there is room for every packet after [`Self::next`] returned `None`.
+    pub fn push(&mut self, byte: u8, now_us: u64) -> bool {
+        self.last_us = now_us;
+        self.effort += 1;
+        if self.start == self.end {
+            if self.is_marker(byte) {
+                self.begin(now_us);
+            }
+            return false;
+        }
+        if self.end == CAPACITY {
+            self.compact();
+        }
+        if let (Some(place), Some(time)) = (self.bytes.get_mut(self.end), self.arrived.get_mut(self.end)) {
+            (*place, *time) = (byte, tick(now_us));
+            self.end += 1;
+        }
+        self.end - self.start >= self.need
+    }
+
+    /// Returns whether the inbox waits for the rest of a packet, or for the confirmation of its end.
+    pub fn is_waiting(&self) -> bool {
+        self.start < self.end
+    }
+
+    /// Returns the work since the last call: the number of bytes that were examined, counted each time.
+    pub fn effort(&self) -> usize {
+        self.effort
+    }
+    /// Sets the work to zero.
+    pub fn reset_effort(&mut self) {
+        self.effort = 0;
+    }
+
+    /// Passes the next packet to `handle`, or `None` for a broken packet. Returns the result of `handle`; `None` if
+    /// there is no packet yet. All bytes that have arrived until `now_us` must have been added.
+    pub fn next<R>(&mut self, now_us: u64, handle: impl FnOnce(Option<Packet<'_>>) -> R) -> Option<R> {
+        match self.step(now_us) {
+            Step::More => None,
+            Step::Broken => {
+                // A damaged length may have hidden another packet: it is searched for after the marker.
+                self.since_damage = 0;
+                self.leave_out(SYNC.len());
+                Some(handle(None))
+            }
+            Step::Packet(length) => {
+                let packet = self.bytes.get(self.start..self.start + length).and_then(packet::parse);
+                let result = handle(packet);
+                self.since_damage = MAX_BYTES;
+                self.leave_out(length);
+                Some(result)
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn step(&mut self, now_us: u64) -> Step {
+        let is_quiet = now_us.saturating_sub(self.last_us) >= PAUSE_US;
+        let held = self.bytes.get(self.start..self.end).unwrap_or_default();
+        let Some(&began) = self.arrived.get(self.start).filter(|_| !held.is_empty()) else {
+            if is_quiet {
+                (self.since_damage, self.window) = (MAX_BYTES, 0);
+            }
+            return Step::More;
+        };
+        let is_late = tick(now_us).wrapping_sub(began) >= COMPLETE_TICKS;
+        let Some(header) = held.first_chunk() else {
+            self.need = SYNC.len() + HEADER;
+            return if is_late { Step::Broken } else { Step::More };
+        };
+        let Some(length) = packet::length(header) else { return Step::Broken };
+        let Some(whole) = held.get(..length) else {
+            self.need = length;
+            return if is_late { Step::Broken } else { Step::More };
+        };
+        if !self.intact {
+            self.effort += length;
+            if packet::read(whole).is_none() {
+                return Step::Broken;
+            }
+            self.intact = true;
+        }
+        if self.since_damage < MAX_BYTES { self.confirm(length, is_quiet) } else { Step::Packet(length) }
+    }
+
+    /// Finds out whether the packet at the start ends after `length` bytes, from what follows it. One byte between the
+    /// packet and the pause or the next marker does not matter: some drivers of a line add it when they switch off.
+    fn confirm(&mut self, length: usize, is_quiet: bool) -> Step {
+        let held = self.bytes.get(self.start..self.end).unwrap_or_default();
+        let times = self.arrived.get(self.start..self.end).unwrap_or_default();
+        for more in 0..=1 {
+            let end = length + more;
+            let is_pause = match (times.get(end - 1), times.get(end)) {
+                (Some(last), Some(next)) => next.wrapping_sub(*last) >= PAUSE_TICKS,
+                (Some(_), None) => is_quiet,
+                _ => false,
+            };
+            if is_pause || held.get(end..).is_some_and(|after| after.starts_with(&SYNC)) {
+                return Step::Packet(length);
+            }
+        }
+        if held.len() > length + SYNC.len() || is_quiet {
+            return Step::Broken;
+        }
+        self.need = held.len() + 1;
+        Step::More
+    }
+
+    /// Removes bytes from the start, and everything up to the next marker.
+    fn leave_out(&mut self, count: usize) {
+        let from = (self.start + count).min(self.end);
+        (self.intact, self.window, self.need) = (false, 0, 0);
+        for at in from..self.end {
+            self.effort += 1;
+            if self.bytes.get(at).copied().is_some_and(|byte| self.is_marker(byte)) {
+                self.start = (at + 1).saturating_sub(SYNC.len());
+                return;
+            }
+        }
+        (self.start, self.end) = (0, 0);
+    }
+
+    /// Takes a byte outside a packet, and returns whether a marker ends with it.
+    #[inline(always)]
+    fn is_marker(&mut self, byte: u8) -> bool {
+        self.window = self.window << 8 | u32::from(byte);
+        if self.window == u32::from_be_bytes(SYNC) {
+            self.window = 0;
+            return true;
+        }
+        let is_damaged = (self.window ^ u32::from_be_bytes(SYNC)).count_ones() <= WRONG_BITS || is_cut(self.window);
+        self.since_damage = if is_damaged { 0 } else { MAX_BYTES.min(self.since_damage + 1) };
+        false
+    }
+
+    fn begin(&mut self, now_us: u64) {
+        (self.start, self.end, self.need, self.intact) = (0, SYNC.len(), SYNC.len() + HEADER, false);
+        for (place, byte) in self.bytes.iter_mut().zip(SYNC) {
+            *place = byte;
+        }
+        self.arrived.iter_mut().take(SYNC.len()).for_each(|time| *time = tick(now_us));
+    }
+
+    #[cold]
+    fn compact(&mut self) {
+        let held = self.end - self.start;
+        for i in 0..held {
+            let from = self.start + i;
+            if let (Some(&byte), Some(&time)) = (self.bytes.get(from), self.arrived.get(from))
+                && let (Some(b), Some(t)) = (self.bytes.get_mut(i), self.arrived.get_mut(i))
+            {
+                (*b, *t) = (byte, time);
+            }
+        }
+        self.effort += held;
+        (self.start, self.end) = (0, held);
+    }
+}
+
+/// Returns whether the last bytes are a marker without its first, second or third byte, or one without its last byte
+/// and another byte.
+fn is_cut(window: u32) -> bool {
+    let [a, b, c, d] = SYNC;
+    let three = window & 0xFF_FFFF;
+    let word = |x: [u8; 3]| u32::from_be_bytes([0, x[0], x[1], x[2]]);
+    three == word([b, c, d]) || three == word([a, c, d]) || three == word([a, b, d]) || window >> 8 == word([a, b, c])
+}
+
+fn tick(now_us: u64) -> u8 {
+    (now_us >> TICK_LOG2) as u8
+}

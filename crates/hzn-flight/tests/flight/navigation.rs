@@ -1,0 +1,112 @@
+//! Values from navigation that have a time, a velocity and an expiry.
+
+use hzn_flight::bytes::Writer;
+use hzn_flight::flight::Flight;
+use hzn_flight::messages::{Code, Event, Function, Mode, Navigation};
+
+use crate::bench::{Bench, command, fly, limb, ready, send, take_sent};
+
+const NAN: f32 = f32::NAN;
+
+fn unknown() -> Navigation {
+    Navigation {
+        epoch_us: 0,
+        expires_s: NAN,
+        altitude_m: NAN,
+        position_x_m: NAN,
+        position_y_m: NAN,
+        position_z_m: NAN,
+        velocity_x_m_s: NAN,
+        velocity_y_m_s: NAN,
+        velocity_z_m_s: NAN,
+        rate_x_rad_s: NAN,
+        rate_y_rad_s: NAN,
+        rate_z_rad_s: NAN,
+    }
+}
+
+fn navigate(f: &mut Flight<'_, Bench>, values: Navigation) -> Code {
+    send(f, &command(1, Function::Navigate, |w: &mut Writer<'_>| values.write(w))).answers[0].2
+}
+
+/// Processes a picture, and returns the axis in ECEF and the altitude that it was given.
+fn picture(f: &mut Flight<'_, Bench>) -> ([f32; 3], f32) {
+    f.board().pictures.push_back((limb(), 0));
+    f.turn();
+    let science = take_sent(f).science;
+    (science[0].1.direction.unwrap().axis_ecef, science[0].0.altitude_m)
+}
+
+#[test]
+fn a_position_moves_on_to_the_exposure() {
+    fly(ready(), |f| {
+        send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
+        let values = Navigation {
+            epoch_us: f.board().now_us,
+            position_x_m: 6_608e3,
+            position_y_m: 0.0,
+            position_z_m: 0.0,
+            velocity_x_m_s: 0.0,
+            velocity_y_m_s: 7300.0,
+            velocity_z_m_s: 0.0,
+            ..unknown()
+        };
+        assert_eq!(navigate(f, values), Code::Done);
+        let angle = |axis: [f32; 3]| (-axis[1]).atan2(-axis[0]).to_degrees();
+        let first = angle(picture(f).0);
+        f.board().now_us += 10_000_000;
+        let later = angle(picture(f).0);
+        // 73 km in ten seconds at 6608 km are 0.633 degrees.
+        assert!(first.abs() < 1e-3 && (later - 0.633).abs() < 2e-3, "{first} {later}");
+    });
+}
+
+#[test]
+fn values_that_have_expired_are_not_used_and_told_once() {
+    fly(ready(), |f| {
+        send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
+        let values = |epoch_us| Navigation { epoch_us, expires_s: 5.0, altitude_m: 231e3, ..unknown() };
+        let now_us = f.board().now_us;
+        assert_eq!(navigate(f, values(now_us)), Code::Done);
+        assert_eq!(picture(f).1, 231e3);
+        f.board().now_us += 6_000_000;
+        f.board().pictures.extend([(limb(), 0), (limb(), 0)]);
+        (0..2).for_each(|_| f.turn());
+        let h = take_sent(f);
+        assert_eq!(h.science[1].0.altitude_m, 230e3, "the altitude of the parameters");
+        assert!(matches!(h.events[..], [(Event::KnownExpired, 6000..=6100, 0)]), "{:?}", h.events);
+        let now_us = f.board().now_us;
+        assert_eq!(navigate(f, values(now_us)), Code::Done);
+        assert_eq!(picture(f).1, 231e3);
+    });
+}
+
+#[test]
+fn impossible_values_are_refused() {
+    fly(ready(), |f| {
+        let now = f.board().now_us;
+        let at = |values: Navigation| Navigation { epoch_us: now, ..values };
+        let placed = Navigation { position_x_m: 6_608e3, position_y_m: 0.0, position_z_m: 0.0, ..at(unknown()) };
+        let refused = [
+            Navigation { epoch_us: now + 3_700_000_000, altitude_m: 2e5, ..unknown() },
+            Navigation { expires_s: 0.0, altitude_m: 2e5, ..at(unknown()) },
+            Navigation { expires_s: f32::INFINITY, altitude_m: 2e5, ..at(unknown()) },
+            Navigation { velocity_x_m_s: 3e4, velocity_y_m_s: 0.0, velocity_z_m_s: 0.0, ..placed },
+            // A velocity without a position.
+            Navigation {
+                velocity_x_m_s: 0.0,
+                velocity_y_m_s: 0.0,
+                velocity_z_m_s: 0.0,
+                altitude_m: 2e5,
+                ..at(unknown())
+            },
+            Navigation { altitude_m: -9e3, ..at(unknown()) },
+        ];
+        for values in refused {
+            assert_eq!(navigate(f, values), Code::Refused, "{values:?}");
+        }
+        assert_eq!(navigate(f, Navigation { velocity_y_m_s: 5.0, ..placed }), Code::Missing);
+        assert_eq!(send(f, &command(1, Function::Navigate, |w| w.u64(5))).answers[0].2, Code::Arguments);
+        assert_eq!(navigate(f, placed), Code::Done);
+    });
+}
