@@ -125,7 +125,7 @@ impl<T: Real> Expected<T> {
         self.sin.atan2(self.cos)
     }
 
-/// Returns the cosine of the expected half-angle and its 1-sigma from altitude, limb height and unknown radius.
+    /// Returns the cosine of the expected half-angle and its 1-sigma from altitude, limb height and unknown radius.
     pub fn cos_and_sigma(&self) -> (T, T) {
         (self.cos, self.sigma_cos)
     }
