@@ -122,11 +122,19 @@ pub fn principal_sigmas(s: &Solution<f64>) -> ([f64; 2], f64) {
     ([(half + root).max(0.0).sqrt(), (half - root).max(0.0).sqrt()], angle)
 }
 
-/// Returns advice for a picture without an answer.
+/// Returns advice for a picture without an answer. Advice for a longer candidate comes first, because the longest edge
+/// is most likely the limb.
 pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
-    let has = |v: &Verdict| r.candidates.iter().any(|c| c.verdict == *v);
-    let by_verdict = VERDICT_TIPS.iter().filter(|(verdicts, _)| verdicts.iter().any(has)).map(|(_, tip)| *tip);
-    status_tip(r).into_iter().chain(by_verdict).collect()
+    let mut candidates: Vec<_> = r.candidates.iter().collect();
+    candidates.sort_by_key(|c| std::cmp::Reverse(c.length_px));
+    let by_verdict = candidates.iter().flat_map(|c| VERDICT_TIPS.iter().filter(|(of, _)| of.contains(&c.verdict)));
+    let mut tips: Vec<&'static str> = status_tip(r).into_iter().collect();
+    for (_, tip) in by_verdict {
+        if !tips.contains(tip) {
+            tips.push(tip);
+        }
+    }
+    tips
 }
 
 /// Returns advice that follows from the status of a picture.

@@ -28,8 +28,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub truth: Option<PathBuf>,
     /// Pictures per second; used where nothing else gives the times of the pictures
-    #[arg(long, value_name = "RATE", default_value_t = 1.0)]
-    pub fps: f64,
+    #[arg(long, value_name = "RATE")]
+    pub fps: Option<f64>,
     /// Size and format of headerless pictures, as for `hzn run`
     #[arg(long, value_name = "WIDTHxHEIGHT:FORMAT")]
     pub raw: Option<Raw>,

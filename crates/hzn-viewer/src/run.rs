@@ -23,7 +23,7 @@ const SHOT_PASSES: u32 = 6;
 /// There is no display or no OpenGL. With `--screenshot`, it is also an error if there is nothing to show.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let program_start = Instant::now();
-    if !(args.fps > 0.0 && args.fps.is_finite()) {
+    if args.fps.is_some_and(|fps| !(fps > 0.0 && fps.is_finite())) {
         bail!("--fps: must be a finite number above 0");
     }
     let shot = args.screenshot.clone();
@@ -46,6 +46,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let options = eframe::NativeOptions { viewport, ..Default::default() };
     let measure = args.measure.map(|kind| Measure::new(kind, program_start));
     let (args, result) = (args.clone(), Arc::clone(&outcome));
+    let store_is_used = store.is_some();
     let window = eframe::run_native(
         "hzn-viewer",
         options,
@@ -54,6 +55,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             let wake = Arc::new(move || ctx.request_repaint());
             let mut viewer = Viewer::new(settings, store, wake);
             viewer.set_flight(args.flight);
+            if store_is_used && native_dialogs() {
+                viewer.use_native_dialogs();
+            } else if !store_is_used {
+                viewer.allow_close();
+            }
             if !args.input.is_empty() {
                 viewer.open(args.request());
             }
@@ -63,6 +69,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     window.map_err(|e| anyhow!("{e}")).context("the window cannot be opened (it needs a display and OpenGL)")?;
     let outcome = outcome.lock().map_err(|_| anyhow!("the window ended with an error"))?.take();
     outcome.unwrap_or(Ok(()))
+}
+
+/// Returns true if the system can show its own dialogs. On Linux they come over the session bus.
+fn native_dialogs() -> bool {
+    let bus = || std::env::var_os("XDG_RUNTIME_DIR").is_some_and(|d| PathBuf::from(d).join("bus").exists());
+    !cfg!(target_os = "linux") || std::env::var_os("DBUS_SESSION_BUS_ADDRESS").is_some() || bus()
 }
 
 type RunResult = Arc<Mutex<Option<anyhow::Result<()>>>>;
@@ -107,7 +119,7 @@ impl eframe::App for Window {
                 Err(anyhow!("no picture was shown within {} s: {}", SHOT_LIMIT.as_secs(), messages.join("; "))),
             );
         }
-        if !self.viewer.is_settled() {
+        if !self.viewer.is_settled() || self.viewer.is_working() {
             let failed = self.viewer.sequence().is_empty() && self.viewer.messages().next().is_some();
             if failed && self.begun.elapsed() > Duration::from_secs(2) {
                 let messages: Vec<&str> = self.viewer.messages().collect();

@@ -2,6 +2,7 @@
 //! calls are compiled away.
 
 use crate::geometry::pixel::{ImagePoint, Pixel};
+use crate::model::body::Expected;
 use crate::model::error_budget::ErrorBudget;
 use crate::model::report::{Candidate, Solution};
 use crate::model::status::Stage;
@@ -84,6 +85,16 @@ pub trait Observer<T> {
     /// called only after a fit, before the verdict.
     #[inline(always)]
     fn budget(&self, _candidate: u32, _budget: &ErrorBudget<T>) {}
+    /// Returns whether the pipeline calls [`Self::fit`]. The default is false: without an observer, only an answer is
+    /// written as a solution.
+    #[inline(always)]
+    fn wants_fit(&self) -> bool {
+        false
+    }
+    /// A candidate is fitted. The call receives the solution that the candidate becomes if it passes every gate, and
+    /// the cone that is expected. It comes before the gates, so a candidate that a gate refuses has a fit, too.
+    #[inline(always)]
+    fn fit(&self, _candidate: u32, _fit: &Solution<T>, _expected: &Expected<T>) {}
     /// A candidate has its verdict, and a solution if there is one.
     fn verdict(&self, _candidate: u32, _outcome: &Candidate<T>, _solution: Option<&Solution<T>>) {}
 }

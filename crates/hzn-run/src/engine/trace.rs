@@ -3,6 +3,7 @@
 use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
+use hzn_core::body::Expected;
 use hzn_core::covariance::{ErrorBudget, Term};
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::real::Real;
@@ -30,8 +31,34 @@ pub struct Edge {
     /// The larger standard deviation (1 sigma) of the axis from each source of error, in radians. Empty if there was no
     /// fit.
     pub budget_rad: Vec<(Term, f64)>,
-    /// The fit of this candidate, if there was one.
+    /// The fit of this candidate, if it passed every gate.
     pub solution: Option<Solution<f64>>,
+    /// The fit of this candidate and the cone that was expected, also if a gate refused the candidate.
+    pub fitted: Option<Fitted>,
+}
+
+/// The fit of a candidate before the gates, and the cone that was expected.
+#[derive(Debug, Clone, Copy)]
+pub struct Fitted {
+    /// The solution that the candidate becomes if it passes every gate.
+    pub solution: Solution<f64>,
+    /// Cosine of the expected half-angle.
+    pub expected_cos: f64,
+    /// 1-sigma of `expected_cos`, from altitude, limb height and unknown radius.
+    pub expected_sigma_cos: f64,
+    /// Limb height in metres with which the expected half-angle equals the one of the free fit, and its derivative by
+    /// the cosine of the half-angle, m; `None` if the half-angle says nothing about the distance, or if it was not
+    /// fitted.
+    pub limb_height_m: Option<(f64, f64)>,
+}
+
+impl Fitted {
+    /// Returns the difference of the cosines of the half-angle, fitted minus expected, and its 1-sigma; `None` if the
+    /// half-angle was not fitted.
+    pub fn difference(&self) -> Option<(f64, f64)> {
+        let free = self.solution.free?;
+        Some((free.cos - self.expected_cos, (free.var_cos + self.expected_sigma_cos.powi(2)).sqrt()))
+    }
 }
 
 /// A record of the work on one body in one picture. It is filled through [`Observer`] and read after the picture.
@@ -185,6 +212,12 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
     fn budget(&self, candidate: u32, budget: &ErrorBudget<T>) {
         self.now().into_iter().for_each(|t| t.budget(candidate, budget));
     }
+    fn wants_fit(&self) -> bool {
+        self.now().is_some()
+    }
+    fn fit(&self, candidate: u32, fit: &Solution<T>, expected: &Expected<T>) {
+        self.now().into_iter().for_each(|t| t.fit(candidate, fit, expected));
+    }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
         self.now().into_iter().for_each(|t| t.verdict(candidate, outcome, solution));
     }
@@ -229,6 +262,22 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
     fn budget(&self, candidate: u32, budget: &ErrorBudget<T>) {
         self.change_edge(candidate, |e| {
             e.budget_rad = Term::ALL.map(|term| (term, budget.covariance(term).sigma_max_rad().into())).into();
+        });
+    }
+    fn wants_fit(&self) -> bool {
+        true
+    }
+    fn fit(&self, candidate: u32, fit: &Solution<T>, expected: &Expected<T>) {
+        let (cos, sigma) = expected.cos_and_sigma();
+        let limb =
+            fit.free.and_then(|free| expected.limb_height_m(free.cos)).map(|(h, slope)| (h.into(), slope.into()));
+        self.change_edge(candidate, |e| {
+            e.fitted = widen_solution(fit).map(|solution| Fitted {
+                solution,
+                expected_cos: cos.into(),
+                expected_sigma_cos: sigma.into(),
+                limb_height_m: limb,
+            });
         });
     }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {

@@ -9,30 +9,44 @@ const STEPS: usize = 4096;
 /// Returns the limb of a cone as lines in pixels. The cone has the axis `axis` (unit vector, camera frame) and this
 /// half-angle. The lines are broken where the limb leaves the picture or the image circle.
 pub fn lines(axis: [f64; 3], half_angle_rad: f64, camera: &Camera<f64>) -> Vec<Vec<[f64; 2]>> {
+    lines_with_steps(axis, half_angle_rad, camera, STEPS)
+}
+
+/// Returns the same as [`lines`] with another number of steps around the cone. Fewer steps take less time; an arc of
+/// less than two steps is not found.
+pub fn lines_with_steps(axis: [f64; 3], half_angle_rad: f64, camera: &Camera<f64>, steps: usize) -> Vec<Vec<[f64; 2]>> {
     let (b1, b2) = basis(axis);
     let (sin, cos) = half_angle_rad.sin_cos();
     let ray = |angle_rad: f64| {
         let (s, c) = angle_rad.sin_cos();
         UnitVec3::try_new(std::array::from_fn(|i| cos * axis[i] + sin * (c * b1[i] + s * b2[i])))
     };
-    lines_along(ray, camera)
+    along(ray, camera, steps)
 }
 
 /// Returns any closed limb as lines in pixels, as [`lines`]. `direction` gives its direction (camera frame) for an
 /// angle about its axis in radians.
 pub fn lines_along(direction: impl Fn(f64) -> Option<UnitVec3<Cam, f64>>, camera: &Camera<f64>) -> Vec<Vec<[f64; 2]>> {
+    along(direction, camera, STEPS)
+}
+
+fn along(
+    direction: impl Fn(f64) -> Option<UnitVec3<Cam, f64>>,
+    camera: &Camera<f64>,
+    steps: usize,
+) -> Vec<Vec<[f64; 2]>> {
     let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
     let point = |step: usize| -> Option<[f64; 2]> {
-        let p = camera.project(&direction(step as f64 * std::f64::consts::TAU / STEPS as f64)?)?;
+        let p = camera.project(&direction(step as f64 * std::f64::consts::TAU / steps as f64)?)?;
         // Half a pixel around the picture is included, because the edge of a line is still visible there.
         ((-1.0..=w).contains(&p.u) && (-1.0..=h).contains(&p.v)).then_some([p.u, p.v])
     };
     // The loop starts outside the picture, so that a line across the first step is not cut there.
-    let start = (0..STEPS).find(|&i| point(i).is_none()).unwrap_or(0);
+    let start = (0..steps).find(|&i| point(i).is_none()).unwrap_or(0);
     let mut out = Vec::new();
     let mut line = Vec::new();
-    for step in start..=start + STEPS {
-        match point(step % STEPS) {
+    for step in start..=start + steps {
+        match point(step % steps) {
             Some(p) => line.push(p),
             None if line.len() > 1 => out.push(std::mem::take(&mut line)),
             None => line.clear(),

@@ -44,6 +44,13 @@ pub fn draw_annotations(image: RgbImage, drawing: &Annotations, title: &str) -> 
 
 /// Draws annotations as [`draw_annotations`] does, and the true limb with them.
 pub fn draw_with_truth(image: RgbImage, drawing: &Annotations, true_limb: &[Vec<[f64; 2]>], title: &str) -> RgbImage {
+    let mut canvas = Canvas { image: draw_plain(image, drawing, true_limb) };
+    legend(&mut canvas, drawing, !true_limb.is_empty(), title);
+    canvas.image
+}
+
+/// Draws annotations and the true limb without a legend.
+pub fn draw_plain(image: RgbImage, drawing: &Annotations, true_limb: &[Vec<[f64; 2]>]) -> RgbImage {
     let mut canvas = Canvas { image };
     let (w, h) = (canvas.image.width(), canvas.image.height());
     // The pen is wide enough to be visible when the whole picture is shown on a screen of about 1600 px.
@@ -73,7 +80,6 @@ pub fn draw_with_truth(image: RgbImage, drawing: &Annotations, true_limb: &[Vec<
             canvas.line([u - dx, v - dy], [u + dx, v + dy], pen * 2.5, AXIS);
         }
     }
-    legend(&mut canvas, drawing, !true_limb.is_empty(), title);
     canvas.image
 }
 

@@ -1,9 +1,14 @@
 //! The state and the decisions of the viewer. Everything here is plain Rust and works without a window, also in tests.
 
 pub mod atomic_file;
+pub mod autosave;
+pub mod cause;
+pub mod diagnosis;
+pub mod histogram;
 pub mod mask;
 pub mod plane;
 pub mod playback;
+pub mod quantity;
 pub mod rows;
 pub mod sequence;
 pub mod session;
@@ -12,13 +17,15 @@ pub mod sheet;
 pub mod slider_range;
 pub mod view;
 
+pub use autosave::{Autosave, Unsaved};
+pub use histogram::Histogram;
 pub use mask::MaskEdit;
 pub use plane::Plane;
 pub use playback::Playback;
-pub use rows::ResultHistory;
+pub use rows::{Processed, ResultHistory};
 pub use sequence::{Entry, Place, Sequence};
 pub use session::Session;
-pub use settings::{Look, Settings};
+pub use settings::{Contrast, Look, Settings};
 pub use sheet::Sheet;
 pub use slider_range::SliderRange;
 pub use view::View;

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 /// Speeds that can be chosen, as multiples of the speed of the sequence.
-pub const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 20.0];
-/// Lowest rate of playing in pictures per second. It holds where the sequence has no times or has pauses.
-const SLOWEST_FPS: f64 = 1.0;
+pub const SPEEDS: [f64; 9] = [0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, 1000.0];
+/// Time that a picture is shown at the speed 1 if the sequence has no times, in seconds.
+const WITHOUT_TIMES_S: f64 = 1.0;
 /// Highest rate of playing in pictures per second; a higher rate cannot be seen.
 const FASTEST_FPS: f64 = 60.0;
 
@@ -69,7 +69,7 @@ impl Playback {
     /// Returns how long the picture is shown, in seconds of the sequence.
     fn time_shown_s(&self, duration_s: impl Fn(usize) -> Option<f64>) -> f64 {
         let known = duration_s(self.frame).filter(|d| *d > 0.0 && d.is_finite());
-        known.unwrap_or(1.0).clamp(0.0, self.speed / SLOWEST_FPS).max(self.speed / FASTEST_FPS)
+        known.unwrap_or(WITHOUT_TIMES_S).max(self.speed / FASTEST_FPS)
     }
 
     /// Returns the time until the next picture is due; `None` if the sequence is not played.
@@ -123,10 +123,15 @@ mod tests {
     }
 
     #[test]
-    fn pauses_and_missing_times_do_not_hold_it_up() {
+    fn slow_recordings_play_in_real_time_and_missing_times_do_not_hold_it_up() {
         let mut p = Playback::default();
         p.toggle(10);
-        assert!((0..101).any(|_| p.advance(ms(10), 10, |_| Some(3600.0))));
+        // One picture in five seconds.
+        let frames = (0..1100).filter(|_| p.advance(ms(10), 10, |_| Some(5.0))).count();
+        assert_eq!(frames, 2);
+        p.set_speed(1000.0);
+        assert!((0..501).any(|_| p.advance(ms(10), 10, |_| Some(3600.0))), "an hour takes 3.6 s at the speed 1000");
+        p.set_speed(1.0);
         assert!((0..101).any(|_| p.advance(ms(10), 10, |_| None)));
         assert!((0..101).any(|_| p.advance(ms(10), 10, |_| Some(-5.0))));
         // At thousands of pictures per second, a call advances by one picture, and a slow call does not catch up.
@@ -171,7 +176,7 @@ mod tests {
     fn speeds_end_too() {
         let mut p = Playback::default();
         (0..20).for_each(|_| p.change_speed(true));
-        assert_eq!(p.speed(), 20.0);
+        assert_eq!(p.speed(), 1000.0);
         (0..20).for_each(|_| p.change_speed(false));
         assert_eq!(p.speed(), 0.1);
     }

@@ -1,21 +1,43 @@
-//! Results over time: the quantities that can be plotted, and the search for conspicuous pictures.
+//! Results over time, and the search for conspicuous pictures.
 
 use std::collections::HashMap;
 
 use hzn_core::status::Status;
 use hzn_mcap::Row;
-use hzn_sim::truth::Truth;
 
-/// Results by picture and body: those of the file, and those of the current parameters.
+use super::cause::{Cause, Group};
+use super::diagnosis::FitFacts;
+use super::quantity::angle_deg;
+
+/// Results by picture and body: those of the file, of the current parameters, of the parameters before, and of the
+/// sensor that is compared with.
 #[derive(Debug, Clone, Default)]
 pub struct ResultHistory {
     recorded: Vec<Vec<Row>>,
-    current: HashMap<usize, Vec<Row>>,
+    /// The file's results come from the current parameters.
+    recorded_is_current: bool,
+    current: HashMap<usize, Processed>,
+    /// Results of the parameters before, for pictures that have no current result yet.
+    previous: HashMap<usize, Vec<Row>>,
+    other: HashMap<usize, Vec<Row>>,
+    generation: u64,
+}
+
+/// Results of a picture, with the causes and the fits of its bodies.
+#[derive(Debug, Clone, Default)]
+pub struct Processed {
+    /// Results of the bodies.
+    pub rows: Vec<Row>,
+    /// Cause of each result.
+    pub causes: Vec<Cause>,
+    /// Fit of each body's longest edge, if there is one.
+    pub fits: Vec<Option<FitFacts>>,
 }
 
 impl ResultHistory {
     /// Appends the file's result for a body of picture `index`. Pictures may lack results.
     pub fn record(&mut self, index: usize, row: Row) {
+        self.generation += 1;
         if self.recorded.len() <= index {
             self.recorded.resize(index + 1, Vec::new());
         }
@@ -24,20 +46,46 @@ impl ResultHistory {
         }
     }
     /// Stores the results of a picture with the current parameters.
-    pub fn set_current(&mut self, index: usize, rows: Vec<Row>) {
-        self.current.insert(index, rows);
+    pub fn set_current(&mut self, index: usize, processed: Processed) {
+        self.generation += 1;
+        self.current.insert(index, processed);
     }
-    /// Drops the results of the current parameters, because the parameters have changed.
-    pub fn clear_current(&mut self) {
-        self.current.clear();
+    /// Begins with other parameters: the results so far become the previous ones. `as_recorded` is true if the
+    /// parameters are those of the file's results.
+    pub fn begin_version(&mut self, as_recorded: bool) {
+        self.previous.extend(self.current.drain().map(|(index, processed)| (index, processed.rows)));
+        self.recorded_is_current = as_recorded;
+        self.generation += 1;
     }
-    /// Returns the number of pictures with results of the current parameters.
+    /// Returns a number that changes with every change of the results.
+    pub fn generation(&self) -> u64 {
+        self.generation
+    }
+    /// Stores the results of the sensor that is compared with.
+    pub fn set_other(&mut self, index: usize, rows: Vec<Row>) {
+        self.other.insert(index, rows);
+    }
+    /// Drops the results of the sensor that is compared with.
+    pub fn clear_other(&mut self) {
+        self.other.clear();
+    }
+    /// Returns the result of the sensor that is compared with.
+    pub fn other(&self, index: usize, body: usize) -> Option<&Row> {
+        self.other.get(&index)?.get(body)
+    }
+    /// Returns the number of pictures with a result of the sensor that is compared with.
+    pub fn other_len(&self) -> usize {
+        self.other.len()
+    }
+    /// Returns the number of pictures that were processed with the current parameters.
     pub fn current_len(&self) -> usize {
         self.current.len()
     }
     /// Returns the number of pictures, up to the last one with a result.
     pub fn len(&self) -> usize {
-        self.current.keys().map(|i| i + 1).max().unwrap_or(0).max(self.recorded.len())
+        let last = |rows: &HashMap<usize, Vec<Row>>| rows.keys().map(|i| i + 1).max().unwrap_or(0);
+        let current = self.current.keys().map(|i| i + 1).max().unwrap_or(0);
+        current.max(last(&self.previous)).max(self.recorded.len())
     }
     /// Returns true if there are no results.
     pub fn is_empty(&self) -> bool {
@@ -47,26 +95,53 @@ impl ResultHistory {
     pub fn recorded(&self, index: usize, body: usize) -> Option<&Row> {
         self.recorded.get(index)?.get(body)
     }
-    /// Returns the newest result: the one of the current parameters, or else the file's.
-    pub fn newest(&self, index: usize, body: usize) -> Option<&Row> {
+    /// Returns the result of the current parameters.
+    pub fn current(&self, index: usize, body: usize) -> Option<&Row> {
         match self.current.get(&index) {
-            Some(rows) => rows.get(body),
-            None => self.recorded(index, body),
+            Some(processed) => processed.rows.get(body),
+            None => self.recorded(index, body).filter(|_| self.recorded_is_current),
         }
+    }
+    /// Returns the result of earlier parameters: the file's, or else the one before the last change.
+    pub fn earlier(&self, index: usize, body: usize) -> Option<&Row> {
+        if self.recorded_is_current {
+            return None;
+        }
+        self.recorded(index, body).or_else(|| self.previous.get(&index)?.get(body))
+    }
+    /// Returns the newest result: the one of the current parameters, or else the one before the last change, or else
+    /// the file's.
+    pub fn newest(&self, index: usize, body: usize) -> Option<&Row> {
+        let before = || self.previous.get(&index).and_then(|rows| rows.get(body));
+        self.current(index, body).or_else(before).or_else(|| self.recorded(index, body))
+    }
+    /// Returns the cause of the newest result.
+    pub fn cause(&self, index: usize, body: usize) -> Option<Cause> {
+        let current = self.current.get(&index).and_then(|p| p.causes.get(body)).copied();
+        current.or_else(|| self.newest(index, body).map(Cause::from_row))
+    }
+    /// Returns the fits of the current parameters.
+    pub fn fits(&self, body: usize) -> impl Iterator<Item = &FitFacts> + Clone {
+        self.current.values().filter_map(move |p| p.fits.get(body)?.as_ref())
     }
     /// Returns the newest results of all pictures and bodies, in order.
     pub fn all(&self) -> impl Iterator<Item = &Row> {
-        (0..self.len()).flat_map(|i| match self.current.get(&i) {
-            Some(rows) => rows.iter(),
-            None => self.recorded.get(i).map(|r| r.iter()).unwrap_or_default(),
-        })
+        let most = (0..self.len()).map(|i| self.bodies(i)).max().unwrap_or(0);
+        (0..self.len()).flat_map(move |i| (0..most).filter_map(move |body| self.newest(i, body)))
+    }
+    fn bodies(&self, index: usize) -> usize {
+        let previous = self.previous.get(&index).map_or(0, Vec::len);
+        let recorded = self.recorded.get(index).map_or(0, Vec::len);
+        self.current.get(&index).map_or(0, |p| p.rows.len()).max(previous).max(recorded)
     }
 
-    /// Returns the next picture after `from` (before it with `back`) whose status is not `ok`. The search wraps around.
-    pub fn next_refused(&self, from: usize, back: bool, body: usize) -> Option<usize> {
+    /// Returns the next picture after `from` (before it with `back`) whose status is not `ok`, within a group if there
+    /// is one. The search wraps around.
+    pub fn next_refused(&self, from: usize, back: bool, body: usize, group: Option<&Group>) -> Option<usize> {
         let n = self.len();
         let nth = |k: usize| if back { (from + n - k % n) % n } else { (from + k) % n };
-        (1..=n).map(nth).find(|&i| self.newest(i, body).is_some_and(|r| r.status != Status::Ok))
+        let wanted = |cause: Cause| group.map_or(cause.status != Status::Ok, |g| cause.is_in(g));
+        (1..=n).map(nth).find(|&i| self.cause(i, body).is_some_and(wanted))
     }
 
     /// Returns the pictures, the worst first: refused pictures, then the others in falling order of `badness`. Pictures
@@ -81,62 +156,43 @@ impl ResultHistory {
         rated.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         rated.into_iter().map(|(i, _)| i).collect()
     }
+
+    /// Compares the current results with those of the other sensor.
+    pub fn compare(&self, body: usize) -> Comparison {
+        let mut comparison = Comparison::default();
+        for index in 0..self.len() {
+            let (Some(a), Some(b)) = (self.current(index, body), self.other(index, body)) else { continue };
+            comparison.pictures += 1;
+            match (a.status == Status::Ok, b.status == Status::Ok) {
+                (false, true) => comparison.better += 1,
+                (true, false) => comparison.worse += 1,
+                (true, true) => {
+                    let apart = a.axis().zip(b.axis()).map_or(0.0, |(a, b)| angle_deg(a, b));
+                    comparison.largest_deg = comparison.largest_deg.max(apart);
+                }
+                (false, false) => {}
+            }
+            if a.status != b.status {
+                comparison.changed.push((index, a.status, b.status));
+            }
+        }
+        comparison
+    }
 }
 
-/// A quantity that can be plotted over time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Quantity {
-    /// Name of the quantity.
-    pub name: &'static str,
-    /// Unit of the quantity.
-    pub unit: &'static str,
-    /// Lines of the plot: the name and the value of each.
-    pub lines: &'static [(&'static str, RowValue)],
-}
-
-/// Function that returns a value of a result, possibly compared with the truth.
-pub type RowValue = fn(&Row, Option<&Truth>) -> Option<f64>;
-
-/// All quantities that can be plotted.
-pub const QUANTITIES: &[Quantity] = &[
-    Quantity {
-        name: "Axis",
-        unit: "",
-        lines: &[("x", |r, _| r.axis_x), ("y", |r, _| r.axis_y), ("z", |r, _| r.axis_z)],
-    },
-    Quantity { name: "3 sigma", unit: "deg", lines: &[("3σ", |r, _| Some(3.0 * r.sigma_max_deg?))] },
-    Quantity {
-        name: "Error",
-        unit: "deg",
-        lines: &[("error", error_deg), ("3σ", |r, t| t.and(Some(3.0 * r.sigma_max_deg?)))],
-    },
-    Quantity { name: "RMS", unit: "px", lines: &[("rms", |r, _| r.rms_px)] },
-    Quantity {
-        name: "Points",
-        unit: "",
-        lines: &[("edge points", |r, _| r.edge_points.map(f64::from)), ("inliers", |r, _| r.inliers.map(f64::from))],
-    },
-    Quantity { name: "Half-angle", unit: "deg", lines: &[("fitted", |r, _| r.half_angle_deg)] },
-    Quantity {
-        name: "Altitude",
-        unit: "km",
-        lines: &[("estimated", |r, _| r.altitude_est_km), ("given", |r, _| r.altitude_km)],
-    },
-    Quantity { name: "Threshold", unit: "counts", lines: &[("threshold", |r, _| r.level.map(f64::from))] },
-    Quantity { name: "Roll, pitch", unit: "deg", lines: &[("roll", |r, _| r.roll_deg), ("pitch", |r, _| r.pitch_deg)] },
-    Quantity { name: "Time", unit: "µs", lines: &[("processing", |r, _| r.elapsed_us)] },
-];
-
-/// Returns the angle between an answer and the truth, in degrees.
-pub fn error_deg(row: &Row, truth: Option<&Truth>) -> Option<f64> {
-    Some(angle_deg(row.axis()?, truth?.axis()?.xyz()))
-}
-
-/// Returns the angle between two directions, in degrees. It is also accurate for small angles.
-pub fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
-    cross.iter().map(|c| c * c).sum::<f64>().sqrt().atan2(dot).to_degrees()
+/// Comparison of two sensors over the sequence.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Comparison {
+    /// Number of pictures with results of both.
+    pub pictures: usize,
+    /// Number of pictures that only the other sensor answers.
+    pub better: usize,
+    /// Number of pictures that only the session answers.
+    pub worse: usize,
+    /// Largest angle between two answers, in degrees.
+    pub largest_deg: f64,
+    /// Pictures whose status differs: index, status of the session, status of the other sensor.
+    pub changed: Vec<(usize, Status, Status)>,
 }
 
 #[cfg(test)]
@@ -163,11 +219,11 @@ mod tests {
     #[test]
     fn refused_frames_are_found_both_ways_around() {
         let rows = rows();
-        assert_eq!(rows.next_refused(1, false, 0), Some(4));
-        assert_eq!(rows.next_refused(4, false, 0), Some(1));
-        assert_eq!(rows.next_refused(0, true, 0), Some(4));
-        assert_eq!(ResultHistory::default().next_refused(0, false, 0), None);
-        assert_eq!(rows.next_refused(0, false, 1), None, "there is no second body");
+        assert_eq!(rows.next_refused(1, false, 0, None), Some(4));
+        assert_eq!(rows.next_refused(4, false, 0, None), Some(1));
+        assert_eq!(rows.next_refused(0, true, 0, None), Some(4));
+        assert_eq!(ResultHistory::default().next_refused(0, false, 0, None), None);
+        assert_eq!(rows.next_refused(0, false, 1, None), None, "there is no second body");
     }
 
     #[test]
@@ -176,29 +232,38 @@ mod tests {
     }
 
     #[test]
-    fn new_results_come_before_the_files_until_cleared() {
+    fn new_results_come_before_earlier_ones() {
         let mut rows = rows();
-        rows.set_current(1, vec![row(1, Some(0.5))]);
+        let processed = |rows| Processed { rows, ..Processed::default() };
+        rows.begin_version(true);
+        assert!(rows.current(0, 0).is_some() && rows.earlier(0, 0).is_none());
+        rows.begin_version(false);
+        assert!(rows.current(0, 0).is_none() && rows.earlier(0, 0).is_some());
+        rows.set_current(1, processed(vec![row(1, Some(0.5))]));
         assert_eq!(rows.newest(1, 0).unwrap().status, Status::Ok);
         assert_eq!(rows.recorded(1, 0).unwrap().status, Status::NoLimb);
-        assert_eq!(rows.next_refused(0, false, 0), Some(4));
-        rows.set_current(7, vec![row(7, None)]);
+        assert_eq!(rows.next_refused(0, false, 0, None), Some(4));
+        rows.set_current(7, processed(vec![row(7, None)]));
         assert_eq!((rows.len(), rows.all().count()), (8, 6));
-        rows.clear_current();
-        assert_eq!((rows.next_refused(0, false, 0), rows.len()), (Some(1), 5));
+        // After another change, the results so far are the earlier ones.
+        rows.begin_version(false);
+        assert_eq!(rows.current_len(), 0);
+        assert!(rows.current(1, 0).is_none() && rows.current(7, 0).is_none());
+        assert_eq!(rows.newest(1, 0).unwrap().status, Status::Ok);
+        assert_eq!(rows.earlier(7, 0).unwrap().status, Status::NoLimb);
     }
 
     #[test]
-    fn small_angles_are_exact() {
-        let e = 1e-9f64;
-        assert!((angle_deg([0.0, 0.0, 1.0], [e.sin(), 0.0, e.cos()]) / e.to_degrees() - 1.0).abs() < 1e-6);
-        assert!((angle_deg([1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]) - 180.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn every_quantity_has_a_line_and_an_own_name() {
-        let names: std::collections::HashSet<_> = QUANTITIES.iter().map(|q| q.name).collect();
-        assert_eq!(names.len(), QUANTITIES.len());
-        assert!(QUANTITIES.iter().all(|q| !q.lines.is_empty()));
+    fn two_sensors_are_compared_over_all_pictures() {
+        let mut rows = rows();
+        rows.begin_version(true);
+        for (i, sigma) in [Some(0.1), Some(0.1), None, Some(0.2)].into_iter().enumerate() {
+            rows.set_other(i, vec![row(i as u64, sigma)]);
+        }
+        let comparison = rows.compare(0);
+        assert_eq!((comparison.pictures, comparison.better, comparison.worse), (4, 1, 1));
+        assert_eq!(comparison.changed, [(1, Status::NoLimb, Status::Ok), (2, Status::Ok, Status::NoLimb)]);
+        rows.clear_other();
+        assert_eq!(rows.compare(0), Comparison::default());
     }
 }

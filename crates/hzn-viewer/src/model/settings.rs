@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Number of recent files that are offered.
 const MAX_RECENT: usize = 8;
 /// Titles of plots in settings of older versions, and their titles now.
-const OLD_PLOTS: [(&str, &str); 1] = [("Level", "Threshold")];
+const OLD_PLOTS: [(&str, &str); 3] = [("Level", "Threshold"), ("Error", "Error (truth)"), ("Time", "Processing")];
 
 /// Display of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -20,17 +20,44 @@ pub enum Look {
     Grey,
     /// Lit or dark pixels.
     Level,
+    /// Brightness as colours, for infrared pictures and for small differences.
+    FalseColour,
+}
+
+/// Range of brightness that is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Contrast {
+    /// Pictures with more than 8 bits are stretched, because they use a small part of their range.
+    #[default]
+    ByDepth,
+    /// Every picture is stretched to the range of its pixels.
+    Stretched,
+    /// Every picture is shown from 0 to full scale.
+    Full,
+}
+
+impl Contrast {
+    /// Returns true if a picture with this number of bits is stretched.
+    pub const fn stretches(self, bits: u8) -> bool {
+        match self {
+            Self::ByDepth => bits > 8,
+            Self::Stretched => true,
+            Self::Full => false,
+        }
+    }
 }
 
 impl Look {
     /// All looks.
-    pub const ALL: [Self; 3] = [Self::Colour, Self::Grey, Self::Level];
+    pub const ALL: [Self; 4] = [Self::Colour, Self::Grey, Self::Level, Self::FalseColour];
     /// Returns the name on the screen.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Colour => "Colour",
             Self::Grey => "Grey",
             Self::Level => "Threshold",
+            Self::FalseColour => "False colour",
         }
     }
 }
@@ -100,10 +127,16 @@ pub struct Settings {
     pub dark: bool,
     /// Display of the picture.
     pub look: Look,
+    /// Range of brightness that is shown.
+    pub contrast: Contrast,
+    /// Exponent of the display: above 1, dark parts are brighter.
+    pub gamma: f32,
     /// The picture is shown without the distortion of the lens.
     pub undistorted: bool,
     /// Layers that are drawn over the picture.
     pub layers: Vec<Layer>,
+    /// The column with the answer is shown.
+    pub answer: bool,
     /// The panel of stages is shown.
     pub stages: bool,
     /// The panel of plots is shown.
@@ -127,6 +160,8 @@ impl Default for Settings {
         Self {
             dark: true,
             look: Look::Colour,
+            contrast: Contrast::ByDepth,
+            gamma: 1.0,
             undistorted: false,
             layers: vec![
                 Layer::Edges,
@@ -138,6 +173,7 @@ impl Default for Settings {
                 Layer::Mask,
                 Layer::Circle,
             ],
+            answer: true,
             stages: true,
             plots: true,
             plotted: ["3 sigma", "RMS"].map(str::to_owned).to_vec(),
@@ -145,7 +181,7 @@ impl Default for Settings {
             window: [1440.0, 900.0],
             side_width: 208.0,
             stages_width: 364.0,
-            plots_height: 206.0,
+            plots_height: 262.0,
         }
     }
 }
@@ -221,7 +257,7 @@ mod tests {
         let old = Settings::load(&path);
         assert_eq!((old.look, old.plotted), (Look::Level, vec!["Threshold".to_owned(), "RMS".to_owned()]));
         for (_, now) in OLD_PLOTS {
-            assert!(crate::model::rows::QUANTITIES.iter().any(|q| q.name == now), "{now}");
+            assert!(crate::model::quantity::QUANTITIES.iter().any(|q| q.name == now), "{now}");
         }
         std::fs::write(&path, "no json").unwrap();
         assert_eq!(Settings::load(&path), Settings::default());

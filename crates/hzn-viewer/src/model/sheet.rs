@@ -72,16 +72,41 @@ impl Sheet {
     /// Returns the lines that differ from `other`: the lines of `other` with a `-`, and the lines of this text with a
     /// `+`.
     pub fn diff(&self, other: &Self) -> Vec<String> {
+        self.diff_by_section(other).into_iter().flat_map(|(_, lines)| lines).collect()
+    }
+
+    /// Returns the same lines as [`Self::diff`], with the header of the section that they are in. The header is empty
+    /// at the top of the file.
+    pub fn diff_by_section(&self, other: &Self) -> Vec<(String, Vec<String>)> {
         let (old, new): (Vec<&str>, Vec<&str>) = (other.0.lines().collect(), self.0.lines().collect());
-        let mut out = Vec::new();
+        let (old_sections, new_sections) = (section_of_lines(&old), section_of_lines(&new));
+        let mut out: Vec<(String, Vec<String>)> = Vec::new();
+        let mut add = |section: &str, line: String| match out.last_mut() {
+            Some((last, lines)) if last == section => lines.push(line),
+            _ => out.push((section.to_owned(), vec![line])),
+        };
         let (mut i, mut j) = (0, 0);
         for (a, b) in common_lines(&old, &new).into_iter().chain([(old.len(), new.len())]) {
-            out.extend(old.get(i..a).unwrap_or_default().iter().map(|l| format!("-{l}")));
-            out.extend(new.get(j..b).unwrap_or_default().iter().map(|l| format!("+{l}")));
+            (i..a).for_each(|k| add(old_sections[k], format!("-{}", old[k])));
+            (j..b).for_each(|k| add(new_sections[k], format!("+{}", new[k])));
             (i, j) = (a + 1, b + 1);
         }
         out
     }
+}
+
+/// Returns the header of the section that each line is in. A header is in its own section.
+fn section_of_lines<'a>(lines: &[&'a str]) -> Vec<&'a str> {
+    let mut section = "";
+    let header =
+        |line: &&'a str| line.trim_start().starts_with('[').then(|| line.split('#').next().unwrap_or("").trim());
+    lines
+        .iter()
+        .map(|line| {
+            section = header(line).unwrap_or(section);
+            section
+        })
+        .collect()
 }
 
 /// Returns the indices of a longest common subsequence of lines, in both texts.
@@ -180,6 +205,18 @@ mod tests {
         assert!(back.diff(&Sheet::new(TEXT)).is_empty());
         let preset = back.with_value(key("", "preset"), Some("sun".into())).unwrap();
         assert_eq!(preset.text(), TEXT.replace("\"hzn\"", "\"sun\""));
+    }
+
+    #[test]
+    fn changed_lines_are_below_their_sections() {
+        let sheet = Sheet::new(TEXT).with_value(key("reject", "threshold_px"), Some(4.5.into())).unwrap();
+        let sheet = sheet.with_value(key("gate", "max_mean"), Some(0.5.into())).unwrap();
+        let diff = sheet.diff_by_section(&Sheet::new(TEXT));
+        let sections: Vec<&str> = diff.iter().map(|(section, _)| section.as_str()).collect();
+        // The empty line before a new section belongs to the section before it.
+        assert_eq!(sections, ["[reject]", "[body]", "[gate]"]);
+        assert_eq!(diff[0].1.len(), 2);
+        assert!(diff[2].1.contains(&"+max_mean = 0.5".to_owned()));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use egui::{RichText, Ui, vec2};
 
 use super::viewer::Viewer;
-use crate::model::rows;
+use crate::model::quantity;
 use crate::work::frame_view::BodyResult;
 
 /// Function that returns the text of a column in one line of the table.
@@ -18,7 +18,8 @@ struct Column {
 }
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
-    let Some((name, other)) = &viewer.other else { return };
+    let Some((name, other)) = viewer.other.clone() else { return };
+    let (name, other) = (name.as_str(), &other);
     let answers = |frame_view: &crate::work::FrameView| {
         [0, 1].map(|i| frame_view.answers.get(i)?.bodies.get(viewer.body).cloned())
     };
@@ -26,7 +27,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         Some([Some(a), Some(b)]) => columns(&a, &b),
         _ => Vec::new(),
     };
-    let mut stop = false;
+    let (mut stop, mut go) = (false, None);
     egui::Panel::top("compare").resizable(false).show(ui, |ui| {
         ui.add_space(4.0);
         ui.horizontal(|ui| {
@@ -39,11 +40,47 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             });
         });
         egui::ScrollArea::horizontal().show(ui, |ui| table(ui, name, &columns));
+        go = over_sequence(viewer, ui);
         ui.add_space(4.0);
     });
     if stop {
         viewer.other = None;
     }
+    if let Some(frame) = go {
+        viewer.go(frame);
+    }
+}
+
+/// Draws the comparison over all pictures. Returns the picture that was clicked.
+fn over_sequence(viewer: &Viewer, ui: &mut Ui) -> Option<usize> {
+    if viewer.sequence.len() < 2 {
+        return None;
+    }
+    let comparison = viewer.rows.compare(viewer.body);
+    let all = viewer.sequence.len();
+    ui.label(
+        RichText::new(format!(
+            "{} of {all} frames compared: {} more answers, {} fewer; answers differ by up to {:.4}°",
+            comparison.pictures, comparison.better, comparison.worse, comparison.largest_deg
+        ))
+        .size(12.5),
+    );
+    let mut go = None;
+    if comparison.changed.is_empty() {
+        return None;
+    }
+    let title = format!("Frames whose status differs ({})", comparison.changed.len());
+    egui::CollapsingHeader::new(RichText::new(title).size(12.5)).show(ui, |ui| {
+        egui::ScrollArea::vertical().max_height(110.0).show(ui, |ui| {
+            for (index, ours, theirs) in &comparison.changed {
+                let name = viewer.sequence.entries.get(*index).map_or("", |e| &e.name);
+                if ui.link(RichText::new(format!("{} {name}: {ours} → {theirs}", index + 1)).size(12.0)).clicked() {
+                    go = Some(*index);
+                }
+            }
+        });
+    });
+    go
 }
 
 fn table(ui: &mut Ui, name: &str, columns: &[Column]) {
@@ -72,7 +109,7 @@ fn difference(x: f64, digits: usize) -> String {
 
 fn columns(a: &BodyResult, b: &BodyResult) -> Vec<Column> {
     let angle = match (a.row.axis(), b.row.axis()) {
-        (Some(x), Some(y)) => format!("{:.4}° apart", rows::angle_deg(x, y)),
+        (Some(x), Some(y)) => format!("{:.4}° apart", quantity::angle_deg(x, y)),
         _ => String::new(),
     };
     let [session, other] = [a, b].map(|answer| answer.row.status.name().to_owned());

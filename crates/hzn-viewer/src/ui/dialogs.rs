@@ -5,15 +5,18 @@ use std::path::Path;
 use egui::{Key, RichText};
 
 use super::path_dialog::Purpose;
+use super::theme;
 use super::viewer::Viewer;
-use crate::model::sheet::Sheet;
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     diff(viewer, ctx);
     let Some(path_dialog) = &mut viewer.path_dialog else { return };
+    if path_dialog.is_hidden() {
+        return ctx.request_repaint_after(std::time::Duration::from_millis(100));
+    }
     let (mut accepted, mut closed) = (false, false);
     let response = egui::Modal::new(egui::Id::unique("path_dialog")).show(ctx, |ui| {
-        ui.set_width(560.0);
+        ui.set_width(560.0_f32.min(ctx.content_rect().width() - 60.0));
         ui.heading(path_dialog.purpose.title());
         ui.weak(path_dialog.purpose.hint());
         ui.add_space(6.0);
@@ -52,26 +55,31 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     if accepted {
         viewer.accept_path();
     } else if closed || response.should_close() {
-        viewer.path_dialog = None;
+        viewer.cancel_path();
     }
 }
 
-/// Shows the differences from the saved file.
+/// Shows the differences from the saved file, below the headings of their sections.
 fn diff(viewer: &mut Viewer, ctx: &egui::Context) {
     if !viewer.showing_diff {
         return;
     }
     let Some(session) = &viewer.session else { return };
-    let lines = Sheet::diff(session.sheet(), session.saved());
+    let sections = session.sheet().diff_by_section(session.saved());
     let mut open = true;
-    egui::Window::new("Changes against the file").open(&mut open).default_width(560.0).show(ctx, |ui| {
-        if lines.is_empty() {
+    egui::Window::new("Unsaved changes").open(&mut open).default_width(520.0).show(ctx, |ui| {
+        if sections.is_empty() {
             ui.label("Nothing has changed.");
         }
+        let dark = ui.visuals().dark_mode;
         egui::ScrollArea::vertical().max_height(400.0).show(ui, |ui| {
-            for line in &lines {
-                let colour = if line.starts_with('+') { super::theme::INLIER } else { super::theme::REJECTED };
-                ui.add(egui::Label::new(RichText::new(line).monospace().color(colour)).wrap());
+            for (section, lines) in &sections {
+                ui.strong(if section.is_empty() { "top of the file" } else { section });
+                for line in lines {
+                    let colour = theme::diff(line.starts_with('+'), dark);
+                    ui.add(egui::Label::new(RichText::new(line).monospace().color(colour)).wrap());
+                }
+                ui.add_space(4.0);
             }
         });
     });

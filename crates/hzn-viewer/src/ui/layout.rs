@@ -2,8 +2,12 @@
 
 use std::path::PathBuf;
 
+use super::panels::Panel;
 use super::viewer::Viewer;
-use super::{command, compare, dialogs, help, picture, plots, side, stages, theme, timeline, top};
+use super::{
+    command, compare, dialogs, help, picture, plots, questions, side, stages, study, theme, timeline, toasts, top,
+    wizard,
+};
 
 impl Viewer {
     /// Draws the window.
@@ -15,6 +19,7 @@ impl Viewer {
         }
         ctx.set_theme(if self.settings.dark { egui::Theme::Dark } else { egui::Theme::Light });
         self.poll(&ctx);
+        self.watch_close(&ctx);
         for command in command::pressed(&ctx) {
             self.run(command, &ctx);
         }
@@ -24,23 +29,45 @@ impl Viewer {
         }
         // The answer is computed while the panels are laid out.
         self.request_frame();
+        self.panels.set_size(ctx.content_rect().size());
         top::show(self, ui);
-        timeline::show(self, ui);
-        if self.settings.plots {
-            plots::show(self, ui);
-        }
-        side::show(self, ui);
-        if self.settings.stages {
-            stages::show(self, ui);
+        // The welcome page has nothing to play, to plot or to tune.
+        let is_open = !self.sequence.title.is_empty();
+        if is_open {
+            self.show_panels(ui);
         }
         // A quick answer to a change in the panels is shown in this frame of the window.
         self.request_frame();
         self.wait(&ctx);
         compare::show(self, ui);
-        picture::show(self, ui);
+        let rect = picture::show(self, ui);
+        if is_open && self.panels.stages_float() && self.panels.shows(Panel::Stages, &self.settings) {
+            stages::show_over(self, &ctx, rect);
+        }
+        toasts::show(self, &ctx, rect);
         dialogs::show(self, &ctx);
+        questions::show(self, &ctx);
+        wizard::show(self, &ctx);
+        study::show(self, &ctx);
         help::show(self, &ctx);
         self.advance(&ctx);
+        self.drive_background(&ctx);
+        self.autosave(&ctx);
+        self.close_if_due(&ctx);
         self.request_frame();
+    }
+
+    /// Draws the panels around the picture.
+    fn show_panels(&mut self, ui: &mut egui::Ui) {
+        timeline::show(self, ui);
+        if self.panels.shows(Panel::Plots, &self.settings) {
+            plots::show(self, ui);
+        }
+        if self.panels.shows(Panel::Answer, &self.settings) {
+            side::show(self, ui);
+        }
+        if !self.panels.stages_float() && self.panels.shows(Panel::Stages, &self.settings) {
+            stages::show(self, ui);
+        }
     }
 }

@@ -4,6 +4,7 @@ use egui::{ComboBox, Id, RichText, Slider, SliderClamping, Ui, vec2};
 use hzn_calib::keys::{self, Key, Limits};
 use toml_edit::Value;
 
+use super::camera_card;
 use super::viewer::Viewer;
 use crate::model::{Session, SliderRange};
 
@@ -11,7 +12,7 @@ use crate::model::{Session, SliderRange};
 const NAME_WIDTH: f32 = 136.0;
 
 /// Draws one key of sensor.toml.
-pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
+pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, key: &'static Key) {
     let body = viewer.body;
     let Some(session) = &mut viewer.session else { return };
     if matches!(key.path, "mask.polygons_px" | "camera.file" | "camera.camera") {
@@ -23,22 +24,47 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, key: &Key) {
         return;
     }
     let hint = hint(key);
-    ui.horizontal(|ui| {
+    let focused = viewer.focus_key == Some(key.path);
+    let linked = viewer.linked_focal;
+    let mut sweep = false;
+    let is_number = SliderRange::from_limits(&key.limits, 1.0).is_some() && key.section() != "camera";
+    let row = ui.horizontal(|ui| {
         let layout = egui::Layout::left_to_right(egui::Align::Center);
         let name = ui
             .allocate_ui_with_layout(vec2(NAME_WIDTH, 18.0), layout, |ui| {
                 ui.set_min_width(NAME_WIDTH);
-                ui.add(egui::Label::new(RichText::new(key.name()).size(12.5)).truncate())
+                let label = egui::Label::new(RichText::new(key.name()).size(12.5)).truncate();
+                ui.add(label.sense(egui::Sense::click()))
             })
             .inner
             .on_hover_text(&hint);
-        value(session, ui, key, body, name.id, &hint);
+        name.context_menu(|ui| {
+            let entry = egui::Button::new(format!("Sweep {} over the sequence…", key.path));
+            sweep = ui.add_enabled(is_number, entry).clicked();
+        });
+        value(session, ui, key, body, name.id, &hint, linked);
         restore(session, ui, key, body);
     });
+    if focused {
+        mark(viewer, ui, &row.response);
+    }
+    if sweep {
+        super::study::open(viewer, key);
+    }
+}
+
+/// Marks the key that a link named, and scrolls to it. The mark goes with the next click.
+fn mark(viewer: &mut Viewer, ui: &Ui, row: &egui::Response) {
+    let colour = super::theme::warning(ui.visuals().dark_mode);
+    ui.painter().rect_stroke(row.rect.expand(2.0), 4, egui::Stroke::new(1.5, colour), egui::StrokeKind::Outside);
+    row.scroll_to_me(Some(egui::Align::Center));
+    if ui.input(|i| i.pointer.any_pressed()) {
+        viewer.focus_key = None;
+    }
 }
 
 /// Draws the value of a key in the form that belongs to its type and its limits.
-fn value(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, name: Id, hint: &str) {
+fn value(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, name: Id, hint: &str, linked: bool) {
     let value = session.value(key.section(), key.name(), body).cloned();
     match (&key.limits, &value) {
         (Limits::Choice, Some(toml::Value::String(current))) => choice(session, ui, key, body, current, name, hint),
@@ -50,7 +76,7 @@ fn value(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, name: Id, h
             }
         }
         (limits, Some(toml::Value::Float(_) | toml::Value::Integer(_))) => {
-            number(session, ui, key, body, limits, name, hint);
+            number(session, ui, key, body, limits, name, hint, linked);
         }
         (Limits::Number { .. }, None) => {
             // The key is not in the text; a click sets a first value.
@@ -61,6 +87,9 @@ fn value(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, name: Id, h
                 session.set_number(key, body, range.middle());
                 session.end_step();
             }
+        }
+        (_, Some(toml::Value::Array(values))) if key.path == "camera.k" || !values.is_empty() => {
+            array(session, ui, key, body, values, hint);
         }
         (_, Some(other)) => {
             let text = other.to_string();
@@ -89,7 +118,53 @@ fn choice(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, current: &
         .on_hover_text(hint);
 }
 
-fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &Limits, name: Id, hint: &str) {
+/// Draws a list of numbers, each of which can be edited. The coefficients of a lens can be added and removed.
+fn array(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, values: &[toml::Value], hint: &str) {
+    let number = |v: &toml::Value| v.as_float().or(v.as_integer().map(|n| n as f64));
+    let Some(mut numbers) = values.iter().map(number).collect::<Option<Vec<f64>>>() else {
+        ui.add(egui::Label::new(RichText::new(format!("{} entries", values.len())).size(12.0)).truncate());
+        return;
+    };
+    let before = numbers.clone();
+    let mut ended = false;
+    ui.vertical(|ui| {
+        for (i, x) in numbers.iter_mut().enumerate() {
+            let speed = (x.abs() * 0.005).max(1e-5);
+            let drag = egui::DragValue::new(x).speed(speed).max_decimals(8).prefix(format!("{} ", i + 1));
+            let response = ui.add(drag).on_hover_text(hint);
+            let name = format!("{} {}", key.name(), i + 1);
+            response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, &name));
+            ended |= response.lost_focus();
+        }
+        if key.path == "camera.k" {
+            ui.horizontal(|ui| {
+                if ui.small_button("Add").on_hover_text("Adds a coefficient of 0").clicked() {
+                    numbers.push(0.0);
+                }
+                if !numbers.is_empty() && ui.small_button("Remove").clicked() {
+                    numbers.pop();
+                }
+            });
+        }
+    });
+    if numbers != before {
+        session.set(key.section(), key.name(), body, Some(Value::from_iter(numbers)));
+    }
+    if ended {
+        session.end_step();
+    }
+}
+
+fn number(
+    session: &mut Session,
+    ui: &mut Ui,
+    key: &Key,
+    body: usize,
+    limits: &Limits,
+    name: Id,
+    hint: &str,
+    linked: bool,
+) {
     let Some(mut x) = session.number(key.section(), key.name(), body) else { return };
     let before = x;
     let is_whole = matches!(session.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)));
@@ -116,8 +191,10 @@ fn number(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, limits: &L
         }
     };
     let response = response.labelled_by(name).on_hover_text(hint);
-    if x != before {
-        session.set_number(key, body, x);
+    match key.path {
+        _ if x == before => {}
+        "camera.fx_px" | "camera.fy_px" if x > 0.0 => camera_card::set_focal(session, key.name(), x, linked),
+        _ => session.set_number(key, body, x),
     }
     if response.lost_focus() {
         session.end_step();

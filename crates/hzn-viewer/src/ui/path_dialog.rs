@@ -1,6 +1,7 @@
-//! The dialog for paths: a line to type a path into, and a button that opens the dialog of the system.
+//! The dialog for paths: the dialog of the system, or a line to type a path into.
 
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, bounded};
 
@@ -54,11 +55,27 @@ pub(super) struct PathDialog {
     pub(super) browsing: Option<Receiver<Option<PathBuf>>>,
     /// The field of the path takes the focus when it is drawn next.
     pub(super) focus: bool,
+    /// The system's dialog is the only one: the field of the path is not drawn.
+    pub(super) native: Option<Instant>,
 }
+
+/// Answer of the system's dialog.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// There is none yet, or the path is in the field and the user checks it.
+    Open,
+    /// The path can be used at once.
+    Accepted,
+    /// The user left the dialog.
+    Cancelled,
+}
+
+/// Time below which no person leaves a dialog: the system has no dialog, so the path is typed.
+const NO_DIALOG: Duration = Duration::from_millis(300);
 
 impl PathDialog {
     pub(super) fn new(purpose: Purpose, start: &Path) -> Self {
-        Self { purpose, text: start.display().to_string(), browsing: None, focus: true }
+        Self { purpose, text: start.display().to_string(), browsing: None, focus: true, native: None }
     }
 
     /// Opens the system's dialog on a separate thread, because it stays open as long as the user wants.
@@ -84,13 +101,30 @@ impl PathDialog {
         self.browsing = Some(receive);
     }
 
-    /// Takes the answer of the system's dialog into the text. Returns true if there is a path that can be used at once:
-    /// a path for writing is shown first, so that the user can check it.
-    pub(super) fn take_answer(&mut self) -> bool {
-        let Some(answer) = self.browsing.as_ref().and_then(|b| b.try_recv().ok()) else { return false };
+    /// Opens the system's dialog without the field of the path.
+    pub(super) fn browse_only(&mut self, folder: bool) {
+        self.native = Some(Instant::now());
+        self.browse(folder);
+    }
+
+    /// Returns true while only the system's dialog is open.
+    pub(super) fn is_hidden(&self) -> bool {
+        self.native.is_some() && self.browsing.is_some()
+    }
+
+    /// Takes the answer of the system's dialog into the text. Without the system's dialog alone, a path for writing is
+    /// shown first, so that the user can check it; the system's dialog itself asks before it replaces a file.
+    pub(super) fn take_answer(&mut self) -> Answer {
+        let Some(answer) = self.browsing.as_ref().and_then(|b| b.try_recv().ok()) else { return Answer::Open };
         self.browsing = None;
-        let Some(path) = answer else { return false };
-        self.text = path.display().to_string();
-        !self.purpose.writes()
+        let native = self.native.take();
+        match (answer, native) {
+            (Some(path), _) => {
+                self.text = path.display().to_string();
+                if native.is_some() || !self.purpose.writes() { Answer::Accepted } else { Answer::Open }
+            }
+            (None, Some(since)) if since.elapsed() > NO_DIALOG => Answer::Cancelled,
+            (None, _) => Answer::Open,
+        }
     }
 }

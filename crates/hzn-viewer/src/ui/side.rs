@@ -3,15 +3,18 @@
 use egui::{Color32, RichText, Ui, vec2};
 use hzn_core::status::Status;
 
+use super::panels::Panel;
 use super::viewer::Viewer;
-use super::{Command, facts, theme};
-use crate::model::rows;
-use crate::model::settings::{Layer, Look};
+use super::{Command, camera_card, facts, theme};
+use crate::model::quantity;
+use crate::model::settings::{Contrast, Layer, Look};
 use crate::work::frame_view::{BodyResult, FrameView};
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
-    let width = viewer.settings.side_width;
-    let shown = egui::Panel::left("side").default_size(width).size_range(180.0..=360.0).show(ui, |ui| {
+    // At most a quarter of a small window goes to this column.
+    let most = (ui.ctx().content_rect().width() * 0.25).clamp(160.0, 360.0);
+    let width = viewer.settings.side_width.min(most);
+    let shown = egui::Panel::left("side").default_size(width).size_range(160.0..=most).show(ui, |ui| {
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             ui.add_space(6.0);
             answer(viewer, ui);
@@ -24,23 +27,73 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     viewer.settings.side_width = shown.response.rect.width();
 }
 
-fn answer(viewer: &Viewer, ui: &mut Ui) {
-    let Some(frame_view) = &viewer.frame_view else { return };
-    let answer = viewer.answer();
+/// Draws a status as a badge.
+fn badge(ui: &mut Ui, text: &str, colour: Color32) {
+    let text = RichText::new(text).strong().size(16.0).color(theme::text_on(colour));
+    egui::Frame::new().fill(colour).corner_radius(5).inner_margin(egui::Margin::symmetric(10, 4)).show(ui, |ui| {
+        ui.label(text);
+    });
+}
+
+fn small(ui: &mut Ui, text: &str) {
+    ui.add(egui::Label::new(RichText::new(text).size(12.0)).wrap());
+}
+
+/// Draws what is wrong with the sensor.toml or with the size of the picture, and the cure. Returns true if there is no
+/// answer for this reason.
+fn trouble(viewer: &mut Viewer, ui: &mut Ui) -> bool {
+    let problem = viewer.session.as_ref().and_then(|s| s.problem()).cloned();
+    if let (Some(problem), Some(session)) = (problem, &mut viewer.session) {
+        badge(ui, "invalid sensor.toml", theme::status(Status::Unreadable));
+        small(ui, &problem.to_string());
+        // A field is named as `[section] key`.
+        let named = problem.field.as_deref().and_then(|field| field.strip_prefix('[')?.split_once("] "));
+        ui.horizontal_wrapped(|ui| {
+            if session.is_changed() && ui.button("Undo").clicked() {
+                session.undo();
+            }
+            if let Some((section, name)) = named
+                && ui.button(format!("Remove {section}.{name}")).on_hover_text("The default applies then").clicked()
+            {
+                session.set(section, name, viewer.body, None);
+                session.end_step();
+            }
+        });
+        if session.config().is_none() {
+            return true;
+        }
+    }
+    let refused = viewer.frame_view.as_ref().and_then(|f| Some((f.answers.first()?.refused.clone()?, f.size()?)));
+    let Some((why, [w, h])) = refused else { return false };
+    badge(ui, "wrong size", theme::status(Status::Unreadable));
+    small(ui, &why);
+    if let Some(session) = &mut viewer.session
+        && ui.button(format!("Scale the camera to {w:.0} × {h:.0}")).clicked()
+    {
+        camera_card::scale_to(session, [w as u32, h as u32]);
+    }
+    true
+}
+
+fn answer(viewer: &mut Viewer, ui: &mut Ui) {
+    if trouble(viewer, ui) {
+        return;
+    }
+    let Some(frame_view) = viewer.frame_view.clone() else { return };
+    let shared = viewer.answer().cloned();
+    let answer = shared.as_ref();
     let status = match (&frame_view.picture, answer) {
         (Err(_), _) => Some(Status::Unreadable),
         (_, Some(answer)) => Some(answer.row.status),
         _ => None,
     };
     if let Some(status) = status {
-        let colour = theme::status(status);
-        let text = RichText::new(status.name()).strong().size(16.0).color(theme::text_on(colour));
-        egui::Frame::new().fill(colour).corner_radius(5).inner_margin(egui::Margin::symmetric(10, 4)).show(ui, |ui| {
-            ui.label(text);
-        });
+        badge(ui, status.name(), theme::status(status));
         if status != Status::Ok {
-            for line in detail(frame_view, answer) {
-                ui.add(egui::Label::new(RichText::new(line).size(12.0)).wrap());
+            detail(&frame_view, answer).iter().for_each(|line| small(ui, line));
+            let hint = "Shows the diagnosis among the stages";
+            if answer.is_some() && ui.link("Why, and what to do").on_hover_text(hint).clicked() {
+                viewer.panels.open(Panel::Stages, &mut viewer.settings);
             }
         }
     }
@@ -57,9 +110,9 @@ fn answer(viewer: &Viewer, ui: &mut Ui) {
             }
             row("3σ", format!("{:.4}°", 3.0 * s.covariance.sigma_max_rad().to_degrees()));
             if let Some(truth) = viewer.truth_of(&frame_view.name, &answer.row.body)
-                && let Some(error) = rows::error_deg(&answer.row, Some(truth))
+                && let Some(error) = quantity::error_deg(&answer.row, Some(truth))
             {
-                row("error", format!("{error:.4}°"));
+                row("error (truth)", format!("{error:.4}°"));
             }
             row("RMS", format!("{:.3} px", s.rms_px));
             row("inliers", s.inliers.to_string());
@@ -69,7 +122,7 @@ fn answer(viewer: &Viewer, ui: &mut Ui) {
                 row("pitch", format!("{pitch:.3}°"));
             }
         }
-        row("time", format!("{:.0} µs", answer.elapsed.as_nanos() as f64 / 1e3));
+        row("processing", format!("{:.0} µs", answer.elapsed.as_nanos() as f64 / 1e3));
         let recorded = viewer.rows.recorded(frame_view.index, viewer.body);
         if let Some(change) = recorded.and_then(|r| change(r, answer)) {
             row("moved", change);
@@ -81,7 +134,7 @@ fn answer(viewer: &Viewer, ui: &mut Ui) {
 fn change(recorded: &hzn_mcap::Row, answer: &BodyResult) -> Option<String> {
     match (recorded.axis(), answer.row.axis()) {
         (Some(a), Some(b)) => {
-            let angle = rows::angle_deg(a, b);
+            let angle = quantity::angle_deg(a, b);
             (angle > 1e-9).then(|| format!("{angle:.4}°"))
         }
         (None, Some(_)) => Some("answered now".into()),
@@ -90,27 +143,41 @@ fn change(recorded: &hzn_mcap::Row, answer: &BodyResult) -> Option<String> {
     }
 }
 
-/// Returns why there is no answer, and the first advice.
+/// Returns why there is no answer, in numbers where there are some.
 fn detail(frame_view: &FrameView, answer: Option<&BodyResult>) -> Vec<String> {
     match (&frame_view.picture, answer) {
         (Err(why), _) => vec![why.clone()],
         (_, Some(answer)) => {
-            let tips = answer.report.as_ref().map(hzn_run::explain::tips).unwrap_or_default();
-            let tip = tips.first().map(|tip| format!("Try: {tip}"));
-            [facts::shorten_detail(&answer.row.detail)].into_iter().chain(tip).collect()
+            let fit = answer.fit.map(|fit| {
+                let (fitted, expected) = (fit.fitted_deg, fit.expected_deg);
+                format!("half-angle {fitted:.2}° fitted, {expected:.2}° expected: {:+.1} σ", fit.sigmas)
+            });
+            [facts::shorten_detail(&answer.row.detail)].into_iter().chain(fit).collect()
         }
         _ => Vec::new(),
     }
 }
 
 fn look(viewer: &mut Viewer, ui: &mut Ui) {
-    ui.horizontal(|ui| {
-        for (look, command) in Look::ALL.into_iter().zip([Command::Colour, Command::Grey, Command::Level]) {
+    let bits = viewer.frame_view.as_ref().and_then(|f| Some(f.picture.as_ref().ok()?.layout.bits));
+    ui.horizontal_wrapped(|ui| {
+        let commands = [Command::Colour, Command::Grey, Command::Level, Command::FalseColour];
+        for (look, command) in Look::ALL.into_iter().zip(commands) {
             let hint = format!("{} ({})", command.name(), command.key(ui.ctx()));
             if ui.selectable_label(viewer.settings.look == look, look.name()).on_hover_text(hint).clicked() {
                 viewer.settings.look = look;
             }
         }
+    });
+    let mut stretched = viewer.settings.contrast.stretches(bits.unwrap_or(8));
+    let hint = "Shows the darkest pixels black and the brightest white; the sensor sees the picture as it is";
+    if ui.checkbox(&mut stretched, "Auto contrast").on_hover_text(hint).changed() {
+        viewer.settings.contrast = if stretched { Contrast::Stretched } else { Contrast::Full };
+    }
+    ui.horizontal(|ui| {
+        let label = ui.label("gamma");
+        let drag = egui::DragValue::new(&mut viewer.settings.gamma).range(0.3..=4.0).speed(0.02).max_decimals(2);
+        ui.add(drag).labelled_by(label.id).on_hover_text("Above 1, dark parts are shown brighter");
     });
     let hint = format!("As a pinhole would see it ({})", Command::Undistorted.key(ui.ctx()));
     ui.checkbox(&mut viewer.settings.undistorted, "Undistorted").on_hover_text(hint);

@@ -7,45 +7,69 @@ use hzn_core::status::Status;
 
 use super::facts::{self, CARDS, Card};
 use super::viewer::Viewer;
-use super::{Command, parameters, theme};
+use super::{Command, camera_card, diagnosis, histogram, parameters, theme};
 use crate::work::frame_view::{BodyResult, Outcome};
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let width = viewer.settings.stages_width;
     let shown = egui::Panel::right("stages").default_size(width).size_range(300.0..=640.0).show(ui, |ui| {
-        header(viewer, ui);
-        ui.separator();
-        if viewer.session.is_none() {
-            return show_missing_sensor(viewer, ui);
-        }
-        egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            // The answer is shared, not copied, because it holds thousands of points.
-            let outcome = viewer.frame_view.as_ref().and_then(|s| s.answers.first().cloned());
-            for card in CARDS {
-                show_card(viewer, ui, card, outcome.as_deref());
-            }
-            ui.add_space(8.0);
-        });
-        // Releasing a slider ends its step.
-        if ui.input(|i| i.pointer.any_released())
-            && let Some(session) = &mut viewer.session
-            && viewer.mask.is_none()
-        {
-            session.end_step();
-        }
+        contents(viewer, ui);
     });
     viewer.settings.stages_width = shown.response.rect.width();
+}
+
+/// Draws the column over the picture, at its right, because a narrow window has no room next to it.
+pub(super) fn show_over(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect) {
+    let rect = picture.shrink(6.0);
+    let size = vec2(340.0_f32.min(rect.width()), rect.height());
+    let area = egui::Area::new(egui::Id::unique("stages over")).order(egui::Order::Middle);
+    area.pivot(egui::Align2::RIGHT_TOP).fixed_pos(rect.right_top()).show(ctx, |ui| {
+        let frame = egui::Frame::window(ui.style()).inner_margin(egui::Margin::symmetric(8, 4));
+        frame.show(ui, |ui| {
+            ui.set_width(size.x - 18.0);
+            ui.set_height(size.y - 12.0);
+            contents(viewer, ui);
+        });
+    });
+}
+
+fn contents(viewer: &mut Viewer, ui: &mut Ui) {
+    header(viewer, ui);
+    ui.separator();
+    if viewer.session.is_none() {
+        return show_missing_sensor(viewer, ui);
+    }
+    egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+        // The answer is shared, not copied, because it holds thousands of points.
+        let outcome = viewer.frame_view.as_ref().and_then(|s| s.answers.first().cloned());
+        diagnosis::show(viewer, ui);
+        for card in CARDS {
+            show_card(viewer, ui, card, outcome.as_deref());
+        }
+        ui.add_space(8.0);
+    });
+    // Releasing a slider ends its step.
+    if ui.input(|i| i.pointer.any_released())
+        && let Some(session) = &mut viewer.session
+        && viewer.mask.is_none()
+    {
+        session.end_step();
+    }
 }
 
 /// Says how to get a sensor.toml if there is none.
 fn show_missing_sensor(viewer: &mut Viewer, ui: &mut Ui) {
     ui.label("With a sensor.toml, this column shows the result of every stage.");
     ui.add_space(4.0);
+    let ready = viewer.frame_view.as_ref().is_some_and(|f| f.size().is_some());
+    if ui.add_enabled(ready, egui::Button::new("Make a sensor.toml…")).clicked() {
+        viewer.open_wizard();
+    }
     if ui.button("Open a sensor.toml…").clicked() {
         viewer.run(Command::Open, &ui.ctx().clone());
     }
     ui.add_space(4.0);
-    ui.weak("`hzn init` writes a first one. You can also drop a sensor.toml on the window.");
+    ui.weak("You can also drop a sensor.toml on the window.");
 }
 
 /// Draws preset, undo, redo, reset and save, and the error in the text.
@@ -84,7 +108,7 @@ fn header(viewer: &mut Viewer, ui: &mut Ui) {
         button(ui, Command::Undo, "Undo", session.can_undo());
         button(ui, Command::Redo, "Redo", session.can_redo());
         let changed = session.is_changed();
-        button(ui, Command::Diff, "Diff", changed);
+        button(ui, Command::Diff, "Changes", changed);
         button(ui, Command::Save, "Save", changed);
     });
     if let Some(problem) = session.problem() {
@@ -93,7 +117,9 @@ fn header(viewer: &mut Viewer, ui: &mut Ui) {
             (None, Some(line)) => format!("line {line}: {}", problem.what),
             _ => problem.what.clone(),
         };
-        ui.colored_label(ui.visuals().error_fg_color, text).on_hover_text("The last accepted values are in use.");
+        let colour = ui.visuals().error_fg_color;
+        let label = egui::Label::new(RichText::new(text).color(colour)).wrap();
+        ui.add(label).on_hover_text("The last accepted values are in use.");
     }
     if viewer.frame_view.as_ref().and_then(|s| s.answers.first()).is_some_and(|o| o.bodies.len() > 1) {
         bodies(viewer, ui);
@@ -126,6 +152,10 @@ fn show_card(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Out
     let answer = outcome.and_then(|o| o.bodies.get(viewer.body).or(o.bodies.first()));
     let id = ui.make_persistent_id(("card", card.title));
     let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, card.open);
+    let focus = viewer.focus_key.filter(|path| card.sections.contains(&path.split('.').next().unwrap_or_default()));
+    if focus.is_some() {
+        state.set_open(true);
+    }
     let fill = ui.visuals().faint_bg_color;
     egui::Frame::new().fill(fill).corner_radius(6).inner_margin(egui::Margin::symmetric(8, 5)).show(ui, |ui| {
         ui.set_width(ui.available_width());
@@ -144,11 +174,16 @@ fn show_card(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Out
         {
             candidates(viewer, ui, answer);
         }
-        if card.title == "Mask" {
-            mask(viewer, ui);
+        match card.title {
+            "Mask" => mask(viewer, ui),
+            "Threshold" => histogram::show(viewer, ui),
+            _ => {}
         }
         state.show_body_unindented(ui, |ui| {
             ui.add_space(2.0);
+            if card.sections.contains(&"camera") {
+                camera_card::show(viewer, ui);
+            }
             for section in card.sections {
                 for key in keys::in_section(section) {
                     parameters::show(viewer, ui, key);
@@ -205,8 +240,8 @@ fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
         return;
     }
     let select = viewer.frame_view.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.select);
-    egui::Grid::new("candidates").num_columns(6).spacing(vec2(10.0, 2.0)).show(ui, |ui| {
-        for head in ["", "length", "points", "inliers", "RMS px", "verdict"] {
+    egui::Grid::new("candidates").num_columns(7).spacing(vec2(10.0, 2.0)).show(ui, |ui| {
+        for head in ["", "length px", "points", "inliers", "RMS px", "verdict", ""] {
             ui.weak(RichText::new(head).size(11.5));
         }
         ui.end_row();
@@ -221,6 +256,12 @@ fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
             row |= ui.label(RichText::new(c.verdict.name()).size(12.0)).on_hover_text(why);
             if row.hovered() || row.contains_pointer() {
                 viewer.pointed = Some(c.number);
+            }
+            let chosen = viewer.chosen_candidate == Some(c.number);
+            let fitted = answer.edges.iter().any(|e| e.candidate == c.number && e.fitted.is_some());
+            let button = ui.add_enabled(fitted, egui::Button::selectable(chosen, "residuals").small());
+            if button.on_disabled_hover_text("No cone was fitted to this edge").clicked() {
+                viewer.chosen_candidate = (!chosen).then_some(c.number);
             }
             ui.end_row();
         }

@@ -13,6 +13,8 @@ pub(super) const REJECTED: Color32 = Color32::from_rgb(213, 94, 0);
 pub(super) const AXIS: Color32 = Color32::from_rgb(230, 140, 190);
 /// The truth.
 pub(super) const TRUTH: Color32 = Color32::from_rgb(230, 159, 0);
+/// The expected limb.
+pub(super) const EXPECTED: Color32 = Color32::from_rgb(235, 238, 245);
 /// Sun and Moon.
 pub(super) const SKY: Color32 = Color32::from_rgb(255, 236, 170);
 /// Masked parts.
@@ -63,42 +65,92 @@ pub(super) fn status(status: Status) -> Color32 {
     }
 }
 
-/// Returns black or white, whichever can be read better on a colour.
+/// Returns black or white, whichever has more contrast to a colour. One of them always has at least 4.5 to 1.
 pub(super) fn text_on(colour: Color32) -> Color32 {
-    let [r, g, b, _] = colour.to_array().map(f32::from);
-    if 0.299 * r + 0.587 * g + 0.114 * b > 140.0 { Color32::BLACK } else { Color32::WHITE }
+    if contrast(colour, Color32::BLACK) > contrast(colour, Color32::WHITE) { Color32::BLACK } else { Color32::WHITE }
+}
+
+/// Returns the contrast of two opaque colours, 1 to 21 (WCAG 2.2: relative luminance, contrast ratio).
+pub(super) fn contrast(a: Color32, b: Color32) -> f64 {
+    let luminance = |c: Color32| {
+        let [r, g, b] = [c.r(), c.g(), c.b()].map(|v| {
+            let v = f64::from(v) / 255.0;
+            if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+        });
+        0.2126 * r + 0.7152 * g + 0.0722 * b
+    };
+    let [x, y] = [luminance(a), luminance(b)];
+    (x.max(y) + 0.05) / (x.min(y) + 0.05)
+}
+
+/// Returns the colour of a warning.
+pub(super) fn warning(dark: bool) -> Color32 {
+    if dark { Color32::from_rgb(255, 190, 92) } else { Color32::from_rgb(138, 74, 0) }
+}
+
+/// Returns the colour of an added or a removed line of text.
+pub(super) fn diff(added: bool, dark: bool) -> Color32 {
+    match (added, dark) {
+        (true, true) => Color32::from_rgb(78, 201, 160),
+        (true, false) => Color32::from_rgb(0, 104, 74),
+        (false, true) => Color32::from_rgb(255, 148, 112),
+        (false, false) => Color32::from_rgb(164, 44, 0),
+    }
+}
+
+/// Returns the colours of a theme.
+fn visuals(dark: bool) -> Visuals {
+    let mut visuals = if dark { Visuals::dark() } else { Visuals::light() };
+    let grey = Color32::from_gray;
+    let rgb = Color32::from_rgb;
+    if dark {
+        visuals.panel_fill = rgb(24, 26, 31);
+        visuals.window_fill = rgb(32, 35, 42);
+        visuals.extreme_bg_color = rgb(15, 16, 20);
+        visuals.faint_bg_color = rgb(33, 36, 43);
+        visuals.weak_text_color = Some(rgb(164, 170, 180));
+        visuals.error_fg_color = rgb(255, 128, 116);
+        visuals.hyperlink_color = rgb(120, 190, 255);
+        visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, rgb(48, 52, 61));
+        visuals.widgets.noninteractive.fg_stroke = Stroke::new(1.0, rgb(205, 209, 216));
+        visuals.widgets.inactive.fg_stroke = Stroke::new(1.0, rgb(214, 218, 224));
+        visuals.widgets.inactive.bg_stroke = Stroke::new(1.0, rgb(142, 148, 158));
+        visuals.selection.bg_fill = rgb(0, 92, 140);
+        visuals.selection.stroke = Stroke::new(1.0, grey(255));
+    } else {
+        visuals.panel_fill = rgb(245, 246, 248);
+        visuals.window_fill = rgb(252, 252, 253);
+        visuals.faint_bg_color = rgb(234, 236, 240);
+        visuals.weak_text_color = Some(rgb(84, 90, 100));
+        visuals.error_fg_color = rgb(170, 20, 20);
+        visuals.hyperlink_color = rgb(0, 84, 160);
+        visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, rgb(196, 200, 207));
+        visuals.widgets.noninteractive.fg_stroke = Stroke::new(1.0, rgb(40, 43, 49));
+        visuals.widgets.inactive.fg_stroke = Stroke::new(1.0, rgb(34, 37, 43));
+        visuals.widgets.inactive.bg_stroke = Stroke::new(1.0, rgb(98, 104, 114));
+        visuals.selection.bg_fill = rgb(165, 210, 238);
+        visuals.selection.stroke = Stroke::new(1.0, rgb(0, 40, 66));
+    }
+    visuals.warn_fg_color = warning(dark);
+    visuals.window_corner_radius = CornerRadius::same(8);
+    visuals.menu_corner_radius = CornerRadius::same(6);
+    for widget in [
+        &mut visuals.widgets.inactive,
+        &mut visuals.widgets.hovered,
+        &mut visuals.widgets.active,
+        &mut visuals.widgets.open,
+        &mut visuals.widgets.noninteractive,
+    ] {
+        widget.corner_radius = CornerRadius::same(5);
+    }
+    visuals.slider_trailing_fill = true;
+    visuals
 }
 
 /// Sets up the dark and the light theme; it is called once.
 pub(super) fn apply(ctx: &egui::Context) {
-    let mut dark = Visuals::dark();
-    dark.panel_fill = Color32::from_rgb(24, 26, 31);
-    dark.window_fill = Color32::from_rgb(32, 35, 42);
-    dark.extreme_bg_color = Color32::from_rgb(15, 16, 20);
-    dark.faint_bg_color = Color32::from_rgb(33, 36, 43);
-    dark.override_text_color = None;
-    dark.widgets.noninteractive.bg_stroke = Stroke::new(1.0, Color32::from_rgb(48, 52, 61));
-    dark.widgets.noninteractive.fg_stroke = Stroke::new(1.0, Color32::from_rgb(205, 209, 216));
-    dark.widgets.inactive.fg_stroke = Stroke::new(1.0, Color32::from_rgb(214, 218, 224));
-    dark.selection.bg_fill = Color32::from_rgb(0, 92, 140);
-    let mut light = Visuals::light();
-    light.panel_fill = Color32::from_rgb(245, 246, 248);
-    light.faint_bg_color = Color32::from_rgb(234, 236, 240);
-    light.selection.bg_fill = Color32::from_rgb(165, 210, 238);
-    for (theme, mut visuals) in [(Theme::Dark, dark), (Theme::Light, light)] {
-        visuals.window_corner_radius = CornerRadius::same(8);
-        visuals.menu_corner_radius = CornerRadius::same(6);
-        for widget in [
-            &mut visuals.widgets.inactive,
-            &mut visuals.widgets.hovered,
-            &mut visuals.widgets.active,
-            &mut visuals.widgets.open,
-            &mut visuals.widgets.noninteractive,
-        ] {
-            widget.corner_radius = CornerRadius::same(5);
-        }
-        visuals.slider_trailing_fill = true;
-        ctx.set_visuals_of(theme, visuals);
+    for (theme, dark) in [(Theme::Dark, true), (Theme::Light, false)] {
+        ctx.set_visuals_of(theme, visuals(dark));
     }
     ctx.all_styles_mut(|style| {
         style.spacing.item_spacing = egui::vec2(7.0, 5.0);
@@ -110,6 +162,47 @@ pub(super) fn apply(ctx: &egui::Context) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Smallest contrast of text (WCAG 2.2, level AA); it holds here for the outlines of controls, too.
+    const READABLE: f64 = 4.5;
+
+    #[test]
+    fn every_text_and_control_can_be_seen_in_both_themes() {
+        let mut poor = Vec::new();
+        for dark in [true, false] {
+            let v = visuals(dark);
+            let grounds = [("panel", v.panel_fill), ("window", v.window_fill), ("card", v.faint_bg_color)];
+            let inks = [
+                ("text", v.widgets.noninteractive.fg_stroke.color),
+                ("weak text", v.weak_text_color()),
+                ("error", v.error_fg_color),
+                ("warning", warning(dark)),
+                ("link", v.hyperlink_color),
+                ("added", diff(true, dark)),
+                ("removed", diff(false, dark)),
+                ("button text", v.widgets.inactive.fg_stroke.color),
+                ("outline of a control", v.widgets.inactive.bg_stroke.color),
+            ];
+            let mut check = |what: String, a: Color32, b: Color32| {
+                if contrast(a, b) < READABLE {
+                    poor.push(format!("dark {dark}: {what}: {:.2}", contrast(a, b)));
+                }
+            };
+            for (ground, back) in grounds {
+                inks.iter().for_each(|(ink, front)| check(format!("{ink} on {ground}"), *front, back));
+            }
+            check("selected".into(), v.selection.stroke.color, v.selection.bg_fill);
+            check("button".into(), v.widgets.inactive.fg_stroke.color, v.widgets.inactive.weak_bg_fill);
+            check("hovered".into(), v.widgets.hovered.fg_stroke.color, v.widgets.hovered.weak_bg_fill);
+        }
+        for s in Status::ALL.iter().copied() {
+            if contrast(text_on(status(s)), status(s)) < READABLE {
+                poor.push(format!("badge {s}"));
+            }
+        }
+        assert!(poor.is_empty(), "{poor:#?}");
+        assert!((contrast(Color32::BLACK, Color32::WHITE) - 21.0).abs() < 1e-9);
+    }
 
     #[test]
     fn no_two_statuses_look_alike() {

@@ -4,7 +4,7 @@ use egui::{Align2, Color32, FontId, Rect, RichText, Sense, Shape, Stroke, Ui, po
 use hzn_core::status::Status;
 
 use super::viewer::Viewer;
-use super::{Command, theme};
+use super::{Command, chips, theme};
 use crate::model::playback::SPEEDS;
 
 /// Width that is kept free for the progress of work on the whole sequence.
@@ -14,7 +14,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     egui::Panel::bottom("timeline").resizable(false).show(ui, |ui| {
         ui.add_space(5.0);
         controls(viewer, ui);
-        ui.add_space(2.0);
+        chips::show(viewer, ui);
         strip(viewer, ui);
         ui.add_space(5.0);
     });
@@ -26,11 +26,11 @@ fn controls(viewer: &mut Viewer, ui: &mut Ui) {
         let hint = |ui: &Ui, c: Command| format!("{} ({})", c.name(), c.key(ui.ctx()));
         let play = if viewer.playback.is_playing() { (Icon::Pause, "Pause") } else { (Icon::Play, "Play") };
         for (c, icon, name) in [
-            (Command::First, Icon::First, "First picture"),
-            (Command::Back, Icon::Back, "Previous picture"),
+            (Command::First, Icon::First, "First frame"),
+            (Command::Back, Icon::Back, "Previous frame"),
             (Command::Play, play.0, play.1),
-            (Command::Next, Icon::Next, "Next picture"),
-            (Command::Last, Icon::Last, "Last picture"),
+            (Command::Next, Icon::Next, "Next frame"),
+            (Command::Last, Icon::Last, "Last frame"),
         ] {
             if icon_button(ui, icon, name).on_hover_text(hint(ui, c)).clicked() {
                 command = Some(c);
@@ -38,7 +38,9 @@ fn controls(viewer: &mut Viewer, ui: &mut Ui) {
         }
         ui.separator();
         let speed = viewer.playback.speed();
-        let label = ui.weak("speed");
+        // A narrow window has no room for words.
+        let narrow = ui.available_width() < 560.0;
+        let label = if narrow { ui.weak("") } else { ui.weak("speed") };
         egui::ComboBox::from_id_salt("speed")
             .selected_text(format!("{speed}×"))
             .width(58.0)
@@ -50,7 +52,8 @@ fn controls(viewer: &mut Viewer, ui: &mut Ui) {
                 }
             })
             .response
-            .labelled_by(label.id);
+            .labelled_by(label.id)
+            .on_hover_text("1× is real time where the times of the frames are known; else one frame per second");
         ui.separator();
         for (c, text) in [(Command::NextRefused, "Next refused"), (Command::Worst, "Worst")] {
             if ui.button(text).on_hover_text(hint(ui, c)).clicked() {
@@ -115,9 +118,9 @@ fn place(viewer: &Viewer, ui: &mut Ui) {
     }
     let frame = viewer.playback.frame();
     let more = if viewer.sequence.complete { "" } else { "…" };
-    ui.label(format!("picture {} of {count}{more}", frame + 1));
+    ui.label(format!("{} of {count}{more}", frame + 1));
     if let Some(entry) = viewer.sequence.entries.get(frame) {
-        let time = entry.time_s.map_or("no time".to_owned(), |t| format!("{t:.3} s"));
+        let time = entry.time_s.map_or("time unknown".to_owned(), |t| format!("{t:.3} s"));
         ui.label(RichText::new(time).monospace().size(12.0));
         // A long name leaves room for the progress on the right.
         let room = vec2((ui.available_width() - WORK_WIDTH).max(0.0), 18.0);
@@ -139,18 +142,14 @@ fn work(viewer: &mut Viewer, ui: &mut Ui) {
         ui.add(
             egui::ProgressBar::new(part).desired_width(170.0).text(format!("{what} {} of {}", sweep.done, sweep.total)),
         );
-    } else if viewer.sequence.len() > 1 && viewer.session.is_some() {
-        let hint = format!(
-            "Process every picture with the current parameters, for the plots ({})",
-            Command::ProcessAll.key(ui.ctx())
-        );
-        if ui.button("Process all").on_hover_text(hint).clicked() {
-            viewer.process_all(None);
+    } else if let Some(running) = &viewer.work.running {
+        let (done, total) = (running.done, running.total);
+        if ui.small_button("Stop").on_hover_text("Stop processing until the next change").clicked() {
+            viewer.stop_background();
         }
-        let current = viewer.rows.current_len();
-        if current > 1 {
-            ui.weak(format!("{current} new"));
-        }
+        ui.weak(format!("processing {done} of {total}"));
+    } else if viewer.work.stopped && ui.button("Process all").clicked() {
+        viewer.process_again();
     }
 }
 
@@ -167,6 +166,7 @@ fn worst(statuses: impl Iterator<Item = Status>) -> Option<Status> {
     statuses.max_by_key(weight)
 }
 
+/// Draws the status of every picture as a colour.
 fn strip(viewer: &mut Viewer, ui: &mut Ui) {
     let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), 24.0), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Time line"));
@@ -179,26 +179,51 @@ fn strip(viewer: &mut Viewer, ui: &mut Ui) {
     }
     let columns = (band.width().floor() as usize).clamp(1, count);
     let width = band.width() / columns as f32;
+    // A picture outside of the chosen group, and a result of earlier parameters, are faint.
+    let strength = |i: usize| match (viewer.group, viewer.rows.cause(i, viewer.body)) {
+        (Some(group), Some(cause)) if !cause.is_in(&group) => 1,
+        _ if viewer.rows.current(i, viewer.body).is_none() => 2,
+        _ => 3,
+    };
     let status = |i: usize| viewer.rows.newest(i, viewer.body).map(|r| r.status);
-    let mut first: Option<(usize, Status)> = None;
+    let shade = |(status, strength): (Status, u8)| {
+        theme::status(status).gamma_multiply(match strength {
+            1 => 0.15,
+            2 => 0.45,
+            _ => 1.0,
+        })
+    };
+    let mut first: Option<(usize, (Status, u8))> = None;
     // Neighbours with the same colour are drawn as one rectangle.
-    let flush = |first: &mut Option<(usize, Status)>, end: usize| {
-        if let Some((from, status)) = first.take() {
+    let flush = |first: &mut Option<(usize, (Status, u8))>, end: usize| {
+        if let Some((from, look)) = first.take() {
             let x = |c: usize| band.left() + c as f32 * width;
             let gap = if width > 4.0 && end == from + 1 { 1.0 } else { 0.0 };
             let cell = Rect::from_min_max(pos2(x(from), band.top()), pos2(x(end) - gap, band.bottom()));
-            painter.rect_filled(cell, 1, theme::status(status));
+            painter.rect_filled(cell, 1, shade(look));
         }
     };
     for column in 0..columns {
         let (from, to) = (column * count / columns, ((column + 1) * count / columns).max(column * count / columns + 1));
-        let here = worst((from..to).filter_map(status));
+        let strongest = (from..to).map(strength).max().unwrap_or(3);
+        let here = worst((from..to).filter(|i| strength(*i) == strongest).filter_map(status)).map(|s| (s, strongest));
         if width > 4.0 || here != first.map(|(_, s)| s) {
             flush(&mut first, column);
             first = here.map(|s| (column, s));
         }
     }
     flush(&mut first, columns);
+    for index in &viewer.damaged {
+        let x = |i: usize| band.left() + i as f32 * band.width() / count as f32;
+        let mark = Rect::from_min_max(pos2(x(*index), band.top() - 3.0), pos2(x(index + 1), band.top()));
+        painter.rect_filled(mark, 0, theme::status(Status::Unreadable));
+    }
+    cursor(viewer, ui, &painter, &response, band);
+}
+
+/// Draws the position in the sequence, and moves it with the pointer.
+fn cursor(viewer: &mut Viewer, ui: &Ui, painter: &egui::Painter, response: &egui::Response, band: Rect) {
+    let (count, rect) = (viewer.sequence.len(), response.rect.shrink2(vec2(2.0, 0.0)));
     let x_of = |frame: usize| band.left() + (frame as f32 + 0.5) * band.width() / count as f32;
     let x = x_of(viewer.playback.frame());
     let ink = if ui.visuals().dark_mode { Color32::WHITE } else { Color32::BLACK };
@@ -211,8 +236,7 @@ fn strip(viewer: &mut Viewer, ui: &mut Ui) {
     }
     if let Some(at) = response.hover_pos() {
         let frame = frame_at(at.x);
-        let status = status(frame).map_or("", Status::name);
-        let text = format!("{} {status}", frame + 1);
+        let text = format!("{} {}", frame + 1, chips::cause_text(viewer, frame));
         let align = if at.x > rect.center().x { Align2::RIGHT_CENTER } else { Align2::LEFT_CENTER };
         let by = if at.x > rect.center().x { -12.0 } else { 12.0 };
         let place = pos2(at.x + by, band.center().y);

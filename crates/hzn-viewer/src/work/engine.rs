@@ -9,15 +9,17 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 use hzn_core::Config;
 use hzn_core::camera::Camera;
 use hzn_core::config::{Input, Orient};
+use hzn_core::image::Channel;
 use hzn_run::engine::AnySensor;
 use hzn_run::source::Picture;
 use hzn_run::source::picture::Samples;
 
 use super::Wake;
 use super::frame_view::{FrameInput, FrameView, Outcome, Shown, process_frame};
-use super::paint::{self, Recipe, Warp};
+use super::paint::{self, Recipe, Tone, Warp};
 use super::store::Store;
-use crate::model::{Entry, Look, Plane, plane::Pinhole};
+use super::trials::Trials;
+use crate::model::{Contrast, Entry, Histogram, Look, Plane, plane::Pinhole};
 
 /// A configuration with its version number.
 #[derive(Debug, Clone)]
@@ -41,6 +43,8 @@ pub struct FrameRequest {
     pub flight: bool,
     /// Display of the picture.
     pub look: Look,
+    /// Range of brightness that is shown, and the exponent of the display.
+    pub contrast: (Contrast, f32),
     /// The picture is shown without the distortion of the lens.
     pub undistorted: bool,
     /// The answer has to list the pixels that were read.
@@ -98,12 +102,16 @@ struct Worker {
     store: Store,
     sensors: Vec<(Arc<Config>, bool, AnySensor)>,
     warp: Warp,
+    /// Trials with the session's configuration.
+    trials: Option<(Arc<Config>, bool, Trials)>,
+    /// Histogram of a picture, by index and channel.
+    histogram: Option<(usize, Channel, Arc<Histogram>)>,
     shown: Option<Arc<Shown>>,
     ahead: VecDeque<(usize, Entry)>,
 }
 
 /// Returns the picture with the number of bits and the orientation that `input` names.
-fn with_input(picture: Arc<Picture>, input: &Input) -> Result<Arc<Picture>, String> {
+pub(super) fn with_input(picture: Arc<Picture>, input: &Input) -> Result<Arc<Picture>, String> {
     match (&picture.samples, input.bits) {
         (Samples::Words(_), Some(bits)) if bits != picture.layout.bits => {
             Picture::clone(&picture).with_input(input).map(Arc::new)
@@ -126,7 +134,7 @@ impl Worker {
                 match message {
                     Message::Open(inputs) => {
                         self.store.open(inputs);
-                        (self.shown, newest) = (None, None);
+                        (self.shown, self.histogram, newest) = (None, None, None);
                         self.ahead.clear();
                     }
                     Message::Recording(pictures) => self.store.set_recording(pictures),
@@ -169,32 +177,33 @@ impl Worker {
             picture: picture.clone(),
             image: None,
             camera: None,
+            histogram: None,
             answers: Vec::new(),
             version: request.setups.first().map_or(0, |s| s.version),
             decoding,
             latency: request.since.elapsed(),
         };
         let Ok(picture) = picture else { return frame_view };
-        let input = FrameInput {
-            index: request.index,
-            name: &request.entry.name,
-            time_s: request.entry.time_s,
-            data: request.entry.data.as_ref(),
-            picture: &picture,
-        };
+        let input = FrameInput::of_entry(request.index, &request.entry, &picture);
         self.sensors.truncate(request.setups.len());
         for (index, setup) in request.setups.iter().enumerate() {
+            let touched = request.touched && index == 0;
+            let mut trials = if index == 0 { self.take_trials(setup, request.flight) } else { None };
             let outcome = match self.sensor(index, setup, request.flight) {
                 Ok((camera, sensor)) => {
                     if index == 0 {
                         frame_view.camera = Some(camera);
                     }
-                    process_frame(input, &setup.config, sensor, request.touched && index == 0)
+                    process_frame(input, &setup.config, sensor, touched, trials.as_mut().map(|(.., t)| t))
                 }
                 Err(why) => Outcome { refused: Some(why), ..Outcome::new(&setup.config) },
             };
+            if index == 0 {
+                self.trials = trials;
+            }
             frame_view.answers.push(Arc::new(outcome));
         }
+        frame_view.histogram = self.histogram(request, &picture);
         frame_view.image = Some(self.show(request, &picture, &frame_view));
         frame_view.latency = request.since.elapsed();
         frame_view
@@ -227,6 +236,31 @@ impl Worker {
         }
     }
 
+    /// Takes the trials out, with the configuration of the session.
+    fn take_trials(&mut self, setup: &Setup, flight: bool) -> Option<(Arc<Config>, bool, Trials)> {
+        match self.trials.take().filter(|(_, is_flight, _)| *is_flight == flight) {
+            Some(trials) if trials.0 == setup.config => Some(trials),
+            Some((_, _, mut trials)) => {
+                trials.reconfigure(&setup.config, flight).ok()?;
+                Some((Arc::clone(&setup.config), flight, trials))
+            }
+            None => Some((Arc::clone(&setup.config), flight, Trials::new(&setup.config, flight)?)),
+        }
+    }
+
+    /// Returns the histogram of a picture. It is counted once.
+    fn histogram(&mut self, request: &FrameRequest, picture: &Picture) -> Option<Arc<Histogram>> {
+        let channel = request.setups.first().map(|s| s.config.input.channel).unwrap_or_default();
+        match &self.histogram {
+            Some((index, of, histogram)) if (*index, *of) == (request.index, channel) => Some(Arc::clone(histogram)),
+            _ => {
+                let histogram = Arc::new(Histogram::of_view(&picture.view(channel).ok()?));
+                self.histogram = Some((request.index, channel, Arc::clone(&histogram)));
+                Some(histogram)
+            }
+        }
+    }
+
     /// Returns the picture for the screen. It is painted only if something that it depends on has changed.
     fn show(
         &mut self,
@@ -247,8 +281,17 @@ impl Worker {
             Some(config) if request.look != Look::Colour => config.input.channel,
             _ => hzn_core::image::Channel::Mean,
         };
+        let bits = picture.layout.bits;
+        let full = ((1u32 << bits.clamp(1, 16)) - 1) as u16;
+        let stretch = frame_view.histogram.as_ref().filter(|_| request.contrast.0.stretches(bits));
+        let [low, high] = stretch.map_or([0, full], |h| h.stretch);
+        let tone = if request.look == Look::Level {
+            Tone::plain(full)
+        } else {
+            Tone { low, high: high.max(low.saturating_add(1)), gamma: request.contrast.1 }
+        };
         let orient = config.map_or(Orient::AsStored, |config| config.input.orient);
-        let recipe = Recipe { look: request.look, level, channel, orient, plane };
+        let recipe = Recipe { look: request.look, level, tone, channel, orient, plane };
         let key = (request.index, recipe);
         if let Some(shown) = self.shown.as_ref().filter(|s| s.key == key) {
             return Arc::clone(shown);

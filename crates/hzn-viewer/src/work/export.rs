@@ -6,12 +6,14 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 
 use hzn_core::Config;
+use hzn_core::status::Status;
 use hzn_mcap::{Annotations, Row};
 use hzn_run::engine::AnySensor;
 use hzn_run::overlay;
 use hzn_run::sink::{Existing, RowFile as Table};
 use hzn_run::source::{Picture, Source};
 
+use super::caption::{self, Caption, Writer};
 use super::frame_view::{FrameInput, FrameView, Outcome, process_frame};
 use super::job::{Done, JobError, Progress};
 use super::sequence_source::SequenceSource;
@@ -45,20 +47,49 @@ pub fn annotations(outcome: &Outcome, layers: &[Layer]) -> Annotations {
     out
 }
 
-fn title(outcome: &Outcome) -> String {
-    let each: Vec<&str> = outcome.bodies.iter().map(|b| b.row.status.name()).collect();
-    each.join(", ")
-}
-
-fn draw(picture: &Picture, outcome: Option<&Outcome>, layers: &[Layer]) -> image::RgbImage {
-    let image = picture.to_rgb();
-    match outcome {
-        Some(outcome) => overlay::draw_annotations(image, &annotations(outcome, layers), &title(outcome)),
-        None => image,
+/// Returns the caption of a picture: its name, time, status and reason, the legend of what is drawn, and a scale.
+fn describe(name: &str, time_s: Option<f64>, outcome: Option<&Outcome>, drawing: &Annotations) -> Caption {
+    use hzn_mcap::palette::{AXIS, EDGE, INLIER, LIMB, REJECTED};
+    let mut text = name.to_owned();
+    text.extend(time_s.map(|t| format!(", {t:.3} s")));
+    let Some(outcome) = outcome else { return Caption { text, ..Caption::default() } };
+    for body in &outcome.bodies {
+        let row = &body.row;
+        let reason = body.cause.and_then(|c| c.reason).map(|r| format!(" ({})", r.name())).unwrap_or_default();
+        text += &format!("; {}: {}{reason}", row.body, row.status);
+        text.extend(row.sigma_max_deg.map(|s| format!(", 3σ {:.4}°", 3.0 * s)));
+        text.extend(row.rms_px.map(|rms| format!(", RMS {rms:.2} px")));
+        if row.status != Status::Ok && body.cause.is_none() && !row.detail.is_empty() {
+            text += &format!(" ({})", row.detail);
+        }
     }
+    let entries = [
+        ("edges", drawing.edges.is_empty(), EDGE),
+        ("outliers", drawing.rejected.is_empty(), REJECTED),
+        ("inliers", drawing.inliers.is_empty(), INLIER),
+        ("fitted limb", drawing.limb.is_empty(), LIMB),
+        ("axis", drawing.axes.is_empty(), AXIS),
+    ];
+    let legend = entries.iter().filter(|(_, none, _)| !none).map(|(name, _, c)| ((*name).to_owned(), *c)).collect();
+    // The bar is as long as 5° are near the optical axis.
+    let camera = &outcome.config.camera;
+    Caption { text, legend, scale: Some((camera.fx_px * 5f64.to_radians().tan(), "5°".to_owned())) }
 }
 
-/// Writes the shown picture with its annotations as PNG, in the size of the picture.
+fn draw(
+    writer: &mut Writer,
+    picture: &Picture,
+    name: &str,
+    time_s: Option<f64>,
+    outcome: Option<&Outcome>,
+    layers: &[Layer],
+) -> image::RgbImage {
+    let drawing = outcome.map(|o| annotations(o, layers)).unwrap_or_default();
+    let drawn = overlay::draw_plain(picture.to_rgb(), &drawing, &[]);
+    writer.add(&drawn, &describe(name, time_s, outcome, &drawing))
+}
+
+/// Writes the shown picture with its annotations as PNG, in the size of the picture, with a caption below it.
 ///
 /// # Errors
 /// There is no picture, the name does not end in `.png`, or the file cannot be written.
@@ -67,7 +98,8 @@ pub fn save_picture(frame_view: &FrameView, layers: &[Layer], path: &Path) -> Re
         return Err(JobError::Failed(format!("{}: the file name of a picture must end in .png", path.display())));
     }
     let picture = frame_view.picture.as_ref().map_err(Clone::clone)?;
-    let image = draw(picture, frame_view.answers.first().map(|o| &**o), layers);
+    let outcome = frame_view.answers.first().map(|o| &**o);
+    let image = draw(&mut Writer::default(), picture, &frame_view.name, frame_view.time_s, outcome, layers);
     let bytes = overlay::png(&image).map_err(|e| format!("{}: {e:#}", path.display()))?;
     atomic_file::write(path, &bytes)?;
     Ok(Done::Written(path.to_owned()))
@@ -137,7 +169,8 @@ impl Video {
 
     fn encode(self, part: &Path, path: &Path, progress: &Progress) -> Result<(), JobError> {
         let mut sensor = AnySensor::new(&self.config, self.flight).map_err(|e| e.to_string())?;
-        let size = (u32::from(self.config.camera.width), u32::from(self.config.camera.height));
+        let [w, h] = [self.config.camera.width, self.config.camera.height].map(u32::from);
+        let size = (w, h + caption::height_px(w, h));
         let mut pipe = start_ffmpeg(part, size, self.fps)?;
         let fed = self.feed(&mut pipe, &mut sensor, size, progress);
         drop(pipe.stdin.take());
@@ -170,6 +203,7 @@ impl Video {
         let known: Vec<_> = self.sequence.entries.iter().map(|e| e.data.clone()).collect();
         let total = known.len() as u64;
         let mut source = SequenceSource::new(self.sequence)?;
+        let mut writer = Writer::default();
         for (index, data) in known.iter().enumerate() {
             progress.report(index as u64, total)?;
             let item = source.next().ok_or_else(|| "the sequence ends before its last picture".to_owned())?;
@@ -179,8 +213,9 @@ impl Video {
                 Ok((picture, _)) => {
                     let (name, time_s) = (&*item.name, item.data.as_ref().and_then(|d| d.time_s));
                     let input = FrameInput { index, name, time_s, data: data.as_ref(), picture: &picture };
-                    let outcome = process_frame(input, &self.config, sensor, false);
-                    draw(&picture, Some(&outcome), &self.layers)
+                    let outcome = process_frame(input, &self.config, sensor, false, None);
+                    let image = draw(&mut writer, &picture, name, time_s, Some(&outcome), &self.layers);
+                    if image.dimensions() == size { image } else { image::RgbImage::new(size.0, size.1) }
                 }
                 Err(_) => image::RgbImage::new(size.0, size.1),
             };

@@ -8,21 +8,27 @@ use std::time::Duration;
 use egui::{Color32, ColorImage};
 use hzn_calib::FrameData;
 use hzn_core::camera::Camera;
-use hzn_core::frames::UnitVec3;
+use hzn_core::covariance::ErrorBudget;
 use hzn_core::image::ImageView;
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::real::Real;
 use hzn_core::report::Candidate;
-use hzn_core::status::Stage;
-use hzn_core::{Config, Observer, Report, Solution, body};
-use hzn_mcap::Row;
+use hzn_core::status::{Stage, Status};
+use hzn_core::{Config, Expected, Observer, Report, Solution, body};
+use hzn_mcap::{Row, RowMeta};
 use hzn_run::engine::trace::Edge;
 use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Trace, Traces, Watch};
 use hzn_run::source::Picture;
-use hzn_run::{explain, overlay, sink};
+use hzn_run::{overlay, sink};
 
+use super::implied::fit_facts;
 use super::paint::Recipe;
+use super::residuals::{Residual, ellipse, residuals};
+use super::trials::{self, OtsuTrial, Trials};
+use crate::model::cause::Cause;
+use crate::model::diagnosis::FitFacts;
 use crate::model::view::Point;
+use crate::model::{Entry, Histogram, Processed};
 
 /// One picture, processed with the current parameters.
 #[derive(Debug, Clone)]
@@ -45,6 +51,8 @@ pub struct FrameView {
     pub answers: Vec<Arc<Outcome>>,
     /// Version number of the session's configuration.
     pub version: u64,
+    /// Brightness of the picture, if it could be read.
+    pub histogram: Option<Arc<Histogram>>,
     /// Time to read and decode the picture; `None` if it was already decoded.
     pub decoding: Option<Duration>,
     /// Time from the request to the answer.
@@ -117,29 +125,23 @@ pub struct BodyResult {
     pub ellipse: Vec<Point>,
     /// Residuals of the chosen edge's points.
     pub residuals: Vec<Residual>,
+    /// Why the picture has no answer.
+    pub cause: Option<Cause>,
+    /// Result with Otsu's threshold, if the sensor uses another threshold.
+    pub otsu: Option<OtsuTrial>,
+    /// Fit of the longest edge.
+    pub fit: Option<FitFacts>,
+    /// Limbs of candidates that are not the answer: the number of the candidate, and lines in pixels.
+    pub candidate_limbs: Vec<(u32, Vec<Vec<Point>>)>,
+    /// Limb of a trial with a cone of any half-angle, in an edge in which the sensor found no cone.
+    pub trial_limb: Vec<Vec<Point>>,
+    /// The limb of the expected half-angle about the axis of the longest fit, where the fitted half-angle is another.
+    pub expected_limb: Vec<Vec<Point>>,
 }
 
-/// Residual of one edge point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Residual {
-    /// Angle about the limb axis in degrees, -180 to 180, from image x towards image y.
-    pub azimuth_deg: f64,
-    /// Distance from the fitted limb in pixels, positive outside.
-    pub distance_px: f64,
-    /// Weight in the fit, 0 to 1.
-    pub weight: f64,
-    /// The edge point, in pixels.
-    pub point: Point,
-}
-
-impl Residual {
-    /// Returns the rejected point that is nearest to a point of the picture, within `reach_px`.
-    pub fn rejected_at(all: &[Self], p: Point, reach_px: f64) -> Option<&Self> {
-        let distance = |r: &&Self| (r.point[0] - p[0]).hypot(r.point[1] - p[1]);
-        let rejected = all.iter().filter(|r| r.weight <= 0.0 && distance(r) <= reach_px);
-        rejected.min_by(|a, b| distance(a).total_cmp(&distance(b)))
-    }
-}
+/// Steps around the cone for the limbs of candidates. They are drawn with every change of a parameter, so they are
+/// coarser than the limb of the answer.
+const CANDIDATE_STEPS: usize = 720;
 
 impl BodyResult {
     /// Collects the result for a body. `camera` is the camera that the limb is drawn with.
@@ -154,9 +156,18 @@ impl BodyResult {
         let solution = outcome.report.as_ref().ok().and_then(|r| r.solution.as_ref()).copied();
         let edges = trace.edges().clone();
         let chosen = solution.and_then(|s| edges.iter().find(|e| e.candidate == s.candidate));
+        let fits = edges.iter().filter_map(|e| Some((e, e.fitted?)));
+        let others = fits.filter(|(e, _)| solution.is_none_or(|s| s.candidate != e.candidate));
+        let candidate_limbs = others.map(|(e, f)| (e.candidate, free_limb(&f.solution, camera))).collect();
         Self {
             kind,
             row,
+            cause: None,
+            otsu: None,
+            fit: None,
+            candidate_limbs,
+            trial_limb: Vec::new(),
+            expected_limb: Vec::new(),
             sample: trace.level().map(|(_, mean, n)| (mean, n)),
             times: trace.times().to_vec(),
             elapsed: outcome.elapsed,
@@ -221,6 +232,24 @@ impl<T: Real + Into<f64>> Observer<T> for PixelTraces {
     fn weight(&self, candidate: u32, point: u32, weight: T) {
         self.traces.weight(candidate, point, weight);
     }
+    fn dark_frame(&self, px: u16) {
+        Observer::<T>::dark_frame(&self.traces, px);
+    }
+    fn look(&self, number: u32, level: u16) {
+        Observer::<T>::look(&self.traces, number, level);
+    }
+    fn wants_budget(&self) -> bool {
+        true
+    }
+    fn budget(&self, candidate: u32, budget: &ErrorBudget<T>) {
+        self.traces.budget(candidate, budget);
+    }
+    fn wants_fit(&self) -> bool {
+        true
+    }
+    fn fit(&self, candidate: u32, fit: &Solution<T>, expected: &Expected<T>) {
+        self.traces.fit(candidate, fit, expected);
+    }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
         self.traces.verdict(candidate, outcome, solution);
     }
@@ -241,9 +270,13 @@ pub struct FrameInput<'a> {
     pub picture: &'a Picture,
 }
 
-impl FrameInput<'_> {
+impl<'a> FrameInput<'a> {
+    /// Returns a picture of the sequence.
+    pub fn of_entry(index: usize, entry: &'a Entry, picture: &'a Picture) -> Self {
+        Self { index, name: &entry.name, time_s: entry.time_s, data: entry.data.as_ref(), picture }
+    }
     /// Returns the processed picture, from the outcomes of its bodies.
-    fn finish(&self, outcomes: Vec<BodyOutcome>) -> Finished {
+    pub(super) fn finish(&self, outcomes: Vec<BodyOutcome>) -> Finished {
         Finished {
             index: self.index as u64,
             name: self.name.to_owned(),
@@ -260,7 +293,14 @@ impl FrameInput<'_> {
 }
 
 /// Processes a picture and returns all facts to show. With `touched`, the result includes the pixels that were read.
-pub fn process_frame(input: FrameInput<'_>, config: &Arc<Config>, sensor: &mut AnySensor, touched: bool) -> Outcome {
+/// `trials` finds the causes of refusals.
+pub fn process_frame(
+    input: FrameInput<'_>,
+    config: &Arc<Config>,
+    sensor: &mut AnySensor,
+    touched: bool,
+    trials: Option<&mut Trials>,
+) -> Outcome {
     let mut outcome = Outcome::new(config);
     let view = match checked_view(input.picture, config) {
         Ok(view) => view,
@@ -284,6 +324,9 @@ pub fn process_frame(input: FrameInput<'_>, config: &Arc<Config>, sensor: &mut A
     for ((((body, found), row), expected), trace) in each {
         outcome.bodies.push(BodyResult::new(body.kind, found, row, expected.ok(), trace, camera));
     }
+    if let Some(trials) = trials {
+        add_causes(&mut outcome, input, &view, camera, trials);
+    }
     if let Some(pixels) = watch.pixels {
         let pixels = pixels.into_inner();
         outcome.touched_pixels = Some(pixels.len());
@@ -292,8 +335,76 @@ pub fn process_frame(input: FrameInput<'_>, config: &Arc<Config>, sensor: &mut A
     outcome
 }
 
+/// Adds the causes of refusals and what the fits say.
+fn add_causes(
+    outcome: &mut Outcome,
+    input: FrameInput<'_>,
+    view: &ImageView<'_>,
+    camera: &Camera<f64>,
+    trials: &mut Trials,
+) {
+    let refused = outcome.bodies.iter().any(|b| b.row.status != Status::Ok);
+    let otsu = trials.try_otsu(view, input.data, refused).unwrap_or_default();
+    for (index, body) in outcome.bodies.iter_mut().enumerate() {
+        let Ok(report) = &body.report else { continue };
+        body.otsu = otsu.get(index).copied();
+        body.cause = Some(Cause::from_report(report, body.otsu.is_some_and(|o| o.answered)));
+        let trial = || trials.try_any_cone(view, input.data);
+        let Some((fit, solution)) = find_fit(&body.edges, report, body.row.altitude_km, camera, trial) else {
+            continue;
+        };
+        body.fit = Some(fit);
+        if fit.is_trial {
+            body.trial_limb = free_limb(&solution, camera);
+        }
+        if report.solution.is_none() {
+            let axis = solution.axis.xyz();
+            let half_angle_rad = fit.expected_deg.to_radians();
+            body.expected_limb = overlay::limb::lines_with_steps(axis, half_angle_rad, camera, CANDIDATE_STEPS);
+        }
+    }
+}
+
+/// Returns the limb of a fit with its own half-angle, in coarse steps.
+fn free_limb(solution: &Solution<f64>, camera: &Camera<f64>) -> Vec<Vec<Point>> {
+    overlay::limb::lines_with_steps(solution.axis.xyz(), solution.half_angle_rad, camera, CANDIDATE_STEPS)
+}
+
+/// Returns what the edge of the answer says, or else the longest edge, with its fit. If the sensor found no cone in
+/// that edge, `trial` returns an edge with a cone of any half-angle.
+pub(super) fn find_fit(
+    edges: &[Edge],
+    report: &Report<f64>,
+    altitude_km: Option<f64>,
+    camera: &Camera<f64>,
+    trial: impl FnOnce() -> Option<Edge>,
+) -> Option<(FitFacts, Solution<f64>)> {
+    let facts = |edge: &Edge, is_trial: bool| {
+        let fitted = edge.fitted.as_ref()?;
+        Some((fit_facts(edge, fitted, camera, altitude_km, is_trial)?, fitted.solution))
+    };
+    if let Some(solution) = &report.solution {
+        return facts(edges.iter().find(|e| e.candidate == solution.candidate)?, false);
+    }
+    match trials::longest(edges)?.fitted {
+        Some(_) => facts(trials::longest(edges)?, false),
+        None => facts(&trial()?, true),
+    }
+}
+
+/// Returns the results of a picture that cannot be processed: one row for each body.
+pub(super) fn refused_rows(index: usize, entry: &Entry, config: &Config, why: &str) -> Processed {
+    let row = |body: &body::Config| {
+        let altitude_km = entry.data.as_ref().and_then(|d| d.altitude_km);
+        let (file, body) = (entry.name.clone(), body.kind.name().to_owned());
+        let meta = RowMeta { index: index as u64, file, time_s: entry.time_s, body, altitude_km };
+        Row::unprocessed(&meta, Status::Unreadable, why)
+    };
+    Processed { rows: config.each_body().iter().map(row).collect(), ..Processed::default() }
+}
+
 /// Returns the picture for the sensor, or the reason why the sensor cannot process it.
-fn checked_view<'a>(picture: &'a Picture, config: &Config) -> Result<ImageView<'a>, String> {
+pub(super) fn checked_view<'a>(picture: &'a Picture, config: &Config) -> Result<ImageView<'a>, String> {
     let (w, h) = (picture.layout.width, picture.layout.height);
     let (own_w, own_h) = (u32::from(config.camera.width), u32::from(config.camera.height));
     if (w, h) != (own_w, own_h) {
@@ -320,67 +431,4 @@ fn touched_image(view: &ImageView<'_>, pixels: &HashSet<(u16, u16)>) -> ColorIma
         }
     }
     image
-}
-
-/// Returns two unit vectors perpendicular to the axis (camera frame): image x and y, turned with the optical axis onto
-/// the limb axis by the shortest rotation.
-fn tangent_basis([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
-    let q = 1.0 / (1.0 + z).max(1e-9);
-    [[1.0 - x * x * q, -x * y * q, -x], [-x * y * q, 1.0 - y * y * q, -y]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Returns the direction at `angle_rad` from the axis (camera frame). The azimuth counts from image x towards image y.
-fn direction_at(axis: [f64; 3], angle_rad: f64, azimuth_rad: f64) -> Option<UnitVec3<hzn_core::frames::Cam, f64>> {
-    let [b1, b2] = tangent_basis(axis);
-    let ((s, c), (sa, ca)) = (angle_rad.sin_cos(), azimuth_rad.sin_cos());
-    UnitVec3::try_new(std::array::from_fn(|i| c * axis[i] + s * (ca * b1[i] + sa * b2[i])))
-}
-
-fn ellipse(s: &Solution<f64>, camera: &Camera<f64>) -> Vec<Point> {
-    const STEPS: usize = 72;
-    let ([major, minor], angle) = explain::principal_sigmas(s);
-    let point = |i: usize| {
-        let (sin, cos) = (i as f64 * std::f64::consts::TAU / STEPS as f64).sin_cos();
-        let (a, b) = (3.0 * major * cos, 3.0 * minor * sin);
-        let p = camera.project(&direction_at(s.axis.xyz(), a.hypot(b), b.atan2(a) + angle)?)?;
-        Some([p.u, p.v])
-    };
-    (0..=STEPS).map(point).collect::<Option<_>>().unwrap_or_default()
-}
-
-fn residuals(s: &Solution<f64>, edge: &Edge, camera: &Camera<f64>) -> Vec<Residual> {
-    let axis = s.axis.xyz();
-    let [b1, b2] = tangent_basis(axis);
-    let residual = |(at, weight): (&Point, &f64)| {
-        let ray = camera.unproject(ImagePoint { u: at[0], v: at[1] })?.xyz();
-        let (x, y) = (dot(ray, b1), dot(ray, b2));
-        let azimuth = y.atan2(x);
-        let limb = camera.project(&direction_at(axis, s.fused_half_angle_rad, azimuth)?)?;
-        let outside = x.hypot(y).atan2(dot(ray, axis)) - s.fused_half_angle_rad;
-        let distance = (at[0] - limb.u).hypot(at[1] - limb.v);
-        Some(Residual {
-            azimuth_deg: azimuth.to_degrees(),
-            distance_px: distance.copysign(outside),
-            weight: *weight,
-            point: *at,
-        })
-    };
-    edge.points.iter().zip(&edge.weights).filter_map(residual).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_nearest_rejected_point_is_found() {
-        let at = |x: f64, weight: f64| Residual { azimuth_deg: 0.0, distance_px: x, weight, point: [x, 0.0] };
-        let all = [at(1.0, 0.0), at(2.0, 1.0), at(3.0, 0.0)];
-        let found = |x: f64| Residual::rejected_at(&all, [x, 0.0], 1.5).map(|r| r.distance_px);
-        assert_eq!((found(2.2), found(0.0), found(9.0)), (Some(3.0), Some(1.0), None));
-    }
 }

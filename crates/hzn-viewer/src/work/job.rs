@@ -14,6 +14,8 @@ use super::Wake;
 pub enum Done {
     /// A file was written.
     Written(PathBuf),
+    /// A sequence was rendered into this folder.
+    Rendered(PathBuf),
     /// A recording was recovered.
     Recovered {
         /// Path of the recovered recording.

@@ -1,15 +1,24 @@
 //! Work on separate threads, so that the window does not wait: opening, decoding, processing and exporting.
 
+pub mod background;
+pub mod caption;
+pub mod check;
+pub mod demo;
 pub mod engine;
 pub mod export;
 pub mod frame_view;
+mod implied;
 pub mod job;
 pub mod open;
 pub mod paint;
 mod reader;
+pub mod residuals;
 mod sequence_source;
 pub mod store;
+pub mod study;
+mod summary;
 pub mod sweep;
+pub mod trials;
 
 pub use engine::{Engine, FrameRequest, Setup};
 pub use frame_view::{BodyResult, FrameView};

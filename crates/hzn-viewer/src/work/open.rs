@@ -13,7 +13,7 @@ use super::Wake;
 use crate::model::{Entry, Place};
 
 /// Request to open a sequence, with the files that belong to it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Request {
     /// A folder, pictures, a video or a recording.
     pub inputs: Vec<PathBuf>,
@@ -23,18 +23,12 @@ pub struct Request {
     pub frames: Option<PathBuf>,
     /// The truth.csv; without it, the one next to the pictures.
     pub truth: Option<PathBuf>,
-    /// Pictures per second; used where nothing else gives the times of the pictures.
-    pub fps: f64,
+    /// Pictures per second, where nothing else gives the times of the pictures; with `None` their times are unknown.
+    pub fps: Option<f64>,
     /// Size and format of headerless pictures.
     pub raw: Option<Raw>,
     /// Index of the picture to begin with, from 0.
     pub frame: usize,
-}
-
-impl Default for Request {
-    fn default() -> Self {
-        Self { inputs: Vec::new(), sensor: None, frames: None, truth: None, fps: 1.0, raw: None, frame: 0 }
-    }
 }
 
 /// A sensor.toml.
@@ -325,7 +319,11 @@ fn open_pictures(request: &Request, events: &EventSender) -> Result<(), String> 
             Place::File(path) => source::exif_time_s(path),
             _ => None,
         };
-        let time_s = time.time_s(data.as_ref(), exif, index, request.fps);
+        let time_s = match (time, request.fps) {
+            // No time is invented for a folder without times.
+            (TimeSource::Count, None) => None,
+            (time, fps) => time.time_s(data.as_ref(), exif, index, fps.unwrap_or(1.0)),
+        };
         let takes_long = time == TimeSource::Exif || matches!(place, Place::Video(_));
         batch.push((Entry { name, time_s, data, place }, Vec::new()));
         // To know the times, a video is decoded and a file is opened. This takes long, so the pictures found so far are

@@ -21,12 +21,61 @@ pub struct Recipe {
     pub look: Look,
     /// Threshold, for [`Look::Level`].
     pub level: u16,
+    /// Brightness that is shown as black and as white, and the exponent of the display.
+    pub tone: Tone,
     /// Channel that is taken as brightness.
     pub channel: Channel,
     /// Orientation in which the picture is read.
     pub orient: Orient,
     /// The plane that the picture is shown in.
     pub plane: Plane,
+}
+
+/// Range of brightness that is shown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tone {
+    /// Value that is shown as black.
+    pub low: u16,
+    /// Value that is shown as white.
+    pub high: u16,
+    /// Exponent: above 1, dark parts are brighter.
+    pub gamma: f32,
+}
+
+impl Tone {
+    /// Returns the tone that shows every value as it is, for this full scale.
+    pub const fn plain(full: u16) -> Self {
+        Self { low: 0, high: full, gamma: 1.0 }
+    }
+    /// Returns the shown brightness of every value up to full scale.
+    fn table(self, full: u16) -> Vec<u8> {
+        let (low, span) = (f32::from(self.low), f32::from(self.high.saturating_sub(self.low).max(1)));
+        let shown = |v: u16| ((f32::from(v) - low) / span).clamp(0.0, 1.0).powf(1.0 / self.gamma.max(0.05));
+        // A plain picture keeps its values to the last bit.
+        let exact = self == Self::plain(full);
+        (0..=full)
+            .map(|v| if exact { (u32::from(v) * 255 / u32::from(full.max(1))) as u8 } else { (shown(v) * 255.0) as u8 })
+            .collect()
+    }
+}
+
+/// Colours of the false-colour display, from dark to bright: equal steps look equal, and brightness rises throughout.
+const FALSE_COLOURS: [[f32; 3]; 7] = [
+    [0.0, 0.0, 4.0],
+    [51.0, 13.0, 94.0],
+    [120.0, 28.0, 109.0],
+    [187.0, 55.0, 84.0],
+    [237.0, 105.0, 37.0],
+    [251.0, 180.0, 26.0],
+    [252.0, 255.0, 164.0],
+];
+
+fn false_colour(v: u8) -> Color32 {
+    let at = f32::from(v) / 255.0 * (FALSE_COLOURS.len() - 1) as f32;
+    let i = (at as usize).min(FALSE_COLOURS.len() - 2);
+    let part = at - i as f32;
+    let [r, g, b] = [0, 1, 2].map(|c| (FALSE_COLOURS[i][c] * (1.0 - part) + FALSE_COLOURS[i + 1][c] * part) as u8);
+    Color32::from_rgb(r, g, b)
 }
 
 /// Source of each pixel of a plane. It is computed once for a camera and a plane.
@@ -63,11 +112,12 @@ pub fn paint(
 ) -> ColorImage {
     let (w, h) = (picture.layout.width as usize, picture.layout.height as usize);
     let pixels = match (recipe.look, picture.view(recipe.channel)) {
-        (Look::Colour, _) | (_, Err(_)) => paint_colours(picture),
-        (Look::Grey, Ok(view)) => paint_values(&view, |v, full| {
-            let v = (u32::from(v) * 255 / u32::from(full.max(1))) as u8;
-            Color32::from_gray(v)
-        }),
+        (Look::Colour, _) | (_, Err(_)) => paint_colours(picture, recipe.tone),
+        (Look::Grey | Look::FalseColour, Ok(view)) => {
+            let shown = recipe.tone.table(full_scale(picture));
+            let colour = if recipe.look == Look::Grey { Color32::from_gray } else { false_colour };
+            paint_values(&view, |v, _| colour(shown.get(usize::from(v)).copied().unwrap_or(255)))
+        }
         (Look::Level, Ok(view)) => paint_values(&view, |v, _| if v >= recipe.level { LIT } else { DARK }),
     };
     let pixels = match camera {
@@ -83,21 +133,37 @@ pub fn paint(
     ColorImage::new([w, h], pixels)
 }
 
-fn paint_colours(picture: &Picture) -> Vec<Color32> {
+/// Returns the largest value that a sample can have.
+fn full_scale(picture: &Picture) -> u16 {
+    ((1u32 << picture.layout.bits.clamp(1, 16)) - 1) as u16
+}
+
+fn paint_colours(picture: &Picture, tone: Tone) -> Vec<Color32> {
     let n = usize::from(picture.layout.channels);
-    let shift = picture.layout.bits.saturating_sub(8);
+    let full = full_scale(picture);
+    let plain = tone == Tone::plain(full);
+    let table = if plain && full == 255 { Vec::new() } else { tone.table(full) };
+    let shown = |v: u16| table.get(usize::from(v)).copied().unwrap_or(255);
+    let colour = |p: [u8; 3]| Color32::from_rgb(p[0], p[1], p[2]);
     match &picture.samples {
-        Samples::Bytes(d) if n >= 3 => d.chunks_exact(n).map(|p| Color32::from_rgb(p[0], p[1], p[2])).collect(),
-        Samples::Bytes(d) => d.chunks_exact(n).map(|p| Color32::from_gray(p[0])).collect(),
-        Samples::Words(d) => {
-            let byte = |v: u16| (v >> shift) as u8;
-            let colour = |p: &[u16]| match p {
-                [r, g, b, ..] => Color32::from_rgb(byte(*r), byte(*g), byte(*b)),
-                [v, ..] => Color32::from_gray(byte(*v)),
-                [] => Color32::BLACK,
-            };
-            d.chunks_exact(n).map(colour).collect()
+        Samples::Bytes(d) if table.is_empty() && n >= 3 => {
+            d.chunks_exact(n).map(|p| colour([p[0], p[1], p[2]])).collect()
         }
+        Samples::Bytes(d) if table.is_empty() => d.chunks_exact(n).map(|p| Color32::from_gray(p[0])).collect(),
+        Samples::Bytes(d) => d
+            .chunks_exact(n)
+            .map(|p| {
+                if n >= 3 {
+                    colour([0, 1, 2].map(|i| shown(p[i].into())))
+                } else {
+                    Color32::from_gray(shown(p[0].into()))
+                }
+            })
+            .collect(),
+        Samples::Words(d) => d
+            .chunks_exact(n)
+            .map(|p| if n >= 3 { colour([0, 1, 2].map(|i| shown(p[i]))) } else { Color32::from_gray(shown(p[0])) })
+            .collect(),
     }
 }
 
@@ -154,7 +220,14 @@ mod tests {
     }
 
     fn recipe(look: Look) -> Recipe {
-        Recipe { look, level: 100, channel: Channel::Mean, orient: Orient::AsStored, plane: Plane::Camera }
+        Recipe {
+            look,
+            level: 100,
+            tone: Tone::plain(255),
+            channel: Channel::Mean,
+            orient: Orient::AsStored,
+            plane: Plane::Camera,
+        }
     }
 
     #[test]
@@ -177,8 +250,18 @@ mod tests {
     fn words_are_shown_by_their_high_bits() {
         let layout = Layout::packed(2, 1, 1, 12);
         let p = Picture::new(Samples::Words(vec![0xfff, 0x080]), layout);
-        let shown = paint(&p, &recipe(Look::Colour), None, &mut Warp::default());
-        assert_eq!((shown[(0, 0)], shown[(1, 0)]), (Color32::from_gray(255), Color32::from_gray(8)));
+        let plain = Recipe { tone: Tone::plain(0xfff), ..recipe(Look::Colour) };
+        let shown = paint(&p, &plain, None, &mut Warp::default());
+        assert_eq!((shown[(0, 0)], shown[(1, 0)]), (Color32::from_gray(255), Color32::from_gray(7)));
+        // A stretched picture uses the range of its pixels.
+        let tone = Tone { low: 0x080, high: 0x100, gamma: 1.0 };
+        let stretched = paint(&p, &Recipe { tone, ..plain.clone() }, None, &mut Warp::default());
+        assert_eq!((stretched[(0, 0)], stretched[(1, 0)]), (Color32::from_gray(255), Color32::from_gray(0)));
+        // A larger exponent makes dark parts brighter.
+        let bright = Recipe { tone: Tone { gamma: 2.0, ..plain.tone }, look: Look::Grey, ..plain.clone() };
+        assert!(paint(&p, &bright, None, &mut Warp::default())[(1, 0)].r() > 40);
+        let coloured = paint(&p, &Recipe { look: Look::FalseColour, ..plain }, None, &mut Warp::default());
+        assert_eq!(coloured[(0, 0)], Color32::from_rgb(252, 255, 164));
         assert_eq!(read(&p, Channel::Mean, 1, 0), Some((0x80, vec![0x80])));
     }
 

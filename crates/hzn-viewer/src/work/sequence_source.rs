@@ -24,7 +24,7 @@ impl SequenceSource {
 }
 
 /// Opens a separate reader for the pictures of a recording.
-fn open_pictures(path: &Path) -> Result<Pictures, String> {
+pub(super) fn open_pictures(path: &Path) -> Result<Pictures, String> {
     let mut index = Index::open(path).map_err(|e| e.to_string())?;
     // The channels of the recording are declared before the first picture.
     while index.channels() == 0 && index.next_part().map_err(|e| e.to_string())?.is_some() {}

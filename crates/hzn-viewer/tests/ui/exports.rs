@@ -26,7 +26,9 @@ fn the_picture_is_saved_as_it_is_shown() {
     path(&mut window, &png, "Write");
     said(&mut window, "Written");
     let saved = image::open(&png).unwrap().to_rgb8();
-    assert_eq!(saved.dimensions(), (WIDTH.into(), HEIGHT.into()));
+    let (width, height) = (u32::from(WIDTH), u32::from(HEIGHT));
+    let caption = hzn_viewer::work::caption::height_px(width, height);
+    assert_eq!(saved.dimensions(), (width, height + caption), "a caption is below the picture");
     // The saved picture shows the fitted limb in its place.
     let limb = frame_view(&window).answers[0].bodies[0].limb.concat();
     let inside = |p: &&[f64; 2]| p[0] > 2.0 && p[1] > 2.0 && p[0] < 317.0 && p[1] < 237.0;
@@ -45,6 +47,7 @@ fn the_picture_is_saved_as_it_is_shown() {
     path(&mut window, &plain, "Write");
     said(&mut window, "plain.png");
     let plain = image::open(&plain).unwrap().to_rgb8();
+    let [saved, plain] = [saved, plain].map(|p| image::imageops::crop_imm(&p, 0, 0, width, height).to_image());
     assert!(colours(&saved) > 200 && colours(&plain) == 0, "{} {}", colours(&saved), colours(&plain));
 
     // A name with another ending is refused.
@@ -58,8 +61,6 @@ fn the_picture_is_saved_as_it_is_shown() {
 fn the_table_holds_what_is_shown() {
     let (dir, pictures) = folder();
     let mut window = window_on(&pictures);
-    window.get_by_label("Process all").click();
-    window.run_steps(2);
     until(&mut window, "not processed", |v| v.processed() == 4);
     let csv = dir.path().join("shown.csv");
     menu(&mut window, "Export", "Save results as CSV…");

@@ -12,7 +12,7 @@ fn open_step_tune_save_and_open_again() {
     assert_eq!(window.state().sequence().len(), 4);
     assert_eq!(answer(&window).0, Status::Ok);
 
-    window.get_by_label("Next picture").click();
+    window.get_by_label("Next frame").click();
     settled(&mut window);
     let first = answer(&window);
     assert_eq!((frame_view(&window).index, first.0), (1, Status::Ok));
@@ -41,7 +41,7 @@ fn open_step_tune_save_and_open_again() {
 
     // In another window, the answer of the saved file is the same to the last bit.
     let mut again = window_on(dir.path());
-    again.get_by_label("Next picture").click();
+    again.get_by_label("Next frame").click();
     settled(&mut again);
     assert_eq!(answer(&again), tuned);
 }
@@ -52,8 +52,6 @@ fn keys_step_and_find_what_has_no_answer() {
     window.key_press(Key::ArrowRight);
     settled(&mut window);
     assert_eq!(frame_view(&window).index, 1);
-    window.get_by_label("Process all").click();
-    window.run_steps(2);
     until(&mut window, "not processed", |v| v.processed() == 4);
     window.key_press(Key::N);
     settled(&mut window);
@@ -112,7 +110,7 @@ fn two_sensor_files_stand_side_by_side_with_the_difference() {
     assert!(window.query_by_label("Compared with other.toml").is_some());
     let [a, b] = [0, 1].map(|i| frame_view(&window).answers[i].bodies[0].row.clone());
     assert_eq!([a.status, b.status], [Status::Ok; 2]);
-    let apart = hzn_viewer::model::rows::angle_deg(a.axis().unwrap(), b.axis().unwrap());
+    let apart = hzn_viewer::model::quantity::angle_deg(a.axis().unwrap(), b.axis().unwrap());
     assert!(apart > 0.0);
     assert!(window.query_by_label(&format!("{apart:.4}° apart")).is_some());
     let level = f64::from(b.level.unwrap()) - f64::from(a.level.unwrap());

@@ -84,9 +84,23 @@ pub(crate) fn another_sensor(folder: &Path) -> PathBuf {
 pub(crate) type Window = Harness<'static, Viewer>;
 
 pub(crate) fn window() -> Window {
-    let viewer = Viewer::new(Settings::default(), None, Arc::new(|| {}));
+    sized_window(1400.0, 1000.0)
+}
+
+/// Returns a window of this size in points.
+pub(crate) fn sized_window(width: f32, height: f32) -> Window {
+    harness(width, height, None)
+}
+
+/// Returns a window that keeps its settings and its unsaved changes next to `store`.
+pub(crate) fn stored_window(store: &Path) -> Window {
+    harness(1400.0, 1000.0, Some(store.to_owned()))
+}
+
+fn harness(width: f32, height: f32, store: Option<PathBuf>) -> Window {
+    let viewer = Viewer::new(Settings::default(), store, Arc::new(|| {}));
     let mut window = Harness::builder()
-        .with_size(egui::vec2(1400.0, 1000.0))
+        .with_size(egui::vec2(width, height))
         .with_step_dt(0.02)
         .build_ui_state(|ui, v: &mut Viewer| v.show(ui), viewer);
     window.step();

@@ -125,6 +125,11 @@ impl<T: Real> Expected<T> {
         self.sin.atan2(self.cos)
     }
 
+    /// Returns the cosine of the expected half-angle and its 1-sigma from altitude, limb height and unknown radius.
+    pub fn cos_and_sigma(&self) -> (T, T) {
+        (self.cos, self.sigma_cos)
+    }
+
     /// Computes the expected cone of a body whose position is not fitted.
     #[cfg(test)]
     pub(crate) fn new(body: &Config, prior: &Prior<T>) -> Result<Self, PriorError> {

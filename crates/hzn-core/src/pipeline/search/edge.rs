@@ -179,6 +179,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let (b1, b2) = basis(&fused.e);
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
+        self.show_fit(fit, &fused, covariance, expected, outcome.number);
         let (made, factor) = (points.count, threshold.factor);
         let judged = gates::judge(fit, &fused, sigma, expected, blocks, made, factor, binary, camera, &config.select);
         outcome.verdict = match judged.verdict {
@@ -213,6 +214,16 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let next =
             (self.needs_next_threshold && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));
         Some(Best { solution, outcome: *outcome, score: judged.score, certain, level: next.flatten() })
+    }
+
+    /// Shows the fit of a candidate to the observer, if the observer wants it.
+    #[inline(always)]
+    fn show_fit(&self, fit: &Fit<T>, fused: &Fused<T>, covariance: Cov3<Cam, T>, expected: &Expected<T>, number: u32) {
+        if self.observer.wants_fit()
+            && let Some(solution) = self.make_solution(fit, fused, covariance, expected, number)
+        {
+            self.observer.fit(number, &solution, expected);
+        }
     }
 
     /// Returns whether the curvature of the edge shows on which side of the edge the body is.

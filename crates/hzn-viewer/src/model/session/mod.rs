@@ -167,6 +167,35 @@ impl Session {
         }
     }
 
+    /// Changes several values as one step. `None` removes a key.
+    pub fn set_all(&mut self, values: &[(&str, &str, Option<Value>)], body: usize) {
+        self.set_step(values, body, None);
+    }
+
+    /// Changes several values of the sensor. Consecutive changes with the same name of a gesture are one step.
+    pub fn set_gesture(&mut self, gesture: &str, values: &[(&str, &str, Option<Value>)]) {
+        self.set_step(values, 0, Some(gesture.to_owned()));
+    }
+
+    fn set_step(&mut self, values: &[(&str, &str, Option<Value>)], body: usize, gesture: Option<String>) {
+        let mut sheet = self.sheet.clone();
+        for (section, name, value) in values {
+            match sheet.with_value(sheet::Key { section, name, body }, value.clone()) {
+                Ok(changed) => sheet = changed,
+                Err(why) => {
+                    self.problem = Some(Problem::new(&self.home, why));
+                    return;
+                }
+            }
+        }
+        self.replace(sheet, gesture);
+    }
+
+    /// Returns a number as it is written into the text.
+    pub fn tidy_value(x: f64) -> Value {
+        Value::from(tidy(x))
+    }
+
     /// Sets a number. It is rounded to a whole number if the value in effect is whole.
     pub fn set_number(&mut self, key: &Key, body: usize, x: f64) {
         let is_whole = matches!(self.value(key.section(), key.name(), body), Some(toml::Value::Integer(_)))
@@ -236,6 +265,11 @@ impl Session {
     /// Goes back to the text that was read or last saved. This can be undone.
     pub fn reset(&mut self) {
         self.replace(self.saved.clone(), None);
+    }
+
+    /// Replaces the whole text, as one step.
+    pub fn set_text(&mut self, text: &str) {
+        self.replace(Sheet::new(text), None);
     }
 
     /// Writes the text to `path`, which becomes the file of the session. The file is written completely or not at all.

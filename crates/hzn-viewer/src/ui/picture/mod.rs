@@ -3,25 +3,27 @@
 mod mask;
 mod overlays;
 mod read_out;
+mod welcome;
 
 use egui::{Align2, Color32, FontId, PointerButton, Rect, Response, Sense, Ui, Vec2, pos2, vec2};
 
 use super::placement::{Placement, area};
+use super::theme;
 use super::viewer::Viewer;
-use super::{Command, theme};
 use crate::model::Plane;
 use crate::model::View;
 use crate::model::settings::Layer;
 use crate::work::FrameView;
 use read_out::{label, notice};
 
-pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
-    egui::CentralPanel::no_frame().show(ui, |ui| {
+/// Draws the picture, and returns its area.
+pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) -> Rect {
+    let area = egui::CentralPanel::no_frame().show(ui, |ui| {
         let rect = ui.max_rect();
         let ground = if ui.visuals().dark_mode { ui.visuals().extreme_bg_color } else { Color32::from_gray(214) };
         ui.painter().rect_filled(rect, 0, ground);
         if viewer.sequence.title.is_empty() {
-            return welcome(viewer, ui);
+            return welcome::show(viewer, ui);
         }
         let Some(frame_view) = viewer.frame_view.clone() else {
             ui.centered_and_justified(|ui| ui.weak(if viewer.sequence.is_empty() { "" } else { "…" }));
@@ -35,26 +37,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             show_pane(viewer, ui, &frame_view, inner, pane);
         }
     });
-}
-
-fn welcome(viewer: &mut Viewer, ui: &mut Ui) {
-    ui.vertical_centered(|ui| {
-        ui.add_space(ui.available_height() * 0.28);
-        ui.heading("hzn viewer");
-        ui.add_space(6.0);
-        ui.label("Drop a recording (.mcap), a folder of pictures, a picture or a video here.");
-        ui.add_space(10.0);
-        if ui.button("Open…").clicked() {
-            viewer.run(Command::Open, &ui.ctx().clone());
-        }
-        ui.add_space(14.0);
-        let recent = viewer.settings.recent.clone();
-        for path in recent {
-            if ui.link(path.display().to_string()).clicked() {
-                viewer.open_paths(vec![path]);
-            }
-        }
-    });
+    area.response.rect
 }
 
 fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rect, pane: usize) {

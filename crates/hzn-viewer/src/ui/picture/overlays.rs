@@ -97,6 +97,17 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Pla
         }
     }
     if on(Layer::Limb) {
+        // Many short edges have a fit; only the longest one, and the one under the pointer, are drawn strongly.
+        let longest = crate::work::trials::longest(&answer.edges).map(|e| e.candidate);
+        let pointed = |c: u32| viewer.pointed == Some(c) || viewer.chosen_candidate == Some(c);
+        for (candidate, limb) in &answer.candidate_limbs {
+            let strong = pointed(*candidate) || longest == Some(*candidate);
+            let colour = theme::edge(*candidate).gamma_multiply(if strong { 1.0 } else { 0.3 });
+            dashed_lines(painter, placement, limb, colour, if pointed(*candidate) { 3.0 } else { 1.6 });
+        }
+        dashed_lines(painter, placement, &answer.trial_limb, theme::LIMB, 1.8);
+        dashed_lines(painter, placement, &answer.expected_limb, theme::EXPECTED, 1.8);
+        expected_label(painter, placement, answer);
         // A dark line below keeps the limb visible on clouds.
         lines(painter, placement, &answer.limb, Stroke::new(6.0, Color32::from_black_alpha(120)));
         lines(painter, placement, &answer.limb, Stroke::new(3.4, theme::LIMB));
@@ -198,6 +209,26 @@ fn lines(painter: &Painter, placement: &Placement<'_>, lines: &[Vec<Point>], str
             painter.add(Shape::line(part.iter().filter_map(|p| placement.to_screen(*p)).collect(), stroke));
         }
     }
+}
+
+/// Draws lines with dashes, above a dark line that keeps them visible on clouds.
+fn dashed_lines(painter: &Painter, placement: &Placement<'_>, lines: &[Vec<Point>], colour: Color32, width: f32) {
+    for line in lines {
+        let points: Vec<Pos2> = line.iter().filter_map(|p| placement.to_screen(*p)).collect();
+        let back = Stroke::new(width + 2.0, Color32::from_black_alpha(colour.a() / 2));
+        painter.extend(Shape::dashed_line(&points, back, 9.0, 6.0));
+        painter.extend(Shape::dashed_line(&points, Stroke::new(width, colour), 9.0, 6.0));
+    }
+}
+
+/// Names the expected limb with its half-angle, at the middle of its longest line.
+fn expected_label(painter: &Painter, placement: &Placement<'_>, answer: &BodyResult) {
+    let longest = answer.expected_limb.iter().max_by_key(|line| line.len());
+    let middle = longest.and_then(|line| placement.to_screen(*line.get(line.len() / 2)?));
+    let (Some(at), Some(rad)) = (middle, answer.expected_rad) else { return };
+    let inside = painter.clip_rect().shrink2(vec2(90.0, 20.0));
+    let text = format!("expected, {:.2}°", rad.to_degrees());
+    super::read_out::label(painter, inside.clamp(at) + vec2(0.0, -14.0), Align2::CENTER_BOTTOM, &text);
 }
 
 /// Draws thousands of points as one mesh of squares.

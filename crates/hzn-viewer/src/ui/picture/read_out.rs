@@ -3,10 +3,11 @@
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, vec2};
 use hzn_core::pixel::ImagePoint;
 
-use crate::model::{Plane, rows};
+use crate::model::{Plane, quantity};
 use crate::ui::placement::Placement;
-use crate::work::frame_view::{BodyResult, FrameView, Outcome, Residual};
+use crate::work::frame_view::{BodyResult, FrameView, Outcome};
 use crate::work::paint;
+use crate::work::residuals::Residual;
 
 /// Scale from which single pixels show their values, in screen points per picture pixel.
 const VALUES_FROM: f64 = 34.0;
@@ -60,7 +61,7 @@ pub(super) fn under_pointer(
     };
     text += &format!("   ray ({rx:.4}, {ry:.4}, {rz:.4})   {:.3}° off axis", rz.clamp(-1.0, 1.0).acos().to_degrees());
     if let Some(s) = outcome.and_then(|o| o.bodies.get(body)).and_then(BodyResult::solution) {
-        let angle = rows::angle_deg([rx, ry, rz], s.axis.xyz());
+        let angle = quantity::angle_deg([rx, ry, rz], s.axis.xyz());
         let beyond = angle - s.fused_half_angle_rad.to_degrees();
         let side = if beyond > 0.0 { "outside of" } else { "inside" };
         text += &format!("   {angle:.3}° from the body's axis, {:.3}° {side} the limb", beyond.abs());

@@ -7,18 +7,21 @@ use hzn_core::Preset;
 use super::Viewer;
 use crate::model::{Look, MaskEdit, Session};
 use crate::ui::Command;
-use crate::ui::path_dialog::{PathDialog, Purpose};
+use crate::ui::panels::Panel;
+use crate::ui::path_dialog::{Answer, PathDialog, Purpose};
 
 impl Viewer {
     /// Executes a command.
     pub fn run(&mut self, command: Command, ctx: &egui::Context) {
         let count = self.sequence.len();
         match command {
-            Command::Open => self.path_dialog = Some(PathDialog::new(Purpose::Open, &self.sequence.folder)),
+            Command::Open => self.ask(PathDialog::new(Purpose::Open, &self.sequence.folder)),
+            Command::OpenFolder => self.ask_folder(),
+            Command::OpenPath => self.path_dialog = Some(PathDialog::new(Purpose::Open, &self.sequence.folder)),
             Command::Save => self.save(),
             Command::SaveAs => {
                 if let Some(session) = &self.session {
-                    self.path_dialog = Some(PathDialog::new(Purpose::SaveSensor, session.home()));
+                    self.ask(PathDialog::new(Purpose::SaveSensor, session.home()));
                 }
             }
             Command::Undo => self.session.iter_mut().for_each(Session::undo),
@@ -40,6 +43,7 @@ impl Viewer {
             Command::Colour => self.settings.look = Look::Colour,
             Command::Grey => self.settings.look = Look::Grey,
             Command::Level => self.settings.look = Look::Level,
+            Command::FalseColour => self.settings.look = Look::FalseColour,
             Command::Undistorted => self.settings.undistorted = !self.settings.undistorted,
             Command::Mask => self.toggle_mask(),
             Command::Layers => self.layers_hidden = !self.layers_hidden,
@@ -47,30 +51,40 @@ impl Viewer {
                 Some(_) => {}
                 None => self.compare_with_preset(Preset::default()),
             },
-            Command::ProcessAll => self.process_all(None),
+            Command::ProcessAll => self.process_again(),
             Command::Rerun => {
                 if self.session.is_some() && count > 0 {
                     let name = format!("{}-again.mcap", self.sequence.stem());
-                    self.path_dialog = Some(PathDialog::new(Purpose::Rerun, &self.sequence.default_output_path(&name)));
+                    self.ask(PathDialog::new(Purpose::Rerun, &self.sequence.default_output_path(&name)));
                 }
             }
             Command::ExportPicture => {
                 let name = hzn_run::overlay::file_name(self.frame_view.as_ref().map_or("picture", |s| &s.name));
                 let name = format!("overlay-{name}");
-                self.path_dialog = Some(PathDialog::new(Purpose::Picture, &self.sequence.default_output_path(&name)));
+                self.ask(PathDialog::new(Purpose::Picture, &self.sequence.default_output_path(&name)));
             }
-            Command::Stages => self.settings.stages = !self.settings.stages,
-            Command::Plots => self.settings.plots = !self.settings.plots,
+            Command::Stages => self.panels.toggle(Panel::Stages, &mut self.settings),
+            Command::Answer => self.panels.toggle(Panel::Answer, &mut self.settings),
+            Command::Plots => self.panels.toggle(Panel::Plots, &mut self.settings),
             Command::Theme => self.settings.dark = !self.settings.dark,
             Command::Help => self.showing_help = !self.showing_help,
         }
+    }
+
+    /// Asks for a folder and opens it.
+    fn ask_folder(&mut self) {
+        let mut dialog = PathDialog::new(Purpose::Open, &self.sequence.folder);
+        if self.native_dialogs {
+            dialog.browse_only(true);
+        }
+        self.path_dialog = Some(dialog);
     }
 
     fn save(&mut self) {
         let Some(session) = &self.session else { return };
         let Some(path) = session.path().map(Path::to_owned) else {
             // The text comes from a recording, so the user has to confirm the path.
-            self.path_dialog = Some(PathDialog::new(Purpose::SaveSensor, session.home()));
+            self.ask(PathDialog::new(Purpose::SaveSensor, session.home()));
             return;
         };
         self.save_to(&path);
@@ -79,14 +93,17 @@ impl Viewer {
     /// Saves the sensor.toml to `path`, which becomes the file of the session.
     pub(in crate::ui) fn save_to(&mut self, path: &Path) {
         match self.session.as_mut().map(|s| s.save(path)) {
-            Some(Ok(())) => self.add_note(format!("Saved: {}", path.display())),
+            Some(Ok(())) => {
+                self.add_note(format!("Saved: {}", path.display()));
+                self.continue_after_save();
+            }
             Some(Err(why)) => self.add_problem(why),
             None => {}
         }
     }
 
     fn go_refused(&mut self, back: bool) {
-        match self.rows.next_refused(self.playback.frame(), back, self.body) {
+        match self.rows.next_refused(self.playback.frame(), back, self.body, self.group.as_ref()) {
             Some(frame) => self.playback.go(frame, self.sequence.len()),
             None => self.add_note("All processed pictures have an answer."),
         }
@@ -97,7 +114,7 @@ impl Viewer {
         let known = !self.truth.is_empty();
         let badness = |row: &hzn_mcap::Row| {
             if known {
-                crate::model::rows::error_deg(row, self.truth_of(&row.file, &row.body))
+                crate::model::quantity::error_deg(row, self.truth_of(&row.file, &row.body))
             } else {
                 row.sigma_max_deg
             }
@@ -136,9 +153,17 @@ impl Viewer {
 
     /// Takes the answer of the system's dialog for paths.
     pub(super) fn poll_path_dialog(&mut self) {
-        if self.path_dialog.as_mut().is_some_and(PathDialog::take_answer) {
-            self.accept_path();
+        match self.path_dialog.as_mut().map(PathDialog::take_answer) {
+            Some(Answer::Accepted) => self.accept_path(),
+            Some(Answer::Cancelled) => self.cancel_path(),
+            _ => {}
         }
+    }
+
+    /// Closes the dialog without a path.
+    pub(in crate::ui) fn cancel_path(&mut self) {
+        self.path_dialog = None;
+        self.changes.after_save = None;
     }
 
     /// Does what the path of the dialog is for, and closes the dialog.
@@ -155,7 +180,7 @@ impl Viewer {
             Purpose::Picture => self.export_picture(path),
             Purpose::Video => self.export_video(path),
             Purpose::Table => self.export_table(path),
-            Purpose::Rerun => self.process_all(Some(path)),
+            Purpose::Rerun => self.run_into(path),
         }
     }
 
@@ -189,6 +214,22 @@ mod tests {
         send.send(answer).unwrap();
         viewer.poll_path_dialog();
         viewer
+    }
+
+    #[test]
+    fn the_dialog_of_the_system_needs_no_second_one() {
+        let native = |age_ms: u64, answer: Option<&str>| {
+            let mut dialog = PathDialog::new(Purpose::Table, Path::new("/typed"));
+            let (send, receive) = bounded(1);
+            dialog.browsing = Some(receive);
+            dialog.native = std::time::Instant::now().checked_sub(std::time::Duration::from_millis(age_ms));
+            assert!(dialog.is_hidden());
+            send.send(answer.map(PathBuf::from)).unwrap();
+            (dialog.take_answer(), dialog.is_hidden())
+        };
+        assert_eq!(native(5000, Some("/picked.csv")), (Answer::Accepted, false));
+        assert_eq!(native(5000, None), (Answer::Cancelled, false));
+        assert_eq!(native(0, None), (Answer::Open, false), "the system has no dialog, so the path is typed");
     }
 
     #[test]

@@ -10,16 +10,16 @@ use crate::work::job::{Done, Job, JobError, Progress};
 use crate::work::sweep::{self, Sweep};
 
 impl Viewer {
-    /// Processes all pictures, for the plots or into a file.
-    pub(in crate::ui) fn process_all(&mut self, output: Option<PathBuf>) {
+    /// Processes all pictures into a new recording.
+    pub(in crate::ui) fn run_into(&mut self, output: PathBuf) {
         let Some(session) = &self.session else {
             self.add_note("Open a sensor.toml first.");
             return;
         };
         let Some(config) = session.config().map(Arc::clone) else { return };
         let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-        if let (Some(output), Some(open)) = (&output, &self.sequence.recording)
-            && same(output, open)
+        if let Some(open) = &self.sequence.recording
+            && same(&output, open)
         {
             self.add_problem(format!("{}: is the recording that is open; write to another file", output.display()));
             return;
@@ -30,7 +30,7 @@ impl Viewer {
             version: session.version(),
             sensor_toml: session.sheet().text().to_owned(),
             flight: self.flight,
-            output,
+            output: Some(output),
         };
         self.sweep = Some(Sweep::start(task, Arc::clone(&self.wake)));
     }
@@ -66,7 +66,7 @@ impl Viewer {
         if self.layers_hidden { Vec::new() } else { self.settings.layers.clone() }
     }
 
-    fn start_job(
+    pub(super) fn start_job(
         &mut self,
         name: &'static str,
         work: impl FnOnce(&Progress) -> Result<Done, JobError> + Send + 'static,
@@ -81,6 +81,7 @@ impl Viewer {
         for (name, end) in ends {
             match end {
                 Ok(Done::Written(path)) => self.add_note(format!("Written: {}", path.display())),
+                Ok(Done::Rendered(folder)) => self.open_paths(vec![folder]),
                 Ok(Done::Recovered { path, frames }) => {
                     self.open_paths(vec![path.clone()]);
                     self.add_note(format!("{frames} pictures recovered into {}", path.display()));

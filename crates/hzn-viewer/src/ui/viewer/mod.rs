@@ -1,9 +1,14 @@
 //! The state of the window.
 
 mod act;
+mod auto;
+mod begin;
+mod changes;
 mod jobs;
 mod request_key;
+mod sequence_work;
 mod threads;
+mod unsaved;
 mod zoom;
 
 use std::collections::HashMap;
@@ -14,26 +19,29 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::Receiver;
 use hzn_sim::truth::Truth;
 
+use super::panels::Panels;
 use super::path_dialog::PathDialog;
+use super::study_window::StudyWindow;
+use super::summary::Summary;
 use super::textures::Textures;
+use super::toast::Toasts;
+use super::wizard_form::Wizard;
+use crate::model::cause::Group;
 use crate::model::{MaskEdit, Playback, ResultHistory, Sequence, Session, Settings, View};
+use crate::work::check::{Check, Damaged};
 use crate::work::frame_view::BodyResult;
 use crate::work::open::{self, Request};
 use crate::work::sweep::Sweep;
 use crate::work::{Engine, FrameView, Job, Wake};
+use changes::Changes;
+pub(super) use changes::Leave;
 use request_key::RequestKey;
+use sequence_work::SequenceWork;
 
 /// Longest time that playing advances in one frame of the window, for example after the window stood still.
 const LONGEST_PASS: Duration = Duration::from_millis(250);
-
-/// A message in the window, which stays until it is closed.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Message {
-    pub(super) text: String,
-    pub(super) bad: bool,
-    /// A recording that can be recovered.
-    pub(super) recover: Option<PathBuf>,
-}
+/// Shortest wait between two frames of the window while the sequence is played.
+const SHORTEST_WAIT: Duration = Duration::from_millis(4);
 
 /// The window's state.
 pub struct Viewer {
@@ -53,7 +61,35 @@ pub struct Viewer {
     /// Candidate that the pointer is on in the column of stages.
     pub(super) pointed: Option<u32>,
     pub(super) frame_view: Option<FrameView>,
-    pub(super) messages: Vec<Message>,
+    pub(super) toasts: Toasts,
+    pub(super) changes: Changes,
+    /// Session that comes back once its sequence is open.
+    restoring: Option<Session>,
+    /// The window closes at its next frame.
+    close_now: bool,
+    /// Version of the session that the results belong to.
+    seen_version: u64,
+    /// Work on the whole sequence in the background.
+    pub(super) work: SequenceWork,
+    /// Check of a recording, and its pictures that cannot be read.
+    checking: Option<Check>,
+    pub(super) damaged: Damaged,
+    pub(super) wizard: Option<Wizard>,
+    pub(super) study: Option<StudyWindow>,
+    pub(super) summary: Summary,
+    /// A change of one focal length changes the other one.
+    pub(super) linked_focal: bool,
+    /// Key that a link opens in the column of stages.
+    pub(super) focus_key: Option<&'static str>,
+    pub(super) panels: Panels,
+    /// Picture under the pointer in the plots.
+    pub(super) hovered_frame: Option<usize>,
+    /// Group of pictures that the time line shows; `None` shows all.
+    pub(super) group: Option<Group>,
+    /// Candidate whose residuals are shown; `None` shows those of the answer.
+    pub(super) chosen_candidate: Option<u32>,
+    /// Opens the dialogs of the system; otherwise paths are typed.
+    native_dialogs: bool,
     pub(super) path_dialog: Option<PathDialog>,
     pub(super) mask: Option<MaskEdit>,
     pub(super) showing_help: bool,
@@ -75,6 +111,8 @@ pub struct Viewer {
     /// Time of the last request.
     requested_at: Instant,
     last: Instant,
+    /// Time until the next picture is due, when the window was drawn last.
+    planned_wait: Duration,
     /// True once the colours and sizes of the window are set.
     pub(super) styled: bool,
 }
@@ -82,6 +120,7 @@ pub struct Viewer {
 impl Viewer {
     /// Creates an empty window. Threads that have something to show call `wake`.
     pub fn new(settings: Settings, store: Option<PathBuf>, wake: Wake) -> Self {
+        let changes = Changes::new(store.as_deref());
         Self {
             settings,
             store,
@@ -96,7 +135,24 @@ impl Viewer {
             body: 0,
             pointed: None,
             frame_view: None,
-            messages: Vec::new(),
+            toasts: Toasts::default(),
+            changes,
+            restoring: None,
+            close_now: false,
+            seen_version: 0,
+            work: SequenceWork::default(),
+            checking: None,
+            damaged: Damaged::new(),
+            wizard: None,
+            study: None,
+            summary: Summary::default(),
+            linked_focal: true,
+            focus_key: None,
+            panels: Panels::default(),
+            hovered_frame: None,
+            group: None,
+            chosen_candidate: None,
+            native_dialogs: false,
             path_dialog: None,
             mask: None,
             showing_help: false,
@@ -114,13 +170,14 @@ impl Viewer {
             requested: None,
             requested_at: Instant::now(),
             last: Instant::now(),
+            planned_wait: Duration::ZERO,
             styled: false,
         }
     }
 
     /// Opens another sequence.
     pub fn open(&mut self, request: Request) {
-        self.messages_before = self.messages.len();
+        self.messages_before = self.toasts.len();
         self.opening = Some(open::start(request.clone(), Arc::clone(&self.wake)));
         for path in &request.inputs {
             self.settings.add_recent(path);
@@ -135,12 +192,13 @@ impl Viewer {
             && one.extension().is_some_and(|e| e == "toml")
         {
             match Session::open(one) {
-                Ok(session) => self.set_session(session),
+                Ok(session) => self.leave(Leave::Sensor(Box::new(session)), None),
                 Err(problem) => self.add_problem(problem.to_string()),
             }
             return;
         }
-        self.open(Request { inputs, fps: self.request.fps, ..Request::default() });
+        let request = Request { inputs, fps: self.request.fps, ..Request::default() };
+        self.leave(Leave::Sequence(Box::new(request)), None);
     }
 
     /// Switches to single precision and 2048 points, as on the flight computer.
@@ -192,24 +250,33 @@ impl Viewer {
     }
     /// Returns the messages to the user.
     pub fn messages(&self) -> impl Iterator<Item = &str> {
-        self.messages.iter().map(|m| m.text.as_str())
+        self.toasts.iter().map(|t| t.text.as_str())
+    }
+    /// Returns the results of all pictures.
+    pub fn results(&self) -> &ResultHistory {
+        &self.rows
+    }
+    /// Uses the dialogs of the system for files.
+    pub fn use_native_dialogs(&mut self) {
+        self.native_dialogs = true;
     }
 
     pub(super) fn add_note(&mut self, text: impl Into<String>) {
-        self.add_message(Message { text: text.into(), bad: false, recover: None });
+        self.toasts.add(text.into(), false, None);
     }
     pub(super) fn add_problem(&mut self, text: impl Into<String>) {
-        self.add_message(Message { text: text.into(), bad: true, recover: None });
+        self.toasts.add(text.into(), true, None);
     }
-    fn add_message(&mut self, message: Message) {
-        if !self.messages.contains(&message) {
-            self.messages.push(message);
+    /// Asks for a path: with the dialog of the system, or by a line to type it.
+    pub(super) fn ask(&mut self, mut dialog: PathDialog) {
+        if self.native_dialogs {
+            dialog.browse_only(false);
         }
+        self.path_dialog = Some(dialog);
     }
 
     pub(super) fn set_session(&mut self, session: Session) {
         self.session = Some(session);
-        self.rows.clear_current();
         self.requested = None;
         self.body = 0;
     }
@@ -218,6 +285,12 @@ impl Viewer {
     pub(super) fn answer(&self) -> Option<&BodyResult> {
         let outcome = self.frame_view.as_ref()?.answers.first()?;
         outcome.bodies.get(self.body).or(outcome.bodies.first())
+    }
+
+    /// Returns true if pictures have altitudes or positions of their own, so that `body.altitude_km` has no effect.
+    pub(super) fn has_own_altitudes(&self) -> bool {
+        let own = |d: &hzn_calib::FrameData| d.altitude_km.is_some() || d.position_km.is_some();
+        self.sequence.entries.iter().any(|e| e.data.as_ref().is_some_and(own))
     }
 
     /// Returns the truth for a picture and a body.
@@ -231,15 +304,22 @@ impl Viewer {
         let elapsed = std::mem::replace(&mut self.last, Instant::now()).elapsed();
         let duration_s = |frame| self.sequence.duration_s(frame);
         if self.frame_view.as_ref().is_none_or(|s| s.index == self.playback.frame()) {
-            self.playback.advance(elapsed.min(LONGEST_PASS), self.sequence.len(), duration_s);
+            // A window that stood still does not catch up; a window that waited for the next picture does.
+            let longest = LONGEST_PASS + std::mem::take(&mut self.planned_wait);
+            self.playback.advance(elapsed.min(longest), self.sequence.len(), duration_s);
         }
         if let Some(due) = self.playback.due(duration_s) {
-            ctx.request_repaint_after(due.clamp(Duration::from_millis(4), LONGEST_PASS / 2));
+            // The window draws nothing until the next picture is due.
+            self.planned_wait = due.max(SHORTEST_WAIT);
+            ctx.request_repaint_after(self.planned_wait);
         }
     }
 
     /// Stops unfinished writing and stores the settings.
     pub fn close(&self) {
+        if let Some(autosave) = self.changes.autosave.as_ref().filter(|_| self.changes.may_close) {
+            autosave.remove();
+        }
         self.jobs.iter().for_each(Job::abandon);
         self.sweep.iter().for_each(Sweep::abandon);
         if let Some(place) = &self.store {

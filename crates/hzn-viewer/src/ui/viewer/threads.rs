@@ -3,10 +3,12 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::Viewer;
 use super::request_key::RequestKey;
-use super::{Message, Viewer};
+use super::sequence_work::SequenceWork;
 use crate::model::settings::Layer;
-use crate::model::{Place, ResultHistory, Sequence, Session, View};
+use crate::model::{Place, Processed, ResultHistory, Sequence, Session, View};
+use crate::work::check::Check;
 use crate::work::open;
 use crate::work::sweep::{self, Sweep};
 use crate::work::{FrameRequest, FrameView, Setup};
@@ -33,6 +35,8 @@ impl Viewer {
         for event in sweep_events {
             self.handle_sweep(event);
         }
+        self.poll_background();
+        self.poll_check();
         self.take_finished_jobs();
         self.poll_path_dialog();
     }
@@ -59,7 +63,12 @@ impl Viewer {
             && self.session.as_ref().is_some_and(|s| s.version() == frame_view.version)
             && !outcome.bodies.is_empty()
         {
-            self.rows.set_current(frame_view.index, outcome.bodies.iter().map(|b| b.row.clone()).collect());
+            let processed = Processed {
+                rows: outcome.bodies.iter().map(|b| b.row.clone()).collect(),
+                causes: outcome.bodies.iter().filter_map(|b| b.cause).collect(),
+                fits: outcome.bodies.iter().map(|b| b.fit).collect(),
+            };
+            self.rows.set_current(frame_view.index, processed);
         }
         self.frame_view = Some(frame_view);
     }
@@ -100,18 +109,24 @@ impl Viewer {
         (self.frame_view, self.requested, self.sweep, self.mask) = (None, None, None, None);
         (self.worst, self.body) = (0, 0);
         self.view = View::FIT;
+        (self.group, self.chosen_candidate, self.seen_version) = (None, None, 0);
+        self.work = SequenceWork::default();
+        (self.checking, self.damaged) = (None, Vec::new());
         // Messages about the previous sequence are removed; newer messages stay.
-        self.messages.drain(..self.messages_before.min(self.messages.len()));
+        self.toasts.remove_first(self.messages_before);
         self.playback.go(self.request.frame, usize::MAX);
         self.engine.open(self.request.inputs.clone());
         // A sensor that the user opened stays if the new pictures come without one.
         match opened.sensor {
             Some(s) => self.session = Some(Session::new(&s.text, &s.home, s.is_file)),
             None if self.session.is_none() => self.add_note(
-                "There is no sensor.toml, so the pictures are shown but not processed. Open one, or drop it on the \
-                 window; `hzn init` writes a first one.",
+                "There is no sensor.toml, so the pictures are shown but not processed. Make one in the panel \
+                 “Stages”, open one, or drop it on the window.",
             ),
             None => {}
+        }
+        if let Some(session) = self.restoring.take() {
+            self.session = Some(session);
         }
         for note in opened.notes {
             self.add_note(note);
@@ -125,13 +140,9 @@ impl Viewer {
         self.playback.go(self.playback.frame(), self.sequence.len());
         if cut_off {
             let path = self.request.inputs.first().cloned();
-            self.add_message(Message {
-                text: "This recording was not closed: its run was interrupted, or the file was cut off. All complete \
-                       pictures are shown."
-                    .into(),
-                bad: true,
-                recover: path,
-            });
+            let text = "This recording was not closed: its run was interrupted, or the file was cut off. All complete \
+                        pictures are shown.";
+            self.toasts.add(text.into(), true, path);
         }
         if self.sequence.is_empty() {
             self.add_problem(format!("{}: contains no picture", self.sequence.title));
@@ -144,15 +155,32 @@ impl Viewer {
         if let Some(note) = note {
             self.add_problem(note);
         }
+        if let Some(recording) = self.sequence.recording.clone() {
+            let has_results = self.rows.recorded(0, 0).is_some();
+            let (entries, wake) = (self.sequence.entries.clone(), Arc::clone(&self.wake));
+            self.checking = Some(Check::start(recording, entries, has_results, wake));
+        }
+    }
+
+    /// Takes the result of the check of a recording.
+    fn poll_check(&mut self) {
+        let Some(damaged) = self.checking.as_ref().and_then(Check::end) else { return };
+        self.checking = None;
+        if let Some(first) = damaged.first() {
+            self.add_problem(format!(
+                "The recording is damaged: {} frames lie in damaged parts, the first is frame {}. Their pictures may \
+                 be wrong; the time line marks them.",
+                damaged.len(),
+                first + 1
+            ));
+        }
+        self.damaged = damaged;
     }
 
     fn handle_sweep(&mut self, event: sweep::Event) {
         match event {
-            sweep::Event::Frame { index, version, rows } => {
-                if self.session.as_ref().is_some_and(|s| s.version() == version) {
-                    self.rows.set_current(index, rows);
-                }
-            }
+            // The results come from the background work, with their causes.
+            sweep::Event::Frame { .. } => {}
             sweep::Event::End { file, stopped } => {
                 self.sweep = None;
                 match file {
@@ -170,6 +198,7 @@ impl Viewer {
 
     /// Requests the picture to show, unless the last request was the same.
     pub(in crate::ui) fn request_frame(&mut self) {
+        self.notice_version();
         let index = self.playback.frame();
         let Some(entry) = self.sequence.entries.get(index) else { return };
         let sessions = self.session.iter().chain(self.other.iter().map(|(_, s)| s));
@@ -179,6 +208,7 @@ impl Viewer {
             index,
             versions: setups.iter().map(|s| s.version).collect(),
             look: self.settings.look,
+            contrast: (self.settings.contrast, self.settings.gamma),
             undistorted: self.settings.undistorted,
             touched: self.settings.shows(Layer::Touched),
             flight: self.flight,
@@ -187,9 +217,6 @@ impl Viewer {
         if self.requested.as_ref() == Some(&key) {
             return;
         }
-        if self.requested.as_ref().is_some_and(|last| last.versions != key.versions) {
-            self.rows.clear_current();
-        }
         let ahead = |i: usize| Some((i, self.sequence.entries.get(i)?.clone()));
         let request = FrameRequest {
             index,
@@ -197,6 +224,7 @@ impl Viewer {
             setups,
             flight: key.flight,
             look: key.look,
+            contrast: key.contrast,
             undistorted: key.undistorted,
             touched: key.touched,
             ahead: (index + 1..=index + AHEAD).filter_map(ahead).collect(),

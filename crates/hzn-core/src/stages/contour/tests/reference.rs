@@ -73,7 +73,7 @@ impl Bitmap {
         let mut marks = Marks::new(&mut bits, self.w, self.h, spacing, spacing);
         let (mut buffer, mut edges) = (vec![Pixel::default(); 1 << 15], Edges::default());
         // An edge touches each side of a pixel once, so this many steps always suffice.
-        let bound = 4 * u32::from(self.w) * u32::from(self.h) * work::follow_step_cost(0);
+        let bound = 4 * u32::from(self.w) * u32::from(self.h) * (work::LOOK_AROUND + work::RUN + work::READ);
         let points = |edge: &Thinned<'_>| edge.pixels().iter().map(|p| (p.x, p.y)).collect::<Points>();
         binary.each_start(1, &mut |start| {
             let (mut edge, mut steps) = (Thinned::new(&mut buffer), bound);

@@ -1,0 +1,139 @@
+//! Why a picture has no answer, in one word, and the groups of pictures with the same cause.
+
+use std::collections::BTreeMap;
+
+use hzn_core::Report;
+use hzn_core::status::Status;
+use hzn_core::verdict::Verdict;
+use hzn_mcap::Row;
+
+/// Cause of the status of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cause {
+    /// Status of the picture.
+    pub status: Status,
+    /// Reason for a picture that has edges but no answer.
+    pub reason: Option<Reason>,
+}
+
+/// Reason why a picture with edges has no answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    /// The picture has an answer with Otsu's threshold, but none with the threshold in use.
+    Level,
+    /// The verdict of the longest candidate.
+    Verdict(Verdict),
+}
+
+impl Reason {
+    /// Returns the word on the screen.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Level => "threshold",
+            Self::Verdict(verdict) => verdict.name(),
+        }
+    }
+}
+
+/// Returns the verdict of the longest candidate.
+pub fn longest_verdict(report: &Report<f64>) -> Option<Verdict> {
+    report.candidates.iter().max_by_key(|c| (c.length_px, std::cmp::Reverse(c.number))).map(|c| c.verdict)
+}
+
+impl Cause {
+    /// Returns the cause of a result. `answered_with_otsu` is true if Otsu's threshold, which is not in use, gives an
+    /// answer.
+    pub fn from_report(report: &Report<f64>, answered_with_otsu: bool) -> Self {
+        let reason = match report.status {
+            Status::Ok => None,
+            _ if answered_with_otsu => Some(Reason::Level),
+            _ => longest_verdict(report).map(Reason::Verdict),
+        };
+        Self { status: report.status, reason }
+    }
+    /// Returns the cause of a result in a file. The detail of a row lists verdicts without lengths, so the first one
+    /// counts.
+    pub fn from_row(row: &Row) -> Self {
+        let first = row.detail.split_once(": ").and_then(|(_, verdicts)| verdicts.split(", ").next());
+        let verdict = first.and_then(|name| Verdict::ALL.iter().find(|v| v.name() == name));
+        let refused = row.status != Status::Ok;
+        Self { status: row.status, reason: verdict.copied().map(Reason::Verdict).filter(|_| refused) }
+    }
+    /// Returns true if this picture belongs to a group.
+    pub fn is_in(&self, group: &Group) -> bool {
+        self.status == group.status && (group.reason.is_none() || group.reason == self.reason)
+    }
+}
+
+/// A group of pictures: a status, or one reason of a status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Group {
+    /// Status of the pictures.
+    pub status: Status,
+    /// Reason of the pictures; `None` for all reasons.
+    pub reason: Option<Reason>,
+}
+
+/// Number of pictures with a status, in all and by reason, the most frequent reason first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Counted {
+    /// Status.
+    pub status: Status,
+    /// Number of pictures.
+    pub count: usize,
+    /// Reasons with their numbers of pictures.
+    pub reasons: Vec<(Reason, usize)>,
+}
+
+/// Counts pictures by status and reason, in the order of the statuses.
+pub fn count(causes: impl Iterator<Item = Cause>) -> Vec<Counted> {
+    let mut by_status: BTreeMap<u8, Counted> = BTreeMap::new();
+    for Cause { status, reason } in causes {
+        let entry = by_status.entry(status as u8).or_insert(Counted { status, count: 0, reasons: Vec::new() });
+        entry.count += 1;
+        let Some(reason) = reason else { continue };
+        match entry.reasons.iter_mut().find(|(r, _)| *r == reason) {
+            Some((_, n)) => *n += 1,
+            None => entry.reasons.push((reason, 1)),
+        }
+    }
+    for counted in by_status.values_mut() {
+        counted.reasons.sort_by_key(|(reason, n)| (std::cmp::Reverse(*n), reason.name()));
+    }
+    by_status.into_values().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hzn_mcap::RowMeta;
+
+    #[test]
+    fn pictures_are_counted_by_status_and_reason() {
+        let cause = |status, reason| Cause { status, reason };
+        let short = Some(Reason::Verdict(Verdict::ShortArc));
+        let causes = [
+            cause(Status::Rejected, short),
+            cause(Status::Ok, None),
+            cause(Status::Rejected, Some(Reason::Level)),
+            cause(Status::Rejected, Some(Reason::Level)),
+            cause(Status::NoLimb, None),
+        ];
+        let counted = count(causes.into_iter());
+        let words: Vec<_> = counted.iter().map(|c| (c.status.name(), c.count, c.reasons.len())).collect();
+        assert_eq!(words, [("ok", 1, 0), ("no-limb", 1, 0), ("rejected", 3, 2)]);
+        assert_eq!(counted[2].reasons[0], (Reason::Level, 2));
+        let group = Group { status: Status::Rejected, reason: short };
+        assert!(causes[0].is_in(&group) && !causes[2].is_in(&group));
+        assert!(causes[2].is_in(&Group { reason: None, ..group }) && !causes[1].is_in(&group));
+    }
+
+    #[test]
+    fn a_row_of_a_file_tells_its_first_verdict() {
+        let meta = RowMeta { index: 0, file: "a".into(), time_s: None, body: "earth".into(), altitude_km: None };
+        let mut row = Row::unprocessed(&meta, Status::Rejected, "ended at select: half-angle, short-arc");
+        assert_eq!(Cause::from_row(&row).reason, Some(Reason::Verdict(Verdict::HalfAngle)));
+        row.detail = "ended at contour".into();
+        assert_eq!(Cause::from_row(&row).reason, None);
+    }
+}

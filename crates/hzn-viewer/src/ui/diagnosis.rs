@@ -1,0 +1,229 @@
+//! The diagnosis: why a picture has no answer, in numbers, and a button for each cure.
+
+use egui::{RichText, Ui, vec2};
+use hzn_core::status::Status;
+use hzn_core::{Config, threshold};
+
+use super::viewer::Viewer;
+use super::{links, theme};
+use crate::model::Session;
+use crate::model::cause::Reason;
+use crate::model::diagnosis::{self, Consensus, FitFacts, Suspect};
+use crate::work::frame_view::BodyResult;
+use crate::work::trials::OtsuTrial;
+
+/// Difference of the half-angles from which the table of causes is shown, in standard deviations.
+const CONSPICUOUS: f64 = 3.0;
+
+/// A change of the sensor.toml that cures a cause: keys of one step with their values.
+pub(super) type Cure = Vec<(&'static str, &'static str, f64)>;
+
+/// Draws the diagnosis. It draws nothing if the picture has an answer and its half-angle is the expected one.
+pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
+    let Some(answer) = viewer.answer().cloned() else { return };
+    let refused = answer.row.status != Status::Ok;
+    let typical = diagnosis::typical_sigmas(viewer.rows.fits(viewer.body));
+    let conspicuous = |sigmas: Option<f64>| sigmas.is_some_and(|s| s.abs() > CONSPICUOUS);
+    let differs = conspicuous(answer.fit.map(|f| f.sigmas)) || conspicuous(typical);
+    if !refused && !differs {
+        return;
+    }
+    let fill = ui.visuals().faint_bg_color;
+    let border = theme::warning(ui.visuals().dark_mode);
+    let frame = egui::Frame::new().fill(fill).stroke(egui::Stroke::new(1.0, border)).corner_radius(6);
+    frame.inner_margin(egui::Margin::symmetric(8, 6)).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.strong("Diagnosis");
+        if let Some(cause) = answer.cause.and_then(|c| c.reason) {
+            ui.label(format!("{}: {}", answer.row.status, cause.name()));
+        }
+        if let Some(otsu) = answer.otsu.filter(|_| refused) {
+            threshold_cause(viewer, ui, &answer, otsu);
+        }
+        if let Some(fit) = answer.fit.filter(|_| differs) {
+            half_angle_causes(viewer, ui, &fit);
+        }
+        let tips = answer.report.as_ref().map(hzn_run::explain::tips).unwrap_or_default();
+        let measured = differs || answer.otsu.is_some_and(|o| o.answered);
+        if !measured {
+            tips.iter().for_each(|tip| links::tip(viewer, ui, tip));
+        } else if !tips.is_empty() {
+            // The numbers above say more than general advice.
+            egui::CollapsingHeader::new(RichText::new("More advice").size(12.5)).show(ui, |ui| {
+                tips.iter().for_each(|tip| links::tip(viewer, ui, tip));
+            });
+        }
+    });
+    ui.add_space(4.0);
+}
+
+/// Compares the threshold with Otsu's.
+fn threshold_cause(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult, otsu: OtsuTrial) {
+    let level = answer.row.level.unwrap_or(0);
+    let times = f64::from(level) / f64::from(otsu.level.max(1));
+    let outcome = if otsu.answered { "gives an answer" } else { "gives no answer, either" };
+    let now = format!("The threshold in use is {level} counts, {times:.2} times as high.");
+    wrapped(ui, &format!("Otsu's threshold, {} counts, {outcome}. {now}", otsu.level));
+    let all = viewer.sequence.len();
+    let same =
+        (0..all).filter_map(|i| viewer.rows.cause(i, viewer.body)).filter(|c| c.reason == Some(Reason::Level)).count();
+    if same > 1 {
+        wrapped(ui, &format!("The same holds for {same} of {all} frames."));
+    }
+    let hint = "Sets binarize.method = \"otsu\" and binarize.scale = 1";
+    if otsu.answered && ui.button("Use Otsu's threshold").on_hover_text(hint).clicked() {
+        use_otsu(viewer);
+    }
+}
+
+/// Sets Otsu's threshold without a factor.
+fn use_otsu(viewer: &mut Viewer) {
+    let body = viewer.body;
+    let Some(session) = &mut viewer.session else { return };
+    let name = threshold::Method::Otsu.name();
+    session.set_all(&[("binarize", "method", Some(name.into())), ("binarize", "scale", None)], body);
+}
+
+fn wrapped(ui: &mut Ui, text: &str) {
+    ui.add(egui::Label::new(RichText::new(text).size(12.5)).wrap());
+}
+
+/// Draws the fitted and the expected half-angle, and what each possible cause would have to be.
+fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
+    let how = if fit.is_trial { " (of a trial with a cone of any half-angle)" } else { "" };
+    wrapped(
+        ui,
+        &format!(
+            "Half-angle {:.3}° fitted{how}, {:.3}° expected: {:+.3}°, {:+.1} σ. These values would make them equal:",
+            fit.fitted_deg,
+            fit.expected_deg,
+            fit.fitted_deg - fit.expected_deg,
+            fit.sigmas
+        ),
+    );
+    let consensus = diagnosis::summarise(viewer.rows.fits(viewer.body));
+    let Some(session) = &viewer.session else { return };
+    let Some(config) = session.config().cloned() else { return };
+    let body = viewer.body;
+    let mut chosen = None;
+    egui::Grid::new("causes").num_columns(5).spacing(vec2(8.0, 3.0)).show(ui, |ui| {
+        for head in ["", "now", "this frame", "all frames", ""] {
+            ui.weak(RichText::new(head).size(11.5));
+        }
+        ui.end_row();
+        for suspect in in_order(&consensus) {
+            let all = consensus.iter().find(|c| c.suspect == suspect);
+            let Some(cause) = Cause::new(suspect, fit, all, &config, body) else { continue };
+            for text in [suspect.name().to_owned(), cause.now.clone(), cause.here.clone(), cause.all.clone()] {
+                ui.label(RichText::new(text).size(12.0));
+            }
+            apply(viewer, ui, &cause, &mut chosen);
+            ui.end_row();
+        }
+    });
+    if let Some(words) = agreement(&consensus) {
+        wrapped(ui, &words);
+    }
+    if let (Some(cure), Some(session)) = (chosen, &mut viewer.session) {
+        let values: Vec<_> = cure.iter().map(|(s, n, x)| (*s, *n, Some(Session::tidy_value(*x)))).collect();
+        session.set_all(&values, body);
+    }
+}
+
+/// Draws the button that applies a cause, or says why it cannot be applied.
+fn apply(viewer: &Viewer, ui: &mut Ui, cause: &Cause, chosen: &mut Option<Cure>) {
+    let own_altitudes = cause.suspect == Suspect::Altitude && viewer.has_own_altitudes();
+    let hint = match (own_altitudes, &cause.impossible) {
+        (true, _) => "The altitudes come from frames.csv or the recording, so correct them there".to_owned(),
+        (_, Some(why)) => why.clone(),
+        _ => cause.cure.iter().map(|(s, n, x)| format!("{s}.{n} = {x:.6}\n")).collect(),
+    };
+    let button = egui::Button::new("Apply").small();
+    let response = ui.add_enabled(!own_altitudes && cause.impossible.is_none(), button);
+    let name = format!("Apply {}", cause.suspect.name());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
+    if response.on_hover_text(&hint).on_disabled_hover_text(&hint).clicked() {
+        *chosen = Some(cause.cure.clone());
+    }
+}
+
+/// Returns all quantities, those that explain all pictures best first.
+fn in_order(consensus: &[Consensus]) -> Vec<Suspect> {
+    let known: Vec<Suspect> = consensus.iter().map(|c| c.suspect).collect();
+    let rest = Suspect::ALL.into_iter().filter(|s| !known.contains(s));
+    known.iter().copied().chain(rest).collect()
+}
+
+/// Says which cause agrees with all pictures.
+fn agreement(consensus: &[Consensus]) -> Option<String> {
+    let [best, second, ..] = consensus else { return None };
+    if best.pictures < 3 {
+        return None;
+    }
+    let words = |c: &Consensus| format!("{} scatters by {:.1} of its σ", c.suspect.name(), c.disagreement);
+    let all: Vec<String> = consensus.iter().map(words).collect();
+    // A wrong cause scatters more. Below 1 the scatter is the noise of the edges, and says nothing.
+    let decided = second.disagreement > 2.0 * best.disagreement.max(1.0);
+    let end = if decided {
+        format!("So the {} is the likely cause.", best.suspect.name())
+    } else {
+        "The frames do not tell the causes apart; check which value you know best.".to_owned()
+    };
+    Some(format!("Over {} frames: {}. {end}", best.pictures, all.join(", ")))
+}
+
+/// One possible cause in words, with its cure.
+struct Cause {
+    suspect: Suspect,
+    now: String,
+    here: String,
+    all: String,
+    cure: Cure,
+    /// Reason why the value cannot be used.
+    impossible: Option<String>,
+}
+
+impl Cause {
+    fn new(suspect: Suspect, fit: &FitFacts, all: Option<&Consensus>, config: &Config, body: usize) -> Option<Self> {
+        let here = fit.implied(suspect)?;
+        let bodies = config.each_body();
+        let of_body = bodies.get(body).or(bodies.first())?;
+        let value = all.map_or(here.value, |c| c.value);
+        let camera = &config.camera;
+        let mut cause = Self {
+            suspect,
+            now: String::new(),
+            here: String::new(),
+            all: String::new(),
+            cure: Vec::new(),
+            impossible: None,
+        };
+        match suspect {
+            Suspect::Altitude => {
+                let given = fit.given_altitude_km?;
+                cause.now = format!("{given:.1} km");
+                cause.here = format!("{:.1} ± {:.1} km", given + here.value, here.sigma);
+                cause.all = all.map(|c| format!("{:+.1} ± {:.1} km", c.value, c.scatter)).unwrap_or_default();
+                cause.cure = vec![("body", "altitude_km", of_body.altitude_km.unwrap_or(given) + value)];
+                cause.impossible = (given + value <= 0.0).then(|| "This altitude is below the ground".into());
+            }
+            Suspect::Focal => {
+                cause.now = format!("fx {:.1} px", camera.fx_px);
+                cause.here = format!("{:.1} ± {:.1} px", camera.fx_px * here.value, camera.fx_px * here.sigma);
+                let words =
+                    |c: &Consensus| format!("{:.1} ± {:.1} px", camera.fx_px * c.value, camera.fx_px * c.scatter);
+                cause.all = all.map(words).unwrap_or_default();
+                cause.cure = vec![("camera", "fx_px", camera.fx_px * value), ("camera", "fy_px", camera.fy_px * value)];
+            }
+            Suspect::LimbHeight => {
+                cause.now = format!("{:.1} km", of_body.limb_height_km);
+                cause.here = format!("{:.1} ± {:.1} km", here.value, here.sigma);
+                cause.all = all.map(|c| format!("{:.1} ± {:.1} km", c.value, c.scatter)).unwrap_or_default();
+                cause.cure = vec![("body", "limb_height_km", value)];
+                cause.impossible = (!(-50.0..=500.0).contains(&value))
+                    .then(|| "No limb is this high: sensor.toml allows −50 to 500 km".into());
+            }
+        }
+        Some(cause)
+    }
+}

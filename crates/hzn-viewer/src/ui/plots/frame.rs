@@ -1,0 +1,44 @@
+//! The parts that all plots share.
+
+use egui::{Color32, Rangef, Response, RichText, Ui, vec2};
+use egui_plot::Plot;
+
+use super::axis::{tick_label, ticks};
+
+/// Width of the labels of the y axis, so that the plots in rows lie exactly below each other.
+pub(super) const LABELS_WIDTH: f32 = 52.0;
+
+/// Draws title, legend and values of a plot above it, because a legend inside would cover the lines.
+pub(super) fn heading(ui: &mut Ui, title: &str, lines: &[(&str, Color32)], values: &str) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(title).size(12.5));
+        for (name, colour) in lines {
+            let (rect, _) = ui.allocate_exact_size(vec2(10.0, 10.0), egui::Sense::hover());
+            ui.painter().rect_filled(rect.shrink(1.0), 2, *colour);
+            ui.weak(RichText::new(*name).size(12.0));
+        }
+        if !values.is_empty() {
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                ui.add(egui::Label::new(RichText::new(values).monospace().size(12.0)).truncate());
+            });
+        }
+    });
+}
+
+/// Names the plot for screen readers.
+pub(super) fn set_label(response: &Response, name: &str) {
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Plot {name}")));
+}
+
+/// Returns a plot with the properties that all plots share.
+pub(super) fn shared_plot<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> {
+    Plot::new(id)
+        .height(height)
+        .allow_scroll(false)
+        // There are few grid lines, and all of them are faint, so that the curve stands out.
+        .grid_spacing(Rangef::new(8.0, 1500.0))
+        .x_grid_spacer(|input| ticks(input, 8.0))
+        .y_grid_spacer(move |input| ticks(input, if height < 90.0 { 2.0 } else { 4.0 }))
+        .y_axis_formatter(|mark, _| tick_label(mark.value, mark.step_size))
+        .y_axis_min_width(LABELS_WIDTH)
+}

@@ -1,0 +1,95 @@
+//! Plots over time in rows, and the residuals along the limb of the shown picture.
+
+mod axis;
+mod frame;
+mod over_time;
+mod residuals;
+
+use egui::{RichText, ScrollArea, Ui};
+
+use super::viewer::Viewer;
+use crate::model::quantity::QUANTITIES;
+use over_time::TimeAxis;
+pub(super) use residuals::RESIDUALS;
+
+/// Height of the row of labels below the plots.
+const RULER: f32 = 24.0;
+/// Lowest height of a plot without its heading; more plots scroll.
+const LEAST_PLOT: f32 = 58.0;
+/// Height of a heading.
+const HEADING: f32 = 24.0;
+
+pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
+    // Most of a low window stays for the picture.
+    let window = ui.ctx().content_rect().height();
+    let most = (window * if window < 640.0 { 0.36 } else { 0.5 }).max(120.0);
+    let height = viewer.settings.plots_height.min(most);
+    let panel = egui::Panel::bottom("plots").resizable(true).default_size(height).size_range(110.0..=most);
+    let shown = panel.show(ui, |ui| {
+        // The contents fill the whole panel. Otherwise the panel would shrink a little with every frame of the window.
+        ui.expand_to_include_rect(ui.max_rect());
+        ui.add_space(4.0);
+        // A single picture has no plot over time.
+        let single = viewer.sequence.complete && viewer.sequence.len() == 1;
+        let chosen = if single {
+            vec![RESIDUALS.to_owned()]
+        } else {
+            quantity_choice(viewer, ui);
+            viewer.settings.plotted.clone()
+        };
+        rows(viewer, ui, &chosen);
+    });
+    viewer.settings.plots_height = shown.response.rect.height();
+}
+
+/// Draws the plots below each other. They share their time axis, whose labels are in the last row.
+fn rows(viewer: &mut Viewer, ui: &mut Ui, chosen: &[String]) {
+    if chosen.is_empty() {
+        ui.weak("Choose the plots above.");
+        return;
+    }
+    let over_time = chosen.iter().any(|name| name != RESIDUALS);
+    let ruler = if over_time { RULER + 6.0 } else { 0.0 };
+    let room = (ui.available_height() - ruler).max(40.0);
+    let each = (room / chosen.len() as f32 - HEADING - 6.0).max(LEAST_PLOT);
+    let axis = TimeAxis::new(viewer);
+    let (mut pointed, mut look) = (None, None);
+    ScrollArea::vertical().max_height(room).auto_shrink([false, false]).show(ui, |ui| {
+        for name in chosen {
+            if name == RESIDUALS {
+                look = residuals::show(viewer, ui, each).or(look);
+            } else if let Some(quantity) = QUANTITIES.iter().find(|q| q.name == name) {
+                pointed = over_time::show(viewer, ui, quantity, &axis, each).or(pointed);
+            }
+        }
+    });
+    // The other plots show the values of this picture with the next frame of the window.
+    viewer.hovered_frame = pointed.map(|(frame, _)| frame);
+    if over_time {
+        over_time::ruler(ui, &axis, RULER);
+    }
+    if let Some((frame, true)) = pointed {
+        viewer.playback.go(frame, viewer.sequence.len());
+    }
+    if let Some(point) = look {
+        viewer.look_at(point);
+    }
+}
+
+fn quantity_choice(viewer: &mut Viewer, ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        for name in QUANTITIES.iter().map(|q| q.name).chain([RESIDUALS]) {
+            if name == "Error (truth)" && viewer.truth.is_empty() {
+                continue;
+            }
+            let on = viewer.settings.plotted.iter().any(|p| p == name);
+            if ui.selectable_label(on, RichText::new(name).size(12.5)).clicked() {
+                if on {
+                    viewer.settings.plotted.retain(|p| p != name);
+                } else {
+                    viewer.settings.plotted.push(name.to_owned());
+                }
+            }
+        }
+    });
+}

@@ -1,0 +1,232 @@
+//! Plots of a quantity over all pictures.
+
+use egui::{Color32, Id, Ui, vec2};
+use egui_plot::{Line, LineStyle, Plot, PlotUi, Points, Span, VLine};
+use hzn_core::status::Status;
+use hzn_mcap::Row;
+
+use super::axis::{axis_labels, polylines, tick_label, value_range};
+use super::frame::{heading, set_label, shared_plot};
+use crate::model::quantity::{Quantity, RowValue};
+use crate::ui::theme;
+use crate::ui::viewer::Viewer;
+
+/// Results that a line shows.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Source {
+    /// The results of the current parameters.
+    Current,
+    /// The results of earlier parameters, where they are not the current ones.
+    Earlier,
+    /// The results of the sensor that is compared with.
+    Other,
+}
+
+impl Source {
+    fn row(self, viewer: &Viewer, index: usize) -> Option<&Row> {
+        match self {
+            Self::Current => viewer.rows.current(index, viewer.body),
+            Self::Earlier => viewer.rows.earlier(index, viewer.body),
+            Self::Other => viewer.rows.other(index, viewer.body),
+        }
+    }
+}
+
+/// The horizontal axis: the time since the first picture, or the number of the picture if the times are not known.
+pub(super) struct TimeAxis {
+    /// Place of each picture, if it has one.
+    places: Vec<Option<f64>>,
+    /// The unit of the labels; empty for numbers of pictures.
+    unit: &'static str,
+}
+
+impl TimeAxis {
+    pub(super) fn new(viewer: &Viewer) -> Self {
+        let entries = &viewer.sequence.entries;
+        // Times may be large numbers, so the plots start at the first picture with time zero.
+        match entries.iter().find_map(|e| e.time_s) {
+            Some(start) => Self { places: entries.iter().map(|e| Some(e.time_s? - start)).collect(), unit: " s" },
+            None => Self { places: (1..=entries.len()).map(|i| Some(i as f64)).collect(), unit: "" },
+        }
+    }
+    fn place(&self, index: usize) -> Option<f64> {
+        self.places.get(index).copied().flatten()
+    }
+    /// Returns the first and the last place.
+    fn ends(&self) -> [f64; 2] {
+        let mut known = self.places.iter().flatten().copied();
+        let first = known.next().unwrap_or(0.0);
+        let last = known.next_back().unwrap_or(first);
+        [first, last.max(first + 1e-3)]
+    }
+    /// Returns the picture that is nearest to a place.
+    fn nearest(&self, x: f64) -> Option<usize> {
+        let distance = |(i, p): (usize, &Option<f64>)| Some((i, (p.as_ref()? - x).abs()));
+        self.places.iter().enumerate().filter_map(distance).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+    }
+    /// Describes a place in words.
+    fn text(&self, x: f64) -> String {
+        if self.unit.is_empty() { format!("frame {x:.0}") } else { format!("{x:.3} s") }
+    }
+}
+
+/// Draws the labels of the horizontal axis below all plots.
+pub(super) fn ruler(ui: &mut Ui, axis: &TimeAxis, height: f32) {
+    let plot = with_axis(shared_plot("ruler", height), axis)
+        .show_axes([true, true])
+        .show_grid([false, false])
+        .y_axis_formatter(|_, _| String::new())
+        .include_y(0.0)
+        .allow_drag([true, false])
+        .x_axis_formatter(axis_labels(axis.unit));
+    set_label(&plot.show(ui, |_| ()).response, "time axis");
+}
+
+fn with_axis<'a>(plot: Plot<'a>, axis: &TimeAxis) -> Plot<'a> {
+    let [first, last] = axis.ends();
+    // The plots cover the whole sequence, also where there are no values, and all of them share their axis.
+    plot.include_x(first)
+        .include_x(last)
+        .link_cursor(Id::unique("time"), [true, false])
+        .link_axis(Id::unique("time"), [true, false])
+        .set_margin_fraction(vec2(0.01, 0.0))
+}
+
+/// The picture under the pointer, and whether it was clicked.
+pub(super) type Pointed = Option<(usize, bool)>;
+
+/// Plots a quantity of all pictures; returns the picture under the pointer.
+pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, axis: &TimeAxis, height: f32) -> Pointed {
+    let dark = ui.visuals().dark_mode;
+    let value = |i: usize, value_of: RowValue, source: Source| {
+        let row = source.row(viewer, i)?;
+        value_of(row, viewer.truth_of(&row.file, &row.body)).filter(|x| x.is_finite())
+    };
+    let count = viewer.sequence.len();
+    let each = |source: Source| {
+        quantity.lines.iter().flat_map(move |(_, value_of)| (0..count).filter_map(move |i| value(i, *value_of, source)))
+    };
+    let title = title(quantity);
+    let all = || [Source::Current, Source::Earlier, Source::Other].into_iter().flat_map(&each);
+    let Some([low, high]) = value_range(all()) else {
+        heading(ui, &title, &[], "");
+        ui.weak(why_empty(viewer, quantity));
+        return None;
+    };
+    let has = |source| each(source).next().is_some();
+    let (earlier, other) = (has(Source::Earlier), has(Source::Other));
+    let at = viewer.hovered_frame.unwrap_or(viewer.playback.frame());
+    let values = values_text(quantity, |value_of| value(at, value_of, Source::Current));
+    heading(ui, &title, &legend(quantity, earlier, other, dark), &values);
+    let plot = with_axis(shared_plot(("plot", quantity.name), height), axis)
+        .show_axes([false, true])
+        .include_y(low)
+        .include_y(high)
+        .allow_boxed_zoom(true)
+        .label_formatter(|_| None);
+    let response = plot.show(ui, |ui| {
+        shade_refused(viewer, ui, axis, dark);
+        let column = ui.transform().dvalue_dpos()[0].abs();
+        for (n, (name, value_of)) in quantity.lines.iter().enumerate() {
+            let colour = theme::line(n, dark);
+            for source in [Source::Earlier, Source::Other, Source::Current] {
+                let parts = polylines(count, column, |i| Some([axis.place(i)?, value(i, *value_of, source)?]));
+                parts.into_iter().for_each(|part| draw(ui, name, part, colour, source));
+            }
+        }
+        if let Some(now) = axis.place(viewer.playback.frame()) {
+            // This colour differs from the grid's.
+            let ink = if dark { theme::LIMB } else { theme::REJECTED };
+            ui.vline(VLine::new("", now).color(ink).width(1.5).allow_hover(false));
+        }
+        let at = ui.response().hovered().then(|| ui.pointer_coordinate()).flatten();
+        (at, ui.response().clicked())
+    });
+    set_label(&response.response, quantity.name);
+    let (at, clicked) = response.inner;
+    let p = at?;
+    response.response.on_hover_text_at_pointer(format!("{}\n{:.5}", axis.text(p.x), p.y));
+    Some((axis.nearest(p.x)?, clicked))
+}
+
+/// Draws a part of a line. Earlier results are faint, and those of the other sensor are dashed.
+fn draw(ui: &mut PlotUi<'_>, name: &str, part: Vec<[f64; 2]>, colour: Color32, source: Source) {
+    let (colour, width) = match source {
+        Source::Current => (colour, 1.6),
+        Source::Other => (colour, 1.2),
+        Source::Earlier => (colour.gamma_multiply(0.4), 1.0),
+    };
+    if let [one] = part.as_slice() {
+        ui.points(Points::new(name, vec![*one]).color(colour).radius(2.0));
+        return;
+    }
+    let line = Line::new(name, part).color(colour).width(width);
+    ui.line(if source == Source::Other { line.style(LineStyle::dashed_loose()) } else { line });
+}
+
+/// Shades the pictures without an answer. Neighbours are shaded together.
+fn shade_refused(viewer: &Viewer, ui: &mut PlotUi<'_>, axis: &TimeAxis, dark: bool) {
+    let colour = theme::status(Status::Rejected).gamma_multiply(if dark { 0.16 } else { 0.22 });
+    let is_refused = |i: usize| viewer.rows.newest(i, viewer.body).is_some_and(|r| r.status != Status::Ok);
+    let count = viewer.sequence.len();
+    // A picture reaches halfway to its neighbours.
+    let middle = |a: usize, b: usize| Some((axis.place(a)? + axis.place(b)?) / 2.0);
+    let mut i = 0;
+    while i < count {
+        let end = (i..count).find(|&k| !is_refused(k)).unwrap_or(count);
+        if end > i {
+            let from = if i == 0 { axis.place(0) } else { middle(i - 1, i) };
+            let to = if end == count { axis.place(end - 1) } else { middle(end - 1, end) };
+            if let (Some(from), Some(to)) = (from, to) {
+                ui.span(Span::new("", from..=to).fill(colour));
+            }
+        }
+        i = end + 1;
+    }
+}
+
+fn title(quantity: &Quantity) -> String {
+    if quantity.unit.is_empty() { quantity.name.to_owned() } else { format!("{} [{}]", quantity.name, quantity.unit) }
+}
+
+/// Returns the values of a picture as text.
+fn values_text(quantity: &Quantity, value: impl Fn(RowValue) -> Option<f64>) -> String {
+    let text = |(name, value_of): &(&str, RowValue)| {
+        let x = value(*value_of)?;
+        let digits = tick_label(x, (x.abs() * 1e-4).max(1e-9));
+        Some(if quantity.lines.len() > 1 { format!("{name} {digits}") } else { digits })
+    };
+    let each: Vec<String> = quantity.lines.iter().filter_map(text).collect();
+    if each.is_empty() { String::new() } else { format!("{} {}", each.join("  "), quantity.unit) }
+}
+
+/// Returns names and colours of the lines. A single line needs no name.
+fn legend(quantity: &Quantity, earlier: bool, other: bool, dark: bool) -> Vec<(&'static str, Color32)> {
+    let named = quantity.lines.iter().zip(0..).map(|((name, _), n)| (*name, theme::line(n, dark)));
+    let mut lines: Vec<_> = if quantity.lines.len() == 1 { Vec::new() } else { named.collect() };
+    if earlier {
+        lines.push(("before the change", theme::line(0, dark).gamma_multiply(0.4)));
+    }
+    if other {
+        lines.push(("dashed: compared", theme::line(0, dark)));
+    }
+    lines
+}
+
+/// Returns why a plot has no values.
+fn why_empty(viewer: &Viewer, quantity: &Quantity) -> String {
+    let Some(session) = &viewer.session else {
+        return "There is no sensor.toml, so there are no results.".into();
+    };
+    let answered =
+        (0..viewer.sequence.len()).filter_map(|i| viewer.rows.newest(i, viewer.body)).any(|r| r.status == Status::Ok);
+    match quantity.name {
+        _ if viewer.rows.is_empty() => "No frame is processed yet.".into(),
+        "Roll, pitch" if session.config().is_some_and(|c| c.mount.is_none()) => {
+            "Roll and pitch need the mounting of the camera: set [mount] q_body_from_camera_wxyz in sensor.toml.".into()
+        }
+        "Error (truth)" => "No answer has a truth to compare with.".into(),
+        _ if !answered => "No frame has an answer yet, so there is nothing to plot.".into(),
+        name => format!("No frame has a value of “{name}”."),
+    }
+}

@@ -1,0 +1,69 @@
+//! The residuals along the limb of the shown picture.
+
+use egui::{Ui, vec2};
+use egui_plot::{HLine, PlotPoints, Points};
+
+use super::axis::axis_labels;
+use super::frame::{heading, set_label, shared_plot};
+use crate::ui::theme;
+use crate::ui::viewer::Viewer;
+use crate::work::residuals::{Residual, residuals};
+
+/// Name of the plot of residuals.
+pub(in crate::ui) const RESIDUALS: &str = "Residuals";
+
+/// Returns the residuals of the candidate that the user chose, or else those of the answer, with a title.
+fn chosen(viewer: &Viewer) -> (String, Vec<Residual>) {
+    let Some(answer) = viewer.answer() else { return (String::new(), Vec::new()) };
+    let candidate = viewer.chosen_candidate.filter(|c| answer.solution().is_none_or(|s| s.candidate != *c));
+    let edge = candidate.and_then(|c| answer.edges.iter().find(|e| e.candidate == c));
+    let camera = viewer.frame_view.as_ref().and_then(|f| f.camera.as_deref());
+    if let (Some(edge), Some(camera)) = (edge, camera) {
+        // A refused candidate is shown against its own fit, with its own half-angle.
+        let all = edge.fitted.map(|fitted| {
+            let mut solution = fitted.solution;
+            solution.fused_half_angle_rad = solution.half_angle_rad;
+            residuals(&solution, edge, camera)
+        });
+        let title = format!("Residual of candidate {} [px] by azimuth about its axis", edge.candidate + 1);
+        return (title, all.unwrap_or_default());
+    }
+    ("Residual [px] by azimuth about the axis".to_owned(), answer.residuals.clone())
+}
+
+/// Plots the residuals of the edge points along the fitted limb; returns the picture point that was clicked.
+pub(super) fn show(viewer: &Viewer, ui: &mut Ui, height: f32) -> Option<[f64; 2]> {
+    let threshold = viewer.frame_view.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.reject.threshold_px);
+    let (title, all) = chosen(viewer);
+    let points = |kept: bool| -> PlotPoints<'_> {
+        all.iter().filter(|r| (r.weight > 0.0) == kept).map(|r| [r.azimuth_deg, r.distance_px]).collect()
+    };
+    if all.is_empty() {
+        heading(ui, RESIDUALS, &[], "");
+        ui.weak("There are no residuals: no limb is fitted. A click on a candidate with a fit shows its residuals.");
+        return None;
+    }
+    heading(ui, &title, &[("inliers", theme::INLIER), ("outliers", theme::REJECTED)], "");
+    let plot = shared_plot("residuals", height)
+        .set_margin_fraction(vec2(0.01, 0.1))
+        .x_axis_formatter(axis_labels("°"))
+        .include_y(-1.0)
+        .include_y(1.0);
+    let shown = plot.show(ui, |ui| {
+        if let Some(px) = threshold {
+            for y in [px, -px] {
+                ui.hline(HLine::new("threshold", y).color(theme::REJECTED.gamma_multiply(0.5)).allow_hover(false));
+            }
+        }
+        ui.points(Points::new("outliers", points(false)).color(theme::REJECTED).radius(1.8));
+        ui.points(Points::new("inliers", points(true)).color(theme::INLIER).radius(1.5));
+    });
+    set_label(&shown.response, RESIDUALS);
+    let pointer = shown.response.interact_pointer_pos().filter(|_| shown.response.clicked())?;
+    // The point that is nearest on the screen is returned.
+    let distance = |r: &Residual| {
+        let p = shown.transform.position_from_point(&[r.azimuth_deg, r.distance_px].into());
+        p.distance_sq(pointer)
+    };
+    all.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|r| r.point)
+}

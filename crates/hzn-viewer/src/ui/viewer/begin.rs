@@ -1,0 +1,69 @@
+//! The first minute: a first sensor.toml, and the demo flight.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use hzn_calib::start::Exif;
+use hzn_core::Config;
+use hzn_sim::truth::Truth;
+
+use super::Viewer;
+use crate::model::{Place, Session};
+use crate::ui::wizard_form::Wizard;
+use crate::work::demo;
+use crate::work::open::Request;
+use crate::work::study::{Study, Task};
+
+impl Viewer {
+    /// Opens the form for a first sensor.toml, for the shown picture.
+    pub(in crate::ui) fn open_wizard(&mut self) {
+        let Some(size) = self.frame_view.as_ref().and_then(|f| f.size()) else { return };
+        let exif = match self.sequence.entries.get(self.playback.frame()).map(|e| &e.place) {
+            Some(Place::File(path)) => hzn_run::source::exif_lens(path).unwrap_or_default(),
+            _ => Exif::default(),
+        };
+        let has_altitudes = self.has_own_altitudes();
+        self.wizard = Some(Wizard::new(size.map(|x| x as u32), exif, has_altitudes));
+    }
+
+    /// Begins a session with a text that is not saved yet.
+    pub(in crate::ui) fn begin_session(&mut self, text: &str, warnings: Vec<String>) {
+        let home = self.sequence.folder.join("sensor.toml");
+        // The text differs from the empty file, so it counts as a change that can be saved.
+        let mut session = Session::new("", &home, false);
+        session.set_text(text);
+        self.set_session(session);
+        warnings.into_iter().for_each(|w| self.add_note(w));
+        self.add_note(format!("Save the sensor.toml to keep it: {}", home.display()));
+    }
+
+    /// Returns the folder of the demo flight: next to the settings, or in the folder for temporary files.
+    fn demo_folder(&self) -> PathBuf {
+        let folder = self.store.as_deref().and_then(Path::parent).map(Path::to_owned);
+        folder.unwrap_or_else(|| std::env::temp_dir().join("hzn")).join("demo-flight")
+    }
+
+    /// Opens the demo flight. Its pictures are rendered the first time.
+    pub(in crate::ui) fn open_demo(&mut self) {
+        let folder = self.demo_folder();
+        if demo::is_complete(&folder) {
+            self.open(Request { inputs: vec![folder], fps: self.request.fps, ..Request::default() });
+        } else {
+            self.start_job("Rendering the demo flight", move |progress| demo::render(&folder, progress));
+        }
+    }
+
+    /// Starts the sweep of a parameter with these values and configurations.
+    pub(in crate::ui) fn start_study(&self, values: Vec<(f64, Arc<Config>)>) -> Study {
+        let body =
+            self.session.as_ref().and_then(|s| s.config()).and_then(|c| c.each_body().get(self.body).map(|b| b.kind));
+        let name = body.map_or("earth", |kind| kind.name());
+        let axis = |(file, all): (&String, &Vec<Truth>)| {
+            let truth = all.iter().find(|t| t.body == name)?;
+            Some((file.clone(), truth.axis()?.xyz()))
+        };
+        let truth = self.truth.iter().filter_map(axis).collect();
+        let task = Task { sequence: self.sequence.clone(), values, truth, body: self.body, flight: self.flight };
+        Study::start(task, Arc::clone(&self.wake))
+    }
+}

@@ -1,0 +1,47 @@
+//! The state of changes that are not saved.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crate::model::{Autosave, Session, Unsaved};
+use crate::work::open::Request;
+
+/// What the user wants to do, and what would lose the changes.
+#[derive(Debug, Clone)]
+pub(in crate::ui) enum Leave {
+    /// Close the window.
+    Window,
+    /// Open another sequence.
+    Sequence(Box<Request>),
+    /// Use another sensor.toml.
+    Sensor(Box<Session>),
+}
+
+/// The state of changes that are not saved.
+#[derive(Debug, Default)]
+pub(in crate::ui) struct Changes {
+    /// What waits for the answer to the question.
+    pub(in crate::ui) question: Option<Leave>,
+    /// What follows once the sensor.toml is saved under a path that the user is asked for.
+    pub(in crate::ui) after_save: Option<Leave>,
+    /// The window may close: there is nothing to lose, or the user answered.
+    pub(in crate::ui) may_close: bool,
+    /// A session of a window that ended with changes, and its file.
+    pub(in crate::ui) lost: Option<(Unsaved, PathBuf)>,
+    pub(in crate::ui) autosave: Option<Autosave>,
+    /// Version that was autosaved, and the version that is to be autosaved with the time of its change.
+    pub(in crate::ui) autosaved: Option<u64>,
+    pub(in crate::ui) pending: Option<(u64, Instant)>,
+}
+
+impl Changes {
+    /// Prepares the autosaving into the folder of the settings file.
+    pub(in crate::ui) fn new(store: Option<&Path>) -> Self {
+        let folder = store.and_then(Path::parent);
+        Self {
+            lost: folder.and_then(Autosave::find_lost),
+            autosave: folder.map(Autosave::in_folder),
+            ..Self::default()
+        }
+    }
+}

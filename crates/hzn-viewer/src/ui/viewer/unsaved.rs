@@ -1,0 +1,143 @@
+//! Changes that are not saved: the question before they go, and the autosaved session.
+
+use std::time::{Duration, Instant};
+
+use super::Viewer;
+use super::changes::Leave;
+use crate::model::{Session, Unsaved};
+use crate::ui::path_dialog::{PathDialog, Purpose};
+use crate::work::open::Request;
+
+/// Time from a change until it is autosaved, so that a slider that moves does not write a file with every step.
+const AUTOSAVE_AFTER: Duration = Duration::from_millis(700);
+
+impl Viewer {
+    fn has_changes(&self) -> bool {
+        self.session.as_ref().is_some_and(Session::is_changed)
+    }
+
+    /// Does what the user wants, or asks first if changes would be lost.
+    pub(in crate::ui) fn leave(&mut self, leave: Leave, ctx: Option<&egui::Context>) {
+        if self.has_changes() {
+            self.changes.question = Some(leave);
+        } else {
+            self.go_on(leave, ctx);
+        }
+    }
+
+    /// Does what waited for the changes.
+    fn go_on(&mut self, leave: Leave, ctx: Option<&egui::Context>) {
+        match leave {
+            Leave::Window => {
+                self.changes.may_close = true;
+                if let Some(ctx) = ctx {
+                    ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+                }
+            }
+            Leave::Sequence(request) => self.open(*request),
+            Leave::Sensor(session) => self.set_session(*session),
+        }
+    }
+
+    /// Lets the window close without a question.
+    pub fn allow_close(&mut self) {
+        self.changes.may_close = true;
+    }
+
+    /// Asks before the window closes, if changes would be lost.
+    pub(in crate::ui) fn watch_close(&mut self, ctx: &egui::Context) {
+        if ctx.input(|i| i.viewport().close_requested()) && self.has_changes() && !self.changes.may_close {
+            ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
+            self.changes.question = Some(Leave::Window);
+        }
+    }
+
+    /// Closes the window after its sensor.toml was saved.
+    pub(in crate::ui) fn close_if_due(&mut self, ctx: &egui::Context) {
+        if std::mem::take(&mut self.close_now) {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+    }
+
+    /// Takes the answer "Save" to the question.
+    pub(in crate::ui) fn save_and_leave(&mut self, ctx: &egui::Context) {
+        let Some(leave) = self.changes.question.take() else { return };
+        let Some(session) = &self.session else { return self.go_on(leave, Some(ctx)) };
+        self.changes.after_save = Some(leave);
+        match session.path().map(std::path::Path::to_owned) {
+            Some(path) => self.save_to(&path),
+            None => self.ask(PathDialog::new(Purpose::SaveSensor, session.home())),
+        }
+    }
+
+    /// Takes the answer "Discard changes" to the question.
+    pub(in crate::ui) fn discard_and_leave(&mut self, ctx: &egui::Context) {
+        let Some(leave) = self.changes.question.take() else { return };
+        self.session.iter_mut().for_each(Session::reset);
+        self.go_on(leave, Some(ctx));
+    }
+
+    /// Goes on with what waited for a saved file.
+    pub(super) fn continue_after_save(&mut self) {
+        if let Some(leave) = self.changes.after_save.take() {
+            // The window closes by itself at its next frame, because it may close now.
+            let closes = matches!(leave, Leave::Window);
+            self.go_on(leave, None);
+            self.close_now |= closes;
+        }
+    }
+
+    /// Brings the changes of a window that crashed back, together with its sequence.
+    pub(in crate::ui) fn restore_lost(&mut self) {
+        let Some((unsaved, path)) = self.changes.lost.take() else { return };
+        let _ = std::fs::remove_file(path);
+        let inputs = unsaved.inputs.clone();
+        let session = unsaved.into_session();
+        if !inputs.is_empty() && self.sequence.is_empty() && self.opening.is_none() {
+            self.open(Request { inputs, fps: self.request.fps, ..Request::default() });
+            self.restoring = Some(session);
+        } else {
+            self.set_session(session);
+        }
+    }
+
+    /// Removes the changes of a window that crashed.
+    pub(in crate::ui) fn forget_lost(&mut self) {
+        if let Some((_, path)) = self.changes.lost.take() {
+            let _ = std::fs::remove_file(path);
+        }
+    }
+
+    /// Writes changes to the autosave file, a moment after the last one.
+    pub(in crate::ui) fn autosave(&mut self, ctx: &egui::Context) {
+        let Some(autosave) = self.changes.autosave.clone() else { return };
+        let Some(session) = self.session.as_ref().filter(|s| s.is_changed()) else {
+            if self.changes.autosaved.take().is_some() {
+                autosave.remove();
+            }
+            self.changes.pending = None;
+            return;
+        };
+        let version = session.version();
+        if self.changes.autosaved == Some(version) {
+            return;
+        }
+        match self.changes.pending {
+            Some((pending, since)) if pending == version => {
+                let left = AUTOSAVE_AFTER.saturating_sub(since.elapsed());
+                if !left.is_zero() {
+                    return ctx.request_repaint_after(left);
+                }
+                let unsaved = Unsaved::of_session(session, &self.sequence.inputs);
+                self.changes.autosaved = Some(version);
+                if let Err(why) = autosave.write(&unsaved) {
+                    self.add_problem(format!("The changes are not autosaved: {why}"));
+                }
+            }
+            _ => {
+                self.changes.pending = Some((version, Instant::now()));
+                ctx.request_repaint_after(AUTOSAVE_AFTER);
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! The short result of a picture, for the plots and for the diagnosis over the sequence.
+
+use hzn_core::Config;
+use hzn_core::image::ImageView;
+use hzn_core::status::Status;
+use hzn_run::engine::{AnySensor, BodyOutcome, Traces};
+use hzn_run::sink;
+
+use super::frame_view::{FrameInput, find_fit};
+use super::trials::Trials;
+use crate::model::Processed;
+use crate::model::cause::Cause;
+
+/// Processes a picture and returns its results with their causes and fits. Without `trials` there are only results.
+pub(super) fn summarise(
+    view: &ImageView<'_>,
+    input: FrameInput<'_>,
+    config: &Config,
+    sensor: &mut AnySensor,
+    trials: Option<&mut Trials>,
+) -> Processed {
+    let traces = Traces::new(config.each_body().len());
+    let found = match &trials {
+        // The time without the observer counts. A sensor that tracks the threshold sees each picture once.
+        Some(_) if config.tracks() => sensor.process(view, input.data, Some(&traces)),
+        Some(_) => {
+            sensor.process(view, input.data, Some(&traces));
+            sensor.process(view, input.data, None)
+        }
+        None => sensor.process(view, input.data, None),
+    };
+    let finished = input.finish(found.into_iter().map(BodyOutcome::from).collect());
+    let mut processed = Processed { rows: sink::rows(&finished, config), ..Processed::default() };
+    let Some(trials) = trials else { return processed };
+    let refused = processed.rows.iter().any(|r| r.status != Status::Ok);
+    let otsu = trials.try_otsu(view, input.data, refused).unwrap_or_default();
+    let camera = sensor.camera().with_rate(input.data.and_then(|d| d.rate_rad_s));
+    for (index, outcome) in finished.outcomes.iter().enumerate() {
+        let row = processed.rows.get(index);
+        let (Ok(report), Some(trace), Some(row)) = (&outcome.report, traces.each.get(index), row) else {
+            let status = row.map_or(Status::Unreadable, |r| r.status);
+            processed.causes.push(Cause { status, reason: None });
+            processed.fits.push(None);
+            continue;
+        };
+        let answered = otsu.get(index).is_some_and(|o| o.answered);
+        processed.causes.push(Cause::from_report(report, answered));
+        let trial = || trials.try_any_cone(view, input.data);
+        let altitude_km = row.altitude_km;
+        let fit = find_fit(&trace.edges(), report, altitude_km, &camera, trial);
+        processed.fits.push(fit.map(|(facts, _)| facts));
+    }
+    processed
+}

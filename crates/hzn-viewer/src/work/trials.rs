@@ -1,0 +1,110 @@
+//! Trials that find the cause of a refusal: the same picture with Otsu's threshold, and with a cone of any half-angle.
+
+use hzn_calib::FrameData;
+use hzn_core::error::ConfigError;
+use hzn_core::image::ImageView;
+use hzn_core::status::Status;
+use hzn_core::verdict::Verdict;
+use hzn_core::{Config, consensus, fit, threshold};
+use hzn_run::engine::trace::Edge;
+use hzn_run::engine::{AnySensor, Traces};
+
+/// Sensors for the trials with one configuration.
+pub struct Trials {
+    /// The sensor with Otsu's threshold; `None` if the sensor itself uses it.
+    otsu: Option<AnySensor>,
+    /// A sensor that finds a cone of any half-angle.
+    any_cone: AnySensor,
+    /// One body; further bodies have thresholds of their own, and their sizes are known.
+    single: bool,
+}
+
+/// Result of the trial with Otsu's threshold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OtsuTrial {
+    /// Otsu's threshold in counts.
+    pub level: u16,
+    /// The picture has an answer with this threshold.
+    pub answered: bool,
+}
+
+fn uses_otsu(config: &Config) -> bool {
+    let of_body = config.each_body().iter().all(|b| b.binarize.is_none());
+    of_body && config.binarize.method == threshold::Method::Otsu && config.binarize.scale == 1.0
+}
+
+fn with_otsu(config: &Config) -> Config {
+    let mut config = config.clone();
+    config.binarize = threshold::Config::default();
+    config.each_body_mut().iter_mut().for_each(|b| b.binarize = None);
+    config
+}
+
+/// Returns the configuration of a sensor that fits a cone of any half-angle to each edge.
+fn with_any_cone(config: &Config) -> Config {
+    let mut config = config.clone();
+    config.reject.method = consensus::Method::Ransac;
+    config.estimate.half_angle = fit::HalfAngle::Free;
+    config.select.max_half_angle_sigma = 1e6;
+    config
+}
+
+impl Trials {
+    /// Makes the sensors. It returns `None` if one of them cannot be made; then there are no trials.
+    pub fn new(config: &Config, flight: bool) -> Option<Self> {
+        let otsu = if uses_otsu(config) { None } else { Some(AnySensor::new(&with_otsu(config), flight).ok()?) };
+        let any_cone = AnySensor::new(&with_any_cone(config), flight).ok()?;
+        Some(Self { otsu, any_cone, single: config.each_body().len() == 1 })
+    }
+
+    /// Takes another configuration.
+    ///
+    /// # Errors
+    /// The sensors cannot be made.
+    pub fn reconfigure(&mut self, config: &Config, flight: bool) -> Result<(), ConfigError> {
+        self.any_cone.reconfigure(&with_any_cone(config))?;
+        self.single = config.each_body().len() == 1;
+        match (&mut self.otsu, uses_otsu(config)) {
+            (otsu, true) => *otsu = None,
+            (Some(otsu), false) => otsu.reconfigure(&with_otsu(config))?,
+            (otsu, false) => *otsu = Some(AnySensor::new(&with_otsu(config), flight)?),
+        }
+        Ok(())
+    }
+
+    /// Returns the result with Otsu's threshold for each body; `None` if the sensor itself uses this threshold, or if
+    /// the picture is not `refused`.
+    pub fn try_otsu(
+        &mut self,
+        view: &ImageView<'_>,
+        data: Option<&FrameData>,
+        refused: bool,
+    ) -> Option<Vec<OtsuTrial>> {
+        let found = self.otsu.as_mut().filter(|_| refused)?.process(view, data, None);
+        let trial = |r: &hzn_core::Report<f64>| OtsuTrial { level: r.level, answered: r.status == Status::Ok };
+        found.iter().map(|p| p.report.as_ref().ok().map(trial)).collect()
+    }
+
+    /// Returns the longest edge that a cone of any half-angle fits.
+    pub fn try_any_cone(&mut self, view: &ImageView<'_>, data: Option<&FrameData>) -> Option<Edge> {
+        if !self.single {
+            return None;
+        }
+        let traces = Traces::new(1);
+        self.any_cone.process(view, data, Some(&traces));
+        let edges = traces.each.first()?.edges();
+        // A cone of any half-angle goes through many edges; only one that passes every other gate says something.
+        longest_fitted(&edges).filter(|e| e.outcome.is_some_and(|o| o.verdict == Verdict::Passed)).cloned()
+    }
+}
+
+/// Returns the longest edge with a fit.
+pub fn longest_fitted(edges: &[Edge]) -> Option<&Edge> {
+    let fitted = edges.iter().filter(|e| e.fitted.is_some_and(|f| f.solution.free.is_some()));
+    fitted.max_by_key(|e| e.outcome.map_or(0, |o| o.length_px))
+}
+
+/// Returns the longest edge.
+pub fn longest(edges: &[Edge]) -> Option<&Edge> {
+    edges.iter().max_by_key(|e| e.outcome.map_or(0, |o| o.length_px))
+}
