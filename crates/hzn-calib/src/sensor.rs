@@ -378,7 +378,8 @@ mod tests {
         }
         // Lists of exactly the maximum length are accepted.
         assert!(parse(&format!("{CAMERA}k = {}\n", list("0.0", 5)), Path::new("s.toml")).is_ok());
-        let full = format!("{CAMERA}[mask]\npolygons_px = {}\n", list(&polygon(16), 8));
+        let corners: Vec<&str> = ["[1, 2]", "[9, 2]", "[9, 8]", "[1, 8]"].into_iter().cycle().take(16).collect();
+        let full = format!("{CAMERA}[mask]\npolygons_px = {}\n", list(&format!("[{}]", corners.join(", ")), 8));
         assert!(parse(&full, Path::new("s.toml")).is_ok());
     }
 

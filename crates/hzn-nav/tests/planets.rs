@@ -175,7 +175,7 @@ fn rotations_are_rotations_about_the_pole() {
         let from_node = rotation * Vector3::new(node.cos(), node.sin(), 0.0);
         let angle = wrapped_deg(from_node.y.atan2(from_node.x).to_degrees() + orientation.meridian_deg);
         assert!(angle.abs() < 1e-9, "{}: {angle}", body.name);
-        assert!(body.radii_km.iter().all(|r| *r > 1.0) && body.radii_km[0] >= body.radii_km[2]);
+        assert!(body.radii_km().iter().all(|r| *r > 1.0) && body.radii_km()[0] >= body.radii_km()[2]);
         assert_eq!(planets::find(body.name), Some(body));
     }
     assert_eq!(planets::find("Jupiter"), None);

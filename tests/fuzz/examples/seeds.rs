@@ -8,7 +8,7 @@ use std::path::Path;
 
 use hzn_flight::bytes::Writer;
 use hzn_flight::messages::Housekeeping;
-use hzn_flight::packet::{self, Apid};
+use hzn_flight::packet::{self, Apid, ApidBase};
 use hzn_flight::{Parameters, table};
 use image::{GrayImage, ImageFormat, Luma};
 
@@ -126,7 +126,9 @@ fn streams() -> Seeds {
     seeds.push(("parameters/seed-set".into(), [&33u16.to_le_bytes()[..], &5f64.to_le_bytes()].concat()));
     seeds.push(("parameters/seed-short".into(), vec![1, 2, 3]));
     let mut packet = [0; packet::MAX_BYTES];
-    let n = packet::write(&mut packet, Apid::Housekeeping, 1, 2, |w: &mut Writer<'_>| Housekeeping::default().write(w));
+    let n = packet::write(&mut packet, ApidBase::default(), Apid::Housekeeping, 1, 2, |w: &mut Writer<'_>| {
+        Housekeeping::default().write(w)
+    });
     let packet = &packet[..n.unwrap_or(0)];
     seeds.push(("telemetry/seed-housekeeping".into(), packet.to_vec()));
     seeds.push(("telemetry/seed-two".into(), [packet, b"noise", packet].concat()));

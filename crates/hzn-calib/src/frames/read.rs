@@ -264,6 +264,8 @@ impl<'a> Row<'a> {
 
 #[cfg(test)]
 mod tests {
+    use hzn_core::body::{self, PriorError};
+
     use super::*;
 
     fn read(text: &str) -> Result<Frames, String> {
@@ -278,6 +280,23 @@ mod tests {
         assert_eq!(f.get("b.png").unwrap().altitude_km, None);
         assert!(f.get("c.png").is_none());
         assert_eq!(f.warnings[0].to_string(), "frames.csv:1: note: unknown column, not used");
+    }
+
+    /// An attitude that is no rotation is a problem of its row, not of the file.
+    #[test]
+    fn each_body_has_its_own_orientation() {
+        let header = "file,qw,qx,qy,qz,range_km,range_sigma_km,q_enceladus_w,q_enceladus_x,q_enceladus_y,q_enceladus_z";
+        let f = read(&format!("{header},pole_saturn_x,pole_saturn_y,pole_saturn_z\na,2,0,0,0,9,1,1,0,0,0,0,0,1\n"));
+        let f = f.unwrap();
+        assert!(f.warnings.is_empty(), "{:?}", f.warnings);
+        let (row, of_kind) = (f.get("a").unwrap(), |kind| body::Config::of_kind(kind, None));
+        assert_eq!(row.for_body(0, &of_kind(Kind::Jupiter)).unwrap_err(), PriorError::Attitude);
+        let enceladus = row.for_body(1, &of_kind(Kind::Enceladus)).unwrap();
+        assert_eq!((enceladus.camera_to_ecef_wxyz, enceladus.range_km), (Some([1.0, 0.0, 0.0, 0.0]), None));
+        let saturn = row.for_body(2, &of_kind(Kind::Saturn)).unwrap();
+        assert_eq!((saturn.camera_to_ecef_wxyz, saturn.pole_camera), (None, Some([0.0, 0.0, 1.0])));
+        assert!(read("file,pole_x,pole_y,pole_z\na,0,0,0\n").unwrap_err().contains("pole_z: has no direction"));
+        assert!(read("file,q_vulcan_w\na,1\n").unwrap().warnings[0].to_string().contains("unknown column"));
     }
 
     #[test]
@@ -302,7 +321,6 @@ mod tests {
             read("file,time_s\na\n").unwrap_err(),
             "frames.csv:2: this row has 1 cells, but the header has 2 columns"
         );
-        assert!(read("file,qw,qx,qy,qz\na,2,0,0,0\n").unwrap_err().contains("length must be 1"));
         assert!(
             read("file,sun_x,sun_y,sun_z\na,0,0,0\n").unwrap_err().contains("sun_x, sun_y, sun_z: has no direction")
         );

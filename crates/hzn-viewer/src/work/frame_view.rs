@@ -172,9 +172,7 @@ impl BodyResult {
             times: trace.times().to_vec(),
             elapsed: outcome.elapsed,
             expected_rad,
-            limb: solution
-                .map(|s| overlay::draw_cone(&s.axis, s.fused_half_angle_rad, camera).limb)
-                .unwrap_or_default(),
+            limb: solution.map(|s| overlay::draw_limb(&s, camera).limb).unwrap_or_default(),
             axis: solution.and_then(|s| camera.project(&s.axis)).map(|p| [p.u, p.v]),
             ellipse: solution.map(|s| ellipse(&s, camera)).unwrap_or_default(),
             residuals: solution.zip(chosen).map(|(s, edge)| residuals(&s, edge, camera)).unwrap_or_default(),
