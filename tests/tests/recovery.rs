@@ -1,5 +1,5 @@
-//! Tests in QEMU how the flight image comes back after resets. `cargo xtask test firmware` builds the image and runs the
-//! tests.
+//! Tests in QEMU how the flight image comes back after resets. `cargo xtask test firmware` builds the image and runs
+//! the tests.
 
 use std::process::Command;
 

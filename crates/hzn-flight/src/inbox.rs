@@ -9,8 +9,8 @@
 //!
 //! A damaged packet does not say where it ends. For [`MAX_BYTES`] bytes after its marker, a packet is therefore taken
 //! only if its end is confirmed: by the marker of the next packet, or by a pause of the line. A packet inside the
-//! damaged one has neither, because the rest of the damaged packet follows it without a pause. A marker with a few wrong
-//! bits, or without one of its bytes, also begins a damaged packet.
+//! damaged one has neither, because the rest of the damaged packet follows it without a pause. A marker with a few
+//! wrong bits, or without one of its bytes, also begins a damaged packet.
 
 use crate::packet::{self, HEADER, MAX_BYTES, Packet, SYNC};
 
@@ -63,8 +63,8 @@ enum Step {
 }
 
 impl Inbox {
-    /// Makes an empty inbox, of all zeros. The line may be in the middle of a packet, so the end of the first packet must
-    /// be confirmed.
+    /// Makes an empty inbox, of all zeros. The line may be in the middle of a packet, so the end of the first packet
+    /// must be confirmed.
     pub const fn new() -> Self {
         Self {
             bytes: [0; CAPACITY],

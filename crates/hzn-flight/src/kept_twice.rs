@@ -1,7 +1,7 @@
 //! A value that is kept twice, so that a bit that changes in memory is noticed.
 //!
-//! A comparison notices every change of a number, in either copy, and costs less than a checksum. It needs the memory of
-//! the second copy.
+//! A comparison notices every change of a number, in either copy, and costs less than a checksum. It needs the memory
+//! of the second copy.
 
 /// A value and its copy.
 #[derive(Debug)]

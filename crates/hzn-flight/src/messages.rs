@@ -126,8 +126,8 @@ numbered_enum! {
         KnownRefused = 12 => "the altitude or position is missing or impossible",
         /// The camera sends no pictures. a: time since the last one, ms. b: number of the last one.
         CameraSilent = 13 => "the camera sends no pictures",
-        /// A bit of the sensor or of the values from navigation changed in memory. a: 1 sensor, which was made anew from
-        /// the stored parameters; 2 values from navigation, which were removed. b: how often since the start.
+        /// A bit of the sensor or of the values from navigation changed in memory. a: 1 sensor, which was made anew
+        /// from the stored parameters; 2 values from navigation, which were removed. b: how often since the start.
         Repaired = 14 => "a memory error was repaired",
         /// The watchdog reset the computer several times in a row, so the older parameters are in use. a: their copy
         /// (0: there is none). b: number of resets.
@@ -309,12 +309,13 @@ record! {
 }
 
 record! {
-    /// Arguments of [`Function::Navigate`]. NaN means that a value is not known; all three numbers of a vector are known,
-    /// or none.
+    /// Arguments of [`Function::Navigate`]. NaN means that a value is not known; all three numbers of a vector are
+    /// known, or none.
     Navigation {
         /// Time of the values, µs since the start of the computer.
         epoch_us: u64,
-        /// The values are not used for exposures that are further from `epoch_us` than this, s; NaN: they do not expire.
+        /// The values are not used for exposures that are further from `epoch_us` than this, s; NaN: they do not
+        /// expire.
         expires_s: f32,
         /// Altitude, m.
         altitude_m: f32,

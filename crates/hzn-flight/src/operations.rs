@@ -8,7 +8,10 @@ use crate::packet::ApidBase;
 pub type Limits = (f64, f64);
 
 macro_rules! operations {
-    ($($(#[$doc:meta])* @$number:literal $name:literal $field:ident: $t:ty = $default:expr, [$low:literal, $high:literal];)*) => {
+    ($(
+        $(#[$doc:meta])*
+        @$number:literal $name:literal $field:ident: $t:ty = $default:expr, [$low:literal, $high:literal];
+    )*) => {
         /// The parameters of the flight software itself.
         #[derive(Debug, Clone, PartialEq)]
         pub struct Operations {

@@ -101,8 +101,8 @@ impl Sensor {
 
     #[doc = doc!("Sensor.process")]
     #[pyo3(signature = (image, *, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
-                        rate_rad_s = None, range_km = None, range_sigma_km = None, pole = None, sun = None, time_s = None,
-                        bits = None, detail = false))]
+                        rate_rad_s = None, range_km = None, range_sigma_km = None, pole = None, sun = None,
+                        time_s = None, bits = None, detail = false))]
     fn process(
         &self,
         py: Python<'_>,
@@ -143,20 +143,10 @@ impl Sensor {
         })??;
         let traces = traces.map(|t| t.each).unwrap_or_default();
         let report = |(which, (processed, body)): (usize, (hzn_run::engine::Processed, &hzn_core::body::Config))| {
-            let meta = RowMeta {
-                time_s: Some(data.time_s.unwrap_or(0.0)),
-                body: body.kind.name().to_owned(),
-                altitude_km: hzn_run::sink::altitude_km(Some(&data), body),
-                ..RowMeta::default()
-            };
+            let meta = row_meta(&data, body);
             let found = match processed.report {
                 Ok(found) => found,
-                // Every rocket starts below the limb height, and its flight goes on, so this is a report and not an
-                // error.
-                Err(why @ PriorError::BelowLimb { .. }) => {
-                    return Ok(Report::from_row(Row::unprocessed(&meta, Status::NoAltitude, why.to_string())));
-                }
-                Err(why) => return Err(errors::config(why)),
+                Err(why) => return report_without_limb(&meta, why),
             };
             let elapsed_us = processed.elapsed.as_nanos() as f64 / 1e3;
             let row = Row::from_report(&meta, &found, Some(elapsed_us));
@@ -214,6 +204,27 @@ fn read_sections(sections: &Bound<'_, PyDict>) -> PyResult<Config> {
         sections.set_item("camera", parameters::to_python(sections.py(), &camera.get().config)?)?;
     }
     parameters::config(&sections)
+}
+
+/// Returns the report on a picture of which nothing can be expected. Every rocket starts below the limb height, and its
+/// flight goes on, so this is no error.
+fn report_without_limb(meta: &RowMeta, why: PriorError) -> PyResult<Report> {
+    match why {
+        PriorError::BelowLimb { .. } => {
+            Ok(Report::from_row(Row::unprocessed(meta, Status::NoAltitude, why.to_string())))
+        }
+        why => Err(errors::config(why)),
+    }
+}
+
+/// Returns the data of a picture for its row.
+fn row_meta(data: &FrameData, body: &hzn_core::body::Config) -> RowMeta {
+    RowMeta {
+        time_s: Some(data.time_s.unwrap_or(0.0)),
+        body: body.kind.name().to_owned(),
+        altitude_km: hzn_run::sink::altitude_km(Some(data), body),
+        ..RowMeta::default()
+    }
 }
 
 /// Checks a direction in the camera frame.

@@ -139,8 +139,9 @@ impl FlightFrame {
     pub fn truth(&self) -> Result<Truth, SceneError> {
         self.scene.truth(&self.file, self.time_s)
     }
-    /// Returns the prior that a navigation system would give the sensor: the position, no attitude. At another body than
-    /// the Earth it is the attitude and the direction to the Sun, because the position is what the sensor measures.
+    /// Returns the prior that a navigation system would give the sensor: the position, no attitude. At another body
+    /// than the Earth it is the attitude and the direction to the Sun, because the position is what the sensor
+    /// measures.
     pub fn prior(&self) -> hzn_core::Prior<f64> {
         if matches!(self.scene.world, World::Ellipsoid(_)) {
             return self.scene.told_prior();

@@ -33,7 +33,7 @@ const LONG_VERSION: &str = concat!(
     env!("HZN_BUILD_TARGET"),
     "\nprofile  ",
     env!("HZN_BUILD_PROFILE"),
-    "\nfeatures dlr, erf, horace, reml, zju"
+    "\nfeatures dlr, erf, horace, position, reml, zju"
 );
 
 /// Find the limb of a planet in pictures, and measure the direction to the body with its covariance.

@@ -1,8 +1,6 @@
 //! Notices that the camera sends no pictures any more.
 
-use super::Flight;
-use crate::board::{Board, Picture};
-use crate::messages::{Event, Mode};
+use crate::board::Picture;
 
 /// Longest wait for the first two pictures, whose period is not known yet.
 const FIRST_US: u64 = 2_000_000;
@@ -27,7 +25,8 @@ impl CameraWatch {
         *self = Self { waiting_since_us: now_us, ..Self::new() };
     }
 
-    /// Takes note of a picture. The period is the time from exposure to exposure, also if pictures were lost in between.
+    /// Takes note of a picture. The period is the time from exposure to exposure, also if pictures were lost in
+    /// between.
     pub(super) fn note(&mut self, picture: &Picture, now_us: u64) {
         let since = self.last_exposure_us.and_then(|last| picture.exposure_us.checked_sub(last));
         let pictures = u64::from(picture.lost).saturating_add(1);
@@ -37,7 +36,7 @@ impl CameraWatch {
     }
 
     /// Returns the time since the last picture when it becomes longer than one and a half periods.
-    fn becomes_silent(&mut self, now_us: u64) -> Option<u64> {
+    pub(super) fn becomes_silent(&mut self, now_us: u64) -> Option<u64> {
         let waited_us = now_us.saturating_sub(self.waiting_since_us);
         let longest_us = self.period_us.map_or(FIRST_US, |period| period + period / 2);
         if self.is_silent || waited_us <= longest_us {
@@ -49,17 +48,5 @@ impl CameraWatch {
 
     pub(super) fn is_silent(&self) -> bool {
         self.is_silent
-    }
-}
-
-impl<B: Board> Flight<'_, B> {
-    /// Sends an event if the camera should have sent a picture by now. Only flight mode expects pictures.
-    pub(super) fn watch_camera(&mut self, now_us: u64) {
-        if self.mode == Mode::Flight
-            && let Some(waited_us) = self.camera.becomes_silent(now_us)
-        {
-            let waited_ms = u32::try_from(waited_us / 1000).unwrap_or(u32::MAX);
-            self.send_event(Event::CameraSilent, waited_ms, self.number);
-        }
     }
 }

@@ -1,7 +1,7 @@
 //! The telecommand that arrives, and its acknowledgement.
 //!
-//! A packet that is no telecommand for this computer is counted and gets no answer, because another computer on the line
-//! may own it, and because the line may return the packets of this computer.
+//! A packet that is no telecommand for this computer is counted and gets no answer, because another computer on the
+//! line may own it, and because the line may return the packets of this computer.
 
 use super::{Buffers, Flight};
 use crate::board::Board;

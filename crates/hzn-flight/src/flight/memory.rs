@@ -14,8 +14,8 @@ const SENSOR: u32 = 1;
 const KNOWN: u32 = 2;
 
 impl<B: Board> Flight<'_, B> {
-    /// Returns whether no bit changed in the values of a picture: sensor, values from navigation, expected limb if there
-    /// is one. Changed values are made anew.
+    /// Returns whether no bit changed in the values of a picture: sensor, values from navigation, expected limb if
+    /// there is one. Changed values are made anew.
     #[inline(never)]
     pub(super) fn check_memory(&mut self, expected: Option<&mut KeptTwice<Expected<f32>>>) -> bool {
         let is_sensor_intact = self.sensor.is_intact();

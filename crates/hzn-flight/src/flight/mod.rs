@@ -25,15 +25,19 @@ use crate::operations::Operations;
 use crate::store::{self, Loaded};
 use crate::table::{self, TableError};
 
+mod camera_turn;
 mod camera_watch;
 mod line;
 mod listen;
 mod longest_edge;
 mod memory;
 mod navigation;
+mod navigation_turn;
 mod parameter_commands;
 mod pictures;
 mod recovery;
+mod recovery_turn;
+mod report_turn;
 mod reports;
 mod self_check;
 mod telecommands;
@@ -109,8 +113,8 @@ pub struct Flight<'a, B> {
 }
 
 impl<'a, B: Board> Flight<'a, B> {
-    /// Loads the parameters. The first turn runs the self-checks and waits in standby, or in safe mode if a check fails.
-    /// `None` cannot occur: stored parameters are checked, and a test shows that the defaults are valid.
+    /// Loads the parameters. The first turn runs the self-checks and waits in standby, or in safe mode if a check
+    /// fails. `None` cannot occur: stored parameters are checked, and a test shows that the defaults are valid.
     ///
     /// Keep the flight software where it is: it has two sensors, 15 KB, and a copy needs that much of the stack.
     // Not inlined, like the other large functions, so that each can use the same part of the stack.

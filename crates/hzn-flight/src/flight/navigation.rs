@@ -1,17 +1,16 @@
 //! Values from navigation: altitude, position, velocity and rate of rotation, with their time and their expiry.
 //!
-//! A position is moved from its time to the exposure with its velocity and the acceleration of free fall in the rotating
-//! frame of the Earth, a = −μ r/|r|³ − 2 ω × v − ω × (ω × r); a velocity is refused for other bodies. The next term of the series is the change of the
-//! acceleration; in low orbit it moves the position by 1.5 m in ten seconds and by 0.3 km in a minute.
+//! A position is moved from its time to the exposure with its velocity and the acceleration of free fall in the
+//! rotating frame of the Earth, a = −μ r/|r|³ − 2 ω × v − ω × (ω × r); a velocity is refused for other bodies. The next
+//! term of the series is the change of the acceleration; in low orbit it moves the position by 1.5 m in ten seconds and
+//! by 0.3 km in a minute.
 
 use hzn_core::Prior;
-use hzn_core::body::{Kind, Last};
+use hzn_core::body::Last;
 use hzn_core::real::Real;
 
-use super::Flight;
-use crate::board::Board;
 use crate::bytes::Reader;
-use crate::messages::{Code, Event, Navigation};
+use crate::messages::{Code, Navigation};
 
 /// Gravitational parameter of the Earth, m³/s² (WGS-84).
 const MU: f32 = 3.986_004_4e14;
@@ -35,13 +34,13 @@ pub(super) struct Known {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Motion {
     epoch_us: u64,
-    velocity_m_s: Option<[f32; 3]>,
+    pub(super) velocity_m_s: Option<[f32; 3]>,
     expires_s: Option<f32>,
 }
 
 impl Motion {
     /// Returns the time from the values to the exposure, s; negative if the exposure was before.
-    fn age_s(&self, exposure_us: u64) -> f32 {
+    pub(super) fn age_s(&self, exposure_us: u64) -> f32 {
         exposure_us.wrapping_sub(self.epoch_us).cast_signed() as f32 * 1e-6
     }
     fn has_expired(&self, exposure_us: u64) -> bool {
@@ -128,41 +127,6 @@ fn known_vector(v: [f32; 3]) -> Result<Option<[f32; 3]>, Code> {
         0 => Ok(Some(v)),
         3 => Ok(None),
         _ => Err(Code::Missing),
-    }
-}
-
-impl<B: Board> Flight<'_, B> {
-    /// Sets the values from navigation for the pictures that follow.
-    pub(super) fn set_known(&mut self, read: Result<Known, Code>) -> Code {
-        let known = match read {
-            Ok(known) => known,
-            Err(code) => return code,
-        };
-        let sensor = self.sensor.get();
-        let is_earth = matches!(sensor.config().body.kind, Kind::Earth | Kind::EarthSphere);
-        let moves = known.motion.is_some_and(|motion| motion.velocity_m_s.is_some());
-        if sensor.expect(&known.prior).is_err() || moves && !is_earth {
-            return Code::Refused;
-        }
-        let last = self.known.get().last;
-        self.known.set(Known { last, ..known });
-        self.known.complete();
-        self.has_expired = false;
-        Code::Done
-    }
-
-    /// Returns the prior of a picture. Values from navigation that are too old are not used; an event says so once.
-    pub(super) fn prior_at(&mut self, exposure_us: u64) -> Prior<f32> {
-        if let Some(prior) = self.known.get().at(exposure_us) {
-            return prior;
-        }
-        if !self.has_expired {
-            self.has_expired = true;
-            let age_s = self.known.get().motion.map_or(0.0, |motion| motion.age_s(exposure_us).abs());
-            self.send_event(Event::KnownExpired, (age_s * 1e3) as u32, 0);
-        }
-        let last = self.known.get().last;
-        Known { last, ..Known::default() }.at(exposure_us).unwrap_or_default()
     }
 }
 

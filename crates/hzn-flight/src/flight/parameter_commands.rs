@@ -41,7 +41,8 @@ impl<B: Board> Flight<'_, B> {
         }
     }
 
-    /// Keeps parameters for a commit. They are checked only there, because a mask is complete only with all its corners.
+    /// Keeps parameters for a commit. They are checked only there, because a mask is complete only with all its
+    /// corners.
     pub(super) fn stage_parameters(&mut self, from: &mut Reader<'_>) -> Code {
         let Some(count) = from.u8() else { return Code::Arguments };
         let new = from.rest();

@@ -8,16 +8,14 @@
 //!
 //! After a minute without a reset the count starts again.
 
-use super::Flight;
 use crate::board::{Board, RETAINED_WORDS};
-use crate::messages::{Event, Mode};
 use crate::store::Choice;
 use crate::table::CRC32;
 
 /// Resets in a row after which the older parameters are used.
-const OLDER_AFTER: u8 = 3;
+pub(super) const OLDER_AFTER: u8 = 3;
 /// Resets in a row after which the computer stays in safe mode.
-const SAFE_AFTER: u8 = 6;
+pub(super) const SAFE_AFTER: u8 = 6;
 /// A computer that runs this long is not in a loop of resets.
 const STABLE_US: u64 = 60_000_000;
 /// Time for which the shut-down is armed.
@@ -69,7 +67,7 @@ impl Recovery {
     }
 
     /// Keeps the counts and the time since lift-off for the time after a reset.
-    fn keep(&mut self, board: &mut impl Board, now_us: u64) {
+    pub(super) fn keep(&mut self, board: &mut impl Board, now_us: u64) {
         let since_us = self.lift_off_us.map(|at| now_us.cast_signed().saturating_sub(at));
         let since_ms = since_us.map_or(ON_THE_GROUND, |us| u32::try_from(us / 1000).unwrap_or(ON_THE_GROUND - 1));
         let resets = if self.is_stable { 0 } else { self.watchdog_resets };
@@ -91,7 +89,7 @@ impl Recovery {
 
     /// Returns whether the lift-off line has changed to lift-off since the last turn. The first turn after the start
     /// counts a line that shows lift-off as a change: a reset during flight must not end the flight.
-    fn sees_lift_off(&mut self, line_is_off: bool, now_us: u64) -> bool {
+    pub(super) fn sees_lift_off(&mut self, line_is_off: bool, now_us: u64) -> bool {
         let is_edge = line_is_off && !self.line_was_off;
         self.line_was_off = line_is_off;
         if is_edge && self.lift_off_us.is_none() {
@@ -122,37 +120,4 @@ fn checksum(words: [u32; RETAINED_WORDS - 1]) -> u32 {
     let mut digest = CRC32.digest();
     words.iter().for_each(|word| digest.update(&word.to_le_bytes()));
     digest.finalize()
-}
-
-impl<B: Board> Flight<'_, B> {
-    /// Enters the mode for the time after the start. The self-checks have been done.
-    pub(super) fn enter_first_mode(&mut self) {
-        let resets = self.recovery.watchdog_resets;
-        if resets >= OLDER_AFTER {
-            self.send_event(Event::OlderParameters, self.state.parameter_copy.into(), resets.into());
-        }
-        if resets >= SAFE_AFTER {
-            self.send_event(Event::SafeAfterResets, resets.into(), 0);
-            self.enter_mode(Mode::Safe);
-        } else if self.mode == Mode::Standby && (self.operations.boot_mode == 1 || self.recovery.has_lifted_off()) {
-            self.enter_mode(Mode::Flight);
-        }
-    }
-
-    /// Follows the lines of the vehicle. Returns whether the computer has shut down.
-    pub(super) fn follow_vehicle(&mut self, now_us: u64) -> bool {
-        let line_is_off = self.board.lift_off();
-        if self.recovery.sees_lift_off(line_is_off, now_us) && self.mode == Mode::Standby {
-            self.enter_mode(Mode::Flight);
-        }
-        self.recovery.keep_up(&mut self.board, now_us);
-        let is_over = match (self.operations.shut_down_after_s, self.recovery.since_lift_off_s(now_us)) {
-            (Some(limit_s), Some(since_s)) => f64::from(since_s) >= limit_s,
-            _ => false,
-        };
-        if is_over || self.board.power_fails() {
-            self.enter_mode(Mode::ShutDown);
-        }
-        self.mode == Mode::ShutDown
-    }
 }

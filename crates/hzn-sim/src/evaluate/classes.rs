@@ -1,19 +1,18 @@
 //! The error classes of star sensors, ECSS-E-ST-60-20C, for a sequence of directions.
 //!
-//! The standard separates errors by how fast they change while a body moves over the detector: the bias is constant, the
-//! error over the field of view changes slowly, the pixel error changes within some pixels, and the temporal noise is
-//! new in every picture. In a sequence these are parts of the error at different numbers of pictures:
+//! The standard separates errors by how fast they change while a body moves over the detector: the bias is constant,
+//! the error over the field of view changes slowly, the pixel error changes within some pixels, and the temporal noise
+//! is new in every picture. In a sequence these are parts of the error at different numbers of pictures:
 //!
 //! - bias: the mean over the sequence;
 //! - temporal noise: ½ of the mean square difference between consecutive pictures is its variance;
-//! - field of view: the variance of means over [`WINDOW`] pictures about the bias, without the share of the noise in it;
+//! - field of view: the variance of means over [`WINDOW`] pictures about the bias, without the share of the noise in
+//!   it;
 //! - pixel: the rest of the variance.
 //!
 //! A body that moves over several pixels from picture to picture shows its pixel error as temporal noise.
 
 use serde::Serialize;
-
-use super::case::Case;
 
 /// Number of consecutive pictures whose mean counts as slow.
 pub const WINDOW: usize = 8;
@@ -52,13 +51,5 @@ impl ErrorClasses {
             pixel_deg: pixel.sqrt(),
             temporal_deg: temporal.sqrt(),
         })
-    }
-
-    /// Separates the errors about the camera's x and y axes of the answers among `cases`, in order of time.
-    pub(super) fn about_x_and_y(cases: &[&Case]) -> Option<[Self; 2]> {
-        let mut answered: Vec<_> = cases.iter().filter_map(|c| Some((c.time_s, c.miss?.about_deg))).collect();
-        answered.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let about = |axis: usize| Self::new(&answered.iter().map(|(_, e)| e[axis]).collect::<Vec<_>>());
-        Some([about(0)?, about(1)?])
     }
 }

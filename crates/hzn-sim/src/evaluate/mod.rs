@@ -15,6 +15,7 @@ mod case;
 mod classes;
 mod honesty;
 mod position;
+mod quantile;
 mod summary;
 
 pub use case::{Answer, Case, MeasuredDirection, Mismatch, Miss, limb_in_view_px, pair};

@@ -4,8 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::case::Case;
-use super::summary::quantile;
+use super::quantile::quantile;
 
 /// A position with its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,9 +81,8 @@ pub struct PositionErrors {
 }
 
 impl PositionErrors {
-    /// Summarises the positions among `cases`; `None` if there are none.
-    pub(super) fn new(cases: &[&Case]) -> Option<Self> {
-        let misses: Vec<PositionMiss> = cases.iter().filter_map(|c| c.position_miss).collect();
+    /// Summarises errors; `None` if there are none.
+    pub(super) fn new(misses: &[PositionMiss]) -> Option<Self> {
         if misses.is_empty() {
             return None;
         }

@@ -8,6 +8,7 @@ use super::case::Case;
 use super::classes::ErrorClasses;
 use super::honesty::Honesty;
 use super::position::PositionErrors;
+use super::quantile::quantile;
 
 /// HORACE counts an answer as a success if radius and centre are right within this fraction of the radius.
 const HORACE_TOLERANCE: f64 = 0.1;
@@ -136,8 +137,8 @@ impl Evaluation {
             false_answers,
             errors: Errors::new(&with_limb),
             honesty: honesty(&with_limb),
-            position: PositionErrors::new(&with_limb),
-            classes: ErrorClasses::about_x_and_y(&with_limb),
+            position: PositionErrors::new(&with_limb.iter().filter_map(|c| c.position_miss).collect::<Vec<_>>()),
+            classes: classes(&with_limb),
             horace: Horace {
                 success,
                 false_negatives: 1.0 - success,
@@ -167,6 +168,14 @@ fn is_horace_success(case: &Case) -> bool {
     })
 }
 
+/// Separates the errors about the camera's x and y axes of the answers, in order of time.
+fn classes(cases: &[&Case]) -> Option<[ErrorClasses; 2]> {
+    let mut answered: Vec<_> = cases.iter().filter_map(|c| Some((c.time_s, c.miss?.about_deg))).collect();
+    answered.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let about = |axis: usize| ErrorClasses::new(&answered.iter().map(|(_, e)| e[axis]).collect::<Vec<_>>());
+    Some([about(0)?, about(1)?])
+}
+
 fn honesty(cases: &[&Case]) -> Option<Honesty> {
     let nees: Vec<f64> = cases.iter().filter_map(|c| c.miss?.nees).collect();
     Honesty::from_nees(&nees)
@@ -189,18 +198,6 @@ impl Errors {
             mean_about_deg: [0, 1, 2].map(|i| mean(&|m| m.about_deg[i])),
             rms_about_deg: [0, 1, 2].map(|i| mean(&|m| m.about_deg[i] * m.about_deg[i]).sqrt()),
         })
-    }
-}
-
-/// Returns the value below which the share `p` of the sorted values lies. It is linear between neighbours, and NaN if
-/// there are no values.
-pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
-    let place = p * sorted.len().saturating_sub(1) as f64;
-    let (below, part) = (place.floor() as usize, place.fract());
-    match (sorted.get(below), sorted.get(below + 1)) {
-        (Some(a), Some(b)) => a + part * (b - a),
-        (Some(a), None) => *a,
-        _ => f64::NAN,
     }
 }
 

@@ -1,5 +1,6 @@
 use super::honesty::interval;
-use super::summary::{nice_step, quantile};
+use super::quantile::quantile;
+use super::summary::nice_step;
 use super::*;
 use crate::counter::{Counter, Stream};
 use crate::truth::Truth;

@@ -11,8 +11,8 @@
 //! | semi-axis a_i | (U q')_i q_i/a_i in the axes of the body |
 //!
 //! The edge of a sunlit body stands at half of the brightness inside of it. That brightness changes from the azimuth of
-//! the Sun to the cusps, so that the shift that all points share (`covariance.bias_px`) changes along the limb, too. The
-//! term is a first harmonic in the azimuth from the Sun, of the size of the shift.
+//! the Sun to the cusps, so that the shift that all points share (`covariance.bias_px`) changes along the limb, too.
+//! The term is a first harmonic in the azimuth from the Sun, of the size of the shift.
 //!
 //! These are the terms of (13.5), written as residuals of the fit in scaled space. The fit converts the residual
 //! cos α − σ·e = sin α dθ into errors of axis and half-angle, and those are errors of the position.

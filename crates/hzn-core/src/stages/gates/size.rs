@@ -12,8 +12,8 @@ pub(super) fn disc_px<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> T 
     expected.half_angle_rad() * (fx + fy)
 }
 
-/// Returns the part of a limb that counts as limb at most. For a position with a known Sun, the points within 75° of the
-/// Sun's azimuth count ([`Expected::is_lit`]), 150° of 360°.
+/// Returns the part of a limb that counts as limb at most. For a position with a known Sun, the points within 75° of
+/// the Sun's azimuth count ([`Expected::is_lit`]), 150° of 360°.
 pub(super) fn lit_share<T>(expected: &Expected<T>) -> f64 {
     #[cfg(feature = "position")]
     if expected.target.is_some() && expected.sun.is_some() {

@@ -1,0 +1,43 @@
+//! The flight loop takes values from navigation, and lets them expire.
+
+use super::Flight;
+use super::navigation::Known;
+use crate::board::Board;
+use crate::messages::{Code, Event};
+use hzn_core::Prior;
+use hzn_core::body::Kind;
+
+impl<B: Board> Flight<'_, B> {
+    /// Sets the values from navigation for the pictures that follow.
+    pub(super) fn set_known(&mut self, read: Result<Known, Code>) -> Code {
+        let known = match read {
+            Ok(known) => known,
+            Err(code) => return code,
+        };
+        let sensor = self.sensor.get();
+        let is_earth = matches!(sensor.config().body.kind, Kind::Earth | Kind::EarthSphere);
+        let moves = known.motion.is_some_and(|motion| motion.velocity_m_s.is_some());
+        if sensor.expect(&known.prior).is_err() || moves && !is_earth {
+            return Code::Refused;
+        }
+        let last = self.known.get().last;
+        self.known.set(Known { last, ..known });
+        self.known.complete();
+        self.has_expired = false;
+        Code::Done
+    }
+
+    /// Returns the prior of a picture. Values from navigation that are too old are not used; an event says so once.
+    pub(super) fn prior_at(&mut self, exposure_us: u64) -> Prior<f32> {
+        if let Some(prior) = self.known.get().at(exposure_us) {
+            return prior;
+        }
+        if !self.has_expired {
+            self.has_expired = true;
+            let age_s = self.known.get().motion.map_or(0.0, |motion| motion.age_s(exposure_us).abs());
+            self.send_event(Event::KnownExpired, (age_s * 1e3) as u32, 0);
+        }
+        let last = self.known.get().last;
+        Known { last, ..Known::default() }.at(exposure_us).unwrap_or_default()
+    }
+}

@@ -1,0 +1,62 @@
+//! The flight loop sends events and housekeeping.
+
+use super::Flight;
+use super::reports::{ARMED, CAMERA_SILENT, LIFTED_OFF, NOT_STORED, STAGED, VERSION};
+use crate::board::Board;
+use crate::bytes::Writer;
+use crate::messages::{Event, EventRecord, Severity};
+use crate::packet::Apid;
+
+impl<B: Board> Flight<'_, B> {
+    /// Sends housekeeping if its time has come.
+    pub(super) fn report_by_time(&mut self, now_us: u64) {
+        let period_us = u64::from(self.operations.housekeeping_s) * 1_000_000;
+        if now_us.saturating_sub(self.housekeeping_us) >= period_us {
+            self.send_housekeeping();
+        }
+    }
+
+    pub(super) fn send_housekeeping(&mut self) {
+        let now_us = self.board.now_us();
+        (self.since_housekeeping, self.housekeeping_us) = (0, now_us);
+        let bit = |is_set: bool, bit: u8| if is_set { bit } else { 0 };
+        let state = &mut self.state;
+        state.mode = self.mode as u8;
+        state.stack_bytes = self.board.stack_bytes();
+        state.version = VERSION;
+        state.flags = bit(self.is_not_stored, NOT_STORED)
+            | bit(self.recovery.is_armed(now_us), ARMED)
+            | bit(self.recovery.has_lifted_off(), LIFTED_OFF)
+            | bit(self.camera.is_silent(), CAMERA_SILENT)
+            | bit(self.staged > 0, STAGED);
+        state.last_sequence = self.last_sequence.unwrap_or(u16::MAX);
+        state.since_lift_off_s = self.recovery.since_lift_off_s(now_us).unwrap_or(u32::MAX);
+        let state = self.state;
+        self.send(Apid::Housekeeping, |out| state.write(out));
+    }
+
+    /// Sends an event. There may be too many warnings; then they are counted.
+    pub(super) fn send_event(&mut self, event: Event, a: u32, b: u32) {
+        let now_us = self.board.now_us();
+        let is_caused_by_line = event == Event::CommandRejected;
+        if event.severity() == Severity::Warning && !self.limiter.allows_warning(now_us)
+            || is_caused_by_line && !self.limiter.allows_answer(EventRecord::BYTES)
+        {
+            self.state.withheld = self.state.withheld.saturating_add(1);
+            return;
+        }
+        let record = EventRecord { number: event as u16, severity: event.severity() as u8, a, b };
+        self.send(Apid::Event, |out| record.write(out));
+    }
+
+    /// Returns whether the acknowledgement of a rejected telecommand may be sent. If not, it is counted.
+    pub(super) fn may_answer(&mut self, user_bytes: usize) -> bool {
+        let is_allowed = self.limiter.allows_answer(user_bytes);
+        self.state.withheld = self.state.withheld.saturating_add(u32::from(!is_allowed));
+        is_allowed
+    }
+
+    pub(super) fn send(&mut self, apid: Apid, user: impl FnOnce(&mut Writer<'_>)) {
+        self.buffers.line.send(&mut self.board, apid, user);
+    }
+}
