@@ -264,8 +264,8 @@ fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
         args.extend(["arm", "mode shut-down"].repeat(8));
         hzn_run(bench.dir(), &args);
         let line = std::fs::read(bench.path("commands.bin")).unwrap();
-        // The watchdog's two seconds are 125 million instructions at this shift. With fewer, a busy machine might feed the
-        // line too slowly: a telecommand must be complete within a second.
+        // The watchdog's two seconds are 125 million instructions at this shift. With fewer, a busy machine might feed
+        // the line too slowly: a telecommand must be complete within a second.
         assert_eq!(bench.run_with_shift(&line, 4), 0);
         let printed = hzn_run(bench.dir(), &["telemetry", "sent.bin"]);
         println!("{printed}");
