@@ -43,7 +43,7 @@ fn a_loop_of_resets_ends_in_safe_mode() {
             row[columns.iter().position(|c| c == name).unwrap()].clone()
         };
         let columns = rows.next().unwrap();
-        let last = rows.last().unwrap();
+        let last = rows.next_back().unwrap();
         assert_eq!(column(&last, "starts", &columns), "7");
         assert_eq!(column(&last, "watchdog_resets", &columns), "6");
         // The computer sends the checksum of its own image.

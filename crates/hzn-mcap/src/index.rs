@@ -46,7 +46,7 @@ pub enum IndexEntry {
     /// A picture, which is not read yet.
     Picture(Place),
     /// The result of one picture and body.
-    Report(Box<Row>, Vec<CandidateEdge>, PicturePrior),
+    Report(Box<Row>, Vec<CandidateEdge>, Box<PicturePrior>),
 }
 
 /// A channel with pictures: its topic, schema and encoding.
@@ -266,7 +266,7 @@ impl Index {
                 detail: format!("report of frame {}: {e}", m.sequence),
             };
             let (row, candidates, prior) = messages::parse_report(m.data).map_err(broken)?;
-            found.push(IndexEntry::Report(Box::new(row), candidates, prior));
+            found.push(IndexEntry::Report(Box::new(row), candidates, Box::new(prior)));
         } else if self.pictures.contains_key(&m.channel) {
             let (channel, log_time_ns, sequence) = (m.channel, m.log_time_ns, m.sequence);
             found.push(IndexEntry::Picture(Place { chunk, message: at, channel, log_time_ns, sequence }));

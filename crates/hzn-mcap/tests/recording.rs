@@ -348,7 +348,7 @@ fn index(path: &Path) -> (Vec<Place>, Vec<(Row, PicturePrior)>, Index) {
                 IndexEntry::Picture(place) => pictures.push(place),
                 IndexEntry::Report(row, candidates, prior) => {
                     assert_eq!(candidates, frame(row.index).candidates);
-                    rows.push((*row, prior));
+                    rows.push((*row, *prior));
                 }
             }
         }

@@ -13,6 +13,7 @@ macro_rules! doc {
 
 mod calibration;
 mod camera;
+mod cells;
 mod drawing;
 mod errors;
 mod expected;

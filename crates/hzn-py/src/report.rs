@@ -9,13 +9,14 @@ use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, Row};
 use hzn_run::engine::Trace;
-use numpy::ndarray::{Array2, arr1, arr2};
+use numpy::ndarray::Array2;
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyWeakrefMethods, PyWeakrefReference};
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
+use crate::cells::{symmetric, vector};
 use crate::{drawing, errors, notebook, parameters};
 
 /// Return type of `__reduce__` for pickle: a function and its arguments.
@@ -169,11 +170,6 @@ impl Report {
     }
 }
 
-fn vector<'py>(py: Python<'py>, xyz: [Option<f64>; 3]) -> Option<Bound<'py, PyArray1<f64>>> {
-    let [Some(x), Some(y), Some(z)] = xyz else { return None };
-    Some(arr1(&[x, y, z]).to_pyarray(py))
-}
-
 fn table<'py, const N: usize>(py: Python<'py>, rows: &[[f64; N]]) -> Bound<'py, PyArray2<f64>> {
     Array2::from_shape_fn((rows.len(), N), |(i, j)| rows[i][j]).to_pyarray(py)
 }
@@ -234,9 +230,7 @@ impl Report {
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         let r = &self.row;
-        let (xx, xy, xz) = (r.cov_xx?, r.cov_xy?, r.cov_xz?);
-        let (yy, yz, zz) = (r.cov_yy?, r.cov_yz?, r.cov_zz?);
-        Some(arr2(&[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).to_pyarray(py))
+        symmetric(py, [r.cov_xx, r.cov_xy, r.cov_xz, r.cov_yy, r.cov_yz, r.cov_zz])
     }
     #[doc = doc!("Report.sigma_max_deg")]
     #[getter]
@@ -257,14 +251,30 @@ impl Report {
     #[getter]
     fn covariance_free<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         let r = &self.row;
-        let (xx, xy, xz) = (r.cov_free_xx?, r.cov_free_xy?, r.cov_free_xz?);
-        let (yy, yz, zz) = (r.cov_free_yy?, r.cov_free_yz?, r.cov_free_zz?);
-        Some(arr2(&[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).to_pyarray(py))
+        let upper = [r.cov_free_xx, r.cov_free_xy, r.cov_free_xz, r.cov_free_yy, r.cov_free_yz, r.cov_free_zz];
+        symmetric(py, upper)
     }
     #[doc = doc!("Report.axis_by_cos")]
     #[getter]
     fn axis_by_cos<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         vector(py, [self.row.axis_by_cos_x, self.row.axis_by_cos_y, self.row.axis_by_cos_z])
+    }
+    #[doc = doc!("Report.position_km")]
+    #[getter]
+    fn position_km<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        vector(py, [self.row.position_x_km, self.row.position_y_km, self.row.position_z_km])
+    }
+    #[doc = doc!("Report.position_covariance_km2")]
+    #[getter]
+    fn position_covariance_km2<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        let r = &self.row;
+        let (x, y) = ([r.pos_cov_xx_km2, r.pos_cov_xy_km2, r.pos_cov_xz_km2], [r.pos_cov_yy_km2, r.pos_cov_yz_km2]);
+        symmetric(py, [x[0], x[1], x[2], y[0], y[1], r.pos_cov_zz_km2])
+    }
+    #[doc = doc!("Report.body_fixed_km")]
+    #[getter]
+    fn body_fixed_km<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        vector(py, [self.row.body_fixed_x_km, self.row.body_fixed_y_km, self.row.body_fixed_z_km])
     }
     #[doc = doc!("Report.altitude_km")]
     #[getter]

@@ -101,3 +101,30 @@ def test_a_sensitivity_is_the_command_lines(tmp_path, hzn_program):
         hzn.sensitivity(fov_deg=176, altitude_km=200)
     with pytest.raises(hzn.ConfigError, match="not above the limb"):
         hzn.sensitivity(altitude_km=5)
+
+
+def test_a_position_has_range_and_covariance():
+    """The position of a planet comes from its limb alone; a known range makes it better."""
+    flight = hzn.simulate("jupiter", frames=2)
+    sensor = hzn.Sensor(camera=flight.parameters["camera"], body={"kind": "jupiter"})
+    found = 0
+    for frame in flight:
+        known = {name: value for name, value in frame.known.items() if not name.startswith("range")}
+        report = sensor.process(frame.image, **known)
+        if report.position_km is None:
+            continue
+        found += 1
+        truth = np.array([frame.truth[0][f"position_{axis}_km"] for axis in "xyz"])
+        covariance = report.position_covariance_km2
+        assert np.allclose(covariance, covariance.T) and np.all(np.linalg.eigvalsh(covariance) > 0)
+        off = report.position_km - truth
+        assert off @ np.linalg.solve(covariance, off) < 25.0
+        assert report.body_fixed_km is not None and report.axis_free is None
+        distance = float(np.linalg.norm(truth))
+        better = sensor.process(frame.image, **known, range_km=distance, range_sigma_km=1e-4 * distance)
+        assert abs(np.linalg.norm(better.position_km) - distance) < 5e-4 * distance
+    assert found > 0
+    with pytest.raises(hzn.ConfigError, match="range_sigma_km"):
+        sensor.process(flight[0].image, attitude=[1, 0, 0, 0], range_km=1e7)
+    with pytest.raises(hzn.ConfigError, match="pole"):
+        sensor.process(flight[0].image, pole=[0, 0, 0])

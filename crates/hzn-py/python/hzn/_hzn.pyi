@@ -295,6 +295,10 @@ class Sensor:
         attitude: Sequence[float] | None = None,
         attitude_sigma_deg: float | None = None,
         rate_rad_s: Sequence[float] | None = None,
+        range_km: float | None = None,
+        range_sigma_km: float | None = None,
+        pole: Sequence[float] | None = None,
+        sun: Sequence[float] | None = None,
         time_s: float | None = None,
         bits: int | None = None,
         detail: bool = False,
@@ -311,12 +315,22 @@ class Sensor:
         position_km
             Position of the camera in ECEF, km, shape (3,). It overrides the altitude.
         attitude
-            Prior attitude: unit quaternion (w, x, y, z) from the camera frame to ECEF.
+            Prior attitude: unit quaternion (w, x, y, z) from the camera frame to ECEF, or to the axes of an ellipsoid.
         attitude_sigma_deg
             1-sigma of the prior attitude, degrees; without it, 5.
         rate_rad_s
             Rotation rate of the camera in the camera frame, rad/s, shape (3,). It corrects a rolling shutter
             (`camera.readout_s`).
+        range_km
+            Distance of the camera from the body's centre, km, if the position is fitted (`estimate.position`). It needs
+            ``range_sigma_km``, here or in the parameters.
+        range_sigma_km
+            1-sigma of that distance, km.
+        pole
+            Direction of the north pole of a body of revolution in the camera frame, shape (3,). It orients the body if
+            there is no attitude.
+        sun
+            Direction to the Sun in the camera frame, shape (3,).
         time_s
             UTC in seconds since 1970. With a position, Sun and Moon get `Report.axis_ecef`.
         bits
@@ -450,6 +464,21 @@ class Report:
 
         A wrong limb height moves this cosine in all pictures alike; a filter needs the derivative.
         """
+
+    @property
+    def position_km(self) -> NDArray[np.float64] | None:
+        """Position of the body's centre in the camera frame, shape (3,), km, with ``estimate.position``.
+
+        It holds the same information as `axis`; a filter must use only one of them.
+        """
+
+    @property
+    def position_covariance_km2(self) -> NDArray[np.float64] | None:
+        """Covariance of `position_km`, shape (3, 3), km². On a short arc direction and range are known only together."""
+
+    @property
+    def body_fixed_km(self) -> NDArray[np.float64] | None:
+        """Position of the camera in the axes of the body, shape (3,), km, if the attitude is known."""
 
     @property
     def altitude_km(self) -> float | None:

@@ -1,0 +1,18 @@
+//! Cells of a row as arrays; `None` if a cell is empty.
+
+use numpy::ndarray::{arr1, arr2};
+use numpy::{PyArray1, PyArray2, ToPyArray};
+use pyo3::prelude::*;
+
+/// Returns a symmetric matrix from its upper triangle: xx, xy, xz, yy, yz, zz.
+pub(crate) fn symmetric(py: Python<'_>, upper: [Option<f64>; 6]) -> Option<Bound<'_, PyArray2<f64>>> {
+    let [xx, xy, xz, yy, yz, zz] = upper;
+    let (xy, xz, yz) = (xy?, xz?, yz?);
+    Some(arr2(&[[xx?, xy, xz], [xy, yy?, yz], [xz, yz, zz?]]).to_pyarray(py))
+}
+
+/// Returns a vector.
+pub(crate) fn vector<'py>(py: Python<'py>, xyz: [Option<f64>; 3]) -> Option<Bound<'py, PyArray1<f64>>> {
+    let [Some(x), Some(y), Some(z)] = xyz else { return None };
+    Some(arr1(&[x, y, z]).to_pyarray(py))
+}
