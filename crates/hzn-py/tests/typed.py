@@ -54,7 +54,7 @@ def wrong_keys(camera: hzn.Camera) -> None:
     hzn.Sensor(camera=camera, rejct={})  # type: ignore[call-arg]
     hzn.Sensor(camera=camera, reject={"treshold_px": 2.0})  # type: ignore[typeddict-unknown-key]
     hzn.Sensor(camera=camera, reject={"threshold_px": "2"})  # type: ignore[typeddict-item]
-    hzn.Sensor(camera=camera, body={"kind": "mars"})  # type: ignore[typeddict-item]
+    hzn.Sensor(camera=camera, body={"kind": "vulcan"})  # type: ignore[typeddict-item]
     hzn.Sensor(camera=camera, preset="dlr")  # type: ignore[arg-type]
     hzn.Sensor(body={"altitude_km": 230.0})  # type: ignore[call-arg]
     hzn.Camera(widht=4)  # type: ignore[call-arg]

@@ -167,6 +167,15 @@ fn judge_rivals<T: Real, P: Pixels, O: Observer<T>>(
     if !(likelier(polyline::straight_rms(&shape), rms) > evidence) {
         return Verdict::Straight;
     }
+    // Without a known distance a part of any smooth curve, a ring or a shadow, is near some cone. Only the residuals tell
+    // them apart: those of the body's own shape are noise, or less than half of the shift that the covariance includes.
+    #[cfg(feature = "position")]
+    if expected.target.is_some_and(|target| target.range.is_none())
+        && rms > ratio * noise.max(floor)
+        && rms + rms > fused.edge.shift_px
+    {
+        return Verdict::Residuals;
+    }
     // No smooth curve can fit better than the noise from point to point.
     if rms > ratio * noise.max(floor) || likelier(rms, noise) > evidence {
         let worse = |rival: T| rms > ratio * rival.max(floor);
