@@ -426,7 +426,6 @@ impl Report {
     fn __deepcopy__<'py>(slf: PyRef<'py, Self>, _memo: &Bound<'py, PyAny>) -> PyRef<'py, Self> {
         slf
     }
-
     fn __repr__(&self) -> String {
         let r = &self.row;
         match (r.axis(), r.sigma_max_deg, r.inliers) {

@@ -140,6 +140,16 @@ fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     Verdict::Passed
 }
 
+/// Returns whether `fits` accepts a polyline in place of the cone. It gets the polyline's residual and the margin that
+/// the additional parameters cost.
+fn rivals_polyline<T: Real>(shape: &shape::Shape<T>, rms: T, independent: T, fits: impl Fn(T, T) -> bool) -> bool {
+    // The additional parameters of a polyline reduce its residual for any points. With too few points, the comparison
+    // proves nothing.
+    let (points, turns) = (T::from_i32(shape.len() as i32), T::from_f64(polyline::PARAMETERS));
+    let left = points - T::from_f64(3.0) - turns;
+    left > T::ZERO && fits(polyline::rms(shape, rms) * ((left + turns) / left).sqrt(), independent.ln() * turns)
+}
+
 /// Tests whether the points belong to another curve. They pass if they fit the cone as well as other shapes, if they
 /// agree with its half-angle within their own noise, and if the edge does not continue next to the cone.
 fn judge_rivals<T: Real, P: Pixels, O: Observer<T>>(
@@ -167,8 +177,8 @@ fn judge_rivals<T: Real, P: Pixels, O: Observer<T>>(
     if !(likelier(polyline::straight_rms(&shape), rms) > evidence) {
         return Verdict::Straight;
     }
-    // Without a known distance a part of any smooth curve, a ring or a shadow, is near some cone. Only the residuals tell
-    // them apart: those of the body's own shape are noise, or less than half of the shift that the covariance includes.
+    // Without a known distance, a part of any smooth curve, a ring or a shadow, is near some cone. Only the residuals
+    // tell them apart: those of the body's own shape are noise, or less than half of the shift in the covariance.
     #[cfg(feature = "position")]
     if expected.target.is_some_and(|target| target.range.is_none())
         && rms > ratio * noise.max(floor)
@@ -182,16 +192,10 @@ fn judge_rivals<T: Real, P: Pixels, O: Observer<T>>(
         if circle::rms(&shape).is_some_and(|c| worse(c) || (likelier(rms, c) > evidence && evidence > T::ZERO)) {
             return Verdict::Circle;
         }
-        // The additional parameters of a polyline reduce its residual for any points. With too few points, the
-        // comparison proves nothing.
-        let (points, turns) = (T::from_i32(shape.len() as i32), T::from_f64(polyline::PARAMETERS));
-        let left = points - T::from_f64(3.0) - turns;
-        if left > T::ZERO {
-            let pieces = polyline::rms(&shape, rms) * ((left + turns) / left).sqrt();
-            let more = independent.ln() * turns;
-            if worse(pieces) || (likelier(rms, pieces) > evidence + more && evidence > T::ZERO) {
-                return Verdict::Polyline;
-            }
+        if rivals_polyline(&shape, rms, independent, |rival, margin| {
+            worse(rival) || (likelier(rms, rival) > evidence + margin && evidence > T::ZERO)
+        }) {
+            return Verdict::Polyline;
         }
     }
     if half_angle::disagrees(fit, fused, expected, blocks, config) {
