@@ -6,7 +6,7 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::cdr;
-use crate::container::{Chunk, Fields, Inflation, MAGIC, Message, Op, Record, Scanner};
+use crate::container::{Channel, Chunk, Inflation, MAGIC, Message, Op, Record, Scanner, Schemas};
 use crate::error::Error;
 use crate::frame::EncodedImage;
 use crate::messages;
@@ -30,21 +30,13 @@ pub struct ImageReader {
     path: PathBuf,
     topic: Option<String>,
     others: BTreeSet<String>,
-    schemas: BTreeMap<u16, String>,
+    schemas: Schemas,
     channels: BTreeMap<u16, Channel>,
     inflation: Inflation,
     /// Pictures of the chunk that was read last.
     ready: VecDeque<InputImage>,
     done: bool,
     broken: Option<String>,
-}
-
-/// A channel of any kind of messages.
-#[derive(Debug, Clone)]
-struct Channel {
-    topic: String,
-    schema: String,
-    encoding: String,
 }
 
 impl std::fmt::Debug for ImageReader {
@@ -68,7 +60,7 @@ impl ImageReader {
             path: path.to_path_buf(),
             topic: topic.map(str::to_owned),
             others: BTreeSet::new(),
-            schemas: BTreeMap::new(),
+            schemas: Schemas::default(),
             channels: BTreeMap::new(),
             inflation: Inflation::default(),
             ready: VecDeque::new(),
@@ -125,21 +117,8 @@ impl ImageReader {
 
     /// Reads a schema or channel.
     fn declare(&mut self, op: u8, content: &[u8]) {
-        let mut f = Fields(content);
-        match op {
-            Op::SCHEMA => {
-                if let (Some(id), Some(name)) = (f.u16(), f.text()) {
-                    self.schemas.insert(id, name.to_owned());
-                }
-            }
-            Op::CHANNEL => {
-                if let (Some(id), Some(schema), Some(topic), Some(encoding)) = (f.u16(), f.u16(), f.text(), f.text()) {
-                    let schema = self.schemas.get(&schema).cloned().unwrap_or_default();
-                    let channel = Channel { topic: topic.to_owned(), schema, encoding: encoding.to_owned() };
-                    self.channels.insert(id, channel);
-                }
-            }
-            _ => {}
+        if let Some((id, channel)) = self.schemas.declare(op, content) {
+            self.channels.insert(id, channel);
         }
     }
 

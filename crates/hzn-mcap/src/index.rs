@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use crate::container::{Chunk, Fields, Inflation, MAGIC, MAX_RECORD_BYTES, Message, Op, Record};
+use crate::container::{Channel, Chunk, Fields, Inflation, MAGIC, MAX_RECORD_BYTES, Message, Op, Record, Schemas};
 use crate::error::Error;
 use crate::frame::{CandidateEdge, PicturePrior};
 use crate::images::{InputImage, decoder};
@@ -49,14 +49,6 @@ pub enum IndexEntry {
     Report(Box<Row>, Vec<CandidateEdge>, Box<PicturePrior>),
 }
 
-/// A channel with pictures: its topic, schema and encoding.
-#[derive(Debug, Clone)]
-struct Kind {
-    topic: String,
-    schema: String,
-    encoding: String,
-}
-
 /// Goes through a recording without reading its uncompressed pictures. The recording may be one of hzn, or one of any
 /// writer with pictures that [`crate::ImageReader`] can read. Only pictures of the first topic with pictures are found.
 /// In a file that was cut off everything complete is found; [`Index::is_complete`] then returns `false`.
@@ -66,8 +58,9 @@ pub struct Index {
     path: PathBuf,
     position: u64,
     sensor_toml: Option<String>,
-    schemas: BTreeMap<u16, String>,
-    pictures: BTreeMap<u16, Kind>,
+    schemas: Schemas,
+    /// Channels with pictures.
+    pictures: BTreeMap<u16, Channel>,
     reports: Option<u16>,
     complete: bool,
     inflation: Inflation,
@@ -92,7 +85,7 @@ impl Index {
             path: path.clone(),
             position: MAGIC.len() as u64,
             sensor_toml: None,
-            schemas: BTreeMap::new(),
+            schemas: Schemas::default(),
             pictures: BTreeMap::new(),
             reports: None,
             complete: false,
@@ -280,38 +273,23 @@ impl Index {
     /// The file cannot be opened again.
     pub fn pictures(&self) -> Result<Pictures, Error> {
         let file = File::open(&self.path).map_err(|source| Error::Read { path: self.path.clone(), source })?;
-        Ok(Pictures { file, path: self.path.clone(), kinds: self.pictures.clone() })
+        Ok(Pictures { file, path: self.path.clone(), channels: self.pictures.clone() })
     }
 
     /// Reads a record outside of chunks, or one that a chunk declares.
     fn read_declaration(&mut self, op: u8, content: &[u8]) {
-        let mut f = Fields(content);
-        match op {
-            Op::SCHEMA => {
-                if let (Some(id), Some(name)) = (f.u16(), f.text()) {
-                    self.schemas.insert(id, name.to_owned());
-                }
+        if let Some((id, channel)) = self.schemas.declare(op, content) {
+            if channel.topic == Topic::Report.name() && channel.schema == Topic::Report.schema().0 {
+                self.reports = Some(id);
+            } else if decoder(&channel.schema, &channel.encoding).is_some()
+                && self.pictures.values().all(|first| first.topic == channel.topic)
+            {
+                self.pictures.insert(id, channel);
             }
-            Op::CHANNEL => {
-                let (Some(id), Some(schema), Some(topic), Some(encoding)) = (f.u16(), f.u16(), f.text(), f.text())
-                else {
-                    return;
-                };
-                let schema = self.schemas.get(&schema).cloned().unwrap_or_default();
-                if topic == Topic::Report.name() && schema == Topic::Report.schema().0 {
-                    self.reports = Some(id);
-                } else if decoder(&schema, encoding).is_some()
-                    && self.pictures.values().all(|first| first.topic == topic)
-                {
-                    let kind = Kind { topic: topic.to_owned(), schema, encoding: encoding.to_owned() };
-                    self.pictures.insert(id, kind);
-                }
-            }
-            Op::ATTACHMENT => {
-                let text = f.attached(SENSOR_TOML).map(|data| String::from_utf8_lossy(data).into_owned());
-                self.sensor_toml = self.sensor_toml.take().or(text);
-            }
-            _ => {}
+        }
+        if op == Op::ATTACHMENT {
+            let text = Fields(content).attached(SENSOR_TOML).map(|data| String::from_utf8_lossy(data).into_owned());
+            self.sensor_toml = self.sensor_toml.take().or(text);
         }
     }
 
@@ -356,7 +334,7 @@ fn fill(file: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
 pub struct Pictures {
     file: File,
     path: PathBuf,
-    kinds: BTreeMap<u16, Kind>,
+    channels: BTreeMap<u16, Channel>,
 }
 
 impl Pictures {
@@ -375,11 +353,11 @@ impl Pictures {
         let Some(message) = message.as_deref().and_then(Message::parse) else {
             return Ok(broken("the recording does not contain the picture any more, or is damaged at its place"));
         };
-        let kind = self.kinds.get(&place.channel);
-        let Some((kind, decode)) = kind.and_then(|k| Some((k, decoder(&k.schema, &k.encoding)?))) else {
+        let channel = self.channels.get(&place.channel);
+        let Some((channel, decode)) = channel.and_then(|c| Some((c, decoder(&c.schema, &c.encoding)?))) else {
             return Ok(broken("is on a channel without pictures"));
         };
-        Ok(match decode(&kind.schema, message.data) {
+        Ok(match decode(&channel.schema, message.data) {
             Ok((image, time_s)) => {
                 InputImage { time_s: time_s.unwrap_or_else(|| place.log_time_s()), image: Ok(image) }
             }

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use crate::container::{Chunk, Fields, Inflation, Message, Op, Record, Scanner};
+use crate::container::{Chunk, Fields, Inflation, Message, Op, Record, Scanner, Schemas};
 use crate::drawing;
 use crate::error::Error;
 use crate::frame::{Annotations, Attitude, EncodedImage, FrameRecord, LogLine};
@@ -35,7 +35,7 @@ pub struct Reader {
     peeked: Option<Record>,
     /// Topics by channel id, because the ids of other writers may differ.
     topics: BTreeMap<u16, Topic>,
-    schemas: BTreeMap<u16, String>,
+    schemas: Schemas,
     images: Parts<EncodedImage>,
     ready: VecDeque<FrameRecord>,
     complete: bool,
@@ -76,7 +76,7 @@ impl Reader {
             metadata: BTreeMap::new(),
             peeked: None,
             topics: BTreeMap::new(),
-            schemas: BTreeMap::new(),
+            schemas: Schemas::default(),
             images: BTreeMap::new(),
             ready: VecDeque::new(),
             complete: false,
@@ -115,22 +115,12 @@ impl Reader {
 
     /// Reads a record outside of chunks, or one that a chunk declares.
     fn read_declaration(&mut self, record: &Record) {
+        if let Some((id, channel)) = self.schemas.declare(record.op, &record.content) {
+            let is_same = |t: &Topic| t.name() == channel.topic && t.schema().0 == channel.schema;
+            self.topics.extend(Topic::ALL.into_iter().find(is_same).map(|topic| (id, topic)));
+        }
         let mut f = Fields(&record.content);
         match record.op {
-            Op::SCHEMA => {
-                if let (Some(id), Some(name)) = (f.u16(), f.text()) {
-                    self.schemas.insert(id, name.to_owned());
-                }
-            }
-            Op::CHANNEL => {
-                if let (Some(id), Some(schema), Some(topic)) = (f.u16(), f.u16(), f.text()) {
-                    let schema = self.schemas.get(&schema).map_or("", String::as_str);
-                    let ours = Topic::ALL.into_iter().find(|t| t.name() == topic && t.schema().0 == schema);
-                    if let Some(ours) = ours {
-                        self.topics.insert(id, ours);
-                    }
-                }
-            }
             Op::ATTACHMENT => {
                 let text = f.attached(SENSOR_TOML).map(|data| String::from_utf8_lossy(data).into_owned());
                 self.sensor_toml = self.sensor_toml.take().or(text);

@@ -4,12 +4,14 @@
 //! compression while all other data are compressed. A resumed or recovered file copies whole chunks without changes.
 //! The layout is that of the MCAP specification; the tests read it back with independent readers.
 
+mod channel;
 mod chunk;
 mod inflation;
 mod op;
 mod scan;
 mod write;
 
+pub(crate) use channel::{Channel, Schemas};
 pub(crate) use chunk::{Chunk, ChunkBuilder, Message};
 pub(crate) use inflation::Inflation;
 pub(crate) use op::{Fields, Op};
