@@ -319,6 +319,23 @@ impl Row {
     pub fn axis(&self) -> Option<[f64; 3]> {
         Some([self.axis_x?, self.axis_y?, self.axis_z?])
     }
+
+    /// Returns the position of the body's centre from the camera, in km (camera frame); `None` if there is none.
+    pub fn position_km(&self) -> Option<[f64; 3]> {
+        Some([self.position_x_km?, self.position_y_km?, self.position_z_km?])
+    }
+
+    /// Returns the covariance of [`Self::position_km`] in km² (camera frame): xx, xy, xz, yy, yz, zz.
+    pub fn position_covariance_km2(&self) -> Option<[f64; 6]> {
+        Some([
+            self.pos_cov_xx_km2?,
+            self.pos_cov_xy_km2?,
+            self.pos_cov_xz_km2?,
+            self.pos_cov_yy_km2?,
+            self.pos_cov_yz_km2?,
+            self.pos_cov_zz_km2?,
+        ])
+    }
 }
 
 /// Returns roll and pitch of the vehicle, in degrees, from the direction to the body in the vehicle's frame.

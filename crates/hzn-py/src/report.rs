@@ -267,9 +267,7 @@ impl Report {
     #[doc = doc!("Report.position_covariance_km2")]
     #[getter]
     fn position_covariance_km2<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
-        let r = &self.row;
-        let (x, y) = ([r.pos_cov_xx_km2, r.pos_cov_xy_km2, r.pos_cov_xz_km2], [r.pos_cov_yy_km2, r.pos_cov_yz_km2]);
-        symmetric(py, [x[0], x[1], x[2], y[0], y[1], r.pos_cov_zz_km2])
+        symmetric(py, self.row.position_covariance_km2()?.map(Some))
     }
     #[doc = doc!("Report.body_fixed_km")]
     #[getter]

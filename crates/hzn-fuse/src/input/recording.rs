@@ -172,15 +172,8 @@ fn seen(row: &Row, index: usize, time_s: f64, body: Body, limb_sigma_km: Option<
     };
     if body == Body::Limb {
         seen.separate_limb_height(row, limb_sigma_km);
-        if let Some(position_km) = three([row.position_x_km, row.position_y_km, row.position_z_km]) {
-            let covariance_km2 = symmetric([
-                row.pos_cov_xx_km2?,
-                row.pos_cov_xy_km2?,
-                row.pos_cov_xz_km2?,
-                row.pos_cov_yy_km2?,
-                row.pos_cov_yz_km2?,
-                row.pos_cov_zz_km2?,
-            ]);
+        if let Some(position_km) = row.position_km().map(Vector3::from) {
+            let covariance_km2 = symmetric(row.position_covariance_km2()?);
             seen.centre = Some(Centre { position_m: position_km * 1e3, covariance_m2: covariance_km2 * 1e6 });
         }
     }

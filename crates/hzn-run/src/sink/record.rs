@@ -79,18 +79,9 @@ pub fn answer(row: &Row) -> evaluate::Answer {
         covariance_rad2: covariance().unwrap_or_default(),
         half_angle_deg: row.half_angle_deg,
     });
-    let position = || -> Option<evaluate::MeasuredPosition> {
-        Some(evaluate::MeasuredPosition {
-            centre_km: [row.position_x_km?, row.position_y_km?, row.position_z_km?],
-            covariance_km2: [
-                row.pos_cov_xx_km2?,
-                row.pos_cov_xy_km2?,
-                row.pos_cov_xz_km2?,
-                row.pos_cov_yy_km2?,
-                row.pos_cov_yz_km2?,
-                row.pos_cov_zz_km2?,
-            ],
-        })
+    let position = || {
+        let (centre_km, covariance_km2) = (row.position_km()?, row.position_covariance_km2()?);
+        Some(evaluate::MeasuredPosition { centre_km, covariance_km2 })
     };
     let position = found.and_then(|_| position());
     evaluate::Answer { file: row.file.clone(), body: row.body.clone(), status: row.status, found, position }

@@ -50,16 +50,15 @@ pub const QUANTITIES: &[Quantity] = &[
 
 /// Returns the distance to the centre of the body, from a result with a position.
 fn range_km(row: &Row, _: Option<&Truth>) -> Option<f64> {
-    let [x, y, z] = [row.position_x_km?, row.position_y_km?, row.position_z_km?];
+    let [x, y, z] = row.position_km()?;
     Some((x * x + y * y + z * z).sqrt())
 }
 
 /// Returns 3-sigma of [`range_km`]: the covariance of the position along its own direction.
 fn range_3sigma_km(row: &Row, truth: Option<&Truth>) -> Option<f64> {
     let range = range_km(row, truth)?;
-    let [x, y, z] = [row.position_x_km?, row.position_y_km?, row.position_z_km?].map(|v| v / range);
-    let [xx, xy, xz] = [row.pos_cov_xx_km2?, row.pos_cov_xy_km2?, row.pos_cov_xz_km2?];
-    let [yy, yz, zz] = [row.pos_cov_yy_km2?, row.pos_cov_yz_km2?, row.pos_cov_zz_km2?];
+    let [x, y, z] = row.position_km()?.map(|v| v / range);
+    let [xx, xy, xz, yy, yz, zz] = row.position_covariance_km2()?;
     let variance = x * x * xx + y * y * yy + z * z * zz + 2.0 * (x * y * xy + x * z * xz + y * z * yz);
     Some(3.0 * variance.max(0.0).sqrt())
 }
