@@ -17,6 +17,7 @@ use crate::motion::Motion;
 use crate::optics::Optics;
 use crate::painter::Painter;
 use crate::picture::Picture;
+use crate::pose::Pose;
 use crate::scene::{Light, Scene, World};
 use crate::visible::Visible;
 use crate::visible::discs::Canvas;
@@ -85,19 +86,12 @@ impl Scene {
         camera: Camera<f64>,
         motion: Option<&Motion>,
     ) -> Result<Plane, SceneError> {
-        let (w, h) = self.size();
         let pixel_rad = pixel_rad(&camera);
         let globe = Globe::new(&self.body);
         let painter = InfraredPainter::try_new(world, camera, globe, &self.pose).ok_or(SceneError::Pose)?;
-        let mut data = vec![0.0f32; w * h];
-        data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
-            None => painter.render_row(y as f64, 1.0, row),
-            Some(motion) => {
-                let poses = motion.poses(&self.pose, y as f64, h, pixel_rad);
-                poses.iter().for_each(|p| painter.with_pose(p).render_row(y as f64, 1.0 / poses.len() as f32, row));
-            }
-        });
-        Ok(Plane { width: w, data })
+        let data =
+            self.render_rows(&painter, InfraredPainter::with_pose, InfraredPainter::render_row, motion, pixel_rad);
+        Ok(Plane { width: self.size().0, data })
     }
 
     /// Renders an ellipsoid in sunlight.
@@ -107,19 +101,35 @@ impl Scene {
         camera: Camera<f64>,
         motion: Option<&Motion>,
     ) -> Result<Plane, SceneError> {
-        let (w, h) = self.size();
         let pixel_rad = pixel_rad(&camera);
         let painter =
             EllipsoidPainter::try_new(body, camera, &self.pose, self.sun_direction()?).ok_or(SceneError::Pose)?;
-        let mut data = vec![0.0f32; w * h];
-        data.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
-            None => painter.render_row(y as f64, 1.0, row),
+        let data =
+            self.render_rows(&painter, EllipsoidPainter::with_pose, EllipsoidPainter::render_row, motion, pixel_rad);
+        Ok(Plane { width: self.size().0, data })
+    }
+
+    /// Returns the light of all pixels. Each row is the mean over the poses of its exposure. `render_row` adds the light
+    /// of row v, times a weight.
+    fn render_rows<S: Sync, P: Default + Clone + Send>(
+        &self,
+        painter: &S,
+        with_pose: fn(&S, &Pose) -> S,
+        render_row: fn(&S, f64, f32, &mut [P]),
+        motion: Option<&Motion>,
+        pixel_rad: f64,
+    ) -> Vec<P> {
+        let (w, h) = self.size();
+        let mut pixels = vec![P::default(); w * h];
+        pixels.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
+            None => render_row(painter, y as f64, 1.0, row),
             Some(motion) => {
                 let poses = motion.poses(&self.pose, y as f64, h, pixel_rad);
-                poses.iter().for_each(|p| painter.with_pose(p).render_row(y as f64, 1.0 / poses.len() as f32, row));
+                let weight = 1.0 / poses.len() as f32;
+                poses.iter().for_each(|pose| render_row(&with_pose(painter, pose), y as f64, weight, row));
             }
         });
-        Ok(Plane { width: w, data })
+        pixels
     }
 
     /// Returns the numbers of columns and rows.
@@ -172,14 +182,7 @@ impl Scene {
         let (w, h) = self.size();
         let pixel_rad = pixel_rad(&camera);
         let shader = self.shader(world, camera)?;
-        let mut pixels = vec![[0.0f32; 3]; w * h];
-        pixels.par_chunks_mut(w).enumerate().for_each(|(y, row)| match motion {
-            None => shader.render_row(y as f64, 1.0, row),
-            Some(motion) => {
-                let poses = motion.poses(&self.pose, y as f64, h, pixel_rad);
-                poses.iter().for_each(|p| shader.with_pose(p).render_row(y as f64, 1.0 / poses.len() as f32, row));
-            }
-        });
+        let mut pixels = self.render_rows(&shader, Shader::with_pose, Shader::render_row, motion, pixel_rad);
         // Stars, Moon and Sun use the poses of the middle row.
         let poses =
             motion.map_or_else(|| vec![self.pose], |m| m.poses(&self.pose, 0.5 * (h as f64 - 1.0), h, pixel_rad));
