@@ -44,7 +44,7 @@ pub(crate) struct BinaryPicture<'a, T, P, O> {
     pub(crate) least_contrast: i32,
     /// Cost of a read of the mask, in the unit of the work budget.
     mask: u32,
-    /// Cost of reads that are not yet paid for.
+    /// Cost of the reads since the last payment to the budget.
     owed: Cell<u32>,
     /// The eight moves, twice: a search over eight directions can begin at any of the first eight without wrapping.
     moves: [Move; 16],

@@ -159,7 +159,7 @@ fn the_position_has_no_bias_and_an_honest_covariance() {
 
 /// The campaign: `cargo test --release -p hzn-core --features position,std,_edges -- --ignored --nocapture campaign`.
 #[test]
-#[ignore = "two minutes"]
+#[ignore = "takes two minutes; the line above is its command"]
 fn position_campaign() {
     std::println!("| body | arc, noise | σ_r/r | bias of 1/r | RMSE/bound | NEES (3) | outside the gate |");
     for scene in scenes() {
