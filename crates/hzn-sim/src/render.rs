@@ -109,8 +109,8 @@ impl Scene {
         Ok(Plane { width: self.size().0, data })
     }
 
-    /// Returns the light of all pixels. Each row is the mean over the poses of its exposure. `render_row` adds the light
-    /// of row v, times a weight.
+    /// Returns the light of all pixels. Each row is the mean over the poses of its exposure. `render_row` adds the
+    /// light of row v, times a weight.
     fn render_rows<S: Sync, P: Default + Clone + Send>(
         &self,
         painter: &S,
