@@ -213,7 +213,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
         let next =
             (self.needs_next_threshold && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));
-        Some(Best { solution, outcome: *outcome, score: judged.score, certain, level: next.flatten() })
+        let (score, glows) = (judged.score, judged.glows);
+        Some(Best { solution, outcome: *outcome, score, certain, glows, level: next.flatten() })
     }
 
     /// Shows the fit of a candidate to the observer, if the observer wants it.

@@ -12,6 +12,7 @@ use crate::model::body::Expected;
 use crate::model::observer::Observer;
 use crate::model::report::{Candidate, Report, Solution};
 use crate::model::status::Status;
+use crate::model::verdict::Verdict;
 use crate::model::work::WorkBudget;
 use crate::stages::{covariance, gates, threshold};
 
@@ -50,6 +51,8 @@ struct Best<T> {
     /// Whether the search can end: the answer explains most of the limb in view, and either most points of its edge are
     /// inliers or the residuals are small.
     certain: bool,
+    /// See [`gates::Judged::glows`].
+    glows: bool,
 }
 
 impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
@@ -127,7 +130,12 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
                 report.status = Status::Ambiguous;
                 return work;
             }
-            report.choose(best.outcome);
+            if best.glows {
+                report.choose(best.outcome, Verdict::Glow);
+                report.status = Status::Rejected;
+                return work;
+            }
+            report.choose(best.outcome, Verdict::Chosen);
             report.status = Status::Ok;
             report.next_level = best.level;
             report.solution = Some(best.solution);
