@@ -18,6 +18,7 @@ mod drawing;
 mod errors;
 mod expected;
 mod image;
+mod locate;
 mod nav;
 mod notebook;
 mod overlay;
@@ -41,6 +42,8 @@ mod _hzn {
     use crate::errors::{ConfigError, HznError, ImageError, panic_within};
     #[pymodule_export]
     use crate::expected::Expected;
+    #[pymodule_export]
+    use crate::locate::locate;
     #[pymodule_export]
     use crate::nav::{Filter, celestial, fuse, triad_of, wahba_of};
     #[pymodule_export]

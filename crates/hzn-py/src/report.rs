@@ -30,6 +30,8 @@ pub(crate) struct Report {
     camera: Option<Arc<Camera>>,
     /// Half-angle of the limb that was fitted, in radians.
     half_angle_rad: Option<f64>,
+    /// The answer, if it has a position: its limb is not that of a cone.
+    placed: Option<Box<hzn_core::Solution<f64>>>,
     /// Edges and points, if they were requested or recorded.
     detail: Option<Detail>,
     /// Annotations, computed on first use, because tracing the limb takes longer than processing the picture.
@@ -54,6 +56,8 @@ struct Pickled {
     candidates: Vec<CandidateEdge>,
     camera: Option<camera::Config>,
     half_angle_rad: Option<f64>,
+    /// The limb of an answer with a position.
+    drawing: Option<Annotations>,
     detail: Option<Detail>,
     stage: Cow<'static, str>,
     bits: Option<u8>,
@@ -70,6 +74,7 @@ impl Report {
             candidates: CandidateEdge::from_report(report),
             camera: Some(Arc::clone(camera)),
             half_angle_rad: report.solution.as_ref().map(|s| s.fused_half_angle_rad),
+            placed: report.solution.filter(|s| s.position.is_some()).map(Box::new),
             detail,
             stage: report.stage.name().into(),
             ..Self::from_row(row)
@@ -83,6 +88,7 @@ impl Report {
             candidates: Vec::new(),
             camera: None,
             half_angle_rad: None,
+            placed: None,
             detail: None,
             drawing: OnceLock::new(),
             stage: "".into(),
@@ -141,6 +147,9 @@ impl Report {
                 return detail.drawing.clone();
             }
             let fitted = || {
+                if let Some(solution) = &self.placed {
+                    return Some(hzn_run::overlay::draw_limb(solution, &self.camera.as_ref()?.lens));
+                }
                 let axis = UnitVec3::try_new(self.row.axis()?)?;
                 Some(hzn_run::overlay::draw_cone(&axis, self.half_angle_rad?, &self.camera.as_ref()?.lens))
             };
@@ -395,6 +404,7 @@ impl Report {
             candidates: this.candidates.clone(),
             camera: this.camera.as_ref().map(|c| c.config.clone()),
             half_angle_rad: this.half_angle_rad,
+            drawing: this.placed.as_ref().map(|_| this.drawing().clone()),
             detail: this.detail.clone(),
             stage: this.stage.clone(),
             bits: this.bits,
@@ -409,6 +419,7 @@ impl Report {
             candidates: pickled.candidates,
             camera: pickled.camera.map(Camera::from_config).transpose()?.map(Arc::new),
             half_angle_rad: pickled.half_angle_rad,
+            drawing: pickled.drawing.map(OnceLock::from).unwrap_or_default(),
             detail: pickled.detail,
             stage: pickled.stage,
             others,
