@@ -23,6 +23,7 @@ mod nav;
 mod notebook;
 mod overlay;
 mod parameters;
+mod pickled;
 mod recording;
 mod report;
 mod sensor;

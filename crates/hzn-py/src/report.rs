@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-use hzn_core::camera;
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
@@ -13,10 +12,10 @@ use numpy::ndarray::Array2;
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyWeakrefMethods, PyWeakrefReference};
-use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
 use crate::cells::{symmetric, vector};
+use crate::pickled::{Detail, Pickled};
 use crate::{drawing, errors, notebook, parameters};
 
 /// Return type of `__reduce__` for pickle: a function and its arguments.
@@ -40,26 +39,6 @@ pub(crate) struct Report {
     others: Vec<Py<Self>>,
     /// The picture, while another object keeps it alive.
     image: Option<Py<PyWeakrefReference>>,
-    bits: Option<u8>,
-}
-
-#[derive(Clone, Default, Serialize, Deserialize)]
-struct Detail {
-    stages_us: Vec<(Cow<'static, str>, f64)>,
-    drawing: Annotations,
-}
-
-/// Contents of a report for pickle: everything except the picture and the other bodies.
-#[derive(Serialize, Deserialize)]
-struct Pickled {
-    row: Row,
-    candidates: Vec<CandidateEdge>,
-    camera: Option<camera::Config>,
-    half_angle_rad: Option<f64>,
-    /// The limb of an answer with a position.
-    drawing: Option<Annotations>,
-    detail: Option<Detail>,
-    stage: Cow<'static, str>,
     bits: Option<u8>,
 }
 
