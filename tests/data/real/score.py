@@ -3,8 +3,8 @@
 RESULTS.csv has a column `file` and, for each picture with an answer, `axis_x, axis_y, axis_z` (unit vector to the body,
 camera frame: x right, y down, z forward) or `position_x_km, position_y_km, position_z_km` (camera to the body's centre),
 or both. These are the columns of `hzn run -o RESULTS.csv`; any other program can write them. With `cov_*` (rad^2) and
-`pos_cov_*_km2` the errors are also given in sigmas. Paths are compared from their
-end.
+`pos_cov_*_km2` the errors are also given in sigmas. Paths are compared from their end, so a name without a folder
+counts for every picture of that name.
 """
 
 import csv
