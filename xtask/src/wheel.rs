@@ -25,12 +25,22 @@ pub(crate) fn run_step(hzn: &Path) -> Outcome {
     let stubs = ["mypy.stubtest", "hzn", "--concise", "--allowlist"];
     steps::run(module(&stubs).arg(tests.join("stubtest.txt")))?;
     steps::run(module(&["mypy", "--strict", "--no-error-summary"]).arg(tests.join("typed.py")))?;
-    steps::run(module(&["pytest", "-q", "-p", "no:cacheprovider"]).arg(tests))?;
+    let basilisk = tests.join("basilisk");
+    steps::run(module(&["pytest", "-q", "-p", "no:cacheprovider", "--ignore"]).arg(&basilisk).arg(&tests))?;
+    compare_with_basilisk(&basilisk, &scratch)?;
     // The site takes its reference from the docstrings. Its notebooks are executed during the build.
     let config = fs::canonicalize("mkdocs.yml")?;
     let mut site = module(&["mkdocs", "build", "--strict", "--quiet", "--config-file"]);
     site.env("NO_MKDOCS_2_WARNING", "1");
     steps::run(site.arg(config).arg("--site-dir").arg(scratch.join("python-site")))
+}
+
+/// Compares positions with those of Basilisk. It has an environment of its own, because it needs older packages.
+fn compare_with_basilisk(tests: &Path, scratch: &Path) -> Outcome {
+    let python = python::prepare_environment("basilisk", &tests.join("requirements.txt"))?;
+    install(&python, &find_wheel(&target().join("wheels"))?)?;
+    let pytest = ["-m", "pytest", "-q", "-p", "no:cacheprovider"];
+    steps::run(Command::new(&python).args(pytest).arg(tests).current_dir(scratch))
 }
 
 /// Measures the wheel of a release build.
@@ -60,10 +70,13 @@ fn install_wheel(profile: &str) -> Result<PathBuf, Trouble> {
     let mut maturin = Command::new(&python);
     maturin.args(["-m", "maturin", "build", "--locked", "--profile", profile, "--manifest-path"]);
     steps::run(maturin.arg(folder.join("Cargo.toml")).arg("--out").arg(&wheels))?;
-    let wheel = find_wheel(&wheels)?;
-    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--force-reinstall", "--no-deps"];
-    steps::run(Command::new(&python).args(pip).arg(wheel))?;
+    install(&python, &find_wheel(&wheels)?)?;
     Ok(python)
+}
+
+fn install(python: &Path, wheel: &Path) -> Outcome {
+    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--force-reinstall", "--no-deps"];
+    steps::run(Command::new(python).args(pip).arg(wheel))
 }
 
 fn find_wheel(folder: &Path) -> Result<PathBuf, Trouble> {

@@ -18,10 +18,12 @@ mod drawing;
 mod errors;
 mod expected;
 mod image;
+mod locate;
 mod nav;
 mod notebook;
 mod overlay;
 mod parameters;
+mod pickled;
 mod recording;
 mod report;
 mod sensor;
@@ -41,6 +43,8 @@ mod _hzn {
     use crate::errors::{ConfigError, HznError, ImageError, panic_within};
     #[pymodule_export]
     use crate::expected::Expected;
+    #[pymodule_export]
+    use crate::locate::locate;
     #[pymodule_export]
     use crate::nav::{Filter, celestial, fuse, triad_of, wahba_of};
     #[pymodule_export]

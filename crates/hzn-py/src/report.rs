@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-use hzn_core::camera;
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
@@ -13,10 +12,10 @@ use numpy::ndarray::Array2;
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyWeakrefMethods, PyWeakrefReference};
-use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
 use crate::cells::{symmetric, vector};
+use crate::pickled::{Detail, Pickled};
 use crate::{drawing, errors, notebook, parameters};
 
 /// Return type of `__reduce__` for pickle: a function and its arguments.
@@ -30,6 +29,8 @@ pub(crate) struct Report {
     camera: Option<Arc<Camera>>,
     /// Half-angle of the limb that was fitted, in radians.
     half_angle_rad: Option<f64>,
+    /// The answer, if it has a position: its limb is not that of a cone.
+    placed: Option<Box<hzn_core::Solution<f64>>>,
     /// Edges and points, if they were requested or recorded.
     detail: Option<Detail>,
     /// Annotations, computed on first use, because tracing the limb takes longer than processing the picture.
@@ -38,24 +39,6 @@ pub(crate) struct Report {
     others: Vec<Py<Self>>,
     /// The picture, while another object keeps it alive.
     image: Option<Py<PyWeakrefReference>>,
-    bits: Option<u8>,
-}
-
-#[derive(Clone, Default, Serialize, Deserialize)]
-struct Detail {
-    stages_us: Vec<(Cow<'static, str>, f64)>,
-    drawing: Annotations,
-}
-
-/// Contents of a report for pickle: everything except the picture and the other bodies.
-#[derive(Serialize, Deserialize)]
-struct Pickled {
-    row: Row,
-    candidates: Vec<CandidateEdge>,
-    camera: Option<camera::Config>,
-    half_angle_rad: Option<f64>,
-    detail: Option<Detail>,
-    stage: Cow<'static, str>,
     bits: Option<u8>,
 }
 
@@ -70,6 +53,7 @@ impl Report {
             candidates: CandidateEdge::from_report(report),
             camera: Some(Arc::clone(camera)),
             half_angle_rad: report.solution.as_ref().map(|s| s.fused_half_angle_rad),
+            placed: report.solution.filter(|s| s.position.is_some()).map(Box::new),
             detail,
             stage: report.stage.name().into(),
             ..Self::from_row(row)
@@ -83,6 +67,7 @@ impl Report {
             candidates: Vec::new(),
             camera: None,
             half_angle_rad: None,
+            placed: None,
             detail: None,
             drawing: OnceLock::new(),
             stage: "".into(),
@@ -141,6 +126,9 @@ impl Report {
                 return detail.drawing.clone();
             }
             let fitted = || {
+                if let Some(solution) = &self.placed {
+                    return Some(hzn_run::overlay::draw_limb(solution, &self.camera.as_ref()?.lens));
+                }
                 let axis = UnitVec3::try_new(self.row.axis()?)?;
                 Some(hzn_run::overlay::draw_cone(&axis, self.half_angle_rad?, &self.camera.as_ref()?.lens))
             };
@@ -395,6 +383,7 @@ impl Report {
             candidates: this.candidates.clone(),
             camera: this.camera.as_ref().map(|c| c.config.clone()),
             half_angle_rad: this.half_angle_rad,
+            drawing: this.placed.as_ref().map(|_| this.drawing().clone()),
             detail: this.detail.clone(),
             stage: this.stage.clone(),
             bits: this.bits,
@@ -409,6 +398,7 @@ impl Report {
             candidates: pickled.candidates,
             camera: pickled.camera.map(Camera::from_config).transpose()?.map(Arc::new),
             half_angle_rad: pickled.half_angle_rad,
+            drawing: pickled.drawing.map(OnceLock::from).unwrap_or_default(),
             detail: pickled.detail,
             stage: pickled.stage,
             others,

@@ -228,12 +228,20 @@ fn row_meta(data: &FrameData, body: &hzn_core::body::Config) -> RowMeta {
 }
 
 /// Checks a direction in the camera frame.
-fn direction(name: &str, v: Option<[f64; 3]>) -> PyResult<Option<[f64; 3]>> {
+pub(crate) fn direction(name: &str, v: Option<[f64; 3]>) -> PyResult<Option<[f64; 3]>> {
     let is_direction = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>() > 1e-18 && v.iter().all(|x| x.is_finite());
     match v {
         Some(v) if !is_direction(&v) => Err(errors::config(format!("{name}: three finite numbers that are not all 0"))),
         v => Ok(v),
     }
+}
+
+/// Checks a quaternion.
+pub(crate) fn check_attitude(q: [f64; 4]) -> PyResult<[f64; 4]> {
+    if (q.iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() < 0.01 {
+        return Ok(q);
+    }
+    Err(errors::config("attitude: a quaternion (w, x, y, z) of length 1 is expected"))
 }
 
 /// Collects the prior of a picture, with the checks that the core cannot make.
@@ -245,10 +253,7 @@ fn collect_prior(
     rate_rad_s: Option<[f64; 3]>,
     time_s: Option<f64>,
 ) -> PyResult<FrameData> {
-    let unit = |q: &[f64; 4]| (q.iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() < 0.01;
-    if attitude.is_some_and(|q| !unit(&q)) {
-        return Err(errors::config("attitude: a quaternion (w, x, y, z) of length 1 is expected"));
-    }
+    let attitude = attitude.map(check_attitude).transpose()?;
     if time_s.is_some_and(|t| !t.is_finite()) {
         return Err(errors::config("time_s: must be a finite number"));
     }

@@ -13,6 +13,7 @@ mod looks;
 mod orbit;
 mod position;
 mod presets;
+mod real;
 mod recordings;
 mod residuals;
 mod scenes;
@@ -58,6 +59,7 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("lost-discs", "Discs under an image circle", looks::lost_discs),
     reproduced("second-look", "One look and several", looks::second_look),
     reproduced("real-pictures", "Photographs at many settings", looks::real_pictures),
+    reproduced("real", "Photographs with truth", real::suite),
     Study { name: "presets", title: "Presets compared", document: Document::Methods, run: presets::compare_presets },
 ];
 

@@ -3,7 +3,8 @@
 RESULTS.csv has a column `file` and, for each picture with an answer, `axis_x, axis_y, axis_z` (unit vector to the body,
 camera frame: x right, y down, z forward) or `position_x_km, position_y_km, position_z_km` (camera to the body's centre),
 or both. These are the columns of `hzn run -o RESULTS.csv`; any other program can write them. With `cov_*` (rad^2) and
-`pos_cov_*_km2` the errors are also given in sigmas. Only the end of a file name counts.
+`pos_cov_*_km2` the errors are also given in sigmas. Paths are compared from their end, so a name without a folder
+counts for every picture of that name.
 """
 
 import csv
@@ -42,20 +43,36 @@ def score_range(row, truth):
 
 
 def score_axis(row, truth):
-    axis = numbers(row, ["axis_x", "axis_y", "axis_z"])
-    axis = axis or numbers(row, ["position_x_km", "position_y_km", "position_z_km"])
+    axis, unit, name = numbers(row, ["axis_x", "axis_y", "axis_z"]), 1.0, "cov_{}"
+    if axis is None:
+        axis, name = numbers(row, ["position_x_km", "position_y_km", "position_z_km"]), "pos_cov_{}_km2"
+        unit = length(axis) if axis else 1.0
     if axis is None:
         return "no direction"
+    axis = [x / length(axis) for x in axis]
     true = [float(truth[f"value_{i}"]) for i in (1, 2, 3)]
-    a, b = length(axis), length(true)
-    cross = [
-        axis[1] * true[2] - axis[2] * true[1],
-        axis[2] * true[0] - axis[0] * true[2],
-        axis[0] * true[1] - axis[1] * true[0],
-    ]
-    dot = sum(x * y for x, y in zip(axis, true))
-    angle = math.degrees(math.atan2(length(cross), dot))
-    return f"direction {angle:.4f} deg off (truth known to {truth['sigma']} deg)"
+    true = [x / length(true) for x in true]
+    off = [x - y for x, y in zip(axis, true)]
+    angle = 2.0 * math.degrees(math.asin(min(1.0, 0.5 * length(off))))
+    text = f"direction {angle:.4f} deg off (truth known to {truth['sigma']} deg)"
+    covariance = numbers(row, [name.format(ij) for ij in ("xx", "xy", "xz", "yy", "yz", "zz")])
+    if covariance and length(off) > 0.0:
+        variance = along(covariance, [x / length(off) for x in off]) / unit**2
+        text += f", {angle / math.hypot(math.degrees(math.sqrt(variance)), float(truth['sigma'])):.2f} sigma"
+    return text
+
+
+# A pole is no answer: it orients the body for a program that needs no attitude.
+SCORES = {"range": score_range, "axis": score_axis}
+
+
+def find(rows, name):
+    """Return the row of a picture. The paths must agree from the end as far as the shorter one goes."""
+    for row in rows:
+        file = (row.get("file") or "").replace("\\", "/")
+        if file and (f"/{name}".endswith(f"/{file}") or f"/{file}".endswith(f"/{name}")):
+            return row
+    return None
 
 
 def main():
@@ -66,13 +83,11 @@ def main():
     with open(Path(__file__).with_name("truth.csv"), newline="") as file:
         truths = list(csv.DictReader(file))
     for truth in truths:
-        name = truth["file"].rsplit("/", 1)[-1]
-        row = next((row for row in rows if (row.get("file") or "").endswith(name)), None)
-        if row is None:
-            print(f"{truth['file']}: not among the results")
+        if truth["quantity"] not in SCORES:
             continue
-        score = score_range if truth["quantity"] == "range" else score_axis
-        print(f"{truth['file']}: {score(row, truth)}")
+        row = find(rows, truth["file"])
+        score = SCORES[truth["quantity"]](row, truth) if row else "not among the results"
+        print(f"{truth['file']}: {score}")
 
 
 if __name__ == "__main__":

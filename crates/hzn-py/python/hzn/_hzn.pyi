@@ -688,6 +688,57 @@ def find_corners(
         The array is no picture.
     """
 
+def locate(
+    points: ArrayLike,
+    *,
+    camera: Camera,
+    radii_km: Sequence[float],
+    attitude: Sequence[float],
+    method: str = "gauss-newton",
+    sigma_px: float = 1.0,
+    lit: Sequence[float] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Compute the position of an ellipsoid from points on its limb that were found elsewhere.
+
+    Parameters
+    ----------
+    points
+        Points (u, v) on the limb, in order along it, shape (n, 2), pixels, pixel centres at integers.
+    camera
+        The camera.
+    radii_km
+        Semi-axes of the limb's ellipsoid along the axes of the body, km: with the height of the visible limb.
+    attitude
+        Unit quaternion (w, x, y, z) from the camera frame to the axes of the body.
+    method
+        ``gauss-newton`` is unbiased on short arcs. ``least-squares`` is the linear method of Christian & Robinson
+        (2016), for comparison; it is biased on short arcs. ``robust`` rejects outliers and weighs the others.
+    sigma_px
+        1-sigma of each coordinate of a point, pixels; the noise of different points is independent. If the residuals
+        of ``gauss-newton`` or ``robust`` are larger, their size counts.
+    lit
+        Rough direction to the body in the camera frame, shape (3,); without it, that of ``least-squares``. Only the
+        side of the limb on which the body lies is taken from it.
+
+    Returns
+    -------
+    tuple of numpy.ndarray or None
+        Position of the body's centre from the camera in the camera frame, shape (3,), km, and its covariance, shape
+        (3, 3), km². It contains only the noise of the points. None if the points do not determine a position.
+
+    Raises
+    ------
+    ConfigError
+        Radii, attitude, method, sigma or direction are refused; the message names it.
+    ImageError
+        The points have the wrong shape, or the lens does not see one of them.
+
+    Examples
+    --------
+    >>> position_km, covariance_km2 = hzn.locate(
+    ...     points, camera=camera, radii_km=[3396.19, 3396.19, 3376.2], attitude=[1, 0, 0, 0], sigma_px=0.1)
+    """
+
 def overlay(image: _Image, report: Report, *, bits: int | None = None) -> NDArray[np.uint8]:
     """Draw limb and axis of a report over its picture; with ``detail=True`` also edges and points.
 
