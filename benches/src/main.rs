@@ -144,6 +144,7 @@ fn measure(case: &Case, rounds: usize, recipe: &mut Recipe) -> Result<CaseResult
     for frame in &case.frames {
         result.pixels_percent.push(single.count_distinct_pixels(case, frame)? as f64 * 100.0 / case.pixels() as f64);
     }
-    result.ns_a_point = sensors::sensor_with_every_point(&case.sensor)?.measure_ns_a_point(case)?;
+    let points = sensors::sensor_with_every_point(&case.sensor)?.measure_ns_a_point(case)?;
+    result.ns_a_point = points.iter().map(|turns| results::median(turns)).collect();
     Ok(result)
 }

@@ -135,9 +135,9 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         Ok(clock.stages())
     }
 
-    /// Returns the time per edge point in nanoseconds, when the frames are processed one after another. It is the
-    /// median over several turns through the frames, for each frame; frames without points are left out.
-    pub(crate) fn measure_ns_a_point(&mut self, case: &Case) -> Result<Vec<f64>, String> {
+    /// Returns the times per edge point in nanoseconds, when the frames are processed one after another: a list for
+    /// each frame, with its time in each of several turns through the frames. Frames without points are left out.
+    pub(crate) fn measure_ns_a_point(&mut self, case: &Case) -> Result<Vec<Vec<f64>>, String> {
         let mut all = vec![Vec::new(); case.frames.len()];
         for _ in 0..TURNS {
             for (frame, list) in case.frames.iter().zip(&mut all) {
@@ -147,7 +147,8 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
                 }
             }
         }
-        Ok(all.iter().filter(|list| !list.is_empty()).map(|list| crate::results::median(list)).collect())
+        all.retain(|list| !list.is_empty());
+        Ok(all)
     }
 
     /// Returns the number of pixels that are read at least once.
