@@ -39,7 +39,7 @@ fn layer(height_km: f64, [peak_km, scale_km]: [f64; 2]) -> f64 {
     (1.0 - y - (-y).exp()).exp()
 }
 
-/// Returns the light along the line of sight with this tangent height; the ground hides what is behind it.
+/// Returns the light along the line of sight with this tangent height. The ground hides the light behind it.
 fn along_limb(tangent_km: f64, aurora: f64) -> f64 {
     const STEP_KM: f64 = 1.0;
     let one_side: f64 = (0..4500)

@@ -1,4 +1,5 @@
-//! Measures every photograph of the public suite, with the sensor.toml next to it, against what is known of it.
+//! Processes every photograph of the public suite with the sensor.toml next to it. Compares the answers with the truth,
+//! where there is one.
 
 use std::path::{Path, PathBuf};
 
