@@ -42,10 +42,10 @@ pub(super) fn suite(_: &Effort) -> anyhow::Result<Section> {
     s.text(
         "The sensor processes every photograph of tests/data/real with the sensor.toml next to it and the frames.csv \
          of its folder. `truth.csv` has the known quantities with their uncertainty, credit and licence. `score.py` \
-         scores the results of any program. Errors are given where there is a truth. Their sigmas contain the uncertainty of the \
-         truth: 0.02° for the pointing of Cassini, 0.05° for the stars, 0.1 % for the distance, because the height of \
-         the visible limb is not known better. The night pictures show airglow and hardly any limb of the surface: \
-         they should be refused, or answered within 3σ.",
+         scores the results of any program. Errors are given where there is a truth. Their sigmas contain the \
+         uncertainty of the truth: 0.02° for the pointing of Cassini, 0.05° for the stars, 0.1 % for the distance, \
+         because the height of the visible limb is not known better. The night pictures show airglow and hardly any \
+         limb of the surface: they should be refused, or answered within 3σ.",
     );
     s.table(["picture", "status", "inliers", "RMS", "σ of the axis", "axis error", "range error ± σ"], rows);
     s.text(match wrong.as_slice() {
