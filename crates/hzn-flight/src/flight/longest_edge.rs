@@ -4,8 +4,10 @@ use core::cell::RefCell;
 
 use hzn_core::observer::Observer;
 use hzn_core::pixel::Pixel;
+use hzn_core::report::MAX_LISTED;
 
 use super::line::Line;
+use super::stuck::{Equality, StuckPlaces};
 use crate::board::Board;
 use crate::cuc::Cuc;
 use crate::messages::{EDGE_PIXELS, EdgePart, EdgePixel};
@@ -57,30 +59,63 @@ impl LongestEdge {
     }
 }
 
-/// Keeps the longest edge if it is wanted. There is only one type of observer, so that the pipeline is linked once.
+/// Watches the edges of a picture: keeps the longest one if it is wanted, and looks for stuck pixels along each. There
+/// is only one type of observer, so that the pipeline is linked once.
 pub(super) struct EdgeWatch<'a> {
     pub(super) wanted: bool,
     pub(super) longest: RefCell<&'a mut LongestEdge>,
+    /// The pixels of the picture, and its width.
+    pub(super) pixels: &'a [u8],
+    pub(super) width: usize,
+    pub(super) equality: Equality,
+    /// The edges with stuck places. Pictures with more such edges have stuck places in all further ones.
+    pub(super) stuck: RefCell<heapless::Vec<StuckPlaces, MAX_LISTED>>,
+}
+
+impl EdgeWatch<'_> {
+    /// Returns what was found along the edge of a candidate, if it is stuck.
+    pub(super) fn stuck_places(&self, candidate: u32) -> Option<StuckPlaces> {
+        let list = self.stuck.try_borrow().ok()?;
+        let found = list.iter().find(|places| places.candidate == candidate).copied();
+        found.or(list.last().filter(|_| list.is_full()).copied()).filter(StuckPlaces::is_stuck)
+    }
 }
 
 impl Observer<f32> for EdgeWatch<'_> {
-    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
-        if !self.wanted {
-            return;
+    fn look(&self, _number: u32, _level: u16) {
+        // The candidates of another look have the same numbers.
+        if let Ok(mut stuck) = self.stuck.try_borrow_mut() {
+            stuck.clear();
         }
+    }
+    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
         let Ok(mut longest) = self.longest.try_borrow_mut() else { return };
+        let list = &mut **longest;
         let (pixels, _) = border.size_hint();
         let length = (pixels as u32).saturating_mul(stride);
-        if length <= longest.length {
-            return;
+        let is_kept = self.wanted && length > list.length;
+        let most = if is_kept { MAX_PIXELS } else { StuckPlaces::MOST };
+        let every = pixels.div_ceil(most).max(1);
+        if is_kept {
+            (list.length, list.candidate, list.len) = (length, candidate, 0);
+            list.stride = stride.saturating_mul(every as u32);
         }
-        let every = pixels.div_ceil(MAX_PIXELS).max(1);
-        let list = &mut **longest;
-        list.len = 0;
-        for (place, pixel) in list.pixels.iter_mut().zip(border.step_by(every)) {
-            *place = pixel;
-            list.len += 1;
+        let mut found = StuckPlaces { candidate, ..StuckPlaces::default() };
+        for (place, pixel) in border.step_by(every).enumerate() {
+            if is_kept && let Some(kept) = list.pixels.get_mut(place) {
+                *kept = pixel;
+                list.len += 1;
+            }
+            if place % (most / StuckPlaces::MOST) == 0 {
+                found.places += 1;
+                found.stuck += u32::from(self.equality.is_stuck(self.pixels, self.width, pixel));
+            }
         }
-        (list.length, list.candidate, list.stride) = (length, candidate, stride.saturating_mul(every as u32));
+        if found.is_stuck()
+            && let Ok(mut stuck) = self.stuck.try_borrow_mut()
+        {
+            // A list that is full is dealt with above.
+            let _ = stuck.push(found);
+        }
     }
 }
