@@ -2,12 +2,13 @@
 
 use core::cell::RefCell;
 
+use hzn_core::Solution;
 use hzn_core::observer::Observer;
 use hzn_core::pixel::Pixel;
-use hzn_core::report::MAX_LISTED;
+use hzn_core::report::Candidate;
 
 use super::line::Line;
-use super::stuck::{Equality, StuckPlaces};
+use super::stuck::{PLACES, StuckWatch};
 use crate::board::Board;
 use crate::cuc::Cuc;
 use crate::messages::{EDGE_PIXELS, EdgePart, EdgePixel};
@@ -64,21 +65,7 @@ impl LongestEdge {
 pub(super) struct EdgeWatch<'a> {
     pub(super) wanted: bool,
     pub(super) longest: RefCell<&'a mut LongestEdge>,
-    /// The pixels of the picture, and its width.
-    pub(super) pixels: &'a [u8],
-    pub(super) width: usize,
-    pub(super) equality: Equality,
-    /// The edges with stuck places. Pictures with more such edges have stuck places in all further ones.
-    pub(super) stuck: RefCell<heapless::Vec<StuckPlaces, MAX_LISTED>>,
-}
-
-impl EdgeWatch<'_> {
-    /// Returns what was found along the edge of a candidate, if it is stuck.
-    pub(super) fn stuck_places(&self, candidate: u32) -> Option<StuckPlaces> {
-        let list = self.stuck.try_borrow().ok()?;
-        let found = list.iter().find(|places| places.candidate == candidate).copied();
-        found.or(list.last().filter(|_| list.is_full()).copied()).filter(StuckPlaces::is_stuck)
-    }
+    pub(super) stuck: RefCell<StuckWatch<'a>>,
 }
 
 impl Observer<f32> for EdgeWatch<'_> {
@@ -88,34 +75,38 @@ impl Observer<f32> for EdgeWatch<'_> {
             stuck.clear();
         }
     }
+
     fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
-        let Ok(mut longest) = self.longest.try_borrow_mut() else { return };
+        let (Ok(mut longest), Ok(mut stuck)) = (self.longest.try_borrow_mut(), self.stuck.try_borrow_mut()) else {
+            return;
+        };
         let list = &mut **longest;
         let (pixels, _) = border.size_hint();
         let length = (pixels as u32).saturating_mul(stride);
         let is_kept = self.wanted && length > list.length;
-        let most = if is_kept { MAX_PIXELS } else { StuckPlaces::MOST };
+        let most = if is_kept { MAX_PIXELS } else { PLACES };
         let every = pixels.div_ceil(most).max(1);
         if is_kept {
             (list.length, list.candidate, list.len) = (length, candidate, 0);
             list.stride = stride.saturating_mul(every as u32);
         }
-        let mut found = StuckPlaces { candidate, ..StuckPlaces::default() };
+        stuck.begin();
         for (place, pixel) in border.step_by(every).enumerate() {
             if is_kept && let Some(kept) = list.pixels.get_mut(place) {
                 *kept = pixel;
                 list.len += 1;
             }
-            if place % (most / StuckPlaces::MOST) == 0 {
-                found.places += 1;
-                found.stuck += u32::from(self.equality.is_stuck(self.pixels, self.width, pixel));
+            if place % (most / PLACES) == 0 {
+                stuck.look_at(pixel);
             }
         }
-        if found.is_stuck()
+    }
+
+    fn verdict(&self, candidate: u32, _outcome: &Candidate<f32>, solution: Option<&Solution<f32>>) {
+        if let Some(solution) = solution
             && let Ok(mut stuck) = self.stuck.try_borrow_mut()
         {
-            // A list that is full is dealt with above.
-            let _ = stuck.push(found);
+            stuck.judge(candidate, solution);
         }
     }
 }

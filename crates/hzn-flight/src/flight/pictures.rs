@@ -7,7 +7,7 @@ use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
 
 use super::longest_edge::EdgeWatch;
-use super::stuck::Equality;
+use super::stuck::StuckWatch;
 use super::{Buffers, Flight, Known};
 use crate::board::{Board, Picture};
 use crate::kept_twice::KeptTwice;
@@ -34,13 +34,10 @@ impl<B: Board> Flight<'_, B> {
         let watch = EdgeWatch {
             wanted,
             longest: RefCell::new(&mut self.buffers.edge),
-            pixels: bytes,
-            width: usize::from(self.sensor.get().camera().width()),
-            equality: Equality::sample(bytes),
-            stuck: RefCell::default(),
+            stuck: RefCell::new(StuckWatch::new(bytes, self.sensor.get().camera())),
         };
         let report = self.sensor.get().process(self.workspace, &grey, expected.get(), &watch);
-        let stuck = report.solution.as_ref().and_then(|s| watch.stuck_places(s.candidate));
+        let stuck = report.solution.as_ref().and_then(|s| watch.stuck.into_inner().found(s.candidate));
         // A bit may have changed during the calculation.
         if !self.check_memory(Some(&mut expected)) {
             self.state.refused = self.state.refused.saturating_add(1);

@@ -6,7 +6,10 @@
 //! pixels has the probability e^(n-1). A run is stuck if this is below one in a million. Without noise (e = 1), nothing
 //! is. Black and saturated pixels are equal without a fault, so they never count.
 
-use hzn_core::pixel::Pixel;
+use hzn_core::Solution;
+use hzn_core::camera::Camera;
+use hzn_core::pixel::{ImagePoint, Pixel};
+use hzn_core::report::MAX_LISTED;
 
 /// Number of pairs of neighbours in the sample.
 const SAMPLES: usize = 128;
@@ -18,8 +21,13 @@ const FEWEST: u32 = 16;
 const SHORTEST: u32 = 16;
 /// Largest share of equal neighbours that is known well enough from the sample.
 const MOST_EQUAL: f32 = 0.9;
-/// Largest part of the places of an edge that may be stuck: the fit leaves out fewer as outliers.
+/// Number of places that are looked at along an edge.
+pub(super) const PLACES: usize = 64;
+/// A limb is stuck if more than one in this many of its places is.
 const MOST_STUCK: u32 = 8;
+/// Places that are nearer to the fitted limb than this belong to it: the edge points may be a few pixels off the border
+/// pixels, and the limb of an ellipsoid is not quite a circle.
+const NEAR_PX: f32 = 4.0;
 
 /// How long a run of equal pixels must be to be stuck.
 #[derive(Debug, Clone, Copy)]
@@ -29,24 +37,81 @@ pub(super) struct Equality {
     bright: u32,
 }
 
-/// What was found along an edge.
+/// What was found along a limb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct StuckPlaces {
     /// Number of the candidate.
-    pub(super) candidate: u32,
+    candidate: u32,
     /// Places where the pixels are stuck.
     pub(super) stuck: u32,
-    /// Places that were looked at.
+    /// Places on the limb that were looked at.
     pub(super) places: u32,
 }
 
 impl StuckPlaces {
-    /// Number of places that are looked at along an edge.
-    pub(super) const MOST: usize = 64;
-
-    /// Returns whether too much of the edge is stuck.
-    pub(super) fn is_stuck(&self) -> bool {
+    /// Returns whether too much of the limb is stuck.
+    fn is_stuck(&self) -> bool {
         self.stuck * MOST_STUCK > self.places
+    }
+}
+
+/// Looks for stuck pixels along the edges of a picture, one edge after the other.
+pub(super) struct StuckWatch<'a> {
+    pixels: &'a [u8],
+    camera: &'a Camera<f32>,
+    equality: Equality,
+    /// Places along the edge that is examined, and whether they are stuck.
+    places: heapless::Vec<(Pixel, bool), PLACES>,
+    /// Limbs that are stuck.
+    found: heapless::Vec<StuckPlaces, MAX_LISTED>,
+}
+
+impl<'a> StuckWatch<'a> {
+    pub(super) fn new(pixels: &'a [u8], camera: &'a Camera<f32>) -> Self {
+        let equality = Equality::sample(pixels);
+        Self { pixels, camera, equality, places: heapless::Vec::new(), found: heapless::Vec::new() }
+    }
+    /// Forgets the edges of another look at the picture.
+    pub(super) fn clear(&mut self) {
+        self.found.clear();
+    }
+    /// Begins another edge.
+    pub(super) fn begin(&mut self) {
+        self.places.clear();
+    }
+    /// Looks at a pixel of the edge.
+    pub(super) fn look_at(&mut self, pixel: Pixel) {
+        let is_stuck = self.equality.is_stuck(self.pixels, self.camera.width().into(), pixel);
+        // There is room, because the caller takes as many pixels.
+        let _ = self.places.push((pixel, is_stuck));
+    }
+
+    /// Judges the limb that was fitted to the edge. Places away from it are not counted: the fit left them out.
+    pub(super) fn judge(&mut self, candidate: u32, limb: &Solution<f32>) {
+        // Rays take time, and most edges have no stuck places.
+        if !self.places.iter().any(|(_, is_stuck)| *is_stuck) {
+            return;
+        }
+        let mut count = StuckPlaces { candidate, ..StuckPlaces::default() };
+        let near = NEAR_PX / self.camera.focal_px().0;
+        for (pixel, is_stuck) in &self.places {
+            let point = ImagePoint { u: f32::from(pixel.x), v: f32::from(pixel.y) };
+            let Some(ray) = self.camera.unproject(point) else { continue };
+            if (ray.angle_rad(&limb.axis) - limb.fused_half_angle_rad).abs() < near {
+                count.places += 1;
+                count.stuck += u32::from(*is_stuck);
+            }
+        }
+        if count.is_stuck() {
+            // A list that is full is dealt with in `found`.
+            let _ = self.found.push(count);
+        }
+    }
+
+    /// Returns what was found along the limb of a candidate, if it is stuck.
+    pub(super) fn found(&self, candidate: u32) -> Option<StuckPlaces> {
+        let found = self.found.iter().find(|found| found.candidate == candidate);
+        found.or(self.found.last().filter(|_| self.found.is_full())).copied()
     }
 }
 
