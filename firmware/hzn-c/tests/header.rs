@@ -9,9 +9,10 @@ use hzn_flight::{Parameters, parameters};
 fn the_header_is_up_to_date() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(here.join("cbindgen.toml")).unwrap();
-    let bindings = ["types.rs", "rows.rs"].iter().fold(cbindgen::Builder::new().with_src(here.join("src/lib.rs")), |b, file| {
-        b.with_src(here.join("src").join(file))
-    });
+    let bindings =
+        ["types.rs", "rows.rs"].iter().fold(cbindgen::Builder::new().with_src(here.join("src/lib.rs")), |b, file| {
+            b.with_src(here.join("src").join(file))
+        });
     let bindings = bindings.with_config(config).generate().unwrap();
     let mut made = Vec::new();
     bindings.write(&mut made);
