@@ -71,7 +71,10 @@ fn flips(trials: u64) -> Outcome {
     steps::run(test("hzn-flight", "flight", "flips::").env("HZN_FLIPS", &trials))?;
     let mut in_memory = cargo(&["test", "--package", "hzn-c", "--test", "flips"]);
     in_memory.current_dir(root().join("firmware")).arg("--target-dir").arg(target().join("firmware/flips"));
-    in_memory.env("CARGO_PROFILE_DEV_DEBUG_ASSERTIONS", "false").env("CARGO_PROFILE_DEV_OPT_LEVEL", "2").env("HZN_FLIPS", &trials);
+    in_memory
+        .env("CARGO_PROFILE_DEV_DEBUG_ASSERTIONS", "false")
+        .env("CARGO_PROFILE_DEV_OPT_LEVEL", "2")
+        .env("HZN_FLIPS", &trials);
     steps::run(in_memory.args(["--", "--nocapture", "--include-ignored"]))
 }
 

@@ -13,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod c_package;
 mod campaign;
 mod demo;
 mod firmware;

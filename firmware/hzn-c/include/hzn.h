@@ -70,15 +70,7 @@
 #define HZN_ROWS_SIZE 147456
 
 // A sensor. Its content is hidden: only pointers to it are passed.
-typedef struct {
-  uint64_t magic;
-  // Number of the parameter that was refused last; 0: none.
-  uint16_t refused;
-  // The parameters from [`hzn_set`]; they are in use after [`hzn_apply`].
-  Parameters pending;
-  Sensor<float> sensor;
-  FlightWorkspace workspace;
-} HznSensor;
+typedef struct HznSensor HznSensor;
 
 // A picture: one byte per pixel, row by row.
 typedef struct {

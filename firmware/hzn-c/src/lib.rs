@@ -85,7 +85,6 @@ const MAGIC: u64 = 0x687A_6E20_6F70_656E;
 
 /// A sensor. Its content is hidden: only pointers to it are passed.
 #[derive(Debug)]
-#[repr(C)]
 pub struct HznSensor {
     magic: u64,
     /// Number of the parameter that was refused last; 0: none.

@@ -170,6 +170,11 @@ impl Equality {
         let start = y.saturating_mul(width);
         let Some(row) = pixels.get(start..start.saturating_add(width)) else { return false };
         let Some(&value) = row.get(x) else { return false };
+        // Most pixels differ from both neighbours, which ends the look at once.
+        let is_beside = |x: usize| row.get(x) == Some(&value);
+        if !is_beside(x.wrapping_sub(1)) && !is_beside(x + 1) {
+            return false;
+        }
         let needed = if value < self.mean { self.dark } else { self.bright };
         if matches!(value, 0 | u8::MAX) || needed == u32::MAX {
             return false;
