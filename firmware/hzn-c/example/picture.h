@@ -2,6 +2,9 @@
 #include <stdint.h>
 
 enum { PICTURE_WIDTH = 320, PICTURE_HEIGHT = 240 };
+/* Sine of the angle from the optical axis to the axis of the cone: the limb crosses the middle column 19.5 px above the centre,
+   at a focal length of 300 px, so the angle is 70.64° - 3.72°. */
+#define LIMB_SIN 0.9200f
 static uint8_t picture[PICTURE_WIDTH * PICTURE_HEIGHT];
 
 /* The cone of 70.64° as a series in x, to 0.01 px, in sixteenths of a pixel and with integers alone. */

@@ -49,7 +49,7 @@ CFE_Status_t CFE_SB_TransmitMsg(const CFE_MSG_Message_t *message, bool increment
     answers++;
     printf("answer: status %d, axis %.4f %.4f %.4f, %u inliers\n", (int)answer->status, answer->axis[0], answer->axis[1],
            answer->axis[2], (unsigned)answer->inliers);
-    good += answer->status == 0 ? fabsf(answer->axis[1] - 0.9433f) < 0.02f : answer->status == -5 && isnan(answer->axis[0]);
+    good += answer->status == 0 ? fabsf(answer->axis[1] - LIMB_SIN) < 0.002f : answer->status == -5 && isnan(answer->axis[0]);
     return CFE_SUCCESS;
 }
 void CFE_SB_TimeStampMsg(CFE_MSG_Message_t *message) {

@@ -13,7 +13,7 @@ int main() {
     component.pictureIn(whole);
     std::printf("status %d, axis %.4f %.4f %.4f, %u inliers\n", component.status, component.axis[0], component.axis[1],
                 component.axis[2], component.inliers);
-    const bool is_found = component.status == 0 && std::fabs(component.axis[1] - 0.9433F) < 0.02F;
+    const bool is_found = component.status == 0 && std::fabs(component.axis[1] - LIMB_SIN) < 0.002F;
     Fw::Buffer cut(picture, 100);
     component.pictureIn(cut);
     std::printf("cut off: status %d\n", component.status);
