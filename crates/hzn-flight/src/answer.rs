@@ -354,6 +354,22 @@ impl PictureAnswer {
 mod tests {
     use super::*;
 
+    fn position() -> Position {
+        Position {
+            axis_free: [0.1, 0.2, 0.97],
+            cov_free: [1.0; 6],
+            cos_free: 0.3,
+            cos_free_variance: 1e-7,
+            cos_free_per_px: 1e-4,
+            axis_by_cos: [1.0, 2.0, 3.0],
+            position_m: [4e6, 5e6, 6e6],
+            pos_cov_m2: [1e9; 6],
+            range_m: 7e6,
+            range_sigma_m: 8e3,
+            body_fixed_m: [9e6, 1e6, 2e6],
+        }
+    }
+
     #[test]
     fn an_answer_survives_with_every_bit() {
         let edge = Edge { number: 3, length_px: 1900, points: 600, inliers: 590, rms_px: 0.3, verdict: 0 };
@@ -370,19 +386,6 @@ mod tests {
             arc_px: 1888.0,
             inliers: 590,
             candidate: 1,
-        };
-        let position = Position {
-            axis_free: [0.1, 0.2, 0.97],
-            cov_free: [1.0; 6],
-            cos_free: 0.3,
-            cos_free_variance: 1e-7,
-            cos_free_per_px: 1e-4,
-            axis_by_cos: [1.0, 2.0, 3.0],
-            position_m: [4e6, 5e6, 6e6],
-            pos_cov_m2: [1e9; 6],
-            range_m: 7e6,
-            range_sigma_m: 8e3,
-            body_fixed_m: [9e6, 1e6, 2e6],
         };
         let mut edges = [None; MAX_LISTED];
         (edges[0], edges[1]) = (Some(Edge { verdict: 5, ..edge }), Some(edge));
@@ -401,7 +404,7 @@ mod tests {
             listed: 2,
             solved: 1,
         };
-        let solved = PictureAnswer { outcome, direction: Some(direction), position: Some(position), edges };
+        let solved = PictureAnswer { outcome, direction: Some(direction), position: Some(position()), edges };
         let empty = PictureAnswer {
             outcome: Outcome { status: 1, solved: 0, listed: 0, ..outcome },
             direction: None,

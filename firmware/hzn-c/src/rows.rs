@@ -25,12 +25,13 @@ pub const HZN_ROWS_SIZE: usize = 147456;
 const _: () = assert!(size_of::<Rows>() <= HZN_ROWS_SIZE);
 
 /// Finds the limb in a picture that comes row by row. `next_row` writes the next row, `width` bytes, and returns 0; any
-/// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or it comes from the
+/// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or that of the
 /// picture before.
 ///
 /// # Safety
 /// `sensor` is null or from `hzn_open`. `memory` is null or has `bytes` writable bytes, which have no other use during
-/// the call. `known` is null (nothing is known) or readable. `out` is null or writable. `next_row` writes `width` bytes.
+/// the call. `known` is null (nothing is known) or readable. `out` is null or writable. `next_row` writes `width`
+/// bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_process_rows(
     sensor: *mut HznSensor,

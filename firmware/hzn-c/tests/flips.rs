@@ -15,7 +15,7 @@ const HEIGHT: usize = 120;
 /// Flips a bit of a value in memory, as radiation does.
 fn flip<T>(value: &mut T, bit: usize) {
     let byte = (value as *mut T).cast::<u8>().wrapping_add(bit / 8);
-    // SAFETY: the byte is within the value. The value is only compared from now on, and used if it is equal to its copy.
+    // SAFETY: the byte is within the value. From now on it is compared, and used if it equals its copy.
     unsafe { byte.write(byte.read() ^ 1 << (bit % 8)) };
 }
 

@@ -22,10 +22,11 @@ fn the_header_is_up_to_date() {
 /// `HZN_BLESS=1` writes the list anew.
 #[test]
 fn the_parameters_are_up_to_date() {
-    let mut made = "/* The numbers of the parameters of hzn, by their names in sensor.toml. Made by tests/header.rs; do not edit.\n   \
-                    Of a parameter with several numbers, such as camera.k, this is the first. */\n\
+    let mut made =
+        "/* The numbers of the parameters of hzn, by their names in sensor.toml. Made by tests/header.rs; do \
+                    not edit.\n   Of a parameter with several numbers, such as camera.k, this is the first. */\n\
                     #ifndef HZN_PARAMETERS_H\n#define HZN_PARAMETERS_H\n\n"
-        .to_owned();
+            .to_owned();
     let mut names = std::collections::BTreeSet::new();
     for id in Parameters::defaults().sensor_numbers().chain([1000]) {
         let name = parameters::name(id).unwrap().to_uppercase().replace(['.', ' '], "_");

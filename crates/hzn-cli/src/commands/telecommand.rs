@@ -212,8 +212,8 @@ impl Command<'_> {
 
     fn navigate(&self) -> Result<Vec<u8>, Stop> {
         let refuse_count = || {
-            let what = "navigate takes a time, the expiry in seconds, altitude and ECEF position in kilometres, velocity \
-                        in m/s, and the rate of rotation in rad/s if it is known: 9 or 12 numbers";
+            let what = "navigate takes a time, the expiry in seconds, altitude and ECEF position in kilometres, \
+                        velocity in m/s, and the rate of rotation in rad/s if it is known: 9 or 12 numbers";
             self.refuse(what)
         };
         let (epoch, numbers) = self.arguments.split_first().ok_or_else(refuse_count)?;

@@ -152,7 +152,8 @@ impl Dictionary {
         let Number { name, ty, description } = number;
         let _ = writeln!(
             self.parameters,
-            "      <Parameter name=\"{name}\" parameterTypeRef=\"{ty}\"><LongDescription>{}</LongDescription></Parameter>",
+            "      <Parameter name=\"{name}\" parameterTypeRef=\"{ty}\">\
+             <LongDescription>{}</LongDescription></Parameter>",
             escape(description)
         );
     }

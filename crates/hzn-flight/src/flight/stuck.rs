@@ -1,7 +1,7 @@
 //! Stuck readouts: runs of equal pixels where the noise of the camera makes equality impossible.
 //!
 //! A readout that hangs repeats a value. The border of such a run is a sharp, straight edge, and may be taken for a
-//! limb. A pixel of a camera has noise, so that it rarely equals its neighbour. How often it does is counted in a sparse
+//! limb. A pixel of a camera has noise, so that it rarely equals its neighbour. How often it does is counted in a small
 //! sample of the same picture, for its dark and its bright part: with a share e of equal neighbours a run of n equal
 //! pixels has the probability e^(n-1). A run is stuck if this is below one in a million. Without noise (e = 1), nothing
 //! is. Black and saturated pixels are equal without a fault, so they never count.

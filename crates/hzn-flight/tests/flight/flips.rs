@@ -32,8 +32,8 @@ impl Random {
     }
 }
 
-/// Returns a picture with clouds and noise: two in three show a limb at 230 km with the axis 70 to 79 degrees off, rolled
-/// by up to 60 degrees; the others show sky or ground alone.
+/// Returns a picture with clouds and noise: two in three show a limb at 230 km with the axis 70 to 79 degrees off,
+/// rolled by up to 60 degrees; the others show sky or ground alone.
 fn picture(random: &mut Random) -> Vec<u8> {
     let only = match random.below(6) {
         0 => Some(-1.0),
