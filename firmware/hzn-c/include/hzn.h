@@ -212,12 +212,13 @@ int32_t hzn_process(HznSensor *sensor,
                     HznAnswer *out);
 
 // Finds the limb in a picture that comes row by row. `next_row` writes the next row, `width` bytes, and returns 0; any
-// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or it comes from the
+// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or that of the
 // picture before.
 //
 // # Safety
 // `sensor` is null or from `hzn_open`. `memory` is null or has `bytes` writable bytes, which have no other use during
-// the call. `known` is null (nothing is known) or readable. `out` is null or writable. `next_row` writes `width` bytes.
+// the call. `known` is null (nothing is known) or readable. `out` is null or writable. `next_row` writes `width`
+// bytes.
 int32_t hzn_process_rows(HznSensor *sensor,
                          uint8_t *memory,
                          size_t bytes,
@@ -227,12 +228,13 @@ int32_t hzn_process_rows(HznSensor *sensor,
                          HznAnswer *out);
 
 // Finds the limb in a picture that comes row by row. `next_row` writes the next row, `width` bytes, and returns 0; any
-// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or it comes from the
+// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or that of the
 // picture before.
 //
 // # Safety
 // `sensor` is null or from `hzn_open`. `memory` is null or has `bytes` writable bytes, which have no other use during
-// the call. `known` is null (nothing is known) or readable. `out` is null or writable. `next_row` writes `width` bytes.
+// the call. `known` is null (nothing is known) or readable. `out` is null or writable. `next_row` writes `width`
+// bytes.
 int32_t hzn_process_rows(HznSensor *sensor,
                          uint8_t *memory,
                          size_t bytes,
