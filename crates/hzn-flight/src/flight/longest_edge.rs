@@ -96,7 +96,7 @@ impl Observer<f32> for EdgeWatch<'_> {
                 *kept = pixel;
                 list.len += 1;
             }
-            if place % (most / PLACES) == 0 {
+            if place.checked_rem(most / PLACES) == Some(0) {
                 stuck.look_at(pixel);
             }
         }
