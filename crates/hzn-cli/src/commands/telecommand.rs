@@ -7,10 +7,13 @@ use hzn_calib::keys::Limits;
 use hzn_flight::bytes::Writer;
 use hzn_flight::messages::{Function, Mode, Navigation};
 use hzn_flight::operations::Operations;
-use hzn_flight::packet::{self, Apid};
+use hzn_flight::packet::{self, Apid, ApidBase};
 use hzn_flight::{Parameters, parameters};
 use hzn_run::disk;
 
+use hzn_fly::link::Address;
+
+use super::ground::{Commander, Incoming};
 use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome, Stop, usage};
 
@@ -38,6 +41,10 @@ pub(super) struct Args {
     /// The file to write
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Send the commands over this line and wait for each acknowledgement: udp:LOCAL,REMOTE, tcp:HOST:PORT,
+    /// tcp-listen:HOST:PORT or serial:DEVICE[:BAUD]
+    #[arg(long, value_name = "LINE", conflicts_with_all = ["output", "force"])]
+    to: Option<Address>,
     /// Sequence count of the first command, 0 to 16383
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(..16384))]
     sequence: u16,
@@ -49,14 +56,14 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
+    if let Some(address) = &args.to {
+        return Incoming::open(address)?.command(Commander::new(args.apids.apid_base, args.sequence, &args.commands)?);
+    }
     let mut out = Vec::new();
     let mut sequence = args.sequence;
     for command in &args.commands {
         for user in encode(command)? {
-            let mut bytes = [0; packet::MAX_BYTES];
-            let n = packet::write(&mut bytes, args.apids.apid_base, Apid::Command, sequence, 0, |w| w.bytes(&user))
-                .ok_or_else(|| usage(format!("{command:?}: too long for one packet; split it")))?;
-            out.extend_from_slice(&bytes[..n]);
+            out.extend(write_packet(args.apids.apid_base, sequence, command, &user)?);
             sequence = (sequence + 1) & 0x3FFF;
         }
     }
@@ -73,8 +80,17 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
 }
 
+/// Returns the packet of a command with these user data.
+pub(super) fn write_packet(base: ApidBase, sequence: u16, command: &str, user: &[u8]) -> Result<Vec<u8>, Stop> {
+    let mut bytes = vec![0; packet::MAX_BYTES];
+    let n = packet::write(&mut bytes, base, Apid::Command, sequence, 0, |w| w.bytes(user))
+        .ok_or_else(|| usage(format!("{command:?}: too long for one packet; split it")))?;
+    bytes.truncate(n);
+    Ok(bytes)
+}
+
 /// Returns the user data of each packet of a command.
-fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
+pub(super) fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
     let words: Vec<&str> = text.split_whitespace().collect();
     let Some((&verb, arguments)) = words.split_first() else { return Err(refuse(text, "is empty")) };
     if verb == "load" {

@@ -1,7 +1,6 @@
 //! `hzn telemetry`: decodes the telemetry of a flight computer.
 
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use hzn_calib::limited;
@@ -17,18 +16,35 @@ use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, 
 use hzn_run::disk;
 use hzn_run::sink::{self, Existing, RowFile, Target};
 
+use hzn_fly::link::Address;
+
+use super::ground::{Commander, Incoming, screen};
 use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
 
-/// Decode a flight computer's telemetry
+/// Decode a flight computer's telemetry, from a file or as it comes
 ///
 /// Answers become rows as `hzn run` writes them; events, acknowledged commands and parameters are printed. Bytes that
 /// are not a complete packet are skipped and counted. book/reference/telemetry.md describes the format.
+///
+/// A line is read until Ctrl-C. It is one of
+///   udp:LOCAL[,REMOTE]         datagrams; commands go to REMOTE
+///   tcp:HOST:PORT              a connection to the flight computer
+///   tcp-listen:HOST:PORT       a connection that the flight computer makes
+///   serial:DEVICE[:BAUD]       a serial port, 115200 baud unless given
 #[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
 pub(super) struct Args {
-    /// The stream as it was received; - for standard input
+    /// The stream as it was received; - for standard input; or a line
+    #[arg(value_name = "FILE|LINE")]
     file: PathBuf,
+    /// Show the state of the flight computer on the whole terminal, and send commands from there
+    #[arg(long)]
+    screen: bool,
+    /// A command to send, as for `hzn telecommand`; each waits for the acknowledgement of the one before
+    #[arg(long, value_name = "COMMAND")]
+    send: Vec<String>,
     /// The file for the answers: .csv, .jsonl or .mcap
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -43,55 +59,114 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let bytes = read(&args.file)?;
+    let name = args.file.display().to_string();
+    let live = if Address::is_address(&name) {
+        let address: Address = name.parse().map_err(usage)?;
+        Some(Incoming::open(&address)?)
+    } else if args.file == Path::new("-") {
+        Some(Incoming::stdin()?)
+    } else {
+        None
+    };
+    if (args.screen || !args.send.is_empty()) && !live.as_ref().is_some_and(Incoming::can_send) {
+        return Err(usage(format!("{name}: --screen and --send need a line, such as tcp:HOST:PORT")));
+    }
+    let bytes = if live.is_some() { Vec::new() } else { read(&args.file)? };
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
-    let mut sink = args.output.as_deref().map(|path| Sink::create(path, existing)).transpose()?;
-    let mut housekeeping = args.housekeeping.as_deref().map(|path| table(path, args.force)).transpose()?;
-    let mut counts = StreamCounts { base: args.apids.apid_base, ..StreamCounts::default() };
-    let mut rest = &bytes[..];
-    loop {
-        match packet::scan(rest) {
-            Scan::More { skip } => {
-                counts.skipped += rest.len() as u64;
-                // The rest is an incomplete packet, or noise.
-                counts.cut += u64::from(rest.len() > skip + packet::SYNC.len());
-                break;
-            }
-            Scan::Bad { skip } => {
-                counts.cut += 1;
-                counts.skipped += skip as u64;
-                rest = rest.get(skip..).unwrap_or_default();
-            }
-            Scan::Packet { end, packet } => {
-                counts.skipped += end.saturating_sub(packet.user.len() + OVERHEAD) as u64;
-                counts.take(&packet, &mut sink, &mut housekeeping)?;
-                rest = rest.get(end..).unwrap_or_default();
+    let mut station = Station {
+        sink: args.output.as_deref().map(|path| Sink::create(path, existing)).transpose()?,
+        housekeeping: args.housekeeping.as_deref().map(|path| table(path, args.force)).transpose()?,
+        counts: StreamCounts { base: args.apids.apid_base, ..StreamCounts::default() },
+    };
+    let mut rest = bytes;
+    if let Some(live) = live {
+        let commander = Commander::new(args.apids.apid_base, 0, &args.send)?;
+        rest = if args.screen {
+            screen::show(live, &mut station, commander)?
+        } else {
+            live.listen(&mut station, commander)?
+        };
+    } else {
+        station.take(&mut rest)?;
+    }
+    station.finish(&rest, &name)
+}
+
+/// What becomes of the packets.
+pub(super) struct Station {
+    pub(super) counts: StreamCounts,
+    sink: Option<Sink>,
+    housekeeping: Option<csv::Writer<std::fs::File>>,
+}
+
+impl Station {
+    /// Makes a station without outputs.
+    pub(super) fn quiet(base: ApidBase) -> Self {
+        let counts = StreamCounts { base, is_quiet: true, ..StreamCounts::default() };
+        Self { counts, sink: None, housekeeping: None }
+    }
+
+    /// Takes the whole packets at the beginning of the bytes out of them.
+    pub(super) fn take(&mut self, bytes: &mut Vec<u8>) -> Result<(), Stop> {
+        let counts = &mut self.counts;
+        let mut rest = &bytes[..];
+        loop {
+            match packet::scan(rest) {
+                Scan::More { .. } => break,
+                Scan::Bad { skip } => {
+                    counts.cut += 1;
+                    counts.skipped += skip as u64;
+                    rest = rest.get(skip..).unwrap_or_default();
+                }
+                Scan::Packet { end, packet } => {
+                    counts.skipped += end.saturating_sub(packet.user.len() + OVERHEAD) as u64;
+                    counts.take(&packet, &mut self.sink, &mut self.housekeeping)?;
+                    rest = rest.get(end..).unwrap_or_default();
+                }
             }
         }
+        let taken = bytes.len() - rest.len();
+        bytes.drain(..taken);
+        Ok(())
     }
-    if let Some(sink) = sink {
-        sink.finish()?;
+
+    /// Passes finished answers to the disk if their time has come.
+    pub(super) fn flush_if_due(&mut self) -> Result<(), Stop> {
+        match &mut self.sink {
+            Some(Sink::Mcap(writer)) => writer.flush_if_due().map_err(failed),
+            _ => Ok(()),
+        }
     }
-    if let Some(mut table) = housekeeping {
-        table.flush()?;
+
+    /// Closes the outputs. `rest` are the bytes after the last packet.
+    fn finish(self, rest: &[u8], name: &str) -> Outcome {
+        let Self { mut counts, sink, housekeeping } = self;
+        let skip = match packet::scan(rest) {
+            Scan::More { skip } => skip,
+            _ => 0,
+        };
+        counts.skipped += rest.len() as u64;
+        // The rest is an incomplete packet, or noise.
+        counts.cut += u64::from(rest.len() > skip + packet::SYNC.len());
+        if let Some(sink) = sink {
+            sink.finish()?;
+        }
+        if let Some(mut table) = housekeeping {
+            table.flush()?;
+        }
+        counts.summary();
+        if counts.packets == 0 && counts.skipped > 0 {
+            let what = "no packet was found; is this the stream of a flight computer? (book/reference/telemetry.md)";
+            return Err(failed(format!("{name}: {what}")));
+        }
+        Ok(Exit::Done)
     }
-    counts.summary();
-    if counts.packets == 0 && !bytes.is_empty() {
-        let what = "no packet was found; is this the stream of a flight computer? (book/reference/telemetry.md)";
-        return Err(failed(format!("{}: {what}", args.file.display())));
-    }
-    Ok(Exit::Done)
 }
 
 /// Largest stream that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 30;
 
 fn read(path: &Path) -> Result<Vec<u8>, Stop> {
-    let mut bytes = Vec::new();
-    if path == Path::new("-") {
-        std::io::stdin().read_to_end(&mut bytes)?;
-        return Ok(bytes);
-    }
     limited::read(path, MAX_BYTES).map_err(|e| usage(format!("{}: {e}", path.display())))
 }
 
@@ -133,19 +208,38 @@ impl Sink {
     }
 }
 
+/// What the ground sees in the packets.
+pub(super) enum Seen {
+    /// An answer to a picture.
+    Answer(Exposure, Box<PictureAnswer>),
+    /// The state of the computer.
+    Housekeeping(Box<Housekeeping>),
+    /// The outcome of a telecommand.
+    Acknowledge(Acknowledge),
+    /// A message, with the time of its packet in seconds since the start of the computer.
+    Note(f64, LogLevel, String),
+}
+
 /// Counts of a stream, and the log lines for the next answer.
 #[derive(Default)]
-struct StreamCounts {
+pub(super) struct StreamCounts {
     base: ApidBase,
-    packets: u64,
-    answers: u64,
-    cut: u64,
+    pub(super) packets: u64,
+    pub(super) answers: u64,
+    pub(super) cut: u64,
     skipped: u64,
     /// Number of lost packets, from the gaps in the sequence counts.
-    lost: u64,
+    pub(super) lost: u64,
     next: BTreeMap<u16, u16>,
     log: Vec<LogLine>,
+    /// What was seen since somebody looked.
+    pub(super) seen: Vec<Seen>,
+    /// Whether messages are not printed, because a screen shows them.
+    pub(super) is_quiet: bool,
 }
+
+/// Most log lines that wait for an answer.
+const MAX_LOG: usize = 1000;
 
 impl StreamCounts {
     fn take(
@@ -168,6 +262,7 @@ impl StreamCounts {
             },
             Some(Apid::Housekeeping) => match Housekeeping::read_any(packet.user) {
                 Some(record) => {
+                    self.seen.push(Seen::Housekeeping(Box::new(record)));
                     write_housekeeping(time_s, &record, housekeeping)?;
                     true
                 }
@@ -210,6 +305,7 @@ impl StreamCounts {
     }
 
     fn acknowledge(&mut self, time_s: f64, a: &Acknowledge) {
+        self.seen.push(Seen::Acknowledge(*a));
         let function = Function::from_number(a.function).map_or("?", Function::name);
         let code = Code::from_number(a.code).map_or("?", Code::name);
         let level = if a.code == 0 { LogLevel::Info } else { LogLevel::Warning };
@@ -240,6 +336,7 @@ impl StreamCounts {
             return Ok(());
         };
         self.answers += 1;
+        self.seen.push(Seen::Answer(*exposure, Box::new(*answer)));
         let Some(sink) = sink else { return Ok(()) };
         let body = Parameters::body(exposure.body);
         let altitude_km = (!exposure.altitude_m.is_nan()).then(|| f64::from(exposure.altitude_m) * 1e-3);
@@ -259,8 +356,13 @@ impl StreamCounts {
     }
 
     fn note(&mut self, time_s: f64, level: LogLevel, message: &str) {
-        tell::line(format!("{time_s:12.6} s  {message}"));
-        self.log.push(LogLine { level, message: message.to_owned() });
+        if !self.is_quiet {
+            tell::line(format!("{time_s:12.6} s  {message}"));
+        }
+        self.seen.push(Seen::Note(time_s, level, message.to_owned()));
+        if self.log.len() < MAX_LOG {
+            self.log.push(LogLine { level, message: message.to_owned() });
+        }
     }
 
     fn summary(&self) {

@@ -119,5 +119,6 @@ impl<B: Board> Flight<'_, B> {
             exposure.write(out);
             answer.write(out);
         });
+        self.board.keep_answer(&exposure, report);
     }
 }

@@ -1,0 +1,266 @@
+//! What the screen of the ground station shows, and its drawing.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use hzn_core::frames::{Cam, Cov3};
+use hzn_core::status::Status;
+use hzn_flight::answer::PictureAnswer;
+use hzn_flight::messages::{Exposure, Housekeeping, Mode};
+use hzn_mcap::LogLevel;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Color, Style, Stylize};
+use ratatui::symbols::Marker;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
+
+use crate::commands::telemetry::{Seen, StreamCounts};
+
+/// Length of the plots, s.
+const WINDOW_S: f64 = 60.0;
+/// Most pictures of the plots.
+const PICTURES: usize = 6000;
+/// Most messages that are kept.
+const MESSAGES: usize = 200;
+
+/// One answer in the plots.
+struct Point {
+    time_s: f64,
+    /// Angle from the optical axis to the body, degrees.
+    nadir_deg: Option<f64>,
+    sigma_deg: Option<f64>,
+    status: u8,
+}
+
+/// The state of the screen.
+#[derive(Default)]
+pub(super) struct View {
+    /// The line.
+    name: String,
+    points: VecDeque<Point>,
+    last: Option<(Exposure, Box<PictureAnswer>)>,
+    housekeeping: Option<Box<Housekeeping>>,
+    messages: VecDeque<(LogLevel, String)>,
+    /// Time since the last packet.
+    pub(super) silent: Option<Duration>,
+    /// The command that is being typed.
+    pub(super) typed: Option<String>,
+}
+
+impl View {
+    pub(super) fn new(name: &str) -> Self {
+        Self { name: name.to_owned(), ..Self::default() }
+    }
+
+    /// Takes what was seen.
+    pub(super) fn take(&mut self, seen: Vec<Seen>) {
+        for seen in seen {
+            match seen {
+                Seen::Answer(exposure, answer) => self.take_answer(exposure, answer),
+                Seen::Housekeeping(record) => self.housekeeping = Some(record),
+                Seen::Acknowledge(_) => {}
+                Seen::Note(time_s, level, text) => self.tell(level, format!("{time_s:10.3}  {text}")),
+            }
+        }
+    }
+
+    /// Shows a message.
+    pub(super) fn tell(&mut self, level: LogLevel, text: String) {
+        self.messages.push_back((level, text));
+        if self.messages.len() > MESSAGES {
+            self.messages.pop_front();
+        }
+    }
+
+    /// Returns the sequence count that the flight computer expects after its last telecommand, if it has told.
+    pub(super) fn last_sequence(&self) -> Option<u16> {
+        self.housekeeping.as_ref().map(|h| h.last_sequence).filter(|&n| n != u16::MAX)
+    }
+
+    fn take_answer(&mut self, exposure: Exposure, answer: Box<PictureAnswer>) {
+        let time_s = exposure.exposure_us as f64 * 1e-6;
+        // The clock of the flight computer begins again after a reset.
+        if self.points.back().is_some_and(|last| last.time_s > time_s) {
+            self.points.clear();
+        }
+        let direction = answer.direction.as_ref();
+        self.points.push_back(Point {
+            time_s,
+            nadir_deg: direction.map(|d| f64::from(d.axis[2]).clamp(-1.0, 1.0).acos().to_degrees()),
+            sigma_deg: direction.map(|d| sigma_deg(d.cov)),
+            status: answer.status,
+        });
+        while self.points.front().is_some_and(|first| first.time_s < time_s - WINDOW_S) || self.points.len() > PICTURES
+        {
+            self.points.pop_front();
+        }
+        self.last = Some((exposure, answer));
+    }
+
+    /// Draws everything.
+    pub(super) fn draw(&self, frame: &mut Frame<'_>, counts: &StreamCounts) {
+        let rows = Layout::vertical([
+            Constraint::Length(1),
+            Constraint::Min(12),
+            Constraint::Length(8),
+            Constraint::Length(1),
+        ]);
+        let [title, middle, messages, prompt] = rows.areas(frame.area());
+        frame.render_widget(self.title(counts), title);
+        let [plots, state] = Layout::horizontal([Constraint::Min(40), Constraint::Length(38)]).areas(middle);
+        let [nadir, sigma, strip] =
+            Layout::vertical([Constraint::Fill(1), Constraint::Fill(1), Constraint::Length(3)]).areas(plots);
+        self.plot(frame, nadir, "nadir from the optical axis, deg", Color::Cyan, |p| p.nadir_deg);
+        self.plot(frame, sigma, "sigma, deg", Color::Yellow, |p| p.sigma_deg);
+        frame.render_widget(self.strip(strip.width), strip);
+        frame.render_widget(self.state(), state);
+        frame.render_widget(self.messages(messages.height), messages);
+        frame.render_widget(self.prompt(), prompt);
+    }
+
+    fn title(&self, counts: &StreamCounts) -> Line<'_> {
+        let StreamCounts { packets, lost, cut, .. } = counts;
+        let mut spans = vec![Span::from(format!(" {}  ", self.name)).bold()];
+        spans.push(Span::from(format!("{packets} packets, {lost} lost, {cut} broken  ")));
+        spans.push(match self.silent {
+            None => Span::from("no packet yet").fg(Color::Yellow),
+            Some(t) if t < Duration::from_secs(10) => Span::from("heard now").fg(Color::Green),
+            Some(t) => Span::from(format!("silent for {} s", t.as_secs())).fg(Color::Red).bold(),
+        });
+        Line::from(spans)
+    }
+
+    fn plot(
+        &self,
+        frame: &mut Frame<'_>,
+        area: Rect,
+        title: &str,
+        color: Color,
+        value: impl Fn(&Point) -> Option<f64>,
+    ) {
+        let end_s = self.points.back().map_or(0.0, |last| last.time_s);
+        let places: Vec<(f64, f64)> = self.points.iter().filter_map(|p| Some((p.time_s - end_s, value(p)?))).collect();
+        let last = places.last().filter(|(t, _)| *t == 0.0).map_or("–".to_owned(), |(_, v)| format!("{v:.3}"));
+        let (low, high) = bounds(places.iter().map(|(_, v)| *v));
+        let labels = |a: f64, b: f64| [format!("{a:.3}"), format!("{:.3}", f64::midpoint(a, b)), format!("{b:.3}")];
+        let data = Dataset::default()
+            .marker(Marker::Braille)
+            .graph_type(GraphType::Line)
+            .style(Style::new().fg(color))
+            .data(&places);
+        let chart = Chart::new(vec![data])
+            .block(Block::bordered().title(format!(" {title}: {last} ")))
+            .x_axis(Axis::default().bounds([-WINDOW_S, 0.0]).labels(["-60 s", "-30 s", "now"]))
+            .y_axis(Axis::default().bounds([low, high]).labels(labels(low, high)));
+        frame.render_widget(chart, area);
+    }
+
+    /// Returns the statuses of the last pictures, one character each: a dot is `ok`, others have their number.
+    fn strip(&self, width: u16) -> Paragraph<'_> {
+        let room = usize::from(width.saturating_sub(2));
+        let skip = self.points.len().saturating_sub(room);
+        let mark = |p: &Point| match p.status {
+            0 => Span::from("·").fg(Color::Green),
+            n => Span::from(char::from_digit(n.into(), 36).unwrap_or('?').to_string()).fg(Color::Red),
+        };
+        let marks: Vec<Span<'_>> = self.points.iter().skip(skip).map(mark).collect();
+        let last = self.last.as_ref().and_then(|(_, answer)| Status::ALL.get(usize::from(answer.status)));
+        let title = format!(" status of each picture: {} ", last.map_or("–", |status| status.name()));
+        Paragraph::new(Line::from(marks)).block(Block::bordered().title(title))
+    }
+
+    fn state(&self) -> Paragraph<'_> {
+        let block = Block::bordered().title(" flight computer ");
+        let Some(h) = &self.housekeeping else { return Paragraph::new("no housekeeping yet").block(block) };
+        let mode = Mode::from_number(h.mode).map_or("?", Mode::name);
+        let color = if h.mode == Mode::Flight as u8 { Color::Green } else { Color::Yellow };
+        let field =
+            |name: &str, value: String| Line::from(vec![Span::from(format!("{name:<13}")).dim(), Span::from(value)]);
+        let mut lines =
+            vec![Line::from(vec![Span::from(format!("{:<13}", "mode")).dim(), Span::from(mode).fg(color).bold()])];
+        lines.push(field("pictures", format!("{}, {} with an answer", h.pictures, h.answers)));
+        lines.push(field("", format!("{} lost, {} refused", h.lost, h.refused)));
+        lines.push(field("calculation", format!("{:.1} ms, {:.1} ms at most", ms(h.last_us), ms(h.longest_us))));
+        if let Some((_, answer)) = &self.last
+            && let Some(d) = &answer.direction
+        {
+            lines.push(field("axis", format!("{:+.4} {:+.4} {:+.4}", d.axis[0], d.axis[1], d.axis[2])));
+            if d.altitude_m.is_finite() {
+                let (h, sigma) = (d.altitude_m * 1e-3, d.altitude_sigma_m * 1e-3);
+                lines.push(field("altitude", format!("{h:.1} ± {sigma:.1} km from the limb")));
+            }
+        }
+        lines.push(field("parameters", format!("copy {}, generation {}", h.parameter_copy, h.parameter_generation)));
+        lines.push(field("commands", format!("{} done, {} rejected", h.commands, h.rejected)));
+        lines.push(field("line", format!("{} foreign, {} broken", h.foreign, h.broken)));
+        lines.push(field("starts", format!("{}, {} resets in a row", h.starts, h.watchdog_resets)));
+        if h.since_lift_off_s != u32::MAX {
+            lines.push(field("lift-off", format!("{} s ago", h.since_lift_off_s)));
+        }
+        for text in alarms(h) {
+            lines.push(Line::from(text).fg(Color::Red));
+        }
+        Paragraph::new(lines).block(block)
+    }
+
+    fn messages(&self, height: u16) -> Paragraph<'_> {
+        let room = usize::from(height.saturating_sub(2));
+        let skip = self.messages.len().saturating_sub(room);
+        let line = |(level, text): &(LogLevel, String)| {
+            let line = Line::from(text.clone());
+            match level {
+                LogLevel::Info => line,
+                LogLevel::Warning => line.fg(Color::Yellow),
+                LogLevel::Error => line.fg(Color::Red),
+            }
+        };
+        let lines: Vec<Line<'_>> = self.messages.iter().skip(skip).map(line).collect();
+        Paragraph::new(lines).block(Block::bordered().title(" messages "))
+    }
+
+    fn prompt(&self) -> Line<'_> {
+        match &self.typed {
+            Some(text) => Line::from(format!(" command: {text}▏")).bold(),
+            None => Line::from(" c  command    q  quit").dim(),
+        }
+    }
+}
+
+/// Returns the larger 1-sigma of a direction, degrees.
+fn sigma_deg(cov: [f32; 6]) -> f64 {
+    Cov3::<Cam, f64>::from_upper(cov.map(f64::from)).sigma_max_rad().to_degrees()
+}
+
+fn ms(us: u32) -> f64 {
+    f64::from(us) * 1e-3
+}
+
+/// Returns limits for an axis that holds all values, with a little room.
+fn bounds(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    if low > high {
+        return (0.0, 1.0);
+    }
+    let room = ((high - low) * 0.1).max(1e-3);
+    (low - room, high + room)
+}
+
+/// Returns what an operator should look at.
+fn alarms(h: &Housekeeping) -> Vec<String> {
+    let bit = |byte: u8, bit: u8, text: &str| (byte & bit != 0).then(|| text.to_owned());
+    let repairs = (h.repairs > 0).then(|| format!("{} memory errors repaired", h.repairs));
+    let withheld = (h.withheld > 0).then(|| format!("{} messages withheld", h.withheld));
+    let all = [
+        bit(h.self_check, 1, "camera failed its check"),
+        bit(h.self_check, 2, "memory failed its check"),
+        bit(h.self_check, 4, "parameters failed their check"),
+        bit(h.flags, 1, "parameters in use are not stored"),
+        bit(h.flags, 2, "shut-down is armed"),
+        bit(h.flags, 8, "the camera is silent"),
+        bit(h.flags, 16, "parameters wait for their commit"),
+        repairs,
+        withheld,
+    ];
+    all.into_iter().flatten().collect()
+}
