@@ -8,7 +8,11 @@
 //! | [`parameters`] | every parameter by number, and its limits |
 //! | [`operations`] | the parameters of the flight software itself |
 //! | [`bytes`] | conversion of numbers to bytes and back |
-//! | [`answer`] | a report with every bit |
+//! | [`answer`] | a report as records, with every bit |
+//! | [`record`] | the fields of packets, with a table that describes them |
+//! | [`layout`] | the packets as lists of records |
+//! | [`cuc`] | the time code of packets |
+//! | [`assembly`] | the packets of a picture put together on the ground |
 //! | [`packet`] | space packets on a serial line |
 //! | [`inbox`] | whole packets from a line that is not perfect |
 //! | [`messages`] | the contents of packets |
@@ -24,16 +28,20 @@
 extern crate std;
 
 pub mod answer;
+pub mod assembly;
 pub mod board;
 pub mod bytes;
+pub mod cuc;
 pub mod flight;
 pub mod inbox;
 mod kept_twice;
+pub mod layout;
 pub mod messages;
 mod numbered;
 pub mod operations;
 pub mod packet;
 pub mod parameters;
+pub mod record;
 pub mod store;
 pub mod table;
 

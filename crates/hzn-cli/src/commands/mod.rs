@@ -21,6 +21,7 @@ mod simulate;
 mod telecommand;
 mod telemetry;
 mod view;
+mod xtce;
 
 use clap::{CommandFactory, Parser, Subcommand};
 

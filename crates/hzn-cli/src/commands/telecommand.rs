@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_calib::keys::Limits;
 use hzn_flight::bytes::Writer;
+use hzn_flight::cuc::Cuc;
 use hzn_flight::messages::{Function, Mode, Navigation};
 use hzn_flight::operations::Operations;
 use hzn_flight::packet::{self, Apid, ApidBase};
@@ -16,6 +17,7 @@ use hzn_fly::link::Address;
 use super::ground::{Commander, Incoming};
 use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::tai;
 
 /// Write commands for a flight computer
 ///
@@ -27,8 +29,10 @@ use crate::exit::{Exit, Outcome, Stop, usage};
 ///   "load sensor.toml"                 every parameter of a sensor; all or none, in as many packets as needed
 ///   "read NAME [NAME]..."
 ///   "known ALTITUDE_KM [X_KM Y_KM Z_KM [RATE_X RATE_Y RATE_Z]]"   rates in rad/s; NaN: not known
-///   "navigate EPOCH_S EXPIRES_S ALTITUDE_KM X_KM Y_KM Z_KM VX_M_S VY_M_S VZ_M_S [RATE_X RATE_Y RATE_Z]"
-///                                      as known, with time, velocity and expiry; NaN: not known
+///   "navigate EPOCH EXPIRES_S ALTITUDE_KM X_KM Y_KM Z_KM VX_M_S VY_M_S VZ_M_S [RATE_X RATE_Y RATE_Z]"
+///                                      as known, with time (UTC, or seconds since the computer's start), velocity and
+///                                      expiry; NaN: not known
+///   "time UTC [pulse]"                 correlates the clock: UTC when the command arrives, or at the last pulse
 ///   "process-once", "dump-edges", "reset-counters", "ping", "report" (sends housekeeping)
 ///   "arm"                              allows "mode shut-down" for ten seconds
 /// The bytes go to standard output unless -o is given. book/reference/telemetry.md describes the format.
@@ -83,7 +87,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// Returns the packet of a command with these user data.
 pub(super) fn write_packet(base: ApidBase, sequence: u16, command: &str, user: &[u8]) -> Result<Vec<u8>, Stop> {
     let mut bytes = vec![0; packet::MAX_BYTES];
-    let n = packet::write(&mut bytes, base, Apid::Command, sequence, 0, |w| w.bytes(user))
+    let n = packet::write(&mut bytes, base, Apid::Command, sequence, None, |w| w.bytes(user))
         .ok_or_else(|| usage(format!("{command:?}: too long for one packet; split it")))?;
     bytes.truncate(n);
     Ok(bytes)
@@ -115,6 +119,7 @@ pub(super) fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
         Function::ReadParameters => command.read_parameters()?,
         Function::SetKnown => command.set_known()?,
         Function::Navigate => command.navigate()?,
+        Function::SetTime => command.set_time()?,
         _ => command.without_arguments()?,
     };
     Ok(vec![user])
@@ -183,41 +188,77 @@ impl Command<'_> {
         })
     }
 
-    /// Returns the arguments as numbers.
-    fn numbers(&self) -> Result<Vec<f64>, Stop> {
+    /// Returns words as numbers.
+    fn numbers(&self, words: &[&str]) -> Result<Vec<f64>, Stop> {
         let number = |word: &str| word.parse::<f64>().map_err(|_| self.refuse(&format!("{word:?} is not a number")));
-        self.arguments.iter().map(|w| number(w)).collect()
+        words.iter().map(|w| number(w)).collect()
+    }
+
+    /// Returns the time of values from navigation, as in their packet.
+    fn epoch(&self, word: &str) -> Result<u64, Stop> {
+        let Ok(seconds) = word.parse::<f64>() else {
+            let tai_us = tai::from_utc(word).map_err(|e| self.refuse(&e))?;
+            return Ok(u64::from_be_bytes(Cuc::tai(tai_us).to_bytes()));
+        };
+        // The clock of the computer begins with its start.
+        if !(0.0..1e9).contains(&seconds) {
+            let what = format!("the time {seconds} s is refused: seconds since the computer's start, or UTC");
+            return Err(self.refuse(&what));
+        }
+        Ok((seconds * 1e6) as u64)
+    }
+
+    fn set_time(&self) -> Result<Vec<u8>, Stop> {
+        let (time, at_pulse) = match self.arguments {
+            [time] => (time, 0),
+            [time, "pulse"] => (time, 1),
+            _ => {
+                return Err(self.refuse("time takes a time in UTC, and the word pulse if it is that of the last pulse"));
+            }
+        };
+        let tai_us = tai::from_utc(time).map_err(|e| self.refuse(&e))?;
+        if at_pulse == 1 && !tai_us.is_multiple_of(1_000_000) {
+            return Err(self.refuse("a pulse comes at a whole second"));
+        }
+        self.user_data(|w| {
+            w.bytes(&Cuc::tai(tai_us).to_bytes());
+            w.u8(at_pulse);
+        })
     }
 
     fn navigate(&self) -> Result<Vec<u8>, Stop> {
-        let (values, rate) = match self.numbers()?[..] {
-            [e, t, h, x, y, z, u, v, w] => ([e, t, h, x, y, z, u, v, w], [f64::NAN; 3]),
-            [e, t, h, x, y, z, u, v, w, p, q, r] => ([e, t, h, x, y, z, u, v, w], [p, q, r]),
-            _ => {
-                let what = "navigate takes time and expiry in seconds, altitude and ECEF position in kilometres, \
-                            velocity in m/s, and the rate of rotation in rad/s if it is known: 9 or 12 numbers";
-                return Err(self.refuse(what));
-            }
+        let refuse_count = || {
+            let what = "navigate takes a time, the expiry in seconds, altitude and ECEF position in kilometres, velocity \
+                        in m/s, and the rate of rotation in rad/s if it is known: 9 or 12 numbers";
+            self.refuse(what)
         };
-        let [epoch_s, expires_s, altitude_km, km @ .., vx, vy, vz] = values;
-        // The clock of the computer begins with its start.
-        if !(0.0..1e12).contains(&epoch_s) {
-            return Err(self.refuse(&format!("the time {epoch_s} s is refused: seconds since the computer's start")));
+        let (epoch, numbers) = self.arguments.split_first().ok_or_else(refuse_count)?;
+        if !matches!(numbers.len(), 8 | 11) {
+            return Err(refuse_count());
         }
+        let epoch = self.epoch(epoch)?;
+        let (values, rate) = match self.numbers(numbers)?[..] {
+            [t, h, x, y, z, u, v, w] => ([t, h, x, y, z, u, v, w], [f64::NAN; 3]),
+            [t, h, x, y, z, u, v, w, p, q, r] => ([t, h, x, y, z, u, v, w], [p, q, r]),
+            _ => return Err(refuse_count()),
+        };
+        let [expires_s, altitude_km, km @ .., vx, vy, vz] = values;
         if let Some(x) = values.iter().chain(&rate).find(|x| x.is_infinite() || (**x * 1e3).abs() > f64::from(f32::MAX))
         {
             return Err(self.refuse(&format!("{x} is not a finite number")));
         }
         let vectors = [("position", km), ("velocity", [vx, vy, vz]), ("rate of rotation", rate)];
         let is_partly_known = |v: [f64; 3]| matches!(v.iter().filter(|x| x.is_nan()).count(), 1 | 2);
-        if let Some((name, _)) = vectors.iter().find(|(_, v)| is_partly_known(*v)) {
-            return Err(self.refuse(&format!("all three numbers of the {name} must be known, or none")));
+        if let Some((name, v)) = vectors.iter().find(|(_, v)| is_partly_known(*v)) {
+            let missing = ["x", "y", "z"].into_iter().zip(v).find(|(_, x)| x.is_nan()).map_or("?", |(axis, _)| axis);
+            let what = format!("all three numbers of the {name} must be known, or none: {missing} is NaN");
+            return Err(self.refuse(&what));
         }
         let m = |km: f64| (km * 1e3) as f32;
         let [x, y, z] = km;
         let [rate_x, rate_y, rate_z] = rate.map(|x| x as f32);
         let values = Navigation {
-            epoch_us: (epoch_s * 1e6) as u64,
+            epoch,
             expires_s: expires_s as f32,
             altitude_m: m(altitude_km),
             position_x_m: m(x),
@@ -234,7 +275,7 @@ impl Command<'_> {
     }
 
     fn set_known(&self) -> Result<Vec<u8>, Stop> {
-        let numbers = self.numbers()?;
+        let numbers = self.numbers(self.arguments)?;
         let (km, rate) = numbers.split_at(numbers.len().min(4));
         if let Some(x) = km.iter().find(|km| !((**km * 1e3) as f32).is_finite()) {
             return Err(self.refuse(&format!("{x} is not a finite number of kilometres")));

@@ -5,10 +5,13 @@ use std::path::{Path, PathBuf};
 
 use hzn_calib::limited;
 use hzn_core::body::Kind;
-use hzn_flight::answer::PictureAnswer;
+use hzn_flight::answer::Position;
+use hzn_flight::assembly::{Assembled, Assembly};
 use hzn_flight::bytes::Reader;
+use hzn_flight::cuc::{Cuc, Epoch};
 use hzn_flight::messages::{
-    Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode, Severity,
+    Acknowledge, Code, EdgePart, EdgePixel, Event, EventRecord, Function, Housekeeping, Mode, Navigation,
+    NavigationState, ParameterValue, Severity,
 };
 use hzn_flight::packet::{self, Apid, ApidBase, OVERHEAD, Packet, Scan};
 use hzn_flight::{Parameters, parameters};
@@ -19,6 +22,7 @@ use hzn_run::sink::{self, Existing, RowFile, Target};
 use hzn_fly::link::Address;
 
 use super::ground::{Commander, Incoming, screen};
+use super::xtce;
 use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
@@ -37,8 +41,11 @@ use crate::tell;
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
     /// The stream as it was received; - for standard input; or a line
-    #[arg(value_name = "FILE|LINE")]
-    file: PathBuf,
+    #[arg(value_name = "FILE|LINE", required_unless_present = "xtce")]
+    file: Option<PathBuf>,
+    /// Print the dictionary of the packets as XTCE, for other ground systems
+    #[arg(long, conflicts_with_all = ["file", "output", "housekeeping"])]
+    xtce: bool,
     /// Show the state of the flight computer on the whole terminal, and send commands from there
     #[arg(long)]
     screen: bool,
@@ -59,11 +66,15 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let name = args.file.display().to_string();
+    let Some(file) = args.file.as_deref().filter(|_| !args.xtce) else {
+        tell::result(xtce::dictionary(args.apids.apid_base))?;
+        return Ok(Exit::Done);
+    };
+    let name = file.display().to_string();
     let live = if Address::is_address(&name) {
         let address: Address = name.parse().map_err(usage)?;
         Some(Incoming::open(&address)?)
-    } else if args.file == Path::new("-") {
+    } else if file == Path::new("-") {
         Some(Incoming::stdin()?)
     } else {
         None
@@ -71,7 +82,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if (args.screen || !args.send.is_empty()) && !live.as_ref().is_some_and(Incoming::can_send) {
         return Err(usage(format!("{name}: --screen and --send need a line, such as tcp:HOST:PORT")));
     }
-    let bytes = if live.is_some() { Vec::new() } else { read(&args.file)? };
+    let bytes = if live.is_some() { Vec::new() } else { read(file)? };
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
     let mut station = Station {
         sink: args.output.as_deref().map(|path| Sink::create(path, existing)).transpose()?,
@@ -216,8 +227,8 @@ pub(super) enum Seen {
     Housekeeping(Box<Housekeeping>),
     /// The outcome of a telecommand.
     Acknowledge(Acknowledge),
-    /// A message, with the time of its packet in seconds since the start of the computer.
-    Note(f64, LogLevel, String),
+    /// A message, with the time of its packet.
+    Note(LogLevel, String),
 }
 
 /// Counts of a stream, and the log lines for the next answer.
@@ -236,6 +247,12 @@ pub(super) struct StreamCounts {
     pub(super) seen: Vec<Seen>,
     /// Whether messages are not printed, because a screen shows them.
     pub(super) is_quiet: bool,
+    /// The packets of a picture whose science packet has not come.
+    assembly: Assembly,
+    /// Packets of the first version of telemetry.
+    old: u64,
+    /// Candidates and values of pictures whose packets did not come.
+    incomplete: u64,
 }
 
 /// Most log lines that wait for an answer.
@@ -250,39 +267,51 @@ impl StreamCounts {
     ) -> Result<(), Stop> {
         self.packets += 1;
         self.count_lost(packet);
-        let time_s = packet.time_us as f64 * 1e-6;
+        let subject = self.base.subject(packet);
+        let is_telemetry = subject.is_some_and(|apid| apid != Apid::Command);
+        let Some(time) = packet.time.filter(|_| is_telemetry) else {
+            self.old += u64::from(is_telemetry);
+            if !is_telemetry {
+                self.not_understood(packet);
+            }
+            return Ok(());
+        };
         let from = &mut Reader::new(packet.user);
-        let is_understood = match self.base.subject(packet) {
-            Some(Apid::Science) => match (Exposure::read(from), PictureAnswer::read(from)) {
-                (Some(exposure), Some(answer)) => {
-                    self.answer(&exposure, &answer, sink)?;
-                    true
+        let is_understood = match subject {
+            Some(apid @ (Apid::Science | Apid::Candidate | Apid::Position | Apid::Navigation)) => {
+                match self.assembly.take(apid, packet.user) {
+                    Some(Some(picture)) => {
+                        self.picture(&picture, sink)?;
+                        true
+                    }
+                    part => part.is_some(),
                 }
-                _ => false,
-            },
-            Some(Apid::Housekeeping) => match Housekeeping::read_any(packet.user) {
+            }
+            Some(Apid::Housekeeping) => match Housekeeping::read(from) {
                 Some(record) => {
                     self.seen.push(Seen::Housekeeping(Box::new(record)));
-                    write_housekeeping(time_s, &record, housekeeping)?;
+                    write_housekeeping(time, &record, housekeeping)?;
                     true
                 }
                 None => false,
             },
-            Some(Apid::Event) => EventRecord::read(from).map(|record| self.event(time_s, &record)).is_some(),
-            Some(Apid::Acknowledge) => Acknowledge::read(from).map(|a| self.acknowledge(time_s, &a)).is_some(),
-            Some(Apid::Parameters) => {
-                self.parameters(time_s, from);
-                true
-            }
-            Some(Apid::Edge) => EdgePart::read(from).map(|part| self.edge(time_s, &part, from)).is_some(),
+            Some(Apid::Event) => EventRecord::read(from).map(|record| self.event(time, &record)).is_some(),
+            Some(Apid::Acknowledge) => Acknowledge::read(from).map(|a| self.acknowledge(time, &a)).is_some(),
+            Some(Apid::Parameters) => ParameterValue::read(from).map(|value| self.parameter(time, value)).is_some(),
+            Some(Apid::Edge) => EdgePart::read(from).map(|part| self.edge(time, &part, from)).is_some(),
             Some(Apid::Command) | None => false,
         };
         if !is_understood {
-            let name = self.base.subject(packet).map_or(String::new(), |a| format!(" ({})", a.name()));
-            let what = format!("a packet of APID {:#x}{name} with {} bytes", packet.apid, packet.user.len());
-            self.note(time_s, LogLevel::Warning, &format!("{what} is not understood"));
+            self.not_understood(packet);
         }
         Ok(())
+    }
+
+    fn not_understood(&mut self, packet: &Packet<'_>) {
+        let name = self.base.subject(packet).map_or(String::new(), |a| format!(" ({})", a.name()));
+        let what = format!("a packet of APID {:#x}{name} with {} bytes", packet.apid, packet.user.len());
+        let time = packet.time.unwrap_or(Cuc::since_start(0));
+        self.note(time, LogLevel::Warning, &format!("{what} is not understood"));
     }
 
     /// Counts the packets that are missing before this one, from its sequence count.
@@ -295,48 +324,58 @@ impl StreamCounts {
         }
     }
 
-    fn event(&mut self, time_s: f64, record: &EventRecord) {
+    fn event(&mut self, time: Cuc, record: &EventRecord) {
         let level = match Severity::from_number(record.severity) {
             Some(Severity::Information) => LogLevel::Info,
             Some(Severity::Warning) => LogLevel::Warning,
             Some(Severity::Error) | None => LogLevel::Error,
         };
-        self.note(time_s, level, &describe_event(record));
+        self.note(time, level, &describe_event(record));
     }
 
-    fn acknowledge(&mut self, time_s: f64, a: &Acknowledge) {
+    fn acknowledge(&mut self, time: Cuc, a: &Acknowledge) {
         self.seen.push(Seen::Acknowledge(*a));
         let function = Function::from_number(a.function).map_or("?", Function::name);
         let code = Code::from_number(a.code).map_or("?", Code::name);
         let level = if a.code == 0 { LogLevel::Info } else { LogLevel::Warning };
-        self.note(time_s, level, &format!("command {} ({function}): {code}", a.sequence));
+        let detail = match (Function::from_number(a.function), a.detail) {
+            (_, 0) => String::new(),
+            (Some(Function::SetKnown | Function::Navigate), place) => {
+                let name = Navigation::FIELDS.get(usize::from(place) - 1).unwrap_or(&"?");
+                format!(": {name}")
+            }
+            (_, number) => format!(": parameter {number} {}", parameters::name(number).unwrap_or("?")),
+        };
+        self.note(time, level, &format!("command {} ({function}): {code}{detail}", a.sequence));
     }
 
-    fn parameters(&mut self, time_s: f64, from: &mut Reader<'_>) {
-        let count = from.u8().unwrap_or(0);
-        for _ in 0..count {
-            let (Some(id), Some(value)) = (from.u16(), from.f64()) else { break };
-            let name = parameters::name(id).unwrap_or("?");
-            self.note(time_s, LogLevel::Info, &format!("parameter {id} {name} = {value}"));
-        }
+    fn parameter(&mut self, time: Cuc, ParameterValue { number, value }: ParameterValue) {
+        let name = parameters::name(number).unwrap_or("?");
+        self.note(time, LogLevel::Info, &format!("parameter {number} {name} = {value}"));
     }
 
-    fn edge(&mut self, time_s: f64, part: &EdgePart, from: &mut Reader<'_>) {
-        let pixels = std::iter::from_fn(|| Some(format!("{},{}", from.u16()?, from.u16()?)));
+    fn edge(&mut self, time: Cuc, part: &EdgePart, from: &mut Reader<'_>) {
+        let pixels = std::iter::from_fn(|| EdgePixel::read(from).map(|p| format!("{},{}", p.x, p.y)));
         let list: Vec<String> = pixels.take(part.count.into()).collect();
         let EdgePart { picture, candidate, first, total, stride, .. } = part;
         let what = format!("edge of picture {picture}, candidate {candidate}, stride {stride}");
-        self.note(time_s, LogLevel::Info, &format!("{what}, {first} of {total}: {}", list.join(" ")));
+        self.note(time, LogLevel::Info, &format!("{what}, {first} of {total}: {}", list.join(" ")));
     }
 
-    fn answer(&mut self, exposure: &Exposure, answer: &PictureAnswer, sink: &mut Option<Sink>) -> Result<(), Stop> {
-        let time_s = exposure.exposure_us as f64 * 1e-6;
+    fn picture(&mut self, picture: &Assembled, sink: &mut Option<Sink>) -> Result<(), Stop> {
+        let Assembled { exposure, answer, navigation, missing_candidates } = picture;
+        let (time, time_s) = (Cuc::since_start(exposure.exposure_us), exposure.exposure_us as f64 * 1e-6);
+        self.incomplete += u64::from(*missing_candidates > 0);
+        if navigation.is_some_and(|n| n.state == NavigationState::EXPIRED) {
+            let what = format!("picture {}: the values from navigation have expired", exposure.picture);
+            self.log.push(LogLine { level: LogLevel::Warning, message: what });
+        }
         let Some(report) = answer.to_report() else {
-            self.note(time_s, LogLevel::Warning, &format!("picture {}: invalid numbers", exposure.picture));
+            self.note(time, LogLevel::Warning, &format!("picture {}: invalid numbers", exposure.picture));
             return Ok(());
         };
         self.answers += 1;
-        self.seen.push(Seen::Answer(*exposure, Box::new(*answer)));
+        self.seen.push(Seen::Answer(*exposure, Box::new(answer.clone())));
         let Some(sink) = sink else { return Ok(()) };
         let body = Parameters::body(exposure.body);
         let altitude_km = (!exposure.altitude_m.is_nan()).then(|| f64::from(exposure.altitude_m) * 1e-3);
@@ -347,7 +386,10 @@ impl StreamCounts {
             body: body.map_or("?", hzn_core::body::Kind::name).to_owned(),
             altitude_km: altitude_km.filter(|_| !matches!(body, Some(Kind::Sun | Kind::Moon))),
         };
-        let row = Row::from_report(&meta, &report, Some(f64::from(exposure.calculation_us)));
+        let mut row = Row::from_report(&meta, &report, Some(f64::from(exposure.calculation_us)));
+        if let Some(position) = &answer.position {
+            set_position(&mut row, position);
+        }
         let mut record = FrameRecord::new(row);
         record.candidates = CandidateEdge::from_report(&report);
         record.annotations = Annotations::default();
@@ -355,18 +397,19 @@ impl StreamCounts {
         sink.write(record)
     }
 
-    fn note(&mut self, time_s: f64, level: LogLevel, message: &str) {
+    fn note(&mut self, time: Cuc, level: LogLevel, message: &str) {
+        let line = format!("{}  {message}", describe_time(time));
         if !self.is_quiet {
-            tell::line(format!("{time_s:12.6} s  {message}"));
+            tell::line(&line);
         }
-        self.seen.push(Seen::Note(time_s, level, message.to_owned()));
+        self.seen.push(Seen::Note(level, line));
         if self.log.len() < MAX_LOG {
             self.log.push(LogLine { level, message: message.to_owned() });
         }
     }
 
     fn summary(&self) {
-        let Self { packets, answers, lost, cut, skipped, .. } = self;
+        let Self { packets, answers, lost, cut, skipped, incomplete, old, .. } = self;
         let mut text = format!("{packets} packets, {answers} answers");
         if *lost > 0 {
             text += &format!(", {lost} packets lost on the way");
@@ -374,17 +417,44 @@ impl StreamCounts {
         if *cut > 0 || *skipped > 0 {
             text += &format!(", {cut} broken packets, {skipped} bytes skipped");
         }
+        if *incomplete > 0 {
+            text += &format!(", {incomplete} answers without some of their candidates");
+        }
+        if *old > 0 {
+            text += &format!(
+                ", {old} packets of version 1 (times in microseconds), which this program does not read; use the \
+                 program of the same version as the flight software"
+            );
+        }
         tell::line(&text);
     }
 }
 
+/// Fills the columns of the position, which is no part of a report that came by telemetry.
+fn set_position(row: &mut Row, position: &Position) {
+    if position.position_m.iter().all(|x| x.is_finite()) {
+        let body_fixed_m = position.body_fixed_m.map(f64::from);
+        let body_fixed_m = body_fixed_m.iter().all(|x| x.is_finite()).then_some(body_fixed_m);
+        row.set_position_m(position.position_m.map(f64::from), position.pos_cov_m2.map(f64::from), body_fixed_m);
+    }
+}
+
+/// Returns a time in words: seconds since the start of the computer, or UTC.
+fn describe_time(time: Cuc) -> String {
+    match time.epoch {
+        Epoch::Start => format!("{:12.6} s", time.us as f64 * 1e-6),
+        Epoch::Tai => crate::tai::utc_text(time.us),
+    }
+}
+
 fn write_housekeeping(
-    time_s: f64,
+    time: Cuc,
     record: &Housekeeping,
     table: &mut Option<csv::Writer<std::fs::File>>,
 ) -> Result<(), Stop> {
     if let Some(table) = table {
-        let values = std::iter::once(time_s).chain(record.values());
+        // The time of a correlated clock counts from 1958; the column `clock` says which time it is.
+        let values = std::iter::once(time.us as f64 * 1e-6).chain(record.values());
         table.write_record(values.map(|v| v.to_string())).map_err(failed)?;
     }
     Ok(())
@@ -402,6 +472,10 @@ fn describe_event(record: &EventRecord) -> String {
             format!("telecommand rejected: {code} (function {b})")
         }
         Some(Event::Stored) => format!("parameters stored in copy {a}, generation {b}"),
+        Some(Event::ClockSet) => {
+            let change = if b == u32::MAX { String::new() } else { format!(", changed by {b} ms") };
+            format!("clock correlated with {}{change}", crate::tai::utc_text(u64::from(a) * 1_000_000))
+        }
         Some(Event::CameraSilent) => {
             format!("the camera sends no pictures: the last one, number {b}, came {:.1} s ago", f64::from(a) * 1e-3)
         }

@@ -7,13 +7,12 @@ use hzn_core::pixel::Pixel;
 
 use super::line::Line;
 use crate::board::Board;
-use crate::messages::EdgePart;
+use crate::cuc::Cuc;
+use crate::messages::{EDGE_PIXELS, EdgePart, EdgePixel};
 use crate::packet::Apid;
 
 /// Most pixels of an edge that are sent.
 const MAX_PIXELS: usize = 512;
-/// Most pixels of an edge in one packet.
-const MAX_PACKET_PIXELS: usize = 200;
 
 /// The longest edge of a picture, thinned to fit.
 #[derive(Debug)]
@@ -36,22 +35,22 @@ impl LongestEdge {
     }
 
     /// Sends the edge in parts.
-    pub(super) fn send(&self, line: &mut Line, board: &mut impl Board, picture: u32) {
+    pub(super) fn send(&self, line: &mut Line, board: &mut impl Board, time: Cuc, picture: u32) {
         let pixels = self.pixels.get(..self.len).unwrap_or_default();
-        for (part, pixels) in pixels.chunks(MAX_PACKET_PIXELS).enumerate() {
+        for (part, pixels) in pixels.chunks(EDGE_PIXELS).enumerate() {
             let head = EdgePart {
                 picture,
                 candidate: self.candidate,
                 stride: self.stride,
-                first: (part * MAX_PACKET_PIXELS) as u16,
+                first: (part * EDGE_PIXELS) as u16,
                 total: self.len as u16,
                 count: pixels.len() as u16,
             };
-            line.send(board, Apid::Edge, |out| {
+            line.send(board, Apid::Edge, time, |out| {
                 head.write(out);
-                for p in pixels {
-                    out.u16(p.x);
-                    out.u16(p.y);
+                for place in 0..EDGE_PIXELS {
+                    let pixel = pixels.get(place).map_or(EdgePixel::default(), |p| EdgePixel { x: p.x, y: p.y });
+                    pixel.write(out);
                 }
             });
         }

@@ -137,8 +137,8 @@ impl Incoming {
             self.notices.try_iter().for_each(tell::line);
             // The values that a command has read.
             for note in &seen {
-                if let Seen::Note(_, _, text) = note
-                    && text.starts_with("parameter ")
+                if let Seen::Note(_, text) = note
+                    && text.contains("  parameter ")
                 {
                     tell::line(text);
                 }

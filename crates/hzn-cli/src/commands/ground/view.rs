@@ -60,7 +60,7 @@ impl View {
                 Seen::Answer(exposure, answer) => self.take_answer(exposure, answer),
                 Seen::Housekeeping(record) => self.housekeeping = Some(record),
                 Seen::Acknowledge(_) => {}
-                Seen::Note(time_s, level, text) => self.tell(level, format!("{time_s:10.3}  {text}")),
+                Seen::Note(level, text) => self.tell(level, text),
             }
         }
     }
@@ -186,8 +186,8 @@ impl View {
             && let Some(d) = &answer.direction
         {
             lines.push(field("axis", format!("{:+.4} {:+.4} {:+.4}", d.axis[0], d.axis[1], d.axis[2])));
-            if d.altitude_m.is_finite() {
-                let (h, sigma) = (d.altitude_m * 1e-3, d.altitude_sigma_m * 1e-3);
+            if d.altitude_est_m.is_finite() {
+                let (h, sigma) = (d.altitude_est_m * 1e-3, d.altitude_sigma_m * 1e-3);
                 lines.push(field("altitude", format!("{h:.1} ± {sigma:.1} km from the limb")));
             }
         }
