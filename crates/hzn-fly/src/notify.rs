@@ -15,11 +15,11 @@ pub(crate) struct Notify {
 }
 
 impl Notify {
-    /// Reads `NOTIFY_SOCKET`, `WATCHDOG_USEC` and `WATCHDOG_PID` of the environment.
+    /// Reads `NOTIFY_SOCKET` and `WATCHDOG_USEC` of the environment. `WATCHDOG_PID` does not count: in a pipe it is the
+    /// number of the shell.
     pub(crate) fn from_environment() -> Self {
         let usec = env::var("WATCHDOG_USEC").ok().and_then(|text| text.parse().ok());
-        let is_for_us = env::var("WATCHDOG_PID").is_ok_and(|pid| pid != std::process::id().to_string());
-        Self::new(env::var("NOTIFY_SOCKET").ok().as_deref(), usec.filter(|_| !is_for_us))
+        Self::new(env::var("NOTIFY_SOCKET").ok().as_deref(), usec)
     }
 
     fn new(path: Option<&str>, watchdog_usec: Option<u64>) -> Self {

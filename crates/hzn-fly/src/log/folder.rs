@@ -8,6 +8,9 @@ use hzn_mcap::{part_path, recover};
 
 use crate::tell::Tell;
 
+/// Parts into which the share of the disk is divided. When it is full, the oldest part is removed.
+const PARTS: u64 = 8;
+
 /// A folder with numbered recordings.
 #[derive(Debug)]
 pub(super) struct Folder {
@@ -34,8 +37,9 @@ impl Folder {
         Ok(folder)
     }
 
-    pub(super) fn limit_bytes(&self) -> u64 {
-        self.limit_bytes
+    /// Returns the most bytes of a recording.
+    pub(super) fn file_bytes(&self) -> u64 {
+        self.limit_bytes / PARTS
     }
 
     fn file(&self, number: u64) -> PathBuf {
@@ -58,10 +62,10 @@ impl Folder {
         entries
     }
 
-    /// Removes the oldest recordings until there is room for `bytes` more within the share of the disk. Returns the path
-    /// of the next recording.
-    pub(super) fn make_room(&mut self, bytes: u64) -> PathBuf {
-        self.free(bytes, u64::MAX);
+    /// Removes the oldest recordings until there is room for one more within the share of the disk. Returns the path of
+    /// the new one.
+    pub(super) fn make_room(&mut self) -> PathBuf {
+        self.free(self.file_bytes(), u64::MAX);
         let path = self.file(self.next);
         self.next += 1;
         path
@@ -93,7 +97,7 @@ impl Folder {
                 continue;
             }
             // The copy has at most the bytes that the recording was allowed to have.
-            self.free(entry.bytes.max(self.limit_bytes / super::PARTS), entry.number);
+            self.free(entry.bytes.max(self.file_bytes()), entry.number);
             if entry.path != input && fs::rename(&entry.path, &input).is_err() {
                 continue;
             }

@@ -18,8 +18,6 @@ use folder::Folder;
 
 /// Answers that wait for a slow disk: at 60 pictures a second, 17 s.
 const WAITING: usize = 1024;
-/// Parts into which the share of the disk is divided. When it is full, the oldest part is removed.
-const PARTS: u64 = 8;
 /// Room in a file for one more answer. An answer has about 3 KB, and at most 16 candidates.
 const ANSWER_BYTES: u64 = 16 << 10;
 /// Smallest share of the disk. A file must hold some answers.
@@ -117,7 +115,7 @@ impl Writing {
             self.lost.fetch_add(1, Ordering::Relaxed);
             return Ok(());
         }
-        let is_full = |file: &Writer| file.finished_bytes() + ANSWER_BYTES > self.folder.limit_bytes() / PARTS;
+        let is_full = |file: &Writer| file.finished_bytes() + ANSWER_BYTES > self.folder.file_bytes();
         if let Some(file) = self.file.as_mut().filter(|file| is_full(file)) {
             // What waits needs less room once it is compressed.
             file.flush()?;
@@ -140,7 +138,7 @@ impl Writing {
         let file = match self.file.take() {
             Some(file) => file,
             None => {
-                let path = self.folder.make_room(self.folder.limit_bytes() / PARTS);
+                let path = self.folder.make_room();
                 let config = self.config.lock().unwrap_or_else(PoisonError::into_inner).clone();
                 // A configuration that was accepted has a text.
                 let sensor_toml = toml::to_string(&config).unwrap_or_default();

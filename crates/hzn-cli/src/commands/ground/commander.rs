@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use hzn_flight::messages::{Acknowledge, Code};
 use hzn_flight::packet::ApidBase;
 
-use crate::commands::telecommand::{encode, write_packet};
+use super::encode::{encode, write_packet};
 use crate::exit::Stop;
 
 /// Longest wait for an acknowledgement. A flight computer carries out a command at the latest 1.1 s after its end.
@@ -177,7 +177,9 @@ mod tests {
     fn a_load_is_one_command() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("sensor.toml");
-        std::fs::write(&path, "[camera]\nwidth = 640\nheight = 480\nmodel = \"pinhole\"\nfx_px = 600.0\n").unwrap();
+        let lens = "model = \"pinhole\"\nfx_px = 600.0\nfy_px = 600.0\ncx_px = 319.5\ncy_px = 239.5";
+        let camera = format!("[camera]\nwidth = 640\nheight = 480\n{lens}\n[body]\naltitude_km = 230.0\n");
+        std::fs::write(&path, camera).unwrap();
         let text = format!("load {}", path.display());
         let load = |code: u8, at: u16| {
             let mut commander = Commander::new(ApidBase::DEFAULT, 0, &[text.clone(), "ping".into()]).unwrap();

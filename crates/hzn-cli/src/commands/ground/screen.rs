@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 use hzn_mcap::LogLevel;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
+use super::commander::Commander;
+use super::incoming::{Came, Incoming};
+use super::station::Station;
 use super::view::View;
-use super::{Came, Commander, Incoming};
-use crate::commands::telemetry::Station;
 use crate::exit::Stop;
 
 /// Shortest time between two drawings.

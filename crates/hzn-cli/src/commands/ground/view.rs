@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use hzn_core::frames::{Cam, Cov3};
 use hzn_core::status::Status;
-use hzn_flight::answer::PictureAnswer;
-use hzn_flight::messages::{Exposure, Housekeeping, Mode};
+use hzn_flight::assembly::Assembled;
+use hzn_flight::messages::{Housekeeping, Mode};
 use hzn_mcap::LogLevel;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -15,7 +15,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 
-use crate::commands::telemetry::{Seen, StreamCounts};
+use super::stream::{Seen, StreamCounts};
 
 /// Length of the plots, s.
 const WINDOW_S: f64 = 60.0;
@@ -39,7 +39,7 @@ pub(super) struct View {
     /// The line.
     name: String,
     points: VecDeque<Point>,
-    last: Option<(Exposure, Box<PictureAnswer>)>,
+    last: Option<Box<Assembled>>,
     housekeeping: Option<Box<Housekeeping>>,
     messages: VecDeque<(LogLevel, String)>,
     /// Time since the last packet.
@@ -57,7 +57,7 @@ impl View {
     pub(super) fn take(&mut self, seen: Vec<Seen>) {
         for seen in seen {
             match seen {
-                Seen::Answer(exposure, answer) => self.take_answer(exposure, answer),
+                Seen::Answer(picture) => self.take_answer(picture),
                 Seen::Housekeeping(record) => self.housekeeping = Some(record),
                 Seen::Acknowledge(_) => {}
                 Seen::Note(level, text) => self.tell(level, text),
@@ -78,7 +78,8 @@ impl View {
         self.housekeeping.as_ref().map(|h| h.last_sequence).filter(|&n| n != u16::MAX)
     }
 
-    fn take_answer(&mut self, exposure: Exposure, answer: Box<PictureAnswer>) {
+    fn take_answer(&mut self, picture: Box<Assembled>) {
+        let (exposure, answer) = (&picture.exposure, &picture.answer);
         let time_s = exposure.exposure_us as f64 * 1e-6;
         // The clock of the flight computer begins again after a reset.
         if self.points.back().is_some_and(|last| last.time_s > time_s) {
@@ -95,7 +96,7 @@ impl View {
         {
             self.points.pop_front();
         }
-        self.last = Some((exposure, answer));
+        self.last = Some(picture);
     }
 
     /// Draws everything.
@@ -165,7 +166,7 @@ impl View {
             n => Span::from(char::from_digit(n.into(), 36).unwrap_or('?').to_string()).fg(Color::Red),
         };
         let marks: Vec<Span<'_>> = self.points.iter().skip(skip).map(mark).collect();
-        let last = self.last.as_ref().and_then(|(_, answer)| Status::ALL.get(usize::from(answer.status)));
+        let last = self.last.as_ref().and_then(|last| Status::ALL.get(usize::from(last.answer.status)));
         let title = format!(" status of each picture: {} ", last.map_or("–", |status| status.name()));
         Paragraph::new(Line::from(marks)).block(Block::bordered().title(title))
     }
@@ -182,13 +183,13 @@ impl View {
         lines.push(field("pictures", format!("{}, {} with an answer", h.pictures, h.answers)));
         lines.push(field("", format!("{} lost, {} refused", h.lost, h.refused)));
         lines.push(field("calculation", format!("{:.1} ms, {:.1} ms at most", ms(h.last_us), ms(h.longest_us))));
-        if let Some((_, answer)) = &self.last
-            && let Some(d) = &answer.direction
+        if let Some(last) = &self.last
+            && let Some(d) = &last.answer.direction
         {
             lines.push(field("axis", format!("{:+.4} {:+.4} {:+.4}", d.axis[0], d.axis[1], d.axis[2])));
             if d.altitude_est_m.is_finite() {
-                let (h, sigma) = (d.altitude_est_m * 1e-3, d.altitude_sigma_m * 1e-3);
-                lines.push(field("altitude", format!("{h:.1} ± {sigma:.1} km from the limb")));
+                let (h, sigma) = (d.altitude_est_m * 1e-3, d.altitude_est_sigma_m * 1e-3);
+                lines.push(field("altitude", format!("{h:.1} ± {sigma:.1} km")));
             }
         }
         lines.push(field("parameters", format!("copy {}, generation {}", h.parameter_copy, h.parameter_generation)));
@@ -263,4 +264,88 @@ fn alarms(h: &Housekeeping) -> Vec<String> {
         withheld,
     ];
     all.into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use hzn_flight::answer::{Direction, Outcome, PictureAnswer};
+    use hzn_flight::messages::Exposure;
+    use hzn_flight::packet::ApidBase;
+    use ratatui::Terminal;
+    use ratatui::backend::TestBackend;
+
+    use super::*;
+
+    /// Returns the answer to picture `n` of a flight that turns slowly; every tenth has no limb.
+    fn answer(n: u32) -> Seen {
+        let nadir = (68.0 + 4.0 * (f64::from(n) / 60.0).sin()).to_radians();
+        let direction = Direction {
+            axis: [0.0, nadir.sin() as f32, nadir.cos() as f32],
+            cov: [1e-6, 0.0, 0.0, 4e-7 * (1.0 + n as f32 / 300.0), 0.0, 1e-7],
+            altitude_est_m: 230_400.0,
+            altitude_est_sigma_m: 1200.0,
+            ..Direction::default()
+        };
+        let is_found = !n.is_multiple_of(10);
+        let status = if is_found { Status::Ok } else { Status::NoLimb } as u8;
+        let exposure = Exposure { picture: n, exposure_us: u64::from(n) * 100_000, ..Exposure::default() };
+        let answer = PictureAnswer {
+            outcome: Outcome { status, ..Outcome::default() },
+            direction: is_found.then_some(direction),
+            position: None,
+            edges: Default::default(),
+        };
+        Seen::Answer(Box::new(Assembled { exposure, answer, navigation: None, missing_candidates: 0 }))
+    }
+
+    fn screen(view: &View, counts: &StreamCounts, width: u16, height: u16) -> String {
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+        terminal.draw(|frame| view.draw(frame, counts)).unwrap();
+        let text = terminal.backend().to_string();
+        // The backend puts every line into quotation marks.
+        text.lines().map(|line| line.trim_matches('"').trim_end()).collect::<Vec<_>>().join("\n")
+    }
+
+    #[test]
+    fn a_flight_is_shown() {
+        let mut counts = StreamCounts::new(ApidBase::DEFAULT, true);
+        let mut view = View::new("tcp:flight:5000");
+        insta::assert_snapshot!("screen_before", screen(&view, &counts, 100, 30));
+        view.take((1..=500).map(answer).collect());
+        let housekeeping = Housekeeping {
+            mode: Mode::Flight as u8,
+            parameter_copy: 2,
+            parameter_generation: 7,
+            pictures: 500,
+            answers: 450,
+            commands: 3,
+            last_us: 1234,
+            longest_us: 5678,
+            starts: 2,
+            watchdog_resets: 1,
+            flags: 8,
+            since_lift_off_s: 42,
+            last_sequence: 11,
+            ..Housekeeping::default()
+        };
+        view.take(vec![
+            Seen::Housekeeping(Box::new(housekeeping)),
+            Seen::Note(LogLevel::Warning, "  10.000000 s  the camera sends no pictures".into()),
+        ]);
+        view.silent = Some(Duration::from_secs(12));
+        view.typed = Some("mode standby".into());
+        counts.packets = 2345;
+        insta::assert_snapshot!("screen_in_flight", screen(&view, &counts, 100, 30));
+        assert_eq!(view.last_sequence(), Some(11));
+        // Only a minute is kept, and a reset of the computer begins it again.
+        assert_eq!(view.points.len(), 500);
+        view.take((501..=700).map(answer).collect());
+        assert_eq!(view.points.len(), 601);
+        view.take(vec![answer(3)]);
+        assert_eq!(view.points.len(), 1);
+        // A small terminal shows less, and does not fail.
+        for (width, height) in [(1, 1), (20, 5), (60, 20)] {
+            screen(&view, &counts, width, height);
+        }
+    }
 }
