@@ -91,7 +91,7 @@ fn main() -> std::io::Result<()> {
         let time = if n % 3 == 0 { Cuc::since_start(us) } else { Cuc::tai(us) };
         let mut bytes = [0; packet::MAX_BYTES];
         let write = |w: &mut Writer<'_>| w.bytes(&user);
-        let length = packet::write(&mut bytes, ApidBase::DEFAULT, apid, n as u16, Some(time), write);
+        let length = packet::write(&mut bytes, ApidBase::DEFAULT, apid, (n / kinds.len()) as u16, Some(time), write);
         packets.write_all(&bytes[..length.expect("a packet fits")])?;
         let numbers = values(apid, &user).expect("the records and the layout have one size");
         let text: Vec<String> =

@@ -46,3 +46,18 @@ pub mod store;
 pub mod table;
 
 pub use parameters::Parameters;
+
+/// Version of this crate: major, minor and patch in one byte each, from the second byte on.
+pub const VERSION: u32 = number(env!("CARGO_PKG_VERSION_MAJOR")) << 16
+    | number(env!("CARGO_PKG_VERSION_MINOR")) << 8
+    | number(env!("CARGO_PKG_VERSION_PATCH"));
+
+const fn number(digits: &str) -> u32 {
+    let mut rest = digits.as_bytes();
+    let mut value = 0;
+    while let [digit, after @ ..] = rest {
+        value = value * 10 + (*digit - b'0') as u32;
+        rest = after;
+    }
+    value
+}

@@ -2,10 +2,13 @@
 
 use core::cell::RefCell;
 
+use hzn_core::Solution;
 use hzn_core::observer::Observer;
 use hzn_core::pixel::Pixel;
+use hzn_core::report::Candidate;
 
 use super::line::Line;
+use super::stuck::{PLACES, StuckWatch};
 use crate::board::Board;
 use crate::cuc::Cuc;
 use crate::messages::{EDGE_PIXELS, EdgePart, EdgePixel};
@@ -57,30 +60,53 @@ impl LongestEdge {
     }
 }
 
-/// Keeps the longest edge if it is wanted. There is only one type of observer, so that the pipeline is linked once.
+/// Watches the edges of a picture: keeps the longest one if it is wanted, and looks for stuck pixels along each. There
+/// is only one type of observer, so that the pipeline is linked once.
 pub(super) struct EdgeWatch<'a> {
     pub(super) wanted: bool,
     pub(super) longest: RefCell<&'a mut LongestEdge>,
+    pub(super) stuck: RefCell<StuckWatch<'a>>,
 }
 
 impl Observer<f32> for EdgeWatch<'_> {
-    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
-        if !self.wanted {
-            return;
+    fn look(&self, _number: u32, _level: u16) {
+        // The candidates of another look have the same numbers.
+        if let Ok(mut stuck) = self.stuck.try_borrow_mut() {
+            stuck.clear();
         }
-        let Ok(mut longest) = self.longest.try_borrow_mut() else { return };
+    }
+
+    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
+        let (Ok(mut longest), Ok(mut stuck)) = (self.longest.try_borrow_mut(), self.stuck.try_borrow_mut()) else {
+            return;
+        };
+        let list = &mut **longest;
         let (pixels, _) = border.size_hint();
         let length = (pixels as u32).saturating_mul(stride);
-        if length <= longest.length {
-            return;
+        let is_kept = self.wanted && length > list.length;
+        let most = if is_kept { MAX_PIXELS } else { PLACES };
+        let every = pixels.div_ceil(most).max(1);
+        if is_kept {
+            (list.length, list.candidate, list.len) = (length, candidate, 0);
+            list.stride = stride.saturating_mul(every as u32);
         }
-        let every = pixels.div_ceil(MAX_PIXELS).max(1);
-        let list = &mut **longest;
-        list.len = 0;
-        for (place, pixel) in list.pixels.iter_mut().zip(border.step_by(every)) {
-            *place = pixel;
-            list.len += 1;
+        stuck.begin();
+        for (place, pixel) in border.step_by(every).enumerate() {
+            if is_kept && let Some(kept) = list.pixels.get_mut(place) {
+                *kept = pixel;
+                list.len += 1;
+            }
+            if place % (most / PLACES) == 0 {
+                stuck.look_at(pixel);
+            }
         }
-        (list.length, list.candidate, list.stride) = (length, candidate, stride.saturating_mul(every as u32));
+    }
+
+    fn verdict(&self, candidate: u32, _outcome: &Candidate<f32>, solution: Option<&Solution<f32>>) {
+        if let Some(solution) = solution
+            && let Ok(mut stuck) = self.stuck.try_borrow_mut()
+        {
+            stuck.judge(candidate, solution);
+        }
     }
 }

@@ -13,6 +13,7 @@
 //! | `clock` | the time of packets, and its correlation |
 //! | `navigation` | position, velocity and rate, with time and expiry |
 //! | `camera_watch` | pictures that do not come |
+//! | `stuck` | pixels that do not change from one to the next |
 //! | `longest_edge` | the edge that a command asks for |
 //! | `reports` | housekeeping and events |
 //! | `line` | packets on the line, with their counts |
@@ -45,6 +46,7 @@ mod report_turn;
 mod reports;
 mod science;
 mod self_check;
+mod stuck;
 mod telecommands;
 
 use budget::BitBudget;

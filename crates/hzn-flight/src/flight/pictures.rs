@@ -7,6 +7,7 @@ use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
 
 use super::longest_edge::EdgeWatch;
+use super::stuck::StuckWatch;
 use super::{Buffers, Flight, Known};
 use crate::board::{Board, Picture};
 use crate::kept_twice::KeptTwice;
@@ -30,11 +31,21 @@ impl<B: Board> Flight<'_, B> {
         let bytes = self.board.pixels().get(..picture.bytes).unwrap_or_default();
         let Ok(grey) = Grey::try_new(bytes, layout) else { return };
         self.buffers.edge.clear();
-        let watch = EdgeWatch { wanted, longest: RefCell::new(&mut self.buffers.edge) };
+        let watch = EdgeWatch {
+            wanted,
+            longest: RefCell::new(&mut self.buffers.edge),
+            stuck: RefCell::new(StuckWatch::new(bytes, self.sensor.get().camera())),
+        };
         let report = self.sensor.get().process(self.workspace, &grey, expected.get(), &watch);
+        let stuck = report.solution.as_ref().and_then(|s| watch.stuck.into_inner().found(s.candidate));
         // A bit may have changed during the calculation.
         if !self.check_memory(Some(&mut expected)) {
             self.state.refused = self.state.refused.saturating_add(1);
+            return;
+        }
+        if let Some(stuck) = stuck {
+            self.state.stuck = self.state.stuck.saturating_add(1);
+            self.send_event(Event::StuckPixels, stuck.stuck, stuck.places);
             return;
         }
         if let Some(s) = &report.solution {

@@ -1,7 +1,7 @@
 //! The flight loop sends events and housekeeping.
 
 use super::Flight;
-use super::reports::{ARMED, CAMERA_SILENT, LIFTED_OFF, NOT_STORED, STAGED, VERSION};
+use super::reports::{ARMED, CAMERA_SILENT, LIFTED_OFF, NOT_STORED, STAGED};
 use crate::board::Board;
 use crate::bytes::Writer;
 use crate::messages::{Event, EventRecord, Severity};
@@ -23,7 +23,7 @@ impl<B: Board> Flight<'_, B> {
         let state = &mut self.state;
         state.mode = self.mode as u8;
         state.stack_bytes = self.board.stack_bytes();
-        state.version = VERSION;
+        state.version = crate::VERSION;
         state.flags = bit(self.is_not_stored, NOT_STORED)
             | bit(self.recovery.is_armed(now_us), ARMED)
             | bit(self.recovery.has_lifted_off(), LIFTED_OFF)
