@@ -170,6 +170,11 @@ fn prepare_parameters(settings: &Settings, flash: &Flash, tell: &Tell) -> Result
             tell(&format!("warning: {state} has other values than sensor.toml for {names}: {what}"));
         }
     }
+    let body = &newest.sensor.body;
+    if body.altitude_km.is_none() && !body.half_angle_is_free() {
+        let what = "a picture has no answer until a telecommand gives the altitude (known or navigate)";
+        tell(&format!("warning: body.altitude_km is not set: {what}"));
+    }
     Ok(newest.sensor)
 }
 

@@ -27,7 +27,7 @@ const AGAIN: Duration = Duration::from_secs(5);
 
 /// The log of answers. A thread writes it, so that a slow disk never holds up the flight loop.
 pub struct Log {
-    sender: Option<Sender<FrameRecord>>,
+    sender: Option<Sender<Box<FrameRecord>>>,
     thread: Option<JoinHandle<()>>,
     lost: Arc<AtomicU64>,
     written: Arc<AtomicU64>,
@@ -66,11 +66,9 @@ impl Log {
 
     /// Adds an answer, without waiting. If there is no room, the answer is lost and counted.
     pub fn add(&self, record: FrameRecord) {
-        match self.sender.as_ref().map(|sender| sender.try_send(record)) {
-            Some(Err(TrySendError::Full(_))) => {
-                self.lost.fetch_add(1, Ordering::Relaxed);
-            }
-            _ => {}
+        let sent = self.sender.as_ref().map(|sender| sender.try_send(Box::new(record)));
+        if let Some(Err(TrySendError::Full(_))) = sent {
+            self.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
 
@@ -97,7 +95,7 @@ struct Writing {
 }
 
 impl Writing {
-    fn run(&mut self, answers: &Receiver<FrameRecord>) {
+    fn run(&mut self, answers: &Receiver<Box<FrameRecord>>) {
         loop {
             let outcome = match answers.recv_timeout(FLUSH_INTERVAL) {
                 Ok(record) => self.add(&record),
