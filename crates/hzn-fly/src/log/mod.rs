@@ -1,4 +1,4 @@
-//! The answers on the disk: recordings that a crash cannot spoil, and that never need more than their share of the disk.
+//! The answers on the disk: recordings that a crash cannot spoil, and that never need more than their share of it.
 
 mod folder;
 

@@ -14,7 +14,7 @@ use crate::exit::{Stop, usage};
 use crate::tai;
 
 /// Returns the packet of a command with these user data.
-pub(in crate::commands) fn write_packet(
+pub(crate) fn write_packet(
     base: ApidBase,
     sequence: u16,
     command: &str,
@@ -28,7 +28,7 @@ pub(in crate::commands) fn write_packet(
 }
 
 /// Returns the user data of each packet of a command.
-pub(in crate::commands) fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
+pub(crate) fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
     let words: Vec<&str> = text.split_whitespace().collect();
     let Some((&verb, arguments)) = words.split_first() else { return Err(refuse(text, "is empty")) };
     if verb == "load" {
@@ -162,8 +162,8 @@ impl Command<'_> {
 
     fn navigate(&self) -> Result<Vec<u8>, Stop> {
         let refuse_count = || {
-            let what = "navigate takes a time, the expiry in seconds, altitude and ECEF position in kilometres, velocity \
-                        in m/s, and the rate of rotation in rad/s if it is known: 9 or 12 numbers";
+            let what = "navigate takes a time, the expiry in seconds, altitude and ECEF position in kilometres, \
+                        velocity in m/s, and the rate of rotation in rad/s if it is known: 9 or 12 numbers";
             self.refuse(what)
         };
         let (epoch, numbers) = self.arguments.split_first().ok_or_else(refuse_count)?;

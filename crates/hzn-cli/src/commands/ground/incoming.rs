@@ -18,7 +18,7 @@ use crate::tell;
 const TICK: Duration = Duration::from_millis(50);
 
 /// Bytes of a flight computer as they come.
-pub(in crate::commands) struct Incoming {
+pub(crate) struct Incoming {
     /// The line; `None` for standard input.
     link: Option<Link>,
     bytes: Receiver<Vec<u8>>,
@@ -36,7 +36,7 @@ pub(super) enum Came {
 
 impl Incoming {
     /// Opens a line.
-    pub(in crate::commands) fn open(address: &Address) -> Result<Self, Stop> {
+    pub(crate) fn open(address: &Address) -> Result<Self, Stop> {
         let (sender, notices) = unbounded();
         let tell = Arc::new(move |text: &str| drop(sender.send(text.to_owned())));
         let (link, bytes) = Link::open(address, Patience::Fails, Arc::default(), tell).map_err(failed)?;
@@ -44,7 +44,7 @@ impl Incoming {
     }
 
     /// Reads standard input.
-    pub(in crate::commands) fn stdin() -> Result<Self, Stop> {
+    pub(crate) fn stdin() -> Result<Self, Stop> {
         let (sender, bytes) = bounded(64);
         std::thread::Builder::new().name("stdin".into()).spawn(move || {
             let mut piece = vec![0; 1 << 16];
@@ -60,7 +60,7 @@ impl Incoming {
     }
 
     /// Returns whether commands can be sent.
-    pub(in crate::commands) fn can_send(&self) -> bool {
+    pub(crate) fn can_send(&self) -> bool {
         self.link.is_some()
     }
     pub(super) fn name(&self) -> &str {
@@ -98,7 +98,7 @@ impl Incoming {
     }
 
     /// Listens until the bytes end or the user stops it. Returns the bytes after the last packet.
-    pub(in crate::commands) fn listen(self, station: &mut Station, mut commander: Commander) -> Result<Vec<u8>, Stop> {
+    pub(crate) fn listen(self, station: &mut Station, mut commander: Commander) -> Result<Vec<u8>, Stop> {
         let stop = stop_flag();
         let mut rest = Vec::new();
         while !stop.load(Ordering::Relaxed) {
@@ -116,7 +116,7 @@ impl Incoming {
     }
 
     /// Sends commands and waits for their acknowledgements.
-    pub(in crate::commands) fn command(self, mut commander: Commander) -> Outcome {
+    pub(crate) fn command(self, mut commander: Commander) -> Outcome {
         let (mut rest, mut is_done) = (Vec::new(), true);
         let mut station = Station::quiet(commander.base());
         let start = Instant::now();

@@ -23,7 +23,7 @@ enum Wish {
 }
 
 /// Shows the screen until the bytes end or the user quits. Returns the bytes after the last packet.
-pub(in crate::commands) fn show(
+pub(crate) fn show(
     incoming: Incoming,
     station: &mut Station,
     mut commander: Commander,

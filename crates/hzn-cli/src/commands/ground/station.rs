@@ -10,7 +10,7 @@ use super::stream::StreamCounts;
 use crate::exit::{Exit, Outcome, Stop, failed};
 
 /// What becomes of the packets.
-pub(in crate::commands) struct Station {
+pub(crate) struct Station {
     pub(super) counts: StreamCounts,
     sink: Option<Sink>,
     housekeeping: Option<csv::Writer<std::fs::File>>,
@@ -18,7 +18,7 @@ pub(in crate::commands) struct Station {
 
 impl Station {
     /// Makes a station with outputs for answers and housekeeping.
-    pub(in crate::commands) fn new(
+    pub(crate) fn new(
         base: ApidBase,
         output: Option<&Path>,
         housekeeping: Option<&Path>,
@@ -38,7 +38,7 @@ impl Station {
     }
 
     /// Takes the whole packets at the beginning of the bytes out of them.
-    pub(in crate::commands) fn take(&mut self, bytes: &mut Vec<u8>) -> Result<(), Stop> {
+    pub(crate) fn take(&mut self, bytes: &mut Vec<u8>) -> Result<(), Stop> {
         let counts = &mut self.counts;
         let mut rest = &bytes[..];
         loop {
@@ -70,7 +70,7 @@ impl Station {
     }
 
     /// Closes the outputs. `rest` are the bytes after the last packet.
-    pub(in crate::commands) fn finish(self, rest: &[u8], name: &str) -> Outcome {
+    pub(crate) fn finish(self, rest: &[u8], name: &str) -> Outcome {
         let Self { mut counts, sink, housekeeping } = self;
         let skip = match packet::scan(rest) {
             Scan::More { skip } => skip,
