@@ -14,12 +14,7 @@ use crate::exit::{Stop, usage};
 use crate::tai;
 
 /// Returns the packet of a command with these user data.
-pub(crate) fn write_packet(
-    base: ApidBase,
-    sequence: u16,
-    command: &str,
-    user: &[u8],
-) -> Result<Vec<u8>, Stop> {
+pub(crate) fn write_packet(base: ApidBase, sequence: u16, command: &str, user: &[u8]) -> Result<Vec<u8>, Stop> {
     let mut bytes = vec![0; packet::MAX_BYTES];
     let n = packet::write(&mut bytes, base, Apid::Command, sequence, None, |w| w.bytes(user))
         .ok_or_else(|| usage(format!("{command:?}: too long for one packet; split it")))?;

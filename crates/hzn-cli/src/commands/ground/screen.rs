@@ -23,11 +23,7 @@ enum Wish {
 }
 
 /// Shows the screen until the bytes end or the user quits. Returns the bytes after the last packet.
-pub(crate) fn show(
-    incoming: Incoming,
-    station: &mut Station,
-    mut commander: Commander,
-) -> Result<Vec<u8>, Stop> {
+pub(crate) fn show(incoming: Incoming, station: &mut Station, mut commander: Commander) -> Result<Vec<u8>, Stop> {
     let mut terminal = ratatui::try_init()?;
     let outcome = run(&incoming, station, &mut commander, &mut terminal);
     ratatui::restore();
