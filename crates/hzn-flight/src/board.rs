@@ -1,5 +1,8 @@
 //! The functions that a board provides. A port is one implementation of this trait.
 
+use hzn_core::Report;
+
+use crate::messages::Exposure;
 use crate::table::CRC32;
 
 /// A picture that the camera has written to memory.
@@ -74,4 +77,6 @@ pub trait Board {
     }
     /// Keeps words for the time after a reset.
     fn write_retained(&mut self, _words: [u32; RETAINED_WORDS]) {}
+    /// Keeps an answer. Its packets were sent just now, unless the bit budget had no room. Most boards keep nothing.
+    fn keep_answer(&mut self, _exposure: &Exposure, _report: &Report<f32>) {}
 }

@@ -12,11 +12,19 @@ use crate::packet::{Apid, OVERHEAD};
 use crate::parameters::Parameters;
 
 impl<B: Board> Flight<'_, B> {
-    /// Sends the answer to the picture that was counted last, if the bit budget allows it.
+    /// Sends the answer to the picture that was counted last, if the bit budget allows it. The board gets it in any
+    /// case.
     pub(super) fn send_answer(&mut self, report: &Report<f32>, exposure_us: u64, done_us: u64) {
-        let answer = PictureAnswer::from_report(report);
         let navigation = self.known.get().state_at(self.number, exposure_us);
-        if !self.has_budget(&answer, navigation.is_some(), done_us) {
+        let exposure = self.exposure(navigation.as_ref(), exposure_us, done_us);
+        self.send_within_budget(report, &exposure, navigation);
+        self.board.keep_answer(&exposure, report);
+    }
+
+    fn send_within_budget(&mut self, report: &Report<f32>, exposure: &Exposure, navigation: Option<NavigationState>) {
+        let answer = PictureAnswer::from_report(report);
+        let exposure_us = exposure.exposure_us;
+        if !self.has_budget(&answer, navigation.is_some(), exposure.done_us) {
             self.state.decimated = self.state.decimated.saturating_add(1);
             return;
         }
@@ -36,7 +44,6 @@ impl<B: Board> Flight<'_, B> {
                 edge.write(out);
             });
         }
-        let exposure = self.exposure(navigation.as_ref(), exposure_us, done_us);
         self.send_at(exposure_us, Apid::Science, |out| {
             exposure.write(out);
             answer.write_science(out);
