@@ -66,7 +66,7 @@ fn values(apid: Apid, user: &[u8]) -> Option<Vec<f64>> {
 /// Gives the fields that are choices a number that they can have.
 fn limit_choices(apid: Apid, user: &mut [u8], draw: u8) {
     match apid {
-        Apid::Housekeeping => (user[0], user[3]) = (draw % 4, if draw % 5 == 0 { 255 } else { draw % 10 }),
+        Apid::Housekeeping => (user[0], user[3]) = (draw % 4, if draw.is_multiple_of(5) { 255 } else { draw % 10 }),
         Apid::Science => (user[Exposure::BYTES], user[Exposure::BYTES + 1]) = (draw % 10, draw % 8),
         Apid::Event => (user[0], user[1], user[2]) = (0, 1 + draw % Event::ALL.len() as u8, draw % 3),
         Apid::Acknowledge => user[3] = draw % Code::ALL.len() as u8,

@@ -1,4 +1,5 @@
-//! Installs the C library with CMake, and builds and runs the samples of cFS and F´ against stubs, as a user's build does.
+//! Installs the C library with CMake, and builds and runs the samples of cFS and F´ against stubs, as a user's build
+//! does.
 
 use std::fs;
 use std::path::Path;

@@ -28,8 +28,8 @@ const FARTHEST: f64 = 8.0;
 const NEAREST: f64 = 2.0;
 /// Fewest places from which the sky must be visible.
 const LEAST: usize = 3;
-/// Depth below a limb at which another one cannot be the same, in scale heights, in addition to `SIGMAS`: an edge nearer
-/// than that is haze above clouds, and sigma covers it.
+/// Depth below a limb at which another one cannot be the same, in scale heights, beyond `SIGMAS`. An edge nearer to
+/// it is haze above clouds, and sigma covers that.
 const OWN_AIR: f64 = 2.0;
 /// Number of places that are read inwards below that depth, one scale height apart. The airglow stands 11 to 13 scale
 /// heights above the ground.
@@ -38,9 +38,11 @@ const INWARDS: usize = 20;
 const MIN_RISE: f64 = 0.2;
 /// Fewest lines inwards.
 const LEAST_LINES: usize = 6;
-/// Smallest mean rise, in standard errors from the scatter between the lines. Clouds rise and fall at random: for twelve
-/// lines and the sixteen depths, one of a thousand pictures exceeds six by chance.
+/// Smallest mean rise, in standard errors from the scatter between the lines. Clouds rise and fall at random: with
+/// twelve lines and sixteen depths, one of a thousand pictures exceeds six by chance.
 const MIN_ERRORS: f64 = 6.0;
+/// Value of `select.max_glow` that turns the gate off.
+const OFF: f64 = 1e6;
 /// Number of depths at which the rise is measured.
 const DEPTHS: usize = INWARDS - 4;
 
@@ -126,7 +128,7 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>> Line<'a, 'b, T, P, O> {
 
 /// Returns whether the edge about (`e`, `c`) may belong to a glow: if the light above it, above the sky farther out, is
 /// more than `most` of the step from the sky to the body; or if there is another limb inside. `false` if the body's air
-/// is unknown, or if the picture shows too little of the sky.
+/// is unknown, or if the picture shows too little of the sky. `most` is `select.max_glow`.
 pub(super) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     c: T,
@@ -134,9 +136,9 @@ pub(super) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
     expected: &Expected<T>,
-    most: T,
+    most: f64,
 ) -> bool {
-    let Some(scales) = Scales::new(c, expected) else { return false };
+    let Some(scales) = Scales::new(c, expected).filter(|_| most < OFF) else { return false };
     let blur = T::from_f64(BLUR_PX);
     let dark = scales.sigma * T::from_f64(SIGMAS) + scales.scale_height * T::from_f64(SCALE_HEIGHTS);
     let (mut body, mut air, mut sky) = (Counts::new(), Counts::new(), Counts::new());
@@ -165,7 +167,7 @@ pub(super) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
     }
     let [body, air, sky] = [&body, &air, &sky].map(|all| T::from_i32(median::median_of_counts(all).into()));
     let step = (body - sky).max(T::one());
-    air - sky > step * most || has_inner_limb(&lines, step * T::from_f64(MIN_RISE))
+    air - sky > step * T::from_f64(most) || has_inner_limb(&lines, step * T::from_f64(MIN_RISE))
 }
 
 /// Returns whether the brightness rises by at least `least` counts at the same depth of all lines.
