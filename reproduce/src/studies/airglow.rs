@@ -14,7 +14,7 @@ use super::setup::{Effort, halton};
 use crate::fly::{Sensor, fly};
 use crate::section::Section;
 
-const PICTURES: usize = 12;
+const PICTURES: usize = 3;
 const ALTITUDE_KM: f64 = 400.0;
 const EARTH_KM: f64 = 6371.0;
 /// Brightness of the moonlit ground, as multiples of the brightest part of the airglow.

@@ -100,7 +100,7 @@ section! {
         /// A terminator fades; the rim of a flare does not.
         @- departure_contrast: f64 = 0.6, [0.0 to 1e6];
         /// Largest brightness high above the limb, as a part of the brightness step at the limb; 1e6 turns the gate
-        /// off, which also looks for another limb inside.
+        /// off.
         ///
         /// It is read three standard deviations of the limb height, 4.8 scale heights of the air and four pixels above
         /// the limb. Sunlit air leaves a fifteenth there in an sRGB picture. Airglow and aurora reach higher, and their

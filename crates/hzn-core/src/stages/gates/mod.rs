@@ -104,7 +104,8 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     };
     // Of a picture that came row by row, only lit and dark pixels are left.
     let looks = !P::STREAMED && verdict == Verdict::Passed;
-    let glows = looks && glow::is_likely(&fused.e, fused.c, blocks, binary, camera, expected, config.max_glow);
+    let most = T::from_f64(config.max_glow);
+    let glows = looks && glow::is_likely(&fused.e, fused.c, blocks, binary, camera, expected, most);
     Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support, glows }
 }
 
