@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use crate::machine::{has, root, target};
+use crate::python;
 use crate::steps::{self, Outcome, Trouble, cargo};
 
 /// The triple that the fuzzing program is built for. With a named target, build scripts are not instrumented.
@@ -22,6 +23,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign kill [RUNS]
        cargo xtask campaign long [PICTURES]
        cargo xtask campaign flips [TRIALS]
+       cargo xtask campaign packets [COUNT]
        cargo xtask campaign parts [FOLDER]
 
   fuzz  runs every target (or those that are named) under libFuzzer for N seconds (60); --keep adds the inputs with
@@ -29,6 +31,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   kill  kills RUNS (1000) runs of hzn at random moments and continues them
   long  processes PICTURES (100000) with hzn run, and ten times as many in one process
   flips flips TRIALS (20000) bits of pictures and of stored parameters, and sticks as many pictures
+  packets sends COUNT (1000000) telecommands to the flight software, most of them damaged
   parts writes the CycloneDX lists of parts (SBOM) of command, wheel and firmware into FOLDER (target/sbom), and runs
         cargo-deny if it is installed";
 
@@ -44,6 +47,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("kill") => kill(number(1000)?).map_err(Trouble::into_message),
         Some("long") => long(number(100_000)?).map_err(Trouble::into_message),
         Some("flips") => flips(number(20_000)?).map_err(Trouble::into_message),
+        Some("packets") => packets(number(1_000_000)?).map_err(Trouble::into_message),
         Some("parts") => parts(args.get(1).map_or("target/sbom", String::as_str)).map_err(Trouble::into_message),
         _ => Err(USAGE.to_owned()),
     };
@@ -76,6 +80,18 @@ fn flips(trials: u64) -> Outcome {
         .env("CARGO_PROFILE_DEV_OPT_LEVEL", "2")
         .env("HZN_FLIPS", &trials);
     steps::run(in_memory.args(["--", "--nocapture", "--include-ignored"]))
+}
+
+/// Sends telecommands with mixed damage to the flight software. A library of others writes them, in Python.
+pub(crate) fn packets(count: u64) -> Outcome {
+    let python = python::prepare_environment("tests", Path::new("tests/python/requirements.txt"))?;
+    let file = target().join("xtask").join("damaged_packets.bin");
+    fs::create_dir_all(target().join("xtask"))?;
+    let mut write = Command::new(python);
+    steps::run(write.arg("tests/python/damaged_packets.py").arg(&file).args([count.to_string(), "2027".into()]))?;
+    // The same call as that of all tests, so that nothing is built again.
+    let mut command = cargo(&["test", "--workspace", "--test", "flight"]);
+    steps::run(command.args(["--", "--nocapture", "--ignored", "damage::"]).env("HZN_PACKETS", file))
 }
 
 fn parts(folder: &str) -> Outcome {

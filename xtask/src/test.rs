@@ -8,7 +8,7 @@ use crate::demo::{demo_dir, find_recordings, run_demo};
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{self, Outcome, Steps, cargo};
 use crate::test_build::build_tests;
-use crate::{firmware, flight_build, python, viewer, wheel};
+use crate::{campaign, firmware, flight_build, python, viewer, wheel};
 
 pub(crate) fn run(only: &[String]) -> Result<(), String> {
     std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
@@ -108,5 +108,6 @@ fn read_files_with_other_readers() -> Outcome {
     steps::run(Command::new(&python).arg("tests/python/check_nav.py").args(programs).arg(folder))?;
     let folder = target().join("xtask").join("telemetry");
     let programs = ["debug/hzn", "debug/examples/telemetry_packets"].map(|program| target().join(program));
-    steps::run(Command::new(python).arg("tests/python/check_telemetry.py").args(programs).arg(folder))
+    steps::run(Command::new(python).arg("tests/python/check_telemetry.py").args(programs).arg(folder))?;
+    campaign::packets(100_000)
 }

@@ -17,10 +17,12 @@ use crate::packet::{self, HEADER, MAX_BYTES, Packet, SYNC};
 /// A pause of the line, which no sender makes inside a packet.
 const PAUSE_US: u64 = 100_000;
 /// Time from the marker of a packet to its end, after which it is given up: a line must carry [`MAX_BYTES`] in less.
-const COMPLETE_US: u64 = 1_000_000;
+/// With the pause that confirms a packet it is one second, so no telecommand waits longer for its answer.
+const COMPLETE_US: u64 = 900_000;
 /// Arrival times are kept in units of 2^14 µs, modulo 256: about four seconds.
 const TICK_LOG2: u32 = 14;
-const PAUSE_TICKS: u8 = (PAUSE_US >> TICK_LOG2) as u8 + 1;
+/// Rounded down, so that a pause is always noticed: from 82 ms on it may be one.
+const PAUSE_TICKS: u8 = (PAUSE_US >> TICK_LOG2) as u8;
 const COMPLETE_TICKS: u8 = (COMPLETE_US >> TICK_LOG2) as u8;
 
 /// The longest packet, and the bytes after it that may confirm its end.
@@ -104,6 +106,11 @@ impl Inbox {
     /// Returns whether the inbox waits for the rest of a packet, or for the confirmation of its end.
     pub fn is_waiting(&self) -> bool {
         self.start < self.end
+    }
+
+    /// Returns whether there is room for another byte.
+    pub fn has_room(&self) -> bool {
+        self.end - self.start < CAPACITY
     }
 
     /// Returns the work since the last call: the number of bytes that were examined, counted each time.

@@ -31,17 +31,24 @@ impl<B: Board> Flight<'_, B> {
     pub(super) fn listen(&mut self) {
         let now_us = self.board.now_us();
         self.buffers.inbox.reset_effort();
-        let (mut bytes, mut is_ready) = (0, false);
+        let (mut bytes, mut is_ready, mut is_done) = (0, false, false);
         while bytes < MAX_READ && self.buffers.inbox.effort() < MAX_EFFORT {
-            if is_ready && let Some(is_command) = self.handle_packet(now_us) {
-                if is_command {
-                    break;
-                }
+            if is_ready
+                && !is_done
+                && let Some(is_command) = self.handle_packet(now_us)
+            {
+                is_done = is_command;
                 continue;
+            }
+            // The bytes behind a telecommand are read too, because the time of their arrival shows the pauses.
+            if is_done && !self.buffers.inbox.has_room() {
+                break;
             }
             let Some(byte) = self.board.receive() else {
                 // Only now it is known whether the line pauses.
-                while self.buffers.inbox.effort() < MAX_EFFORT && self.handle_packet(now_us) == Some(false) {}
+                while !is_done && self.buffers.inbox.effort() < MAX_EFFORT {
+                    is_done = self.handle_packet(now_us) != Some(false);
+                }
                 break;
             };
             bytes += 1;

@@ -2,6 +2,7 @@
 
 mod bench;
 mod clock;
+mod damage;
 mod flips;
 mod line;
 mod navigation;
