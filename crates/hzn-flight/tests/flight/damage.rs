@@ -1,4 +1,4 @@
-//! A long stream of telecommands with mixed damage, which another program has written (tests/python/damaged_packets.py).
+//! A long stream of telecommands with mixed damage, written by another program: tests/python/damaged_packets.py.
 
 use std::collections::VecDeque;
 
