@@ -8,10 +8,10 @@ use hzn_sim::flight::rocket;
 use hzn_tests::emulated::Board;
 use hzn_tests::flight_image::{Bench, hzn_run};
 
-/// Returns commands that end the image. Those before them are lost: a start takes a telecommand or two with it.
+/// Returns commands that end the image. Those before them are lost: a start takes up to a thousand bytes with it.
 fn shut_down_after_starts(bench: &Bench) -> Vec<u8> {
     let mut args = vec!["telecommand", "-o", "commands.bin"];
-    args.extend(["ping"; 60]);
+    args.extend(["ping"; 400]);
     args.extend(["report", "arm", "mode shut-down"]);
     hzn_run(bench.dir(), &args);
     std::fs::read(bench.path("commands.bin")).unwrap()
