@@ -5,6 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::firmware;
 use crate::machine::{has, root, target};
 use crate::python;
 use crate::steps::{self, Outcome, Trouble, cargo};
@@ -24,6 +25,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign long [PICTURES]
        cargo xtask campaign flips [TRIALS]
        cargo xtask campaign packets [COUNT]
+       cargo xtask campaign paths
        cargo xtask campaign parts [FOLDER]
 
   fuzz  runs every target (or those that are named) under libFuzzer for N seconds (60); --keep adds the inputs with
@@ -32,6 +34,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   long  processes PICTURES (100000) with hzn run, and ten times as many in one process
   flips flips TRIALS (20000) bits of pictures and of stored parameters, and sticks as many pictures
   packets sends COUNT (1000000) telecommands to the flight software, most of them damaged
+  paths builds the images of the flight computer in another folder; their bytes must be the same
   parts writes the CycloneDX lists of parts (SBOM) of command, wheel and firmware into FOLDER (target/sbom), and runs
         cargo-deny if it is installed";
 
@@ -48,6 +51,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("long") => long(number(100_000)?).map_err(Trouble::into_message),
         Some("flips") => flips(number(20_000)?).map_err(Trouble::into_message),
         Some("packets") => packets(number(1_000_000)?).map_err(Trouble::into_message),
+        Some("paths") => firmware::is_the_same_elsewhere().map_err(Trouble::into_message),
         Some("parts") => parts(args.get(1).map_or("target/sbom", String::as_str)).map_err(Trouble::into_message),
         _ => Err(USAGE.to_owned()),
     };
@@ -90,7 +94,7 @@ pub(crate) fn packets(count: u64) -> Outcome {
     let mut write = Command::new(python);
     steps::run(write.arg("tests/python/damaged_packets.py").arg(&file).args([count.to_string(), "2027".into()]))?;
     // The same call as that of all tests, so that nothing is built again.
-    let mut command = cargo(&["test", "--workspace", "--test", "flight"]);
+    let mut command = cargo(&["test", "--test", "flight"]);
     steps::run(command.args(["--", "--nocapture", "--ignored", "damage::"]).env("HZN_PACKETS", file))
 }
 

@@ -49,15 +49,15 @@ impl Toolchain {
         Ok(Self::Debian)
     }
 
-    /// Returns `cargo build --release` (or another verb, for example `rustc`) for the target, and the folder that it
+    /// Returns `cargo build --profile flight` (or another verb, for example `rustc`) for the target, and the folder that it
     /// builds to. This folder is under `dir` of the target folder.
     pub(crate) fn cargo(self, verb: &str, dir: &str, args: &[&str]) -> (Command, PathBuf) {
         let dir = target().join(dir);
         let mut command = match self {
-            Self::Own => cargo(&[verb, "--release"]),
+            Self::Own => cargo(&[verb, "--profile", "flight"]),
             Self::Debian => {
                 let mut command = Command::new("/usr/bin/cargo");
-                command.args([verb, "--release", "--locked", "-Zbuild-std=core"]);
+                command.args([verb, "--profile", "flight", "--locked", "-Zbuild-std=core"]);
                 // RUSTC_BOOTSTRAP lets Debian's stable compiler build core from its own sources. The caller's flags and
                 // toolchain settings belong to another compiler, so they are removed.
                 command.env("RUSTC", "/usr/bin/rustc").env("RUSTC_BOOTSTRAP", "1").env_remove("RUSTUP_TOOLCHAIN");
@@ -66,7 +66,7 @@ impl Toolchain {
         };
         command.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
         command.args(["--target", TARGET, "--target-dir"]).arg(&dir).args(args);
-        (command, dir.join(TARGET).join("release"))
+        (command, dir.join(TARGET).join("flight"))
     }
 }
 

@@ -1,5 +1,5 @@
 //! The functions that the sensor calls once, or once per picture, but not once per point. They are compiled for size,
-//! the rest for speed (the profiles in `firmware/Cargo.toml`). The functions of hzn-core are generic, so they are
+//! the rest for speed (the profile `flight` in `Cargo.toml`). The functions of hzn-core are generic, so they are
 //! compiled with the settings of the crate that calls them.
 
 #![no_std]

@@ -9,8 +9,8 @@ use hzn_fuzz::supply::{PRODUCTS, sbom};
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: sbom FOLDER")?);
     std::fs::create_dir_all(&folder)?;
-    for (manifest, package) in PRODUCTS {
-        let list = sbom(manifest, package);
+    for package in PRODUCTS {
+        let list = sbom(package);
         let path = folder.join(format!("{package}.cdx.json"));
         std::fs::write(&path, serde_json::to_string_pretty(&list)? + "\n")?;
         println!("{}: {} parts", path.display(), list["components"].as_array().map_or(0, Vec::len));

@@ -7,9 +7,8 @@ use std::process::Command;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-/// The products: manifest of the workspace, and package.
-pub const PRODUCTS: &[(&str, &str)] =
-    &[("Cargo.toml", "hzn-cli"), ("Cargo.toml", "hzn-py"), ("firmware/Cargo.toml", "hzn-mps2")];
+/// The packages of the products.
+pub const PRODUCTS: &[&str] = &["hzn-cli", "hzn-py", "hzn-mps2"];
 
 /// Packages for other systems are left out, because cargo would have to fetch them.
 const PLATFORM: &str = "x86_64-unknown-linux-gnu";
@@ -97,9 +96,9 @@ pub fn packages(manifest: &str) -> Vec<Package> {
 ///
 /// # Panics
 /// The package does not exist, or cargo cannot read the manifest and its lock file.
-pub fn sbom(manifest: &str, package: &str) -> Value {
-    let Metadata { packages, resolve } = metadata(manifest);
-    let lock = std::fs::read_to_string(root().join(manifest).with_file_name("Cargo.lock")).expect("a lock file");
+pub fn sbom(package: &str) -> Value {
+    let Metadata { packages, resolve } = metadata("Cargo.toml");
+    let lock = std::fs::read_to_string(root().join("Cargo.lock")).expect("a lock file");
     let lock: Lock = toml::from_str(&lock).expect("a valid lock file");
     let checksums: BTreeMap<(&str, &str), &str> = lock
         .package
