@@ -7,8 +7,8 @@ use std::process::{Command, Stdio};
 
 use crate::firmware;
 use crate::machine::{has, root, target};
-use crate::python;
 use crate::steps::{self, Outcome, Trouble, cargo};
+use crate::{processors, python};
 
 /// The triple that the fuzzing program is built for. With a named target, build scripts are not instrumented.
 const HOST: &str = "x86_64-unknown-linux-gnu";
@@ -26,6 +26,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign flips [TRIALS]
        cargo xtask campaign packets [COUNT]
        cargo xtask campaign paths
+       cargo xtask campaign processors [PICTURES]
        cargo xtask campaign parts [FOLDER]
 
   fuzz  runs every target (or those that are named) under libFuzzer for N seconds (60); --keep adds the inputs with
@@ -35,6 +36,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   flips flips TRIALS (20000) bits of pictures and of stored parameters, and sticks as many pictures
   packets sends COUNT (1000000) telecommands to the flight software, most of them damaged
   paths builds the images of the flight computer in another folder; their bytes must be the same
+  processors
+        compares the answers to PICTURES (2000) on aarch64 and big-endian powerpc64, in QEMU, with those of this machine
   parts writes the CycloneDX lists of parts (SBOM) of command, wheel and firmware into FOLDER (target/sbom), and runs
         cargo-deny if it is installed";
 
@@ -51,6 +54,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("long") => long(number(100_000)?).map_err(Trouble::into_message),
         Some("flips") => flips(number(20_000)?).map_err(Trouble::into_message),
         Some("packets") => packets(number(1_000_000)?).map_err(Trouble::into_message),
+        Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
         Some("paths") => firmware::is_the_same_elsewhere().map_err(Trouble::into_message),
         Some("parts") => parts(args.get(1).map_or("target/sbom", String::as_str)).map_err(Trouble::into_message),
         _ => Err(USAGE.to_owned()),

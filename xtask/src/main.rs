@@ -19,6 +19,7 @@ mod demo;
 mod firmware;
 mod flight_build;
 mod machine;
+mod processors;
 mod python;
 mod reproduce;
 mod soft_double;

@@ -17,7 +17,9 @@ from conftest import CAMERA, PARAMETERS, limb
 
 EXPECTED = (TypeError, ValueError, OverflowError)
 SENSOR = hzn.Sensor(**PARAMETERS)
-SMALL = hzn.Sensor(camera=dict(CAMERA, width=24, height=16, fx_px=20.0, fy_px=20.0, cx_px=11.5, cy_px=7.5), body=PARAMETERS["body"])
+SMALL = hzn.Sensor(
+    camera=dict(CAMERA, width=24, height=16, fx_px=20.0, fy_px=20.0, cx_px=11.5, cy_px=7.5), body=PARAMETERS["body"]
+)
 MANY = settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
 
 numbers = st.one_of(
@@ -28,17 +30,29 @@ numbers = st.one_of(
 things = st.one_of(st.none(), st.booleans(), numbers, st.text(max_size=5), st.binary(max_size=5))
 vectors = st.one_of(
     st.lists(numbers, max_size=6),
-    arrays.arrays(st.sampled_from([np.float64, np.float32, np.int32]), arrays.array_shapes(min_dims=0, max_dims=2, min_side=0, max_side=5)),
+    arrays.arrays(
+        st.sampled_from([np.float64, np.float32, np.int32]),
+        arrays.array_shapes(min_dims=0, max_dims=2, min_side=0, max_side=5),
+    ),
     things,
 )
-values = st.recursive(st.one_of(things, vectors), lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3))
+values = st.recursive(
+    st.one_of(things, vectors),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
+)
 
 
 @st.composite
 def pictures(draw, height=16, width=24):
     """Draw an array: any type and shape, or pixels of the right shape seen through any strides."""
     if draw(st.booleans()):
-        dtype = st.one_of(arrays.integer_dtypes(), arrays.unsigned_integer_dtypes(), arrays.floating_dtypes(), st.just(np.dtype(bool)), st.just(np.dtype("O")))
+        dtype = st.one_of(
+            arrays.integer_dtypes(),
+            arrays.unsigned_integer_dtypes(),
+            arrays.floating_dtypes(),
+            st.just(np.dtype(bool)),
+            st.just(np.dtype("O")),
+        )
         shape = arrays.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=30)
         return np.zeros(draw(shape), draw(dtype))
     channels = draw(st.sampled_from([(), (1,), (3,), (4,)]))
@@ -51,7 +65,20 @@ def pictures(draw, height=16, width=24):
     return pixels[tuple(slice(None, None, step) for step in steps)]
 
 
-PRIOR = ["altitude_km", "position_km", "attitude", "attitude_sigma_deg", "rate_rad_s", "range_km", "range_sigma_km", "pole", "sun", "time_s", "bits", "detail"]
+PRIOR = [
+    "altitude_km",
+    "position_km",
+    "attitude",
+    "attitude_sigma_deg",
+    "rate_rad_s",
+    "range_km",
+    "range_sigma_km",
+    "pole",
+    "sun",
+    "time_s",
+    "bits",
+    "detail",
+]
 
 
 def check(report):
@@ -177,7 +204,16 @@ def test_stages(first, second, number):
 def test_navigation(arguments, scalars):
     a, b, c = arguments
     x, y = scalars
-    nav = hzn.nav.Filter(0.0, np.eye(3), np.zeros(3), [7e6, 0.0, 0.0], mounts=[np.eye(3)], attitude_sigma_rad=0.1, velocity_sigma=1.0, position_sigma=100.0)
+    nav = hzn.nav.Filter(
+        0.0,
+        np.eye(3),
+        np.zeros(3),
+        [7e6, 0.0, 0.0],
+        mounts=[np.eye(3)],
+        attitude_sigma_rad=0.1,
+        velocity_sigma=1.0,
+        position_sigma=100.0,
+    )
     calls = [
         lambda: hzn.nav.triad((a, b), (b, c)),
         lambda: hzn.nav.wahba(a, b, c),
