@@ -252,9 +252,9 @@ fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
         bench.write_parameter_copy(1, &rocket(640, 480, 1, 1).sensor, 1);
         let hangs = [*b"HANG", [0; 4], [0; 4], [0; 4]].concat();
         std::fs::write(bench.path("frames.bin"), hangs).unwrap();
-        // Commands that were received before the reset are lost with it.
+        // Up to a thousand bytes that were received before the reset are lost with it.
         let mut args = vec!["telecommand", "-o", "commands.bin", "process-once"];
-        args.extend(["arm", "mode shut-down"].repeat(8));
+        args.extend(["arm", "mode shut-down"].repeat(80));
         hzn_run(bench.dir(), &args);
         let line = std::fs::read(bench.path("commands.bin")).unwrap();
         // The watchdog's two seconds are 125 million instructions at this shift. With fewer, a busy machine might feed
