@@ -14,6 +14,7 @@ pub(super) enum Purpose {
     Picture,
     Video,
     Table,
+    Plots,
     Rerun,
 }
 
@@ -26,6 +27,7 @@ impl Purpose {
             Self::Picture => "Save picture with overlays",
             Self::Video => "Save video with overlays",
             Self::Table => "Save results",
+            Self::Plots => "Save plots",
             Self::Rerun => "Run all pictures into a new recording",
         }
     }
@@ -37,6 +39,7 @@ impl Purpose {
             Self::Picture => "PNG in the picture's own size",
             Self::Video => "The ending sets the format: .mp4, .mkv, .webm; needs ffmpeg on PATH",
             Self::Table => ".csv or .jsonl, with the results that are shown",
+            Self::Plots => "SVG of the plots over time that are chosen below the picture",
             Self::Rerun => ".mcap with the current parameters",
         }
     }

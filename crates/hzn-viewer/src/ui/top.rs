@@ -155,4 +155,5 @@ fn export_menu(viewer: &mut Viewer, ui: &mut Ui) {
     };
     ask(ui, "Save video with overlays…", has_sensor && has_frames, Purpose::Video, &format!("{stem}.mp4"));
     ask(ui, "Save results as CSV…", has_frames, Purpose::Table, &format!("{stem}-viewed.csv"));
+    ask(ui, "Save plots as SVG…", has_frames, Purpose::Plots, &format!("{stem}-plots.svg"));
 }

@@ -11,6 +11,7 @@ mod implied;
 pub mod job;
 pub mod open;
 pub mod paint;
+pub mod plots;
 mod reader;
 pub mod residuals;
 mod sequence_source;

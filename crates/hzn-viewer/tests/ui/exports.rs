@@ -73,6 +73,24 @@ fn the_table_holds_what_is_shown() {
 }
 
 #[test]
+fn the_plots_are_saved_as_they_are_chosen() {
+    let (dir, pictures) = folder();
+    let mut window = window_on(&pictures);
+    until(&mut window, "not processed", |v| v.processed() == 4);
+    let svg = dir.path().join("flight.svg");
+    menu(&mut window, "Export", "Save plots as SVG…");
+    path(&mut window, &svg, "Write");
+    said(&mut window, "Written");
+    let text = std::fs::read_to_string(&svg).unwrap();
+    assert!(text.contains("3 sigma [°]") && text.contains("RMS [px]") && !text.contains("Half-angle"), "{text}");
+    assert!(text.contains("pictures, 4 frames") && text.contains("<polyline"), "{text}");
+
+    menu(&mut window, "Export", "Save plots as SVG…");
+    path(&mut window, &dir.path().join("flight.pdf"), "Write");
+    said(&mut window, "must end in .svg");
+}
+
+#[test]
 fn the_video_shows_every_frame_or_nothing_is_left() {
     if std::process::Command::new("ffmpeg").arg("-version").output().is_err() {
         eprintln!("skipped: there is no ffmpeg");

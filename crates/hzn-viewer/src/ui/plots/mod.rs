@@ -4,6 +4,7 @@ mod axis;
 mod frame;
 mod over_time;
 mod residuals;
+mod sheet;
 
 use egui::{RichText, ScrollArea, Ui};
 
@@ -11,6 +12,7 @@ use super::viewer::Viewer;
 use crate::model::quantity::QUANTITIES;
 use over_time::TimeAxis;
 pub(super) use residuals::RESIDUALS;
+pub(super) use sheet::sheet;
 
 /// Height of the row of labels below the plots.
 const RULER: f32 = 24.0;

@@ -49,11 +49,15 @@ impl TimeAxis {
             None => Self { places: (1..=entries.len()).map(|i| Some(i as f64)).collect(), unit: "" },
         }
     }
-    fn place(&self, index: usize) -> Option<f64> {
+    /// Returns the label of the axis.
+    pub(super) fn label(&self) -> &'static str {
+        if self.unit.is_empty() { "frame" } else { "time since the first frame, s" }
+    }
+    pub(super) fn place(&self, index: usize) -> Option<f64> {
         self.places.get(index).copied().flatten()
     }
     /// Returns the first and the last place.
-    fn ends(&self) -> [f64; 2] {
+    pub(super) fn ends(&self) -> [f64; 2] {
         let mut known = self.places.iter().flatten().copied();
         let first = known.next().unwrap_or(0.0);
         let last = known.next_back().unwrap_or(first);
@@ -164,28 +168,34 @@ fn draw(ui: &mut PlotUi<'_>, name: &str, part: Vec<[f64; 2]>, colour: Color32, s
     ui.line(if source == Source::Other { line.style(LineStyle::dashed_loose()) } else { line });
 }
 
-/// Shades the pictures without an answer. Neighbours are shaded together.
+/// Shades the pictures without an answer.
 fn shade_refused(viewer: &Viewer, ui: &mut PlotUi<'_>, axis: &TimeAxis, dark: bool) {
     let colour = theme::status(Status::Rejected).gamma_multiply(if dark { 0.16 } else { 0.22 });
+    for [from, to] in refused(viewer, axis) {
+        ui.span(Span::new("", from..=to).fill(colour));
+    }
+}
+
+/// Returns from where to where pictures have no answer. Neighbours are joined.
+pub(super) fn refused(viewer: &Viewer, axis: &TimeAxis) -> Vec<[f64; 2]> {
     let is_refused = |i: usize| viewer.rows.newest(i, viewer.body).is_some_and(|r| r.status != Status::Ok);
     let count = viewer.sequence.len();
     // A picture reaches halfway to its neighbours.
     let middle = |a: usize, b: usize| Some((axis.place(a)? + axis.place(b)?) / 2.0);
-    let mut i = 0;
+    let (mut out, mut i) = (Vec::new(), 0);
     while i < count {
         let end = (i..count).find(|&k| !is_refused(k)).unwrap_or(count);
         if end > i {
             let from = if i == 0 { axis.place(0) } else { middle(i - 1, i) };
             let to = if end == count { axis.place(end - 1) } else { middle(end - 1, end) };
-            if let (Some(from), Some(to)) = (from, to) {
-                ui.span(Span::new("", from..=to).fill(colour));
-            }
+            out.extend(from.zip(to).map(|(from, to)| [from, to]));
         }
         i = end + 1;
     }
+    out
 }
 
-fn title(quantity: &Quantity) -> String {
+pub(super) fn title(quantity: &Quantity) -> String {
     if quantity.unit.is_empty() { quantity.name.to_owned() } else { format!("{} [{}]", quantity.name, quantity.unit) }
 }
 

@@ -180,6 +180,7 @@ impl Viewer {
             Purpose::Picture => self.export_picture(path),
             Purpose::Video => self.export_video(path),
             Purpose::Table => self.export_table(path),
+            Purpose::Plots => self.export_plots(path),
             Purpose::Rerun => self.run_into(path),
         }
     }

@@ -7,6 +7,7 @@ use super::Viewer;
 use crate::model::settings::Layer;
 use crate::work::export::{self, Video};
 use crate::work::job::{Done, Job, JobError, Progress};
+use crate::work::plots;
 use crate::work::sweep::{self, Sweep};
 
 impl Viewer {
@@ -46,6 +47,12 @@ impl Viewer {
     pub(in crate::ui) fn export_table(&mut self, path: PathBuf) {
         let rows: Vec<_> = self.rows.all().cloned().collect();
         self.start_job("Saving results", move |progress| export::save_table(&rows, &path, progress));
+    }
+
+    /// Saves the chosen plots over time.
+    pub(in crate::ui) fn export_plots(&mut self, path: PathBuf) {
+        let sheet = crate::ui::plots::sheet(self);
+        self.start_job("Saving the plots", move |_| plots::save(&sheet, &path));
     }
 
     /// Saves all pictures with their overlays as a video.
