@@ -48,11 +48,18 @@ impl<'a> Thinned<'a> {
             room.copy_from_slice(passed);
             self.len += passed.len();
             self.total += passed.len() as u32;
-        } else {
-            for &p in passed {
-                self.push(p);
-            }
+            return;
         }
+        let mut rest = passed;
+        while let Some((&p, after)) = rest.get(self.wait as usize..).and_then(<[_]>::split_first) {
+            self.total += self.wait;
+            self.wait = 0;
+            self.push(p);
+            rest = after;
+        }
+        // All that is left is skipped.
+        self.wait -= rest.len() as u32;
+        self.total += rest.len() as u32;
     }
 
     #[cold]

@@ -25,7 +25,7 @@ use crate::model::verdict::Verdict;
 use crate::stages::contour::BinaryPicture;
 use crate::stages::covariance::Fused;
 use crate::stages::fit::{self, Fit};
-use places::inliers;
+use places::{Places, along_limb, inliers};
 use size::{disc_px, is_possible_size, lit_share, min_arc, min_support, sin_for_points};
 
 pub use config::Config;
@@ -60,7 +60,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     camera: &Camera<T>,
     config: &Config,
 ) -> Judged<T> {
-    let limb_px = inliers(blocks, 1)
+    let limb_px = inliers(blocks, fit.inliers, 1)
         .next()
         .map_or(T::ZERO, |(b, l)| view::limb_in_view(&fused.e, fused.c, &b.ray(l), camera, binary.region));
     let covered_px = view::covered(&fused.e, blocks);
@@ -73,6 +73,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         .min(small_disc_points(sin_for_points(fused, expected), camera, 3))
         .min(small_picture_points(camera, 3));
     let counts = |n: u32| T::from_i32(n as i32);
+    let mut places = Places::new();
     let verdict = if counts(fit.inliers) < counts(points) * T::from_f64(config.min_inlier_share) {
         Verdict::NoConsensus
     } else if fit.inliers < u32::from(least) {
@@ -92,7 +93,8 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     {
         Verdict::Indistinct
     } else {
-        judge_surroundings(fused, expected, blocks, binary, camera, config)
+        places = along_limb(&fused.e, blocks, fit.inliers, camera);
+        judge_surroundings(fused, expected, blocks, &places, binary, camera, config)
     };
     let verdict = match verdict {
         Verdict::Passed => attitude::verdict(&fused.e, sigma_max_rad, expected, config),
@@ -105,7 +107,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     // Of a picture that came row by row, only lit and dark pixels are left.
     let looks = !P::STREAMED && verdict == Verdict::Passed;
     let most = T::from_f64(config.max_glow);
-    let glows = looks && glow::is_likely(&fused.e, fused.c, blocks, binary, camera, expected, most);
+    let glows = looks && glow::is_likely(&places, fused.c, binary, expected, most);
     Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support, glows }
 }
 
@@ -120,6 +122,7 @@ fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     fused: &Fused<T>,
     expected: &Expected<T>,
     blocks: &[Block<T>],
+    places: &Places<T>,
     binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
@@ -129,7 +132,7 @@ fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     } else {
         binary.level
     };
-    let sky = sky::measure_sky(&fused.e, blocks, binary, camera, lit_from);
+    let sky = sky::measure_sky(places, binary, lit_from);
     if sky.lit > T::from_f64(config.max_lit_sky) {
         return Verdict::NoSky;
     }
@@ -142,7 +145,7 @@ fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     let wide = disc_px > T::from_i32(camera.width().min(camera.height()).into());
     let looks = !P::STREAMED && config.max_band < 1.0 && wide;
     let step = T::from_f64(config.band_step);
-    if looks && band::banded(&fused.e, blocks, binary, camera, &sky, disc_px, step) >= T::from_f64(config.max_band) {
+    if looks && band::banded(places, binary, &sky, disc_px, step) >= T::from_f64(config.max_band) {
         return Verdict::Band;
     }
     Verdict::Passed
@@ -211,7 +214,7 @@ fn judge_rivals<T: Real, P: Pixels, O: Observer<T>>(
     }
     if !P::STREAMED
         && fit.inliers < points
-        && departure::departs(blocks, points, &curve, noise, support, binary, camera, expected, config)
+        && departure::departs(blocks, [points, fit.inliers], &curve, noise, support, binary, camera, expected, config)
     {
         return Verdict::Departure;
     }
