@@ -205,5 +205,10 @@ pub(crate) fn exp_neg<T: Real>(lanes: &[T; LANES]) -> [T; LANES] {
     if lanes.iter().any(|&x| !(x <= T::EXP_SERIES)) {
         return lanes.map(T::exp_neg);
     }
-    lanes.map(T::exp_neg_series)
+    // A loop: on a flight computer, `map` would not be unrolled.
+    let mut out = [T::ZERO; LANES];
+    for l in 0..LANES {
+        out[l] = lanes[l].exp_neg_series();
+    }
+    out
 }
