@@ -128,8 +128,8 @@ pub(super) fn is_clear<T: Real, P: Pixels, O: Observer<T>>(
     region.is_inside_by(p.x, p.y, margin) && (!region.has_mask() || binary.clearance(p.x, p.y, margin) == margin)
 }
 
-/// Returns whether there is no mask and the line through a pixel in the direction (dx, dy), with a pixel to each side, is
-/// in the region up to `margin` pixels away.
+/// Returns whether there is no mask and the line through a pixel in the direction (dx, dy), with a pixel to each side,
+/// is in the region up to `margin` pixels away.
 #[inline(always)]
 fn is_line_clear<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
