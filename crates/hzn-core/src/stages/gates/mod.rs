@@ -93,8 +93,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     {
         Verdict::Indistinct
     } else {
-        places = along_limb(&fused.e, blocks, fit.inliers, camera);
-        judge_surroundings(fused, expected, blocks, &places, binary, camera, config)
+        judge_surroundings(fit, fused, expected, blocks, &mut places, binary, camera, config)
     };
     let verdict = match verdict {
         Verdict::Passed => attitude::verdict(&fused.e, sigma_max_rad, expected, config),
@@ -106,8 +105,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     };
     // Of a picture that came row by row, only lit and dark pixels are left.
     let looks = !P::STREAMED && verdict == Verdict::Passed;
-    let most = T::from_f64(config.max_glow);
-    let glows = looks && glow::is_likely(&places, fused.c, binary, expected, most);
+    let glows = looks && glow::is_likely(&places, fused.c, binary, expected, T::from_f64(config.max_glow));
     Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support, glows }
 }
 
@@ -117,12 +115,14 @@ fn is_by_chance<T: Real>(fit: &Fit<T>, points: u32, covered_px: T, config: &Conf
     !whole && fit.arc_px > covered_px * T::from_f64(config.max_way)
 }
 
-/// Tests whether the sky is beyond the fitted limb and the body is inside it.
+/// Tests whether the sky is beyond the fitted limb and the body is inside it. The function fills `places` with the
+/// places from which it looks.
 fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
+    fit: &Fit<T>,
     fused: &Fused<T>,
     expected: &Expected<T>,
     blocks: &[Block<T>],
-    places: &Places<T>,
+    places: &mut Places<T>,
     binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
@@ -132,6 +132,7 @@ fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     } else {
         binary.level
     };
+    *places = along_limb(&fused.e, blocks, fit.inliers, camera);
     let sky = sky::measure_sky(places, binary, lit_from);
     if sky.lit > T::from_f64(config.max_lit_sky) {
         return Verdict::NoSky;
