@@ -172,6 +172,25 @@ impl<T: Real> Block<T> {
     }
 }
 
+/// Returns every `every`-th point that has a weight, from the middle of the first stretch on: its number, its block and
+/// its lane. A loop should use `for_each`, which compiles to two plain loops.
+pub(crate) fn every_weighted<T: Real>(
+    blocks: &[Block<T>],
+    every: usize,
+) -> impl Iterator<Item = (usize, &Block<T>, usize)> {
+    let every = every.max(1);
+    let mut to_pass = every / 2;
+    let points = blocks.iter().enumerate().flat_map(|(n, b)| (0..LANES).map(move |l| (n * LANES + l, b, l)));
+    points.filter(move |(_, block, lane)| {
+        if !(block.weight[lane & 7] > T::ZERO) {
+            return false;
+        }
+        let is_chosen = to_pass == 0;
+        to_pass = if is_chosen { every - 1 } else { to_pass - 1 };
+        is_chosen
+    })
+}
+
 /// Adds the lanes in a fixed order.
 #[inline(always)]
 pub(crate) fn sum<T: Real>(lanes: &[T; LANES]) -> T {
@@ -186,5 +205,10 @@ pub(crate) fn exp_neg<T: Real>(lanes: &[T; LANES]) -> [T; LANES] {
     if lanes.iter().any(|&x| !(x <= T::EXP_SERIES)) {
         return lanes.map(T::exp_neg);
     }
-    lanes.map(T::exp_neg_series)
+    // A loop: on a flight computer, `map` would not be unrolled.
+    let mut out = [T::ZERO; LANES];
+    for l in 0..LANES {
+        out[l] = lanes[l].exp_neg_series();
+    }
+    out
 }

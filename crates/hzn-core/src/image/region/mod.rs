@@ -200,14 +200,20 @@ impl<T: Real> Region<T> {
     /// Returns whether every pixel up to `margin` away in x and y is in the region. Polygons are not tested.
     #[inline(always)]
     pub(crate) fn is_inside_by(&self, x: u16, y: u16, margin: u16) -> bool {
+        self.is_inside_by_each(x, y, [margin; 2])
+    }
+
+    /// Does the same as [`Self::is_inside_by`], with a margin in x and another in y.
+    #[inline(always)]
+    pub(crate) fn is_inside_by_each(&self, x: u16, y: u16, margins: [u16; 2]) -> bool {
         let (w, h) = (u32::from(self.width), u32::from(self.height));
-        let (x32, y32, m) = (u32::from(x), u32::from(y), u32::from(margin));
-        let side = m + u32::from(self.frame);
-        x32 >= side
-            && y32 >= side
-            && x32 + side < w
-            && y32 + side < h
-            && self.circle.as_ref().is_none_or(|c| c.clear(x, y, T::from_i32(i32::from(margin))))
+        let (x32, y32) = (u32::from(x), u32::from(y));
+        let [across, down] = margins.map(|m| u32::from(m) + u32::from(self.frame));
+        x32 >= across
+            && y32 >= down
+            && x32 + across < w
+            && y32 + down < h
+            && self.circle.as_ref().is_none_or(|c| c.clear(x, y, margins.map(|m| T::from_i32(i32::from(m)))))
     }
 
     /// Returns the number of pixels, up to `most`, that can be walked from here in any direction without leaving the
@@ -223,7 +229,7 @@ impl<T: Real> Region<T> {
         let most = most.min(sides);
         let mut clear = |n: u16| {
             let margin = T::from_i32(i32::from(n));
-            self.circle.as_ref().is_none_or(|c| c.clear(x, y, margin))
+            self.circle.as_ref().is_none_or(|c| c.clear(x, y, [margin; 2]))
                 && (!self.has_mask() || self.is_unmasked_by(x, y, margin, cost))
         };
         [most, most / 4].into_iter().find(|&n| clear(n)).unwrap_or(0)
@@ -311,13 +317,13 @@ impl<T: Real> Circle<T> {
     }
     #[inline(always)]
     fn contains(&self, x: u16, y: u16) -> bool {
-        self.clear(x, y, T::ZERO)
+        self.clear(x, y, [T::ZERO; 2])
     }
-    /// Returns whether the square of `margin` pixels to each side lies within the circle.
+    /// Returns whether the rectangle of these margins to each side, in x and y, lies within the circle.
     #[inline(always)]
-    fn clear(&self, x: u16, y: u16, margin: T) -> bool {
-        let dx = ((T::from_i32(i32::from(x)) - self.cx).abs() + margin) * self.inv_x;
-        let dy = ((T::from_i32(i32::from(y)) - self.cy).abs() + margin) * self.inv_y;
+    fn clear(&self, x: u16, y: u16, margins: [T; 2]) -> bool {
+        let dx = ((T::from_i32(i32::from(x)) - self.cx).abs() + margins[0]) * self.inv_x;
+        let dy = ((T::from_i32(i32::from(y)) - self.cy).abs() + margins[1]) * self.inv_y;
         dx * dx + dy * dy <= T::one()
     }
     /// Returns whether the square of `margin` pixels to each side lies outside the circle.

@@ -211,8 +211,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let certain = !expected.free
             && judged.support > T::from_f64(config.select.certain_support)
             && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
-        let next =
-            (self.needs_next_threshold && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));
+        let next = (self.needs_next_threshold && !P::STREAMED)
+            .then(|| gates::middle_level(&fused.e, blocks, fit.inliers, binary, camera));
         Some(Best { solution, outcome: *outcome, judged, certain, level: next.flatten() })
     }
 

@@ -187,7 +187,10 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
             let free = self.free_steps(walk.at, start, marks).min(*steps);
             if free > 0 {
                 *steps = steps.saturating_sub(free + work::RUN + self.cost());
-                self.run(&mut walk, free as usize, edge);
+                match edge.places(free as usize) {
+                    Some(places) => self.run(&mut walk, places),
+                    None => self.run_thinned(&mut walk, free as usize, edge),
+                }
                 continue;
             }
             if *steps == 0 {
@@ -233,14 +236,22 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         u32::from(self.clearance(here.x, here.y, most + 1).saturating_sub(1))
     }
 
-    /// Does `n` free steps, at most [`RUN`].
+    /// Does `n` free steps, at most [`RUN`], if not every pixel is stored.
     #[inline(never)]
-    fn run(&self, walk: &mut Walk, n: usize, edge: &mut Thinned<'_>) {
+    fn run_thinned(&self, walk: &mut Walk, n: usize, edge: &mut Thinned<'_>) {
         let mut passed = [Pixel::default(); RUN];
+        let passed = passed.get_mut(..n).unwrap_or_default();
+        self.run(walk, passed);
+        edge.extend(passed);
+    }
+
+    /// Does as many free steps as there are places, and stores the pixels that are passed.
+    #[inline(never)]
+    fn run(&self, walk: &mut Walk, passed: &mut [Pixel]) {
         // The area of a run fits 32 bits.
         let (mut at, mut index, mut twice_area) = (word(walk.at), walk.index, 0i32);
         let mut last = &self.moves[usize::from((walk.back + 4) & 7)];
-        for slot in passed.iter_mut().take(n) {
+        for slot in passed {
             *slot = pixel(at);
             let first = usize::from(last.first & 7);
             for turn in self.moves.get(first..first + 8).unwrap_or_default() {
@@ -254,7 +265,6 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
                 }
             }
         }
-        edge.extend(passed.get(..n).unwrap_or_default());
         let twice_area = walk.twice_area + i64::from(twice_area);
         *walk = Walk { at: pixel(at), index, back: (last.direction + 4) & 7, twice_area };
     }

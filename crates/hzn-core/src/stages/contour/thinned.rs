@@ -39,20 +39,30 @@ impl<'a> Thinned<'a> {
         self.wait = self.stride - 1;
     }
 
-    /// Adds several pixels.
+    /// Returns the places of the next `n` pixels, which the caller must write; `None` if not all of them are stored.
     #[inline]
-    pub(crate) fn extend(&mut self, passed: &[Pixel]) {
-        if self.stride == 1
-            && let Some(room) = self.buffer.get_mut(self.len..self.len + passed.len())
-        {
-            room.copy_from_slice(passed);
-            self.len += passed.len();
-            self.total += passed.len() as u32;
-        } else {
-            for &p in passed {
-                self.push(p);
-            }
+    pub(crate) fn places(&mut self, n: usize) -> Option<&mut [Pixel]> {
+        if self.stride > 1 {
+            return None;
         }
+        let places = self.buffer.get_mut(self.len..self.len + n)?;
+        self.len += n;
+        self.total += n as u32;
+        Some(places)
+    }
+
+    /// Adds several pixels.
+    pub(crate) fn extend(&mut self, passed: &[Pixel]) {
+        let mut rest = passed;
+        while let Some((&p, after)) = rest.get(self.wait as usize..).and_then(<[_]>::split_first) {
+            self.total += self.wait;
+            self.wait = 0;
+            self.push(p);
+            rest = after;
+        }
+        // All that is left is skipped.
+        self.wait -= rest.len() as u32;
+        self.total += rest.len() as u32;
     }
 
     #[cold]
@@ -120,7 +130,10 @@ mod tests {
             let mut buffer = [Pixel::default(); 8];
             let mut t = Thinned::new(&mut buffer);
             let all: Vec<Pixel> = (0..n).map(|x| Pixel { x, y: 0 }).collect();
-            all.chunks(3).for_each(|three| t.extend(three));
+            all.chunks(3).for_each(|three| match t.places(three.len()) {
+                Some(places) => places.copy_from_slice(three),
+                None => t.extend(three),
+            });
             let got: Vec<u16> = t.pixels().iter().map(|p| p.x).collect();
             assert_eq!((got, t.total()), (want, u32::from(n)), "by threes, n {n}");
         }

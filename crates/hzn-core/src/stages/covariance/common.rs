@@ -23,7 +23,7 @@ use super::noise::EdgeNoiseModel;
 use super::sandwich::response;
 use crate::base::linalg::{M3, V3, basis};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, LANES};
+use crate::geometry::block::{Block, every_weighted};
 use crate::geometry::camera::{Camera, INTRINSICS};
 use crate::model::body::Expected;
 use crate::model::error_budget::Term;
@@ -104,11 +104,7 @@ impl<T: Real> Row<T> {
 pub(super) fn part<'a, T: Real>(blocks: &'a [Block<T>], fit: &'a Fit<T>) -> impl Iterator<Item = Row<T>> + 'a {
     let (b1, b2) = basis(&fit.e);
     let [m1, m2] = fit.mean;
-    let points = blocks.iter().flat_map(|block| (0..LANES).map(move |l| (block, l))).enumerate();
-    let carrying = points.filter(|(_, (block, l))| block.weight[l & 7] > T::ZERO);
-    // The points are in the middle of each stretch.
-    let every = (fit.inliers as usize).div_ceil(PART).max(1);
-    carrying.skip(every / 2).step_by(every).map(move |(place, (block, l))| {
+    every_weighted(blocks, (fit.inliers as usize).div_ceil(PART)).map(move |(place, block, l)| {
         let s = block.ray(l);
         let [gu, gv] = block.gradient_at(l, &fit.e);
         let g2 = (gu * gu + gv * gv).max(T::from_f64(1e-20));
@@ -147,7 +143,7 @@ impl<T: Real> Sums<T> {
             lens: [zero; INTRINSICS],
         };
         let is_uncertain = camera.intrinsic_modes().is_some();
-        for row in part(blocks, fit) {
+        part(blocks, fit).for_each(|row| {
             let Row { s, gradient: [gu, gv], h, weight, place, x, y, .. } = row;
             row.add_to(&mut sums.normal);
             let shift = row.shift();
@@ -168,7 +164,7 @@ impl<T: Real> Sums<T> {
                     *sum += h * (gu * du + gv * dv);
                 }
             }
-        }
+        });
         sums
     }
 

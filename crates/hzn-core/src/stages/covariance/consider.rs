@@ -45,7 +45,7 @@ impl<T: Real> Sensitivity<T> {
         let to_body = target.body_to_cam.transpose();
         let mut normal = [T::ZERO; 6];
         let (mut limb, mut rotation, mut axes, mut light) = (zero, [zero; 3], [zero; 3], [zero; 2]);
-        for row in part(blocks, fit) {
+        part(blocks, fit).for_each(|row| {
             row.add_to(&mut normal);
             let per = T::one() / (row.x * row.x + row.y * row.y).max(T::from_f64(1e-20)).sqrt();
             let outward = (b1 * row.x + b2 * row.y) * (per * fit.c) - fit.e * sin;
@@ -62,7 +62,7 @@ impl<T: Real> Sensitivity<T> {
                 rotation[i] += h * turn[i];
                 axes[i] += h * (n[i] * q[i] / target.semi_axes[i]);
             }
-        }
+        });
         let response: M3<T> = response(&fit.sums.with_normal(normal), fit.mean, true)?;
         let error = |sum: V3<T>| response * sum;
         Some(Self {

@@ -27,11 +27,19 @@ pub(crate) fn correlated<T: Real>(
             q[1][l] = w * (sx * b2.x + sy * b2.y + sz * b2.z - mean[1]);
             q[2][l] = -w;
         }
-        let rho =
-            if per_length > T::ZERO { exp_neg(&block.step_px.map(|step| step * per_length)) } else { [T::ZERO; LANES] };
+        let mut rho = [T::ZERO; LANES];
+        if per_length > T::ZERO {
+            for l in 0..LANES {
+                rho[l] = block.step_px[l] * per_length;
+            }
+            rho = exp_neg(&rho);
+        }
         // Each step completes the term of the point before with 1 − ρ², then updates c. Only the update depends on the
         // lane before.
-        let gap = rho.map(|r| T::one() - r * r);
+        let mut gap = [T::ZERO; LANES];
+        for l in 0..LANES {
+            gap[l] = T::one() - rho[l] * rho[l];
+        }
         let mut before = [[[T::ZERO; LANES]; 3]; 2];
         for (before, (c, g)) in before.iter_mut().zip(c.iter_mut().zip(&g)) {
             for i in 0..3 {

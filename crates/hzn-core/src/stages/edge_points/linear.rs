@@ -54,7 +54,8 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
     let step = half.min(fifth.max(4)).clamp(1, WIDEST);
     let here = near.across(lit)[1];
-    let found = if FREE && is_clear(binary, p, (MARGIN * step) as u16) {
+    let reach = (MARGIN * step) as u16;
+    let found = if is_line_clear(binary, p, (dx, dy), reach) || (FREE && is_clear(binary, p, reach)) {
         locate_in_steps::<T, P, O, true>(binary, p, (dx, dy), step, here)?
     } else {
         locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here)?
@@ -91,14 +92,29 @@ fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
         }
         *slow += 1;
         let p = Pixel { x: x as u16, y: y as u16 };
-        let around = Around::<T, P, O, false>::new(binary, p);
-        let here = Line::new(&around, (dx, dy), step).smoothed(0);
-        let next = here.and_then(|here| locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here));
+        let next = if is_line_clear(binary, p, (dx, dy), (MARGIN * step) as u16) {
+            locate_from::<T, P, O, true>(binary, p, (dx, dy), step)
+        } else {
+            locate_from::<T, P, O, false>(binary, p, (dx, dy), step)
+        };
         let Some(next) = next else { break };
         whole += moved;
         found = WideCrossing { off: next.off + T::from_i32(whole), ..next };
     }
     found
+}
+
+/// Locates the crossing as [`locate_in_steps`], from any pixel.
+#[inline(always)]
+fn locate_from<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
+    binary: &BinaryPicture<'_, T, P, O>,
+    p: Pixel,
+    towards_dark: (i32, i32),
+    step: i32,
+) -> Option<WideCrossing<T>> {
+    let around = Around::<T, P, O, FREE>::new(binary, p);
+    let here = Line::new(&around, towards_dark, step).smoothed(0)?;
+    locate_in_steps::<T, P, O, FREE>(binary, p, towards_dark, step, here)
 }
 
 /// Returns whether the border of the region and all masks are more than `margin` pixels away.
@@ -110,6 +126,19 @@ pub(super) fn is_clear<T: Real, P: Pixels, O: Observer<T>>(
 ) -> bool {
     let region = binary.region;
     region.is_inside_by(p.x, p.y, margin) && (!region.has_mask() || binary.clearance(p.x, p.y, margin) == margin)
+}
+
+/// Returns whether there is no mask and the line through a pixel in the direction (dx, dy), with a pixel to each side,
+/// is in the region up to `margin` pixels away.
+#[inline(always)]
+fn is_line_clear<T: Real, P: Pixels, O: Observer<T>>(
+    binary: &BinaryPicture<'_, T, P, O>,
+    p: Pixel,
+    (dx, _): (i32, i32),
+    margin: u16,
+) -> bool {
+    let margins = if dx == 0 { [1, margin] } else { [margin, 1] };
+    !binary.region.has_mask() && binary.region.is_inside_by_each(p.x, p.y, margins)
 }
 
 /// Crossing of the mid-level on a wide edge; `off` is its distance from the border pixel towards the dark, in pixels.

@@ -1,13 +1,9 @@
 //! Band gate: a band has sky on both sides, for example a ring, a streak or the frame of a window. A limb has the body
 //! inside. From some inliers, the gate reads the brightness along lines inwards.
 
-use super::places::{MAX_PLACES, inliers};
+use super::places::{Place, Places};
 use super::sky;
-use crate::base::linalg::V3;
 use crate::base::real::Real;
-use crate::geometry::block::Block;
-use crate::geometry::camera::Camera;
-use crate::geometry::frames::UnitVec3;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
@@ -23,7 +19,7 @@ const ACROSS: f64 = 0.8;
 const ASIDE_PX: i32 = 6;
 /// Smallest part of the places behind a band that must be sky, as numerator and denominator. Inside a body, almost no
 /// place is sky.
-const MIN_SKY_SHARE: [usize; 2] = [2, 3];
+const MIN_SKY_SHARE: [i32; 2] = [2, 3];
 /// Largest brightness of a sky place behind a band, above the median of the sky, as a part of the step at the limb. It
 /// allows for blur and stray light.
 const SKY_PART: f64 = 0.1;
@@ -32,17 +28,15 @@ const SKY_PART: f64 = 0.1;
 /// must be at least `step` times that of the limb. A terminator fades and is no edge. `disc_px` is the diameter of the
 /// body's disc in pixels.
 pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
-    e: &V3<T>,
-    blocks: &[Block<T>],
+    places: &Places<T>,
     binary: &BinaryPicture<'_, T, P, O>,
-    camera: &Camera<T>,
     sky: &sky::Sky<T>,
     disc_px: T,
     step: T,
 ) -> T {
     let (mut looks, mut bands) = (0, 0);
-    for (block, lane) in inliers(blocks, MAX_PLACES) {
-        let Some(is_band) = comes_back(e, block, lane, binary, camera, sky, disc_px, step) else { continue };
+    for place in places {
+        let Some(is_band) = comes_back(place, binary, sky, disc_px, step) else { continue };
         looks += 1;
         bands += i32::from(is_band);
     }
@@ -53,21 +47,14 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
 /// does not show enough of the body there.
 #[inline(always)]
 fn comes_back<T: Real, P: Pixels, O: Observer<T>>(
-    e: &V3<T>,
-    block: &Block<T>,
-    lane: usize,
+    from: &Place<T>,
     binary: &BinaryPicture<'_, T, P, O>,
-    camera: &Camera<T>,
     sky: &sky::Sky<T>,
     disc_px: T,
     step: T,
 ) -> Option<bool> {
-    let from = camera.project(&UnitVec3::assume_unit(block.ray(lane)))?;
-    let [gu, gv] = block.gradient_at(lane, e);
-    let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
-    let (du, dv) = (gu / norm, gv / norm);
     let at = |px: i32| {
-        let (x, y) = ((from.u + du * T::from_i32(px)).to_i32(), (from.v + dv * T::from_i32(px)).to_i32());
+        let [x, y] = from.inwards_by(T::from_i32(px)).map(Real::to_i32);
         let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
         binary.region.contains(x, y).then_some((x, y))
     };
@@ -84,16 +71,13 @@ fn comes_back<T: Real, P: Pixels, O: Observer<T>>(
     let limb = (lit - sky.median).max(T::one());
     let dark = (sky.spread * T::from_f64(3.0)).max(limb * T::from_f64(SKY_PART)) + sky.median;
     let place = |k: i32| ASIDE_PX + (end - ASIDE_PX) * k / PLACES;
-    let mut is_sky = [None; PLACES as usize];
-    for (k, cell) in (1..=PLACES).zip(is_sky.iter_mut()) {
-        *cell = seen(place(k)).map(|b| b < dark);
-    }
-    let Some(back) = first_lasting_sky(&is_sky) else { return Some(false) };
+    let is_sky = |k: i32| seen(place(k)).map(|b| b < dark);
+    let Some(back) = first_lasting_sky(is_sky) else { return Some(false) };
     // The far edge is where half of the brightness of the band is left: after the last place that is brighter.
     let above = |px: i32| seen(px).map_or(T::ZERO, |b| b - sky.median);
     let passed = |k: i32| above(if k == 0 { ASIDE_PX } else { place(k) });
-    let level = (0..=back as i32).fold(limb, |most, k| most.max(passed(k))) * T::from_f64(0.5);
-    let last = (0..=back as i32).rev().find(|&k| passed(k) >= level).unwrap_or(0);
+    let level = (0..=back).fold(limb, |most, k| most.max(passed(k))) * T::from_f64(0.5);
+    let last = (0..=back).rev().find(|&k| passed(k) >= level).unwrap_or(0);
     let (mut near, mut far) = (place(last), place(last + 1));
     while far - near > 1 {
         let middle = (near + far) / 2;
@@ -123,17 +107,22 @@ fn inside(at: &impl Fn(i32) -> Option<(u16, u16)>, most: i32) -> i32 {
     within
 }
 
-/// Returns the first place that is sky and from which on at least `MIN_SKY_SHARE` of the visible places are sky. At
-/// least three visible places are necessary.
-fn first_lasting_sky(is_sky: &[Option<bool>]) -> Option<usize> {
+/// Returns the place before the first one that is sky and from which on at least `MIN_SKY_SHARE` of the visible places
+/// are sky. At least three visible places are necessary. `is_sky` reads a place, 1 to `PLACES`; `None` is not visible.
+fn first_lasting_sky(is_sky: impl Fn(i32) -> Option<bool>) -> Option<i32> {
+    let [part, whole] = MIN_SKY_SHARE;
     let (mut first, mut sky, mut all) = (None, 0, 0);
     // The loop begins at the far end, so that each place is added to those behind it.
-    for (k, seen) in is_sky.iter().enumerate().rev() {
-        let Some(is_sky) = *seen else { continue };
+    for k in (1..=PLACES).rev() {
+        // Inside a body, the share is soon out of reach even if all places that are left are sky.
+        if (sky + k) * whole < (all + k) * part {
+            break;
+        }
+        let Some(is_sky) = is_sky(k) else { continue };
         all += 1;
-        sky += usize::from(is_sky);
-        if is_sky && all >= 3 && sky * MIN_SKY_SHARE[1] >= all * MIN_SKY_SHARE[0] {
-            first = Some(k);
+        sky += i32::from(is_sky);
+        if is_sky && all >= 3 && sky * whole >= all * part {
+            first = Some(k - 1);
         }
     }
     first

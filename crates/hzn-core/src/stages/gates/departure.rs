@@ -195,7 +195,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
 /// the noise of the boxes.
 pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
     blocks: &[Block<T>],
-    points: u32,
+    [points, on_limb]: [u32; 2],
     curve: &Curve<T>,
     noise_px: T,
     support: T,
@@ -218,7 +218,7 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
         return false;
     }
     let mut on_cone = Mean::default();
-    for (block, lane) in inliers(blocks, MAX_PLACES) {
+    for (block, lane) in inliers(blocks, on_limb, MAX_PLACES) {
         let [gu, gv] = block.gradient_at(lane, curve.axis());
         if let Some(at) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) {
             on_cone.add(edge.contrast([at.u, at.v], [-gv, gu]));

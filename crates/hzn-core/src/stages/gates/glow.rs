@@ -1,13 +1,9 @@
 //! Glow gate: airglow and aurora are layers of light high above the limb, and their edge has the form of a limb. Air
 //! fades within a few scale heights above the limb, so light that reaches higher is a glow.
 
-use super::places::{MAX_PLACES, inliers};
-use crate::base::linalg::V3;
+use super::places::{MAX_PLACES, Place, Places};
 use crate::base::median;
 use crate::base::real::Real;
-use crate::geometry::block::Block;
-use crate::geometry::camera::Camera;
-use crate::geometry::frames::UnitVec3;
 use crate::image::Pixels;
 use crate::model::body::Expected;
 use crate::model::observer::Observer;
@@ -37,63 +33,41 @@ fn dark_angle<T: Real>(sin: T, c: T, expected: &Expected<T>) -> Option<T> {
     (expected.scale_height_m > T::ZERO).then_some(height_m * by_height)
 }
 
-/// A line across the limb through one inlier.
-struct Line<'a, 'b, T, P, O> {
-    binary: &'a BinaryPicture<'b, T, P, O>,
-    from: [T; 2],
-    inwards: [T; 2],
-    /// Pixels per radian across the limb.
-    px_rad: T,
-}
-
-impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>> Line<'a, 'b, T, P, O> {
-    fn new(
-        e: &V3<T>,
-        sin: T,
-        block: &Block<T>,
-        lane: usize,
-        binary: &'a BinaryPicture<'b, T, P, O>,
-        camera: &Camera<T>,
-    ) -> Option<Self> {
-        let from = camera.project(&UnitVec3::assume_unit(block.ray(lane)))?;
-        let [gu, gv] = block.gradient_at(lane, e);
-        // The gradient is that of 1 − cos ρ by the image point, sin ρ dρ.
-        let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
-        Some(Self { binary, from: [from.u, from.v], inwards: [gu / norm, gv / norm], px_rad: sin / norm })
+/// Returns the mean brightness of nine pixels at this distance inwards of a place, in pixels; `None` outside of the
+/// region. One pixel would be too noisy.
+fn mean_brightness<T: Real, P: Pixels, O: Observer<T>>(
+    place: &Place<T>,
+    inwards_px: T,
+    binary: &BinaryPicture<'_, T, P, O>,
+) -> Option<u16> {
+    let half = T::from_f64(0.5);
+    let [x, y] = place.inwards_by(inwards_px).map(|at| at + half);
+    if !(x >= T::one() && y >= T::one()) {
+        return None;
     }
-
-    /// Returns the mean brightness of nine pixels at this distance inwards, in pixels; `None` outside of the region.
-    /// One pixel would be too noisy.
-    fn at(&self, inwards_px: T) -> Option<u16> {
-        let half = T::from_f64(0.5);
-        let [x, y] = [0, 1].map(|k| self.from[k] + self.inwards[k] * inwards_px + half);
-        if !(x >= T::one() && y >= T::one()) {
-            return None;
-        }
-        let (x, y) = (x.to_i32(), y.to_i32());
-        let mut sum = 0;
-        for v in y - 1..=y + 1 {
-            for u in x - 1..=x + 1 {
-                let (u, v) = (u16::try_from(u).ok()?, u16::try_from(v).ok()?);
-                if !self.binary.region.contains(u, v) || self.binary.masked(u, v) {
-                    return None;
-                }
-                sum += u32::from(self.binary.brightness(u, v));
+    let (x, y) = (u16::try_from(x.to_i32()).ok()?, u16::try_from(y.to_i32()).ok()?);
+    let (right, below) = (x.checked_add(1)?, y.checked_add(1)?);
+    // The second pixel of the margin is for the rounding at the image circle.
+    let free = !binary.region.has_mask() && binary.region.is_inside_by(x, y, 2);
+    let mut sum = 0;
+    for v in [y - 1, y, below] {
+        for u in [x - 1, x, right] {
+            if !free && (!binary.region.contains(u, v) || binary.masked(u, v)) {
+                return None;
             }
+            sum += u32::from(binary.brightness(u, v));
         }
-        u16::try_from(sum / 9).ok()
     }
+    u16::try_from(sum / 9).ok()
 }
 
-/// Returns whether the edge about (`e`, `c`) may belong to a glow: if the light above it, above the sky farther out, is
+/// Returns whether a limb of cosine `c` may belong to a glow: if the light above it, above the sky farther out, is
 /// more than `most` of the step from the sky to the body. `false` if the body's air is unknown, or if the picture shows
 /// too little of the sky. `most` is `select.max_glow`.
 pub(super) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
-    e: &V3<T>,
+    places: &Places<T>,
     c: T,
-    blocks: &[Block<T>],
     binary: &BinaryPicture<'_, T, P, O>,
-    camera: &Camera<T>,
     expected: &Expected<T>,
     most: T,
 ) -> bool {
@@ -101,16 +75,17 @@ pub(super) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
     let Some(dark) = dark_angle(sin, c, expected) else { return false };
     let blur = T::from_f64(BLUR_PX);
     let (mut body, mut air, mut sky) = (Counts::new(), Counts::new(), Counts::new());
-    for (block, lane) in inliers(blocks, MAX_PLACES) {
-        let Some(line) = Line::new(e, sin, block, lane, binary, camera) else { continue };
-        let dark_px = dark * line.px_rad + blur;
+    for place in places {
+        let at = |inwards_px: T| mean_brightness(place, inwards_px, binary);
+        // The derivative is that of s·e = cos ρ, sin ρ dρ.
+        let dark_px = dark * (sin / place.by_px) + blur;
         let mut multiple = T::from_f64(FARTHEST);
         let mut far = None;
         while far.is_none() && multiple >= T::from_f64(NEAREST) {
-            far = line.at(-dark_px * multiple);
+            far = at(-dark_px * multiple);
             multiple *= T::from_f64(0.5);
         }
-        if let (Some(b), Some(a), Some(s)) = (line.at(blur), line.at(-dark_px), far) {
+        if let (Some(b), Some(a), Some(s)) = (at(blur), at(-dark_px), far) {
             let _ = (body.push(b), air.push(a), sky.push(s));
         }
     }

@@ -25,7 +25,7 @@ use crate::model::verdict::Verdict;
 use crate::stages::contour::BinaryPicture;
 use crate::stages::covariance::Fused;
 use crate::stages::fit::{self, Fit};
-use places::inliers;
+use places::{Places, along_limb, inliers};
 use size::{disc_px, is_possible_size, lit_share, min_arc, min_support, sin_for_points};
 
 pub use config::Config;
@@ -60,7 +60,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     camera: &Camera<T>,
     config: &Config,
 ) -> Judged<T> {
-    let limb_px = inliers(blocks, 1)
+    let limb_px = inliers(blocks, fit.inliers, 1)
         .next()
         .map_or(T::ZERO, |(b, l)| view::limb_in_view(&fused.e, fused.c, &b.ray(l), camera, binary.region));
     let covered_px = view::covered(&fused.e, blocks);
@@ -73,6 +73,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         .min(small_disc_points(sin_for_points(fused, expected), camera, 3))
         .min(small_picture_points(camera, 3));
     let counts = |n: u32| T::from_i32(n as i32);
+    let mut places = Places::new();
     let verdict = if counts(fit.inliers) < counts(points) * T::from_f64(config.min_inlier_share) {
         Verdict::NoConsensus
     } else if fit.inliers < u32::from(least) {
@@ -92,7 +93,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     {
         Verdict::Indistinct
     } else {
-        judge_surroundings(fused, expected, blocks, binary, camera, config)
+        judge_surroundings(fit, fused, expected, blocks, &mut places, binary, camera, config)
     };
     let verdict = match verdict {
         Verdict::Passed => attitude::verdict(&fused.e, sigma_max_rad, expected, config),
@@ -104,8 +105,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     };
     // Of a picture that came row by row, only lit and dark pixels are left.
     let looks = !P::STREAMED && verdict == Verdict::Passed;
-    let most = T::from_f64(config.max_glow);
-    let glows = looks && glow::is_likely(&fused.e, fused.c, blocks, binary, camera, expected, most);
+    let glows = looks && glow::is_likely(&places, fused.c, binary, expected, T::from_f64(config.max_glow));
     Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support, glows }
 }
 
@@ -115,11 +115,14 @@ fn is_by_chance<T: Real>(fit: &Fit<T>, points: u32, covered_px: T, config: &Conf
     !whole && fit.arc_px > covered_px * T::from_f64(config.max_way)
 }
 
-/// Tests whether the sky is beyond the fitted limb and the body is inside it.
+/// Tests whether the sky is beyond the fitted limb and the body is inside it. The function fills `places` with the
+/// places from which it looks.
 fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
+    fit: &Fit<T>,
     fused: &Fused<T>,
     expected: &Expected<T>,
     blocks: &[Block<T>],
+    places: &mut Places<T>,
     binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
     config: &Config,
@@ -129,7 +132,8 @@ fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     } else {
         binary.level
     };
-    let sky = sky::measure_sky(&fused.e, blocks, binary, camera, lit_from);
+    *places = along_limb(&fused.e, blocks, fit.inliers, camera);
+    let sky = sky::measure_sky(places, binary, lit_from);
     if sky.lit > T::from_f64(config.max_lit_sky) {
         return Verdict::NoSky;
     }
@@ -142,7 +146,7 @@ fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     let wide = disc_px > T::from_i32(camera.width().min(camera.height()).into());
     let looks = !P::STREAMED && config.max_band < 1.0 && wide;
     let step = T::from_f64(config.band_step);
-    if looks && band::banded(&fused.e, blocks, binary, camera, &sky, disc_px, step) >= T::from_f64(config.max_band) {
+    if looks && band::banded(places, binary, &sky, disc_px, step) >= T::from_f64(config.max_band) {
         return Verdict::Band;
     }
     Verdict::Passed
@@ -211,7 +215,7 @@ fn judge_rivals<T: Real, P: Pixels, O: Observer<T>>(
     }
     if !P::STREAMED
         && fit.inliers < points
-        && departure::departs(blocks, points, &curve, noise, support, binary, camera, expected, config)
+        && departure::departs(blocks, [points, fit.inliers], &curve, noise, support, binary, camera, expected, config)
     {
         return Verdict::Departure;
     }

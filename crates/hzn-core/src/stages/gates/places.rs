@@ -2,22 +2,57 @@
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
-use crate::geometry::block::{Block, LANES};
+use crate::geometry::block::{Block, every_weighted};
 use crate::geometry::camera::Camera;
 use crate::geometry::frames::UnitVec3;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
-/// Returns up to `count` inliers, evenly along the edge, each from the middle of its part.
-pub(super) fn inliers<T: Real>(blocks: &[Block<T>], count: usize) -> impl Iterator<Item = (&Block<T>, usize)> {
-    let all = || blocks.iter().flat_map(|b| (0..LANES).filter(|&l| b.weight[l & 7] > T::ZERO).map(move |l| (b, l)));
-    let every = (all().count() / count.max(1)).max(1);
-    all().skip(every / 2).step_by(every).take(count)
+/// Returns up to `count` of all `inliers` of the fit, evenly along the edge, each from the middle of its part.
+pub(super) fn inliers<T: Real>(
+    blocks: &[Block<T>],
+    inliers: u32,
+    count: usize,
+) -> impl Iterator<Item = (&Block<T>, usize)> {
+    let every = inliers as usize / count.max(1);
+    every_weighted(blocks, every).take(count).map(|(_, block, lane)| (block, lane))
 }
 
 /// Number of inliers from which the gates look outwards and inwards.
 pub(super) const MAX_PLACES: usize = 12;
+
+/// A place on the limb, from which the gates look outwards and inwards.
+pub(super) struct Place<T> {
+    /// Image point (u, v), in pixels.
+    pub(super) from: [T; 2],
+    /// Unit vector in the picture, across the limb towards the body.
+    pub(super) inwards: [T; 2],
+    /// Derivative of s·e by a step of one pixel inwards, in radians per pixel.
+    pub(super) by_px: T,
+}
+
+impl<T: Real> Place<T> {
+    /// Returns the image point at a distance inwards, in pixels.
+    pub(super) fn inwards_by(&self, px: T) -> [T; 2] {
+        [self.from[0] + self.inwards[0] * px, self.from[1] + self.inwards[1] * px]
+    }
+}
+
+/// Places evenly along a limb.
+pub(super) type Places<T> = heapless::Vec<Place<T>, MAX_PLACES>;
+
+/// Returns the places on the limb about `e`, at some of its `inliers`.
+pub(super) fn along_limb<T: Real>(e: &V3<T>, blocks: &[Block<T>], count: u32, camera: &Camera<T>) -> Places<T> {
+    let mut places = Places::new();
+    inliers(blocks, count, MAX_PLACES).for_each(|(block, lane)| {
+        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { return };
+        let [gu, gv] = block.gradient_at(lane, e);
+        let by_px = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
+        let _ = places.push(Place { from: [from.u, from.v], inwards: [gu / by_px, gv / by_px], by_px });
+    });
+    places
+}
 
 /// Distance from the limb at which the brightness on both sides is read for the threshold of the next picture, in
 /// pixels.
@@ -28,17 +63,14 @@ const PLATEAU_PX: i32 = 6;
 pub(crate) fn middle_level<T: Real, P: Pixels, O: Observer<T>>(
     e: &V3<T>,
     blocks: &[Block<T>],
+    inliers: u32,
     binary: &BinaryPicture<'_, T, P, O>,
     camera: &Camera<T>,
 ) -> Option<u16> {
     let (mut dark, mut lit, mut looks) = (0u32, 0u32, 0u32);
-    for (block, lane) in inliers(blocks, MAX_PLACES) {
-        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
-        let [gu, gv] = block.gradient_at(lane, e);
-        let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
+    for place in &along_limb(e, blocks, inliers, camera) {
         let at = |px: i32| {
-            let px = T::from_i32(px);
-            let (x, y) = ((from.u + gu / norm * px).to_i32(), (from.v + gv / norm * px).to_i32());
+            let [x, y] = place.inwards_by(T::from_i32(px)).map(Real::to_i32);
             let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
             (binary.region.contains(x, y) && !binary.masked(x, y)).then(|| u32::from(binary.brightness(x, y)))
         };

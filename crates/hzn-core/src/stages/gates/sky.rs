@@ -1,12 +1,8 @@
 //! Sky gate: the sky is beyond the fitted limb, except where an object is in front of it.
 
-use super::places::{MAX_PLACES, inliers};
-use crate::base::linalg::V3;
+use super::places::{MAX_PLACES, Places};
 use crate::base::median;
 use crate::base::real::Real;
-use crate::geometry::block::Block;
-use crate::geometry::camera::Camera;
-use crate::geometry::frames::UnitVec3;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
@@ -28,22 +24,17 @@ pub(super) struct Sky<T> {
 
 /// Reads the brightness from the limb outwards to the border of the region. Sky counts as lit from `lit_from` on.
 pub(super) fn measure_sky<T: Real, P: Pixels, O: Observer<T>>(
-    e: &V3<T>,
-    blocks: &[Block<T>],
+    places: &Places<T>,
     binary: &BinaryPicture<'_, T, P, O>,
-    camera: &Camera<T>,
     lit_from: u16,
 ) -> Sky<T> {
     let (mut looks, mut lit) = (0, 0);
     let mut seen = heapless::Vec::<u16, { MAX_PLACES * OUTWARDS }>::new();
-    for (block, lane) in inliers(blocks, MAX_PLACES) {
-        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
-        let [gu, gv] = block.gradient_at(lane, e);
-        let norm = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
+    for place in places {
         let mut distance = T::ZERO;
         let mut fading = Some(u16::MAX);
         for _ in 0..OUTWARDS {
-            let (x, y) = ((from.u - gu / norm * distance).to_i32(), (from.v - gv / norm * distance).to_i32());
+            let [x, y] = place.inwards_by(-distance).map(Real::to_i32);
             let (Ok(x), Ok(y)) = (u16::try_from(x), u16::try_from(y)) else { break };
             if !binary.region.contains(x, y) {
                 break;

@@ -2,7 +2,7 @@
 
 use crate::base::linalg::{V3, basis};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, LANES};
+use crate::geometry::block::{Block, LANES, sum};
 use crate::geometry::camera::Camera;
 use crate::geometry::frames::UnitVec3;
 use crate::geometry::pixel::ImagePoint;
@@ -11,22 +11,28 @@ use crate::image::region::Region;
 /// Returns the length that the inliers cover along the limb about `e`, in pixels. Each step from one inlier to the next
 /// counts with its component along the limb, forwards or backwards. The path along a noisy edge is many times longer.
 pub(super) fn covered<T: Real>(e: &V3<T>, blocks: &[Block<T>]) -> T {
-    let mut length = T::ZERO;
-    let mut before: Option<V3<T>> = None;
+    let mut length = [T::ZERO; LANES];
+    // The point before and its weight: the previous lane, or the last lane of the previous block.
+    let mut last = [T::ZERO; 4];
     for block in blocks {
-        for lane in 0..LANES {
-            let here = (block.weight[lane] > T::ZERO).then(|| block.ray(lane));
-            if let (Some(a), Some(b)) = (before, here) {
-                let (step, along) = (b - a, e.cross(&b));
-                let whole = (step.dot(&step) * along.dot(&along)).sqrt();
-                if whole > T::ZERO {
-                    length += block.step_px[lane] * step.dot(&along) / whole;
-                }
-            }
-            before = here;
+        let here = [&block.s[0], &block.s[1], &block.s[2], &block.weight];
+        let mut before = [[T::ZERO; LANES]; 4];
+        for ((before, here), last) in before.iter_mut().zip(here).zip(&mut last) {
+            before[0] = *last;
+            before[1..].copy_from_slice(&here[..LANES - 1]);
+            *last = here[LANES - 1];
+        }
+        for l in 0..LANES {
+            let (x, y, z) = (block.s[0][l], block.s[1][l], block.s[2][l]);
+            let (dx, dy, dz) = (x - before[0][l], y - before[1][l], z - before[2][l]);
+            let (ax, ay, az) = (e.y * z - e.z * y, e.z * x - e.x * z, e.x * y - e.y * x);
+            let whole = ((dx * dx + dy * dy + dz * dz) * (ax * ax + ay * ay + az * az)).sqrt();
+            let along = block.step_px[l] * (dx * ax + dy * ay + dz * az) / whole.max(T::from_f64(1e-20));
+            let counts = block.weight[l].min(before[3][l]) > T::ZERO;
+            length[l] += if counts { along } else { T::ZERO };
         }
     }
-    length.abs()
+    sum(&length).abs()
 }
 
 /// Largest number of steps along the limb to each side.
