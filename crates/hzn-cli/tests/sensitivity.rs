@@ -132,3 +132,45 @@ fn designs_that_cannot_be_are_refused_with_a_reason() {
          --depression 47",
     );
 }
+
+/// The bounds of math.md, 13.8: the whole disc at 600 km and the second harmonic of the limb height at latitude 30.
+#[test]
+fn the_third_axis_of_a_flattened_body() {
+    let place = Place::new();
+    let yaw = |more: &[&str]| {
+        let fixed = ["sensitivity", "yaw", "--lens", "equidistant", "--depression", "90", "--sigma-px", "0.05"];
+        let ran = place.run(&[&fixed, more].concat()).expect(0);
+        ran.out
+    };
+    let table = [
+        "--fov",
+        "150",
+        "--size",
+        "1000x1000",
+        "--altitude",
+        "600",
+        "--latitude",
+        "0,30,60",
+        "--second-harmonic",
+        "0.1",
+        "-o",
+        "yaw.csv",
+        "-o",
+        "yaw.svg",
+    ];
+    assert_eq!(yaw(&table).lines().count(), 4);
+    let rows = rows(&place.read("yaw.csv"));
+    let by_height: f64 = cell(&rows[1], "yaw_by_height_deg").parse().unwrap();
+    assert!((by_height / 2.2 - 1.0).abs() < 0.1, "{by_height}");
+    assert!(place.read("yaw.svg").contains("by limb height"));
+    // A sphere has no third axis, and a note says so.
+    let ran =
+        place.run(&["sensitivity", "yaw", "--body", "1737.4", "--altitude", "100", "--depression", "20"]).expect(0);
+    assert!(ran.err.contains("1 of 1 designs do not determine the rotation"), "{}", ran.err);
+    place.run(&["sensitivity", "yaw", "--altitude", "600", "--latitude", "91"]).expect(2).says("--latitude: 91");
+    place
+        .run(&["sensitivity", "yaw", "--altitude", "600", "--second-harmonic", "-1"])
+        .expect(2)
+        .says("--second-harmonic: -1 is refused");
+    place.run(&["sensitivity", "--body", "vulcan", "--altitude", "600"]).expect(2).says("a planet such as jupiter");
+}

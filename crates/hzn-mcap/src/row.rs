@@ -3,7 +3,7 @@
 use hzn_core::frames::{Body, UnitVec3};
 use hzn_core::real::Real;
 use hzn_core::report::Position;
-use hzn_core::status::Status;
+use hzn_core::status::{Stage, Status};
 use hzn_core::{Report, Solution};
 use serde::{Deserialize, Serialize};
 
@@ -218,6 +218,11 @@ columns! {
         body_fixed_y_km: Option<f64>,
         /// Position of the camera in the axes of the body, z, kilometres.
         body_fixed_z_km: Option<f64>,
+        /// Rotation of the body about the line to it, relative to the given orientation, degrees; right-handed about
+        /// the direction to the body. Only if its 1σ is below `estimate.yaw_limit_deg`.
+        yaw_deg: Option<f64>,
+        /// 1σ of that rotation, degrees.
+        yaw_sigma_deg: Option<f64>,
     }
 }
 
@@ -313,6 +318,10 @@ impl Row {
         if let Some(body_fixed) = p.body_fixed_m {
             [self.body_fixed_x_km, self.body_fixed_y_km, self.body_fixed_z_km] = body_fixed.map(km);
         }
+        if let Some(yaw) = p.yaw_rad {
+            let deg = |x: T| finite(x.to_f64().to_degrees());
+            (self.yaw_deg, self.yaw_sigma_deg) = (deg(yaw.0), deg(yaw.1));
+        }
     }
 
     /// Returns the axis (camera frame); `None` if there is no answer.
@@ -356,6 +365,11 @@ fn finite(x: f64) -> Option<f64> {
 /// Describes the last stage, the verdict of each candidate, and the number of looks if there was more than one.
 fn describe<T: Real>(report: &Report<T>) -> String {
     let mut text = format!("ended at {}", report.stage.name());
+    if report.status == Status::NoLimb && report.stage == Stage::Binarize {
+        text.push_str(
+            ": dark and lit differ by less than 3 % of full scale; the body fills the picture or is not in it",
+        );
+    }
     if report.counters.looks > 1 {
         text.push_str(&format!(" in {} looks", report.counters.looks));
     }

@@ -132,8 +132,8 @@ fn orientations_are_those_of_spice() {
         let [days, ra, dec, w] =
             numbers.split(',').map(|x| x.parse::<f64>().unwrap()).collect::<Vec<_>>().try_into().unwrap();
         let body = planets::find(name).unwrap();
-        let theirs =
-            planets::Orientation { right_ascension_deg: ra, declination_deg: dec, meridian_deg: w }.icrf_to_body_fixed();
+        let theirs = planets::Orientation { right_ascension_deg: ra, declination_deg: dec, meridian_deg: w }
+            .icrf_to_body_fixed();
         let turn = theirs * body.icrf_to_body_fixed(days).transpose();
         // |R − I| of a rotation by a small angle a is √2 a.
         let angle = ((turn - Matrix3::identity()).norm() / 2f64.sqrt()).to_degrees();

@@ -53,7 +53,7 @@ impl<T: Real> Scaling<T> {
     #[inline(always)]
     pub(crate) fn at_foot(&self, ray: &V3<T>, v: &V3<T>) -> V3<T> {
         let w = self.from * ray;
-        let a = ray - self.from * w * (T::one() / w.dot(&w));
+        let a = ray - self.from * w * (T::one() / w.dot(&w).max(T::from_f64(1e-20)));
         v + a * ray.dot(v)
     }
 

@@ -46,6 +46,8 @@ pub(crate) struct Target<T> {
     pub(crate) attitude_sigma_rad: T,
     /// 1-sigma of the limb height, metres; clipping adds to it.
     pub(crate) limb_sigma_m: T,
+    /// 1-sigma of each component of the second harmonic of the limb height, metres.
+    pub(crate) second_harmonic_sigma_m: T,
     /// Height that clipping adds to the limb, metres.
     pub(crate) raised_m: T,
     /// 1-sigma of each semi-axis, metres.
@@ -89,6 +91,9 @@ impl<T: Real> Target<T> {
             has_attitude: attitude.is_some(),
             attitude_sigma_rad: if is_sphere { T::ZERO } else { attitude_sigma_rad },
             limb_sigma_m: T::from_f64(body.limb_height_sigma_km) * km,
+            second_harmonic_sigma_m: T::from_f64(
+                body.limb_height_harmonic_sigma_km.unwrap_or(body.limb_height_sigma_km),
+            ) * km,
             raised_m: T::ZERO,
             radii_sigma_m: T::from_f64(body.radii_sigma_km) * km,
             range: range(body, prior, limb)?,

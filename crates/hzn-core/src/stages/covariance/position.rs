@@ -97,7 +97,7 @@ fn located<T: Real>(
     given.by_axis.iter().for_each(|v| add(v, target.radii_sigma_m / target.unit_m));
     lights.iter().for_each(|v| add(v, T::one()));
     let covariance = g * errors * g.transpose();
-    Located { r, p: covariance, free_r: r, free_p: covariance }
+    Located { r, p: covariance, free_r: r, free_p: covariance, turn: None }
 }
 
 /// Returns the errors by light that changes along the limb, for a shift of one pixel. Without the direction to the Sun,
@@ -203,6 +203,7 @@ pub(crate) fn place<T: Real>(fused: &Fused<T>, target: &Target<T>, mean_radius_m
             covariance_m2: [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33],
             free_range_m: (length(&free_r), sigma_m),
             body_fixed_m: target.has_attitude.then(|| body_fixed.into()),
+            yaw_rad: found.turn.map(|turn| (turn.rad, turn.sigma_rad)),
             limb: ScaledCone { e: fused.e, c: fused.c, scaling: Some(target.scaling) },
         }),
     })

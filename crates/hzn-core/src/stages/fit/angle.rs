@@ -13,7 +13,7 @@ use super::cone::{Cone, State};
 use super::sums::{Weights, pass};
 use crate::base::linalg::{V3, basis, invert_spd3, unit};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, LANES};
+use crate::geometry::block::{Block, LANES, sum};
 use crate::geometry::scaling::Scaling;
 
 /// Largest number of steps. From the robust fit, three are enough (math.md, 13.3).
@@ -28,7 +28,7 @@ pub(super) fn settle<T: Real>(blocks: &mut [Block<T>], start: State<T>, scaling:
     for _ in 0..STEPS {
         let (b1, b2) = basis(&at.e);
         let sums = Sums::new(blocks, &at.e, [&b1, &b2], alpha, scaling);
-        let [d1, d2, d_alpha] = sums.step()?;
+        let ([d1, d2, d_alpha], is_last) = sums.step()?;
         at.e = unit(&(at.e + b1 * d1 + b2 * d2))?;
         alpha += d_alpha;
         let quarter_turn = T::from_f64(core::f64::consts::FRAC_PI_2);
@@ -37,8 +37,8 @@ pub(super) fn settle<T: Real>(blocks: &mut [Block<T>], start: State<T>, scaling:
             return None;
         }
         let size = d1.abs() + d2.abs() + d_alpha.abs();
-        // Convergence is quadratic.
-        if size * size < T::EPSILON * T::from_f64(2.0) * alpha {
+        // Exact rays leave no residuals to compare with; the convergence is then quadratic.
+        if is_last || size * size < T::EPSILON * T::from_f64(2.0) * alpha {
             break;
         }
     }
@@ -61,6 +61,9 @@ struct Sums<T> {
     /// Upper triangle of Σ w h hᵀ.
     n: [T; 6],
     g: [T; 3],
+    /// Σ w ρ², and the sum of the robust weights.
+    cost: T,
+    weight: T,
     mean: [T; 2],
 }
 
@@ -68,43 +71,47 @@ impl<T: Real> Sums<T> {
     fn new(blocks: &[Block<T>], e: &V3<T>, b: [&V3<T>; 2], alpha: T, scaling: &Scaling<T>) -> Self {
         let mean = mean_azimuth(blocks, e, b);
         let (sin, cos) = alpha.sin_cos();
-        let (mut n, mut g) = ([T::ZERO; 6], [T::ZERO; 3]);
+        let mut sums = [[T::ZERO; LANES]; 11];
         for block in blocks {
             for lane in 0..LANES {
-                let weight = block.weight[lane];
-                if !(weight > T::ZERO) {
-                    continue;
-                }
-                let [x, y, across] = azimuth(block, lane, e, b);
-                let d = block.ray(lane) - e;
+                let ray = block.ray(lane);
+                let [x, y, across] = azimuth(&ray, e, b);
+                let d = ray - e;
                 let along = T::one() - d.dot(&d) * T::from_f64(0.5);
                 let rho = arc_sine(across * cos - along * sin);
                 // The direction in which the limb moves when α grows, at the foot point.
                 let outward = (b[0] * x + b[1] * y) * cos - e * sin;
-                let [gu, gv] = block.gradient_at(lane, &scaling.at_foot(&block.ray(lane), &outward));
+                let [gu, gv] = block.gradient_at(lane, &scaling.at_foot(&ray, &outward));
+                let weight = block.weight[lane];
                 let w = weight / (gu * gu + gv * gv).max(T::from_f64(1e-20));
                 let (h1, h2) = (x - mean[0], y - mean[1]);
-                let (w1, w2) = (w * h1, w * h2);
-                let terms = [w1 * h1, w1 * h2, w1, w2 * h2, w2, w];
-                n.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-                g = [g[0] + w1 * rho, g[1] + w2 * rho, g[2] + w * rho];
+                let (w1, w2, wr) = (w * h1, w * h2, w * rho);
+                let terms = [w1 * h1, w1 * h2, w1, w2 * h2, w2, w, wr * h1, wr * h2, wr, wr * rho, weight];
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    sum[lane] += term;
+                }
             }
         }
-        Self { n, g, mean }
+        let [n @ .., g1, g2, g3, cost, weight] = sums.map(|lanes| sum(&lanes));
+        Self { n, g: [g1, g2, g3], cost, weight, mean }
     }
 
-    /// Returns the step of the axis on its tangent basis, and of the half-angle.
-    fn step(&self) -> Option<[T; 3]> {
+    /// Returns the step of the axis on its tangent basis, and of the half-angle, and whether it is the last one: it is
+    /// shorter than a hundredth of the sigma of white noise, and what is left of it is less than a hundredth of that
+    /// (math.md, 13.3).
+    fn step(&self) -> Option<([T; 3], bool)> {
         let [g1, g2, g3] = self.g;
         let d = invert_spd3(&self.n)? * V3::new(g1, g2, g3);
-        Some([d.x, d.y, d.z - self.mean[0] * d.x - self.mean[1] * d.y])
+        let in_sigmas = (d.x * g1 + d.y * g2 + d.z * g3) * self.weight;
+        let is_last = in_sigmas < self.cost * T::from_f64(1e-4);
+        Some(([d.x, d.y, d.z - self.mean[0] * d.x - self.mean[1] * d.y], is_last))
     }
 }
 
-/// Returns the azimuth of a point as the components of its unit vector u, and |e × σ|.
+/// Returns the azimuth of a ray as the components of its unit vector u, and |e × σ|.
 #[inline(always)]
-fn azimuth<T: Real>(block: &Block<T>, lane: usize, e: &V3<T>, [b1, b2]: [&V3<T>; 2]) -> [T; 3] {
-    let d = block.ray(lane) - e;
+fn azimuth<T: Real>(ray: &V3<T>, e: &V3<T>, [b1, b2]: [&V3<T>; 2]) -> [T; 3] {
+    let d = ray - e;
     let (x, y) = (d.dot(b1), d.dot(b2));
     let across = (x * x + y * y).sqrt();
     let per = T::one() / across.max(T::from_f64(LEAST_SIN));
@@ -113,16 +120,19 @@ fn azimuth<T: Real>(block: &Block<T>, lane: usize, e: &V3<T>, [b1, b2]: [&V3<T>;
 
 /// Returns the mean of Bᵀu over the points with a weight.
 fn mean_azimuth<T: Real>(blocks: &[Block<T>], e: &V3<T>, b: [&V3<T>; 2]) -> [T; 2] {
-    let mut sums = [T::ZERO; 3];
+    let mut sums = [[T::ZERO; LANES]; 3];
     for block in blocks {
         for lane in 0..LANES {
             let w = block.weight[lane];
-            let [x, y, _] = azimuth(block, lane, e, b);
-            sums = [sums[0] + w * x, sums[1] + w * y, sums[2] + w];
+            let [x, y, _] = azimuth(&block.ray(lane), e, b);
+            for (sum, term) in sums.iter_mut().zip([w * x, w * y, w]) {
+                sum[lane] += term;
+            }
         }
     }
-    let n = sums[2].max(T::from_f64(1e-20));
-    [sums[0] / n, sums[1] / n]
+    let [x, y, w] = sums.map(|lanes| sum(&lanes));
+    let n = w.max(T::from_f64(1e-20));
+    [x / n, y / n]
 }
 
 /// Returns the arc sine of a small number: the error is below 1e-12 up to 0.05, and nothing depends on larger ones,
