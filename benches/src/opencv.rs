@@ -8,6 +8,11 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use serde::Deserialize;
 use serde_json::json;
 
+use crate::state::State;
+
+/// How the recipe solves its least squares; also the names in its requests and stages.
+pub(crate) const SOLVERS: [&str; 2] = ["lstsq", "normal equations"];
+
 /// Running process of the recipe.
 pub(crate) struct Recipe {
     child: Child,
@@ -23,6 +28,9 @@ pub(crate) struct Answer {
     pub(crate) stages_us: BTreeMap<String, f64>,
     pub(crate) total_us: f64,
     pub(crate) axis: Option<[f64; 3]>,
+    pub(crate) points: u32,
+    /// Memory of the case's frames and of the binary picture that lies on pages of 2 MiB, in MiB.
+    pub(crate) large_pages_mib: f64,
 }
 
 #[derive(Deserialize)]
@@ -56,10 +64,20 @@ impl Recipe {
         serde_json::from_str(&line).map_err(|e| format!("the OpenCV recipe ended or gave an invalid answer: {e}"))
     }
 
-    /// Measures one frame with flushed caches.
-    pub(crate) fn measure(&mut self, case: &str, frame: usize, level: u16) -> Result<Answer, String> {
+    /// Measures one frame with the caches in a state.
+    pub(crate) fn measure(
+        &mut self,
+        case: &str,
+        frame: usize,
+        level: u16,
+        solver: &str,
+        state: State,
+    ) -> Result<Answer, String> {
         let requests = self.requests.as_mut().ok_or("the OpenCV recipe has no standard input")?;
-        writeln!(requests, "{}", json!({ "case": case, "frame": frame, "level": level })).map_err(|e| e.to_string())?;
+        let request = json!({
+            "case": case, "frame": frame, "level": level, "solver": solver, "state": state.name(),
+        });
+        writeln!(requests, "{request}").map_err(|e| e.to_string())?;
         requests.flush().map_err(|e| e.to_string())?;
         self.read()
     }

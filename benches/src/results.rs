@@ -1,11 +1,12 @@
 //! Collects the measurements and computes their medians.
 
-use hzn_core::status::Status;
 use serde::Serialize;
 
 use crate::cases::{Case, Picture};
+use crate::memory::on_large_pages_mib;
 use crate::opencv::{Answer, Recipe};
 use crate::sensors::Timed;
+use crate::state::State;
 
 /// All measurements.
 #[derive(Serialize)]
@@ -17,27 +18,52 @@ pub(crate) struct Results {
     pub(crate) frames: usize,
     pub(crate) rounds: usize,
     pub(crate) cases: Vec<CaseResult>,
+    pub(crate) growth: Vec<Grown>,
+}
+
+/// Time of one case of the growth in microseconds, all flushed.
+#[derive(Serialize)]
+pub(crate) struct Grown {
+    pub(crate) title: String,
+    pub(crate) pixels: u64,
+    pub(crate) hzn_us: f64,
+    pub(crate) recipe_us: f64,
 }
 
 /// Measurements of one case.
 #[derive(Serialize)]
 pub(crate) struct CaseResult {
-    pub(crate) name: String,
-    pub(crate) f32: Times,
-    pub(crate) fewer: Times,
-    pub(crate) f64: Times,
-    pub(crate) warm: Times,
-    pub(crate) opencv: Times,
-    frames: usize,
-    answered: [usize; 4],
-    error_deg: [Vec<f64>; 4],
+    pub(crate) title: String,
+    /// The programs in the order of the table; the recipe with `lstsq` is [`RECIPE`].
+    pub(crate) programs: Vec<ProgramResult>,
     pub(crate) pixels_percent: Vec<f64>,
-    /// Nanoseconds per edge point, warm, with every point kept.
+    /// Nanoseconds per edge point, with every point kept and changing frames.
     pub(crate) ns_a_point: Vec<f64>,
+    /// Memory of the frames in MiB, and how much of it lies on pages of 2 MiB: of hzn's and of the recipe's.
+    pub(crate) frames_mib: f64,
+    pub(crate) large_mib: [f64; 2],
 }
 
-/// Times of one program in microseconds: the best round of each frame. On a busy machine a longer run is interrupted
-/// more often, so a median over rounds would favour the faster program.
+/// Place of hzn with its defaults in f32 among the programs, of hzn with fewer points, and of the recipe as one usually
+/// writes it.
+pub(crate) const HZN: usize = 0;
+pub(crate) const HZN_FEWER: usize = 1;
+pub(crate) const RECIPE: usize = 3;
+
+/// Measurements of one program.
+#[derive(Serialize)]
+pub(crate) struct ProgramResult {
+    pub(crate) name: String,
+    frames: usize,
+    /// Points that the fit used, for each frame.
+    points: Vec<f64>,
+    /// Times in each of [`State::ALL`].
+    times: [Times; 3],
+    error_deg: Vec<f64>,
+}
+
+/// Times in microseconds: the best round of each frame. On a busy machine a longer run is interrupted more often, so a
+/// median over rounds would favour the faster program.
 #[derive(Serialize, Default)]
 pub(crate) struct Times {
     total_us: Vec<f64>,
@@ -46,10 +72,7 @@ pub(crate) struct Times {
 }
 
 impl Times {
-    pub(crate) fn add_total(&mut self, frame: usize, us: f64) {
-        keep_best(&mut self.total_us, frame, us);
-    }
-    pub(crate) fn add_stage(&mut self, name: &str, frame: usize, us: f64) {
+    fn add_stage(&mut self, name: &str, frame: usize, us: f64) {
         match self.stages_us.iter_mut().find(|(n, _)| n == name) {
             Some((_, list)) => keep_best(list, frame, us),
             None => {
@@ -59,10 +82,7 @@ impl Times {
             }
         }
     }
-    pub(crate) fn median(&self) -> f64 {
-        median(&self.total_us)
-    }
-    pub(crate) fn stages_text(&self) -> String {
+    fn stages_text(&self) -> String {
         let frames = self.total_us.len();
         let one = |(name, us): &(String, Vec<f64>)| {
             // A stage that a frame does not reach took no time there.
@@ -101,44 +121,74 @@ fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
     cross.iter().map(|x| x * x).sum::<f64>().sqrt().atan2(dot).to_degrees()
 }
 
-impl CaseResult {
-    pub(crate) fn new(case: &Case) -> Self {
+impl ProgramResult {
+    pub(crate) fn new(name: impl Into<String>, case: &Case) -> Self {
         Self {
-            name: case.name.clone(),
-            f32: Times::default(),
-            fewer: Times::default(),
-            f64: Times::default(),
-            warm: Times::default(),
-            opencv: Times::default(),
+            name: name.into(),
             frames: case.frames.len(),
-            answered: [0; 4],
-            error_deg: Default::default(),
+            points: Vec::new(),
+            times: Default::default(),
+            error_deg: Vec::new(),
+        }
+    }
+
+    /// Records a run of hzn on a frame.
+    pub(crate) fn add_run(&mut self, number: usize, state: State, run: &Timed) {
+        keep_best(&mut self.times[state as usize].total_us, number, run.elapsed_us);
+    }
+    /// Records the times of hzn's stages on a frame.
+    pub(crate) fn add_stages(&mut self, number: usize, state: State, stages: Vec<(&'static str, f64)>) {
+        stages.iter().for_each(|(name, us)| self.times[state as usize].add_stage(name, number, *us));
+    }
+    /// Records a run of the recipe on a frame, with its stages.
+    pub(crate) fn add_answer(&mut self, number: usize, state: State, answer: &Answer) {
+        let times = &mut self.times[state as usize];
+        keep_best(&mut times.total_us, number, answer.total_us);
+        answer.stages_us.iter().for_each(|(name, us)| times.add_stage(name, number, *us));
+    }
+    /// Records what a program found in a frame; every run finds the same.
+    pub(crate) fn add_found(&mut self, frame: &Picture, points: u32, axis: Option<[f64; 3]>) {
+        self.points.push(points.into());
+        if let (Some(axis), Some(truth)) = (axis, frame.truth) {
+            self.error_deg.push(angle_deg(axis, truth));
+        }
+    }
+
+    /// Returns the median over the frames in microseconds.
+    pub(crate) fn median_us(&self, state: State) -> f64 {
+        median(&self.times[state as usize].total_us)
+    }
+    /// Returns the median time of each stage as text.
+    pub(crate) fn stages_text(&self, state: State) -> String {
+        self.times[state as usize].stages_text()
+    }
+    /// Returns the median number of points.
+    pub(crate) fn points(&self) -> f64 {
+        median(&self.points)
+    }
+    /// Returns the errors as text: median and worst in degrees, and the number of frames with an answer.
+    pub(crate) fn error_cell(&self) -> String {
+        let worst = self.error_deg.iter().copied().fold(f64::NAN, f64::max);
+        format!("{:.3} / {worst:.3} ({} of {})", median(&self.error_deg), self.error_deg.len(), self.frames)
+    }
+}
+
+impl CaseResult {
+    pub(crate) fn new(case: &Case, programs: Vec<ProgramResult>) -> Self {
+        Self {
+            title: case.title.clone(),
+            programs,
             pixels_percent: Vec::new(),
             ns_a_point: Vec::new(),
+            frames_mib: (case.pixels() * case.frames.len() as u64) as f64 / f64::from(1 << 20),
+            large_mib: [on_large_pages_mib(), 0.0],
         }
     }
 
-    /// Records the answers to a frame: hzn in f32, in f32 with fewer points, in f64, and the recipe.
-    pub(crate) fn add_answers(&mut self, frame: &Picture, hzn: [&Timed; 3], theirs: &Answer) {
-        let [single, fewer, double] = hzn.map(|t| t.axis.filter(|_| t.status == Status::Ok));
-        let axes = [single, fewer, double, theirs.axis];
-        for ((axis, count), errors) in axes.into_iter().zip(&mut self.answered).zip(&mut self.error_deg) {
-            if let Some(axis) = axis {
-                *count += 1;
-                errors.push(angle_deg(axis, frame.truth));
-            }
-        }
-    }
-
-    pub(crate) fn add_pixels(&mut self, read: u64, all: u64) {
-        self.pixels_percent.push(read as f64 * 100.0 / all as f64);
-    }
-
-    pub(crate) fn error_cells(&self) -> [String; 4] {
-        [0, 1, 2, 3].map(|i| {
-            let worst = self.error_deg[i].iter().copied().fold(f64::NAN, f64::max);
-            format!("{:.3} / {worst:.3} ({} of {})", median(&self.error_deg[i]), self.answered[i], self.frames)
-        })
+    /// Returns how many times as fast as the recipe hzn is, in a state.
+    pub(crate) fn ratio(&self, program: usize, state: State) -> f64 {
+        let time = |i: usize| self.programs.get(i).map_or(f64::NAN, |p| p.median_us(state));
+        time(RECIPE) / time(program)
     }
 }
 
@@ -155,11 +205,8 @@ impl Results {
             frames,
             rounds,
             cases: Vec::new(),
+            growth: Vec::new(),
         }
-    }
-
-    pub(crate) fn push(&mut self, case: CaseResult) {
-        self.cases.push(case);
     }
 }
 

@@ -1,4 +1,4 @@
-//! Measures hzn-core in both precisions, as the table needs it.
+//! Measures hzn-core in both precisions, as the tables need it.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -10,14 +10,12 @@ use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Prior};
 
 use crate::cases::{Case, Picture};
 use crate::observers::{Clock, PixelMap};
-
-/// Number of bytes that are touched to flush the caches; more than the caches hold.
-const FLUSH_BYTES: usize = 64 << 20;
-/// Repetitions of a warm measurement; their median counts.
-const WARM_RUNS: usize = 9;
+use crate::state::{FLUSH_BYTES, State};
 
 /// Value of `keep_points` in the measurement with fewer points.
 pub(crate) const FEWER: u16 = 200;
+/// Times that the frames are processed one after another to measure the time of a point.
+const TURNS: usize = 9;
 
 /// Sensor, with the memory that flushes the caches.
 pub(crate) struct Sensor<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
@@ -29,9 +27,17 @@ pub(crate) struct Sensor<T, const POINTS: usize, const BLOCKS: usize, const WORD
 pub(crate) struct Timed {
     pub(crate) elapsed_us: f64,
     pub(crate) level: u16,
-    pub(crate) status: Status,
     pub(crate) points: u32,
+    /// The answer, if the status is `ok`.
     pub(crate) axis: Option<[f64; 3]>,
+}
+
+/// Measurements of any sensor.
+pub(crate) trait Measured {
+    /// Measures one frame with the caches in a state.
+    fn measure(&mut self, case: &Case, frame: usize, state: State) -> Result<Timed, String>;
+    /// Returns the time of each stage in microseconds, with the caches in a state.
+    fn measure_stages(&mut self, case: &Case, frame: usize, state: State) -> Result<Vec<(&'static str, f64)>, String>;
 }
 
 /// Makes a sensor in f32 with the lists of a flight computer.
@@ -60,7 +66,8 @@ pub(crate) fn sensor_with_every_point(config: &Config) -> Result<Sensor<f32, 163
 
 fn picture<'a>(case: &Case, frame: &'a Picture) -> Result<Grey<'a, u8>, String> {
     let c = &case.sensor.camera;
-    Grey::try_new(&frame.bytes, Layout::packed(c.width.into(), c.height.into(), 1, 8)).map_err(|e| e.to_string())
+    Grey::try_new(frame.memory.bytes(), Layout::packed(c.width.into(), c.height.into(), 1, 8))
+        .map_err(|e| e.to_string())
 }
 
 fn prior<T: Real>(frame: &Picture) -> Prior<T> {
@@ -89,41 +96,59 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         let start = Instant::now();
         let report = black_box(self.horizon.process(black_box(&picture), &expected));
         let elapsed_us = start.elapsed().as_secs_f64() * 1e6;
+        let solution = report.solution.filter(|_| report.status == Status::Ok);
         Ok(Timed {
             elapsed_us,
             level: report.level,
-            status: report.status,
             points: report.counters.edge_points,
-            axis: report.solution.map(|s| s.axis.xyz().map(Real::to_f64)),
+            axis: solution.map(|s| s.axis.xyz().map(Real::to_f64)),
         })
     }
 
-    /// Measures one run with flushed caches.
-    pub(crate) fn measure_cold(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
-        self.flush_caches();
-        self.measure_once(case, frame)
+    /// Brings the caches into a state before frame number `frame` is measured, with an observer if `observed`: the
+    /// stages with an observer are other code than those without.
+    fn prepare(&mut self, case: &Case, frame: usize, state: State, observed: bool) -> Result<(), String> {
+        let before = if state == State::Warm { frame } else { (frame + 1) % case.frames.len() };
+        if state != State::Warm {
+            self.flush_caches();
+        }
+        if state == State::AllFlushed {
+            return Ok(());
+        }
+        let before = case.frame(before)?;
+        for _ in 0..2 {
+            if observed {
+                self.observe(case, before)?;
+            } else {
+                self.measure_once(case, before)?;
+            }
+        }
+        Ok(())
     }
 
-    /// Returns the time in microseconds when the same frame has just been processed.
-    pub(crate) fn measure_warm(&mut self, case: &Case, frame: &Picture) -> Result<f64, String> {
-        Ok(self.measure_warm_run(case, frame)?.elapsed_us)
-    }
-
-    /// Measures as [`Self::measure_warm`] does, and returns the whole result of the run.
-    pub(crate) fn measure_warm_run(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
-        let mut runs = (0..WARM_RUNS).map(|_| self.measure_once(case, frame)).collect::<Result<Vec<_>, _>>()?;
-        runs.sort_by(|a, b| a.elapsed_us.total_cmp(&b.elapsed_us));
-        Ok(runs.swap_remove(WARM_RUNS / 2))
-    }
-
-    /// Returns the time of each stage in microseconds, with flushed caches.
-    pub(crate) fn measure_stages(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
-        self.flush_caches();
+    /// Processes a frame with a clock in its stages, and returns their times in microseconds.
+    fn observe(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
         let picture = picture(case, frame)?;
         let expected = self.horizon.expect(&prior(frame)).map_err(|e| e.to_string())?;
         let clock = Clock::start();
         black_box(self.horizon.process_observed(black_box(&picture), &expected, &clock));
         Ok(clock.stages())
+    }
+
+    /// Returns the times per edge point in nanoseconds, when the frames are processed one after another: a list for
+    /// each frame, with its time in each of several turns through the frames. Frames without points are left out.
+    pub(crate) fn measure_ns_a_point(&mut self, case: &Case) -> Result<Vec<Vec<f64>>, String> {
+        let mut all = vec![Vec::new(); case.frames.len()];
+        for _ in 0..TURNS {
+            for (frame, list) in case.frames.iter().zip(&mut all) {
+                let Timed { elapsed_us, points, .. } = self.measure_once(case, frame)?;
+                if points > 0 {
+                    list.push(elapsed_us * 1e3 / f64::from(points));
+                }
+            }
+        }
+        all.retain(|list| !list.is_empty());
+        Ok(all)
     }
 
     /// Returns the number of pixels that are read at least once.
@@ -133,5 +158,19 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         let touched = PixelMap::new(case.sensor.camera.width, case.sensor.camera.height);
         self.horizon.process_observed(&picture, &expected, &touched);
         Ok(touched.count())
+    }
+}
+
+impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Measured
+    for Sensor<T, POINTS, BLOCKS, WORDS>
+{
+    fn measure(&mut self, case: &Case, frame: usize, state: State) -> Result<Timed, String> {
+        self.prepare(case, frame, state, false)?;
+        self.measure_once(case, case.frame(frame)?)
+    }
+
+    fn measure_stages(&mut self, case: &Case, frame: usize, state: State) -> Result<Vec<(&'static str, f64)>, String> {
+        self.prepare(case, frame, state, true)?;
+        self.observe(case, case.frame(frame)?)
     }
 }

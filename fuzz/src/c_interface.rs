@@ -3,7 +3,8 @@
 use std::alloc::{Layout, alloc, dealloc};
 use std::ptr;
 
-use hzn::{HznAnswer, HznKnown, HznPicture, hzn_apply, hzn_get, hzn_open, hzn_process, hzn_set};
+use hzn::types::{HznAnswer, HznKnown, HznPicture};
+use hzn::{HZN_INTERFACE, hzn_apply, hzn_get, hzn_open, hzn_process, hzn_refused, hzn_set};
 use hzn::{hzn_workspace_align, hzn_workspace_size};
 
 /// Calls every function with values from the bytes.
@@ -17,10 +18,10 @@ pub(crate) fn call(data: &[u8]) {
         let memory = alloc(layout);
         let mut sensor = ptr::null_mut();
         assert_eq!(
-            hzn_open(ptr::null_mut(), layout.size(), &mut sensor),
-            hzn_open(memory, layout.size(), ptr::null_mut())
+            hzn_open(ptr::null_mut(), layout.size(), HZN_INTERFACE, &mut sensor),
+            hzn_open(memory, layout.size(), HZN_INTERFACE, ptr::null_mut())
         );
-        if hzn_open(memory, layout.size() - short, &mut sensor) == 0 {
+        if hzn_open(memory, layout.size() - short, HZN_INTERFACE, &mut sensor) == 0 {
             for _ in 0..byte() % 8 {
                 let number = u16::from_le_bytes([byte(), byte() % 2]);
                 let value = if byte() % 2 == 0 {
@@ -34,7 +35,9 @@ pub(crate) fn call(data: &[u8]) {
                 }
                 hzn_get(sensor, number, ptr::null_mut());
             }
-            hzn_apply(sensor);
+            if hzn_apply(sensor) != 0 {
+                let _ = hzn_refused(sensor);
+            }
             let pixels: Vec<u8> =
                 data.iter().cycle().take(if data.is_empty() { 0 } else { 640 * 480 }).copied().collect();
             let less = usize::from(byte() % 3);

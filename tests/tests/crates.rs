@@ -14,7 +14,11 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("hzn-mcap", &["hzn-core", "hzn-nav"]),
     ("hzn-run", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap"]),
     ("hzn-fuse", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-mcap", "hzn-run"]),
-    ("hzn-cli", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run", "hzn-fuse"]),
+    ("hzn-fly", &["hzn-core", "hzn-mcap", "hzn-flight", "hzn-run"]),
+    (
+        "hzn-cli",
+        &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run", "hzn-fuse", "hzn-fly"],
+    ),
     ("hzn-py", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run", "hzn-fuse"]),
     ("hzn-viewer", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap", "hzn-run", "hzn-fuse"]),
 ];

@@ -156,6 +156,24 @@ fn aurora_is_refused_or_doubted() {
     }
 }
 
+/// Direction to the Earth in iss030e102170-night.jpg, from its stars.
+const NIGHT_AXIS: [f64; 3] = [0.022320, 0.942248, 0.334170];
+
+#[test]
+fn airglow_is_no_limb() {
+    for file in ["iss030e102170-night.jpg", "iss030e130515-night.jpg"] {
+        let p = Photograph::load(file);
+        let l = process_both(&p);
+        assert!(matches!((&l.host, &l.flight), (Err(_), Err(_))), "{file}: {:?} {:?}", l.host, l.flight);
+    }
+    // The edge of the airglow has the form of a limb. Only the light above it shows what it is.
+    let mut night = Photograph::load("iss030e102170-night.jpg");
+    night.sensor.select.max_glow = 1e6;
+    let believed = process(&mut Sensors::new(&night.sensor).host, &night.view(), &Prior::default());
+    let error_deg = believed.expect("the airglow passes the other gates").error_deg(NIGHT_AXIS);
+    assert!(error_deg > 2.0, "{error_deg}°");
+}
+
 #[test]
 fn pluto() {
     let p = Photograph::load("pluto-pia19948.jpg");

@@ -32,7 +32,10 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
             return steps::run(samplers.args(rest));
         }
         let python = python::prepare_environment("benches", Path::new("benches/requirements.txt"))?;
-        let mut harness = cargo(&["run", "--quiet", "--release", "--package", "hzn-benches"]);
+        // The profile in which the programs are shipped.
+        let build = ["--profile", "dist", "--package", "hzn-benches", "--no-default-features"];
+        let mut harness = cargo(&["run", "--quiet"]);
+        harness.args(build).args(["--bin", "hzn-benches"]);
         steps::run(harness.args(["--", "--python"]).arg(python).args(args))
     };
     go().map_err(Trouble::into_message)

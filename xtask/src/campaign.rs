@@ -21,12 +21,14 @@ const MAX_INPUT_BYTES: u32 = 8192;
 const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TARGET]...
        cargo xtask campaign kill [RUNS]
        cargo xtask campaign long [PICTURES]
+       cargo xtask campaign flips [TRIALS]
        cargo xtask campaign parts [FOLDER]
 
   fuzz  runs every target (or those that are named) under libFuzzer for N seconds (60); --keep adds the inputs with
         new coverage to fuzz/corpus
   kill  kills RUNS (1000) runs of hzn at random moments and continues them
   long  processes PICTURES (100000) with hzn run, and ten times as many in one process
+  flips flips TRIALS (20000) bits of pictures and of stored parameters, and sticks as many pictures
   parts writes the CycloneDX lists of parts (SBOM) of command, wheel and firmware into FOLDER (target/sbom), and runs
         cargo-deny if it is installed";
 
@@ -41,6 +43,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("fuzz") => Request::parse(&args[1..]).and_then(|request| request.run().map_err(Trouble::into_message)),
         Some("kill") => kill(number(1000)?).map_err(Trouble::into_message),
         Some("long") => long(number(100_000)?).map_err(Trouble::into_message),
+        Some("flips") => flips(number(20_000)?).map_err(Trouble::into_message),
         Some("parts") => parts(args.get(1).map_or("target/sbom", String::as_str)).map_err(Trouble::into_message),
         _ => Err(USAGE.to_owned()),
     };
@@ -61,6 +64,18 @@ fn kill(runs: u64) -> Outcome {
 fn long(pictures: u64) -> Outcome {
     steps::run(test("hzn-core", "long", "the_answers_repeat").env("HZN_FRAMES", (10 * pictures).to_string()))?;
     steps::run(test("hzn-cli", "campaign", "a_long_run").env("HZN_PICTURES", pictures.to_string()))
+}
+
+fn flips(trials: u64) -> Outcome {
+    let trials = trials.to_string();
+    steps::run(test("hzn-flight", "flight", "flips::").env("HZN_FLIPS", &trials))?;
+    let mut in_memory = cargo(&["test", "--package", "hzn-c", "--test", "flips"]);
+    in_memory.current_dir(root().join("firmware")).arg("--target-dir").arg(target().join("firmware/flips"));
+    in_memory
+        .env("CARGO_PROFILE_DEV_DEBUG_ASSERTIONS", "false")
+        .env("CARGO_PROFILE_DEV_OPT_LEVEL", "2")
+        .env("HZN_FLIPS", &trials);
+    steps::run(in_memory.args(["--", "--nocapture", "--include-ignored"]))
 }
 
 fn parts(folder: &str) -> Outcome {

@@ -195,7 +195,7 @@ fn check_c_interface() -> Outcome {
     if host != emulated {
         return Err(Trouble::Failed(format!("the C example prints another result in QEMU:\n{emulated}")));
     }
-    Ok(())
+    crate::c_package::check(&c, &here, &out)
 }
 
 /// Returns what a program prints on both streams; an error if the program fails.

@@ -13,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod c_package;
 mod campaign;
 mod demo;
 mod firmware;
@@ -41,7 +42,7 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|
                      compares samplers of outliers on simulated edge points
   reproduce [STUDY]...
                      measures the numbers of book/results/reproduction.md again and writes the file (see --help there)
-  campaign <fuzz|kill|long|parts> [ARG]...
+  campaign <fuzz|kill|long|flips|parts> [ARG]...
                      looks for faults, and lists what hzn is built from (see book/results/reliability.md)
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into book/results/firmware-cost.md;

@@ -27,7 +27,7 @@ const STAGES: [&str; 11] = [
 /// the number of places that may do so.
 const ALLOWED_CONVERSIONS: [(&str, usize); 15] = [
     ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::candidate::{{closure}}", 34),
-    ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::judge_edge", 36),
+    ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::judge_edge", 38),
     ("hzn_core::stages::consensus::inliers::Threshold<T>::new", 3),
     ("hzn_core::stages::consensus::find", 2),
     ("hzn_core::stages::covariance::fuse", 5),

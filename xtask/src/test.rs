@@ -105,5 +105,8 @@ fn read_files_with_other_readers() -> Outcome {
     steps::run(Command::new(&python).arg("tests/python/check_mcap.py").args(files))?;
     let folder = target().join("xtask").join("navigation");
     let programs = ["debug/hzn", "debug/examples/flight"].map(|program| target().join(program));
-    steps::run(Command::new(python).arg("tests/python/check_nav.py").args(programs).arg(folder))
+    steps::run(Command::new(&python).arg("tests/python/check_nav.py").args(programs).arg(folder))?;
+    let folder = target().join("xtask").join("telemetry");
+    let programs = ["debug/hzn", "debug/examples/telemetry_packets"].map(|program| target().join(program));
+    steps::run(Command::new(python).arg("tests/python/check_telemetry.py").args(programs).arg(folder))
 }

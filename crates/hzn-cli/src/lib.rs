@@ -15,6 +15,7 @@ pub mod plot;
 mod progress;
 mod refusals;
 mod setup;
+mod tai;
 mod tell;
 
 use clap::Parser;

@@ -281,9 +281,18 @@ fn a_telecommand_has_values_that_can_be() {
     place.run(&["telecommand", "ping", "--apid-base", "0x101"]).expect(2).says("multiple of 16");
     place.run(&["telecommand", "navigate 1 2 3"]).expect(2).says("9 or 12 numbers");
     let half = "navigate 5 60 NaN 6608 nan 0 0 7300 0";
-    place.run(&["telecommand", half]).expect(2).says("all three numbers of the position");
+    place
+        .run(&["telecommand", half])
+        .expect(2)
+        .says("all three numbers of the position must be known, or none: y is NaN");
     place.run(&["telecommand", "navigate 5 60 NaN 6608 0 0 0 7300 0", "-o", "n.bin"]).expect(0);
     assert_eq!(std::fs::metadata(place.path("n.bin")).unwrap().len(), 21 + 52);
+    place.run(&["telecommand", "navigate 2026-11-24T12:00:00Z 60 NaN 6608 0 0 0 7300 0", "-o", "u.bin"]).expect(0);
+    // P-field of TAI, then 2174212837 seconds: `date -u -d 2026-11-24T12:00:00 +%s`, 37 s and 4383 days.
+    let sent = std::fs::read(place.path("u.bin")).unwrap();
+    assert_eq!(sent[19..27], [0x1F, 0x81, 0x97, 0xDA, 0xE5, 0, 0, 0], "{:x?}", &sent[19..27]);
+    place.run(&["telecommand", "time 12:00"]).expect(2).says("is not a time in UTC");
+    place.run(&["telecommand", "time 2026-01-01T00:00:00.5Z pulse"]).expect(2).says("a whole second");
     place.run(&["telecommand", "stage"]).expect(2).says("there is no such command");
     // A choice by name gives the same command as by number. An optional value may be NaN.
     let (named, numbered) = (set("binarize.method fixed"), set("50 1"));

@@ -22,7 +22,6 @@ fn sensor(body: &str) -> String {
 
 fn place(body: &str, pictures: &[(&str, image::GrayImage)]) -> Place {
     let place = Place::new();
-    std::fs::create_dir(place.path("in")).unwrap();
     for (name, picture) in pictures {
         picture.save(place.path("in").join(name)).unwrap();
     }

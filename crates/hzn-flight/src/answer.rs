@@ -1,94 +1,225 @@
-//! A report as bytes for science telemetry, with every bit of its numbers.
+//! A report as records for telemetry, with every bit of its numbers.
 
 use hzn_core::frames::{Cov3, UnitVec3};
+use hzn_core::report::{Candidate, Counters, Free, MAX_LISTED};
 use hzn_core::status::{Stage, Status};
+use hzn_core::verdict::Verdict;
 use hzn_core::{Report, Solution};
-use hzn_core::{
-    report::{Candidate, Counters, MAX_LISTED},
-    verdict::Verdict,
-};
 
 use crate::bytes::{Reader, Writer};
+use crate::record::record;
 
 type Candidates = heapless::Vec<Candidate<f64>, MAX_LISTED>;
 
-/// A candidate edge.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Edge {
-    /// Number of border pixels.
-    pub length_px: u32,
-    /// Number of sub-pixel points.
-    pub points: u32,
-    /// Number of points that fit the limb.
-    pub inliers: u32,
-    /// RMS distance of the inliers from the limb in pixels; NaN without a fit.
-    pub rms_px: f32,
-    /// [`hzn_core::verdict::Verdict`] as a number.
-    pub verdict: u8,
+record! {
+    /// The outcome of a picture.
+    Outcome {
+        /// [`hzn_core::status::Status`] as a number.
+        status: u8,
+        /// [`hzn_core::status::Stage`] as a number: the last stage that was entered.
+        stage: u8,
+        /// Number of looks at the picture, each at another threshold.
+        looks: u8,
+        /// Threshold between dark and lit in counts; 0: not reached.
+        level: u16,
+        /// Border pixels that were followed.
+        followed: u32,
+        /// Number of edges that were examined as candidates, listed or not.
+        candidates: u32,
+        /// Border pixels that were dropped.
+        dropped: u32,
+        /// Points at the threshold of the whole picture, because their local mid-level was not found.
+        fallback_points: u32,
+        /// Edge points of the chosen edge.
+        edge_points: u32,
+        /// Draws of the consensus.
+        draws: u32,
+        /// Work of the picture, in the unit of `limits.max_work`.
+        work: u32,
+        /// Number of candidates whose packets came before this one.
+        listed: u8,
+        /// 1: there is a direction. 0: there is none, and the numbers that follow are NaN or 0.
+        solved: u8,
+    }
 }
 
-/// A direction; see [`hzn_core::Solution`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Direction {
-    /// Unit vector to the body, in the camera frame.
-    pub axis: [f32; 3],
-    /// Covariance of `axis` (xx, xy, xz, yy, yz, zz), rad².
-    pub cov: [f32; 6],
-    /// The same direction in ECEF; NaN without a position.
-    pub axis_ecef: [f32; 3],
-    /// The same direction in the vehicle's frame; NaN without a mounting.
-    pub axis_body: [f32; 3],
-    /// Half-angle of the free fit, rad.
-    pub half_angle_rad: f32,
-    /// Half-angle of the answer, rad.
-    pub fused_half_angle_rad: f32,
-    /// Altitude from the free fit, m; NaN where the half-angle does not give one.
-    pub altitude_m: f32,
-    /// 1-sigma of the altitude, m.
-    pub altitude_sigma_m: f32,
-    /// RMS distance of the inliers, px.
-    pub rms_px: f32,
-    /// Length of the edge that the inliers cover, px.
-    pub arc_px: f32,
-    /// Number of edge points that carry the answer.
-    pub inliers: u32,
-    /// Number of the chosen candidate.
-    pub candidate: u32,
+record! {
+    /// A direction; see [`hzn_core::Solution`].
+    Direction {
+        /// Unit vector to the body, in the camera frame.
+        axis: [f32; 3],
+        /// Covariance of `axis`, rad².
+        cov: [f32; 6],
+        /// The same direction in ECEF; NaN without a position.
+        axis_ecef: [f32; 3],
+        /// The same direction in the vehicle's frame; NaN without a mounting.
+        axis_body: [f32; 3],
+        /// Half-angle of the free fit, rad.
+        half_angle_rad: f32,
+        /// Half-angle of the answer, rad.
+        fused_half_angle_rad: f32,
+        /// Altitude from the free fit, m; NaN where the half-angle does not give one.
+        altitude_est_m: f32,
+        /// 1-sigma of that altitude, m.
+        altitude_est_sigma_m: f32,
+        /// RMS distance of the inliers, px.
+        rms_px: f32,
+        /// Length of the edge that the inliers cover, px.
+        arc_px: f32,
+        /// Number of edge points that carry the answer.
+        inliers: u32,
+        /// Number of the chosen candidate.
+        candidate: u32,
+    }
+}
+
+record! {
+    /// The fit with a free half-angle, and the position of the body's centre. What is not known is NaN.
+    Position {
+        /// Axis of the fit with a free half-angle, in the camera frame.
+        axis_free: [f32; 3],
+        /// Covariance of `axis_free`, rad²: all terms except that of the expected half-angle.
+        cov_free: [f32; 6],
+        /// Cosine of the free half-angle.
+        cos_free: f32,
+        /// Variance of `cos_free`.
+        cos_free_variance: f32,
+        /// Change of `cos_free` when every edge point moves by one pixel across the limb, 1/px.
+        cos_free_per_px: f32,
+        /// Derivative of the axis by the cosine of the expected half-angle, in the camera frame.
+        axis_by_cos: [f32; 3],
+        /// Position of the body's centre from the camera, in the camera frame, m; only with `estimate.position`.
+        position_m: [f32; 3],
+        /// Covariance of `position_m`, m².
+        pos_cov_m2: [f32; 6],
+        /// Distance of the centre before the known distance was fused, m.
+        range_m: f32,
+        /// 1-sigma of that distance, m.
+        range_sigma_m: f32,
+        /// Position of the camera in the axes of the body, m.
+        body_fixed_m: [f32; 3],
+    }
+}
+
+record! {
+    /// A candidate edge.
+    Edge {
+        /// Number of the candidate, from 0.
+        number: u32,
+        /// Number of border pixels.
+        length_px: u32,
+        /// Number of sub-pixel points.
+        points: u32,
+        /// Number of points that fit the limb.
+        inliers: u32,
+        /// RMS distance of the inliers from the limb in pixels; NaN without a fit.
+        rms_px: f32,
+        /// [`hzn_core::verdict::Verdict`] as a number.
+        verdict: u8,
+    }
+}
+
+const NAN: f32 = f32::NAN;
+
+impl Direction {
+    /// What a picture without a direction has.
+    pub const NONE: Self = Self {
+        axis: [NAN; 3],
+        cov: [NAN; 6],
+        axis_ecef: [NAN; 3],
+        axis_body: [NAN; 3],
+        half_angle_rad: NAN,
+        fused_half_angle_rad: NAN,
+        altitude_est_m: NAN,
+        altitude_est_sigma_m: NAN,
+        rms_px: NAN,
+        arc_px: NAN,
+        inliers: 0,
+        candidate: 0,
+    };
+
+    fn from_solution(s: &Solution<f32>) -> Self {
+        let (altitude_est_m, altitude_est_sigma_m) = s.altitude_m.unwrap_or((NAN, NAN));
+        Self {
+            axis: s.axis.xyz(),
+            cov: s.covariance.upper_rad2,
+            axis_ecef: s.axis_ecef.map_or([NAN; 3], |a| a.xyz()),
+            axis_body: s.axis_body.map_or([NAN; 3], |a| a.xyz()),
+            half_angle_rad: s.half_angle_rad,
+            fused_half_angle_rad: s.fused_half_angle_rad,
+            altitude_est_m,
+            altitude_est_sigma_m,
+            rms_px: s.rms_px,
+            arc_px: s.arc_px,
+            inliers: s.inliers,
+            candidate: s.candidate,
+        }
+    }
+}
+
+impl Position {
+    /// What a picture without a position and without a free fit has.
+    pub const NONE: Self = Self {
+        axis_free: [NAN; 3],
+        cov_free: [NAN; 6],
+        cos_free: NAN,
+        cos_free_variance: NAN,
+        cos_free_per_px: NAN,
+        axis_by_cos: [NAN; 3],
+        position_m: [NAN; 3],
+        pos_cov_m2: [NAN; 6],
+        range_m: NAN,
+        range_sigma_m: NAN,
+        body_fixed_m: [NAN; 3],
+    };
+
+    fn from_solution(s: &Solution<f32>) -> Option<Self> {
+        if s.free.is_none() && s.position.is_none() {
+            return None;
+        }
+        let mut p = Self { axis_by_cos: s.axis_by_cos.unwrap_or([NAN; 3]), ..Self::NONE };
+        if let Some(free) = &s.free {
+            (p.axis_free, p.cov_free) = (free.axis.xyz(), free.covariance.upper_rad2);
+            (p.cos_free, p.cos_free_variance, p.cos_free_per_px) = (free.cos, free.var_cos, free.cos_per_px);
+        }
+        if let Some(position) = &s.position {
+            (p.position_m, p.pos_cov_m2) = (position.centre_m, position.covariance_m2);
+            (p.range_m, p.range_sigma_m) = position.free_range_m;
+            p.body_fixed_m = position.body_fixed_m.unwrap_or([NAN; 3]);
+        }
+        Some(p)
+    }
+
+    fn free(&self) -> Option<Free<f64>> {
+        Some(Free {
+            axis: UnitVec3::try_new(self.axis_free.map(f64::from))?,
+            covariance: Cov3::from_upper(self.cov_free.map(f64::from)),
+            cos: self.cos_free.into(),
+            var_cos: self.cos_free_variance.into(),
+            cos_per_px: self.cos_free_per_px.into(),
+        })
+    }
 }
 
 /// The answer to one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PictureAnswer {
-    /// [`hzn_core::status::Status`] as a number.
-    pub status: u8,
-    /// [`hzn_core::status::Stage`] as a number: the last stage that was entered.
-    pub stage: u8,
-    /// Number of looks at the picture, each at another threshold: 1 to 16.
-    pub looks: u8,
-    /// Threshold between dark and lit in counts.
-    pub level: u16,
-    /// Border pixels that were followed.
-    pub followed: u32,
-    /// Number of edges that were examined as candidates, listed or not.
-    pub candidates: u32,
-    /// Border pixels that were dropped.
-    pub dropped: u32,
-    /// Points at the threshold of the whole picture, because their local mid-level was not found.
-    pub fallback_points: u32,
-    /// Edge points of the chosen edge.
-    pub edge_points: u32,
-    /// Draws of the consensus.
-    pub draws: u32,
-    /// Work of the picture, in the unit of `limits.max_work`.
-    pub work: u32,
+    /// The outcome, with its counts.
+    pub outcome: Outcome,
     /// The direction; only with status `ok`.
     pub direction: Option<Direction>,
+    /// The free fit and the position, if there is one of them.
+    pub position: Option<Position>,
     /// The first candidates, including the chosen one.
     pub edges: [Option<Edge>; MAX_LISTED],
 }
 
-/// Most looks that the packet can show.
-const MAX_LOOKS: u32 = 16;
+impl core::ops::Deref for PictureAnswer {
+    type Target = Outcome;
+    fn deref(&self) -> &Outcome {
+        &self.outcome
+    }
+}
 
 impl PictureAnswer {
     /// Makes the answer from a report.
@@ -97,6 +228,7 @@ impl PictureAnswer {
         let mut edges = [None; MAX_LISTED];
         for (edge, c) in edges.iter_mut().zip(&report.candidates) {
             *edge = Some(Edge {
+                number: c.number,
                 length_px: c.length_px,
                 points: c.points,
                 inliers: c.inliers,
@@ -104,28 +236,11 @@ impl PictureAnswer {
                 verdict: c.verdict as u8,
             });
         }
-        let direction = report.solution.as_ref().map(|s| {
-            let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = s.covariance.rows();
-            let (altitude_m, altitude_sigma_m) = s.altitude_m.unwrap_or((f32::NAN, f32::NAN));
-            Direction {
-                axis: s.axis.xyz(),
-                cov: [xx, xy, xz, yy, yz, zz],
-                axis_ecef: s.axis_ecef.map_or([f32::NAN; 3], |a| a.xyz()),
-                axis_body: s.axis_body.map_or([f32::NAN; 3], |a| a.xyz()),
-                half_angle_rad: s.half_angle_rad,
-                fused_half_angle_rad: s.fused_half_angle_rad,
-                altitude_m,
-                altitude_sigma_m,
-                rms_px: s.rms_px,
-                arc_px: s.arc_px,
-                inliers: s.inliers,
-                candidate: s.candidate,
-            }
-        });
-        Self {
+        let direction = report.solution.as_ref().map(Direction::from_solution);
+        let outcome = Outcome {
             status: report.status as u8,
             stage: report.stage as u8,
-            looks: c.looks.clamp(1, MAX_LOOKS) as u8,
+            looks: c.looks.min(255) as u8,
             level: report.level,
             followed: c.followed,
             candidates: c.candidates,
@@ -134,25 +249,24 @@ impl PictureAnswer {
             edge_points: c.edge_points,
             draws: c.draws,
             work: c.work,
-            direction,
-            edges,
-        }
+            listed: report.candidates.len() as u8,
+            solved: u8::from(direction.is_some()),
+        };
+        Self { outcome, direction, position: report.solution.as_ref().and_then(Position::from_solution), edges }
     }
 
-    /// Returns the report in double precision, as on a workstation; `None` if a number in it has no meaning.
+    /// Returns the report in double precision, as on a workstation; `None` if a number in it has no meaning. The
+    /// position is in [`Self::position`] alone.
     pub fn to_report(&self) -> Option<Report<f64>> {
         let mut candidates = Candidates::default();
-        for (place, e) in (0..).zip(self.edges.iter().flatten()) {
-            let verdict = *Verdict::ALL.get(usize::from(e.verdict))?;
-            // Telemetry has no candidate numbers. Only the chosen candidate can be at a place other than its number.
-            let chosen = self.direction.filter(|_| verdict == Verdict::Chosen).map(|d| d.candidate);
+        for e in self.edges.iter().flatten() {
             let candidate = Candidate {
-                number: chosen.unwrap_or(place),
+                number: e.number,
                 length_px: e.length_px,
                 points: e.points,
                 inliers: e.inliers,
                 rms_px: f64::from(e.rms_px),
-                verdict,
+                verdict: *Verdict::ALL.get(usize::from(e.verdict))?,
             };
             candidates.push(candidate).ok()?;
         }
@@ -166,9 +280,10 @@ impl PictureAnswer {
                 axis_body: UnitVec3::try_new(widen(d.axis_body)),
                 half_angle_rad: d.half_angle_rad.into(),
                 fused_half_angle_rad: d.fused_half_angle_rad.into(),
-                altitude_m: (!d.altitude_m.is_nan()).then(|| (d.altitude_m.into(), d.altitude_sigma_m.into())),
-                free: None,
-                axis_by_cos: None,
+                altitude_m: (!d.altitude_est_m.is_nan())
+                    .then(|| (d.altitude_est_m.into(), d.altitude_est_sigma_m.into())),
+                free: self.position.and_then(|p| p.free()),
+                axis_by_cos: self.position.map(|p| widen(p.axis_by_cos)).filter(|v| !v.iter().any(|x| x.is_nan())),
                 position: None,
                 rms_px: d.rms_px.into(),
                 inliers: d.inliers,
@@ -176,102 +291,60 @@ impl PictureAnswer {
                 candidate: d.candidate,
             }),
         };
+        let o = &self.outcome;
         Some(Report {
-            status: *Status::ALL.get(usize::from(self.status))?,
-            stage: *Stage::ALL.get(usize::from(self.stage))?,
-            level: self.level,
+            status: *Status::ALL.get(usize::from(o.status))?,
+            stage: *Stage::ALL.get(usize::from(o.stage))?,
+            level: o.level,
             // Telemetry does not have it: the next picture was exposed long before.
             next_level: None,
             counters: Counters {
-                followed: self.followed,
-                candidates: self.candidates,
-                dropped: self.dropped,
-                fallback_points: self.fallback_points,
-                edge_points: self.edge_points,
-                draws: self.draws,
-                work: self.work,
+                followed: o.followed,
+                candidates: o.candidates,
+                dropped: o.dropped,
+                fallback_points: o.fallback_points,
+                edge_points: o.edge_points,
+                draws: o.draws,
+                work: o.work,
                 // Pictures of the flight software do not come row by row.
                 cut_points: 0,
-                looks: self.looks.into(),
+                looks: o.looks.into(),
             },
             candidates,
             solution,
         })
     }
 
-    /// Appends the answer to `out`.
+    /// Appends outcome and direction, as in a science packet.
+    pub fn write_science(&self, out: &mut Writer<'_>) {
+        self.outcome.write(out);
+        self.direction.unwrap_or(Direction::NONE).write(out);
+    }
+
+    /// Reads outcome and direction; `None` if they are cut off.
+    pub fn read_science(from: &mut Reader<'_>) -> Option<Self> {
+        let (outcome, direction) = (Outcome::read(from)?, Direction::read(from)?);
+        let direction = (outcome.solved != 0).then_some(direction);
+        Some(Self { outcome, direction, position: None, edges: [None; MAX_LISTED] })
+    }
+
+    /// Appends the whole answer: outcome, direction, position, and the listed candidates.
     pub fn write(&self, out: &mut Writer<'_>) {
-        out.u8(self.status);
-        // This byte has two numbers: the stage in its lower four bits, the number of further looks in its upper four.
-        out.u8(self.stage | self.looks.saturating_sub(1).min(15) << 4);
-        out.u16(self.level);
-        let counts = [self.followed, self.candidates, self.dropped, self.fallback_points, self.edge_points, self.draws];
-        for n in counts.into_iter().chain([self.work]) {
-            out.u32(n);
-        }
-        out.u8(u8::from(self.direction.is_some()));
-        out.u8(self.edges.iter().flatten().count() as u8);
-        if let Some(d) = &self.direction {
-            let numbers =
-                [d.half_angle_rad, d.fused_half_angle_rad, d.altitude_m, d.altitude_sigma_m, d.rms_px, d.arc_px];
-            for &x in d.axis.iter().chain(&d.cov).chain(&d.axis_ecef).chain(&d.axis_body).chain(&numbers) {
-                out.f32(x);
-            }
-            out.u32(d.inliers);
-            out.u32(d.candidate);
-        }
+        self.write_science(out);
+        self.position.unwrap_or(Position::NONE).write(out);
         for e in self.edges.iter().flatten() {
-            out.u32(e.length_px);
-            out.u32(e.points);
-            out.u32(e.inliers);
-            out.f32(e.rms_px);
-            out.u8(e.verdict);
+            e.write(out);
         }
     }
 
-    /// Reads an answer; `None` if it is cut off.
+    /// Reads a whole answer; `None` if it is cut off.
     pub fn read(from: &mut Reader<'_>) -> Option<Self> {
-        let (status, stage) = (from.u8()?, from.u8()?);
-        let mut answer = Self {
-            status,
-            stage: stage & 15,
-            looks: (stage >> 4) + 1,
-            level: from.u16()?,
-            followed: from.u32()?,
-            candidates: from.u32()?,
-            dropped: from.u32()?,
-            fallback_points: from.u32()?,
-            edge_points: from.u32()?,
-            draws: from.u32()?,
-            work: from.u32()?,
-            direction: None,
-            edges: [None; MAX_LISTED],
-        };
-        let (solved, listed) = (from.u8()?, from.u8()?);
-        if solved != 0 {
-            answer.direction = Some(Direction {
-                axis: from.floats()?,
-                cov: from.floats()?,
-                axis_ecef: from.floats()?,
-                axis_body: from.floats()?,
-                half_angle_rad: from.f32()?,
-                fused_half_angle_rad: from.f32()?,
-                altitude_m: from.f32()?,
-                altitude_sigma_m: from.f32()?,
-                rms_px: from.f32()?,
-                arc_px: from.f32()?,
-                inliers: from.u32()?,
-                candidate: from.u32()?,
-            });
-        }
-        for edge in answer.edges.iter_mut().take(usize::from(listed)) {
-            *edge = Some(Edge {
-                length_px: from.u32()?,
-                points: from.u32()?,
-                inliers: from.u32()?,
-                rms_px: from.f32()?,
-                verdict: from.u8()?,
-            });
+        let mut answer = Self::read_science(from)?;
+        let position = Position::read(from)?;
+        let is_known = position.values().any(|x| !x.is_nan());
+        answer.position = is_known.then_some(position);
+        for edge in answer.edges.iter_mut().take(usize::from(answer.outcome.listed)) {
+            *edge = Some(Edge::read(from)?);
         }
         Some(answer)
     }
@@ -281,9 +354,25 @@ impl PictureAnswer {
 mod tests {
     use super::*;
 
+    fn position() -> Position {
+        Position {
+            axis_free: [0.1, 0.2, 0.97],
+            cov_free: [1.0; 6],
+            cos_free: 0.3,
+            cos_free_variance: 1e-7,
+            cos_free_per_px: 1e-4,
+            axis_by_cos: [1.0, 2.0, 3.0],
+            position_m: [4e6, 5e6, 6e6],
+            pos_cov_m2: [1e9; 6],
+            range_m: 7e6,
+            range_sigma_m: 8e3,
+            body_fixed_m: [9e6, 1e6, 2e6],
+        }
+    }
+
     #[test]
     fn an_answer_survives_with_every_bit() {
-        let edge = Edge { length_px: 1900, points: 600, inliers: 590, rms_px: 0.3, verdict: 0 };
+        let edge = Edge { number: 3, length_px: 1900, points: 600, inliers: 590, rms_px: 0.3, verdict: 0 };
         let direction = Direction {
             axis: [0.1, 0.2, 0.97],
             cov: [1e-8, 2e-9, 3e-9, 4e-8, 5e-9, 6e-9],
@@ -291,8 +380,8 @@ mod tests {
             axis_body: [1.0, 0.0, 0.0],
             half_angle_rad: 1.2,
             fused_half_angle_rad: 1.21,
-            altitude_m: 230e3,
-            altitude_sigma_m: 900.0,
+            altitude_est_m: 230e3,
+            altitude_est_sigma_m: 900.0,
             rms_px: 0.3,
             arc_px: 1888.0,
             inliers: 590,
@@ -300,7 +389,7 @@ mod tests {
         };
         let mut edges = [None; MAX_LISTED];
         (edges[0], edges[1]) = (Some(Edge { verdict: 5, ..edge }), Some(edge));
-        let solved = PictureAnswer {
+        let outcome = Outcome {
             status: 0,
             stage: 7,
             looks: 3,
@@ -312,11 +401,18 @@ mod tests {
             edge_points: 600,
             draws: 20,
             work: 25_000,
-            direction: Some(direction),
-            edges,
+            listed: 2,
+            solved: 1,
         };
-        for answer in [solved, PictureAnswer { status: 1, direction: None, edges: [None; MAX_LISTED], ..solved }] {
-            let mut bytes = [0; 512];
+        let solved = PictureAnswer { outcome, direction: Some(direction), position: Some(position()), edges };
+        let empty = PictureAnswer {
+            outcome: Outcome { status: 1, solved: 0, listed: 0, ..outcome },
+            direction: None,
+            position: None,
+            edges: [None; MAX_LISTED],
+        };
+        for answer in [solved, empty] {
+            let mut bytes = [0; 640];
             let mut out = Writer::new(&mut bytes);
             answer.write(&mut out);
             let n = out.finish().unwrap();

@@ -1,5 +1,8 @@
 //! The functions that a board provides. A port is one implementation of this trait.
 
+use hzn_core::Report;
+
+use crate::messages::Exposure;
 use crate::table::CRC32;
 
 /// A picture that the camera has written to memory.
@@ -7,7 +10,7 @@ use crate::table::CRC32;
 pub struct Picture {
     /// Bytes that the camera wrote.
     pub bytes: usize,
-    /// Time of the exposure, µs since the start.
+    /// Time of the middle of the exposure, µs since the start. The values from navigation are moved to it.
     pub exposure_us: u64,
     /// Pictures lost since the last one, because both buffers were full.
     pub lost: u32,
@@ -34,6 +37,11 @@ pub const RETAINED_WORDS: usize = 4;
 pub trait Board {
     /// Returns the microseconds since the start. The time never goes back.
     fn now_us(&mut self) -> u64;
+    /// Returns the time of the last pulse per second, µs since the start; `None` if there was none, or if there is no
+    /// such line. Capture it with a timer: its error is an error of every time in telemetry.
+    fn pulse_us(&mut self) -> Option<u64> {
+        None
+    }
     /// Returns the next byte that was received, if there is one.
     fn receive(&mut self) -> Option<u8>;
     /// Sends bytes. Returns when the line has taken them.
@@ -69,4 +77,6 @@ pub trait Board {
     }
     /// Keeps words for the time after a reset.
     fn write_retained(&mut self, _words: [u32; RETAINED_WORDS]) {}
+    /// Keeps an answer. Its packets were sent just now, unless the bit budget had no room. Most boards keep nothing.
+    fn keep_answer(&mut self, _exposure: &Exposure, _report: &Report<f32>) {}
 }

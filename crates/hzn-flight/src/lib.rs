@@ -8,7 +8,11 @@
 //! | [`parameters`] | every parameter by number, and its limits |
 //! | [`operations`] | the parameters of the flight software itself |
 //! | [`bytes`] | conversion of numbers to bytes and back |
-//! | [`answer`] | a report with every bit |
+//! | [`answer`] | a report as records, with every bit |
+//! | [`record`] | the fields of packets, with a table that describes them |
+//! | [`layout`] | the packets as lists of records |
+//! | [`cuc`] | the time code of packets |
+//! | [`assembly`] | the packets of a picture put together on the ground |
 //! | [`packet`] | space packets on a serial line |
 //! | [`inbox`] | whole packets from a line that is not perfect |
 //! | [`messages`] | the contents of packets |
@@ -24,17 +28,36 @@
 extern crate std;
 
 pub mod answer;
+pub mod assembly;
 pub mod board;
 pub mod bytes;
+pub mod cuc;
 pub mod flight;
 pub mod inbox;
 mod kept_twice;
+pub mod layout;
 pub mod messages;
 mod numbered;
 pub mod operations;
 pub mod packet;
 pub mod parameters;
+pub mod record;
 pub mod store;
 pub mod table;
 
 pub use parameters::Parameters;
+
+/// Version of this crate: major, minor and patch in one byte each, from the second byte on.
+pub const VERSION: u32 = number(env!("CARGO_PKG_VERSION_MAJOR")) << 16
+    | number(env!("CARGO_PKG_VERSION_MINOR")) << 8
+    | number(env!("CARGO_PKG_VERSION_PATCH"));
+
+const fn number(digits: &str) -> u32 {
+    let mut rest = digits.as_bytes();
+    let mut value = 0;
+    while let [digit, after @ ..] = rest {
+        value = value * 10 + (*digit - b'0') as u32;
+        rest = after;
+    }
+    value
+}

@@ -1,7 +1,7 @@
 //! The contents of packets: telecommands, and telemetry other than the answers. The numbers are frozen.
 
-use crate::bytes::{Reader, Writer};
 use crate::numbered::numbered_enum;
+use crate::record::record;
 
 numbered_enum! {
     /// Modes, as in HORACE (Barf 2014).
@@ -42,7 +42,11 @@ numbered_enum! {
         /// The sequence count is not within the window: the telecommand is a replay, or earlier ones were lost.
         Sequence = 9 => "sequence count outside of the window",
         /// A number is missing: all three of a vector are needed, or none.
-        Missing = 10 => "a number of the position or the rate is not a number",
+        Missing = 10 => "a number of a vector is missing",
+        /// No pulse came within the last 1.5 seconds.
+        NoPulse = 11 => "no pulse within the last 1.5 s",
+        /// The time is TAI, and the clock is not correlated.
+        NoClock = 12 => "the clock is not correlated",
     }
 }
 
@@ -81,6 +85,9 @@ numbered_enum! {
         ArmShutDown = 13 => "arm",
         /// Sets the values from navigation as [`Self::SetKnown`], with their time, velocity and expiry: [`Navigation`].
         Navigate = 14 => "navigate",
+        /// Correlates the clock: the time was (time code, 8 bytes, TAI) when the telecommand arrived (u8: 0) or at the
+        /// last pulse (u8: 1).
+        SetTime = 15 => "time",
     }
 }
 
@@ -137,6 +144,12 @@ numbered_enum! {
         SafeAfterResets = 16 => "safe mode after resets by the watchdog",
         /// The values from navigation have expired and are not used. a: their age, ms. b: 0.
         KnownExpired = 17 => "the values from navigation have expired",
+        /// The clock was correlated. a: seconds of the time, TAI since 1958. b: change of the correlation, ms;
+        /// 4294967295 at the first time and if it is larger.
+        ClockSet = 18 => "clock correlated",
+        /// An answer was not sent, because pixels at its limb do not change from one to the next: the readout was
+        /// stuck. a: number of such places along the edge. b: number of places that were looked at.
+        StuckPixels = 19 => "stuck pixels at the limb",
     }
 }
 
@@ -144,7 +157,7 @@ impl Event {
     /// Returns the severity of the event.
     pub const fn severity(self) -> Severity {
         match self {
-            Self::Started | Self::ModeChanged | Self::Stored => Severity::Information,
+            Self::Started | Self::ModeChanged | Self::Stored | Self::ClockSet => Severity::Information,
             Self::CopyBroken
             | Self::CommandRejected
             | Self::WrongSize
@@ -152,6 +165,7 @@ impl Event {
             | Self::KnownRefused
             | Self::CameraSilent
             | Self::KnownExpired
+            | Self::StuckPixels
             | Self::Repaired => Severity::Warning,
             Self::Defaults
             | Self::SelfCheck
@@ -161,34 +175,6 @@ impl Event {
             | Self::SafeAfterResets => Severity::Error,
         }
     }
-}
-
-macro_rules! record {
-    ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $t:ident,)* }) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Default)]
-        pub struct $name {
-            $($(#[$field_doc])* pub $field: $t,)*
-        }
-        impl $name {
-            /// The names of the fields, in the order of the packet.
-            pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
-            /// Number of bytes of the fields.
-            pub const BYTES: usize = 0 $(+ size_of::<$t>())*;
-            /// Appends the fields.
-            pub fn write(&self, out: &mut Writer<'_>) {
-                $(out.$t(self.$field);)*
-            }
-            /// Reads the fields; `None` if they are cut off.
-            pub fn read(from: &mut Reader<'_>) -> Option<Self> {
-                Some(Self { $($field: from.$t()?,)* })
-            }
-            /// Returns every field as a number.
-            pub fn values(&self) -> [f64; Self::FIELDS.len()] {
-                [$(self.$field as f64),*]
-            }
-        }
-    };
 }
 
 record! {
@@ -247,20 +233,12 @@ record! {
         withheld: u32,
         /// Time since lift-off, s; 4294967295 before it.
         since_lift_off_s: u32,
-    }
-}
-
-impl Housekeeping {
-    /// Number of bytes of the first version of the packet, which ends with `stack_bytes`.
-    pub const FIRST_BYTES: usize = 40;
-
-    /// Reads the packet or its first version, whose later fields are then 0; `None` if it is cut off.
-    pub fn read_any(user: &[u8]) -> Option<Self> {
-        let mut whole = [0; Self::BYTES];
-        let known = user.len().min(Self::BYTES);
-        let is_whole = known == Self::BYTES || user.len() == Self::FIRST_BYTES;
-        whole.get_mut(..known)?.copy_from_slice(user.get(..known)?);
-        Self::read(&mut Reader::new(&whole)).filter(|_| is_whole)
+        /// Clock of the packets: 0 since the start of the computer, 1 TAI by a command, 2 TAI kept by pulses.
+        clock: u8,
+        /// Pictures whose packets were not sent, because of `telemetry.science_bits_s`.
+        decimated: u32,
+        /// Answers that were not sent, because the pixels at their limb do not change: the readout was stuck.
+        stuck: u32,
     }
 }
 
@@ -291,6 +269,9 @@ record! {
         sequence: u16,
         /// [`Code`] as a number.
         code: u8,
+        /// What was refused: the number of a parameter, or, after `known` and `navigate`, the place of a number in
+        /// [`Navigation`], from 1; 0: not said.
+        detail: u16,
     }
 }
 
@@ -312,9 +293,10 @@ record! {
     /// Arguments of [`Function::Navigate`]. NaN means that a value is not known; all three numbers of a vector are
     /// known, or none.
     Navigation {
-        /// Time of the values, µs since the start of the computer.
-        epoch_us: u64,
-        /// The values are not used for exposures that are further from `epoch_us` than this, s; NaN: they do not
+        /// Time of the values: µs since the start of the computer (the first byte is then 0), or a time code
+        /// ([`crate::cuc`]).
+        epoch: u64,
+        /// The values are not used for exposures that are further from `epoch` than this, s; NaN: they do not
         /// expire.
         expires_s: f32,
         /// Altitude, m.
@@ -341,7 +323,57 @@ record! {
 }
 
 record! {
-    /// The data before the pixels (x and y as u16) of a part of an edge.
+    /// The values from navigation that a picture was processed with. NaN means that a value is not known.
+    NavigationState {
+        /// Number of the picture.
+        picture: u32,
+        /// 1: the values were used. 2: they have expired and were not used.
+        state: u8,
+        /// Time from the values to the exposure, s; NaN: the values have no time.
+        age_s: f32,
+        /// Altitude, m.
+        altitude_m: f32,
+        /// Position of the camera at the exposure in ECEF, m.
+        position_m: [f32; 3],
+        /// Velocity of the camera in ECEF, m/s, at the time of the values.
+        velocity_m_s: [f32; 3],
+        /// Rate of rotation of the camera in its own axes, rad/s.
+        rate_rad_s: [f32; 3],
+    }
+}
+
+impl NavigationState {
+    /// [`Self::state`]: the values were used.
+    pub const USED: u8 = 1;
+    /// [`Self::state`]: the values have expired and were not used.
+    pub const EXPIRED: u8 = 2;
+}
+
+record! {
+    /// User data of a packet with the value of a parameter.
+    ParameterValue {
+        /// Number of the parameter.
+        number: u16,
+        /// Its value; NaN: not set.
+        value: f64,
+    }
+}
+
+/// Number of pixels in a packet with a part of an edge. Those after [`EdgePart::count`] are 0.
+pub const EDGE_PIXELS: usize = 64;
+
+record! {
+    /// A pixel of an edge.
+    EdgePixel {
+        /// Column.
+        x: u16,
+        /// Row.
+        y: u16,
+    }
+}
+
+record! {
+    /// The data before the pixels of a part of an edge.
     EdgePart {
         /// Number of the picture.
         picture: u32,
@@ -361,6 +393,7 @@ record! {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bytes::{Reader, Writer};
 
     #[test]
     fn numbers_are_frozen() {
@@ -388,8 +421,6 @@ mod tests {
         assert_eq!(Housekeeping::read(&mut Reader::new(&bytes)), Some(h));
         for length in 0..Housekeeping::BYTES {
             assert_eq!(Housekeeping::read(&mut Reader::new(&bytes[..length])), None);
-            let is_version = length == Housekeeping::FIRST_BYTES;
-            assert_eq!(Housekeeping::read_any(&bytes[..length]), is_version.then_some(h), "{length}");
         }
     }
 }

@@ -73,6 +73,9 @@ operations! {
     @304 "boot.mode" boot_mode: u16 = 0, [0.0, 1.0];
     /// Time from lift-off to shut-down, s; NaN: no such shut-down.
     @305 "boot.shut_down_after_s" shut_down_after_s: Option<f64> = None, [1.0, 1e6];
+    /// Most bits of the packets of pictures in a second; NaN: no limit. The packets of a picture are sent whole or not
+    /// at all.
+    @306 "telemetry.science_bits_s" science_bits_s: Option<f64> = None, [1.0, 1e9];
 }
 
 impl Operations {

@@ -5,12 +5,13 @@
 //!     4  sync marker 1A CF FC 1D (CCSDS 131.0-B), to find the next packet after noise
 //!     6  primary header (CCSDS 133.0-B): version 0, type, secondary header flag 1, APID; unsegmented, sequence count;
 //!        length of what follows minus one
-//!     8  secondary header: time in microseconds since the start of the computer (telecommands: 0)
+//!     8  secondary header: time, CUC of CCSDS 301.0-B with its P-field (telecommands: 0)
 //!     n  user data
 //!     2  CRC-16 (CCITT, start FFFF) from the primary header to the end of the user data
 //! ```
 
 use crate::bytes::{Reader, Writer};
+use crate::cuc::Cuc;
 use crate::numbered::numbered_enum;
 
 /// The sync marker before every packet.
@@ -20,7 +21,7 @@ pub const MAX_BYTES: usize = 1024;
 /// Number of bytes of a packet without its user data: marker, both headers, checksum.
 pub const OVERHEAD: usize = SYNC.len() + HEADER + TIME + CRC;
 pub(crate) const HEADER: usize = 6;
-const TIME: usize = 8;
+const TIME: usize = Cuc::BYTES;
 const CRC: usize = 2;
 
 /// The sequence flags of a packet that is not a segment of a larger one.
@@ -40,10 +41,16 @@ numbered_enum! {
         Event = 0x102 => "event",
         /// The outcome of a telecommand.
         Acknowledge = 0x103 => "acknowledgement",
-        /// Values of parameters.
+        /// Value of a parameter.
         Parameters = 0x104 => "parameters",
         /// A part of an edge.
         Edge = 0x105 => "edge",
+        /// A candidate of a picture.
+        Candidate = 0x106 => "candidate",
+        /// Free fit and position of a picture.
+        Position = 0x107 => "position",
+        /// The values from navigation that a picture was processed with.
+        Navigation = 0x108 => "navigation",
         /// A telecommand.
         Command = 0x1C0 => "telecommand",
     }
@@ -86,18 +93,18 @@ impl ApidBase {
     }
 }
 
-/// Writes a packet with `user` as its user data into `out`. Returns its length; `None` if it does not fit into `out` or
-/// into [`MAX_BYTES`].
+/// Writes a packet with `user` as its user data into `out`; a telecommand has no time. Returns its length; `None` if it
+/// does not fit into `out` or into [`MAX_BYTES`].
 pub fn write(
     out: &mut [u8],
     base: ApidBase,
     apid: Apid,
     sequence: u16,
-    time_us: u64,
+    time: Option<Cuc>,
     user: impl FnOnce(&mut Writer<'_>),
 ) -> Option<usize> {
     let mut body = Writer::new(out.get_mut(SYNC.len() + HEADER..)?);
-    body.u64(time_us);
+    body.bytes(&time.map_or([0; TIME], Cuc::to_bytes));
     user(&mut body);
     let len = body.finish()?;
     let command = u16::from(apid == Apid::Command);
@@ -124,8 +131,8 @@ pub struct Packet<'a> {
     pub is_whole: bool,
     /// Sequence count of this APID, 0 to 16383.
     pub sequence: u16,
-    /// Time in microseconds since the start of the computer.
-    pub time_us: u64,
+    /// Time of the packet; `None` if the secondary header is no such time.
+    pub time: Option<Cuc>,
     /// User data.
     pub user: &'a [u8],
 }
@@ -154,13 +161,13 @@ pub(crate) fn read(bytes: &[u8]) -> Option<Packet<'_>> {
 pub(crate) fn parse(bytes: &[u8]) -> Option<Packet<'_>> {
     let (checked, _) = bytes.get(SYNC.len()..)?.split_last_chunk::<CRC>()?;
     let mut from = Reader::new(checked);
-    let (id, sequence, _, time_us) = (from.u16()?, from.u16()?, from.u16()?, from.u64()?);
+    let (id, sequence, _, time) = (from.u16()?, from.u16()?, from.u16()?, from.u64()?);
     Some(Packet {
         apid: id & 0x7FF,
         is_command: id & 1 << 12 != 0,
         is_whole: sequence >> 14 == UNSEGMENTED,
         sequence: sequence & 0x3FFF,
-        time_us,
+        time: Cuc::from_bytes(time.to_be_bytes()),
         user: from.rest(),
     })
 }
@@ -212,7 +219,9 @@ mod tests {
 
     fn sample(apid: Apid, data: &[u8]) -> Vec<u8> {
         let mut out = [0; MAX_BYTES];
-        let n = write(&mut out, ApidBase::DEFAULT, apid, 77, 123_456_789_012, |w| w.bytes(data)).unwrap();
+        let n =
+            write(&mut out, ApidBase::DEFAULT, apid, 77, Some(Cuc::since_start(123_456_789_012)), |w| w.bytes(data))
+                .unwrap();
         out[..n].to_vec()
     }
 
@@ -220,7 +229,7 @@ mod tests {
     fn the_bytes_are_those_of_the_standard() {
         let bytes = sample(Apid::Command, &[1, 2, 3]);
         assert_eq!(bytes[..10], [0x1A, 0xCF, 0xFC, 0x1D, 0x19, 0xC0, 0xC0, 77, 0, 12]);
-        assert_eq!(bytes[10..18], 123_456_789_012u64.to_be_bytes());
+        assert_eq!(bytes[10..18], Cuc::since_start(123_456_789_012).to_bytes());
         assert_eq!(bytes[18..21], [1, 2, 3]);
         // The check value of CRC-16/CCITT-FALSE.
         assert_eq!(CRC16.checksum(b"123456789"), 0x29B1);
@@ -273,11 +282,11 @@ mod tests {
         let base = ApidBase::try_new(0x230).unwrap();
         assert_eq!((base.apid(Apid::Event), base.apid(Apid::Command)), (0x232, 0x2F0));
         let mut out = [0; MAX_BYTES];
-        let n = write(&mut out, base, Apid::Event, 0, 0, |_| ()).unwrap();
+        let n = write(&mut out, base, Apid::Event, 0, None, |_| ()).unwrap();
         let Scan::Packet { packet, .. } = scan(&out[..n]) else { panic!() };
         assert_eq!((base.subject(&packet), ApidBase::DEFAULT.subject(&packet)), (Some(Apid::Event), None));
         // A telemetry packet with the APID of telecommands is no telecommand, and a segment is no packet.
-        let command = Packet { apid: 0x2F0, is_command: true, is_whole: true, sequence: 0, time_us: 0, user: &[] };
+        let command = Packet { apid: 0x2F0, is_command: true, is_whole: true, sequence: 0, time: None, user: &[] };
         assert_eq!(base.subject(&command), Some(Apid::Command));
         assert_eq!(base.subject(&Packet { is_command: false, ..command }), None);
         assert_eq!(base.subject(&Packet { is_whole: false, ..command }), None);
@@ -286,8 +295,8 @@ mod tests {
     #[test]
     fn a_packet_that_does_not_fit_is_not_written() {
         let mut out = [0; 40];
-        assert_eq!(write(&mut out, ApidBase::DEFAULT, Apid::Event, 0, 0, |w| w.bytes(&[0; 30])), None);
+        assert_eq!(write(&mut out, ApidBase::DEFAULT, Apid::Event, 0, None, |w| w.bytes(&[0; 30])), None);
         let mut out = [0; 2000];
-        assert_eq!(write(&mut out, ApidBase::DEFAULT, Apid::Event, 0, 0, |w| w.bytes(&[0; 1500])), None);
+        assert_eq!(write(&mut out, ApidBase::DEFAULT, Apid::Event, 0, None, |w| w.bytes(&[0; 1500])), None);
     }
 }

@@ -32,6 +32,17 @@ pub enum Refused {
     Config(ConfigError),
 }
 
+impl Refused {
+    /// Returns the number of the refused parameter; 0 if it has none. Of a parameter with several numbers, such as a
+    /// corner of a mask, this is the first one.
+    pub fn number(&self) -> u16 {
+        match self {
+            Self::Unknown(id) | Self::Value(id, _) => *id,
+            Self::Config(e) => Parameters::number_of(e.field).unwrap_or(0),
+        }
+    }
+}
+
 impl core::fmt::Display for Refused {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {

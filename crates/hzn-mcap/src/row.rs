@@ -305,8 +305,15 @@ impl Row {
     }
 
     fn set_position<T: Real>(&mut self, p: &Position<T>) {
-        let km = |x: T| finite(x.to_f64() / 1e3);
-        [self.position_x_km, self.position_y_km, self.position_z_km] = p.centre_m.map(km);
+        let widen = |x: T| x.to_f64();
+        self.set_position_m(p.centre_m.map(widen), p.covariance_m2.map(widen), p.body_fixed_m.map(|v| v.map(widen)));
+    }
+
+    /// Fills the columns of the position: of the body's centre from the camera in metres (camera frame), with its
+    /// covariance in m² (xx, xy, xz, yy, yz, zz), and of the camera in the axes of the body in metres, if it is known.
+    pub fn set_position_m(&mut self, centre_m: [f64; 3], covariance_m2: [f64; 6], body_fixed_m: Option<[f64; 3]>) {
+        let km = |x: f64| finite(x / 1e3);
+        [self.position_x_km, self.position_y_km, self.position_z_km] = centre_m.map(km);
         [
             self.pos_cov_xx_km2,
             self.pos_cov_xy_km2,
@@ -314,8 +321,8 @@ impl Row {
             self.pos_cov_yy_km2,
             self.pos_cov_yz_km2,
             self.pos_cov_zz_km2,
-        ] = p.covariance_m2.map(|x| finite(x.to_f64() / 1e6));
-        if let Some(body_fixed) = p.body_fixed_m {
+        ] = covariance_m2.map(|x| finite(x / 1e6));
+        if let Some(body_fixed) = body_fixed_m {
             [self.body_fixed_x_km, self.body_fixed_y_km, self.body_fixed_z_km] = body_fixed.map(km);
         }
         if let Some(yaw) = p.yaw_rad {

@@ -26,6 +26,10 @@ const BATCH_DATA_BYTES: usize = 1 << 20;
 /// The calibration is repeated after this much of the recording's time, in nanoseconds.
 const CALIBRATION_EVERY_NS: u64 = 1_000_000_000;
 
+/// Largest size in bytes of what surrounds the messages of a chunk: its head, the heads of its indexes (at most seven
+/// topics), its entry in the summary.
+const CHUNK_BYTES: u64 = 1024;
+
 /// Settings of a recording.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
@@ -109,6 +113,16 @@ impl Writer {
     /// Returns the number of records that this writer wrote: one per frame and body.
     pub fn frames(&self) -> u64 {
         self.frames
+    }
+
+    /// Returns the size in bytes that the recording has at most if it is finished now; 0 after a failure.
+    pub fn finished_bytes(&self) -> u64 {
+        // Pictures are stored as they are; what cannot be compressed becomes a little longer.
+        let waiting =
+            [&self.images, &self.data].map(|chunk| chunk.len() as u64 + chunk.len() as u64 / 64 + CHUNK_BYTES);
+        let messages = self.images.messages() + self.data.messages();
+        let indexes = messages * 16;
+        self.container.as_ref().map_or(0, |c| c.finished_bytes() + waiting.iter().sum::<u64>() + indexes)
     }
 
     /// Appends a frame. The frame is finished when it is flushed: at the latest by the first call after

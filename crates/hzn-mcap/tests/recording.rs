@@ -24,6 +24,31 @@ fn options() -> Options {
     }
 }
 
+#[test]
+fn the_finished_size_is_known_before() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut closest = f64::MAX;
+    for frames in [0, 1, 2, 5, 40, 300] {
+        let path = dir.path().join(format!("{frames}.mcap"));
+        let mut writer = Writer::create(&path, &options()).unwrap();
+        for i in 0..frames {
+            writer.write(&frame(i)).unwrap();
+            if i % 7 == 6 {
+                writer.flush().unwrap();
+            }
+        }
+        let waiting = writer.finished_bytes();
+        writer.flush().unwrap();
+        let flushed = writer.finished_bytes();
+        writer.finish().unwrap();
+        let size = fs::metadata(&path).unwrap().len();
+        assert!(size <= flushed && flushed <= waiting, "{frames}: {size} {flushed} {waiting}");
+        closest = closest.min(flushed as f64 / size as f64);
+    }
+    // The bound of long recordings is close.
+    assert!(closest < 1.02, "{closest}");
+}
+
 /// Returns frame `i`. Frames differ in most parts; every third has no answer, every fourth has no picture.
 fn frame(i: u64) -> FrameRecord {
     let f = i as f64;

@@ -4,12 +4,13 @@
 #include <stdint.h>
 
 #include "hzn.h"
+#include "hzn_parameters.h"
+#include "picture.h"
 
 void print(const char *text);
 
-enum { WIDTH = 320, HEIGHT = 240 };
-static uint8_t picture[WIDTH * HEIGHT];
-static _Alignas(16) uint8_t memory[128 * 1024];
+static _Alignas(HZN_WORKSPACE_ALIGN) uint8_t memory[HZN_WORKSPACE_SIZE];
+static _Alignas(HZN_WORKSPACE_ALIGN) uint8_t rows_memory[HZN_ROWS_SIZE];
 
 static void print_hex(uint32_t word) {
     char text[12];
@@ -30,33 +31,35 @@ static void print_floats(const char *name, const float *x, size_t n) {
     print("\n");
 }
 
-/* A bright body below a limb of the Earth, 17 km high and seen from 400 km: the cone of 70.64° as a series in x, to 0.01 px,
-   in sixteenths of a pixel and with integers alone. */
-static void draw(void) {
-    for (int y = 0; y < HEIGHT; y++) {
-        for (int x = 0; x < WIDTH; x++) {
-            int dx = x - WIDTH / 2;
-            int dx2 = dx * dx, dx4 = (dx2 / 64) * (dx2 / 64);
-            int depth = 16 * (y - 100) - dx2 * 100 / 10692 + dx4 / 13035;
-            int v = 110 + 6 * depth;
-            picture[y * WIDTH + x] = (uint8_t)(v < 10 ? 10 : v > 210 ? 210 : v);
-        }
+/* Gives the rows of the picture, one after the other. */
+static int32_t next_row(void *context, uint8_t *row, size_t width) {
+    int *y = context;
+    for (size_t x = 0; x < width; x++) {
+        row[x] = picture[*y * PICTURE_WIDTH + (int)x];
     }
+    *y += 1;
+    return 0;
 }
 
 int example(void) {
     HznSensor *sensor = NULL;
-    if (hzn_workspace_size() > sizeof memory || hzn_workspace_align() > 16) {
-        print("the memory is too small\n");
+    HznAnswer answer;
+    /* Memory that was never opened is no sensor, whatever it holds. */
+    for (size_t i = 0; i < sizeof memory; i++) {
+        memory[i] = 0xFF;
+    }
+    if (hzn_apply((HznSensor *)memory) != HZN_NOT_OPEN || hzn_apply((HznSensor *)(memory + 1)) != HZN_MEMORY) {
         return 1;
     }
-    if (hzn_open(memory, sizeof memory, &sensor) != 0) {
+    if (hzn_open(memory, sizeof memory, HZN_INTERFACE + 1, &sensor) != HZN_OTHER_INTERFACE ||
+        hzn_open(memory, sizeof memory, HZN_INTERFACE, &sensor) != 0) {
         return 2;
     }
     /* Numbers of parameters: book/reference/telemetry.md. */
     const struct { uint16_t number; double value; } parameters[] = {
-        { 1, WIDTH }, { 2, HEIGHT }, { 4, 300 }, { 5, 300 }, { 6, 159.5 }, { 7, 119.5 }, /* the camera */
-        { 32, 400 },                                                                    /* body.altitude_km */
+        { HZN_CAMERA_WIDTH, PICTURE_WIDTH }, { HZN_CAMERA_HEIGHT, PICTURE_HEIGHT }, { HZN_CAMERA_FX_PX, 300 },
+        { HZN_CAMERA_FY_PX, 300 },           { HZN_CAMERA_CX_PX, 159.5 },           { HZN_CAMERA_CY_PX, 119.5 },
+        { HZN_BODY_ALTITUDE_KM, 400 },
     };
     for (size_t i = 0; i < sizeof parameters / sizeof *parameters; i++) {
         if (hzn_set(sensor, parameters[i].number, parameters[i].value) != 0) {
@@ -66,9 +69,13 @@ int example(void) {
     if (hzn_set(sensor, 9999, 1) != HZN_UNKNOWN_PARAMETER || hzn_apply(sensor) != 0) {
         return 4;
     }
-    draw();
-    HznPicture frame = { picture, sizeof picture, WIDTH, HEIGHT, WIDTH };
-    HznAnswer answer;
+    /* What is refused is named, and nothing changes. */
+    if (hzn_set(sensor, HZN_CAMERA_FX_PX, -1) != 0 || hzn_apply(sensor) != HZN_REFUSED ||
+        hzn_refused(sensor) != HZN_CAMERA_FX_PX) {
+        return 7;
+    }
+    draw_picture();
+    HznPicture frame = { picture, sizeof picture, PICTURE_WIDTH, PICTURE_HEIGHT, PICTURE_WIDTH };
     int32_t status = hzn_process(sensor, &frame, NULL, &answer);
     print("status ");
     print_hex((uint32_t)status);
@@ -79,10 +86,30 @@ int example(void) {
     print("inliers ");
     print_hex(answer.inliers);
     print("\n");
-    /* A mistake gets an error code and changes nothing. */
+    if (status != HZN_OK || answer.inliers < 100 || answer.listed != 1 || answer.edges[0].verdict != 0) {
+        return 6;
+    }
+    /* The same picture, row by row, with a threshold that is known before. */
+    int y = 0;
+    HznAnswer by_rows;
+    if (hzn_set(sensor, HZN_BINARIZE_METHOD, 1) != 0 || hzn_set(sensor, HZN_BINARIZE_LEVEL, 110) != 0 ||
+        hzn_apply(sensor) != 0 || hzn_process(sensor, &frame, NULL, &answer) != HZN_OK ||
+        hzn_process_rows(sensor, rows_memory, sizeof rows_memory, next_row, &y, NULL, &by_rows) != HZN_OK) {
+        return 8;
+    }
+    print_floats("by rows ", by_rows.axis, 3);
+    for (int i = 0; i < 3; i++) {
+        if (by_rows.axis[i] != answer.axis[i]) {
+            return 9;
+        }
+    }
+    /* A mistake gets an error code, changes nothing, and leaves no older answer. */
     frame.bytes = 100;
-    if (hzn_process(sensor, &frame, NULL, &answer) != HZN_PICTURE || hzn_process(NULL, NULL, NULL, NULL) != HZN_NULL) {
+    if (hzn_process(sensor, &frame, NULL, &answer) != HZN_PICTURE || hzn_process(NULL, NULL, NULL, NULL) != HZN_NULL ||
+        answer.status != 255 || answer.axis[0] == answer.axis[0]) {
         return 5;
     }
-    return status == 0 && answer.inliers > 100 ? 0 : 6;
+    frame.bytes = sizeof picture;
+    frame.width = PICTURE_WIDTH / 2;
+    return hzn_process(sensor, &frame, NULL, &answer) == HZN_PICTURE ? 0 : 10;
 }

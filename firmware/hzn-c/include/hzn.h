@@ -18,11 +18,56 @@
 // A parameter cannot have this value, or the combination of the parameters is refused.
 #define HZN_REFUSED -4
 
-// The picture has no pixels, an impossible size or stride, or fewer bytes than its size needs.
+// The picture has no pixels, another size than the camera, an impossible stride, or fewer bytes than its size needs.
 #define HZN_PICTURE -5
 
-// The altitude or the position in `HznKnown` is impossible.
+// The altitude or the position in `HznKnown` is impossible, or a part of a vector is NaN.
 #define HZN_KNOWN -6
+
+// There is no sensor at this pointer: it was not opened, or its memory was overwritten.
+#define HZN_NOT_OPEN -7
+
+// The program was compiled with the header of another version of this library.
+#define HZN_OTHER_INTERFACE -8
+
+// The parameters need the whole picture in memory, or the camera has more than 1920 columns or 1080 rows.
+#define HZN_NO_ROWS -9
+
+// Status: a direction was found.
+#define HZN_OK 0
+
+// Status: no edge in the picture is a limb of the body.
+#define HZN_NO_LIMB 1
+
+// Status: the picture is too dark.
+#define HZN_TOO_DARK 2
+
+// Status: the picture is too bright.
+#define HZN_TOO_BRIGHT 3
+
+// Status: no edge has enough points.
+#define HZN_TOO_FEW_POINTS 4
+
+// Status: two different directions fit about equally well.
+#define HZN_AMBIGUOUS 5
+
+// Status: a direction was found and refused.
+#define HZN_REJECTED 6
+
+// Status: lists were full or the work budget was used up.
+#define HZN_TRUNCATED 7
+
+// Version of the structures and functions of this header. `hzn_open` compares it with that of the library.
+#define HZN_INTERFACE 2
+
+// Bytes that a sensor needs, on every machine.
+#define HZN_WORKSPACE_SIZE 114688
+
+// Alignment that a sensor needs, bytes.
+#define HZN_WORKSPACE_ALIGN 16
+
+// Bytes that the rows of a picture need, on every machine; they have the alignment of a sensor.
+#define HZN_ROWS_SIZE 147456
 
 // A sensor. Its content is hidden: only pointers to it are passed.
 typedef struct HznSensor HznSensor;
@@ -51,8 +96,24 @@ typedef struct {
   float rate_rad_s[3];
 } HznKnown;
 
+// A candidate edge.
+typedef struct {
+  // Number of the candidate, from 0.
+  uint32_t number;
+  // Border pixels.
+  uint32_t length_px;
+  // Edge points.
+  uint32_t points;
+  // Edge points that fit the limb.
+  uint32_t inliers;
+  // RMS distance of the inliers from the limb, px; NaN without a fit.
+  float rms_px;
+  // Verdict: 0 chosen, 1 passed; the others are in book/reference/telemetry.md.
+  uint8_t verdict;
+} HznEdge;
+
 // The answer to a picture. Without a direction (status not 0) the values from `axis` to `rms_px` are NaN and `inliers`
-// is 0.
+// is 0. After a call that returns an error, `status` is 255 and every other number is NaN or 0.
 typedef struct {
   // Unit vector to the body, camera frame (x right, y down, z forward).
   float axis[3];
@@ -60,6 +121,8 @@ typedef struct {
   float cov_rad2[6];
   // The same direction in ECEF; NaN without a position.
   float axis_ecef[3];
+  // The same direction in the vehicle's frame; NaN without a mounting.
+  float axis_body[3];
   // Half-angle of the free fit, rad.
   float half_angle_rad;
   // Altitude from the free fit, m; NaN for Sun and Moon.
@@ -82,6 +145,10 @@ typedef struct {
   uint8_t status;
   // The last stage that was entered.
   uint8_t stage;
+  // Number of candidates in `edges`.
+  uint8_t listed;
+  // The first candidates, and the chosen one.
+  HznEdge edges[16];
 } HznAnswer;
 
 #ifdef __cplusplus
@@ -94,13 +161,18 @@ size_t hzn_workspace_size(void);
 // Returns the alignment that a sensor needs, in bytes.
 size_t hzn_workspace_align(void);
 
-// Makes a sensor in `memory`, with every parameter at its default, and writes a pointer to it to `out`.
+// Returns the version of the library: major, minor and patch in one byte each, from the second byte on.
+uint32_t hzn_version(void);
+
+// Makes a sensor in `memory`, with every parameter at its default, and writes a pointer to it to `out`. `interface`
+// is [`HZN_INTERFACE`].
 //
 // # Safety
 // `memory` is null or has `bytes` writable bytes that nothing else uses as long as the sensor is used. `out` is null
 // or writable.
 int32_t hzn_open(uint8_t *memory,
                  size_t bytes,
+                 uint32_t interface,
                  HznSensor **out);
 
 // Sets a parameter by its number. The value is in use after the next `hzn_apply`.
@@ -122,6 +194,13 @@ int32_t hzn_get(const HznSensor *sensor, uint16_t number, double *value);
 // `sensor` is null or from `hzn_open`.
 int32_t hzn_apply(HznSensor *sensor);
 
+// Returns the number of the parameter that `hzn_set` or `hzn_apply` refused last; 0: none, or the sensor is not open.
+// Of a parameter with several numbers, such as the corners of a mask, this is the first.
+//
+// # Safety
+// `sensor` is null or from `hzn_open`.
+uint16_t hzn_refused(const HznSensor *sensor);
+
 // Finds the limb. Every valid picture gets a status, which is returned, and an answer in `out`.
 //
 // # Safety
@@ -131,6 +210,38 @@ int32_t hzn_process(HznSensor *sensor,
                     const HznPicture *picture,
                     const HznKnown *known,
                     HznAnswer *out);
+
+// Finds the limb in a picture that comes row by row. `next_row` writes the next row, `width` bytes, and returns 0; any
+// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or that of the
+// picture before.
+//
+// # Safety
+// `sensor` is null or from `hzn_open`. `memory` is null or has `bytes` writable bytes, which have no other use during
+// the call. `known` is null (nothing is known) or readable. `out` is null or writable. `next_row` writes `width`
+// bytes.
+int32_t hzn_process_rows(HznSensor *sensor,
+                         uint8_t *memory,
+                         size_t bytes,
+                         int32_t (*next_row)(void *context, uint8_t *row, size_t width),
+                         void *context,
+                         const HznKnown *known,
+                         HznAnswer *out);
+
+// Finds the limb in a picture that comes row by row. `next_row` writes the next row, `width` bytes, and returns 0; any
+// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or that of the
+// picture before.
+//
+// # Safety
+// `sensor` is null or from `hzn_open`. `memory` is null or has `bytes` writable bytes, which have no other use during
+// the call. `known` is null (nothing is known) or readable. `out` is null or writable. `next_row` writes `width`
+// bytes.
+int32_t hzn_process_rows(HznSensor *sensor,
+                         uint8_t *memory,
+                         size_t bytes,
+                         int32_t (*next_row)(void *context, uint8_t *row, size_t width),
+                         void *context,
+                         const HznKnown *known,
+                         HznAnswer *out);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -1,4 +1,5 @@
-//! hzn for C: one sensor in memory that the caller owns. There is no heap, no callback and no global state.
+//! hzn for C: one sensor in memory that the caller owns. There is no heap and no global state, and only
+//! [`rows::hzn_process_rows`] calls back.
 //!
 //! Functions return 0 to 7 or a negative number. 0 to 7 is the status of a picture, as everywhere in hzn; 0 is success.
 //! A negative number means an error of the caller, after which nothing has changed. Parameters have the numbers of
@@ -9,12 +10,18 @@
 use core::mem::{align_of, size_of};
 use core::ptr::{self, NonNull};
 
+use hzn_core::body::Expected;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::observer::Unobserved;
 use hzn_core::{FlightWorkspace, Prior, Sensor};
 use hzn_flight::Parameters;
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::parameters::Refused;
+
+pub mod rows;
+pub mod types;
+
+use types::{HznAnswer, HznKnown, HznPicture, NO_ANSWER, to_answer, to_prior};
 
 #[cfg(feature = "standalone")]
 mod standalone {
@@ -37,81 +44,55 @@ pub const HZN_MEMORY: i32 = -2;
 pub const HZN_UNKNOWN_PARAMETER: i32 = -3;
 /// A parameter cannot have this value, or the combination of the parameters is refused.
 pub const HZN_REFUSED: i32 = -4;
-/// The picture has no pixels, an impossible size or stride, or fewer bytes than its size needs.
+/// The picture has no pixels, another size than the camera, an impossible stride, or fewer bytes than its size needs.
 pub const HZN_PICTURE: i32 = -5;
-/// The altitude or the position in `HznKnown` is impossible.
+/// The altitude or the position in `HznKnown` is impossible, or a part of a vector is NaN.
 pub const HZN_KNOWN: i32 = -6;
+/// There is no sensor at this pointer: it was not opened, or its memory was overwritten.
+pub const HZN_NOT_OPEN: i32 = -7;
+/// The program was compiled with the header of another version of this library.
+pub const HZN_OTHER_INTERFACE: i32 = -8;
+/// The parameters need the whole picture in memory, or the camera has more than 1920 columns or 1080 rows.
+pub const HZN_NO_ROWS: i32 = -9;
+
+/// Status: a direction was found.
+pub const HZN_OK: i32 = 0;
+/// Status: no edge in the picture is a limb of the body.
+pub const HZN_NO_LIMB: i32 = 1;
+/// Status: the picture is too dark.
+pub const HZN_TOO_DARK: i32 = 2;
+/// Status: the picture is too bright.
+pub const HZN_TOO_BRIGHT: i32 = 3;
+/// Status: no edge has enough points.
+pub const HZN_TOO_FEW_POINTS: i32 = 4;
+/// Status: two different directions fit about equally well.
+pub const HZN_AMBIGUOUS: i32 = 5;
+/// Status: a direction was found and refused.
+pub const HZN_REJECTED: i32 = 6;
+/// Status: lists were full or the work budget was used up.
+pub const HZN_TRUNCATED: i32 = 7;
+
+/// Version of the structures and functions of this header. `hzn_open` compares it with that of the library.
+pub const HZN_INTERFACE: u32 = 2;
+/// Bytes that a sensor needs, on every machine.
+pub const HZN_WORKSPACE_SIZE: usize = 114688;
+/// Alignment that a sensor needs, bytes.
+pub const HZN_WORKSPACE_ALIGN: usize = 16;
+const _: () = assert!(size_of::<HznSensor>() <= HZN_WORKSPACE_SIZE && align_of::<HznSensor>() <= HZN_WORKSPACE_ALIGN);
+
+/// Is in an open sensor.
+const MAGIC: u64 = 0x687A_6E20_6F70_656E;
 
 /// A sensor. Its content is hidden: only pointers to it are passed.
 #[derive(Debug)]
 pub struct HznSensor {
+    magic: u64,
+    /// Number of the parameter that was refused last; 0: none.
+    refused: u16,
     /// The parameters from [`hzn_set`]; they are in use after [`hzn_apply`].
     pending: Parameters,
     sensor: Sensor<f32>,
     workspace: FlightWorkspace,
-}
-
-/// A picture: one byte per pixel, row by row.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct HznPicture {
-    /// The first pixel of the first row.
-    pub pixels: *const u8,
-    /// Readable bytes from `pixels` on.
-    pub bytes: usize,
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Bytes from the start of a row to the start of the next.
-    pub stride: usize,
-}
-
-/// The prior of a picture. NaN means that a value is not known.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct HznKnown {
-    /// Altitude in metres: geodetic for the Earth, above the radius for other bodies.
-    pub altitude_m: f32,
-    /// Position of the camera in ECEF, metres. If it is known, the altitude is not used.
-    pub position_m: [f32; 3],
-    /// Rate of rotation of the camera in the camera frame, rad/s; it has an effect only with a rolling shutter.
-    pub rate_rad_s: [f32; 3],
-}
-
-/// The answer to a picture. Without a direction (status not 0) the values from `axis` to `rms_px` are NaN and `inliers`
-/// is 0.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct HznAnswer {
-    /// Unit vector to the body, camera frame (x right, y down, z forward).
-    pub axis: [f32; 3],
-    /// Covariance of `axis`: xx, xy, xz, yy, yz, zz, rad².
-    pub cov_rad2: [f32; 6],
-    /// The same direction in ECEF; NaN without a position.
-    pub axis_ecef: [f32; 3],
-    /// Half-angle of the free fit, rad.
-    pub half_angle_rad: f32,
-    /// Altitude from the free fit, m; NaN for Sun and Moon.
-    pub altitude_m: f32,
-    /// 1-sigma of the altitude, m.
-    pub altitude_sigma_m: f32,
-    /// RMS distance of the inliers from the limb, px.
-    pub rms_px: f32,
-    /// Number of edge points that carry the answer.
-    pub inliers: u32,
-    /// Number of edge points of the chosen edge.
-    pub edge_points: u32,
-    /// Number of edges that were candidates.
-    pub candidates: u32,
-    /// Number of border pixels left out because lists were full.
-    pub dropped: u32,
-    /// Threshold between dark and lit, counts.
-    pub level: u16,
-    /// Status: the value that `hzn_process` returned.
-    pub status: u8,
-    /// The last stage that was entered.
-    pub stage: u8,
 }
 
 /// Returns the number of bytes that a sensor needs.
@@ -126,17 +107,46 @@ pub extern "C" fn hzn_workspace_align() -> usize {
     align_of::<HznSensor>()
 }
 
-/// Makes a sensor in `memory`, with every parameter at its default, and writes a pointer to it to `out`.
+/// Returns the version of the library: major, minor and patch in one byte each, from the second byte on.
+#[unsafe(no_mangle)]
+pub extern "C" fn hzn_version() -> u32 {
+    hzn_flight::VERSION
+}
+
+/// Returns the sensor at a pointer, or the error.
+///
+/// # Safety
+/// `sensor` is null or points to readable and writable memory of the size of a sensor.
+unsafe fn open_sensor<'a>(sensor: *mut HznSensor) -> Result<&'a mut HznSensor, i32> {
+    if sensor.is_null() {
+        return Err(HZN_NULL);
+    }
+    if !sensor.is_aligned() {
+        return Err(HZN_MEMORY);
+    }
+    // SAFETY: the caller guarantees that the memory is readable; a number may have any value.
+    if unsafe { (&raw const (*sensor).magic).read() } != MAGIC {
+        return Err(HZN_NOT_OPEN);
+    }
+    // SAFETY: `hzn_open` has made a sensor here.
+    Ok(unsafe { &mut *sensor })
+}
+
+/// Makes a sensor in `memory`, with every parameter at its default, and writes a pointer to it to `out`. `interface`
+/// is [`HZN_INTERFACE`].
 ///
 /// # Safety
 /// `memory` is null or has `bytes` writable bytes that nothing else uses as long as the sensor is used. `out` is null
 /// or writable.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, out: *mut *mut HznSensor) -> i32 {
+pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, interface: u32, out: *mut *mut HznSensor) -> i32 {
     let place = memory.cast::<HznSensor>();
     let (Some(_), false) = (NonNull::new(place), out.is_null()) else { return HZN_NULL };
     if bytes < size_of::<HznSensor>() || !place.is_aligned() {
         return HZN_MEMORY;
+    }
+    if interface != HZN_INTERFACE {
+        return HZN_OTHER_INTERFACE;
     }
     let pending = Parameters::defaults();
     let Ok(sensor) = Sensor::new(&pending.sensor) else { return HZN_REFUSED };
@@ -146,6 +156,8 @@ pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, out: *mut *mut 
         (&raw mut (*place).pending).write(pending);
         (&raw mut (*place).sensor).write(sensor);
         ptr::write_bytes(&raw mut (*place).workspace, 0, 1);
+        (&raw mut (*place).refused).write(0);
+        (&raw mut (*place).magic).write(MAGIC);
         out.write(place);
     }
     0
@@ -158,8 +170,14 @@ pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, out: *mut *mut 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_set(sensor: *mut HznSensor, number: u16, value: f64) -> i32 {
     // SAFETY: the caller guarantees it.
-    let Some(sensor) = (unsafe { sensor.as_mut() }) else { return HZN_NULL };
-    to_code(sensor.pending.set(number, value))
+    let sensor = match unsafe { open_sensor(sensor) } {
+        Ok(sensor) => sensor,
+        Err(code) => return code,
+    };
+    match sensor.pending.set(number, value) {
+        Ok(()) => 0,
+        Err(refused) => sensor.refuse(&refused),
+    }
 }
 
 /// Writes the value of a parameter, as it was set last, to `value`.
@@ -168,8 +186,19 @@ pub unsafe extern "C" fn hzn_set(sensor: *mut HznSensor, number: u16, value: f64
 /// `sensor` is null or from `hzn_open`. `value` is null or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_get(sensor: *const HznSensor, number: u16, value: *mut f64) -> i32 {
-    // SAFETY: the caller guarantees it.
-    let (Some(sensor), Some(value)) = (unsafe { sensor.as_ref() }, unsafe { value.as_mut() }) else { return HZN_NULL };
+    if value.is_null() {
+        return HZN_NULL;
+    }
+    if !value.is_aligned() {
+        return HZN_MEMORY;
+    }
+    // SAFETY: the caller guarantees it. The sensor is only read.
+    let sensor = match unsafe { open_sensor(sensor.cast_mut()) } {
+        Ok(sensor) => sensor,
+        Err(code) => return code,
+    };
+    // SAFETY: the pointer is neither null nor unaligned, and the caller guarantees the rest.
+    let value = unsafe { &mut *value };
     match sensor.pending.get(number) {
         Some(found) => {
             *value = found;
@@ -187,17 +216,33 @@ pub unsafe extern "C" fn hzn_get(sensor: *const HznSensor, number: u16, value: *
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_apply(sensor: *mut HznSensor) -> i32 {
     // SAFETY: the caller guarantees it.
-    let Some(sensor) = (unsafe { sensor.as_mut() }) else { return HZN_NULL };
-    match (sensor.pending.check(), Sensor::new(&sensor.pending.sensor)) {
-        (Ok(()), Ok(new)) => {
-            sensor.sensor = new;
+    let sensor = match unsafe { open_sensor(sensor) } {
+        Ok(sensor) => sensor,
+        Err(code) => return code,
+    };
+    let new = sensor.pending.check().and_then(|()| Sensor::new(&sensor.pending.sensor).map_err(Refused::Config));
+    match new {
+        Ok(new) => {
+            (sensor.sensor, sensor.refused) = (new, 0);
             0
         }
-        _ => {
+        Err(refused) => {
             sensor.pending = Parameters::new(sensor.sensor.config().clone());
+            sensor.refuse(&refused);
             HZN_REFUSED
         }
     }
+}
+
+/// Returns the number of the parameter that `hzn_set` or `hzn_apply` refused last; 0: none, or the sensor is not open.
+/// Of a parameter with several numbers, such as the corners of a mask, this is the first.
+///
+/// # Safety
+/// `sensor` is null or from `hzn_open`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hzn_refused(sensor: *const HznSensor) -> u16 {
+    // SAFETY: the caller guarantees it. The sensor is only read.
+    unsafe { open_sensor(sensor.cast_mut()) }.map_or(0, |sensor| sensor.refused)
 }
 
 /// Finds the limb. Every valid picture gets a status, which is returned, and an answer in `out`.
@@ -212,12 +257,24 @@ pub unsafe extern "C" fn hzn_process(
     known: *const HznKnown,
     out: *mut HznAnswer,
 ) -> i32 {
-    // SAFETY: the caller guarantees it.
-    let (Some(sensor), Some(picture), Some(out)) =
-        (unsafe { sensor.as_mut() }, unsafe { picture.as_ref() }, unsafe { out.as_mut() })
-    else {
+    if picture.is_null() || out.is_null() {
         return HZN_NULL;
+    }
+    if !picture.is_aligned() || !out.is_aligned() || !known.is_aligned() {
+        return HZN_MEMORY;
+    }
+    // SAFETY: the pointers are neither null nor unaligned, and the caller guarantees the rest.
+    let (picture, out) = unsafe { (&*picture, &mut *out) };
+    *out = NO_ANSWER;
+    // SAFETY: the caller guarantees it.
+    let sensor = match unsafe { open_sensor(sensor) } {
+        Ok(sensor) => sensor,
+        Err(code) => return code,
     };
+    let camera = sensor.sensor.camera();
+    if (picture.width, picture.height) != (camera.width().into(), camera.height().into()) {
+        return HZN_PICTURE;
+    }
     if picture.pixels.is_null() || picture.bytes > isize::MAX as usize {
         return HZN_PICTURE;
     }
@@ -226,48 +283,29 @@ pub unsafe extern "C" fn hzn_process(
     let layout = Layout { width: picture.width, height: picture.height, stride: picture.stride, channels: 1, bits: 8 };
     let Ok(grey) = Grey::try_new(pixels, layout) else { return HZN_PICTURE };
     // SAFETY: the caller guarantees it.
-    let prior = unsafe { known.as_ref() }.map_or_else(Prior::default, to_prior);
-    let Ok(expected) = sensor.sensor.expect(&prior) else { return HZN_KNOWN };
+    let Some(expected) = (unsafe { expect(&sensor.sensor, known) }) else { return HZN_KNOWN };
     let report = sensor.sensor.process(&mut sensor.workspace, &grey, &expected, &Unobserved);
     *out = to_answer(&PictureAnswer::from_report(&report));
     i32::from(out.status)
 }
 
-fn to_prior(values: &HznKnown) -> Prior<f32> {
-    let known = |v: [f32; 3]| (!v.iter().any(|x| x.is_nan())).then_some(v);
-    Prior {
-        altitude_m: (!values.altitude_m.is_nan()).then_some(values.altitude_m),
-        position_m: known(values.position_m),
-        rate_rad_s: known(values.rate_rad_s),
-        ..Prior::default()
-    }
+/// Returns the expected limb; `None` if the values are impossible.
+///
+/// # Safety
+/// `known` is null or readable and aligned.
+unsafe fn expect(sensor: &Sensor<f32>, known: *const HznKnown) -> Option<Expected<f32>> {
+    // SAFETY: the caller guarantees it.
+    let prior = match unsafe { known.as_ref() } {
+        Some(values) => to_prior(values)?,
+        None => Prior::default(),
+    };
+    sensor.expect(&prior).ok()
 }
 
-fn to_answer(a: &PictureAnswer) -> HznAnswer {
-    let nan = f32::NAN;
-    let d = a.direction.as_ref();
-    HznAnswer {
-        axis: d.map_or([nan; 3], |d| d.axis),
-        cov_rad2: d.map_or([nan; 6], |d| d.cov),
-        axis_ecef: d.map_or([nan; 3], |d| d.axis_ecef),
-        half_angle_rad: d.map_or(nan, |d| d.half_angle_rad),
-        altitude_m: d.map_or(nan, |d| d.altitude_m),
-        altitude_sigma_m: d.map_or(nan, |d| d.altitude_sigma_m),
-        rms_px: d.map_or(nan, |d| d.rms_px),
-        inliers: d.map_or(0, |d| d.inliers),
-        edge_points: a.edge_points,
-        candidates: a.candidates,
-        dropped: a.dropped,
-        level: a.level,
-        status: a.status,
-        stage: a.stage,
-    }
-}
-
-fn to_code(result: Result<(), Refused>) -> i32 {
-    match result {
-        Ok(()) => 0,
-        Err(Refused::Unknown(_)) => HZN_UNKNOWN_PARAMETER,
-        Err(_) => HZN_REFUSED,
+impl HznSensor {
+    /// Keeps what was refused, and returns the code.
+    fn refuse(&mut self, refused: &Refused) -> i32 {
+        self.refused = refused.number();
+        if matches!(refused, Refused::Unknown(_)) { HZN_UNKNOWN_PARAMETER } else { HZN_REFUSED }
     }
 }

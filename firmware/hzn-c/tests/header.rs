@@ -2,17 +2,44 @@
 
 use std::path::Path;
 
+use hzn_flight::{Parameters, parameters};
+
 /// `HZN_BLESS=1` writes the header anew.
 #[test]
 fn the_header_is_up_to_date() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(here.join("cbindgen.toml")).unwrap();
-    let bindings = cbindgen::Builder::new().with_src(here.join("src/lib.rs")).with_config(config).generate().unwrap();
+    let bindings =
+        ["types.rs", "rows.rs"].iter().fold(cbindgen::Builder::new().with_src(here.join("src/lib.rs")), |b, file| {
+            b.with_src(here.join("src").join(file))
+        });
+    let bindings = bindings.with_config(config).generate().unwrap();
     let mut made = Vec::new();
     bindings.write(&mut made);
-    let (made, path) = (String::from_utf8(made).unwrap(), here.join("include/hzn.h"));
-    if std::env::var_os("HZN_BLESS").is_some() {
-        std::fs::write(&path, &made).unwrap();
+    compare(&here.join("include/hzn.h"), &String::from_utf8(made).unwrap());
+}
+
+/// `HZN_BLESS=1` writes the list anew.
+#[test]
+fn the_parameters_are_up_to_date() {
+    let mut made =
+        "/* The numbers of the parameters of hzn, by their names in sensor.toml. Made by tests/header.rs; do \
+                    not edit.\n   Of a parameter with several numbers, such as camera.k, this is the first. */\n\
+                    #ifndef HZN_PARAMETERS_H\n#define HZN_PARAMETERS_H\n\n"
+            .to_owned();
+    let mut names = std::collections::BTreeSet::new();
+    for id in Parameters::defaults().sensor_numbers().chain([1000]) {
+        let name = parameters::name(id).unwrap().to_uppercase().replace(['.', ' '], "_");
+        if names.insert(name.clone()) {
+            made += &format!("#define HZN_{name} {id}\n");
+        }
     }
-    assert_eq!(std::fs::read_to_string(&path).unwrap_or_default(), made, "HZN_BLESS=1 writes it anew");
+    compare(&Path::new(env!("CARGO_MANIFEST_DIR")).join("include/hzn_parameters.h"), &(made + "\n#endif\n"));
+}
+
+fn compare(path: &Path, made: &str) {
+    if std::env::var_os("HZN_BLESS").is_some() {
+        std::fs::write(path, made).unwrap();
+    }
+    assert_eq!(std::fs::read_to_string(path).unwrap_or_default(), made, "HZN_BLESS=1 writes it anew");
 }

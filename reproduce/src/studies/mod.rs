@@ -1,5 +1,6 @@
 //! Lists the studies in the order of the document.
 
+mod airglow;
 mod artefacts;
 mod atek;
 mod defaults;
@@ -49,6 +50,7 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("scenes", "Accuracy and honesty: the other scenes", scenes::others),
     reproduced("position", "Positions: rendered bodies of every size and phase", position::rendered),
     reproduced("artefacts", "False answers: artefacts instead of a limb", artefacts::campaign),
+    reproduced("airglow", "False answers: airglow and aurora on the night side", airglow::night_side),
     reproduced("suns", "False answers: clouds and reflections instead of the Sun", suns::false_suns),
     reproduced("defaults", "Honesty with default settings", defaults::default_settings),
     reproduced("lens-from-limb", "The lens from the limb", lens::from_the_limb),

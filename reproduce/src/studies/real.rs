@@ -1,4 +1,5 @@
-//! Measures every photograph of the public suite, with the sensor.toml next to it, against what is known of it.
+//! Processes every photograph of the public suite with the sensor.toml next to it. Compares the answers with the truth,
+//! where there is one.
 
 use std::path::{Path, PathBuf};
 
@@ -39,14 +40,14 @@ pub(super) fn suite(_: &Effort) -> anyhow::Result<Section> {
     }
     let mut s = Section::default();
     s.text(
-        "Every photograph of tests/data/real through the sensor.toml next to it, with the frames.csv of its folder. \
-         `truth.csv` holds what is known of them, its uncertainty, credit and licence, and `score.py` scores the \
-         results of any program. Errors are given where there is a truth. Their sigmas contain the uncertainty of the \
-         truth: 0.02° for the pointing of Cassini, 0.05° for the stars, 0.1 % for the distance, because the height of \
-         the visible limb is not known better. The night pictures show airglow and hardly any limb of the surface: \
-         they should be refused, or answered within 3σ. What is left on the limb of \
-         Jupiter is no noise: it has the same profile by latitude in both pictures, about 40 km high, so that the \
-         closer picture has the larger RMS (test `the_residuals_are_the_limb_of_jupiter`).",
+        "The sensor processes every photograph of tests/data/real with the sensor.toml next to it and the frames.csv \
+         of its folder. `truth.csv` has the known quantities with their uncertainty, credit and licence. `score.py` \
+         scores the results of any program. Errors are given where there is a truth. Their sigmas contain the \
+         uncertainty of the truth: 0.02° for the pointing of Cassini, 0.05° for the stars, 0.1 % for the distance, \
+         because the height of the visible limb is not known better. The night pictures show airglow and hardly any \
+         limb of the surface: they should be refused, or answered within 3σ. The residuals on the limb of Jupiter are \
+         not noise: both pictures have the same profile by latitude, about 40 km high, so that the closer picture has \
+         the larger RMS (test `the_residuals_are_the_limb_of_jupiter`).",
     );
     s.table(["picture", "status", "inliers", "RMS", "σ of the axis", "axis error", "range error ± σ"], rows);
     s.text(match wrong.as_slice() {

@@ -7,6 +7,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use hzn_flight::bytes::Writer;
+use hzn_flight::cuc::Cuc;
 use hzn_flight::messages::Housekeeping;
 use hzn_flight::packet::{self, Apid, ApidBase};
 use hzn_flight::{Parameters, table};
@@ -126,9 +127,14 @@ fn streams() -> Seeds {
     seeds.push(("parameters/seed-set".into(), [&33u16.to_le_bytes()[..], &5f64.to_le_bytes()].concat()));
     seeds.push(("parameters/seed-short".into(), vec![1, 2, 3]));
     let mut packet = [0; packet::MAX_BYTES];
-    let n = packet::write(&mut packet, ApidBase::default(), Apid::Housekeeping, 1, 2, |w: &mut Writer<'_>| {
-        Housekeeping::default().write(w)
-    });
+    let n = packet::write(
+        &mut packet,
+        ApidBase::default(),
+        Apid::Housekeeping,
+        1,
+        Some(Cuc::since_start(2)),
+        |w: &mut Writer<'_>| Housekeeping::default().write(w),
+    );
     let packet = &packet[..n.unwrap_or(0)];
     seeds.push(("telemetry/seed-housekeeping".into(), packet.to_vec()));
     seeds.push(("telemetry/seed-two".into(), [packet, b"noise", packet].concat()));

@@ -1,6 +1,7 @@
 //! Arbitrary streams to and from a flight computer.
 
 use hzn_flight::answer::PictureAnswer;
+use hzn_flight::assembly::Assembly;
 use hzn_flight::board::{Board, Picture};
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::flight::{Buffers, Flight, Lists};
@@ -13,11 +14,15 @@ use crate::input::Input;
 /// A stream from the flight computer: every packet in it is read as every kind of message.
 pub(crate) fn telemetry(bytes: &[u8]) {
     let mut rest = bytes;
+    let mut assembly = Assembly::default();
     loop {
         let before = rest.len();
         let skip = match packet::scan(rest) {
             Scan::Packet { end, packet } => {
                 read_messages(packet.user);
+                if let Some(apid) = ApidBase::DEFAULT.subject(&packet) {
+                    let _ = assembly.take(apid, packet.user);
+                }
                 end
             }
             Scan::Bad { skip } => skip,
@@ -113,7 +118,7 @@ pub(crate) fn telecommand(bytes: &[u8]) {
         let (user, rest) = input.0.split_at(length);
         input.0 = rest;
         let mut out = [0; packet::MAX_BYTES];
-        let n = packet::write(&mut out, ApidBase::default(), Apid::Command, sequence, 0, |w| w.bytes(user));
+        let n = packet::write(&mut out, ApidBase::default(), Apid::Command, sequence, None, |w| w.bytes(user));
         line.extend_from_slice(&out[..n.unwrap_or(0)]);
     }
     line.extend_from_slice(input.rest());

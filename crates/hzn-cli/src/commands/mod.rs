@@ -7,7 +7,10 @@ mod demo;
 mod evaluate;
 mod explain;
 mod export;
+#[cfg(target_os = "linux")]
+mod fly;
 mod fuse;
+mod ground;
 mod info;
 mod init;
 mod lens_model;
@@ -18,6 +21,7 @@ mod simulate;
 mod telecommand;
 mod telemetry;
 mod view;
+mod xtce;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
@@ -63,6 +67,8 @@ enum Command {
     Sensitivity(Box<sensitivity::Args>),
     Calibrate(calibrate::Args),
     Camera(camera::Args),
+    #[cfg(target_os = "linux")]
+    Fly(fly::Args),
     Telemetry(telemetry::Args),
     Telecommand(telecommand::Args),
     View(view::Args),
@@ -88,6 +94,8 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Sensitivity(args) => sensitivity::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Camera(args) => camera::run(&args),
+        #[cfg(target_os = "linux")]
+        Command::Fly(args) => fly::run(args),
         Command::Telemetry(args) => telemetry::run(&args),
         Command::Telecommand(args) => telecommand::run(&args),
         Command::View(args) => view::run(&args),

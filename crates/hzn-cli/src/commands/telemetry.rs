@@ -1,34 +1,42 @@
 //! `hzn telemetry`: decodes the telemetry of a flight computer.
 
-use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use hzn_calib::limited;
-use hzn_core::body::Kind;
-use hzn_flight::answer::PictureAnswer;
-use hzn_flight::bytes::Reader;
-use hzn_flight::messages::{
-    Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping, Mode, Severity,
-};
-use hzn_flight::packet::{self, Apid, ApidBase, OVERHEAD, Packet, Scan};
-use hzn_flight::{Parameters, parameters};
-use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, RowMeta};
-use hzn_run::disk;
-use hzn_run::sink::{self, Existing, RowFile, Target};
+use hzn_fly::link::Address;
 
+use super::ground::{Commander, Incoming, Station, show};
+use super::xtce;
 use crate::apid::ApidArgs;
-use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
 
-/// Decode a flight computer's telemetry
+/// Decode a flight computer's telemetry, from a file or as it comes
 ///
-/// Answers become rows as `hzn run` writes them; events, acknowledged commands and parameters are printed. Bytes that
-/// are not a complete packet are skipped and counted. book/reference/telemetry.md describes the format.
+/// Answers become rows as `hzn run` writes them; events, acknowledged commands and parameters are
+/// printed. Bytes that are not a complete packet are skipped and counted.
+/// book/reference/telemetry.md describes the format.
+///
+/// A line is read until Ctrl-C. It is one of
+///   udp:LOCAL[,REMOTE]         datagrams; commands go to REMOTE
+///   tcp:HOST:PORT              a connection to the flight computer
+///   tcp-listen:HOST:PORT       a connection that the flight computer makes
+///   serial:DEVICE[:BAUD]       a serial port, 115200 baud unless given
 #[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
 pub(super) struct Args {
-    /// The stream as it was received; - for standard input
-    file: PathBuf,
+    /// The stream as it was received; - for standard input; or a line
+    #[arg(value_name = "FILE|LINE", required_unless_present = "xtce")]
+    file: Option<PathBuf>,
+    /// Print the dictionary of the packets as XTCE, for other ground systems
+    #[arg(long, conflicts_with_all = ["file", "output", "housekeeping"])]
+    xtce: bool,
+    /// Show the state of the flight computer on the whole terminal, and send commands from there
+    #[arg(long)]
+    screen: bool,
+    /// A command to send, as for `hzn telecommand`; each waits for the acknowledgement of the one before
+    #[arg(long, value_name = "COMMAND")]
+    send: Vec<String>,
     /// The file for the answers: .csv, .jsonl or .mcap
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -43,271 +51,38 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let bytes = read(&args.file)?;
-    let existing = if args.force { Existing::Replace } else { Existing::Refuse };
-    let mut sink = args.output.as_deref().map(|path| Sink::create(path, existing)).transpose()?;
-    let mut housekeeping = args.housekeeping.as_deref().map(|path| table(path, args.force)).transpose()?;
-    let mut counts = StreamCounts { base: args.apids.apid_base, ..StreamCounts::default() };
-    let mut rest = &bytes[..];
-    loop {
-        match packet::scan(rest) {
-            Scan::More { skip } => {
-                counts.skipped += rest.len() as u64;
-                // The rest is an incomplete packet, or noise.
-                counts.cut += u64::from(rest.len() > skip + packet::SYNC.len());
-                break;
-            }
-            Scan::Bad { skip } => {
-                counts.cut += 1;
-                counts.skipped += skip as u64;
-                rest = rest.get(skip..).unwrap_or_default();
-            }
-            Scan::Packet { end, packet } => {
-                counts.skipped += end.saturating_sub(packet.user.len() + OVERHEAD) as u64;
-                counts.take(&packet, &mut sink, &mut housekeeping)?;
-                rest = rest.get(end..).unwrap_or_default();
-            }
-        }
+    let Some(file) = args.file.as_deref().filter(|_| !args.xtce) else {
+        tell::result(xtce::dictionary(args.apids.apid_base))?;
+        return Ok(Exit::Done);
+    };
+    let name = file.display().to_string();
+    let live = if Address::is_address(&name) {
+        let address: Address = name.parse().map_err(usage)?;
+        Some(Incoming::open(&address)?)
+    } else if file == Path::new("-") {
+        Some(Incoming::stdin()?)
+    } else {
+        None
+    };
+    if (args.screen || !args.send.is_empty()) && !live.as_ref().is_some_and(Incoming::can_send) {
+        return Err(usage(format!("{name}: --screen and --send need a line, such as tcp:HOST:PORT")));
     }
-    if let Some(sink) = sink {
-        sink.finish()?;
+    let bytes = if live.is_some() { Vec::new() } else { read(file)? };
+    let (base, output, housekeeping) = (args.apids.apid_base, args.output.as_deref(), args.housekeeping.as_deref());
+    let mut station = Station::new(base, output, housekeeping, args.force)?;
+    let mut rest = bytes;
+    if let Some(live) = live {
+        let commander = Commander::new(base, 0, &args.send)?;
+        rest = if args.screen { show(live, &mut station, commander)? } else { live.listen(&mut station, commander)? };
+    } else {
+        station.take(&mut rest)?;
     }
-    if let Some(mut table) = housekeeping {
-        table.flush()?;
-    }
-    counts.summary();
-    if counts.packets == 0 && !bytes.is_empty() {
-        let what = "no packet was found; is this the stream of a flight computer? (book/reference/telemetry.md)";
-        return Err(failed(format!("{}: {what}", args.file.display())));
-    }
-    Ok(Exit::Done)
+    station.finish(&rest, &name)
 }
 
 /// Largest stream that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 30;
 
 fn read(path: &Path) -> Result<Vec<u8>, Stop> {
-    let mut bytes = Vec::new();
-    if path == Path::new("-") {
-        std::io::stdin().read_to_end(&mut bytes)?;
-        return Ok(bytes);
-    }
     limited::read(path, MAX_BYTES).map_err(|e| usage(format!("{}: {e}", path.display())))
-}
-
-fn table(path: &Path, force: bool) -> Result<csv::Writer<std::fs::File>, Stop> {
-    disk::refuse_existing(path, force)?;
-    let mut table = csv::Writer::from_path(path).map_err(|e| failed(format!("{}: {e}", path.display())))?;
-    let columns = ["time_s"].into_iter().chain(Housekeeping::FIELDS.iter().copied());
-    table.write_record(columns).map_err(failed)?;
-    Ok(table)
-}
-
-/// The output for answers.
-enum Sink {
-    Rows(RowFile),
-    Mcap(Box<hzn_mcap::Writer>),
-}
-
-impl Sink {
-    fn create(path: &Path, existing: Existing) -> Result<Self, Stop> {
-        if sink::target(path)? != Target::Mcap {
-            return Ok(Self::Rows(RowFile::create(path, existing)?));
-        }
-        let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
-        let options = hzn_mcap::Options { metadata, force: existing == Existing::Replace, ..Default::default() };
-        let writer = hzn_mcap::Writer::create(path, &options).map_err(usage)?;
-        Ok(Self::Mcap(Box::new(writer)))
-    }
-    fn write(&mut self, record: FrameRecord) -> Result<(), Stop> {
-        match self {
-            Self::Rows(rows) => Ok(rows.write(&record.row)?),
-            Self::Mcap(writer) => writer.write(&record).map_err(failed),
-        }
-    }
-    fn finish(self) -> Result<(), Stop> {
-        match self {
-            Self::Rows(rows) => Ok(rows.finish()?),
-            Self::Mcap(writer) => writer.finish().map(drop).map_err(failed),
-        }
-    }
-}
-
-/// Counts of a stream, and the log lines for the next answer.
-#[derive(Default)]
-struct StreamCounts {
-    base: ApidBase,
-    packets: u64,
-    answers: u64,
-    cut: u64,
-    skipped: u64,
-    /// Number of lost packets, from the gaps in the sequence counts.
-    lost: u64,
-    next: BTreeMap<u16, u16>,
-    log: Vec<LogLine>,
-}
-
-impl StreamCounts {
-    fn take(
-        &mut self,
-        packet: &Packet<'_>,
-        sink: &mut Option<Sink>,
-        housekeeping: &mut Option<csv::Writer<std::fs::File>>,
-    ) -> Result<(), Stop> {
-        self.packets += 1;
-        self.count_lost(packet);
-        let time_s = packet.time_us as f64 * 1e-6;
-        let from = &mut Reader::new(packet.user);
-        let is_understood = match self.base.subject(packet) {
-            Some(Apid::Science) => match (Exposure::read(from), PictureAnswer::read(from)) {
-                (Some(exposure), Some(answer)) => {
-                    self.answer(&exposure, &answer, sink)?;
-                    true
-                }
-                _ => false,
-            },
-            Some(Apid::Housekeeping) => match Housekeeping::read_any(packet.user) {
-                Some(record) => {
-                    write_housekeeping(time_s, &record, housekeeping)?;
-                    true
-                }
-                None => false,
-            },
-            Some(Apid::Event) => EventRecord::read(from).map(|record| self.event(time_s, &record)).is_some(),
-            Some(Apid::Acknowledge) => Acknowledge::read(from).map(|a| self.acknowledge(time_s, &a)).is_some(),
-            Some(Apid::Parameters) => {
-                self.parameters(time_s, from);
-                true
-            }
-            Some(Apid::Edge) => EdgePart::read(from).map(|part| self.edge(time_s, &part, from)).is_some(),
-            Some(Apid::Command) | None => false,
-        };
-        if !is_understood {
-            let name = self.base.subject(packet).map_or(String::new(), |a| format!(" ({})", a.name()));
-            let what = format!("a packet of APID {:#x}{name} with {} bytes", packet.apid, packet.user.len());
-            self.note(time_s, LogLevel::Warning, &format!("{what} is not understood"));
-        }
-        Ok(())
-    }
-
-    /// Counts the packets that are missing before this one, from its sequence count.
-    fn count_lost(&mut self, packet: &Packet<'_>) {
-        if let Some(next) = self.next.insert(packet.apid, (packet.sequence + 1) & 0x3FFF) {
-            // A count of 0 means that the computer has restarted.
-            if packet.sequence != next && packet.sequence != 0 {
-                self.lost += u64::from(packet.sequence.wrapping_sub(next) & 0x3FFF);
-            }
-        }
-    }
-
-    fn event(&mut self, time_s: f64, record: &EventRecord) {
-        let level = match Severity::from_number(record.severity) {
-            Some(Severity::Information) => LogLevel::Info,
-            Some(Severity::Warning) => LogLevel::Warning,
-            Some(Severity::Error) | None => LogLevel::Error,
-        };
-        self.note(time_s, level, &describe_event(record));
-    }
-
-    fn acknowledge(&mut self, time_s: f64, a: &Acknowledge) {
-        let function = Function::from_number(a.function).map_or("?", Function::name);
-        let code = Code::from_number(a.code).map_or("?", Code::name);
-        let level = if a.code == 0 { LogLevel::Info } else { LogLevel::Warning };
-        self.note(time_s, level, &format!("command {} ({function}): {code}", a.sequence));
-    }
-
-    fn parameters(&mut self, time_s: f64, from: &mut Reader<'_>) {
-        let count = from.u8().unwrap_or(0);
-        for _ in 0..count {
-            let (Some(id), Some(value)) = (from.u16(), from.f64()) else { break };
-            let name = parameters::name(id).unwrap_or("?");
-            self.note(time_s, LogLevel::Info, &format!("parameter {id} {name} = {value}"));
-        }
-    }
-
-    fn edge(&mut self, time_s: f64, part: &EdgePart, from: &mut Reader<'_>) {
-        let pixels = std::iter::from_fn(|| Some(format!("{},{}", from.u16()?, from.u16()?)));
-        let list: Vec<String> = pixels.take(part.count.into()).collect();
-        let EdgePart { picture, candidate, first, total, stride, .. } = part;
-        let what = format!("edge of picture {picture}, candidate {candidate}, stride {stride}");
-        self.note(time_s, LogLevel::Info, &format!("{what}, {first} of {total}: {}", list.join(" ")));
-    }
-
-    fn answer(&mut self, exposure: &Exposure, answer: &PictureAnswer, sink: &mut Option<Sink>) -> Result<(), Stop> {
-        let time_s = exposure.exposure_us as f64 * 1e-6;
-        let Some(report) = answer.to_report() else {
-            self.note(time_s, LogLevel::Warning, &format!("picture {}: invalid numbers", exposure.picture));
-            return Ok(());
-        };
-        self.answers += 1;
-        let Some(sink) = sink else { return Ok(()) };
-        let body = Parameters::body(exposure.body);
-        let altitude_km = (!exposure.altitude_m.is_nan()).then(|| f64::from(exposure.altitude_m) * 1e-3);
-        let meta = RowMeta {
-            index: u64::from(exposure.picture).saturating_sub(1),
-            file: format!("picture-{:06}", exposure.picture),
-            time_s: Some(time_s),
-            body: body.map_or("?", hzn_core::body::Kind::name).to_owned(),
-            altitude_km: altitude_km.filter(|_| !matches!(body, Some(Kind::Sun | Kind::Moon))),
-        };
-        let row = Row::from_report(&meta, &report, Some(f64::from(exposure.calculation_us)));
-        let mut record = FrameRecord::new(row);
-        record.candidates = CandidateEdge::from_report(&report);
-        record.annotations = Annotations::default();
-        record.log = std::mem::take(&mut self.log);
-        sink.write(record)
-    }
-
-    fn note(&mut self, time_s: f64, level: LogLevel, message: &str) {
-        tell::line(format!("{time_s:12.6} s  {message}"));
-        self.log.push(LogLine { level, message: message.to_owned() });
-    }
-
-    fn summary(&self) {
-        let Self { packets, answers, lost, cut, skipped, .. } = self;
-        let mut text = format!("{packets} packets, {answers} answers");
-        if *lost > 0 {
-            text += &format!(", {lost} packets lost on the way");
-        }
-        if *cut > 0 || *skipped > 0 {
-            text += &format!(", {cut} broken packets, {skipped} bytes skipped");
-        }
-        tell::line(&text);
-    }
-}
-
-fn write_housekeeping(
-    time_s: f64,
-    record: &Housekeeping,
-    table: &mut Option<csv::Writer<std::fs::File>>,
-) -> Result<(), Stop> {
-    if let Some(table) = table {
-        let values = std::iter::once(time_s).chain(record.values());
-        table.write_record(values.map(|v| v.to_string())).map_err(failed)?;
-    }
-    Ok(())
-}
-
-/// Returns an event in words.
-fn describe_event(record: &EventRecord) -> String {
-    let EventRecord { number, a, b, .. } = *record;
-    let mode = |n: u32| u8::try_from(n).ok().and_then(Mode::from_number).map_or("?", Mode::name);
-    match Event::from_number(number) {
-        Some(Event::ModeChanged) => format!("{} to {} mode", mode(a), mode(b)),
-        Some(Event::Started) => format!("started with copy {a} of the parameters, generation {b}"),
-        Some(Event::CommandRejected) => {
-            let code = u8::try_from(a).ok().and_then(Code::from_number).map_or("?", Code::name);
-            format!("telecommand rejected: {code} (function {b})")
-        }
-        Some(Event::Stored) => format!("parameters stored in copy {a}, generation {b}"),
-        Some(Event::CameraSilent) => {
-            format!("the camera sends no pictures: the last one, number {b}, came {:.1} s ago", f64::from(a) * 1e-3)
-        }
-        Some(Event::Repaired) => {
-            let what = if a == 1 { "sensor, made anew from the stored parameters" } else { "values from navigation" };
-            format!("memory error number {b} was repaired: {what}")
-        }
-        Some(e) => format!("{} ({a}, {b})", e.name()),
-        None => format!("event {number} ({a}, {b})"),
-    }
 }

@@ -83,10 +83,15 @@ impl<T> Report<T> {
             solution: None,
         }
     }
-    /// Lists a candidate as the chosen one, in the last place if the list has no room for it.
-    pub(crate) fn choose(&mut self, mut chosen: Candidate<T>) {
+    /// Returns whether a candidate won that is an edge in a glow, see [`Verdict::Glow`].
+    pub(crate) fn glows(&self) -> bool {
+        self.candidates.iter().any(|c| c.verdict == Verdict::Glow)
+    }
+    /// Lists the candidate that won, in the last place if the list has no room for it. Its verdict is `Chosen`, or the
+    /// reason why the picture has no answer all the same.
+    pub(crate) fn choose(&mut self, mut chosen: Candidate<T>, verdict: Verdict) {
         self.counters.edge_points = chosen.points;
-        chosen.verdict = Verdict::Chosen;
+        chosen.verdict = verdict;
         let place = self.candidates.iter().position(|c| c.number == chosen.number);
         let place = place.unwrap_or(self.candidates.len().saturating_sub(1));
         if let Some(listed) = self.candidates.get_mut(place) {

@@ -74,4 +74,7 @@ verdicts! {
     Sun = 21, "sun";
     /// The axis is farther from the last answer than the vehicle can have turned.
     Rate = 22, "rate";
+    /// The candidate won, but light reaches higher above the fitted limb than air does. The edge belongs to airglow or
+    /// aurora, or it cannot be told from one that does, so the picture has no answer.
+    Glow = 23, "glow";
 }

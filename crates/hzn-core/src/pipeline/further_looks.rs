@@ -19,9 +19,9 @@ use crate::model::work;
 use crate::stages::contour::BinaryPicture;
 use crate::stages::threshold::{self, Level};
 
-/// Returns whether the look gave no answer and a further look may give one.
-fn goes_on(status: Status) -> bool {
-    matches!(status, Status::NoLimb | Status::TooFewPoints | Status::Rejected)
+/// Returns whether the look gave no answer and a further look may give one. In a glow, every threshold has an edge.
+fn goes_on<T>(report: &Report<T>) -> bool {
+    matches!(report.status, Status::NoLimb | Status::TooFewPoints | Status::Rejected) && !report.glows()
 }
 
 impl<T: Real> Sensor<T> {
@@ -65,7 +65,7 @@ impl<T: Real> Sensor<T> {
             }
             let binary = look(within.as_ref().unwrap_or(&self.region));
             work = self.search(lists.reborrow(), &binary, work, expected, taken, report);
-            if !goes_on(report.status) {
+            if !goes_on(report) {
                 break;
             }
             if status != Some(Status::Rejected) {

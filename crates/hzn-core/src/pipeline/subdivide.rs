@@ -50,7 +50,7 @@ impl<T: Real> Sensor<T> {
         } else {
             self.look_at_crop(lists.reborrow(), whole, picture, expected, taken, observer, None, report);
         }
-        let divisible = !matches!(report.status, Status::Ok | Status::TooDark | Status::TooBright);
+        let divisible = !matches!(report.status, Status::Ok | Status::TooDark | Status::TooBright) && !report.glows();
         if self.config.recover.method == Method::Division && divisible {
             self.divide(lists, whole, picture, expected, taken, observer, report);
         }
@@ -115,7 +115,7 @@ impl<T: Real> Sensor<T> {
             report.status = Status::Ok;
             report.stage = Stage::Select;
             if let Some(edge) = chosen.iter().find(|c| c.number == answer.candidate) {
-                report.choose(*edge);
+                report.choose(*edge, Verdict::Chosen);
             }
             report.solution = Some(answer);
         }

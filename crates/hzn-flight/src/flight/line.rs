@@ -1,7 +1,9 @@
 //! The line for telemetry.
 
+use super::clock::Clock;
 use crate::board::Board;
 use crate::bytes::Writer;
+use crate::cuc::Cuc;
 use crate::packet::{self, Apid, ApidBase, MAX_BYTES};
 
 /// The line for telemetry, with a sequence count for each APID.
@@ -12,12 +14,13 @@ pub(super) struct Line {
     sequences: [u16; Apid::ALL.len()],
     /// The APIDs of this computer; `None` until the parameters are loaded.
     base: Option<ApidBase>,
+    pub(super) clock: Clock,
 }
 
 impl Line {
     /// Makes a line. It is all zeros, so that it takes no flash.
     pub(super) const fn new() -> Self {
-        Self { out: [0; MAX_BYTES], sequences: [0; Apid::ALL.len()], base: None }
+        Self { out: [0; MAX_BYTES], sequences: [0; Apid::ALL.len()], base: None, clock: Clock::new() }
     }
 
     pub(super) fn base(&self) -> ApidBase {
@@ -27,17 +30,17 @@ impl Line {
         self.base = Some(base);
     }
 
-    /// Sends a packet. `user` writes its user data.
-    pub(super) fn send<B: Board>(&mut self, board: &mut B, apid: Apid, user: impl FnOnce(&mut Writer<'_>)) {
+    /// Sends a packet with a time. `user` writes its user data.
+    pub(super) fn send<B: Board>(&mut self, board: &mut B, apid: Apid, time: Cuc, user: impl FnOnce(&mut Writer<'_>)) {
         let place = Apid::ALL.iter().zip(&mut self.sequences).find(|(a, _)| **a == apid);
         let sequence = place.map_or(0, |(_, n)| {
             let now = *n;
             *n = n.wrapping_add(1);
             now
         });
-        let (time_us, base) = (board.now_us(), self.base());
+        let base = self.base();
         if let Some(bytes) =
-            packet::write(&mut self.out, base, apid, sequence, time_us, user).and_then(|n| self.out.get(..n))
+            packet::write(&mut self.out, base, apid, sequence, Some(time), user).and_then(|n| self.out.get(..n))
         {
             board.send(bytes);
         }

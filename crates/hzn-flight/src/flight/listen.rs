@@ -87,6 +87,7 @@ impl<B: Board> Flight<'_, B> {
         let user = self.buffers.line.out;
         let mut from = Reader::new(user.get(..bytes).unwrap_or_default());
         let number = from.u8().unwrap_or(0);
+        self.detail = 0;
         let code = match Function::from_number(number) {
             _ if !self.is_in_sequence(sequence) => Code::Sequence,
             Some(function) => {
@@ -119,7 +120,7 @@ impl<B: Board> Flight<'_, B> {
                 return;
             }
         }
-        let record = Acknowledge { function, sequence, code: code as u8 };
+        let record = Acknowledge { function, sequence, code: code as u8, detail: self.detail };
         self.send(Apid::Acknowledge, |out| record.write(out));
     }
 }

@@ -2,18 +2,20 @@
 
 use core::cell::RefCell;
 
+use hzn_core::Solution;
 use hzn_core::observer::Observer;
 use hzn_core::pixel::Pixel;
+use hzn_core::report::Candidate;
 
 use super::line::Line;
+use super::stuck::{PLACES, StuckWatch};
 use crate::board::Board;
-use crate::messages::EdgePart;
+use crate::cuc::Cuc;
+use crate::messages::{EDGE_PIXELS, EdgePart, EdgePixel};
 use crate::packet::Apid;
 
 /// Most pixels of an edge that are sent.
 const MAX_PIXELS: usize = 512;
-/// Most pixels of an edge in one packet.
-const MAX_PACKET_PIXELS: usize = 200;
 
 /// The longest edge of a picture, thinned to fit.
 #[derive(Debug)]
@@ -36,52 +38,75 @@ impl LongestEdge {
     }
 
     /// Sends the edge in parts.
-    pub(super) fn send(&self, line: &mut Line, board: &mut impl Board, picture: u32) {
+    pub(super) fn send(&self, line: &mut Line, board: &mut impl Board, time: Cuc, picture: u32) {
         let pixels = self.pixels.get(..self.len).unwrap_or_default();
-        for (part, pixels) in pixels.chunks(MAX_PACKET_PIXELS).enumerate() {
+        for (part, pixels) in pixels.chunks(EDGE_PIXELS).enumerate() {
             let head = EdgePart {
                 picture,
                 candidate: self.candidate,
                 stride: self.stride,
-                first: (part * MAX_PACKET_PIXELS) as u16,
+                first: (part * EDGE_PIXELS) as u16,
                 total: self.len as u16,
                 count: pixels.len() as u16,
             };
-            line.send(board, Apid::Edge, |out| {
+            line.send(board, Apid::Edge, time, |out| {
                 head.write(out);
-                for p in pixels {
-                    out.u16(p.x);
-                    out.u16(p.y);
+                for place in 0..EDGE_PIXELS {
+                    let pixel = pixels.get(place).map_or(EdgePixel::default(), |p| EdgePixel { x: p.x, y: p.y });
+                    pixel.write(out);
                 }
             });
         }
     }
 }
 
-/// Keeps the longest edge if it is wanted. There is only one type of observer, so that the pipeline is linked once.
+/// Watches the edges of a picture: keeps the longest one if it is wanted, and looks for stuck pixels along each. There
+/// is only one type of observer, so that the pipeline is linked once.
 pub(super) struct EdgeWatch<'a> {
     pub(super) wanted: bool,
     pub(super) longest: RefCell<&'a mut LongestEdge>,
+    pub(super) stuck: RefCell<StuckWatch<'a>>,
 }
 
 impl Observer<f32> for EdgeWatch<'_> {
-    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
-        if !self.wanted {
-            return;
+    fn look(&self, _number: u32, _level: u16) {
+        // The candidates of another look have the same numbers.
+        if let Ok(mut stuck) = self.stuck.try_borrow_mut() {
+            stuck.clear();
         }
-        let Ok(mut longest) = self.longest.try_borrow_mut() else { return };
+    }
+
+    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
+        let (Ok(mut longest), Ok(mut stuck)) = (self.longest.try_borrow_mut(), self.stuck.try_borrow_mut()) else {
+            return;
+        };
+        let list = &mut **longest;
         let (pixels, _) = border.size_hint();
         let length = (pixels as u32).saturating_mul(stride);
-        if length <= longest.length {
-            return;
+        let is_kept = self.wanted && length > list.length;
+        let most = if is_kept { MAX_PIXELS } else { PLACES };
+        let every = pixels.div_ceil(most).max(1);
+        if is_kept {
+            (list.length, list.candidate, list.len) = (length, candidate, 0);
+            list.stride = stride.saturating_mul(every as u32);
         }
-        let every = pixels.div_ceil(MAX_PIXELS).max(1);
-        let list = &mut **longest;
-        list.len = 0;
-        for (place, pixel) in list.pixels.iter_mut().zip(border.step_by(every)) {
-            *place = pixel;
-            list.len += 1;
+        stuck.begin();
+        for (place, pixel) in border.step_by(every).enumerate() {
+            if is_kept && let Some(kept) = list.pixels.get_mut(place) {
+                *kept = pixel;
+                list.len += 1;
+            }
+            if place.checked_rem(most / PLACES) == Some(0) {
+                stuck.look_at(pixel);
+            }
         }
-        (list.length, list.candidate, list.stride) = (length, candidate, stride.saturating_mul(every as u32));
+    }
+
+    fn verdict(&self, candidate: u32, _outcome: &Candidate<f32>, solution: Option<&Solution<f32>>) {
+        if let Some(solution) = solution
+            && let Ok(mut stuck) = self.stuck.try_borrow_mut()
+        {
+            stuck.judge(candidate, solution);
+        }
     }
 }

@@ -159,7 +159,7 @@ mod tests {
             if packet.apid == Apid::Science as u16 {
                 let from = &mut Reader::new(packet.user);
                 Exposure::read(from).unwrap();
-                axis = Some(PictureAnswer::read(from).unwrap().direction.unwrap().axis);
+                axis = Some(PictureAnswer::read_science(from).unwrap().direction.unwrap().axis);
             }
             rest = &rest[end..];
         }

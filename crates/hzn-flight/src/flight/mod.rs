@@ -9,8 +9,11 @@
 //! | `parameter_commands` | the functions that read and change parameters |
 //! | `pictures` | the way of a picture to its science packet |
 //! | `memory` | bits that changed in memory |
+//! | `science` | the packets of a picture, within the bit budget |
+//! | `clock` | the time of packets, and its correlation |
 //! | `navigation` | position, velocity and rate, with time and expiry |
 //! | `camera_watch` | pictures that do not come |
+//! | `stuck` | pixels that do not change from one to the next |
 //! | `longest_edge` | the edge that a command asks for |
 //! | `reports` | housekeeping and events |
 //! | `line` | packets on the line, with their counts |
@@ -25,8 +28,10 @@ use crate::operations::Operations;
 use crate::store::{self, Loaded};
 use crate::table::{self, TableError};
 
+mod budget;
 mod camera_turn;
 mod camera_watch;
+mod clock;
 mod line;
 mod listen;
 mod longest_edge;
@@ -39,9 +44,12 @@ mod recovery;
 mod recovery_turn;
 mod report_turn;
 mod reports;
+mod science;
 mod self_check;
+mod stuck;
 mod telecommands;
 
+use budget::BitBudget;
 use camera_watch::CameraWatch;
 use line::Line;
 use longest_edge::LongestEdge;
@@ -99,6 +107,7 @@ pub struct Flight<'a, B> {
     recovery: Recovery,
     camera: CameraWatch,
     limiter: Limiter,
+    budget: BitBudget,
     /// Number of the last picture, from 1.
     number: u32,
     /// Number of pictures since the last housekeeping packet, and its time.
@@ -106,6 +115,8 @@ pub struct Flight<'a, B> {
     housekeeping_us: u64,
     /// Sequence count of the last telecommand that was taken.
     last_sequence: Option<u16>,
+    /// What the last telecommand was refused for, as in [`crate::messages::Acknowledge::detail`].
+    detail: u16,
     /// Whether a command asked for the next picture to be processed.
     process_once: bool,
     /// Whether a command asked for the edges of the next picture.
@@ -176,10 +187,12 @@ impl<'a, B: Board> Flight<'a, B> {
             recovery,
             camera: CameraWatch::new(),
             limiter: Limiter::new(),
+            budget: BitBudget::new(),
             number: 0,
             since_housekeeping: 0,
             housekeeping_us: 0,
             last_sequence: None,
+            detail: 0,
             process_once: false,
             dump_edges: false,
         })
@@ -218,6 +231,8 @@ impl<'a, B: Board> Flight<'a, B> {
         self.sensor.complete();
         self.known.complete();
         let now_us = self.board.now_us();
+        let pulse_us = self.board.pulse_us();
+        self.buffers.line.clock.note_pulse(pulse_us);
         if self.mode == Mode::ShutDown || self.follow_vehicle(now_us) {
             return;
         }

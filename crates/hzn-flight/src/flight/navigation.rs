@@ -9,8 +9,10 @@ use hzn_core::Prior;
 use hzn_core::body::Last;
 use hzn_core::real::Real;
 
+use super::clock::Clock;
 use crate::bytes::Reader;
-use crate::messages::{Code, Navigation};
+use crate::cuc::Cuc;
+use crate::messages::{Code, Navigation, NavigationState};
 
 /// Gravitational parameter of the Earth, m³/s² (WGS-84).
 const MU: f32 = 3.986_004_4e14;
@@ -64,6 +66,26 @@ impl Known {
         };
         Some(Prior { position_m: prior.position_m.map(moved), ..prior })
     }
+
+    /// Returns the values from navigation as they are sent with a picture; `None` if there are none.
+    pub(super) fn state_at(&self, picture: u32, exposure_us: u64) -> Option<NavigationState> {
+        let prior = self.at(exposure_us);
+        let state = if prior.is_some() { NavigationState::USED } else { NavigationState::EXPIRED };
+        let prior = prior.unwrap_or(self.prior);
+        if prior.altitude_m.is_none() && prior.position_m.is_none() && prior.rate_rad_s.is_none() {
+            return None;
+        }
+        const UNKNOWN: [f32; 3] = [f32::NAN; 3];
+        Some(NavigationState {
+            picture,
+            state,
+            age_s: self.motion.map_or(f32::NAN, |motion| motion.age_s(exposure_us)),
+            altitude_m: prior.altitude_m.unwrap_or(f32::NAN),
+            position_m: prior.position_m.unwrap_or(UNKNOWN),
+            velocity_m_s: self.motion.and_then(|motion| motion.velocity_m_s).unwrap_or(UNKNOWN),
+            rate_rad_s: prior.rate_rad_s.unwrap_or(UNKNOWN),
+        })
+    }
 }
 
 /// Returns the position in ECEF after `t` seconds of free fall.
@@ -81,52 +103,88 @@ fn move_freely(r: [f32; 3], v: [f32; 3], t: f32) -> [f32; 3] {
     })
 }
 
+/// Why values from navigation are refused, and the place of the number in [`Navigation`], from 1; 0 for all of them.
+pub(super) type Refusal = (Code, u16);
+
+/// Places of the first numbers of the vectors in [`Navigation`].
+const POSITION: u16 = 4;
+const VELOCITY: u16 = 7;
+const RATE: u16 = 10;
+
 /// Reads the arguments of [`crate::messages::Function::SetKnown`].
-pub(super) fn read_prior(from: &mut Reader<'_>) -> Result<Known, Code> {
-    let numbers = from.f32().zip(from.floats());
-    let (altitude_m, position_m) = numbers.ok_or(Code::Arguments)?;
+pub(super) fn read_prior(from: &mut Reader<'_>) -> Result<Known, Refusal> {
+    let cut_off = (Code::Arguments, 0);
+    let (altitude_m, position_m) = from.f32().zip(from.floats()).ok_or(cut_off)?;
     let rate = match from.rest() {
         [] => [f32::NAN; 3],
-        _ => from.floats().ok_or(Code::Arguments)?,
+        _ => from.floats().ok_or(cut_off)?,
     };
     if !from.rest().is_empty() {
-        return Err(Code::Arguments);
+        return Err(cut_off);
     }
     Ok(Known { prior: prior(altitude_m, position_m, rate)?, ..Known::default() })
 }
 
-/// Reads the arguments of [`crate::messages::Function::Navigate`], which arrived at `now_us`.
-pub(super) fn read_navigation(from: &mut Reader<'_>, now_us: u64) -> Result<Known, Code> {
-    let n = Navigation::read(from).filter(|_| from.rest().is_empty()).ok_or(Code::Arguments)?;
-    let position_m = [n.position_x_m, n.position_y_m, n.position_z_m];
-    let rate = [n.rate_x_rad_s, n.rate_y_rad_s, n.rate_z_rad_s];
-    let velocity_m_s = known_vector([n.velocity_x_m_s, n.velocity_y_m_s, n.velocity_z_m_s])?;
-    let expires_s = (!n.expires_s.is_nan()).then_some(n.expires_s);
-    let motion = Motion { epoch_us: n.epoch_us, velocity_m_s, expires_s };
-    let known = Known { prior: prior(n.altitude_m, position_m, rate)?, motion: Some(motion), last: None };
-    // A velocity without a position moves nothing. The negation also refuses what is not finite.
-    let is_possible = motion.age_s(now_us).abs() <= LARGEST_AGE_S
-        && expires_s.is_none_or(|limit| limit > 0.0 && limit.is_finite())
-        && velocity_m_s.is_none_or(|v| known.prior.position_m.is_some() && v.iter().all(|x| x.abs() < 2e4));
-    if is_possible { Ok(known) } else { Err(Code::Refused) }
+/// Returns the time of the values on the board's clock.
+fn epoch_us(epoch: u64, clock: &Clock) -> Result<u64, Refusal> {
+    let bytes = epoch.to_be_bytes();
+    match (bytes, Cuc::from_bytes(bytes)) {
+        (_, Some(time)) => clock.clock_us(time).ok_or((Code::NoClock, 1)),
+        ([0, ..], None) => Ok(epoch),
+        _ => Err((Code::Refused, 1)),
+    }
 }
 
-fn prior(altitude_m: f32, position_m: [f32; 3], rate_rad_s: [f32; 3]) -> Result<Prior<f32>, Code> {
+/// Reads the arguments of [`crate::messages::Function::Navigate`], which arrived at `now_us`.
+pub(super) fn read_navigation(from: &mut Reader<'_>, clock: &Clock, now_us: u64) -> Result<Known, Refusal> {
+    let n = Navigation::read(from).filter(|_| from.rest().is_empty()).ok_or((Code::Arguments, 0))?;
+    let position_m = [n.position_x_m, n.position_y_m, n.position_z_m];
+    let rate = [n.rate_x_rad_s, n.rate_y_rad_s, n.rate_z_rad_s];
+    let velocity_m_s = known_vector([n.velocity_x_m_s, n.velocity_y_m_s, n.velocity_z_m_s], VELOCITY)?;
+    let expires_s = (!n.expires_s.is_nan()).then_some(n.expires_s);
+    let motion = Motion { epoch_us: epoch_us(n.epoch, clock)?, velocity_m_s, expires_s };
+    let known = Known { prior: prior(n.altitude_m, position_m, rate)?, motion: Some(motion), last: None };
+    let is_fast = |x: &f32| x.abs() >= 2e4;
+    let fastest = velocity_m_s.and_then(|v| (VELOCITY..).zip(v).find(|(_, x)| is_fast(x)));
+    // A velocity without a position moves nothing.
+    let moves_nothing = velocity_m_s.is_some() && known.prior.position_m.is_none();
+    let checks = [
+        (motion.age_s(now_us).abs() > LARGEST_AGE_S, 1),
+        (expires_s.is_some_and(|limit| limit <= 0.0 || limit.is_infinite()), 2),
+        (moves_nothing, POSITION),
+        (fastest.is_some(), fastest.map_or(0, |(place, _)| place)),
+    ];
+    match checks.iter().find(|(is_wrong, _)| *is_wrong) {
+        Some((_, place)) => Err((Code::Refused, *place)),
+        None => Ok(known),
+    }
+}
+
+fn prior(altitude_m: f32, position_m: [f32; 3], rate_rad_s: [f32; 3]) -> Result<Prior<f32>, Refusal> {
+    if altitude_m.is_infinite() {
+        return Err((Code::Refused, POSITION - 1));
+    }
     Ok(Prior {
         altitude_m: (!altitude_m.is_nan()).then_some(altitude_m),
-        position_m: known_vector(position_m)?,
-        rate_rad_s: known_vector(rate_rad_s)?,
+        position_m: known_vector(position_m, POSITION)?,
+        rate_rad_s: known_vector(rate_rad_s, RATE)?,
         ..Prior::default()
     })
 }
 
 /// Returns a vector; `None` if all of its numbers are NaN, which means that it is not known. One NaN is an error of the
-/// sender.
-fn known_vector(v: [f32; 3]) -> Result<Option<[f32; 3]>, Code> {
-    match v.iter().filter(|x| x.is_nan()).count() {
-        0 => Ok(Some(v)),
-        3 => Ok(None),
-        _ => Err(Code::Missing),
+/// sender; the refusal names its place. `first` is that of the first number.
+fn known_vector(v: [f32; 3], first: u16) -> Result<Option<[f32; 3]>, Refusal> {
+    let find = |is_wrong: fn(&f32) -> bool| (first..).zip(v).find(|(_, x)| is_wrong(x));
+    if v.iter().all(|x| x.is_nan()) {
+        return Ok(None);
+    }
+    if let Some((place, _)) = find(|x| x.is_nan()) {
+        return Err((Code::Missing, place));
+    }
+    match find(|x| x.is_infinite()) {
+        Some((place, _)) => Err((Code::Refused, place)),
+        None => Ok(Some(v)),
     }
 }
 

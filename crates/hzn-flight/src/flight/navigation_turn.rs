@@ -1,7 +1,7 @@
 //! The flight loop takes values from navigation, and lets them expire.
 
 use super::Flight;
-use super::navigation::Known;
+use super::navigation::{Known, Refusal};
 use crate::board::Board;
 use crate::messages::{Code, Event};
 use hzn_core::Prior;
@@ -9,10 +9,10 @@ use hzn_core::body::Kind;
 
 impl<B: Board> Flight<'_, B> {
     /// Sets the values from navigation for the pictures that follow.
-    pub(super) fn set_known(&mut self, read: Result<Known, Code>) -> Code {
+    pub(super) fn set_known(&mut self, read: Result<Known, Refusal>) -> Code {
         let known = match read {
             Ok(known) => known,
-            Err(code) => return code,
+            Err((code, place)) => return self.refuse(code, place),
         };
         let sensor = self.sensor.get();
         let is_earth = matches!(sensor.config().body.kind, Kind::Earth | Kind::EarthSphere);

@@ -5,7 +5,7 @@ use hzn_core::Sensor;
 use super::Flight;
 use crate::board::Board;
 use crate::bytes::Reader;
-use crate::messages::{Code, Event};
+use crate::messages::{Code, Event, ParameterValue};
 use crate::packet::Apid;
 use crate::parameters::{Parameters, Refused};
 use crate::store;
@@ -19,7 +19,7 @@ pub(super) enum Keep {
 
 /// Bytes of a parameter that waits for the commit: its number and its value.
 const ENTRY: usize = 10;
-/// Most parameters that are read in one packet.
+/// Most parameters that are read by one telecommand.
 const MAX_READ: u8 = 96;
 
 impl<B: Board> Flight<'_, B> {
@@ -37,7 +37,7 @@ impl<B: Board> Flight<'_, B> {
         let mut parameters = self.parameters();
         match merge(&mut parameters, *from) {
             Ok(()) => self.use_parameters(&parameters, keep),
-            Err(code) => code,
+            Err(refused) => self.refuse_parameter(refused),
         }
     }
 
@@ -72,7 +72,7 @@ impl<B: Board> Flight<'_, B> {
         let mut parameters = self.parameters();
         match merge(&mut parameters, Reader::new(entries)) {
             Ok(()) => self.use_parameters(&parameters, Keep::Stored),
-            Err(code) => code,
+            Err(refused) => self.refuse_parameter(refused),
         }
     }
 
@@ -80,7 +80,10 @@ impl<B: Board> Flight<'_, B> {
     fn use_parameters(&mut self, parameters: &Parameters, keep: Keep) -> Code {
         let is_sensor_new = parameters.sensor != *self.sensor.get().config();
         if is_sensor_new || parameters.operations != self.operations {
-            if parameters.check().is_err() || is_sensor_new && !self.renew_sensor(parameters) {
+            if let Err(refused) = parameters.check() {
+                return self.refuse_parameter(refused);
+            }
+            if is_sensor_new && !self.renew_sensor(parameters) {
                 return Code::Refused;
             }
             self.sensor.complete();
@@ -101,6 +104,11 @@ impl<B: Board> Flight<'_, B> {
             self.sensor.set(sensor);
         }
         is_accepted
+    }
+
+    fn refuse_parameter(&mut self, refused: Refused) -> Code {
+        let code = if matches!(refused, Refused::Unknown(_)) { Code::UnknownParameter } else { Code::Refused };
+        self.refuse(code, refused.number())
     }
 
     #[inline(never)]
@@ -131,30 +139,24 @@ impl<B: Board> Flight<'_, B> {
         }
         let parameters = self.parameters();
         let ids = *from;
-        for _ in 0..count {
-            if from.u16().and_then(|id| parameters.get(id)).is_none() {
-                return Code::UnknownParameter;
+        while let Some(id) = from.u16() {
+            if parameters.get(id).is_none() {
+                return self.refuse(Code::UnknownParameter, id);
             }
         }
-        self.send(Apid::Parameters, |out| {
-            out.u8(count);
-            let mut ids = ids;
-            while let Some(id) = ids.u16() {
-                out.u16(id);
-                out.f64(parameters.get(id).unwrap_or(f64::NAN));
-            }
-        });
+        let mut ids = ids;
+        while let Some(number) = ids.u16() {
+            let value = ParameterValue { number, value: parameters.get(number).unwrap_or(f64::NAN) };
+            self.send(Apid::Parameters, |out| value.write(out));
+        }
         Code::Done
     }
 }
 
 /// Sets parameters to the numbers and values in `from`.
-fn merge(parameters: &mut Parameters, mut from: Reader<'_>) -> Result<(), Code> {
+fn merge(parameters: &mut Parameters, mut from: Reader<'_>) -> Result<(), Refused> {
     while let (Some(id), Some(value)) = (from.u16(), from.f64()) {
-        parameters.set(id, value).map_err(|refused| match refused {
-            Refused::Unknown(_) => Code::UnknownParameter,
-            _ => Code::Refused,
-        })?;
+        parameters.set(id, value)?;
     }
     Ok(())
 }

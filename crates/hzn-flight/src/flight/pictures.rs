@@ -2,19 +2,16 @@
 
 use core::cell::RefCell;
 
-use hzn_core::Report;
 use hzn_core::body::{Expected, Last};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
 
 use super::longest_edge::EdgeWatch;
+use super::stuck::StuckWatch;
 use super::{Buffers, Flight, Known};
-use crate::answer::PictureAnswer;
 use crate::board::{Board, Picture};
 use crate::kept_twice::KeptTwice;
-use crate::messages::{Event, Exposure};
-use crate::packet::Apid;
-use crate::parameters::Parameters;
+use crate::messages::Event;
 
 impl<B: Board> Flight<'_, B> {
     /// Processes a picture and sends its answer. A picture of the wrong size, or with an impossible prior, gets an
@@ -34,11 +31,21 @@ impl<B: Board> Flight<'_, B> {
         let bytes = self.board.pixels().get(..picture.bytes).unwrap_or_default();
         let Ok(grey) = Grey::try_new(bytes, layout) else { return };
         self.buffers.edge.clear();
-        let watch = EdgeWatch { wanted, longest: RefCell::new(&mut self.buffers.edge) };
+        let watch = EdgeWatch {
+            wanted,
+            longest: RefCell::new(&mut self.buffers.edge),
+            stuck: RefCell::new(StuckWatch::new(bytes, self.sensor.get().camera())),
+        };
         let report = self.sensor.get().process(self.workspace, &grey, expected.get(), &watch);
+        let stuck = report.solution.as_ref().and_then(|s| watch.stuck.into_inner().found(s.candidate));
         // A bit may have changed during the calculation.
         if !self.check_memory(Some(&mut expected)) {
             self.state.refused = self.state.refused.saturating_add(1);
+            return;
+        }
+        if let Some(stuck) = stuck {
+            self.state.stuck = self.state.stuck.saturating_add(1);
+            self.send_event(Event::StuckPixels, stuck.stuck, stuck.places);
             return;
         }
         if let Some(s) = &report.solution {
@@ -52,7 +59,8 @@ impl<B: Board> Flight<'_, B> {
         self.send_answer(&report, picture.exposure_us, done_us);
         if wanted {
             let Buffers { line, edge, .. } = &mut *self.buffers;
-            edge.send(line, &mut self.board, self.number);
+            let time = line.clock.at(picture.exposure_us);
+            edge.send(line, &mut self.board, time, self.number);
         }
         self.since_housekeeping = self.since_housekeeping.saturating_add(1);
         if self.since_housekeeping >= self.operations.housekeeping_every {
@@ -95,29 +103,5 @@ impl<B: Board> Flight<'_, B> {
         state.last_status = status as u8;
         state.last_us = calculation_us;
         state.longest_us = state.longest_us.max(calculation_us);
-    }
-
-    /// Sends the answer to the picture that was counted last.
-    fn send_answer(&mut self, report: &Report<f32>, exposure_us: u64, done_us: u64) {
-        let config = self.sensor.get().config();
-        let altitude_m = self
-            .known
-            .get()
-            .at(exposure_us)
-            .and_then(|prior| prior.altitude_m)
-            .or(config.body.altitude_km.map(|h| (h * 1000.0) as f32));
-        let exposure = Exposure {
-            picture: self.number,
-            exposure_us,
-            done_us,
-            calculation_us: self.state.last_us,
-            body: Parameters::body_number(config),
-            altitude_m: altitude_m.unwrap_or(f32::NAN),
-        };
-        let answer = PictureAnswer::from_report(report);
-        self.send(Apid::Science, |out| {
-            exposure.write(out);
-            answer.write(out);
-        });
     }
 }

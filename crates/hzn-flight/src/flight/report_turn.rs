@@ -1,7 +1,7 @@
 //! The flight loop sends events and housekeeping.
 
 use super::Flight;
-use super::reports::{ARMED, CAMERA_SILENT, LIFTED_OFF, NOT_STORED, STAGED, VERSION};
+use super::reports::{ARMED, CAMERA_SILENT, LIFTED_OFF, NOT_STORED, STAGED};
 use crate::board::Board;
 use crate::bytes::Writer;
 use crate::messages::{Event, EventRecord, Severity};
@@ -23,7 +23,7 @@ impl<B: Board> Flight<'_, B> {
         let state = &mut self.state;
         state.mode = self.mode as u8;
         state.stack_bytes = self.board.stack_bytes();
-        state.version = VERSION;
+        state.version = crate::VERSION;
         state.flags = bit(self.is_not_stored, NOT_STORED)
             | bit(self.recovery.is_armed(now_us), ARMED)
             | bit(self.recovery.has_lifted_off(), LIFTED_OFF)
@@ -31,6 +31,7 @@ impl<B: Board> Flight<'_, B> {
             | bit(self.staged > 0, STAGED);
         state.last_sequence = self.last_sequence.unwrap_or(u16::MAX);
         state.since_lift_off_s = self.recovery.since_lift_off_s(now_us).unwrap_or(u32::MAX);
+        state.clock = self.buffers.line.clock.state(now_us);
         let state = self.state;
         self.send(Apid::Housekeeping, |out| state.write(out));
     }
@@ -56,7 +57,15 @@ impl<B: Board> Flight<'_, B> {
         is_allowed
     }
 
+    /// Sends a packet with the time of now.
     pub(super) fn send(&mut self, apid: Apid, user: impl FnOnce(&mut Writer<'_>)) {
-        self.buffers.line.send(&mut self.board, apid, user);
+        let now_us = self.board.now_us();
+        self.send_at(now_us, apid, user);
+    }
+
+    /// Sends a packet with a time on the board's clock.
+    pub(super) fn send_at(&mut self, clock_us: u64, apid: Apid, user: impl FnOnce(&mut Writer<'_>)) {
+        let line = &mut self.buffers.line;
+        line.send(&mut self.board, apid, line.clock.at(clock_us), user);
     }
 }

@@ -10,21 +10,6 @@ const WARNING_US: u64 = 1_000_000;
 /// but not many of them.
 const CREDIT: u16 = 1024;
 
-/// Version of this crate: major, minor and patch in one byte each.
-pub(super) const VERSION: u32 = number(env!("CARGO_PKG_VERSION_MAJOR")) << 16
-    | number(env!("CARGO_PKG_VERSION_MINOR")) << 8
-    | number(env!("CARGO_PKG_VERSION_PATCH"));
-
-const fn number(digits: &str) -> u32 {
-    let mut rest = digits.as_bytes();
-    let mut value = 0;
-    while let [digit, after @ ..] = rest {
-        value = value * 10 + (*digit - b'0') as u32;
-        rest = after;
-    }
-    value
-}
-
 /// Limits of what the line makes the computer send.
 #[derive(Debug)]
 pub(super) struct Limiter {

@@ -5,7 +5,8 @@ use super::navigation::{read_navigation, read_prior};
 use super::parameter_commands::Keep;
 use crate::board::Board;
 use crate::bytes::Reader;
-use crate::messages::{Code, Function, Housekeeping, Mode};
+use crate::cuc::Cuc;
+use crate::messages::{Code, Event, Function, Housekeeping, Mode};
 
 impl<B: Board> Flight<'_, B> {
     pub(super) fn carry_out(&mut self, function: Function, from: &mut Reader<'_>) -> Code {
@@ -19,8 +20,10 @@ impl<B: Board> Flight<'_, B> {
             Function::SetKnown => self.set_known(read_prior(from)),
             Function::Navigate => {
                 let now_us = self.board.now_us();
-                self.set_known(read_navigation(from, now_us))
+                let read = read_navigation(from, &self.buffers.line.clock, now_us);
+                self.set_known(read)
             }
+            Function::SetTime => self.set_time(from),
             // The other functions have no arguments.
             _ if !from.rest().is_empty() => Code::Arguments,
             Function::ProcessOnce if self.mode != Mode::Standby => Code::Mode,
@@ -63,6 +66,28 @@ impl<B: Board> Flight<'_, B> {
         Code::Done
     }
 
+    /// Keeps what a telecommand is refused for, and returns the code.
+    pub(super) fn refuse(&mut self, code: Code, detail: u16) -> Code {
+        self.detail = detail;
+        code
+    }
+
+    fn set_time(&mut self, from: &mut Reader<'_>) -> Code {
+        let (Some(time), Some(at_pulse @ 0..=1), []) = (from.u64(), from.u8(), from.rest()) else {
+            return Code::Arguments;
+        };
+        let Some(time) = Cuc::from_bytes(time.to_be_bytes()) else { return Code::Arguments };
+        let now_us = self.board.now_us();
+        match self.buffers.line.clock.correlate(time, at_pulse == 1, now_us) {
+            Ok(change_us) => {
+                let change_ms = change_us.and_then(|us| u32::try_from(us / 1000).ok()).unwrap_or(u32::MAX);
+                self.send_event(Event::ClockSet, (time.us / 1_000_000) as u32, change_ms);
+                Code::Done
+            }
+            Err(code) => code,
+        }
+    }
+
     /// Sets the counters to zero. What is no counter stays.
     fn reset_counters(&mut self) {
         self.state = Housekeeping {
@@ -78,6 +103,8 @@ impl<B: Board> Flight<'_, B> {
             foreign: 0,
             broken: 0,
             withheld: 0,
+            decimated: 0,
+            stuck: 0,
             ..self.state
         };
     }

@@ -5,10 +5,14 @@ use std::collections::VecDeque;
 use hzn_core::pixel;
 use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::{Reader, Writer};
+use hzn_flight::cuc::Cuc;
 use hzn_flight::flight::{Buffers, Flight, Lists};
-use hzn_flight::messages::{Acknowledge, Code, EdgePart, Event, EventRecord, Exposure, Function, Housekeeping};
+use hzn_flight::messages::{
+    Acknowledge, Code, EDGE_PIXELS, EdgePart, EdgePixel, Event, EventRecord, Exposure, Function, Housekeeping,
+    NavigationState, ParameterValue,
+};
 use hzn_flight::packet::{self, Apid, ApidBase, Scan};
-use hzn_flight::{Parameters, answer::PictureAnswer, table};
+use hzn_flight::{Parameters, answer::PictureAnswer, assembly::Assembly, layout, table};
 
 pub(crate) const WIDTH: usize = 640;
 pub(crate) const HEIGHT: usize = 480;
@@ -23,6 +27,7 @@ pub(crate) struct Bench {
     pub(crate) copies: [Vec<u8>; 2],
     /// Bytes that can still be written before power is cut.
     pub(crate) power: Option<usize>,
+    pub(crate) pulse_us: Option<u64>,
     pub(crate) lift_off: bool,
     pub(crate) power_fails: bool,
     pub(crate) camera_is_dead: bool,
@@ -37,6 +42,9 @@ impl Board for Bench {
     fn now_us(&mut self) -> u64 {
         self.now_us += 10;
         self.now_us
+    }
+    fn pulse_us(&mut self) -> Option<u64> {
+        self.pulse_us
     }
     fn receive(&mut self) -> Option<u8> {
         self.line.pop_front()
@@ -138,7 +146,7 @@ pub(crate) fn command(sequence: u16, function: Function, arguments: impl FnOnce(
         w.u8(function as u8);
         arguments(w);
     };
-    let n = packet::write(&mut out, ApidBase::DEFAULT, Apid::Command, sequence, 0, user).unwrap();
+    let n = packet::write(&mut out, ApidBase::DEFAULT, Apid::Command, sequence, None, user).unwrap();
     out[..n].to_vec()
 }
 
@@ -146,6 +154,11 @@ pub(crate) fn command(sequence: u16, function: Function, arguments: impl FnOnce(
 pub(crate) struct Sent {
     pub(crate) housekeeping: Vec<Housekeeping>,
     pub(crate) science: Vec<(Exposure, PictureAnswer)>,
+    pub(crate) navigation: Vec<NavigationState>,
+    /// The times of the packets, in their order.
+    pub(crate) times: Vec<(Apid, Cuc)>,
+    /// What was refused, of every acknowledgement.
+    pub(crate) details: Vec<u16>,
     pub(crate) events: Vec<(Event, u32, u32)>,
     pub(crate) answers: Vec<(u8, u16, Code)>,
     pub(crate) parameters: Vec<(u16, f64)>,
@@ -156,35 +169,43 @@ pub(crate) struct Sent {
 pub(crate) fn take_sent(flight: &mut Flight<'_, Bench>) -> Sent {
     let sent = std::mem::take(&mut flight.board().sent);
     let (mut rest, mut out) = (&sent[..], Sent::default());
-    let mut last_us = 0;
+    let mut assembly = Assembly::default();
     while !rest.is_empty() {
         let Scan::Packet { end, packet } = packet::scan(rest) else { panic!("{rest:?}") };
         rest = &rest[end..];
-        assert!(packet.time_us > last_us);
-        last_us = packet.time_us;
         let mut r = Reader::new(packet.user);
-        match Apid::from_number(packet.apid).unwrap() {
+        let apid = Apid::from_number(packet.apid).unwrap();
+        assert_eq!(Some(packet.user.len()), layout::user_bytes(apid), "every packet has a fixed size");
+        out.times.push((apid, packet.time.unwrap()));
+        match apid {
             Apid::Housekeeping => out.housekeeping.push(Housekeeping::read(&mut r).unwrap()),
-            Apid::Science => out.science.push((Exposure::read(&mut r).unwrap(), PictureAnswer::read(&mut r).unwrap())),
+            Apid::Science | Apid::Candidate | Apid::Position | Apid::Navigation => {
+                if let Some(picture) = assembly.take(apid, packet.user).unwrap() {
+                    assert_eq!(picture.missing_candidates, 0);
+                    out.navigation.extend(picture.navigation);
+                    out.science.push((picture.exposure, picture.answer));
+                }
+                continue;
+            }
             Apid::Event => {
                 let e = EventRecord::read(&mut r).unwrap();
                 out.events.push((Event::from_number(e.number).unwrap(), e.a, e.b));
             }
             Apid::Acknowledge => {
                 let a = Acknowledge::read(&mut r).unwrap();
+                out.details.push(a.detail);
                 out.answers.push((a.function, a.sequence, Code::from_number(a.code).unwrap()));
             }
             Apid::Parameters => {
-                for _ in 0..r.u8().unwrap() {
-                    out.parameters.push((r.u16().unwrap(), r.f64().unwrap()));
-                }
+                let ParameterValue { number, value } = ParameterValue::read(&mut r).unwrap();
+                out.parameters.push((number, value));
             }
             Apid::Edge => {
                 let part = EdgePart::read(&mut r).unwrap();
                 assert_eq!(usize::from(part.first), out.edge.len());
-                for _ in 0..part.count {
-                    out.edge.push(pixel::Pixel { x: r.u16().unwrap(), y: r.u16().unwrap() });
-                }
+                let pixels = (0..EDGE_PIXELS).map(|_| EdgePixel::read(&mut r).unwrap());
+                let pixels: Vec<_> = pixels.map(|p| pixel::Pixel { x: p.x, y: p.y }).collect();
+                out.edge.extend(&pixels[..part.count.into()]);
             }
             Apid::Command => panic!("a flight computer sends no commands"),
         }

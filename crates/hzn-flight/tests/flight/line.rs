@@ -260,7 +260,7 @@ fn another_base_moves_every_apid() {
         assert!(send(f, &command(2, Function::Ping, |_| ())).answers.is_empty());
         let mut out = [0; 64];
         let ping = |w: &mut Writer<'_>| w.u8(Function::Ping as u8);
-        let n = packet::write(&mut out, ApidBase::try_new(0x240).unwrap(), Apid::Command, 3, 0, ping).unwrap();
+        let n = packet::write(&mut out, ApidBase::try_new(0x240).unwrap(), Apid::Command, 3, None, ping).unwrap();
         f.board().line.extend(&out[..n]);
         f.turn();
         let sent = std::mem::take(&mut f.board().sent);

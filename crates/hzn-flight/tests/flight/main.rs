@@ -1,6 +1,8 @@
 //! Tests the flight software on a board that is made of vectors.
 
 mod bench;
+mod clock;
+mod flips;
 mod line;
 mod navigation;
 mod parameters;
@@ -203,7 +205,7 @@ fn bad_commands_are_rejected_with_a_code() {
         assert_eq!(send(f, &command(3, Function::SetMode, |w| w.u8(9))).answers, [(1, 3, Code::Arguments)]);
         assert_eq!(send(f, &command(4, Function::SetParameters, |w| w.u8(3))).answers, [(2, 4, Code::Arguments)]);
         let mut out = [0; 64];
-        let n = packet::write(&mut out, ApidBase::DEFAULT, Apid::Command, 5, 0, |w| w.u8(200)).unwrap();
+        let n = packet::write(&mut out, ApidBase::DEFAULT, Apid::Command, 5, None, |w| w.u8(200)).unwrap();
         assert_eq!(send(f, &out[..n]).answers, [(200, 5, Code::Unknown)]);
         let h = send(f, &command(9, Function::SetMode, |w| w.u8(Mode::Safe as u8)));
         assert_eq!(h.answers, [(1, 9, Code::Done)]);

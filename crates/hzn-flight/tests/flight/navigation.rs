@@ -10,7 +10,7 @@ const NAN: f32 = f32::NAN;
 
 fn unknown() -> Navigation {
     Navigation {
-        epoch_us: 0,
+        epoch: 0,
         expires_s: NAN,
         altitude_m: NAN,
         position_x_m: NAN,
@@ -42,7 +42,7 @@ fn a_position_moves_on_to_the_exposure() {
     fly(ready(), |f| {
         send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
         let values = Navigation {
-            epoch_us: f.board().now_us,
+            epoch: f.board().now_us,
             position_x_m: 6_608e3,
             position_y_m: 0.0,
             position_z_m: 0.0,
@@ -65,7 +65,7 @@ fn a_position_moves_on_to_the_exposure() {
 fn values_that_have_expired_are_not_used_and_told_once() {
     fly(ready(), |f| {
         send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
-        let values = |epoch_us| Navigation { epoch_us, expires_s: 5.0, altitude_m: 231e3, ..unknown() };
+        let values = |epoch| Navigation { epoch, expires_s: 5.0, altitude_m: 231e3, ..unknown() };
         let now_us = f.board().now_us;
         assert_eq!(navigate(f, values(now_us)), Code::Done);
         assert_eq!(picture(f).1, 231e3);
@@ -85,10 +85,10 @@ fn values_that_have_expired_are_not_used_and_told_once() {
 fn impossible_values_are_refused() {
     fly(ready(), |f| {
         let now = f.board().now_us;
-        let at = |values: Navigation| Navigation { epoch_us: now, ..values };
+        let at = |values: Navigation| Navigation { epoch: now, ..values };
         let placed = Navigation { position_x_m: 6_608e3, position_y_m: 0.0, position_z_m: 0.0, ..at(unknown()) };
         let refused = [
-            Navigation { epoch_us: now + 3_700_000_000, altitude_m: 2e5, ..unknown() },
+            Navigation { epoch: now + 3_700_000_000, altitude_m: 2e5, ..unknown() },
             Navigation { expires_s: 0.0, altitude_m: 2e5, ..at(unknown()) },
             Navigation { expires_s: f32::INFINITY, altitude_m: 2e5, ..at(unknown()) },
             Navigation { velocity_x_m_s: 3e4, velocity_y_m_s: 0.0, velocity_z_m_s: 0.0, ..placed },
@@ -108,5 +108,28 @@ fn impossible_values_are_refused() {
         assert_eq!(navigate(f, Navigation { velocity_y_m_s: 5.0, ..placed }), Code::Missing);
         assert_eq!(send(f, &command(1, Function::Navigate, |w| w.u64(5))).answers[0].2, Code::Arguments);
         assert_eq!(navigate(f, placed), Code::Done);
+    });
+}
+
+#[test]
+fn a_number_that_is_missing_or_impossible_is_named() {
+    fly(ready(), |f| {
+        let epoch = f.board().now_us;
+        let placed = Navigation { epoch, position_x_m: 6_608e3, position_y_m: 0.0, position_z_m: 0.0, ..unknown() };
+        let cases = [
+            (Navigation { position_y_m: NAN, ..placed }, Code::Missing, "position_y_m"),
+            (Navigation { velocity_z_m_s: 1.0, ..placed }, Code::Missing, "velocity_x_m_s"),
+            (Navigation { rate_x_rad_s: 1.0, rate_y_rad_s: 1.0, ..placed }, Code::Missing, "rate_z_rad_s"),
+            (Navigation { position_z_m: f32::INFINITY, ..placed }, Code::Refused, "position_z_m"),
+            (Navigation { altitude_m: f32::INFINITY, ..placed }, Code::Refused, "altitude_m"),
+            (Navigation { expires_s: -1.0, ..placed }, Code::Refused, "expires_s"),
+            (Navigation { epoch: epoch + 3_700_000_000, ..placed }, Code::Refused, "epoch"),
+            (Navigation { epoch: 0x77 << 56, ..placed }, Code::Refused, "epoch"),
+        ];
+        for (values, code, name) in cases {
+            let h = send(f, &command(1, Function::Navigate, |w| values.write(w)));
+            assert_eq!(h.answers[0].2, code, "{name}");
+            assert_eq!(Navigation::FIELDS[usize::from(h.details[0]) - 1], name);
+        }
     });
 }

@@ -29,6 +29,7 @@ impl<'a> Message<'a> {
 #[derive(Debug, Default)]
 pub(crate) struct ChunkBuilder {
     bytes: Vec<u8>,
+    messages: u64,
 }
 
 impl ChunkBuilder {
@@ -39,9 +40,14 @@ impl ChunkBuilder {
     pub(crate) fn is_empty(&self) -> bool {
         self.bytes.is_empty()
     }
+    /// Returns the number of messages collected so far.
+    pub(crate) fn messages(&self) -> u64 {
+        self.messages
+    }
     /// Appends a message; `fill` appends its data.
     pub(crate) fn push(&mut self, channel: u16, sequence: u32, time_ns: u64, fill: impl FnOnce(&mut Vec<u8>)) {
         let start = self.bytes.len();
+        self.messages += 1;
         self.bytes.u8(Op::MESSAGE).u64(0).u16(channel).u32(sequence).u64(time_ns).u64(time_ns);
         fill(&mut self.bytes);
         let length = (self.bytes.len() - start - 9) as u64;
@@ -59,6 +65,7 @@ impl ChunkBuilder {
     /// Returns the chunk and begins a new one.
     pub(crate) fn take(&mut self, compress: bool) -> std::io::Result<Chunk> {
         let plain = std::mem::take(&mut self.bytes);
+        self.messages = 0;
         let crc = crc32fast::hash(&plain);
         let index = Index::read(&plain).unwrap_or_default();
         let size = plain.len() as u64;

@@ -202,6 +202,21 @@ impl<W: Write> Container<W> {
         }
     }
 
+    /// Returns the size in bytes that the file has if it is closed now.
+    pub(crate) fn finished_bytes(&self) -> u64 {
+        // A record has nine bytes before its content; a summary has at most six groups with an offset of 26 bytes each.
+        let records = |contents: &mut dyn Iterator<Item = &Vec<u8>>| contents.map(|c| 9 + c.len() as u64).sum::<u64>();
+        let summary = records(&mut self.schemas.values())
+            + records(&mut self.channels.values())
+            + records(&mut self.chunk_indexes.iter())
+            + records(&mut self.attachment_indexes.iter())
+            + records(&mut self.metadata_indexes.iter())
+            + 9
+            + self.statistics().len() as u64;
+        let (data_end, offsets, footer) = (13, 6 * 26, 29 + MAGIC.len() as u64);
+        self.position + data_end + summary + offsets + footer
+    }
+
     /// Passes all data to the operating system: they stay in the file if the program ends.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.out.flush()

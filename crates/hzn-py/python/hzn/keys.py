@@ -276,6 +276,9 @@ class Select(TypedDict, total=False):
     departure_contrast: float
     """Smallest contrast of a continuation that counts, as a part of the limb's contrast. Values: 0 to 1e6. Default:
     0.6."""
+    max_glow: float
+    """Largest brightness high above the limb, as a part of the brightness step at the limb; 1e6 turns the gate off.
+    Values: 0 to 1e6. Default: 0.125."""
     max_band: float
     """Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky; 1
     turns the gate off. Values: 0 to 1. Default: 0.5."""

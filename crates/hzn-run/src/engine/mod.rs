@@ -28,3 +28,4 @@ pub use process::process_one;
 pub use sensor::{AnySensor, LastAnswer, Processed, check_frames};
 pub use sequence::{End, Sink, run};
 pub use trace::{Trace, Traces, Watch};
+pub use widen::widen_report;

@@ -6,7 +6,7 @@ use hzn_core::report::{Candidate, Free, Position};
 use hzn_core::{Report, Solution};
 
 /// Converts a report to f64.
-pub(super) fn widen_report<T: Real + Into<f64>>(r: &Report<T>) -> Report<f64> {
+pub fn widen_report<T: Real + Into<f64>>(r: &Report<T>) -> Report<f64> {
     Report {
         status: r.status,
         stage: r.stage,

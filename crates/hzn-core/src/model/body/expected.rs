@@ -74,6 +74,8 @@ pub struct Expected<T> {
     pub(crate) rate_rad_s: Option<[T; 3]>,
     /// Radius of the sphere with this half-angle at this altitude, without the limb height, metres.
     pub(crate) radius_m: T,
+    /// Scale height of the air in metres; 0 if it is unknown or if there is no air.
+    pub(crate) scale_height_m: T,
     /// Limb height in metres and its sigma.
     pub(crate) limb_m: T,
     pub(crate) limb_sigma_m: T,
@@ -204,6 +206,7 @@ impl<T: Real> Expected<T> {
             last: prior.last,
             rate_rad_s: prior.rate_rad_s,
             radius_m: seen.radius,
+            scale_height_m: T::from_f64(body.scale_height_km()) * km,
             limb_m: limb,
             limb_sigma_m: (limb_sigma * limb_sigma + seen.unknown_m * seen.unknown_m).sqrt(),
             free,

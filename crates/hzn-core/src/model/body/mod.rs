@@ -238,6 +238,14 @@ impl Config {
         body
     }
 
+    /// Returns the scale height of the body's air in kilometres; 0 if it is unknown or if there is no air.
+    pub(crate) fn scale_height_km(&self) -> f64 {
+        match self.kind {
+            Kind::Earth | Kind::EarthSphere => EARTH_SCALE_HEIGHT_KM,
+            kind => kind.planet().map_or(0.0, |planet| planet.scale_height_km),
+        }
+    }
+
     /// Returns whether the body is given as an ellipsoid of its own: `ellipsoid`, or a planet with a name.
     pub fn is_ellipsoid(&self) -> bool {
         // Without the feature no such body is accepted.

@@ -180,8 +180,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
         self.show_fit(fit, &fused, covariance, expected, outcome.number);
-        let (made, factor) = (points.count, threshold.factor);
-        let judged = gates::judge(fit, &fused, sigma, expected, blocks, made, factor, binary, camera, &config.select);
+        let (made, factor, gates) = (points.count, threshold.factor, &config.select);
+        let judged = gates::judge(fit, &fused, sigma, expected, blocks, made, factor, binary, camera, gates);
         outcome.verdict = match judged.verdict {
             Verdict::Passed => papers::verdict(fit, expected, blocks, camera, binary.region, &config.select),
             failed => failed,
@@ -213,7 +213,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
         let next =
             (self.needs_next_threshold && !P::STREAMED).then(|| gates::middle_level(&fused.e, blocks, binary, camera));
-        Some(Best { solution, outcome: *outcome, score: judged.score, certain, level: next.flatten() })
+        Some(Best { solution, outcome: *outcome, judged, certain, level: next.flatten() })
     }
 
     /// Shows the fit of a candidate to the observer, if the observer wants it.

@@ -12,6 +12,7 @@ use crate::model::body::Expected;
 use crate::model::observer::Observer;
 use crate::model::report::{Candidate, Report, Solution};
 use crate::model::status::Status;
+use crate::model::verdict::Verdict;
 use crate::model::work::WorkBudget;
 use crate::stages::{covariance, gates, threshold};
 
@@ -46,7 +47,7 @@ struct Best<T> {
     outcome: Candidate<T>,
     /// Threshold for the next picture.
     level: Option<u16>,
-    score: T,
+    judged: gates::Judged<T>,
     /// Whether the search can end: the answer explains most of the limb in view, and either most points of its edge are
     /// inliers or the residuals are small.
     certain: bool,
@@ -108,9 +109,9 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             T::from_f64(self.sensor.config.select.ambiguous_deg.to_radians())
         };
         let apart = new.solution.axis.angle_rad(&old.solution.axis) > limit;
-        let (better, other) = if new.score < old.score { (new, old) } else { (old, new) };
+        let (better, other) = if new.judged.score < old.judged.score { (new, old) } else { (old, new) };
         if apart {
-            self.rival = Some(self.rival.map_or(other.score, |r| r.min(other.score)));
+            self.rival = Some(self.rival.map_or(other.judged.score, |r| r.min(other.judged.score)));
         }
         self.best = Some(better);
     }
@@ -122,12 +123,17 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         report.counters.looks += 1;
         if let Some(best) = self.best {
             let factor = T::from_f64(self.sensor.config.select.ambiguous_score);
-            let is_close = |rival: T| rival < best.score * factor || self.expected.free;
+            let is_close = |rival: T| rival < best.judged.score * factor || self.expected.free;
             if !best.certain && self.rival.is_some_and(is_close) {
                 report.status = Status::Ambiguous;
                 return work;
             }
-            report.choose(best.outcome);
+            if best.judged.glows {
+                report.choose(best.outcome, Verdict::Glow);
+                report.status = Status::Rejected;
+                return work;
+            }
+            report.choose(best.outcome, Verdict::Chosen);
             report.status = Status::Ok;
             report.next_level = best.level;
             report.solution = Some(best.solution);

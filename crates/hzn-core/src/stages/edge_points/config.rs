@@ -32,7 +32,7 @@ section! {
         @70 min_points: u16 = 40, [8.0 or more];
         /// Points kept per edge, evenly along it; 0 keeps all that fit into memory.
         ///
-        /// 200 points take half the time and lose little accuracy.
+        /// 200 points take half the time, but single pictures are then lost or much less accurate.
         @71 keep_points: u16 = 600, ["0 (all) or 16 to 65535"];
         /// How a border pixel becomes an edge point.
         @72 sub_pixel: SubPixel = SubPixel::Linear, [choice];

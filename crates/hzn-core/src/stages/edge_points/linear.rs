@@ -53,10 +53,11 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     *slow += 1;
     let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
     let step = half.min(fifth.max(4)).clamp(1, WIDEST);
+    let here = near.across(lit)[1];
     let found = if FREE && is_clear(binary, p, (MARGIN * step) as u16) {
-        locate_in_steps::<T, P, O, true>(binary, p, (dx, dy), step)?
+        locate_in_steps::<T, P, O, true>(binary, p, (dx, dy), step, here)?
     } else {
-        locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step)?
+        locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here)?
     };
     let WideCrossing { off, fallback, clipped, .. } =
         if found.rising { recentre_profile(binary, p, (dx, dy), step, found, slow) } else { found };
@@ -89,10 +90,11 @@ fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
             break;
         }
         *slow += 1;
-        let Some(next) = locate_in_steps::<T, P, O, false>(binary, Pixel { x: x as u16, y: y as u16 }, (dx, dy), step)
-        else {
-            break;
-        };
+        let p = Pixel { x: x as u16, y: y as u16 };
+        let around = Around::<T, P, O, false>::new(binary, p);
+        let here = Line::new(&around, (dx, dy), step).smoothed(0);
+        let next = here.and_then(|here| locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here));
+        let Some(next) = next else { break };
         whole += moved;
         found = WideCrossing { off: next.off + T::from_i32(whole), ..next };
     }
@@ -119,18 +121,20 @@ struct WideCrossing<T> {
     rising: bool,
 }
 
-/// Locates the crossing like [`linear`], with steps of `step` pixels.
+/// Locates the crossing like [`linear`], with steps of `step` pixels. `here` is the smoothed brightness of the border
+/// pixel.
 #[inline(never)]
 fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
     (dx, dy): (i32, i32),
     step: i32,
+    here: i32,
 ) -> Option<WideCrossing<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
     let line = Line::new(&around, (dx, dy), step);
     let Crossing { part, mid2, fallback, clipped, rising } =
-        line.crossing([line.smoothed(-1)?, line.smoothed(0)?, line.smoothed(1)?])?;
+        line.crossing([line.smoothed(-1)?, here, line.smoothed(1)?])?;
     let coarse = part * T::from_i32(step);
     // The profile is curved within a step. The crossing is therefore interpolated again over half a step around it.
     let half = step / 2;

@@ -99,6 +99,13 @@ section! {
         ///
         /// A terminator fades; the rim of a flare does not.
         @- departure_contrast: f64 = 0.6, [0.0 to 1e6];
+        /// Largest brightness high above the limb, as a part of the brightness step at the limb; 1e6 turns the gate
+        /// off.
+        ///
+        /// It is read three standard deviations of the limb height, 4.8 scale heights of the air and four pixels above
+        /// the limb. Sunlit air leaves a fifteenth there in an sRGB picture. Airglow and aurora reach higher, and their
+        /// edge is not the limb. Bodies without known air are not checked.
+        @- max_glow: f64 = 0.125, [0.0 to 1e6];
         /// Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky;
         /// 1 turns the gate off.
         ///
@@ -187,6 +194,7 @@ impl Config {
         (self.max_rival_ratio, self.min_evidence, self.residual_floor_px) = (1e6, -1e6, 1e4);
         (self.min_support_abrupt, self.whole_edge) = (0.0, 0.0);
         (self.max_departure, self.max_band, self.max_unlit) = (1e6, 1.0, 1.0);
+        self.max_glow = 1e6;
         self.max_attitude_sigma = 1e6;
     }
 }

@@ -5,6 +5,7 @@ mod band;
 mod circle;
 mod config;
 mod departure;
+mod glow;
 mod half_angle;
 mod places;
 mod polyline;
@@ -40,6 +41,9 @@ pub(crate) struct Judged<T> {
     pub(crate) score: T,
     /// Part of the limb in view that edge points cover, 0 to 1.
     pub(crate) support: T,
+    /// Whether light reaches higher above the limb than air does, see [`Verdict::Glow`]. The candidate stays in the
+    /// choice, because another edge in the same glow is no better. If it wins, the picture has no answer.
+    pub(crate) glows: bool,
 }
 
 /// Tests a fit with its inliers in `blocks`. `points` is the number of points of the edge. `raised` is the factor by
@@ -98,7 +102,11 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
         Verdict::Passed => judge_rivals(fit, fused, expected, blocks, points, support, binary, camera, config),
         failed => failed,
     };
-    Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support }
+    // Of a picture that came row by row, only lit and dark pixels are left.
+    let looks = !P::STREAMED && verdict == Verdict::Passed;
+    let most = T::from_f64(config.max_glow);
+    let glows = looks && glow::is_likely(&fused.e, fused.c, blocks, binary, camera, expected, most);
+    Judged { verdict, score: fit.rms_px.max(T::from_f64(0.05)) / support.max(T::from_f64(1e-3)), support, glows }
 }
 
 /// Returns whether only a part of a winding edge is on the cone; this may happen by chance.

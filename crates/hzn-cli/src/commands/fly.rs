@@ -1,0 +1,103 @@
+//! `hzn fly`: the flight software on a Linux computer.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use hzn_fly::camera::Ended;
+use hzn_fly::flight::{Settings, Source, Summary, fly};
+use hzn_fly::link::Address;
+use hzn_run::source::Raw;
+
+use crate::exit::{Exit, Outcome, failed, usage};
+use crate::tell;
+
+/// Fly: process a camera's pictures on this Linux computer, with telecommands and telemetry
+///
+/// The flight loop is that of the microcontrollers, in single precision with lists of fixed size: its answers are those
+/// of `hzn run --flight`. They go to the ground and into a log (STATE/log/*.mcap). book/guide/fly.md has examples.
+///
+/// The parameters of the sensor are stored at the first start; after that, telecommands change them. SIGTERM or Ctrl-C
+/// ends the flight. SIGPWR says that power will be cut: the log is closed, and the program waits. SIGUSR1 is lift-off.
+///
+/// Exit codes: 0 the flight was stopped, or the pipe was closed after a whole picture; 3 the pipe was closed within a
+/// picture.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The device of a camera, such as /dev/video0; or - for pictures without headers on standard input
+    source: PathBuf,
+    /// The sensor.toml whose parameters are stored, if none are stored yet
+    #[arg(short, long, value_name = "FILE")]
+    sensor: Option<PathBuf>,
+    /// Store the parameters of --sensor also if there are others
+    #[arg(long, requires = "sensor")]
+    load: bool,
+    /// Size and format of the pictures on standard input (formats as for `hzn run`); without it, those of the
+    /// parameters as mono8
+    #[arg(long, value_name = "WIDTHxHEIGHT:FORMAT")]
+    raw: Option<Raw>,
+    /// The line to the ground: udp:LOCAL,REMOTE, tcp-listen:HOST:PORT, tcp:HOST:PORT or serial:DEVICE[:BAUD]; without
+    /// it, there is only the log
+    #[arg(long, value_name = "LINE")]
+    line: Option<Address>,
+    /// The folder for parameters and log; without it, $STATE_DIRECTORY (of systemd), or ./hzn-fly
+    #[arg(long, value_name = "DIR")]
+    state: Option<PathBuf>,
+    /// Most megabytes of the log; its oldest files are removed
+    #[arg(long, value_name = "MB", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(2..1_000_000))]
+    log_mb: u64,
+}
+
+pub(super) fn run(args: Args) -> Outcome {
+    if let Some(Address::Udp { remote: None, .. }) = &args.line {
+        return Err(usage("--line: udp needs the ground's address too, as in udp:0.0.0.0:5001,192.168.1.2:5000"));
+    }
+    let sensor = args.sensor.as_deref().map(hzn_calib::sensor::load).transpose()?;
+    sensor.iter().flat_map(|sensor| &sensor.warnings).for_each(tell::warning);
+    let from_systemd = || std::env::var_os("STATE_DIRECTORY").map(PathBuf::from);
+    let settings = Settings {
+        source: if args.source.as_os_str() == "-" { Source::Stdin } else { Source::Device(args.source) },
+        raw: args.raw,
+        sensor: sensor.map(|sensor| sensor.config),
+        replaces_parameters: args.load,
+        line: args.line,
+        state: args.state.or_else(from_systemd).unwrap_or_else(|| "hzn-fly".into()),
+        log_bytes: args.log_mb * 1_000_000,
+    };
+    let summary = fly(settings, Arc::new(|text: &str| tell::line(text)))
+        .map_err(|e| if e.is_usage { usage(e) } else { failed(e) })?;
+    tell_summary(&summary);
+    match summary.ended {
+        Some(Ended::Failed(why)) => Err(failed(why)),
+        Some(Ended::Partial { .. }) => Ok(Exit::SomeUnreadable),
+        Some(Ended::Whole) | None => Ok(Exit::Done),
+    }
+}
+
+fn tell_summary(summary: &Summary) {
+    if let Some(Ended::Partial { bytes, expected }) = summary.ended {
+        let what = format!("the last picture has {bytes} of {expected} bytes and is not processed");
+        tell::warning(format_args!("{what}; are width, height and format right?"));
+    }
+    let counts = summary.counts;
+    let mut text = format!("{} pictures, {} answers", counts.pictures, counts.answers);
+    if counts.lost > 0 {
+        text += &format!(", {} pictures lost", counts.lost);
+    }
+    let (logged, missing) = summary.logged;
+    text += &format!("; {logged} in the log");
+    if missing > 0 {
+        text += &format!(", {missing} are missing there");
+    }
+    if summary.dropped_packets > 0 {
+        text += &format!("; {} packets had no room on the line", summary.dropped_packets);
+    }
+    tell::line(text);
+    if let Some(latency) = summary.latency {
+        let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
+        let (median, most, longest) = (ms(latency.median), ms(latency.percent99), ms(latency.longest));
+        tell::line(format!(
+            "from the last byte of a picture to its packet: {median:.2} ms median, {most:.2} ms for 99 %, {longest:.2} \
+             ms at most"
+        ));
+    }
+}

@@ -1,0 +1,203 @@
+//! Commands on their way to the flight computer, each with its acknowledgement.
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use hzn_flight::messages::{Acknowledge, Code};
+use hzn_flight::packet::ApidBase;
+
+use super::encode::{encode, write_packet};
+use crate::exit::Stop;
+
+/// Longest wait for an acknowledgement. A flight computer carries out a command at the latest 1.1 s after its end.
+const LONGEST: Duration = Duration::from_secs(3);
+
+/// The commands that were not acknowledged yet. Only one packet is on its way at a time.
+pub(crate) struct Commander {
+    base: ApidBase,
+    sequence: u16,
+    has_sent: bool,
+    waiting: VecDeque<Pending>,
+}
+
+/// A packet of a command.
+struct Pending {
+    text: String,
+    user: Vec<u8>,
+    sent: Option<Sent>,
+    is_last: bool,
+}
+
+#[derive(Clone, Copy)]
+struct Sent {
+    sequence: u16,
+    at: Instant,
+}
+
+/// What became of a command.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Answered {
+    text: String,
+    /// The code of the acknowledgement; `None` if none came.
+    code: Option<u8>,
+    after: Duration,
+}
+
+impl Answered {
+    /// Returns whether the command was carried out.
+    pub(crate) fn is_done(&self) -> bool {
+        self.code == Some(Code::Done as u8)
+    }
+}
+
+impl fmt::Display for Answered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { text, code, after } = self;
+        match code {
+            Some(code) => {
+                let name = Code::from_number(*code).map_or("unknown code", Code::name);
+                write!(f, "{text}: {name} ({} ms)", after.as_millis())
+            }
+            None => write!(f, "{text}: no acknowledgement within {} s", LONGEST.as_secs()),
+        }
+    }
+}
+
+impl Commander {
+    /// Makes a commander; `sequence` is the sequence count of its first packet.
+    pub(crate) fn new(base: ApidBase, sequence: u16, commands: &[String]) -> Result<Self, Stop> {
+        let mut new = Self { base, sequence, has_sent: false, waiting: VecDeque::new() };
+        commands.iter().try_for_each(|text| new.add(text))?;
+        Ok(new)
+    }
+
+    pub(crate) fn base(&self) -> ApidBase {
+        self.base
+    }
+
+    /// Adds a command.
+    pub(crate) fn add(&mut self, text: &str) -> Result<(), Stop> {
+        let packets = encode(text)?;
+        let count = packets.len();
+        for (place, user) in (1..).zip(packets) {
+            self.waiting.push_back(Pending { text: text.to_owned(), user, sent: None, is_last: place == count });
+        }
+        Ok(())
+    }
+
+    /// Makes the first packet have the sequence count after this one. Later packets count on.
+    pub(crate) fn continue_after(&mut self, sequence: u16) {
+        if !self.has_sent {
+            self.sequence = (sequence + 1) & 0x3FFF;
+        }
+    }
+
+    pub(crate) fn is_idle(&self) -> bool {
+        self.waiting.is_empty()
+    }
+
+    /// Returns the packet to send now, if there is one.
+    pub(crate) fn next(&mut self, now: Instant) -> Result<Option<Vec<u8>>, Stop> {
+        let Some(first) = self.waiting.front_mut().filter(|first| first.sent.is_none()) else { return Ok(None) };
+        let bytes = write_packet(self.base, self.sequence, &first.text, &first.user)?;
+        first.sent = Some(Sent { sequence: self.sequence, at: now });
+        self.sequence = (self.sequence + 1) & 0x3FFF;
+        self.has_sent = true;
+        Ok(Some(bytes))
+    }
+
+    /// Takes an acknowledgement. Returns what became of a command, if this decides it. Other acknowledgements belong to
+    /// the commands of somebody else.
+    pub(crate) fn take(&mut self, a: &Acknowledge, now: Instant) -> Option<Answered> {
+        let first = self.waiting.front()?;
+        let sent = first.sent.filter(|sent| sent.sequence == a.sequence && first.user.first() == Some(&a.function))?;
+        let (is_last, is_done) = (first.is_last, a.code == Code::Done as u8);
+        if is_done && !is_last {
+            self.waiting.pop_front();
+            return None;
+        }
+        Some(self.end_first(Some(a.code), now - sent.at))
+    }
+
+    /// Returns the command whose acknowledgement did not come.
+    pub(crate) fn expired(&mut self, now: Instant) -> Option<Answered> {
+        let sent = self.waiting.front()?.sent?;
+        (now - sent.at > LONGEST).then(|| self.end_first(None, now - sent.at))
+    }
+
+    /// Removes the first command with all of its packets.
+    fn end_first(&mut self, code: Option<u8>, after: Duration) -> Answered {
+        let mut text = String::new();
+        while let Some(packet) = self.waiting.pop_front() {
+            text = packet.text;
+            if packet.is_last {
+                break;
+            }
+        }
+        Answered { text, code, after }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hzn_flight::messages::Function;
+    use hzn_flight::packet::{self, Scan};
+
+    use super::*;
+
+    fn ack(function: Function, sequence: u16, code: u8) -> Acknowledge {
+        Acknowledge { function: function as u8, sequence, code, ..Acknowledge::default() }
+    }
+
+    #[test]
+    fn each_command_waits_for_the_one_before() {
+        let texts = ["ping", "mode flight"].map(str::to_owned);
+        let mut commander = Commander::new(ApidBase::DEFAULT, 16383, &texts).unwrap();
+        let start = Instant::now();
+        let ms = |n| start + Duration::from_millis(n);
+        let bytes = commander.next(ms(0)).unwrap().unwrap();
+        let Scan::Packet { packet, .. } = packet::scan(&bytes) else { panic!() };
+        assert_eq!((packet.sequence, packet.user), (16383, &[Function::Ping as u8][..]));
+        assert_eq!(commander.next(ms(1)).unwrap(), None);
+        // Acknowledgements of others decide nothing.
+        assert_eq!(commander.take(&ack(Function::Report, 16383, 0), ms(2)), None);
+        assert_eq!(commander.take(&ack(Function::Ping, 5, 0), ms(2)), None);
+        let ping = commander.take(&ack(Function::Ping, 16383, 0), ms(7)).unwrap();
+        assert_eq!((ping.to_string().as_str(), ping.is_done()), ("ping: done (7 ms)", true));
+        // The count begins again after 16383.
+        assert!(commander.next(ms(8)).unwrap().is_some());
+        assert_eq!(commander.expired(ms(3000)), None);
+        let mode = commander.expired(ms(3009)).unwrap();
+        assert_eq!((mode.to_string().as_str(), mode.is_done()), ("mode flight: no acknowledgement within 3 s", false));
+        assert!(commander.is_idle() && commander.add("mode fly").is_err());
+    }
+
+    #[test]
+    fn a_load_is_one_command() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("sensor.toml");
+        let lens = "model = \"pinhole\"\nfx_px = 600.0\nfy_px = 600.0\ncx_px = 319.5\ncy_px = 239.5";
+        let camera = format!("[camera]\nwidth = 640\nheight = 480\n{lens}\n[body]\naltitude_km = 230.0\n");
+        std::fs::write(&path, camera).unwrap();
+        let text = format!("load {}", path.display());
+        let load = |code: u8, at: u16| {
+            let mut commander = Commander::new(ApidBase::DEFAULT, 0, &[text.clone(), "ping".into()]).unwrap();
+            let now = Instant::now();
+            for sequence in 0.. {
+                let bytes = commander.next(now).unwrap().unwrap();
+                let Scan::Packet { packet, .. } = packet::scan(&bytes) else { panic!() };
+                let function = Function::from_number(packet.user[0]).unwrap();
+                let code = if sequence == at { code } else { 0 };
+                if let Some(answer) = commander.take(&ack(function, sequence, code), now) {
+                    assert!(!commander.is_idle());
+                    return (function, answer.is_done());
+                }
+            }
+            unreachable!()
+        };
+        assert_eq!(load(0, 0), (Function::CommitParameters, true));
+        // What follows a refused packet is not sent.
+        assert_eq!(load(6, 1), (Function::StageParameters, false));
+    }
+}

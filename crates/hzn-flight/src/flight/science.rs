@@ -1,0 +1,79 @@
+//! The packets of a picture, within the bit budget. The science packet comes last, so that the ground knows then that
+//! the picture is complete.
+
+use hzn_core::Report;
+
+use super::Flight;
+use crate::answer::PictureAnswer;
+use crate::board::Board;
+use crate::layout;
+use crate::messages::{Exposure, NavigationState};
+use crate::packet::{Apid, OVERHEAD};
+use crate::parameters::Parameters;
+
+impl<B: Board> Flight<'_, B> {
+    /// Sends the answer to the picture that was counted last, if the bit budget allows it. The board gets it in any
+    /// case.
+    pub(super) fn send_answer(&mut self, report: &Report<f32>, exposure_us: u64, done_us: u64) {
+        let navigation = self.known.get().state_at(self.number, exposure_us);
+        let exposure = self.exposure(navigation.as_ref(), exposure_us, done_us);
+        self.send_within_budget(report, &exposure, navigation);
+        self.board.keep_answer(&exposure, report);
+    }
+
+    fn send_within_budget(&mut self, report: &Report<f32>, exposure: &Exposure, navigation: Option<NavigationState>) {
+        let answer = PictureAnswer::from_report(report);
+        let exposure_us = exposure.exposure_us;
+        if !self.has_budget(&answer, navigation.is_some(), exposure.done_us) {
+            self.state.decimated = self.state.decimated.saturating_add(1);
+            return;
+        }
+        if let Some(navigation) = navigation {
+            self.send_at(exposure_us, Apid::Navigation, |out| navigation.write(out));
+        }
+        let picture = self.number;
+        if let Some(position) = answer.position {
+            self.send_at(exposure_us, Apid::Position, |out| {
+                out.u32(picture);
+                position.write(out);
+            });
+        }
+        for edge in answer.edges.iter().flatten() {
+            self.send_at(exposure_us, Apid::Candidate, |out| {
+                out.u32(picture);
+                edge.write(out);
+            });
+        }
+        self.send_at(exposure_us, Apid::Science, |out| {
+            exposure.write(out);
+            answer.write_science(out);
+        });
+    }
+
+    fn exposure(&self, navigation: Option<&NavigationState>, exposure_us: u64, done_us: u64) -> Exposure {
+        let config = self.sensor.get().config();
+        let known_m = navigation.filter(|n| n.state == NavigationState::USED).map(|n| n.altitude_m);
+        let altitude_m = known_m.filter(|h| !h.is_nan()).or(config.body.altitude_km.map(|h| (h * 1000.0) as f32));
+        Exposure {
+            picture: self.number,
+            exposure_us,
+            done_us,
+            calculation_us: self.state.last_us,
+            body: Parameters::body_number(config),
+            altitude_m: altitude_m.unwrap_or(f32::NAN),
+        }
+    }
+
+    /// Returns whether the bit budget has room for all packets of a picture, and counts them.
+    fn has_budget(&mut self, answer: &PictureAnswer, has_navigation: bool, now_us: u64) -> bool {
+        let Some(rate) = self.operations.science_bits_s else { return true };
+        let counts = [
+            (Apid::Science, 1),
+            (Apid::Candidate, answer.edges.iter().flatten().count()),
+            (Apid::Position, usize::from(answer.position.is_some())),
+            (Apid::Navigation, usize::from(has_navigation)),
+        ];
+        let bytes = counts.map(|(apid, count)| count * (OVERHEAD + layout::user_bytes(apid).unwrap_or(0)));
+        self.budget.allows(8 * bytes.iter().sum::<usize>() as u32, rate, now_us)
+    }
+}

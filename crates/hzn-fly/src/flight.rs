@@ -1,0 +1,242 @@
+//! The flight on a Linux computer: preparation, loop, end.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+use hzn_core::Config;
+use hzn_core::config::Orient;
+use hzn_flight::flight::{Buffers, Flight, Lists};
+use hzn_flight::messages::Mode;
+use hzn_flight::{Parameters, parameters, table};
+use hzn_run::source::raw::{Format, Raw};
+
+use crate::board::{Counts, Linux, Parts};
+use crate::camera::{Camera, Capture, DeviceCamera, Ended, Pipe, Samples, V4l2};
+use crate::error::Error;
+use crate::flash::Flash;
+use crate::latency::{Latency, LatencySummary};
+use crate::link::{Address, Link, Patience};
+use crate::log::Log;
+use crate::notify::Notify;
+use crate::signals::Lines;
+use crate::tell::Tell;
+
+/// Where the pictures come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Source {
+    /// Pictures without headers on standard input.
+    Stdin,
+    /// A camera of Video4Linux 2, by its device.
+    Device(PathBuf),
+}
+
+/// The settings of a flight.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Where the pictures come from.
+    pub source: Source,
+    /// Size and format of the pictures; without it, those of the parameters, with one byte for each pixel.
+    pub raw: Option<Raw>,
+    /// The sensor whose parameters are stored if none are.
+    pub sensor: Option<Config>,
+    /// Whether the parameters of `sensor` are stored in any case.
+    pub replaces_parameters: bool,
+    /// The line for telecommands and telemetry; without it, there is only the log.
+    pub line: Option<Address>,
+    /// The folder for parameters and log.
+    pub state: PathBuf,
+    /// Most bytes of the log.
+    pub log_bytes: u64,
+}
+
+/// What happened in a flight.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Summary {
+    /// Pictures, answers, losses.
+    pub counts: Counts,
+    /// Answers in the log, and answers that are missing there.
+    pub logged: (u64, u64),
+    /// Packets for which the line had no room.
+    pub dropped_packets: u64,
+    /// Time from the last byte of a picture to its packet on the line.
+    pub latency: Option<LatencySummary>,
+    /// Why the pictures ended; `None` if the flight was stopped.
+    pub ended: Option<Ended>,
+}
+
+/// Flies until the pictures end or a signal stops the program.
+///
+/// In the mode shut-down the log is closed and the loop waits: power may be cut, and only another start ends the mode.
+///
+/// # Errors
+/// The flight cannot start: no parameters, no camera, a line or a folder that cannot be used.
+pub fn fly(settings: Settings, tell: Tell) -> Result<Summary, Error> {
+    // First of all, because the other threads inherit it.
+    let lines = Lines::listen().map_err(|e| Error::failed(format!("signals: {e}")))?;
+    let state = &settings.state;
+    let in_state = |e: std::io::Error| Error::failed(format!("{}: {e}", state.display()));
+    let flash = Flash::open(state).map_err(in_state)?;
+    let config = prepare_parameters(&settings, &flash, &tell)?;
+    let capture = Capture::start(open_camera(&settings, &config, &tell)?).map_err(in_state)?;
+    let latency = Arc::new(Latency::default());
+    let line = match &settings.line {
+        None => None,
+        Some(address) => {
+            let opened = Link::open(address, Patience::Waits, Arc::clone(&latency), tell.clone());
+            Some(opened.map_err(Error::failed)?)
+        }
+    };
+    let log_folder = state.join("log");
+    let log = Log::open(&log_folder, settings.log_bytes, &config, tell.clone())
+        .map_err(|e| Error::failed(format!("{}: {e}", log_folder.display())))?;
+    let notify = Notify::from_environment();
+    let parts = Parts { capture, line, latency, flash, log, lines, notify, tell };
+    run(Linux::new(parts))
+}
+
+fn run(board: Linux) -> Result<Summary, Error> {
+    let (mut buffers, mut lists) = (Box::new(Buffers::new()), Box::new(Lists::new()));
+    let flight = Flight::start(board, &mut buffers, &mut lists);
+    let mut flight = Box::new(flight.ok_or_else(|| Error::failed("the default parameters are refused"))?);
+    flight.turn();
+    flight.board().parts().notify.ready();
+    let mut mode = None;
+    loop {
+        if mode != Some(flight.mode()) {
+            let now = flight.mode();
+            mode = Some(now);
+            flight.board().parts().notify.status(&format!("{} mode", now.name()));
+            (flight.board().parts().tell)(&format!("{} mode", now.name()));
+        }
+        if flight.mode() == Mode::ShutDown || flight.board().ended().is_some() {
+            break;
+        }
+        let takes_pictures = flight.mode() == Mode::Flight;
+        flight.board().wait(takes_pictures);
+        flight.turn();
+    }
+    let is_shut_down = flight.mode() == Mode::ShutDown;
+    Ok(end(flight.board(), is_shut_down))
+}
+
+/// Closes log and line. A computer that is shut down then waits for the end of power, or for a signal to stop.
+fn end(board: &mut Linux, is_shut_down: bool) -> Summary {
+    let parts = board.parts();
+    let logged = parts.log.finish();
+    parts.flash.end();
+    let dropped_packets = parts.line.as_ref().map_or(0, |(link, _)| {
+        link.drain(Duration::from_secs(1));
+        link.dropped()
+    });
+    if is_shut_down && !parts.lines.stop() {
+        (parts.tell)("shut down: the log is closed, and power may be cut");
+        while !parts.lines.stop() {
+            parts.notify.feed();
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+    let parts = board.parts();
+    parts.notify.stopping();
+    Summary {
+        logged,
+        dropped_packets,
+        latency: parts.latency.summary(),
+        counts: board.counts(),
+        ended: board.ended().cloned(),
+    }
+}
+
+/// Stores the parameters of the settings if there are none, and returns the sensor that will be used.
+fn prepare_parameters(settings: &Settings, flash: &Flash, tell: &Tell) -> Result<Config, Error> {
+    let has_copies = flash.has_copies();
+    if let Some(sensor) = settings.sensor.as_ref().filter(|_| !has_copies || settings.replaces_parameters) {
+        store(sensor, flash)?;
+    }
+    if settings.sensor.is_none() && !has_copies {
+        let what = "no parameters are stored yet: give --sensor FILE once";
+        return Err(Error::usage(format!("{}: {what}", settings.state.display())));
+    }
+    let newest = newest(flash).map_or_else(Parameters::defaults, |(parameters, _)| parameters);
+    if let Some(sensor) = &settings.sensor {
+        let given = Parameters::new(sensor.clone());
+        let is_other = |id: &u16| given.get(*id).map(f64::to_bits) != newest.get(*id).map(f64::to_bits);
+        let mut others: Vec<&str> = given.sensor_numbers().filter(is_other).filter_map(parameters::name).collect();
+        others.dedup();
+        if !others.is_empty() {
+            let (names, state) = (others.join(", "), settings.state.display());
+            let what = "the stored parameters are used; --load replaces them";
+            tell(&format!("warning: {state} has other values than sensor.toml for {names}: {what}"));
+        }
+    }
+    let body = &newest.sensor.body;
+    if body.altitude_km.is_none() && !body.half_angle_is_free() {
+        let what = "a picture has no answer until a telecommand gives the altitude (known or navigate)";
+        tell(&format!("warning: body.altitude_km is not set: {what}"));
+    }
+    Ok(newest.sensor)
+}
+
+/// Returns the newest valid copy of the parameters, and its generation.
+fn newest(flash: &Flash) -> Option<(Parameters, u32)> {
+    let read = |copy| {
+        let mut bytes = vec![0; table::MAX_BYTES];
+        flash.read_copy(copy, &mut bytes);
+        table::read(&bytes).ok()
+    };
+    [read(1), read(2)].into_iter().flatten().max_by_key(|(_, generation)| *generation)
+}
+
+/// Stores the parameters of a sensor in both copies. Every picture is processed from the start (`boot.mode` = 1),
+/// because the program starts when it is wanted, unlike a microcontroller.
+fn store(sensor: &Config, flash: &Flash) -> Result<(), Error> {
+    let mut parameters = Parameters::new(sensor.clone());
+    parameters.operations.boot_mode = 1;
+    parameters.check_flyable().map_err(|key| {
+        Error::usage(format!("{key} has a value that the flight software does not support; leave it at its default"))
+    })?;
+    parameters.check().map_err(|e| Error::usage(e.to_string()))?;
+    let generation = newest(flash).map_or(0, |(_, generation)| generation);
+    let mut bytes = vec![0; table::MAX_BYTES];
+    for (copy, generation) in [(1, generation.wrapping_add(1)), (2, generation.wrapping_add(2))] {
+        let n = table::write(&parameters, generation, &mut bytes).unwrap_or(0);
+        let written = flash.write_copy(copy, bytes.get(..n).unwrap_or_default());
+        written.map_err(|e| Error::failed(format!("{}: {e}", flash.folder().display())))?;
+    }
+    Ok(())
+}
+
+fn open_camera(settings: &Settings, config: &Config, tell: &Tell) -> Result<Box<dyn Camera>, Error> {
+    let (width, height) = (u32::from(config.camera.width), u32::from(config.camera.height));
+    check_input(settings.sensor.as_ref())?;
+    let raw = settings.raw.unwrap_or(Raw { width, height, format: Format::Mono8 });
+    if raw.size() != (width, height) {
+        let (w, h) = raw.size();
+        let what = "every picture will be refused until the parameters fit (event 6)";
+        tell(&format!("warning: pictures of {w}x{h}, but the camera of the parameters has {width}x{height}: {what}"));
+    }
+    match &settings.source {
+        Source::Stdin => Ok(Box::new(Pipe::new(std::io::stdin(), Samples::Raw(raw)))),
+        Source::Device(path) if settings.raw.is_some() => {
+            Err(Error::usage(format!("{}: --raw is for pictures on standard input only", path.display())))
+        }
+        Source::Device(path) => {
+            let opener = Box::new(V4l2::new(path, width, height));
+            let camera = DeviceCamera::open(opener, tell.clone())
+                .map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+            Ok(Box::new(camera))
+        }
+    }
+}
+
+/// Refuses what the flight software does not do to a picture.
+fn check_input(sensor: Option<&Config>) -> Result<(), Error> {
+    let Some(input) = sensor.map(|config| config.input) else { return Ok(()) };
+    let key = match (input.orient, input.scale_to_height) {
+        (Orient::AsStored, None) => return Ok(()),
+        (Orient::AsStored, Some(_)) => "input.scale_to_height",
+        _ => "input.orient",
+    };
+    Err(Error::usage(format!("{key}: the flight software takes pictures as they are; leave it at its default")))
+}

@@ -1,0 +1,276 @@
+//! The answers on the disk: recordings that a crash cannot spoil, and that never need more than their share of it.
+
+mod folder;
+
+use std::io;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+use hzn_core::Config;
+use hzn_mcap::{FLUSH_INTERVAL, FrameRecord, Options, Writer};
+
+use crate::tell::Tell;
+use folder::Folder;
+
+/// Answers that wait for a slow disk: at 60 pictures a second, 17 s.
+const WAITING: usize = 1024;
+/// Room in a file for one more answer. An answer has about 3 KB, and at most 16 candidates.
+const ANSWER_BYTES: u64 = 16 << 10;
+/// Smallest share of the disk. A file must hold some answers.
+pub const MIN_LIMIT_BYTES: u64 = 1 << 20;
+/// Time until another attempt after an error of the disk.
+const AGAIN: Duration = Duration::from_secs(5);
+
+/// The log of answers. A thread writes it, so that a slow disk never holds up the flight loop.
+pub struct Log {
+    sender: Option<Sender<Box<FrameRecord>>>,
+    thread: Option<JoinHandle<()>>,
+    lost: Arc<AtomicU64>,
+    written: Arc<AtomicU64>,
+    config: Arc<Mutex<Config>>,
+}
+
+impl Log {
+    /// Opens the log in a folder, and closes the files that the last program left. The files need at most
+    /// `limit_bytes`, which must be at least [`MIN_LIMIT_BYTES`].
+    ///
+    /// # Errors
+    /// The folder cannot be made or read.
+    pub fn open(folder: &Path, limit_bytes: u64, config: &Config, tell: Tell) -> io::Result<Self> {
+        let mut folder = Folder::open(folder, limit_bytes.max(MIN_LIMIT_BYTES))?;
+        folder.recover(&tell);
+        let (sender, answers) = bounded(WAITING);
+        let (lost, written) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
+        let config = Arc::new(Mutex::new(config.clone()));
+        let mut writing = Writing {
+            folder,
+            file: None,
+            failed: None,
+            lost: Arc::clone(&lost),
+            written: Arc::clone(&written),
+            config: Arc::clone(&config),
+            tell,
+        };
+        let thread = thread::Builder::new().name("log".into()).spawn(move || writing.run(&answers))?;
+        Ok(Self { sender: Some(sender), thread: Some(thread), lost, written, config })
+    }
+
+    /// Sets the configuration that the next files name.
+    pub fn set_config(&self, config: &Config) {
+        *self.config.lock().unwrap_or_else(PoisonError::into_inner) = config.clone();
+    }
+
+    /// Adds an answer, without waiting. If there is no room, the answer is lost and counted.
+    pub fn add(&self, record: FrameRecord) {
+        let sent = self.sender.as_ref().map(|sender| sender.try_send(Box::new(record)));
+        if let Some(Err(TrySendError::Full(_))) = sent {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Writes what waits, and closes the file. Returns how many answers are in the log, and how many were lost.
+    pub fn finish(&mut self) -> (u64, u64) {
+        self.sender = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+        (self.written.load(Ordering::Relaxed), self.lost.load(Ordering::Relaxed))
+    }
+}
+
+/// The state of the thread.
+struct Writing {
+    folder: Folder,
+    file: Option<Writer>,
+    /// Time of the last error of the disk.
+    failed: Option<Instant>,
+    lost: Arc<AtomicU64>,
+    written: Arc<AtomicU64>,
+    config: Arc<Mutex<Config>>,
+    tell: Tell,
+}
+
+impl Writing {
+    fn run(&mut self, answers: &Receiver<Box<FrameRecord>>) {
+        loop {
+            let outcome = match answers.recv_timeout(FLUSH_INTERVAL) {
+                Ok(record) => self.add(&record),
+                Err(e) if e.is_timeout() => self.file.as_mut().map_or(Ok(()), Writer::flush_if_due),
+                Err(_) => break,
+            };
+            self.take_outcome(outcome);
+        }
+        let outcome = self.close();
+        self.take_outcome(outcome);
+    }
+
+    fn add(&mut self, record: &FrameRecord) -> Result<(), hzn_mcap::Error> {
+        if self.failed.is_some_and(|failed| failed.elapsed() < AGAIN) {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+            return Ok(());
+        }
+        let is_full = |file: &Writer| file.finished_bytes() + ANSWER_BYTES > self.folder.file_bytes();
+        if let Some(file) = self.file.as_mut().filter(|file| is_full(file)) {
+            // What waits needs less room once it is compressed.
+            file.flush()?;
+            if is_full(file) {
+                self.close()?;
+            }
+        }
+        let written = self.open().and_then(|file| file.write(record));
+        let count = if written.is_ok() { &self.written } else { &self.lost };
+        count.fetch_add(1, Ordering::Relaxed);
+        if written.is_ok() && self.failed.take().is_some() {
+            let lost = self.lost.load(Ordering::Relaxed);
+            (self.tell)(&format!("the log is written again; {lost} answers are not in it"));
+        }
+        written
+    }
+
+    /// Returns the file that is being written.
+    fn open(&mut self) -> Result<&mut Writer, hzn_mcap::Error> {
+        let file = match self.file.take() {
+            Some(file) => file,
+            None => {
+                let path = self.folder.make_room();
+                let config = self.config.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                // A configuration that was accepted has a text.
+                let sensor_toml = toml::to_string(&config).unwrap_or_default();
+                let metadata = [("program".to_owned(), format!("hzn fly {}", env!("CARGO_PKG_VERSION")))].into();
+                let camera = Some(config.camera);
+                Writer::create(path, &Options { sensor_toml, metadata, camera, force: true, durable: true })?
+            }
+        };
+        Ok(self.file.insert(file))
+    }
+
+    fn close(&mut self) -> Result<(), hzn_mcap::Error> {
+        self.file.take().map_or(Ok(()), |file| file.finish().map(drop))
+    }
+
+    /// Takes note of an error. The file that failed stays as it is; the next one is tried later.
+    fn take_outcome(&mut self, outcome: Result<(), hzn_mcap::Error>) {
+        if let Err(e) = outcome {
+            if self.failed.is_none() {
+                (self.tell)(&format!("the log cannot be written: {e}; the flight goes on without it"));
+            }
+            self.failed = Some(Instant::now());
+            self.file = None;
+            // The part with the finished answers becomes a file, if the disk has room for it.
+            self.folder.recover(&self.tell);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::sync::Mutex;
+
+    use hzn_core::camera::{self, Model};
+    use hzn_core::status::Status;
+    use hzn_mcap::{Contents, Reader, Row, RowMeta};
+
+    use super::*;
+
+    fn config() -> Config {
+        Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 600.0))
+    }
+    fn record(index: u64) -> FrameRecord {
+        let meta = RowMeta {
+            index,
+            file: format!("frame-{index:06}"),
+            time_s: Some(index as f64),
+            body: "earth".into(),
+            altitude_km: None,
+        };
+        // The reason does not compress well, so that few answers fill the disk.
+        let noise = |i: u64| (index * 1_000_003 + i).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
+        let reason: Vec<String> = (0..80).map(|i| format!("{:x}", noise(i))).collect();
+        FrameRecord::new(Row::unprocessed(&meta, Status::Unreadable, reason.join(" ")))
+    }
+    fn quiet() -> Tell {
+        Arc::new(|_: &str| ())
+    }
+    /// Returns the sizes of all files in a folder.
+    fn used(folder: &Path) -> u64 {
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().metadata().unwrap().len()).sum()
+    }
+    fn indexes(folder: &Path) -> Vec<u64> {
+        let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        paths.sort();
+        let rows = |path| Reader::open(path, Contents::WithoutImages).unwrap().map(|frame| frame.unwrap().row.index);
+        paths.into_iter().flat_map(rows).collect()
+    }
+
+    #[test]
+    fn the_disk_is_never_used_beyond_the_limit() {
+        let dir = tempfile::tempdir().unwrap();
+        let (mut most, limit) = (0, MIN_LIMIT_BYTES);
+        for start in [0, 1500] {
+            let mut log = Log::open(dir.path(), limit, &config(), quiet()).unwrap();
+            for index in start..start + 1500 {
+                while log.sender.as_ref().unwrap().is_full() {
+                    thread::sleep(Duration::from_millis(1));
+                }
+                log.add(record(index));
+                if index % 20 == 0 {
+                    thread::sleep(Duration::from_millis(1));
+                    most = most.max(used(dir.path()));
+                }
+            }
+            assert_eq!(log.finish(), (1500, 0));
+            most = most.max(used(dir.path()));
+        }
+        assert!(most <= limit && most > limit * 3 / 4, "{most} of {limit}");
+        // The newest answers are kept, in order.
+        let kept = indexes(dir.path());
+        assert_eq!(kept.last(), Some(&2999));
+        assert!(kept.len() > 500 && kept.windows(2).all(|w| w[1] == w[0] + 1), "{}", kept.len());
+    }
+
+    #[test]
+    fn what_a_crash_left_is_closed() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut log = Log::open(dir.path(), MIN_LIMIT_BYTES, &config(), quiet()).unwrap();
+        (0..40).for_each(|index| log.add(record(index)));
+        thread::sleep(2 * FLUSH_INTERVAL);
+        // A copy of the folder now is what a crash leaves.
+        let after = tempfile::tempdir().unwrap();
+        for entry in fs::read_dir(dir.path()).unwrap() {
+            let entry = entry.unwrap();
+            fs::copy(entry.path(), after.path().join(entry.file_name())).unwrap();
+        }
+        fs::write(after.path().join("fly-000009.mcap.part"), b"\x89MC").unwrap();
+        log.finish();
+        let told = Arc::new(Mutex::new(Vec::<String>::new()));
+        let list = Arc::clone(&told);
+        let tell: Tell = Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned()));
+        let mut log = Log::open(after.path(), MIN_LIMIT_BYTES, &config(), tell).unwrap();
+        log.add(record(40));
+        log.finish();
+        assert_eq!(indexes(after.path()), (0..=40).collect::<Vec<_>>());
+        assert!(told.lock().unwrap()[0].contains("answers were recovered"), "{told:?}");
+        assert!(after.path().join("fly-000010.mcap").exists());
+    }
+
+    #[test]
+    fn a_disk_that_fails_does_not_end_the_flight() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("log");
+        let told = Arc::new(Mutex::new(Vec::<String>::new()));
+        let list = Arc::clone(&told);
+        let tell: Tell = Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned()));
+        let mut log = Log::open(&folder, MIN_LIMIT_BYTES, &config(), tell).unwrap();
+        fs::remove_dir(&folder).unwrap();
+        (0..5).for_each(|index| log.add(record(index)));
+        assert_eq!(log.finish(), (0, 5));
+        let told = told.lock().unwrap();
+        assert_eq!(told.len(), 1, "{told:?}");
+        assert!(told[0].contains("the flight goes on without it"), "{told:?}");
+    }
+}

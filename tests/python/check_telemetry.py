@@ -1,0 +1,123 @@
+"""Decodes telemetry with other libraries: space-packet-parser reads the XTCE dictionary, ccsdspy tables written here.
+
+Usage: check_telemetry.py HZN EXAMPLE FOLDER. EXAMPLE writes packets with random contents and their numbers.
+"""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import ccsdspy
+import numpy as np
+import space_packet_parser as spp
+
+MARKER = bytes.fromhex("1acffc1d")
+
+
+def is_same(decoded: float, written: float | None) -> bool:
+    """Return whether a number is the one that was written; None stands for NaN and infinity."""
+    return not math.isfinite(decoded) if written is None else float(decoded) == written
+
+
+def without_markers(stream: bytes) -> tuple[bytes, list[int]]:
+    """Return the packets one after another, and their APIDs."""
+    packets, apids, at = bytearray(), [], 0
+    while at < len(stream):
+        assert stream[at : at + 4] == MARKER, at
+        end = at + 4 + 6 + int.from_bytes(stream[at + 8 : at + 10], "big") + 1
+        packets += stream[at + 4 : end]
+        apids.append(int.from_bytes(stream[at + 4 : at + 6], "big") & 0x7FF)
+        at = end
+    return bytes(packets), apids
+
+
+def check_xtce(dictionary: Path, packets: Path, lines: list[dict]) -> int:
+    """Compare every number of every packet; return how many there are."""
+    definition = spp.load_xtce(dictionary)
+    numbers = 0
+    with packets.open("rb") as stream:
+        for line, raw in zip(lines, spp.ccsds_generator(stream), strict=True):
+            packet = definition.parse_bytes(raw)
+            names = [name for name in packet if not name.startswith(("packet_", "time_"))]
+            assert int(packet["packet_apid"]) == line["apid"]
+            seconds, fraction = int(packet["time_seconds"]), int(packet["time_fraction"])
+            us = seconds * 1_000_000 + round(fraction * 1_000_000 / 2**24)
+            assert us == line["us"], (us, line["us"])
+            values = [getattr(packet[name], "raw_value", packet[name]) for name in names]
+            assert len(values) == len(line["values"]), (line["apid"], len(values), len(line["values"]))
+            for name, value, written in zip(names, values, line["values"], strict=True):
+                assert is_same(value, written), (name, value, written)
+            numbers += len(values)
+            if line["apid"] == 0x102:
+                assert isinstance(packet["event_severity"], str)
+                assert packet["event_severity"] in ("information", "warning", "error")
+    return numbers
+
+
+def fields(text: str) -> list[ccsdspy.PacketField]:
+    """Return fields from words such as ``u4:pictures``: type, bytes, name."""
+    types = {"u": "uint", "f": "float"}
+    return [
+        ccsdspy.PacketField(name=word[3:], data_type=types[word[0]], bit_length=8 * int(word[1])) for word in text.split()
+    ]
+
+
+TIME = "u1:p_field u4:seconds u3:fraction "
+# The tables of book/reference/telemetry.md, by hand.
+TABLES = {
+    0x100: "u1:mode u1:self_check u1:copy u1:last_status u4:generation u4:pictures u4:answers u4:lost u4:refused "
+    "u2:commands u2:rejected u4:last_us u4:longest_us u4:stack u4:version u4:build u4:image_crc u2:starts "
+    "u1:watchdog_resets u1:flags u2:repairs u2:last_sequence u4:foreign u4:broken u4:withheld u4:since_lift_off_s "
+    "u1:clock u4:decimated u4:stuck",
+    0x101: "u4:picture u8:exposure_us u8:done_us u4:calculation_us u1:body f4:altitude_m "
+    "u1:status u1:stage u1:looks u2:level u4:followed u4:candidates u4:dropped u4:fallback u4:edge_points u4:draws u4:work "
+    "u1:listed u1:solved f4:axis_x f4:axis_y f4:axis_z f4:xx f4:xy f4:xz f4:yy f4:yz f4:zz f4:ecef_x f4:ecef_y f4:ecef_z "
+    "f4:body_x f4:body_y f4:body_z f4:half_angle f4:fused f4:alt f4:alt_sigma f4:rms f4:arc u4:inliers u4:candidate",
+    0x102: "u2:number u1:severity u4:a u4:b",
+    0x103: "u1:function u2:sequence u1:code u2:detail",
+    0x104: "u2:number f8:value",
+    0x106: "u4:picture u4:number u4:length_px u4:points u4:inliers f4:rms_px u1:verdict",
+}
+
+
+def check_ccsdspy(folder: Path, packets: bytes, lines: list[dict]) -> int:
+    """Compare the packets whose tables are here; return how many there are."""
+    compared, at, by_apid = 0, 0, {apid: bytearray() for apid in TABLES}
+    for line in lines:
+        end = at + 6 + int.from_bytes(packets[at + 4 : at + 6], "big") + 1
+        by_apid.get(line["apid"], bytearray()).extend(packets[at:end])
+        at = end
+    for apid, table in TABLES.items():
+        file = folder / f"{apid:x}.ccsds"
+        file.write_bytes(by_apid[apid])
+        decoded = ccsdspy.FixedLength(fields(TIME + table + " u2:crc")).load(str(file))
+        names = [word[3:] for word in table.split()]
+        written = np.array(
+            [[math.nan if x is None else x for x in line["values"]] for line in lines if line["apid"] == apid]
+        )
+        for column, name in enumerate(names):
+            value = decoded[name].astype(float)
+            value[~np.isfinite(value)] = math.nan
+            assert np.array_equal(value, written[:, column], equal_nan=True), (hex(apid), name)
+        compared += len(written)
+    return compared
+
+
+def main() -> None:
+    """Write packets and read them again."""
+    hzn, example, folder = sys.argv[1], sys.argv[2], Path(sys.argv[3])
+    subprocess.run([example, folder], check=True)
+    dictionary = folder / "hzn.xml"
+    dictionary.write_bytes(subprocess.run([hzn, "telemetry", "--xtce"], check=True, capture_output=True).stdout)
+    packets, apids = without_markers((folder / "packets.bin").read_bytes())
+    (folder / "packets.ccsds").write_bytes(packets)
+    lines = [json.loads(line) for line in (folder / "values.jsonl").read_text().splitlines()]
+    assert apids == [line["apid"] for line in lines] and len(lines) == 10_000
+    numbers = check_xtce(dictionary, folder / "packets.ccsds", lines)
+    compared = check_ccsdspy(folder, packets, lines)
+    print(f"space-packet-parser: {len(lines)} packets, {numbers} numbers equal; ccsdspy: {compared} packets equal")
+
+
+main()
