@@ -307,6 +307,10 @@ impl Row {
     fn set_position<T: Real>(&mut self, p: &Position<T>) {
         let widen = |x: T| x.to_f64();
         self.set_position_m(p.centre_m.map(widen), p.covariance_m2.map(widen), p.body_fixed_m.map(|v| v.map(widen)));
+        if let Some(yaw) = p.yaw_rad {
+            let deg = |x: T| finite(x.to_f64().to_degrees());
+            (self.yaw_deg, self.yaw_sigma_deg) = (deg(yaw.0), deg(yaw.1));
+        }
     }
 
     /// Fills the columns of the position: of the body's centre from the camera in metres (camera frame), with its
@@ -324,10 +328,6 @@ impl Row {
         ] = covariance_m2.map(|x| finite(x / 1e6));
         if let Some(body_fixed) = body_fixed_m {
             [self.body_fixed_x_km, self.body_fixed_y_km, self.body_fixed_z_km] = body_fixed.map(km);
-        }
-        if let Some(yaw) = p.yaw_rad {
-            let deg = |x: T| finite(x.to_f64().to_degrees());
-            (self.yaw_deg, self.yaw_sigma_deg) = (deg(yaw.0), deg(yaw.1));
         }
     }
 

@@ -39,7 +39,7 @@ pub(super) fn fused<T: Real>(
 ) -> Option<Fused<T>> {
     let by_direction = fusion::fused(fit, p, edge, expected, estimate, budget)?;
     let sin = (fit.k * (T::one() + fit.c)).max(T::ZERO).sqrt();
-    if !is_determined(fit, sin, p.m33) || !is_lit_inside(blocks, &fit.e) {
+    if !is_determined(fit, sin, p.m33) || !is_lit_inside(blocks, fit) {
         return target.range.map(|_| by_direction);
     }
     let given = Sensitivity::new(blocks, fit, target)?;
@@ -63,17 +63,20 @@ fn is_determined<T: Real>(fit: &Fit<T>, sin: T, var_cos: T) -> bool {
 
 /// Returns whether most of the edge is lit on the side of the axis. Noise can turn the curvature of a short arc over,
 /// and the fitted body is then on the dark side.
-fn is_lit_inside<T: Real>(blocks: &[Block<T>], e: &V3<T>) -> bool {
-    let (mut inside, mut all) = (T::ZERO, T::ZERO);
+fn is_lit_inside<T: Real>(blocks: &[Block<T>], fit: &Fit<T>) -> bool {
+    let (mut inside, half) = (T::ZERO, fit.sums.weight * T::from_f64(0.5));
     for block in blocks {
+        let [gu, gv] = block.gradient(&fit.e);
         for lane in 0..LANES {
-            all += block.weight[lane];
-            if block.weight[lane] > T::ZERO && block.is_lit_towards(lane, e) {
+            if block.weight[lane] > T::ZERO && block.is_lit_along(lane, [gu[lane], gv[lane]]) {
                 inside += block.weight[lane];
             }
         }
+        if inside > half {
+            return true;
+        }
     }
-    inside + inside > all
+    false
 }
 
 /// Returns the position that the fit gives, with all errors of the given shape and orientation.
