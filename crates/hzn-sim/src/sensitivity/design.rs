@@ -75,9 +75,9 @@ impl Design {
     }
 }
 
-/// Returns the rotation into the camera frame for a camera with this local vertical and north: it looks in the
-/// direction `azimuth` (from north over east), `depression` below the horizontal, and is turned by `roll` about its optical axis,
-/// all in degrees. The direction down is then that of [`Design::axis`].
+/// Returns the rotation into the camera frame for a camera with this local vertical and north. The camera looks in the
+/// direction `azimuth` (from north over east), `depression` below the horizontal, and is turned by `roll` about its
+/// optical axis, all in degrees. The direction down is then that of [`Design::axis`].
 pub(super) fn rotation_to_camera(
     up: &Vector3<f64>,
     north: &Vector3<f64>,

@@ -22,8 +22,8 @@ const STEPS: usize = 6;
 const LEAST_SIN: f64 = 1e-7;
 
 /// Fits axis and half-angle with the weights that the points have. `None` if the points do not determine the cone.
-/// `at_start` are the normal equations at the start, if they are known. If the first step is the last one, the result is
-/// so near that they hold for it, too.
+/// `at_start` are the normal equations at the start, if they are known. If the first step is the last one, the result
+/// is so near that they hold for it, too.
 pub(super) fn settle<T: Real>(
     blocks: &mut [Block<T>],
     start: State<T>,
@@ -135,8 +135,8 @@ impl<T: Real> Sums<T> {
     }
 
     /// Returns the step of the axis on its tangent basis, and of the half-angle; how much it reduces the cost; and
-    /// whether it is the last one: it is shorter than a hundredth of the sigma of white noise, and what is left of it is
-    /// less than a hundredth of that (math.md, 13.3).
+    /// whether it is the last one: it is shorter than a hundredth of the sigma of white noise, and what is left of it
+    /// is less than a hundredth of that (math.md, 13.3).
     fn step(&self) -> Option<([T; 3], T, bool)> {
         let [g1, g2, g3] = self.g;
         let d = invert_spd3(&self.n)? * V3::new(g1, g2, g3);
