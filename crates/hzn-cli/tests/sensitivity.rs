@@ -162,10 +162,15 @@ fn the_third_axis_of_a_flattened_body() {
         "yaw.svg",
     ];
     assert_eq!(yaw(&table).lines().count(), 4);
-    let rows = rows(&place.read("yaw.csv"));
-    let by_height: f64 = cell(&rows[1], "yaw_by_height_deg").parse().unwrap();
+    let table = rows(&place.read("yaw.csv"));
+    let by_height: f64 = cell(&table[1], "yaw_by_height_deg").parse().unwrap();
     assert!((by_height / 2.2 - 1.0).abs() < 0.1, "{by_height}");
     assert!(place.read("yaw.svg").contains("by limb height"));
+    // The limb of a planet is known as well as its own sigma says: 80 km of 4638 km of flattening.
+    yaw(&["--body", "jupiter", "--fov", "2", "--altitude", "5.8e6", "-o", "jupiter.csv"]);
+    let table = rows(&place.read("jupiter.csv"));
+    let by_height: f64 = cell(&table[0], "yaw_by_height_deg").parse().unwrap();
+    assert!((by_height / 0.99 - 1.0).abs() < 0.05, "{by_height}");
     // A sphere has no third axis, and a note says so.
     let ran =
         place.run(&["sensitivity", "yaw", "--body", "1737.4", "--altitude", "100", "--depression", "20"]).expect(0);

@@ -43,7 +43,7 @@ pub(crate) struct Args {
     /// Height of the visible limb, kilometres [default: 10 for the Earth, that of the body for a planet]
     #[arg(long, value_name = "KM")]
     pub(super) limb_height: Option<Values>,
-    /// 1-sigma of the limb height, kilometres [default: 2]
+    /// 1-sigma of the limb height, kilometres [default: 2, that of the body for a planet]
     #[arg(long, value_name = "KM")]
     pub(super) limb_height_sigma: Option<f64>,
     /// 1-sigma of the altitude, kilometres [default: 0.5]

@@ -10,6 +10,9 @@ pub(super) struct Body {
     pub(super) radius_km: f64,
     pub(super) radii_km: [f64; 3],
     pub(super) limb_height_km: f64,
+    /// 1-sigma of the limb height, and of its second harmonic, if they are known of the body.
+    pub(super) limb_height_sigma_km: Option<f64>,
+    pub(super) second_harmonic_km: Option<f64>,
 }
 
 impl Body {
@@ -18,20 +21,28 @@ impl Body {
         radius_km: EARTH_MEAN_RADIUS_M / 1e3,
         radii_km: [WGS84_A_M / 1e3, WGS84_A_M / 1e3, WGS84_B_M / 1e3],
         limb_height_km: 10.0,
+        limb_height_sigma_km: None,
+        second_harmonic_km: None,
     };
 
     /// Returns the body of a sensor.toml.
     pub(super) fn from_config(body: &body::Config) -> Self {
         let radius_km = body.mean_radius_km();
         let radii_km = body.figure_km().unwrap_or([radius_km; 3]);
-        Self { radius_km, radii_km, limb_height_km: body.limb_height_km }
+        Self {
+            radius_km,
+            radii_km,
+            limb_height_km: body.limb_height_km,
+            limb_height_sigma_km: Some(body.limb_height_sigma_km),
+            second_harmonic_km: body.limb_height_harmonic_sigma_km,
+        }
     }
 }
 
 impl std::str::FromStr for Body {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let bare = |radius_km| Self { radius_km, radii_km: [radius_km; 3], limb_height_km: 0.0 };
+        let bare = |radius_km| Self { radius_km, radii_km: [radius_km; 3], limb_height_km: 0.0, ..Self::EARTH };
         match text {
             "earth" => Ok(Self::EARTH),
             "earth-sphere" => Ok(Self { radii_km: [Self::EARTH.radius_km; 3], ..Self::EARTH }),

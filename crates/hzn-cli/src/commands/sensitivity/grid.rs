@@ -105,6 +105,7 @@ impl<'a> Grid<'a> {
         if !(sigma_px > 0.0) {
             return Err(usage(format!("--sigma-px: {sigma_px} is refused: must be above 0")));
         }
+        let limb_height_sigma = args.limb_height_sigma.or(body.limb_height_sigma_km);
         Ok(Design {
             camera,
             radius_km,
@@ -116,7 +117,7 @@ impl<'a> Grid<'a> {
             limb_height_km: value("limb_height_km").unwrap_or(limb_height),
             limb_height_sigma_km: positive(
                 "limb-height-sigma",
-                args.limb_height_sigma.or(own.map(|(b, _)| b.limb_height_sigma_km)).unwrap_or(2.0),
+                limb_height_sigma.or(own.map(|(b, _)| b.limb_height_sigma_km)).unwrap_or(2.0),
             )?,
             depression_deg: value("depression_deg").unwrap_or(0.0),
             roll_deg: value("roll_deg").unwrap_or(0.0),

@@ -59,7 +59,10 @@ pub(super) fn compute(args: &Args) -> Result<Study, Stop> {
 fn design(grid: &Grid<'_>, args: &Args, place: &[f64]) -> Result<ThirdAxis, Stop> {
     let limb = grid.design(place)?;
     let value = |column: &str| grid.value(place, column).unwrap_or(0.0);
-    let second_harmonic_km = args.second_harmonic.unwrap_or(limb.limb_height_sigma_km);
+    let body = grid.body(place);
+    // A limb height that is given on the command line replaces all that is known of the body's.
+    let own = body.second_harmonic_km.filter(|_| args.limb_height_sigma.is_none());
+    let second_harmonic_km = args.second_harmonic.or(own).unwrap_or(limb.limb_height_sigma_km);
     if !(second_harmonic_km >= 0.0 && second_harmonic_km.is_finite()) {
         return Err(usage(format!("--second-harmonic: {second_harmonic_km} is refused: must be 0 or more")));
     }
@@ -68,7 +71,7 @@ fn design(grid: &Grid<'_>, args: &Args, place: &[f64]) -> Result<ThirdAxis, Stop
         return Err(usage(format!("--latitude: {latitude_deg} is refused: must be from -90 to 90")));
     }
     Ok(ThirdAxis {
-        radii_km: grid.body(place).radii_km,
+        radii_km: body.radii_km,
         limb_height_km: limb.limb_height_km,
         second_harmonic_km,
         altitude_km: limb.altitude_km,
