@@ -1,7 +1,6 @@
 //! The quantities that can be plotted over time.
 
 use hzn_mcap::Row;
-use hzn_sim::evaluate::{MeasuredPosition, PositionMiss};
 use hzn_sim::truth::Truth;
 
 /// A quantity that can be plotted over time.
@@ -43,38 +42,7 @@ pub const QUANTITIES: &[Quantity] = &[
         unit: "km",
         lines: &[("estimated", |r, _| r.altitude_est_km), ("given", |r, _| r.altitude_km)],
     },
-    Quantity {
-        name: "Position",
-        unit: "km",
-        lines: &[("x", |r, _| r.position_x_km), ("y", |r, _| r.position_y_km), ("z", |r, _| r.position_z_km)],
-    },
-    Quantity { name: "Range", unit: "km", lines: &[("to the centre of the body", range_km)] },
-    Quantity {
-        name: "Position, 3 sigma",
-        unit: "km",
-        lines: &[("range", range_3sigma_km), ("cross-range", cross_range_3sigma_km)],
-    },
-    Quantity {
-        name: "Range error (truth)",
-        unit: "km",
-        lines: &[
-            ("error", |r, t| Some(position_miss(r, t)?.range_km)),
-            ("3σ", |r, t| position_miss(r, t).and(range_3sigma_km(r, t))),
-        ],
-    },
-    Quantity {
-        name: "Cross-range error (truth)",
-        unit: "km",
-        lines: &[
-            ("error", |r, t| Some(position_miss(r, t)?.cross_range_km)),
-            ("3σ", |r, t| position_miss(r, t).and(cross_range_3sigma_km(r, t))),
-        ],
-    },
-    Quantity {
-        name: "Third axis",
-        unit: "°",
-        lines: &[("rotation", |r, _| r.yaw_deg), ("3σ", |r, _| Some(3.0 * r.yaw_sigma_deg?))],
-    },
+    Quantity { name: "Range", unit: "km", lines: &[("to the centre of the body", range_km), ("3σ", range_3sigma_km)] },
     Quantity { name: "Threshold", unit: "counts", lines: &[("threshold", |r, _| r.level.map(f64::from))] },
     Quantity { name: "Roll, pitch", unit: "°", lines: &[("roll", |r, _| r.roll_deg), ("pitch", |r, _| r.pitch_deg)] },
     Quantity { name: "Processing", unit: "µs", lines: &[("processing", |r, _| r.elapsed_us)] },
@@ -86,23 +54,13 @@ fn range_km(row: &Row, _: Option<&Truth>) -> Option<f64> {
     Some((x * x + y * y + z * z).sqrt())
 }
 
-fn position(row: &Row) -> Option<MeasuredPosition> {
-    Some(MeasuredPosition { centre_km: row.position_km()?, covariance_km2: row.position_covariance_km2()? })
-}
-
-/// Returns 3-sigma of [`range_km`].
-fn range_3sigma_km(row: &Row, _: Option<&Truth>) -> Option<f64> {
-    Some(3.0 * position(row)?.sigmas_km()?[0])
-}
-
-/// Returns 3-sigma of the position in the worst direction perpendicular to the line to the body.
-fn cross_range_3sigma_km(row: &Row, _: Option<&Truth>) -> Option<f64> {
-    Some(3.0 * position(row)?.sigmas_km()?[1])
-}
-
-/// Returns the errors of a position, if there is a truth.
-fn position_miss(row: &Row, truth: Option<&Truth>) -> Option<PositionMiss> {
-    PositionMiss::new(&position(row)?, truth?.position_km()?)
+/// Returns 3-sigma of [`range_km`]: the covariance of the position along its own direction.
+fn range_3sigma_km(row: &Row, truth: Option<&Truth>) -> Option<f64> {
+    let range = range_km(row, truth)?;
+    let [x, y, z] = row.position_km()?.map(|v| v / range);
+    let [xx, xy, xz, yy, yz, zz] = row.position_covariance_km2()?;
+    let variance = x * x * xx + y * y * yy + z * z * zz + 2.0 * (x * y * xy + x * z * xz + y * z * yz);
+    Some(3.0 * variance.max(0.0).sqrt())
 }
 
 /// Returns the angle between an answer and the truth, in degrees.
@@ -122,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn positions_have_their_sigmas_along_and_across_the_line_of_sight() {
+    fn the_range_has_the_sigma_along_the_line_of_sight() {
         let meta =
             hzn_mcap::RowMeta { index: 0, file: "a".into(), time_s: None, body: "earth".into(), altitude_km: None };
         let mut row = Row::unprocessed(&meta, hzn_core::status::Status::Ok, "");
@@ -132,11 +90,6 @@ mod tests {
         (row.pos_cov_xx_km2, row.pos_cov_xy_km2, row.pos_cov_xz_km2) = (Some(100.0), Some(0.0), Some(0.0));
         (row.pos_cov_yy_km2, row.pos_cov_yz_km2, row.pos_cov_zz_km2) = (Some(4.0), Some(0.0), Some(4.0));
         assert!((range_3sigma_km(&row, None).unwrap() - 6.0).abs() < 1e-12);
-        // Across the line of sight, x has the largest sigma.
-        assert!((cross_range_3sigma_km(&row, None).unwrap() - 30.0).abs() < 1e-12);
-        assert!(position_miss(&row, None).is_none());
-        let quantity = |name: &str| QUANTITIES.iter().find(|q| q.name == name).unwrap();
-        assert!(quantity("Range error (truth)").lines.iter().all(|(_, value)| value(&row, None).is_none()));
     }
 
     #[test]
