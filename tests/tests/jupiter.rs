@@ -1,8 +1,12 @@
 //! Two photographs of Jupiter whose distance is known: a body that is 6.5 % flat, from the limb alone.
 
+use std::cell::RefCell;
 use std::path::Path;
 
+use hzn_core::camera::Camera;
 use hzn_core::image::{Grey, Layout};
+use hzn_core::observer::{Observer, Unobserved};
+use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_core::{Config, HostHorizon, Report, body};
 
@@ -19,12 +23,16 @@ fn sensor() -> Config {
 }
 
 fn process(config: &Config, file: &str) -> Report<f64> {
+    process_observed(config, file, &Unobserved)
+}
+
+fn process_observed(config: &Config, file: &str, observer: &impl Observer<f64>) -> Report<f64> {
     let frames = hzn_calib::frames::load(&folder().join("frames.csv")).unwrap_or_else(|e| panic!("{e}"));
     let mut horizon = HostHorizon::boxed(config).unwrap();
     let expected = horizon.expect(&frames.get(file).unwrap().to_prior(None)).unwrap();
     let picture = image::open(folder().join(file)).unwrap().into_luma8();
     let layout = Layout::packed(picture.width(), picture.height(), 1, 8);
-    horizon.process(&Grey::try_new(picture.as_raw(), layout).unwrap(), &expected)
+    horizon.process_observed(&Grey::try_new(picture.as_raw(), layout).unwrap(), &expected, observer)
 }
 
 #[test]
@@ -38,7 +46,8 @@ fn the_range_is_right_from_the_limb_alone() {
         let sigma = position.free_range_m.1 / 1e3 / range_km;
         println!("{file}: {:.3} px, range {:+.3} % ± {:.3} %", solution.rms_px, error * 100.0, sigma * 100.0);
         assert!(error.abs() < 0.0025 && error.abs() < 3.0 * sigma && sigma < 0.004, "{file}: {error}");
-        // The goal of 0.12 px is missed by 0.01 px in the second picture.
+        // The goal of 0.12 px is missed by 0.01 px in the second picture, by the shape of Jupiter's own limb: see
+        // `the_residuals_are_the_limb_of_jupiter`.
         assert!(solution.rms_px < 0.14, "{file}: {}", solution.rms_px);
         // The camera is in the plane of the equator within four degrees, as the pole in the picture says.
         let [_, _, z] = position.body_fixed_m.expect("the attitude is known");
@@ -60,4 +69,71 @@ fn a_sphere_is_refused() {
         let report = process(&config, file);
         assert!(report.solution.is_none() && report.status == Status::Rejected, "{file}: {}", report.status);
     }
+}
+
+/// Collects the points of the only candidate, with their weights.
+#[derive(Default)]
+struct Points(RefCell<Vec<(ImagePoint<f64>, f64)>>);
+
+impl Observer<f64> for Points {
+    fn point(&self, _: u32, point: ImagePoint<f64>) {
+        self.0.borrow_mut().push((point, 0.0));
+    }
+    fn weight(&self, _: u32, point: u32, weight: f64) {
+        self.0.borrow_mut()[point as usize].1 = weight;
+    }
+}
+
+/// Places of a limb from 72 degrees north of the equator to 72 degrees south of it, and their distance.
+const PLACES: usize = 24;
+const STEP_DEG: f64 = 6.0;
+
+/// Returns the mean distance of the points outside of the fitted limb, km, for each place along the sunlit limb.
+fn heights_km(file: &str, range_km: f64) -> Vec<f64> {
+    let config = sensor();
+    let points = Points::default();
+    let position = process_observed(&config, file, &points).solution.unwrap().position.unwrap();
+    let camera = Camera::<f64>::try_new(&config.camera).unwrap();
+    let limb: Vec<_> = (0..7200)
+        .map(|i| camera.project(&position.limb_direction(f64::from(i).to_radians() / 20.0)).unwrap())
+        .collect();
+    let n = limb.len() as f64;
+    let centre = [limb.iter().map(|p| p.u).sum::<f64>() / n, limb.iter().map(|p| p.v).sum::<f64>() / n];
+    let polar = |p: &ImagePoint<f64>| {
+        let (u, v) = (p.u - centre[0], p.v - centre[1]);
+        (v.atan2(u).to_degrees(), u.hypot(v))
+    };
+    let mut sums = vec![[0.0; 2]; PLACES];
+    for (point, _) in points.0.borrow().iter().filter(|(_, weight)| *weight > 0.0) {
+        let (azimuth, radius) = polar(point);
+        let off = |p: &&ImagePoint<f64>| (polar(p).0 - azimuth).abs();
+        let at = limb.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+        let place = ((azimuth / STEP_DEG).floor() + PLACES as f64 / 2.0) as usize;
+        if azimuth.abs() < STEP_DEG * PLACES as f64 / 2.0 {
+            sums[place][0] += (radius - polar(at).1) * range_km / config.camera.fx_px;
+            sums[place][1] += 1.0;
+        }
+    }
+    sums.iter().map(|[sum, count]| sum / count).collect()
+}
+
+/// What is left after the fit is not noise: it is the same profile in both pictures, in kilometres, although they show
+/// other longitudes, eleven days apart. It is the height of Jupiter's haze and clouds by latitude, about 40 km,
+/// which the 1-sigma of the limb height of 80 km covers. The RMS of the second picture is larger in pixels (0.130),
+/// because the camera was closer: a pixel is 318 km there, and 376 km in the first.
+#[test]
+fn the_residuals_are_the_limb_of_jupiter() {
+    let [first, second] = PICTURES.map(|(file, range_km)| heights_km(file, range_km));
+    println!("{first:.0?}\n{second:.0?}");
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let (m1, m2) = (mean(&first), mean(&second));
+    let product = |a: &[f64], am: f64, b: &[f64], bm: f64| {
+        a.iter().zip(b).map(|(a, b)| (a - am) * (b - bm)).sum::<f64>() / a.len() as f64
+    };
+    let (p11, p22, p12) =
+        (product(&first, m1, &first, m1), product(&second, m2, &second, m2), product(&first, m1, &second, m2));
+    let correlation = p12 / (p11 * p22).sqrt();
+    println!("RMS {:.0} km and {:.0} km, correlation {correlation:.2}", p11.sqrt(), p22.sqrt());
+    assert!(correlation > 0.8, "{correlation}");
+    assert!(p22.sqrt() < 60.0);
 }

@@ -119,7 +119,10 @@ fn designs_that_cannot_be_are_refused_with_a_reason() {
     );
     refused(&["--altitude", "200", "--size", "1920"], "expected WIDTHxHEIGHT");
     refused(&["--altitude", "200", "--rows", "0.5"], "--rows: 0.5 is refused");
-    refused(&["--altitude", "200", "--body", "mars"], "\"mars\" is not a body; expected earth, moon, sun, or a radius");
+    refused(
+        &["--altitude", "200", "--body", "vulcan"],
+        "\"vulcan\" is not a body; expected earth, moon, sun, a planet such as jupiter, or a radius in kilometres",
+    );
     refused(&["--altitude", "200", "--sigma-px", "0"], "--sigma-px: 0 is refused");
     refused(&["--altitude", "200", "-o", "x.pdf"], "a table ends in .csv, a plot in .svg");
     refused(&["--altitude", "200", "-o", "x.svg"], "there is no range to plot over");
@@ -131,4 +134,50 @@ fn designs_that_cannot_be_are_refused_with_a_reason() {
         "1 of 1 designs see no limb, or too little of it: at 3000 km the limb is 47.1 deg below the horizontal; \
          --depression 47",
     );
+}
+
+/// The bounds of math.md, 13.8: the whole disc at 600 km and the second harmonic of the limb height at latitude 30.
+#[test]
+fn the_third_axis_of_a_flattened_body() {
+    let place = Place::new();
+    let yaw = |more: &[&str]| {
+        let fixed = ["sensitivity", "yaw", "--lens", "equidistant", "--depression", "90", "--sigma-px", "0.05"];
+        let ran = place.run(&[&fixed, more].concat()).expect(0);
+        ran.out
+    };
+    let table = [
+        "--fov",
+        "150",
+        "--size",
+        "1000x1000",
+        "--altitude",
+        "600",
+        "--latitude",
+        "0,30,60",
+        "--second-harmonic",
+        "0.1",
+        "-o",
+        "yaw.csv",
+        "-o",
+        "yaw.svg",
+    ];
+    assert_eq!(yaw(&table).lines().count(), 4);
+    let table = rows(&place.read("yaw.csv"));
+    let by_height: f64 = cell(&table[1], "yaw_by_height_deg").parse().unwrap();
+    assert!((by_height / 2.2 - 1.0).abs() < 0.1, "{by_height}");
+    assert!(place.read("yaw.svg").contains("by limb height"));
+    // The limb of a planet is known as well as its own sigma says: 80 km of 4638 km of flattening.
+    yaw(&["--body", "jupiter", "--fov", "2", "--altitude", "5.8e6", "-o", "jupiter.csv"]);
+    let table = rows(&place.read("jupiter.csv"));
+    let by_height: f64 = cell(&table[0], "yaw_by_height_deg").parse().unwrap();
+    assert!((by_height / 0.99 - 1.0).abs() < 0.05, "{by_height}");
+    // A sphere has no third axis, and a note says so.
+    let ran =
+        place.run(&["sensitivity", "yaw", "--body", "1737.4", "--altitude", "100", "--depression", "20"]).expect(0);
+    assert!(ran.err.contains("1 of 1 designs do not determine the rotation"), "{}", ran.err);
+    place.run(&["sensitivity", "yaw", "--altitude", "600", "--latitude", "91"]).expect(2).says("--latitude: 91");
+    place
+        .run(&["sensitivity", "yaw", "--altitude", "600", "--second-harmonic=-1"])
+        .expect(2)
+        .says("--second-harmonic: -1 is refused");
 }

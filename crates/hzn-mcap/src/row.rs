@@ -3,7 +3,7 @@
 use hzn_core::frames::{Body, UnitVec3};
 use hzn_core::real::Real;
 use hzn_core::report::Position;
-use hzn_core::status::Status;
+use hzn_core::status::{Stage, Status};
 use hzn_core::{Report, Solution};
 use serde::{Deserialize, Serialize};
 
@@ -218,6 +218,11 @@ columns! {
         body_fixed_y_km: Option<f64>,
         /// Position of the camera in the axes of the body, z, kilometres.
         body_fixed_z_km: Option<f64>,
+        /// Rotation of the body about the line to it, relative to the given orientation, degrees; right-handed about
+        /// the direction to the body. Only if its 1σ is below `estimate.yaw_limit_deg`.
+        yaw_deg: Option<f64>,
+        /// 1σ of that rotation, degrees.
+        yaw_sigma_deg: Option<f64>,
     }
 }
 
@@ -302,6 +307,10 @@ impl Row {
     fn set_position<T: Real>(&mut self, p: &Position<T>) {
         let widen = |x: T| x.to_f64();
         self.set_position_m(p.centre_m.map(widen), p.covariance_m2.map(widen), p.body_fixed_m.map(|v| v.map(widen)));
+        if let Some(yaw) = p.yaw_rad {
+            let deg = |x: T| finite(x.to_f64().to_degrees());
+            (self.yaw_deg, self.yaw_sigma_deg) = (deg(yaw.0), deg(yaw.1));
+        }
     }
 
     /// Fills the columns of the position: of the body's centre from the camera in metres (camera frame), with its
@@ -363,6 +372,11 @@ fn finite(x: f64) -> Option<f64> {
 /// Describes the last stage, the verdict of each candidate, and the number of looks if there was more than one.
 fn describe<T: Real>(report: &Report<T>) -> String {
     let mut text = format!("ended at {}", report.stage.name());
+    if report.status == Status::NoLimb && report.stage == Stage::Binarize {
+        text.push_str(
+            ": dark and lit differ by less than 3 % of full scale; the body fills the picture or is not in it",
+        );
+    }
     if report.counters.looks > 1 {
         text.push_str(&format!(" in {} looks", report.counters.looks));
     }

@@ -262,6 +262,16 @@ impl Report {
     fn body_fixed_km<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         vector(py, [self.row.body_fixed_x_km, self.row.body_fixed_y_km, self.row.body_fixed_z_km])
     }
+    #[doc = doc!("Report.yaw_deg")]
+    #[getter]
+    fn yaw_deg(&self) -> Option<f64> {
+        self.row.yaw_deg
+    }
+    #[doc = doc!("Report.yaw_sigma_deg")]
+    #[getter]
+    fn yaw_sigma_deg(&self) -> Option<f64> {
+        self.row.yaw_sigma_deg
+    }
     #[doc = doc!("Report.altitude_km")]
     #[getter]
     fn altitude_km(&self) -> Option<f64> {

@@ -4,7 +4,7 @@ use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Model};
 use hzn_core::{Config, HostHorizon, Prior, covariance};
 use hzn_sim::pose::position_m;
-use hzn_sim::sensitivity::{Design, Sigmas, reference};
+use hzn_sim::sensitivity::{Design, Sigmas, ThirdAxis, reference};
 use hzn_sim::{Look, Pose, Scene};
 
 /// Returns a level pinhole camera of 1920×1080 pixels at 200 km, with R = 1 px², L = 300 px.
@@ -159,4 +159,53 @@ fn the_sensor_reports_what_the_design_says() {
         let largest = promised.fused.pitch_deg.max(promised.fused.roll_deg);
         assert!((reported / largest - 1.0).abs() < 0.03, "{model:?}: {reported} {largest}");
     }
+}
+
+/// The bounds of math.md, 13.8: white errors of 0.05 px, 2513 points on a disc with a radius of 400 px, and 0.1 km of
+/// second harmonic at latitude 30. The published values have two digits.
+#[test]
+fn the_third_axis_has_its_bounds() {
+    let design = |radii_km: [f64; 3], altitude_km: f64| {
+        let radius_km = radii_km.iter().sum::<f64>() / 3.0;
+        let focal_px = 400.0 / (radius_km / (radius_km + altitude_km)).asin();
+        ThirdAxis {
+            camera: camera::Config {
+                theta_max_deg: Some(100.0),
+                ..camera::Config::ideal(Model::Equidistant, 1000, 1000, focal_px)
+            },
+            radii_km,
+            limb_height_km: 0.0,
+            second_harmonic_km: 0.1,
+            altitude_km,
+            latitude_deg: 0.0,
+            azimuth_deg: 0.0,
+            depression_deg: 90.0,
+            roll_deg: 0.0,
+            sigma_px: 0.05,
+            correlation_px: 0.0,
+        }
+    };
+    let earth = [6378.137, 6378.137, 6356.752];
+    let jupiter = [71_492.0, 71_492.0, 66_854.0];
+    for (radii_km, altitude_km, by_latitude, by_height) in [
+        (earth, 600.0, [0.19, 0.25, 0.75], Some(2.2)),
+        (earth, 8000.0, [0.070, 0.093, 0.28], Some(0.44)),
+        (earth, 35_786.0, [0.060, 0.080, 0.24], Some(0.37)),
+        (jupiter, 83.0 * 71_492.0, [0.003, 0.004, 0.013], None),
+    ] {
+        for (latitude_deg, expected) in [0.0, 30.0, 60.0].into_iter().zip(by_latitude) {
+            let at = ThirdAxis { latitude_deg, ..design(radii_km, altitude_km) };
+            let sigmas = at.sigmas().unwrap().unwrap();
+            println!("{altitude_km} km, {latitude_deg}: {sigmas:?}");
+            assert!((sigmas.by_edges_deg / expected - 1.0).abs() < 0.17, "{altitude_km} {latitude_deg}: {sigmas:?}");
+            if let Some(by_height) = by_height.filter(|_| latitude_deg == 30.0) {
+                assert!((sigmas.by_height_deg / by_height - 1.0).abs() < 0.05, "{altitude_km}: {sigmas:?}");
+            }
+        }
+    }
+    // Over the pole of a body of revolution, and for a sphere, there is no third axis.
+    let over_the_pole = ThirdAxis { latitude_deg: 90.0, ..design(earth, 600.0) };
+    assert_eq!(over_the_pole.sigmas().unwrap(), None);
+    assert_eq!(design([1737.4; 3], 600.0).sigmas().unwrap(), None);
+    assert!(ThirdAxis { altitude_km: -100.0, ..design(earth, 600.0) }.sigmas().is_err());
 }

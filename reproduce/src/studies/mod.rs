@@ -19,6 +19,7 @@ mod residuals;
 mod scenes;
 mod setup;
 mod suns;
+mod yaw;
 
 use crate::document::Document;
 use crate::section::Section;
@@ -58,6 +59,7 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("effects", "What moves the limb in the scenes", effects::switched_off_effects),
     reproduced("lost-discs", "Discs under an image circle", looks::lost_discs),
     reproduced("second-look", "One look and several", looks::second_look),
+    reproduced("yaw", "The third axis from the shape of the limb", yaw::orbits),
     reproduced("real-pictures", "Photographs at many settings", looks::real_pictures),
     reproduced("real", "Photographs with truth", real::suite),
     Study { name: "presets", title: "Presets compared", document: Document::Methods, run: presets::compare_presets },

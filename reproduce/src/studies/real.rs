@@ -45,7 +45,9 @@ pub(super) fn suite(_: &Effort) -> anyhow::Result<Section> {
          scores the results of any program. Errors are given where there is a truth. Their sigmas contain the \
          uncertainty of the truth: 0.02° for the pointing of Cassini, 0.05° for the stars, 0.1 % for the distance, \
          because the height of the visible limb is not known better. The night pictures show airglow and hardly any \
-         limb of the surface: they should be refused, or answered within 3σ.",
+         limb of the surface: they should be refused, or answered within 3σ. The residuals on the limb of Jupiter are \
+         not noise: both pictures have the same profile by latitude, about 40 km high, so that the closer picture has \
+         the larger RMS (test `the_residuals_are_the_limb_of_jupiter`).",
     );
     s.table(["picture", "status", "inliers", "RMS", "σ of the axis", "axis error", "range error ± σ"], rows);
     s.text(match wrong.as_slice() {

@@ -187,13 +187,19 @@ impl<'a> Row<'a> {
             range_sigma_km: self.number("range_sigma_km")?,
             other_bodies: self.other_bodies()?,
         };
-        let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        for (columns, v) in [("sun_x, sun_y, sun_z", data.sun_camera), ("pole_x, pole_y, pole_z", data.pole_camera)] {
-            if v.is_some_and(|v| length(&v) < 1e-9) {
-                return Err(self.problem(columns, "has no direction; leave the cells empty if it is not known"));
-            }
-        }
+        self.check_direction("sun_x, sun_y, sun_z", data.sun_camera)?;
+        self.check_direction("pole_x, pole_y, pole_z", data.pole_camera)?;
         Ok(data)
+    }
+
+    fn check_direction(&self, columns: &str, v: Option<[f64; 3]>) -> Result<(), Problem> {
+        let has_none = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt() < 1e-9;
+        match v {
+            Some(v) if has_none(v) => {
+                Err(self.problem(columns, "has no direction; leave the cells empty if it is not known"))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Reads the orientations of further bodies.
@@ -208,10 +214,12 @@ impl<'a> Row<'a> {
             if !q.iter().chain(&pole).any(|name| self.columns.0.contains_key(name)) {
                 continue;
             }
+            let pole_camera = self.vector([&*pole[0], &*pole[1], &*pole[2]])?;
+            self.check_direction(&pole.join(", "), pole_camera)?;
             found.push(Orientation {
                 body: body.to_owned(),
                 camera_to_body_wxyz: self.vector([&*q[0], &*q[1], &*q[2], &*q[3]])?,
-                pole_camera: self.vector([&*pole[0], &*pole[1], &*pole[2]])?,
+                pole_camera,
             });
         }
         Ok(found)
@@ -296,6 +304,8 @@ mod tests {
         let saturn = row.for_body(2, &of_kind(Kind::Saturn)).unwrap();
         assert_eq!((saturn.camera_to_ecef_wxyz, saturn.pole_camera), (None, Some([0.0, 0.0, 1.0])));
         assert!(read("file,pole_x,pole_y,pole_z\na,0,0,0\n").unwrap_err().contains("pole_z: has no direction"));
+        let other = "file,pole_saturn_x,pole_saturn_y,pole_saturn_z\na,0,0,0\n";
+        assert!(read(other).unwrap_err().contains("pole_saturn_z: has no direction"));
         assert!(read("file,q_vulcan_w\na,1\n").unwrap().warnings[0].to_string().contains("unknown column"));
     }
 

@@ -8,8 +8,8 @@
 
 use crate::base::linalg::{M3, V3};
 use crate::base::real::Real;
-use crate::geometry::block::Block;
-use crate::geometry::camera::ray::{Ray, tangent};
+use crate::geometry::block::{Block, LANES};
+use crate::geometry::camera::ray::Ray;
 
 /// The map between the camera frame and the scaled space of one ellipsoid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +30,8 @@ impl<T: Real> Scaling<T> {
             return Self { to: M3::identity() * (one / a), from: M3::identity() * a };
         }
         // R D Rᵀ = c I + (a − c) x xᵀ + (b − c) y yᵀ keeps small differences between the axes exact.
-        let (x, y) = (body_to_cam.column(0).into_owned(), body_to_cam.column(1).into_owned());
+        let m = body_to_cam;
+        let (x, y) = (V3::new(m.m11, m.m21, m.m31), V3::new(m.m12, m.m22, m.m32));
         let root = |a: T, b: T, c: T| M3::identity() * c + x * x.transpose() * (a - c) + y * y.transpose() * (b - c);
         Self { to: root(one / a, one / b, one / c), from: root(a, b, c) }
     }
@@ -47,41 +48,75 @@ impl<T: Real> Scaling<T> {
         direction * (T::one() / direction.dot(&direction).sqrt())
     }
 
-    /// Adds to a vector the part that its product with the derivative of a scaled ray lacks: the derivative is that of
+    /// Returns whether scaled rays are the rays themselves: the body is a sphere.
+    pub(crate) fn is_uniform(&self) -> bool {
+        self.to == M3::identity() * self.to.m11
+    }
+
+    /// Adds to a derivative v·dσ by (u, v) for each lane the part that it lacks, for v·σ = `along`: it is that of
     /// σ = U s/‖U s‖, while (13.10) has that of U s/‖U s‖ at constant length. With w = U⁻¹σ, the derivative of ln ‖U s‖
-    /// is that of a·σ, a = σ − U⁻¹w/(w·w); for a sphere a is 0.
+    /// is −(U⁻¹w)·dσ/(w·w).
     #[inline(always)]
-    pub(crate) fn at_foot(&self, ray: &V3<T>, v: &V3<T>) -> V3<T> {
-        let w = self.from * ray;
-        let a = ray - self.from * w * (T::one() / w.dot(&w));
-        v + a * ray.dot(v)
+    pub(crate) fn add_length(&self, block: &Block<T>, along: &[T; LANES], derivative: &mut [[T; LANES]; 2]) {
+        for l in 0..LANES {
+            let w = times(&self.from, [block.s[0][l], block.s[1][l], block.s[2][l]]);
+            let per = -along[l] / dot(w, w).max(T::from_f64(1e-20));
+            let [gu, gv] = block.gradient_at(l, &V3::from(times(&self.from, w).map(|x| x * per)));
+            (derivative[0][l], derivative[1][l]) = (derivative[0][l] + gu, derivative[1][l] + gv);
+        }
     }
 
     /// Converts a ray with its derivative: dσ = (I − σ σᵀ) U ds/‖U s‖.
     #[inline]
     pub(crate) fn scale_ray(&self, ray: &Ray<T>) -> Ray<T> {
-        let scaled = self.to * ray.s;
-        let per_length = T::one() / scaled.dot(&scaled).sqrt();
-        let s = scaled * per_length;
-        // Both derivatives are in tangent bases, which are perpendicular to the rays, so that the projection is
-        // implicit.
-        let ([a, b], [c, d]) = (tangent(&ray.s), tangent(&s));
-        let (a, b) = (self.to * a * per_length, self.to * b * per_length);
-        let [au, av, bu, bv] = ray.m;
-        let (ca, cb, da, db) = (c.dot(&a), c.dot(&b), d.dot(&a), d.dot(&b));
-        Ray { s, m: [ca * au + cb * bu, ca * av + cb * bv, da * au + db * bu, da * av + db * bv] }
+        let ([x, y, z], m) = self.scaled([ray.s.x, ray.s.y, ray.s.z], ray.m);
+        Ray { s: V3::new(x, y, z), m }
     }
 
     /// Converts the rays of a block, as [`Self::scale_ray`].
     #[inline(never)]
     pub(crate) fn scale_block(&self, block: &mut Block<T>) {
-        for lane in 0..crate::geometry::block::LANES {
-            if block.weight[lane] > T::ZERO {
-                let ray = self.scale_ray(&block.ray_with_derivative(lane));
-                block.set_ray(lane, &ray);
+        let (s, m) = (block.s, block.m);
+        for l in 0..LANES {
+            let (scaled, derivative) = self.scaled([s[0][l], s[1][l], s[2][l]], [m[0][l], m[1][l], m[2][l], m[3][l]]);
+            for i in 0..3 {
+                block.s[i][l] = scaled[i];
+            }
+            for i in 0..4 {
+                block.m[i][l] = derivative[i];
             }
         }
     }
+
+    /// Converts a ray and its derivative in the tangent bases, which are perpendicular to the rays, so that the
+    /// projection (I − σ σᵀ) is implicit. A ray of length 0 stays so.
+    #[inline(always)]
+    fn scaled(&self, s: [T; 3], [au, av, bu, bv]: [T; 4]) -> ([T; 3], [T; 4]) {
+        let one = T::one();
+        let long = times(&self.to, s);
+        let per_length = one / dot(long, long).max(T::from_f64(1e-20)).sqrt();
+        let [x, y, z] = long.map(|c| c * per_length);
+        let (from, to) = (one / (one + s[2]), one / (one + z));
+        let by = |a: T, b: T| {
+            let along = s[0] * a + s[1] * b;
+            let moved = times(&self.to, [a - s[0] * (along * from), b - s[1] * (along * from), -along]);
+            let w = (x * moved[0] + y * moved[1]) * to + moved[2];
+            [(moved[0] - x * w) * per_length, (moved[1] - y * w) * per_length]
+        };
+        let ([au, bu], [av, bv]) = (by(au, bu), by(av, bv));
+        ([x, y, z], [au, av, bu, bv])
+    }
+}
+
+/// Returns the product of a symmetric matrix and a vector, as plain sums that become vector instructions.
+#[inline(always)]
+fn times<T: Real>(m: &M3<T>, [x, y, z]: [T; 3]) -> [T; 3] {
+    [m.m11 * x + m.m12 * y + m.m13 * z, m.m12 * x + m.m22 * y + m.m23 * z, m.m13 * x + m.m23 * y + m.m33 * z]
+}
+
+#[inline(always)]
+fn dot<T: Real>(a: [T; 3], b: [T; 3]) -> T {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// A cone σ·e = cos α about a scaled axis, seen from the scaled space of another body.

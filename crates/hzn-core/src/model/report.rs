@@ -177,6 +177,10 @@ pub struct Position<T> {
     /// Position of the camera in the axes of the body, metres; `None` without an attitude. Its error contains the whole
     /// error of the attitude.
     pub body_fixed_m: Option<[T; 3]>,
+    /// Rotation of the body about the line to it, relative to the given orientation, and its 1-sigma, radians:
+    /// right-handed about the direction from the camera to the body. `None` if the 1-sigma is above
+    /// `estimate.yaw_limit_deg`. The third axis of an attitude, from the shape of the limb.
+    pub yaw_rad: Option<(T, T)>,
     /// The limb of the body in its scaled space.
     #[cfg(feature = "position")]
     pub(crate) limb: ScaledCone<T>,
@@ -190,6 +194,7 @@ impl<T: Real> Position<T> {
             covariance_m2: self.covariance_m2.map(Real::to_f64),
             free_range_m: (self.free_range_m.0.to_f64(), self.free_range_m.1.to_f64()),
             body_fixed_m: self.body_fixed_m.map(|x| x.map(Real::to_f64)),
+            yaw_rad: self.yaw_rad.map(|(yaw, sigma)| (yaw.to_f64(), sigma.to_f64())),
             #[cfg(feature = "position")]
             limb: self.limb.to_f64(),
         }

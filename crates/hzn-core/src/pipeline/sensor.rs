@@ -1,10 +1,14 @@
 //! A configuration that was accepted, with everything that follows from it.
 
 use crate::base::error::ConfigError;
+#[cfg(feature = "position")]
+use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::config::{Config, Mount};
 use crate::geometry::camera::Camera;
 use crate::geometry::frames::{Body, Cam, Rotation};
+#[cfg(feature = "position")]
+use crate::geometry::pixel::ImagePoint;
 use crate::image::region::Region;
 use crate::model::body::{Expected, Prior, PriorError};
 
@@ -12,6 +16,13 @@ use crate::model::body::{Expected, Prior, PriorError};
 const SMALLEST_DISC_PX: f64 = 8.0;
 /// Without a known distance, the search finds discs down to this part of the picture's shorter side.
 const SIDES: f64 = 40.0;
+/// Intervals on each side of the picture, at whose ends the border is compared with the predicted limb. The inside of a
+/// limb is convex, so that the corners alone decide in a picture without distortion.
+#[cfg(feature = "position")]
+const BORDER_STEPS: i32 = 16;
+/// A body fills the picture if its limb is farther outside than this many sigmas of the attitude.
+#[cfg(feature = "position")]
+const FILLS_SIGMAS: f64 = 5.0;
 
 /// A checked configuration with everything that follows from it: lens, region, mounting. It takes some kilobytes. The
 /// lists that a picture needs are in a [`Workspace`](super::Workspace); [`Horizon`](super::Horizon) holds both.
@@ -101,7 +112,10 @@ impl<T: Real> Sensor<T> {
         let smallest = self.config.fits_position(body).then(|| self.smallest_half_angle_rad());
         let expected = Expected { which: which as u8, ..Expected::try_new(body, frame, smallest)? };
         #[cfg(feature = "position")]
-        self.check_disc(&expected)?;
+        {
+            self.check_disc(&expected)?;
+            self.check_limb_in_view(&expected)?;
+        }
         Ok(expected)
     }
 
@@ -123,6 +137,33 @@ impl<T: Real> Sensor<T> {
         match is_small {
             true => Err(PriorError::TooSmall { diameter_px_100: (diameter_px * T::from_f64(100.0)).to_i32() }),
             false => Ok(()),
+        }
+    }
+
+    /// Refuses a body that fills the picture: the position and the attitude say that no part of the limb is near it.
+    #[cfg(feature = "position")]
+    fn check_limb_in_view(&self, expected: &Expected<T>) -> Result<(), PriorError> {
+        let (Some(target), Some((e, attitude_sigma))) = (&expected.target, expected.predicted) else { return Ok(()) };
+        let half_angle = expected.half_angle_rad();
+        let angle_to_limb = |s: &V3<T>| {
+            let scaled = target.scaling.scale(s);
+            half_angle - scaled.cross(&e).dot(&scaled.cross(&e)).sqrt().atan2(scaled.dot(&e))
+        };
+        let (width, height) = (self.camera.width() - 1, self.camera.height() - 1);
+        let border = (0..=BORDER_STEPS).flat_map(|i| {
+            let along = |side: u16| T::from_i32(i32::from(side) * i / BORDER_STEPS);
+            let (u, v) = (along(width), along(height));
+            let (zero, right, low) = (T::ZERO, T::from_i32(i32::from(width)), T::from_i32(i32::from(height)));
+            [(u, zero), (u, low), (zero, v), (right, v)]
+        });
+        let rays = border.filter_map(|(u, v)| self.camera.ray(ImagePoint { u, v }));
+        let inside = rays.map(|ray| angle_to_limb(ray.direction().v())).reduce(|a, b| a.min(b));
+        match inside {
+            Some(beyond) if beyond > attitude_sigma * T::from_f64(FILLS_SIGMAS) && beyond > T::ZERO => {
+                let deg_100 = |rad: T| (rad * T::from_f64(100.0 * 180.0 / core::f64::consts::PI)).to_i32();
+                Err(PriorError::Fills { half_angle_deg_100: deg_100(half_angle), beyond_deg_100: deg_100(beyond) })
+            }
+            _ => Ok(()),
         }
     }
 

@@ -481,6 +481,17 @@ class Report:
         """Position of the camera in the axes of the body, shape (3,), km, if the attitude is known."""
 
     @property
+    def yaw_deg(self) -> float | None:
+        """Rotation of the body about the line to it, relative to the given attitude, degrees.
+
+        It is right-handed about the direction to the body, and None if its 1-sigma is above ``estimate.yaw_limit_deg``.
+        """
+
+    @property
+    def yaw_sigma_deg(self) -> float | None:
+        """1-sigma of `yaw_deg`, degrees."""
+
+    @property
     def altitude_km(self) -> float | None:
         """The given altitude, or the altitude of the position, kilometres."""
 

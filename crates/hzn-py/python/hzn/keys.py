@@ -184,6 +184,9 @@ class Estimate(TypedDict, total=False):
     """Whether the fit gives the position of the body's centre: the whole vector with its covariance. The limb of an
     ellipsoid must then have an orientation: an attitude, or for a body of revolution its pole. Values: true or
     false. Default: true for ``ellipsoid`` and the planets with a name."""
+    yaw_limit_deg: float
+    """The rotation about the line to the body is reported if its 1σ is below this, degrees; 0 never reports it. It
+    needs ``estimate.position`` and a body that is not a sphere. Values: 0 to 180 deg. Default: 1.0."""
     weigh_above_deg: float
     """For ``wtls``: points are weighted where the axis is farther from the optical axis than this, degrees; 0 always
     weights them. Values: 0 to 180 deg. Default: 0.0."""
@@ -396,6 +399,10 @@ class Body(TypedDict, total=False):
     limb_height_sigma_km: float
     """1σ of the limb height, km; 7 km spans the visible wavelengths and usual thresholds. Values: 0 to 10000 km.
     Default: 7.0."""
+    limb_height_harmonic_sigma_km: float | None
+    """1σ of the part of the limb height that goes twice up and down along the limb, km. It decides how well the
+    rotation about the line to the body is known, see ``estimate.yaw_limit_deg``. Values: 0 to 10000 km. Default:
+    ``limb_height_sigma_km``."""
     clipped_height_km: float
     """Height that overexposure adds to the limb, km; it is multiplied by the fraction of the limb that is clipped at
     full scale. Values: 0 to 500 km. Default: 7.8."""

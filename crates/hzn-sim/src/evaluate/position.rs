@@ -15,6 +15,20 @@ pub struct MeasuredPosition {
     pub covariance_km2: [f64; 6],
 }
 
+impl MeasuredPosition {
+    /// Returns the 1-sigma along the line to the body, and the largest one across it, kilometres; `None` if the
+    /// position has no direction.
+    pub fn sigmas_km(&self) -> Option<[f64; 2]> {
+        let u = Vector3::from(self.centre_km).try_normalize(1e-12)?;
+        let across = u.cross(&Vector3::ith(u.iamin(), 1.0)).normalize();
+        let to_sight = Matrix3::from_rows(&[u.transpose(), across.transpose(), u.cross(&across).transpose()]);
+        let [xx, xy, xz, yy, yz, zz] = self.covariance_km2;
+        let p = to_sight * Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * to_sight.transpose();
+        let widest = p.fixed_view::<2, 2>(1, 1).into_owned().symmetric_eigenvalues().max();
+        Some([p.m11, widest].map(|variance| variance.max(0.0).sqrt()))
+    }
+}
+
 /// Error of a position.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PositionMiss {

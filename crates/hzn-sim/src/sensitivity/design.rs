@@ -2,6 +2,7 @@
 
 use hzn_core::camera;
 use hzn_core::error::ConfigError;
+use nalgebra::{Matrix3, Vector3};
 
 /// A camera above a sphere.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,4 +73,21 @@ impl Design {
     pub fn dip_deg(&self) -> Result<f64, DesignError> {
         Ok(90.0 - self.half_angle_rad()?.to_degrees())
     }
+}
+
+/// Returns the rotation into the camera frame for a camera with this local vertical and north. The camera looks in the
+/// direction `azimuth` (from north over east), `depression` below the horizontal, and is turned by `roll` about its
+/// optical axis, all in degrees. The direction down is then that of [`Design::axis`].
+pub(super) fn rotation_to_camera(
+    up: &Vector3<f64>,
+    north: &Vector3<f64>,
+    [azimuth, depression, roll]: [f64; 3],
+) -> Matrix3<f64> {
+    let [(sa, ca), (sd, cd), (sr, cr)] = [azimuth, depression, roll].map(|deg| deg.to_radians().sin_cos());
+    let ahead = north * ca + north.cross(up) * sa;
+    let z = ahead * cd - up * sd;
+    let down = -up * cd - ahead * sd;
+    let right = down.cross(&z);
+    let (x, y) = (right * cr + down * sr, down * cr - right * sr);
+    Matrix3::from_rows(&[x.transpose(), y.transpose(), z.transpose()])
 }

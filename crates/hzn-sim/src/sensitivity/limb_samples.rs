@@ -30,42 +30,49 @@ impl Design {
         let b1 = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
         let b2 = e.cross(&b1);
         let (sin, cos) = half_angle_rad.sin_cos();
-        let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
-        let project = |azimuth: f64| {
+        sample(camera, &|azimuth| {
             let (s, c) = azimuth.sin_cos();
-            let p = camera.project(&UnitVec3::try_new((e * cos + (b1 * c + b2 * s) * sin).into())?)?;
-            (p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5).then_some(p)
-        };
-        let mut samples = Vec::new();
-        for azimuths in visible_segments(&project) {
-            let points: Vec<(f64, ImagePoint<f64>)> = azimuths.iter().filter_map(|&a| Some((a, project(a)?))).collect();
-            // Each entry has (arc length, azimuth) along the segment.
-            let mut arc = 0.0;
-            let mut along_segment = Vec::with_capacity(points.len());
-            for (i, (azimuth, p)) in points.iter().enumerate() {
-                if let Some((_, before)) = i.checked_sub(1).and_then(|j| points.get(j)) {
-                    arc += (p.u - before.u).hypot(p.v - before.v);
-                }
-                along_segment.push((arc, *azimuth));
+            e * cos + (b1 * c + b2 * s) * sin
+        })
+    }
+}
+
+/// Returns the points of a closed curve of directions that are in view, one pixel apart.
+pub(super) fn sample(camera: &Camera<f64>, direction: &impl Fn(f64) -> Vector3<f64>) -> Vec<LimbSample> {
+    let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
+    let project = |azimuth: f64| {
+        let p = camera.project(&UnitVec3::try_new(direction(azimuth).into())?)?;
+        (p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5).then_some(p)
+    };
+    let mut samples = Vec::new();
+    for azimuths in visible_segments(&project) {
+        let points: Vec<(f64, ImagePoint<f64>)> = azimuths.iter().filter_map(|&a| Some((a, project(a)?))).collect();
+        // Each entry has (arc length, azimuth) along the segment.
+        let mut arc = 0.0;
+        let mut along_segment = Vec::with_capacity(points.len());
+        for (i, (azimuth, p)) in points.iter().enumerate() {
+            if let Some((_, before)) = i.checked_sub(1).and_then(|j| points.get(j)) {
+                arc += (p.u - before.u).hypot(p.v - before.v);
             }
-            let count = arc.round().clamp(1.0, MAX_POINTS);
-            let spacing = arc / count;
-            let mut pairs = along_segment.windows(2);
-            let mut pair = pairs.next();
-            for i in 0..count as usize {
-                let target = (i as f64 + 0.5) * spacing;
-                while pair.is_some_and(|s| s[1].0 < target) {
-                    pair = pairs.next();
-                }
-                let Some([(a0, phi0), (a1, phi1)]) = pair else { break };
-                let azimuth = phi0 + (phi1 - phi0) * (target - a0) / (a1 - a0).max(1e-12);
-                if let Some(point) = project(azimuth) {
-                    samples.push(LimbSample { point, step_px: (i > 0).then_some(spacing) });
-                }
+            along_segment.push((arc, *azimuth));
+        }
+        let count = arc.round().clamp(1.0, MAX_POINTS);
+        let spacing = arc / count;
+        let mut pairs = along_segment.windows(2);
+        let mut pair = pairs.next();
+        for i in 0..count as usize {
+            let target = (i as f64 + 0.5) * spacing;
+            while pair.is_some_and(|s| s[1].0 < target) {
+                pair = pairs.next();
+            }
+            let Some([(a0, phi0), (a1, phi1)]) = pair else { break };
+            let azimuth = phi0 + (phi1 - phi0) * (target - a0) / (a1 - a0).max(1e-12);
+            if let Some(point) = project(azimuth) {
+                samples.push(LimbSample { point, step_px: (i > 0).then_some(spacing) });
             }
         }
-        samples
     }
+    samples
 }
 
 /// Returns the visible ranges of azimuth as rising azimuths in radians. Bisection locates their ends.

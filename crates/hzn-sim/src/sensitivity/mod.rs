@@ -5,15 +5,20 @@
 //! |---|---|
 //! | [`design`] | camera, body and position |
 //! | `limb_samples` | the limb in view as points one pixel apart |
+//! | `correlated` | the sum over all pairs of points with correlated errors |
 //! | [`sigmas`] | the covariance of these points with correlated errors |
+//! | [`third_axis`] | the rotation about the line to a flattened body |
 //! | [`mod@reference`] | published results, computed independently of this program |
 //! | [`chart`] | the conic that is seen from each altitude; the error of a spherical Earth |
 
 pub mod chart;
+mod correlated;
 pub mod design;
 mod limb_samples;
 pub mod reference;
 pub mod sigmas;
+pub mod third_axis;
 
 pub use design::{Design, DesignError};
 pub use sigmas::{DirectionSigmas, Sigmas};
+pub use third_axis::{ThirdAxis, ThirdAxisSigmas};

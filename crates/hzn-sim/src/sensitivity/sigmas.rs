@@ -6,9 +6,10 @@
 //! a ← ρ (a + b). This implementation is independent of hzn-core, and a test compares both.
 
 use hzn_core::camera::{Camera, Model};
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use serde::Serialize;
 
+use super::correlated::{Row, correlated};
 use super::design::{Design, DesignError};
 use super::limb_samples::LimbSample;
 
@@ -40,27 +41,6 @@ pub struct Sigmas {
     pub braun_barf: Option<DirectionSigmas>,
     /// The overbound of their equation 37: one sigma for every direction.
     pub braun_barf_bound_deg: Option<f64>,
-}
-
-/// A point's contribution to the normal equations.
-struct Row<const N: usize> {
-    q: SVector<f64, N>,
-    g: Vector2<f64>,
-    /// Correlation with the point before; 0 at the first point of a segment.
-    rho: f64,
-}
-
-/// Returns X of the module's equation, the sum over all pairs of b ρ… bᵀ.
-fn correlated<const N: usize>(rows: &[Row<N>]) -> SMatrix<f64, N, N> {
-    let mut x = SMatrix::<f64, N, N>::zeros();
-    let (mut a, mut before) = (SMatrix::<f64, N, 2>::zeros(), SMatrix::<f64, N, 2>::zeros());
-    for row in rows {
-        let b = row.q * row.g.transpose();
-        a = (a + before) * row.rho;
-        x += b * b.transpose() + b * a.transpose() + a * b.transpose();
-        before = b;
-    }
-    x
 }
 
 impl Design {

@@ -15,7 +15,8 @@ use super::sweep::Values;
 /// exact.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Sigmas; or the field of view that shows each kind of limb; or the error of treating the Earth as a sphere
+    /// Sigmas of the direction, or of the rotation about it; or the field of view that shows each kind of limb; or the
+    /// error of treating the Earth as a sphere
     #[arg(value_enum, default_value_t = What::Sigma)]
     pub(super) what: What,
     /// Field of view across the width, degrees
@@ -36,13 +37,13 @@ pub(crate) struct Args {
     /// Take camera, body and noise from this sensor.toml
     #[arg(short, long, value_name = "FILE")]
     pub(super) sensor: Option<PathBuf>,
-    /// Bodies: earth, moon, sun, or a radius in kilometres; several with commas
+    /// Bodies: earth, moon, sun, a planet or moon by name, or a radius in kilometres; several with commas
     #[arg(long, value_name = "BODY", value_delimiter = ',')]
     pub(super) body: Vec<Body>,
-    /// Height of the visible limb, kilometres [default: 10 for the Earth, else 0]
+    /// Height of the visible limb, kilometres [default: 10 for the Earth, that of the body for a planet]
     #[arg(long, value_name = "KM")]
     pub(super) limb_height: Option<Values>,
-    /// 1-sigma of the limb height, kilometres [default: 2]
+    /// 1-sigma of the limb height, kilometres [default: 2, that of the body for a planet]
     #[arg(long, value_name = "KM")]
     pub(super) limb_height_sigma: Option<f64>,
     /// 1-sigma of the altitude, kilometres [default: 0.5]
@@ -54,6 +55,16 @@ pub(crate) struct Args {
     /// Turn of the camera about its optical axis, degrees
     #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true)]
     pub(super) roll: Values,
+    /// For `yaw`: latitude of the camera as seen from the centre of the body, degrees
+    #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true)]
+    pub(super) latitude: Values,
+    /// For `yaw`: direction of view from north over east, degrees
+    #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true)]
+    pub(super) azimuth: Values,
+    /// For `yaw`: 1-sigma of the second harmonic of the limb height along the limb, kilometres [default: the 1-sigma of
+    /// the limb height]
+    #[arg(long, value_name = "KM")]
+    pub(super) second_harmonic: Option<f64>,
     /// 1-sigma of an edge point, pixels [default: 1]
     #[arg(long, value_name = "PX")]
     pub(super) sigma_px: Option<f64>,
@@ -72,6 +83,8 @@ pub(crate) struct Args {
 pub(super) enum What {
     /// Sigma of the direction
     Sigma,
+    /// Sigma of the rotation about the line to a flattened body: the third axis, from the shape of its limb
+    Yaw,
     /// Smallest fields of view that show an ellipse, a hyperbola, or the whole disc, by altitude
     Visibility,
     /// Angles between centre, geodetic vertical and limb axis of WGS-84, by latitude and altitude

@@ -1,37 +1,65 @@
 //! Bodies, by name or radius.
 
-use hzn_core::body::{self, MOON_RADIUS_KM, SUN_RADIUS_KM};
-use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
+use hzn_core::body::{self, Kind, MOON_RADIUS_KM, SUN_RADIUS_KM};
+use hzn_core::ellipsoid::{EARTH_MEAN_RADIUS_M, WGS84_A_M, WGS84_B_M};
 
-/// A sphere, with the limb height that is used if none is given.
+/// A body, with the limb height that is used if none is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Body {
+    /// Mean radius, for the studies that take the body for a sphere.
     pub(super) radius_km: f64,
+    pub(super) radii_km: [f64; 3],
     pub(super) limb_height_km: f64,
+    /// 1-sigma of the limb height, and of its second harmonic, if they are known of the body.
+    pub(super) limb_height_sigma_km: Option<f64>,
+    pub(super) second_harmonic_km: Option<f64>,
 }
 
 impl Body {
-    /// The mean Earth, with the visible limb at 10 km.
-    pub(super) const EARTH: Self = Self { radius_km: EARTH_MEAN_RADIUS_M / 1e3, limb_height_km: 10.0 };
+    /// The Earth (WGS-84), with the visible limb at 10 km.
+    pub(super) const EARTH: Self = Self {
+        radius_km: EARTH_MEAN_RADIUS_M / 1e3,
+        radii_km: [WGS84_A_M / 1e3, WGS84_A_M / 1e3, WGS84_B_M / 1e3],
+        limb_height_km: 10.0,
+        limb_height_sigma_km: None,
+        second_harmonic_km: None,
+    };
 
-    /// Returns the body of a sensor.toml, as a sphere.
+    /// Returns the body of a sensor.toml.
     pub(super) fn from_config(body: &body::Config) -> Self {
-        Self { radius_km: body.mean_radius_km(), limb_height_km: body.limb_height_km }
+        let radius_km = body.mean_radius_km();
+        let radii_km = body.figure_km().unwrap_or([radius_km; 3]);
+        Self {
+            radius_km,
+            radii_km,
+            limb_height_km: body.limb_height_km,
+            limb_height_sigma_km: Some(body.limb_height_sigma_km),
+            second_harmonic_km: body.limb_height_harmonic_sigma_km,
+        }
     }
 }
 
 impl std::str::FromStr for Body {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let bare = |radius_km| Self { radius_km, limb_height_km: 0.0 };
+        let bare = |radius_km| Self { radius_km, radii_km: [radius_km; 3], limb_height_km: 0.0, ..Self::EARTH };
         match text {
-            "earth" | "earth-sphere" => Ok(Self::EARTH),
+            "earth" => Ok(Self::EARTH),
+            "earth-sphere" => Ok(Self { radii_km: [Self::EARTH.radius_km; 3], ..Self::EARTH }),
             "moon" => Ok(bare(MOON_RADIUS_KM)),
             "sun" => Ok(bare(SUN_RADIUS_KM)),
-            _ => match text.parse::<f64>() {
-                Ok(km) if km > 0.0 && km.is_finite() => Ok(bare(km)),
-                _ => Err(format!("{text:?} is not a body; expected earth, moon, sun, or a radius in kilometres")),
-            },
+            _ => {
+                if let Some(kind) = Kind::ALL.iter().find(|kind| kind.name() == text && kind.planet().is_some()) {
+                    return Ok(Self::from_config(&body::Config::of_kind(*kind, None)));
+                }
+                match text.parse::<f64>() {
+                    Ok(km) if km > 0.0 && km.is_finite() => Ok(bare(km)),
+                    _ => Err(format!(
+                        "{text:?} is not a body; expected earth, moon, sun, a planet such as jupiter, or a radius in \
+                         kilometres"
+                    )),
+                }
+            }
         }
     }
 }

@@ -3,10 +3,12 @@
 mod args;
 mod body;
 mod charts;
+mod grid;
 mod sigma;
 mod study;
 mod sweep;
 mod table;
+mod yaw;
 
 use hzn_run::disk;
 use hzn_run::source::ending;
@@ -27,6 +29,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let Study { table, chart, notes } = match args.what {
         What::Sigma => sigma::compute(args)?,
+        What::Yaw => yaw::compute(args)?,
         What::Visibility => charts::visibility(args)?,
         What::SphericalEarth => charts::spherical_earth(args)?,
     };

@@ -311,23 +311,22 @@ impl<T: Real> Camera<T> {
     pub fn project(&self, d: &UnitVec3<Cam, T>) -> Option<ImagePoint<T>> {
         #[cfg(feature = "position")]
         if let Some(scaling) = &self.scaling {
-            let d = UnitVec3::assume_unit(scaling.unscale(d.v()));
-            return self.project_from_camera(&d);
+            return self.project_from_camera(&(scaling.from * d.v()));
         }
-        self.project_from_camera(d)
+        self.project_from_camera(d.v())
     }
 
-    /// Does the same as [`Self::project`], for a direction in the camera frame.
+    /// Does the same as [`Self::project`], for a direction in the camera frame of any length.
     #[inline(always)]
-    fn project_from_camera(&self, d: &UnitVec3<Cam, T>) -> Option<ImagePoint<T>> {
+    fn project_from_camera(&self, d: &V3<T>) -> Option<ImagePoint<T>> {
         match &self.turning {
-            None => self.project_in_row_frame(d.v()),
-            Some(turning) => turning.project(d.v(), |s| self.project_in_row_frame(s)),
+            None => self.project_in_row_frame(d),
+            Some(turning) => turning.project(d, |s| self.project_in_row_frame(s)),
         }
     }
 
-    /// Does the same as [`Self::project`], for a direction in the camera frame at the time when the point's row is
-    /// exposed.
+    /// Does the same as [`Self::project`], for a direction of any length in the camera frame at the time when the
+    /// point's row is exposed.
     fn project_in_row_frame(&self, s: &V3<T>) -> Option<ImagePoint<T>> {
         let h = (s.x * s.x + s.y * s.y).sqrt();
         let theta = h.atan2(s.z);
@@ -356,10 +355,10 @@ impl<T: Real> Camera<T> {
     }
 
     /// Returns this camera with its rays in the scaled space of an ellipsoid. [`Self::project`] then takes scaled
-    /// directions.
+    /// directions. For a sphere these are the directions themselves.
     #[cfg(feature = "position")]
     pub(crate) fn with_scaling(self, scaling: Scaling<T>) -> Self {
-        Self { scaling: Some(scaling), ..self }
+        Self { scaling: Some(scaling).filter(|scaling| !scaling.is_uniform()), ..self }
     }
 
     /// Returns the scaled space of the rays; `None` for rays in the camera frame.

@@ -85,6 +85,13 @@ section! {
         /// The height is 24 km at 440 nm and 12 km at 650 nm. The range of thresholds is a quarter to three quarters of
         /// the limb's brightness. A larger sigma gives the expected half-angle less weight.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
+        /// 1σ of the part of the limb height that goes twice up and down along the limb, km. It decides how well the
+        /// rotation about the line to the body is known, see `estimate.yaw_limit_deg`.
+        ///
+        /// Nothing is known of the shape of the height along the limb, so that by default it has the sigma of the
+        /// height itself.
+        @- limb_height_harmonic_sigma_km: Option<f64> = None, [0.0 to 1e4]
+            { needs: "position", unset: "`limb_height_sigma_km`", example: "0.1" };
         /// Height that overexposure adds to the limb, km; it is multiplied by the fraction of the limb that is clipped
         /// at full scale.
         ///

@@ -1,6 +1,6 @@
 //! What is known about a body whose position is fitted: its shape, its orientation, its distance (math.md, 13).
 
-use crate::base::linalg::{M3, V3, basis, symmetric_eigen};
+use crate::base::linalg::{M3, V3, basis, symmetric_eigen, unit};
 use crate::base::real::Real;
 use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
 use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
@@ -46,6 +46,8 @@ pub(crate) struct Target<T> {
     pub(crate) attitude_sigma_rad: T,
     /// 1-sigma of the limb height, metres; clipping adds to it.
     pub(crate) limb_sigma_m: T,
+    /// 1-sigma of each component of the second harmonic of the limb height, metres.
+    pub(crate) second_harmonic_sigma_m: T,
     /// Height that clipping adds to the limb, metres.
     pub(crate) raised_m: T,
     /// 1-sigma of each semi-axis, metres.
@@ -89,6 +91,9 @@ impl<T: Real> Target<T> {
             has_attitude: attitude.is_some(),
             attitude_sigma_rad: if is_sphere { T::ZERO } else { attitude_sigma_rad },
             limb_sigma_m: T::from_f64(body.limb_height_sigma_km) * km,
+            second_harmonic_sigma_m: T::from_f64(
+                body.limb_height_harmonic_sigma_km.unwrap_or(body.limb_height_sigma_km),
+            ) * km,
             raised_m: T::ZERO,
             radii_sigma_m: T::from_f64(body.radii_sigma_km) * km,
             range: range(body, prior, limb)?,
@@ -189,6 +194,11 @@ impl<T: Real> Target<T> {
         let u = self.scaling.to.map(|x| x.to_f64() / grown);
         let r = (r / self.unit_m).map(Real::to_f64);
         let (y, a) = (u * r, u * u);
+        if self.scaling.is_uniform() {
+            // (U r)·(U r) is 1/sin².
+            let half_angle = libm::atan2(1.0, libm::sqrt(y.dot(&y) - 1.0));
+            return half_angle.is_finite().then_some((unit(&r.map(T::from_f64))?, T::from_f64(half_angle)));
+        }
         let ar = u * y;
         let m: M3<f64> = ar * ar.transpose() - a * (y.dot(&y) - 1.0);
         let rows = [[m.m11, m.m12, m.m13], [m.m12, m.m22, m.m23], [m.m13, m.m23, m.m33]];

@@ -113,6 +113,13 @@ pub enum PriorError {
         /// Diameter of the disc in hundredths of a pixel.
         diameter_px_100: i32,
     },
+    /// The limb lies outside of the picture on all sides, by more than five sigmas of the attitude.
+    Fills {
+        /// Half-angle of the limb in hundredths of a degree.
+        half_angle_deg_100: i32,
+        /// Smallest angle from the border of the picture to the limb, in hundredths of a degree.
+        beyond_deg_100: i32,
+    },
     /// The sensor has no body with that number.
     NoBody,
 }
@@ -127,7 +134,7 @@ impl core::fmt::Display for PriorError {
                 let place = if altitude < limb { "below" } else { "not above" };
                 return write!(f, "altitude {altitude} km is {place} the limb height {limb} km");
             }
-            Self::Attitude => "qw, qx, qy, qz must be a rotation: the quaternion's length must be 1",
+            Self::Attitude => "qw, qx, qy, qz must be a rotation: the quaternion's length must be 1 within 0.01",
             Self::AttitudeSigma => "attitude_sigma_deg must be a finite number, 0 or more",
             Self::Rate => "rate_x, rate_y, rate_z must be finite and at most 1000 (rad/s)",
             Self::NoAltitude => {
@@ -151,6 +158,14 @@ impl core::fmt::Display for PriorError {
             Self::TooSmall { diameter_px_100 } => {
                 let diameter = f64::from(*diameter_px_100) / 100.0;
                 return write!(f, "the body is {diameter} px wide at this distance; the smallest is 8 px");
+            }
+            Self::Fills { half_angle_deg_100, beyond_deg_100 } => {
+                let [half_angle, beyond] = [half_angle_deg_100, beyond_deg_100].map(|x| f64::from(*x) / 100.0);
+                return write!(
+                    f,
+                    "the body fills the picture: its limb, {half_angle} deg from its centre, is {beyond} deg or more \
+                     beyond the border of the picture, which is over 5 attitude_sigma_deg"
+                );
             }
             Self::NoBody => "the sensor has no body with this number",
         })

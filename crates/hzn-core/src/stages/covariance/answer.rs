@@ -39,6 +39,18 @@ pub(crate) struct Located<T> {
     /// The same before the known distance was fused.
     pub(crate) free_r: V3<T>,
     pub(crate) free_p: M3<T>,
+    /// The rotation about the line to the body, if it is known well enough.
+    pub(crate) turn: Option<Turn<T>>,
+}
+
+/// A rotation of the body about the line to it, relative to the given orientation; right-handed about the direction
+/// from the camera to the body.
+#[cfg(feature = "position")]
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Turn<T> {
+    pub(crate) rad: T,
+    /// 1-sigma.
+    pub(crate) sigma_rad: T,
 }
 
 /// Errors of the edge points that a covariance includes.

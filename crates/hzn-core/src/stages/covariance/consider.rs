@@ -45,22 +45,28 @@ impl<T: Real> Sensitivity<T> {
         let to_body = target.body_to_cam.transpose();
         let mut normal = [T::ZERO; 6];
         let (mut limb, mut rotation, mut axes, mut light) = (zero, [zero; 3], [zero; 3], [zero; 2]);
+        // The limb of a sphere does not feel a rotation, and exact semi-axes have no error.
+        let turns = !target.scaling.is_uniform();
+        let reshapes = target.radii_sigma_m > T::ZERO;
         part(blocks, fit).for_each(|row| {
             row.add_to(&mut normal);
             let per = T::one() / (row.x * row.x + row.y * row.y).max(T::from_f64(1e-20)).sqrt();
             let outward = (b1 * row.x + b2 * row.y) * (per * fit.c) - fit.e * sin;
             let n = target.scaling.to * outward;
-            let q = target.scaling.from * outward;
             let across = row.shift();
             light[0] += across * (row.x * per);
             light[1] += across * (row.y * per);
             let h = row.h * (tan * sin);
             limb += h * n.dot(&n).sqrt();
-            let turn = q.cross(&n);
-            let (n, q) = (to_body * n, to_body * q);
-            for i in 0..3 {
-                rotation[i] += h * turn[i];
-                axes[i] += h * (n[i] * q[i] / target.semi_axes[i]);
+            if turns {
+                let turn = (target.scaling.from * outward).cross(&n);
+                rotation.iter_mut().zip(turn.iter()).for_each(|(sum, turn)| *sum += h * *turn);
+            }
+            if reshapes {
+                let (n, q) = (to_body * n, to_body * (target.scaling.from * outward));
+                for i in 0..3 {
+                    axes[i] += h * (n[i] * q[i] / target.semi_axes[i]);
+                }
             }
         });
         let response: M3<T> = response(&fit.sums.with_normal(normal), fit.mean, true)?;

@@ -25,6 +25,8 @@ pub(crate) mod position;
 #[cfg(feature = "reml")]
 pub mod reml;
 mod sandwich;
+#[cfg(feature = "position")]
+mod third_axis;
 
 use crate::base::linalg::M3;
 use crate::base::real::Real;
@@ -81,7 +83,12 @@ pub(crate) fn fuse<T: Real>(
     })?;
     #[cfg(feature = "position")]
     if let Some(target) = expected.target.as_ref().filter(|_| fit.free) {
-        return position::fused(blocks, fit, &p, edge, expected, target, estimate, budget);
+        let mut fused = position::fused(blocks, fit, &p, edge, expected, target, estimate, budget)?;
+        if let Some(located) = &mut fused.located {
+            let limit_rad = estimate.yaw_limit_deg.to_radians();
+            located.turn = third_axis::measured(blocks, fit, expected, target, config, camera, limit_rad);
+        }
+        return Some(fused);
     }
     fused(fit, &p, edge, expected, estimate, budget)
 }

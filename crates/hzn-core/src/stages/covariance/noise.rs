@@ -42,14 +42,19 @@ pub(super) struct EdgeNoiseModel<T> {
 impl<T: Real> EdgeNoiseModel<T> {
     /// Makes the noise model of an edge, from its residuals if the configuration says so.
     pub(super) fn new(fit: &Fit<T>, config: &Config) -> Self {
+        Self::with_residuals(fit, fit.rms_px, config)
+    }
+
+    /// Does the same for another RMS of the residuals.
+    pub(super) fn with_residuals(fit: &Fit<T>, rms_px: T, config: &Config) -> Self {
         let told = T::from_f64(config.sigma_px);
         let (length_px, common) = match config.noise {
-            Noise::Rms => (measured_length_px(fit), fit.rms_px),
+            Noise::Rms => (measured_length_px(fit), rms_px),
             // The likelihood includes the errors that the fit absorbs, at every length.
             Noise::Given | Noise::Reml => (T::ZERO, T::ZERO),
         };
         Self {
-            variance: (told * told).max(fit.rms_px * fit.rms_px),
+            variance: (told * told).max(rms_px * rms_px),
             length_px: T::from_f64(config.correlation_px).max(length_px),
             shift_px: T::from_f64(config.bias_px).max(common),
             tilt_px: T::from_f64(config.tilt_px).max(common * T::from_f64(END_PER_RMS)),

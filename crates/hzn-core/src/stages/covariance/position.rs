@@ -39,7 +39,7 @@ pub(super) fn fused<T: Real>(
 ) -> Option<Fused<T>> {
     let by_direction = fusion::fused(fit, p, edge, expected, estimate, budget)?;
     let sin = (fit.k * (T::one() + fit.c)).max(T::ZERO).sqrt();
-    if !is_determined(fit, sin, p.m33) || !is_lit_inside(blocks, &fit.e) {
+    if !is_determined(fit, sin, p.m33) || !is_lit_inside(blocks, fit) {
         return target.range.map(|_| by_direction);
     }
     let given = Sensitivity::new(blocks, fit, target)?;
@@ -63,17 +63,20 @@ fn is_determined<T: Real>(fit: &Fit<T>, sin: T, var_cos: T) -> bool {
 
 /// Returns whether most of the edge is lit on the side of the axis. Noise can turn the curvature of a short arc over,
 /// and the fitted body is then on the dark side.
-fn is_lit_inside<T: Real>(blocks: &[Block<T>], e: &V3<T>) -> bool {
-    let (mut inside, mut all) = (T::ZERO, T::ZERO);
+fn is_lit_inside<T: Real>(blocks: &[Block<T>], fit: &Fit<T>) -> bool {
+    let (mut inside, half) = (T::ZERO, fit.sums.weight * T::from_f64(0.5));
     for block in blocks {
+        let [gu, gv] = block.gradient(&fit.e);
         for lane in 0..LANES {
-            all += block.weight[lane];
-            if block.weight[lane] > T::ZERO && block.is_lit_towards(lane, e) {
+            if block.weight[lane] > T::ZERO && block.is_lit_along(lane, [gu[lane], gv[lane]]) {
                 inside += block.weight[lane];
             }
         }
+        if inside > half {
+            return true;
+        }
     }
-    inside + inside > all
+    false
 }
 
 /// Returns the position that the fit gives, with all errors of the given shape and orientation.
@@ -97,7 +100,7 @@ fn located<T: Real>(
     given.by_axis.iter().for_each(|v| add(v, target.radii_sigma_m / target.unit_m));
     lights.iter().for_each(|v| add(v, T::one()));
     let covariance = g * errors * g.transpose();
-    Located { r, p: covariance, free_r: r, free_p: covariance }
+    Located { r, p: covariance, free_r: r, free_p: covariance, turn: None }
 }
 
 /// Returns the errors by light that changes along the limb, for a shift of one pixel. Without the direction to the Sun,
@@ -203,6 +206,7 @@ pub(crate) fn place<T: Real>(fused: &Fused<T>, target: &Target<T>, mean_radius_m
             covariance_m2: [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33],
             free_range_m: (length(&free_r), sigma_m),
             body_fixed_m: target.has_attitude.then(|| body_fixed.into()),
+            yaw_rad: found.turn.map(|turn| (turn.rad, turn.sigma_rad)),
             limb: ScaledCone { e: fused.e, c: fused.c, scaling: Some(target.scaling) },
         }),
     })

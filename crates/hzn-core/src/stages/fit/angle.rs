@@ -10,10 +10,10 @@
 //! that its arc sine is a short series.
 
 use super::cone::{Cone, State};
-use super::sums::{Weights, pass};
+use super::sums::{self, Weights, pass};
 use crate::base::linalg::{V3, basis, invert_spd3, unit};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, LANES};
+use crate::geometry::block::{Block, HALF_LANES, LANES};
 use crate::geometry::scaling::Scaling;
 
 /// Largest number of steps. From the robust fit, three are enough (math.md, 13.3).
@@ -22,13 +22,24 @@ const STEPS: usize = 6;
 const LEAST_SIN: f64 = 1e-7;
 
 /// Fits axis and half-angle with the weights that the points have. `None` if the points do not determine the cone.
-pub(super) fn settle<T: Real>(blocks: &mut [Block<T>], start: State<T>, scaling: &Scaling<T>) -> Option<Cone<T>> {
+/// `at_start` are the normal equations at the start, if they are known. If the first step is the last one, the result
+/// is so near that they hold for it, too.
+pub(super) fn settle<T: Real>(
+    blocks: &mut [Block<T>],
+    start: State<T>,
+    at_start: Option<sums::Sums<T>>,
+    scaling: &Scaling<T>,
+) -> Option<Cone<T>> {
+    let scaling = Some(scaling).filter(|scaling| !scaling.is_uniform());
     let mut at = start;
     let mut alpha = at.sin().atan2(at.c());
+    let (b1, b2) = basis(&at.e);
+    let centre = (b1 * at.mean[0] + b2 * at.mean[1]) * (T::one() / at.sin().max(T::from_f64(LEAST_SIN)));
+    let mut known = at_start;
     for _ in 0..STEPS {
         let (b1, b2) = basis(&at.e);
-        let sums = Sums::new(blocks, &at.e, [&b1, &b2], alpha, scaling);
-        let [d1, d2, d_alpha] = sums.step()?;
+        let sums = Sums::new(blocks, &at.e, [&b1, &b2], alpha, &centre, scaling);
+        let ([d1, d2, d_alpha], gain, is_last) = sums.step()?;
         at.e = unit(&(at.e + b1 * d1 + b2 * d2))?;
         alpha += d_alpha;
         let quarter_turn = T::from_f64(core::f64::consts::FRAC_PI_2);
@@ -37,15 +48,18 @@ pub(super) fn settle<T: Real>(blocks: &mut [Block<T>], start: State<T>, scaling:
             return None;
         }
         let size = d1.abs() + d2.abs() + d_alpha.abs();
-        // Convergence is quadratic.
-        if size * size < T::EPSILON * T::from_f64(2.0) * alpha {
+        // Exact rays leave no residuals to compare with; the convergence is then quadratic.
+        if is_last || size * size < T::EPSILON * T::from_f64(2.0) * alpha {
+            known.iter_mut().for_each(|known| known.cost = (sums.cost - gain).max(T::ZERO));
             break;
         }
+        known = None;
     }
     let (half, _) = (alpha * T::from_f64(0.5)).sin_cos();
     at.k = half * half * T::from_f64(2.0);
     let (b1, b2) = basis(&at.e);
-    let (mean, sums) = (at.mean, pass(blocks, &at.e, &b1, &b2, at.k, at.mean, &Weights::Kept, None));
+    let mean = at.mean;
+    let sums = known.unwrap_or_else(|| pass(blocks, &at.e, &b1, &b2, at.k, mean, &Weights::Kept, None));
     (sums.weight > T::from_f64(2.5) && sums.cost >= T::ZERO).then_some(Cone {
         at,
         mean,
@@ -56,73 +70,80 @@ pub(super) fn settle<T: Real>(blocks: &mut [Block<T>], start: State<T>, scaling:
     })
 }
 
-/// Normal equations about the mean of Bᵀu.
+/// Normal equations about a value `mean` near the mean of Bᵀu.
 struct Sums<T> {
     /// Upper triangle of Σ w h hᵀ.
     n: [T; 6],
     g: [T; 3],
+    /// Σ w ρ², and the sum of the robust weights.
+    cost: T,
+    weight: T,
     mean: [T; 2],
 }
 
 impl<T: Real> Sums<T> {
-    fn new(blocks: &[Block<T>], e: &V3<T>, b: [&V3<T>; 2], alpha: T, scaling: &Scaling<T>) -> Self {
-        let mean = mean_azimuth(blocks, e, b);
+    /// Sums over the points. `centre` is near the mean of u. Without a scaling, the scaled rays are the rays.
+    fn new(
+        blocks: &[Block<T>],
+        e: &V3<T>,
+        [b1, b2]: [&V3<T>; 2],
+        alpha: T,
+        centre: &V3<T>,
+        scaling: Option<&Scaling<T>>,
+    ) -> Self {
+        let mean = [centre.dot(b1), centre.dot(b2)];
         let (sin, cos) = alpha.sin_cos();
-        let (mut n, mut g) = ([T::ZERO; 6], [T::ZERO; 3]);
+        let mut totals = [[T::ZERO; HALF_LANES]; 11];
         for block in blocks {
-            for lane in 0..LANES {
-                let weight = block.weight[lane];
-                if !(weight > T::ZERO) {
-                    continue;
-                }
-                let [x, y, across] = azimuth(block, lane, e, b);
-                let d = block.ray(lane) - e;
+            let mut gradient = block.gradient(e);
+            let [mut x, mut y, mut rho] = [[T::ZERO; LANES]; 3];
+            let mut sin_rho = [T::ZERO; LANES];
+            for l in 0..LANES {
+                let d = V3::new(block.s[0][l] - e.x, block.s[1][l] - e.y, block.s[2][l] - e.z);
+                (x[l], y[l]) = (d.dot(b1), d.dot(b2));
+                let across = (x[l] * x[l] + y[l] * y[l]).sqrt();
+                let per = T::one() / across.max(T::from_f64(LEAST_SIN));
                 let along = T::one() - d.dot(&d) * T::from_f64(0.5);
-                let rho = arc_sine(across * cos - along * sin);
-                // The direction in which the limb moves when α grows, at the foot point.
-                let outward = (b[0] * x + b[1] * y) * cos - e * sin;
-                let [gu, gv] = block.gradient_at(lane, &scaling.at_foot(&block.ray(lane), &outward));
-                let w = weight / (gu * gu + gv * gv).max(T::from_f64(1e-20));
-                let (h1, h2) = (x - mean[0], y - mean[1]);
-                let (w1, w2) = (w * h1, w * h2);
-                let terms = [w1 * h1, w1 * h2, w1, w2 * h2, w2, w];
-                n.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-                g = [g[0] + w1 * rho, g[1] + w2 * rho, g[2] + w * rho];
+                (x[l], y[l]) = (x[l] * per, y[l] * per);
+                sin_rho[l] = across * cos - along * sin;
+                rho[l] = arc_sine(sin_rho[l]);
+                // At the foot point the limb moves along u cos α − e sin α when α grows, and the derivative of the ray
+                // does not contain the ray.
+                let at_foot = -(along * cos + across * sin) * per;
+                (gradient[0][l], gradient[1][l]) = (gradient[0][l] * at_foot, gradient[1][l] * at_foot);
+            }
+            if let Some(scaling) = scaling {
+                scaling.add_length(block, &sin_rho, &mut gradient);
+            }
+            for l in 0..HALF_LANES {
+                let terms = |l: usize| {
+                    let (weight, rho) = (block.weight[l], rho[l]);
+                    let g2 = gradient[0][l] * gradient[0][l] + gradient[1][l] * gradient[1][l];
+                    let w = weight / g2.max(T::from_f64(1e-20));
+                    let (h1, h2) = (x[l] - mean[0], y[l] - mean[1]);
+                    let (w1, w2, wr) = (w * h1, w * h2, w * rho);
+                    [w1 * h1, w1 * h2, w1, w2 * h2, w2, w, wr * h1, wr * h2, wr, wr * rho, weight]
+                };
+                let (one, other) = (terms(l), terms(l + HALF_LANES));
+                for (total, (a, b)) in totals.iter_mut().zip(one.iter().zip(&other)) {
+                    total[l] += *a + *b;
+                }
             }
         }
-        Self { n, g, mean }
+        let [n @ .., g1, g2, g3, cost, weight] = totals.map(|[a, b, c, d]| (a + b) + (c + d));
+        Self { n, g: [g1, g2, g3], cost, weight, mean }
     }
 
-    /// Returns the step of the axis on its tangent basis, and of the half-angle.
-    fn step(&self) -> Option<[T; 3]> {
+    /// Returns the step of the axis on its tangent basis, and of the half-angle; how much it reduces the cost; and
+    /// whether it is the last one: it is shorter than a hundredth of the sigma of white noise, and what is left of it
+    /// is less than a hundredth of that (math.md, 13.3).
+    fn step(&self) -> Option<([T; 3], T, bool)> {
         let [g1, g2, g3] = self.g;
         let d = invert_spd3(&self.n)? * V3::new(g1, g2, g3);
-        Some([d.x, d.y, d.z - self.mean[0] * d.x - self.mean[1] * d.y])
+        let gain = d.x * g1 + d.y * g2 + d.z * g3;
+        let is_last = gain * self.weight < self.cost * T::from_f64(1e-4);
+        Some(([d.x, d.y, d.z - self.mean[0] * d.x - self.mean[1] * d.y], gain, is_last))
     }
-}
-
-/// Returns the azimuth of a point as the components of its unit vector u, and |e × σ|.
-#[inline(always)]
-fn azimuth<T: Real>(block: &Block<T>, lane: usize, e: &V3<T>, [b1, b2]: [&V3<T>; 2]) -> [T; 3] {
-    let d = block.ray(lane) - e;
-    let (x, y) = (d.dot(b1), d.dot(b2));
-    let across = (x * x + y * y).sqrt();
-    let per = T::one() / across.max(T::from_f64(LEAST_SIN));
-    [x * per, y * per, across]
-}
-
-/// Returns the mean of Bᵀu over the points with a weight.
-fn mean_azimuth<T: Real>(blocks: &[Block<T>], e: &V3<T>, b: [&V3<T>; 2]) -> [T; 2] {
-    let mut sums = [T::ZERO; 3];
-    for block in blocks {
-        for lane in 0..LANES {
-            let w = block.weight[lane];
-            let [x, y, _] = azimuth(block, lane, e, b);
-            sums = [sums[0] + w * x, sums[1] + w * y, sums[2] + w];
-        }
-    }
-    let n = sums[2].max(T::from_f64(1e-20));
-    [sums[0] / n, sums[1] / n]
 }
 
 /// Returns the arc sine of a small number: the error is below 1e-12 up to 0.05, and nothing depends on larger ones,

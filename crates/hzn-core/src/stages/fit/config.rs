@@ -51,6 +51,12 @@ section! {
         /// The position and the axis of one picture hold the same information. A filter must use only one of them.
         @- position: Option<bool> = None, ["true or false"]
             { needs: "position", unset: "true for `ellipsoid` and the planets with a name", example: "true" };
+        /// The rotation about the line to the body is reported if its 1σ is below this, degrees; 0 never reports it. It
+        /// needs `estimate.position` and a body that is not a sphere.
+        ///
+        /// At 1 degree it is as good as a magnetometer. The second harmonic of the limb height decides: see
+        /// `body.limb_height_harmonic_sigma_km`.
+        @- yaw_limit_deg: f64 = 1.0, [0.0 to 180.0] { needs: "position" };
         /// For `wtls`: points are weighted where the axis is farther from the optical axis than this, degrees; 0 always
         /// weights them.
         @- weigh_above_deg: f64 = 0.0, [0.0 to 180.0] { needs: "zju" };

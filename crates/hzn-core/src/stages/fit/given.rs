@@ -27,7 +27,7 @@ pub(crate) fn fit_position_from<T: Real>(
     scaling: &Scaling<T>,
 ) -> Option<Fit<T>> {
     let start = cone_at(blocks, e, k)?.at;
-    let cone = super::angle::settle(blocks, start, scaling)?;
+    let cone = super::angle::settle(blocks, start, None, scaling)?;
     Some(count_points(blocks, cone))
 }
 

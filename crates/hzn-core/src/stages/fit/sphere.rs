@@ -43,7 +43,7 @@ pub(super) fn sphere<T: Real>(
     let expected = &refined;
     #[cfg(feature = "position")]
     if let Some(target) = &expected.target
-        && let Some(cone) = super::angle::settle(blocks, robust, &target.scaling)
+        && let Some(cone) = super::angle::settle(blocks, robust, Some(sums), &target.scaling)
     {
         return Some(cone);
     }

@@ -176,7 +176,7 @@ fn a_known_distance_is_fused_to_convergence() {
         let unit_km = case.target().unit_m / 1e3;
         let r = Vec3::from(triple(&case.value["gauss_newton"]["r_km"])) / unit_km;
         let p = matrix(&case.value["gauss_newton"]["cov_km2"]) / (unit_km * unit_km);
-        let free = covariance::Located { r, p, free_r: r, free_p: p };
+        let free = covariance::Located { r, p, free_r: r, free_p: p, turn: None };
         let mut target = *case.target();
         target.set_range(num(&prior["r0_km"]) * 1e3, num(&prior["sigma_km"]) * 1e3);
         let sigma = num(&prior["sigma_km"]) / unit_km;
