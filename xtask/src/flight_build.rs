@@ -49,8 +49,8 @@ impl Toolchain {
         Ok(Self::Debian)
     }
 
-    /// Returns `cargo build --profile flight` (or another verb, for example `rustc`) for the target, and the folder that it
-    /// builds to. This folder is under `dir` of the target folder.
+    /// Returns `cargo build --profile flight` (or another verb, for example `rustc`) for the target, and the folder
+    /// that it builds to. This folder is under `dir` of the target folder.
     pub(crate) fn cargo(self, verb: &str, dir: &str, args: &[&str]) -> (Command, PathBuf) {
         let dir = target().join(dir);
         let mut command = match self {

@@ -160,8 +160,8 @@ mod tests {
             assert!(text.contains(word), "{word}");
         }
         let drawn = |colour: &str| text.matches(&format!("stroke=\"{colour}\"")).count();
-        // The first line is in both plots and in one legend, the second in one plot and in its legend.
-        assert_eq!((drawn("#0072B2"), drawn("#D55E00")), (3, 2), "{text}");
+        // Two parts in each of two plots and an entry in one legend; then two parts in one plot and an entry.
+        assert_eq!((drawn("#0072B2"), drawn("#D55E00")), (5, 3), "{text}");
         let circles = text.matches("<circle").count();
         assert_eq!(circles, 3, "a part of one point is a dot");
         assert_eq!(svg(&PlotSheet { rows: Vec::new(), ..sheet }), Err("no chosen plot has a value".into()));
