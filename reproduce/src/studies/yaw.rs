@@ -21,7 +21,7 @@ const TOLD_SIGMA_DEG: f64 = 1.0;
 const PLACES: usize = 24;
 const RUNS: usize = 25;
 /// The seeds of this study; no other study uses them.
-const FIRST_SEED: u64 = 910_000;
+const FIRST_SEED: u64 = 4_210_000;
 
 /// Body, altitude above the mean radius in km, and the 1-sigma of the second harmonic in km; `None` for the default.
 const ORBITS: [(body::Kind, f64, Option<f64>); 8] = [
@@ -47,8 +47,7 @@ pub(super) fn orbits(effort: &Effort) -> anyhow::Result<Section> {
          the sigma that the sensor is told; `default` is the sigma of the limb height itself. σ at latitudes 0°, 30° \
          and 60° is that of `hzn sensitivity yaw`. NEES has one degree of freedom (1 is ideal). It counts the runs \
          whose reported σ is below 20°, because a rotation is periodic; `below 1°` is the share of runs that \
-         `estimate.yaw_limit_deg` lets through by default. One rule was changed after a look at these seeds: what the \
-         rotation explains of the residuals is not noise. In this rule the figures are in-sample.",
+         `estimate.yaw_limit_deg` lets through by default. The rules were chosen on other seeds.",
     ));
     let mut rows = Vec::new();
     for (number, (kind, altitude_km, harmonic_km)) in ORBITS.into_iter().enumerate() {
