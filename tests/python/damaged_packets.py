@@ -157,7 +157,7 @@ def main() -> None:
         for _ in range(count):
             kind = 0 if line.random.random() < 0.2 else line.random.randrange(1, len(KINDS))
             sent = line.damaged(KINDS[kind], sent) if kind else line.make_good()
-            # A sender pauses after a telecommand. What is damaged comes with and without a pause.
+            # A sender pauses after a good telecommand. Only some of the damaged ones have a pause after them.
             pause = line.random.choice([100, 120, 150]) if kind == 0 else line.random.choice([0, 0, 0, 0, 3, 40, 110])
             file.write(struct.pack(">BBH", kind, pause, len(sent)) + sent)
 

@@ -117,9 +117,9 @@ fn heights_km(file: &str, range_km: f64) -> Vec<f64> {
     sums.iter().map(|[sum, count]| sum / count).collect()
 }
 
-/// What is left after the fit is not noise: it is the same profile in both pictures, in kilometres, although they show
-/// other longitudes, eleven days apart. It is the height of Jupiter's haze and clouds by latitude, about 40 km,
-/// which the 1-sigma of the limb height of 80 km covers. The RMS of the second picture is larger in pixels (0.130),
+/// The residuals of the fit are not noise. Both pictures have the same profile of residuals in kilometres, although
+/// they show other longitudes, eleven days apart. The profile is the height of Jupiter's haze and clouds by latitude,
+/// about 40 km, which the 1-sigma of the limb height of 80 km covers. The RMS of the second picture is larger in pixels (0.130),
 /// because the camera was closer: a pixel is 318 km there, and 376 km in the first.
 #[test]
 fn the_residuals_are_the_limb_of_jupiter() {

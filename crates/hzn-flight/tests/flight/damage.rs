@@ -53,7 +53,7 @@ impl Ground {
         self.wrongly_taken.len() + self.twice.len() + self.unanswered.len()
     }
 
-    /// Runs a turn after `us` and judges what is sent.
+    /// Lets `us` microseconds pass, runs a turn, and judges what the computer sends.
     fn turn(&mut self, f: &mut Flight<'_, Bench>, us: u64) {
         f.board().now_us += us;
         f.turn();

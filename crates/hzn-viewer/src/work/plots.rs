@@ -34,7 +34,7 @@ pub struct PlotRow {
 /// Plots with the same horizontal axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlotSheet {
-    /// What is plotted, above the plots.
+    /// The text above the plots: the name of the sequence.
     pub heading: String,
     /// Label of the horizontal axis.
     pub axis: &'static str,

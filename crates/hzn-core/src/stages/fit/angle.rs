@@ -134,9 +134,9 @@ impl<T: Real> Sums<T> {
         Self { n, g: [g1, g2, g3], cost, weight, mean }
     }
 
-    /// Returns the step of the axis on its tangent basis, and of the half-angle; how much it reduces the cost; and
-    /// whether it is the last one: it is shorter than a hundredth of the sigma of white noise, and what is left of it
-    /// is less than a hundredth of that (math.md, 13.3).
+    /// Returns the step of the axis on its tangent basis and of the half-angle, how much the step reduces the cost, and
+    /// whether it is the last one. The last step is shorter than a hundredth of the sigma of white noise, and what
+    /// remains to the solution after it is less than a hundredth of that (math.md, 13.3).
     fn step(&self) -> Option<([T; 3], T, bool)> {
         let [g1, g2, g3] = self.g;
         let d = invert_spd3(&self.n)? * V3::new(g1, g2, g3);
