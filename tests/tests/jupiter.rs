@@ -119,8 +119,8 @@ fn heights_km(file: &str, range_km: f64) -> Vec<f64> {
 
 /// The residuals of the fit are not noise. Both pictures have the same profile of residuals in kilometres, although
 /// they show other longitudes, eleven days apart. The profile is the height of Jupiter's haze and clouds by latitude,
-/// about 40 km, which the 1-sigma of the limb height of 80 km covers. The RMS of the second picture is larger in pixels (0.130),
-/// because the camera was closer: a pixel is 318 km there, and 376 km in the first.
+/// about 40 km, which the 1-sigma of the limb height of 80 km covers. The RMS of the second picture is larger in
+/// pixels (0.130), because the camera was closer: a pixel is 318 km there, and 376 km in the first.
 #[test]
 fn the_residuals_are_the_limb_of_jupiter() {
     let [first, second] = PICTURES.map(|(file, range_km)| heights_km(file, range_km));
