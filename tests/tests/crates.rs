@@ -6,11 +6,12 @@ use std::path::Path;
 /// Every crate in `crates/`, with the crates of this project that it may import from.
 const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("hzn-fpu", &[]),
+    ("hzn-twice", &[]),
     ("hzn-core", &["hzn-fpu"]),
     ("hzn-nav", &["hzn-core"]),
     ("hzn-calib", &["hzn-core", "hzn-nav"]),
     ("hzn-sim", &["hzn-core", "hzn-nav", "hzn-calib"]),
-    ("hzn-flight", &["hzn-core", "hzn-nav"]),
+    ("hzn-flight", &["hzn-twice", "hzn-core", "hzn-nav"]),
     ("hzn-mcap", &["hzn-core", "hzn-nav"]),
     ("hzn-run", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-flight", "hzn-mcap"]),
     ("hzn-fuse", &["hzn-core", "hzn-nav", "hzn-calib", "hzn-sim", "hzn-mcap", "hzn-run"]),

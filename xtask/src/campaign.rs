@@ -33,7 +33,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
         new coverage to fuzz/corpus
   kill  kills RUNS (1000) runs of hzn at random moments and continues them
   long  processes PICTURES (100000) with hzn run, and ten times as many in one process
-  flips flips TRIALS (20000) bits of pictures and of stored parameters, and sticks as many pictures
+  flips flips TRIALS (20000) bits of pictures and of stored parameters, sticks as many pictures, and flips every bit
+        of a sensor in memory
   packets sends COUNT (1000000) telecommands to the flight software, most of them damaged
   paths builds the images of the flight computer in another folder; their bytes must be the same
   processors
@@ -81,13 +82,7 @@ fn long(pictures: u64) -> Outcome {
 fn flips(trials: u64) -> Outcome {
     let trials = trials.to_string();
     steps::run(test("hzn-flight", "flight", "flips::").env("HZN_FLIPS", &trials))?;
-    let mut in_memory = cargo(&["test", "--package", "hzn-c", "--test", "flips"]);
-    in_memory.current_dir(root().join("firmware")).arg("--target-dir").arg(target().join("firmware/flips"));
-    in_memory
-        .env("CARGO_PROFILE_DEV_DEBUG_ASSERTIONS", "false")
-        .env("CARGO_PROFILE_DEV_OPT_LEVEL", "2")
-        .env("HZN_FLIPS", &trials);
-    steps::run(in_memory.args(["--", "--nocapture", "--include-ignored"]))
+    steps::run(test("hzn-twice", "flips", "every_flipped_bit_is_seen"))
 }
 
 /// Sends telecommands with mixed damage to the flight software. A library of others writes them, in Python.

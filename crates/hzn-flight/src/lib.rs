@@ -34,7 +34,6 @@ pub mod bytes;
 pub mod cuc;
 pub mod flight;
 pub mod inbox;
-mod kept_twice;
 pub mod layout;
 pub mod messages;
 mod numbered;

@@ -1,11 +1,11 @@
 //! Bits that changed in memory: the values are made anew, and an answer that was calculated with them is not sent.
 
 use hzn_core::body::Expected;
+use hzn_twice::KeptTwice;
 
 use super::Flight;
 use super::navigation::Known;
 use crate::board::Board;
-use crate::kept_twice::KeptTwice;
 use crate::messages::Event;
 use crate::store::{self, Choice};
 
@@ -183,7 +183,7 @@ mod tests {
                     continue;
                 }
                 let Ok(sensor) = Sensor::new(&changed.sensor) else { continue };
-                flight.sensor.damage(|s| *s = sensor);
+                *flight.sensor.value_mut() = sensor;
                 flight.limiter = crate::flight::Limiter::new();
                 assert_eq!(turn(&mut flight), (right, true), "parameter {id}, bit {bit}");
                 flips += 1;
@@ -192,7 +192,7 @@ mod tests {
         }
         assert!(flips > 400, "{flips}");
         // Wrong values from navigation are not used; the altitude of the parameters replaces them.
-        flight.known.damage(|known| known.prior.altitude_m = Some(5e5));
+        flight.known.value_mut().prior.altitude_m = Some(5e5);
         assert_eq!(turn(&mut flight), (right, true));
         assert_eq!(turn(&mut flight), (right, false));
     }
@@ -203,9 +203,9 @@ mod tests {
         let mut flight = Flight::start(board(), &mut buffers, &mut lists).unwrap();
         let expect = |h: f32| flight.sensor.get().expect(&Prior { altitude_m: Some(h), ..Prior::default() }).unwrap();
         let (mut expected, other) = (KeptTwice::new(expect(230e3)), expect(231e3));
-        expected.keep();
+        expected.complete();
         assert!(flight.check_memory(Some(&mut expected)));
-        expected.damage(|e| *e = other);
+        *expected.value_mut() = other;
         assert!(!flight.check_memory(Some(&mut expected)));
     }
 }

@@ -19,10 +19,10 @@
 //! | `line` | packets on the line, with their counts |
 
 use hzn_core::{Sensor, Workspace};
+use hzn_twice::KeptTwice;
 
 use crate::board::Board;
 use crate::inbox::Inbox;
-use crate::kept_twice::KeptTwice;
 use crate::messages::{Event, Housekeeping, Mode};
 use crate::operations::Operations;
 use crate::store::{self, Loaded};

@@ -5,12 +5,12 @@ use core::cell::RefCell;
 use hzn_core::body::{Expected, Last};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
+use hzn_twice::KeptTwice;
 
 use super::longest_edge::EdgeWatch;
 use super::stuck::StuckWatch;
 use super::{Buffers, Flight, Known};
 use crate::board::{Board, Picture};
-use crate::kept_twice::KeptTwice;
 use crate::messages::Event;
 
 impl<B: Board> Flight<'_, B> {
@@ -25,7 +25,9 @@ impl<B: Board> Flight<'_, B> {
         // What changed since the last picture is made anew in time for this one.
         self.check_memory(None);
         let Some(layout) = self.check_size(picture.bytes) else { return };
-        let Some(mut expected) = self.expect_limb(picture.exposure_us) else { return };
+        let Some(expected) = self.expect_limb(picture.exposure_us) else { return };
+        let mut expected = KeptTwice::new(expected);
+        expected.complete();
         let start = self.board.now_us();
         let wanted = core::mem::take(&mut self.dump_edges);
         let bytes = self.board.pixels().get(..picture.bytes).unwrap_or_default();
@@ -82,16 +84,14 @@ impl<B: Board> Flight<'_, B> {
 
     /// Returns the expected limb of a picture, from the values of navigation and the last answer. Refuses the picture
     /// if these are impossible.
-    fn expect_limb(&mut self, exposure_us: u64) -> Option<KeptTwice<Expected<f32>>> {
+    fn expect_limb(&mut self, exposure_us: u64) -> Option<Expected<f32>> {
         let prior = self.prior_at(exposure_us);
         let expected = self.sensor.get().expect(&prior).ok();
         if expected.is_none() {
             self.state.refused = self.state.refused.saturating_add(1);
             self.send_event(Event::KnownRefused, 0, 0);
         }
-        let mut expected = KeptTwice::new(expected?);
-        expected.keep();
-        Some(expected)
+        expected
     }
 
     /// Adds a processed picture to the counters.
