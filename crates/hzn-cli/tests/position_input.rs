@@ -88,7 +88,8 @@ fn an_impossible_frame_is_a_row_and_the_run_goes_on() {
     }
     place.write("in/frames.csv", frames.as_bytes());
     // 3: the run finished, but some pictures were not processed.
-    place.run(&["run", "in", "-o", "out.csv"]).expect(3);
+    let ran = place.run(&["run", "in", "-o", "out.csv"]).expect(3);
+    ran.says("8 with values that allow no search, not processed (status no-altitude); the first is");
     let rows = place.rows("out.csv");
     assert_eq!(rows.len(), cases.len());
     for (name, _, what) in &cases {

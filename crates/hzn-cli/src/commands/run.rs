@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 use hzn_calib::{Frames, Sensor};
+use hzn_core::body::PriorError;
 use hzn_core::config::Orient;
 use hzn_core::status::Status;
 use hzn_mcap::{Row, part_path};
@@ -396,6 +397,9 @@ struct MissingPriors {
     no_time: u64,
     no_altitude: u64,
     below_limb: u64,
+    /// Pictures with other values that contradict each other, and the first of them with the reason.
+    impossible: u64,
+    first_impossible: Option<String>,
 }
 
 impl MissingPriors {
@@ -403,10 +407,15 @@ impl MissingPriors {
         self.frames += 1;
         self.no_row += u64::from(frame.data.is_none());
         self.no_time += u64::from(frame.time_s.is_none());
-        let unprocessed = |f: &BodyOutcome| f.status() == Status::NoAltitude;
-        if frame.outcomes.iter().any(unprocessed) {
-            let below = frame.outcomes.iter().any(BodyOutcome::is_below_limb);
-            *(if below { &mut self.below_limb } else { &mut self.no_altitude }) += 1;
+        let unprocessed = |f: &&BodyOutcome| f.status() == Status::NoAltitude;
+        let Some(why) = frame.outcomes.iter().find(unprocessed) else { return };
+        match why.refused_prior() {
+            Some(PriorError::BelowLimb { .. }) => self.below_limb += 1,
+            Some(PriorError::NoAltitude) | None => self.no_altitude += 1,
+            Some(other) => {
+                self.impossible += 1;
+                self.first_impossible.get_or_insert_with(|| format!("{}: {other}", frame.name));
+            }
         }
     }
 
@@ -426,6 +435,10 @@ impl MissingPriors {
         if self.below_limb > 0 {
             let what = "below the limb height, where no limb can be seen, not processed (status no-altitude)";
             parts.push(format!("{} {what}", self.below_limb));
+        }
+        if let Some(first) = &self.first_impossible {
+            let what = "with values that allow no search, not processed (status no-altitude); the first is";
+            parts.push(format!("{} {what} {first}", self.impossible));
         }
         if !parts.is_empty() {
             tell::warning(format_args!("of {}: {}", explain::counted(self.frames, "picture"), parts.join("; ")));

@@ -51,9 +51,9 @@ impl BodyOutcome {
         self.report.as_ref().map_or_else(|e| e.status, |r| r.status)
     }
 
-    /// Returns whether the body was not searched for because the camera is not above the limb height.
-    pub fn is_below_limb(&self) -> bool {
-        self.report.as_ref().is_err_and(|e| e.below_limb)
+    /// Returns why the values of frames.csv did not allow to search for the body, if this is so.
+    pub fn refused_prior(&self) -> Option<&PriorError> {
+        self.report.as_ref().err()?.prior.as_ref()
     }
 }
 
@@ -70,8 +70,8 @@ pub struct Unprocessed {
     pub status: Status,
     /// The reason in words.
     pub why: String,
-    /// True if the camera is not above the limb height.
-    pub below_limb: bool,
+    /// The error of the prior, if that is the reason.
+    pub prior: Option<PriorError>,
 }
 
 impl From<PriorError> for Unprocessed {
@@ -85,7 +85,7 @@ impl From<PriorError> for Unprocessed {
             // Nothing can be expected of the body: no distance is known, or what is known contradicts itself.
             _ => Status::NoAltitude,
         };
-        Self { status, why: error.to_string(), below_limb: matches!(error, PriorError::BelowLimb { .. }) }
+        Self { status, why: error.to_string(), prior: Some(error) }
     }
 }
 
@@ -97,7 +97,7 @@ impl Finished {
     }
     /// Returns the result of a picture that could not be read. It is unreadable for every body.
     pub(super) fn into_unreadable(self, plan: &Plan, why: &str) -> Self {
-        let why = Unprocessed { status: Status::Unreadable, why: why.to_owned(), below_limb: false };
+        let why = Unprocessed { status: Status::Unreadable, why: why.to_owned(), prior: None };
         let none = || BodyOutcome { report: Err(why.clone()), elapsed: Duration::ZERO };
         Self { outcomes: plan.config.each_body().iter().map(|_| none()).collect(), ..self }
     }

@@ -95,7 +95,7 @@ impl Payload {
             Self::File(path) => encoded(decode::read_file(&path)?),
             Self::Encoded(bytes) if bytes.is_empty() => Err("message without picture data".into()),
             Self::Encoded(bytes) => encoded(bytes),
-            Self::RawFile(path, raw) => sized(raw.decode(&decode::read_file(&path)?)?),
+            Self::RawFile(path, raw) => sized(raw.decode(decode::read_file(&path)?)?),
             Self::Decoded(picture) => sized(picture),
             Self::Broken(why) => Err(why),
         }

@@ -1,5 +1,6 @@
 //! Headerless pictures: `--raw WIDTHxHEIGHT:FORMAT`.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
@@ -124,25 +125,27 @@ impl Raw {
         format!("{length} bytes, but a picture of {self} has {one}: {left}{hint}")
     }
 
-    /// Decodes a picture from exactly as many bytes as it has.
+    /// Decodes a picture from exactly as many bytes as it has. A vector of single bytes becomes the picture without a
+    /// copy.
     ///
     /// # Errors
     /// The number of bytes is different.
-    pub fn decode(&self, data: &[u8]) -> Result<Picture, String> {
+    pub fn decode<'a>(&self, data: impl Into<Cow<'a, [u8]>>) -> Result<Picture, String> {
+        let data = data.into();
         if data.len() != self.bytes() {
             return Err(self.wrong_length(data.len()));
         }
         let pixels = self.width as usize * self.height as usize;
         let samples = match self.format {
-            Format::Mono8 => Samples::Bytes(data.to_vec()),
+            Format::Mono8 => Samples::Bytes(data.into_owned()),
             Format::Words(bits) => {
                 // The bits above the significant ones are noise of the transport.
                 let mask = u16::MAX >> (16 - bits);
                 Samples::Words(data.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]) & mask).collect())
             }
-            Format::Mono10p => Samples::Words(unpack(data, 10, pixels)),
-            Format::Mono12p => Samples::Words(unpack(data, 12, pixels)),
-            Format::Bayer8 => return Ok(self.bayer(data)),
+            Format::Mono10p => Samples::Words(unpack(&data, 10, pixels)),
+            Format::Mono12p => Samples::Words(unpack(&data, 12, pixels)),
+            Format::Bayer8 => return Ok(self.bayer(&data)),
         };
         Ok(Picture::new(samples, Layout::packed(self.width, self.height, 1, self.bits())))
     }
