@@ -16,24 +16,36 @@ pub enum Board {
     An386,
     /// Cortex-M7, double precision.
     An500,
+    /// Cortex-M4F with 192 KiB of RAM, which takes the rows of a picture one by one. It has only the image `flight`.
+    Stm32F405,
 }
 
 impl Board {
-    /// Both boards.
+    /// The boards with memory for pictures, which have every image.
     pub const ALL: [Self; 2] = [Self::An386, Self::An500];
 
-    /// Returns the name that QEMU and the folders of the images use.
+    /// Returns the name that the folders of the images use.
     pub fn name(self) -> &'static str {
         match self {
             Self::An386 => "an386",
             Self::An500 => "an500",
+            Self::Stm32F405 => "stm32f405",
+        }
+    }
+
+    /// Returns QEMU's name of the machine.
+    fn machine(self) -> &'static str {
+        match self {
+            Self::An386 => "mps2-an386",
+            Self::An500 => "mps2-an500",
+            Self::Stm32F405 => "netduinoplus2",
         }
     }
 
     /// Returns the name of the core, for messages.
     pub fn core(self) -> &'static str {
         match self {
-            Self::An386 => "Cortex-M4F",
+            Self::An386 | Self::Stm32F405 => "Cortex-M4F",
             Self::An500 => "Cortex-M7",
         }
     }
@@ -56,7 +68,7 @@ impl Board {
     pub fn qemu(self, image: &Path, shift: u32) -> Command {
         let mut command = Command::new("qemu-system-arm");
         command
-            .args(["-M", &format!("mps2-{}", self.name()), "-display", "none", "-monitor", "none"])
+            .args(["-M", self.machine(), "-display", "none", "-monitor", "none"])
             .args(["-semihosting-config", "enable=on,target=native", "-icount", &format!("shift={shift}"), "-kernel"])
             .arg(image)
             .stdin(Stdio::null());

@@ -80,10 +80,15 @@ impl Bench {
             .spawn()
             .expect("files and programs of this machine work");
         let mut stdin = child.stdin.take().expect("files and programs of this machine work");
-        let line = line.to_vec();
+        let (line, sent) = (line.to_vec(), self.path("sent.bin"));
+        let waits = self.board == Board::Stm32F405;
         // The line stays open until the image ends, because QEMU would end with the line.
         let feed = std::thread::spawn(move || {
             use std::io::Write;
+            // QEMU throws away what its STM32 USART receives before the program has started it.
+            while waits && std::fs::metadata(&sent).is_ok_and(|file| file.len() == 0) {
+                std::thread::sleep(std::time::Duration::from_millis(10));
+            }
             let _ = stdin.write_all(&line);
             let _ = stdin.flush();
             stdin

@@ -116,6 +116,41 @@ fn rows_have_the_bits_of_the_picture() {
     }
 }
 
+/// Tests the flight software on a board without memory for a picture: the decoded telemetry of pictures that came row by
+/// row must equal what `hzn run --flight` writes for the same pictures in memory.
+#[test]
+#[ignore = "needs the images: cargo xtask firmware"]
+fn the_flight_loop_takes_rows_on_a_small_board() {
+    let mut flight = rocket(640, 480, 8, 6);
+    flight.sensor.binarize = threshold::Config { method: threshold::Method::Fixed, level: 60.0, ..Default::default() };
+    flight.sensor.body.altitude_km = Some(180.0);
+    flight.sensor.body.altitude_sigma_km = 60.0;
+    let bench = Bench::new(Board::Stm32F405);
+    let mut pictures = save_pictures(&flight, &bench.path("pictures"));
+    std::fs::write(bench.path("pictures/sensor.toml"), toml::to_string(&flight.sensor).unwrap()).unwrap();
+    // One picture has the wrong size: its rows are left out.
+    pictures.insert(4, (vec![7; 1000], 0));
+    bench.write_frames(&pictures);
+    bench.write_parameter_copy(1, &flight.sensor, 1);
+    let mut args = vec!["telecommand", "-o", "commands.bin"];
+    args.extend(["process-once"; 9]);
+    args.extend(["arm", "mode shut-down"]);
+    hzn_run(bench.dir(), &args);
+    assert_eq!(bench.run(&std::fs::read(bench.path("commands.bin")).unwrap()), 0);
+    let printed = hzn_run(bench.dir(), &["telemetry", "sent.bin", "-o", "sent.csv", "--housekeeping", "hk.csv"]);
+    assert!(printed.contains("picture of wrong size (1000, 307200)"), "{printed}");
+    hzn_run(bench.dir(), &["run", "pictures", "--flight", "-o", "here.csv"]);
+    let (sent, host) = (answers(&bench.path("sent.csv")), answers(&bench.path("here.csv")));
+    assert_eq!(sent, host);
+    let ok = sent.iter().filter(|cells| cells[1] == "ok").count();
+    let housekeeping = std::fs::read_to_string(bench.path("hk.csv")).unwrap();
+    let column = housekeeping.lines().next().unwrap().split(',').position(|c| c == "stack_bytes").unwrap();
+    let last: Vec<&str> = housekeeping.lines().last().unwrap().split(',').collect();
+    let stack: u32 = last[column].parse().unwrap();
+    println!("{} pictures by rows, {ok} answers; most stack {stack} of 65536 bytes", sent.len());
+    assert!(sent.len() == 8 && ok >= 6 && (4096..60_000).contains(&stack));
+}
+
 /// Returns the cells of a table, row by row, without the columns that name the picture or the clock.
 fn answers(path: &Path) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(path).unwrap();

@@ -127,7 +127,7 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
     assert!(ok >= 18 && wide * 2 < cases.len() as u32, "{ok} {wide}");
 }
 
-/// Tests the memory of the lists in book/guide/porting.md, for a 640×480 picture and for a large one.
+/// Tests the memory of the lists in ARCHITECTURE.md, for a 640×480 picture and for a large one.
 #[test]
 fn memory_without_a_frame() {
     type Vga = RowBuffers<u8, { ROWS_HELD as usize * 640 }, 480, 8192, 2560>;

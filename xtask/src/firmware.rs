@@ -1,4 +1,4 @@
-//! Builds the images of `firmware/` for both boards, inspects them and runs them in QEMU.
+//! Builds the images of `firmware/` for the emulated boards, inspects them and runs them in QEMU.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,28 +10,56 @@ use crate::soft_double;
 use crate::steps::{self, Outcome, Steps, Trouble, cargo};
 use crate::test_build::build_tests;
 
-/// Boards, each with the compiler flags for its core.
-const BOARDS: [(&str, &str); 2] = [("an386", ""), (M7, M7_FLAGS)];
+/// A board that QEMU emulates.
+struct Board {
+    name: &'static str,
+    package: &'static str,
+    /// Flags of the compiler for the core.
+    flags: &'static str,
+    images: &'static [&'static str],
+}
+const BOARDS: [Board; 3] = [
+    Board { name: "an386", package: "hzn-mps2", flags: "", images: &IMAGES },
+    Board { name: M7, package: "hzn-mps2", flags: M7_FLAGS, images: &IMAGES },
+    Board { name: "stm32f405", package: "hzn-stm32f405", flags: "", images: &["flight"] },
+];
 const M7: &str = "an500";
 const M7_FLAGS: &str = "-C target-cpu=cortex-m7";
-/// Images of each board.
+/// Images of the boards with memory for pictures.
 const IMAGES: [&str; 5] = ["chain", "flight", "measure", "nav", "rows"];
 /// Document with the costs.
 const COSTS: &str = "book/results/firmware-cost.md";
+
+impl Board {
+    /// Builds the images in a clone of this repository, or runs another verb of cargo with further arguments. Returns
+    /// the folder of the images.
+    fn build(
+        &self,
+        toolchain: Toolchain,
+        verb: &str,
+        dir: &str,
+        clone: &Path,
+        more: &[&str],
+    ) -> Result<PathBuf, Trouble> {
+        let features = if self.package == "hzn-mps2" { &["--features", self.name][..] } else { &[] };
+        let args = [&["--package", self.package], features, more].concat();
+        let (mut command, built) = toolchain.cargo(verb, dir, &args);
+        steps::run(configure_for_firmware(&mut command, self.flags).current_dir(clone.join("firmware")))?;
+        Ok(built)
+    }
+}
 
 /// Builds every image and puts it where the tests find it: `target/firmware/BOARD/images`.
 pub(crate) fn build() -> Outcome {
     apt_install(&["qemu-system-arm", "binutils-arm-none-eabi", "gcc-arm-none-eabi"])?;
     let toolchain = Toolchain::find()?;
-    for (board, flags) in BOARDS {
-        let dir = format!("firmware/{board}");
-        let (mut command, built) = toolchain.cargo("build", &dir, &["--package", "hzn-mps2", "--features", board]);
-        steps::run(configure_for_firmware(&mut command, flags))?;
-        let images = images(board);
+    for board in BOARDS {
+        let built = board.build(toolchain, "build", &format!("firmware/{}", board.name), &root(), &[])?;
+        let images = images(board.name);
         fs::create_dir_all(&images)?;
-        for image in IMAGES {
+        for image in board.images {
             fs::copy(built.join(image), images.join(image))?;
-            check_no_panics(board, image)?;
+            check_no_panics(board.name, image)?;
         }
     }
     Ok(())
@@ -45,15 +73,15 @@ pub(crate) fn is_the_same_elsewhere() -> Outcome {
         fs::remove_dir_all(&clone)?;
     }
     steps::run(Command::new("git").args(["clone", "--quiet"]).arg(root()).arg(&clone))?;
-    for (board, flags) in BOARDS {
-        let args = ["--package", "hzn-mps2", "--features", board];
-        let (mut command, built) = Toolchain::find()?.cargo("build", &format!("xtask/elsewhere/{board}"), &args);
-        steps::run(configure_for_firmware(&mut command, flags).current_dir(clone.join("firmware")))?;
-        for image in IMAGES {
-            if fs::read(built.join(image))? != fs::read(images(board).join(image))? {
-                return Err(Trouble::Failed(format!("{board} {image} differs; is everything committed?")));
+    for board in BOARDS {
+        let dir = format!("xtask/elsewhere/{}", board.name);
+        let built = board.build(Toolchain::find()?, "build", &dir, &clone, &[])?;
+        for image in board.images {
+            let name = board.name;
+            if fs::read(built.join(image))? != fs::read(images(name).join(image))? {
+                return Err(Trouble::Failed(format!("{name} {image} differs; is everything committed?")));
             }
-            println!("{board} {image}: the same bytes");
+            println!("{name} {image}: the same bytes");
         }
     }
     Ok(())
@@ -64,6 +92,7 @@ pub(crate) fn test(steps: &mut Steps) -> Outcome {
     build()?;
     soft_double::check(&images("an386").join("measure"))?;
     build_flight_image(METHODS)?;
+    build_vendor_port()?;
     lint_and_document()?;
     build_tests()?;
     // Without a package's name nothing is built again with other features.
@@ -91,10 +120,8 @@ fn lint_and_document() -> Outcome {
         println!("lints of the images are skipped: Debian's Rust has no clippy for the target");
         return Ok(());
     }
-    for (board, flags) in BOARDS {
-        let args = ["--package", "hzn-mps2", "--features", board];
-        let (mut command, _) = toolchain.cargo("clippy", &format!("firmware/{board}"), &args);
-        steps::run(configure_for_firmware(command.args(["--", "-D", "warnings"]), flags))?;
+    for board in BOARDS {
+        board.build(toolchain, "clippy", &format!("firmware/{}", board.name), &root(), &["--", "-D", "warnings"])?;
     }
     Ok(())
 }
@@ -109,6 +136,14 @@ fn build_flight_image(features: &[&str]) -> Result<PathBuf, Trouble> {
     let (mut command, built) = Toolchain::find()?.cargo("build", &format!("firmware/{M7}"), &args);
     steps::run(configure_for_firmware(&mut command, M7_FLAGS))?;
     Ok(built.join("flight"))
+}
+
+/// Builds the port for the STM32H743 and prints its size. No emulator has this part, so it does not run. Its hardware
+/// library can panic, so panics are not looked for.
+fn build_vendor_port() -> Outcome {
+    let (mut command, built) = Toolchain::find()?.cargo("build", "firmware/stm32h743", &["--package", "hzn-stm32h743"]);
+    steps::run(configure_for_firmware(&mut command, M7_FLAGS))?;
+    steps::run(Command::new("arm-none-eabi-size").arg(built.join("flight")))
 }
 
 /// Prints how much flash the methods of published systems take, as the table of book/theory/methods.md.

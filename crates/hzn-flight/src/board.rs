@@ -4,11 +4,12 @@ use hzn_core::Report;
 
 use crate::messages::Exposure;
 use crate::table::CRC32;
+use crate::view::Viewer;
 
-/// A picture that the camera has written to memory.
+/// A picture of the camera: in memory, or about to come row by row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Picture {
-    /// Bytes that the camera wrote.
+    /// Bytes that the camera wrote, or will send.
     pub bytes: usize,
     /// Time of the middle of the exposure, µs since the start. The values from navigation are moved to it.
     pub exposure_us: u64,
@@ -59,8 +60,9 @@ pub trait Board {
     /// Takes the newest picture that was not taken yet, if there is one. The camera gets the buffer of the picture
     /// before.
     fn next_picture(&mut self) -> Option<Picture>;
-    /// Returns the pixels of the picture that was taken last: one byte per pixel, row by row.
-    fn pixels(&self) -> &[u8];
+    /// Shows the picture that was taken last: all of its pixels with [`Viewer::see`], or its rows with [`Viewer::rows`],
+    /// as the camera sends them. Called at most once for a picture.
+    fn show(&mut self, viewer: &mut Viewer<'_>);
     /// Reads copy 1 or 2 of the parameters from memory.
     fn read_copy(&mut self, copy: u8, into: &mut [u8]);
     /// Writes copy 1 or 2 of the parameters. Returns false if the memory refuses.
@@ -78,5 +80,8 @@ pub trait Board {
     /// Keeps words for the time after a reset.
     fn write_retained(&mut self, _words: [u32; RETAINED_WORDS]) {}
     /// Keeps an answer. Its packets were sent just now, unless the bit budget had no room. Most boards keep nothing.
-    fn keep_answer(&mut self, _exposure: &Exposure, _report: &Report<f32>) {}
+    /// Returns false if this answer, or one shortly before it, could not be kept.
+    fn keep_answer(&mut self, _exposure: &Exposure, _report: &Report<f32>) -> bool {
+        true
+    }
 }

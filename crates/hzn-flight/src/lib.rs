@@ -19,6 +19,7 @@
 //! | [`board`] | the functions that a board provides |
 //! | [`store`] | two copies of the parameters |
 //! | [`flight`] | the loop |
+//! | [`view`] | the two ways in which a board shows a picture |
 //! | [`table`] | the parameters as bytes with a checksum |
 
 #![no_std]
@@ -43,6 +44,7 @@ pub mod parameters;
 pub mod record;
 pub mod store;
 pub mod table;
+pub mod view;
 
 pub use parameters::Parameters;
 

@@ -12,6 +12,7 @@ use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::Reader;
 use hzn_flight::messages::{Event, EventRecord, Exposure, Severity};
 use hzn_flight::packet::{self, Apid, ApidBase, Scan};
+use hzn_flight::view::Viewer;
 use hzn_mcap::{CandidateEdge, FrameRecord, LogLevel, LogLine, Row, RowMeta};
 use hzn_run::engine::widen_report;
 
@@ -211,8 +212,10 @@ impl Board for Linux {
         }
         Some(picture)
     }
-    fn pixels(&self) -> &[u8] {
-        self.current.as_ref().map_or(&[], |shot| &shot.pixels)
+    fn show(&mut self, viewer: &mut Viewer<'_>) {
+        if let Some(shot) = &self.current {
+            viewer.see(&shot.pixels);
+        }
     }
     fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
         self.parts.flash.read_copy(copy, into);
@@ -243,7 +246,7 @@ impl Board for Linux {
     fn write_retained(&mut self, words: [u32; RETAINED_WORDS]) {
         self.parts.flash.keep_words(words);
     }
-    fn keep_answer(&mut self, exposure: &Exposure, report: &Report<f32>) {
+    fn keep_answer(&mut self, exposure: &Exposure, report: &Report<f32>) -> bool {
         self.counts.pictures += 1;
         self.counts.answers += u64::from(report.status == Status::Ok);
         let number = self.current.as_ref().map_or(0, |shot| shot.number);
@@ -261,6 +264,6 @@ impl Board for Linux {
         let mut record = FrameRecord::new(row);
         record.candidates = CandidateEdge::from_report(&report);
         record.log = std::mem::take(&mut self.events);
-        self.parts.log.add(record);
+        self.parts.log.add(record)
     }
 }

@@ -7,6 +7,7 @@ use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::flight::{Buffers, Flight, Lists};
 use hzn_flight::messages::{Acknowledge, EdgePart, EventRecord, Exposure, Housekeeping};
 use hzn_flight::packet::{self, Apid, ApidBase, Scan};
+use hzn_flight::view::Viewer;
 use hzn_flight::{Parameters, table};
 
 use crate::input::Input;
@@ -91,8 +92,8 @@ impl Board for Ground<'_> {
         let bytes = self.pixels.len();
         self.now_us.is_multiple_of(3).then_some(Picture { bytes, exposure_us: self.now_us, lost: 0 })
     }
-    fn pixels(&self) -> &[u8] {
-        &self.pixels
+    fn show(&mut self, viewer: &mut Viewer<'_>) {
+        viewer.see(&self.pixels);
     }
     fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
         let kept = &self.copies[usize::from(copy) % 2];

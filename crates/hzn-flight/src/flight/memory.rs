@@ -73,6 +73,7 @@ mod tests {
     use crate::packet::{self, Apid, Scan};
     use crate::parameters::Parameters;
     use crate::table;
+    use crate::view::Viewer;
 
     /// A board that has a picture of a limb at every turn.
     struct Still {
@@ -109,8 +110,8 @@ mod tests {
         fn next_picture(&mut self) -> Option<Picture> {
             Some(Picture { bytes: self.picture.len(), exposure_us: self.now_us, lost: 0 })
         }
-        fn pixels(&self) -> &[u8] {
-            &self.picture
+        fn show(&mut self, viewer: &mut Viewer<'_>) {
+            viewer.see(&self.picture);
         }
         fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
             into.fill(0xFF);

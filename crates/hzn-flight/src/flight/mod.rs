@@ -13,12 +13,11 @@
 //! | `clock` | the time of packets, and its correlation |
 //! | `navigation` | position, velocity and rate, with time and expiry |
 //! | `camera_watch` | pictures that do not come |
-//! | `stuck` | pixels that do not change from one to the next |
-//! | `longest_edge` | the edge that a command asks for |
+//! | `longest_edge` | the packets of the edge that a command asks for |
 //! | `reports` | housekeeping and events |
 //! | `line` | packets on the line, with their counts |
 
-use hzn_core::{Sensor, Workspace};
+use hzn_core::Sensor;
 use hzn_twice::KeptTwice;
 
 use crate::board::Board;
@@ -27,6 +26,8 @@ use crate::messages::{Event, Housekeeping, Mode};
 use crate::operations::Operations;
 use crate::store::{self, Loaded};
 use crate::table::{self, TableError};
+pub use crate::view::Lists;
+use crate::view::LongestEdge;
 
 mod budget;
 mod camera_turn;
@@ -46,21 +47,14 @@ mod report_turn;
 mod reports;
 mod science;
 mod self_check;
-mod stuck;
 mod telecommands;
 
 use budget::BitBudget;
 use camera_watch::CameraWatch;
 use line::Line;
-use longest_edge::LongestEdge;
 use navigation::Known;
 use recovery::Recovery;
 use reports::Limiter;
-
-/// The lists that a picture needs; keep them in a `static`. They are those of `hzn run --flight`, except that at most
-/// 608 points are kept per edge. The default `candidates.keep_points` needs no more; `keep_points = 0` (all) also means
-/// 608 here.
-pub type Lists = Workspace<f32, 2048, 76, 512>;
 
 /// The memory of the flight software in addition to the lists of a picture; keep it in a `static`.
 #[derive(Debug)]
@@ -117,6 +111,8 @@ pub struct Flight<'a, B> {
     last_sequence: Option<u16>,
     /// What the last telecommand was refused for, as in [`crate::messages::Acknowledge::detail`].
     detail: u16,
+    /// Whether the board could keep the last answer.
+    keeps_answers: bool,
     /// Whether a command asked for the next picture to be processed.
     process_once: bool,
     /// Whether a command asked for the edges of the next picture.
@@ -193,6 +189,7 @@ impl<'a, B: Board> Flight<'a, B> {
             housekeeping_us: 0,
             last_sequence: None,
             detail: 0,
+            keeps_answers: true,
             process_once: false,
             dump_edges: false,
         })

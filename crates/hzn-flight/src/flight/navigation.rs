@@ -30,6 +30,8 @@ pub(super) struct Known {
     pub(super) motion: Option<Motion>,
     /// The last answer, and the time when its picture was exposed, µs since the start.
     pub(super) last: Option<(Last<f32>, u64)>,
+    /// The threshold that the last picture proposes for the next one, in counts.
+    pub(super) level: Option<u16>,
 }
 
 /// Time and motion of the values from navigation.
@@ -143,7 +145,7 @@ pub(super) fn read_navigation(from: &mut Reader<'_>, clock: &Clock, now_us: u64)
     let velocity_m_s = known_vector([n.velocity_x_m_s, n.velocity_y_m_s, n.velocity_z_m_s], VELOCITY)?;
     let expires_s = (!n.expires_s.is_nan()).then_some(n.expires_s);
     let motion = Motion { epoch_us: epoch_us(n.epoch, clock)?, velocity_m_s, expires_s };
-    let known = Known { prior: prior(n.altitude_m, position_m, rate)?, motion: Some(motion), last: None };
+    let known = Known { prior: prior(n.altitude_m, position_m, rate)?, motion: Some(motion), ..Known::default() };
     let is_fast = |x: &f32| x.abs() >= 2e4;
     let fastest = velocity_m_s.and_then(|v| (VELOCITY..).zip(v).find(|(_, x)| is_fast(x)));
     // A velocity without a position moves nothing.

@@ -20,8 +20,8 @@ impl<B: Board> Flight<'_, B> {
         if sensor.expect(&known.prior).is_err() || moves && !is_earth {
             return Code::Refused;
         }
-        let last = self.known.get().last;
-        self.known.set(Known { last, ..known });
+        let Known { last, level, .. } = *self.known.get();
+        self.known.set(Known { last, level, ..known });
         self.known.complete();
         self.has_expired = false;
         Code::Done

@@ -1,17 +1,14 @@
 //! The way of a picture from memory to its science packet.
 
-use core::cell::RefCell;
-
 use hzn_core::body::{Expected, Last};
-use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
+use hzn_core::{Prior, Report};
 use hzn_twice::KeptTwice;
 
-use super::longest_edge::EdgeWatch;
-use super::stuck::StuckWatch;
-use super::{Buffers, Flight, Known};
+use super::{Buffers, Flight, longest_edge};
 use crate::board::{Board, Picture};
 use crate::messages::Event;
+use crate::view::{Seen, StuckPlaces, Viewer};
 
 impl<B: Board> Flight<'_, B> {
     /// Processes a picture and sends its answer. A picture of the wrong size, or with an impossible prior, gets an
@@ -24,36 +21,29 @@ impl<B: Board> Flight<'_, B> {
         }
         // What changed since the last picture is made anew in time for this one.
         self.check_memory(None);
-        let Some(layout) = self.check_size(picture.bytes) else { return };
+        if !self.check_size(picture.bytes) {
+            return;
+        }
         let Some(expected) = self.expect_limb(picture.exposure_us) else { return };
         let mut expected = KeptTwice::new(expected);
         expected.complete();
         let start = self.board.now_us();
         let wanted = core::mem::take(&mut self.dump_edges);
-        let bytes = self.board.pixels().get(..picture.bytes).unwrap_or_default();
-        let Ok(grey) = Grey::try_new(bytes, layout) else { return };
-        self.buffers.edge.clear();
-        let watch = EdgeWatch {
-            wanted,
-            longest: RefCell::new(&mut self.buffers.edge),
-            stuck: RefCell::new(StuckWatch::new(bytes, self.sensor.get().camera())),
-        };
-        let report = self.sensor.get().process(self.workspace, &grey, expected.get(), &watch);
-        let stuck = report.solution.as_ref().and_then(|s| watch.stuck.into_inner().found(s.candidate));
+        let edge = &mut self.buffers.edge;
+        let mut viewer = Viewer::new(self.sensor.get(), expected.get(), self.workspace, edge, wanted);
+        self.board.show(&mut viewer);
+        let seen = viewer.into_seen();
+        let Some((report, stuck)) = self.accept(seen) else { return };
         // A bit may have changed during the calculation.
         if !self.check_memory(Some(&mut expected)) {
             self.state.refused = self.state.refused.saturating_add(1);
             return;
         }
+        self.remember(&report, picture.exposure_us, stuck.is_none());
         if let Some(stuck) = stuck {
             self.state.stuck = self.state.stuck.saturating_add(1);
             self.send_event(Event::StuckPixels, stuck.stuck, stuck.places);
             return;
-        }
-        if let Some(s) = &report.solution {
-            let last = Last { axis: s.axis, sigma_rad: s.covariance.sigma_max_rad(), age_s: 0.0 };
-            self.known.set(Known { last: Some((last, picture.exposure_us)), ..self.known.get().clone() });
-            self.known.complete();
         }
         let done_us = self.board.now_us();
         let calculation_us = u32::try_from(done_us.saturating_sub(start)).unwrap_or(u32::MAX);
@@ -62,7 +52,7 @@ impl<B: Board> Flight<'_, B> {
         if wanted {
             let Buffers { line, edge, .. } = &mut *self.buffers;
             let time = line.clock.at(picture.exposure_us);
-            edge.send(line, &mut self.board, time, self.number);
+            longest_edge::send(edge, line, &mut self.board, time, self.number);
         }
         self.since_housekeeping = self.since_housekeeping.saturating_add(1);
         if self.since_housekeeping >= self.operations.housekeeping_every {
@@ -70,22 +60,50 @@ impl<B: Board> Flight<'_, B> {
         }
     }
 
-    /// Returns the layout of a picture with this number of bytes. Refuses the picture if the camera has another size.
-    fn check_size(&mut self, bytes: usize) -> Option<Layout> {
+    /// Returns whether a picture with this number of bytes has the size of the camera. Refuses it otherwise.
+    fn check_size(&mut self, bytes: usize) -> bool {
         let camera = self.sensor.get().camera();
         let expected_bytes = usize::from(camera.width()) * usize::from(camera.height());
-        if bytes == expected_bytes {
-            return Some(Layout::packed(camera.width().into(), camera.height().into(), 1, 8));
+        if bytes != expected_bytes {
+            self.state.refused = self.state.refused.saturating_add(1);
+            self.send_event(Event::WrongSize, bytes as u32, expected_bytes as u32);
         }
-        self.state.refused = self.state.refused.saturating_add(1);
-        self.send_event(Event::WrongSize, bytes as u32, expected_bytes as u32);
+        bytes == expected_bytes
+    }
+
+    /// Returns the report of a picture, and what is stuck at its limb. Refuses a picture that was not seen as a whole.
+    fn accept(&mut self, seen: Seen) -> Option<(Report<f32>, Option<StuckPlaces>)> {
+        match seen {
+            Seen::Whole(report, stuck) => return Some((report, stuck)),
+            Seen::Part(pixels) => {
+                // The camera has more, so this always refuses.
+                self.check_size(pixels);
+            }
+            Seen::Refused(why) => {
+                self.state.refused = self.state.refused.saturating_add(1);
+                self.send_event(Event::RowsRefused, why as u32, 0);
+            }
+        }
         None
+    }
+
+    /// Remembers what a picture says about the next one: its threshold, and its direction if that may be believed.
+    fn remember(&mut self, report: &Report<f32>, exposure_us: u64, is_believed: bool) {
+        let mut known = self.known.get().clone();
+        known.level = report.next_level;
+        if let Some(s) = report.solution.as_ref().filter(|_| is_believed) {
+            let last = Last { axis: s.axis, sigma_rad: s.covariance.sigma_max_rad(), age_s: 0.0 };
+            known.last = Some((last, exposure_us));
+        }
+        self.known.set(known);
+        self.known.complete();
     }
 
     /// Returns the expected limb of a picture, from the values of navigation and the last answer. Refuses the picture
     /// if these are impossible.
     fn expect_limb(&mut self, exposure_us: u64) -> Option<Expected<f32>> {
-        let prior = self.prior_at(exposure_us);
+        // A picture that comes row by row has no other threshold, unless the parameters fix it.
+        let prior = Prior { level: self.known.get().level, ..self.prior_at(exposure_us) };
         let expected = self.sensor.get().expect(&prior).ok();
         if expected.is_none() {
             self.state.refused = self.state.refused.saturating_add(1);

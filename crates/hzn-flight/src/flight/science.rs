@@ -7,7 +7,7 @@ use super::Flight;
 use crate::answer::PictureAnswer;
 use crate::board::Board;
 use crate::layout;
-use crate::messages::{Exposure, NavigationState};
+use crate::messages::{Event, Exposure, NavigationState};
 use crate::packet::{Apid, OVERHEAD};
 use crate::parameters::Parameters;
 
@@ -18,7 +18,11 @@ impl<B: Board> Flight<'_, B> {
         let navigation = self.known.get().state_at(self.number, exposure_us);
         let exposure = self.exposure(navigation.as_ref(), exposure_us, done_us);
         self.send_within_budget(report, &exposure, navigation);
-        self.board.keep_answer(&exposure, report);
+        let is_kept = self.board.keep_answer(&exposure, report);
+        if !is_kept && self.keeps_answers {
+            self.send_event(Event::AnswersNotKept, self.number, 0);
+        }
+        self.keeps_answers = is_kept;
     }
 
     fn send_within_budget(&mut self, report: &Report<f32>, exposure: &Exposure, navigation: Option<NavigationState>) {

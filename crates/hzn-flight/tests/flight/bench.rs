@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use hzn_core::pixel;
+use hzn_core::{Report, pixel};
 use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::cuc::Cuc;
@@ -12,10 +12,14 @@ use hzn_flight::messages::{
     NavigationState, ParameterValue,
 };
 use hzn_flight::packet::{self, Apid, ApidBase, Scan};
+use hzn_flight::view::{ROWS_HELD, RowMemory, Viewer};
 use hzn_flight::{Parameters, answer::PictureAnswer, assembly::Assembly, layout, table};
 
 pub(crate) const WIDTH: usize = 640;
 pub(crate) const HEIGHT: usize = 480;
+
+/// Memory for the rows of a picture.
+pub(crate) type Rows = RowMemory<{ ROWS_HELD as usize * WIDTH }, HEIGHT, 8192, 2560>;
 
 #[derive(Default)]
 pub(crate) struct Bench {
@@ -24,6 +28,12 @@ pub(crate) struct Bench {
     pub(crate) sent: Vec<u8>,
     pub(crate) pictures: VecDeque<(Vec<u8>, u32)>,
     pub(crate) pixels: Vec<u8>,
+    /// The memory for rows of a board that has none for a picture.
+    pub(crate) rows: Option<Box<Rows>>,
+    /// Whether the log of answers cannot be written.
+    pub(crate) log_fails: bool,
+    /// Number of rows that the camera sends.
+    pub(crate) rows_sent: usize,
     pub(crate) copies: [Vec<u8>; 2],
     /// Bytes that can still be written before power is cut.
     pub(crate) power: Option<usize>,
@@ -72,8 +82,11 @@ impl Board for Bench {
         self.pixels = pixels;
         Some(Picture { bytes: self.pixels.len(), exposure_us: self.now_us, lost })
     }
-    fn pixels(&self) -> &[u8] {
-        &self.pixels
+    fn show(&mut self, viewer: &mut Viewer<'_>) {
+        let Some(memory) = &mut self.rows else { return viewer.see(&self.pixels) };
+        let Some(mut rows) = viewer.rows(memory) else { return };
+        self.pixels.chunks(WIDTH).take(self.rows_sent).for_each(|row| rows.push(row));
+        rows.finish();
     }
     fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
         into.fill(0xFF);
@@ -98,6 +111,9 @@ impl Board for Bench {
     }
     fn write_retained(&mut self, words: [u32; RETAINED_WORDS]) {
         self.retained = words;
+    }
+    fn keep_answer(&mut self, _exposure: &Exposure, _report: &Report<f32>) -> bool {
+        !self.log_fails
     }
 }
 

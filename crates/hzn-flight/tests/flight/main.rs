@@ -8,6 +8,7 @@ mod line;
 mod navigation;
 mod parameters;
 mod recovery;
+mod rows;
 mod silence;
 
 use hzn_core::status::Status;
@@ -83,6 +84,23 @@ fn flies_at_lift_off_and_stops_before_power_is_cut() {
         let before = f.board().copies.clone();
         assert!(send(f, &set).answers.is_empty());
         assert_eq!(f.board().copies, before, "nothing is written any more");
+    });
+}
+
+#[test]
+fn a_log_that_cannot_be_written_is_reported_once() {
+    fly(ready(), |f| {
+        f.board().lift_off = true;
+        let mut events_with = |log_fails| {
+            take_sent(f);
+            f.board().log_fails = log_fails;
+            f.board().pictures.extend((0..3).map(|_| (limb(), 0)));
+            (0..4).for_each(|_| f.turn());
+            let sent = take_sent(f);
+            assert_eq!(sent.science.len(), 3);
+            sent.events.iter().filter(|(event, ..)| *event == Event::AnswersNotKept).count()
+        };
+        assert_eq!([false, true, true, false, true].map(&mut events_with), [0, 1, 0, 0, 1]);
     });
 }
 

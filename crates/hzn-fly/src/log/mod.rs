@@ -4,7 +4,7 @@ mod folder;
 
 use std::io;
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
@@ -31,6 +31,8 @@ pub struct Log {
     thread: Option<JoinHandle<()>>,
     lost: Arc<AtomicU64>,
     written: Arc<AtomicU64>,
+    /// Whether the last answer could not be written.
+    fails: Arc<AtomicBool>,
     config: Arc<Mutex<Config>>,
 }
 
@@ -45,18 +47,19 @@ impl Log {
         folder.recover(&tell);
         let (sender, answers) = bounded(WAITING);
         let (lost, written) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
-        let config = Arc::new(Mutex::new(config.clone()));
+        let (config, fails) = (Arc::new(Mutex::new(config.clone())), Arc::new(AtomicBool::new(false)));
         let mut writing = Writing {
             folder,
             file: None,
             failed: None,
             lost: Arc::clone(&lost),
             written: Arc::clone(&written),
+            fails: Arc::clone(&fails),
             config: Arc::clone(&config),
             tell,
         };
         let thread = thread::Builder::new().name("log".into()).spawn(move || writing.run(&answers))?;
-        Ok(Self { sender: Some(sender), thread: Some(thread), lost, written, config })
+        Ok(Self { sender: Some(sender), thread: Some(thread), lost, written, fails, config })
     }
 
     /// Sets the configuration that the next files name.
@@ -64,12 +67,13 @@ impl Log {
         *self.config.lock().unwrap_or_else(PoisonError::into_inner) = config.clone();
     }
 
-    /// Adds an answer, without waiting. If there is no room, the answer is lost and counted.
-    pub fn add(&self, record: FrameRecord) {
+    /// Adds an answer, without waiting. If there is no room, the answer is lost and counted. Returns false if it is lost,
+    /// or if the disk refused the last answer that was written.
+    pub fn add(&self, record: FrameRecord) -> bool {
         let sent = self.sender.as_ref().map(|sender| sender.try_send(Box::new(record)));
-        if let Some(Err(TrySendError::Full(_))) = sent {
-            self.lost.fetch_add(1, Ordering::Relaxed);
-        }
+        let is_lost = matches!(sent, Some(Err(TrySendError::Full(_))));
+        self.lost.fetch_add(is_lost.into(), Ordering::Relaxed);
+        !is_lost && !self.fails.load(Ordering::Relaxed)
     }
 
     /// Writes what waits, and closes the file. Returns how many answers are in the log, and how many were lost.
@@ -90,6 +94,7 @@ struct Writing {
     failed: Option<Instant>,
     lost: Arc<AtomicU64>,
     written: Arc<AtomicU64>,
+    fails: Arc<AtomicBool>,
     config: Arc<Mutex<Config>>,
     tell: Tell,
 }
@@ -126,6 +131,7 @@ impl Writing {
         count.fetch_add(1, Ordering::Relaxed);
         if written.is_ok() && self.failed.take().is_some() {
             let lost = self.lost.load(Ordering::Relaxed);
+            self.fails.store(false, Ordering::Relaxed);
             (self.tell)(&format!("the log is written again; {lost} answers are not in it"));
         }
         written
@@ -159,6 +165,7 @@ impl Writing {
                 (self.tell)(&format!("the log cannot be written: {e}; the flight goes on without it"));
             }
             self.failed = Some(Instant::now());
+            self.fails.store(true, Ordering::Relaxed);
             self.file = None;
             // The part with the finished answers becomes a file, if the disk has room for it.
             self.folder.recover(&self.tell);
@@ -237,7 +244,7 @@ mod tests {
     fn what_a_crash_left_is_closed() {
         let dir = tempfile::tempdir().unwrap();
         let mut log = Log::open(dir.path(), MIN_LIMIT_BYTES, &config(), quiet()).unwrap();
-        (0..40).for_each(|index| log.add(record(index)));
+        assert!((0..40).all(|index| log.add(record(index))));
         thread::sleep(2 * FLUSH_INTERVAL);
         // A copy of the folder now is what a crash leaves.
         let after = tempfile::tempdir().unwrap();
@@ -267,7 +274,9 @@ mod tests {
         let tell: Tell = Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned()));
         let mut log = Log::open(&folder, MIN_LIMIT_BYTES, &config(), tell).unwrap();
         fs::remove_dir(&folder).unwrap();
-        (0..5).for_each(|index| log.add(record(index)));
+        assert!(log.add(record(0)), "nothing has failed so far");
+        thread::sleep(2 * FLUSH_INTERVAL);
+        (1..5).for_each(|index| assert!(!log.add(record(index)), "the flight software is told"));
         assert_eq!(log.finish(), (0, 5));
         let told = told.lock().unwrap();
         assert_eq!(told.len(), 1, "{told:?}");

@@ -2,12 +2,8 @@
 //!
 //! The line is UART 0, the clock is timer 0, and the watchdog is that of the board, with two seconds.
 //!
-//! These boards have no camera and no flash. Files in the working folder of the emulator stand for them:
-//! - `frames.bin` is the camera. For each picture it has "FRAM", the length, the number of pictures lost before it and
-//!   one spare word, little-endian, and then the bytes of the picture. "HANG" in place of "FRAM" stands for a camera
-//!   that never answers.
-//! - `copy1.bin` and `copy2.bin` are the flash.
-//! - `cut.bin` has one word: power is cut after this number of bytes was written to flash.
+//! These boards have no camera and no flash. Files in the working folder of the emulator stand for them
+//! ([`hzn_firmware::camera`], [`hzn_firmware::flash`]).
 
 #![no_std]
 #![no_main]

@@ -215,6 +215,11 @@ impl<T: Real> Sensor<T> {
 }
 
 impl<T: Real, S: Sample> RowStream<'_, T, S> {
+    /// Returns the threshold in counts; `None` if the picture only serves to find that of the next one.
+    pub fn level(&self) -> Option<u16> {
+        self.level
+    }
+
     /// Adds the next row, from the top.
     ///
     /// # Errors

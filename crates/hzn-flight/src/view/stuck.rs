@@ -11,14 +11,12 @@ use hzn_core::camera::Camera;
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::report::MAX_LISTED;
 
-/// Number of pairs of neighbours in the sample.
-const SAMPLES: usize = 128;
+use super::row_readout::{RowRuns, RowSample, SHORTEST, sample_step};
+
 /// Probability of a run that noise does not allow.
 const RARE: f32 = 1e-6;
 /// Fewest pairs of pixels that give a share; with fewer, the share of the whole picture is used.
 const FEWEST: u32 = 16;
-/// Shortest run that counts: light and lens can make shorter ones.
-const SHORTEST: u32 = 16;
 /// Largest share of equal neighbours that is known well enough from the sample.
 const MOST_EQUAL: f32 = 0.9;
 /// Number of places that are looked at along an edge.
@@ -39,13 +37,13 @@ pub(super) struct Equality {
 
 /// What was found along a limb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct StuckPlaces {
+pub(crate) struct StuckPlaces {
     /// Number of the candidate.
     candidate: u32,
     /// Places where the pixels are stuck.
-    pub(super) stuck: u32,
+    pub(crate) stuck: u32,
     /// Places on the limb that were looked at.
-    pub(super) places: u32,
+    pub(crate) places: u32,
 }
 
 impl StuckPlaces {
@@ -55,9 +53,18 @@ impl StuckPlaces {
     }
 }
 
+/// What is left of a picture when its edges are known.
+#[derive(Clone, Copy)]
+pub(super) enum Readout<'a> {
+    /// Every pixel, and the width of the picture.
+    Pixels(&'a [u8], usize),
+    /// The longest runs of every row. Other runs are not noticed.
+    Rows(&'a [RowRuns]),
+}
+
 /// Looks for stuck pixels along the edges of a picture, one edge after the other.
 pub(super) struct StuckWatch<'a> {
-    pixels: &'a [u8],
+    readout: Readout<'a>,
     camera: &'a Camera<f32>,
     equality: Equality,
     /// Places along the edge that is examined, and whether they are stuck.
@@ -67,9 +74,8 @@ pub(super) struct StuckWatch<'a> {
 }
 
 impl<'a> StuckWatch<'a> {
-    pub(super) fn new(pixels: &'a [u8], camera: &'a Camera<f32>) -> Self {
-        let equality = Equality::sample(pixels);
-        Self { pixels, camera, equality, places: heapless::Vec::new(), found: heapless::Vec::new() }
+    pub(super) fn new(readout: Readout<'a>, equality: Equality, camera: &'a Camera<f32>) -> Self {
+        Self { readout, camera, equality, places: heapless::Vec::new(), found: heapless::Vec::new() }
     }
     /// Forgets the edges of another look at the picture.
     pub(super) fn clear(&mut self) {
@@ -81,7 +87,7 @@ impl<'a> StuckWatch<'a> {
     }
     /// Looks at a pixel of the edge.
     pub(super) fn look_at(&mut self, pixel: Pixel) {
-        let is_stuck = self.equality.is_stuck(self.pixels, self.camera.width().into(), pixel);
+        let is_stuck = self.equality.is_stuck(self.readout, pixel);
         // There is room, because the caller takes as many pixels.
         let _ = self.places.push((pixel, is_stuck));
     }
@@ -135,21 +141,25 @@ impl Pairs {
             probability *= share;
             length += 1;
         }
-        length.max(SHORTEST)
+        length.max(SHORTEST as u32)
     }
 }
 
 impl Equality {
     /// Samples a picture of one byte per pixel.
     pub(super) fn sample(pixels: &[u8]) -> Self {
-        // An odd step does not stay in one column.
-        let step = (pixels.len() / SAMPLES) | 1;
-        let pair = |pair: &[u8]| pair.first().copied().zip(pair.get(1).copied());
-        let pairs = || pixels.windows(2).step_by(step).filter_map(pair);
-        let (sum, count) = pairs().fold((0u32, 0u32), |(sum, count), (a, _)| (sum + u32::from(a), count + 1));
+        let pair = |pair: &[u8]| pair.first_chunk().copied();
+        Self::of(|| pixels.windows(2).step_by(sample_step(pixels.len())).filter_map(pair))
+    }
+    /// Takes the sample of a picture whose rows came one by one.
+    pub(super) fn of_rows(sample: &RowSample) -> Self {
+        Self::of(|| sample.pairs())
+    }
+    fn of<I: Iterator<Item = [u8; 2]>>(pairs: impl Fn() -> I) -> Self {
+        let (sum, count) = pairs().fold((0u32, 0u32), |(sum, count), [a, _]| (sum + u32::from(a), count + 1));
         let mean = sum.checked_div(count).unwrap_or(0) as u8;
         let (mut dark, mut bright) = (Pairs::default(), Pairs::default());
-        for (a, b) in pairs().filter(|(a, _)| !matches!(*a, 0 | u8::MAX)) {
+        for [a, b] in pairs().filter(|[a, _]| !matches!(*a, 0 | u8::MAX)) {
             let part = if a < mean { &mut dark } else { &mut bright };
             part.equal += u32::from(a == b);
             part.all += 1;
@@ -160,10 +170,21 @@ impl Equality {
     }
 
     /// Returns whether the pixels at a pixel of an edge are stuck: its own run or that of a neighbour.
-    pub(super) fn is_stuck(&self, pixels: &[u8], width: usize, at: Pixel) -> bool {
+    pub(super) fn is_stuck(&self, readout: Readout<'_>, at: Pixel) -> bool {
         let (x, y) = (usize::from(at.x), usize::from(at.y));
         let near = [(x, y), (x, y.wrapping_sub(1)), (x, y + 1), (x.wrapping_sub(1), y), (x + 1, y)];
-        near.iter().any(|&(x, y)| self.is_in_stuck_run(pixels, width, x, y))
+        near.iter().any(|&(x, y)| match readout {
+            Readout::Pixels(pixels, width) => self.is_in_stuck_run(pixels, width, x, y),
+            Readout::Rows(rows) => {
+                let run = rows.get(y).and_then(|row| row.at(x));
+                run.is_some_and(|run| u32::from(run.length) >= self.needed(run.value))
+            }
+        })
+    }
+
+    /// Returns the length of a run of this value that noise does not allow.
+    fn needed(&self, value: u8) -> u32 {
+        if value < self.mean { self.dark } else { self.bright }
     }
 
     fn is_in_stuck_run(&self, pixels: &[u8], width: usize, x: usize, y: usize) -> bool {
@@ -175,7 +196,7 @@ impl Equality {
         if !is_beside(x.wrapping_sub(1)) && !is_beside(x + 1) {
             return false;
         }
-        let needed = if value < self.mean { self.dark } else { self.bright };
+        let needed = self.needed(value);
         if matches!(value, 0 | u8::MAX) || needed == u32::MAX {
             return false;
         }
@@ -202,9 +223,14 @@ mod tests {
         (0..160 * 120).map(|i| (if i / 160 < 40 { 20 } else { 150 } + draw()) as u8).collect()
     }
 
+    /// Returns the number of stuck places of a row; in memory and row by row there are as many.
     fn stuck_places(pixels: &[u8], y: u16) -> usize {
         let equality = Equality::sample(pixels);
-        (0..160).filter(|&x| equality.is_stuck(pixels, 160, Pixel { x, y })).count()
+        let count = |readout| (0..160).filter(|&x| equality.is_stuck(readout, Pixel { x, y })).count();
+        let rows: Vec<RowRuns> = pixels.chunks(160).map(|row| RowRuns::find(row, 90)).collect();
+        let found = count(Readout::Pixels(pixels, 160));
+        assert_eq!(found, count(Readout::Rows(&rows)), "row {y}");
+        found
     }
 
     #[test]
