@@ -51,9 +51,7 @@ pub(super) fn write_all(
         disk::write_whole(path, &text)?;
     }
     if outputs.is_empty() && !quiet {
-        tell::line(
-            "note: -o camera.toml writes the camera, -o report.html plots, -o residuals.csv the residual of every point",
-        );
+        tell::line("note: -o camera.toml writes the camera, -o report.html plots, -o residuals.csv all residuals");
     }
     Ok(())
 }

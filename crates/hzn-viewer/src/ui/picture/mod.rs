@@ -88,9 +88,7 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
         overlays::draw(viewer, &painter, frame_view, outcome, &placement);
     }
     if pane == 0 {
-        lens::draw(viewer, &painter, frame_view, &placement);
-        mask::draw(viewer, &painter, &placement, ui);
-        circle::draw(viewer, &painter, &placement);
+        draw_tools(viewer, ui, &painter, frame_view, &placement);
     }
     if let Some(name) = viewer.other.as_ref().map(|(name, _)| name.clone()) {
         let title = if pane == 0 { "session".to_owned() } else { name };
@@ -104,6 +102,13 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
     {
         label(&painter, rect.left_bottom() + vec2(10.0, -10.0), Align2::LEFT_BOTTOM, &text);
     }
+}
+
+/// Draws the residuals of a calibration and the tools of mask and image circle.
+fn draw_tools(viewer: &Viewer, ui: &Ui, painter: &egui::Painter, frame_view: &FrameView, placement: &Placement<'_>) {
+    lens::draw(viewer, painter, frame_view, placement);
+    mask::draw(viewer, painter, placement, ui);
+    circle::draw(viewer, painter, placement);
 }
 
 /// Handles zoom and pan, or the tool of the mask or of the image circle. Returns true if the view has changed.

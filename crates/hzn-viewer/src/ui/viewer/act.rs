@@ -28,11 +28,7 @@ impl Viewer {
             Command::Redo => self.session.iter_mut().for_each(Session::redo),
             Command::Reset => self.session.iter_mut().for_each(Session::reset),
             Command::Diff => self.showing_diff = !self.showing_diff,
-            Command::Play => {
-                // The first picture is shown for its full time.
-                self.last = std::time::Instant::now();
-                self.playback.toggle(count);
-            }
+            Command::Play => self.toggle_playing(),
             Command::Next => self.playback.step(1, count),
             Command::Back => self.playback.step(-1, count),
             Command::Next10 => self.playback.step(10, count),
@@ -74,6 +70,13 @@ impl Viewer {
             Command::Theme => self.settings.dark = !self.settings.dark,
             Command::Help => self.showing_help = !self.showing_help,
         }
+    }
+
+    /// Starts or stops playing.
+    fn toggle_playing(&mut self) {
+        // The first picture is shown for its full time.
+        self.last = std::time::Instant::now();
+        self.playback.toggle(self.sequence.len());
     }
 
     /// Asks for a folder and opens it.
