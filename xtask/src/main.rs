@@ -8,7 +8,7 @@
 //! cargo xtask campaign   looks for faults: fuzzing, killed runs, long runs
 //! cargo xtask keys       writes the files that follow from the keys of sensor.toml: table, template, JSON schema,
 //!                        types of Python
-//! cargo xtask viewer     makes the picture of the viewer's window in the documents
+//! cargo xtask viewer     makes the picture of the viewer's window in the documents, or pictures of all situations
 //! ```
 #![forbid(unsafe_code)]
 
@@ -16,12 +16,14 @@ mod bench;
 mod c_package;
 mod campaign;
 mod demo;
+mod display;
 mod firmware;
 mod flight_build;
 mod machine;
 mod processors;
 mod python;
 mod reproduce;
+mod situations;
 mod soft_double;
 mod steps;
 mod test;
@@ -50,7 +52,8 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|
                      --by-feature prints only how much flash the methods of published systems take
   keys               writes the table of book/reference/sensor-toml.md, the template, the JSON schema and the
                      Python types (hzn.keys) from the keys in hzn-core
-  viewer             makes book/images/viewer.png again; needs `cargo xtask test demo` first";
+  viewer             makes book/images/viewer.png again; needs `cargo xtask test demo` first
+  viewer situations  makes pictures of the window into target/xtask/situations: six sizes and themes of each situation";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -65,7 +68,7 @@ fn main() -> ExitCode {
         "campaign" => campaign::run(rest),
         "firmware" => firmware::run(rest),
         "keys" => write_keys(),
-        "viewer" => viewer::run(),
+        "viewer" => viewer::run(rest),
         "help" | "-h" | "--help" => {
             println!("{USAGE}");
             Ok(())

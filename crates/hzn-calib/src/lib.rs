@@ -5,6 +5,7 @@
 //! | `sensor.toml` | [`sensor::load`] | [`hzn_core::Config`], checked |
 //! | Kalibr camchain, OpenCV YAML, EuRoC `sensor.yaml` | [`camera_file::load`] | [`hzn_core::camera::Config`] |
 //! | `frames.csv` | [`frames::load`] | time, altitude, position, attitude of every picture |
+//! | `residuals.csv` | [`residual_table::read`] | residuals of a lens calibration |
 //!
 //! [`document`] reads TOML files of other crates with the same checks, for example scene.toml.
 //!
@@ -38,6 +39,7 @@ pub mod noise;
 pub mod plausible;
 pub mod points;
 mod problem;
+pub mod residual_table;
 mod robust;
 pub mod sensor;
 pub mod sky;

@@ -36,7 +36,7 @@ fn reported(report: &str, name: &str) -> f64 {
 fn real_boards_give_a_camera() {
     let place = Place::new();
     let board = ["--board", "9x6", "--square-mm", "25", "--model", "brown-conrady"];
-    let out = ["-o", "camera.toml", "-o", "report.html"];
+    let out = ["-o", "camera.toml", "-o", "report.html", "-o", "residuals.csv"];
     let (code, report, stderr) = run(&place, &[&["calibrate", "board", BOARDS][..], &board, &out].concat());
     assert_eq!(code, 0, "{stderr}");
     assert!(report.contains("pictures         13 of 13 used"), "{report}");
@@ -51,6 +51,13 @@ fn real_boards_give_a_camera() {
     assert!(code == 0 && shown.contains("brown-conrady"), "{shown} {stderr}");
     let page = place.read("report.html");
     assert!(page.contains("<svg") && page.contains("left14.jpg") && page.contains("1 sigma of the radial curve"));
+    let table = hzn_calib::residual_table::read(&place.path("residuals.csv")).unwrap();
+    let counts: Vec<_> = table.iter().filter(|(_, r)| r.counts).collect();
+    let rms = (counts.iter().map(|(_, r)| r.error_px[0].powi(2) + r.error_px[1].powi(2)).sum::<f64>()
+        / counts.len() as f64)
+        .sqrt();
+    assert!((rms - reported(&report, "RMS")).abs() < 6e-4 && table.len() == 13 * 54, "{rms} {}", table.len());
+    assert!(table.iter().any(|(file, _)| file == "left14.jpg"));
     let (code, _, stderr) = run(&place, &[&["calibrate", "board", BOARDS][..], &board, &out].concat());
     assert!(code == 2 && stderr.contains("exists already; --force replaces it"), "{stderr}");
 }

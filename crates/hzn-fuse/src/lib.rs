@@ -11,12 +11,14 @@
 //! | [`results`] | what comes out |
 //! | [`simulated`] | recordings of simulated flights without pictures |
 //! | [`sink`] | results as files: CSV, MCAP, AEM, CK, frames.csv |
+//! | [`read_back`] | these files (CSV, MCAP) back into numbers |
 
 #![forbid(unsafe_code)]
 
 mod error;
 pub mod flight;
 pub mod input;
+pub mod read_back;
 pub mod results;
 pub mod settings;
 pub mod simulated;

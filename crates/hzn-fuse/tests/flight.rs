@@ -76,6 +76,53 @@ fn a_flight_gives_attitude_mounts_clocks_and_the_way_back() {
 }
 
 #[test]
+fn written_results_are_read_back() {
+    use hzn_fuse::read_back::{find_solution, is_solution, read_solution};
+    use hzn_fuse::sink::{Phase, innovations, states, write_innovations, write_mcap, write_states};
+    let fused = fuse(&flight(&scene(SEED)), &settings(), Wanted { smoothed: true, ..Wanted::default() }).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| dir.path().join(name);
+    assert_eq!(find_solution(dir.path()), None);
+    let create = |name: &str| std::fs::File::create(file(name)).unwrap();
+    write_states(&fused, create("nav.csv")).unwrap();
+    write_innovations(&fused, create("nav.innovations.csv")).unwrap();
+    assert_eq!(find_solution(dir.path()), Some(file("nav.csv")));
+    write_mcap(&fused, "", &file("nav.mcap")).unwrap();
+    assert_eq!(find_solution(dir.path()), Some(file("nav.mcap")));
+
+    let [table, recording] = ["nav.csv", "nav.mcap"].map(|name| read_solution(&file(name)).unwrap());
+    let count = |phase| table.states.iter().filter(|s| s.phase == phase).count();
+    assert!([Phase::Back, Phase::Filter, Phase::Smoothed].into_iter().all(|phase| count(phase) > 100));
+    for (read, written) in table.states.iter().zip(states(&fused)) {
+        assert_eq!(
+            (read.time_s, read.yaw_deg, read.sigma_z_deg),
+            (written.time_s, written.yaw_deg, written.sigma_z_deg)
+        );
+        assert_eq!(read.limb_height_sigma_km, written.limb_height_sigma_km);
+    }
+    for (read, written) in table.innovations.iter().zip(innovations(&fused)) {
+        assert_eq!((read.time_s, &*read.source, read.taken), (written.time_s, &*written.source, written.taken));
+        let components = read.sigmas().collect::<Vec<_>>();
+        assert_eq!(components.len(), if written.third.is_some() { 3 } else { 2 });
+        assert!((components[0] - written.first / written.first_sigma).abs() < 1e-9);
+    }
+    // The recording has the same numbers in the order of time.
+    let sorted = |mut all: Vec<hzn_fuse::read_back::State>| {
+        all.sort_by(|a, b| (a.time_s, a.phase as u8).partial_cmp(&(b.time_s, b.phase as u8)).unwrap());
+        all
+    };
+    assert_eq!(sorted(recording.states), sorted(table.states));
+    assert_eq!(recording.innovations.len(), table.innovations.len());
+
+    std::fs::write(file("other.csv"), "time_s,u,v\n").unwrap();
+    assert!(!is_solution(&file("other.csv")) && !is_solution(&file("none.mcap")));
+    assert!(read_solution(&file("other.csv")).unwrap_err().to_string().contains("no result of hzn fuse"));
+    std::fs::write(file("nav.innovations.csv"), "time_s,source,kind,taken\n1.0,left,limb,perhaps\n").unwrap();
+    let why = read_solution(&file("nav.csv")).unwrap_err().to_string();
+    assert!(why.contains("nav.innovations.csv") && why.contains("line: 2"), "{why}");
+}
+
+#[test]
 fn samples_that_misbehave_are_counted_and_do_no_harm() {
     let scene = scene(SEED);
     let mut inputs = flight(&scene);

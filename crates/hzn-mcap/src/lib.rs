@@ -12,7 +12,7 @@
 //!   end.
 //! - [`Reader`] reads the frames, also from broken files; [`recover`] closes a broken file, [`resume`] continues it.
 //! - [`ImageReader`] reads pictures from MCAP files of any writer, as an input.
-//! - [`SeriesWriter`] writes series over time, for example of a navigation filter.
+//! - [`SeriesWriter`] writes series over time, for example of a navigation filter; [`read_series`] reads them.
 //! - [`Index`] finds pictures and reports without reading the pictures; [`Pictures`] then reads any one of them.
 //!
 //! # The file
@@ -50,6 +50,7 @@ mod reader;
 mod recover;
 mod row;
 mod series;
+mod series_reader;
 mod status_name;
 mod topics;
 mod writer;
@@ -66,6 +67,7 @@ pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};
 pub use row::{Row, RowMeta, roll_pitch_deg};
 pub use series::{Placed, SeriesWriter};
+pub use series_reader::{begins_with_attachment, read_series};
 pub use topics::{IMAGE_TOPIC, report_schema};
 pub use writer::{FLUSH_INTERVAL, Options, Writer};
 

@@ -6,6 +6,7 @@ use clap::Parser;
 use hzn_run::source::Raw;
 
 use crate::measure::Kind;
+use crate::ui::Situation;
 use crate::work::open::Request;
 
 /// Shows what the sensor found in each picture, and tunes its parameters live.
@@ -42,6 +43,9 @@ pub struct Args {
     /// Save a screenshot of the window, print status and axis of the shown picture, and exit
     #[arg(long, value_name = "PNG")]
     pub screenshot: Option<PathBuf>,
+    /// Bring the window into this situation before the screenshot
+    #[arg(long, value_name = "WHAT", hide = true, requires = "screenshot")]
+    pub situation: Option<Situation>,
     /// Size of the window in points
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
     pub size: Option<[f32; 2]>,

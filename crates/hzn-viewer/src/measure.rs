@@ -7,6 +7,8 @@ use clap::ValueEnum;
 use crate::model::Look;
 use crate::ui::{Command, Viewer};
 
+/// Time from the start until a window has nothing to do any more.
+const SETTLED: Duration = Duration::from_secs(15);
 /// Number of parameter changes that are timed.
 const CHANGES: usize = 200;
 
@@ -19,6 +21,8 @@ pub enum Kind {
     Tune,
     /// Memory while all pictures are played at the highest speed.
     Play,
+    /// Processor time while pictures are played at the speed of the sequence.
+    RealTime,
 }
 
 /// Times of one parameter change. `answer` counts from the request, all others count from the change.
@@ -55,6 +59,8 @@ pub struct Measure {
     late: u32,
     frames: usize,
     shown: Option<usize>,
+    /// Frames of the window that were drawn.
+    passes: usize,
 }
 
 impl Measure {
@@ -62,7 +68,21 @@ impl Measure {
     pub fn new(kind: Kind, began: Instant) -> Self {
         let (look, times) = (Look::Colour, Vec::new());
         let (worked, handed) = (Duration::ZERO, Times::default());
-        Self { kind, began, look, changed: None, worked, seen: false, times, handed, late: 0, frames: 0, shown: None }
+        let shown = None;
+        Self {
+            kind,
+            began,
+            look,
+            changed: None,
+            worked,
+            seen: false,
+            times,
+            handed,
+            late: 0,
+            frames: 0,
+            shown,
+            passes: 0,
+        }
     }
 
     /// Runs before the window is drawn, when the last drawing is on the screen. Returns true when the measurement is
@@ -72,6 +92,7 @@ impl Measure {
             Kind::Start => self.start(viewer),
             Kind::Tune => self.tune(viewer),
             Kind::Play => self.play(viewer, ctx),
+            Kind::RealTime => self.real_time(viewer, ctx),
         }
     }
 
@@ -93,7 +114,8 @@ impl Measure {
                 ..Times::default()
             };
         }
-        if self.seen {
+        self.passes += 1;
+        if self.seen && self.kind != Kind::RealTime {
             // The next pass comes when this one is on the screen.
             ctx.request_repaint();
         }
@@ -165,6 +187,34 @@ impl Measure {
         false
     }
 
+    /// Waits until the window has nothing to do, plays the sequence once, and counts the processor time.
+    fn real_time(&mut self, viewer: &mut Viewer, ctx: &egui::Context) -> bool {
+        if !viewer.is_playing() && self.changed.is_none() {
+            // All work in the background, and all messages of the beginning, end before the measurement.
+            if !self.seen || viewer.is_working() || self.began.elapsed() < SETTLED {
+                ctx.request_repaint_after(Duration::from_millis(200));
+                return false;
+            }
+            viewer.run(Command::Play, ctx);
+            (self.changed, self.worked, self.passes) = (Some(Instant::now()), process_time(), 0);
+        }
+        let index = viewer.frame_view().map(|s| s.index);
+        if index != self.shown {
+            (self.shown, self.frames) = (index, self.frames + 1);
+        }
+        let Some(began) = self.changed.filter(|_| !viewer.is_playing()) else { return false };
+        let (worked, took) = (process_time().saturating_sub(self.worked), began.elapsed());
+        println!(
+            "{} pictures in {:.1} s, drawn {} times: processor time {:.2} s, {:.1} % of a core",
+            self.frames,
+            took.as_secs_f64(),
+            self.passes,
+            worked.as_secs_f64(),
+            100.0 * worked.as_secs_f64() / took.as_secs_f64()
+        );
+        true
+    }
+
     fn play(&mut self, viewer: &mut Viewer, ctx: &egui::Context) -> bool {
         let count = viewer.sequence().len();
         if self.changed.is_none() {
@@ -193,6 +243,15 @@ impl Measure {
         }
         is_finished
     }
+}
+
+/// Returns the processor time of all threads of this process so far, or zero if the system does not report it.
+fn process_time() -> Duration {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // The name of the program, in parentheses, may contain spaces. User and system time are the fields 14 and 15, in
+    // hundredths of a second.
+    let fields = text.rsplit_once(')').map_or("", |(_, fields)| fields).split_whitespace();
+    Duration::from_millis(10 * fields.skip(11).take(2).filter_map(|n| n.parse::<u64>().ok()).sum::<u64>())
 }
 
 /// Returns the processor time of this thread so far, or zero if the system does not report it.

@@ -10,12 +10,15 @@ use egui::{ColorImage, ScreenshotCallback, ViewportCommand};
 use crate::args::Args;
 use crate::measure::Measure;
 use crate::model::Settings;
-use crate::ui::Viewer;
+use crate::ui::{Situation, Viewer};
 
 /// Longest time to wait for the screenshot.
 const SHOT_LIMIT: Duration = Duration::from_secs(60);
 /// Passes of the window before the screenshot is taken; plots find their bounds and panels their sizes in these passes.
 const SHOT_PASSES: u32 = 6;
+
+/// Time until the window is drawn when a thread has something to show.
+const WAKE_DELAY: Duration = Duration::from_millis(1);
 
 /// Opens the window and returns when it is closed.
 ///
@@ -52,7 +55,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         options,
         Box::new(move |cc| {
             let ctx = cc.egui_ctx.clone();
-            let wake = Arc::new(move || ctx.request_repaint());
+            // Without a delay, the window would be drawn twice.
+            let wake = Arc::new(move || ctx.request_repaint_after(WAKE_DELAY));
             let mut viewer = Viewer::new(settings, store, wake);
             viewer.set_flight(args.flight);
             if store_is_used && native_dialogs() {
@@ -63,7 +67,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             if !args.input.is_empty() {
                 viewer.open(args.request());
             }
-            Ok(Box::new(Window { viewer, shot, measure, begun: Instant::now(), passes: 0, is_printed: false, result }))
+            let is_welcome = args.input.is_empty();
+            let (begun, situation) = (Instant::now(), args.situation);
+            let window =
+                Window { viewer, shot, is_welcome, situation, measure, begun, passes: 0, is_printed: false, result };
+            Ok(Box::new(window))
         }),
     );
     window.map_err(|e| anyhow!("{e}")).context("the window cannot be opened (it needs a display and OpenGL)")?;
@@ -83,6 +91,10 @@ struct Window {
     viewer: Viewer,
     /// File for the screenshot of the window; `None` without `--screenshot`.
     shot: Option<PathBuf>,
+    /// Nothing is opened, so the welcome page is shown.
+    is_welcome: bool,
+    /// Situation that the window has to be brought into before the screenshot.
+    situation: Option<Situation>,
     measure: Option<Measure>,
     begun: Instant,
     /// Passes of the window since the picture is shown.
@@ -119,13 +131,16 @@ impl eframe::App for Window {
                 Err(anyhow!("no picture was shown within {} s: {}", SHOT_LIMIT.as_secs(), messages.join("; "))),
             );
         }
-        if !self.viewer.is_settled() || self.viewer.is_working() {
+        if !self.is_welcome && (!self.viewer.is_settled() || self.viewer.is_working()) {
             let failed = self.viewer.sequence().is_empty() && self.viewer.messages().next().is_some();
             if failed && self.begun.elapsed() > Duration::from_secs(2) {
                 let messages: Vec<&str> = self.viewer.messages().collect();
                 return self.finish(&ctx, Err(anyhow!("{}", messages.join("; "))));
             }
             return;
+        }
+        if let Some(situation) = self.situation.take() {
+            return self.viewer.arrange(situation, &ctx);
         }
         self.passes += 1;
         if self.passes == SHOT_PASSES

@@ -3,12 +3,12 @@
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
 use hzn_nav::strapdown::Nominal;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::results::{CameraState, Epoch, Fused, Innovation};
 
 /// The origin of a solution.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
     /// Integrated back from the start.

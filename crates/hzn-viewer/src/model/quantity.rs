@@ -1,6 +1,7 @@
 //! The quantities that can be plotted over time.
 
 use hzn_mcap::Row;
+use hzn_sim::evaluate::{MeasuredPosition, PositionMiss};
 use hzn_sim::truth::Truth;
 
 /// A quantity that can be plotted over time.
@@ -12,6 +13,16 @@ pub struct Quantity {
     pub unit: &'static str,
     /// Lines of the plot: the name and the value of each.
     pub lines: &'static [(&'static str, RowValue)],
+    /// True if only some sequences have values; without values it is not offered.
+    pub is_optional: bool,
+}
+
+const fn always(name: &'static str, unit: &'static str, lines: &'static [(&'static str, RowValue)]) -> Quantity {
+    Quantity { name, unit, lines, is_optional: false }
+}
+
+const fn optional(name: &'static str, unit: &'static str, lines: &'static [(&'static str, RowValue)]) -> Quantity {
+    Quantity { name, unit, lines, is_optional: true }
 }
 
 /// Function that returns a value of a result, possibly compared with the truth.
@@ -19,33 +30,44 @@ pub type RowValue = fn(&Row, Option<&Truth>) -> Option<f64>;
 
 /// All quantities that can be plotted.
 pub const QUANTITIES: &[Quantity] = &[
-    Quantity {
-        name: "Axis",
-        unit: "",
-        lines: &[("x", |r, _| r.axis_x), ("y", |r, _| r.axis_y), ("z", |r, _| r.axis_z)],
-    },
-    Quantity { name: "3 sigma", unit: "°", lines: &[("3σ", |r, _| Some(3.0 * r.sigma_max_deg?))] },
-    Quantity {
-        name: "Error (truth)",
-        unit: "°",
-        lines: &[("error", error_deg), ("3σ", |r, t| t.and(Some(3.0 * r.sigma_max_deg?)))],
-    },
-    Quantity { name: "RMS", unit: "px", lines: &[("rms", |r, _| r.rms_px)] },
-    Quantity {
-        name: "Points",
-        unit: "",
-        lines: &[("edge points", |r, _| r.edge_points.map(f64::from)), ("inliers", |r, _| r.inliers.map(f64::from))],
-    },
-    Quantity { name: "Half-angle", unit: "°", lines: &[("fitted", |r, _| r.half_angle_deg)] },
-    Quantity {
-        name: "Altitude",
-        unit: "km",
-        lines: &[("estimated", |r, _| r.altitude_est_km), ("given", |r, _| r.altitude_km)],
-    },
-    Quantity { name: "Range", unit: "km", lines: &[("to the centre of the body", range_km), ("3σ", range_3sigma_km)] },
-    Quantity { name: "Threshold", unit: "counts", lines: &[("threshold", |r, _| r.level.map(f64::from))] },
-    Quantity { name: "Roll, pitch", unit: "°", lines: &[("roll", |r, _| r.roll_deg), ("pitch", |r, _| r.pitch_deg)] },
-    Quantity { name: "Processing", unit: "µs", lines: &[("processing", |r, _| r.elapsed_us)] },
+    always("Axis", "", &[("x", |r, _| r.axis_x), ("y", |r, _| r.axis_y), ("z", |r, _| r.axis_z)]),
+    always("3 sigma", "°", &[("3σ", |r, _| Some(3.0 * r.sigma_max_deg?))]),
+    optional("Error (truth)", "°", &[("error", error_deg), ("3σ", |r, t| t.and(Some(3.0 * r.sigma_max_deg?)))]),
+    always("RMS", "px", &[("rms", |r, _| r.rms_px)]),
+    always(
+        "Points",
+        "",
+        &[("edge points", |r, _| r.edge_points.map(f64::from)), ("inliers", |r, _| r.inliers.map(f64::from))],
+    ),
+    always("Half-angle", "°", &[("fitted", |r, _| r.half_angle_deg)]),
+    always("Altitude", "km", &[("estimated", |r, _| r.altitude_est_km), ("given", |r, _| r.altitude_km)]),
+    optional(
+        "Position",
+        "km",
+        &[("x", |r, _| r.position_x_km), ("y", |r, _| r.position_y_km), ("z", |r, _| r.position_z_km)],
+    ),
+    optional("Range", "km", &[("to the centre of the body", range_km)]),
+    optional("Position 3σ", "km", &[("range", range_3sigma_km), ("cross-range", cross_range_3sigma_km)]),
+    optional(
+        "Range error (truth)",
+        "km",
+        &[
+            ("error", |r, t| Some(position_miss(r, t)?.range_km)),
+            ("3σ", |r, t| position_miss(r, t).and(range_3sigma_km(r, t))),
+        ],
+    ),
+    optional(
+        "Cross-range error (truth)",
+        "km",
+        &[
+            ("error", |r, t| Some(position_miss(r, t)?.cross_range_km)),
+            ("3σ", |r, t| position_miss(r, t).and(cross_range_3sigma_km(r, t))),
+        ],
+    ),
+    optional("Third axis", "°", &[("rotation", |r, _| r.yaw_deg), ("3σ", |r, _| Some(3.0 * r.yaw_sigma_deg?))]),
+    always("Threshold", "counts", &[("threshold", |r, _| r.level.map(f64::from))]),
+    always("Roll, pitch", "°", &[("roll", |r, _| r.roll_deg), ("pitch", |r, _| r.pitch_deg)]),
+    always("Processing", "µs", &[("processing", |r, _| r.elapsed_us)]),
 ];
 
 /// Returns the distance to the centre of the body, from a result with a position.
@@ -54,13 +76,23 @@ fn range_km(row: &Row, _: Option<&Truth>) -> Option<f64> {
     Some((x * x + y * y + z * z).sqrt())
 }
 
-/// Returns 3-sigma of [`range_km`]: the covariance of the position along its own direction.
-fn range_3sigma_km(row: &Row, truth: Option<&Truth>) -> Option<f64> {
-    let range = range_km(row, truth)?;
-    let [x, y, z] = row.position_km()?.map(|v| v / range);
-    let [xx, xy, xz, yy, yz, zz] = row.position_covariance_km2()?;
-    let variance = x * x * xx + y * y * yy + z * z * zz + 2.0 * (x * y * xy + x * z * xz + y * z * yz);
-    Some(3.0 * variance.max(0.0).sqrt())
+fn position(row: &Row) -> Option<MeasuredPosition> {
+    Some(MeasuredPosition { centre_km: row.position_km()?, covariance_km2: row.position_covariance_km2()? })
+}
+
+/// Returns 3-sigma of [`range_km`].
+fn range_3sigma_km(row: &Row, _: Option<&Truth>) -> Option<f64> {
+    Some(3.0 * position(row)?.sigmas_km()?[0])
+}
+
+/// Returns 3-sigma of the position in the worst direction perpendicular to the line to the body.
+fn cross_range_3sigma_km(row: &Row, _: Option<&Truth>) -> Option<f64> {
+    Some(3.0 * position(row)?.sigmas_km()?[1])
+}
+
+/// Returns the errors of a position, if there is a truth.
+fn position_miss(row: &Row, truth: Option<&Truth>) -> Option<PositionMiss> {
+    PositionMiss::new(&position(row)?, truth?.position_km()?)
 }
 
 /// Returns the angle between an answer and the truth, in degrees.
@@ -80,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_range_has_the_sigma_along_the_line_of_sight() {
+    fn positions_have_their_sigmas_along_and_across_the_line_of_sight() {
         let meta =
             hzn_mcap::RowMeta { index: 0, file: "a".into(), time_s: None, body: "earth".into(), altitude_km: None };
         let mut row = Row::unprocessed(&meta, hzn_core::status::Status::Ok, "");
@@ -90,6 +122,9 @@ mod tests {
         (row.pos_cov_xx_km2, row.pos_cov_xy_km2, row.pos_cov_xz_km2) = (Some(100.0), Some(0.0), Some(0.0));
         (row.pos_cov_yy_km2, row.pos_cov_yz_km2, row.pos_cov_zz_km2) = (Some(4.0), Some(0.0), Some(4.0));
         assert!((range_3sigma_km(&row, None).unwrap() - 6.0).abs() < 1e-12);
+        // Across the line of sight, x has the largest sigma.
+        assert!((cross_range_3sigma_km(&row, None).unwrap() - 30.0).abs() < 1e-12);
+        assert!(position_miss(&row, None).is_none());
     }
 
     #[test]

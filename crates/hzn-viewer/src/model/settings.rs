@@ -86,11 +86,13 @@ pub enum Layer {
     Circle,
     /// The true limb.
     Truth,
+    /// The residuals of a lens calibration as arrows.
+    Lens,
 }
 
 impl Layer {
     /// All layers, in the order in which they are listed.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Touched,
         Self::Edges,
         Self::Rejected,
@@ -101,6 +103,7 @@ impl Layer {
         Self::Mask,
         Self::Circle,
         Self::Truth,
+        Self::Lens,
     ];
     /// Returns the name on the screen.
     pub const fn name(self) -> &'static str {
@@ -115,6 +118,7 @@ impl Layer {
             Self::Mask => "Mask",
             Self::Circle => "Image circle",
             Self::Truth => "True limb",
+            Self::Lens => "Lens residuals",
         }
     }
 }
@@ -172,6 +176,7 @@ impl Default for Settings {
                 Layer::Sky,
                 Layer::Mask,
                 Layer::Circle,
+                Layer::Lens,
             ],
             answer: true,
             stages: true,

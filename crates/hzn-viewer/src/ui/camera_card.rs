@@ -2,13 +2,26 @@
 
 use egui::Ui;
 
+use super::picture;
 use super::viewer::Viewer;
 use crate::model::Session;
 
-/// Draws the switch that links both focal lengths.
+/// Draws the switch that links both focal lengths, and the tool of the image circle.
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let hint = "A change of fx_px or fy_px changes the other one by the same factor, so that pixels keep their shape";
-    ui.checkbox(&mut viewer.linked_focal, "Link fx and fy").on_hover_text(hint);
+    ui.horizontal_wrapped(|ui| {
+        ui.checkbox(&mut viewer.linked_focal, "Link fx and fy").on_hover_text(hint);
+        let dragging = viewer.circle.is_some();
+        if ui.selectable_label(dragging, if dragging { "Done" } else { "Drag the image circle" }).clicked() {
+            viewer.toggle_circle();
+        }
+        if let Some(session) = &mut viewer.session
+            && session.number("camera", "theta_max_deg", 0).is_some()
+            && ui.button("No image circle").on_hover_text("Removes camera.theta_max_deg").clicked()
+        {
+            picture::remove_circle(session);
+        }
+    });
 }
 
 /// Changes a focal length and, if they are linked, the other one by the same factor. Both are one step.

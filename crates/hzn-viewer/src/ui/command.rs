@@ -67,6 +67,8 @@ pub enum Command {
     Undistorted,
     /// Starts or ends the drawing of the mask.
     Mask,
+    /// Starts or ends the dragging of the image circle.
+    Circle,
     /// Hides or shows all overlays.
     Layers,
     /// Compares with another sensor.
@@ -122,6 +124,7 @@ pub(super) const ALL: &[(Command, &str, Modifiers, Key)] = &[
     (Command::FalseColour, "False colour: brightness as colours", Modifiers::NONE, Key::F),
     (Command::Undistorted, "Without distortion", Modifiers::NONE, Key::U),
     (Command::Mask, "Draw the mask", Modifiers::NONE, Key::M),
+    (Command::Circle, "Drag the image circle", Modifiers::NONE, Key::I),
     (Command::Layers, "Hide or show all overlays", Modifiers::NONE, Key::H),
     (Command::Compare, "Compare", Modifiers::NONE, Key::X),
     (Command::ProcessAll, "Process all frames again", Modifiers::COMMAND, Key::P),

@@ -27,8 +27,12 @@ impl Viewer {
         if !dropped.is_empty() {
             self.open_paths(dropped);
         }
+        let is_next = self.advance(&ctx);
         // The answer is computed while the panels are laid out.
         self.request_frame();
+        if is_next {
+            self.wait_for_next(&ctx);
+        }
         self.panels.set_size(ctx.content_rect().size());
         top::show(self, ui);
         // The welcome page has nothing to play, to plot or to tune.
@@ -50,7 +54,6 @@ impl Viewer {
         wizard::show(self, &ctx);
         study::show(self, &ctx);
         help::show(self, &ctx);
-        self.advance(&ctx);
         self.drive_background(&ctx);
         self.autosave(&ctx);
         self.close_if_due(&ctx);

@@ -20,6 +20,7 @@ mod placement;
 mod plots;
 mod questions;
 mod side;
+mod situations;
 mod stages;
 mod study;
 mod study_window;
@@ -35,4 +36,5 @@ mod wizard;
 mod wizard_form;
 
 pub use command::Command;
+pub use situations::Situation;
 pub use viewer::Viewer;

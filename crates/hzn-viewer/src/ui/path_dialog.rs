@@ -39,7 +39,9 @@ impl Purpose {
             Self::Picture => "PNG in the picture's own size",
             Self::Video => "The ending sets the format: .mp4, .mkv, .webm; needs ffmpeg on PATH",
             Self::Table => ".csv or .jsonl, with the results that are shown",
-            Self::Plots => "SVG of the plots over time that are chosen below the picture",
+            Self::Plots => {
+                ".svg, or .png with 2700 pixels across: the plots over time that are chosen below the picture"
+            }
             Self::Rerun => ".mcap with the current parameters",
         }
     }

@@ -192,7 +192,9 @@ fn layers(viewer: &mut Viewer, ui: &mut Ui) {
     });
     ui.add_enabled_ui(!viewer.layers_hidden, |ui| {
         for layer in Layer::ALL {
-            if layer == Layer::Truth && viewer.truth.is_empty() {
+            if (layer == Layer::Truth && viewer.truth.is_empty())
+                || (layer == Layer::Lens && viewer.companions.residuals.is_none())
+            {
                 continue;
             }
             ui.horizontal(|ui| {
@@ -228,5 +230,6 @@ fn colour(layer: Layer) -> Color32 {
         Layer::Mask => theme::MASK,
         Layer::Circle => theme::CIRCLE,
         Layer::Truth => theme::TRUTH,
+        Layer::Lens => theme::LENS,
     }
 }

@@ -52,6 +52,7 @@ fn contents(viewer: &mut Viewer, ui: &mut Ui) {
     if ui.input(|i| i.pointer.any_released())
         && let Some(session) = &mut viewer.session
         && viewer.mask.is_none()
+        && viewer.circle.is_none()
     {
         session.end_step();
     }

@@ -107,6 +107,7 @@ fn edit_menu(viewer: &mut Viewer, ui: &mut Ui) {
     menu_entry(viewer, ui, Command::Diff, changed);
     ui.separator();
     menu_entry(viewer, ui, Command::Mask, viewer.session.is_some());
+    menu_entry(viewer, ui, Command::Circle, viewer.session.is_some());
 }
 
 fn frames_menu(viewer: &mut Viewer, ui: &mut Ui) {
@@ -156,4 +157,5 @@ fn export_menu(viewer: &mut Viewer, ui: &mut Ui) {
     ask(ui, "Save video with overlays…", has_sensor && has_frames, Purpose::Video, &format!("{stem}.mp4"));
     ask(ui, "Save results as CSV…", has_frames, Purpose::Table, &format!("{stem}-viewed.csv"));
     ask(ui, "Save plots as SVG…", has_frames, Purpose::Plots, &format!("{stem}-plots.svg"));
+    ask(ui, "Save plots as PNG…", has_frames, Purpose::Plots, &format!("{stem}-plots.png"));
 }

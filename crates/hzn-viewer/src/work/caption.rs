@@ -54,28 +54,46 @@ impl Writer {
         image::imageops::replace(&mut out, picture, 0, 0);
         let left = line / 3;
         let room = (w.saturating_sub(2 * left)) as f32;
-        self.write(&mut out, [left, h + line / 4], &caption.text, line, room, INK);
+        let place = |x: u32, y: u32| [x as f32, y as f32];
+        let size = line as f32 * 0.74;
+        self.write(&mut out, place(left, h + line / 4), &caption.text, size, room, INK);
         let y = h + line / 4 + 2 * line;
         let mut x = left;
         for (name, colour) in &caption.legend {
             let box_px = line / 2;
             fill(&mut out, [x, y + line / 4], [box_px, box_px], *colour);
             let [r, g, b] = *colour;
-            let width = self.write(&mut out, [x + box_px + line / 5, y], name, line, room, Color32::from_rgb(r, g, b));
+            let colour = Color32::from_rgb(r, g, b);
+            let width = self.write(&mut out, place(x + box_px + line / 5, y), name, size, room, colour);
             x += box_px + width + line;
         }
         if let Some((length, what)) = &caption.scale {
             let length = (length.round() as u32).min(w / 4);
             let x = x.max(w.saturating_sub(length + 6 * line));
             fill(&mut out, [x, y + line / 2], [length, (line / 10).max(2)], [236, 238, 242]);
-            self.write(&mut out, [x + length + line / 4, y], what, line, room, INK);
+            self.write(&mut out, place(x + length + line / 4, y), what, size, room, INK);
         }
         out
     }
 
-    /// Writes text with its top left corner at `at`, wrapped at `room` pixels, and returns its width in pixels.
-    fn write(&mut self, image: &mut RgbImage, at: [u32; 2], text: &str, line_px: u32, room: f32, ink: Color32) -> u32 {
-        let size = line_px as f32 * 0.74;
+    /// Returns width and height of a line of text in pixels, for letters of this size in pixels.
+    pub(super) fn measure(&mut self, text: &str, size: f32) -> [u32; 2] {
+        let font = FontId::proportional(size);
+        let galley = self.fonts.with_pixels_per_point(1.0).layout(text.to_owned(), font, INK, f32::INFINITY);
+        [galley.size().x, galley.size().y].map(|x| x.ceil() as u32)
+    }
+
+    /// Writes text with its top left corner at `at`, wrapped at `room` pixels, and returns its width in pixels. `size`
+    /// is that of the letters in pixels.
+    pub(super) fn write(
+        &mut self,
+        image: &mut RgbImage,
+        at: [f32; 2],
+        text: &str,
+        size: f32,
+        room: f32,
+        ink: Color32,
+    ) -> u32 {
         let galley =
             self.fonts.with_pixels_per_point(1.0).layout(text.to_owned(), FontId::proportional(size), ink, room);
         let atlas = self.fonts.image();
@@ -89,7 +107,7 @@ impl Writer {
                 for y in 0..size[1].round() as usize {
                     for x in 0..size[0].round() as usize {
                         let Some(alpha) = atlas.pixels.get((uv[1] + y) * atlas.size[0] + uv[0] + x) else { continue };
-                        let place = [at[0] as f32 + to[0] + x as f32, at[1] as f32 + to[1] + y as f32];
+                        let place = [at[0] + to[0] + x as f32, at[1] + to[1] + y as f32];
                         blend(image, place, ink, alpha.a());
                     }
                 }

@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
@@ -65,6 +66,8 @@ enum Message {
 pub struct Engine {
     send: Sender<Message>,
     receive: Receiver<FrameView>,
+    /// True while the window waits for an answer, so that it need not be woken.
+    is_awaited: Arc<AtomicBool>,
 }
 
 impl Engine {
@@ -72,8 +75,16 @@ impl Engine {
     pub fn start(wake: Wake) -> Self {
         let (send, messages) = unbounded();
         let (frame_views, receive) = unbounded();
+        let is_awaited = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&is_awaited);
+        // An answer to a window that waits does not make it draw once more.
+        let wake: Wake = Arc::new(move || {
+            if !flag.load(Ordering::SeqCst) {
+                wake();
+            }
+        });
         std::thread::spawn(move || Worker::default().run(&messages, &frame_views, &wake));
-        Self { send, receive }
+        Self { send, receive, is_awaited }
     }
     /// Starts another sequence.
     pub fn open(&self, inputs: Vec<std::path::PathBuf>) {
@@ -93,7 +104,11 @@ impl Engine {
     }
     /// Waits for an answer; returns `None` when the time is up.
     pub fn wait(&self, limit: std::time::Duration) -> Option<FrameView> {
-        self.receive.recv_timeout(limit).ok()
+        self.is_awaited.store(true, Ordering::SeqCst);
+        let answer = self.receive.recv_timeout(limit).ok();
+        self.is_awaited.store(false, Ordering::SeqCst);
+        // An answer that came between the two lines above has not woken the window.
+        answer.or_else(|| self.receive.try_recv().ok())
     }
 }
 

@@ -1,8 +1,10 @@
 //! Work on separate threads, so that the window does not wait: opening, decoding, processing and exporting.
 
 pub mod background;
+mod canvas;
 pub mod caption;
 pub mod check;
+pub mod companion;
 pub mod demo;
 pub mod engine;
 pub mod export;

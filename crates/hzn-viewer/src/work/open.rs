@@ -105,6 +105,10 @@ impl EventSender {
 
 fn run(request: &Request, events: &EventSender) -> Result<(), String> {
     match request.inputs.as_slice() {
+        [one] if super::companion::kind_of(one).is_some() => {
+            let what = "holds results and no pictures; open the pictures or a recording first, then this file";
+            Err(format!("{}: {what}", one.display()))
+        }
         [one] if one.is_file() && is_recording(one) => open_recording(one, request, events),
         [one] if is_table(one) => Err(format!("{}: is neither a picture nor a recording", one.display())),
         _ => open_pictures(request, events),

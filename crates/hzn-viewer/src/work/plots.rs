@@ -1,19 +1,27 @@
-//! Writes plots over time as SVG, for documents.
+//! Writes plots over time as SVG or PNG, for documents.
 
 use std::path::Path;
 
+use image::RgbImage;
+use image::imageops::{self, FilterType};
+use plotters::coord::Shift;
 use plotters::prelude::*;
 
+use super::canvas::Canvas;
 use super::job::{Done, JobError};
 use crate::model::atomic_file;
 
-/// Width of the drawing, and heights of a plot and of the heading, in pixels.
+/// Width of the drawing, and heights of a plot and of the heading, in units: a unit is a pixel of the SVG.
 const WIDTH: u32 = 900;
 const PLOT: u32 = 190;
 const HEADING: u32 = 34;
 /// Width of the labels left of a plot, and height of those below the last one.
 const LEFT: u32 = 76;
 const BELOW: u32 = 46;
+/// Pixels of a PNG in a unit: 2700 pixels are 300 per inch on a page that is 23 cm wide.
+const PNG_SCALE: u32 = 3;
+/// The PNG is drawn this much larger and then made smaller, which gives lines and letters smooth edges.
+const OVERSAMPLING: u32 = 2;
 /// The colours of Okabe and Ito, which colour-blind people can distinguish.
 const COLOURS: [RGBColor; 4] =
     [RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
@@ -46,64 +54,86 @@ pub struct PlotSheet {
     pub rows: Vec<PlotRow>,
 }
 
-/// Writes the plots as SVG.
+/// Writes the plots as SVG or as PNG, depending on the ending.
 ///
 /// # Errors
-/// The name does not end in `.svg`, no plot has a value, or the file cannot be written.
+/// The name has another ending, no plot has a value, or the file cannot be written.
 pub fn save(sheet: &PlotSheet, path: &Path) -> Result<Done, JobError> {
-    if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("svg")) {
-        return Err(JobError::Failed(format!("{}: the file name of plots must end in .svg", path.display())));
-    }
-    let text = svg(sheet).map_err(JobError::Failed)?;
-    atomic_file::write(path, text.as_bytes())?;
+    let is = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    let bytes = if is("svg") {
+        svg(sheet)?.into_bytes()
+    } else if is("png") {
+        let picture = png(sheet)?;
+        hzn_run::overlay::png(&picture).map_err(|e| format!("{}: {e:#}", path.display()))?
+    } else {
+        return Err(JobError::Failed(format!("{}: the file name of plots must end in .svg or .png", path.display())));
+    };
+    atomic_file::write(path, &bytes)?;
     Ok(Done::Written(path.to_owned()))
 }
 
-/// Returns the drawing.
+/// Returns the size of the drawing in units.
+fn size(sheet: &PlotSheet) -> Result<[u32; 2], String> {
+    match sheet.rows.len() as u32 {
+        0 => Err("no chosen plot has a value".into()),
+        count => Ok([WIDTH, HEADING + count * PLOT + BELOW]),
+    }
+}
+
+/// Returns the drawing as SVG.
 fn svg(sheet: &PlotSheet) -> Result<String, String> {
-    let count = sheet.rows.len() as u32;
-    if count == 0 {
-        return Err("no chosen plot has a value".into());
-    }
+    let [w, h] = size(sheet)?;
     let mut out = String::new();
-    {
-        let root = SVGBackend::with_string(&mut out, (WIDTH, HEADING + count * PLOT + BELOW)).into_drawing_area();
-        draw(sheet, &root).map_err(|e| format!("the plots cannot be drawn: {e}"))?;
-    }
+    draw(sheet, &SVGBackend::with_string(&mut out, (w, h)).into_drawing_area(), 1)?;
     Ok(out)
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-
-fn draw(sheet: &PlotSheet, root: &Area<'_>) -> Result<(), Box<dyn std::error::Error>> {
-    root.fill(&WHITE)?;
-    let (heading, mut rest) = root.split_vertically(HEADING);
-    heading.draw_text(&sheet.heading, &("sans-serif", 16).into_text_style(root), (LEFT as i32, 10))?;
-    for (n, row) in sheet.rows.iter().enumerate() {
-        let is_last = n + 1 == sheet.rows.len();
-        let (area, below) = rest.split_vertically(if is_last { PLOT + BELOW } else { PLOT });
-        draw_row(sheet, row, &area, is_last)?;
-        rest = below;
-    }
-    root.present()?;
-    Ok(())
+/// Returns the drawing as a picture.
+fn png(sheet: &PlotSheet) -> Result<RgbImage, String> {
+    let [w, h] = size(sheet)?.map(|x| x * PNG_SCALE);
+    let (large_w, large_h) = (w * OVERSAMPLING, h * OVERSAMPLING);
+    let mut large = RgbImage::new(large_w, large_h);
+    draw(sheet, &Canvas::new(&mut large).into_drawing_area(), PNG_SCALE * OVERSAMPLING)?;
+    Ok(imageops::resize(&large, w, h, FilterType::Triangle))
 }
 
-fn draw_row(
+type Area<B> = DrawingArea<B, Shift>;
+
+/// Draws everything, with `scale` pixels in a unit.
+fn draw<B: DrawingBackend>(sheet: &PlotSheet, root: &Area<B>, scale: u32) -> Result<(), String> {
+    let all = || -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+        root.fill(&WHITE)?;
+        let (heading, mut rest) = root.split_vertically(HEADING * scale);
+        let place = [LEFT, 10].map(|x| (x * scale) as i32);
+        heading.draw_text(&sheet.heading, &("sans-serif", 16 * scale).into_text_style(root), place.into())?;
+        for (n, row) in sheet.rows.iter().enumerate() {
+            let is_last = n + 1 == sheet.rows.len();
+            let (area, below) = rest.split_vertically(if is_last { PLOT + BELOW } else { PLOT } * scale);
+            draw_row(sheet, row, &area, is_last, scale)?;
+            rest = below;
+        }
+        root.present()
+    };
+    all().map_err(|e| format!("the plots cannot be drawn: {e}"))
+}
+
+fn draw_row<B: DrawingBackend>(
     sheet: &PlotSheet,
     row: &PlotRow,
-    area: &Area<'_>,
+    area: &Area<B>,
     is_last: bool,
-) -> Result<(), Box<dyn std::error::Error>> {
+    scale: u32,
+) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
     let values = row.lines.iter().flat_map(|(_, parts)| parts.iter().flatten()).map(|p| p[1]);
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
     let room = (0.08 * (high - low)).max(1e-6 * high.abs()).max(1e-9);
     let [first, last] = sheet.ends;
+    let font = |size: u32| ("sans-serif", size * scale);
     let mut chart = ChartBuilder::on(area)
-        .caption(&row.title, ("sans-serif", 14))
-        .margin_right(16)
-        .y_label_area_size(LEFT)
-        .x_label_area_size(if is_last { BELOW } else { 0 })
+        .caption(&row.title, font(14))
+        .margin_right(16 * scale)
+        .y_label_area_size(LEFT * scale)
+        .x_label_area_size(if is_last { BELOW * scale } else { 0 })
         .build_cartesian_2d(first..last, low - room..high + room)?;
     chart.draw_series(
         sheet
@@ -112,24 +142,28 @@ fn draw_row(
             .map(|[from, to]| Rectangle::new([(*from, low - room), (*to, high + room)], REFUSED.mix(0.25).filled())),
     )?;
     let mut mesh = chart.configure_mesh();
-    mesh.light_line_style(TRANSPARENT).y_labels(5).label_style(("sans-serif", 12));
+    mesh.light_line_style(TRANSPARENT).y_labels(5).label_style(font(12));
+    mesh.axis_style(BLACK.stroke_width(scale)).bold_line_style(BLACK.mix(0.15).stroke_width(scale));
+    mesh.set_all_tick_mark_size(5 * scale);
     mesh.x_desc(if is_last { sheet.axis } else { "" }).draw()?;
     for (n, (name, parts)) in row.lines.iter().enumerate() {
-        let colour = COLOURS[n % COLOURS.len()];
+        let style = COLOURS[n % COLOURS.len()].stroke_width(2 * scale);
         for (k, part) in parts.iter().enumerate() {
             let points = part.iter().map(|p| (p[0], p[1]));
             if let [one] = part.as_slice() {
-                chart.draw_series([Circle::new((one[0], one[1]), 2, colour.filled())])?;
+                chart.draw_series([Circle::new((one[0], one[1]), 2 * scale, style.filled())])?;
             }
-            let line = chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
+            let line = chart.draw_series(LineSeries::new(points, style))?;
             if k == 0 && row.lines.len() > 1 {
-                line.label(name).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
+                let length = 18 * scale as i32;
+                line.label(name).legend(move |(x, y)| PathElement::new([(x, y), (x + length, y)], style));
             }
         }
     }
     if row.lines.len() > 1 {
         let mut legend = chart.configure_series_labels();
-        legend.background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.2)).label_font(("sans-serif", 12)).draw()?;
+        legend.legend_area_size(24 * scale).margin(6 * scale).label_font(font(12));
+        legend.background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.2).stroke_width(scale)).draw()?;
     }
     Ok(())
 }
@@ -164,6 +198,20 @@ mod tests {
         assert_eq!((drawn("#0072B2"), drawn("#D55E00")), (5, 3), "{text}");
         let circles = text.matches("<circle").count();
         assert_eq!(circles, 3, "a part of one point is a dot");
-        assert_eq!(svg(&PlotSheet { rows: Vec::new(), ..sheet }), Err("no chosen plot has a value".into()));
+        let empty = PlotSheet { rows: Vec::new(), ..sheet.clone() };
+        assert_eq!(svg(&empty), Err("no chosen plot has a value".into()));
+        assert!(png(&empty).is_err());
+
+        // The picture has the same lines in the same colours, and letters above and below them.
+        let picture = png(&sheet).unwrap();
+        assert_eq!(picture.dimensions(), (3 * WIDTH, 3 * (HEADING + 2 * PLOT + BELOW)));
+        let has = |colour: RGBColor| picture.pixels().filter(|p| p.0 == [colour.0, colour.1, colour.2]).count();
+        assert!(has(COLOURS[0]) > 1000 && has(COLOURS[1]) > 1000, "{} {}", has(COLOURS[0]), has(COLOURS[1]));
+        let ink = |from: u32, to: u32| {
+            let rows = picture.rows().skip(from as usize).take((to - from) as usize);
+            rows.flatten().filter(|p| p.0.iter().all(|c| *c < 90)).count()
+        };
+        assert!(ink(0, 3 * HEADING) > 300, "the heading");
+        assert!(ink(picture.height() - 60, picture.height()) > 300, "the label of the axis");
     }
 }

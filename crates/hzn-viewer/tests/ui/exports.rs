@@ -87,7 +87,12 @@ fn the_plots_are_saved_as_they_are_chosen() {
 
     menu(&mut window, "Export", "Save plots as SVG…");
     path(&mut window, &dir.path().join("flight.pdf"), "Write");
-    said(&mut window, "must end in .svg");
+    said(&mut window, "must end in .svg or .png");
+    let png = dir.path().join("flight.png");
+    menu(&mut window, "Export", "Save plots as PNG…");
+    path(&mut window, &png, "Write");
+    said(&mut window, "flight.png");
+    assert_eq!(image::open(&png).unwrap().width(), 2700);
 }
 
 #[test]

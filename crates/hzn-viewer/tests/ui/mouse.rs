@@ -113,6 +113,51 @@ fn the_mask_is_drawn_moved_and_removed() {
     assert!(polygons(&window).is_empty());
 }
 
+#[test]
+fn the_image_circle_is_dragged_in_the_picture() {
+    let (_dir, mut window) = window_on_flight();
+    let number = |w: &Window, name: &str| w.state().session().unwrap().number("camera", name, 0);
+    let before = answer(&window);
+    window.key_press(Key::I);
+    window.run_steps(2);
+    // Without a circle, the largest one within the picture is offered.
+    let (centre, rim) = ([159.5, 119.5], [39.5, 119.5]);
+    let (from, to) = (at(&window, rim), at(&window, [79.5, 119.5]));
+    drag(&mut window, from, to);
+    settled(&mut window);
+    let deg = number(&window, "theta_max_deg").unwrap();
+    assert!((deg - (80.0f64 / 260.0).atan().to_degrees()).abs() < 0.15, "{deg}");
+    let circle = frame_view(&window).camera.as_ref().unwrap().image_circle_px().unwrap();
+    assert!((circle.1 - 80.0).abs() < 0.8, "{circle:?}");
+    assert_ne!(answer(&window).2, before.2, "pixels beyond the circle count as masked");
+
+    // A drag of the centre moves the principal point, and is one step.
+    let (from, to) = (at(&window, centre), at(&window, [170.0, 110.0]));
+    drag(&mut window, from, to);
+    settled(&mut window);
+    let moved = [number(&window, "cx_px").unwrap(), number(&window, "cy_px").unwrap()];
+    assert!(near(moved, [170.0, 110.0]), "{moved:?}");
+    window.get_by_label("Undo").click();
+    settled(&mut window);
+    assert_eq!([number(&window, "cx_px"), number(&window, "cy_px")], [Some(159.5), Some(119.5)]);
+    assert_eq!(number(&window, "theta_max_deg"), Some(deg), "the rim is a step of its own");
+    window.get_by_label("Undo").click();
+    settled(&mut window);
+    assert_eq!((number(&window, "theta_max_deg"), answer(&window)), (None, before));
+
+    // A drag elsewhere does not change the camera; a right click on the rim removes the circle.
+    window.get_by_label("Redo").click();
+    settled(&mut window);
+    let text = window.state().session().unwrap().sheet().clone();
+    let (from, to) = (at(&window, [40.0, 200.0]), at(&window, [60.0, 180.0]));
+    drag(&mut window, from, to);
+    assert_eq!(window.state().session().unwrap().sheet(), &text);
+    let rim = at(&window, [79.5, 119.5]);
+    click_with(&mut window, rim, PointerButton::Secondary);
+    settled(&mut window);
+    assert_eq!((number(&window, "theta_max_deg"), answer(&window)), (None, before));
+}
+
 #[derive(Debug)]
 struct Dropped(PathBuf);
 

@@ -3,6 +3,7 @@
 use egui::{Key, Role};
 use egui_kittest::kittest::Queryable;
 use hzn_core::status::Status;
+use hzn_viewer::ui::Command;
 
 use crate::window::*;
 
@@ -74,7 +75,10 @@ fn playing_shows_every_frame_once() {
     for _ in 0..8 {
         window.key_press(Key::Period);
     }
-    window.key_press(Key::Space);
+    window.run_steps(2);
+    // A key would be two frames of the window: one for the press and one for the release.
+    let ctx = window.ctx.clone();
+    window.state_mut().run(Command::Play, &ctx);
     let mut shown = vec![frame_view(&window).index];
     let begin = std::time::Instant::now();
     while shown.last() != Some(&59) {

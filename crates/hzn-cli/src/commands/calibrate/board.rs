@@ -21,7 +21,8 @@ use crate::tell;
 /// the border of the picture cuts counts as well.
 ///
 /// The report goes to stdout. `-o camera.toml` writes the section [camera] with the covariance of its parameters, ready
-/// for a sensor.toml; `-o report.html` writes plots. `hzn camera convert` turns the file into the form of another tool.
+/// for a sensor.toml; `-o report.html` writes plots; `-o residuals.csv` writes the residual of every corner.
+/// `hzn camera convert` turns the camera into the form of another tool.
 ///
 ///   hzn calibrate board boards/*.png --board 9x6 --square-mm 30 -o camera.toml
 #[derive(Debug, clap::Args)]
@@ -41,7 +42,7 @@ pub(super) struct Args {
     /// Size and format of headerless pictures, as in `hzn run`
     #[arg(long, value_name = "WIDTHxHEIGHT:FORMAT")]
     raw: Option<Raw>,
-    /// Also write the camera (.toml) or a report with plots (.html); may be given twice
+    /// Also write the camera (.toml), a report with plots (.html) or the residuals (.csv); may be given several times
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
     /// Replace files that exist

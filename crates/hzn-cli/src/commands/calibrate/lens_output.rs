@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use hzn_calib::board::Calibrated;
 use hzn_calib::camera_file::{self, Format};
+use hzn_calib::residual_table;
 use hzn_run::disk;
 use hzn_run::source::ending;
 
@@ -16,8 +17,11 @@ use crate::tell;
 pub(super) fn check_outputs(outputs: &[PathBuf], force: bool) -> Result<(), Stop> {
     for path in outputs {
         match ending(path).as_str() {
-            "toml" | "html" => disk::refuse_existing(path, force)?,
-            _ => return Err(usage(format!("{}: a camera ends in .toml, a report in .html", path.display()))),
+            "toml" | "html" | "csv" => disk::refuse_existing(path, force)?,
+            _ => {
+                let endings = "a camera ends in .toml, a report in .html, a table of residuals in .csv";
+                return Err(usage(format!("{}: {endings}", path.display())));
+            }
         }
     }
     Ok(())
@@ -36,6 +40,7 @@ pub(super) fn write_all(
     for path in outputs {
         let text = match ending(path).as_str() {
             "html" => lens_page::html(calibrated, reasons, name)?,
+            "csv" => residual_table::write(calibrated).map_err(failed)?,
             _ => camera_file::write(&calibrated.camera, Format::Sensor).map_err(failed)?,
         };
         files.push((path, text));
@@ -46,7 +51,7 @@ pub(super) fn write_all(
         disk::write_whole(path, &text)?;
     }
     if outputs.is_empty() && !quiet {
-        tell::line("note: -o camera.toml writes the camera, -o report.html a report with plots");
+        tell::line("note: -o camera.toml writes the camera, -o report.html plots, -o residuals.csv all residuals");
     }
     Ok(())
 }

@@ -19,7 +19,7 @@ use crate::exit::{Exit, Outcome, failed};
 /// each picture has a rotation of its own.
 ///
 /// The report goes to stdout. `-o camera.toml` writes the section [camera] with the covariance of its parameters, ready
-/// for a sensor.toml; `-o report.html` writes plots.
+/// for a sensor.toml; `-o report.html` writes plots; `-o residuals.csv` writes the residual of every point.
 ///
 ///   hzn calibrate points rotator.csv --size 384x288 -o camera.toml
 #[derive(Debug, clap::Args)]
@@ -33,7 +33,7 @@ pub(super) struct Args {
     /// Model of the lens: kannala-brandt, brown-conrady, equidistant, pinhole, double-sphere, eucm
     #[arg(long, value_name = "MODEL", default_value = "kannala-brandt", value_parser = lens_model::parse)]
     model: Model,
-    /// Also write the camera (.toml) or a report with plots (.html); may be given twice
+    /// Also write the camera (.toml), a report with plots (.html) or the residuals (.csv); may be given several times
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
     /// Replace files that exist

@@ -3,7 +3,6 @@
 use egui::{Align2, Painter, PointerButton, Pos2, Response, Shape, Stroke, Ui, vec2};
 
 use super::read_out::label;
-use crate::model::mask::MaskEdit;
 use crate::ui::placement::Placement;
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
@@ -61,7 +60,9 @@ pub(super) fn edit(viewer: &mut Viewer, ui: &Ui, response: &Response, placement:
     grabbing
 }
 
-pub(super) fn draw(tool: &MaskEdit, viewer: &Viewer, painter: &Painter, placement: &Placement<'_>, ui: &Ui) {
+/// Draws the tool, if it is in use.
+pub(super) fn draw(viewer: &Viewer, painter: &Painter, placement: &Placement<'_>, ui: &Ui) {
+    let Some(tool) = &viewer.mask else { return };
     let stroke = Stroke::new(2.0, theme::TRUTH);
     for corner in viewer.session.iter().flat_map(|s| s.polygons()).flatten() {
         painter.extend(placement.to_screen(corner).map(|p| Shape::circle_filled(p, 4.5, theme::TRUTH)));

@@ -1,9 +1,13 @@
 //! The panel with the picture and its overlays.
 
+mod circle;
+mod lens;
 mod mask;
 mod overlays;
 mod read_out;
 mod welcome;
+
+pub(super) use circle::remove as remove_circle;
 
 use egui::{Align2, Color32, FontId, PointerButton, Rect, Response, Sense, Ui, Vec2, pos2, vec2};
 
@@ -83,8 +87,8 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
     if let Some(outcome) = outcome.filter(|_| !viewer.layers_hidden) {
         overlays::draw(viewer, &painter, frame_view, outcome, &placement);
     }
-    if let (Some(tool), 0) = (&viewer.mask, pane) {
-        mask::draw(tool, viewer, &painter, &placement, ui);
+    if pane == 0 {
+        draw_tools(viewer, ui, &painter, frame_view, &placement);
     }
     if let Some(name) = viewer.other.as_ref().map(|(name, _)| name.clone()) {
         let title = if pane == 0 { "session".to_owned() } else { name };
@@ -100,7 +104,14 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
     }
 }
 
-/// Handles zoom and pan, or the tool of the mask. Returns true if the view has changed.
+/// Draws the residuals of a calibration and the tools of mask and image circle.
+fn draw_tools(viewer: &Viewer, ui: &Ui, painter: &egui::Painter, frame_view: &FrameView, placement: &Placement<'_>) {
+    lens::draw(viewer, painter, frame_view, placement);
+    mask::draw(viewer, painter, placement, ui);
+    circle::draw(viewer, painter, placement);
+}
+
+/// Handles zoom and pan, or the tool of the mask or of the image circle. Returns true if the view has changed.
 fn pointer(viewer: &mut Viewer, ui: &Ui, response: &Response, placement: &mut Placement<'_>) -> bool {
     let before = placement.view;
     if let Some(at) = response.hover_pos() {
@@ -111,12 +122,14 @@ fn pointer(viewer: &mut Viewer, ui: &Ui, response: &Response, placement: &mut Pl
             placement.view.zoom(placement.area, placement.size, at, factor);
         }
     }
-    let drawing = viewer.mask.is_some() && mask::edit(viewer, ui, response, placement);
+    let drawing = (viewer.mask.is_some() && mask::edit(viewer, ui, response, placement))
+        || (viewer.circle.is_some() && circle::edit(viewer, ui, response, placement));
     let by = response.drag_delta();
     if by != Vec2::ZERO && (!drawing || response.dragged_by(PointerButton::Middle)) {
         placement.view.pan(placement.area, placement.size, [by.x.into(), by.y.into()]);
     }
-    if viewer.mask.is_none() && response.double_clicked() {
+    let has_tool = viewer.mask.is_some() || viewer.circle.is_some();
+    if !has_tool && response.double_clicked() {
         if placement.view.is_fit() {
             let at = response.interact_pointer_pos().unwrap_or(response.rect.center());
             let factor = 4.0 / placement.scale();
@@ -125,7 +138,7 @@ fn pointer(viewer: &mut Viewer, ui: &Ui, response: &Response, placement: &mut Pl
             placement.view = View::FIT;
         }
     }
-    if response.dragged() && viewer.mask.is_none() {
+    if response.dragged() && !has_tool {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
     }
     placement.view != before

@@ -2,6 +2,8 @@
 
 mod axis;
 mod frame;
+mod navigation;
+pub(super) mod offered;
 mod over_time;
 mod residuals;
 mod sheet;
@@ -9,6 +11,7 @@ mod sheet;
 use egui::{RichText, ScrollArea, Ui};
 
 use super::viewer::Viewer;
+use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
 use crate::model::quantity::QUANTITIES;
 use over_time::TimeAxis;
 pub(super) use residuals::RESIDUALS;
@@ -36,8 +39,10 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         let chosen = if single {
             vec![RESIDUALS.to_owned()]
         } else {
-            quantity_choice(viewer, ui);
-            viewer.settings.plotted.clone()
+            let offered = offered::names(viewer);
+            quantity_choice(viewer, ui, &offered);
+            // A plot that this sequence does not have stays chosen for others.
+            viewer.settings.plotted.iter().filter(|name| offered.contains(&name.as_str())).cloned().collect()
         };
         rows(viewer, ui, &chosen);
     });
@@ -62,6 +67,10 @@ fn rows(viewer: &mut Viewer, ui: &mut Ui, chosen: &[String]) {
                 look = residuals::show(viewer, ui, each).or(look);
             } else if let Some(quantity) = QUANTITIES.iter().find(|q| q.name == name) {
                 pointed = over_time::show(viewer, ui, quantity, &axis, each).or(pointed);
+            } else if let Some(quantity) = NAV_QUANTITIES.iter().find(|q| q.name == name) {
+                pointed = navigation::show(viewer, ui, quantity, &axis, each).or(pointed);
+            } else if name == INNOVATIONS {
+                pointed = navigation::innovations(viewer, ui, &axis, each).or(pointed);
             }
         }
     });
@@ -78,12 +87,9 @@ fn rows(viewer: &mut Viewer, ui: &mut Ui, chosen: &[String]) {
     }
 }
 
-fn quantity_choice(viewer: &mut Viewer, ui: &mut Ui) {
+fn quantity_choice(viewer: &mut Viewer, ui: &mut Ui, offered: &[&str]) {
     ui.horizontal_wrapped(|ui| {
-        for name in QUANTITIES.iter().map(|q| q.name).chain([RESIDUALS]) {
-            if name == "Error (truth)" && viewer.truth.is_empty() {
-                continue;
-            }
+        for name in offered.iter().copied() {
             let on = viewer.settings.plotted.iter().any(|p| p == name);
             if ui.selectable_label(on, RichText::new(name).size(12.5)).clicked() {
                 if on {

@@ -38,16 +38,32 @@ pub(super) struct TimeAxis {
     places: Vec<Option<f64>>,
     /// The unit of the labels; empty for numbers of pictures.
     unit: &'static str,
+    /// Time of the first picture, s; `None` if the times are not known.
+    start_s: Option<f64>,
 }
 
 impl TimeAxis {
     pub(super) fn new(viewer: &Viewer) -> Self {
         let entries = &viewer.sequence.entries;
         // Times may be large numbers, so the plots start at the first picture with time zero.
-        match entries.iter().find_map(|e| e.time_s) {
-            Some(start) => Self { places: entries.iter().map(|e| Some(e.time_s? - start)).collect(), unit: " s" },
-            None => Self { places: (1..=entries.len()).map(|i| Some(i as f64)).collect(), unit: "" },
+        let start_s = entries.iter().find_map(|e| e.time_s);
+        match start_s {
+            Some(start) => {
+                Self { places: entries.iter().map(|e| Some(e.time_s? - start)).collect(), unit: " s", start_s }
+            }
+            None => Self { places: (1..=entries.len()).map(|i| Some(i as f64)).collect(), unit: "", start_s },
         }
+    }
+    /// Returns the place of a time, s, if it lies within the sequence.
+    pub(super) fn place_of_time(&self, time_s: f64) -> Option<f64> {
+        let ([first, last], place) = (self.ends(), time_s - self.start_s?);
+        let room = 0.01 * (last - first);
+        (first - room..=last + room).contains(&place).then_some(place)
+    }
+    /// Returns the times of the first and the last picture, s, if times are known.
+    pub(super) fn span_s(&self) -> Option<[f64; 2]> {
+        let start = self.start_s?;
+        Some(self.ends().map(|place| place + start))
     }
     /// Returns the label of the axis.
     pub(super) fn label(&self) -> &'static str {
@@ -122,7 +138,32 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, axis: &Tim
     let at = viewer.hovered_frame.unwrap_or(viewer.playback.frame());
     let values = values_text(quantity, |value_of| value(at, value_of, Source::Current));
     heading(ui, &title, &legend(quantity, earlier, other, dark), &values);
-    let plot = with_axis(shared_plot(("plot", quantity.name), height), axis)
+    frame_plot(viewer, ui, quantity.name, axis, [low, high], height, |ui, column| {
+        for (n, (name, value_of)) in quantity.lines.iter().enumerate() {
+            let colour = theme::line(n, dark);
+            for (source, style) in
+                [(Source::Earlier, Style::Faint), (Source::Other, Style::Dashed), (Source::Current, Style::Plain)]
+            {
+                let parts = polylines(count, column, |i| Some([axis.place(i)?, value(i, *value_of, source)?]));
+                parts.into_iter().for_each(|part| draw(ui, name, part, colour, style));
+            }
+        }
+    })
+}
+
+/// Draws a plot over the pictures: `contents` gets the width of a column of pixels on the time axis. Returns the
+/// picture under the pointer.
+pub(super) fn frame_plot(
+    viewer: &Viewer,
+    ui: &mut Ui,
+    name: &str,
+    axis: &TimeAxis,
+    [low, high]: [f64; 2],
+    height: f32,
+    contents: impl FnOnce(&mut PlotUi<'_>, f64),
+) -> Pointed {
+    let dark = ui.visuals().dark_mode;
+    let plot = with_axis(shared_plot(("plot", name), height), axis)
         .show_axes([false, true])
         .include_y(low)
         .include_y(high)
@@ -131,13 +172,7 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, axis: &Tim
     let response = plot.show(ui, |ui| {
         shade_refused(viewer, ui, axis, dark);
         let column = ui.transform().dvalue_dpos()[0].abs();
-        for (n, (name, value_of)) in quantity.lines.iter().enumerate() {
-            let colour = theme::line(n, dark);
-            for source in [Source::Earlier, Source::Other, Source::Current] {
-                let parts = polylines(count, column, |i| Some([axis.place(i)?, value(i, *value_of, source)?]));
-                parts.into_iter().for_each(|part| draw(ui, name, part, colour, source));
-            }
-        }
+        contents(ui, column);
         if let Some(now) = axis.place(viewer.playback.frame()) {
             // This colour differs from the grid's.
             let ink = if dark { theme::LIMB } else { theme::REJECTED };
@@ -146,26 +181,34 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, axis: &Tim
         let at = ui.response().hovered().then(|| ui.pointer_coordinate()).flatten();
         (at, ui.response().clicked())
     });
-    set_label(&response.response, quantity.name);
+    set_label(&response.response, name);
     let (at, clicked) = response.inner;
     let p = at?;
     response.response.on_hover_text_at_pointer(format!("{}\n{:.5}", axis.text(p.x), p.y));
     Some((axis.nearest(p.x)?, clicked))
 }
 
-/// Draws a part of a line. Earlier results are faint, and those of the other sensor are dashed.
-fn draw(ui: &mut PlotUi<'_>, name: &str, part: Vec<[f64; 2]>, colour: Color32, source: Source) {
-    let (colour, width) = match source {
-        Source::Current => (colour, 1.6),
-        Source::Other => (colour, 1.2),
-        Source::Earlier => (colour.gamma_multiply(0.4), 1.0),
+/// Style of a line.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Style {
+    Plain,
+    Dashed,
+    Faint,
+}
+
+/// Draws a part of a line; a single point is a dot.
+pub(super) fn draw(ui: &mut PlotUi<'_>, name: &str, part: Vec<[f64; 2]>, colour: Color32, style: Style) {
+    let (colour, width) = match style {
+        Style::Plain => (colour, 1.6),
+        Style::Dashed => (colour, 1.2),
+        Style::Faint => (colour.gamma_multiply(0.4), 1.0),
     };
     if let [one] = part.as_slice() {
         ui.points(Points::new(name, vec![*one]).color(colour).radius(2.0));
         return;
     }
     let line = Line::new(name, part).color(colour).width(width);
-    ui.line(if source == Source::Other { line.style(LineStyle::dashed_loose()) } else { line });
+    ui.line(if style == Style::Dashed { line.style(LineStyle::dashed_loose()) } else { line });
 }
 
 /// Shades the pictures without an answer.

@@ -1,7 +1,11 @@
 //! The chosen plots, for a file.
 
+use hzn_fuse::sink::Phase;
+
 use super::axis::polylines;
+use super::navigation;
 use super::over_time::{TimeAxis, refused, title};
+use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
 use crate::model::quantity::QUANTITIES;
 use crate::ui::viewer::Viewer;
 use crate::work::plots::{PlotRow, PlotSheet};
@@ -31,6 +35,42 @@ pub(in crate::ui) fn sheet(viewer: &Viewer) -> PlotSheet {
             rows.push(PlotRow { title: title(quantity), lines });
         }
     }
+    rows.extend(navigation(viewer, &axis));
     let heading = format!("{}, {} frames; grey: without an answer", viewer.sequence.stem(), count);
     PlotSheet { heading, axis: axis.label(), ends: axis.ends(), refused: refused(viewer, &axis), rows }
+}
+
+/// Returns the chosen plots of the results of `hzn fuse`.
+fn navigation(viewer: &Viewer, axis: &TimeAxis) -> Vec<PlotRow> {
+    let Some(nav) = &viewer.companions.navigation else { return Vec::new() };
+    let chosen = |name: &str| viewer.settings.plotted.iter().any(|p| p == name);
+    let [first, last] = axis.ends();
+    // More points than this cannot be seen on paper.
+    let column = (last - first) / 2000.0;
+    let mut rows = Vec::new();
+    for quantity in NAV_QUANTITIES.iter().filter(|q| chosen(q.name)) {
+        let mut lines = Vec::new();
+        for (phase, more) in [(Phase::Filter, ""), (Phase::Smoothed, " (smoothed)"), (Phase::Back, " (back)")] {
+            for (name, value_of) in quantity.lines {
+                let parts = navigation::parts(nav, phase, *value_of, axis, column);
+                lines.push((format!("{name}{more}"), parts));
+            }
+        }
+        rows.push(PlotRow { title: navigation::title(quantity), lines });
+    }
+    if chosen(INNOVATIONS) {
+        let dots = |points: Vec<[f64; 2]>| points.into_iter().map(|p| vec![p]).collect();
+        let mut lines = Vec::new();
+        for series in &nav.innovations {
+            let [taken, refused] = navigation::innovation_points(series, axis, column);
+            lines.push((series.name.clone(), dots(taken)));
+            lines.push((format!("{} (refused)", series.name), dots(refused)));
+        }
+        rows.push(PlotRow { title: navigation::innovations_title(), lines });
+    }
+    for row in &mut rows {
+        row.lines.retain(|(_, parts)| !parts.is_empty());
+    }
+    rows.retain(|row| !row.lines.is_empty());
+    rows
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Preset;
 
 use super::Viewer;
-use crate::model::{Look, MaskEdit, Session};
+use crate::model::{CircleEdit, Look, MaskEdit, Session};
 use crate::ui::Command;
 use crate::ui::panels::Panel;
 use crate::ui::path_dialog::{Answer, PathDialog, Purpose};
@@ -28,7 +28,7 @@ impl Viewer {
             Command::Redo => self.session.iter_mut().for_each(Session::redo),
             Command::Reset => self.session.iter_mut().for_each(Session::reset),
             Command::Diff => self.showing_diff = !self.showing_diff,
-            Command::Play => self.playback.toggle(count),
+            Command::Play => self.toggle_playing(),
             Command::Next => self.playback.step(1, count),
             Command::Back => self.playback.step(-1, count),
             Command::Next10 => self.playback.step(10, count),
@@ -46,6 +46,7 @@ impl Viewer {
             Command::FalseColour => self.settings.look = Look::FalseColour,
             Command::Undistorted => self.settings.undistorted = !self.settings.undistorted,
             Command::Mask => self.toggle_mask(),
+            Command::Circle => self.toggle_circle(),
             Command::Layers => self.layers_hidden = !self.layers_hidden,
             Command::Compare => match self.other.take() {
                 Some(_) => {}
@@ -69,6 +70,13 @@ impl Viewer {
             Command::Theme => self.settings.dark = !self.settings.dark,
             Command::Help => self.showing_help = !self.showing_help,
         }
+    }
+
+    /// Starts or stops playing.
+    fn toggle_playing(&mut self) {
+        // The first picture is shown for its full time.
+        self.last = std::time::Instant::now();
+        self.playback.toggle(self.sequence.len());
     }
 
     /// Asks for a folder and opens it.
@@ -192,6 +200,15 @@ impl Viewer {
             None if self.session.is_some() => Some(MaskEdit::default()),
             None => None,
         };
+        self.circle = None;
+    }
+
+    /// Starts or ends the dragging of the image circle, which is a circle only in the camera's own picture.
+    pub(in crate::ui) fn toggle_circle(&mut self) {
+        let starts = self.circle.is_none() && self.session.as_ref().is_some_and(|s| s.config().is_some());
+        self.circle = starts.then(CircleEdit::default);
+        self.mask = None;
+        self.settings.undistorted &= !starts;
     }
 }
 

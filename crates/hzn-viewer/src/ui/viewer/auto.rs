@@ -110,8 +110,10 @@ impl Viewer {
         (self.work.running, self.work.stopped) = (None, true);
     }
 
-    /// Returns true while pictures are processed in the background, or if that is about to begin.
+    /// Returns true while pictures are processed in the background, or if that is about to begin, and while results of
+    /// other commands are read.
     pub fn is_working(&self) -> bool {
-        !self.work.stopped && (self.work.running.is_some() || self.work.due.is_some())
+        let processing = !self.work.stopped && (self.work.running.is_some() || self.work.due.is_some());
+        processing || self.companions.is_reading()
     }
 }

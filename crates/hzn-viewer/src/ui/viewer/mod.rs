@@ -4,6 +4,7 @@ mod act;
 mod auto;
 mod begin;
 mod changes;
+mod companions;
 mod jobs;
 mod request_key;
 mod sequence_work;
@@ -21,20 +22,23 @@ use hzn_sim::truth::Truth;
 
 use super::panels::Panels;
 use super::path_dialog::PathDialog;
+use super::plots::offered::Offered;
 use super::study_window::StudyWindow;
 use super::summary::Summary;
 use super::textures::Textures;
 use super::toast::Toasts;
 use super::wizard_form::Wizard;
 use crate::model::cause::Group;
-use crate::model::{MaskEdit, Playback, ResultHistory, Sequence, Session, Settings, View};
+use crate::model::{CircleEdit, MaskEdit, Playback, ResultHistory, Sequence, Session, Settings, View};
 use crate::work::check::{Check, Damaged};
+use crate::work::companion;
 use crate::work::frame_view::BodyResult;
 use crate::work::open::{self, Request};
 use crate::work::sweep::Sweep;
 use crate::work::{Engine, FrameView, Job, Wake};
 use changes::Changes;
 pub(super) use changes::Leave;
+use companions::Companions;
 use request_key::RequestKey;
 use sequence_work::SequenceWork;
 
@@ -77,6 +81,10 @@ pub struct Viewer {
     pub(super) wizard: Option<Wizard>,
     pub(super) study: Option<StudyWindow>,
     pub(super) summary: Summary,
+    /// The plots that the sequence offers.
+    pub(super) offered: Offered,
+    /// Results of other commands that belong to the sequence.
+    pub(super) companions: Companions,
     /// A change of one focal length changes the other one.
     pub(super) linked_focal: bool,
     /// Key that a link opens in the column of stages.
@@ -92,6 +100,7 @@ pub struct Viewer {
     native_dialogs: bool,
     pub(super) path_dialog: Option<PathDialog>,
     pub(super) mask: Option<MaskEdit>,
+    pub(super) circle: Option<CircleEdit>,
     pub(super) showing_help: bool,
     pub(super) showing_diff: bool,
     pub(super) layers_hidden: bool,
@@ -146,6 +155,8 @@ impl Viewer {
             wizard: None,
             study: None,
             summary: Summary::default(),
+            offered: Offered::default(),
+            companions: Companions::default(),
             linked_focal: true,
             focus_key: None,
             panels: Panels::default(),
@@ -155,6 +166,7 @@ impl Viewer {
             native_dialogs: false,
             path_dialog: None,
             mask: None,
+            circle: None,
             showing_help: false,
             showing_diff: false,
             layers_hidden: false,
@@ -197,6 +209,11 @@ impl Viewer {
             }
             return;
         }
+        if let [one] = inputs.as_slice()
+            && companion::kind_of(one).is_some()
+        {
+            return self.attach(one);
+        }
         let request = Request { inputs, fps: self.request.fps, ..Request::default() };
         self.leave(Leave::Sequence(Box::new(request)), None);
     }
@@ -221,6 +238,10 @@ impl Viewer {
     /// Returns the sensor that is tuned, for changes.
     pub fn session_mut(&mut self) -> Option<&mut Session> {
         self.session.as_mut()
+    }
+    /// Returns true while the sequence is played.
+    pub fn is_playing(&self) -> bool {
+        self.playback.is_playing()
     }
     /// Goes to a picture.
     pub fn go(&mut self, frame: usize) {
@@ -299,20 +320,22 @@ impl Viewer {
     }
 
     /// Advances the time of playing. No picture is skipped because it is slow: each is drawn before the next one is
-    /// requested. The next one is computed while this one is painted.
-    pub(super) fn advance(&mut self, ctx: &egui::Context) {
+    /// requested. Returns true if the next picture is to be shown.
+    pub(super) fn advance(&mut self, ctx: &egui::Context) -> bool {
         let elapsed = std::mem::replace(&mut self.last, Instant::now()).elapsed();
         let duration_s = |frame| self.sequence.duration_s(frame);
+        let mut is_next = false;
         if self.frame_view.as_ref().is_none_or(|s| s.index == self.playback.frame()) {
             // A window that stood still does not catch up; a window that waited for the next picture does.
             let longest = LONGEST_PASS + std::mem::take(&mut self.planned_wait);
-            self.playback.advance(elapsed.min(longest), self.sequence.len(), duration_s);
+            is_next = self.playback.advance(elapsed.min(longest), self.sequence.len(), duration_s);
         }
         if let Some(due) = self.playback.due(duration_s) {
             // The window draws nothing until the next picture is due.
             self.planned_wait = due.max(SHORTEST_WAIT);
             ctx.request_repaint_after(self.planned_wait);
         }
+        is_next
     }
 
     /// Stops unfinished writing and stores the settings.

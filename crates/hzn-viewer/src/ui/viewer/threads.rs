@@ -18,6 +18,9 @@ const AHEAD: usize = 4;
 /// Longest wait of the window for an answer, from the request on, so that the answer appears in the same frame as the
 /// change. The rest of the 16 ms of a displayed frame is enough to lay out the window and to hand it over.
 const AT_ONCE: Duration = Duration::from_millis(10);
+/// The same while the sequence is played: the picture was decoded in advance, and nothing else has to be drawn until it
+/// is there.
+const AT_ONCE_PLAYING: Duration = Duration::from_millis(40);
 
 impl Viewer {
     /// Takes all messages of the threads.
@@ -37,13 +40,28 @@ impl Viewer {
         }
         self.poll_background();
         self.poll_check();
+        self.poll_companions();
         self.take_finished_jobs();
         self.poll_path_dialog();
     }
 
-    /// Waits a short time for the answer to the last request. A slow answer comes with a later frame of the window.
+    /// Waits a short time for the answer to the last request, after the panels were drawn. A slow answer comes with a
+    /// later frame of the window.
     pub(in crate::ui) fn wait(&mut self, ctx: &egui::Context) {
-        let until = self.requested_at + AT_ONCE;
+        if self.wait_until(self.requested_at + AT_ONCE, ctx) {
+            // The columns were drawn before the answer came, so they are drawn again.
+            ctx.request_repaint();
+        }
+    }
+
+    /// Waits a short time for the next picture of a sequence that is played, before anything is drawn. So the window is
+    /// drawn once for each picture.
+    pub(in crate::ui) fn wait_for_next(&mut self, ctx: &egui::Context) {
+        self.wait_until(self.requested_at + AT_ONCE_PLAYING, ctx);
+    }
+
+    /// Waits for the answer to the last request. Returns true if there is a new one.
+    fn wait_until(&mut self, until: Instant, ctx: &egui::Context) -> bool {
         let mut new = false;
         while !self.is_settled() && self.requested.is_some() {
             let Some(frame_view) = self.engine.wait(until.saturating_duration_since(Instant::now())) else { break };
@@ -52,9 +70,8 @@ impl Viewer {
         }
         if new {
             self.textures.take(self.frame_view.as_ref(), ctx);
-            // The columns were drawn before the answer came, so they are drawn again.
-            ctx.request_repaint();
         }
+        new
     }
 
     /// Takes over a processed picture.
@@ -106,7 +123,8 @@ impl Viewer {
             ..Sequence::default()
         };
         (self.rows, self.truth) = (ResultHistory::default(), opened.truth);
-        (self.frame_view, self.requested, self.sweep, self.mask) = (None, None, None, None);
+        (self.frame_view, self.requested, self.sweep) = (None, None, None);
+        (self.mask, self.circle) = (None, None);
         (self.worst, self.body) = (0, 0);
         self.view = View::FIT;
         (self.group, self.chosen_candidate, self.seen_version) = (None, None, 0);
@@ -114,6 +132,7 @@ impl Viewer {
         (self.checking, self.damaged) = (None, Vec::new());
         // Messages about the previous sequence are removed; newer messages stay.
         self.toasts.remove_first(self.messages_before);
+        self.search_companions();
         self.playback.go(self.request.frame, usize::MAX);
         self.engine.open(self.request.inputs.clone());
         // A sensor that the user opened stays if the new pictures come without one.

@@ -1,0 +1,41 @@
+//! The plots that a sequence offers. Some quantities exist only in some sequences: a truth, positions, the third axis,
+//! and the results of `hzn fuse`.
+
+use super::residuals::RESIDUALS;
+use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
+use crate::model::quantity::{QUANTITIES, Quantity};
+use crate::ui::viewer::Viewer;
+
+/// Names of the optional quantities with a value, kept until the results change.
+#[derive(Debug, Default)]
+pub(in crate::ui) struct Offered {
+    of: Option<(u64, usize, bool)>,
+    names: Vec<&'static str>,
+}
+
+/// Returns the names of all plots of the sequence.
+pub(super) fn names(viewer: &mut Viewer) -> Vec<&'static str> {
+    let key = (viewer.rows.generation(), viewer.body, viewer.truth.is_empty());
+    if viewer.offered.of != Some(key) {
+        let names = QUANTITIES.iter().filter(|q| !q.is_optional || has_value(viewer, q)).map(|q| q.name).collect();
+        viewer.offered = Offered { of: Some(key), names };
+    }
+    let mut names = viewer.offered.names.clone();
+    if let Some(nav) = &viewer.companions.navigation {
+        names.extend(NAV_QUANTITIES.iter().map(|q| q.name));
+        names.extend((!nav.innovations.is_empty()).then_some(INNOVATIONS));
+    }
+    names.push(RESIDUALS);
+    names
+}
+
+fn has_value(viewer: &Viewer, quantity: &Quantity) -> bool {
+    if quantity.name == "Error (truth)" {
+        return !viewer.truth.is_empty();
+    }
+    let rows = (0..viewer.sequence.len()).filter_map(|i| viewer.rows.newest(i, viewer.body));
+    rows.into_iter().any(|row| {
+        let truth = viewer.truth_of(&row.file, &row.body);
+        quantity.lines.iter().any(|(_, value_of)| value_of(row, truth).is_some())
+    })
+}

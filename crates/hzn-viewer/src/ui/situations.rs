@@ -1,0 +1,46 @@
+//! Situations of the window for screenshots: what a user would reach with some clicks.
+
+use clap::ValueEnum;
+
+use super::command::Command;
+use super::panels::Panel;
+use super::viewer::Viewer;
+use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
+
+/// A situation of the window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Situation {
+    /// The stages are shown, also in a narrow window.
+    Stages,
+    /// The sequence is compared with another preset.
+    Compare,
+    /// The parameters of the threshold are unfolded.
+    Parameters,
+    /// The form for a first sensor.toml is open.
+    Wizard,
+    /// The results of `hzn fuse` are plotted.
+    Navigation,
+    /// The image circle is being dragged.
+    Circle,
+}
+
+impl Viewer {
+    /// Brings the window into a situation.
+    pub fn arrange(&mut self, situation: Situation, ctx: &egui::Context) {
+        match situation {
+            Situation::Stages => self.panels.open(Panel::Stages, &mut self.settings),
+            Situation::Compare => self.run(Command::Compare, ctx),
+            Situation::Parameters => {
+                self.panels.open(Panel::Stages, &mut self.settings);
+                self.focus_key = Some("binarize.scale");
+            }
+            Situation::Wizard => self.open_wizard(),
+            Situation::Navigation => {
+                let names = NAV_QUANTITIES.iter().take(2).map(|q| q.name).chain([INNOVATIONS]);
+                self.settings.plotted = names.map(str::to_owned).collect();
+                self.panels.open(Panel::Plots, &mut self.settings);
+            }
+            Situation::Circle => self.run(Command::Circle, ctx),
+        }
+    }
+}
