@@ -60,8 +60,8 @@ pub trait Board {
     /// Takes the newest picture that was not taken yet, if there is one. The camera gets the buffer of the picture
     /// before.
     fn next_picture(&mut self) -> Option<Picture>;
-    /// Shows the picture that was taken last: all of its pixels with [`Viewer::see`], or its rows with [`Viewer::rows`],
-    /// as the camera sends them. Called at most once for a picture.
+    /// Shows the picture that was taken last: all of its pixels with [`Viewer::see`], or its rows with
+    /// [`Viewer::rows`], as the camera sends them. Called at most once for a picture.
     fn show(&mut self, viewer: &mut Viewer<'_>);
     /// Reads copy 1 or 2 of the parameters from memory.
     fn read_copy(&mut self, copy: u8, into: &mut [u8]);

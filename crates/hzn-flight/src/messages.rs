@@ -150,8 +150,8 @@ numbered_enum! {
         /// An answer was not sent, because pixels at its limb do not change from one to the next: the readout was
         /// stuck. a: number of such places along the edge. b: number of places that were looked at.
         StuckPixels = 19 => "stuck pixels at the limb",
-        /// The picture comes row by row, and was refused. a: 1 a method of the parameters needs the whole picture, 2 the
-        /// board has too little memory for the rows. b: 0.
+        /// The picture comes row by row, and was refused. a: 1 a method of the parameters needs the whole picture, 2
+        /// the board has too little memory for the rows. b: 0.
         RowsRefused = 20 => "the picture cannot be processed row by row",
         /// The computer can no longer keep the answers that it sends: the disk of the log is full or fails. Sent again
         /// only when it could be written meanwhile. a: number of the picture. b: 0.

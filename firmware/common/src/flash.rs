@@ -1,5 +1,5 @@
-//! The two copies of the parameters: `copy1.bin` and `copy2.bin` of the host. `cut.bin` has one word: power is cut after
-//! this number of bytes was written.
+//! The two copies of the parameters: `copy1.bin` and `copy2.bin` of the host. `cut.bin` has one word: power is cut
+//! after this number of bytes was written.
 
 use core::ffi::CStr;
 

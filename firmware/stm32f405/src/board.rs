@@ -1,6 +1,7 @@
 //! The registers: timer, serial line, watchdog. Names and addresses are those of the reference manual RM0090.
 //!
-//! The processor keeps its clock after a reset, the internal one of 16 MHz. A port for a real board starts a faster one.
+//! The processor keeps its clock after a reset, the internal one of 16 MHz. A port for a real board starts a faster
+//! one.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 

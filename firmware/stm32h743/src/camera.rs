@@ -1,7 +1,7 @@
 //! A camera at the DCMI, whose pictures a DMA writes to memory.
 //!
-//! The memory has room for one picture: the next one is captured when the last one has been processed. Pictures that the
-//! camera sends meanwhile are left out, and are not counted as lost.
+//! The memory has room for one picture: the next one is captured when the last one has been processed. Pictures that
+//! the camera sends meanwhile are left out, and are not counted as lost.
 
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU32, Ordering, fence};

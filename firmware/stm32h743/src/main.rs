@@ -1,5 +1,5 @@
-//! The flight software on an STM32H743 with a camera at the DCMI, by the hardware library stm32h7xx-hal. It was built and
-//! linked, but never run: no emulator has this part.
+//! The flight software on an STM32H743 with a camera at the DCMI, by the hardware library stm32h7xx-hal. It was built
+//! and linked, but never run: no emulator has this part.
 //!
 //! | file | idea |
 //! |---|---|

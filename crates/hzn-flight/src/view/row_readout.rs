@@ -1,5 +1,5 @@
-//! What is kept of a picture that comes row by row, so that stuck pixels can be found when its edges are known: a sample
-//! of neighbours, and the longest run of equal pixels of each row, one of the dark and one of the bright part.
+//! What is kept of a picture that comes row by row, so that stuck pixels can be found when its edges are known: a
+//! sample of neighbours, and the longest run of equal pixels of each row, one of the dark and one of the bright part.
 
 /// Shortest run that is kept; shorter ones never count as stuck.
 pub(super) const SHORTEST: usize = 16;
@@ -65,7 +65,8 @@ impl RowRuns {
     }
 }
 
-/// The sample of neighbours of a picture whose rows come one by one. It has the same pairs as that of the whole picture.
+/// The sample of neighbours of a picture whose rows come one by one. It has the same pairs as that of the whole
+/// picture.
 #[derive(Debug)]
 pub(super) struct RowSample {
     step: usize,

@@ -18,9 +18,9 @@ pub type Lists = Workspace<f32, 2048, 76, 512>;
 
 /// The memory of a board that has no room for a picture, in addition to the [`Lists`]; keep it in a `static`.
 ///
-/// `WINDOW` is [`super::ROWS_HELD`] times the width of the picture, `HEIGHT` the number of its rows. `TURNS` is the number
-/// of changes between dark and lit along the rows, `POINTS` the number of edge points, both of all rows together.
-/// [`RowBuffers`] says what happens when the last two are full.
+/// `WINDOW` is [`super::ROWS_HELD`] times the width of the picture, `HEIGHT` the number of its rows. `TURNS` is the
+/// number of changes between dark and lit along the rows, `POINTS` the number of edge points, both of all rows
+/// together. [`RowBuffers`] says what happens when the last two are full.
 #[derive(Debug)]
 pub struct RowMemory<const WINDOW: usize, const HEIGHT: usize, const TURNS: usize, const POINTS: usize> {
     rows: RowBuffers<u8, WINDOW, HEIGHT, TURNS, POINTS>,
@@ -184,8 +184,8 @@ impl RowView<'_> {
         self.rows += 1;
     }
 
-    /// Finds the limb after the last row. Call it as well when the camera stops before: the flight software then reports
-    /// a picture of wrong size.
+    /// Finds the limb after the last row. Call it as well when the camera stops before: the flight software then
+    /// reports a picture of wrong size.
     #[inline(never)]
     pub fn finish(self) {
         let camera = self.sensor.camera();

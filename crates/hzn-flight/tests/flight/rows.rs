@@ -32,7 +32,8 @@ fn set(f: &mut Flight<'_, Bench>, values: &[(u16, f64)]) {
     assert_eq!(send(f, &set).answers, [(Function::SetParameters as u8, 1, Code::Done)]);
 }
 
-/// Flies over pictures and returns the answers (without the work, which differs in rows), the events, and the pixels of the longest edge of the first picture.
+/// Flies over pictures and returns the answers (without the work, which differs in rows), the events, and the pixels
+/// of the longest edge of the first picture.
 fn fly_over(
     bench: Bench,
     parameters: &[(u16, f64)],

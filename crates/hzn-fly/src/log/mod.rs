@@ -67,8 +67,8 @@ impl Log {
         *self.config.lock().unwrap_or_else(PoisonError::into_inner) = config.clone();
     }
 
-    /// Adds an answer, without waiting. If there is no room, the answer is lost and counted. Returns false if it is lost,
-    /// or if the disk refused the last answer that was written.
+    /// Adds an answer, without waiting. If there is no room, the answer is lost and counted. Returns false if it is
+    /// lost, or if the disk refused the last answer that was written.
     pub fn add(&self, record: FrameRecord) -> bool {
         let sent = self.sender.as_ref().map(|sender| sender.try_send(Box::new(record)));
         let is_lost = matches!(sent, Some(Err(TrySendError::Full(_))));

@@ -1,7 +1,7 @@
 //! The flight software on an STM32F405, as QEMU's machine `netduinoplus2`.
 //!
-//! The line is USART1 and the clock is timer 2. The camera sends pictures of 640×480 pixels row by row; it and the flash
-//! of the parameters are files in the working folder of the emulator ([`hzn_firmware::camera`],
+//! The line is USART1 and the clock is timer 2. The camera sends pictures of 640×480 pixels row by row; it and the
+//! flash of the parameters are files in the working folder of the emulator ([`hzn_firmware::camera`],
 //! [`hzn_firmware::flash`]).
 
 #![no_std]
