@@ -115,6 +115,10 @@ impl Measure {
             };
         }
         self.passes += 1;
+        if self.kind == Kind::RealTime && self.changed.is_some() && !viewer.is_playing() {
+            // The end of the sequence is the end of the measurement.
+            ctx.request_repaint();
+        }
         if self.seen && self.kind != Kind::RealTime {
             // The next pass comes when this one is on the screen.
             ctx.request_repaint();

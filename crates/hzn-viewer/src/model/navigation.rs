@@ -138,11 +138,11 @@ impl Navigation {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
 
     /// Returns a solution of some seconds: half a degree of 1-sigma, and one refused direction of the camera `left`.
-    pub(crate) fn solution(times: &[f64]) -> Solution {
+    fn solution(times: &[f64]) -> Solution {
         let state = |phase: &str, t: &f64| {
             serde_json::from_value(serde_json::json!({
                 "time_s": t, "phase": phase, "yaw_deg": 10.0 * t, "pitch_deg": 1.0, "roll_deg": -1.0,

@@ -12,6 +12,7 @@ mod help;
 mod histogram;
 mod layout;
 mod links;
+mod offered;
 mod panels;
 mod parameters;
 mod path_dialog;

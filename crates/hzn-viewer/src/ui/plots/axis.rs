@@ -13,9 +13,14 @@ pub(super) fn axis_labels(unit: &'static str) -> impl Fn(GridMark, &RangeInclusi
     }
 }
 
-/// Returns about `count` grid lines, at 1, 2 or 5 times a power of ten.
+/// Returns about `count` grid lines, at 1, 2 or 5 times a power of ten. A single line would not show the scale, so
+/// there are more of them then.
 pub(super) fn ticks(input: GridInput, count: f64) -> Vec<GridMark> {
-    let (low, high) = input.bounds;
+    let marks = grid(input.bounds, count);
+    if marks.len() == 1 { grid(input.bounds, 2.0 * count) } else { marks }
+}
+
+fn grid((low, high): (f64, f64), count: f64) -> Vec<GridMark> {
     let rough = (high - low) / count;
     if !(rough > 0.0 && rough.is_finite()) {
         return Vec::new();
@@ -95,6 +100,9 @@ mod tests {
         };
         assert_eq!(tick_values(0.0, 10.0), [0.0, 5.0, 10.0]);
         assert_eq!(tick_values(-0.9, 7.2), [0.0, 5.0]);
+        // One line at 0 would not show the scale.
+        let few = ticks(GridInput { bounds: (-190.0, 190.0), base_step_size: 0.0 }, 2.0);
+        assert_eq!(few.iter().map(|m| m.value).collect::<Vec<_>>(), [-100.0, 0.0, 100.0]);
         assert_eq!(tick_values(100.0, 103.5), [100.0, 101.0, 102.0, 103.0]);
         assert!(tick_values(1.0, 1.0).is_empty() && tick_values(f64::NAN, 1.0).is_empty());
     }

@@ -19,6 +19,8 @@ pub(super) fn heading(ui: &mut Ui, title: &str, lines: &[(&str, Color32)], value
         }
         if !values.is_empty() {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                // The bar that scrolls the plots lies here.
+                ui.add_space(10.0);
                 ui.add(egui::Label::new(RichText::new(values).monospace().size(12.0)).truncate());
             });
         }

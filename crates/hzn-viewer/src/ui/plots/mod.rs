@@ -3,7 +3,7 @@
 mod axis;
 mod frame;
 mod navigation;
-pub(super) mod offered;
+mod offered;
 mod over_time;
 mod residuals;
 mod sheet;

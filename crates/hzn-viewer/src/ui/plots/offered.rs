@@ -4,14 +4,8 @@
 use super::residuals::RESIDUALS;
 use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
 use crate::model::quantity::{QUANTITIES, Quantity};
+use crate::ui::offered::Offered;
 use crate::ui::viewer::Viewer;
-
-/// Names of the optional quantities with a value, kept until the results change.
-#[derive(Debug, Default)]
-pub(in crate::ui) struct Offered {
-    of: Option<(u64, usize, bool)>,
-    names: Vec<&'static str>,
-}
 
 /// Returns the names of all plots of the sequence.
 pub(super) fn names(viewer: &mut Viewer) -> Vec<&'static str> {

@@ -1,6 +1,7 @@
 //! The state of the window.
 
 mod act;
+mod attach;
 mod auto;
 mod begin;
 mod changes;
@@ -20,9 +21,9 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::Receiver;
 use hzn_sim::truth::Truth;
 
+use super::offered::Offered;
 use super::panels::Panels;
 use super::path_dialog::PathDialog;
-use super::plots::offered::Offered;
 use super::study_window::StudyWindow;
 use super::summary::Summary;
 use super::textures::Textures;
