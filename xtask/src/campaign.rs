@@ -82,7 +82,7 @@ fn long(pictures: u64) -> Outcome {
 fn flips(trials: u64) -> Outcome {
     let trials = trials.to_string();
     steps::run(test("hzn-flight", "flight", "flips::").env("HZN_FLIPS", &trials))?;
-    steps::run(test("hzn-twice", "flips", "every_flipped_bit_is_seen"))
+    steps::run(&mut test("hzn-twice", "flips", "every_flipped_bit_is_seen"))
 }
 
 /// Sends telecommands with mixed damage to the flight software. A library of others writes them, in Python.
