@@ -6,7 +6,8 @@ use std::process::{Command, Stdio};
 
 use crate::display::Display;
 use crate::machine::target;
-use crate::steps::{self, Trouble, cargo, show};
+use crate::steps::{self, Trouble, show};
+use crate::test_build::build_tests;
 
 /// Sizes of the window in points, and pixels in a point. The last one has 2560×1440 pixels.
 const SIZES: [(&str, u32); 4] = [("720x480", 1), ("1024x768", 1), ("1440x900", 1), ("1280x720", 2)];
@@ -39,7 +40,7 @@ const SHOTS: [Shot; 9] = [
 
 /// Makes all pictures in target/xtask/situations.
 pub(crate) fn run() -> Result<(), Trouble> {
-    steps::run(&mut cargo(&["build", "--profile", "test", "-p", "hzn-cli", "-p", "hzn-viewer", "--bins"]))?;
+    build_tests()?;
     let folder = target().join("xtask").join("situations");
     prepare(&folder)?;
     let display = Display::start(DISPLAY)?;
