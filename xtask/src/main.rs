@@ -53,7 +53,7 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|
   keys               writes the table of book/reference/sensor-toml.md, the template, the JSON schema and the
                      Python types (hzn.keys) from the keys in hzn-core
   viewer             makes book/images/viewer.png again; needs `cargo xtask test demo` first
-  viewer situations  makes pictures of the window into target/xtask/situations: each situation in four sizes and two themes";
+  viewer situations  makes pictures of the window into target/xtask/situations, in four sizes and two themes";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
