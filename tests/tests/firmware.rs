@@ -118,7 +118,7 @@ fn rows_have_the_bits_of_the_picture() {
 }
 
 /// Tests the flight software on a board without memory for a picture: the decoded telemetry of pictures that came row
-/// by row must equal what `hzn run --flight` writes for the same pictures in memory, unless a list was full.
+/// by row must equal what `hzn run --flight` writes for the same pictures in memory.
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn the_flight_loop_takes_rows_on_a_small_board() {
