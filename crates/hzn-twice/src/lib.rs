@@ -1,8 +1,7 @@
 //! A value that is kept twice, so that a bit that changes in memory is noticed.
 //!
 //! The comparison reads bytes. A comparison by `==` looks only at the bits that have a meaning. It does not see a flip
-//! of the upper bits of the tag of an `Option`, for example, but compiled code may test the whole tag. Such flips
-//! changed answers.
+//! of the upper bits of the tag of an `Option`, for example, but compiled code may test the whole tag.
 //!
 //! A comparison costs less than a checksum. It needs the memory of the second copy.
 

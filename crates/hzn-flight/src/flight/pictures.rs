@@ -71,7 +71,7 @@ impl<B: Board> Flight<'_, B> {
         bytes == expected_bytes
     }
 
-    /// Returns the report of a picture, and what is stuck at its limb. Refuses a picture that was not seen as a whole.
+    /// Returns the report of a picture, with the stuck pixels at its limb. Refuses an incomplete picture.
     fn accept(&mut self, seen: Seen) -> Option<(Report<f32>, Option<StuckPlaces>)> {
         match seen {
             Seen::Whole(report, stuck) => return Some((report, stuck)),

@@ -90,7 +90,7 @@ impl Observer<f32> for EdgeWatch<'_> {
 }
 
 impl EdgeWatch<'_> {
-    /// Returns what is stuck at the limb of a report.
+    /// Returns the stuck pixels at the limb of a report, if there are any.
     pub(super) fn found(self, report: &Report<f32>) -> Option<StuckPlaces> {
         report.solution.as_ref().and_then(|s| self.stuck.into_inner().found(s.candidate))
     }

@@ -3,7 +3,7 @@
 //! | part | idea |
 //! |---|---|
 //! | `viewer` | the two ways to show a picture |
-//! | `row_readout` | what is kept of rows for the search for stuck pixels |
+//! | `row_readout` | the data of each row that the search for stuck pixels needs |
 //! | `stuck` | pixels that do not change from one to the next |
 //! | `edge_watch` | the edges of a picture, watched for stuck pixels and for the longest one |
 

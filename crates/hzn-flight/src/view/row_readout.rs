@@ -1,5 +1,5 @@
-//! What is kept of a picture that comes row by row, so that stuck pixels can be found when its edges are known: a
-//! sample of neighbours, and the longest run of equal pixels of each row, one of the dark and one of the bright part.
+//! Data of a picture that comes row by row, so that stuck pixels can be found when its edges are known: a sample of
+//! neighbours, and in each row the longest run of equal dark pixels and the longest one of equal bright pixels.
 
 /// Shortest run that is kept; shorter ones never count as stuck.
 pub(super) const SHORTEST: usize = 16;

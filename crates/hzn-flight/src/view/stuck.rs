@@ -53,7 +53,7 @@ impl StuckPlaces {
     }
 }
 
-/// What is left of a picture when its edges are known.
+/// The pixels, or the data of the rows, that are still in memory when the edges are known.
 #[derive(Clone, Copy)]
 pub(super) enum Readout<'a> {
     /// Every pixel, and the width of the picture.

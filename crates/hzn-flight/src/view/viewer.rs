@@ -63,7 +63,7 @@ pub(crate) enum Seen {
     Part(usize),
     /// The picture was refused.
     Refused(Refusal),
-    /// The report, and what is stuck at the limb.
+    /// The report, with the stuck pixels at the limb.
     Whole(Report<f32>, Option<StuckPlaces>),
 }
 
