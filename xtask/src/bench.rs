@@ -41,7 +41,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
     go().map_err(Trouble::into_message)
 }
 
-/// Compares `hzn run` on a sequence of PNGs with decoding alone.
+/// Compares `hzn run` on sequences with decoding alone.
 fn compare_sequence(args: &[String]) -> Result<(), Trouble> {
     steps::run(&mut cargo(&["build", "--quiet", "--release", "--package", "hzn-cli", "--package", "hzn-benches"]))?;
     let release = target().join("release");

@@ -38,7 +38,7 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|
   test [STEP]...     runs all steps, or those whose name contains one of the words;
                      CI=true turns a step that cannot run into a failure
   bench [ARG]...     compares hzn-core with the OpenCV recipe; arguments go to hzn-benches (see --help there)
-  bench run [ARG]... compares `hzn run` on PNGs with decoding alone
+  bench run [ARG]... compares `hzn run` on PNG, JPEG and headerless pictures with decoding alone
   bench python       measures the cost of the Python package compared with the sensor; writes
                      book/results/python-measured.md
   bench ransac [--runs N]
