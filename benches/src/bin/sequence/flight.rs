@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use hzn_run::source::Raw;
 
 /// Kinds of files: name in the table, ending of the files.
-pub(crate) const KINDS: [(&str, &str); 3] = [("PNG", "png"), ("JPEG", "jpg"), ("headerless, 8 bits", "raw")];
+const KINDS: [(&str, &str); 3] = [("PNG", "png"), ("JPEG", "jpg"), ("headerless, 8 bits", "raw")];
 
 /// Quality of the JPEG files, from 1 to 100.
 const JPEG_QUALITY: u8 = 90;
