@@ -9,6 +9,7 @@
 //! | [`disc`] | discs of Sun and Moon |
 //! | [`emulated`] | the firmware in QEMU |
 //! | [`flight_image`] | the flight image in QEMU, with its camera, its flash and its serial line |
+//! | [`stack_bound`] | a bound of a firmware image's stack, from its disassembly |
 //! | [`real`] | photographs with their sensor.toml, and the fitted limb drawn over them |
 
 pub mod disc;
@@ -16,6 +17,7 @@ pub mod emulated;
 pub mod flight_image;
 pub mod real;
 pub mod sensors;
+pub mod stack_bound;
 pub mod table;
 pub mod tally;
 

@@ -14,6 +14,7 @@ use hzn_sim::{Disc, Sky};
 use hzn_tests::emulated::{Board, Case, answer_bytes, measure, measure_rows, run_chain};
 use hzn_tests::flight_image::{Bench, hzn_run};
 use hzn_tests::real::Photograph;
+use hzn_tests::stack_bound::stack_bound;
 
 /// Returns the pictures: rendered flights, payload in view, 8 bits of an infrared sensor, photographs, and patterns
 /// that show nothing.
@@ -162,6 +163,9 @@ fn the_flight_loop_takes_rows_on_a_small_board() {
     let stack: u32 = last[column].parse().unwrap();
     println!("{} pictures by rows, {whole} answers without a full list; most stack {stack} of 65536 bytes", sent.len());
     assert!(sent.len() == 8 && whole == 8 && (4096..60_000).contains(&stack));
+    let bound = stack_bound(&Board::Stm32F405.image("flight")).unwrap();
+    println!("at most {} bytes by the calls", bound.bytes);
+    assert!((stack..60_000).contains(&bound.bytes));
 }
 
 /// Returns the cells of a table, row by row, without the columns that name the picture or the clock.
@@ -209,7 +213,7 @@ fn an_exchange_over_the_line() {
         assert_eq!(bench.run(&line), 0);
         let printed = hzn_run(dir, &["telemetry", "sent.bin", "-o", "sent.csv", "--housekeeping", "hk.csv"]);
         assert_events(&printed);
-        assert_housekeeping(&bench);
+        assert_housekeeping(board, &bench);
 
         let mut after = before;
         after.reject.threshold_px = 2.5;
@@ -254,15 +258,16 @@ fn assert_events(printed: &str) {
 }
 
 /// Asserts the counters of the last housekeeping packet, and that the RAM is large enough for the stack.
-fn assert_housekeeping(bench: &Bench) {
+fn assert_housekeeping(board: Board, bench: &Bench) {
     let housekeeping = std::fs::read_to_string(bench.path("hk.csv")).unwrap();
     let last: Vec<&str> = housekeeping.lines().last().unwrap().split(',').collect();
     let column = |name: &str| housekeeping.lines().next().unwrap().split(',').position(|c| c == name).unwrap();
     assert_eq!((last[column("pictures")], last[column("lost")], last[column("refused")]), ("10", "3", "1"));
     // Besides the pictures, RAM holds the lists, the buffers and the stack.
     let stack: usize = last[column("stack_bytes")].parse().unwrap();
-    println!("most stack {stack} bytes");
-    assert!(size_of::<Lists>() + size_of::<Buffers>() + stack < 96 * 1024);
+    let bound = stack_bound(&board.image("flight")).unwrap().bytes as usize;
+    println!("most stack {stack} bytes, at most {bound} by the calls");
+    assert!(stack <= bound && size_of::<Lists>() + size_of::<Buffers>() + bound < 96 * 1024);
 }
 
 /// Tests a power cut in the middle of writing the parameters: after the reset the old parameters are in use, and the

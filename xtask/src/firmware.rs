@@ -92,9 +92,10 @@ pub(crate) fn test(steps: &mut Steps) -> Outcome {
     build()?;
     soft_double::check(&images("an386").join("measure"))?;
     build_flight_image(METHODS)?;
-    build_vendor_port()?;
+    let vendor_port = build_vendor_port()?;
     lint_and_document()?;
     build_tests()?;
+    steps::run(Command::new(target().join("debug/examples/stack_bound")).arg(vendor_port))?;
     // Without a package's name nothing is built again with other features.
     let tests = ["--test", "firmware", "--test", "navigation", "--test", "recovery"];
     steps.cargo_test(&[&tests[..], &["--", "--ignored"]].concat())?;
@@ -138,12 +139,13 @@ fn build_flight_image(features: &[&str]) -> Result<PathBuf, Trouble> {
     Ok(built.join("flight"))
 }
 
-/// Builds the port for the STM32H743 and prints its size. No emulator has this part, so it does not run. Its hardware
-/// library can panic, so panics are not looked for.
-fn build_vendor_port() -> Outcome {
+/// Builds the port for the STM32H743, prints its size, and returns the image. No emulator has this part, so it does not
+/// run. Its hardware library can panic, so panics are not looked for.
+fn build_vendor_port() -> Result<PathBuf, Trouble> {
     let (mut command, built) = Toolchain::find()?.cargo("build", "firmware/stm32h743", &["--package", "hzn-stm32h743"]);
     steps::run(configure_for_firmware(&mut command, M7_FLAGS))?;
-    steps::run(Command::new("arm-none-eabi-size").arg(built.join("flight")))
+    steps::run(Command::new("arm-none-eabi-size").arg(built.join("flight")))?;
+    Ok(built.join("flight"))
 }
 
 /// Prints how much flash the methods of published systems take, as the table of book/theory/methods.md.

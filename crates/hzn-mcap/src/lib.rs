@@ -39,6 +39,7 @@
 mod cdr;
 mod container;
 mod drawing;
+mod early_sync;
 mod error;
 mod frame;
 mod images;

@@ -11,6 +11,7 @@ use hzn_core::status::Status;
 
 use crate::container::{ChunkBuilder, Container, MAX_RECORD_BYTES};
 use crate::drawing;
+use crate::early_sync::EarlySync;
 use crate::error::{Error, while_writing};
 use crate::frame::FrameRecord;
 use crate::messages;
@@ -63,6 +64,7 @@ pub struct Writer {
     last_ns: u64,
     frames: u64,
     durable: bool,
+    early_sync: EarlySync,
 }
 
 impl Writer {
@@ -102,6 +104,7 @@ impl Writer {
             last_ns: 0,
             frames: 0,
             durable: options.durable,
+            early_sync: EarlySync::default(),
         }
     }
 
@@ -239,6 +242,7 @@ impl Writer {
             return Err(Error::AfterFailure { path: self.part.clone() });
         };
         let (images, data, durable) = (&mut self.images, &mut self.data, self.durable);
+        let bytes = images.len() + data.len();
         let mut write = || -> std::io::Result<()> {
             // Pictures come first: a frame with a report is complete.
             if !images.is_empty() {
@@ -255,6 +259,9 @@ impl Writer {
         match write() {
             Ok(()) => {
                 self.waiting_since = None;
+                if !durable {
+                    self.early_sync.add(bytes as u64, container.output().get_ref());
+                }
                 self.container = Some(container);
                 Ok(())
             }
@@ -273,7 +280,8 @@ impl Writer {
         };
         let failed = |e| while_writing(&self.part, e);
         let file = container.finish().map_err(failed)?;
-        publish(file.get_ref(), &self.part, &self.path).map_err(|e| while_writing(&self.path, e))?;
+        let published = self.early_sync.finish().and_then(|()| publish(file.get_ref(), &self.part, &self.path));
+        published.map_err(|e| while_writing(&self.path, e))?;
         Ok(self.path.clone())
     }
 }

@@ -113,6 +113,11 @@ impl eframe::App for Window {
             self.measure = None;
         }
         self.viewer.show(ui);
+        let is_watched = self.shot.is_some() || self.measure.is_some();
+        if is_watched && !self.is_welcome && self.viewer.is_without_pictures() {
+            let messages: Vec<&str> = self.viewer.messages().collect();
+            return self.finish(&ctx, Err(anyhow!("{}", messages.join("; "))));
+        }
         if let Some(measure) = &mut self.measure {
             measure.after_pass(&self.viewer, &ctx);
         }
@@ -132,11 +137,6 @@ impl eframe::App for Window {
             );
         }
         if !self.is_welcome && (!self.viewer.is_settled() || self.viewer.is_working()) {
-            let failed = self.viewer.sequence().is_empty() && self.viewer.messages().next().is_some();
-            if failed && self.begun.elapsed() > Duration::from_secs(2) {
-                let messages: Vec<&str> = self.viewer.messages().collect();
-                return self.finish(&ctx, Err(anyhow!("{}", messages.join("; "))));
-            }
             return;
         }
         if let Some(situation) = self.situation.take() {

@@ -75,6 +75,32 @@ fn a_camera_that_stops_is_told_within_two_periods() {
 }
 
 #[test]
+fn a_camera_with_jitter_is_not_silent() {
+    fly(ready(), |f| {
+        send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
+        take_sent(f);
+        // Pictures come every 40 ms, each up to 8 ms early or late, for 80 s; then every 100 ms.
+        let mut random = 1u32;
+        let mut told = Vec::new();
+        for picture in 0..2100u64 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let due_us = if picture < 2000 { 40_000 * picture } else { 80_000_000 + 100_000 * (picture - 2000) };
+            let at_us = 1_000_000 + due_us + u64::from(random >> 16) * 16_000 / 65_536;
+            while f.board().now_us + 1000 < at_us {
+                f.board().now_us += 1000;
+                f.turn();
+            }
+            f.board().now_us = at_us;
+            f.board().pictures.push_back((vec![0; 5], 0));
+            f.turn();
+            told.extend(take_sent(f).events.into_iter().filter(|e| e.0 == Event::CameraSilent).map(|_| picture));
+        }
+        // The slower rate is told once, until its period is known.
+        assert_eq!(told, [2001]);
+    });
+}
+
+#[test]
 fn warnings_are_limited_and_counted() {
     fly(ready(), |f| {
         send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));

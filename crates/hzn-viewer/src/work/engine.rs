@@ -2,8 +2,7 @@
 //! [`FrameView`]. Without a request it decodes the pictures that come next.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
@@ -66,8 +65,23 @@ enum Message {
 pub struct Engine {
     send: Sender<Message>,
     receive: Receiver<FrameView>,
-    /// True while the window waits for an answer, so that it need not be woken.
-    is_awaited: Arc<AtomicBool>,
+    is_awaited: Awaited,
+}
+
+/// True while the window waits for an answer, so that it need not be woken. The lock is held while an answer is sent,
+/// so the window cannot have the answer before the thread knows whether to wake it.
+#[derive(Clone, Default)]
+struct Awaited(Arc<Mutex<bool>>);
+
+impl Awaited {
+    fn set(&self, is_awaited: bool) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = is_awaited;
+    }
+    /// Calls `send` and returns true if the window waited for it.
+    fn during<T>(&self, send: impl FnOnce() -> T) -> (bool, T) {
+        let is_awaited = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        (*is_awaited, send())
+    }
 }
 
 impl Engine {
@@ -75,15 +89,18 @@ impl Engine {
     pub fn start(wake: Wake) -> Self {
         let (send, messages) = unbounded();
         let (frame_views, receive) = unbounded();
-        let is_awaited = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&is_awaited);
-        // An answer to a window that waits does not make it draw once more.
-        let wake: Wake = Arc::new(move || {
-            if !flag.load(Ordering::SeqCst) {
-                wake();
-            }
+        let is_awaited = Awaited::default();
+        let awaited = is_awaited.clone();
+        std::thread::spawn(move || {
+            Worker::default().run(&messages, |frame_view| {
+                let (is_awaited, sent) = awaited.during(|| frame_views.send(frame_view));
+                // An answer to a window that waits does not make it draw once more.
+                if !is_awaited {
+                    wake();
+                }
+                sent.is_ok()
+            });
         });
-        std::thread::spawn(move || Worker::default().run(&messages, &frame_views, &wake));
         Self { send, receive, is_awaited }
     }
     /// Starts another sequence.
@@ -104,9 +121,9 @@ impl Engine {
     }
     /// Waits for an answer; returns `None` when the time is up.
     pub fn wait(&self, limit: std::time::Duration) -> Option<FrameView> {
-        self.is_awaited.store(true, Ordering::SeqCst);
+        self.is_awaited.set(true);
         let answer = self.receive.recv_timeout(limit).ok();
-        self.is_awaited.store(false, Ordering::SeqCst);
+        self.is_awaited.set(false);
         // An answer that came between the two lines above has not woken the window.
         answer.or_else(|| self.receive.try_recv().ok())
     }
@@ -137,7 +154,8 @@ pub(super) fn with_input(picture: Arc<Picture>, input: &Input) -> Result<Arc<Pic
 }
 
 impl Worker {
-    fn run(&mut self, messages: &Receiver<Message>, frame_views: &Sender<FrameView>, wake: &Wake) {
+    /// Answers the requests with `answer`, until it returns false or nobody can request any more.
+    fn run(&mut self, messages: &Receiver<Message>, answer: impl Fn(FrameView) -> bool) {
         loop {
             let mut newest = None;
             // The thread waits only if there is nothing to decode in advance.
@@ -160,10 +178,9 @@ impl Worker {
                 Some(request) => {
                     let frame_view = self.process(&request);
                     self.ahead = request.ahead.into();
-                    if frame_views.send(frame_view).is_err() {
+                    if !answer(frame_view) {
                         return;
                     }
-                    wake();
                 }
                 None => {
                     if let Some((index, entry)) = self.ahead.pop_front()

@@ -258,6 +258,10 @@ impl Viewer {
         self.opening.is_none()
             && self.frame_view.as_ref().is_some_and(|s| s.index == self.playback.frame() && s.version == version)
     }
+    /// Returns true if nothing is being opened and there is no picture.
+    pub fn is_without_pictures(&self) -> bool {
+        self.opening.is_none() && self.sequence.is_empty()
+    }
     /// Returns the number of pictures that are processed with the current parameters.
     pub fn processed(&self) -> usize {
         self.rows.current_len()
