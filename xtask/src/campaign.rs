@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use crate::firmware;
 use crate::machine::{has, root, target};
 use crate::steps::{self, Outcome, Trouble, cargo};
-use crate::{processors, python};
+use crate::{processors, python, wheel};
 
 /// The triple that the fuzzing program is built for. With a named target, build scripts are not instrumented.
 const HOST: &str = "x86_64-unknown-linux-gnu";
@@ -36,7 +36,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   flips flips TRIALS (20000) bits of pictures and of stored parameters, sticks as many pictures, and flips every bit
         of a sensor in memory
   packets sends COUNT (1000000) telecommands to the flight software, most of them damaged
-  paths builds the images of the flight computer in another folder; their bytes must be the same
+  paths builds the images of the flight computer and the wheel in another folder; their bytes must be the same
   processors
         compares the answers to PICTURES (2000) on aarch64 and big-endian powerpc64, in QEMU, with those of this machine
   parts writes the CycloneDX lists of parts (SBOM) of command, wheel and firmware into FOLDER (target/sbom), and runs
@@ -56,7 +56,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("flips") => flips(number(20_000)?).map_err(Trouble::into_message),
         Some("packets") => packets(number(1_000_000)?).map_err(Trouble::into_message),
         Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
-        Some("paths") => firmware::is_the_same_elsewhere().map_err(Trouble::into_message),
+        Some("paths") => paths().map_err(Trouble::into_message),
         Some("parts") => parts(args.get(1).map_or("target/sbom", String::as_str)).map_err(Trouble::into_message),
         _ => Err(USAGE.to_owned()),
     };
@@ -95,6 +95,17 @@ pub(crate) fn packets(count: u64) -> Outcome {
     // The same call as that of all tests, so that nothing is built again.
     let mut command = cargo(&["test", "--test", "flight"]);
     steps::run(command.args(["--", "--nocapture", "--ignored", "damage::"]).env("HZN_PACKETS", file))
+}
+
+/// Builds what is delivered in a clone of this repository, which lies in a folder with another name.
+fn paths() -> Outcome {
+    let clone = target().join("xtask/elsewhere/a folder with another name");
+    if clone.exists() {
+        fs::remove_dir_all(&clone)?;
+    }
+    steps::run(Command::new("git").args(["clone", "--quiet"]).arg(root()).arg(&clone))?;
+    firmware::is_the_same_elsewhere(&clone)?;
+    wheel::is_the_same_elsewhere(&clone)
 }
 
 fn parts(folder: &str) -> Outcome {

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::machine::target;
+use crate::machine::{root, target};
 use crate::python;
 use crate::steps::{self, Outcome, Trouble};
 
@@ -67,11 +67,39 @@ fn install_wheel(profile: &str) -> Result<PathBuf, Trouble> {
     if wheels.exists() {
         fs::remove_dir_all(&wheels)?;
     }
-    let mut maturin = Command::new(&python);
-    maturin.args(["-m", "maturin", "build", "--locked", "--profile", profile, "--manifest-path"]);
-    steps::run(maturin.arg(folder.join("Cargo.toml")).arg("--out").arg(&wheels))?;
+    steps::run(&mut maturin(&python, folder, profile, &wheels))?;
     install(&python, &find_wheel(&wheels)?)?;
     Ok(python)
+}
+
+/// Returns the call that builds the wheel of the package in `folder` into the folder `wheels`.
+fn maturin(python: &Path, folder: &Path, profile: &str, wheels: &Path) -> Command {
+    let mut maturin = Command::new(python);
+    maturin.args(["-m", "maturin", "build", "--locked", "--profile", profile, "--manifest-path"]);
+    maturin.arg(folder.join("Cargo.toml")).arg("--out").arg(wheels);
+    maturin
+}
+
+/// Builds the wheel of a release here and in a clone of this repository, and compares their bytes.
+pub(crate) fn is_the_same_elsewhere(clone: &Path) -> Outcome {
+    let python = python::prepare_environment("wheel", &Path::new(CRATE).join("tests/requirements.txt"))?;
+    let elsewhere = target().join("xtask/elsewhere");
+    let build = |root: &Path, name: &str| -> Result<PathBuf, Trouble> {
+        let wheels = elsewhere.join(name);
+        if wheels.exists() {
+            fs::remove_dir_all(&wheels)?;
+        }
+        let mut maturin = maturin(&python, &root.join(CRATE), "release", &wheels);
+        steps::run(maturin.arg("--target-dir").arg(elsewhere.join(format!("{name}-target"))))?;
+        find_wheel(&wheels)
+    };
+    let [here, there] = [build(&root(), "wheel-here")?, build(clone, "wheel-there")?];
+    let name = here.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    if fs::read(here)? != fs::read(there)? {
+        return Err(Trouble::Failed(format!("{name} differs; is everything committed?")));
+    }
+    println!("{name}: the same bytes");
+    Ok(())
 }
 
 fn install(python: &Path, wheel: &Path) -> Outcome {
