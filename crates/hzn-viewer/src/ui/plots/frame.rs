@@ -40,7 +40,7 @@ pub(super) fn shared_plot<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> 
         // There are few grid lines, and all of them are faint, so that the curve stands out.
         .grid_spacing(Rangef::new(8.0, 1500.0))
         .x_grid_spacer(|input| ticks(input, 8.0))
-        .y_grid_spacer(move |input| ticks(input, if height < 90.0 { 2.0 } else { 4.0 }))
+        .y_grid_spacer(move |input| ticks(input, if height < 90.0 { 3.0 } else { 4.0 }))
         .custom_y_axes(vec![
             AxisHints::new_y()
                 .formatter(|mark, _| tick_label(mark.value, mark.step_size))
