@@ -120,8 +120,12 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
         for suspect in in_order(&consensus) {
             let all = consensus.iter().find(|c| c.suspect == suspect);
             let Some(cause) = Cause::new(suspect, fit, all, &config, body) else { continue };
-            for text in [suspect.name().to_owned(), cause.now.clone(), cause.here.clone(), cause.all.clone()] {
+            for text in [suspect.name().to_owned(), cause.now.clone(), cause.here.clone()] {
                 ui.label(RichText::new(text).size(12.0));
+            }
+            let all = ui.label(RichText::new(cause.all.clone()).size(12.0));
+            if suspect == Suspect::Altitude {
+                all.on_hover_text("A shift of the altitudes of all frames");
             }
             apply(viewer, ui, &cause, &mut chosen);
             ui.end_row();
@@ -145,10 +149,10 @@ fn apply(viewer: &Viewer, ui: &mut Ui, cause: &Cause, chosen: &mut Option<Cure>)
         (_, Some(why)) => why.clone(),
         _ => cause.cure.iter().map(|(s, n, x)| format!("{s}.{n} = {x:.6}")).collect::<Vec<_>>().join("\n"),
     };
-    let button = egui::Button::new("Apply").small();
-    let response = ui.add_enabled(!own_altitudes && cause.impossible.is_none(), button);
+    let can = !own_altitudes && cause.impossible.is_none();
+    let response = ui.add_enabled(can, egui::Button::new("Apply").small());
     let name = format!("Apply {}", cause.suspect.name());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, can, &name));
     if response.on_hover_text(&hint).on_disabled_hover_text(&hint).clicked() {
         *chosen = Some(cause.cure.clone());
     }
@@ -168,7 +172,8 @@ const EARTH_LIMB_KM: core::ops::RangeInclusive<f64> = -5.0..=65.0;
 /// Returns false for a limb height at which no camera sees the limb of the Earth.
 fn is_plausible(c: &Consensus, config: &Config, body: usize) -> bool {
     let bodies = config.each_body();
-    let is_earth = bodies.get(body).or(bodies.first()).is_some_and(|b| b.kind == Kind::Earth);
+    let is_earth =
+        bodies.get(body).or(bodies.first()).is_some_and(|b| matches!(b.kind, Kind::Earth | Kind::EarthSphere));
     c.suspect != Suspect::LimbHeight || !is_earth || EARTH_LIMB_KM.contains(&c.value)
 }
 
@@ -230,7 +235,7 @@ impl Cause {
                 cause.now = format!("{given:.1} km");
                 cause.here = format!("{:.1} ± {:.1} km", given + here.value, here.sigma);
                 // The frames have different altitudes, so only the shift is common to them.
-                cause.all = all.map(|c| format!("shift {:+.1} ± {:.1} km", c.value, c.scatter)).unwrap_or_default();
+                cause.all = all.map(|c| format!("Δ {:+.1} ± {:.1} km", c.value, c.scatter)).unwrap_or_default();
                 cause.cure = vec![("body", "altitude_km", of_body.altitude_km.unwrap_or(given) + value)];
                 cause.impossible = (given + value <= 0.0).then(|| "This altitude is below the ground".into());
             }
