@@ -20,7 +20,7 @@ pub(crate) struct EarlySync {
 
 impl EarlySync {
     /// Takes notice of new bytes in `file`, and passes them on if they are enough. It does not wait for the disk.
-    pub fn add(&mut self, bytes: u64, file: &File) {
+    pub(crate) fn add(&mut self, bytes: u64, file: &File) {
         self.new_bytes += bytes;
         if self.new_bytes < STEP_BYTES {
             return;
@@ -40,7 +40,7 @@ impl EarlySync {
     ///
     /// # Errors
     /// The disk has failed. The system reports a failure only once, so it must not be lost here.
-    pub fn finish(&mut self) -> io::Result<()> {
+    pub(crate) fn finish(&mut self) -> io::Result<()> {
         let Some((request, thread)) = self.thread.take() else { return Ok(()) };
         drop(request);
         thread.join().unwrap_or_else(|_| Err(io::Error::other("the thread that passes the file to the disk failed")))

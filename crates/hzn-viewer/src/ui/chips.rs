@@ -52,7 +52,12 @@ fn status(ui: &mut Ui, one: &Counted, group: &mut Option<Group>) {
     };
     let colon = if one.reasons.is_empty() { "" } else { ":" };
     entry(ui, format!("{} {}{colon}", one.count, one.status), Group { status: one.status, reason: None });
+    let named: usize = one.reasons.iter().map(|(_, count)| count).sum();
+    let unnamed = one.count.saturating_sub(named);
     for (reason, count) in &one.reasons {
         entry(ui, format!("{count} {}", reason.name()), Group { status: one.status, reason: Some(*reason) });
+    }
+    if named > 0 && unnamed > 0 {
+        ui.weak(RichText::new(format!("{unnamed} without an edge")).size(12.5));
     }
 }

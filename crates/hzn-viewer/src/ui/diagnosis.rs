@@ -1,6 +1,7 @@
 //! The diagnosis: why a picture has no answer, in numbers, and a button for each cure.
 
 use egui::{RichText, Ui, vec2};
+use hzn_core::body::Kind;
 use hzn_core::status::Status;
 use hzn_core::{Config, threshold};
 
@@ -30,8 +31,9 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     }
     let fill = ui.visuals().faint_bg_color;
     let border = theme::warning(ui.visuals().dark_mode);
-    let frame = egui::Frame::new().fill(fill).stroke(egui::Stroke::new(1.0, border)).corner_radius(6);
-    frame.inner_margin(egui::Margin::symmetric(8, 6)).show(ui, |ui| {
+    let width = if viewer.focus_diagnosis { 3.0 } else { 1.0 };
+    let frame = egui::Frame::new().fill(fill).stroke(egui::Stroke::new(width, border)).corner_radius(6);
+    let card = frame.inner_margin(egui::Margin::symmetric(8, 6)).show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.strong("Diagnosis");
         if let Some(cause) = answer.cause.and_then(|c| c.reason) {
@@ -54,6 +56,10 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             });
         }
     });
+    if viewer.focus_diagnosis {
+        card.response.scroll_to_me(Some(egui::Align::TOP));
+        viewer.focus_diagnosis = !ui.input(|i| i.pointer.any_pressed());
+    }
     ui.add_space(4.0);
 }
 
@@ -114,14 +120,19 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
         for suspect in in_order(&consensus) {
             let all = consensus.iter().find(|c| c.suspect == suspect);
             let Some(cause) = Cause::new(suspect, fit, all, &config, body) else { continue };
-            for text in [suspect.name().to_owned(), cause.now.clone(), cause.here.clone(), cause.all.clone()] {
+            for text in [suspect.name().to_owned(), cause.now.clone(), cause.here.clone()] {
                 ui.label(RichText::new(text).size(12.0));
+            }
+            let all = ui.label(RichText::new(cause.all.clone()).size(12.0));
+            if suspect == Suspect::Altitude {
+                all.on_hover_text("A shift of the altitudes of all frames");
             }
             apply(viewer, ui, &cause, &mut chosen);
             ui.end_row();
         }
     });
-    if let Some(words) = agreement(&consensus) {
+    let plausible: Vec<Consensus> = consensus.iter().copied().filter(|c| is_plausible(c, &config, body)).collect();
+    if let Some(words) = agreement(&plausible, viewer.has_own_altitudes()) {
         wrapped(ui, &words);
     }
     if let (Some(cure), Some(session)) = (chosen, &mut viewer.session) {
@@ -136,12 +147,12 @@ fn apply(viewer: &Viewer, ui: &mut Ui, cause: &Cause, chosen: &mut Option<Cure>)
     let hint = match (own_altitudes, &cause.impossible) {
         (true, _) => "The altitudes come from frames.csv or the recording, so correct them there".to_owned(),
         (_, Some(why)) => why.clone(),
-        _ => cause.cure.iter().map(|(s, n, x)| format!("{s}.{n} = {x:.6}\n")).collect(),
+        _ => cause.cure.iter().map(|(s, n, x)| format!("{s}.{n} = {x:.6}")).collect::<Vec<_>>().join("\n"),
     };
-    let button = egui::Button::new("Apply").small();
-    let response = ui.add_enabled(!own_altitudes && cause.impossible.is_none(), button);
+    let can = !own_altitudes && cause.impossible.is_none();
+    let response = ui.add_enabled(can, egui::Button::new("Apply").small());
     let name = format!("Apply {}", cause.suspect.name());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, can, &name));
     if response.on_hover_text(&hint).on_disabled_hover_text(&hint).clicked() {
         *chosen = Some(cause.cure.clone());
     }
@@ -154,22 +165,42 @@ fn in_order(consensus: &[Consensus]) -> Vec<Suspect> {
     known.iter().copied().chain(rest).collect()
 }
 
-/// Says which cause agrees with all pictures.
-fn agreement(consensus: &[Consensus]) -> Option<String> {
+/// Heights at which cameras see the limb of the Earth, in km: from the ground, in the near infrared, to the band of
+/// carbon dioxide and the haze in the blue, with a margin. Airglow at 90 km is not the limb.
+const EARTH_LIMB_KM: core::ops::RangeInclusive<f64> = -5.0..=65.0;
+
+/// Returns false for a limb height at which no camera sees the limb of the Earth.
+fn is_plausible(c: &Consensus, config: &Config, body: usize) -> bool {
+    let bodies = config.each_body();
+    let is_earth =
+        bodies.get(body).or(bodies.first()).is_some_and(|b| matches!(b.kind, Kind::Earth | Kind::EarthSphere));
+    c.suspect != Suspect::LimbHeight || !is_earth || EARTH_LIMB_KM.contains(&c.value)
+}
+
+/// Says which cause agrees with all pictures. `own_altitudes`: the altitudes are those of frames.csv.
+fn agreement(consensus: &[Consensus], own_altitudes: bool) -> Option<String> {
     let [best, second, ..] = consensus else { return None };
     if best.pictures < 3 {
         return None;
     }
-    let words = |c: &Consensus| format!("{} scatters by {:.1} of its σ", c.suspect.name(), c.disagreement);
+    let words = |c: &Consensus| format!("{} {:.1}", c.suspect.name(), c.disagreement);
     let all: Vec<String> = consensus.iter().map(words).collect();
     // A wrong cause scatters more. Below 1 the scatter is the noise of the edges, and says nothing.
     let decided = second.disagreement > 2.0 * best.disagreement.max(1.0);
     let end = if decided {
-        format!("So the {} is the likely cause.", best.suspect.name())
+        let altitudes = own_altitudes && best.suspect == Suspect::Altitude;
+        let side = if best.value < 0.0 { "high" } else { "low" };
+        let where_to = format!(" Those in frames.csv are {:.1} km too {side}; correct them there.", best.value.abs());
+        format!(
+            "So the {} is the likely cause.{}",
+            best.suspect.name(),
+            if altitudes { where_to } else { String::new() }
+        )
     } else {
         "The frames do not tell the causes apart; check which value you know best.".to_owned()
     };
-    Some(format!("Over {} frames: {}. {end}", best.pictures, all.join(", ")))
+    // The true cause gives the same value in every frame.
+    Some(format!("Scatter over {} frames, in σ of one frame: {}. {end}", best.pictures, all.join(", ")))
 }
 
 /// One possible cause in words, with its cure.
@@ -203,7 +234,8 @@ impl Cause {
                 let given = fit.given_altitude_km?;
                 cause.now = format!("{given:.1} km");
                 cause.here = format!("{:.1} ± {:.1} km", given + here.value, here.sigma);
-                cause.all = all.map(|c| format!("{:+.1} ± {:.1} km", c.value, c.scatter)).unwrap_or_default();
+                // The frames have different altitudes, so only the shift is common to them.
+                cause.all = all.map(|c| format!("Δ {:+.1} ± {:.1} km", c.value, c.scatter)).unwrap_or_default();
                 cause.cure = vec![("body", "altitude_km", of_body.altitude_km.unwrap_or(given) + value)];
                 cause.impossible = (given + value <= 0.0).then(|| "This altitude is below the ground".into());
             }
@@ -220,8 +252,12 @@ impl Cause {
                 cause.here = format!("{:.1} ± {:.1} km", here.value, here.sigma);
                 cause.all = all.map(|c| format!("{:.1} ± {:.1} km", c.value, c.scatter)).unwrap_or_default();
                 cause.cure = vec![("body", "limb_height_km", value)];
-                cause.impossible = (!(-50.0..=500.0).contains(&value))
-                    .then(|| "No limb is this high: sensor.toml allows −50 to 500 km".into());
+                cause.impossible = all.is_some_and(|c| !is_plausible(c, config, body)).then(|| {
+                    "The limb of the Earth lies between the ground and 65 km, so another value is wrong".into()
+                });
+                if !(-50.0..=500.0).contains(&value) {
+                    cause.impossible = Some("No limb is this high: sensor.toml allows −50 to 500 km".into());
+                }
             }
         }
         Some(cause)

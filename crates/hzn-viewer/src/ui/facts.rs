@@ -161,7 +161,7 @@ fn gates(report: &Report<f64>) -> Vec<String> {
         Status::Ok => vec!["passed every gate".into()],
         status => {
             let mut out = vec![format!("{status} at {}", report.stage.name())];
-            out.extend(hzn_run::explain::tips(report).into_iter().map(|tip| format!("Try: {tip}")));
+            out.extend(hzn_run::explain::tips(report).into_iter().map(|tip| format!("• {tip}")));
             out
         }
     }

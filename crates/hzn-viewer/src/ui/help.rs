@@ -10,18 +10,21 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
         return;
     }
     let response = egui::Modal::new(egui::Id::unique("help")).show(ctx, |ui| {
+        let room = ctx.content_rect().size() - vec2(60.0, 120.0);
+        ui.set_width(room.x.min(820.0));
         ui.heading("Keys and mouse");
         ui.add_space(6.0);
-        let room = ctx.content_rect().size() - vec2(60.0, 90.0);
-        egui::ScrollArea::both().max_height(room.y).max_width(room.x).show(ui, contents);
+        egui::ScrollArea::vertical().max_height(room.y).show(ui, contents);
+        ui.add_space(4.0);
+        ui.button("Close").clicked()
     });
-    if response.should_close() {
+    if response.inner || response.should_close() {
         viewer.showing_help = false;
     }
 }
 
 fn contents(ui: &mut egui::Ui) {
-    ui.horizontal_top(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let half = command::ALL.len().div_ceil(2);
         for (n, part) in command::ALL.chunks(half).enumerate() {
             egui::Grid::new(("keys", n)).num_columns(2).spacing(vec2(14.0, 4.0)).show(ui, |ui| {

@@ -8,7 +8,7 @@ use super::viewer::Viewer;
 
 /// Draws an advice with a link for each key that it names.
 pub(super) fn tip(viewer: &mut Viewer, ui: &mut Ui, tip: &str) {
-    ui.add(egui::Label::new(RichText::new(format!("Try: {tip}")).size(12.5)).wrap());
+    ui.add(egui::Label::new(RichText::new(format!("• {tip}")).size(12.5)).wrap());
     let named = named_keys(tip);
     if named.is_empty() {
         return;

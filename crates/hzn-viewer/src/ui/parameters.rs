@@ -10,6 +10,10 @@ use crate::model::{Session, SliderRange};
 
 /// Width of the names of parameters.
 const NAME_WIDTH: f32 = 136.0;
+/// Width of the value behind a slider.
+const VALUE_WIDTH: f32 = 96.0;
+/// Width of the button that restores the file's value.
+const RESTORE_WIDTH: f32 = 46.0;
 
 /// Draws one key of sensor.toml.
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, key: &'static Key) {
@@ -47,6 +51,11 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, key: &'static Key) {
     });
     if focused {
         mark(viewer, ui, &row.response);
+    }
+    if key.path == "body.altitude_km" && viewer.has_own_altitudes() {
+        ui.weak(
+            RichText::new("The frames have altitudes of their own (frames.csv), which are used instead.").size(12.0),
+        );
     }
     if sweep {
         super::study::open(viewer, key);
@@ -172,7 +181,10 @@ fn number(
     let magnitude = session.usual_magnitude(key.section(), key.name(), body);
     let response = match SliderRange::from_limits(limits, magnitude).filter(|_| key.section() != "camera") {
         Some(range) => {
-            ui.spacing_mut().slider_width = (ui.available_width() - 96.0).max(60.0);
+            // Without room for the button behind it, the panel would grow with every frame of the window.
+            let differs = session.differs(key.section(), key.name(), body);
+            let behind = VALUE_WIDTH + if differs { RESTORE_WIDTH } else { 0.0 };
+            ui.spacing_mut().slider_width = (ui.available_width() - behind).max(60.0);
             let mut slider = Slider::new(&mut x, range.low..=range.high)
                 .logarithmic(range.logarithmic)
                 .clamping(SliderClamping::Never)
@@ -213,7 +225,7 @@ fn restore(session: &mut Session, ui: &mut Ui, key: &Key, body: usize) {
 fn hint(key: &Key) -> String {
     let limits = match key.limits {
         Limits::Choice => String::new(),
-        _ => format!("\n{}.", keys::limits_in_words(key).replace('`', "")),
+        _ => format!("\nAllowed: {}.", keys::limits_in_words(key).replace('`', "")),
     };
     let unit = if key.unit().is_empty() { String::new() } else { format!(" [{}]", key.unit()) };
     format!("{}{unit}: {}{limits}", key.path, key.sentence().replace('`', ""))

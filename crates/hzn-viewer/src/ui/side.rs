@@ -1,6 +1,6 @@
 //! The left column: the answer, how the picture is shown, and which overlays are drawn.
 
-use egui::{Color32, RichText, Ui, vec2};
+use egui::{Color32, Rect, RichText, Ui, vec2};
 use hzn_core::status::Status;
 
 use super::panels::Panel;
@@ -94,6 +94,7 @@ fn answer(viewer: &mut Viewer, ui: &mut Ui) {
             let hint = "Shows the diagnosis among the stages";
             if answer.is_some() && ui.link("Why, and what to do").on_hover_text(hint).clicked() {
                 viewer.panels.open(Panel::Stages, &mut viewer.settings);
+                viewer.focus_diagnosis = true;
             }
         }
     }
@@ -211,11 +212,26 @@ fn layers(viewer: &mut Viewer, ui: &mut Ui) {
                 }
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     let (rect, _) = ui.allocate_exact_size(vec2(18.0, 10.0), egui::Sense::hover());
-                    ui.painter().rect_filled(rect, 2, colour(layer));
+                    for (part, colour) in split(rect, &colours(layer)) {
+                        ui.painter().rect_filled(part, 2, colour);
+                    }
                 });
             });
         }
     });
+}
+
+/// Returns the colours of a layer: each candidate has its own.
+fn colours(layer: Layer) -> Vec<Color32> {
+    if layer == Layer::Edges { (0..4).map(theme::edge).collect() } else { vec![colour(layer)] }
+}
+
+/// Divides a rectangle into equal columns, one for each colour.
+fn split(rect: Rect, colours: &[Color32]) -> impl Iterator<Item = (Rect, Color32)> {
+    let width = rect.width() / colours.len().max(1) as f32;
+    let left = move |n: usize| rect.left() + width * n as f32;
+    let part = move |n: usize| Rect::from_x_y_ranges(left(n)..=left(n + 1), rect.y_range());
+    colours.iter().enumerate().map(move |(n, colour)| (part(n), *colour))
 }
 
 fn colour(layer: Layer) -> Color32 {

@@ -26,14 +26,14 @@ pub(super) const CIRCLE: Color32 = Color32::from_rgb(140, 170, 200);
 /// Pixels that were read.
 pub(super) const TOUCHED: Color32 = Color32::from_rgb(204, 121, 167);
 
-/// Candidate edges, in turn.
+/// Candidate edges, in turn. None of the colours is that of another overlay.
 const EDGES: [Color32; 6] = [
     Color32::from_rgb(86, 180, 233),
-    Color32::from_rgb(204, 121, 167),
-    Color32::from_rgb(230, 159, 0),
-    Color32::from_rgb(0, 158, 115),
     Color32::from_rgb(150, 130, 220),
-    Color32::from_rgb(213, 94, 0),
+    Color32::from_rgb(196, 164, 132),
+    Color32::from_rgb(160, 176, 70),
+    Color32::from_rgb(100, 214, 204),
+    Color32::from_rgb(120, 140, 196),
 ];
 
 /// Returns the colour of a candidate edge, by its number.
@@ -158,6 +158,8 @@ pub(super) fn apply(ctx: &egui::Context) {
         style.spacing.item_spacing = egui::vec2(7.0, 5.0);
         style.spacing.button_padding = egui::vec2(8.0, 3.0);
         style.interaction.tooltip_delay = 0.4;
+        // What scrolls shows it, also without the pointer over it.
+        style.spacing.scroll.dormant_handle_opacity = 0.5;
     });
 }
 

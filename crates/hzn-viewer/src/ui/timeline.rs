@@ -101,10 +101,10 @@ fn icon_button(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
     };
     match icon {
         Icon::First => [bar(-6.0), triangle(2.0, -1.0)],
-        Icon::Back => [triangle(-1.0, -1.0), ()],
+        Icon::Back => [triangle(-3.0, -1.0), bar(4.0)],
         Icon::Play => [triangle(0.0, 1.0), ()],
         Icon::Pause => [bar(-3.0), bar(3.0)],
-        Icon::Next => [triangle(1.0, 1.0), ()],
+        Icon::Next => [bar(-4.0), triangle(3.0, 1.0)],
         Icon::Last => [triangle(-2.0, 1.0), bar(6.0)],
     };
     response

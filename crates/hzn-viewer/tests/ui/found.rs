@@ -185,10 +185,48 @@ fn a_wrong_altitude_is_measured_and_applied() {
     let all = fits(&window);
     let altitude = diagnosis::summarise(all.iter()).into_iter().find(|c| c.suspect == Suspect::Altitude).unwrap();
     assert!((420.0 + altitude.value - 240.0).abs() < 20.0, "{altitude:?}");
+    let can = |name: &str| !window.get_by_label(name).accesskit_node().is_disabled();
+    assert!(!can("Apply limb height") && can("Apply altitude"), "a limb of the Earth is nowhere near 190 km high");
     window.get_by_label("Apply altitude").click();
     window.run_steps(2);
     until(&mut window, "no answer", |v| v.is_settled() && !v.is_working());
     assert_eq!(answer(&window).0, Status::Ok);
+}
+
+#[test]
+fn altitudes_of_frames_csv_that_are_too_high_are_named() {
+    let (_dir, pictures) = folder();
+    let mut table = "file,altitude_km\n".to_owned();
+    let mut names: Vec<_> = std::fs::read_dir(&pictures).unwrap().map(|e| e.unwrap().file_name()).collect();
+    names.sort();
+    let pictures_only = names.iter().filter_map(|n| n.to_str()).filter(|n| n.ends_with(".png"));
+    pictures_only.for_each(|name| table += &format!("{name},420.0\n"));
+    std::fs::write(pictures.join("frames.csv"), table).unwrap();
+    let mut window = window_on(&pictures);
+    until(&mut window, "not processed", |v| v.processed() == 4 && !v.is_working());
+    assert_ne!(answer(&window).0, Status::Ok);
+    for name in ["Apply limb height", "Apply altitude"] {
+        assert!(window.get_by_label(name).accesskit_node().is_disabled(), "{name}");
+    }
+    // The field of the altitude would change nothing, and says so.
+    window.get_by_label("Body").click();
+    window.run_steps(3);
+    let why = "The frames have altitudes of their own (frames.csv), which are used instead.";
+    assert!(window.query_by_label(why).is_some());
+}
+
+#[test]
+fn the_column_of_stages_keeps_its_width() {
+    let (_dir, mut window) = window_on_flight();
+    window.get_by_label("Body").click();
+    window.run_steps(5);
+    let before = window.state_mut().settings_mut().stages_width;
+    window.get_by_role_and_label(egui::Role::Slider, "limb_height_km").set_value_accesskit(60.5);
+    settled(&mut window);
+    window.run_steps(40);
+    assert!(window.query_by_label("file").is_some(), "the value can be restored");
+    let after = window.state_mut().settings_mut().stages_width;
+    assert!(after <= before + 1.0, "{before} {after}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The parts that all plots share.
 
 use egui::{Color32, Rangef, Response, RichText, Ui, vec2};
-use egui_plot::Plot;
+use egui_plot::{AxisHints, Plot};
 
 use super::axis::{tick_label, ticks};
 
@@ -40,7 +40,12 @@ pub(super) fn shared_plot<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> 
         // There are few grid lines, and all of them are faint, so that the curve stands out.
         .grid_spacing(Rangef::new(8.0, 1500.0))
         .x_grid_spacer(|input| ticks(input, 8.0))
-        .y_grid_spacer(move |input| ticks(input, if height < 90.0 { 2.0 } else { 4.0 }))
-        .y_axis_formatter(|mark, _| tick_label(mark.value, mark.step_size))
-        .y_axis_min_width(LABELS_WIDTH)
+        .y_grid_spacer(move |input| ticks(input, if height < 90.0 { 3.0 } else { 4.0 }))
+        .custom_y_axes(vec![
+            AxisHints::new_y()
+                .formatter(|mark, _| tick_label(mark.value, mark.step_size))
+                .min_thickness(LABELS_WIDTH)
+                // A low plot has labels, too: they need 12 points.
+                .label_spacing(Rangef::new(10.0, 14.0)),
+        ])
 }

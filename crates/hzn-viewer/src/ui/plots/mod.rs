@@ -41,6 +41,10 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         } else {
             let offered = offered::names(viewer);
             quantity_choice(viewer, ui, &offered);
+            // The time line below shows the times of the frames as they are.
+            if viewer.sequence.entries.iter().find_map(|e| e.time_s).is_some_and(|start| start != 0.0) {
+                ui.weak(RichText::new("The plots show the time since the first frame.").size(12.0));
+            }
             // A plot that this sequence does not have stays chosen for others.
             viewer.settings.plotted.iter().filter(|name| offered.contains(&name.as_str())).cloned().collect()
         };
@@ -63,6 +67,7 @@ fn rows(viewer: &mut Viewer, ui: &mut Ui, chosen: &[String]) {
     let (mut pointed, mut look) = (None, None);
     ScrollArea::vertical().max_height(room).auto_shrink([false, false]).show(ui, |ui| {
         for name in chosen {
+            let top = ui.cursor().top();
             if name == RESIDUALS {
                 look = residuals::show(viewer, ui, each).or(look);
             } else if let Some(quantity) = QUANTITIES.iter().find(|q| q.name == name) {
@@ -71,6 +76,10 @@ fn rows(viewer: &mut Viewer, ui: &mut Ui, chosen: &[String]) {
                 pointed = navigation::show(viewer, ui, quantity, &axis, each).or(pointed);
             } else if name == INNOVATIONS {
                 pointed = navigation::innovations(viewer, ui, &axis, each).or(pointed);
+            }
+            if viewer.new_plot.take_if(|new| new == name).is_some() {
+                let plot = egui::Rect::from_x_y_ranges(ui.max_rect().x_range(), top..=ui.cursor().top());
+                ui.scroll_to_rect(plot, None);
             }
         }
     });
@@ -96,6 +105,7 @@ fn quantity_choice(viewer: &mut Viewer, ui: &mut Ui, offered: &[&str]) {
                     viewer.settings.plotted.retain(|p| p != name);
                 } else {
                     viewer.settings.plotted.push(name.to_owned());
+                    viewer.new_plot = Some(name.to_owned());
                 }
             }
         }

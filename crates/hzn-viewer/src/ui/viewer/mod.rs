@@ -90,6 +90,10 @@ pub struct Viewer {
     pub(super) linked_focal: bool,
     /// Key that a link opens in the column of stages.
     pub(super) focus_key: Option<&'static str>,
+    /// The column of stages scrolls to the diagnosis and marks it, until the next click.
+    pub(super) focus_diagnosis: bool,
+    /// Plot that was switched on last; the plots scroll to it.
+    pub(super) new_plot: Option<String>,
     pub(super) panels: Panels,
     /// Picture under the pointer in the plots.
     pub(super) hovered_frame: Option<usize>,
@@ -160,6 +164,8 @@ impl Viewer {
             companions: Companions::default(),
             linked_focal: true,
             focus_key: None,
+            focus_diagnosis: false,
+            new_plot: None,
             panels: Panels::default(),
             hovered_frame: None,
             group: None,
