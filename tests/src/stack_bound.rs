@@ -84,8 +84,8 @@ impl Graph {
         Ok(Self { functions, pointed: addresses(data.into_iter().collect()), handlers })
     }
 
-    /// Returns the bytes of the deepest path that begins with a call of the function at `start`. `above` has the functions
-    /// that have led to it.
+    /// Returns the bytes of the deepest path that begins with a call of the function at `start`. `above` has the
+    /// functions that have led to it.
     fn deepest(&self, start: u32, above: &mut Vec<u32>) -> Result<(u32, Vec<u32>), String> {
         let function = &self.functions[&start];
         if above.contains(&start) {

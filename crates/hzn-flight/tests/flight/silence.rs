@@ -91,7 +91,7 @@ fn a_camera_with_jitter_is_not_silent() {
                 f.turn();
             }
             f.board().now_us = at_us;
-            f.board().pictures.push_back((vec![0; 5], 0));
+            f.board().pictures.push_back((limb(), 0));
             f.turn();
             told.extend(take_sent(f).events.into_iter().filter(|e| e.0 == Event::CameraSilent).map(|_| picture));
         }
