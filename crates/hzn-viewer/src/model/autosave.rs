@@ -43,7 +43,8 @@ impl Unsaved {
     }
 }
 
-fn absolute(path: &Path) -> PathBuf {
+/// Returns the absolute path, also of a file that does not exist.
+pub(crate) fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 

@@ -46,25 +46,26 @@ fn unsaved(viewer: &mut Viewer, ctx: &egui::Context, what: &str) {
 /// Asks whether the changes of a window that crashed come back.
 fn lost(viewer: &mut Viewer, ctx: &egui::Context) {
     let home = viewer.changes.lost.as_ref().map(|(u, _)| u.home.display().to_string()).unwrap_or_default();
-    let (mut restore, mut discard) = (false, false);
+    let (mut restore, mut later, mut discard) = (false, false, false);
     let shown = Modal::new(Id::unique("lost")).show(ctx, |ui| {
         ui.set_max_width(460.0);
-        ui.heading("Changes from the last window");
+        ui.heading("Changes of an earlier window");
         ui.add_space(4.0);
-        ui.label("The last window ended before its changes of this sensor.toml were saved:");
+        ui.label("A window ended before its changes of this sensor.toml were saved:");
         ui.add(egui::Label::new(egui::RichText::new(home).monospace()).wrap());
         ui.add_space(8.0);
         ui.horizontal(|ui| {
-            restore = ui.button("Restore changes").clicked();
+            let hint = "Opens the pictures of that window with the changed sensor.toml";
+            restore = ui.button("Restore changes").on_hover_text(hint).clicked();
+            later = ui.button("Later").on_hover_text("The next window asks again").clicked();
             discard = ui.button("Discard changes").clicked();
         });
     });
-    // With Esc the question comes again with the next window.
     if restore {
         viewer.restore_lost();
     } else if discard {
         viewer.forget_lost();
-    } else if shown.should_close() {
-        viewer.changes.lost = None;
+    } else if later || shown.should_close() {
+        viewer.keep_lost();
     }
 }

@@ -345,10 +345,20 @@ fn a_crashed_window_gives_its_changes_back() {
     // The window crashes. No process has this number.
     std::fs::rename(&own, store.with_file_name("unsaved-4294967295.json")).unwrap();
     drop(window);
+    let mut later = stored_window(&store);
+    later.run_steps(3);
+    later.get_by_label("Later").click();
+    later.run_steps(3);
+    assert!(later.query_by_label("Later").is_none() && unsaved().is_some());
+    drop(later);
+    // Other pictures are open when the changes come back: their own pictures are opened.
+    let (_other_dir, other) = folder();
     let mut again = stored_window(&store);
-    again.run_steps(3);
+    open(&mut again, &other);
+    settled(&mut again);
     again.get_by_label("Restore changes").click();
     until(&mut again, "not restored", |v: &Viewer| v.session().is_some_and(|s| s.is_changed()) && v.is_settled());
+    assert_eq!(again.state().sequence().inputs, [std::path::absolute(&pictures).unwrap()]);
     assert!(again.state().session().unwrap().sheet().text().contains("scale = 1.5"));
     assert!(unsaved().is_none());
     assert!(Path::new(&pictures).exists());

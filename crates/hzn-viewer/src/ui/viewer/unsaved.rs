@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::Viewer;
 use super::changes::Leave;
-use crate::model::{Session, Unsaved};
+use crate::model::{Session, Unsaved, autosave};
 use crate::ui::path_dialog::{PathDialog, Purpose};
 use crate::work::open::Request;
 
@@ -93,12 +93,20 @@ impl Viewer {
         let _ = std::fs::remove_file(path);
         let inputs = unsaved.inputs.clone();
         let session = unsaved.into_session();
-        if !inputs.is_empty() && self.sequence.is_empty() && self.opening.is_none() {
+        let here = self.request.inputs.iter().map(|path| autosave::absolute(path));
+        if !inputs.is_empty() && !here.eq(inputs.iter().cloned()) {
+            // The changes belong to another sequence than the one that is open.
             self.open(Request { inputs, fps: self.request.fps, ..Request::default() });
+            self.restoring = Some(session);
+        } else if self.opening.is_some() && self.sequence.inputs != self.request.inputs {
             self.restoring = Some(session);
         } else {
             self.set_session(session);
         }
+    }
+    /// Keeps the changes of a window that crashed for the next window.
+    pub(in crate::ui) fn keep_lost(&mut self) {
+        self.changes.lost = None;
     }
 
     /// Removes the changes of a window that crashed.
