@@ -162,11 +162,10 @@ impl Function {
             }
             "blx" | "bx" if !operands.contains("lr") => self.calls_pointer = true,
             "pop" | "vpop" | "ldmia" | "vldmia" | "add" | "addw" | "ldr" | "ldrd" => {}
+            // Stores and comparisons read the stack pointer.
+            "stmia" | "vstmia" | "cmp" => {}
             _ if operands.starts_with("sp,") || operands.starts_with("sp!") => {
-                // Stores and comparisons read the stack pointer; all else changes it in a way that is not known here.
-                if !["stmia", "vstmia", "cmp"].contains(&base) {
-                    return Err("changes the stack pointer in an unknown way".into());
-                }
+                return Err("changes the stack pointer in an unknown way".into());
             }
             "mov" | "ldm" if operands.starts_with("pc") => self.calls_pointer = true,
             _ => {}

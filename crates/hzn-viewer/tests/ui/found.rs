@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use egui::{Key, Modifiers};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use hzn_core::status::Status;
 use hzn_viewer::model::cause::Reason;
 use hzn_viewer::model::diagnosis::{self, Suspect};
