@@ -9,7 +9,7 @@ use super::viewer::Viewer;
 use super::{links, theme};
 use crate::model::Session;
 use crate::model::cause::Reason;
-use crate::model::diagnosis::{self, Consensus, FitFacts, Suspect};
+use crate::model::diagnosis::{self, Consensus, FitFacts, Implied, Suspect};
 use crate::work::frame_view::BodyResult;
 use crate::work::trials::OtsuTrial;
 
@@ -216,10 +216,12 @@ struct Cause {
 
 impl Cause {
     fn new(suspect: Suspect, fit: &FitFacts, all: Option<&Consensus>, config: &Config, body: usize) -> Option<Self> {
-        let here = fit.implied(suspect)?;
+        let here = fit.implied(suspect);
         let bodies = config.each_body();
         let of_body = bodies.get(body).or(bodies.first())?;
-        let value = all.map_or(here.value, |c| c.value);
+        // A frame may say nothing about a quantity that all frames together decide.
+        let value = all.map(|c| c.value).or(here.map(|here| here.value))?;
+        let in_words = |words: &dyn Fn(Implied) -> String| here.map_or_else(|| "–".to_owned(), words);
         let camera = &config.camera;
         let mut cause = Self {
             suspect,
@@ -233,7 +235,7 @@ impl Cause {
             Suspect::Altitude => {
                 let given = fit.given_altitude_km?;
                 cause.now = format!("{given:.1} km");
-                cause.here = format!("{:.1} ± {:.1} km", given + here.value, here.sigma);
+                cause.here = in_words(&|here| format!("{:.1} ± {:.1} km", given + here.value, here.sigma));
                 // The frames have different altitudes, so only the shift is common to them.
                 cause.all = all.map(|c| format!("Δ {:+.1} ± {:.1} km", c.value, c.scatter)).unwrap_or_default();
                 cause.cure = vec![("body", "altitude_km", of_body.altitude_km.unwrap_or(given) + value)];
@@ -241,15 +243,15 @@ impl Cause {
             }
             Suspect::Focal => {
                 cause.now = format!("fx {:.1} px", camera.fx_px);
-                cause.here = format!("{:.1} ± {:.1} px", camera.fx_px * here.value, camera.fx_px * here.sigma);
                 let words =
-                    |c: &Consensus| format!("{:.1} ± {:.1} px", camera.fx_px * c.value, camera.fx_px * c.scatter);
-                cause.all = all.map(words).unwrap_or_default();
+                    |factor: f64, by: f64| format!("{:.1} ± {:.1} px", camera.fx_px * factor, camera.fx_px * by);
+                cause.here = in_words(&|here| words(here.value, here.sigma));
+                cause.all = all.map(|c| words(c.value, c.scatter)).unwrap_or_default();
                 cause.cure = vec![("camera", "fx_px", camera.fx_px * value), ("camera", "fy_px", camera.fy_px * value)];
             }
             Suspect::LimbHeight => {
                 cause.now = format!("{:.1} km", of_body.limb_height_km);
-                cause.here = format!("{:.1} ± {:.1} km", here.value, here.sigma);
+                cause.here = in_words(&|here| format!("{:.1} ± {:.1} km", here.value, here.sigma));
                 cause.all = all.map(|c| format!("{:.1} ± {:.1} km", c.value, c.scatter)).unwrap_or_default();
                 cause.cure = vec![("body", "limb_height_km", value)];
                 cause.impossible = all.is_some_and(|c| !is_plausible(c, config, body)).then(|| {

@@ -95,7 +95,9 @@ fn threshold(answer: &BodyResult, config: &Config) -> Vec<String> {
             "mean brightness is outside of {} to {} of full scale",
             config.gate.min_mean, config.gate.max_mean
         )],
-        (_, Some((mean, n))) => vec![format!("threshold {}, mean {mean:.1} of {n} pixels", report.level)],
+        (_, Some((mean, n))) => {
+            vec![format!("threshold {}, mean brightness {mean:.1} in a sample of {n} pixels", report.level)]
+        }
         _ => vec![format!("threshold {}", report.level)],
     }
 }

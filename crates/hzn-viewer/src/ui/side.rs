@@ -211,6 +211,8 @@ fn layers(viewer: &mut Viewer, ui: &mut Ui) {
                     viewer.settings.show(layer, on);
                 }
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    // The scroll bar of the column lies here.
+                    ui.add_space(6.0);
                     let (rect, _) = ui.allocate_exact_size(vec2(18.0, 10.0), egui::Sense::hover());
                     for (part, colour) in split(rect, &colours(layer)) {
                         ui.painter().rect_filled(part, 2, colour);
