@@ -30,6 +30,9 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, key: &'static Key) {
     let hint = hint(key);
     let focused = viewer.focus_key == Some(key.path);
     let linked = viewer.linked_focal;
+    // A change in this frame of the window shows its button in the next one, when the slider leaves room for it.
+    // Otherwise the panel would grow.
+    let differs = session.differs(key.section(), key.name(), body);
     let mut sweep = false;
     let is_number = SliderRange::from_limits(&key.limits, 1.0).is_some() && key.section() != "camera";
     let row = ui.horizontal(|ui| {
@@ -46,8 +49,11 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, key: &'static Key) {
             let entry = egui::Button::new(format!("Sweep {} over the sequence…", key.path));
             sweep = ui.add_enabled(is_number, entry).clicked();
         });
-        value(session, ui, key, body, name.id, &hint, linked);
-        restore(session, ui, key, body);
+        let room = if differs { RESTORE_WIDTH } else { 0.0 };
+        value(session, ui, key, body, name.id, &hint, linked, room);
+        if differs {
+            restore(session, ui, key, body);
+        }
     });
     if focused {
         mark(viewer, ui, &row.response);
@@ -73,7 +79,8 @@ fn mark(viewer: &mut Viewer, ui: &Ui, row: &egui::Response) {
 }
 
 /// Draws the value of a key in the form that belongs to its type and its limits.
-fn value(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, name: Id, hint: &str, linked: bool) {
+/// `room` is the width that stays free behind it.
+fn value(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, name: Id, hint: &str, linked: bool, room: f32) {
     let value = session.value(key.section(), key.name(), body).cloned();
     match (&key.limits, &value) {
         (Limits::Choice, Some(toml::Value::String(current))) => choice(session, ui, key, body, current, name, hint),
@@ -85,7 +92,7 @@ fn value(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, name: Id, h
             }
         }
         (limits, Some(toml::Value::Float(_) | toml::Value::Integer(_))) => {
-            number(session, ui, key, body, limits, name, hint, linked);
+            number(session, ui, key, body, limits, name, hint, linked, room);
         }
         (Limits::Number { .. }, None) => {
             // The key is not in the text; a click sets a first value.
@@ -173,6 +180,7 @@ fn number(
     name: Id,
     hint: &str,
     linked: bool,
+    room: f32,
 ) {
     let Some(mut x) = session.number(key.section(), key.name(), body) else { return };
     let before = x;
@@ -181,10 +189,7 @@ fn number(
     let magnitude = session.usual_magnitude(key.section(), key.name(), body);
     let response = match SliderRange::from_limits(limits, magnitude).filter(|_| key.section() != "camera") {
         Some(range) => {
-            // Without room for the button behind it, the panel would grow with every frame of the window.
-            let differs = session.differs(key.section(), key.name(), body);
-            let behind = VALUE_WIDTH + if differs { RESTORE_WIDTH } else { 0.0 };
-            ui.spacing_mut().slider_width = (ui.available_width() - behind).max(60.0);
+            ui.spacing_mut().slider_width = (ui.available_width() - VALUE_WIDTH - room).max(60.0);
             let mut slider = Slider::new(&mut x, range.low..=range.high)
                 .logarithmic(range.logarithmic)
                 .clamping(SliderClamping::Never)
@@ -215,8 +220,7 @@ fn number(
 
 /// Draws the button that restores the saved file's value of a key.
 fn restore(session: &mut Session, ui: &mut Ui, key: &Key, body: usize) {
-    let differs = session.differs(key.section(), key.name(), body);
-    if differs && ui.small_button("file").on_hover_text("Restore the value of the file").clicked() {
+    if ui.small_button("file").on_hover_text("Restore the value of the file").clicked() {
         session.restore(key.section(), key.name(), body);
         session.end_step();
     }
