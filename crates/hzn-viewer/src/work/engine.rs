@@ -93,12 +93,12 @@ impl Engine {
         let awaited = is_awaited.clone();
         std::thread::spawn(move || {
             Worker::default().run(&messages, |frame_view| {
-                let (is_awaited, sent) = awaited.during(|| frame_views.send(frame_view));
+                let (is_awaited, sent) = awaited.during(|| frame_views.send(frame_view).is_ok());
                 // An answer to a window that waits does not make it draw once more.
                 if !is_awaited {
                     wake();
                 }
-                sent.is_ok()
+                sent
             });
         });
         Self { send, receive, is_awaited }
