@@ -52,7 +52,11 @@ fn hostile_picture(seed: u32) -> Case {
     let (kind, lit) = pattern(seed, draw(6), f64::from(width_px), tilt, (w.into(), h.into()), draw(4));
     let bytes = (0..usize::from(h)).flat_map(|y| (0..usize::from(w)).map(move |x| (x, y)));
     let bytes = bytes.map(|(x, y)| 255 * u8::from(lit(x as f64, y as f64))).collect();
-    let name = format!("{kind} of {width_px} px, {w}×{h}, {}, hostile (seed {seed})", sensor.body.kind.name());
+    let corners: usize = sensor.mask.polygons_px.iter().map(|polygon| polygon.len()).sum();
+    let mask = if corners > 0 { format!(", {corners} corners masked") } else { String::new() };
+    let circle = if sensor.camera.theta_max_deg.is_some() { ", image circle" } else { "" };
+    let name = sensor.body.kind.name();
+    let name = format!("{kind} of {width_px} px, {w}×{h}, {name}{mask}{circle}, hostile (seed {seed})");
     Case { name, sensor, prior: Prior::default(), bytes }
 }
 

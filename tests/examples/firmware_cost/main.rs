@@ -46,7 +46,8 @@ fn search_hostile(seeds: std::ops::Range<u32>) -> bool {
         println!("{}: {} pictures", board.core(), found.len());
         for line in found.iter().take(10) {
             let per_unit = line.total / line.work.max(1.0);
-            println!("{:8.0} {:6.0} {per_unit:6.1} {}", line.total, line.work, line.name);
+            let stages: Vec<String> = line.stages.iter().map(|n| format!("{n:.0}")).collect();
+            println!("{:8.0} {:6.0} {per_unit:6.1} {}: {}", line.total, line.work, line.name, stages.join(" "));
         }
         keeps &= found.iter().all(|line| line.total * 1e3 <= MOST);
     }

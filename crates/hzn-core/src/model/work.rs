@@ -47,10 +47,15 @@ pub(crate) const CROSSING: u32 = 4;
 /// Cost of a sub-pixel point with its ray, by the default method. On stripes of one pixel, where every look at the
 /// picture is far from the one before and every branch changes, a Cortex-M7 spends 1400 instructions on it.
 pub(crate) const POINT: u32 = 19;
-/// Returns the additional cost of a point whose reads are checked one by one: next to a mask or the border, or on a
-/// wide edge.
-pub(crate) fn slow_point_cost(mask: u32) -> u32 {
-    18 + 12 * mask
+/// Additional cost of a point on a wide edge or next to the border: it reads up to 45 pixels.
+pub(crate) const SLOW_POINT: u32 = 18;
+/// Cost to check these reads against border and image circle, one by one.
+pub(crate) const CHECKS: u32 = 20;
+/// Cost to compare these reads with the bounding box of a polygon.
+pub(crate) const BOXES: u32 = 7;
+/// Returns the cost to compare these reads with all sides of a polygon.
+pub(crate) fn sides_cost(corners: u32) -> u32 {
+    7 * corners
 }
 /// Cost of a draw of the consensus stage, verified on one further point.
 pub(crate) const DRAW: u32 = 10;

@@ -12,6 +12,7 @@ use crate::geometry::camera::{self, Camera};
 #[cfg(feature = "horace")]
 use crate::geometry::crop::Crop;
 use crate::geometry::pixel::ImagePoint;
+use crate::model::work;
 
 /// Maximum number of corners of one polygon.
 pub const MAX_CORNERS: usize = 16;
@@ -254,6 +255,19 @@ impl<T: Real> Region<T> {
         polygons + u32::from(self.blind.is_some())
     }
 
+    /// Returns the largest cost to check the reads of one edge point, up to `margin` pixels from here, against border,
+    /// image circle and masks, in the unit of [`crate::model::work`]. Only polygons whose bounding box is near take
+    /// much.
+    #[inline(never)]
+    pub(crate) fn checks_cost(&self, x: u16, y: u16, margin: u16) -> u32 {
+        let (p, margin) = ([T::from_i32(i32::from(x)), T::from_i32(i32::from(y))], T::from_i32(i32::from(margin)));
+        let of_polygon = |o: &Outline<T>| {
+            work::BOXES + if o.is_near(p, margin) { work::sides_cost(o.corners.len() as u32) } else { 0 }
+        };
+        let blind = if self.blind.is_some() { work::CHECKS } else { 0 };
+        work::CHECKS + blind + self.polygons.iter().map(of_polygon).sum::<u32>()
+    }
+
     /// Returns whether a polygon or the blind centre covers the pixel.
     #[inline(always)]
     pub fn masked(&self, x: u16, y: u16) -> bool {
@@ -340,11 +354,16 @@ impl<T: Real> Outline<T> {
     fn cost(&self) -> u32 {
         1 + self.corners.len() as u32 / 4
     }
+    /// Returns whether the bounding box meets the square of `margin` pixels to each side of a point.
+    #[inline(always)]
+    fn is_near(&self, p: [T; 2], margin: T) -> bool {
+        (0..2).all(|k| !(p[k] + margin < self.low[k] || p[k] - margin > self.high[k]))
+    }
     /// Returns whether the polygon lies outside the square of `margin` pixels to each side of the pixel. The cost of a
     /// test of all sides is added to `cost`.
     fn clear(&self, x: u16, y: u16, margin: T, cost: &mut u32) -> bool {
         let p = [T::from_i32(i32::from(x)), T::from_i32(i32::from(y))];
-        if (0..2).any(|k| p[k] + margin < self.low[k] || p[k] - margin > self.high[k]) {
+        if !self.is_near(p, margin) {
             return true;
         }
         // Each side is compared with the square, and then with its centre.

@@ -93,15 +93,14 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         outcome: &mut Candidate<T>,
     ) -> Option<Points> {
         self.enter(Stage::Candidates);
-        let slow = work::slow_point_cost(binary.mask_cost());
-        let most_slow = self.work.remaining() / slow;
+        let most_slow = self.work.remaining();
         let config = &self.sensor.config.candidates;
         let points = edge_points::locate_edge_points(binary, config, border, outcome.number, self.blocks, most_slow);
-        if points.slow == most_slow {
+        if points.slow >= most_slow {
             self.work.exhaust();
             return None;
         }
-        self.work.charge(points.slow * slow);
+        self.work.charge(points.slow);
         outcome.points = points.count;
         self.report.counters.edge_points += points.count;
         self.report.counters.fallback_points += points.fallback;

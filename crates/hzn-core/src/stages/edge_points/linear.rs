@@ -7,6 +7,7 @@ use crate::base::real::Real;
 use crate::geometry::pixel::Pixel;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
+use crate::model::work;
 use crate::stages::contour::BinaryPicture;
 
 /// Longest step of a profile, in pixels.
@@ -30,6 +31,10 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     slow: &mut u32,
 ) -> Option<EdgePoint<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
+    if !FREE {
+        // The neighbourhood is a fifth of the reads of a point.
+        *slow += binary.region.checks_cost(p.x, p.y, 1) / 4;
+    }
     let near = around.read_3x3()?;
     let gradient = near.gradient();
     let (lit, dx, dy) = orientation(gradient)?;
@@ -50,14 +55,15 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
         let Crossing { part, fallback, clipped, .. } = line.crossing(near.across(lit))?;
         return Some(EdgePoint { point: point_off(p, (dx, dy), part), lit, fallback, clipped });
     }
-    *slow += 1;
     let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
     let step = half.min(fifth.max(4)).clamp(1, WIDEST);
     let here = near.across(lit)[1];
     let reach = (MARGIN * step) as u16;
+    *slow += work::SLOW_POINT;
     let found = if is_line_clear(binary, p, (dx, dy), reach) || (FREE && is_clear(binary, p, reach)) {
         locate_in_steps::<T, P, O, true>(binary, p, (dx, dy), step, here)?
     } else {
+        *slow += binary.region.checks_cost(p.x, p.y, reach);
         locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here)?
     };
     let WideCrossing { off, fallback, clipped, .. } =
@@ -90,11 +96,12 @@ fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
         if !binary.region.is_usable(x, y) {
             break;
         }
-        *slow += 1;
-        let p = Pixel { x: x as u16, y: y as u16 };
-        let next = if is_line_clear(binary, p, (dx, dy), (MARGIN * step) as u16) {
+        *slow += work::SLOW_POINT;
+        let (p, reach) = (Pixel { x: x as u16, y: y as u16 }, (MARGIN * step) as u16);
+        let next = if is_line_clear(binary, p, (dx, dy), reach) {
             locate_from::<T, P, O, true>(binary, p, (dx, dy), step)
         } else {
+            *slow += binary.region.checks_cost(p.x, p.y, reach);
             locate_from::<T, P, O, false>(binary, p, (dx, dy), step)
         };
         let Some(next) = next else { break };

@@ -50,7 +50,7 @@ pub(crate) struct Points {
     pub(crate) fallback: u32,
     /// Number of these points with a lit side that is clipped at full scale.
     pub(crate) clipped: u32,
-    /// Number of border pixels that cost more: next to a mask or the border of the picture, or on a wide edge.
+    /// What border pixels cost in addition: next to a mask or the border of the picture, or on a wide edge.
     pub(crate) slow: u32,
     /// In a picture that arrives row by row: number of points, also of lost ones, with plateaus outside of the rows
     /// that are kept.
@@ -58,7 +58,7 @@ pub(crate) struct Points {
 }
 
 /// Fills `blocks` with the edge points of a border, thinned evenly to `keep_points`. Empty lanes have weight 0. The
-/// function stops after `most_slow` points that cost more.
+/// function stops when points have cost more than `most_slow` in addition.
 pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
