@@ -18,7 +18,7 @@ calls, with an exception on top, so no picture can need more.
 
 The goals are for a Cortex-M7: 96 KiB (98304 bytes) of flash for the sensor alone, 96 KiB of RAM in addition to the
 picture, 0.6 million instructions for a clean picture of 1920×1080, 2 million for a cloudy one, 20 million for the
-worst. Flash, the clean picture (also with 200 points kept) and the worst picture miss their goals;
+worst. Flash and the clean picture (also with 200 points kept) miss their goals;
 [porting.md](../guide/porting.md) says what fewer points cost. On the Cortex-M4F, double-precision arithmetic in
 software takes about 9 KB more flash and nearly all of the time of `expect`: `expect` calculates the cone of an altitude
 or a position in double precision, once per picture. No other code that runs per picture uses it (`cargo xtask test`
