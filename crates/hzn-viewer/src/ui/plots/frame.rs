@@ -45,7 +45,7 @@ pub(super) fn shared_plot<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> 
             AxisHints::new_y()
                 .formatter(|mark, _| tick_label(mark.value, mark.step_size))
                 .min_thickness(LABELS_WIDTH)
-                // A low plot has labels, too: they need 12 points.
-                .label_spacing(Rangef::new(10.0, 14.0)),
+                // A low plot has labels, too.
+                .label_spacing(Rangef::new(7.0, 10.0)),
         ])
 }

@@ -41,10 +41,6 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         } else {
             let offered = offered::names(viewer);
             quantity_choice(viewer, ui, &offered);
-            // The time line below shows the times of the frames as they are.
-            if viewer.sequence.entries.iter().find_map(|e| e.time_s).is_some_and(|start| start != 0.0) {
-                ui.weak(RichText::new("The plots show the time since the first frame.").size(12.0));
-            }
             // A plot that this sequence does not have stays chosen for others.
             viewer.settings.plotted.iter().filter(|name| offered.contains(&name.as_str())).cloned().collect()
         };
@@ -108,6 +104,10 @@ fn quantity_choice(viewer: &mut Viewer, ui: &mut Ui, offered: &[&str]) {
                     viewer.new_plot = Some(name.to_owned());
                 }
             }
+        }
+        // The time line below shows the times of the frames as they are.
+        if viewer.sequence.entries.iter().find_map(|e| e.time_s).is_some_and(|start| start != 0.0) {
+            ui.weak(RichText::new("· time since the first frame").size(12.0));
         }
     });
 }
