@@ -4,6 +4,7 @@
 mod outline;
 mod ring;
 
+pub use outline::MAX_CORNERS;
 use outline::Outline;
 pub(crate) use ring::Run;
 
@@ -16,8 +17,6 @@ use crate::geometry::crop::Crop;
 use crate::geometry::pixel::ImagePoint;
 use crate::model::work;
 
-/// Maximum number of corners of one polygon.
-pub const MAX_CORNERS: usize = 16;
 /// Maximum number of polygons.
 pub const MAX_POLYGONS: usize = 8;
 

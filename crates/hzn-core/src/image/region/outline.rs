@@ -1,7 +1,9 @@
 //! A masked polygon.
 
-use super::MAX_CORNERS;
 use crate::base::real::Real;
+
+/// Maximum number of corners of one polygon.
+pub const MAX_CORNERS: usize = 16;
 
 /// The corners of a polygon and its bounding box, in pixels.
 #[derive(Debug, Clone, PartialEq)]
