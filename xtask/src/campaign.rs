@@ -97,7 +97,7 @@ pub(crate) fn packets(count: u64) -> Outcome {
     steps::run(command.args(["--", "--nocapture", "--ignored", "damage::"]).env("HZN_PACKETS", file))
 }
 
-/// Builds what is delivered in a clone of this repository, which lies in a folder with another name.
+/// Clones this repository into a folder with another name, builds the images and the wheel there, and compares them.
 fn paths() -> Outcome {
     let clone = target().join("xtask/elsewhere/a folder with another name");
     if clone.exists() {

@@ -1,7 +1,7 @@
 //! The work budget of a picture. All stages spend from one budget, so that the cost of the worst picture has a bound.
 //!
 //! The unit is a step of the border follower, about fifty instructions of a Cortex-M7; the most expensive picture found
-//! costs eighty. Most stages pay their largest cost in advance, from the amount of data that they will examine, so that
+//! costs 75. Most stages pay their largest cost in advance, from the amount of data that they will examine, so that
 //! the sum does not depend on the machine. Reads of single pixels and of the mask are counted and paid for after a few
 //! of them.
 

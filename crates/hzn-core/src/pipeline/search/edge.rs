@@ -93,14 +93,14 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         outcome: &mut Candidate<T>,
     ) -> Option<Points> {
         self.enter(Stage::Candidates);
-        let most_slow = self.work.remaining();
+        let most_extra = self.work.remaining();
         let config = &self.sensor.config.candidates;
-        let points = edge_points::locate_edge_points(binary, config, border, outcome.number, self.blocks, most_slow);
-        if points.slow >= most_slow {
+        let points = edge_points::locate_edge_points(binary, config, border, outcome.number, self.blocks, most_extra);
+        if points.extra_cost >= most_extra {
             self.work.exhaust();
             return None;
         }
-        self.work.charge(points.slow);
+        self.work.charge(points.extra_cost);
         outcome.points = points.count;
         self.report.counters.edge_points += points.count;
         self.report.counters.fallback_points += points.fallback;

@@ -28,12 +28,12 @@ const FARTHEST: i32 = 1024;
 pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
-    slow: &mut u32,
+    extra_cost: &mut u32,
 ) -> Option<EdgePoint<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
     if !FREE {
-        // The neighbourhood is a fifth of the reads of a point.
-        *slow += binary.region.checks_cost(p.x, p.y, 1) / 4;
+        // These are nine of the 45 reads of a point, so a quarter is more than enough.
+        *extra_cost += binary.region.checks_cost(p.x, p.y, 1) / 4;
     }
     let near = around.read_3x3()?;
     let gradient = near.gradient();
@@ -59,15 +59,15 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let step = half.min(fifth.max(4)).clamp(1, WIDEST);
     let here = near.across(lit)[1];
     let reach = (MARGIN * step) as u16;
-    *slow += work::SLOW_POINT;
+    *extra_cost += work::SLOW_POINT;
     let found = if is_line_clear(binary, p, (dx, dy), reach) || (FREE && is_clear(binary, p, reach)) {
         locate_in_steps::<T, P, O, true>(binary, p, (dx, dy), step, here)?
     } else {
-        *slow += binary.region.checks_cost(p.x, p.y, reach);
+        *extra_cost += binary.region.checks_cost(p.x, p.y, reach);
         locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here)?
     };
     let WideCrossing { off, fallback, clipped, .. } =
-        if found.rising { recentre_profile(binary, p, (dx, dy), step, found, slow) } else { found };
+        if found.rising { recentre_profile(binary, p, (dx, dy), step, found, extra_cost) } else { found };
     Some(EdgePoint { point: point_off(p, (dx, dy), off), lit, fallback, clipped })
 }
 
@@ -84,7 +84,7 @@ fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
     (dx, dy): (i32, i32),
     step: i32,
     mut found: WideCrossing<T>,
-    slow: &mut u32,
+    extra_cost: &mut u32,
 ) -> WideCrossing<T> {
     let mut whole = 0;
     for _ in 0..CLIMBS {
@@ -96,12 +96,12 @@ fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
         if !binary.region.is_usable(x, y) {
             break;
         }
-        *slow += work::SLOW_POINT;
+        *extra_cost += work::SLOW_POINT;
         let (p, reach) = (Pixel { x: x as u16, y: y as u16 }, (MARGIN * step) as u16);
         let next = if is_line_clear(binary, p, (dx, dy), reach) {
             locate_from::<T, P, O, true>(binary, p, (dx, dy), step)
         } else {
-            *slow += binary.region.checks_cost(p.x, p.y, reach);
+            *extra_cost += binary.region.checks_cost(p.x, p.y, reach);
             locate_from::<T, P, O, false>(binary, p, (dx, dy), step)
         };
         let Some(next) = next else { break };

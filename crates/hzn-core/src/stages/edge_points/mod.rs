@@ -51,21 +51,21 @@ pub(crate) struct Points {
     /// Number of these points with a lit side that is clipped at full scale.
     pub(crate) clipped: u32,
     /// What border pixels cost in addition: next to a mask or the border of the picture, or on a wide edge.
-    pub(crate) slow: u32,
+    pub(crate) extra_cost: u32,
     /// In a picture that arrives row by row: number of points, also of lost ones, with plateaus outside of the rows
     /// that are kept.
     pub(crate) cut: u32,
 }
 
 /// Fills `blocks` with the edge points of a border, thinned evenly to `keep_points`. Empty lanes have weight 0. The
-/// function stops when points have cost more than `most_slow` in addition.
+/// function stops when points have cost more than `most_extra` in addition.
 pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
     border: &[Pixel],
     candidate: u32,
     blocks: &mut [Block<T>],
-    most_slow: u32,
+    most_extra: u32,
 ) -> Points {
     let room = blocks.len() * LANES;
     let keep = match usize::from(config.keep_points) {
@@ -76,7 +76,7 @@ pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
     let mut made = Points::default();
     let mut place = 0;
     for &pixel in border.iter().skip(every / 2).step_by(every) {
-        if made.slow >= most_slow {
+        if made.extra_cost >= most_extra {
             break;
         }
         let found = if P::STREAMED {
@@ -87,7 +87,7 @@ pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
                 EdgePoint { point, lit: f.lit, fallback: f.fallback, clipped: f.clipped }
             })
         } else {
-            locate(binary, config, pixel, &mut made.slow)
+            locate(binary, config, pixel, &mut made.extra_cost)
         };
         let Some(found) = found else { continue };
         let Some(block) = blocks.get_mut(place / LANES) else { break };
@@ -110,7 +110,7 @@ fn locate<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
     p: Pixel,
-    slow: &mut u32,
+    extra_cost: &mut u32,
 ) -> Option<EdgePoint<T>> {
     match config.sub_pixel {
         SubPixel::None => half_pixel(binary, p),
@@ -119,8 +119,8 @@ fn locate<T: Real, P: Pixels, O: Observer<T>>(
         #[cfg(feature = "zju")]
         SubPixel::Zernike => zernike::locate(binary, p).and_then(towards_light),
         // `Config::check` refuses a method that is not built in.
-        _ if is_clear(binary, p, MARGIN as u16) => linear::<T, P, O, true>(binary, p, slow),
-        _ => linear::<T, P, O, false>(binary, p, slow),
+        _ if is_clear(binary, p, MARGIN as u16) => linear::<T, P, O, true>(binary, p, extra_cost),
+        _ => linear::<T, P, O, false>(binary, p, extra_cost),
     }
 }
 

@@ -104,6 +104,7 @@ impl Viewer {
             self.set_session(session);
         }
     }
+
     /// Keeps the changes of a window that crashed for the next window.
     pub(in crate::ui) fn keep_lost(&mut self) {
         self.changes.lost = None;
