@@ -207,11 +207,15 @@ fn run(board: Board, image: &str, cases: &[Case]) -> Vec<Measured> {
     out
 }
 
+/// Returns the instructions of an interval, in ticks of the timer. A tick takes 40 ns, an instruction 1024 ns. Reading
+/// the timer costs one instruction.
+pub fn instructions(ticks: u64) -> u64 {
+    ((ticks * 40 + 512) / 1024).saturating_sub(1)
+}
+
 fn read(from: &mut Reader<'_>) -> Option<Measured> {
     let magic = from.u32()?;
     assert_eq!(magic.to_be_bytes(), *b"DONE");
-    // A tick takes 40 ns, an instruction 1024 ns. Reading the timer costs one instruction.
-    let instructions = |ticks: u64| ((ticks * 40 + 512) / 1024).saturating_sub(1);
     let mut calls = [0; 3];
     for n in &mut calls {
         *n = instructions(from.u32()?.into());

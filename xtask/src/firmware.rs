@@ -26,7 +26,9 @@ const BOARDS: [Board; 3] = [
 const M7: &str = "an500";
 const M7_FLAGS: &str = "-C target-cpu=cortex-m7";
 /// Images of the boards with memory for pictures.
-const IMAGES: [&str; 5] = ["chain", "flight", "measure", "nav", "rows"];
+const IMAGES: [&str; 6] = ["chain", "flight", "line", "measure", "nav", "rows"];
+/// Folder of the port with a hardware library.
+const VENDOR_PORT: &str = "firmware/stm32h743";
 /// Document with the costs.
 const COSTS: &str = "book/results/firmware-cost.md";
 
@@ -79,6 +81,12 @@ pub(crate) fn is_the_same_elsewhere(clone: &Path) -> Outcome {
             println!("{name} {image}: the same bytes");
         }
     }
+    let here = build_vendor_port(VENDOR_PORT, &root())?;
+    let there = build_vendor_port("xtask/elsewhere/stm32h743", clone)?;
+    if fs::read(here)? != fs::read(there)? {
+        return Err(Trouble::Failed("stm32h743 flight differs; is everything committed?".to_owned()));
+    }
+    println!("stm32h743 flight: the same bytes");
     Ok(())
 }
 
@@ -87,12 +95,12 @@ pub(crate) fn test(steps: &mut Steps) -> Outcome {
     build()?;
     soft_double::check(&images("an386").join("measure"))?;
     build_flight_image(METHODS)?;
-    let vendor_port = build_vendor_port()?;
+    let vendor_port = build_vendor_port(VENDOR_PORT, &root())?;
     lint_and_document()?;
     build_tests()?;
     steps::run(Command::new(target().join("debug/examples/stack_bound")).arg(vendor_port))?;
     // Without a package's name nothing is built again with other features.
-    let tests = ["--test", "firmware", "--test", "navigation", "--test", "recovery"];
+    let tests = ["--test", "firmware", "--test", "line_cost", "--test", "navigation", "--test", "recovery"];
     steps.cargo_test(&[&tests[..], &["--", "--ignored"]].concat())?;
     steps::run(Command::new(target().join("debug/examples/firmware_cost")).args(["--check", COSTS]))?;
     check_c_interface()
@@ -136,9 +144,9 @@ fn build_flight_image(features: &[&str]) -> Result<PathBuf, Trouble> {
 
 /// Builds the port for the STM32H743, prints its size, and returns the image. No emulator has this part, so it does not
 /// run. Its hardware library can panic, so panics are not looked for.
-fn build_vendor_port() -> Result<PathBuf, Trouble> {
-    let (mut command, built) = Toolchain::find()?.cargo("build", "firmware/stm32h743", &["--package", "hzn-stm32h743"]);
-    steps::run(configure_for_firmware(&mut command, M7_FLAGS))?;
+fn build_vendor_port(dir: &str, clone: &Path) -> Result<PathBuf, Trouble> {
+    let (mut command, built) = Toolchain::find()?.cargo("build", dir, &["--package", "hzn-stm32h743"]);
+    steps::run(configure_for_firmware(&mut command, M7_FLAGS).current_dir(clone.join("firmware")))?;
     steps::run(Command::new("arm-none-eabi-size").arg(built.join("flight")))?;
     Ok(built.join("flight"))
 }

@@ -57,6 +57,17 @@ impl Default for Inbox {
     }
 }
 
+/// Why [`Inbox::fill`] took no more bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Filled {
+    /// [`Inbox::next`] has something to do.
+    Ready,
+    /// There are no more bytes.
+    Silent,
+    /// The most bytes were taken, or there is no room for more.
+    Full,
+}
+
 /// The state of the packet at the start.
 enum Step {
     More,
@@ -82,35 +93,76 @@ impl Inbox {
         }
     }
 
-    /// Adds a byte that arrived at `now_us`. Returns whether [`Self::next`] has something to do. A byte for which there
-    /// is no room is lost; there is room for every packet after [`Self::next`] returned `None`.
-    pub fn push(&mut self, byte: u8, now_us: u64) -> bool {
-        self.last_us = now_us;
-        self.effort += 1;
-        if self.start == self.end {
+    /// Takes at most `most` bytes, which have arrived until `now_us`, from `receive`. Unless `reads_on` is set, it stops
+    /// when [`Self::next`] has something to do. Returns the number of bytes and why there are no more.
+    pub fn fill(
+        &mut self,
+        now_us: u64,
+        most: usize,
+        reads_on: bool,
+        mut receive: impl FnMut() -> Option<u8>,
+    ) -> (usize, Filled) {
+        let mut taken = 0;
+        let filled = loop {
+            let left = most - taken;
+            let (count, is_silent) = if self.start == self.end {
+                self.find_marker(now_us, left, &mut receive)
+            } else {
+                self.add(now_us, left, reads_on, &mut receive)
+            };
+            taken += count;
+            let held = self.end - self.start;
+            if is_silent {
+                break Filled::Silent;
+            } else if held > 0 && held >= self.need && !reads_on {
+                break Filled::Ready;
+            } else if taken >= most || held == CAPACITY {
+                break Filled::Full;
+            }
+        };
+        if taken > 0 {
+            self.last_us = now_us;
+        }
+        self.effort += taken;
+        (taken, filled)
+    }
+
+    /// Takes bytes outside a packet, up to the end of a marker. Returns their number, and whether there are no more.
+    #[inline(always)]
+    fn find_marker(&mut self, now_us: u64, most: usize, receive: &mut impl FnMut() -> Option<u8>) -> (usize, bool) {
+        for count in 0..most {
+            let Some(byte) = receive() else { return (count, true) };
             if self.is_marker(byte) {
                 self.begin(now_us);
+                return (count + 1, false);
             }
-            return false;
         }
-        if self.end == CAPACITY {
+        (most, false)
+    }
+
+    /// Adds bytes to those of the packet. Returns their number, and whether there are no more.
+    #[inline(always)]
+    fn add(
+        &mut self,
+        now_us: u64,
+        most: usize,
+        reads_on: bool,
+        receive: &mut impl FnMut() -> Option<u8>,
+    ) -> (usize, bool) {
+        let wanted = if reads_on { CAPACITY } else { self.need.min(CAPACITY) };
+        if self.start + wanted > CAPACITY {
             self.compact();
         }
-        if let (Some(place), Some(time)) = (self.bytes.get_mut(self.end), self.arrived.get_mut(self.end)) {
-            (*place, *time) = (byte, tick(now_us));
-            self.end += 1;
+        let (from, to, now) = (self.end, self.start + wanted, tick(now_us));
+        let places = self.bytes.get_mut(from..to).unwrap_or_default().iter_mut();
+        let mut count = 0;
+        for (place, time) in places.zip(self.arrived.get_mut(from..to).unwrap_or_default()).take(most) {
+            let Some(byte) = receive() else { break };
+            (*place, *time) = (byte, now);
+            count += 1;
         }
-        self.end - self.start >= self.need
-    }
-
-    /// Returns whether the inbox waits for the rest of a packet, or for the confirmation of its end.
-    pub fn is_waiting(&self) -> bool {
-        self.start < self.end
-    }
-
-    /// Returns whether there is room for another byte.
-    pub fn has_room(&self) -> bool {
-        self.end - self.start < CAPACITY
+        self.end += count;
+        (count, count < most && self.end < to)
     }
 
     /// Returns the work since the last call: the number of bytes that were examined, counted each time.
@@ -218,8 +270,12 @@ impl Inbox {
             self.window = 0;
             return true;
         }
-        let is_damaged = (self.window ^ u32::from_be_bytes(SYNC)).count_ones() <= WRONG_BITS || is_cut(self.window);
-        self.since_damage = if is_damaged { 0 } else { MAX_BYTES.min(self.since_damage + 1) };
+        // A damaged marker has a byte of the marker in its place. Other bytes, nearly all, are known at a glance.
+        if has_zero_byte(self.window ^ u32::from_be_bytes(SYNC)) && is_damaged_marker(self.window) {
+            self.since_damage = 0;
+        } else if self.since_damage < MAX_BYTES {
+            self.since_damage += 1;
+        }
         false
     }
 
@@ -247,13 +303,24 @@ impl Inbox {
     }
 }
 
-/// Returns whether the last bytes are a marker without its first, second or third byte, or one without its last byte
-/// and another byte.
-fn is_cut(window: u32) -> bool {
+/// Returns whether one of the four bytes is zero.
+#[inline(always)]
+const fn has_zero_byte(word: u32) -> bool {
+    word.wrapping_sub(0x0101_0101) & !word & 0x8080_8080 != 0
+}
+
+/// Returns whether the last bytes are a marker with a few wrong bits, a marker without its first, second or third byte,
+/// or one without its last byte and another byte.
+#[cold]
+fn is_damaged_marker(window: u32) -> bool {
     let [a, b, c, d] = SYNC;
     let three = window & 0xFF_FFFF;
     let word = |x: [u8; 3]| u32::from_be_bytes([0, x[0], x[1], x[2]]);
-    three == word([b, c, d]) || three == word([a, c, d]) || three == word([a, b, d]) || window >> 8 == word([a, b, c])
+    let is_cut = three == word([b, c, d])
+        || three == word([a, c, d])
+        || three == word([a, b, d])
+        || window >> 8 == word([a, b, c]);
+    is_cut || (window ^ u32::from_be_bytes(SYNC)).count_ones() <= WRONG_BITS
 }
 
 fn tick(now_us: u64) -> u8 {

@@ -133,8 +133,9 @@ numbered_enum! {
         KnownRefused = 12 => "the altitude or position is missing or impossible",
         /// The camera sends no pictures. a: time since the last one, ms. b: number of the last one.
         CameraSilent = 13 => "the camera sends no pictures",
-        /// A bit of the sensor or of the values from navigation changed in memory. a: 1 sensor, which was made anew
-        /// from the stored parameters; 2 values from navigation, which were removed. b: how often since the start.
+        /// A bit of the sensor, of the values from navigation or of the parameters of the flight software changed in
+        /// memory. a: 1 sensor, which was made anew from the stored parameters; 2 values from navigation, which were
+        /// removed; 3 parameters of the flight software, which were read again. b: how often since the start.
         Repaired = 14 => "a memory error was repaired",
         /// The watchdog reset the computer several times in a row, so the older parameters are in use. a: their copy
         /// (0: there is none). b: number of resets.

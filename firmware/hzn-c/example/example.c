@@ -5,6 +5,7 @@
 
 #include "hzn.h"
 #include "hzn_parameters.h"
+#include "hzn_verdicts.h"
 #include "picture.h"
 
 void print(const char *text);
@@ -86,7 +87,7 @@ int example(void) {
     print("inliers ");
     print_hex(answer.inliers);
     print("\n");
-    if (status != HZN_OK || answer.inliers < 100 || answer.listed != 1 || answer.edges[0].verdict != 0) {
+    if (status != HZN_OK || answer.inliers < 100 || answer.listed != 1 || answer.edges[0].verdict != HZN_VERDICT_CHOSEN) {
         return 6;
     }
     /* The same picture, row by row, with a threshold that is known before. */

@@ -108,7 +108,7 @@ typedef struct {
   uint32_t inliers;
   // RMS distance of the inliers from the limb, px; NaN without a fit.
   float rms_px;
-  // Verdict: 0 chosen, 1 passed; the others are in book/reference/telemetry.md.
+  // Verdict: a number of `hzn_verdicts.h`.
   uint8_t verdict;
 } HznEdge;
 
@@ -210,22 +210,6 @@ int32_t hzn_process(HznSensor *sensor,
                     const HznPicture *picture,
                     const HznKnown *known,
                     HznAnswer *out);
-
-// Finds the limb in a picture that comes row by row. `next_row` writes the next row, `width` bytes, and returns 0; any
-// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or that of the
-// picture before.
-//
-// # Safety
-// `sensor` is null or from `hzn_open`. `memory` is null or has `bytes` writable bytes, which have no other use during
-// the call. `known` is null (nothing is known) or readable. `out` is null or writable. `next_row` writes `width`
-// bytes.
-int32_t hzn_process_rows(HznSensor *sensor,
-                         uint8_t *memory,
-                         size_t bytes,
-                         int32_t (*next_row)(void *context, uint8_t *row, size_t width),
-                         void *context,
-                         const HznKnown *known,
-                         HznAnswer *out);
 
 // Finds the limb in a picture that comes row by row. `next_row` writes the next row, `width` bytes, and returns 0; any
 // other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or that of the

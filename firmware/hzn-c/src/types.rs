@@ -86,7 +86,7 @@ pub struct HznEdge {
     pub inliers: u32,
     /// RMS distance of the inliers from the limb, px; NaN without a fit.
     pub rms_px: f32,
-    /// Verdict: 0 chosen, 1 passed; the others are in book/reference/telemetry.md.
+    /// Verdict: a number of `hzn_verdicts.h`.
     pub verdict: u8,
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use hzn_core::verdict::Verdict;
 use hzn_flight::{Parameters, parameters};
 
 /// `HZN_BLESS=1` writes the header anew.
@@ -9,10 +10,7 @@ use hzn_flight::{Parameters, parameters};
 fn the_header_is_up_to_date() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(here.join("cbindgen.toml")).unwrap();
-    let bindings =
-        ["types.rs", "rows.rs"].iter().fold(cbindgen::Builder::new().with_src(here.join("src/lib.rs")), |b, file| {
-            b.with_src(here.join("src").join(file))
-        });
+    let bindings = cbindgen::Builder::new().with_src(here.join("src/lib.rs")).with_src(here.join("src/types.rs"));
     let bindings = bindings.with_config(config).generate().unwrap();
     let mut made = Vec::new();
     bindings.write(&mut made);
@@ -35,6 +33,19 @@ fn the_parameters_are_up_to_date() {
         }
     }
     compare(&Path::new(env!("CARGO_MANIFEST_DIR")).join("include/hzn_parameters.h"), &(made + "\n#endif\n"));
+}
+
+/// `HZN_BLESS=1` writes the list anew.
+#[test]
+fn the_verdicts_are_up_to_date() {
+    let mut made = "/* The verdicts on candidates. Made by tests/header.rs; do not edit. */\n\
+                    #ifndef HZN_VERDICTS_H\n#define HZN_VERDICTS_H\n\n"
+        .to_owned();
+    for verdict in Verdict::ALL {
+        let name = verdict.name().to_uppercase().replace('-', "_");
+        made += &format!("#define HZN_VERDICT_{name} {}\n", *verdict as u8);
+    }
+    compare(&Path::new(env!("CARGO_MANIFEST_DIR")).join("include/hzn_verdicts.h"), &(made + "\n#endif\n"));
 }
 
 fn compare(path: &Path, made: &str) {

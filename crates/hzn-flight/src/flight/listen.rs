@@ -6,11 +6,12 @@
 use super::{Buffers, Flight};
 use crate::board::Board;
 use crate::bytes::Reader;
+use crate::inbox::Filled;
 use crate::messages::{Acknowledge, Code, Event, Function};
 use crate::packet::{Apid, MAX_BYTES};
 
 /// Most bytes that are read in a turn. More bytes wait in the memory of the serial port.
-const MAX_READ: u16 = 1024;
+const MAX_READ: usize = 1024;
 /// Most work of a turn, in examined bytes: two of the longest packets. Packets inside of packets could otherwise make a
 /// thousand times the work of their bytes.
 const MAX_EFFORT: usize = 2 * MAX_BYTES;
@@ -31,30 +32,28 @@ impl<B: Board> Flight<'_, B> {
     pub(super) fn listen(&mut self) {
         let now_us = self.board.now_us();
         self.buffers.inbox.reset_effort();
-        let (mut bytes, mut is_ready, mut is_done) = (0, false, false);
-        while bytes < MAX_READ && self.buffers.inbox.effort() < MAX_EFFORT {
-            if is_ready
-                && !is_done
-                && let Some(is_command) = self.handle_packet(now_us)
-            {
-                is_done = is_command;
-                continue;
-            }
-            // The bytes behind a telecommand are read too, because the time of their arrival shows the pauses.
-            if is_done && !self.buffers.inbox.has_room() {
+        let (mut bytes, mut is_done) = (0, false);
+        loop {
+            let (board, inbox) = (&mut self.board, &mut self.buffers.inbox);
+            let most = (MAX_READ - bytes).min(MAX_EFFORT.saturating_sub(inbox.effort()));
+            if most == 0 {
                 break;
             }
-            let Some(byte) = self.board.receive() else {
-                // Only now it is known whether the line pauses.
-                while !is_done && self.buffers.inbox.effort() < MAX_EFFORT {
-                    is_done = self.handle_packet(now_us) != Some(false);
+            // After a telecommand it reads on, because the time at which bytes arrive shows the pauses.
+            let (count, filled) = inbox.fill(now_us, most, is_done, || board.receive());
+            bytes += count;
+            // A packet may be complete; if the line is silent, it is known that the line pauses.
+            while filled != Filled::Full && !is_done && self.buffers.inbox.effort() < MAX_EFFORT {
+                match self.handle_packet(now_us) {
+                    Some(is_command) => is_done = is_command,
+                    None => break,
                 }
+            }
+            if filled != Filled::Ready {
                 break;
-            };
-            bytes += 1;
-            is_ready = self.buffers.inbox.push(byte, now_us);
+            }
         }
-        self.limiter.add_received(bytes);
+        self.limiter.add_received(bytes as u16);
     }
 
     /// Handles a packet that has arrived. Returns whether it was a telecommand; `None` if there is no packet.
@@ -105,12 +104,12 @@ impl<B: Board> Flight<'_, B> {
         };
         self.acknowledge(number, sequence, code);
         // A new base is valid from the next packet on, so that the acknowledgement comes from the old one.
-        self.buffers.line.set_base(self.operations.base());
+        self.buffers.line.set_base(self.operations.get().base());
     }
 
     /// Returns whether a sequence count is within the window after that of the last telecommand that was taken.
     fn is_in_sequence(&self, sequence: u16) -> bool {
-        let window = self.operations.sequence_window;
+        let window = self.operations.get().sequence_window;
         let Some(last) = self.last_sequence.filter(|_| window > 0) else { return true };
         let ahead = sequence.wrapping_sub(last) & 0x3FFF;
         (1..=window).contains(&ahead)

@@ -12,6 +12,7 @@ use crate::store::{self, Choice};
 /// What changed, as in [`Event::Repaired`].
 const SENSOR: u32 = 1;
 const KNOWN: u32 = 2;
+const OPERATIONS: u32 = 3;
 
 impl<B: Board> Flight<'_, B> {
     /// Returns whether no bit changed in the values of a picture: sensor, values from navigation, expected limb if
@@ -24,7 +25,7 @@ impl<B: Board> Flight<'_, B> {
             return true;
         }
         if !is_sensor_intact {
-            self.reload_sensor();
+            self.reload_parameters();
             self.report_repair(SENSOR);
         }
         if !is_known_intact {
@@ -35,9 +36,19 @@ impl<B: Board> Flight<'_, B> {
         false
     }
 
+    /// Replaces changed parameters of the flight software by the stored ones, and a changed APID base of the line. It
+    /// runs at every turn, because these parameters also act without a picture.
+    pub(super) fn check_operations(&mut self) {
+        if !self.operations.is_intact() {
+            self.reload_parameters();
+            self.report_repair(OPERATIONS);
+        }
+        self.buffers.line.set_base(self.operations.get().base());
+    }
+
     /// Makes the sensor anew from the stored parameters. Parameters that were not stored are lost.
     #[inline(never)]
-    fn reload_sensor(&mut self) {
+    fn reload_parameters(&mut self) {
         let choice = Choice::Copy(self.state.parameter_copy);
         // The buffer of the table is written.
         self.staged = 0;
@@ -45,7 +56,8 @@ impl<B: Board> Flight<'_, B> {
         // The parameters were checked when they were read, so they make a sensor.
         if self.renew_sensor(&loaded.parameters) {
             self.sensor.complete();
-            self.operations = loaded.parameters.operations;
+            self.operations.set(loaded.parameters.operations);
+            self.operations.complete();
             self.state.parameter_copy = loaded.copy;
             self.is_not_stored = loaded.copy == 0;
         }
@@ -196,6 +208,38 @@ mod tests {
         flight.known.value_mut().prior.altitude_m = Some(5e5);
         assert_eq!(turn(&mut flight), (right, true));
         assert_eq!(turn(&mut flight), (right, false));
+    }
+
+    #[test]
+    fn every_bit_of_the_parameters_of_the_flight_software_is_watched() {
+        let (mut buffers, mut lists) = (Box::new(Buffers::new()), Box::new(Lists::new()));
+        let mut flight = Flight::start(board(), &mut buffers, &mut lists).unwrap();
+        let right = turn(&mut flight).0;
+        let stored = flight.operations.get().clone();
+        let mut flips = 0u16;
+        for &id in crate::operations::Operations::NUMBERS {
+            for bit in 0..64 {
+                // An integer has fewer bits, so other flips are not values of it.
+                let mut changed = stored.clone();
+                let value = stored.get(id).unwrap();
+                let value = if value.is_nan() { 1.0 } else { value };
+                let flipped = if id < 305 { (value as u64 ^ 1 << bit) as f64 } else { value * 0.5f64.powi(bit) };
+                if changed.set(id, flipped) != Some(true) || changed == stored {
+                    continue;
+                }
+                *flight.operations.value_mut() = changed;
+                flight.limiter = crate::flight::Limiter::new();
+                assert_eq!(turn(&mut flight), (right, true), "parameter {id}, bit {bit}");
+                assert_eq!((flight.operations.get(), flight.mode), (&stored, Mode::Flight));
+                flips += 1;
+                assert_eq!(flight.state.repairs, flips);
+            }
+        }
+        assert!(flips > 150, "{flips}");
+        // The line has a copy of the APID base.
+        flight.buffers.line.set_base(crate::packet::ApidBase::try_new(512).unwrap());
+        assert_eq!(turn(&mut flight), (right, false));
+        assert_eq!(flight.buffers.line.base(), stored.base());
     }
 
     #[test]

@@ -88,7 +88,7 @@ pub struct Flight<'a, B> {
     buffers: &'a mut Buffers,
     workspace: &'a mut Lists,
     sensor: KeptTwice<Sensor<f32>>,
-    operations: Operations,
+    operations: KeptTwice<Operations>,
     /// Whether the parameters in use differ from the stored ones.
     is_not_stored: bool,
     /// Number of parameters that are kept for a commit; they are in the buffer of the table.
@@ -173,7 +173,7 @@ impl<'a, B: Board> Flight<'a, B> {
             board,
             buffers,
             workspace,
-            operations: loaded.parameters.operations.clone(),
+            operations: KeptTwice::new(loaded.parameters.operations.clone()),
             is_not_stored: loaded.copy == 0,
             staged: 0,
             known: KeptTwice::new(Known::default()),
@@ -227,6 +227,7 @@ impl<'a, B: Board> Flight<'a, B> {
         }
         self.sensor.complete();
         self.known.complete();
+        self.check_operations();
         let now_us = self.board.now_us();
         let pulse_us = self.board.pulse_us();
         self.buffers.line.clock.note_pulse(pulse_us);

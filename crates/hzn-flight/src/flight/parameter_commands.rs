@@ -24,7 +24,7 @@ const MAX_READ: u8 = 96;
 
 impl<B: Board> Flight<'_, B> {
     fn parameters(&self) -> Parameters {
-        Parameters { sensor: self.sensor.get().config().clone(), operations: self.operations.clone() }
+        Parameters { sensor: self.sensor.get().config().clone(), operations: self.operations.get().clone() }
     }
 
     /// Sets all parameters, or none.
@@ -79,7 +79,7 @@ impl<B: Board> Flight<'_, B> {
     /// Puts parameters to use.
     fn use_parameters(&mut self, parameters: &Parameters, keep: Keep) -> Code {
         let is_sensor_new = parameters.sensor != *self.sensor.get().config();
-        if is_sensor_new || parameters.operations != self.operations {
+        if is_sensor_new || parameters.operations != *self.operations.get() {
             if let Err(refused) = parameters.check() {
                 return self.refuse_parameter(refused);
             }
@@ -87,7 +87,8 @@ impl<B: Board> Flight<'_, B> {
                 return Code::Refused;
             }
             self.sensor.complete();
-            self.operations = parameters.operations.clone();
+            self.operations.set(parameters.operations.clone());
+            self.operations.complete();
             self.is_not_stored = true;
         }
         // Memory wears out: it is written only if this changes something.

@@ -55,7 +55,7 @@ impl<B: Board> Flight<'_, B> {
             longest_edge::send(edge, line, &mut self.board, time, self.number);
         }
         self.since_housekeeping = self.since_housekeeping.saturating_add(1);
-        if self.since_housekeeping >= self.operations.housekeeping_every {
+        if self.since_housekeeping >= self.operations.get().housekeeping_every {
             self.send_housekeeping();
         }
     }

@@ -15,7 +15,8 @@ impl<B: Board> Flight<'_, B> {
         if resets >= SAFE_AFTER {
             self.send_event(Event::SafeAfterResets, resets.into(), 0);
             self.enter_mode(Mode::Safe);
-        } else if self.mode == Mode::Standby && (self.operations.boot_mode == 1 || self.recovery.has_lifted_off()) {
+        } else if self.mode == Mode::Standby && (self.operations.get().boot_mode == 1 || self.recovery.has_lifted_off())
+        {
             self.enter_mode(Mode::Flight);
         }
     }
@@ -27,7 +28,7 @@ impl<B: Board> Flight<'_, B> {
             self.enter_mode(Mode::Flight);
         }
         self.recovery.keep_up(&mut self.board, now_us);
-        let is_over = match (self.operations.shut_down_after_s, self.recovery.since_lift_off_s(now_us)) {
+        let is_over = match (self.operations.get().shut_down_after_s, self.recovery.since_lift_off_s(now_us)) {
             (Some(limit_s), Some(since_s)) => f64::from(since_s) >= limit_s,
             _ => false,
         };

@@ -10,7 +10,7 @@ use crate::packet::Apid;
 impl<B: Board> Flight<'_, B> {
     /// Sends housekeeping if its time has come.
     pub(super) fn report_by_time(&mut self, now_us: u64) {
-        let period_us = u64::from(self.operations.housekeeping_s) * 1_000_000;
+        let period_us = u64::from(self.operations.get().housekeeping_s) * 1_000_000;
         if now_us.saturating_sub(self.housekeeping_us) >= period_us {
             self.send_housekeeping();
         }

@@ -42,8 +42,10 @@ impl Limiter {
 
     /// Returns whether a warning may be sent now, and counts it.
     pub(super) fn allows_warning(&mut self, now_us: u64) -> bool {
-        let passed = now_us.saturating_sub(self.since_us) / WARNING_US;
-        if passed > 0 {
+        let waited_us = now_us.saturating_sub(self.since_us);
+        // A division of 64 bits takes long on a small processor, and there may be a warning for every few bytes.
+        if waited_us >= WARNING_US {
+            let passed = waited_us / WARNING_US;
             self.warnings = self.warnings.saturating_add(u8::try_from(passed).unwrap_or(WARNINGS)).min(WARNINGS);
             self.since_us += passed * WARNING_US;
         }

@@ -70,7 +70,7 @@ impl<B: Board> Flight<'_, B> {
 
     /// Returns whether the bit budget has room for all packets of a picture, and counts them.
     fn has_budget(&mut self, answer: &PictureAnswer, has_navigation: bool, now_us: u64) -> bool {
-        let Some(rate) = self.operations.science_bits_s else { return true };
+        let Some(rate) = self.operations.get().science_bits_s else { return true };
         let counts = [
             (Apid::Science, 1),
             (Apid::Candidate, answer.edges.iter().flatten().count()),

@@ -127,8 +127,8 @@ fn columns(a: &BodyResult, b: &BodyResult) -> Vec<Column> {
     add("half-angle", 3, "°", |r| r.half_angle_deg);
     add("RMS", 3, " px", |r| r.rms_px);
     add("inliers", 0, "", |r| r.inliers.map(f64::from));
-    add("level", 0, "", |r| r.level.map(f64::from));
-    add("time", 0, " µs", |r| r.elapsed_us);
+    add("threshold", 0, " counts", |r| r.level.map(f64::from));
+    add("processing", 0, " µs", |r| r.elapsed_us);
     out
 }
 

@@ -199,8 +199,8 @@ fn agreement(consensus: &[Consensus], own_altitudes: bool) -> Option<String> {
     } else {
         "The frames do not tell the causes apart; check which value you know best.".to_owned()
     };
-    // The true cause gives the same value in every frame.
-    Some(format!("Scatter over {} frames, in σ of one frame: {}. {end}", best.pictures, all.join(", ")))
+    let what = "in σ of one frame, about 1 for the true cause";
+    Some(format!("Scatter over {} frames, {what}: {}. {end}", best.pictures, all.join(", ")))
 }
 
 /// One possible cause in words, with its cure.

@@ -56,7 +56,7 @@ pub(super) fn lines(card: &Card, frame_view: &FrameView, outcome: &Outcome, answ
         "Rays" if reached(Stage::Undistort) => vec![format!("{} points became rays", c.edge_points)],
         "Consensus" if reached(Stage::Reject) => consensus(report, answer),
         "Fit" => answer.solution().map_or_else(Vec::new, |s| fit(s, answer)),
-        "Covariance" => answer.solution().map_or_else(Vec::new, covariance),
+        "Covariance" => answer.solution().map_or_else(Vec::new, |s| covariance(s, answer)),
         "Gates" => gates(report),
         _ => Vec::new(),
     }
@@ -96,9 +96,9 @@ fn threshold(answer: &BodyResult, config: &Config) -> Vec<String> {
             config.gate.min_mean, config.gate.max_mean
         )],
         (_, Some((mean, n))) => {
-            vec![format!("threshold {}, mean brightness {mean:.1} in a sample of {n} pixels", report.level)]
+            vec![format!("threshold {} counts, mean {mean:.1} counts in a sample of {n} pixels", report.level)]
         }
-        _ => vec![format!("threshold {}", report.level)],
+        _ => vec![format!("threshold {} counts", report.level)],
     }
 }
 
@@ -148,14 +148,18 @@ fn fit(s: &Solution<f64>, answer: &BodyResult) -> Vec<String> {
     out
 }
 
-fn covariance(s: &Solution<f64>) -> Vec<String> {
+fn covariance(s: &Solution<f64>, answer: &BodyResult) -> Vec<String> {
     let ([major, minor], angle) = hzn_run::explain::principal_sigmas(s);
-    vec![format!(
+    let mut out = vec![format!(
         "σ {:.4}° at {:.0}° from image x, {:.4}° perpendicular to it",
         major.to_degrees(),
         angle.to_degrees(),
         minor.to_degrees()
-    )]
+    )];
+    let terms = answer.chosen().map_or(&[][..], |edge| edge.budget_rad.as_slice());
+    let text = |term, rad: f64| format!("• {:.4}° from {}", rad.to_degrees(), hzn_run::explain::term_text(term));
+    out.extend(terms.iter().filter(|(_, rad)| *rad > 0.0).map(|(term, rad)| text(*term, *rad)));
+    out
 }
 
 fn gates(report: &Report<f64>) -> Vec<String> {

@@ -249,6 +249,67 @@ fn a_click_among_the_residuals_shows_the_point() {
 }
 
 #[test]
+fn a_click_on_a_candidate_shows_its_residuals() {
+    let dir = tempfile::tempdir().unwrap();
+    flight(dir.path());
+    // The focal length is wrong, so the fit of the candidate is refused.
+    std::fs::write(dir.path().join("sensor.toml"), SENSOR.replace("260.0", "200.0")).unwrap();
+    let mut window = window_on(dir.path());
+    assert_ne!(answer(&window).0, hzn_core::status::Status::Ok);
+    window.state_mut().settings_mut().plotted = vec!["Residuals".to_owned()];
+    window.run_steps(4);
+    assert!(window.query_by_label("Plot Residuals").is_none(), "nothing is fitted yet");
+    window.get_all_by_label("residuals").next().unwrap().click();
+    window.run_steps(4);
+    assert!(window.query_by_label_contains("Residual of candidate").is_some());
+    assert!(window.query_by_label("Plot Residuals").is_some());
+}
+
+#[test]
+fn the_threshold_is_dragged_in_the_histogram() {
+    let (_dir, mut window) = window_on_flight();
+    let (before, sheet) = (answer(&window), window.state().session().unwrap().sheet().clone());
+    let bars = window.get_by_label("Histogram: threshold").rect();
+    let place = |part: f32| pos2(bars.left() + part * bars.width(), bars.center().y);
+    drag(&mut window, place(0.4), place(0.8));
+    settled(&mut window);
+    let scale = window.state().session().unwrap().number("binarize", "scale", 0).unwrap();
+    assert!(scale > 1.0, "Otsu's method is kept, with another factor: {scale}");
+    assert!(answer(&window).1 > before.1, "{:?}", answer(&window));
+    window.get_by_label("Undo").click();
+    settled(&mut window);
+    assert_eq!(window.state().session().unwrap().sheet(), &sheet, "the drag is one step");
+    assert_eq!(answer(&window), before);
+}
+
+#[test]
+fn a_parameter_is_swept_and_a_click_takes_a_value() {
+    let (_dir, mut window) = window_on_flight();
+    let scale = |w: &Window| w.state().session().unwrap().number("binarize", "scale", 0).unwrap();
+    let name = window.get_by_role_and_label(egui::accesskit::Role::Label, "scale").rect();
+    click_with(&mut window, name.left_center() + egui::vec2(4.0, 0.0), PointerButton::Secondary);
+    window.get_by_label("Sweep binarize.scale over the sequence…").click();
+    window.run_steps(3);
+    window.get_by_label("Start").click();
+    for _ in 0..3000 {
+        window.step();
+        if window.query_by_label("4 of 4 frames").is_some() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    window.run_steps(3);
+    let title = window.get_by_label("answered frames [%]").rect();
+    click(&mut window, title.left_bottom() + egui::vec2(330.0, 60.0));
+    settled(&mut window);
+    let taken = scale(&window);
+    assert!(taken > 1.05, "a value to the right of the one in effect: {taken}");
+    window.get_by_label("Undo").click();
+    settled(&mut window);
+    assert_eq!(scale(&window), 1.0);
+}
+
+#[test]
 fn the_wheel_zooms_about_the_pointer_and_a_drag_moves() {
     let (_dir, mut window) = window_on_flight();
     let pixel = [80.0, 60.0];

@@ -147,3 +147,30 @@ fn a_refused_value_is_said_in_place() {
     assert!((0.1..=10.0).contains(&config.binarize.scale));
     assert_eq!(before.0, Status::Ok);
 }
+
+#[test]
+fn the_lens_is_edited_with_linked_focal_lengths() {
+    let (_dir, mut window) = window_on_flight();
+    let text = |w: &Window| w.state().session().unwrap().sheet().text().to_owned();
+    window.get_by_label("Rays").click_accesskit();
+    // The card opens slowly.
+    window.run_steps(30);
+    window.get_by_role_and_label(Role::SpinButton, "fx_px").set_value_accesskit(250.0);
+    settled(&mut window);
+    assert!(text(&window).contains("fx_px = 250.0\nfy_px = 250.0"), "{}", text(&window));
+    window.get_by_label("Add").click_accesskit();
+    settled(&mut window);
+    window.get_by_role_and_label(Role::SpinButton, "k 1").set_value_accesskit(-0.02);
+    settled(&mut window);
+    let k = window.state().session().unwrap().value("camera", "k", 0).cloned();
+    assert_eq!(k.unwrap().to_string(), "[-0.02]");
+    window.get_by_label("Remove").click_accesskit();
+    settled(&mut window);
+    assert!(!text(&window).contains("0.02"), "{}", text(&window));
+}
+
+#[test]
+fn the_terms_of_the_covariance_are_listed() {
+    let (_dir, window) = window_on_flight();
+    assert!(window.query_by_label_contains("° from edge noise").is_some());
+}

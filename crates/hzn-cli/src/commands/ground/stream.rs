@@ -272,7 +272,11 @@ fn describe_event(record: &EventRecord) -> String {
             format!("the camera sends no pictures: the last one, number {b}, came {:.1} s ago", f64::from(a) * 1e-3)
         }
         Some(Event::Repaired) => {
-            let what = if a == 1 { "sensor, made anew from the stored parameters" } else { "values from navigation" };
+            let what = match a {
+                1 => "sensor, made anew from the stored parameters",
+                2 => "values from navigation",
+                _ => "parameters of the flight software, read again from memory",
+            };
             format!("memory error number {b} was repaired: {what}")
         }
         Some(e) => format!("{} ({a}, {b})", e.name()),
