@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::Place;
+use common::{Place, Ran};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::{FlightHorizon, Prior};
 use hzn_flight::answer::PictureAnswer;
@@ -103,6 +103,11 @@ fn rows_have_every_column_of_a_run() {
         place.run(&["run", "in", "--flight", "-o", "here.csv"]).expect(0);
         let (sent, here) = (cells(&place, "sent.csv"), cells(&place, "here.csv"));
         assert_eq!(sent, here);
+        // A stream from another program gives the same rows.
+        let mut piped = place.command(&["telemetry", "-", "-o", "piped.csv"]);
+        let output = piped.stdin(std::fs::File::open(place.path("sent.bin")).unwrap()).output().unwrap();
+        Ran::from_output(&output, &place.path("")).expect(0);
+        assert_eq!(place.read("piped.csv"), place.read("sent.csv"));
         for column in columns {
             let value = &sent.iter().find(|(c, _)| c == column).unwrap().1;
             assert!(value.parse::<f64>().is_ok_and(|x| x != 0.0), "{column}: {value:?}");

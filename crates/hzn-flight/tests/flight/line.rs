@@ -4,6 +4,7 @@ use hzn_flight::bytes::Writer;
 use hzn_flight::flight::Flight;
 use hzn_flight::messages::{Acknowledge, Code, Event, EventRecord, Function};
 use hzn_flight::packet::{self, Apid, ApidBase, OVERHEAD, SYNC};
+use hzn_flight::{Parameters, table};
 
 use crate::bench::{Bench, Sent, command, fly, ready, send, take_sent};
 
@@ -69,6 +70,41 @@ fn an_echo_dies_at_once() {
         }
         assert!(bytes[0] > 0 && bytes[1..].iter().all(|&n| n == 0), "{bytes:?}");
     });
+}
+
+#[test]
+fn two_computers_on_one_line_do_not_answer_each_other() {
+    // With the same base and with another one: each computer hears all that the other one sends.
+    for base in [256.0, 512.0] {
+        let mut other = Parameters::defaults();
+        other.set(302, base).unwrap();
+        let mut table = vec![0; table::MAX_BYTES];
+        let n = table::write(&other, 1, &mut table).unwrap();
+        table.truncate(n);
+        let bench = Bench { copies: [table, Vec::new()], ..Bench::default() };
+        fly(ready(), |a| {
+            fly(bench, |b| {
+                take_sent(a);
+                b.board().sent.clear();
+                // Everybody hears a command that is refused, and one for the first computer.
+                let commands =
+                    [command(1, Function::SetMode, |w| w.u8(9)), command(2, Function::Ping, |_| ())].concat();
+                a.board().line.extend(&commands);
+                b.board().line.extend(&commands);
+                let mut bytes = Vec::new();
+                for _ in 0..50 {
+                    a.turn();
+                    b.turn();
+                    let from_a = std::mem::take(&mut a.board().sent);
+                    let from_b = std::mem::take(&mut b.board().sent);
+                    a.board().line.extend(&from_b);
+                    b.board().line.extend(&from_a);
+                    bytes.push(from_a.len() + from_b.len());
+                }
+                assert!(bytes[0] > 0 && bytes[3..].iter().all(|&n| n == 0), "{base}: {bytes:?}");
+            });
+        });
+    }
 }
 
 #[test]

@@ -4,7 +4,9 @@ use hzn_flight::bytes::Writer;
 use hzn_flight::flight::Flight;
 use hzn_flight::messages::{Code, Event, Function};
 
-use crate::bench::{Bench, command, fly, ready, send, take_sent};
+use hzn_flight::{Parameters, table};
+
+use crate::bench::{Bench, Sent, command, fly, ready, send, stored, take_sent};
 
 fn pairs(pairs: &[(u16, f64)]) -> impl Fn(&mut Writer<'_>) {
     let pairs = pairs.to_vec();
@@ -41,6 +43,19 @@ fn memory_is_written_only_for_a_change() {
         assert_eq!(f.board().writes, 0);
         assert_eq!(do_it(f, Function::SetParameters, pairs(&[(81, 2.0)])), Code::Done);
         assert_eq!(f.board().writes, 1);
+    });
+}
+
+#[test]
+fn a_stored_limit_that_is_too_high_is_refused_at_the_start() {
+    let mut free = Parameters::defaults();
+    free.sensor.limits.max_work = Some(1_000_000_000);
+    let mut bytes = vec![0; table::MAX_BYTES];
+    let n = table::write(&free, 9, &mut bytes).unwrap();
+    bytes.truncate(n);
+    fly(Bench { copies: [bytes, stored(1)], ..Bench::default() }, |f| {
+        let events = take_sent(f).events;
+        assert!(events.contains(&(Event::CopyBroken, 1, 3)) && events.contains(&(Event::Started, 2, 1)), "{events:?}");
     });
 }
 
@@ -118,8 +133,9 @@ fn one_number_that_is_missing_is_refused_by_name() {
             command(1, Function::SetKnown, move |w| numbers.iter().for_each(|&x| w.f32(x)))
         };
         let nan = f32::NAN;
-        assert_eq!(send(f, &known(&[2e5, 6.5e6, nan, 1e5])).answers[0].2, Code::Missing);
-        assert_eq!(send(f, &known(&[2e5, nan, nan, nan, 0.1, nan, 0.0])).answers[0].2, Code::Missing);
+        let refused = |h: &Sent| (h.answers[0].2, h.details[0]);
+        assert_eq!(refused(&send(f, &known(&[2e5, 6.5e6, nan, 1e5]))), (Code::Missing, 5));
+        assert_eq!(refused(&send(f, &known(&[2e5, nan, nan, nan, 0.1, nan, 0.0]))), (Code::Missing, 11));
         assert_eq!(send(f, &known(&[2e5, nan, nan, nan])).answers[0].2, Code::Done);
     });
 }

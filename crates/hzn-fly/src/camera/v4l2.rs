@@ -1,5 +1,7 @@
 //! A camera of Video4Linux 2. This file has not been run with a camera: the tests have none.
 //!
+//! `linuxvideo` speaks to the kernel itself; the better known `v4l` links or generates bindings of C.
+//!
 //! The time of a picture is the time when the driver delivers it, because `linuxvideo` does not pass on the driver's
 //! own.
 

@@ -179,8 +179,16 @@ mod tests {
         let path = dir.path().join("sensor.toml");
         let lens = "model = \"pinhole\"\nfx_px = 600.0\nfy_px = 600.0\ncx_px = 319.5\ncy_px = 239.5";
         let camera = format!("[camera]\nwidth = 640\nheight = 480\n{lens}\n[body]\naltitude_km = 230.0\n");
-        std::fs::write(&path, camera).unwrap();
+        // A mask of four polygons with eight corners needs several packets.
+        let corner = |i: usize, k: usize| {
+            let (sin, cos) = (k as f64 * std::f64::consts::FRAC_PI_4).sin_cos();
+            format!("[{:.3}, {:.3}]", 100.0 * i as f64 + 30.0 * cos, 60.0 + 30.0 * sin)
+        };
+        let polygon = |i: usize| format!("[{}]", (0..8).map(|k| corner(i, k)).collect::<Vec<_>>().join(", "));
+        let mask = (1..5).map(polygon).collect::<Vec<_>>().join(", ");
+        std::fs::write(&path, format!("{camera}[mask]\npolygons_px = [{mask}]\n")).unwrap();
         let text = format!("load {}", path.display());
+        let staged = std::cell::Cell::new(0);
         let load = |code: u8, at: u16| {
             let mut commander = Commander::new(ApidBase::DEFAULT, 0, &[text.clone(), "ping".into()]).unwrap();
             let now = Instant::now();
@@ -188,6 +196,15 @@ mod tests {
                 let bytes = commander.next(now).unwrap().unwrap();
                 let Scan::Packet { packet, .. } = packet::scan(&bytes) else { panic!() };
                 let function = Function::from_number(packet.user[0]).unwrap();
+                if function == Function::StageParameters {
+                    // The parameters of the flight software, from 300 to 399, are not part of a sensor.toml.
+                    let ids = packet.user[2..].chunks(10).map(|p| u16::from_be_bytes([p[0], p[1]]));
+                    assert!(
+                        ids.clone().count() == usize::from(packet.user[1])
+                            && !ids.clone().any(|id| (300..400).contains(&id))
+                    );
+                    staged.set(staged.get() + ids.count());
+                }
                 let code = if sequence == at { code } else { 0 };
                 if let Some(answer) = commander.take(&ack(function, sequence, code), now) {
                     assert!(!commander.is_idle());
@@ -197,6 +214,7 @@ mod tests {
             unreachable!()
         };
         assert_eq!(load(0, 0), (Function::CommitParameters, true));
+        assert!(staged.get() > 4 * 8 * 2, "the mask is loaded, too: {}", staged.get());
         // What follows a refused packet is not sent.
         assert_eq!(load(6, 1), (Function::StageParameters, false));
     }
