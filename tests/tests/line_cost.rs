@@ -13,7 +13,7 @@ const BYTES: usize = 64 << 10;
 const MOST: f64 = 60.0;
 /// Most instructions for a turn without a picture.
 const MOST_IN_A_TURN: u32 = 40_000;
-/// Bytes that are dearer, because many of them begin a packet that must be refused. Only the work of a turn bounds them.
+/// Bytes that are dearer, because many of them begin a packet that must be refused. The work of a turn bounds them.
 const DEARER: [&str; 2] = ["markers alone", "headers inside headers"];
 
 /// Returns repeatable bytes without a pattern.

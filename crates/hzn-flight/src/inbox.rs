@@ -93,8 +93,8 @@ impl Inbox {
         }
     }
 
-    /// Takes at most `most` bytes, which have arrived until `now_us`, from `receive`. Unless `reads_on` is set, it stops
-    /// when [`Self::next`] has something to do. Returns the number of bytes and why there are no more.
+    /// Takes at most `most` bytes, which have arrived until `now_us`, from `receive`. It stops when [`Self::next`] has
+    /// something to do, unless `reads_on` is set. Returns the number of bytes and why there are no more.
     pub fn fill(
         &mut self,
         now_us: u64,

@@ -1,8 +1,8 @@
 //! Counts the instructions that the bytes of a line cost the flight software.
 //!
 //! The file `line.bin` has the bytes. They arrive at 115 200 bits a second, at most 256 for each turn of the loop. The
-//! file `cost.bin` gets three numbers of 32 bits: the ticks of all turns, the most for one turn, and the ticks of as many
-//! turns without a byte.
+//! file `cost.bin` gets three numbers of 32 bits: the ticks of all turns, the most for one turn, and the ticks of as
+//! many turns without a byte.
 
 #![no_std]
 #![no_main]
