@@ -26,6 +26,15 @@ pub struct Image {
     pub crc: u32,
 }
 
+/// Number of the build, from the variable `HZN_BUILD` of the environment in which the program was built; 0 without it.
+pub const BUILD: u32 = match option_env!("HZN_BUILD") {
+    Some(digits) => match u32::from_str_radix(digits, 10) {
+        Ok(build) => build,
+        Err(_) => panic!("HZN_BUILD must be a whole number"),
+    },
+    None => 0,
+};
+
 /// Returns the CRC-32 of a program image, as zlib and `crc32` compute it.
 pub fn image_crc(image: &[u8]) -> u32 {
     CRC32.checksum(image)

@@ -8,7 +8,7 @@ use crossbeam_channel::{Receiver, never, select};
 use hzn_core::Report;
 use hzn_core::status::Status;
 use hzn_flight::Parameters;
-use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS};
+use hzn_flight::board::{BUILD, Board, Image, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::Reader;
 use hzn_flight::messages::{Event, EventRecord, Exposure, Severity};
 use hzn_flight::packet::{self, Apid, ApidBase, Scan};
@@ -29,8 +29,6 @@ use crate::tell::{Rarely, Tell};
 const LONGEST_WAIT: Duration = Duration::from_millis(20);
 /// Events that wait for the next answer in the log.
 const EVENTS: usize = 64;
-/// Number of the build, from the variable `HZN_BUILD` of the environment; 0 without it.
-const BUILD: Option<&str> = option_env!("HZN_BUILD");
 
 /// Counts of a flight.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -235,10 +233,7 @@ impl Board for Linux {
     }
     fn image(&mut self) -> Image {
         let program = std::fs::read("/proc/self/exe").unwrap_or_default();
-        Image {
-            build: BUILD.and_then(|digits| digits.parse().ok()).unwrap_or(0),
-            crc: if program.is_empty() { 0 } else { crc32fast::hash(&program) },
-        }
+        Image { build: BUILD, crc: if program.is_empty() { 0 } else { crc32fast::hash(&program) } }
     }
     fn read_retained(&mut self) -> [u32; RETAINED_WORDS] {
         self.parts.flash.words()

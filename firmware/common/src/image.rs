@@ -1,14 +1,5 @@
 //! The program in flash.
 
-/// Number of the build, from the variable `HZN_BUILD` of the environment; 0 without it.
-pub const BUILD: u32 = match option_env!("HZN_BUILD") {
-    Some(digits) => match u32::from_str_radix(digits, 10) {
-        Ok(build) => build,
-        Err(_) => panic!("HZN_BUILD must be a whole number"),
-    },
-    None => 0,
-};
-
 unsafe extern "C" {
     /// Begin of the vector table, which is the begin of the image.
     static __vector_table: u8;

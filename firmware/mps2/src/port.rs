@@ -3,7 +3,7 @@
 use hzn_firmware::camera::{Camera, Header};
 use hzn_firmware::flash::Flash;
 use hzn_firmware::{image, watermark};
-use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS, image_crc};
+use hzn_flight::board::{BUILD, Board, Image, Picture, RETAINED_WORDS, image_crc};
 use hzn_flight::view::Viewer;
 
 use crate::board::{self, FRAME_BYTES, Timer, Uart, Watchdog};
@@ -101,7 +101,7 @@ impl Board for Mps2 {
         watermark::stack_bytes()
     }
     fn image(&mut self) -> Image {
-        Image { build: image::BUILD, crc: image_crc(image::bytes()) }
+        Image { build: BUILD, crc: image_crc(image::bytes()) }
     }
     fn read_retained(&mut self) -> [u32; RETAINED_WORDS] {
         board::read_retained()

@@ -4,7 +4,7 @@
 use hzn_firmware::camera::{Camera, Header};
 use hzn_firmware::flash::Flash;
 use hzn_firmware::{image, watermark};
-use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS, image_crc};
+use hzn_flight::board::{BUILD, Board, Image, Picture, RETAINED_WORDS, image_crc};
 use hzn_flight::view::{ROWS_HELD, RowMemory, Viewer};
 
 use crate::board::{self, Timer, Uart, Watchdog};
@@ -115,7 +115,7 @@ impl Board for Stm32F405 {
         watermark::stack_bytes()
     }
     fn image(&mut self) -> Image {
-        Image { build: image::BUILD, crc: image_crc(image::bytes()) }
+        Image { build: BUILD, crc: image_crc(image::bytes()) }
     }
     fn read_retained(&mut self) -> [u32; RETAINED_WORDS] {
         board::read_retained()

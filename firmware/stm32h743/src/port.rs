@@ -1,7 +1,6 @@
 //! The port of the flight software.
 
-use hzn_firmware::image;
-use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS, image_crc};
+use hzn_flight::board::{BUILD, Board, Image, Picture, RETAINED_WORDS, image_crc};
 use hzn_flight::view::Viewer;
 use stm32h7xx_hal::prelude::*;
 
@@ -89,7 +88,7 @@ impl Board for Stm32H743 {
         let length = (constants_end as usize).saturating_sub(begin as usize) + variables;
         // SAFETY: the linker places the image in flash without gaps that are not mapped, and nothing writes to it.
         let image = unsafe { core::slice::from_raw_parts(begin, length) };
-        Image { build: image::BUILD, crc: image_crc(image) }
+        Image { build: BUILD, crc: image_crc(image) }
     }
     fn read_retained(&mut self) -> [u32; RETAINED_WORDS] {
         core::array::from_fn(|word| self.parts.backup.bkpr.get(word).map_or(0, |register| register.read().bits()))
