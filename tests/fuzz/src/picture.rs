@@ -108,8 +108,9 @@ const WIDTH: usize = 64;
 const HEIGHT: usize = 48;
 type Rows = RowBuffers<u8, { ROWS_HELD as usize * WIDTH }, HEIGHT, 1024, 1024>;
 
-/// A picture that comes row by row gives the same status as the same picture in memory, unless lists overflow. The gates
-/// that look at brightness again are off, because only lit and dark pixels are left of rows.
+/// A picture that comes row by row gives the same status as the same picture in memory, unless lists overflow or an
+/// edge is wider than the rows in memory. The gates that look at brightness again are off, because only lit and dark
+/// pixels are left of rows.
 pub(crate) fn any_rows(bytes: &[u8]) {
     let mut input = Input(bytes);
     let mut config = config(&mut input, WIDTH as u16, HEIGHT as u16);
@@ -133,7 +134,7 @@ pub(crate) fn any_rows(bytes: &[u8]) {
     let whole = Grey::try_new(&data, Layout::packed(WIDTH as u32, HEIGHT as u32, 1, 8)).expect("a whole picture");
     let report = FlightHorizon::boxed(&config).map(|mut flight| flight.process(&whole, &expected));
     if let Ok(report) = report
-        && streamed.counters.dropped == 0
+        && (streamed.counters.dropped, streamed.counters.cut_points) == (0, 0)
         && streamed.status != Status::Truncated
         && report.status != Status::Truncated
     {
