@@ -78,7 +78,13 @@ TABLES = {
     0x102: "u2:number u1:severity u4:a u4:b",
     0x103: "u1:function u2:sequence u1:code u2:detail",
     0x104: "u2:number f8:value",
+    0x105: "u4:picture u4:candidate u4:stride u2:first u2:total u2:count "
+    + " ".join(f"u2:x{i} u2:y{i}" for i in range(64)),
     0x106: "u4:picture u4:number u4:length_px u4:points u4:inliers f4:rms_px u1:verdict",
+    0x107: "u4:picture f4:free_x f4:free_y f4:free_z f4:xx f4:xy f4:xz f4:yy f4:yz f4:zz f4:cos f4:var_cos f4:cos_per_px "
+    "f4:by_cos_x f4:by_cos_y f4:by_cos_z f4:x f4:y f4:z f4:pxx f4:pxy f4:pxz f4:pyy f4:pyz f4:pzz f4:range f4:range_sigma "
+    "f4:body_x f4:body_y f4:body_z",
+    0x108: "u4:picture u1:state f4:age_s f4:altitude f4:x f4:y f4:z f4:vx f4:vy f4:vz f4:rate_x f4:rate_y f4:rate_z",
 }
 
 
