@@ -114,6 +114,8 @@ type Rows = RowBuffers<u8, { ROWS_HELD as usize * WIDTH }, HEIGHT, 1024, 1024>;
 pub(crate) fn any_rows(bytes: &[u8]) {
     let mut input = Input(bytes);
     let mut config = config(&mut input, WIDTH as u16, HEIGHT as u16);
+    // The size is one of the numbers.
+    (config.camera.width, config.camera.height) = (WIDTH as u16, HEIGHT as u16);
     config.binarize.method = Method::Fixed;
     config.binarize.level = f64::from(1 + input.byte() % 254);
     config.recover.levels.clear();

@@ -118,7 +118,7 @@ fn two_sensor_files_stand_side_by_side_with_the_difference() {
     assert!(apart > 0.0);
     assert!(window.query_by_label(&format!("{apart:.4}° apart")).is_some());
     let level = f64::from(b.level.unwrap()) - f64::from(a.level.unwrap());
-    assert!(level > 0.0 && window.query_by_label(&format!("{level:+.0}")).is_some());
+    assert!(level > 0.0 && window.query_by_label(&format!("{level:+.0} counts")).is_some());
     // The session can be tuned further; the other sensor stays.
     window.get_by_role_and_label(Role::Slider, "scale").set_value_accesskit(1.6);
     until(&mut window, "not equal", |v| {
