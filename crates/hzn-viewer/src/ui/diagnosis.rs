@@ -132,7 +132,8 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
         }
     });
     let plausible: Vec<Consensus> = consensus.iter().copied().filter(|c| is_plausible(c, &config, body)).collect();
-    if let Some(words) = agreement(&plausible, viewer.has_own_altitudes()) {
+    let impossible = consensus.iter().filter(|c| !is_plausible(c, &config, body)).map(|c| c.suspect);
+    if let Some(words) = agreement(&plausible, &impossible.collect::<Vec<_>>(), viewer.has_own_altitudes()) {
         wrapped(ui, &words);
     }
     if let (Some(cure), Some(session)) = (chosen, &mut viewer.session) {
@@ -177,14 +178,16 @@ fn is_plausible(c: &Consensus, config: &Config, body: usize) -> bool {
     c.suspect != Suspect::LimbHeight || !is_earth || EARTH_LIMB_KM.contains(&c.value)
 }
 
-/// Says which cause agrees with all pictures. `own_altitudes`: the altitudes are those of frames.csv.
-fn agreement(consensus: &[Consensus], own_altitudes: bool) -> Option<String> {
+/// Says which cause agrees with all pictures. No camera sees what the `impossible` causes would need. `own_altitudes`:
+/// the altitudes are those of frames.csv.
+fn agreement(consensus: &[Consensus], impossible: &[Suspect], own_altitudes: bool) -> Option<String> {
     let [best, second, ..] = consensus else { return None };
     if best.pictures < 3 {
         return None;
     }
     let words = |c: &Consensus| format!("{} {:.1}", c.suspect.name(), c.disagreement);
-    let all: Vec<String> = consensus.iter().map(words).collect();
+    let none = |suspect: &Suspect| format!("{} impossible", suspect.name());
+    let all: Vec<String> = consensus.iter().map(words).chain(impossible.iter().map(none)).collect();
     // A wrong cause scatters more. Below 1 the scatter is the noise of the edges, and says nothing.
     let decided = second.disagreement > 2.0 * best.disagreement.max(1.0);
     let end = if decided {
@@ -262,6 +265,22 @@ impl Cause {
                 }
             }
         }
+        if cause.impossible.is_none() && cause.is_now(config, of_body.limb_height_km) {
+            cause.impossible = Some("This is the value now".into());
+        }
         Some(cause)
+    }
+
+    /// Returns whether the values of the cure are those of now, to as many digits as the table shows.
+    fn is_now(&self, config: &Config, limb_height_km: f64) -> bool {
+        self.cure.iter().all(|(_, name, x)| {
+            let now = match *name {
+                "fx_px" => config.camera.fx_px,
+                "fy_px" => config.camera.fy_px,
+                "limb_height_km" => limb_height_km,
+                _ => return false,
+            };
+            (now - x).abs() < 0.05
+        })
     }
 }
