@@ -17,7 +17,7 @@ const RESET: &str = "Reset";
 #[derive(Debug, Default)]
 struct Function {
     name: String,
-    /// Sum of all that the function puts on the stack. None of its calls finds more than this on the stack.
+    /// Sum of all that the function puts on the stack. At each of its calls, it has at most this on the stack.
     frame_bytes: u32,
     /// Addresses of the functions that are called or jumped to.
     calls: BTreeSet<u32>,

@@ -74,20 +74,16 @@ pub(crate) fn is_the_same_elsewhere(clone: &Path) -> Outcome {
         let dir = format!("xtask/elsewhere/{}", board.name);
         let built = board.build(Toolchain::find()?, "build", &dir, clone, &[])?;
         for image in board.images {
-            let name = board.name;
-            if fs::read(built.join(image))? != fs::read(images(name).join(image))? {
-                return Err(Trouble::Failed(format!("{name} {image} differs; is everything committed?")));
-            }
-            println!("{name} {image}: the same bytes");
+            steps::compare_bytes(
+                &format!("{} {image}", board.name),
+                &images(board.name).join(image),
+                &built.join(image),
+            )?;
         }
     }
     let here = build_vendor_port(VENDOR_PORT, &root())?;
     let there = build_vendor_port("xtask/elsewhere/stm32h743", clone)?;
-    if fs::read(here)? != fs::read(there)? {
-        return Err(Trouble::Failed("stm32h743 flight differs; is everything committed?".to_owned()));
-    }
-    println!("stm32h743 flight: the same bytes");
-    Ok(())
+    steps::compare_bytes("stm32h743 flight", &here, &there)
 }
 
 /// Builds what the image tests need, then runs the tests and checks the costs and the C interface.

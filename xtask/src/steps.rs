@@ -171,6 +171,15 @@ pub(crate) fn run(command: &mut Command) -> Outcome {
     }
 }
 
+/// Fails if two files that were built in different folders differ.
+pub(crate) fn compare_bytes(name: &str, here: &Path, there: &Path) -> Outcome {
+    if std::fs::read(here)? != std::fs::read(there)? {
+        return Err(Trouble::Failed(format!("{name} differs; is everything committed?")));
+    }
+    println!("{name}: the same bytes");
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::parse_counts;

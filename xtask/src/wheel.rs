@@ -95,11 +95,7 @@ pub(crate) fn is_the_same_elsewhere(clone: &Path) -> Outcome {
     };
     let [here, there] = [build(&root(), "wheel-here")?, build(clone, "wheel-there")?];
     let name = here.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    if fs::read(here)? != fs::read(there)? {
-        return Err(Trouble::Failed(format!("{name} differs; is everything committed?")));
-    }
-    println!("{name}: the same bytes");
-    Ok(())
+    steps::compare_bytes(&name, &here, &there)
 }
 
 fn install(python: &Path, wheel: &Path) -> Outcome {

@@ -149,7 +149,9 @@ impl Inbox {
         reads_on: bool,
         receive: &mut impl FnMut() -> Option<u8>,
     ) -> (usize, bool) {
-        let wanted = if reads_on { CAPACITY } else { self.need.min(CAPACITY) };
+        // At least one byte is read before a packet of the last turn is judged, so that the pause before it is known.
+        let held = self.end - self.start;
+        let wanted = if reads_on { CAPACITY } else { self.need.max(held + 1).min(CAPACITY) };
         if self.start + wanted > CAPACITY {
             self.compact();
         }

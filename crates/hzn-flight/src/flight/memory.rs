@@ -46,7 +46,7 @@ impl<B: Board> Flight<'_, B> {
         self.buffers.line.set_base(self.operations.get().base());
     }
 
-    /// Makes the sensor anew from the stored parameters. Parameters that were not stored are lost.
+    /// Reads the stored parameters again, and makes the sensor anew. Parameters that were not stored are lost.
     #[inline(never)]
     fn reload_parameters(&mut self) {
         let choice = Choice::Copy(self.state.parameter_copy);
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bit_of_the_parameters_of_the_flight_software_is_watched() {
+    fn a_changed_parameter_of_the_flight_software_is_repaired_before_it_acts() {
         let (mut buffers, mut lists) = (Box::new(Buffers::new()), Box::new(Lists::new()));
         let mut flight = Flight::start(board(), &mut buffers, &mut lists).unwrap();
         let right = turn(&mut flight).0;
@@ -219,7 +219,7 @@ mod tests {
         let mut flips = 0u16;
         for &id in crate::operations::Operations::NUMBERS {
             for bit in 0..64 {
-                // An integer has fewer bits, so other flips are not values of it.
+                // Whole numbers get every flip that is a value of them, the others smaller values.
                 let mut changed = stored.clone();
                 let value = stored.get(id).unwrap();
                 let value = if value.is_nan() { 1.0 } else { value };

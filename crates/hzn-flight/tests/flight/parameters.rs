@@ -3,7 +3,6 @@
 use hzn_flight::bytes::Writer;
 use hzn_flight::flight::Flight;
 use hzn_flight::messages::{Code, Event, Function};
-
 use hzn_flight::{Parameters, table};
 
 use crate::bench::{Bench, Sent, command, fly, ready, send, stored, take_sent};

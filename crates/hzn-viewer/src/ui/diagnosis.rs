@@ -131,9 +131,8 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
             ui.end_row();
         }
     });
-    let plausible: Vec<Consensus> = consensus.iter().copied().filter(|c| is_plausible(c, &config, body)).collect();
-    let impossible = consensus.iter().filter(|c| !is_plausible(c, &config, body)).map(|c| c.suspect);
-    if let Some(words) = agreement(&plausible, &impossible.collect::<Vec<_>>(), viewer.has_own_altitudes()) {
+    let (plausible, impossible): (Vec<_>, Vec<_>) = consensus.iter().partition(|c| is_plausible(c, &config, body));
+    if let Some(words) = agreement(&plausible, &impossible, viewer.has_own_altitudes()) {
         wrapped(ui, &words);
     }
     if let (Some(cure), Some(session)) = (chosen, &mut viewer.session) {
@@ -178,16 +177,16 @@ fn is_plausible(c: &Consensus, config: &Config, body: usize) -> bool {
     c.suspect != Suspect::LimbHeight || !is_earth || EARTH_LIMB_KM.contains(&c.value)
 }
 
-/// Says which cause agrees with all pictures. No camera sees what the `impossible` causes would need. `own_altitudes`:
-/// the altitudes are those of frames.csv.
-fn agreement(consensus: &[Consensus], impossible: &[Suspect], own_altitudes: bool) -> Option<String> {
-    let [best, second, ..] = consensus else { return None };
+/// Says which of the plausible causes agrees with all pictures, and names the impossible ones. `own_altitudes`: the
+/// altitudes are those of frames.csv.
+fn agreement(plausible: &[Consensus], impossible: &[Consensus], own_altitudes: bool) -> Option<String> {
+    let [best, second, ..] = plausible else { return None };
     if best.pictures < 3 {
         return None;
     }
     let words = |c: &Consensus| format!("{} {:.1}", c.suspect.name(), c.disagreement);
-    let none = |suspect: &Suspect| format!("{} impossible", suspect.name());
-    let all: Vec<String> = consensus.iter().map(words).chain(impossible.iter().map(none)).collect();
+    let none = |c: &Consensus| format!("{} impossible", c.suspect.name());
+    let all: Vec<String> = plausible.iter().map(words).chain(impossible.iter().map(none)).collect();
     // A wrong cause scatters more. Below 1 the scatter is the noise of the edges, and says nothing.
     let decided = second.disagreement > 2.0 * best.disagreement.max(1.0);
     let end = if decided {

@@ -21,7 +21,7 @@ static BUFFERS: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
 /// Bytes that arrive for each turn, and their time.
 const BYTES: usize = 256;
 const TURN_US: u64 = 22_222;
-/// Turns after the last byte: two seconds, in which the receiver gives up what is not complete.
+/// Number of turns after the last byte. They take two seconds; an incomplete packet is given up after one.
 const TURNS_AFTER: u32 = 90;
 
 /// A board that is a line and nothing else.
