@@ -1,7 +1,11 @@
 //! Runs the flight image in QEMU, with its camera, its flash and its serial line.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use hzn_core::Config;
 use hzn_flight::{Parameters, table};
@@ -65,11 +69,14 @@ impl Bench {
         self.run_with_shift(line, 0)
     }
     /// Does the same as `run`, with an instruction that takes `2^shift` ns.
+    pub fn run_with_shift(&self, line: &[u8], shift: u32) -> i32 {
+        self.run_in_parts(&[(0, line)], shift)
+    }
+    /// Runs the image with parts of a line. A part is sent when the image has sent at least its number of bytes.
     ///
     /// # Panics
     /// Panics if QEMU fails or the image does not end within two minutes.
-    pub fn run_with_shift(&self, line: &[u8], shift: u32) -> i32 {
-        std::fs::write(self.path("line.bin"), line).expect("files and programs of this machine work");
+    pub fn run_in_parts(&self, parts: &[(u64, &[u8])], shift: u32) -> i32 {
         let sent = std::fs::File::create(self.path("sent.bin")).expect("files and programs of this machine work");
         let mut command = self.board.qemu(&self.board.image("flight"), shift);
         let mut child = command
@@ -80,30 +87,36 @@ impl Bench {
             .spawn()
             .expect("files and programs of this machine work");
         let mut stdin = child.stdin.take().expect("files and programs of this machine work");
-        let (line, sent) = (line.to_vec(), self.path("sent.bin"));
-        let waits = self.board == Board::Stm32F405;
+        // QEMU throws away what its STM32 USART receives before the program has started it.
+        let first = u64::from(self.board == Board::Stm32F405);
+        let parts: Vec<_> = parts.iter().map(|(bytes, line)| (first.max(*bytes), line.to_vec())).collect();
+        let (ended, sent) = (Arc::new(AtomicBool::new(false)), self.path("sent.bin"));
+        let ended_here = ended.clone();
         // The line stays open until the image ends, because QEMU would end with the line.
         let feed = std::thread::spawn(move || {
-            use std::io::Write;
-            // QEMU throws away what its STM32 USART receives before the program has started it.
-            while waits && std::fs::metadata(&sent).is_ok_and(|file| file.len() == 0) {
-                std::thread::sleep(std::time::Duration::from_millis(10));
+            for (bytes, line) in parts {
+                let waits = || std::fs::metadata(&sent).is_ok_and(|file| file.len() < bytes);
+                while waits() && !ended_here.load(Ordering::Relaxed) {
+                    std::thread::sleep(Duration::from_millis(10));
+                }
+                let _ = stdin.write_all(&line);
+                let _ = stdin.flush();
             }
-            let _ = stdin.write_all(&line);
-            let _ = stdin.flush();
             stdin
         });
-        let deadline = std::time::Instant::now() + std::time::Duration::from_secs(120);
+        let deadline = Instant::now() + Duration::from_secs(120);
         let code = loop {
             if let Some(status) = child.try_wait().expect("files and programs of this machine work") {
                 break status.code().unwrap_or(-1);
             }
-            if std::time::Instant::now() > deadline {
+            if Instant::now() > deadline {
                 let _ = child.kill();
+                ended.store(true, Ordering::Relaxed);
                 panic!("{}: the image did not end", self.board.name());
             }
-            std::thread::sleep(std::time::Duration::from_millis(20));
+            std::thread::sleep(Duration::from_millis(20));
         };
+        ended.store(true, Ordering::Relaxed);
         drop(feed.join());
         code
     }
