@@ -156,8 +156,8 @@ fn status_tip(r: &Report<f64>) -> Option<&'static str> {
             "the whole picture has one brightness: nothing is in view, or the exposure does not show it"
         }
         Status::NoLimb if r.candidates.is_empty() => {
-            "no edge is long enough. Is the limb in view? Try another threshold (binarize.scale, or method = \
-             \"fixed\")"
+            "no edge is long enough. Is the limb in view? If it is, try another threshold (binarize.scale, or \
+             binarize.level if binarize.method is \"fixed\")"
         }
         _ => return None,
     })

@@ -47,7 +47,7 @@ pub struct FitFacts {
     /// Difference of the cosines of the half-angles in standard deviations; positive if the fitted half-angle is the
     /// larger one.
     pub sigmas: f64,
-    /// True if the fit comes from a trial without the expected half-angle, because the sensor itself found no cone.
+    /// True if the fit comes from a trial without the expected half-angle, because the picture has no answer.
     pub is_trial: bool,
     /// Altitude that the picture was processed with, in km.
     pub given_altitude_km: Option<f64>,
@@ -115,9 +115,10 @@ pub fn summarise<'a>(facts: impl Iterator<Item = &'a FitFacts> + Clone) -> Vec<C
     all
 }
 
-/// Returns the median difference in standard deviations, or `None` without pictures. Above 3 the half-angles disagree.
+/// Returns the median size of the difference in standard deviations, or `None` without pictures. Above 3 the half-angles
+/// disagree. The sign does not count: a wrong focal length makes it differ from picture to picture.
 pub fn typical_sigmas<'a>(facts: impl Iterator<Item = &'a FitFacts>) -> Option<f64> {
-    median(&mut facts.map(|f| f.sigmas).filter(|s| s.is_finite()).collect::<Vec<_>>())
+    median(&mut facts.map(|f| f.sigmas.abs()).filter(|s| s.is_finite()).collect::<Vec<_>>())
 }
 
 #[cfg(test)]
@@ -148,7 +149,7 @@ mod tests {
         assert_eq!(summary[0].suspect, Suspect::Focal);
         assert!((summary[0].value - 0.751).abs() < 1e-9 && summary[0].disagreement < 1.0);
         assert!(summary[1].disagreement > 5.0 && summary[1].pictures == 20);
-        assert_eq!(typical_sigmas(all.iter()), Some(-9.0));
+        assert_eq!(typical_sigmas(all.iter()), Some(9.0));
         assert!(summarise([].iter()).is_empty());
     }
 

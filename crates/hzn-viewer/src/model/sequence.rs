@@ -48,6 +48,8 @@ pub struct Sequence {
     pub entries: Vec<Entry>,
     /// True if the list is complete.
     pub complete: bool,
+    /// Shift of the altitudes and positions of all pictures that is on trial, in km.
+    pub altitude_shift_km: f64,
 }
 
 impl Sequence {
@@ -58,6 +60,22 @@ impl Sequence {
     /// Returns true if there is no picture yet.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
+    }
+    /// Returns true if pictures have altitudes or positions of their own, so that `body.altitude_km` has no effect.
+    pub fn has_altitudes(&self) -> bool {
+        let own = |d: &FrameData| d.altitude_km.is_some() || d.position_km.is_some();
+        self.entries.iter().any(|e| e.data.as_ref().is_some_and(own))
+    }
+    /// Shifts the altitudes of all pictures by `by_km` on trial, and their positions along the radius. No file changes.
+    pub fn shift_altitudes(&mut self, by_km: f64) {
+        self.altitude_shift_km += by_km;
+        for data in self.entries.iter_mut().filter_map(|e| e.data.as_mut()) {
+            data.altitude_km = data.altitude_km.map(|km| km + by_km);
+            data.position_km = data.position_km.map(|p| {
+                let radius_km = p.iter().map(|x| x * x).sum::<f64>().sqrt();
+                p.map(|x| x * (1.0 + by_km / radius_km.max(1.0)))
+            });
+        }
     }
     /// Returns the default path of a file that is made from the sequence: next to the sequence. For a folder of
     /// pictures, the path is next to the folder, because a picture in the folder would become part of the sequence.
@@ -100,6 +118,22 @@ mod tests {
         let recording = Sequence { inputs: vec![file], folder: parent.into(), ..Sequence::default() };
         assert_eq!(recording.default_output_path("flight.mp4"), parent.join("flight.mp4"));
         assert_eq!(Sequence { title: "a.mcap.part".into(), ..Sequence::default() }.stem(), "a");
+    }
+
+    #[test]
+    fn altitudes_and_positions_are_shifted_and_come_back() {
+        let data =
+            FrameData { altitude_km: Some(200.0), position_km: Some([0.0, 3000.0, 4000.0]), ..FrameData::default() };
+        let entry = Entry { name: "a".into(), time_s: None, data: Some(data.clone()), place: Place::Nowhere };
+        let mut s = Sequence { entries: vec![entry], ..Sequence::default() };
+        assert!(s.has_altitudes());
+        s.shift_altitudes(-50.0);
+        let shifted = s.entries[0].data.clone().unwrap();
+        assert_eq!((shifted.altitude_km, s.altitude_shift_km), (Some(150.0), -50.0));
+        assert!((shifted.position_km.unwrap()[2] - 3960.0).abs() < 1e-9);
+        s.shift_altitudes(50.0);
+        assert!((s.entries[0].data.as_ref().unwrap().position_km.unwrap()[2] - 4000.0).abs() < 1e-9);
+        assert_eq!((s.entries[0].data.as_ref().unwrap().altitude_km, s.altitude_shift_km), (Some(200.0), 0.0));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use hzn_core::status::Status;
 use hzn_core::{Config, threshold};
 
 use super::viewer::Viewer;
-use super::{links, theme};
+use super::{altitude_trial, links, theme};
 use crate::model::Session;
 use crate::model::cause::Reason;
 use crate::model::diagnosis::{self, Consensus, FitFacts, Implied, Suspect};
@@ -46,10 +46,11 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             half_angle_causes(viewer, ui, &fit);
         }
         let tips = answer.report.as_ref().map(hzn_run::explain::tips).unwrap_or_default();
-        let measured = differs || answer.otsu.is_some_and(|o| o.answered);
-        if !measured {
+        // General advice follows from the edges, and those of a wrong threshold are not the limb.
+        let wrong_level = answer.otsu.is_some_and(|o| o.answered);
+        if !differs && !wrong_level {
             tips.iter().for_each(|tip| links::tip(viewer, ui, tip));
-        } else if !tips.is_empty() {
+        } else if !tips.is_empty() && !wrong_level {
             // The numbers above say more than general advice.
             egui::CollapsingHeader::new(RichText::new("More advice").size(12.5)).show(ui, |ui| {
                 tips.iter().for_each(|tip| links::tip(viewer, ui, tip));
@@ -96,11 +97,11 @@ fn wrapped(ui: &mut Ui, text: &str) {
 
 /// Draws the fitted and the expected half-angle, and what each possible cause would have to be.
 fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
-    let how = if fit.is_trial { " (of a trial with a cone of any half-angle)" } else { "" };
+    let how = if fit.is_trial { "a cone of any half-angle" } else { "the answer" };
     wrapped(
         ui,
         &format!(
-            "Half-angle {:.3}° fitted{how}, {:.3}° expected: {:+.3}°, {:+.1} σ. These values would make them equal:",
+            "Half-angle of {how} {:.3}°, {:.3}° expected: {:+.3}°, {:+.1} σ. These values would make them equal:",
             fit.fitted_deg,
             fit.expected_deg,
             fit.fitted_deg - fit.expected_deg,
@@ -111,7 +112,7 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
     let Some(session) = &viewer.session else { return };
     let Some(config) = session.config().cloned() else { return };
     let body = viewer.body;
-    let mut chosen = None;
+    let (mut chosen, mut shift_km) = (None, None);
     egui::Grid::new("causes").num_columns(5).spacing(vec2(8.0, 3.0)).show(ui, |ui| {
         for head in ["", "now", "this frame", "all frames", ""] {
             ui.weak(RichText::new(head).size(11.5));
@@ -127,12 +128,19 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
             if suspect == Suspect::Altitude {
                 all.on_hover_text("A shift of the altitudes of all frames");
             }
-            apply(viewer, ui, &cause, &mut chosen);
+            match cause.shift_km.filter(|_| viewer.sequence.has_altitudes()) {
+                Some(by_km) => try_shift(ui, by_km, &mut shift_km),
+                None => apply(ui, &cause, &mut chosen),
+            }
             ui.end_row();
         }
     });
+    if let Some(by_km) = shift_km {
+        return altitude_trial::shift(viewer, by_km);
+    }
     let (plausible, impossible): (Vec<_>, Vec<_>) = consensus.iter().partition(|c| is_plausible(c, &config, body));
-    if let Some(words) = agreement(&plausible, &impossible, viewer.has_own_altitudes()) {
+    let given_km = viewer.sequence.has_altitudes().then_some(viewer.sequence.altitude_shift_km);
+    if let Some(words) = agreement(&plausible, &impossible, given_km) {
         wrapped(ui, &words);
     }
     if let (Some(cure), Some(session)) = (chosen, &mut viewer.session) {
@@ -142,19 +150,25 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
 }
 
 /// Draws the button that applies a cause, or says why it cannot be applied.
-fn apply(viewer: &Viewer, ui: &mut Ui, cause: &Cause, chosen: &mut Option<Cure>) {
-    let own_altitudes = cause.suspect == Suspect::Altitude && viewer.has_own_altitudes();
-    let hint = match (own_altitudes, &cause.impossible) {
-        (true, _) => "The altitudes come from frames.csv or the recording, so correct them there".to_owned(),
-        (_, Some(why)) => why.clone(),
-        _ => cause.cure.iter().map(|(s, n, x)| format!("{s}.{n} = {x:.6}")).collect::<Vec<_>>().join("\n"),
-    };
-    let can = !own_altitudes && cause.impossible.is_none();
+fn apply(ui: &mut Ui, cause: &Cause, chosen: &mut Option<Cure>) {
+    let values = || cause.cure.iter().map(|(s, n, x)| format!("{s}.{n} = {x:.6}")).collect::<Vec<_>>().join("\n");
+    let hint = cause.impossible.clone().unwrap_or_else(values);
+    let can = cause.impossible.is_none();
     let response = ui.add_enabled(can, egui::Button::new("Apply").small());
     let name = format!("Apply {}", cause.suspect.name());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, can, &name));
     if response.on_hover_text(&hint).on_disabled_hover_text(&hint).clicked() {
         *chosen = Some(cause.cure.clone());
+    }
+}
+
+/// Draws the button that shifts the altitudes of all frames on trial: the window does not change frames.csv.
+fn try_shift(ui: &mut Ui, by_km: f64, chosen: &mut Option<f64>) {
+    let response = ui.add(egui::Button::new("Try").small());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Try altitude"));
+    let hint = format!("Processes all frames with altitudes shifted by {by_km:+.1} km. No file changes.");
+    if response.on_hover_text(hint).clicked() {
+        *chosen = Some(by_km);
     }
 }
 
@@ -177,29 +191,31 @@ fn is_plausible(c: &Consensus, config: &Config, body: usize) -> bool {
     c.suspect != Suspect::LimbHeight || !is_earth || EARTH_LIMB_KM.contains(&c.value)
 }
 
-/// Says which of the plausible causes agrees with all pictures, and names the impossible ones. `own_altitudes`: the
-/// altitudes are those of frames.csv.
-fn agreement(plausible: &[Consensus], impossible: &[Consensus], own_altitudes: bool) -> Option<String> {
-    let [best, second, ..] = plausible else { return None };
-    if best.pictures < 3 {
+/// Says which of the plausible causes agrees with all pictures, and names the impossible ones. `shift_km` is the shift
+/// that is on trial, if the frames have altitudes of their own.
+fn agreement(plausible: &[Consensus], impossible: &[Consensus], shift_km: Option<f64>) -> Option<String> {
+    let (best, others) = plausible.split_first()?;
+    if best.pictures < 3 || others.len() + impossible.len() == 0 {
         return None;
     }
     let words = |c: &Consensus| format!("{} {:.1}", c.suspect.name(), c.disagreement);
     let none = |c: &Consensus| format!("{} impossible", c.suspect.name());
     let all: Vec<String> = plausible.iter().map(words).chain(impossible.iter().map(none)).collect();
     // A wrong cause scatters more. Below 1 the scatter is the noise of the edges, and says nothing.
-    let decided = second.disagreement > 2.0 * best.disagreement.max(1.0);
-    let end = if decided {
-        let altitudes = own_altitudes && best.suspect == Suspect::Altitude;
-        let side = if best.value < 0.0 { "high" } else { "low" };
-        let where_to = format!(" Those in frames.csv are {:.1} km too {side}; correct them there.", best.value.abs());
-        format!(
-            "So the {} is the likely cause.{}",
-            best.suspect.name(),
-            if altitudes { where_to } else { String::new() }
-        )
+    let scatters = |c: &Consensus| c.disagreement > 2.0 * best.disagreement.max(1.0);
+    let end = if others.iter().all(scatters) {
+        let wrong_km = shift_km.filter(|_| best.suspect == Suspect::Altitude).map(|shift| best.value + shift);
+        let where_to = wrong_km.map(|km| {
+            let side = if km < 0.0 { "high" } else { "low" };
+            format!(" The given altitudes are {:.1} km too {side}; correct them where they come from.", km.abs())
+        });
+        format!("So the {} is the likely cause.{}", best.suspect.name(), where_to.unwrap_or_default())
     } else {
-        "The frames do not tell the causes apart; check which value you know best.".to_owned()
+        let names: Vec<&str> = plausible.iter().filter(|c| !scatters(c)).map(|c| c.suspect.name()).collect();
+        format!(
+            "So the cause is one of these: {}. The frames do not tell them apart; check the one that you know least.",
+            names.join(", ")
+        )
     };
     let what = "in σ of one frame, about 1 for the true cause";
     Some(format!("Scatter over {} frames, {what}: {}. {end}", best.pictures, all.join(", ")))
@@ -212,6 +228,8 @@ struct Cause {
     here: String,
     all: String,
     cure: Cure,
+    /// Shift of the altitudes of all frames.
+    shift_km: Option<f64>,
     /// Reason why the value cannot be used.
     impossible: Option<String>,
 }
@@ -231,6 +249,7 @@ impl Cause {
             here: String::new(),
             all: String::new(),
             cure: Vec::new(),
+            shift_km: None,
             impossible: None,
         };
         match suspect {
@@ -241,6 +260,7 @@ impl Cause {
                 // The frames have different altitudes, so only the shift is common to them.
                 cause.all = all.map(|c| format!("Δ {:+.1} ± {:.1} km", c.value, c.scatter)).unwrap_or_default();
                 cause.cure = vec![("body", "altitude_km", of_body.altitude_km.unwrap_or(given) + value)];
+                cause.shift_km = Some(value);
                 cause.impossible = (given + value <= 0.0).then(|| "This altitude is below the ground".into());
             }
             Suspect::Focal => {

@@ -32,10 +32,10 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     bars(ui, &painter, rect, &histogram, top);
     let dark = ui.visuals().dark_mode;
     if let Some(otsu) = otsu {
-        mark(&painter, rect, x_of(otsu), theme::line(0, dark), "Otsu", true);
+        mark(ui, &painter, rect, x_of(otsu), theme::line(0, dark), "Otsu", true);
     }
     if let Some(level) = level {
-        mark(&painter, rect, x_of(level.into()), theme::warning(dark), &format!("{level}"), false);
+        mark(ui, &painter, rect, x_of(level.into()), theme::warning(dark), &format!("{level}"), false);
     }
     let pointer = response.interact_pointer_pos().filter(|_| response.dragged() || response.clicked());
     if let Some(at) = pointer {
@@ -88,7 +88,8 @@ fn bars(ui: &Ui, painter: &egui::Painter, rect: Rect, histogram: &Histogram, top
 }
 
 /// Draws a vertical mark with its name below.
-fn mark(painter: &egui::Painter, rect: Rect, x: f32, colour: Color32, name: &str, dashed: bool) {
+fn mark(ui: &Ui, painter: &egui::Painter, rect: Rect, x: f32, colour: Color32, name: &str, dashed: bool) {
+    let background = if dashed { ui.visuals().extreme_bg_color } else { Color32::TRANSPARENT };
     let x = x.clamp(rect.left(), rect.right());
     let line = [pos2(x, rect.top()), pos2(x, rect.bottom())];
     match dashed {
@@ -98,13 +99,12 @@ fn mark(painter: &egui::Painter, rect: Rect, x: f32, colour: Color32, name: &str
     let align = if x > rect.center().x { Align2::RIGHT_TOP } else { Align2::LEFT_TOP };
     // Otsu's name is above its line, the threshold's number below, so that they never cover each other.
     let y = if dashed { rect.top() + 1.0 } else { rect.bottom() };
-    painter.text(
-        pos2(x + if x > rect.center().x { -3.0 } else { 3.0 }, y),
-        align,
-        name,
-        FontId::proportional(11.5),
-        colour,
-    );
+    let at = pos2(x + if x > rect.center().x { -3.0 } else { 3.0 }, y);
+    let text = painter.layout_no_wrap(name.to_owned(), FontId::proportional(11.5), colour);
+    let place = align.anchor_size(at, text.size());
+    // Bars behind the name would make it hard to read.
+    painter.rect_filled(place.expand2(vec2(2.0, 0.0)), 2, background);
+    painter.galley(place.min, text, colour);
 }
 
 #[cfg(test)]

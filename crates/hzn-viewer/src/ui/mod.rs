@@ -1,6 +1,7 @@
 //! The window. [`Viewer`] holds the state and decides. `layout` draws it. Every panel has a separate file and only
 //! draws.
 
+mod altitude_trial;
 mod camera_card;
 mod chips;
 mod command;

@@ -58,7 +58,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, key: &'static Key) {
     if focused {
         mark(viewer, ui, &row.response);
     }
-    if key.path == "body.altitude_km" && viewer.has_own_altitudes() {
+    if key.path == "body.altitude_km" && viewer.sequence.has_altitudes() {
         ui.weak(
             RichText::new("The frames have altitudes of their own (frames.csv), which are used instead.").size(12.0),
         );

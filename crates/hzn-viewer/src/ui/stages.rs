@@ -7,7 +7,7 @@ use hzn_core::status::Status;
 
 use super::facts::{self, CARDS, Card};
 use super::viewer::Viewer;
-use super::{Command, camera_card, diagnosis, histogram, parameters, theme};
+use super::{Command, altitude_trial, camera_card, diagnosis, histogram, parameters, theme};
 use crate::work::frame_view::{BodyResult, Outcome};
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
@@ -42,6 +42,7 @@ fn contents(viewer: &mut Viewer, ui: &mut Ui) {
     egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         // The answer is shared, not copied, because it holds thousands of points.
         let outcome = viewer.frame_view.as_ref().and_then(|s| s.answers.first().cloned());
+        altitude_trial::show(viewer, ui);
         diagnosis::show(viewer, ui);
         for card in CARDS {
             show_card(viewer, ui, card, outcome.as_deref());

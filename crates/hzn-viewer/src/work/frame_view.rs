@@ -346,7 +346,12 @@ fn add_causes(
     for (index, body) in outcome.bodies.iter_mut().enumerate() {
         let Ok(report) = &body.report else { continue };
         body.otsu = otsu.get(index).copied();
-        body.cause = Some(Cause::from_report(report, body.otsu.is_some_and(|o| o.answered)));
+        let wrong_level = body.otsu.is_some_and(|o| o.answered);
+        body.cause = Some(Cause::from_report(report, wrong_level));
+        // The edge of a wrong threshold is not the limb.
+        if wrong_level {
+            continue;
+        }
         let trial = || trials.try_any_cone(view, input.data);
         let Some((fit, solution)) = find_fit(&body.edges, report, body.row.altitude_km, camera, trial) else {
             continue;
@@ -368,8 +373,9 @@ fn free_limb(solution: &Solution<f64>, camera: &Camera<f64>) -> Vec<Vec<Point>> 
     overlay::limb::lines_with_steps(solution.axis.xyz(), solution.half_angle_rad, camera, CANDIDATE_STEPS)
 }
 
-/// Returns what the edge of the answer says, or else the longest edge, with its fit. If the sensor found no cone in
-/// that edge, `trial` returns an edge with a cone of any half-angle.
+/// Returns what the edge of the answer says, with its fit. Without an answer, `trial` returns an edge with a cone of any
+/// half-angle: the sensor's own fit uses only points near a limb with the expected half-angle, so that it misses most of
+/// the limb if the expected one is wrong. Its longest edge counts only if the trial finds nothing.
 pub(super) fn find_fit(
     edges: &[Edge],
     report: &Report<f64>,
@@ -384,10 +390,7 @@ pub(super) fn find_fit(
     if let Some(solution) = &report.solution {
         return facts(edges.iter().find(|e| e.candidate == solution.candidate)?, false);
     }
-    match trials::longest(edges)?.fitted {
-        Some(_) => facts(trials::longest(edges)?, false),
-        None => facts(&trial()?, true),
-    }
+    trial().and_then(|edge| facts(&edge, true)).or_else(|| facts(trials::longest(edges)?, false))
 }
 
 /// Returns the results of a picture that cannot be processed: one row for each body.

@@ -46,8 +46,8 @@ pub(super) fn summarise(
         let answered = otsu.get(index).is_some_and(|o| o.answered);
         processed.causes.push(Cause::from_report(report, answered));
         let trial = || trials.try_any_cone(view, input.data);
-        let altitude_km = row.altitude_km;
-        let fit = find_fit(&trace.edges(), report, altitude_km, &camera, trial);
+        // The edge of a wrong threshold is not the limb.
+        let fit = (!answered).then(|| find_fit(&trace.edges(), report, row.altitude_km, &camera, trial)).flatten();
         processed.fits.push(fit.map(|(facts, _)| facts));
     }
     processed

@@ -205,14 +205,28 @@ fn altitudes_of_frames_csv_that_are_too_high_are_named() {
     let mut window = window_on(&pictures);
     until(&mut window, "not processed", |v| v.processed() == 4 && !v.is_working());
     assert_ne!(answer(&window).0, Status::Ok);
-    for name in ["Apply limb height", "Apply altitude"] {
-        assert!(window.get_by_label(name).accesskit_node().is_disabled(), "{name}");
-    }
+    assert!(window.get_by_label("Apply limb height").accesskit_node().is_disabled());
     // The field of the altitude would change nothing, and says so.
     window.get_by_label("Body").click();
     window.run_steps(3);
     let why = "The frames have altitudes of their own (frames.csv), which are used instead.";
     assert!(window.query_by_label(why).is_some());
+    // The altitudes are shifted on trial; no file changes.
+    let table = std::fs::read_to_string(pictures.join("frames.csv")).unwrap();
+    window.get_by_label("Try altitude").click_accesskit();
+    window.run_steps(2);
+    until(&mut window, "no answer", |v| v.is_settled() && !v.is_working() && v.processed() == 4);
+    window.run_steps(2);
+    assert_eq!(answer(&window).0, Status::Ok);
+    let shift_km = window.state().sequence().altitude_shift_km;
+    assert!((shift_km + 180.0).abs() < 20.0, "{shift_km}");
+    assert!(!window.state().session().unwrap().is_changed());
+    window.get_by_label("End the trial").click_accesskit();
+    window.run_steps(2);
+    until(&mut window, "not processed again", |v| v.is_settled() && !v.is_working());
+    assert_ne!(answer(&window).0, Status::Ok);
+    assert_eq!(window.state().sequence().altitude_shift_km, 0.0);
+    assert_eq!(std::fs::read_to_string(pictures.join("frames.csv")).unwrap(), table);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Tests of the viewer through its accessibility tree and by mouse, as a user or a screen reader would drive it.
 
+mod causes;
 mod companions;
 mod exports;
 mod found;

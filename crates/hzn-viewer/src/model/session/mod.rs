@@ -302,6 +302,12 @@ impl Session {
         self.read();
     }
 
+    /// Gives the configuration a new version number, so that all pictures are processed again.
+    pub fn renew(&mut self) {
+        static VERSIONS: AtomicU64 = AtomicU64::new(1);
+        self.version = VERSIONS.fetch_add(1, Ordering::Relaxed);
+    }
+
     /// Parses the text, once per change, because the panels read the result in every frame of the window.
     fn read(&mut self) {
         let table: Option<toml::Table> = self.sheet.text().parse().ok();
@@ -325,8 +331,7 @@ impl Session {
                 }
                 self.config = Some(Arc::new(sensor.config));
                 self.problem = None;
-                static VERSIONS: AtomicU64 = AtomicU64::new(1);
-                self.version = VERSIONS.fetch_add(1, Ordering::Relaxed);
+                self.renew();
             }
             Err(problem) => self.problem = Some(problem),
         }

@@ -85,7 +85,10 @@ pub(super) fn value_range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]>
         return None;
     }
     let pad = 0.08 * (high - low);
-    let least = if low.abs().max(high.abs()) > 0.0 { 1e-3 * low.abs().max(high.abs()) } else { 1.0 };
+    let largest = low.abs().max(high.abs());
+    // The axis of a single value has round numbers.
+    let part = if low == high { 0.1 } else { 1e-3 };
+    let least = if largest > 0.0 { part * largest } else { 1.0 };
     Some([low - pad.max(least), high + pad.max(least)])
 }
 
@@ -124,7 +127,7 @@ mod tests {
     fn a_single_value_has_an_axis_around_it() {
         assert_eq!(value_range(std::iter::empty()), None);
         let [low, high] = value_range([0.012].into_iter()).unwrap();
-        assert!(low < 0.012 && high > 0.012 && high - low < 0.001, "{low} {high}");
+        assert!(low < 0.0115 && high > 0.0125 && high - low < 0.004, "{low} {high}");
         assert_eq!(value_range([0.0].into_iter()), Some([-1.0, 1.0]));
         let [low, high] = value_range([1.0, 3.0, 2.0].into_iter()).unwrap();
         assert!(low < 1.0 && low > 0.5 && high > 3.0 && high < 3.5);

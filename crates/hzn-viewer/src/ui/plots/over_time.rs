@@ -211,29 +211,31 @@ pub(super) fn draw(ui: &mut PlotUi<'_>, name: &str, part: Vec<[f64; 2]>, colour:
     ui.line(if style == Style::Dashed { line.style(LineStyle::dashed_loose()) } else { line });
 }
 
-/// Shades the pictures without an answer.
+/// Shades the pictures without an answer, in the colour of their status.
 fn shade_refused(viewer: &Viewer, ui: &mut PlotUi<'_>, axis: &TimeAxis, dark: bool) {
-    let colour = theme::status(Status::Rejected).gamma_multiply(if dark { 0.16 } else { 0.22 });
-    for [from, to] in refused(viewer, axis) {
+    for (status, [from, to]) in refused(viewer, axis) {
+        let colour = theme::status(status).gamma_multiply(if dark { 0.16 } else { 0.22 });
         ui.span(Span::new("", from..=to).fill(colour));
     }
 }
 
-/// Returns from where to where pictures have no answer. Neighbours are joined.
-pub(super) fn refused(viewer: &Viewer, axis: &TimeAxis) -> Vec<[f64; 2]> {
-    let is_refused = |i: usize| viewer.rows.newest(i, viewer.body).is_some_and(|r| r.status != Status::Ok);
+/// Returns from where to where pictures have no answer, with their status. Neighbours of the same status are joined.
+pub(super) fn refused(viewer: &Viewer, axis: &TimeAxis) -> Vec<(Status, [f64; 2])> {
+    let status = |i: usize| viewer.rows.newest(i, viewer.body).map(|r| r.status).filter(|s| *s != Status::Ok);
     let count = viewer.sequence.len();
     // A picture reaches halfway to its neighbours.
     let middle = |a: usize, b: usize| Some((axis.place(a)? + axis.place(b)?) / 2.0);
     let (mut out, mut i) = (Vec::new(), 0);
     while i < count {
-        let end = (i..count).find(|&k| !is_refused(k)).unwrap_or(count);
-        if end > i {
-            let from = if i == 0 { axis.place(0) } else { middle(i - 1, i) };
-            let to = if end == count { axis.place(end - 1) } else { middle(end - 1, end) };
-            out.extend(from.zip(to).map(|(from, to)| [from, to]));
-        }
-        i = end + 1;
+        let Some(here) = status(i) else {
+            i += 1;
+            continue;
+        };
+        let end = (i..count).find(|&k| status(k) != Some(here)).unwrap_or(count);
+        let from = if i == 0 { axis.place(0) } else { middle(i - 1, i) };
+        let to = if end == count { axis.place(end - 1) } else { middle(end - 1, end) };
+        out.extend(from.zip(to).map(|(from, to)| (here, [from, to])));
+        i = end;
     }
     out
 }

@@ -37,7 +37,8 @@ pub(in crate::ui) fn sheet(viewer: &Viewer) -> PlotSheet {
     }
     rows.extend(navigation(viewer, &axis));
     let heading = format!("{}, {} frames; grey: without an answer", viewer.sequence.stem(), count);
-    PlotSheet { heading, axis: axis.label(), ends: axis.ends(), refused: refused(viewer, &axis), rows }
+    let refused = refused(viewer, &axis).into_iter().map(|(_, ends)| ends).collect();
+    PlotSheet { heading, axis: axis.label(), ends: axis.ends(), refused, rows }
 }
 
 /// Returns the chosen plots of the results of `hzn fuse`.

@@ -25,7 +25,10 @@ impl Viewer {
         if self.seen_version != session.version() {
             self.seen_version = session.version();
             // A recording holds the results of its own sensor.toml.
-            let as_recorded = self.sequence.recording.is_some() && session.path().is_none() && !session.is_changed();
+            let as_recorded = self.sequence.recording.is_some()
+                && self.sequence.altitude_shift_km == 0.0
+                && session.path().is_none()
+                && !session.is_changed();
             self.rows.begin_version(as_recorded);
         }
     }

@@ -22,7 +22,7 @@ impl Viewer {
             Some(Place::File(path)) => hzn_run::source::exif_lens(path).unwrap_or_default(),
             _ => Exif::default(),
         };
-        let has_altitudes = self.has_own_altitudes();
+        let has_altitudes = self.sequence.has_altitudes();
         self.wizard = Some(Wizard::new(size.map(|x| x as u32), exif, has_altitudes));
     }
 

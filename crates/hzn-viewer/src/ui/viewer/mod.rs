@@ -319,12 +319,6 @@ impl Viewer {
         outcome.bodies.get(self.body).or(outcome.bodies.first())
     }
 
-    /// Returns true if pictures have altitudes or positions of their own, so that `body.altitude_km` has no effect.
-    pub(super) fn has_own_altitudes(&self) -> bool {
-        let own = |d: &hzn_calib::FrameData| d.altitude_km.is_some() || d.position_km.is_some();
-        self.sequence.entries.iter().any(|e| e.data.as_ref().is_some_and(own))
-    }
-
     /// Returns the truth for a picture and a body.
     pub(super) fn truth_of(&self, name: &str, body: &str) -> Option<&Truth> {
         self.truth.get(name)?.iter().find(|t| t.body == body)
