@@ -78,6 +78,15 @@ fn killed_at_random_moments() {
     assert!(early * 3 > runs, "{early} of {runs} runs were killed before their end");
 }
 
+/// Returns the processor time of a process in ticks, from its file `stat`.
+#[cfg(target_os = "linux")]
+fn processor_ticks(stat: &str) -> Option<u64> {
+    let text = std::fs::read_to_string(stat).ok()?;
+    // The name of the program is in parentheses; utime and stime are the 12th and 13th field after it.
+    let mut fields = text.rsplit_once(')')?.1.split_whitespace().skip(11);
+    Some(fields.next()?.parse::<u64>().ok()? + fields.next()?.parse::<u64>().ok()?)
+}
+
 /// Runs many pictures: the memory does not grow, the answers repeat, and the rate is steady.
 #[cfg(target_os = "linux")]
 #[test]
@@ -91,40 +100,42 @@ fn a_long_run() {
     for out in ["a.csv", "a.mcap"] {
         let mut child =
             place.command(&["run", "in", "-o", out, "--durable", "-q"]).stderr(Stdio::null()).spawn().unwrap();
-        let status = format!("/proc/{}/status", child.id());
+        let (status, stat) = ["status", "stat"].map(|name| format!("/proc/{}/{name}", child.id())).into();
         let begin = Instant::now();
-        // Time in seconds, resident memory in kB, bytes of the unfinished file.
+        // Time in seconds, resident memory in kB, bytes of the unfinished file, processor time in ticks.
         let mut samples = Vec::new();
         while child.try_wait().unwrap().is_none() {
             let text = std::fs::read_to_string(&status).unwrap_or_default();
             let kb =
                 text.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse().ok());
             let size = std::fs::metadata(place.path(&format!("{out}.part"))).map_or(0, |meta| meta.len());
-            if let Some(kb) = kb
+            if let (Some(kb), Some(ticks)) = (kb, processor_ticks(&stat))
                 && size > 0
             {
-                samples.push((begin.elapsed().as_secs_f64(), kb, size));
+                samples.push((begin.elapsed().as_secs_f64(), kb, size, ticks));
             }
             std::thread::sleep(Duration::from_millis(200));
         }
         assert!(child.wait().unwrap().success());
         let seconds = begin.elapsed().as_secs_f64();
         let memory = |from: f64, to: f64| {
-            let part = samples.iter().filter(|(t, ..)| (from..to).contains(&(t / seconds))).map(|(_, kb, _)| *kb);
+            let part = samples.iter().filter(|(t, ..)| (from..to).contains(&(t / seconds))).map(|(_, kb, ..)| *kb);
             part.max().unwrap_or(0u64)
         };
         let at = |share: f64| samples.iter().rfind(|(t, ..)| t / seconds <= share).unwrap();
+        // Bytes per tick of processor time, which other programs on the machine hardly change.
         let rate = |from: f64, to: f64| {
             let (a, b) = (at(from), at(to));
-            (b.2 - a.2) as f64 / (b.0 - a.0)
+            (b.2 - a.2) as f64 / (b.3 - a.3) as f64
         };
         let (early, late) = (memory(0.1, 0.3), memory(0.8, 1.0));
         let steady = rate(0.7, 0.95) / rate(0.1, 0.35);
         println!(
             "{out}: {pictures} pictures in {seconds:.0} s, {:.0} a second; memory {early} kB early, {late} kB late; \
-             late rate {steady:.2} of the early one",
+             pictures per processor second late {steady:.2} of early",
             pictures as f64 / seconds
         );
+        assert!((0.8..1.25).contains(&steady), "{out}: the rate is not steady: {steady:.2}");
         // The index of a recording's chunks grows, with a hundred bytes for each flush.
         assert!(late < early + early / 10 + 4096, "{out}: the memory grows from {early} to {late} kB");
         place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);

@@ -1,4 +1,5 @@
-//! The C interface, with arbitrary memory, numbers and pictures. Build it with the address sanitizer.
+//! Calls of the C interface with arbitrary memory, numbers and pictures. libFuzzer runs them with the address sanitizer
+//! (`fuzz/`), and the test `corpus` without it.
 
 use std::alloc::{Layout, alloc, dealloc};
 use std::ptr;
