@@ -97,11 +97,11 @@ fn wrapped(ui: &mut Ui, text: &str) {
 
 /// Draws the fitted and the expected half-angle, and what each possible cause would have to be.
 fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
-    let how = if fit.is_trial { "a cone of any half-angle" } else { "the answer" };
+    let how = if fit.is_trial { "The limb in this frame has the half-angle" } else { "Half-angle of the answer" };
     wrapped(
         ui,
         &format!(
-            "Half-angle of {how} {:.3}°, {:.3}° expected: {:+.3}°, {:+.1} σ. These values would make them equal:",
+            "{how} {:.3}°, expected is {:.3}°: {:+.3}°, {:+.1} σ. These values would make them equal:",
             fit.fitted_deg,
             fit.expected_deg,
             fit.fitted_deg - fit.expected_deg,
