@@ -15,6 +15,8 @@ use crate::work::trials::OtsuTrial;
 
 /// Difference of the half-angles from which the table of causes is shown, in standard deviations.
 const CONSPICUOUS: f64 = 3.0;
+/// Number of frames that together say something about a cause.
+const ENOUGH: usize = 3;
 
 /// A change of the sensor.toml that cures a cause: keys of one step with their values.
 pub(super) type Cure = Vec<(&'static str, &'static str, f64)>;
@@ -23,6 +25,7 @@ pub(super) type Cure = Vec<(&'static str, &'static str, f64)>;
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let Some(answer) = viewer.answer().cloned() else { return };
     let refused = answer.row.status != Status::Ok;
+    let fits = viewer.rows.fits(viewer.body).count();
     let typical = diagnosis::typical_sigmas(viewer.rows.fits(viewer.body));
     let conspicuous = |sigmas: Option<f64>| sigmas.is_some_and(|s| s.abs() > CONSPICUOUS);
     let differs = conspicuous(answer.fit.map(|f| f.sigmas)) || conspicuous(typical);
@@ -42,8 +45,11 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         if let Some(otsu) = answer.otsu.filter(|_| refused) {
             threshold_cause(viewer, ui, &answer, otsu);
         }
-        if let Some(fit) = answer.fit.filter(|_| differs) {
-            half_angle_causes(viewer, ui, &fit);
+        match answer.fit.filter(|_| differs) {
+            // In the other frames the values of now are right.
+            Some(fit) if fits >= ENOUGH && !conspicuous(typical) => wrapped(ui, &only_here(&fit)),
+            Some(fit) => half_angle_causes(viewer, ui, &fit),
+            None => {}
         }
         let tips = answer.report.as_ref().map(hzn_run::explain::tips).unwrap_or_default();
         // General advice follows from the edges, and those of a wrong threshold are not the limb.
@@ -62,6 +68,15 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         viewer.focus_diagnosis = !ui.input(|i| i.pointer.any_pressed());
     }
     ui.add_space(4.0);
+}
+
+/// Says that the half-angle of this frame alone is not the expected one.
+fn only_here(fit: &FitFacts) -> String {
+    format!(
+        "An edge here fits a half-angle of {:.3}°, expected is {:.3}° ({:+.1} σ). Most other frames agree with the \
+         expected one, so this edge is probably not the limb.",
+        fit.fitted_deg, fit.expected_deg, fit.sigmas
+    )
 }
 
 /// Compares the threshold with Otsu's.
@@ -112,13 +127,14 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
     let Some(session) = &viewer.session else { return };
     let Some(config) = session.config().cloned() else { return };
     let body = viewer.body;
+    let (plausible, impossible): (Vec<_>, Vec<_>) = consensus.iter().partition(|c| is_plausible(c, &config, body));
     let (mut chosen, mut shift_km) = (None, None);
     egui::Grid::new("causes").num_columns(5).spacing(vec2(8.0, 3.0)).show(ui, |ui| {
         for head in ["", "now", "this frame", "all frames", ""] {
             ui.weak(RichText::new(head).size(11.5));
         }
         ui.end_row();
-        for suspect in in_order(&consensus) {
+        for suspect in in_order(&plausible, &impossible) {
             let all = consensus.iter().find(|c| c.suspect == suspect);
             let Some(cause) = Cause::new(suspect, fit, all, &config, body) else { continue };
             for text in [suspect.name().to_owned(), cause.now.clone(), cause.here.clone()] {
@@ -138,7 +154,6 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
     if let Some(by_km) = shift_km {
         return altitude_trial::shift(viewer, by_km);
     }
-    let (plausible, impossible): (Vec<_>, Vec<_>) = consensus.iter().partition(|c| is_plausible(c, &config, body));
     let given_km = viewer.sequence.has_altitudes().then_some(viewer.sequence.altitude_shift_km);
     if let Some(words) = agreement(&plausible, &impossible, given_km) {
         wrapped(ui, &words);
@@ -172,9 +187,9 @@ fn try_shift(ui: &mut Ui, by_km: f64, chosen: &mut Option<f64>) {
     }
 }
 
-/// Returns all quantities, those that explain all pictures best first.
-fn in_order(consensus: &[Consensus]) -> Vec<Suspect> {
-    let known: Vec<Suspect> = consensus.iter().map(|c| c.suspect).collect();
+/// Returns all quantities: the plausible ones, those that explain all pictures best first, and then the others.
+fn in_order(plausible: &[Consensus], impossible: &[Consensus]) -> Vec<Suspect> {
+    let known: Vec<Suspect> = plausible.iter().chain(impossible).map(|c| c.suspect).collect();
     let rest = Suspect::ALL.into_iter().filter(|s| !known.contains(s));
     known.iter().copied().chain(rest).collect()
 }
@@ -195,11 +210,11 @@ fn is_plausible(c: &Consensus, config: &Config, body: usize) -> bool {
 /// that is on trial, if the frames have altitudes of their own.
 fn agreement(plausible: &[Consensus], impossible: &[Consensus], shift_km: Option<f64>) -> Option<String> {
     let (best, others) = plausible.split_first()?;
-    if best.pictures < 3 || others.len() + impossible.len() == 0 {
+    if best.pictures < ENOUGH || others.len() + impossible.len() == 0 {
         return None;
     }
     let words = |c: &Consensus| format!("{} {:.1}", c.suspect.name(), c.disagreement);
-    let none = |c: &Consensus| format!("{} impossible", c.suspect.name());
+    let none = |c: &Consensus| format!("{} impossible ({:.0} km)", c.suspect.name(), c.value);
     let all: Vec<String> = plausible.iter().map(words).chain(impossible.iter().map(none)).collect();
     // A wrong cause scatters more. Below 1 the scatter is the noise of the edges, and says nothing.
     let scatters = |c: &Consensus| c.disagreement > 2.0 * best.disagreement.max(1.0);
@@ -217,8 +232,8 @@ fn agreement(plausible: &[Consensus], impossible: &[Consensus], shift_km: Option
             names.join(", ")
         )
     };
-    let what = "in σ of one frame, about 1 for the true cause";
-    Some(format!("Scatter over {} frames, {what}: {}. {end}", best.pictures, all.join(", ")))
+    let what = format!("The true cause has the same value in every frame. Scatter over {} frames", best.pictures);
+    Some(format!("{what}, divided by σ: {}; 1 is only noise. {end}", all.join(", ")))
 }
 
 /// One possible cause in words, with its cure.

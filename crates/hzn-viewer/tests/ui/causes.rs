@@ -3,10 +3,14 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use egui_kittest::kittest::Queryable;
+use hzn_core::camera::{Camera, Config, Model};
+use hzn_core::pixel::ImagePoint;
+use hzn_core::status::Status;
 use hzn_sim::flight::{Flight, rocket};
 use hzn_viewer::model::diagnosis::{self, Consensus, Suspect};
 
-use super::window::{until, window_on};
+use super::window::{HEIGHT, WIDTH, answer, folder, settled, until, window_on};
 
 /// A value of the sensor or of the priors that is changed.
 #[derive(Debug, Clone, Copy)]
@@ -78,4 +82,28 @@ fn wrong_values_are_measured_in_new_flights() {
     }
     println!("largest errors: altitude {altitude_km:.1} km, focal length {:.1} %", 100.0 * focal);
     assert!(altitude_km < 5.0 && focal < 0.02);
+}
+
+#[test]
+fn a_single_frame_with_another_disc_is_not_blamed_on_the_sensor() {
+    let (_dir, pictures) = folder();
+    // A body of half the Earth's half-angle.
+    let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, WIDTH, HEIGHT, 260.0)).unwrap();
+    let axis = [0.1, 0.75f64.sin(), 0.75f64.cos()];
+    let disc = image::GrayImage::from_fn(WIDTH.into(), HEIGHT.into(), |x, y| {
+        let ray = camera.unproject(ImagePoint { u: x.into(), v: y.into() }).unwrap().xyz();
+        let cos: f64 = ray.iter().zip(axis).map(|(a, b)| a * b).sum::<f64>() / (1.0 + 0.01f64).sqrt();
+        let inside_px = (0.65 - cos.acos()) * 260.0;
+        image::Luma([(8.0 + 190.0 / (1.0 + (-inside_px / 0.6).exp())) as u8])
+    });
+    disc.save(pictures.join("4.png")).unwrap();
+    let mut window = window_on(&pictures);
+    until(&mut window, "not processed", |v| v.processed() == 5 && !v.is_working());
+    window.state_mut().go(4);
+    settled(&mut window);
+    window.run_steps(3);
+    assert_ne!(answer(&window).0, Status::Ok);
+    let words = "so this edge is probably not the limb";
+    assert!(window.query_all_by_label_contains(words).next().is_some());
+    assert!(window.query_by_label("Apply altitude").is_none());
 }
