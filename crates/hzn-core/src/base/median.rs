@@ -27,6 +27,7 @@ pub(crate) fn median_of_counts(values: &[u16]) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::{median_of_counts, median_of_reals};
+    use std::vec::Vec;
 
     #[test]
     fn medians_of_few_and_many_counts() {
@@ -42,5 +43,17 @@ mod tests {
         assert_eq!(median_of_reals(&[0.0, 0.0, 4096.0], 4096.0), 1.0);
         assert_eq!(median_of_reals(&[3.0, 1.0, 2.0, 4.0], 4.0), 2.0);
         assert!((median_of_reals(&[0.1, 0.7, 0.3_f32], 0.7) - 0.3).abs() < 2e-4);
+    }
+
+    #[test]
+    fn every_short_list_has_the_median_of_its_order() {
+        for length in 1..=6u32 {
+            for number in 0..5u32.pow(length) {
+                let mut values: Vec<u16> = (0..length).map(|k| (number / 5u32.pow(k) % 5) as u16).collect();
+                let found = median_of_counts(&values);
+                values.sort_unstable();
+                assert_eq!(found, values[(values.len() - 1) / 2], "{values:?}");
+            }
+        }
     }
 }

@@ -67,4 +67,17 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    fn every_short_list_is_sorted() {
+        for length in 0..=7u32 {
+            for number in 0..4u32.pow(length) {
+                let mut items: Vec<u32> = (0..length).map(|k| number / 4u32.pow(k) % 4).collect();
+                let mut sorted = items.clone();
+                sorted.sort_unstable();
+                by(&mut items, |a, b| a < b);
+                assert_eq!(items, sorted);
+            }
+        }
+    }
 }

@@ -88,3 +88,57 @@ impl Crop {
         Pixel { x: place(x, self.x0, 0), y: place(y, self.y0, 1) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Halves a rectangle down to its pixels, and counts how often each of them occurs.
+    fn count(crop: Crop, seen: &mut [[u8; 12]; 12]) {
+        match crop.halves() {
+            Some([a, b]) => {
+                assert_eq!(a.area() + b.area(), crop.area());
+                assert!(a.area() > 0 && b.area() > 0);
+                count(a, seen);
+                count(b, seen);
+            }
+            None => {
+                assert_eq!(crop.area(), 1);
+                seen[usize::from(crop.y0)][usize::from(crop.x0)] += 1;
+            }
+        }
+    }
+
+    #[test]
+    fn every_small_rectangle_is_halved_into_each_of_its_pixels_once() {
+        for (width, height) in (1..=12u16).flat_map(|w| (1..=12u16).map(move |h| (w, h))) {
+            let mut seen = [[0; 12]; 12];
+            count(Crop::whole([width, height], None), &mut seen);
+            for (y, row) in seen.iter().enumerate() {
+                for (x, &n) in row.iter().enumerate() {
+                    assert_eq!(n == 1, x < width.into() && y < height.into(), "{width}×{height} at ({x}, {y})");
+                    assert!(n <= 1);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_small_copy_keeps_its_pixels_within_the_picture() {
+        for (width, height, rows) in
+            (1..=12u16).flat_map(|w| (1..=12u16).flat_map(move |h| (0..=13u16).map(move |r| (w, h, r))))
+        {
+            let crop = Crop::whole([width, height], Some(rows));
+            assert!(crop.width >= 1 && crop.width <= width && crop.height >= 1 && crop.height <= height);
+            for (x, y) in (0..crop.width).flat_map(|x| (0..crop.height).map(move |y| (x, y))) {
+                let Pixel { x: u, y: v } = crop.pixel(x, y);
+                assert!(u < width && v < height, "{width}×{height} in {rows} rows: ({x}, {y}) is ({u}, {v})");
+                // The pixel of the picture contains the centre of the pixel of the copy.
+                let centre = crop.picture_point(ImagePoint { u: f64::from(x), v: f64::from(y) });
+                assert!((centre.u - f64::from(u)).abs() <= 0.5 + 1e-9 && (centre.v - f64::from(v)).abs() <= 0.5 + 1e-9);
+                let back = crop.crop_point(centre);
+                assert!((back.u - f64::from(x)).abs() < 1e-9 && (back.v - f64::from(y)).abs() < 1e-9);
+            }
+        }
+    }
+}

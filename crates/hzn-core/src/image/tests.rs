@@ -51,3 +51,36 @@ fn short_or_odd_pictures_are_refused() {
     let l = Layout { width: 1, height: 2, stride: 10, channels: 1, bits: 8 };
     assert!(Grey::try_new(&data, l).is_ok());
 }
+
+#[test]
+fn every_small_layout_is_read_as_its_definition_says() {
+    let data: [u8; 30] = core::array::from_fn(|i| (i * 83 % 251) as u8);
+    let mut accepted = 0;
+    for (width, height, channels) in
+        (0..4u32).flat_map(|w| (0..4u32).flat_map(move |h| (0..5u8).map(move |c| (w, h, c))))
+    {
+        for (stride, length, bits) in
+            (0..12usize).flat_map(|s| (0..=data.len()).flat_map(move |n| [7, 8, 9].map(move |b| (s, n, b))))
+        {
+            let layout = Layout { width, height, stride, channels, bits };
+            let (w, h, c) = (width as usize, height as usize, usize::from(channels));
+            let data = &data[..length];
+            let fits = w > 0 && h > 0 && c > 0 && bits == 8 && stride >= w * c && length >= (h - 1) * stride + w * c;
+            let view = ImageView::from_bytes(data, layout, Channel::Mean);
+            assert_eq!(view.is_ok(), fits, "{layout:?}, {length} bytes");
+            let Ok(view) = view else { continue };
+            accepted += 1;
+            for (x, y) in (0..width as u16).flat_map(|x| (0..height as u16).map(move |y| (x, y))) {
+                let place = usize::from(y) * stride + usize::from(x) * c;
+                let pixel = &data[place..place + c];
+                // Grey and grey with transparency have one colour.
+                let colours = if c < 3 { &pixel[..1] } else { &pixel[..3] };
+                let mean = colours.iter().map(|&v| u16::from(v)).sum::<u16>() / colours.len() as u16;
+                assert_eq!(view.at(x, y), mean, "{layout:?} at ({x}, {y})");
+            }
+            // Beyond the end there is nothing, and no panic.
+            assert_eq!([0, 1, 1000].map(|k| view.read(length + k)), [0; 3]);
+        }
+    }
+    assert!(accepted > 1000, "{accepted} layouts were accepted");
+}

@@ -81,6 +81,38 @@ fn dark_noise_is_measured_on_any_background() {
     assert_eq!(of(1), 0.0, "nothing is below");
 }
 
+/// Tests Otsu's threshold against its definition, on all samples of six pixels from seven brightnesses.
+#[test]
+fn every_small_sample_has_the_threshold_of_the_definition() {
+    const VALUES: [u16; 7] = [0, 3, 4, 60, 61, 200, 255];
+    let mut found = 0;
+    for number in 0..7u32.pow(6) {
+        let sample: [u16; 6] = core::array::from_fn(|k| VALUES[(number / 7u32.pow(k as u32) % 7) as usize]);
+        if !sample.is_sorted() {
+            continue;
+        }
+        let mut histogram = Histogram { bins: [0; BINS], sum: 0, count: 0, shift: 0, first: 0 };
+        sample.iter().for_each(|&v| histogram.count(v));
+        let Some(level) = histogram.otsu::<f64>(255) else { continue };
+        found += 1;
+        // Variance between the pixels below a threshold and the others, times the square of the number of pixels.
+        let between = |level: f64| {
+            let dark: Vec<f64> = sample.iter().map(|&v| f64::from(v)).filter(|&v| v < level).collect();
+            let lit: Vec<f64> = sample.iter().map(|&v| f64::from(v)).filter(|&v| v >= level).collect();
+            let (n, m) = (dark.len() as f64, lit.len() as f64);
+            let difference = dark.iter().sum::<f64>() / n.max(1.0) - lit.iter().sum::<f64>() / m.max(1.0);
+            n * m * difference * difference
+        };
+        let best = (0..=256).map(|k| between(f64::from(k))).fold(0.0, f64::max);
+        assert!(between(level) >= best * (1.0 - 1e-12), "{sample:?}: {level}");
+        // It lies in the middle between the two classes.
+        let below = sample.iter().rfind(|&&v| f64::from(v) < level).unwrap();
+        let above = sample.iter().find(|&&v| f64::from(v) >= level).unwrap();
+        assert_eq!(level, f64::from(below + above + 1) / 2.0, "{sample:?}");
+    }
+    assert!(found > 800, "{found} samples have a threshold");
+}
+
 #[test]
 fn bins_widen_without_losing_a_pixel() {
     let mut histogram = Histogram { bins: [0; BINS], sum: 0, count: 0, shift: 0, first: 0 };
