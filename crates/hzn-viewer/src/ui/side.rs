@@ -81,7 +81,7 @@ fn answer(viewer: &mut Viewer, ui: &mut Ui) {
     }
     let Some(frame_view) = viewer.frame_view.clone() else { return };
     let shared = viewer.answer().cloned();
-    let answer = shared.as_ref();
+    let answer = shared.as_deref();
     let status = match (&frame_view.picture, answer) {
         (Err(_), _) => Some(Status::Unreadable),
         (_, Some(answer)) => Some(answer.row.status),

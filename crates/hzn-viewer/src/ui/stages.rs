@@ -151,7 +151,7 @@ fn bodies(viewer: &mut Viewer, ui: &mut Ui) {
 
 /// Draws a card: its header, the results of its stage, and the parameters, which unfold.
 fn show_card(viewer: &mut Viewer, ui: &mut Ui, card: &Card, outcome: Option<&Outcome>) {
-    let answer = outcome.and_then(|o| o.bodies.get(viewer.body).or(o.bodies.first()));
+    let answer = outcome.and_then(|o| o.bodies.get(viewer.body).or(o.bodies.first())).map(|shared| &**shared);
     let id = ui.make_persistent_id(("card", card.title));
     let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, card.open);
     let focus = viewer.focus_key.filter(|path| card.sections.contains(&path.split('.').next().unwrap_or_default()));

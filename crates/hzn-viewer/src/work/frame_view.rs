@@ -81,8 +81,8 @@ pub struct Shown {
 pub struct Outcome {
     /// The configuration.
     pub config: Arc<Config>,
-    /// Results of the bodies, in order.
-    pub bodies: Vec<BodyResult>,
+    /// Results of the bodies, in order. They are shared, because they hold thousands of points.
+    pub bodies: Vec<Arc<BodyResult>>,
     /// Reason why the picture was not processed, for example because it has another size.
     pub refused: Option<String>,
     /// Pixels that were read, white in a transparent picture; only on request.
@@ -319,12 +319,15 @@ pub fn process_frame(
     // The drawing takes the rotation rate into account, so every row is drawn where the sensor saw it.
     let camera = &sensor.camera().with_rate(input.data.and_then(|d| d.rate_rad_s));
     let each = bodies.iter().zip(finished.outcomes).zip(rows).zip(half_angles).zip(&watch.traces.each);
-    for ((((body, found), row), expected), trace) in each {
-        outcome.bodies.push(BodyResult::new(body.kind, found, row, expected.ok(), trace, camera));
-    }
+    let mut results: Vec<BodyResult> = each
+        .map(|((((body, found), row), expected), trace)| {
+            BodyResult::new(body.kind, found, row, expected.ok(), trace, camera)
+        })
+        .collect();
     if let Some(trials) = trials {
-        add_causes(&mut outcome, input, &view, camera, trials);
+        add_causes(&mut results, input, &view, camera, trials);
     }
+    outcome.bodies = results.into_iter().map(Arc::new).collect();
     if let Some(pixels) = watch.pixels {
         let pixels = pixels.into_inner();
         outcome.touched_pixels = Some(pixels.len());
@@ -335,15 +338,15 @@ pub fn process_frame(
 
 /// Adds the causes of refusals and what the fits say.
 fn add_causes(
-    outcome: &mut Outcome,
+    bodies: &mut [BodyResult],
     input: FrameInput<'_>,
     view: &ImageView<'_>,
     camera: &Camera<f64>,
     trials: &mut Trials,
 ) {
-    let refused = outcome.bodies.iter().any(|b| b.row.status != Status::Ok);
+    let refused = bodies.iter().any(|b| b.row.status != Status::Ok);
     let otsu = trials.try_otsu(view, input.data, refused).unwrap_or_default();
-    for (index, body) in outcome.bodies.iter_mut().enumerate() {
+    for (index, body) in bodies.iter_mut().enumerate() {
         let Ok(report) = &body.report else { continue };
         body.otsu = otsu.get(index).copied();
         let wrong_level = body.otsu.is_some_and(|o| o.answered);

@@ -46,6 +46,8 @@ fn with_any_cone(config: &Config) -> Config {
     config.reject.method = consensus::Method::Ransac;
     config.estimate.half_angle = fit::HalfAngle::Free;
     config.select.max_half_angle_sigma = 1e6;
+    // The first look finds the limb of most pictures. Further looks would cost several times as much.
+    config.recover.levels.clear();
     config
 }
 

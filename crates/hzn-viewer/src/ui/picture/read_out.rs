@@ -5,7 +5,7 @@ use hzn_core::pixel::ImagePoint;
 
 use crate::model::{Plane, quantity};
 use crate::ui::placement::Placement;
-use crate::work::frame_view::{BodyResult, FrameView, Outcome};
+use crate::work::frame_view::{FrameView, Outcome};
 use crate::work::paint;
 use crate::work::residuals::Residual;
 
@@ -60,7 +60,7 @@ pub(super) fn under_pointer(
         return Some(text + if placement.camera.is_some() { "   outside of the image circle" } else { "" });
     };
     text += &format!("   ray ({rx:.4}, {ry:.4}, {rz:.4})   {:.3}° off axis", rz.clamp(-1.0, 1.0).acos().to_degrees());
-    if let Some(s) = outcome.and_then(|o| o.bodies.get(body)).and_then(BodyResult::solution) {
+    if let Some(s) = outcome.and_then(|o| o.bodies.get(body)).and_then(|b| b.solution()) {
         let angle = quantity::angle_deg([rx, ry, rz], s.axis.xyz());
         let beyond = angle - s.fused_half_angle_rad.to_degrees();
         let side = if beyond > 0.0 { "outside of" } else { "inside" };

@@ -314,7 +314,7 @@ impl Viewer {
     }
 
     /// Returns the result for the selected body.
-    pub(super) fn answer(&self) -> Option<&BodyResult> {
+    pub(super) fn answer(&self) -> Option<&Arc<BodyResult>> {
         let outcome = self.frame_view.as_ref()?.answers.first()?;
         outcome.bodies.get(self.body).or(outcome.bodies.first())
     }
