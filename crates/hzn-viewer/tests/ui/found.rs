@@ -137,6 +137,19 @@ fn many_plots_keep_their_time_axis_within_the_window() {
 }
 
 #[test]
+fn the_panel_grows_for_a_new_plot() {
+    let (_dir, mut window) = window_on_flight();
+    window.state_mut().settings_mut().plotted.clear();
+    for name in ["3 sigma", "Points", "Half-angle", "Processing"] {
+        window.get_by_label(name).click();
+        window.run_steps(6);
+        let panel_top = window.get_by_label("3 sigma").rect().bottom();
+        let first = window.get_by_label("Plot 3 sigma").rect();
+        assert!(first.top() > panel_top, "the first plot is not scrolled away for {name}: {first:?}");
+    }
+}
+
+#[test]
 fn a_folder_without_times_has_no_invented_seconds() {
     let (_dir, mut window) = window_on_flight();
     assert!(window.state().sequence().entries.iter().all(|e| e.time_s.is_none()));

@@ -17,6 +17,8 @@ use over_time::TimeAxis;
 pub(super) use residuals::RESIDUALS;
 pub(super) use sheet::sheet;
 
+/// Height of the row of names above the plots, with the space around it.
+const CHOICE: f32 = 44.0;
 /// Height of the row of labels below the plots.
 const RULER: f32 = 24.0;
 /// Lowest height of a plot without its heading; more plots scroll.
@@ -29,7 +31,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let window = ui.ctx().content_rect().height();
     let most = (window * if window < 640.0 { 0.36 } else { 0.5 }).max(120.0);
     let height = viewer.settings.plots_height.min(most);
-    let panel = egui::Panel::bottom("plots").resizable(true).default_size(height).size_range(110.0..=most);
+    let panel = egui::Panel::bottom(("plots", viewer.plots_panel)).resizable(true).default_size(height).size_range(110.0..=most);
     let shown = panel.show(ui, |ui| {
         // The contents fill the whole panel. Otherwise the panel would shrink a little with every frame of the window.
         ui.expand_to_include_rect(ui.max_rect());
@@ -44,9 +46,19 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             // A plot that this sequence does not have stays chosen for others.
             viewer.settings.plotted.iter().filter(|name| offered.contains(&name.as_str())).cloned().collect()
         };
+        let is_new = viewer.new_plot.is_some();
         rows(viewer, ui, &chosen);
+        is_new.then_some(chosen.len())
     });
     viewer.settings.plots_height = shown.response.rect.height();
+    if let Some(count) = shown.inner {
+        // A panel of another name takes the size that it is given; this one would keep its own.
+        let needed = (CHOICE + count as f32 * (LEAST_PLOT + HEADING + 6.0) + RULER + 6.0).min(most);
+        if needed > viewer.settings.plots_height {
+            viewer.settings.plots_height = needed;
+            viewer.plots_panel += 1;
+        }
+    }
 }
 
 /// Draws the plots below each other. They share their time axis, whose labels are in the last row.
