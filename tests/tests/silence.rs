@@ -1,5 +1,5 @@
-//! Tests in QEMU that the flight image is heard from in every mode. `cargo xtask test firmware` builds the image and runs
-//! the tests.
+//! Tests in QEMU that the flight image is heard from in every mode. `cargo xtask test firmware` builds the image and
+//! runs the tests.
 
 use hzn_flight::Parameters;
 use hzn_sim::Samples;
@@ -16,8 +16,8 @@ fn commands(bench: &Bench, args: &[&str]) -> Vec<u8> {
     std::fs::read(bench.path("commands.bin")).unwrap()
 }
 
-/// Runs the image with a first command until it has sent a number of bytes, and returns the decoded events and the times
-/// of the housekeeping packets in seconds.
+/// Runs the image with a first command until it has sent a number of bytes, and returns the decoded events and the
+/// times of the housekeeping packets in seconds.
 fn run_with(bench: &Bench, first: &str, bytes: u64) -> (String, Vec<f64>) {
     let first = commands(bench, &[first]);
     // On a busy machine a command can arrive after the ten seconds of the image's clock for which `arm` counts.
@@ -63,8 +63,8 @@ fn every_mode_sends_a_packet_in_ten_seconds() {
     }
 }
 
-/// Tests a camera that sends twenty pictures and then dies, on a computer that starts in flight mode: the image says so within two periods of the
-/// camera, once, and its packets go on.
+/// Tests a camera that sends twenty pictures and then dies, on a computer that starts in flight mode: the image says so
+/// within two periods of the camera, once, and its packets go on.
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn a_dead_camera_is_told_within_two_periods() {

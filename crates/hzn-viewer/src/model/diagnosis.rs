@@ -115,8 +115,8 @@ pub fn summarise<'a>(facts: impl Iterator<Item = &'a FitFacts> + Clone) -> Vec<C
     all
 }
 
-/// Returns the median size of the difference in standard deviations, or `None` without pictures. Above 3 the half-angles
-/// disagree. The sign does not count: a wrong focal length makes it differ from picture to picture.
+/// Returns the median size of the difference in standard deviations, or `None` without pictures. Above 3 the
+/// half-angles disagree. The sign does not count: a wrong focal length makes it differ from picture to picture.
 pub fn typical_sigmas<'a>(facts: impl Iterator<Item = &'a FitFacts>) -> Option<f64> {
     median(&mut facts.map(|f| f.sigmas.abs()).filter(|s| s.is_finite()).collect::<Vec<_>>())
 }

@@ -376,9 +376,9 @@ fn free_limb(solution: &Solution<f64>, camera: &Camera<f64>) -> Vec<Vec<Point>> 
     overlay::limb::lines_with_steps(solution.axis.xyz(), solution.half_angle_rad, camera, CANDIDATE_STEPS)
 }
 
-/// Returns what the edge of the answer says, with its fit. Without an answer, `trial` returns an edge with a cone of any
-/// half-angle: the sensor's own fit uses only points near a limb with the expected half-angle, so that it misses most of
-/// the limb if the expected one is wrong. Its longest edge counts only if the trial finds nothing.
+/// Returns what the edge of the answer says, with its fit. Without an answer, `trial` returns an edge with a cone of
+/// any half-angle: the sensor's own fit uses only points near a limb with the expected half-angle, so that it misses
+/// most of the limb if the expected one is wrong. Its longest edge counts only if the trial finds nothing.
 pub(super) fn find_fit(
     edges: &[Edge],
     report: &Report<f64>,
