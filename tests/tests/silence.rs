@@ -16,14 +16,17 @@ fn commands(bench: &Bench, args: &[&str]) -> Vec<u8> {
     std::fs::read(bench.path("commands.bin")).unwrap()
 }
 
+/// The image has sent so many bytes when its start is over: a start takes received bytes with it.
+const STARTED_BYTES: u64 = 200;
+
 /// Runs the image with a first command until it has sent a number of bytes, and returns the decoded events and the
 /// times of the housekeeping packets in seconds.
 fn run_with(bench: &Bench, first: &str, bytes: u64) -> (String, Vec<f64>) {
-    let first = commands(bench, &[first]);
+    // On a busy machine the bytes of a command can arrive too slowly, so it is sent three times.
+    let first = commands(bench, &[first; 3]);
     // On a busy machine a command can arrive after the ten seconds of the image's clock for which `arm` counts.
     let end = commands(bench, &["arm", "mode shut-down"].repeat(40));
-    // The first part waits for the first byte of the image, because a start can take bytes with it.
-    assert_eq!(bench.run_in_parts(&[(1, &first), (bytes, &end)], SHIFT), 0);
+    assert_eq!(bench.run_in_parts(&[(STARTED_BYTES, &first), (bytes, &end)], SHIFT), 0);
     let args = ["telemetry", "sent.bin", "--force", "-o", "sent.csv", "--housekeeping", "hk.csv"];
     let printed = hzn_run(bench.dir(), &args);
     let housekeeping = std::fs::read_to_string(bench.path("hk.csv")).unwrap();
@@ -50,7 +53,7 @@ fn assert_heard(times_s: &[f64], what: &str) {
 #[ignore = "needs the images: cargo xtask firmware"]
 fn every_mode_sends_a_packet_in_ten_seconds() {
     for board in Board::ALL {
-        for (mode, is_silent) in [("standby", 0), ("flight", 1), ("safe", 0)] {
+        for (mode, is_silent) in [("standby", false), ("flight", true), ("safe", false)] {
             let bench = Bench::new(board);
             bench.write_frames(&[]);
             bench.write_parameter_copy(1, &rocket(640, 480, 1, 1).sensor, 1);
@@ -58,7 +61,7 @@ fn every_mode_sends_a_packet_in_ten_seconds() {
             assert_heard(&times_s, &format!("{} in {mode} mode", board.name()));
             assert!(mode == "standby" || printed.contains(&format!("standby to {mode}")), "{printed}");
             // The camera never sends a picture, which only flight mode expects.
-            assert_eq!(printed.matches("the camera sends no pictures").count(), is_silent, "{printed}");
+            assert_eq!(printed.contains("the camera sends no pictures"), is_silent, "{printed}");
         }
     }
 }
