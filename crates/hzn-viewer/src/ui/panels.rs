@@ -26,11 +26,13 @@ pub(super) struct Panels {
     answer: bool,
     plots: bool,
     stages: bool,
+    /// Number of times that the panel of the plots was made higher for a new plot.
+    pub(super) grown: u32,
 }
 
 impl Default for Panels {
     fn default() -> Self {
-        Self { size: Vec2::INFINITY, answer: false, plots: false, stages: false }
+        Self { size: Vec2::INFINITY, answer: false, plots: false, stages: false, grown: 0 }
     }
 }
 

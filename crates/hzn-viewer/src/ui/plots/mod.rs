@@ -31,7 +31,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let window = ui.ctx().content_rect().height();
     let most = (window * if window < 640.0 { 0.36 } else { 0.5 }).max(120.0);
     let height = viewer.settings.plots_height.min(most);
-    let panel = egui::Panel::bottom(("plots", viewer.plots_panel)).resizable(true);
+    let panel = egui::Panel::bottom(("plots", viewer.panels.grown)).resizable(true);
     let panel = panel.default_size(height).size_range(110.0..=most);
     let shown = panel.show(ui, |ui| {
         // The contents fill the whole panel. Otherwise the panel would shrink a little with every frame of the window.
@@ -57,7 +57,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         let needed = (CHOICE + count as f32 * (LEAST_PLOT + HEADING + 6.0) + RULER + 6.0).min(most);
         if needed > viewer.settings.plots_height {
             viewer.settings.plots_height = needed;
-            viewer.plots_panel += 1;
+            viewer.panels.grown += 1;
         }
     }
 }

@@ -94,8 +94,6 @@ pub struct Viewer {
     pub(super) focus_diagnosis: bool,
     /// Plot that was switched on last; the plots scroll to it.
     pub(super) new_plot: Option<String>,
-    /// Number of times that the panel of the plots was made higher for a new plot.
-    pub(super) plots_panel: u32,
     pub(super) panels: Panels,
     /// Picture under the pointer in the plots.
     pub(super) hovered_frame: Option<usize>,
@@ -168,7 +166,6 @@ impl Viewer {
             focus_key: None,
             focus_diagnosis: false,
             new_plot: None,
-            plots_panel: 0,
             panels: Panels::default(),
             hovered_frame: None,
             group: None,
