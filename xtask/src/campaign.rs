@@ -64,25 +64,25 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
 }
 
 /// Returns the call of a test that prints its figures. It is built as the gate builds it.
-fn test(package: &str, file: &str, name: &str) -> Command {
-    let mut command = cargo(&["test", "--package", package, "--test", file]);
+fn test(file: &str, name: &str) -> Command {
+    let mut command = cargo(&["test", "--test", file]);
     command.args(["--", "--nocapture", "--include-ignored", name]);
     command
 }
 
 fn kill(runs: u64) -> Outcome {
-    steps::run(test("hzn-cli", "campaign", "killed_at_random_moments").env("HZN_KILLS", runs.to_string()))
+    steps::run(test("campaign", "killed_at_random_moments").env("HZN_KILLS", runs.to_string()))
 }
 
 fn long(pictures: u64) -> Outcome {
-    steps::run(test("hzn-core", "long", "the_answers_repeat").env("HZN_FRAMES", (10 * pictures).to_string()))?;
-    steps::run(test("hzn-cli", "campaign", "a_long_run").env("HZN_PICTURES", pictures.to_string()))
+    steps::run(test("long", "the_answers_repeat").env("HZN_FRAMES", (10 * pictures).to_string()))?;
+    steps::run(test("campaign", "a_long_run").env("HZN_PICTURES", pictures.to_string()))
 }
 
 fn flips(trials: u64) -> Outcome {
     let trials = trials.to_string();
-    steps::run(test("hzn-flight", "flight", "flips::").env("HZN_FLIPS", &trials))?;
-    steps::run(&mut test("hzn-twice", "flips", "every_flipped_bit_is_seen"))
+    steps::run(test("flight", "flips::").env("HZN_FLIPS", &trials))?;
+    steps::run(&mut test("flips", "every_flipped_bit_is_seen"))
 }
 
 /// Sends telecommands with mixed damage to the flight software. A library of others writes them, in Python.
