@@ -45,15 +45,20 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         if let Some(otsu) = answer.otsu.filter(|_| refused) {
             threshold_cause(viewer, ui, &answer, otsu);
         }
+        let wrong_level = answer.otsu.is_some_and(|o| o.answered);
         match answer.fit.filter(|_| differs) {
             // In the other frames the values of now are right.
             Some(fit) if fits >= ENOUGH && !conspicuous(typical) => wrapped(ui, &only_here(&fit)),
             Some(fit) => half_angle_causes(viewer, ui, &fit),
+            None if answer.fit.is_none() && !wrong_level && fits >= ENOUGH && !conspicuous(typical) => {
+                let what = "No edge here fits a limb, and in most other frames the limb is as expected. The body is \
+                            probably out of view, or hidden.";
+                wrapped(ui, what);
+            }
             None => {}
         }
         let tips = answer.report.as_ref().map(hzn_run::explain::tips).unwrap_or_default();
         // General advice follows from the edges, and those of a wrong threshold are not the limb.
-        let wrong_level = answer.otsu.is_some_and(|o| o.answered);
         if !differs && !wrong_level {
             tips.iter().for_each(|tip| links::tip(viewer, ui, tip));
         } else if !tips.is_empty() && !wrong_level {

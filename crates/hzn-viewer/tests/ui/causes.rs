@@ -106,4 +106,9 @@ fn a_single_frame_with_another_disc_is_not_blamed_on_the_sensor() {
     let words = "so this edge is probably not the limb";
     assert!(window.query_all_by_label_contains(words).next().is_some());
     assert!(window.query_by_label("Apply altitude").is_none());
+    // The fourth picture is dark.
+    window.state_mut().go(3);
+    settled(&mut window);
+    window.run_steps(3);
+    assert!(window.query_all_by_label_contains("probably out of view, or hidden").next().is_some());
 }
