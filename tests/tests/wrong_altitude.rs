@@ -1,5 +1,5 @@
-//! What a wrong altitude does to the answers. With a sigma that covers the error, no answer is far beyond its sigma. The
-//! test prints the table of the case for trusting hzn.
+//! What a wrong altitude does to the answers. With a sigma that covers the error, no answer is far beyond its sigma.
+//! The test prints the figures of the case for trusting hzn.
 
 use hzn_core::body;
 use hzn_core::status::Status;
