@@ -16,7 +16,7 @@ fn commands(bench: &Bench, args: &[&str]) -> Vec<u8> {
     std::fs::read(bench.path("commands.bin")).unwrap()
 }
 
-/// The image has sent so many bytes when its start is over: a start takes received bytes with it.
+/// Number of bytes that the image has sent when its start is over. Commands that it receives earlier can be lost.
 const STARTED_BYTES: u64 = 200;
 
 /// Runs the image with a first command until it has sent a number of bytes, and returns the decoded events and the
