@@ -25,6 +25,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign long [PICTURES]
        cargo xtask campaign flips [TRIALS]
        cargo xtask campaign packets [COUNT]
+       cargo xtask campaign pictures [FLIGHTS]
        cargo xtask campaign paths
        cargo xtask campaign processors [PICTURES]
        cargo xtask campaign parts [FOLDER]
@@ -36,6 +37,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   flips flips TRIALS (20000) bits of pictures and of stored parameters, sticks as many pictures, and flips every bit
         of a sensor in memory
   packets sends COUNT (1000000) telecommands to the flight software, most of them damaged
+  pictures
+        renders FLIGHTS (30) flights of three kinds with a program in Python, and counts hzn's errors against sigma
   paths builds the images of the flight computer and the wheel in another folder; their bytes must be the same
   processors
         compares the answers to PICTURES (2000) on aarch64 and big-endian powerpc64, in QEMU, with those of this machine
@@ -55,6 +58,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("long") => long(number(100_000)?).map_err(Trouble::into_message),
         Some("flips") => flips(number(20_000)?).map_err(Trouble::into_message),
         Some("packets") => packets(number(1_000_000)?).map_err(Trouble::into_message),
+        Some("pictures") => pictures(number(30)?).map_err(Trouble::into_message),
         Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
         Some("paths") => paths().map_err(Trouble::into_message),
         Some("parts") => parts(args.get(1).map_or("target/sbom", String::as_str)).map_err(Trouble::into_message),
@@ -95,6 +99,21 @@ pub(crate) fn packets(count: u64) -> Outcome {
     // The same call as that of all tests, so that nothing is built again.
     let mut command = cargo(&["test", "--test", "flight"]);
     steps::run(command.args(["--", "--nocapture", "--ignored", "damage::"]).env("HZN_PACKETS", file))
+}
+
+/// Renders flights with a program that shares no code with hzn, and compares the answers with its truth.
+fn pictures(flights: u64) -> Outcome {
+    steps::run(&mut cargo(&["build", "--release", "--bin", "hzn"]))?;
+    let mut campaign = limb_campaign(&target().join("release/hzn"))?;
+    steps::run(campaign.args(["--list", "--flights", &flights.to_string()]))
+}
+
+/// Returns the call of the campaign on pictures of another program.
+pub(crate) fn limb_campaign(hzn: &Path) -> Result<Command, Trouble> {
+    let python = python::prepare_environment("benches", Path::new("benches/requirements.txt"))?;
+    let mut campaign = Command::new(python);
+    campaign.arg("tests/python/limb_campaign.py").arg("--hzn").arg(hzn);
+    Ok(campaign)
 }
 
 /// Clones this repository into a folder with another name, builds the images and the wheel there, and compares them.

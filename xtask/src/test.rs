@@ -34,6 +34,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("viewer", |_| viewer::test());
     all.step("lenses against OpenCV", |_| compare_lenses_with_opencv());
     all.step("simulator rendered again", |_| compare_simulator_with_python());
+    all.step("limbs of another program", |_| check_limbs_of_another_program());
     all.step("files read by others", |_| read_files_with_other_readers());
     all.step("wheel", |_| {
         build_tests()?;
@@ -77,6 +78,13 @@ fn run_core_examples() -> Outcome {
 /// Compares a simulated picture with one that NumPy and OpenCV compute from the documented model.
 fn compare_simulator_with_python() -> Outcome {
     compare_in_python("check_simulator.py", "debug/hzn", "simulator")
+}
+
+/// Processes a few flights that a program in Python renders. `cargo xtask campaign pictures` takes many.
+fn check_limbs_of_another_program() -> Outcome {
+    build_tests()?;
+    let mut campaign = campaign::limb_campaign(&target().join("debug/hzn"))?;
+    steps::run(campaign.args(["--check", "--list", "--flights", "2", "--first-seed", "1"]))
 }
 
 /// Runs a script of tests/python. Its arguments are one of our programs and a folder that the script makes.

@@ -26,5 +26,6 @@
 #define HZN_VERDICT_SUN 21
 #define HZN_VERDICT_RATE 22
 #define HZN_VERDICT_GLOW 23
+#define HZN_VERDICT_FAINT 24
 
 #endif

@@ -1,7 +1,7 @@
 //! Glow gate: airglow and aurora are layers of light high above the limb, and their edge has the form of a limb. Air
 //! fades within a few scale heights above the limb, so light that reaches higher is a glow.
 
-use super::places::{MAX_PLACES, Place, Places};
+use super::places::{MAX_PLACES, Places, mean_brightness};
 use crate::base::median;
 use crate::base::real::Real;
 use crate::image::Pixels;
@@ -31,34 +31,6 @@ fn dark_angle<T: Real>(sin: T, c: T, expected: &Expected<T>) -> Option<T> {
     // An angle is a height divided by the distance (R + d) cot α of the limb.
     let by_height = sin / (c.max(T::from_f64(1e-6)) * (expected.radius_m + expected.limb_m));
     (expected.scale_height_m > T::ZERO).then_some(height_m * by_height)
-}
-
-/// Returns the mean brightness of nine pixels at this distance inwards of a place, in pixels; `None` outside of the
-/// region. One pixel would be too noisy.
-fn mean_brightness<T: Real, P: Pixels, O: Observer<T>>(
-    place: &Place<T>,
-    inwards_px: T,
-    binary: &BinaryPicture<'_, T, P, O>,
-) -> Option<u16> {
-    let half = T::from_f64(0.5);
-    let [x, y] = place.inwards_by(inwards_px).map(|at| at + half);
-    if !(x >= T::one() && y >= T::one()) {
-        return None;
-    }
-    let (x, y) = (u16::try_from(x.to_i32()).ok()?, u16::try_from(y.to_i32()).ok()?);
-    let (right, below) = (x.checked_add(1)?, y.checked_add(1)?);
-    // The second pixel of the margin is for the rounding at the image circle.
-    let free = !binary.region.has_mask() && binary.region.is_inside_by(x, y, 2);
-    let mut sum = 0;
-    for v in [y - 1, y, below] {
-        for u in [x - 1, x, right] {
-            if !free && (!binary.region.contains(u, v) || binary.masked(u, v)) {
-                return None;
-            }
-            sum += u32::from(binary.brightness(u, v));
-        }
-    }
-    u16::try_from(sum / 9).ok()
 }
 
 /// Returns whether a limb of cosine `c` may belong to a glow: if the light above it, above the sky farther out, is

@@ -5,6 +5,7 @@ mod band;
 mod circle;
 mod config;
 mod departure;
+mod faint;
 mod glow;
 mod half_angle;
 mod places;
@@ -145,6 +146,9 @@ fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     let disc_px = disc_px(expected, camera);
     let wide = disc_px > T::from_i32(camera.width().min(camera.height()).into());
     let looks = !P::STREAMED && config.max_band < 1.0 && wide;
+    if !P::STREAMED && faint::is_faint(places, binary, disc_px) {
+        return Verdict::Faint;
+    }
     let step = T::from_f64(config.band_step);
     if looks && band::banded(places, binary, &sky, disc_px, step) >= T::from_f64(config.max_band) {
         return Verdict::Band;

@@ -54,6 +54,34 @@ pub(super) fn along_limb<T: Real>(e: &V3<T>, blocks: &[Block<T>], count: u32, ca
     places
 }
 
+/// Returns the mean brightness of nine pixels at this distance inwards of a place, in pixels; `None` outside of the
+/// region. One pixel would be too noisy.
+pub(super) fn mean_brightness<T: Real, P: Pixels, O: Observer<T>>(
+    place: &Place<T>,
+    inwards_px: T,
+    binary: &BinaryPicture<'_, T, P, O>,
+) -> Option<u16> {
+    let half = T::from_f64(0.5);
+    let [x, y] = place.inwards_by(inwards_px).map(|at| at + half);
+    if !(x >= T::one() && y >= T::one()) {
+        return None;
+    }
+    let (x, y) = (u16::try_from(x.to_i32()).ok()?, u16::try_from(y.to_i32()).ok()?);
+    let (right, below) = (x.checked_add(1)?, y.checked_add(1)?);
+    // The second pixel of the margin is for the rounding at the image circle.
+    let free = !binary.region.has_mask() && binary.region.is_inside_by(x, y, 2);
+    let mut sum = 0;
+    for v in [y - 1, y, below] {
+        for u in [x - 1, x, right] {
+            if !free && (!binary.region.contains(u, v) || binary.masked(u, v)) {
+                return None;
+            }
+            sum += u32::from(binary.brightness(u, v));
+        }
+    }
+    u16::try_from(sum / 9).ok()
+}
+
 /// Distance from the limb at which the brightness on both sides is read for the threshold of the next picture, in
 /// pixels.
 const PLATEAU_PX: i32 = 6;
