@@ -3,8 +3,9 @@
     python limb_campaign.py --hzn target/release/hzn --flights 30 --first-seed 2000
 
 The sensor has default settings. It gets the camera, whose calibration has errors of the given sizes, and the position.
-A second sensor also gets the direction to the Sun, and has body.sunlit = true. With --check the program exits with 1 if an
-answer by day is beyond 5 sigma, or if fewer than nine of ten limbs by day are answered.
+Others also get an attitude with errors of 5 degrees, the direction to the Sun with body.sunlit = true, or both. With
+--check the program exits with 1 if an answer by day is beyond 5 sigma, or if fewer than nine of ten limbs by day are
+answered.
 """
 
 import argparse
@@ -26,16 +27,23 @@ PICTURES = 8
 LEAST_LIMB_PX = 50
 # Chi-square of two degrees of freedom, with the probabilities of 3 and 5 sigma of one degree.
 BEYOND_3, BEYOND_5 = 11.83, 28.74
-SENSORS = ("default", "with the Sun")
+# What each sensor gets: columns of frames.csv, and lines at the end of its sensor.toml.
+POSITION, SUN = ["file", "x_km", "y_km", "z_km"], ["sun_x", "sun_y", "sun_z"]
+ATTITUDE = ["qw", "qx", "qy", "qz", "attitude_sigma_deg"]
+SENSORS = {
+    "default": (POSITION, ""),
+    "with an attitude": (POSITION + ATTITUDE, ""),
+    "with the Sun": (POSITION + SUN, "sunlit = true\n"),
+    "with both": (POSITION + ATTITUDE + SUN, "sunlit = true\n"),
+}
 
 
 def answers(hzn, folder, sensor):
     """Runs hzn on a flight. Returns the rows of its results."""
-    text = (folder / "sensor.toml").read_text()
-    (folder / "used.toml").write_text(text + "sunlit = true\n" if sensor == "with the Sun" else text)
+    columns, lines = SENSORS[sensor]
+    (folder / "used.toml").write_text((folder / "sensor.toml").read_text() + lines)
     with (folder / "frames.csv").open() as file:
         rows = list(csv.DictReader(file))
-    columns = [name for name in rows[0] if sensor == "with the Sun" or not name.startswith("sun_")]
     with (folder / "used.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, columns, extrasaction="ignore")
         writer.writeheader()

@@ -32,6 +32,7 @@ VERTICAL_DEPTH = np.array([0.06, 0.11, 0.24])
 # Sine of the Sun's elevation at which half of the light is left, and the width of the step.
 TERMINATOR, TWILIGHT = -0.03, 0.035
 SUN_RADIUS_RAD = 0.0047
+ATTITUDE_SIGMA_DEG = 5.0
 
 # Sun's elevation below the camera in degrees, and exposure: 1 makes white clouds about as bright as full scale.
 CLASSES = {
@@ -257,6 +258,24 @@ class Camera:
         return total
 
 
+def quaternion_wxyz(rotation):
+    """Returns the quaternion of a rotation matrix: the eigenvector of the largest eigenvalue (Bar-Itzhack 2000)."""
+    r = rotation
+    k = np.array([
+        [r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
+        [r[2, 1] - r[1, 2], r[0, 0] - r[1, 1] - r[2, 2], r[1, 0] + r[0, 1], r[0, 2] + r[2, 0]],
+        [r[0, 2] - r[2, 0], r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], r[2, 1] + r[1, 2]],
+        [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[2, 1] + r[1, 2], r[2, 2] - r[0, 0] - r[1, 1]],
+    ])
+    return np.linalg.eigh(k)[1][:, 3]
+
+
+def turned(rng, rotation, sigma_deg):
+    """Returns the rotation with a random error about each axis of the camera."""
+    error = np.radians(sigma_deg) * rng.normal(size=3)
+    return rotation @ cv2.Rodrigues(error)[0]
+
+
 def draw_camera(rng, exposure):
     return Camera(
         lens=draw_lens(rng),
@@ -297,12 +316,14 @@ def sensor_toml(rng, lens, focal_sigma_percent=0.3, centre_sigma_px=1.0):
 
 
 def render_flight(folder, seed, kind, pictures):
-    """Writes pictures, frames.csv (positions, directions to the Sun) and sensor.toml. Returns the truth per picture.
+    """Writes pictures, frames.csv and sensor.toml. Returns the truth per picture.
+
+    frames.csv has positions, directions to the Sun, and attitudes with random errors of ATTITUDE_SIGMA_DEG per axis.
 
     The truth is the limb axis in the camera, and the number of limb pixels that sunlight reaches.
     """
     elevations_deg, exposures = CLASSES[kind]
-    rng = np.random.default_rng([list(CLASSES).index(kind), seed])
+    rng, errors = (np.random.default_rng([list(CLASSES).index(kind), seed, *more]) for more in ([], [1]))
     folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     camera, world = draw_camera(rng, exposures), draw_world(rng)
@@ -310,7 +331,7 @@ def render_flight(folder, seed, kind, pictures):
     altitude_km = math.exp(rng.uniform(math.log(70), math.log(900)))
     about = unit(rng.normal(size=3))
     sun_elevation, sun_azimuth = math.radians(rng.uniform(*elevations_deg)), rng.uniform(0, 2 * math.pi)
-    rows, truth = ["file,x_km,y_km,z_km,sun_x,sun_y,sun_z"], {}
+    rows, truth = ["file,x_km,y_km,z_km,sun_x,sun_y,sun_z,qw,qx,qy,qz,attitude_sigma_deg"], {}
     for index in range(pictures):
         position_km = draw_position(rng, about, altitude_km)
         up = unit(position_km)
@@ -331,7 +352,8 @@ def render_flight(folder, seed, kind, pictures):
         limb = seen & ~inside & beside
         limb[[0, -1]] = limb[:, [0, -1]] = False
         truth[name] = (rotation.T @ limb_axis(position_km), int((limb & (sunlight > 0.5)).sum()))
-        numbers = [*position_km, *(rotation.T @ sun)]
+        attitude = quaternion_wxyz(turned(errors, rotation, ATTITUDE_SIGMA_DEG))
+        numbers = [*position_km, *(rotation.T @ sun), *attitude, ATTITUDE_SIGMA_DEG]
         rows.append(",".join([name, *(f"{n:.9f}" for n in numbers)]))
     (folder / "frames.csv").write_text("\n".join(rows) + "\n")
     (folder / "sensor.toml").write_text(sensor_toml(rng, camera.lens))

@@ -412,8 +412,9 @@ class Body(TypedDict, total=False):
     """Limb height by latitude instead of ``limb_height_km``: rows of [geodetic latitude in degrees, height in km],
     with rising latitudes. Values: up to 16 rows, for ``earth``."""
     sunlit: bool | None
-    """Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun. Values: true or
-    false. Default: true for all but ``earth``, ``earth-sphere`` and ``sun``."""
+    """Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun. In visible
+    light, true is better: near the terminator the light fades, and the edge is too low there. Values: true or false.
+    Default: true for all but ``earth``, ``earth-sphere`` and ``sun``."""
     binarize: Binarize | None
     """Threshold for this body, as a table with the keys of ``[binarize]``. Values: the keys of ``[binarize]``.
     Default: ``[binarize]``; ``fixed`` at 0.9 for a ``sun`` among several bodies."""

@@ -108,7 +108,8 @@ section! {
         /// beyond the first and last row. Without an attitude, the variation along the limb widens the covariance.
         @- limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES> = heapless::Vec::new(),
             ["up to 16 rows, for `earth`"] { unset: "none", example: "[[-90, 20.5], [0, 25.0], [90, 29.5]]" };
-        /// Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun.
+        /// Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun. In visible
+        /// light, true is better: near the terminator the light fades, and the edge is too low there.
         @- sunlit: Option<bool> = None, ["true or false"]
             { unset: "true for all but `earth`, `earth-sphere` and `sun`", example: "true" };
         /// Threshold for this body, as a table with the keys of `[binarize]`.
