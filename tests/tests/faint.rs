@@ -1,5 +1,5 @@
-//! Light that fades slowly has a contour line at each threshold, and it may have the exact form of the limb. Only a step of
-//! the brightness is a limb.
+//! Light that fades slowly has a contour line at each threshold, and it may have the exact form of the limb. Only a
+//! step of the brightness is a limb.
 
 use hzn_core::camera::{Config as Camera, Model};
 use hzn_core::image::{Channel, ImageView, Layout};

@@ -52,8 +52,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
             "behind the edge there is a narrow band and then the sky again, not the body (select.max_band)".into()
         }
         Verdict::Faint => {
-            "the brightness hardly changes across the edge: it is no limb but a contour line of light that fades slowly"
-                .into()
+            "the brightness hardly changes across the edge: the light fades slowly, as in twilight".into()
         }
         Verdict::Glow => "light reaches high above the edge: it is airglow or aurora (select.max_glow)".into(),
         Verdict::Attitude => format!(

@@ -141,16 +141,19 @@ fn judge_surroundings<T: Real, P: Pixels, O: Observer<T>>(
     if sun::unlit(&fused.e, fused.c, blocks, expected, config.min_sun_elevation_deg) > T::from_f64(config.max_unlit) {
         return Verdict::Sun;
     }
-    // Of a picture that came row by row, only lit and dark pixels are left, and a terminator is as steep as an edge. A
-    // disc that is whole in the picture may be a crescent, which is a band, too.
+    // Of a picture that came row by row, only lit and dark pixels are left, and a terminator is as steep as an edge.
+    // Where bands are allowed, the inside of the limb may be as dark as the sky.
+    if P::STREAMED || config.max_band >= 1.0 {
+        return Verdict::Passed;
+    }
     let disc_px = disc_px(expected, camera);
-    let wide = disc_px > T::from_i32(camera.width().min(camera.height()).into());
-    let looks = !P::STREAMED && config.max_band < 1.0 && wide;
-    if !P::STREAMED && faint::is_faint(places, binary, disc_px) {
+    if faint::is_faint(places, binary, disc_px) {
         return Verdict::Faint;
     }
+    // A disc that is whole in the picture may be a crescent, which is a band, too.
+    let wide = disc_px > T::from_i32(camera.width().min(camera.height()).into());
     let step = T::from_f64(config.band_step);
-    if looks && band::banded(places, binary, &sky, disc_px, step) >= T::from_f64(config.max_band) {
+    if wide && band::banded(places, binary, &sky, disc_px, step) >= T::from_f64(config.max_band) {
         return Verdict::Band;
     }
     Verdict::Passed
