@@ -51,9 +51,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Band => {
             "behind the edge there is a narrow band and then the sky again, not the body (select.max_band)".into()
         }
-        Verdict::Faint => {
-            "the brightness hardly changes across the edge: the light fades slowly, as in twilight".into()
-        }
+        Verdict::Faint => "the brightness hardly changes across the edge, as in twilight".into(),
         Verdict::Glow => "light reaches high above the edge: it is airglow or aurora (select.max_glow)".into(),
         Verdict::Attitude => format!(
             "the axis is more than {} sigma from the given attitude (select.max_attitude_sigma)",
