@@ -1,4 +1,4 @@
-"""Renders pictures of the Earth's limb. This program shares no code and no model with hzn and its simulator.
+"""Renders pictures of the Earth's limb. This program shares no code with hzn and its simulator.
 
 A flight has one camera. Its lens, exposure, noise, tone curve and file format are drawn at random, and so are the
 altitude, the clouds, the Sun and the attitude of each picture. The Earth is the WGS-84 ellipsoid. Each pixel has one line of
