@@ -405,3 +405,47 @@ fn pictures_go_by_one_clock() {
     let rows = without_time(&place.run(&["run", "in", "--fps", "4"]).expect(3).out);
     assert_eq!(rows.iter().map(|r| cell(r, "time_s")).collect::<Vec<_>>(), ["", "86401.0", ""]);
 }
+
+/// Runs a command and returns the largest resident memory that was seen, in kB.
+#[cfg(target_os = "linux")]
+fn peak_memory_kb(command: &mut std::process::Command) -> u64 {
+    let mut child = command.stdout(std::process::Stdio::null()).spawn().unwrap();
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = 0;
+    loop {
+        // The kernel keeps the largest value, so a look now and then sees it.
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let kb = |line: &str| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse().ok();
+        peak = peak.max(text.lines().find_map(kb).unwrap_or(0));
+        if let Some(status) = child.try_wait().unwrap() {
+            assert!(status.success(), "{status}");
+            return peak;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_compressed_colour_profile_takes_no_memory() {
+    let place = Place::with_pictures(1);
+    let mut bomb = Vec::new();
+    let mut encoder = image::codecs::png::PngEncoder::new(&mut bomb);
+    encoder.set_icc_profile(vec![0; 256 << 20]).unwrap();
+    encoder.write_image(&limb(320, 240, 0.0), 320, 240, image::ExtendedColorType::L8).unwrap();
+    assert!(bomb.len() < 1 << 20, "{}", bomb.len());
+    for i in 1..16 {
+        place.write(&format!("in/{i:04}.png"), &bomb);
+    }
+    let peak = peak_memory_kb(&mut place.command(&["run", "in", "--jobs", "8", "-o", "out.csv"]));
+    assert!(peak > 0 && peak < 200_000, "{peak} kB");
+    let rows = without_time(&place.read("out.csv"));
+    assert_eq!(rows.len(), 16);
+    // The profile has no influence on the answer, and takes no memory in a command that asks for another picture.
+    assert_eq!(
+        ["axis_x", "axis_y", "axis_z"].map(|c| cell(&rows[1], c)),
+        ["axis_x", "axis_y", "axis_z"].map(|c| cell(&rows[0], c))
+    );
+    let peak = peak_memory_kb(&mut place.command(&["explain", "in/0000.png"]));
+    assert!(peak > 0 && peak < 200_000, "{peak} kB");
+}

@@ -5,10 +5,11 @@ use std::path::Path;
 
 use hzn_core::image::Layout;
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageFormat};
 
 use super::paths::open_file;
 use super::picture::{Picture, Samples};
+use super::picture_reader::picture_reader;
 use super::{exif, pages};
 
 /// Longest side of a picture that is read, in pixels.
@@ -52,7 +53,7 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
 /// # Errors
 /// The reason why it cannot be decoded, for the picture's result.
 pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, String> {
-    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+    let mut reader = picture_reader(Cursor::new(bytes)).map_err(|e| e.to_string())?;
     let mut limits = image::Limits::no_limits();
     limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);

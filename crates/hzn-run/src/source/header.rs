@@ -1,24 +1,23 @@
 //! Facts from the header of a picture file, without its pixels.
 
-use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
+use image::ImageDecoder;
 use image::metadata::Orientation;
-use image::{ImageDecoder, ImageReader};
 
 use super::exif;
 use super::paths::open_file;
+use super::picture_reader::picture_reader;
 
 /// Returns the decoder of a picture file, which has read only the header. `None` if it cannot be read.
 fn open(path: &Path) -> Option<impl ImageDecoder + use<>> {
-    let reader: ImageReader<BufReader<File>> = ImageReader::new(BufReader::new(open_file(path).ok()?));
-    reader.with_guessed_format().ok()?.into_decoder().ok()
+    picture_reader(open_file(path).ok()?).ok()?.into_decoder().ok()
 }
 
 /// Returns width and height in pixels from the header of a picture file.
 pub(super) fn read_size(path: &Path) -> Option<(u32, u32)> {
-    read_size_from(BufReader::new(open_file(path).ok()?))
+    read_size_from(open_file(path).ok()?)
 }
 
 /// Returns the time of exposure, if the camera wrote it into the file. `None` if the header cannot be read.
@@ -39,8 +38,8 @@ pub(super) fn read_orientation(path: &Path) -> Option<Orientation> {
 }
 
 /// Returns whether the samples are words, from the header.
-pub(super) fn has_words(contents: impl std::io::Read + std::io::Seek) -> bool {
-    let reader = ImageReader::new(BufReader::new(contents)).with_guessed_format();
+pub(super) fn has_words(contents: impl Read + Seek) -> bool {
+    let reader = picture_reader(contents);
     reader.ok().and_then(|reader| reader.into_decoder().ok()).is_some_and(|decoder| {
         let color = decoder.color_type();
         color.bytes_per_pixel() > color.channel_count()
@@ -57,6 +56,6 @@ pub(super) fn has_white_value(path: &Path) -> bool {
 }
 
 /// Returns width and height as [`read_size`] does, from the file's contents.
-pub(super) fn read_size_from(contents: impl std::io::BufRead + std::io::Seek) -> Option<(u32, u32)> {
-    ImageReader::new(contents).with_guessed_format().ok()?.into_dimensions().ok()
+pub(super) fn read_size_from(contents: impl Read + Seek) -> Option<(u32, u32)> {
+    picture_reader(contents).ok()?.into_dimensions().ok()
 }

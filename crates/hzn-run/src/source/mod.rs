@@ -15,6 +15,7 @@ mod pages;
 mod paths;
 mod payload;
 pub mod picture;
+mod picture_reader;
 pub mod raw;
 mod recording;
 mod rerun;
