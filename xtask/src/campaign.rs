@@ -68,19 +68,19 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
 }
 
 /// Returns the call of a test that prints its figures. It is built as the gate builds it.
-fn test(file: &str, name: &str) -> Command {
-    let mut command = cargo(&["test", "--test", file]);
+fn test(binary: &str, name: &str) -> Command {
+    let mut command = cargo(&["test", "--test", binary]);
     command.args(["--", "--nocapture", "--include-ignored", name]);
     command
 }
 
 fn kill(runs: u64) -> Outcome {
-    steps::run(test("campaign", "killed_at_random_moments").env("HZN_KILLS", runs.to_string()))
+    steps::run(test("cli", "campaign::killed_at_random_moments").env("HZN_KILLS", runs.to_string()))
 }
 
 fn long(pictures: u64) -> Outcome {
-    steps::run(test("long", "the_answers_repeat").env("HZN_FRAMES", (10 * pictures).to_string()))?;
-    steps::run(test("campaign", "a_long_run").env("HZN_PICTURES", pictures.to_string()))
+    steps::run(test("core", "long::the_answers_repeat").env("HZN_FRAMES", (10 * pictures).to_string()))?;
+    steps::run(test("cli", "campaign::a_long_run").env("HZN_PICTURES", pictures.to_string()))
 }
 
 fn flips(trials: u64) -> Outcome {

@@ -96,9 +96,8 @@ pub(crate) fn test(steps: &mut Steps) -> Outcome {
     build_tests()?;
     steps::run(Command::new(target().join("debug/examples/stack_bound")).arg(vendor_port))?;
     // Without a package's name nothing is built again with other features.
-    let names = ["firmware", "line_cost", "navigation", "recovery", "silence"];
-    let tests: Vec<&str> = names.iter().flat_map(|name| ["--test", name]).collect();
-    steps.cargo_test(&[&tests[..], &["--", "--ignored"]].concat())?;
+    let files = ["firmware::", "line_cost::", "navigation::", "recovery::", "silence::"];
+    steps.cargo_test(&[&["--test", "chain", "--", "--ignored"], &files[..]].concat())?;
     steps::run(Command::new(target().join("debug/examples/firmware_cost")).args(["--check", COSTS]))?;
     check_c_interface()
 }

@@ -1,7 +1,7 @@
 //! Prints a checksum of every number in the answers to many pictures, so that processors can be compared:
 //! `cargo run --release -p hzn-core --example digest -- 2000`
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/core/common/mod.rs"]
 mod common;
 
 use common::{KINDS, garbage};

@@ -1,0 +1,103 @@
+//! `hzn evaluate` on a few pictures whose truth is known by construction.
+
+use crate::common::{Place, SENSOR};
+
+const HEADER: &str = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,moon_x,\
+                      moon_y,moon_z,qw,qx,qy,qz\n";
+
+/// Returns a folder with the results and the truth of six pictures; the last picture is black.
+fn place() -> Place {
+    let place = Place::with_pictures(5);
+    image::GrayImage::new(320, 240).save(place.path("in/black.png")).unwrap();
+    let mut truth = HEADER.to_owned();
+    let mut row = |file: &str, time: usize, limb: u8, shift: f64| {
+        let (sin, cos) = (68.0 + 0.05 * shift).to_radians().sin_cos();
+        truth.push_str(&format!("{file},{time},earth-sphere,{limb},0,{sin},{cos},70.38,400,,,,,,,1,0,0,0\n"));
+    };
+    (0..5).for_each(|i| row(&format!("{i:04}.png"), i, 1, i as f64));
+    row("black.png", 5, 0, 0.0);
+    place.write("in/truth.csv", truth.as_bytes());
+    place.run(&["run", "in", "-o", "out.mcap", "-q"]).expect(0);
+    place.run(&["export", "out.mcap", "-o", "out.csv"]).expect(0);
+    place
+}
+
+#[test]
+fn a_run_against_its_truth_as_text_json_and_page() {
+    let place = place();
+    let args = ["evaluate", "out.mcap", "--truth", "in/truth.csv", "-o", "r.json", "-o", "r.html"];
+    let ran = place.run(&args).expect(0);
+    for text in ["answered           5 of 5 pictures", "false answers      0 of 1 pictures", "HORACE criteria"] {
+        assert!(ran.out.contains(text), "{text} in {}", ran.out);
+    }
+    // The folder of the truth is sufficient, and a table gives the same report as the recording.
+    let again = place.run(&["evaluate", "out.csv", "--truth", "in"]).expect(0);
+    assert_eq!(again.out, ran.out);
+
+    let json: serde_json::Value = serde_json::from_str(&place.read("r.json")).unwrap();
+    let e = &json["evaluations"][0];
+    assert_eq!((e["with_limb"].as_u64(), e["answered"].as_u64()), (Some(5), Some(5)));
+    let rms = e["errors"]["rms_deg"].as_f64().unwrap();
+    assert!(rms > 0.0 && rms < 0.2, "{rms}");
+    assert_eq!(json["frames"].as_array().unwrap().len(), 6);
+
+    let page = place.read("r.html");
+    assert!(page.matches("<svg").count() >= 4 && page.contains("data:image/jpeg;base64,"));
+    // The page loads nothing from elsewhere.
+    assert!(!page.contains("src=\"http") && !page.contains("href") && !page.contains("@import"));
+    place.run(&args).expect(2).says("r.json: exists already; --force replaces it");
+}
+
+#[test]
+fn missed_and_false_answers_are_the_worst_frames() {
+    let place = place();
+    let truth = place.read("in/truth.csv");
+    let lies = truth
+        .replace("0001.png,1,earth-sphere,1", "0001.png,1,earth-sphere,0")
+        .replace("black.png,5,earth-sphere,0", "black.png,5,earth-sphere,1");
+    place.write("lies.csv", lies.as_bytes());
+    let out = place
+        .run(&["evaluate", "out.csv", "--truth", "lies.csv", "--worst", "2", "-s", "in/sensor.toml"])
+        .expect(0)
+        .out;
+    assert!(out.contains("answered           4 of 5") && out.contains("false answers      1 of 1"), "{out}");
+    let worst: Vec<&str> = out.lines().skip_while(|l| !l.starts_with("worst")).skip(1).collect();
+    assert!(worst[0].contains("0001.png") && worst[0].contains("answered without a limb in view"), "{out}");
+    assert!(worst[1].contains("black.png") && worst[1].contains("not answered: no-limb"), "{out}");
+    assert_eq!(worst.len(), 2);
+}
+
+#[test]
+fn what_does_not_fit_is_named() {
+    let place = place();
+    let truth = place.read("in/truth.csv");
+    let against = |text: &str| {
+        place.write("t.csv", text.as_bytes());
+        place.run(&["evaluate", "out.csv", "--truth", "t.csv"]).expect(2)
+    };
+    against(&truth.replace("0003.png", "0009.png"))
+        .says("t.csv does not match out.csv: 0003.png (earth-sphere) is among the results but has no row in the truth");
+    against(&format!("{truth}more.png,6,earth-sphere,1,0,0,1,70,400,,,,,,,1,0,0,0\n"))
+        .says("more.png (earth-sphere) has a row in the truth but none among the results");
+    against(&truth.replace("earth-sphere", "moon")).says("the results are about earth-sphere, the truth about moon");
+    against(&truth.replace("70.38", "wide")).says("t.csv:2: half_angle_deg: invalid float literal");
+    against(&truth.replace("axis_y", "axis")).says("t.csv:1: axis_y: this column is missing");
+    against(HEADER).says("t.csv: has no rows");
+    place.run(&["evaluate", "out.csv", "--truth", "nowhere.csv"]).expect(2).says("nowhere.csv: no such file");
+    place.run(&["evaluate", "nothing.csv", "--truth", "in"]).expect(2).says("nothing.csv: no such file");
+    place.run(&["evaluate", "in/0000.png", "--truth", "in"]).expect(2).says("results of `hzn run` are expected");
+    place.run(&["evaluate", "out.csv", "--truth", "in", "-o", "r.pdf"]).expect(2).says("ends in .json or .html");
+}
+
+#[test]
+fn other_times_and_a_missing_sensor_are_reported() {
+    let place = place();
+    let truth = place.read("in/truth.csv").replace("0002.png,2,", "0002.png,2.5,");
+    place.write("t.csv", truth.as_bytes());
+    let ran = place.run(&["evaluate", "out.csv", "--truth", "t.csv"]).expect(0);
+    assert!(!ran.out.contains("limb in view [px]"), "{}", ran.out);
+    ran.says("warning: 0002.png: at 2 s in the results, at 2.5 s in the truth")
+        .says("note: no sensor.toml is available");
+    place.write("bad.toml", SENSOR.replace("pinhole", "pinhol").as_bytes());
+    place.run(&["evaluate", "out.csv", "--truth", "t.csv", "-s", "bad.toml"]).expect(2).says("did you mean pinhole");
+}

@@ -1,0 +1,91 @@
+//! Gates that need more than the picture: the last answer, an attitude, the Sun.
+
+use crate::common::{Place, SENSOR, cell, limb, without_time};
+
+/// Returns a folder with three pictures; the middle one is turned by ten degrees.
+fn turned() -> Place {
+    let place = Place::new();
+    for (i, shift) in [0.0, 200.0, 4.0].into_iter().enumerate() {
+        limb(320, 240, shift).save(place.path(&format!("in/{i:04}.png"))).unwrap();
+    }
+    place
+}
+
+fn statuses(text: &str) -> Vec<(String, String)> {
+    let of = |row: &Vec<(String, String)>| (cell(row, "status").to_owned(), cell(row, "detail").to_owned());
+    without_time(text).iter().map(of).collect()
+}
+
+#[test]
+fn an_answer_farther_than_the_vehicle_can_turn_is_refused() {
+    let place = turned();
+    let all = place.run(&["run", "in"]).expect(0);
+    assert!(statuses(&all.out).iter().all(|(status, _)| status == "ok"), "{}", all.out);
+    place.write("in/sensor.toml", format!("{SENSOR}\n[select]\nmax_rate_deg_s = 1.0\n").as_bytes());
+    let slow = statuses(&place.run(&["run", "in"]).expect(0).out);
+    assert_eq!([&slow[0].0, &slow[1].0, &slow[2].0], ["ok", "rejected", "ok"], "{slow:?}");
+    assert!(slow[1].1.contains("rate"), "{slow:?}");
+    // With ten times the time between pictures, the vehicle can turn by ten degrees.
+    let slow = statuses(&place.run(&["run", "in", "--fps", "0.1"]).expect(0).out);
+    assert!(slow.iter().all(|(status, _)| status == "ok"), "{slow:?}");
+}
+
+/// A continued run uses the last answer of the run that was interrupted.
+#[test]
+fn resume_goes_on_from_the_last_answer() {
+    let place = turned();
+    place.write("in/sensor.toml", format!("{SENSOR}\n[select]\nmax_rate_deg_s = 1.0\n").as_bytes());
+    for ending in ["csv", "jsonl"] {
+        let (whole, part) = (format!("whole.{ending}"), format!("part.{ending}"));
+        place.run(&["run", "in", "-o", &whole]).expect(0);
+        let text = place.read(&whole);
+        let kept = if ending == "csv" { 2 } else { 1 };
+        let begun: String = text.split_inclusive('\n').take(kept).collect();
+        place.write(&format!("{part}.part"), begun.as_bytes());
+        place.run(&["run", "in", "-o", &part, "--resume"]).expect(0).says("after 1 that were finished before");
+        let plain = |text: &str| -> Vec<String> {
+            text.lines().map(|l| l.split("elapsed_us").next().unwrap_or_default().to_owned()).collect()
+        };
+        if ending == "csv" {
+            assert_eq!(without_time(&place.read(&part)), without_time(&text));
+        } else {
+            assert_eq!(plain(&place.read(&part)), plain(&text));
+        }
+    }
+}
+
+/// The attitude and the position put the Earth elsewhere; the Sun makes it night there.
+#[test]
+fn a_given_attitude_and_a_given_sun_are_gates() {
+    let place = Place::with_pictures(1);
+    let frames = |attitude: &str, sun: &str| {
+        let head = "file,x_km,y_km,z_km,qw,qx,qy,qz,attitude_sigma_deg,sun_x,sun_y,sun_z\n";
+        place.write("in/frames.csv", format!("{head}0000.png,6771.0088,0,0,{attitude},{sun}\n").as_bytes());
+        statuses(&place.run(&["run", "in"]).expect(0).out).remove(0)
+    };
+    // The camera looks along its own +z, and the body's centre is 68 degrees below: (0, sin 68, cos 68) in the camera
+    // frame. The attitude takes this direction to −x of ECEF. `more_deg` turns the camera about its x axis.
+    let to_ecef = |more_deg: f64| {
+        // These are the columns of the rotation: x to x', y to y', z to z', with (0, sin, cos) to (−1, 0, 0).
+        let (s, c) = (68.0f64 + more_deg).to_radians().sin_cos();
+        let m = quaternion_of([[0.0, -s, -c], [1.0, 0.0, 0.0], [0.0, -c, s]]);
+        format!("{},{},{},{},1", m[0], m[1], m[2], m[3])
+    };
+    let noon = "0,-0.9,-0.4358898943540674";
+    assert_eq!(frames(&to_ecef(0.0), noon).0, "ok");
+    let (status, why) = frames(&to_ecef(20.0), noon);
+    assert!(status == "rejected" && why.contains("attitude"), "{status}: {why}");
+    let (status, why) = frames(&to_ecef(0.0), "0,0.9,0.4358898943540674");
+    assert!(status == "rejected" && why.contains("sun"), "{status}: {why}");
+    // A camera that sees thermal radiation does not need the Sun.
+    place.write("in/sensor.toml", SENSOR.replace("[body]\n", "[body]\nsunlit = false\n").as_bytes());
+    assert_eq!(frames(&to_ecef(0.0), "0,0.9,0.4358898943540674").0, "ok");
+}
+
+/// Returns the quaternion, scalar first, of a rotation matrix given by rows.
+fn quaternion_of(m: [[f64; 3]; 3]) -> [f64; 4] {
+    let trace = m[0][0] + m[1][1] + m[2][2];
+    let w = (1.0 + trace).max(0.0).sqrt() / 2.0;
+    let axis = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]].map(|v| v / (4.0 * w));
+    [w, axis[0], axis[1], axis[2]]
+}

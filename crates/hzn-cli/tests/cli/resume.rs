@@ -1,0 +1,152 @@
+//! Tests of runs that end early, on a full disk or by a signal, and of their continuation.
+
+use crate::common::{Place, without_time};
+use std::time::{Duration, Instant};
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_reported() {
+    let place = Place::with_pictures(3);
+    // /dev/full replaces the unfinished file: every write to it reports a full disk.
+    std::os::unix::fs::symlink("/dev/full", place.path("a.csv.part")).unwrap();
+    place.run(&["run", "in", "-o", "a.csv", "--force"]).expect(1).says("the disk is full");
+    std::os::unix::fs::symlink("/dev/full", place.path("a.mcap.part")).unwrap();
+    place.run(&["run", "in", "-o", "a.mcap", "--force"]).expect(1).says("no space is left").says("resume the run");
+    std::os::unix::fs::symlink("/dev/full", place.path("o.png")).unwrap();
+    place.run(&["explain", "in/0000.png", "--overlay", "o.png", "--force"]).expect(1).says("the disk is full");
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = place.command(&["run", "in"]).stdout(full).output().unwrap();
+    crate::common::Ran::from_output(&output, &place.path("")).expect(1).says("cannot be written to stdout");
+}
+
+/// A limit on the file size simulates a disk that fills up during a run.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_that_fills_up_keeps_what_is_finished() {
+    let place = Place::with_pictures(600);
+    place.run(&["run", "in", "-o", "whole.csv", "-q"]).expect(0);
+    let whole = without_time(&place.read("whole.csv"));
+    for (out, blocks) in [("a.csv", 60), ("a.jsonl", 120), ("a.mcap", 800)] {
+        let limited = format!("ulimit -f {blocks}; exec \"$0\" run in -o {out}");
+        let hzn = place.command(&[]);
+        let mut shell = std::process::Command::new("bash");
+        shell.args(["-c", &limited]).arg(hzn.get_program()).current_dir(place.path(""));
+        crate::common::Ran::from_output(&shell.output().unwrap(), &place.path(""))
+            .expect(1)
+            .says("ulimit -f")
+            .says("resume the run to");
+        assert!(!place.path(out).exists());
+        let info = place.run(&["info", &format!("{out}.part")]).expect(0).out;
+        assert!(!info.contains("pictures         0"), "{out}: {info}");
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("that were finished before");
+        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
+        assert_eq!(without_time(&place.read("rows.csv")), whole, "{out}");
+    }
+}
+
+/// Starts a run of many pictures, waits until some are finished, and ends it with the signal `end`.
+#[cfg(unix)]
+fn end_early(place: &Place, out: &str, end: &str) -> Option<i32> {
+    let mut child =
+        place.command(&["run", "in", "-o", out, "-j", "1"]).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let part = place.path(&format!("{out}.part"));
+    let begin = Instant::now();
+    // The file is larger than the part before the first picture.
+    let grown = |part: &std::path::Path| std::fs::metadata(part).is_ok_and(|m| m.len() > 100_000);
+    while !grown(&part) && begin.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    if out.ends_with(".mcap") {
+        // Pictures precede their results in a recording; the pause lets the results follow.
+        std::thread::sleep(Duration::from_millis(60));
+    }
+    let id = child.id().to_string();
+    std::process::Command::new("kill").args([end, &id]).status().unwrap();
+    child.wait().unwrap().code()
+}
+
+#[cfg(unix)]
+#[test]
+fn killed_and_continued_gives_the_same() {
+    let place = Place::with_pictures(2000);
+    place.run(&["run", "in", "-o", "whole.csv", "-q"]).expect(0);
+    let whole = without_time(&place.read("whole.csv"));
+    for out in ["a.csv", "a.jsonl", "a.mcap"] {
+        let code = end_early(&place, out, "-9");
+        assert_eq!(code, None, "{out}: ended before it was killed");
+        assert!(!place.path(out).exists());
+        place.run(&["run", "in", "-o", out]).expect(2).says("--resume");
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("that were finished before");
+        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
+        assert_eq!(without_time(&place.read("rows.csv")), whole, "{out}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn recover_closes_what_a_crash_left() {
+    let place = Place::with_pictures(2000);
+    for out in ["a.csv", "a.mcap"] {
+        end_early(&place, out, "-9");
+        // The end of the last write is cut off.
+        let part = place.path(&format!("{out}.part"));
+        let file = std::fs::OpenOptions::new().write(true).open(&part).unwrap();
+        file.set_len(std::fs::metadata(&part).unwrap().len() - 3).unwrap();
+        let ran =
+            place.run(&["recover", &format!("{out}.part")]).expect(0).says(" bytes of unfinished pictures dropped");
+        let kept = ran.err.split_whitespace().nth(1).unwrap().to_owned();
+        place.run(&["export", out, "-o", "kept.csv", "--force"]).expect(0).says(&format!("{kept} rows"));
+        place.run(&["info", out]).expect(0);
+        assert!(!place.path(&format!("{out}.part")).exists());
+        // The recovered file can be continued.
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
+        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0).says("2000 rows");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn interrupted_leaves_a_valid_file() {
+    let place = Place::with_pictures(2000);
+    for out in ["a.csv", "a.mcap"] {
+        assert_eq!(end_early(&place, out, "-INT"), Some(130), "{out}");
+        assert!(place.path(out).exists());
+        place.run(&["info", out]).expect(0);
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
+        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0).says("2000 rows");
+    }
+}
+
+#[test]
+fn another_input_is_not_appended() {
+    let place = Place::with_pictures(4);
+    place.run(&["run", "in/0000.png", "in/0002.png", "-o", "a.csv"]).expect(0);
+    let before = place.read("a.csv");
+    let err = place.run(&["run", "in", "-o", "a.csv", "--resume"]).expect(2).err;
+    insta::assert_snapshot!(err, @"error: a.csv: its last picture is 0002.png, but the input has 0001.png in this place; \
+                                   give the input that it was begun with, or start over with --force");
+    let err = place.run(&["run", "in/0000.png", "-o", "a.csv", "--resume"]).expect(2).err;
+    insta::assert_snapshot!(err, @"error: a.csv: contains 2 pictures, but the input has only 1; give the input that it was \
+                                   begun with, or start over with --force");
+    assert_eq!(place.read("a.csv"), before);
+}
+
+#[test]
+fn another_sensor_is_not_appended() {
+    let place = Place::with_pictures(4);
+    for out in ["a.csv", "a.jsonl", "a.mcap"] {
+        place.run(&["run", "in/0000.png", "in/0001.png", "-o", out]).expect(0);
+        let before = std::fs::read(place.path(out)).unwrap();
+        place
+            .run(&["run", "in", "-o", out, "--resume", "--altitude-km", "410"])
+            .expect(2)
+            // A recording contains its sensor.
+            .says(if out == "a.mcap" { "was begun with another sensor.toml" } else { "now gives another result" });
+        assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
+        place.write("other.toml", format!("{}[reject]\nseed = 2\n", crate::common::SENSOR).as_bytes());
+        let ran = place.run(&["run", "in", "-o", out, "--resume", "-s", "other.toml"]);
+        assert!(ran.code == 2 && ran.err.contains("--force"), "{out}: {}", ran.err);
+        assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("2 pictures: 2 ok");
+    }
+}

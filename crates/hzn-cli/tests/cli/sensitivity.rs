@@ -1,0 +1,181 @@
+//! Tests of `hzn sensitivity`: tables, plots, and messages about impossible designs.
+
+use crate::common::{Place, cell, rows};
+
+#[test]
+fn a_sweep_as_text_table_and_plot() {
+    let place = Place::new();
+    let sweep = [
+        "sensitivity",
+        "--fov",
+        "66:130:16",
+        "--altitude",
+        "200",
+        "--limb-height",
+        "0",
+        "--limb-height-sigma",
+        "0.5",
+        "-o",
+        "s.csv",
+        "-o",
+        "s.svg",
+    ];
+    let ran = place.run(&sweep).expect(0);
+    assert_eq!(ran.out.lines().count(), 6);
+    assert!(ran.err.contains("smallest pitch, fused:"), "{}", ran.err);
+    let table = rows(&place.read("s.csv"));
+    let number = |row: usize, name: &str| cell(&table[row], name).parse::<f64>().unwrap();
+    // The reference values of Braun & Barf 33 at 98 degrees, 3 sigma, are 0.5400 in pitch and 0.1248 in roll; 0.0998
+    // with α known.
+    assert_eq!(cell(&table[2], "fov_deg"), "98");
+    for (name, expected) in
+        [("pitch_braun_barf_33_deg", 0.54), ("roll_braun_barf_33_deg", 0.1248), ("pitch_known_deg", 0.0998)]
+    {
+        assert!((3.0 * number(2, name) / expected - 1.0).abs() < 0.02, "{name} {}", number(2, name));
+    }
+    let svg = place.read("s.svg");
+    assert!(svg.starts_with("<svg") && svg.contains("field of view [deg]") && svg.contains("pitch, fused"));
+    place.run(&sweep).expect(2).says("s.csv: exists already; --force replaces it");
+}
+
+#[test]
+fn several_quantities_are_combined() {
+    let place = Place::new();
+    let args = ["sensitivity", "--fov", "60,90", "--altitude", "100:300:100", "--body", "earth,moon", "--rows", "540"];
+    let out = place.run(&args).expect(0).out;
+    assert_eq!(out.lines().count(), 1 + 2 * 3 * 2, "{out}");
+    let lens =
+        ["sensitivity", "--lens", "equidistant", "--fov", "180", "--altitude", "600", "--depression", "30:90:30"];
+    assert_eq!(place.run(&lens).expect(0).out.lines().count(), 4);
+}
+
+#[test]
+fn a_sensor_file_brings_camera_body_and_noise() {
+    let place = Place::new();
+    let own = place.run(&["sensitivity", "-s", "in/sensor.toml", "--depression", "20"]).expect(0);
+    let line = own.out.lines().nth(1).unwrap();
+    // The file has 400 km above a sphere with the limb at 17 km.
+    assert!(line.trim_start().starts_with("400") && line.contains("70.64"), "{}", own.out);
+    place.run(&["sensitivity", "-s", "in/sensor.toml", "--fov", "60"]).expect(2).says("cannot be used with");
+    // If the sensor has several bodies, one must be named.
+    let bodies = "[[bodies]]\nkind = \"sun\"\n[[bodies]]\nkind = \"moon\"\n";
+    let sensor = place.read("in/sensor.toml");
+    let (before, after) = sensor.split_once("[body]").unwrap();
+    let rest = after.split_once("\n[").map_or(String::new(), |(_, rest)| format!("[{rest}"));
+    place.write("several.toml", format!("{before}{rest}\n{bodies}").as_bytes());
+    let several = ["sensitivity", "-s", "several.toml", "--altitude", "384400", "--depression", "90"];
+    place.run(&several).expect(2).says("looks for several bodies (sun, moon); name one with --body");
+    place.run(&[&several[..], &["--body", "moon"]].concat()).expect(0);
+}
+
+/// Runs the commands of book/guide/evaluation.md, with a sensor from `hzn simulate`: its altitude is in frames.csv.
+#[test]
+fn the_examples_of_the_docs_run() {
+    let place = Place::new();
+    place.write("sensor.toml", crate::common::SENSOR.replace("altitude_km = 400.0\n", "").as_bytes());
+    let docs = include_str!("../../../../book/guide/evaluation.md");
+    let examples: Vec<&str> = docs.lines().filter(|l| l.starts_with("hzn sensitivity")).collect();
+    assert!(examples.len() >= 5, "{examples:?}");
+    for example in examples {
+        let words: Vec<&str> = example.split('#').next().unwrap().split_whitespace().skip(1).collect();
+        let ran = place.run(&words);
+        assert_eq!(ran.code, 0, "{example}: {}", ran.err);
+    }
+    assert!(place.path("plot.svg").exists() && place.path("table.csv").exists());
+}
+
+#[test]
+fn charts_of_visibility_and_of_the_spherical_earth() {
+    let place = Place::new();
+    let args = ["sensitivity", "visibility", "--altitude", "238", "--limb-height", "0", "-o", "v.csv"];
+    place.run(&args).expect(0);
+    let table = rows(&place.read("v.csv"));
+    let from: f64 = cell(&table[0], "ellipse_from_deg").parse().unwrap();
+    assert!((from - 118.3).abs() < 0.1);
+    place.run(&["sensitivity", "visibility", "-o", "v.svg"]).expect(0);
+    assert!(place.read("v.svg").contains("arc of a hyperbola"));
+    place.run(&["sensitivity", "spherical-earth", "--altitude", "240", "-o", "e.csv", "-o", "e.svg"]).expect(0);
+    let table = rows(&place.read("e.csv"));
+    let middle = table.iter().find(|r| cell(r, "latitude_deg") == "45").unwrap();
+    let angle: f64 = cell(middle, "geocentric_to_axis_deg").parse().unwrap();
+    assert!((angle - 0.1787).abs() < 1e-3);
+}
+
+#[test]
+fn designs_that_cannot_be_are_refused_with_a_reason() {
+    let place = Place::new();
+    let refused = |args: &[&str], why: &str| {
+        place.run(&[&["sensitivity"], args].concat()).expect(2).says(why);
+    };
+    refused(&[], "--altitude: missing; give it in kilometres");
+    refused(&["--altitude", "5"], "the camera at 5 km is not above the limb at 10 km");
+    refused(&["--altitude", "high"], "\"high\" is not a number");
+    refused(&["--altitude", "200", "--fov", "150:60"], "from the lower to the higher");
+    refused(
+        &["--altitude", "200", "--fov", "190"],
+        "--fov: 190 is refused: must be above 0 and up to 175 for this lens",
+    );
+    refused(&["--altitude", "200", "--size", "1920"], "expected WIDTHxHEIGHT");
+    refused(&["--altitude", "200", "--rows", "0.5"], "--rows: 0.5 is refused");
+    refused(
+        &["--altitude", "200", "--body", "vulcan"],
+        "\"vulcan\" is not a body; expected earth, moon, sun, a planet such as jupiter, or a radius in kilometres",
+    );
+    refused(&["--altitude", "200", "--sigma-px", "0"], "--sigma-px: 0 is refused");
+    refused(&["--altitude", "200", "-o", "x.pdf"], "a table ends in .csv, a plot in .svg");
+    refused(&["--altitude", "200", "-o", "x.svg"], "there is no range to plot over");
+    refused(&["visibility", "--altitude", "5"], "5 km is not above the limb at 10 km");
+    // No limb in view is a valid result, with advice.
+    let ran = place.run(&["sensitivity", "--altitude", "3000", "--fov", "30"]).expect(0);
+    assert!(ran.out.lines().nth(1).unwrap().ends_with('-'), "{}", ran.out);
+    ran.says(
+        "1 of 1 designs see no limb, or too little of it: at 3000 km the limb is 47.1 deg below the horizontal; \
+         --depression 47",
+    );
+}
+
+/// The bounds of math.md, 13.8: the whole disc at 600 km and the second harmonic of the limb height at latitude 30.
+#[test]
+fn the_third_axis_of_a_flattened_body() {
+    let place = Place::new();
+    let yaw = |more: &[&str]| {
+        let fixed = ["sensitivity", "yaw", "--lens", "equidistant", "--depression", "90", "--sigma-px", "0.05"];
+        let ran = place.run(&[&fixed, more].concat()).expect(0);
+        ran.out
+    };
+    let table = [
+        "--fov",
+        "150",
+        "--size",
+        "1000x1000",
+        "--altitude",
+        "600",
+        "--latitude",
+        "0,30,60",
+        "--second-harmonic",
+        "0.1",
+        "-o",
+        "yaw.csv",
+        "-o",
+        "yaw.svg",
+    ];
+    assert_eq!(yaw(&table).lines().count(), 4);
+    let table = rows(&place.read("yaw.csv"));
+    let by_height: f64 = cell(&table[1], "yaw_by_height_deg").parse().unwrap();
+    assert!((by_height / 2.2 - 1.0).abs() < 0.1, "{by_height}");
+    assert!(place.read("yaw.svg").contains("by limb height"));
+    // The limb of a planet is known as well as its own sigma says: 80 km of 4638 km of flattening.
+    yaw(&["--body", "jupiter", "--fov", "2", "--altitude", "5.8e6", "-o", "jupiter.csv"]);
+    let table = rows(&place.read("jupiter.csv"));
+    let by_height: f64 = cell(&table[0], "yaw_by_height_deg").parse().unwrap();
+    assert!((by_height / 0.99 - 1.0).abs() < 0.05, "{by_height}");
+    // A sphere has no third axis, and a note says so.
+    let ran =
+        place.run(&["sensitivity", "yaw", "--body", "1737.4", "--altitude", "100", "--depression", "20"]).expect(0);
+    assert!(ran.err.contains("1 of 1 designs do not determine the rotation"), "{}", ran.err);
+    place.run(&["sensitivity", "yaw", "--altitude", "600", "--latitude", "91"]).expect(2).says("--latitude: 91");
+    place
+        .run(&["sensitivity", "yaw", "--altitude", "600", "--second-harmonic=-1"])
+        .expect(2)
+        .says("--second-harmonic: -1 is refused");
+}

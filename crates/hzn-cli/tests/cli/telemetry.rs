@@ -1,0 +1,171 @@
+//! `hzn telemetry`: the packets of pictures become the rows of `hzn run`.
+
+use crate::common::{Place, Ran};
+use hzn_core::image::{Grey, Layout};
+use hzn_core::{FlightHorizon, Prior};
+use hzn_flight::answer::PictureAnswer;
+use hzn_flight::bytes::Writer;
+use hzn_flight::cuc::Cuc;
+use hzn_flight::messages::{Acknowledge, Code, Event, EventRecord, Exposure, Function, Severity};
+use hzn_flight::packet::{self, Apid, ApidBase};
+use image::{GrayImage, Luma};
+
+/// A stream of telemetry.
+#[derive(Default)]
+struct Stream {
+    bytes: Vec<u8>,
+    sequences: [u16; 16],
+}
+
+impl Stream {
+    fn add(&mut self, apid: Apid, time: Option<Cuc>, user: impl FnOnce(&mut Writer<'_>)) {
+        let count = &mut self.sequences[apid as usize & 15];
+        let mut out = [0; packet::MAX_BYTES];
+        let n = packet::write(&mut out, ApidBase::DEFAULT, apid, *count, time, user).unwrap();
+        *count += 1;
+        self.bytes.extend(&out[..n]);
+    }
+
+    fn add_picture(&mut self, time: Cuc, exposure: &Exposure, answer: &PictureAnswer) {
+        let with_picture = |w: &mut Writer<'_>| w.u32(exposure.picture);
+        self.add(Apid::Position, Some(time), |w| {
+            with_picture(w);
+            answer.position.unwrap().write(w);
+        });
+        for edge in answer.edges.iter().flatten() {
+            self.add(Apid::Candidate, Some(time), |w| {
+                with_picture(w);
+                edge.write(w);
+            });
+        }
+        self.add(Apid::Science, Some(time), |w| {
+            exposure.write(w);
+            answer.write_science(w);
+        });
+    }
+}
+
+/// Returns a folder with the picture of a disc, whose position may be wanted, and the answer of the flight computer.
+fn disc(position: bool) -> (Place, PictureAnswer) {
+    let place = Place::new();
+    let body = "kind = \"sphere\"\nradius_km = 1000.0\nlimb_height_km = 0.0\naltitude_km = 2863.7033";
+    let sensor = crate::common::SENSOR.replace("kind = \"earth-sphere\"\naltitude_km = 400.0", body);
+    place.write("in/sensor.toml", format!("{sensor}\n[estimate]\nposition = {position}\n").as_bytes());
+    let picture = GrayImage::from_fn(320, 240, |x, y| {
+        let (u, v) = ((f64::from(x) - 159.5) / 300.0, (f64::from(y) - 119.5) / 300.0);
+        let cos = (0.05 * u + 0.08 * v + 1.0) / ((1.0 + u * u + v * v) * (1.0 + 0.0025 + 0.0064)).sqrt();
+        let inside_px = 300.0 * (15f64.to_radians() - cos.min(1.0).acos());
+        Luma([(20.0 + 180.0 * (0.5 + inside_px / 2.0).clamp(0.0, 1.0)) as u8])
+    });
+    picture.save(place.path("in/disc.png")).unwrap();
+    let config = hzn_calib::sensor::load(&place.path("in/sensor.toml")).unwrap().config;
+    let mut horizon = Box::new(FlightHorizon::new(&config).unwrap());
+    let grey = Grey::try_new(picture.as_raw(), Layout::packed(320, 240, 1, 8)).unwrap();
+    let expected = horizon.expect(&Prior::default()).unwrap();
+    (place, PictureAnswer::from_report(&horizon.process(&grey, &expected)))
+}
+
+fn exposure(picture: u32) -> Exposure {
+    let exposure_us = u64::from(picture) * 1_000_000;
+    Exposure {
+        picture,
+        exposure_us,
+        done_us: exposure_us + 2000,
+        calculation_us: 1500,
+        body: 4,
+        altitude_m: 2_863_703.2,
+    }
+}
+
+/// Returns the cells of the first row by their names, without those that name the picture and its times.
+fn cells(place: &Place, file: &str) -> Vec<(String, String)> {
+    let text = std::fs::read_to_string(place.path(file)).unwrap();
+    let mut lines = text.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let (columns, row) = (lines.next().unwrap(), lines.next().unwrap());
+    let other = ["index", "file", "time_s", "elapsed_us", "altitude_km", "crc32"];
+    columns.into_iter().zip(row).filter(|(c, _)| !other.contains(&c.as_str())).collect()
+}
+
+#[test]
+fn rows_have_every_column_of_a_run() {
+    let cases = [
+        (true, &["position_x_km", "position_z_km", "pos_cov_xx_km2", "pos_cov_zz_km2"]),
+        (false, &["axis_free_x", "cov_free_zz", "axis_by_cos_x", "axis_by_cos_z"]),
+    ];
+    for (position, columns) in cases {
+        let (place, answer) = disc(position);
+        let mut stream = Stream::default();
+        stream.add_picture(Cuc::since_start(1_000_000), &exposure(1), &answer);
+        place.write("sent.bin", &stream.bytes);
+        place.run(&["telemetry", "sent.bin", "-o", "sent.csv"]).expect(0);
+        place.run(&["run", "in", "--flight", "-o", "here.csv"]).expect(0);
+        let (sent, here) = (cells(&place, "sent.csv"), cells(&place, "here.csv"));
+        assert_eq!(sent, here);
+        // A stream from another program gives the same rows.
+        let mut piped = place.command(&["telemetry", "-", "-o", "piped.csv"]);
+        let output = piped.stdin(std::fs::File::open(place.path("sent.bin")).unwrap()).output().unwrap();
+        Ran::from_output(&output, &place.path("")).expect(0);
+        assert_eq!(place.read("piped.csv"), place.read("sent.csv"));
+        for column in columns {
+            let value = &sent.iter().find(|(c, _)| c == column).unwrap().1;
+            assert!(value.parse::<f64>().is_ok_and(|x| x != 0.0), "{column}: {value:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_missing_refused_or_of_another_version_is_told() {
+    let (place, answer) = disc(true);
+    let mut stream = Stream::default();
+    // The times are those of a clock that was correlated: 2017-01-01T00:00:00 is this second of TAI.
+    let time = Cuc::tai((21_550 * 86_400 + 37) * 1_000_000);
+    stream.add(Apid::Event, Some(time), |w| {
+        let (number, severity) = (Event::ClockSet as u16, Severity::Information as u8);
+        EventRecord { number, severity, a: 21_550 * 86_400 + 37, b: 12 }.write(w);
+    });
+    stream.add(Apid::Acknowledge, Some(time), |w| {
+        let (function, code) = (Function::Navigate as u8, Code::Missing as u8);
+        Acknowledge { function, sequence: 9, code, detail: 5 }.write(w);
+    });
+    stream.add(Apid::Acknowledge, Some(time), |w| {
+        let (function, code) = (Function::SetParameters as u8, Code::Refused as u8);
+        Acknowledge { function, sequence: 10, code, detail: 81 }.write(w);
+    });
+    stream.add(Apid::Science, Some(time), |w| {
+        exposure(3).write(w);
+        answer.write_science(w);
+    });
+    // The first version had microseconds in place of the time code.
+    let mut old = Stream::default();
+    old.add(Apid::Housekeeping, None, |w| w.bytes(&[0; 40]));
+    stream.bytes.extend(old.bytes);
+    place.write("sent.bin", &stream.bytes);
+    let ran = place.run(&["telemetry", "sent.bin", "-o", "sent.csv"]).expect(0);
+    for text in [
+        "2017-01-01T00:00:00.000Z  clock correlated with 2017-01-01T00:00:00.000Z, changed by 12 ms",
+        "command 9 (navigate): a number of a vector is missing: position_y_m",
+        "command 10 (set): value refused; nothing changed: parameter 81 reject.threshold_px",
+        "1 answers without some of their candidates",
+        "1 packets of version 1",
+    ] {
+        assert!(ran.err.contains(text), "{text:?} is not in\n{}", ran.err);
+    }
+    let row = cells(&place, "sent.csv");
+    let column = |name: &str| row.iter().find(|(c, _)| c == name).unwrap().1.as_str();
+    assert!(column("axis_x").parse::<f64>().is_ok() && column("position_x_km").is_empty());
+}
+
+/// The dictionary in the book is what the program prints.
+#[test]
+fn the_dictionary_is_that_of_the_records() {
+    let place = Place::new();
+    let printed = place.run(&["telemetry", "--xtce"]).expect(0).out;
+    let committed = include_str!("../../../../book/reference/telemetry.xtce.xml");
+    let command = "hzn telemetry --xtce > book/reference/telemetry.xtce.xml";
+    assert!(printed == committed, "write the file again: {command}");
+    let moved = place.run(&["telemetry", "--xtce", "--apid-base", "0x240"]).expect(0).out;
+    // Only the APIDs move: 0x100 to 0x108 become 0x240 to 0x248.
+    let apid = |digits: &str| format!("packet_apid\" value=\"{digits}");
+    assert_eq!(moved, committed.replace(&apid("25"), &apid("57")).replace(&apid("26"), &apid("58")));
+    place.run(&["telemetry"]).expect(2).says("<FILE|LINE>");
+}

@@ -1,0 +1,10 @@
+//! Tests of the sensor through its public interface.
+
+mod architecture;
+mod common;
+mod long;
+mod precision;
+#[cfg(all(feature = "dlr", feature = "erf", feature = "horace", feature = "zju"))]
+mod published;
+mod rows;
+mod total;

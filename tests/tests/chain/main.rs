@@ -1,0 +1,22 @@
+//! Tests of the whole chain: rendered scenes with truth, photographs, and images in the emulator.
+
+mod accuracy_table;
+mod artefacts;
+mod discs;
+mod faint;
+mod firmware;
+mod free_axis;
+mod hard;
+mod jupiter;
+mod line_cost;
+mod looks;
+mod navigation;
+mod panoramic;
+mod published;
+mod real;
+mod recovery;
+mod rendered;
+mod rows;
+mod silence;
+mod suns;
+mod wrong_altitude;
