@@ -7,7 +7,7 @@ use hzn_core::Config;
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Channel, ImageView, Layout};
-use hzn_core::observer::Observer;
+use hzn_core::observer::{Border, Observer};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::real::Real;
 use image::RgbImage;
@@ -170,7 +170,7 @@ impl PointRecorder {
 }
 
 impl<T: Real> Observer<T> for PointRecorder {
-    fn edge(&self, _: u32, _: impl Iterator<Item = hzn_core::pixel::Pixel>, _: u32) {
+    fn edge(&self, _: u32, _: Border<'_>) {
         self.all.borrow_mut().clear();
     }
     fn point(&self, _: u32, p: ImagePoint<T>) {

@@ -17,7 +17,8 @@ use anyhow::{Context, anyhow};
 use clap::Parser;
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
-use hzn_core::pixel::{ImagePoint, Pixel};
+use hzn_core::observer::Border;
+use hzn_core::pixel::ImagePoint;
 use hzn_core::{Config, HostHorizon};
 use hzn_core::{
     observer::Observer,
@@ -76,7 +77,7 @@ struct Watch {
 }
 
 impl Observer<f64> for Watch {
-    fn edge(&self, candidate: u32, _: impl Iterator<Item = Pixel>, _: u32) {
+    fn edge(&self, candidate: u32, _: Border<'_>) {
         self.edges.borrow_mut().insert(candidate, Vec::new());
     }
     fn point(&self, candidate: u32, p: ImagePoint<f64>) {

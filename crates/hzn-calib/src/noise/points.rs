@@ -3,7 +3,8 @@
 use std::cell::RefCell;
 
 use hzn_core::Observer;
-use hzn_core::pixel::{ImagePoint, Pixel};
+use hzn_core::observer::Border;
+use hzn_core::pixel::ImagePoint;
 use hzn_core::real::Real;
 
 /// Edge points with their weights, in their order along the edge: (u, v) in pixels, and the weight. A weight of 0 is a
@@ -36,7 +37,7 @@ impl PointRecorder {
 }
 
 impl<T: Real + Into<f64>> Observer<T> for PointRecorder {
-    fn edge(&self, candidate: u32, _: impl Iterator<Item = Pixel>, _: u32) {
+    fn edge(&self, candidate: u32, _: Border<'_>) {
         self.change(candidate, Vec::clear);
     }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {

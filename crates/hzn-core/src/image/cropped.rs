@@ -4,16 +4,18 @@ use super::Pixels;
 use crate::geometry::crop::Crop;
 
 /// A picture that is read through a crop. If the scales of the picture and of the crop differ, each read interpolates
-/// between four pixels.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Cropped<'a, P> {
-    picture: &'a P,
+/// between four pixels. The picture is read through a pointer, so that pictures of every kind use the same compiled
+/// pipeline: crops are rare.
+pub(crate) struct Cropped<'a> {
+    /// Returns the brightness of the picture at a column and a row.
+    at: &'a dyn Fn(u16, u16) -> u16,
+    full_scale: u16,
     crop: Crop,
 }
 
-impl<'a, P: Pixels> Cropped<'a, P> {
-    pub(crate) fn new(picture: &'a P, crop: Crop) -> Self {
-        Self { picture, crop }
+impl<'a> Cropped<'a> {
+    pub(crate) fn new(at: &'a dyn Fn(u16, u16) -> u16, full_scale: u16, crop: Crop) -> Self {
+        Self { at, full_scale, crop }
     }
 
     /// Interpolates bilinearly between the four pixels around the centre of the crop's pixel (x, y), which is computed
@@ -28,13 +30,13 @@ impl<'a, P: Pixels> Cropped<'a, P> {
         };
         let (x0, x1, fx) = place(x, self.crop.x0, 0);
         let (y0, y1, fy) = place(y, self.crop.y0, 1);
-        let at = |x: u16, y: u16| u64::from(self.picture.at(x, y));
+        let at = |x: u16, y: u16| u64::from((self.at)(x, y));
         let across = |y: u16| at(x0, y) * (65536 - fx) + at(x1, y) * fx;
         ((across(y0) * (65536 - fy) + across(y1) * fy + (1 << 31)) >> 32) as u16
     }
 }
 
-impl<P: Pixels> Pixels for Cropped<'_, P> {
+impl Pixels for Cropped<'_> {
     fn width(&self) -> u16 {
         self.crop.width
     }
@@ -42,7 +44,7 @@ impl<P: Pixels> Pixels for Cropped<'_, P> {
         self.crop.height
     }
     fn full_scale(&self) -> u16 {
-        self.picture.full_scale()
+        self.full_scale
     }
     fn index(&self, x: u16, y: u16) -> usize {
         usize::from(y) * usize::from(self.crop.width) + usize::from(x)
@@ -60,7 +62,7 @@ impl<P: Pixels> Pixels for Cropped<'_, P> {
             return 0;
         }
         if self.crop.copy == self.crop.full {
-            return self.picture.at(self.crop.x0 + x, self.crop.y0 + y as u16);
+            return (self.at)(self.crop.x0 + x, self.crop.y0 + y as u16);
         }
         self.between(x, y as u16)
     }
@@ -80,7 +82,8 @@ mod tests {
         let picture = Grey::try_new(&data, Layout::packed(120, 90, 1, 16)).unwrap();
         for height in [10, 30, 45, 60, 89] {
             let crop = Crop::whole([120, 90], Some(height));
-            let part = Cropped::new(&picture, crop);
+            let at = |x: u16, y: u16| picture.at(x, y);
+            let part = Cropped::new(&at, picture.full_scale(), crop);
             assert_eq!((part.height(), part.width()), (height, (120.0 * f64::from(height) / 90.0_f64).round() as u16));
             for y in 0..part.height() {
                 for x in 0..part.width() {
@@ -95,7 +98,8 @@ mod tests {
         // At half the size, each pixel is the mean of four pixels and not a copy of one.
         let four: [u8; 16] = [0, 40, 80, 120, 8, 48, 88, 128, 0, 0, 0, 0, 0, 0, 0, 0];
         let picture = Grey::try_new(&four, Layout::packed(4, 4, 1, 8)).unwrap();
-        let part = Cropped::new(&picture, Crop::whole([4, 4], Some(2)));
+        let at = |x: u16, y: u16| picture.at(x, y);
+        let part = Cropped::new(&at, picture.full_scale(), Crop::whole([4, 4], Some(2)));
         assert_eq!([part.at(0, 0), part.at(1, 0)], [24, 104]);
     }
 
@@ -113,13 +117,14 @@ mod tests {
                     parts.extend(halves);
                     continue;
                 }
-                let part = Cropped::new(&picture, crop);
+                let at = |x: u16, y: u16| picture.at(x, y);
+            let part = Cropped::new(&at, picture.full_scale(), crop);
                 for y in 0..part.height() {
                     for x in 0..part.width() {
-                        let at = crop.pixel(x, y);
-                        prop_assert_eq!(part.at(x, y), picture.at(at.x, at.y));
-                        seen[usize::from(at.y) * usize::from(w) + usize::from(at.x)] += 1;
-                        let back = crop.crop_point(ImagePoint { u: f64::from(at.x), v: f64::from(at.y) });
+                        let place = crop.pixel(x, y);
+                        prop_assert_eq!(part.at(x, y), picture.at(place.x, place.y));
+                        seen[usize::from(place.y) * usize::from(w) + usize::from(place.x)] += 1;
+                        let back = crop.crop_point(ImagePoint { u: f64::from(place.x), v: f64::from(place.y) });
                         prop_assert!((back.u - f64::from(x)).abs() < 1e-9 && (back.v - f64::from(y)).abs() < 1e-9);
                     }
                 }

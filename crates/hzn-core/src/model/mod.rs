@@ -1,6 +1,7 @@
 //! Types that the stages and the pipeline share: the body, its limb, errors, the answer.
 
 pub mod body;
+mod border;
 pub mod edge_noise;
 pub mod error_budget;
 pub mod observer;

@@ -1,14 +1,18 @@
 //! The interface of a program that watches the pipeline, for clocks, counters and overlays. Without an observer, the
 //! calls are compiled away.
 
-use crate::geometry::pixel::{ImagePoint, Pixel};
+use crate::geometry::pixel::ImagePoint;
 use crate::model::body::Expected;
+pub use crate::model::border::Border;
 use crate::model::error_budget::ErrorBudget;
 use crate::model::report::{Candidate, Solution};
 use crate::model::status::Stage;
 
 /// Receives calls at stage boundaries and on pixel reads. Every method does nothing by default; implement the ones that
 /// you need. Methods take `&self`: an observer that collects data uses `Cell` or `RefCell`.
+///
+/// Each type of observer compiles the pipeline once more. A program with several of them on a workstation passes
+/// `&dyn Observer`, which is an observer, too: it compiles the pipeline once, and each call costs a jump.
 ///
 /// # Example
 ///
@@ -60,9 +64,8 @@ pub trait Observer<T> {
     /// A further look at a picture without an answer begins: its number (1 for the second look) and its threshold in
     /// counts.
     fn look(&self, _number: u32, _level: u16) {}
-    /// An edge is followed and becomes candidate number `candidate`. The call receives every `stride`-th border pixel
-    /// of the edge, in order.
-    fn edge(&self, _candidate: u32, _border: impl Iterator<Item = Pixel>, _stride: u32) {}
+    /// An edge is followed and becomes candidate number `candidate`.
+    fn edge(&self, _candidate: u32, _border: Border<'_>) {}
     /// Returns whether this edge goes on through the stages. If an observer always returns false, every edge is
     /// followed and there is no answer.
     #[inline(always)]
@@ -103,3 +106,54 @@ pub trait Observer<T> {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unobserved;
 impl<T> Observer<T> for Unobserved {}
+
+impl<T> Observer<T> for &dyn Observer<T> {
+    fn body(&self, which: u8) {
+        (**self).body(which);
+    }
+    fn enter(&self, stage: Stage) {
+        (**self).enter(stage);
+    }
+    fn leave(&self) {
+        (**self).leave();
+    }
+    fn pixel(&self, x: u16, y: u16) {
+        (**self).pixel(x, y);
+    }
+    fn level(&self, level: u16, mean: T, samples: u32) {
+        (**self).level(level, mean, samples);
+    }
+    fn dark_frame(&self, px: u16) {
+        (**self).dark_frame(px);
+    }
+    fn look(&self, number: u32, level: u16) {
+        (**self).look(number, level);
+    }
+    fn edge(&self, candidate: u32, border: Border<'_>) {
+        (**self).edge(candidate, border);
+    }
+    fn wants(&self, candidate: u32) -> bool {
+        (**self).wants(candidate)
+    }
+    fn point(&self, candidate: u32, point: ImagePoint<T>) {
+        (**self).point(candidate, point);
+    }
+    fn weight(&self, candidate: u32, point: u32, weight: T) {
+        (**self).weight(candidate, point, weight);
+    }
+    fn wants_budget(&self) -> bool {
+        (**self).wants_budget()
+    }
+    fn budget(&self, candidate: u32, budget: &ErrorBudget<T>) {
+        (**self).budget(candidate, budget);
+    }
+    fn wants_fit(&self) -> bool {
+        (**self).wants_fit()
+    }
+    fn fit(&self, candidate: u32, fit: &Solution<T>, expected: &Expected<T>) {
+        (**self).fit(candidate, fit, expected);
+    }
+    fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
+        (**self).verdict(candidate, outcome, solution);
+    }
+}

@@ -17,7 +17,7 @@ use crate::geometry::frames::{Cam, Cov3, UnitVec3};
 use crate::geometry::pixel::{ImagePoint, Pixel};
 use crate::image::Pixels;
 use crate::model::body::Expected;
-use crate::model::observer::{Observer, Unobserved};
+use crate::model::observer::{Border, Observer, Unobserved};
 use crate::model::report::{Position, Report};
 use crate::model::status::Status;
 use crate::model::work::WorkBudget;
@@ -122,8 +122,8 @@ impl<T: Real> Sensor<T> {
 struct Borders(RefCell<Vec<Vec<Pixel>>>);
 
 impl<T> Observer<T> for Borders {
-    fn edge(&self, _: u32, border: impl Iterator<Item = Pixel>, _: u32) {
-        self.0.borrow_mut().push(border.collect());
+    fn edge(&self, _: u32, border: Border<'_>) {
+        self.0.borrow_mut().push(border.pixels().collect());
     }
     fn wants(&self, _: u32) -> bool {
         false

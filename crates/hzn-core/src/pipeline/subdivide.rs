@@ -16,11 +16,11 @@ use crate::base::sort;
 use crate::config::retry::{Combine, Method};
 use crate::geometry::crop::Crop;
 use crate::geometry::frames::{Cov3, UnitVec3};
-use crate::geometry::pixel::{ImagePoint, Pixel};
+use crate::geometry::pixel::ImagePoint;
 use crate::image::{Cropped, Pixels};
 use crate::model::body::Expected;
 use crate::model::error_budget::ErrorBudget;
-use crate::model::observer::Observer;
+use crate::model::observer::{Border, Observer};
 use crate::model::report::{Candidate, Report, Solution};
 use crate::model::status::{Stage, Status};
 use crate::model::verdict::Verdict;
@@ -141,7 +141,10 @@ impl<T: Real> Sensor<T> {
             region: self.region.for_crop(&crop),
             cam_to_body: self.cam_to_body,
         };
-        part.look(lists, &Cropped::new(picture, crop), expected, taken, &Through { observer, crop }, report);
+        let at = |x: u16, y: u16| picture.at(x, y);
+        let picture = Cropped::new(&at, picture.full_scale(), crop);
+        let observer: &dyn Observer<T> = &Through { observer, crop };
+        part.look(lists, &picture, expected, taken, &observer, report);
     }
 }
 
@@ -220,8 +223,8 @@ impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
     fn look(&self, number: u32, level: u16) {
         self.observer.look(number, level);
     }
-    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
-        self.observer.edge(candidate, border.map(|p| self.crop.pixel(p.x, p.y)), stride);
+    fn edge(&self, candidate: u32, border: Border<'_>) {
+        self.observer.edge(candidate, border.within(self.crop));
     }
     fn wants(&self, candidate: u32) -> bool {
         self.observer.wants(candidate)
@@ -237,6 +240,12 @@ impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
     }
     fn budget(&self, candidate: u32, budget: &ErrorBudget<T>) {
         self.observer.budget(candidate, budget);
+    }
+    fn wants_fit(&self) -> bool {
+        self.observer.wants_fit()
+    }
+    fn fit(&self, candidate: u32, fit: &Solution<T>, expected: &Expected<T>) {
+        self.observer.fit(candidate, fit, expected);
     }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
         self.observer.verdict(candidate, outcome, solution);

@@ -8,6 +8,7 @@ use hzn_core::body::{Kind, Prior};
 use hzn_core::camera::{self, Model};
 use hzn_core::edge_points::SubPixel;
 use hzn_core::image::{Grey, Layout};
+use hzn_core::observer::Border;
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::retry::Combine;
 use hzn_core::status::Status;
@@ -67,8 +68,8 @@ impl Observer<f64> for Watch {
         let (u, v) = self.read.get();
         self.read.set((u.max(x), v.max(y)));
     }
-    fn edge(&self, _: u32, border: impl Iterator<Item = Pixel>, _: u32) {
-        self.border.borrow_mut().extend(border);
+    fn edge(&self, _: u32, border: Border<'_>) {
+        self.border.borrow_mut().extend(border.pixels());
     }
     fn point(&self, _: u32, point: ImagePoint<f64>) {
         self.points.borrow_mut().push(point);

@@ -2,7 +2,7 @@
 
 use core::cell::RefCell;
 
-use hzn_core::observer::Observer;
+use hzn_core::observer::{Border, Observer};
 use hzn_core::pixel::Pixel;
 use hzn_core::report::Candidate;
 use hzn_core::{Report, Solution};
@@ -54,12 +54,12 @@ impl Observer<f32> for EdgeWatch<'_> {
         }
     }
 
-    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
+    fn edge(&self, candidate: u32, border: Border<'_>) {
         let (Ok(mut longest), Ok(mut stuck)) = (self.longest.try_borrow_mut(), self.stuck.try_borrow_mut()) else {
             return;
         };
         let list = &mut **longest;
-        let (pixels, _) = border.size_hint();
+        let (pixels, stride) = (border.len(), border.stride());
         let length = (pixels as u32).saturating_mul(stride);
         let is_kept = self.wanted && length > list.length;
         let most = if is_kept { MAX_PIXELS } else { PLACES };
@@ -69,7 +69,7 @@ impl Observer<f32> for EdgeWatch<'_> {
             list.stride = stride.saturating_mul(every as u32);
         }
         stuck.begin();
-        for (place, pixel) in border.step_by(every).enumerate() {
+        for (place, pixel) in border.pixels().step_by(every).enumerate() {
             if is_kept && let Some(kept) = list.pixels.get_mut(place) {
                 *kept = pixel;
                 list.len += 1;

@@ -126,7 +126,7 @@ impl AnySensor {
     ) -> Vec<Processed> {
         match traces {
             Some(traces) => self.process_watched(view, data, traces),
-            None => self.process_watched(view, data, &Clock::default()),
+            None => self.process_unwatched(view, data),
         }
     }
 
@@ -137,34 +137,58 @@ impl AnySensor {
         data: Option<&FrameData>,
         traces: Option<&Traces>,
     ) -> Vec<Processed> {
-        match traces {
-            Some(traces) => self.watch(picture, data, traces),
-            None => self.watch(picture, data, &Clock::default()),
-        }
+        let clock = Clock::default();
+        self.watch(picture, data, traces.map_or(&clock, |traces| traces))
     }
 
     /// Processes a picture as [`Self::process`] does, with the caller's own observer.
-    pub fn process_watched<W: Watch>(
+    pub fn process_watched(
         &mut self,
         view: &ImageView<'_>,
         data: Option<&FrameData>,
-        watch: &W,
+        watch: &dyn Watch,
     ) -> Vec<Processed> {
-        // Each kind of picture has its own compiled pipeline; with the enum, every pixel would cost a branch.
-        match view {
-            ImageView::Grey8(p) => self.watch(p, data, watch),
-            ImageView::Grey16(p) => self.watch(p, data, watch),
-            ImageView::Colour8(p) => self.watch(p, data, watch),
-            ImageView::Colour16(p) => self.watch(p, data, watch),
-        }
+        self.watch(view, data, watch)
     }
 
-    fn watch<P: Pixels, W: Watch>(&mut self, picture: &P, data: Option<&FrameData>, watch: &W) -> Vec<Processed> {
-        let now_s = self.time_s.take().or(data.and_then(|d| d.time_s));
-        let mut processed = match &mut self.kind {
-            Kind::Host(h) => run(h, picture, data, &self.last, now_s, watch),
-            Kind::Flight(h) => run(h, picture, data, &self.last, now_s, watch),
+    /// Processes a picture without a record. The usual kinds of pictures have their own compiled pipelines; with the
+    /// enum, every pixel costs a branch (1.4 times the time of a picture).
+    fn process_unwatched(&mut self, view: &ImageView<'_>, data: Option<&FrameData>) -> Vec<Processed> {
+        let now_s = self.take_time(data);
+        let last = &self.last;
+        let processed = match (&mut self.kind, view) {
+            (Kind::Host(h), ImageView::Grey8(p)) => run_unwatched(h, p, data, last, now_s),
+            (Kind::Host(h), ImageView::Grey16(p)) => run_unwatched(h, p, data, last, now_s),
+            (Kind::Host(h), ImageView::Colour8(p)) => run_unwatched(h, p, data, last, now_s),
+            (Kind::Host(h), ImageView::Colour16(p)) => run_unwatched(h, p, data, last, now_s),
+            (Kind::Flight(h), ImageView::Grey8(p)) => run_unwatched(h, p, data, last, now_s),
+            (Kind::Flight(h), view) => run_unwatched(h, view, data, last, now_s),
         };
+        self.conclude(processed, data, now_s)
+    }
+
+    /// Processes a picture with an observer behind a pointer, so that every observer uses the same compiled pipeline.
+    fn watch<P: Pixels>(&mut self, picture: &P, data: Option<&FrameData>, watch: &dyn Watch) -> Vec<Processed> {
+        let now_s = self.take_time(data);
+        let last = &self.last;
+        let processed = match &mut self.kind {
+            Kind::Host(h) => run(h, picture, data, last, now_s, &(watch as &dyn Observer<f64>), watch),
+            Kind::Flight(h) => run(h, picture, data, last, now_s, &(watch as &dyn Observer<f32>), watch),
+        };
+        self.conclude(processed, data, now_s)
+    }
+
+    fn take_time(&mut self, data: Option<&FrameData>) -> Option<f64> {
+        self.time_s.take().or(data.and_then(|d| d.time_s))
+    }
+
+    /// Remembers the answers and adds the directions in ECEF.
+    fn conclude(
+        &mut self,
+        mut processed: Vec<Processed>,
+        data: Option<&FrameData>,
+        now_s: Option<f64>,
+    ) -> Vec<Processed> {
         for (last, processed) in self.last.iter_mut().zip(&processed) {
             if let (Ok(Report { solution: Some(s), .. }), Some(time_s)) = (&processed.report, now_s) {
                 *last = Some(LastAnswer { axis: s.axis.xyz(), sigma_rad: s.covariance.sigma_max_rad(), time_s });
@@ -215,20 +239,25 @@ fn prior<T: Real>(data: Option<&FrameData>, which: usize, body: &body::Config) -
     data.map_or(Ok(Prior::default()), |d| Ok(d.for_body(which, body)?.to_prior(None)))
 }
 
-fn run<
-    P: Pixels,
-    T: Real + Into<f64>,
-    W: Watch + Observer<T>,
-    const POINTS: usize,
-    const BLOCKS: usize,
-    const WORDS: usize,
->(
+fn run_unwatched<P: Pixels, T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
     horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
     picture: &P,
     data: Option<&FrameData>,
     last: &[Option<LastAnswer>],
     now_s: Option<f64>,
-    watch: &W,
+) -> Vec<Processed> {
+    let clock = Clock::default();
+    run(horizon, picture, data, last, now_s, &clock, &clock)
+}
+
+fn run<P: Pixels, T: Real + Into<f64>, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+    horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
+    picture: &P,
+    data: Option<&FrameData>,
+    last: &[Option<LastAnswer>],
+    now_s: Option<f64>,
+    observer: &O,
+    watch: &dyn Watch,
 ) -> Vec<Processed> {
     let expect = |(which, last): (usize, &Option<LastAnswer>)| {
         let last = last.zip(now_s).and_then(|(last, now_s)| last.to_last(now_s));
@@ -237,7 +266,7 @@ fn run<
     };
     let expected: Vec<_> = last.iter().enumerate().map(expect).collect();
     let known: Vec<_> = expected.iter().filter_map(|e| e.as_ref().ok().copied()).collect();
-    let reports = horizon.process_each_observed(picture, &known, watch);
+    let reports = horizon.process_each_observed(picture, &known, observer);
     let times = watch.times();
     let mut done = reports.iter().zip(times);
     // There is one report for each body with an expected half-angle.

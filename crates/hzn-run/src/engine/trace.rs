@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use hzn_core::body::Expected;
 use hzn_core::covariance::{ErrorBudget, Term};
+use hzn_core::observer::Border;
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::real::Real;
 use hzn_core::report::Candidate;
@@ -195,9 +196,9 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
     fn look(&self, number: u32, level: u16) {
         self.now().into_iter().for_each(|t| Observer::<T>::look(t, number, level));
     }
-    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
+    fn edge(&self, candidate: u32, border: Border<'_>) {
         if let Some(trace) = self.now() {
-            Observer::<T>::edge(trace, candidate, border, stride);
+            Observer::<T>::edge(trace, candidate, border);
         }
     }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
@@ -239,10 +240,10 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
     fn look(&self, _: u32, level: u16) {
         self.further_thresholds.borrow_mut().push(level);
     }
-    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
+    fn edge(&self, candidate: u32, border: Border<'_>) {
         self.change_edge(candidate, |e| {
-            e.border = border.collect();
-            e.stride = stride;
+            e.border = border.pixels().collect();
+            e.stride = border.stride();
         });
     }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {

@@ -10,7 +10,8 @@ use hzn_calib::FrameData;
 use hzn_core::camera::Camera;
 use hzn_core::covariance::ErrorBudget;
 use hzn_core::image::ImageView;
-use hzn_core::pixel::{ImagePoint, Pixel};
+use hzn_core::observer::Border;
+use hzn_core::pixel::ImagePoint;
 use hzn_core::real::Real;
 use hzn_core::report::Candidate;
 use hzn_core::status::{Stage, Status};
@@ -221,8 +222,8 @@ impl<T: Real + Into<f64>> Observer<T> for PixelTraces {
     fn level(&self, level: u16, mean: T, samples: u32) {
         Observer::<T>::level(&self.traces, level, mean, samples);
     }
-    fn edge(&self, candidate: u32, border: impl Iterator<Item = Pixel>, stride: u32) {
-        Observer::<T>::edge(&self.traces, candidate, border, stride);
+    fn edge(&self, candidate: u32, border: Border<'_>) {
+        Observer::<T>::edge(&self.traces, candidate, border);
     }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
         self.traces.point(candidate, point);

@@ -11,7 +11,7 @@ use crate::model::body::Expected;
 #[cfg(feature = "position")]
 use crate::model::body::Target;
 use crate::model::error_budget::ErrorBudget;
-use crate::model::observer::Observer;
+use crate::model::observer::{Border, Observer};
 use crate::model::report::{Candidate, Free, Report, Solution};
 use crate::model::status::Stage;
 use crate::model::verdict::Verdict;
@@ -43,7 +43,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let number = counters.candidates;
         counters.candidates += 1;
         counters.dropped += length - length.div_ceil(edge.stride().max(1));
-        self.observer.edge(number, edge.pixels().iter().copied(), edge.stride());
+        self.observer.edge(number, Border::new(edge.pixels(), edge.stride()));
         if !self.observer.wants(number) {
             return;
         }
