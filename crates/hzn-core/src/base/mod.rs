@@ -7,5 +7,4 @@ pub(crate) mod linalg;
 pub(crate) mod median;
 pub mod real;
 pub(crate) mod rng;
-#[cfg(any(feature = "horace", feature = "zju"))]
 pub(crate) mod sort;

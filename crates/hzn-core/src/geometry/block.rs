@@ -130,7 +130,6 @@ impl<T: Real> Block<T> {
     }
 
     /// Returns the ray with its derivative.
-    #[cfg(feature = "position")]
     pub(crate) fn ray_with_derivative(&self, lane: usize) -> Ray<T> {
         Ray { s: self.ray(lane), m: self.m.map(|m| m[lane & 7]) }
     }

@@ -13,7 +13,6 @@
 
 use core::marker::PhantomData;
 
-#[cfg(feature = "position")]
 use crate::base::linalg::M3;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
@@ -85,7 +84,6 @@ impl<F, T: Real> UnitVec3<F, T> {
     }
 }
 
-#[cfg(feature = "horace")]
 impl<T: Real> UnitVec3<Cam, T> {
     /// Returns the unit vector (right, down) in the picture from the principal point towards the body's centre. This is
     /// HORACE's two-dimensional direction (Barf 2014, (2.37)). `None` straight ahead and straight behind.
@@ -224,7 +222,6 @@ impl<A, B, T: Real> Rotation<A, B, T> {
         UnitVec3::assume_unit(V3::new(a.dot(&d.v), b.dot(&d.v), c.dot(&d.v)))
     }
     /// Returns the rotation as a matrix. Its columns are the axes of `A` in the frame `B`.
-    #[cfg(feature = "position")]
     pub(crate) fn to_matrix(self) -> M3<T> {
         M3::from_rows(&self.rows.map(|row| row.transpose()))
     }
@@ -262,7 +259,6 @@ mod tests {
         assert!(Rotation::<Cam, Body, f64>::assume_from_quaternion([0.0; 4]).is_none());
     }
 
-    #[cfg(feature = "horace")]
     #[test]
     fn euler_angles_turn_the_camera_to_the_direction() {
         for v in [[0.3, -0.5, 0.8], [-0.9, 0.1, -0.3], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {

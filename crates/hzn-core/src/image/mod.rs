@@ -5,7 +5,6 @@
 //! one that it uses.
 
 mod colour;
-#[cfg(feature = "horace")]
 mod cropped;
 mod grey;
 mod layout;
@@ -17,7 +16,6 @@ mod tests;
 mod view;
 
 pub use colour::{Channel, Colour};
-#[cfg(feature = "horace")]
 pub(crate) use cropped::Cropped;
 pub use grey::Grey;
 pub use layout::{ImageError, Layout};

@@ -17,7 +17,6 @@ impl<'a> Border<'a> {
         Self { pixels, stride, crop: None }
     }
     /// Returns the same border, if its pixels were found in a part of the picture.
-    #[cfg(feature = "horace")]
     pub(crate) fn within(self, crop: Crop) -> Self {
         Self { crop: Some(crop), ..self }
     }

@@ -1,10 +1,8 @@
 //! The report that `process` returns.
 
-#[cfg(feature = "position")]
 use crate::base::linalg::basis;
 use crate::base::real::Real;
 use crate::geometry::frames::{Body, Cam, Cov3, Ecef, UnitVec3};
-#[cfg(feature = "position")]
 use crate::geometry::scaling::ScaledCone;
 use crate::model::status::{Stage, Status};
 use crate::model::verdict::Verdict;
@@ -182,7 +180,6 @@ pub struct Position<T> {
     /// `estimate.yaw_limit_deg`. The third axis of an attitude, from the shape of the limb.
     pub yaw_rad: Option<(T, T)>,
     /// The limb of the body in its scaled space.
-    #[cfg(feature = "position")]
     pub(crate) limb: ScaledCone<T>,
 }
 
@@ -195,13 +192,11 @@ impl<T: Real> Position<T> {
             free_range_m: (self.free_range_m.0.to_f64(), self.free_range_m.1.to_f64()),
             body_fixed_m: self.body_fixed_m.map(|x| x.map(Real::to_f64)),
             yaw_rad: self.yaw_rad.map(|(yaw, sigma)| (yaw.to_f64(), sigma.to_f64())),
-            #[cfg(feature = "position")]
             limb: self.limb.to_f64(),
         }
     }
 
     /// Returns a direction along the limb of the body, for an angle about its axis, in radians.
-    #[cfg(feature = "position")]
     pub fn limb_direction(&self, angle_rad: T) -> UnitVec3<Cam, T> {
         let ScaledCone { e, c, scaling } = &self.limb;
         let (b1, b2) = basis(e);

@@ -62,23 +62,18 @@ pub(crate) const DRAW: u32 = 10;
 /// Cost to compare a block of eight points with a drawn cone.
 pub(crate) const SCORE: u32 = 4;
 /// Cost to compare a block by the likelihood of a mixture, with exponentials and logarithms.
-#[cfg(feature = "zju")]
 pub(crate) const LIKELIHOOD: u32 = 80;
 /// Returns the cost of a pixel's gradient: its eight neighbours are read and tested against the mask.
-#[cfg(feature = "zju")]
 pub(crate) fn gradient_cost(mask: u32) -> u32 {
     4 + 9 * mask
 }
 /// Returns the cost to count the lit pixels of a square.
-#[cfg(feature = "horace")]
 pub(crate) fn square_cost(side: u16, mask: u32) -> u32 {
     u32::from(side) * u32::from(side) * (1 + 2 * mask)
 }
 /// Cost to sort one pixel among those of its edge.
-#[cfg(any(feature = "horace", feature = "zju"))]
 pub(crate) const ORDER: u32 = 20;
 /// Cost of a part of a picture, before anything is found in it.
-#[cfg(feature = "horace")]
 pub(crate) const PART: u32 = 1000;
 /// Cost to fit a block of eight points and to compute its share of the covariance.
 pub(crate) const FIT: u32 = 230;
@@ -141,7 +136,6 @@ impl WorkBudget {
         (self.remaining, self.truncated) = (0, true);
     }
     /// Records that some work was omitted for lack of budget. The remaining budget can still serve other work.
-    #[cfg(feature = "horace")]
     pub(crate) fn mark_truncated(&mut self) {
         self.truncated = true;
     }

@@ -29,14 +29,14 @@ impl<T: Real> Edges<T> {
         lit: &UnitVec3<Cam, T>,
     ) -> Self {
         let Some(camera) = sensor.camera_for(expected) else { return Self::new(sensor.camera(), points, lit) };
-        let lit = expected.target.as_ref().map_or(*lit, |t| UnitVec3::assume_unit(t.scaling.scale(lit.v())));
+        let lit = expected.target().map_or(*lit, |t| UnitVec3::assume_unit(t.scaling.scale(lit.v())));
         Self::new(&camera, points, &lit)
     }
 
     /// Returns the position by plain least squares (Christian & Robinson 2016) with its covariance, (13.7). It is
     /// biased on short arcs. `None` if the points do not determine a position, or if no position is fitted.
     pub fn least_squares(&self, expected: &Expected<T>) -> Option<PlainPosition<T>> {
-        let target = expected.target.as_ref()?;
+        let target = expected.target()?;
         let (e, k) = fit::closed::least_squares(&self.blocks)?;
         let one = T::one();
         let (cos, sin) = (one - k, (k * (one + one - k)).sqrt());
@@ -52,7 +52,7 @@ impl<T: Real> Edges<T> {
 
     /// Fits the position to all points by generalised total least squares and Gauss-Newton, without rejecting any.
     pub fn fit_position(&mut self, expected: &Expected<T>) -> Option<Fitted<T>> {
-        let scaling = expected.target.as_ref()?.scaling;
+        let scaling = expected.target()?.scaling;
         let start = fit::closed::generalised_tls(&self.blocks)?;
         fit::fit_position_from(&mut self.blocks, start, &scaling).map(Fitted)
     }

@@ -242,7 +242,6 @@ impl<T: Real> Edges<T> {
     pub fn fuse(&self, sensor: &Sensor<T>, fit: &Fitted<T>, expected: &Expected<T>) -> Option<Fused<T>> {
         let noise = sensor.config.noise_model_of(expected.which);
         let expected = &expected.clipped(self.clipped);
-        #[cfg(feature = "position")]
         let expected = &expected.seen_along(&fit.0.e);
         let fused =
             covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().estimate, &self.camera, None)?;
@@ -252,8 +251,7 @@ impl<T: Real> Edges<T> {
             cos_half_angle: fused.c,
             position: None,
         };
-        #[cfg(feature = "position")]
-        if let Some(target) = &expected.target {
+        if let Some(target) = expected.target() {
             let placed = covariance::place(&fused, target, expected.radius_m)?;
             let (b1, b2) = basis(&placed.axis);
             return Some(Fused {

@@ -4,7 +4,6 @@ use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::geometry::camera::Camera;
-#[cfg(feature = "position")]
 use crate::geometry::scaling::ScaledCone;
 use crate::model::report::Solution;
 
@@ -14,7 +13,6 @@ pub(super) struct FoundLimb<T> {
     e: V3<T>,
     c: T,
     /// The limb in scaled space, if the position of the body was fitted.
-    #[cfg(feature = "position")]
     scaled: Option<ScaledCone<T>>,
 }
 
@@ -31,19 +29,13 @@ impl<T: Real> FoundLimb<T> {
         Self {
             e: *solution.axis.v(),
             c: solution.fused_half_angle_rad.sin_cos().1,
-            #[cfg(feature = "position")]
             scaled: solution.position.as_ref().map(|position| position.limb),
         }
     }
     /// Makes a limb that is circular in the camera frame.
     #[cfg(any(test, feature = "_edges"))]
     pub(super) fn circular(e: V3<T>, c: T) -> Self {
-        Self {
-            e,
-            c,
-            #[cfg(feature = "position")]
-            scaled: None,
-        }
+        Self { e, c, scaled: None }
     }
     /// Returns whether this body hides a Sun or Moon in a direction. The Earth looks smaller than [`NEAR_DEG`] from
     /// beyond half of the way to the Moon; only from there the Moon can be in front of it.
@@ -71,13 +63,10 @@ impl<T: Real> FoundLimb<T> {
     /// Returns cos α − s·e for a ray of `camera`, and the vector v with d(s·e) = v·ds.
     #[inline(always)]
     fn offset(&self, ray: &V3<T>, camera: &Camera<T>) -> (T, V3<T>) {
-        #[cfg(feature = "position")]
-        if self.scaled.is_some() || camera.scaling().is_some() {
+        if cfg!(feature = "position") && (self.scaled.is_some() || camera.scaling().is_some()) {
             let limb = self.scaled.unwrap_or(ScaledCone { e: self.e, c: self.c, scaling: None });
             return limb.offset_from(ray, camera.scaling());
         }
-        #[cfg(not(feature = "position"))]
-        let _ = camera;
         (self.c - ray.dot(&self.e), self.e)
     }
 }

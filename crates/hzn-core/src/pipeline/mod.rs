@@ -8,7 +8,7 @@
 //! examined again, at other thresholds (`[recover]`).
 
 mod budget;
-#[cfg(all(feature = "position", any(test, feature = "_edges")))]
+#[cfg(any(test, feature = "_edges"))]
 pub mod edge_position;
 #[cfg(any(test, feature = "_edges"))]
 pub mod edges;
@@ -19,7 +19,6 @@ mod process;
 mod row_stream;
 mod search;
 mod sensor;
-#[cfg(feature = "horace")]
 mod subdivide;
 mod workspace;
 

@@ -11,7 +11,6 @@ use crate::model::observer::Observer;
 use crate::model::report::{MAX_BODIES, Report, Reports};
 use crate::model::status::Stage;
 use crate::model::work::WorkBudget;
-#[cfg(any(feature = "horace", feature = "zju"))]
 use crate::stages::contour;
 use crate::stages::contour::BinaryPicture;
 use crate::stages::threshold;
@@ -64,10 +63,11 @@ impl<T: Real> Sensor<T> {
     ) -> Report<T> {
         let mut report = Report::empty();
         if picture.width() == self.camera.width() && picture.height() == self.camera.height() {
-            #[cfg(feature = "horace")]
-            self.look_at_parts(lists, picture, expected, taken, observer, &mut report);
-            #[cfg(not(feature = "horace"))]
-            self.look(lists, picture, expected, taken, observer, &mut report);
+            if cfg!(feature = "horace") {
+                self.look_at_parts(lists, picture, expected, taken, observer, &mut report);
+            } else {
+                self.look(lists, picture, expected, taken, observer, &mut report);
+            }
         }
         observer.leave();
         report
@@ -121,16 +121,13 @@ impl<T: Real> Sensor<T> {
         let camera = own.as_ref().unwrap_or(&self.camera);
         let mut search = Search::new(self, camera, expected, taken, binary.observer, lists.blocks, work, report);
         match config.contour.method {
-            #[cfg(feature = "horace")]
-            contour::Method::Raster => search.raster(binary, lists.border, lists.marks),
-            #[cfg(feature = "horace")]
-            contour::Method::Erode => {
+            contour::Method::Raster if cfg!(feature = "horace") => search.raster(binary, lists.border, lists.marks),
+            contour::Method::Erode if cfg!(feature = "horace") => {
                 search.judge_all_as_one(binary, |work| {
                     contour::erode::edges(binary, &config.contour, lists.border, work)
                 });
             }
-            #[cfg(feature = "zju")]
-            contour::Method::Sobel => {
+            contour::Method::Sobel if cfg!(feature = "zju") => {
                 search.judge_all_as_one(binary, |work| contour::sobel::edges(binary, lists.border, work))
             }
             // `Config::check` refuses a method that is not built in.

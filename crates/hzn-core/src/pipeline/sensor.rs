@@ -1,13 +1,11 @@
 //! A configuration that was accepted, with everything that follows from it.
 
 use crate::base::error::ConfigError;
-#[cfg(feature = "position")]
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::config::{Config, Mount};
 use crate::geometry::camera::Camera;
 use crate::geometry::frames::{Body, Cam, Rotation};
-#[cfg(feature = "position")]
 use crate::geometry::pixel::ImagePoint;
 use crate::image::region::Region;
 use crate::model::body::{Expected, Prior, PriorError};
@@ -18,10 +16,8 @@ const SMALLEST_DISC_PX: f64 = 8.0;
 const SIDES: f64 = 40.0;
 /// Intervals on each side of the picture, at whose ends the border is compared with the predicted limb. The inside of a
 /// limb is convex, so that the corners alone decide in a picture without distortion.
-#[cfg(feature = "position")]
 const BORDER_STEPS: i32 = 16;
 /// A body fills the picture if its limb is farther outside than this many sigmas of the attitude.
-#[cfg(feature = "position")]
 const FILLS_SIGMAS: f64 = 5.0;
 
 /// A checked configuration with everything that follows from it: lens, region, mounting. It takes some kilobytes. The
@@ -111,8 +107,7 @@ impl<T: Real> Sensor<T> {
         let body = self.config.each_body().get(which).ok_or(PriorError::NoBody)?;
         let smallest = self.config.fits_position(body).then(|| self.smallest_half_angle_rad());
         let expected = Expected { which: which as u8, ..Expected::try_new(body, frame, smallest)? };
-        #[cfg(feature = "position")]
-        {
+        if cfg!(feature = "position") {
             self.check_disc(&expected)?;
             self.check_limb_in_view(&expected)?;
         }
@@ -128,12 +123,11 @@ impl<T: Real> Sensor<T> {
     }
 
     /// Refuses a body that is too small in the picture.
-    #[cfg(feature = "position")]
     fn check_disc(&self, expected: &Expected<T>) -> Result<(), PriorError> {
         let (fx, fy) = self.camera.focal_px();
         let diameter_px = expected.half_angle_rad() * (fx + fy);
         let is_small =
-            expected.target.is_some_and(|t| t.range.is_some()) && diameter_px < T::from_f64(SMALLEST_DISC_PX);
+            expected.target().is_some_and(|t| t.range.is_some()) && diameter_px < T::from_f64(SMALLEST_DISC_PX);
         match is_small {
             true => Err(PriorError::TooSmall { diameter_px_100: (diameter_px * T::from_f64(100.0)).to_i32() }),
             false => Ok(()),
@@ -141,9 +135,8 @@ impl<T: Real> Sensor<T> {
     }
 
     /// Refuses a body that fills the picture: the position and the attitude say that no part of the limb is near it.
-    #[cfg(feature = "position")]
     fn check_limb_in_view(&self, expected: &Expected<T>) -> Result<(), PriorError> {
-        let (Some(target), Some((e, attitude_sigma))) = (&expected.target, expected.predicted) else { return Ok(()) };
+        let (Some(target), Some((e, attitude_sigma))) = (expected.target(), expected.predicted) else { return Ok(()) };
         let half_angle = expected.half_angle_rad();
         let angle_to_limb = |s: &V3<T>| {
             let scaled = target.scaling.scale(s);
@@ -171,8 +164,7 @@ impl<T: Real> Sensor<T> {
     /// read out row by row, or its rays are in the scaled space of the body.
     pub(super) fn camera_for(&self, expected: &Expected<T>) -> Option<Camera<T>> {
         let rate = expected.rate_rad_s.filter(|_| self.camera.has_rolling_shutter());
-        #[cfg(feature = "position")]
-        if let Some(target) = &expected.target {
+        if let Some(target) = expected.target() {
             return Some(self.camera.with_rate(rate).with_scaling(target.scaling));
         }
         Some(self.camera.with_rate(Some(rate?)))

@@ -1,11 +1,7 @@
 //! Private names for nalgebra's types, and small decompositions that in nalgebra have panic paths.
 
-#[cfg(any(feature = "dlr", feature = "zju", feature = "position"))]
-#[allow(dead_code, reason = "not every feature uses all of these functions")]
 mod decompose;
 
-#[cfg(any(feature = "dlr", feature = "zju", feature = "position"))]
-#[allow(unused_imports, reason = "not every feature uses all of these functions")]
 pub(crate) use decompose::{Triangle, dot, symmetric_eigen};
 
 use crate::base::real::Real;

@@ -6,10 +6,8 @@
 mod brown;
 mod config;
 mod curve;
-#[cfg(feature = "kalibr")]
 mod double_sphere;
 mod equation;
-#[cfg(feature = "kalibr")]
 mod eucm;
 mod intrinsic;
 mod lens;
@@ -30,11 +28,9 @@ use crate::base::error::{ConfigError, Limit, require};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
-#[cfg(feature = "horace")]
 use crate::geometry::crop::Crop;
 use crate::geometry::frames::{Cam, UnitVec3};
 use crate::geometry::pixel::ImagePoint;
-#[cfg(feature = "position")]
 use crate::geometry::scaling::Scaling;
 
 /// A lens that is checked and ready. All of its functions are total.
@@ -87,7 +83,6 @@ pub struct Camera<T> {
     /// Rotation of the camera while this picture is read out; `None` without a rate or without a rolling shutter.
     turning: Option<shutter::Turning<T>>,
     /// The scaled space in which all rays are given; `None` for rays in the camera frame.
-    #[cfg(feature = "position")]
     scaling: Option<Scaling<T>>,
 }
 
@@ -144,13 +139,11 @@ impl<T: Real> Camera<T> {
             row_s: T::from_f64(c.readout_s / (f64::from(c.height) - 1.0)),
             middle_row: T::from_f64((f64::from(c.height) - 1.0) * 0.5),
             turning: None,
-            #[cfg(feature = "position")]
             scaling: None,
         })
     }
 
     /// Returns the camera for a rectangle of this camera's pictures, or for smaller copies.
-    #[cfg(feature = "horace")]
     pub(crate) fn for_crop(&self, crop: &Crop) -> Self {
         let ([sx, sy], centre) = (crop.scale::<T>(), crop.crop_point(self.principal_point()));
         Self {
@@ -207,8 +200,7 @@ impl<T: Real> Camera<T> {
             None => ray,
             Some(turning) => turning.to_frame_time(&ray, p.v),
         };
-        #[cfg(feature = "position")]
-        if let Some(scaling) = &self.scaling {
+        if let Some(scaling) = self.scaling() {
             return Some(scaling.scale_ray(&ray));
         }
         Some(ray)
@@ -259,8 +251,7 @@ impl<T: Real> Camera<T> {
                     block.m[3][l] = or_zero(d[l] * self.inv_fy);
                     block.weight[l] = if counts { block.weight[l] } else { T::ZERO };
                 }
-                #[cfg(feature = "position")]
-                if let Some(scaling) = &self.scaling {
+                if let Some(scaling) = self.scaling() {
                     scaling.scale_block(block);
                 }
                 return;
@@ -282,7 +273,6 @@ impl<T: Real> Camera<T> {
     }
 
     /// Converts an image point to its offset from the principal point, in focal lengths.
-    #[cfg(feature = "horace")]
     pub(crate) fn to_focal_lengths(&self, p: ImagePoint<T>) -> [T; 2] {
         [(p.u - self.cx) * self.inv_fx, (p.v - self.cy) * self.inv_fy]
     }
@@ -290,7 +280,6 @@ impl<T: Real> Camera<T> {
     /// Returns the direction of a point that lies (x, y) focal lengths from the principal point. The point may lie
     /// beyond the picture and the image circle. Beyond its largest radius, a radial lens is continued along the tangent
     /// of its curve, up to 180° off axis. All other lenses count as a pinhole. `None` when the direction is not finite.
-    #[cfg(feature = "horace")]
     pub(crate) fn unproject_extrapolated(&self, [x, y]: [T; 2]) -> Option<UnitVec3<Cam, T>> {
         let rho2 = x * x + y * y;
         let Lens::Radial(lens) = &self.lens else { return UnitVec3::try_new([x, y, T::one()]) };
@@ -309,8 +298,7 @@ impl<T: Real> Camera<T> {
 
     /// Returns the image point of a direction; `None` beyond the image circle. The point may lie outside the picture.
     pub fn project(&self, d: &UnitVec3<Cam, T>) -> Option<ImagePoint<T>> {
-        #[cfg(feature = "position")]
-        if let Some(scaling) = &self.scaling {
+        if let Some(scaling) = self.scaling() {
             return self.project_from_camera(&(scaling.from * d.v()));
         }
         self.project_from_camera(d.v())
@@ -356,15 +344,13 @@ impl<T: Real> Camera<T> {
 
     /// Returns this camera with its rays in the scaled space of an ellipsoid. [`Self::project`] then takes scaled
     /// directions. For a sphere these are the directions themselves.
-    #[cfg(feature = "position")]
     pub(crate) fn with_scaling(self, scaling: Scaling<T>) -> Self {
         Self { scaling: Some(scaling).filter(|scaling| !scaling.is_uniform()), ..self }
     }
 
     /// Returns the scaled space of the rays; `None` for rays in the camera frame.
-    #[cfg(feature = "position")]
     pub(crate) fn scaling(&self) -> Option<&Scaling<T>> {
-        self.scaling.as_ref()
+        if cfg!(feature = "position") { self.scaling.as_ref() } else { None }
     }
 
     /// Returns whether rows are exposed one after the other, so that a rate of rotation has an effect.
@@ -381,8 +367,7 @@ impl<T: Real> Camera<T> {
     /// by 1 in the relative units.
     pub(crate) fn shift_by_intrinsics(&self, s: &V3<T>) -> [[T; 2]; INTRINSICS] {
         let (one, zero) = (T::one(), T::ZERO);
-        #[cfg(feature = "position")]
-        let s = &self.scaling.as_ref().map_or(*s, |scaling| scaling.unscale(s));
+        let s = &self.scaling().map_or(*s, |scaling| scaling.unscale(s));
         let (x, y, [k1, k2, k3, k4, k5]) = self.lens.by_coefficients(s);
         [[x, zero], [zero, y], [one, zero], [zero, one], k1, k2, k3, k4, k5].map(|[u, v]| [u * self.fx, v * self.fy])
     }

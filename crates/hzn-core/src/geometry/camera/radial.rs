@@ -213,7 +213,6 @@ impl<T: Real> Radial<T> {
     }
 
     /// Returns θ beyond the largest radius, along the tangent of the curve there, up to π.
-    #[cfg(feature = "horace")]
     pub(super) fn extrapolate_theta(&self, rho: T) -> T {
         let (r, d) = self.curve.radius_and_slope(self.theta_max);
         (self.theta_max + (rho - r) / d).min(T::from_f64(core::f64::consts::PI))

@@ -12,7 +12,6 @@ use crate::base::error::{ConfigError, Limit, between, require};
 use crate::base::keys::section;
 use crate::base::real::Real;
 use crate::geometry::camera::{self, Camera};
-#[cfg(feature = "horace")]
 use crate::geometry::crop::Crop;
 use crate::geometry::pixel::ImagePoint;
 use crate::model::work;
@@ -147,7 +146,6 @@ impl<T: Real> Region<T> {
     }
 
     /// Returns the region in the coordinates of a rectangle of the picture or of a smaller copy.
-    #[cfg(feature = "horace")]
     pub(crate) fn for_crop(&self, crop: &Crop) -> Self {
         let [sx, sy] = crop.scale::<T>();
         let place = |[u, v]: [T; 2]| {

@@ -6,7 +6,6 @@ use crate::geometry::ellipsoid::LimbCone;
 use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
 
 use super::apparent::{ApparentBody, below_limb_error};
-#[cfg(feature = "position")]
 use super::position::Target;
 use super::{Config, Kind, LOWEST_ALTITUDE_M, Last, Prior, PriorError};
 
@@ -87,7 +86,6 @@ pub struct Expected<T> {
     pub(crate) which: u8,
     /// The body in scaled space, if its position is fitted. The cone, its harmonics and the directions above are then
     /// those of scaled space.
-    #[cfg(feature = "position")]
     pub(crate) target: Option<Target<T>>,
 }
 
@@ -127,6 +125,11 @@ impl<T: Real> Expected<T> {
         self.sin.atan2(self.cos)
     }
 
+    /// Returns the body whose position is fitted. Without the feature there is none, so the code for it is left out.
+    pub(crate) fn target(&self) -> Option<&Target<T>> {
+        if cfg!(feature = "position") { self.target.as_ref() } else { None }
+    }
+
     /// Returns the cosine of the expected half-angle and its 1-sigma from altitude, limb height and unknown radius.
     pub fn cos_and_sigma(&self) -> (T, T) {
         (self.cos, self.sigma_cos)
@@ -144,14 +147,12 @@ impl<T: Real> Expected<T> {
     /// smallest disc that the search must find; it counts if nothing is known of the distance.
     pub(crate) fn try_new(body: &Config, prior: &Prior<T>, smallest_rad: Option<T>) -> Result<Self, PriorError> {
         let attitude_sigma = check(prior)?;
-        #[cfg(feature = "position")]
-        if let Some(smallest_rad) = smallest_rad
+        if cfg!(feature = "position")
+            && let Some(smallest_rad) = smallest_rad
             && let Some(target) = Target::new(body, prior, useful_attitude(prior, attitude_sigma), attitude_sigma)?
         {
             return Self::in_scaled_space(body, prior, target, smallest_rad);
         }
-        #[cfg(not(feature = "position"))]
-        let _ = smallest_rad;
         Self::of_limb(body, prior, attitude_sigma)
     }
 
@@ -212,7 +213,6 @@ impl<T: Real> Expected<T> {
             free,
             phases: body.kind != Kind::Sun,
             which: 0,
-            #[cfg(feature = "position")]
             target: None,
         })
     }
@@ -246,16 +246,13 @@ impl<T: Real> Expected<T> {
         let apart = self.clipped_m[0] * (part * (one - part)).max(T::zero()).sqrt();
         let root = |parts: &[T]| parts.iter().fold(T::zero(), |sum, s| sum + *s * *s).sqrt();
         let [first, second] = self.unknown_harmonics_cos;
-        #[cfg(feature = "position")]
         let target =
-            self.target.map(|t| Target { raised_m: height, limb_sigma_m: root(&[t.limb_sigma_m, sigma]), ..t });
+            self.target().map(|t| Target { raised_m: height, limb_sigma_m: root(&[t.limb_sigma_m, sigma]), ..*t });
         // Without a known distance there is no expected half-angle that a higher limb could change.
-        #[cfg(feature = "position")]
         if target.is_some_and(|target| target.range.is_none()) {
             return Self { target, ..*self };
         }
         Self {
-            #[cfg(feature = "position")]
             target,
             cos,
             sin,
@@ -302,8 +299,7 @@ impl<T: Real> Expected<T> {
 
     /// Returns the limb axis in ECEF, when the position is known.
     pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
-        #[cfg(feature = "position")]
-        if let Some(target) = &self.target {
+        if let Some(target) = self.target() {
             let (axis, _) = target.limb_cone(target.predicted_m.as_ref()?)?;
             return Some(UnitVec3::assume_unit(target.body_to_cam.transpose() * axis));
         }

@@ -5,10 +5,8 @@ use crate::base::linalg::V3;
 use crate::base::real::Real;
 
 /// cos 75°: the part of the largest elevation of the Sun along the limb that a point needs.
-#[cfg(feature = "position")]
 const CUSP: f64 = 0.258_819_045_102_520_76;
 /// Distance between terminator and limb that does not matter, pixels.
-#[cfg(feature = "position")]
 const TERMINATOR_PX: f64 = 0.05;
 
 impl<T: Real> Expected<T> {
@@ -30,8 +28,7 @@ impl<T: Real> Expected<T> {
     /// terminator is nearer to the limb than a part of a pixel, ρ φ²/2, the whole limb is lit.
     #[inline(always)]
     fn lowest_sun(&self, sun: &V3<T>, e: &V3<T>, c: T, focal_px: T) -> T {
-        #[cfg(feature = "position")]
-        if self.target.is_some() {
+        if self.target().is_some() {
             let sin = (T::one() - c * c).max(T::ZERO).sqrt();
             let along = e.dot(sun);
             let sin_phase2 = (T::one() - along * along).max(T::ZERO);

@@ -5,10 +5,8 @@ mod expected;
 mod kind;
 mod lit;
 mod planets;
-#[cfg(feature = "position")]
 mod position;
 mod prior;
-#[cfg(feature = "position")]
 mod scaled;
 mod shape;
 
@@ -22,7 +20,6 @@ use crate::model::threshold;
 pub use expected::Expected;
 pub use kind::{AltitudeReference, Kind};
 pub use planets::Planet;
-#[cfg(feature = "position")]
 pub(crate) use position::Target;
 pub use prior::{Last, Prior, PriorError};
 
@@ -200,7 +197,6 @@ impl Config {
     }
 
     /// Returns the limb height in kilometres, or the mean over the latitudes if it is given by latitude.
-    #[cfg(feature = "position")]
     pub(crate) fn mean_limb_height_km(&self) -> f64 {
         let rows = &self.limb_height_by_latitude_km;
         if rows.is_empty() {

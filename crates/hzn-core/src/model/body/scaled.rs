@@ -86,7 +86,7 @@ impl<T: Real> Expected<T> {
     /// Returns the expected cone for a body along the scaled axis `e`. From the direction follows how large the body
     /// appears at its distance.
     pub(crate) fn seen_along(&self, e: &V3<T>) -> Self {
-        let Some(target) = &self.target else { return *self };
+        let Some(target) = self.target() else { return *self };
         let Some((sin, range_sigma_m)) = target.size_along(&target.direction(e)) else { return *self };
         let cos = (T::one() - sin * sin).max(T::EPSILON).sqrt();
         let [limb, _, _, clipped] = self.limb_sigma_parts_m;

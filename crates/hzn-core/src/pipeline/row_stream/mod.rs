@@ -186,8 +186,7 @@ impl<T: Real> Sensor<T> {
         if config.contour.method != contour::Method::BorderFollowing {
             return Err(RowStreamError::Method("contour.method"));
         }
-        #[cfg(feature = "horace")]
-        {
+        if cfg!(feature = "horace") {
             if config.recover.method != crate::config::retry::Method::None {
                 return Err(RowStreamError::Method("recover.method"));
             }

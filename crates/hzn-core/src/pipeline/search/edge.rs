@@ -8,7 +8,6 @@ use crate::geometry::frames::{Cam, Cov3, UnitVec3};
 use crate::geometry::pixel::Pixel;
 use crate::image::Pixels;
 use crate::model::body::Expected;
-#[cfg(feature = "position")]
 use crate::model::body::Target;
 use crate::model::error_budget::ErrorBudget;
 use crate::model::observer::{Border, Observer};
@@ -166,8 +165,9 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let (config, camera) = (&self.sensor.config, self.camera);
         let blocks = self.blocks.get(..(points.count as usize).div_ceil(LANES))?;
         enter(self.report, self.observer, Stage::Covariance);
-        #[cfg(feature = "position")]
-        let (expected, _) = (&expected.seen_along(&fit.e), outcome.verdict = Verdict::Uncertain);
+        let refined = expected.target().map(|_| expected.seen_along(&fit.e));
+        let expected = refined.as_ref().unwrap_or(expected);
+        outcome.verdict = Verdict::Uncertain;
         let mut budget = self.observer.wants_budget().then(ErrorBudget::new);
         let fused = covariance::fuse(blocks, fit, expected, self.noise, &config.estimate, camera, budget.as_mut())?;
         if let Some(budget) = &budget {
@@ -270,15 +270,13 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             arc_px: fit.arc_px,
             candidate: number,
         };
-        #[cfg(feature = "position")]
-        if let Some(target) = &expected.target {
+        if let Some(target) = expected.target() {
             return self.place(solution, fused, target, expected);
         }
         Some(solution)
     }
 
     /// Replaces what is in scaled space by the same in the camera frame, and adds the position.
-    #[cfg(feature = "position")]
     fn place(
         &self,
         solution: Solution<T>,

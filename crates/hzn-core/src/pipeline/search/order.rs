@@ -9,9 +9,7 @@ use crate::image::Pixels;
 use crate::model::body::Expected;
 use crate::model::observer::Observer;
 use crate::model::work;
-#[cfg(any(feature = "horace", feature = "zju"))]
 use crate::model::work::WorkBudget;
-#[cfg(feature = "horace")]
 use crate::stages::contour;
 use crate::stages::contour::{BinaryPicture, End, Marks, Thinned};
 
@@ -135,7 +133,6 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
     }
 
     /// Examines every outer border of the picture.
-    #[cfg(feature = "horace")]
     pub(in crate::pipeline) fn raster<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
@@ -156,7 +153,6 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
     }
 
     /// Examines all edge pixels of the picture as one edge, for methods that do not separate edges.
-    #[cfg(any(feature = "horace", feature = "zju"))]
     pub(in crate::pipeline) fn judge_all_as_one<'b, P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,

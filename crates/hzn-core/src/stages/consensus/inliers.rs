@@ -49,6 +49,5 @@ pub(crate) struct Consensus<T> {
     /// Number of draws.
     pub(crate) draws: u32,
     /// Whether every point is an inlier, so that the fit leaves no point out.
-    #[allow(dead_code, reason = "for the estimators behind features")]
     pub(crate) all: bool,
 }

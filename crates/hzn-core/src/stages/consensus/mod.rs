@@ -7,14 +7,10 @@
 
 mod config;
 mod inliers;
-#[cfg(feature = "zju")]
 mod mlesac;
 mod noise;
-#[cfg(feature = "zju")]
 mod preverified;
-#[cfg(feature = "dlr")]
 mod ransac;
-#[cfg(any(feature = "dlr", feature = "zju"))]
 mod sampled;
 mod two_point;
 
@@ -46,12 +42,13 @@ pub(crate) fn find<T: Real>(
             let (e, c) = through_three(&a, &mid, &b)?;
             return Some(Consensus { e, c, draws: 1, all: true });
         }
-        #[cfg(feature = "dlr")]
-        Method::Ransac => return ransac::find(blocks, count, threshold, config, work),
-        #[cfg(feature = "zju")]
-        Method::RansacPreverify => return preverified::find(blocks, count, threshold, config, work),
-        #[cfg(feature = "zju")]
-        Method::Mlesac => return mlesac::find(blocks, count, focal_px, threshold, config, work),
+        Method::Ransac if cfg!(feature = "dlr") => return ransac::find(blocks, count, threshold, config, work),
+        Method::RansacPreverify if cfg!(feature = "zju") => {
+            return preverified::find(blocks, count, threshold, config, work);
+        }
+        Method::Mlesac if cfg!(feature = "zju") => {
+            return mlesac::find(blocks, count, focal_px, threshold, config, work);
+        }
         // `Config::check` refuses a method that is not built in.
         _ => search(blocks, count, expected, focal_px, threshold, config, work)?,
     };

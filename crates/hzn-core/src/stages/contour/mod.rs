@@ -4,17 +4,13 @@
 //! Closed edges are found on horizontal search lines. The cost therefore grows with the length of the edges, and not
 //! with the number of pixels.
 
-#[cfg(feature = "horace")]
 pub(crate) mod erode;
 mod follow;
 mod frame;
 mod marks;
-#[cfg(any(feature = "horace", feature = "zju"))]
 mod order;
-#[cfg(feature = "horace")]
 pub(crate) mod raster;
 mod search;
-#[cfg(feature = "zju")]
 pub(crate) mod sobel;
 mod thinned;
 

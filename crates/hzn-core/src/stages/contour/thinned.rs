@@ -83,13 +83,11 @@ impl<'a> Thinned<'a> {
     }
 
     /// Clears the list.
-    #[cfg(feature = "horace")]
     pub(crate) fn clear(&mut self) {
         (self.len, self.stride, self.wait, self.total) = (0, 1, 0, 0);
     }
 
     /// Returns the stored pixels, so that they can be sorted.
-    #[cfg(any(feature = "horace", feature = "zju"))]
     pub(crate) fn pixels_mut(&mut self) -> &mut [Pixel] {
         self.buffer.get_mut(..self.len).unwrap_or_default()
     }

@@ -1,6 +1,5 @@
 //! The answer of a fit with its covariance.
 
-#[cfg(feature = "position")]
 use crate::base::linalg::M3;
 use crate::base::linalg::V3;
 
@@ -24,12 +23,10 @@ pub(crate) struct Fused<T> {
     /// Errors of the edge points in this answer.
     pub(crate) edge: EdgeNoise<T>,
     /// The position of the body, if it was fitted.
-    #[cfg(feature = "position")]
     pub(crate) located: Option<Located<T>>,
 }
 
 /// The position of a body with its covariance.
-#[cfg(feature = "position")]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Located<T> {
     /// From the camera to the centre of the body in the camera frame, in units of the target's mean semi-axis.
@@ -45,7 +42,6 @@ pub(crate) struct Located<T> {
 
 /// A rotation of the body about the line to it, relative to the given orientation; right-handed about the direction
 /// from the camera to the body.
-#[cfg(feature = "position")]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Turn<T> {
     pub(crate) rad: T,
@@ -62,6 +58,5 @@ pub(crate) struct EdgeNoise<T> {
     pub(crate) sigma_px: T,
     pub(crate) length_px: T,
     /// 1-sigma of the shift that all points share, in pixels.
-    #[cfg(feature = "position")]
     pub(crate) shift_px: T,
 }

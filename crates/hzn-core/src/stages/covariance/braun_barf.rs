@@ -42,10 +42,8 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
             var_cos: var_c,
             sigma_px: T::from_f64(config.sigma_px),
             length_px: T::from_f64(config.correlation_px),
-            #[cfg(feature = "position")]
             shift_px: T::ZERO,
         },
-        #[cfg(feature = "position")]
         located: None,
     })
 }

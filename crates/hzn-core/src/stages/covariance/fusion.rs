@@ -49,7 +49,6 @@ pub(super) fn fused<T: Real>(
         var_free_cos: var_free,
         chi2: difference * difference / total,
         edge,
-        #[cfg(feature = "position")]
         located: None,
     })
 }
@@ -74,18 +73,7 @@ fn unfused<T: Real>(
         budget.project(&b1, &b2, [T::ZERO; 2], k.map(|k| k * var_c.sqrt()), expected);
     }
     let p = [p.m11 + k[0] * k[0] * var_c, p.m12 + k[0] * k[1] * var_c, p.m22 + k[1] * k[1] * var_c];
-    Fused {
-        e: fit.e,
-        c: fit.c,
-        p,
-        free_p,
-        by_cos: k,
-        var_free_cos: var_free,
-        chi2: T::ZERO,
-        edge,
-        #[cfg(feature = "position")]
-        located: None,
-    }
+    Fused { e: fit.e, c: fit.c, p, free_p, by_cos: k, var_free_cos: var_free, chi2: T::ZERO, edge, located: None }
 }
 
 /// Returns the change of the axis for δc = 1 with a fixed half-angle: the solution of the normal equations for the

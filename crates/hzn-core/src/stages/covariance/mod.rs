@@ -10,22 +10,16 @@
 //! not appear in the residuals; each of them adds a term. Last, the expected half-angle is fused.
 
 mod answer;
-#[cfg(feature = "dlr")]
 pub(crate) mod braun_barf;
 mod common;
-#[cfg(feature = "position")]
 pub(crate) mod consider;
-#[cfg(feature = "zju")]
 mod elliptic;
 mod fusion;
 mod gauss_markov;
 mod noise;
-#[cfg(feature = "position")]
 pub(crate) mod position;
-#[cfg(feature = "reml")]
 pub mod reml;
 mod sandwich;
-#[cfg(feature = "position")]
 mod third_axis;
 
 use crate::base::linalg::M3;
@@ -38,12 +32,11 @@ use crate::stages::fit::{self, Fit};
 pub use crate::model::edge_noise::{Config, Method, Noise};
 pub use crate::model::error_budget::{ErrorBudget, Term};
 pub(crate) use answer::Fused;
-#[cfg(all(test, feature = "position"))]
+#[cfg(test)]
 pub(crate) use answer::Located;
 use fusion::fused;
 pub(crate) use gauss_markov::correlated;
 pub(crate) use noise::measured_length_px;
-#[cfg(feature = "position")]
 pub(crate) use position::place;
 pub(crate) use sandwich::{response, sandwich};
 
@@ -58,13 +51,11 @@ pub(crate) fn fuse<T: Real>(
     camera: &Camera<T>,
     mut budget: Option<&mut ErrorBudget<T>>,
 ) -> Option<Fused<T>> {
-    #[cfg(feature = "dlr")]
-    if config.method == Method::BraunBarf {
+    if cfg!(feature = "dlr") && config.method == Method::BraunBarf {
         return braun_barf::fused(blocks, fit, config);
     }
     let noise = noise::EdgeNoiseModel::new(fit, config);
-    #[cfg(feature = "zju")]
-    if let Some(quadric) = &fit.quadric {
+    if let Some(quadric) = fit.quadric() {
         let p = elliptic::covariance(blocks, quadric, noise.length_px) * noise.variance;
         return fused(fit, &p, noise.edge(p.m33), expected, estimate, budget);
     }
@@ -81,8 +72,7 @@ pub(crate) fn fuse<T: Real>(
         p += more;
         add(term, more);
     })?;
-    #[cfg(feature = "position")]
-    if let Some(target) = expected.target.as_ref().filter(|_| fit.free) {
+    if let Some(target) = expected.target().filter(|_| fit.free) {
         let mut fused = position::fused(blocks, fit, &p, edge, expected, target, estimate, budget)?;
         if let Some(located) = &mut fused.located {
             let limit_rad = estimate.yaw_limit_deg.to_radians();

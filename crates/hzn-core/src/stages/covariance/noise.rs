@@ -35,7 +35,6 @@ pub(super) struct EdgeNoiseModel<T> {
     /// 1-sigma of the common tilt, px.
     pub(super) tilt_px: T,
     /// Sigma of the configuration in pixels, if the likelihood of the residuals gives the noise.
-    #[cfg(feature = "reml")]
     reml: Option<f64>,
 }
 
@@ -58,28 +57,20 @@ impl<T: Real> EdgeNoiseModel<T> {
             length_px: T::from_f64(config.correlation_px).max(length_px),
             shift_px: T::from_f64(config.bias_px).max(common),
             tilt_px: T::from_f64(config.tilt_px).max(common * T::from_f64(END_PER_RMS)),
-            #[cfg(feature = "reml")]
             reml: (config.noise == Noise::Reml).then_some(config.sigma_px),
         }
     }
 
     /// Returns the errors of the edge points, with their contribution to the variance of the freely fitted cos α.
     pub(super) fn edge(&self, var_cos: T) -> EdgeNoise<T> {
-        EdgeNoise {
-            var_cos,
-            sigma_px: self.variance.sqrt(),
-            length_px: self.length_px,
-            #[cfg(feature = "position")]
-            shift_px: self.shift_px,
-        }
+        EdgeNoise { var_cos, sigma_px: self.variance.sqrt(), length_px: self.length_px, shift_px: self.shift_px }
     }
 
     /// Returns the upper triangle of the covariance of the right-hand side Σ w r h of the normal equations.
     pub(super) fn correlated(&self, blocks: &[Block<T>], fit: &Fit<T>, expected: &Expected<T>) -> [T; 6] {
-        #[cfg(not(feature = "reml"))]
-        let _ = expected;
-        #[cfg(feature = "reml")]
-        if let Some(x) = self.reml.and_then(|floor_px| super::reml::averaged(blocks, fit, expected, floor_px)) {
+        if cfg!(feature = "reml")
+            && let Some(x) = self.reml.and_then(|floor_px| super::reml::averaged(blocks, fit, expected, floor_px))
+        {
             return x;
         }
         let (b1, b2) = basis(&fit.e);

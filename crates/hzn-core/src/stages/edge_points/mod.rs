@@ -11,20 +11,17 @@
 //! illumination.
 
 mod config;
-#[cfg(feature = "erf")]
 mod erf;
 #[cfg(test)]
 #[path = "../../../tests/unit/edge_points.rs"]
 mod golden;
 mod linear;
-#[cfg(any(feature = "erf", feature = "zju"))]
 mod patch;
 mod plateau;
 mod point;
 mod reads;
 #[cfg(test)]
 mod tests;
-#[cfg(feature = "zju")]
 mod zernike;
 
 use crate::base::real::Real;
@@ -34,7 +31,6 @@ use crate::image::{Pixels, StreamedPoint};
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 use linear::{MARGIN, is_clear, linear};
-#[cfg(any(feature = "erf", feature = "zju"))]
 use point::towards_light;
 use point::{EdgePoint, orientation, point_off};
 use reads::Around;
@@ -114,10 +110,8 @@ fn locate<T: Real, P: Pixels, O: Observer<T>>(
 ) -> Option<EdgePoint<T>> {
     match config.sub_pixel {
         SubPixel::None => half_pixel(binary, p),
-        #[cfg(feature = "erf")]
-        SubPixel::Erf => erf::locate(binary, p).and_then(towards_light),
-        #[cfg(feature = "zju")]
-        SubPixel::Zernike => zernike::locate(binary, p).and_then(towards_light),
+        SubPixel::Erf if cfg!(feature = "erf") => erf::locate(binary, p).and_then(towards_light),
+        SubPixel::Zernike if cfg!(feature = "zju") => zernike::locate(binary, p).and_then(towards_light),
         // `Config::check` refuses a method that is not built in.
         _ if is_clear(binary, p, MARGIN as u16) => linear::<T, P, O, true>(binary, p, extra_cost),
         _ => linear::<T, P, O, false>(binary, p, extra_cost),

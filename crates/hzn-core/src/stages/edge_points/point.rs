@@ -40,7 +40,6 @@ pub(super) fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
 }
 
 /// Makes an edge point for the methods that know the direction of the gradient.
-#[cfg(any(feature = "erf", feature = "zju"))]
 pub(super) fn towards_light<T: Real>((point, [x, y]): (ImagePoint<T>, [T; 2])) -> Option<EdgePoint<T>> {
     // `orientation` compares integers, and the direction is a unit vector.
     let scale = T::from_f64(1024.0);

@@ -65,7 +65,6 @@ pub(super) fn settle<T: Real>(
         mean,
         sums,
         free: true,
-        #[cfg(feature = "zju")]
         quadric: None,
     })
 }

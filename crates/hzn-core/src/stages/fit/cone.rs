@@ -1,6 +1,5 @@
 //! The fitted cone: the state of the iterations, the result of every method, and the fit with its statistics.
 
-#[cfg(feature = "zju")]
 use super::quadric::Quadric;
 use super::sums::Sums;
 use crate::base::linalg::{V3, unit};
@@ -31,8 +30,14 @@ pub(crate) struct Fit<T> {
     /// Means of Bᵀs.
     pub(crate) mean: [T; 2],
     /// The elliptic cone of the methods that fit one. Its covariance is not the one of the normal equations.
-    #[cfg(feature = "zju")]
-    pub(crate) quadric: Option<Quadric<T>>,
+    quadric: Option<Quadric<T>>,
+}
+
+impl<T: Real> Fit<T> {
+    /// Returns the elliptic cone of the methods that fit one. Without the feature there is none.
+    pub(crate) fn quadric(&self) -> Option<&Quadric<T>> {
+        if cfg!(feature = "zju") { self.quadric.as_ref() } else { None }
+    }
 }
 
 /// Makes the fit of a cone, and counts its points.
@@ -60,7 +65,6 @@ pub(super) fn count_points<T: Real>(blocks: &[Block<T>], cone: Cone<T>) -> Fit<T
         nearby: at.nearby,
         sums,
         mean,
-        #[cfg(feature = "zju")]
         quadric: cone.quadric,
     }
 }
@@ -72,7 +76,6 @@ pub(super) struct Cone<T> {
     pub(super) mean: [T; 2],
     pub(super) sums: Sums<T>,
     pub(super) free: bool,
-    #[cfg(feature = "zju")]
     pub(super) quadric: Option<Quadric<T>>,
 }
 

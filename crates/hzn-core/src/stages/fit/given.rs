@@ -7,12 +7,11 @@ use super::sums::{Weights, means, pass};
 use crate::base::linalg::{V3, basis, unit};
 use crate::base::real::Real;
 use crate::geometry::block::Block;
-#[cfg(all(feature = "position", any(test, feature = "_edges")))]
+#[cfg(any(test, feature = "_edges"))]
 use crate::geometry::scaling::Scaling;
 
 /// Returns the fit at a given cone, with the weights that the points have.
 #[cfg(any(test, feature = "_edges"))]
-#[allow(dead_code, reason = "behind a feature")]
 pub(crate) fn fit_at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option<Fit<T>> {
     let cone = cone_at(blocks, e, T::one() - c)?;
     Some(count_points(blocks, cone))
@@ -20,7 +19,7 @@ pub(crate) fn fit_at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, c: T) -> Option
 
 /// Fits axis and half-angle of a position with the weights that the points have, from a start: axis and 1 − cos of the
 /// half-angle.
-#[cfg(all(feature = "position", any(test, feature = "_edges")))]
+#[cfg(any(test, feature = "_edges"))]
 pub(crate) fn fit_position_from<T: Real>(
     blocks: &mut [Block<T>],
     (e, k): (V3<T>, T),
@@ -46,7 +45,6 @@ pub(super) fn cone_at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, k: T) -> Optio
         mean,
         sums,
         free: true,
-        #[cfg(feature = "zju")]
         quadric: None,
     })
 }

@@ -11,29 +11,20 @@
 //! the edge are *correlated*. Then the half-angle is fitted freely with the weights that were found: for the
 //! covariance, for the altitude estimate, and for the test of the candidate. `covariance` fuses the two half-angles.
 
-#[cfg(feature = "position")]
 mod angle;
 mod azimuth;
-#[cfg(feature = "horace")]
 mod circle;
-#[cfg(feature = "position")]
 pub(crate) mod closed;
 mod cone;
 mod config;
-#[cfg(feature = "dlr")]
 pub(crate) mod conic;
-#[cfg(feature = "dlr")]
 pub(crate) mod direct;
-#[cfg(any(test, feature = "dlr", feature = "zju", feature = "horace", feature = "position", feature = "_edges"))]
 mod given;
-#[cfg(any(feature = "dlr", feature = "zju", feature = "horace", feature = "position"))]
 mod published;
-#[cfg(feature = "zju")]
 mod quadric;
 mod sphere;
 mod sums;
 
-#[cfg(any(feature = "dlr", feature = "horace"))]
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::Block;
@@ -46,22 +37,17 @@ pub(crate) use cone::Fit;
 use cone::count_points;
 pub use config::{Config, HalfAngle, Method};
 #[cfg(any(test, feature = "_edges"))]
-#[allow(unused_imports, reason = "for the tests of methods behind features")]
 pub(crate) use given::fit_at;
-#[cfg(all(feature = "position", any(test, feature = "_edges")))]
+#[cfg(any(test, feature = "_edges"))]
 pub(crate) use given::fit_position_from;
-#[cfg(any(feature = "dlr", feature = "horace", feature = "position"))]
 use published::fit_by;
-#[cfg(feature = "zju")]
 use published::{HALF_TURN_RAD, elliptic};
-#[cfg(feature = "zju")]
 pub(crate) use quadric::Quadric;
 use sphere::sphere;
 #[cfg(test)]
 pub(crate) use sums::Weights;
 pub(crate) use sums::{Sums, inverse};
-#[cfg(any(test, feature = "_edges"))]
-#[allow(unused_imports, reason = "for the tests of methods behind features")]
+#[cfg(test)]
 pub(crate) use sums::{means, pass};
 
 /// Fits the cone, and stores the weight of each point in its block. The result is `None` if the points do not determine
@@ -75,23 +61,26 @@ pub(crate) fn fit<T: Real>(
     config: &Config,
     noise: &edge_noise::Config,
 ) -> Option<Fit<T>> {
-    #[cfg(not(feature = "horace"))]
-    let _ = camera;
     let cone = match config.method {
-        #[cfg(feature = "dlr")]
-        Method::Direct => fit_by(blocks, start, threshold_px, |blocks| direct::fit(blocks).map(with_k))?,
-        #[cfg(feature = "dlr")]
-        Method::Conic => fit_by(blocks, start, threshold_px, |blocks| conic::fit(blocks).map(with_k))?,
-        #[cfg(feature = "zju")]
-        Method::Tls => elliptic(blocks, start, threshold_px, HALF_TURN_RAD)?,
-        #[cfg(feature = "zju")]
-        Method::Wtls => elliptic(blocks, start, threshold_px, config.weigh_above_deg.to_radians())?,
-        #[cfg(feature = "horace")]
-        Method::Circle => fit_by(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera).map(with_k))?,
-        #[cfg(feature = "position")]
-        Method::LeastSquares => fit_by(blocks, start, threshold_px, |blocks| closed::least_squares(blocks))?,
-        #[cfg(feature = "position")]
-        Method::GeneralisedTls => fit_by(blocks, start, threshold_px, |blocks| closed::generalised_tls(blocks))?,
+        Method::Direct if cfg!(feature = "dlr") => {
+            fit_by(blocks, start, threshold_px, |blocks| direct::fit(blocks).map(with_k))?
+        }
+        Method::Conic if cfg!(feature = "dlr") => {
+            fit_by(blocks, start, threshold_px, |blocks| conic::fit(blocks).map(with_k))?
+        }
+        Method::Tls if cfg!(feature = "zju") => elliptic(blocks, start, threshold_px, HALF_TURN_RAD)?,
+        Method::Wtls if cfg!(feature = "zju") => {
+            elliptic(blocks, start, threshold_px, config.weigh_above_deg.to_radians())?
+        }
+        Method::Circle if cfg!(feature = "horace") => {
+            fit_by(blocks, start, threshold_px, |blocks| circle::fit(blocks, camera).map(with_k))?
+        }
+        Method::LeastSquares if cfg!(feature = "position") => {
+            fit_by(blocks, start, threshold_px, |blocks| closed::least_squares(blocks))?
+        }
+        Method::GeneralisedTls if cfg!(feature = "position") => {
+            fit_by(blocks, start, threshold_px, |blocks| closed::generalised_tls(blocks))?
+        }
         // `Config::check` refuses a method that is not built in.
         _ => sphere(blocks, start, expected, threshold_px, config, noise)?,
     };
@@ -99,7 +88,6 @@ pub(crate) fn fit<T: Real>(
 }
 
 /// Converts the cosine of a half-angle to 1 − cos.
-#[cfg(any(feature = "dlr", feature = "horace"))]
 fn with_k<T: Real>((e, c): (V3<T>, T)) -> (V3<T>, T) {
     (e, T::one() - c)
 }

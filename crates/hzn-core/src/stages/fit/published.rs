@@ -3,9 +3,7 @@
 
 use super::cone::Cone;
 use super::given::cone_at;
-#[cfg(feature = "zju")]
 use super::quadric::Quadric;
-#[cfg(feature = "zju")]
 use super::sums::Sums;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
@@ -16,7 +14,6 @@ use crate::stages::consensus::Consensus;
 /// are therefore the same as for the default method. The method uses the points within `threshold_px` of the consensus,
 /// or all points if `start.all` is set. `find` receives the blocks with weights 0 and 1, and returns the axis and 1 −
 /// cos of the half-angle.
-#[allow(dead_code, reason = "for the estimators behind features")]
 pub(super) fn fit_by<T: Real>(
     blocks: &mut [Block<T>],
     start: &Consensus<T>,
@@ -40,12 +37,10 @@ pub(super) fn fit_by<T: Real>(
 }
 
 /// Largest possible angle between the axis and the optical axis, in radians.
-#[cfg(feature = "zju")]
 pub(super) const HALF_TURN_RAD: f64 = core::f64::consts::PI;
 
 /// Fits an elliptic cone to the points. `rms_px` uses the distances from this cone, and the covariance comes from
 /// `quadric`.
-#[cfg(feature = "zju")]
 pub(super) fn elliptic<T: Real>(
     blocks: &mut [Block<T>],
     start: &Consensus<T>,

@@ -37,19 +37,15 @@ pub(super) fn sphere<T: Real>(
     let azimuth = azimuth.as_ref();
     let known = config.half_angle == HalfAngle::Known && !expected.free;
     let (robust, sums) = robust(blocks, start, expected, threshold_px, known, config, noise, azimuth)?;
-    #[cfg(feature = "position")]
-    let refined = expected.seen_along(&robust.e);
-    #[cfg(feature = "position")]
-    let expected = &refined;
-    #[cfg(feature = "position")]
-    if let Some(target) = &expected.target
+    let refined = expected.target().map(|_| expected.seen_along(&robust.e));
+    let expected = refined.as_ref().unwrap_or(expected);
+    if let Some(target) = expected.target()
         && let Some(cone) = super::angle::settle(blocks, robust, Some(sums), &target.scaling)
     {
         return Some(cone);
     }
     // Without a known distance there is no expected half-angle to use instead.
-    #[cfg(feature = "position")]
-    if expected.target.is_some_and(|target| target.range.is_none()) {
+    if expected.target().is_some_and(|target| target.range.is_none()) {
         return None;
     }
     let freely = if known { None } else { settle(blocks, robust, Some(sums), true, azimuth) };
@@ -59,14 +55,7 @@ pub(super) fn sphere<T: Real>(
         None if expected.free => return None,
         None => (settle(blocks, State { k: T::one() - expected.cos, ..robust }, None, false, azimuth)?, false),
     };
-    Some(Cone {
-        at,
-        mean,
-        sums,
-        free,
-        #[cfg(feature = "zju")]
-        quadric: None,
-    })
+    Some(Cone { at, mean, sums, free, quadric: None })
 }
 
 /// Does the iterations with Tukey's weights. The cut-off begins at three thresholds and then follows the residuals,

@@ -94,8 +94,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
     /// Returns whether a point cannot be on the limb because the Sun does not light the limb there. The edge then
     /// continues as the terminator, which says nothing about the limb. This is known only for a position.
     fn is_terminator(&self, ray: &V3<T>) -> bool {
-        #[cfg(feature = "position")]
-        if self.expected.target.is_some() {
+        if self.expected.target().is_some() {
             let (fx, fy) = self.camera.focal_px();
             let focal_px = (fx + fy) * T::from_f64(0.5);
             return !self.expected.is_lit(ray, self.curve.axis(), T::one() - self.curve.k(), focal_px);

@@ -198,8 +198,7 @@ fn judge_rivals<T: Real, P: Pixels, O: Observer<T>>(
     }
     // Without a known distance, a part of any smooth curve, a ring or a shadow, is near some cone. Only the residuals
     // tell them apart: those of the body's own shape are noise, or less than half of the shift in the covariance.
-    #[cfg(feature = "position")]
-    if expected.target.is_some_and(|target| target.range.is_none())
+    if expected.target().is_some_and(|target| target.range.is_none())
         && rms > ratio * noise.max(floor)
         && rms + rms > fused.edge.shift_px
     {

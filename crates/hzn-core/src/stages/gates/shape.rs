@@ -44,7 +44,6 @@ impl<T: Real> Curve<T> {
         &self.e
     }
     /// Returns 1 − cos of the half-angle of the cone.
-    #[cfg(feature = "position")]
     pub(super) fn k(&self) -> T {
         self.k
     }

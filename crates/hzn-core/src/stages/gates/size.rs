@@ -14,9 +14,8 @@ pub(super) fn disc_px<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> T 
 
 /// Returns the part of a limb that counts as limb at most. For a position with a known Sun, the points within 75° of
 /// the Sun's azimuth count ([`Expected::is_lit`]), 150° of 360°.
-pub(super) fn lit_share<T>(expected: &Expected<T>) -> f64 {
-    #[cfg(feature = "position")]
-    if expected.target.is_some() && expected.sun.is_some() {
+pub(super) fn lit_share<T: Real>(expected: &Expected<T>) -> f64 {
+    if expected.target().is_some() && expected.sun.is_some() {
         return 150.0 / 360.0;
     }
     let _ = expected;
@@ -26,8 +25,7 @@ pub(super) fn lit_share<T>(expected: &Expected<T>) -> f64 {
 /// Returns the sine of the half-angle from which the number of points of a small disc follows: the expected one. For a
 /// position without a known distance it is the fitted one.
 pub(super) fn sin_for_points<T: Real>(fused: &Fused<T>, expected: &Expected<T>) -> T {
-    #[cfg(feature = "position")]
-    if expected.target.is_some() {
+    if expected.target().is_some() {
         return (T::one() - fused.c * fused.c).max(T::ZERO).sqrt();
     }
     let _ = fused;
