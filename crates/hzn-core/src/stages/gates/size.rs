@@ -18,7 +18,6 @@ pub(super) fn lit_share<T: Real>(expected: &Expected<T>) -> f64 {
     if expected.target().is_some() && expected.sun.is_some() {
         return 150.0 / 360.0;
     }
-    let _ = expected;
     1.0
 }
 
@@ -28,7 +27,6 @@ pub(super) fn sin_for_points<T: Real>(fused: &Fused<T>, expected: &Expected<T>) 
     if expected.target().is_some() {
         return (T::one() - fused.c * fused.c).max(T::ZERO).sqrt();
     }
-    let _ = fused;
     expected.sin
 }
 
