@@ -1,8 +1,9 @@
 //! The core of a horizon sensor. It computes the direction of a body, with a covariance for a navigation filter, from a
 //! picture of the body's limb.
 //!
-//! The crate uses no heap, a fixed amount of memory and no unsafe code. `process` returns a report for every picture
-//! and never reports NaN or infinity. Functions that IEEE 754 does not round correctly come from one library, and every
+//! The crate uses no heap, a fixed amount of memory and no unsafe code. (Where the ABI is `eabihf`, the square root is
+//! the one unsafe instruction of the crate `hzn-fpu`.) `process` returns a report for every picture and never reports
+//! NaN or infinity. Functions that IEEE 754 does not round correctly come from one library, and every
 //! sum has a fixed order. Therefore the answer does not depend on the machine. A picture passes through these stages in
 //! order; each stage is one module:
 //!
