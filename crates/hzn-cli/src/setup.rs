@@ -201,7 +201,7 @@ pub(crate) fn check_altitude(sensor: &Sensor, source: &dyn Source, frames: Optio
     }
     let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or give a frames.csv with \
                 altitudes";
-    Err(Stop { exit: Exit::Usage, error: anyhow::anyhow!(what) })
+    Err(usage(what))
 }
 
 /// Checks the sensor's own altitude if no other is known: it must be above the limb height of at least one body.
@@ -243,7 +243,9 @@ pub(crate) fn stop_flag() -> Arc<AtomicBool> {
         if shared.swap(true, Ordering::SeqCst) {
             std::process::exit(i32::from(Exit::Interrupted as u8));
         }
-        tell::line(format_args!("\nfinishing the pictures that were begun; press Ctrl-C again to stop at once"));
+        // The terminal shows ^C at the end of the line before.
+        tell::line("");
+        tell::line("finishing the pictures that were begun; press Ctrl-C again to stop at once");
     });
     // Without a handler, Ctrl-C ends the program at once; the output can still be continued.
     drop(handler);

@@ -13,7 +13,7 @@ use hzn_run::{disk, engine, explain, overlay, sink};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::setup::{InputArgs, SensorArgs, check_altitude, find_input};
-use crate::tell;
+use crate::tell::{self, one_line};
 
 /// Show what happens to one picture: what is kept, what is dropped, and why
 #[derive(Debug, clap::Args)]
@@ -52,7 +52,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let picture = match item.payload.decode(Some(config)) {
         Ok((picture, _)) => picture,
         Err(why) => {
-            tell::result(format_args!("{}: unreadable: {why}\n", item.name))?;
+            tell::result(format_args!("{}\n", one_line(format_args!("{}: unreadable: {why}", item.name))))?;
             return Ok(Exit::SomeUnreadable);
         }
     };
@@ -121,7 +121,8 @@ impl PictureWithPrior<'_> {
                 (Ok(report), Ok(half_angle)) => (report, half_angle),
                 (Err(why), _) | (_, Err(why)) => {
                     let Unprocessed { status, why, .. } = why.into();
-                    tell::result(format_args!("{between}{file}: {name}: {status}: {why}\n"))?;
+                    let text = one_line(format_args!("{file}: {name}: {status}: {why}"));
+                    tell::result(format_args!("{between}{text}\n"))?;
                     statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
                     exit = Exit::SomeUnreadable;
                     continue;
@@ -162,7 +163,7 @@ impl Explained<'_> {
     fn text(&self, decoding: Duration, elapsed: Duration) -> String {
         let mut out = String::new();
         let mut line = |name: &str, value: String| {
-            out.push_str(format!("{name:<11} {value}").trim_end());
+            out.push_str(format!("{name:<11} {}", one_line(value)).trim_end());
             out.push('\n');
         };
         line("picture", self.layout());

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::progress::Progress;
 use crate::setup::{clear_rendered, stop_flag};
-use crate::tell;
+use crate::tell::{self, one_line};
 
 /// Render a sequence of pictures with truth, and write a sensor.toml that fits it
 ///
@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let name = args.scene.as_deref().unwrap_or_default();
     if args.show {
-        tell::result(format_args!("{}\n", scene::source(name)?.1.trim_end()))?;
+        tell::file(format_args!("{}\n", scene::source(name)?.1.trim_end()))?;
         return Ok(Exit::Done);
     }
     let mut scenario = scene::load(name, args.frames, args.seed)?;
@@ -310,7 +310,8 @@ impl Sequence {
     fn summary(&self) -> Result<(), Stop> {
         let Self { scenario, flight, folder } = self;
         let pictures = explain::counted(flight.frames.len() as u64, "picture");
-        tell::result(format_args!("{}: {pictures} of {}\n", folder.display(), scenario.name))?;
+        let text = one_line(format_args!("{}: {pictures} of {}", folder.display(), scenario.name));
+        tell::result(format_args!("{text}\n"))?;
         for &kind in &scenario.bodies {
             let mut seen = 0;
             let mut body = String::new();
@@ -329,7 +330,7 @@ impl Sequence {
 fn next(cameras: &[Sequence]) -> Result<(), Stop> {
     tell::result("\n")?;
     for (i, one) in cameras.iter().enumerate() {
-        let shown = one.folder.display();
+        let shown = one_line(one.folder.display());
         let begin = if i == 0 { "Next:  " } else { "       " };
         tell::result(format_args!("{begin}hzn run {shown} -o {shown}.csv\n"))?;
     }

@@ -1,6 +1,5 @@
 //! `hzn telecommand`: writes commands for a flight computer, as the bytes that are sent to it, or sends them.
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use hzn_fly::link::Address;
@@ -9,6 +8,7 @@ use hzn_run::disk;
 use super::ground::{Commander, Incoming, encode, write_packet};
 use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome};
+use crate::tell;
 
 /// Write commands for a flight computer
 ///
@@ -69,7 +69,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             Ok(Exit::Done)
         }
         None => {
-            std::io::stdout().write_all(&out)?;
+            tell::bytes(&out)?;
             Ok(Exit::Done)
         }
     }

@@ -52,7 +52,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let Some(file) = args.file.as_deref().filter(|_| !args.xtce) else {
-        tell::result(xtce::dictionary(args.apids.apid_base))?;
+        tell::file(xtce::dictionary(args.apids.apid_base))?;
         return Ok(Exit::Done);
     };
     let name = file.display().to_string();

@@ -141,7 +141,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         let what = "no place in the result; put it into the [camera] section that names this file";
         tell::warning(format_args!("{} has {what}", lost.join(", ")));
     }
-    let Some(path) = &args.output else { return Ok(tell::result(text)?) };
+    let Some(path) = &args.output else { return Ok(tell::file(text)?) };
     disk::refuse_existing(path, args.force)?;
     if to == To::Sensor {
         let comment = comment.map(|c| format!("# {c}\n")).unwrap_or_default();
