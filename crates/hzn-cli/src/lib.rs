@@ -10,6 +10,7 @@
 mod apid;
 pub mod commands;
 pub mod exit;
+mod files;
 mod html;
 pub mod plot;
 mod progress;

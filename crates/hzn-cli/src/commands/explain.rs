@@ -9,9 +9,10 @@ use hzn_core::{Config, Report, Solution, body, threshold};
 use hzn_mcap::Annotations;
 use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
 use hzn_run::source::{self, Item, Picture, Source};
-use hzn_run::{disk, engine, explain, overlay, sink};
+use hzn_run::{engine, explain, overlay, sink};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::files;
 use crate::setup::{InputArgs, SensorArgs, check_altitude, find_input};
 use crate::tell::{self, one_line};
 
@@ -37,7 +38,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.overlay {
-        check_overlay(path, args)?;
+        check_overlay(path)?;
     }
     let mut source = args.source.open(std::slice::from_ref(&args.frame))?;
     let mut sensor = args.sensor.load(source.as_ref())?;
@@ -45,6 +46,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
     check_altitude(&sensor, source.as_ref(), frames.as_ref())?;
+    if let Some(path) = &args.overlay {
+        let read = files::of_sequence(source.as_ref(), &args.sensor, &args.source);
+        files::check_outputs(&read, std::slice::from_ref(path), args.force)?;
+    }
     let mut item = item(source.as_mut(), args.index)?;
     let config = &sensor.config;
     let data = item.take_prior(frames.as_ref());
@@ -65,16 +70,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     picture.explain(args, decoding)
 }
 
-/// Refuses an overlay that is not a PNG, is the picture itself, or exists.
-fn check_overlay(path: &Path, args: &Args) -> Result<(), Stop> {
-    if source::ending(path) != "png" {
-        return Err(usage(format!("{}: the overlay's ending must be .png", path.display())));
+/// Refuses an overlay that is not a PNG.
+fn check_overlay(path: &Path) -> Result<(), Stop> {
+    if source::ending(path) == "png" {
+        return Ok(());
     }
-    if disk::is_same(path, &args.frame) {
-        let what = "is the picture itself; choose another name for the overlay";
-        return Err(usage(format!("{}: {what}", path.display())));
-    }
-    Ok(disk::refuse_existing(path, args.force)?)
+    Err(usage(format!("{}: the overlay's ending must be .png", path.display())))
 }
 
 /// Returns picture number `index` of a sequence, counted from 0.
