@@ -69,8 +69,8 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     check_list_lengths(text, path, &places)?;
     let from_file = camera_from_file(table.get_mut(), text, path)?;
     if from_file.is_some() {
-        // `Config` requires a camera. This one is a placeholder; `merge_camera` replaces it. The keys next to `file` are
-        // kept.
+        // `Config` requires a camera. This one is a placeholder; `merge_camera` replaces it and keeps the keys next to
+        // `file`.
         let stand_in = DeTable::parse("width = 2\nheight = 2\nfx_px = 1.0\nfy_px = 1.0\ncx_px = 0.0\ncy_px = 0.0\n");
         if let (Ok(stand_in), Some(DeValue::Table(own))) =
             (stand_in, table.get_mut().get_mut("camera").map(toml::Spanned::get_mut))
