@@ -20,6 +20,7 @@ mod display;
 mod firmware;
 mod flight_build;
 mod machine;
+mod miri;
 mod processors;
 mod python;
 mod reproduce;

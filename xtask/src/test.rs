@@ -8,7 +8,7 @@ use crate::demo::{demo_dir, find_recordings, run_demo};
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{self, Outcome, Steps, cargo};
 use crate::test_build::build_tests;
-use crate::{campaign, firmware, flight_build, python, viewer, wheel};
+use crate::{campaign, firmware, flight_build, miri, python, viewer, wheel};
 
 pub(crate) fn run(only: &[String]) -> Result<(), String> {
     std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
@@ -20,6 +20,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("tests", |s| s.cargo_test(&[]));
     // A workspace build unites the features of all crates. Alone, the core is built as it flies.
     all.step("tests of hzn-core alone", |s| s.cargo_test(&["--package", "hzn-core"]));
+    all.step("undefined behaviour", |_| miri::test());
     all.step("feature sets of hzn-core", |_| {
         // Without features it is built for the tests above. A feature chooses by `cfg!`, so most code is always compiled.
         ["std,_edges", "serde", "dlr,zju,horace,erf,kalibr,position,reml"].into_iter().try_for_each(check_core_with)

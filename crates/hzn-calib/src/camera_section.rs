@@ -1,6 +1,6 @@
 //! A `[camera]` whose calibration comes from the `file` of another tool.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Config;
 use toml::de::{DeTable, DeValue};
@@ -10,6 +10,18 @@ use crate::{Problem, camera_file};
 
 /// The keys of `[camera]` that camera files do not have. They may be next to `file`.
 const KEYS_ALLOWED_WITH_FILE: [&str; 4] = ["focal_sigma_percent", "centre_sigma_px", "covariance", "readout_s"];
+
+/// Returns the camera file that the text of a sensor.toml or scene.toml names; `path` is the file of the text.
+pub fn named_camera_file(text: &str, path: &Path) -> Option<PathBuf> {
+    let table = DeTable::parse(text).ok()?.into_inner();
+    let file = table.get("camera")?.get_ref().get("file")?;
+    Some(next_to(path, file.get_ref().as_str()?))
+}
+
+/// Returns the path of a file that is named relative to the file at `path`.
+fn next_to(path: &Path, file: &str) -> PathBuf {
+    path.parent().unwrap_or(Path::new("")).join(file)
+}
 
 /// Takes `file` and its options out of the `[camera]` table and loads the calibration; `None` if there is no `file`.
 pub(crate) fn camera_from_file(table: &mut DeTable<'_>, text: &str, path: &Path) -> Result<Option<Config>, Problem> {
@@ -28,7 +40,7 @@ pub(crate) fn camera_from_file(table: &mut DeTable<'_>, text: &str, path: &Path)
         let field = format!("[camera] {}", key.get_ref());
         return Err(Problem::new(path, what).at_offset(text, key.span().start).in_field(field));
     }
-    let file = path.parent().unwrap_or(Path::new("")).join(file);
+    let file = next_to(path, file);
     if !file.exists() {
         return Err(refused(format!("{}: no such file (paths are relative to the sensor.toml)", file.display())));
     }

@@ -94,6 +94,11 @@ mod tests {
         assert!(error("[captures]\nframes = 1\n").contains("did you mean capture?"));
         assert!(error("[capture]\nframes = \"many\"\n").starts_with("scene.toml:10: [capture] frames: "));
         assert_eq!(error(""), "scene.toml: capture: the section [capture] is missing");
+        // serde alone would read the first four numbers.
+        for mount in ["[attitude_mount]\n", "[[cameras]]\nmount."] {
+            let message = error(&format!("{mount}q_body_from_camera_wxyz = [1, 0, 0, 0, 0]\n"));
+            assert!(message.ends_with("q_body_from_camera_wxyz: has 5 numbers; at most 4 are allowed"), "{message}");
+        }
     }
 
     #[test]

@@ -48,6 +48,7 @@ pub mod start;
 pub mod template;
 pub mod time;
 
+pub use camera_section::named_camera_file;
 pub use frames::{FrameData, Frames, Orientation};
 pub use nearest::nearest;
 pub use problem::Problem;

@@ -82,12 +82,13 @@ pub(crate) fn find_places(table: &DeTable<'_>) -> Vec<KeyPlace> {
 /// length, and would read only the first values of others.
 pub(crate) fn check_list_lengths(text: &str, path: &Path, places: &[KeyPlace]) -> Result<(), Problem> {
     const ROWS: &str = "limb_height_by_latitude_km";
+    const QUATERNION: &str = "q_body_from_camera_wxyz";
     for place in places {
         let parts: Vec<&str> = place.path.iter().map(String::as_str).collect();
         let (max, what) = match parts[..] {
             // The limit is that of `brown-conrady`.
             ["camera", "k"] => (5, "numbers"),
-            ["mount", "q_body_from_camera_wxyz"] => (4, "numbers"),
+            ["mount" | "attitude_mount", QUATERNION] | ["cameras", _, "mount", QUATERNION] => (4, "numbers"),
             ["mask", "polygons_px"] => (MAX_POLYGONS, "polygons"),
             ["mask", "polygons_px", _] => (MAX_CORNERS, "corners"),
             ["body", ROWS] | ["bodies", _, ROWS] => (MAX_LATITUDES, "rows"),

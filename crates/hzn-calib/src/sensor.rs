@@ -1,12 +1,13 @@
 //! `sensor.toml`: one file that describes a sensor.
 //!
-//! The structure is [`hzn_core::Config`] with two more keys: `preset` at the top, and `file` in `[camera]`. `file`
-//! takes the calibration from another tool's file (see [`crate::camera_file`]). Its path is relative to the
-//! sensor.toml. `camera = "cam1"` next to it selects one of several cameras.
+//! The structure is [`hzn_core::Config`] with two more keys: `preset` at the top, and `file` in `[camera]`. `preset`
+//! gives the keys that the file does not have, as [`Config::preset`] does for the camera of the file. `file` takes the
+//! calibration from another tool's file (see [`crate::camera_file`]). Its path is relative to the sensor.toml.
+//! `camera = "cam1"` next to it selects one of several cameras.
 
 use std::path::Path;
 
-use hzn_core::camera::{self, Camera, Model};
+use hzn_core::camera::{self, Camera};
 use hzn_core::error::ConfigError;
 use hzn_core::report::MAX_BODIES;
 use hzn_core::{Config, Preset};
@@ -63,14 +64,13 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
         Some((value, span)) => find_preset(value.as_str().unwrap_or_default())
             .map_err(|what| Problem::new(path, what).at_offset(text, span.start).in_field("preset"))?,
     };
-    let starting_values = starting_values(preset);
     let body_defaults = body_defaults(table.get_ref());
     check_bodies(table.get_ref(), text, path)?;
     check_list_lengths(text, path, &places)?;
     let from_file = camera_from_file(table.get_mut(), text, path)?;
     if from_file.is_some() {
-        // `Config` requires a camera. This one is a placeholder; the camera of the file replaces it below. The keys
-        // next to `file` are kept.
+        // `Config` requires a camera. This one is a placeholder; `merge_camera` replaces it and keeps the keys next to
+        // `file`.
         let stand_in = DeTable::parse("width = 2\nheight = 2\nfx_px = 1.0\nfy_px = 1.0\ncx_px = 0.0\ncy_px = 0.0\n");
         if let (Ok(stand_in), Some(DeValue::Table(own))) =
             (stand_in, table.get_mut().get_mut("camera").map(toml::Spanned::get_mut))
@@ -79,16 +79,18 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
         }
     }
     merge_body_defaults(table.get_mut(), &body_defaults);
+    let read = |table: toml::Spanned<DeTable<'_>>| {
+        Config::deserialize(toml::Deserializer::from(table))
+            .map_err(|e| translate_serde_error(&e, text, path, &places, &["preset"]))
+    };
+    // Values of a preset follow from the camera, which is therefore read first.
+    let camera = merge_camera(read(table.clone())?.camera, from_file);
+    let starting_values = starting_values(preset, camera.clone());
+    let mut table = table;
     if let Ok(values) = DeTable::parse(&starting_values) {
         merge_missing(table.get_mut(), values.into_inner());
     }
-    let mut config = Config::deserialize(toml::Deserializer::from(table))
-        .map_err(|e| translate_serde_error(&e, text, path, &places, &["preset"]))?;
-    if let Some(camera) = from_file {
-        let camera::Config { focal_sigma_percent, centre_sigma_px, readout_s, .. } = config.camera;
-        let covariance = config.camera.covariance.take();
-        config.camera = camera::Config { focal_sigma_percent, centre_sigma_px, covariance, readout_s, ..camera };
-    }
+    let config = Config { camera, ..read(table)? };
     if let Some(what) = plausible::explain_five_coefficients(&config.camera) {
         return Err(problem_at_key("camera.k", None, what, text, path, &places));
     }
@@ -123,13 +125,20 @@ fn find_preset(name: &str) -> Result<Preset, String> {
     Ok(preset)
 }
 
-/// Writes a preset as the text of a sensor.toml without camera.
-fn starting_values(preset: Preset) -> String {
-    let mut table =
-        match toml::Table::try_from(Config::preset(preset, camera::Config::ideal(Model::Pinhole, 2, 2, 1.0))) {
-            Ok(table) => table,
-            Err(e) => unreachable!("plain numbers, texts and lists are TOML: {e}"),
-        };
+/// Returns the camera of another tool's file with the keys of `[camera]` that are next to `file`; without such a file,
+/// the camera of `[camera]`.
+fn merge_camera(section: camera::Config, from_file: Option<camera::Config>) -> camera::Config {
+    let Some(camera) = from_file else { return section };
+    let camera::Config { focal_sigma_percent, centre_sigma_px, covariance, readout_s, .. } = section;
+    camera::Config { focal_sigma_percent, centre_sigma_px, covariance, readout_s, ..camera }
+}
+
+/// Writes the preset of a sensor with this camera as the text of a sensor.toml without camera.
+fn starting_values(preset: Preset, camera: camera::Config) -> String {
+    let mut table = match toml::Table::try_from(Config::preset(preset, camera)) {
+        Ok(table) => table,
+        Err(e) => unreachable!("plain numbers, texts and lists are TOML: {e}"),
+    };
     table.remove("camera");
     table.to_string()
 }

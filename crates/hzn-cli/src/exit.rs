@@ -34,6 +34,19 @@ pub struct Stop {
     pub exit: Exit,
     /// What went wrong and what to do.
     pub error: anyhow::Error,
+    /// Further lines about it, for example one for each picture.
+    pub details: Vec<String>,
+}
+
+impl Stop {
+    /// Returns the error with its exit code.
+    pub fn new(exit: Exit, error: anyhow::Error) -> Self {
+        Self { exit, error, details: Vec::new() }
+    }
+    /// Adds lines about the error.
+    pub(crate) fn with_details(self, details: impl IntoIterator<Item = String>) -> Self {
+        Self { details: details.into_iter().collect(), ..self }
+    }
 }
 
 /// The result of a command.
@@ -41,13 +54,13 @@ pub type Outcome = Result<Exit, Stop>;
 
 impl From<anyhow::Error> for Stop {
     fn from(error: anyhow::Error) -> Self {
-        Self { exit: Exit::Failed, error }
+        Self::new(Exit::Failed, error)
     }
 }
 
 impl From<std::io::Error> for Stop {
     fn from(error: std::io::Error) -> Self {
-        Self { exit: Exit::Failed, error: error.into() }
+        Self::new(Exit::Failed, error.into())
     }
 }
 
@@ -61,7 +74,7 @@ impl From<hzn_run::Error> for Stop {
             Some(option) => anyhow::anyhow!("{error}; {option}"),
             None => error.into_cause(),
         };
-        Self { exit, error }
+        Self::new(exit, error)
     }
 }
 
@@ -80,16 +93,16 @@ fn option(remedy: Remedy) -> Option<&'static str> {
 
 impl From<Problem> for Stop {
     fn from(problem: Problem) -> Self {
-        Self { exit: Exit::Usage, error: problem.into() }
+        Self::new(Exit::Usage, problem.into())
     }
 }
 
 /// Returns the error for a wrong command line or configuration.
 pub fn usage(message: impl std::fmt::Display) -> Stop {
-    Stop { exit: Exit::Usage, error: anyhow::anyhow!("{message}") }
+    Stop::new(Exit::Usage, anyhow::anyhow!("{message}"))
 }
 
 /// Returns the error for something that failed.
 pub fn failed(message: impl std::fmt::Display) -> Stop {
-    Stop { exit: Exit::Failed, error: anyhow::anyhow!("{message}") }
+    Stop::new(Exit::Failed, anyhow::anyhow!("{message}"))
 }

@@ -10,6 +10,7 @@
 mod apid;
 pub mod commands;
 pub mod exit;
+mod files;
 mod html;
 pub mod plot;
 mod progress;
@@ -25,18 +26,26 @@ use exit::Exit;
 /// Runs the command line and returns how it ended. Errors are printed on stderr.
 pub fn main() -> Exit {
     report_file_size_limit();
-    // clap itself prints help and usage errors, and exits with 0 or 2.
-    let cli = commands::Cli::parse();
-    match commands::run(cli) {
+    match commands::run(parse()) {
         Ok(exit) => exit,
         Err(stop) => {
             // A reader that has read enough (`hzn run ... | head`) is not an error worth a message.
             if !is_broken_pipe(&stop.error) {
                 tell::line(format_args!("error: {:#}", stop.error));
+                stop.details.iter().for_each(tell::line);
             }
             stop.exit
         }
     }
+}
+
+/// Parses the command line. clap itself prints help and usage errors, and exits with 0 or 2.
+fn parse() -> commands::Cli {
+    commands::Cli::try_parse().unwrap_or_else(|error| {
+        // clap prints refused arguments as they are, so it gets them once more without what a terminal would obey.
+        let shown = std::env::args_os().map(|word| tell::one_line(word.to_string_lossy()));
+        commands::Cli::try_parse_from(shown).err().unwrap_or(error).exit()
+    })
 }
 
 /// Makes a write beyond the limit of the file size (`ulimit -f`) an error with a message. Without this, a signal ends

@@ -51,16 +51,21 @@ pub(crate) struct InputArgs {
 }
 
 impl SensorArgs {
+    /// Returns the sensor.toml that is read; `None` if the sensor is that of the recording, or if there is none.
+    pub(crate) fn path(&self, source: &dyn Source) -> Option<PathBuf> {
+        let neighbour = source.folder().join("sensor.toml");
+        let is_read = source.sensor_toml().is_none() && neighbour.exists();
+        self.sensor.clone().or_else(|| is_read.then_some(neighbour))
+    }
+
     /// Reads the sensor for the pictures.
     pub(crate) fn load(&self, source: &dyn Source) -> Result<Sensor, Stop> {
         let folder = source.folder();
-        let neighbour = folder.join("sensor.toml");
-        let mut sensor = match (&self.sensor, source.sensor_toml()) {
-            (Some(path), _) => hzn_calib::sensor::load(path)?,
+        let mut sensor = match (self.path(source), source.sensor_toml()) {
+            (Some(path), _) => hzn_calib::sensor::load(&path)?,
             // If the text names a camera file, the file is expected next to the recording.
-            (None, Some(text)) => hzn_calib::sensor::parse(text, &neighbour)
+            (None, Some(text)) => hzn_calib::sensor::parse(text, &folder.join("sensor.toml"))
                 .map_err(|e| usage(format!("the sensor.toml in the recording: {e}; --sensor FILE replaces it")))?,
-            (None, None) if neighbour.exists() => hzn_calib::sensor::load(&neighbour)?,
             (None, None) => {
                 let what = format!("no sensor: give --sensor FILE, or put a sensor.toml into {}", folder_name(&folder));
                 return Err(usage(format!("{what} (`hzn init` writes a first one)")));
@@ -98,14 +103,16 @@ impl InputArgs {
         Ok(source::open(inputs, self.raw, self.topic.as_deref())?)
     }
 
+    /// Returns the frames.csv that is read, if there is one.
+    pub(crate) fn frames_path(&self, source: &dyn Source) -> Option<PathBuf> {
+        let neighbour = source.folder().join("frames.csv");
+        let is_read = source.sensor_toml().is_none() && neighbour.exists();
+        self.frames.clone().or_else(|| is_read.then_some(neighbour))
+    }
+
     /// Reads frames.csv, if there is one, and checks every row against the sensor. Warnings are printed to stderr.
     pub(crate) fn frames(&self, source: &dyn Source, sensor: &Sensor, flight: bool) -> Result<Option<Frames>, Stop> {
-        let neighbour = source.folder().join("frames.csv");
-        let path = match &self.frames {
-            Some(path) => path.clone(),
-            None if source.sensor_toml().is_none() && neighbour.exists() => neighbour,
-            None => return Ok(None),
-        };
+        let Some(path) = self.frames_path(source) else { return Ok(None) };
         let frames = hzn_calib::frames::load(&path)?;
         for warning in &frames.warnings {
             tell::warning(warning);
@@ -201,7 +208,7 @@ pub(crate) fn check_altitude(sensor: &Sensor, source: &dyn Source, frames: Optio
     }
     let what = "no altitude: set altitude_km in [body] of sensor.toml, give --altitude-km, or give a frames.csv with \
                 altitudes";
-    Err(Stop { exit: Exit::Usage, error: anyhow::anyhow!(what) })
+    Err(usage(what))
 }
 
 /// Checks the sensor's own altitude if no other is known: it must be above the limb height of at least one body.
@@ -217,15 +224,20 @@ fn check_above_limb(config: &Config) -> Result<(), Stop> {
     }
 }
 
-/// Removes the pictures of an earlier rendering, because new tables would not list them. These are the pictures that
-/// truth.csv in the folder lists, as only rendered pictures have a truth.
+/// Returns the pictures of an earlier rendering. These are the pictures that truth.csv in the folder lists, as only
+/// rendered pictures have a truth.
+pub(crate) fn rendered(folder: &Path) -> Vec<PathBuf> {
+    let Ok(mut before) = csv::Reader::from_path(folder.join("truth.csv")) else { return Vec::new() };
+    let truths = before.deserialize::<Truth>().map_while(Result::ok);
+    let paths = truths.map(|truth| folder.join(Path::new(&truth.file).file_name().unwrap_or_default()));
+    paths.filter(|path| path.is_file()).collect()
+}
+
+/// Removes the pictures of an earlier rendering, because new tables would not list them.
 pub(crate) fn clear_rendered(folder: &Path) -> Result<(), Stop> {
-    let Ok(mut before) = csv::Reader::from_path(folder.join("truth.csv")) else { return Ok(()) };
-    for truth in before.deserialize::<Truth>().map_while(Result::ok) {
-        let path = folder.join(Path::new(&truth.file).file_name().unwrap_or_default());
-        if path.is_file() {
-            std::fs::remove_file(&path).map_err(|e| disk::cannot_write(&path, &e))?;
-        }
+    // A picture of several bodies is listed several times.
+    for path in rendered(folder).into_iter().filter(|path| path.is_file()) {
+        std::fs::remove_file(&path).map_err(|e| disk::cannot_write(&path, &e))?;
     }
     Ok(())
 }
@@ -243,7 +255,9 @@ pub(crate) fn stop_flag() -> Arc<AtomicBool> {
         if shared.swap(true, Ordering::SeqCst) {
             std::process::exit(i32::from(Exit::Interrupted as u8));
         }
-        tell::line(format_args!("\nfinishing the pictures that were begun; press Ctrl-C again to stop at once"));
+        // The terminal shows ^C at the end of the line before.
+        tell::line("");
+        tell::line("finishing the pictures that were begun; press Ctrl-C again to stop at once");
     });
     // Without a handler, Ctrl-C ends the program at once; the output can still be continued.
     drop(handler);

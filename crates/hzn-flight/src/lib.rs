@@ -1,6 +1,7 @@
 //! The flight software around [`hzn_core`]: parameters that survive a reset, modes, telecommands and telemetry.
 //!
-//! There is no heap, no unsafe code, no clock and no hardware. A board provides clock and hardware (`firmware/` of this
+//! There is no heap, no unsafe code, no clock and no hardware. (The crate `hzn-twice`, which compares the bytes of
+//! values that are kept twice, has unsafe code.) A board provides clock and hardware (`firmware/` of this
 //! project); the tests of this crate have their own board.
 //!
 //! | module | idea |

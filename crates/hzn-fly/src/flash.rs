@@ -13,6 +13,19 @@ const BOOT_ID: usize = 36;
 /// Length of the file with the words: identifier, words, whether the program runs.
 const RETAINED: usize = BOOT_ID + 4 * RETAINED_WORDS + 1;
 
+/// Returns the files that a folder holds for a reset: two copies of the parameters, and the words.
+pub fn files(folder: &Path) -> [PathBuf; 3] {
+    [copy_path(folder, 1), copy_path(folder, 2), words_path(folder)]
+}
+
+fn copy_path(folder: &Path, copy: u8) -> PathBuf {
+    folder.join(format!("parameters-{copy}.bin"))
+}
+
+fn words_path(folder: &Path) -> PathBuf {
+    folder.join("retained.bin")
+}
+
 /// A folder that holds what a reset leaves.
 #[derive(Debug)]
 pub struct Flash {
@@ -47,25 +60,18 @@ impl Flash {
         Ok(flash)
     }
 
-    fn copy_path(&self, copy: u8) -> PathBuf {
-        self.folder.join(format!("parameters-{copy}.bin"))
-    }
-    fn words_path(&self) -> PathBuf {
-        self.folder.join("retained.bin")
-    }
-
     /// Returns the folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
     /// Returns whether a copy of the parameters was ever stored here.
     pub fn has_copies(&self) -> bool {
-        [1, 2].iter().any(|&copy| self.copy_path(copy).exists())
+        [1, 2].iter().any(|&copy| copy_path(&self.folder, copy).exists())
     }
     /// Reads copy 1 or 2 of the parameters. What the file does not have is 0xFF, as in erased flash.
     pub fn read_copy(&self, copy: u8, into: &mut [u8]) {
         into.fill(0xFF);
-        let bytes = fs::read(self.copy_path(copy)).unwrap_or_default();
+        let bytes = fs::read(copy_path(&self.folder, copy)).unwrap_or_default();
         let n = bytes.len().min(into.len());
         if let (Some(room), Some(bytes)) = (into.get_mut(..n), bytes.get(..n)) {
             room.copy_from_slice(bytes);
@@ -76,7 +82,7 @@ impl Flash {
     /// # Errors
     /// The disk fails or is full. The earlier copy is then unchanged.
     pub fn write_copy(&self, copy: u8, bytes: &[u8]) -> io::Result<()> {
-        let path = self.copy_path(copy);
+        let path = copy_path(&self.folder, copy);
         let part = part_path(&path);
         let written = File::create(&part)
             .and_then(|mut file| file.write_all(bytes).map(|()| file))
@@ -109,13 +115,13 @@ impl Flash {
         let mut bytes = self.boot_id.clone();
         bytes.extend(self.words.iter().flat_map(|word| word.to_le_bytes()));
         bytes.push(u8::from(runs));
-        let part = part_path(&self.words_path());
+        let part = part_path(&words_path(&self.folder));
         // If it fails, the next program starts as after power-on.
-        let _ = fs::write(&part, bytes).and_then(|()| fs::rename(&part, self.words_path()));
+        let _ = fs::write(&part, bytes).and_then(|()| fs::rename(&part, words_path(&self.folder)));
     }
 
     fn read_words(&mut self) {
-        let Ok(bytes) = fs::read(self.words_path()) else { return };
+        let Ok(bytes) = fs::read(words_path(&self.folder)) else { return };
         // After power-on the identifier is another one.
         if self.boot_id.len() != BOOT_ID || bytes.len() != RETAINED || !bytes.starts_with(&self.boot_id) {
             return;

@@ -1,7 +1,10 @@
 //! Paths and errors of files that are written, with advice for the user.
 
+use std::collections::HashMap;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use hzn_mcap::part_path;
 
 use crate::error::{Error, Remedy, failed, unusable};
 
@@ -9,6 +12,52 @@ use crate::error::{Error, Remedy, failed, unusable};
 pub fn is_same(a: &Path, b: &Path) -> bool {
     let b = if b.as_os_str().is_empty() { Path::new(".") } else { b };
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Refuses to write a file that is also read, under whatever name: by another path, or through a link. Each file that
+/// is written counts with its `.part`.
+///
+/// # Errors
+/// One of the files is read as well. The user may not replace it, so the error has no remedy.
+pub fn refuse_inputs(read: &[PathBuf], written: &[PathBuf]) -> Result<(), Error> {
+    let with_part = written.iter().flat_map(|path| [path.clone(), part_path(path)]);
+    refuse_inputs_exactly(read, &with_part.collect::<Vec<_>>())
+}
+
+/// Refuses files as [`refuse_inputs`] does, but without their `.part`.
+///
+/// # Errors
+/// The errors are those of [`refuse_inputs`].
+pub fn refuse_inputs_exactly(read: &[PathBuf], written: &[PathBuf]) -> Result<(), Error> {
+    let written: HashMap<Place, &PathBuf> = written.iter().filter_map(|path| Some((place(path)?, path))).collect();
+    let same = read.iter().find_map(|read| Some((read, written.get(&place(read)?)?)));
+    let Some((read, written)) = same else { return Ok(()) };
+    let other = if read == *written { String::new() } else { format!("{} ", read.display()) };
+    let what = "itself and would be replaced; choose another name for the output";
+    Err(unusable(format!("{}: is the input {other}{what}", written.display())))
+}
+
+/// Where a file is, whatever path leads there.
+#[derive(PartialEq, Eq, Hash)]
+enum Place {
+    /// Device and number of the file on it.
+    #[cfg(unix)]
+    Node(u64, u64),
+    /// The path without links, of a file that does not exist yet or whose system has no such numbers.
+    Path(PathBuf),
+}
+
+fn place(path: &Path) -> Option<Place> {
+    #[cfg(unix)]
+    if let Ok(meta) = std::fs::metadata(path) {
+        use std::os::unix::fs::MetadataExt;
+        return Some(Place::Node(meta.dev(), meta.ino()));
+    }
+    let in_folder = || {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some(folder.canonicalize().ok()?.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(in_folder).map(Place::Path)
 }
 
 /// Refuses a file that exists, unless it may be replaced.
@@ -27,14 +76,12 @@ pub fn refuse_existing(path: &Path, force: bool) -> Result<(), Error> {
 /// # Errors
 /// The file cannot be written. An earlier file of the name is then unchanged.
 pub fn write_whole(path: &Path, text: &str) -> Result<(), Error> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    let part = Path::new(&part);
-    let written = std::fs::File::create(part)
+    let part = part_path(path);
+    let written = std::fs::File::create(&part)
         .and_then(|mut file| file.write_all(text.as_bytes()).map(|()| file))
-        .and_then(|file| hzn_mcap::publish(&file, part, path));
+        .and_then(|file| hzn_mcap::publish(&file, &part, path));
     written.map_err(|e| {
-        let _ = std::fs::remove_file(part);
+        let _ = std::fs::remove_file(&part);
         cannot_write(path, &e)
     })
 }

@@ -4,7 +4,8 @@
 //! A [`source`] hands out pictures in order. The [`engine`] processes them with the sensor on all cores. A [`sink`]
 //! takes the results in order. [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of
 //! their rows. [`overlay`] draws the result over a picture, and [`explain`] describes in words what happened to it.
-//! [`scene`] reads the scenes for the simulator. [`disk`] has the errors of files that cannot be written.
+//! [`scene`] reads the scenes for the simulator. [`disk`] has the errors of files that cannot be written. [`terminal`]
+//! makes text from files safe for a terminal.
 //!
 //! The command line, the Python package and the viewer are built on this crate. It prints nothing, and its [`Error`]
 //! contains no exit code and no name of an option.
@@ -21,5 +22,6 @@ pub mod results;
 pub mod scene;
 pub mod sink;
 pub mod source;
+pub mod terminal;
 
 pub use error::{Error, Kind, Remedy};

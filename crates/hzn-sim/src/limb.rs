@@ -158,25 +158,18 @@ impl<'a> ProjectedLimb<'a> {
 
     /// Returns the position of the limb at an azimuth in the plane of the picture; `None` if the lens does not reach
     /// there.
-    fn project(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
+    pub(crate) fn project(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
         self.camera.project(&self.outline.ray(azimuth_rad)?)
     }
 
-    /// Returns true if the point is in the picture, lit, neither in the blind centre of the lens nor behind the
-    /// vehicle.
-    fn is_visible(&self, azimuth_rad: f64, p: ImagePoint<f64>) -> bool {
-        let (w, h) = (f64::from(self.camera.width()), f64::from(self.camera.height()));
-        let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
-        let blind =
-            self.camera.blind_centre_px().is_some_and(|(c, a, b)| ((p.u - c.u) / a).hypot((p.v - c.v) / b) < 1.0);
-        inside
-            && !blind
-            && !self.scene.foreground.iter().any(|f| f.contains([p.u, p.v]))
-            && self.outline.is_lit(azimuth_rad)
+    fn project_visible(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
+        let is_visible = |p: &ImagePoint<f64>| self.scene.shows(&self.camera, *p) && self.outline.is_lit(azimuth_rad);
+        self.project(azimuth_rad).filter(is_visible)
     }
 
-    fn project_visible(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
-        self.project(azimuth_rad).filter(|p| self.is_visible(azimuth_rad, *p))
+    /// Returns the length of the visible segments, pixels.
+    pub(crate) fn visible_px(&self) -> f64 {
+        self.visible_segments().iter().map(Segment::length_px).sum()
     }
 
     /// Returns the visible segments, with their ends located to better than a hundredth of a pixel. A segment shorter
@@ -232,6 +225,14 @@ impl<'a> ProjectedLimb<'a> {
 }
 
 impl Scene {
+    /// Returns true if a point is in the picture, neither in the blind centre of the lens nor behind the vehicle.
+    pub(crate) fn shows(&self, camera: &Camera<f64>, p: ImagePoint<f64>) -> bool {
+        let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
+        let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
+        let blind = camera.blind_centre_px().is_some_and(|(c, a, b)| ((p.u - c.u) / a).hypot((p.v - c.v) / b) < 1.0);
+        inside && !blind && !self.foreground.iter().any(|f| f.contains([p.u, p.v]))
+    }
+
     /// Returns `count` points evenly spaced along the visible limb: in the picture, lit, not behind the vehicle. If no
     /// limb is visible, the list is empty. The scene's seed determines the errors.
     ///
@@ -270,7 +271,7 @@ impl Scene {
     /// # Errors
     /// Fails if the camera, the position or the light is invalid.
     pub fn visible_limb_px(&self) -> Result<f64, SceneError> {
-        Ok(ProjectedLimb::try_new(self)?.visible_segments().iter().map(Segment::length_px).sum())
+        Ok(ProjectedLimb::try_new(self)?.visible_px())
     }
 }
 

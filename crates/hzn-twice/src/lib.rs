@@ -10,9 +10,12 @@
 use core::mem::MaybeUninit;
 
 /// A value and a copy of its bytes.
+///
+/// The value is never dropped, because a flipped bit may have made it invalid. A value that owns memory is lost.
 #[derive(Debug)]
 pub struct KeptTwice<T> {
-    value: T,
+    // Both may have any bytes. A flipped bit may make bytes that are no `T`, so that they may not be read as one.
+    value: MaybeUninit<T>,
     copy: MaybeUninit<T>,
     /// Whether there is a copy. A number, because a flipped bit makes an invalid `bool`.
     copies: u8,
@@ -24,7 +27,7 @@ type Word = u32;
 impl<T> KeptTwice<T> {
     /// Takes a value. [`Self::complete`] makes its copy, after the value has been moved to its place.
     pub const fn new(value: T) -> Self {
-        Self { value, copy: MaybeUninit::uninit(), copies: 0 }
+        Self { value: MaybeUninit::new(value), copy: MaybeUninit::uninit(), copies: 0 }
     }
     /// Makes the copy if there is none. From now on a change is noticed.
     ///
@@ -32,52 +35,77 @@ impl<T> KeptTwice<T> {
     /// [`Self::is_intact`] may return false although no bit changed.
     pub fn complete(&mut self) {
         if self.copies == 0 {
-            let (from, to) = ((&raw const self.value).cast::<MaybeUninit<u8>>(), self.copy.as_mut_ptr());
-            // SAFETY: both places have this size and do not overlap. Bytes without a value may be copied as
-            // `MaybeUninit<u8>`. The copy is never used as a `T`, so nothing is dropped twice.
+            let (from, to) = (initialise_bytes(&mut self.value), self.copy.as_mut_ptr());
+            // SAFETY: both places have this size and do not overlap. The copy is never used as a `T`.
             unsafe { from.copy_to_nonoverlapping(to.cast(), size_of::<T>()) };
             self.copies = 1;
         }
     }
     /// Replaces the value. Call [`Self::complete`] soon: until then a change is not noticed.
     pub fn set(&mut self, value: T) {
-        self.value = value;
+        self.value.write(value);
         self.copies = 0;
     }
-    /// Returns the value.
+    /// Changes the value and makes its copy anew. Call it only if [`Self::is_intact`] returned true: it would copy a
+    /// flipped bit.
+    pub fn change<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> R {
+        let result = change(self.value_mut());
+        self.copies = 0;
+        self.complete();
+        result
+    }
+    /// Returns the value. If a bit of it may have flipped, call [`Self::is_intact`] first.
     pub fn get(&self) -> &T {
-        &self.value
+        // SAFETY: `new` or `set` wrote a value.
+        unsafe { self.value.assume_init_ref() }
     }
     /// Returns the value for a change that [`Self::is_intact`] shall notice. This is for tests.
     pub fn value_mut(&mut self) -> &mut T {
-        &mut self.value
+        // SAFETY: `new` or `set` wrote a value.
+        unsafe { self.value.assume_init_mut() }
     }
     /// Returns whether all bytes of the value and of its copy are equal. If there was no copy, it is made.
     #[inline(never)]
     pub fn is_intact(&mut self) -> bool {
         self.complete();
-        // The black box: the compiler must not conclude from the copying above that both are equal.
-        let value = core::hint::black_box(&raw const self.value);
-        let copy = core::hint::black_box(self.copy.as_ptr());
+        let (value, copy) = (initialise_bytes(&mut self.value), initialise_bytes(&mut self.copy));
         let words = if align_of::<T>() >= align_of::<Word>() { size_of::<T>() / size_of::<Word>() } else { 0 };
-        // SAFETY: both places have the size and the alignment of a `T`.
+        // SAFETY: both places have the size and the alignment of a `T`, and all their bytes are initialised.
         unsafe {
             are_equal::<Word>(value.cast(), copy.cast(), 0..words)
-                && are_equal::<u8>(value.cast(), copy.cast(), words * size_of::<Word>()..size_of::<T>())
+                && are_equal::<u8>(value, copy, words * size_of::<Word>()..size_of::<T>())
         }
     }
+}
+
+/// Initialises every byte of a place with what is in memory, and returns the first byte.
+///
+/// The unused bytes between fields have no value in the language, and reading them as numbers is undefined behaviour.
+/// The empty assembly gets the place, so the compiler must assume that the assembly has written every byte. For the
+/// same reason the compiler cannot conclude that a value still equals its copy. `core::hint::black_box` guarantees
+/// neither.
+///
+/// Miri cannot run assembly. Under Miri only types without unused bytes may be kept.
+#[inline(always)]
+fn initialise_bytes<T>(place: &mut MaybeUninit<T>) -> *mut u8 {
+    let bytes = place.as_mut_ptr().cast();
+    #[cfg(not(miri))]
+    // SAFETY: there is no instruction. The reference allows that the bytes are written.
+    unsafe {
+        core::arch::asm!("/* {} */", in(reg) bytes, options(nostack, preserves_flags));
+    }
+    bytes
 }
 
 /// Returns whether the pieces of two places are equal.
 ///
 /// # Safety
-/// Every piece of the range must lie within both places, and both must be aligned for a piece.
+/// Every piece of the range must lie within both places and be initialised. Both places must be aligned for a piece.
 unsafe fn are_equal<Piece: PartialEq>(a: *const Piece, b: *const Piece, range: core::ops::Range<usize>) -> bool {
     let mut equal = true;
     for i in range {
-        // SAFETY: the caller guarantees places and alignment. The unused bytes between fields have no value in the
-        // language. A volatile read takes the bytes that are in memory, and both copies of them came from one place.
-        equal &= unsafe { a.add(i).read_volatile() == b.add(i).read_volatile() };
+        // SAFETY: the caller guarantees places, alignment and initialised bytes.
+        equal &= unsafe { *a.add(i) == *b.add(i) };
     }
     equal
 }
@@ -87,6 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[cfg_attr(miri, ignore = "the type has unused bytes, which only assembly can initialise")]
     fn a_change_is_noticed_until_the_value_is_replaced() {
         let mut kept = KeptTwice::new((1u8, 2.0f64, [3u8; 5]));
         assert!(kept.is_intact());
@@ -106,6 +135,40 @@ mod tests {
             assert!(!kept.is_intact());
         }
         assert!(KeptTwice::new(()).is_intact());
+    }
+
+    #[test]
+    fn a_change_of_the_copy_is_noticed() {
+        let mut kept = KeptTwice::new([5u16; 3]);
+        kept.complete();
+        kept.copy.write([5, 5, 4]);
+        assert!(!kept.is_intact());
+    }
+
+    #[test]
+    fn a_wanted_change_is_copied() {
+        let mut kept = KeptTwice::new([1u32, 2]);
+        kept.complete();
+        assert_eq!(kept.change(|value| core::mem::replace(&mut value[1], 3)), 2);
+        assert!(kept.is_intact() && *kept.get() == [1, 3]);
+        kept.value_mut()[1] = 2;
+        assert!(!kept.is_intact());
+    }
+
+    #[test]
+    fn a_value_that_may_be_invalid_is_never_dropped() {
+        struct Counted(u32);
+        impl Drop for Counted {
+            fn drop(&mut self) {
+                panic!("the value {} is dropped", self.0);
+            }
+        }
+        let mut kept = KeptTwice::new(Counted(1));
+        kept.complete();
+        kept.value_mut().0 = 3;
+        assert!(!kept.is_intact());
+        kept.set(Counted(2));
+        assert!(kept.is_intact());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! `hzn completions`: prints completions for a shell.
 
 use crate::exit::{Exit, Outcome};
+use crate::tell;
 
 /// Print completions for a shell
 ///
@@ -29,6 +30,6 @@ pub(super) fn run(args: &Args, mut command: clap::Command) -> Outcome {
     // The text goes to memory first, because the generator panics when stdout is closed early.
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut command, "hzn", &mut text);
-    std::io::Write::write_all(&mut std::io::stdout(), &text)?;
+    tell::bytes(&text)?;
     Ok(Exit::Done)
 }

@@ -11,7 +11,7 @@ use hzn_sim::{Flight, Truth};
 use super::{evaluate, run as sequence};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::setup::clear_rendered;
-use crate::tell;
+use crate::tell::{self, one_line};
 
 const ISS_PICTURE: &[u8] = include_bytes!("../../assets/iss-limb-2020-11-20.jpg");
 const ISS_SENSOR: &str = include_str!("../../assets/iss.toml");
@@ -92,7 +92,7 @@ impl Places {
 
     /// Returns the list of the files, and the commands to try next. `drawn` is the number of overlays.
     fn text(&self, drawn: usize) -> String {
-        let place = |p: &Path| p.display().to_string();
+        let place = |p: &Path| one_line(p.display());
         let files = [
             (place(&self.flight), "rendered pictures with sensor.toml, frames.csv (positions) and truth.csv"),
             (place(&self.flight_mcap), "results with pictures, for Foxglove"),

@@ -9,11 +9,12 @@ use hzn_core::{Config, Report, Solution, body, threshold};
 use hzn_mcap::Annotations;
 use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
 use hzn_run::source::{self, Item, Picture, Source};
-use hzn_run::{disk, engine, explain, overlay, sink};
+use hzn_run::{engine, explain, overlay, sink};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::files;
 use crate::setup::{InputArgs, SensorArgs, check_altitude, find_input};
-use crate::tell;
+use crate::tell::{self, one_line};
 
 /// Show what happens to one picture: what is kept, what is dropped, and why
 #[derive(Debug, clap::Args)]
@@ -37,7 +38,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.overlay {
-        check_overlay(path, args)?;
+        check_overlay(path)?;
     }
     let mut source = args.source.open(std::slice::from_ref(&args.frame))?;
     let mut sensor = args.sensor.load(source.as_ref())?;
@@ -45,6 +46,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
     check_altitude(&sensor, source.as_ref(), frames.as_ref())?;
+    if let Some(path) = &args.overlay {
+        let read = files::of_sequence(source.as_ref(), &args.sensor, &args.source);
+        files::check_outputs(&read, std::slice::from_ref(path), args.force)?;
+    }
     let mut item = item(source.as_mut(), args.index)?;
     let config = &sensor.config;
     let data = item.take_prior(frames.as_ref());
@@ -52,7 +57,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let picture = match item.payload.decode(Some(config)) {
         Ok((picture, _)) => picture,
         Err(why) => {
-            tell::result(format_args!("{}: unreadable: {why}\n", item.name))?;
+            tell::result(format_args!("{}\n", one_line(format_args!("{}: unreadable: {why}", item.name))))?;
             return Ok(Exit::SomeUnreadable);
         }
     };
@@ -65,16 +70,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     picture.explain(args, decoding)
 }
 
-/// Refuses an overlay that is not a PNG, is the picture itself, or exists.
-fn check_overlay(path: &Path, args: &Args) -> Result<(), Stop> {
-    if source::ending(path) != "png" {
-        return Err(usage(format!("{}: the overlay's ending must be .png", path.display())));
+/// Refuses an overlay that is not a PNG.
+fn check_overlay(path: &Path) -> Result<(), Stop> {
+    if source::ending(path) == "png" {
+        return Ok(());
     }
-    if disk::is_same(path, &args.frame) {
-        let what = "is the picture itself; choose another name for the overlay";
-        return Err(usage(format!("{}: {what}", path.display())));
-    }
-    Ok(disk::refuse_existing(path, args.force)?)
+    Err(usage(format!("{}: the overlay's ending must be .png", path.display())))
 }
 
 /// Returns picture number `index` of a sequence, counted from 0.
@@ -121,7 +122,8 @@ impl PictureWithPrior<'_> {
                 (Ok(report), Ok(half_angle)) => (report, half_angle),
                 (Err(why), _) | (_, Err(why)) => {
                     let Unprocessed { status, why, .. } = why.into();
-                    tell::result(format_args!("{between}{file}: {name}: {status}: {why}\n"))?;
+                    let text = one_line(format_args!("{file}: {name}: {status}: {why}"));
+                    tell::result(format_args!("{between}{text}\n"))?;
                     statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
                     exit = Exit::SomeUnreadable;
                     continue;
@@ -162,7 +164,7 @@ impl Explained<'_> {
     fn text(&self, decoding: Duration, elapsed: Duration) -> String {
         let mut out = String::new();
         let mut line = |name: &str, value: String| {
-            out.push_str(format!("{name:<11} {value}").trim_end());
+            out.push_str(format!("{name:<11} {}", one_line(value)).trim_end());
             out.push('\n');
         };
         line("picture", self.layout());

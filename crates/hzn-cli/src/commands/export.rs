@@ -8,6 +8,7 @@ use hzn_run::source::{self, ending};
 use hzn_run::{disk, explain, overlay, results};
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::files;
 use crate::tell;
 
 /// Turn a recording into a table, pictures, or pictures with overlay
@@ -44,7 +45,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     if kind != "mcap" && pictures {
         return Err(usage(format!("{}: only a recording (.mcap) contains pictures", file.display())));
     }
-    for folder in [&args.images, &args.overlay].into_iter().flatten() {
+    let folders = [&args.images, &args.overlay].into_iter().flatten();
+    let written = args.output.iter().cloned().chain(folders.clone().flat_map(|folder| files::pictures_in(folder)));
+    disk::refuse_inputs(std::slice::from_ref(file), &written.collect::<Vec<_>>())?;
+    for folder in folders {
         std::fs::create_dir_all(folder).map_err(|e| disk::cannot_write(folder, &e))?;
     }
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };

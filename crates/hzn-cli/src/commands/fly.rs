@@ -6,9 +6,11 @@ use std::sync::Arc;
 use hzn_fly::camera::Ended;
 use hzn_fly::flight::{Settings, Source, Summary, fly};
 use hzn_fly::link::Address;
+use hzn_run::disk;
 use hzn_run::source::Raw;
 
 use crate::exit::{Exit, Outcome, failed, usage};
+use crate::files;
 use crate::tell;
 
 /// Fly: process a camera's pictures on this Linux computer, with telecommands and telemetry
@@ -54,13 +56,16 @@ pub(super) fn run(args: Args) -> Outcome {
     let sensor = args.sensor.as_deref().map(hzn_calib::sensor::load).transpose()?;
     sensor.iter().flat_map(|sensor| &sensor.warnings).for_each(tell::warning);
     let from_systemd = || std::env::var_os("STATE_DIRECTORY").map(PathBuf::from);
+    let state = args.state.or_else(from_systemd).unwrap_or_else(|| "hzn-fly".into());
+    let read = args.sensor.as_deref().map(files::of_sensor).unwrap_or_default();
+    disk::refuse_inputs(&read, &hzn_fly::flash::files(&state))?;
     let settings = Settings {
         source: if args.source.as_os_str() == "-" { Source::Stdin } else { Source::Device(args.source) },
         raw: args.raw,
         sensor: sensor.map(|sensor| sensor.config),
         replaces_parameters: args.load,
         line: args.line,
-        state: args.state.or_else(from_systemd).unwrap_or_else(|| "hzn-fly".into()),
+        state,
         log_bytes: args.log_mb * 1_000_000,
     };
     let summary = fly(settings, Arc::new(|text: &str| tell::line(text)))

@@ -10,7 +10,7 @@ use hzn_run::{checked_row, explain};
 use hzn_sim::Scenario;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
-use crate::tell;
+use crate::tell::{self, one_line};
 
 /// Say what a file is, and what it contains
 ///
@@ -51,7 +51,7 @@ fn recording(file: &Path) -> Result<Described, Stop> {
     }
     let mut out = kind_line("recording of hzn run") + &summary.text();
     for (key, value) in reader.metadata() {
-        out.push_str(&format!("{key:<16} {value}\n"));
+        out.push_str(&format!("{:<16} {}\n", one_line(key), one_line(value)));
     }
     if !reader.is_complete() {
         out.push_str(&unfinished(file));
@@ -69,7 +69,7 @@ fn recording(file: &Path) -> Result<Described, Stop> {
 }
 
 fn unfinished(file: &Path) -> String {
-    format!("unfinished       `hzn run --resume` continues it, `hzn recover {}` closes it\n", file.display())
+    format!("unfinished       `hzn run --resume` continues it, `hzn recover {}` closes it\n", one_line(file.display()))
 }
 
 /// Describes the pictures in a recording of another program.
@@ -83,10 +83,10 @@ fn foreign(file: &Path) -> Result<Described, Stop> {
     }
     let mut out = kind_line("recording without results of hzn") + &format!("pictures         {count}\n");
     if let (Some(topic), Some((a, b))) = (reader.topic(), span) {
-        out.push_str(&format!("topic            {topic}\ntime             {a:.3} to {b:.3} s\n"));
+        out.push_str(&format!("topic            {}\ntime             {a:.3} to {b:.3} s\n", one_line(topic)));
     }
     for topic in reader.other_topics() {
-        out.push_str(&format!("other topic      {topic}\n"));
+        out.push_str(&format!("other topic      {}\n", one_line(topic)));
     }
     let lost = reader.broken().map(|why| format!("{}: {why}; the pictures before that were counted", file.display()));
     Ok((out, lost))
@@ -96,7 +96,7 @@ fn foreign(file: &Path) -> Result<Described, Stop> {
 const FIRST_COLUMNS: &[&str] = &["index", "file", "time_s", "body", "status"];
 
 fn table(file: &Path, kind: &str) -> Result<String, Stop> {
-    let mut notes = String::new();
+    let mut notes = Vec::new();
     if kind == "csv" {
         let header = csv::Reader::from_path(file).and_then(|mut r| r.headers().cloned()).map_err(failed)?;
         let has = |name: &str| header.iter().any(|column| column == name);
@@ -111,9 +111,10 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
     }
     let mut summary = Summary::default();
     for row in hzn_run::results::rows(file, kind)? {
-        summary.add(&row.map_err(|e| if notes.is_empty() { e.into() } else { failed(format!("{e}\n{notes}")) })?);
+        summary.add(&row.map_err(|e| Stop::from(e).with_details(notes.iter().cloned()))?);
     }
-    let mut out = kind_line("results of hzn run") + &summary.text() + &notes;
+    let mut out = kind_line("results of hzn run") + &summary.text();
+    notes.iter().for_each(|note| out.push_str(&format!("{note}\n")));
     if ending(file) == "part" {
         out.push_str(&unfinished(file));
     }
@@ -121,17 +122,15 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
 }
 
 /// Returns lines about the columns in which results of another version differ; nothing for results of this version.
-fn other_columns(header: &csv::StringRecord) -> String {
+fn other_columns(header: &csv::StringRecord) -> Vec<String> {
     let missing: Vec<&str> = Row::COLUMNS.into_iter().filter(|name| !header.iter().any(|c| c == *name)).collect();
     let unknown: Vec<&str> =
         header.iter().filter(|column| !Row::COLUMNS.contains(column) && *column != checked_row::COLUMN).collect();
-    let mut out = String::new();
-    for (title, columns) in [("columns missing", missing), ("columns unknown", unknown)] {
-        if !columns.is_empty() {
-            out.push_str(&format!("{title:<16} {} (the file is of another version of hzn)\n", columns.join(", ")));
-        }
-    }
-    out
+    let named = [("columns missing", missing), ("columns unknown", unknown)];
+    let line = |(title, columns): (&str, Vec<&str>)| {
+        one_line(format!("{title:<16} {} (the file is of another version of hzn)", columns.join(", ")))
+    };
+    named.into_iter().filter(|(_, columns)| !columns.is_empty()).map(line).collect()
 }
 
 /// Describes a frames.csv.
@@ -152,7 +151,7 @@ fn priors(file: &Path) -> Result<String, Stop> {
     }
     let unused: Vec<&str> = frames.warnings.iter().filter_map(|w| w.field.as_deref()).collect();
     if !unused.is_empty() {
-        out.push_str(&format!("columns not used {}\n", unused.join(", ")));
+        out.push_str(&format!("columns not used {}\n", one_line(unused.join(", "))));
     }
     Ok(out)
 }
@@ -167,7 +166,7 @@ fn truth(file: &Path) -> Result<String, Stop> {
     }
     let mut out = kind_line("truth of pictures, for `hzn evaluate RESULTS --truth FILE`");
     for (body, [seen, all]) in bodies {
-        out.push_str(&format!("{body:<16} limb in view in {seen} of {all} pictures\n"));
+        out.push_str(&format!("{:<16} limb in view in {seen} of {all} pictures\n", one_line(body)));
     }
     Ok(out)
 }
@@ -197,7 +196,7 @@ fn series(file: &Path, header: &csv::StringRecord) -> Result<String, Stop> {
     if has("saturated").is_some() {
         out.push_str(&format!("saturated        {saturated}\n"));
     }
-    out.push_str(&format!("columns          {}\n", header.iter().collect::<Vec<_>>().join(", ")));
+    out.push_str(&format!("columns          {}\n", one_line(header.iter().collect::<Vec<_>>().join(", "))));
     Ok(out)
 }
 
@@ -225,7 +224,7 @@ fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
 
 fn scene(scenario: &Scenario) -> Result<String, Stop> {
     let mut out = kind_line("scene, for `hzn simulate FILE`");
-    let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {value}\n"));
+    let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {}\n", one_line(value)));
     let (capture, camera) = (&scenario.capture, &scenario.camera);
     line("name", scenario.name.clone());
     line("pictures", format!("{}, at {} to {} s from {}", capture.frames, capture.from_s, capture.to_s, scenario.utc));
@@ -305,7 +304,7 @@ impl Summary {
 
     fn text(self) -> String {
         let mut out = format!("pictures         {}\n", self.frames);
-        let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {value}\n"));
+        let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {}\n", one_line(value)));
         if let Some((a, b)) = self.time {
             line("time", format!("{a:.3} to {b:.3} s"));
         }

@@ -68,16 +68,19 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage(format!("{name}: is a file to write, not a picture; name it with -o:  hzn init -o {name}")));
     }
     let name = args.output.display();
+    let source = if args.pictures.is_empty() { None } else { Some(source::open(&args.pictures, None, None)?) };
+    let read = source.as_ref().map(|source| source.files()).unwrap_or_default();
+    disk::refuse_inputs(&read, std::slice::from_ref(&args.output))?;
     if args.output.exists() && !args.force {
         return Err(usage(format!("{name}: exists already; choose another name with -o, or --force replaces it")));
     }
     let write = |text: &str| std::fs::write(&args.output, text).map_err(|e| disk::cannot_write(&args.output, &e));
-    if args.pictures.is_empty() {
+    let Some(mut source) = source else {
         write(hzn_calib::template::SENSOR_TOML)?;
         tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));
         return Ok(Exit::Done);
-    }
-    let known = known(args)?;
+    };
+    let known = known(args, source.as_mut())?;
     let start = start::write_sensor_toml(&known).map_err(usage)?;
     write(&start.text)?;
     start.warnings.iter().for_each(tell::warning);
@@ -105,10 +108,9 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 /// Collects what the pictures and the command line say about the camera.
-fn known(args: &Args) -> Result<CameraFacts, Stop> {
-    let mut source = source::open(&args.pictures, None, None)?;
+fn known(args: &Args, source: &mut dyn Source) -> Result<CameraFacts, Stop> {
     source.notes().iter().for_each(tell::warning);
-    let size_px = one_size(source.as_ref())?;
+    let size_px = one_size(source)?;
     if let Some(km) = args.altitude.filter(|km| !(*km > 0.0 && km.is_finite())) {
         return Err(usage(format!("--altitude {km}: must be above 0 km")));
     }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use hzn_mcap::part_path;
 use hzn_run::{disk, explain, sink, source};
 
 use crate::exit::{Exit, Outcome, failed, usage};
@@ -40,16 +41,17 @@ pub(super) fn run(args: &Args) -> Outcome {
         }
     };
     let target = sink::target(&path)?;
-    if path.exists() {
-        if !args.force {
-            return Err(usage(format!(
-                "{}: exists already; choose another name with -o, or --force replaces it",
-                path.display()
-            )));
-        }
-        if path.canonicalize()? == file.canonicalize()? {
-            return Err(usage("the output must be another file than the input"));
-        }
+    let mut written = vec![path.clone()];
+    match target {
+        sink::Target::Mcap => written.extend([recovering(&path), part_path(&recovering(&path))]),
+        // A table is finished in place.
+        _ if *file == part_path(&path) => {}
+        _ => written.push(part_path(&path)),
+    }
+    disk::refuse_inputs_exactly(std::slice::from_ref(file), &written)?;
+    if path.exists() && !args.force {
+        let what = "exists already; choose another name with -o, or --force replaces it";
+        return Err(usage(format!("{}: {what}", path.display())));
     }
     let (rows, lost) = match target {
         sink::Target::Mcap => recording(file, &path)?,
@@ -76,10 +78,15 @@ fn table(file: &Path, path: &Path, target: sink::Target) -> Result<(u64, u64), c
     Ok((found.rows, found.dropped_bytes))
 }
 
+/// Returns where a recording is recovered. The library never replaces a file; therefore the result is written next to
+/// it and then renamed.
+fn recovering(path: &Path) -> PathBuf {
+    path.with_extension("recovering.mcap")
+}
+
 /// Recovers a recording. Returns the number of rows kept and of bytes dropped.
 fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> {
-    // The library never replaces a file. Therefore the result is written next to it and then renamed.
-    let recovering = path.with_extension("recovering.mcap");
+    let recovering = recovering(path);
     if recovering.exists() {
         std::fs::remove_file(&recovering)?;
     }

@@ -7,13 +7,14 @@ use hzn_calib::{Frames, Sensor};
 use hzn_core::body::PriorError;
 use hzn_core::config::Orient;
 use hzn_core::status::Status;
-use hzn_mcap::{Row, part_path};
+use hzn_mcap::Row;
 use hzn_run::engine::{self, AnySensor, BodyOutcome, End, Finished, Plan};
 use hzn_run::sink::{self, Existing, Output, StoredResults};
 use hzn_run::source::{self, Source, ending};
 use hzn_run::{disk, explain};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::files;
 use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
 use crate::setup::{InputArgs, SensorArgs, check_altitude, check_size, find_input, stop_flag};
@@ -84,7 +85,6 @@ impl Args {
 pub(super) fn run(args: &Args) -> Outcome {
     check_arguments(args)?;
     let mut source = args.source.open(&args.input)?;
-    let folder = source.folder();
     let mut sensor = args.sensor.load(source.as_ref())?;
     let mut notes = source.notes();
     notes.extend(find_input(source.as_mut(), &mut sensor)?);
@@ -93,10 +93,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     check_altitude(&sensor, source.as_ref(), frames.as_ref())?;
     // The check is made only for folders, because the table next to a single picture also lists all others.
     if let Some(frames) = frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
-        warn_of_missing_pictures(frames, &folder);
+        warn_of_missing_pictures(frames, &source.folder());
     }
+    refuse_inputs(args, source.as_ref())?;
     if let Some(drawn) = &args.overlay {
-        prepare_overlays(drawn, &folder, args.force || args.resume)?;
+        prepare_overlays(drawn, args.force || args.resume)?;
     }
     let path = args.output.as_deref();
     // A recording stores the pictures as they were processed, that is, already turned.
@@ -144,27 +145,27 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 /// Refuses arguments that contradict each other, before anything is opened.
 fn check_arguments(args: &Args) -> Result<(), Stop> {
-    if let Some(path) = &args.output {
-        sink::target(path)?;
-    }
-    if let Some(path) = &args.output
-        && let Some(input) = args.input.iter().find(|i| disk::is_same(path, i) || disk::is_same(&part_path(path), i))
-    {
-        return Err(usage(format!("{}: is the input itself; choose another name for the output", input.display())));
-    }
+    args.output.as_deref().map(sink::target).transpose()?;
     if args.no_images && args.output.as_deref().is_none_or(|p| ending(p) != "mcap") {
         return Err(usage("--no-images: only an MCAP contains pictures; give -o out.mcap, or leave out --no-images"));
     }
     Ok(())
 }
 
-/// Makes the folder of the overlays. If `may_have_files` is true, the folder may already contain files.
-fn prepare_overlays(drawn: &Path, pictures: &Path, may_have_files: bool) -> Result<(), Stop> {
-    std::fs::create_dir_all(drawn).map_err(|e| disk::cannot_write(drawn, &e))?;
-    if disk::is_same(drawn, pictures) {
+/// Refuses outputs that are also read.
+fn refuse_inputs(args: &Args, source: &dyn Source) -> Result<(), Stop> {
+    if let Some(drawn) = args.overlay.as_deref().filter(|drawn| disk::is_same(drawn, &source.folder())) {
         let what = "is the folder of the pictures, and they would be replaced; choose another folder";
         return Err(usage(format!("--overlay {}: {what}", drawn.display())));
     }
+    let drawn = args.overlay.as_deref().map(files::pictures_in).unwrap_or_default();
+    let written: Vec<PathBuf> = args.output.iter().cloned().chain(drawn).collect();
+    Ok(disk::refuse_inputs(&files::of_sequence(source, &args.sensor, &args.source), &written)?)
+}
+
+/// Makes the folder of the overlays. If `may_have_files` is true, the folder may already contain files.
+fn prepare_overlays(drawn: &Path, may_have_files: bool) -> Result<(), Stop> {
+    std::fs::create_dir_all(drawn).map_err(|e| disk::cannot_write(drawn, &e))?;
     let has_files = std::fs::read_dir(drawn).map_err(|e| disk::cannot_write(drawn, &e))?.next().is_some();
     if has_files && !may_have_files {
         let what = "contains files already; choose another folder, or --force replaces files of the same name";

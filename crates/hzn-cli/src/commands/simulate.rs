@@ -11,9 +11,10 @@ use hzn_sim::{Flight, FlightFrame, Scenario};
 use rayon::prelude::*;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::files;
 use crate::progress::Progress;
-use crate::setup::{clear_rendered, stop_flag};
-use crate::tell;
+use crate::setup::{clear_rendered, rendered, stop_flag};
+use crate::tell::{self, one_line};
 
 /// Render a sequence of pictures with truth, and write a sensor.toml that fits it
 ///
@@ -64,11 +65,14 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let name = args.scene.as_deref().unwrap_or_default();
     if args.show {
-        tell::result(format_args!("{}\n", scene::source(name)?.1.trim_end()))?;
+        tell::file(format_args!("{}\n", scene::source(name)?.1.trim_end()))?;
         return Ok(Exit::Done);
     }
     let mut scenario = scene::load(name, args.frames, args.seed)?;
-    let files = files(&mut scenario, Path::new(name).parent().unwrap_or(Path::new("")))?;
+    let from = Path::new(name).parent().unwrap_or(Path::new(""));
+    let mut read = files::of_sensor(Path::new(name));
+    read.extend(scenario.files_mut().into_iter().map(|(_, file)| from.join(file)));
+    let files = files(&mut scenario, from)?;
     let folder = args.output.clone().unwrap_or_default();
     let text = toml::to_string(&scenario).map_err(failed)?;
     let scene_toml = folder.join("scene.toml");
@@ -80,6 +84,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         let folder = if scenario.cameras.is_empty() { folder.clone() } else { folder.join(&one.name) };
         cameras.push(Sequence { scenario: one, flight, folder });
     }
+    disk::refuse_inputs(&read, &written(args, &folder, &cameras, &files))?;
     std::fs::create_dir_all(&folder).map_err(|e| disk::cannot_write(&folder, &e))?;
     write(&scene_toml, &text)?;
     for folder in cameras.iter().map(|one| &one.folder).chain([&folder]) {
@@ -104,6 +109,24 @@ pub(super) fn run(args: &Args) -> Outcome {
     cameras.iter().try_for_each(Sequence::summary)?;
     next(&cameras)?;
     Ok(Exit::Done)
+}
+
+/// Returns every file that is written or removed.
+fn written(args: &Args, folder: &Path, cameras: &[Sequence], files: &[(String, Vec<u8>)]) -> Vec<PathBuf> {
+    let copies = || ["scene.toml"].into_iter().chain(files.iter().map(|(name, _)| name.as_str()));
+    let mut all: Vec<PathBuf> = ["imu.csv", "gnss.csv", "vehicle.csv"].map(|name| folder.join(name)).into();
+    for one in cameras.iter().map(|one| &one.folder).map(PathBuf::as_path).chain([folder]) {
+        // To resume, these must be the files of the scene already.
+        if !(args.resume && one == folder) {
+            all.extend(copies().map(|name| one.join(name)));
+        }
+    }
+    for Sequence { flight, folder, .. } in cameras {
+        all.extend(["sensor.toml", "frames.csv", "truth.csv"].map(|name| folder.join(name)));
+        let pictures = flight.frames.iter().flat_map(|frame| [frame.file.clone(), part_name(&frame.file)]);
+        all.extend(pictures.map(|name| folder.join(name)).chain(rendered(folder)));
+    }
+    all
 }
 
 /// Refuses a folder that exists without `--resume` or `--force`, and a resumed one of another scene.
@@ -310,7 +333,8 @@ impl Sequence {
     fn summary(&self) -> Result<(), Stop> {
         let Self { scenario, flight, folder } = self;
         let pictures = explain::counted(flight.frames.len() as u64, "picture");
-        tell::result(format_args!("{}: {pictures} of {}\n", folder.display(), scenario.name))?;
+        let text = one_line(format_args!("{}: {pictures} of {}", folder.display(), scenario.name));
+        tell::result(format_args!("{text}\n"))?;
         for &kind in &scenario.bodies {
             let mut seen = 0;
             let mut body = String::new();
@@ -329,17 +353,22 @@ impl Sequence {
 fn next(cameras: &[Sequence]) -> Result<(), Stop> {
     tell::result("\n")?;
     for (i, one) in cameras.iter().enumerate() {
-        let shown = one.folder.display();
+        let shown = one_line(one.folder.display());
         let begin = if i == 0 { "Next:  " } else { "       " };
         tell::result(format_args!("{begin}hzn run {shown} -o {shown}.csv\n"))?;
     }
     Ok(())
 }
 
+/// Returns the name of a picture until it is complete.
+fn part_name(file: &str) -> String {
+    format!(".part-{file}")
+}
+
 /// Renders one picture. Its file gets its name when it is complete.
 fn render(frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
     let path = folder.join(&frame.file);
-    let part = folder.join(format!(".part-{}", frame.file));
+    let part = folder.join(part_name(&frame.file));
     let picture = frame.scene.render().map_err(failed)?;
     let saved = match frame.jpeg_quality {
         Some(quality) => picture.encode_jpeg(quality).and_then(|file| Ok(std::fs::write(&part, file)?)),

@@ -1,14 +1,15 @@
 //! `hzn telecommand`: writes commands for a flight computer, as the bytes that are sent to it, or sends them.
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use hzn_fly::link::Address;
 use hzn_run::disk;
 
-use super::ground::{Commander, Incoming, encode, write_packet};
+use super::ground::{Commander, Incoming, encode, loaded_files, write_packet};
 use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome};
+use crate::files;
+use crate::tell;
 
 /// Write commands for a flight computer
 ///
@@ -64,12 +65,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     match &args.output {
         Some(path) => {
-            disk::refuse_existing(path, args.force)?;
+            files::check_outputs(&loaded_files(&args.commands), std::slice::from_ref(path), args.force)?;
             std::fs::write(path, out).map_err(|e| disk::cannot_write(path, &e))?;
             Ok(Exit::Done)
         }
         None => {
-            std::io::stdout().write_all(&out)?;
+            tell::bytes(&out)?;
             Ok(Exit::Done)
         }
     }

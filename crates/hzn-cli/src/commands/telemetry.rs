@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use hzn_calib::limited;
 use hzn_fly::link::Address;
+use hzn_run::disk;
 
-use super::ground::{Commander, Incoming, Station, show};
+use super::ground::{Commander, Incoming, Station, loaded_files, show};
 use super::xtce;
 use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome, Stop, usage};
@@ -52,7 +53,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let Some(file) = args.file.as_deref().filter(|_| !args.xtce) else {
-        tell::result(xtce::dictionary(args.apids.apid_base))?;
+        tell::file(xtce::dictionary(args.apids.apid_base))?;
         return Ok(Exit::Done);
     };
     let name = file.display().to_string();
@@ -67,6 +68,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     if (args.screen || !args.send.is_empty()) && !live.as_ref().is_some_and(Incoming::can_send) {
         return Err(usage(format!("{name}: --screen and --send need a line, such as tcp:HOST:PORT")));
     }
+    let mut read_files = loaded_files(&args.send);
+    if live.is_none() {
+        read_files.push(file.to_owned());
+    }
+    let written: Vec<PathBuf> = [&args.output, &args.housekeeping].into_iter().flatten().cloned().collect();
+    disk::refuse_inputs(&read_files, &written)?;
     let bytes = if live.is_some() { Vec::new() } else { read(file)? };
     let (base, output, housekeeping) = (args.apids.apid_base, args.output.as_deref(), args.housekeeping.as_deref());
     let mut station = Station::new(base, output, housekeeping, args.force)?;

@@ -187,11 +187,8 @@ fn overlays_replace_nothing_without_force() {
     place.write("notes/mine.txt.png", b"mine");
     place.run(&["run", "in", "--overlay", "notes"]).expect(2).says("contains files already");
     place.run(&["run", "in", "--overlay", "notes", "--force"]).expect(0);
-    place.run(&["explain", "in/0001.png", "--overlay", "in/0001.png"]).expect(2).says("is the picture itself");
-    place
-        .run(&["explain", "in/0001.png", "--overlay", "in/0001.png", "--force"])
-        .expect(2)
-        .says("is the picture itself");
+    place.run(&["explain", "in/0001.png", "--overlay", "in/0001.png"]).expect(2).says("is the input itself");
+    place.run(&["explain", "in/0001.png", "--overlay", "in/0001.png", "--force"]).expect(2).says("is the input itself");
     place.run(&["explain", "in/0001.png", "--overlay", "in/sensor.toml"]).expect(2).says("must be .png");
     place.run(&["explain", "in/0001.png", "--overlay", "notes/0001.png"]).expect(2).says("--force replaces it");
     place.run(&["explain", "in/0001.png", "--overlay", "notes/0001.png", "--force"]).expect(0);

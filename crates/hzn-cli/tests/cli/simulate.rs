@@ -291,3 +291,52 @@ fn a_planet_has_frames_with_attitude_and_truth_with_position() {
     let (_, info, _) = hzn(at, "1", &["info", "out/scene.toml"]);
     assert!(info.contains("bodies           saturn\n"), "{info}");
 }
+
+/// Returns the product of two quaternions, scalar first.
+fn product([a, b, c, d]: [f64; 4], [w, x, y, z]: [f64; 4]) -> [f64; 4] {
+    [
+        a * w - b * x - c * y - d * z,
+        a * x + b * w + c * z - d * y,
+        a * y - b * z + c * w + d * x,
+        a * z + b * y - c * x + d * w,
+    ]
+}
+
+#[test]
+fn two_cameras_follow_the_vehicle_of_the_first_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    // The second camera is turned by 90 degrees about its axis.
+    let mounts = [[0.8, 0.6, 0.0, 0.0], [0.565_685_425, 0.424_264_069, -0.424_264_069, 0.565_685_425]];
+    let camera =
+        |name: &str, q: [f64; 4]| format!("[[cameras]]\nname = {name:?}\nmount.q_body_from_camera_wxyz = {q:?}\n");
+    let scene = format!("{SCENE}{}{}", camera("first", mounts[0]), camera("second", mounts[1]));
+    std::fs::write(at.join("my.toml"), scene).unwrap();
+    let (code, _, stderr) = hzn(at, "2", &["simulate", "my.toml", "-o", "out", "-q"]);
+    assert_eq!(code, 0, "{stderr}");
+    let mut table = csv::Reader::from_path(at.join("out/vehicle.csv")).unwrap();
+    let vehicle: Vec<hzn_sim::trajectory::VehicleRow> = table.deserialize().collect::<Result<_, _>>().unwrap();
+    for (name, mount) in ["first", "second"].into_iter().zip(mounts) {
+        assert!(!at.join("out").join(name).join("vehicle.csv").exists());
+        let truth = hzn_sim::truth::load(&at.join("out").join(name).join("truth.csv")).unwrap();
+        assert_eq!(truth.len(), 5);
+        for (i, row) in truth.iter().enumerate() {
+            let at_time = vehicle.iter().find(|v| (v.time_s - row.time_s).abs() < 1e-6).unwrap();
+            let q = product([at_time.qw, at_time.qx, at_time.qy, at_time.qz], mount);
+            let cos: f64 = q.iter().zip([row.qw, row.qx, row.qy, row.qz]).map(|(a, b)| a * b).sum();
+            assert!(cos.abs() > 1.0 - 1e-9, "{name} {i}: {cos}");
+            // Both look along the same axis, which has the angle that was asked for.
+            let off_nadir_deg = row.axis_z.acos().to_degrees();
+            assert!((off_nadir_deg - (75.0 + 1.25 * i as f64)).abs() < 0.3, "{name} {i}: {off_nadir_deg}");
+        }
+    }
+    // The scene of the second camera alone gives the same pictures.
+    let (code, _, stderr) = hzn(at, "2", &["simulate", "out/second/scene.toml", "-o", "alone", "-q"]);
+    assert_eq!(code, 0, "{stderr}");
+    for file in ["truth.csv", "second-00003.png"] {
+        assert!(
+            std::fs::read(at.join("alone").join(file)).unwrap()
+                == std::fs::read(at.join("out/second").join(file)).unwrap()
+        );
+    }
+}

@@ -35,7 +35,10 @@ pub fn mount(path: &Path) -> Result<UnitQuaternion<f64>, Error> {
     let shown = path.display();
     let text =
         limited::read_text(path, limited::SETTINGS_BYTES).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
-    let file: File = toml::from_str(&text).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
+    let file: File = toml::from_str(&text).map_err(|e| {
+        let before = e.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+        Error::unusable(format!("{shown}:{}: {}", before.matches('\n').count() + 1, e.message()))
+    })?;
     let refuse = |what: String| Error::unusable(format!("{shown}: [mount] {what}"));
     match (file.mount.q_body_from_camera_wxyz, file.mount.body_from_camera) {
         (Some(wxyz), None) => of_quaternion(wxyz).map_err(refuse),

@@ -9,6 +9,7 @@ use hzn_mcap::Row;
 use super::stored::StoredResults;
 use crate::checked_row::{csv_line, from_csv, from_json, header, json_line};
 use crate::disk::run_advice;
+use crate::terminal::FileOnStdout;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
@@ -25,7 +26,7 @@ pub(crate) struct Text {
 }
 
 enum Out {
-    Stdout(BufWriter<io::Stdout>),
+    Stdout(BufWriter<FileOnStdout>),
     File {
         file: BufWriter<File>,
         path: PathBuf,
@@ -48,7 +49,7 @@ const JSON_HEAD: &[u8] = b"{\"index\":";
 
 impl Text {
     pub(crate) fn stdout() -> io::Result<Self> {
-        let mut text = Self { out: Out::Stdout(BufWriter::new(io::stdout())), form: Form::Csv, durable: false };
+        let mut text = Self { out: Out::Stdout(BufWriter::new(FileOnStdout::new())), form: Form::Csv, durable: false };
         text.out.writer().write_all(header().as_bytes())?;
         Ok(text)
     }

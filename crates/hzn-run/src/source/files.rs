@@ -115,6 +115,9 @@ impl Source for Files {
     fn folder(&self) -> PathBuf {
         self.folder.clone()
     }
+    fn files(&self) -> Vec<PathBuf> {
+        self.paths.clone()
+    }
     fn bits(&self) -> Option<u8> {
         // Words of mono16 can have any number of significant bits.
         self.raw.filter(|raw| raw.format != raw::Format::Words(16)).map(|raw| raw.bits())

@@ -102,6 +102,9 @@ impl Source for Recording {
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()
     }
+    fn files(&self) -> Vec<PathBuf> {
+        vec![self.path.clone()]
+    }
     fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
         let Ok(reader) = ImageReader::open(&self.path, self.reader.topic()) else {
             return Box::new(std::iter::empty());

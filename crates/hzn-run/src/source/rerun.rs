@@ -112,6 +112,9 @@ impl Source for Rerun {
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()
     }
+    fn files(&self) -> Vec<PathBuf> {
+        vec![self.path.clone()]
+    }
     fn sensor_toml(&self) -> Option<&str> {
         self.reader.sensor_toml()
     }

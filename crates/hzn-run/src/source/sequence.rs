@@ -27,6 +27,10 @@ pub trait Source: Send {
     }
     /// Returns the folder in which frames.csv and sensor.toml may lie.
     fn folder(&self) -> PathBuf;
+    /// Returns the files that the pictures are read from, so that no output replaces one of them.
+    fn files(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
     /// Returns the text of the sensor.toml that the pictures were recorded with. A source that has one also knows the
     /// content of frames.csv ([`Item::data`]).
     fn sensor_toml(&self) -> Option<&str> {

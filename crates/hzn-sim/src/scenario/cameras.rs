@@ -57,6 +57,7 @@ impl Scenario {
         let one = |(number, camera): (u32, &CameraOnVehicle)| Self {
             name: camera.name.clone(),
             mount: Some(camera.mount),
+            attitude_mount: self.pointed_mount(),
             mount_error_deg: camera.mount_error_deg,
             clock: camera.clock,
             vehicle: camera.vehicle.clone(),
@@ -78,6 +79,12 @@ impl Scenario {
             let all = if names.is_empty() { "no [[cameras]]".to_owned() } else { names.join(", ") };
             ScenarioError::new("[[cameras]]", format!("there is no camera {name}; the scene has {all}"))
         })
+    }
+
+    /// Returns the told mount of the camera that `[attitude]` describes. All cameras of a vehicle have the same one, so
+    /// that the vehicle has one attitude.
+    pub(super) fn pointed_mount(&self) -> Option<Mount> {
+        self.attitude_mount.or(self.cameras.first().map(|first| first.mount)).or(self.mount)
     }
 
     /// Returns the true attitude of the camera on the vehicle (rotation from the camera to the body frame). It differs

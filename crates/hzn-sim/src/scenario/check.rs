@@ -84,10 +84,11 @@ impl Scenario {
         if let Some(part) = self.vehicle.iter().find(|p| !(3..=16).contains(&p.polygon_px.len())) {
             return refuse("[[vehicle]] polygon_px", part.polygon_px.len() as f64, "must have 3 to 16 corners");
         }
-        if let Some(mount) = &self.mount {
-            let n2: f64 = mount.q_body_from_camera_wxyz.iter().map(|x| x * x).sum();
-            if !((n2 - 1.0).abs() < 0.01) {
-                return refuse("[mount] q_body_from_camera_wxyz", n2, "its squared length must be 1");
+        for (table, mount) in [("mount", self.mount), ("attitude_mount", self.attitude_mount)] {
+            let n2: f64 = mount.iter().flat_map(|m| m.q_body_from_camera_wxyz).map(|x| x * x).sum();
+            if mount.is_some() && !((n2 - 1.0).abs() < 0.01) {
+                let key = format!("[{table}] q_body_from_camera_wxyz");
+                return refuse(&key, n2, "its squared length must be 1");
             }
         }
         self.imu.map_or(Ok(()), |imu| imu.check())?;

@@ -110,6 +110,10 @@ pub struct Scenario {
     /// Attitude of the camera on the vehicle, as in sensor.toml.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mount: Option<Mount>,
+    /// Told attitude on the vehicle of the camera that `attitude` describes (`pointing`, `towards`, `aimed`, `table`).
+    /// Without it, that is the first of `cameras`, or the camera of `mount`. [`Scenario::by_camera`] sets it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attitude_mount: Option<Mount>,
     /// Angle between the true mount of the camera and the told one, 1-sigma about each axis, degrees.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub mount_error_deg: f64,
@@ -336,8 +340,7 @@ impl Scenario {
             Trajectory::Table(_) => [from_s, to_s],
             _ => [from_s, to_s.max(from_s + 1e-3)],
         };
-        let told = self.cameras.first().map_or(self.mount, |first| Some(first.mount));
-        let told = told.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
+        let told = self.pointed_mount().map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
         let start_unix_s = self.start_unix_s();
         let path = Path::try_new(&self.sized_trajectory(), &self.attitude, told, span, start_unix_s, self.seed)?;
         Ok(path.with_camera(self.true_mount_wxyz()))

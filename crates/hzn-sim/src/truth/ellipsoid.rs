@@ -1,18 +1,12 @@
 //! The truth about a scene with an ellipsoid.
 
-use hzn_core::camera::Camera;
 use hzn_core::frames::{Cam, UnitVec3};
 use nalgebra::Vector3;
 
 use super::row::Truth;
-use super::scene::LIMB_IN_VIEW_PX;
 use crate::ellipsoid::{Ellipsoid, EllipsoidLimb};
 use crate::error::SceneError;
 use crate::scene::Scene;
-
-/// Share of the outline of a small disc that must be lit and in view, if it is shorter than [`LIMB_IN_VIEW_PX`]. Half
-/// of it is lit at every phase.
-const SMALL_DISC_SHARE: f64 = 0.25;
 
 impl Scene {
     /// Returns the truth about an ellipsoid. The axis is that of the elliptic cone of limb rays; the altitude counts
@@ -25,12 +19,11 @@ impl Scene {
         let [qw, qx, qy, qz] = self.pose.unit_quaternion_wxyz();
         let range_km = Vector3::from(limb.position_km()).norm();
         let half_angle_rad = libm::atan2(1.0, cot2.sqrt());
-        let least_px = LIMB_IN_VIEW_PX.min(SMALL_DISC_SHARE * self.outline_px(half_angle_rad)?);
         let truth = Truth {
             file: file.to_owned(),
             time_s,
             body: body.kind().to_owned(),
-            limb: u8::from(self.visible_limb_px()? >= least_px),
+            limb: u8::from(self.has_limb(self.body.kind)?),
             axis_x,
             axis_y,
             axis_z,
@@ -57,11 +50,5 @@ impl Scene {
             sun: sun.and_then(|sun| UnitVec3::try_new(sun.into())),
             ..hzn_core::Prior::default()
         }
-    }
-
-    /// Returns the length of the outline of a disc in the middle of the picture, pixels.
-    fn outline_px(&self, half_angle_rad: f64) -> Result<f64, SceneError> {
-        let (fx, fy) = Camera::<f64>::try_new(&self.camera)?.focal_px();
-        Ok(core::f64::consts::TAU * fx.min(fy) * libm::tan(half_angle_rad))
     }
 }

@@ -2,12 +2,13 @@
 
 mod ellipsoid;
 mod file;
+mod in_view;
 mod row;
 mod scene;
 
 pub use file::{TruthError, load, parse};
+pub use in_view::{LIMB_IN_VIEW_PX, OUTLINE_SHARE, SIDE_SHARE};
 pub use row::Truth;
-pub use scene::LIMB_IN_VIEW_PX;
 
 #[cfg(test)]
 mod tests {

@@ -12,8 +12,8 @@ pub struct Truth {
     pub time_s: f64,
     /// The body's kind as in sensor.toml.
     pub body: String,
-    /// 1 when at least 50 px of lit limb are in view and not behind the vehicle, else 0. For the small disc of an
-    /// ellipsoid a quarter of its outline is enough.
+    /// 1 when lit limb is in view that nothing hides, of at least the smallest of 50 px, a quarter of the outline, and
+    /// half of the picture's shorter side ([`Scene::has_limb`](crate::Scene::has_limb)); else 0.
     pub limb: u8,
     /// Limb axis in the camera frame, first component of the unit vector. For spheres it is the direction to the
     /// centre.

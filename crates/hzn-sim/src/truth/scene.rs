@@ -1,19 +1,14 @@
 //! The truth about a scene.
 
 use hzn_core::body::{AU_KM, Kind, MOON_RADIUS_KM, SUN_RADIUS_KM};
-use hzn_core::camera::Camera;
 use hzn_core::ellipsoid::LimbCone;
 use hzn_core::frames::{Ecef, UnitVec3};
-use hzn_core::pixel::ImagePoint;
 use nalgebra::Vector3;
 
 use super::row::Truth;
 use crate::error::SceneError;
-use crate::globe::{Globe, View};
+use crate::globe::Globe;
 use crate::scene::{Light, Scene, World};
-
-/// Smallest length of visible limb with which a picture counts as showing a limb, in pixels.
-pub const LIMB_IN_VIEW_PX: f64 = 50.0;
 
 impl Scene {
     /// Returns the truth of the scene, for the name and time of a picture.
@@ -46,7 +41,7 @@ impl Scene {
             file: file.to_owned(),
             time_s,
             body: self.body.kind.name().to_owned(),
-            limb: u8::from(self.visible_limb_px()? >= LIMB_IN_VIEW_PX),
+            limb: u8::from(self.has_limb(self.body.kind)?),
             axis_x,
             axis_y,
             axis_z,
@@ -80,7 +75,7 @@ impl Scene {
         let [axis_x, axis_y, axis_z] = ecef_to_cam.apply(&direction).xyz();
         let seen = Truth {
             body: kind.name().to_owned(),
-            limb: u8::from(self.visible_px(kind)? >= LIMB_IN_VIEW_PX),
+            limb: u8::from(self.has_limb(kind)?),
             axis_x,
             axis_y,
             axis_z,
@@ -92,52 +87,8 @@ impl Scene {
         Ok(Truth { phase_deg: seen.phase_deg.filter(|_| kind != Kind::Sun), ..seen })
     }
 
-    /// Returns the length in pixels of the limb that is in the picture, lit and not hidden. `kind` selects the scene's
-    /// own body, or Sun or Moon next to it.
-    ///
-    /// # Errors
-    /// Fails like [`Scene::body_truth`].
-    pub fn visible_px(&self, kind: Kind) -> Result<f64, SceneError> {
-        let Some(disc) = self.sky_disc(kind)? else { return self.visible_limb_px() };
-        let camera = Camera::<f64>::try_new(&self.camera)?;
-        let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
-        let view = View::try_new(Globe::new(&self.body), &self.pose).ok_or(SceneError::Pose)?;
-        let centre = Vector3::from(disc.direction);
-        let helper = if centre.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
-        let a = centre.cross(&helper).normalize();
-        let b = centre.cross(&a);
-        let sun = match (kind, self.light) {
-            (Kind::Moon, Light::Sun { direction, .. }) => Some(Vector3::from(direction)),
-            _ => None,
-        };
-        let (w, h) = (f64::from(self.camera.width), f64::from(self.camera.height));
-        const STEPS: i32 = 720;
-        let mut visible_px = 0.0;
-        let mut last = None;
-        for i in 0..=STEPS {
-            let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(i) / f64::from(STEPS));
-            let outward = a * cos + b * sin;
-            let ray = (centre + outward * libm::tan(disc.half_angle_rad)).normalize();
-            let point = UnitVec3::<Ecef, f64>::try_new(ray.into()).and_then(|r| {
-                let cam = ecef_to_cam.apply(&r);
-                let p = camera.project(&cam)?;
-                let inside = p.u >= -0.5 && p.v >= -0.5 && p.u <= w - 0.5 && p.v <= h - 0.5;
-                let behind = view.intersect(cam.xyz()).miss <= 0.0;
-                let lit = sun.is_none_or(|s| s.dot(&outward) > 0.05);
-                let hidden = self.foreground.iter().any(|f| f.contains([p.u, p.v]));
-                (inside && !behind && lit && !hidden).then_some(p)
-            });
-            if let (Some(p), Some(q)) = (point, last) {
-                let q: ImagePoint<f64> = q;
-                visible_px += libm::hypot(p.u - q.u, p.v - q.v);
-            }
-            last = point;
-        }
-        Ok(visible_px)
-    }
-
     /// Returns Sun or Moon as a disc in the sky; `None` for other kinds, and if `kind` is the scene's own body.
-    fn sky_disc(&self, kind: Kind) -> Result<Option<SkyDisc>, SceneError> {
+    pub(super) fn sky_disc(&self, kind: Kind) -> Result<Option<SkyDisc>, SceneError> {
         if self.body.kind == kind {
             return Ok(None);
         }
@@ -160,10 +111,11 @@ impl Scene {
 }
 
 /// A distant body as the camera sees it.
-struct SkyDisc {
-    direction: [f64; 3],
+pub(super) struct SkyDisc {
+    /// Direction to its centre, ECEF.
+    pub(super) direction: [f64; 3],
     distance_m: f64,
-    half_angle_rad: f64,
+    pub(super) half_angle_rad: f64,
     radius_km: f64,
 }
 

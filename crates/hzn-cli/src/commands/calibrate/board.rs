@@ -8,9 +8,10 @@ use hzn_core::camera::Model;
 use hzn_run::source::{self, Raw};
 
 use super::board_search;
-use super::lens_output::{check_outputs, write_all};
+use super::lens_output::{check_endings, write_all};
 use crate::commands::lens_model;
 use crate::exit::{Exit, Outcome, failed, usage};
+use crate::files;
 use crate::setup::stop_flag;
 use crate::tell;
 
@@ -76,12 +77,13 @@ impl FromStr for BoardSize {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    check_outputs(&args.output, args.force)?;
+    check_endings(&args.output)?;
     if !(args.square_mm > 0.0 && args.square_mm.is_finite()) {
         return Err(usage("--square-mm: must be above 0"));
     }
     let board = Board { columns: args.board.0[0], rows: args.board.0[1], square_mm: args.square_mm };
     let mut source = source::open(&args.input, args.raw, None)?;
+    files::check_outputs(&source.files(), &args.output, args.force)?;
     if !args.quiet {
         source.notes().iter().for_each(|note| tell::line(format_args!("note: {note}")));
     }

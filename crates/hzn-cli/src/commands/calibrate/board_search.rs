@@ -123,27 +123,24 @@ fn check_sizes(searched: &[Searched]) -> Result<[usize; 2], Stop> {
     }
     let usual = sizes.iter().max_by_key(|(_, names)| names.len()).map(|(size, names)| (*size, names.len()));
     let Some((usual, pictures)) = usual else {
-        let why = |s: &Searched| format!("\n  {}: {}", s.name, s.result.as_ref().err().map_or("", String::as_str));
-        return Err(failed(format!("no picture can be read:{}", searched.iter().map(why).collect::<String>())));
+        let why = |s: &Searched| format!("  {}: {}", s.name, s.result.as_ref().err().map_or("", String::as_str));
+        return Err(failed("no picture can be read:").with_details(searched.iter().map(why)));
     };
     if sizes.len() == 1 {
         return Ok(usual);
     }
     let others = sizes.iter().filter(|(size, _)| **size != usual);
-    let lines: String =
-        others.flat_map(|(s, names)| names.iter().map(move |n| format!("\n  {n}: {}x{} px", s[0], s[1]))).collect();
-    Err(usage(format!(
-        "the pictures have different sizes: {pictures} have {}x{} px, but{lines}\ngive pictures of one size, as the \
-         camera takes them",
-        usual[0], usual[1]
-    )))
+    let lines = others.flat_map(|(s, names)| names.iter().map(move |n| format!("  {n}: {}x{} px", s[0], s[1])));
+    let [w, h] = usual;
+    let what = format!("the pictures have different sizes: {pictures} have {w}x{h} px, but");
+    Err(usage(what).with_details(lines.chain(["give pictures of one size, as the camera takes them".to_owned()])))
 }
 
 /// Refuses pictures that agree on a board of another size, and pictures without any board.
 fn check_board(searched: &[Searched], board: &Board) -> Result<(), Stop> {
     let given = [board.columns, board.rows];
     let mut seen: BTreeMap<[u16; 2], usize> = BTreeMap::new();
-    let (mut boards, mut has_whole, mut reasons) = (0, false, String::new());
+    let (mut boards, mut has_whole, mut reasons) = (0, false, Vec::new());
     for Searched { name, result } in searched {
         let size = match result {
             Ok((_, Ok(found))) => {
@@ -152,7 +149,7 @@ fn check_board(searched: &[Searched], board: &Board) -> Result<(), Stop> {
                 found.size
             }
             Ok((_, Err(why))) => {
-                reasons.push_str(&format!("\n  {name}: {why}"));
+                reasons.push(format!("  {name}: {why}"));
                 match why {
                     NotFound::OtherSize { found, .. } => *found,
                     _ => continue,
@@ -176,7 +173,7 @@ fn check_board(searched: &[Searched], board: &Board) -> Result<(), Stop> {
         )));
     }
     if boards == 0 {
-        return Err(failed(format!("no picture shows the board; no camera is written:{reasons}")));
+        return Err(failed("no picture shows the board; no camera is written:").with_details(reasons));
     }
     Ok(())
 }

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use hzn_calib::noise::{self, WeightedPoints};
 use hzn_calib::{FrameData, Sensor};
 use hzn_core::{Prior, Solution};
-use hzn_run::disk;
 use hzn_run::engine::{self, End, Finished, Plan, Sink};
 use hzn_run::source::{Source, ending};
 
@@ -14,14 +13,13 @@ use crate::exit::{Stop, usage};
 use crate::progress::Progress;
 use crate::setup::{InputArgs, check_altitude, stop_flag};
 
-/// Refuses outputs of another kind, and files that exist.
-pub(super) fn check_outputs(output: &[PathBuf], force: bool) -> Result<(), Stop> {
+/// Refuses outputs of another kind.
+pub(super) fn check_endings(output: &[PathBuf]) -> Result<(), Stop> {
     for path in output {
         match ending(path).as_str() {
             "toml" | "html" => {}
             _ => return Err(usage(format!("{}: a sensor ends in .toml, a report in .html", path.display()))),
         }
-        disk::refuse_existing(path, force)?;
     }
     Ok(())
 }

@@ -13,11 +13,11 @@ use super::{lens_page, lens_text};
 use crate::exit::{Stop, failed, usage};
 use crate::tell;
 
-/// Refuses outputs of another kind, and files that exist.
-pub(super) fn check_outputs(outputs: &[PathBuf], force: bool) -> Result<(), Stop> {
+/// Refuses outputs of another kind.
+pub(super) fn check_endings(outputs: &[PathBuf]) -> Result<(), Stop> {
     for path in outputs {
         match ending(path).as_str() {
-            "toml" | "html" | "csv" => disk::refuse_existing(path, force)?,
+            "toml" | "html" | "csv" => {}
             _ => {
                 let endings = "a camera ends in .toml, a report in .html, a table of residuals in .csv";
                 return Err(usage(format!("{}: {endings}", path.display())));

@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use hzn_calib::board::{Calibrated, ViewResult};
 use hzn_core::camera::Intrinsic;
 
+use crate::tell::one_line;
+
 /// The reason for each picture that was left out before the fit, by the name of the picture.
 pub(super) type Reasons = BTreeMap<String, String>;
 
@@ -12,7 +14,7 @@ pub(super) type Reasons = BTreeMap<String, String>;
 pub(super) fn report(calibrated: &Calibrated, reasons: &Reasons) -> String {
     let mut out = String::new();
     for view in &calibrated.views {
-        out.push_str(&format!("{:<24} {}\n", view.name, describe_view(view, reasons)));
+        out.push_str(&format!("{:<24} {}\n", one_line(&view.name), one_line(describe_view(view, reasons))));
     }
     out.push('\n');
     for (name, value) in lines(calibrated) {

@@ -7,9 +7,10 @@ use hzn_core::camera::Camera;
 use hzn_run::source::ending;
 use hzn_run::{disk, explain};
 
-use super::flight::{self, Answered, check_outputs};
+use super::flight::{self, Answered, check_endings};
 use super::{page, text};
 use crate::exit::{Exit, Outcome, failed, usage};
+use crate::files;
 use crate::progress::Progress;
 use crate::setup::{InputArgs, SensorArgs, check_size, find_input};
 use crate::tell;
@@ -46,8 +47,10 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    check_outputs(&args.output, args.force)?;
+    check_endings(&args.output)?;
     let mut source = args.source.open(&args.input)?;
+    let read = files::of_sequence(source.as_ref(), &args.sensor, &args.source);
+    files::check_outputs(&read, &args.output, args.force)?;
     let mut sensor = args.sensor.load(source.as_ref())?;
     let mut notes = source.notes();
     notes.extend(find_input(source.as_mut(), &mut sensor)?);

@@ -6,10 +6,11 @@ use std::str::FromStr;
 use hzn_calib::points;
 use hzn_core::camera::Model;
 
-use super::lens_output::{check_outputs, write_all};
+use super::lens_output::{check_endings, write_all};
 use super::lens_text::Reasons;
 use crate::commands::lens_model;
 use crate::exit::{Exit, Outcome, failed};
+use crate::files;
 
 /// Calibrate a camera from points with known directions: a rotator with a collimator, or stars
 ///
@@ -61,7 +62,8 @@ impl FromStr for Size {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    check_outputs(&args.output, args.force)?;
+    check_endings(&args.output)?;
+    files::check_outputs(std::slice::from_ref(&args.table), &args.output, args.force)?;
     let pictures = points::table::load(&args.table, args.size.0)?;
     let name = args.table.display().to_string();
     let calibrated = points::calibrate(args.model, args.size.0, &pictures)

@@ -9,10 +9,11 @@ use hzn_run::engine::Plan;
 use hzn_run::explain::counted;
 use hzn_run::source::ending;
 
-use super::flight::{self, check_outputs};
+use super::flight::{self, check_endings};
 use super::sky_args::{Args, unknowns, write_sensors};
 use super::{page, sky_text, track};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::files;
 use crate::progress::Progress;
 use crate::setup::{InputArgs, SensorArgs, check_size, find_input};
 use crate::tell;
@@ -32,7 +33,9 @@ pub(super) struct Pictures {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    check_outputs(&args.output, args.force)?;
+    check_endings(&args.output)?;
+    let read = files::of_sequence(args.source.open(&args.input)?.as_ref(), &args.sensor, &args.source);
+    files::check_outputs(&read, &args.output, args.force)?;
     let (sensor, notes) = load(&args.input, &args.sensor, &args.source)?;
     if !args.quiet {
         notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));

@@ -7,6 +7,7 @@ use hzn_core::camera::Intrinsic;
 use hzn_run::explain::counted;
 
 use crate::plot::{Chart, Series, Style};
+use crate::tell::one_line;
 
 /// A mount, or why there is none.
 type MountResult = Result<Mount, MountRefusal>;
@@ -17,7 +18,7 @@ pub(super) fn report(estimate: &Estimate, pictures: u64, mount: Option<&MountRes
 }
 
 pub(super) fn join(lines: &[(String, String)]) -> String {
-    lines.iter().map(|(name, value)| format!("{name:<14} {value}\n")).collect()
+    lines.iter().map(|(name, value)| format!("{name:<14} {}\n", one_line(value))).collect()
 }
 
 /// Returns the lines of the report: name and value.

@@ -3,9 +3,11 @@
 use hzn_calib::noise::Calibration;
 use hzn_run::explain::counted;
 
+use crate::tell::one_line;
+
 /// Returns the report.
 pub(super) fn report(calibration: &Calibration, pictures: u64) -> String {
-    lines(calibration, pictures).iter().map(|(name, value)| format!("{name:<14} {value}\n")).collect()
+    lines(calibration, pictures).iter().map(|(name, value)| format!("{name:<14} {}\n", one_line(value))).collect()
 }
 
 /// Returns the lines of the report: name and value.

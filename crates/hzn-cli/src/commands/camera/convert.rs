@@ -10,6 +10,7 @@ use hzn_run::disk;
 use hzn_run::source::ending;
 
 use crate::exit::{Stop, usage};
+use crate::files;
 use crate::tell;
 
 /// Convert a calibration: sensor.toml, Kalibr, OpenCV, EuRoC, ROS, Foxglove, or the coefficients of Braun & Barf
@@ -141,8 +142,9 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         let what = "no place in the result; put it into the [camera] section that names this file";
         tell::warning(format_args!("{} has {what}", lost.join(", ")));
     }
-    let Some(path) = &args.output else { return Ok(tell::result(text)?) };
-    disk::refuse_existing(path, args.force)?;
+    let Some(path) = &args.output else { return Ok(tell::file(text)?) };
+    let read = args.file.as_deref().map(files::of_sensor).unwrap_or_default();
+    files::check_outputs(&read, std::slice::from_ref(path), args.force)?;
     if to == To::Sensor {
         let comment = comment.map(|c| format!("# {c}\n")).unwrap_or_default();
         text = format!("# From {}. Every other key: hzn init.\n{comment}preset = \"hzn\"\n\n{text}", source(args));

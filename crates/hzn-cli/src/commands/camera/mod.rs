@@ -11,11 +11,12 @@ use hzn_core::Config;
 use hzn_core::camera::{self, Camera};
 use hzn_core::frames::UnitVec3;
 use hzn_run::engine::AnySensor;
+use hzn_run::overlay;
 use hzn_run::source::ending;
-use hzn_run::{disk, overlay};
 
 use self::field::{end_rad, field_of_view};
 use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::files;
 use crate::tell;
 
 /// Show a camera calibration, or convert it
@@ -45,7 +46,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     match &args.command {
         Command::Show { file, picture, force } => {
             if let Some(path) = picture {
-                check_map(path, *force)?;
+                check_map(path)?;
+                files::check_outputs(&files::of_sensor(file), std::slice::from_ref(path), *force)?;
             }
             let config = load(file)?;
             for doubt in hzn_calib::plausible::find_implausible(&config) {
@@ -61,12 +63,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
-/// Refuses the map's file if it is no PNG or exists.
-fn check_map(path: &Path, force: bool) -> Result<(), Stop> {
-    if ending(path) != "png" {
-        return Err(usage(format!("{}: a map ends in .png", path.display())));
-    }
-    Ok(disk::refuse_existing(path, force)?)
+/// Refuses the map's file if it is no PNG.
+fn check_map(path: &Path) -> Result<(), Stop> {
+    if ending(path) == "png" { Ok(()) } else { Err(usage(format!("{}: a map ends in .png", path.display()))) }
 }
 
 fn load(file: &Path) -> Result<Config, Stop> {

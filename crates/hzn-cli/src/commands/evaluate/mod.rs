@@ -15,6 +15,7 @@ use hzn_sim::Truth;
 use hzn_sim::evaluate::{Answer, Evaluation, pair};
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::files;
 use crate::tell;
 use report::Report;
 
@@ -50,11 +51,15 @@ pub(super) fn run(args: &Args) -> Outcome {
             "json" | "html" => {}
             _ => return Err(usage(format!("{}: a report ends in .json or .html", path.display()))),
         }
-        disk::refuse_existing(path, args.force)?;
     }
     let truth_path = if args.truth.is_dir() { args.truth.join("truth.csv") } else { args.truth.clone() };
     let folder = truth_path.parent().unwrap_or(Path::new(""));
     let truth = hzn_sim::truth::load(&truth_path).map_err(usage)?;
+    let sensor_path = args.sensor.clone().unwrap_or_else(|| folder.join("sensor.toml"));
+    let mut read = files::of_sensor(&sensor_path);
+    read.extend([args.results.clone(), truth_path.clone()]);
+    read.extend(truth.iter().map(|t| folder.join(&t.file)));
+    files::check_outputs(&read, &args.output, args.force)?;
     let (rows, recorded_sensor) = hzn_run::results::read(&args.results)?;
     let sensor = sensor(args.sensor.as_deref(), recorded_sensor.as_deref(), folder)?;
     let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok());

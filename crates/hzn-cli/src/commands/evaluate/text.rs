@@ -3,13 +3,14 @@
 use hzn_sim::evaluate::{Case, Evaluation, Group, Honesty};
 
 use super::report::Report;
+use crate::tell::one_line;
 
 pub(super) fn report(report: &Report, worst: &[&Case]) -> String {
     let mut out = String::new();
     for e in &report.evaluations {
-        out.push_str(&format!("{}\n", e.body));
+        out.push_str(&format!("{}\n", one_line(&e.body)));
         for (name, value) in lines(e) {
-            out.push_str(&format!("  {name:<18} {value}\n"));
+            out.push_str(&format!("  {name:<18} {}\n", one_line(value)));
         }
         for group in &e.groups {
             out.push('\n');
@@ -20,7 +21,7 @@ pub(super) fn report(report: &Report, worst: &[&Case]) -> String {
     if !worst.is_empty() {
         out.push_str("worst pictures\n");
         for case in worst {
-            out.push_str(&format!("  {}\n", worst_line(case)));
+            out.push_str(&format!("  {}\n", one_line(worst_line(case))));
         }
     }
     out

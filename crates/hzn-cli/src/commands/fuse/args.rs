@@ -74,6 +74,15 @@ pub(crate) struct Args {
     pub(super) show_config: bool,
 }
 
+impl Args {
+    /// Returns every file that is read.
+    pub(super) fn inputs(&self) -> Vec<PathBuf> {
+        let tables = [&self.imu, &self.gnss, &self.attitude, &self.config, &self.truth];
+        let mounts = self.mount.iter().map(|(_, file)| PathBuf::from(file));
+        self.nadir.iter().chain(tables.into_iter().flatten()).cloned().chain(mounts).collect()
+    }
+}
+
 /// Parses NAME=VALUE.
 fn pair(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {

@@ -12,7 +12,7 @@ use hzn_fuse::input::{self, Inputs};
 use hzn_fuse::{Settings, truth};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::tell;
+use crate::tell::{self, one_line};
 pub(super) use args::Args;
 use args::names;
 use output::Outputs;
@@ -23,13 +23,13 @@ impl From<hzn_fuse::Error> for Stop {
             hzn_fuse::Error::Unusable(_) => Exit::Usage,
             hzn_fuse::Error::Failed(_) => Exit::Failed,
         };
-        Self { exit, error: error.into() }
+        Self::new(exit, error.into())
     }
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
     if args.show_config {
-        tell::result(toml::to_string(&Settings::default()).map_err(crate::exit::failed)?)?;
+        tell::file(toml::to_string(&Settings::default()).map_err(crate::exit::failed)?)?;
         return Ok(Exit::Done);
     }
     let settings = args.config.as_deref().map_or_else(|| Ok(Settings::default()), Settings::load)?;
@@ -50,6 +50,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let written = outputs.write(&fused, &inputs, &settings)?;
     summary::print(&fused, truth.as_deref())?;
+    let written: Vec<String> = written.iter().map(one_line).collect();
     tell::result(format_args!("\n{}\n", written.join("\n")))?;
     Ok(Exit::Done)
 }

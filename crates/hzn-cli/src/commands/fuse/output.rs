@@ -13,6 +13,7 @@ use hzn_run::disk;
 use super::args::{Args, names};
 use super::page;
 use crate::exit::{Stop, failed, usage};
+use crate::files;
 
 /// The files that are written.
 pub(super) struct Outputs<'a> {
@@ -22,18 +23,14 @@ pub(super) struct Outputs<'a> {
 }
 
 impl<'a> Outputs<'a> {
-    /// Chooses the files, and refuses those that exist.
+    /// Chooses the files, and refuses those that exist or are read.
     pub(super) fn new(args: &'a Args) -> Result<Self, Stop> {
         let results = args.output.clone().unwrap_or_default();
         let outputs = Self { args, results, utc: args.utc.as_deref().map(Utc::parse).transpose()? };
         if !matches!(outputs.ending().as_str(), "csv" | "mcap") {
             return Err(usage(format!("{}: .mcap or .csv is expected", outputs.results.display())));
         }
-        for path in outputs.all() {
-            if path.exists() && !args.force {
-                return Err(usage(format!("{}: exists already; --force replaces it", path.display())));
-            }
-        }
+        files::check_outputs(&args.inputs(), &outputs.all(), args.force)?;
         Ok(outputs)
     }
 

@@ -8,12 +8,12 @@ use hzn_fuse::truth::{self, Miss};
 use hzn_sim::trajectory::VehicleRow;
 
 use crate::exit::Stop;
-use crate::tell;
+use crate::tell::{self, one_line};
 
 /// Prints what happened.
 pub(super) fn print(fused: &Fused, truth: Option<&[VehicleRow]>) -> Result<(), Stop> {
     for (name, value) in lines(fused, truth) {
-        tell::result(format_args!("{name:<22} {value}\n"))?;
+        tell::result(format_args!("{:<22} {}\n", one_line(name), one_line(value)))?;
     }
     for note in &fused.notes {
         tell::line(format_args!("note: {note}"));

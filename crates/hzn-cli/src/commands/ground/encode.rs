@@ -1,6 +1,6 @@
 //! The text of a command as packets.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hzn_calib::keys::Limits;
 use hzn_flight::bytes::Writer;
@@ -11,6 +11,7 @@ use hzn_flight::packet::{self, Apid, ApidBase};
 use hzn_flight::{Parameters, parameters};
 
 use crate::exit::{Stop, usage};
+use crate::files;
 use crate::tai;
 
 /// Returns the packet of a command with these user data.
@@ -52,6 +53,12 @@ pub(crate) fn encode(text: &str) -> Result<Vec<Vec<u8>>, Stop> {
         _ => command.without_arguments()?,
     };
     Ok(vec![user])
+}
+
+/// Returns the files that the commands read: a sensor.toml is loaded with its camera file.
+pub(crate) fn loaded_files(commands: &[String]) -> Vec<PathBuf> {
+    let file = |text: &String| Some(PathBuf::from(text.trim_start().strip_prefix("load")?.trim()));
+    commands.iter().filter_map(file).flat_map(|path| files::of_sensor(&path)).collect()
 }
 
 /// Returns the error for a refused command.

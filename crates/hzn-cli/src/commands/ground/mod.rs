@@ -21,7 +21,7 @@ mod stream;
 mod view;
 
 pub(super) use commander::Commander;
-pub(super) use encode::{encode, write_packet};
+pub(super) use encode::{encode, loaded_files, write_packet};
 pub(super) use incoming::Incoming;
 pub(super) use screen::show;
 pub(super) use station::Station;

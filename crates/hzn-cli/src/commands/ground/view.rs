@@ -16,6 +16,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 
 use super::stream::{Seen, StreamCounts};
+use crate::tell::one_line;
 
 /// Length of the plots, s.
 const WINDOW_S: f64 = 60.0;
@@ -50,7 +51,7 @@ pub(super) struct View {
 
 impl View {
     pub(super) fn new(name: &str) -> Self {
-        Self { name: name.to_owned(), ..Self::default() }
+        Self { name: one_line(name), ..Self::default() }
     }
 
     /// Takes what was seen.
@@ -67,7 +68,7 @@ impl View {
 
     /// Shows a message.
     pub(super) fn tell(&mut self, level: LogLevel, text: String) {
-        self.messages.push_back((level, text));
+        self.messages.push_back((level, one_line(text)));
         if self.messages.len() > MESSAGES {
             self.messages.pop_front();
         }
@@ -304,6 +305,14 @@ mod tests {
         let text = terminal.backend().to_string();
         // The backend puts every line into quotation marks.
         text.lines().map(|line| line.trim_matches('"').trim_end()).collect::<Vec<_>>().join("\n")
+    }
+
+    #[test]
+    fn what_a_terminal_obeys_is_shown() {
+        let mut view = View::new("tcp:\u{202e}h:1");
+        view.tell(LogLevel::Error, "load \x1b]52;c;aGk\x07\u{2066}".to_owned());
+        let shown = screen(&view, &StreamCounts::new(ApidBase::DEFAULT, true), 100, 30);
+        assert!(shown.contains(r"tcp:\u{202e}h:1") && shown.contains(r"load \x1b]52;c;aGk\x07\u{2066}"), "{shown}");
     }
 
     #[test]

@@ -14,6 +14,7 @@ use hzn_run::disk;
 use hzn_run::source::ending;
 
 use crate::exit::{Exit, Outcome, usage};
+use crate::files;
 use crate::tell;
 pub(super) use args::Args;
 use args::What;
@@ -25,8 +26,9 @@ pub(super) fn run(args: &Args) -> Outcome {
             "csv" | "svg" => {}
             _ => return Err(usage(format!("{}: a table ends in .csv, a plot in .svg", path.display()))),
         }
-        disk::refuse_existing(path, args.force)?;
     }
+    let read = args.sensor.as_deref().map(files::of_sensor).unwrap_or_default();
+    files::check_outputs(&read, &args.output, args.force)?;
     let Study { table, chart, notes } = match args.what {
         What::Sigma => sigma::compute(args)?,
         What::Yaw => yaw::compute(args)?,

@@ -244,6 +244,9 @@ impl Source for Video {
     fn folder(&self) -> PathBuf {
         self.path.parent().map(Path::to_owned).unwrap_or_default()
     }
+    fn files(&self) -> Vec<PathBuf> {
+        vec![self.path.clone()]
+    }
     fn describe_loss(&self) -> Option<String> {
         self.loss.clone()
     }

@@ -1,0 +1,91 @@
+//! `hzn simulate`, `hzn run` and `hzn evaluate` agree on which pictures show a limb, also a short one.
+
+use std::path::Path;
+
+/// A thermal array of 32 x 24 pixels in a low orbit: no picture has 50 px of limb.
+const THERMAL: &str = r#"
+name = "thermal"
+utc = 2021-07-15T00:00:00Z
+[capture]
+to_s = 2900.0
+frames = 40
+[camera]
+width = 32
+height = 24
+model = "pinhole"
+fx_px = 30.0
+fy_px = 30.0
+cx_px = 15.5
+cy_px = 11.5
+[trajectory.orbit]
+perigee_km = 600.0
+[attitude.pointing]
+off_nadir_deg = [62.0, 68.0]
+azimuth_deg = [0.0, 300.0]
+[world.infrared]
+[detector]
+psf_sigma_px = 0.6
+read_noise = 0.01
+bits = 16
+"#;
+
+/// The Sun with a radius of 2.7 px: its whole outline has 17 px.
+const SUN: &str = r#"
+name = "sun"
+utc = 2019-06-13T10:30:00Z
+bodies = ["sun"]
+[capture]
+from_s = 70.0
+to_s = 420.0
+frames = 12
+[camera]
+width = 320
+height = 240
+model = "equidistant"
+fx_px = 580.0
+fy_px = 580.0
+cx_px = 159.5
+cy_px = 119.5
+[trajectory.rocket]
+[attitude.towards]
+bodies = ["sun"]
+wander_deg = 6.0
+[world.visible]
+[detector]
+psf_sigma_px = 0.9
+read_noise = 0.01
+"#;
+
+/// Runs hzn in a folder and returns its stdout.
+fn hzn(folder: &Path, args: &[&str]) -> String {
+    let out = assert_cmd::Command::cargo_bin("hzn")
+        .expect("the binary is built")
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .expect("hzn starts");
+    assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
+    String::from_utf8_lossy(&out.stdout).into_owned()
+}
+
+#[test]
+fn answers_to_short_limbs_are_answers_and_not_false() {
+    for (name, scene, body, pictures) in [("thermal", THERMAL, "earth", 40), ("sun", SUN, "sun", 12)] {
+        let dir = tempfile::tempdir().unwrap();
+        let at = dir.path();
+        std::fs::write(at.join("my.toml"), scene).unwrap();
+        let told = hzn(at, &["simulate", "my.toml", "-o", "out", "-q"]);
+        assert!(told.contains(&format!("limb of the {body} in view in {pictures}\n")), "{name}: {told}");
+        let truth = hzn_sim::truth::load(&at.join("out/truth.csv")).unwrap();
+        assert_eq!(truth.iter().filter(|row| row.has_limb()).count(), pictures, "{name}");
+        hzn(at, &["run", "out", "-o", "out.csv", "-q"]);
+        let told = hzn(at, &["evaluate", "out.csv", "--truth", "out/truth.csv", "-o", "e.json"]);
+        let json: serde_json::Value = serde_json::from_slice(&std::fs::read(at.join("e.json")).unwrap()).unwrap();
+        let e = &json["evaluations"][0];
+        assert_eq!((e["with_limb"].as_u64(), e["false_answers"].as_u64()), (Some(pictures as u64), Some(0)), "{told}");
+        let answered = e["answered"].as_u64().unwrap() as usize;
+        assert!(answered * 10 >= pictures * 9, "{name}: {told}");
+        let worst_deg = e["errors"]["worst_deg"].as_f64().unwrap();
+        assert!(worst_deg < 1.0, "{name}: {told}");
+    }
+}
