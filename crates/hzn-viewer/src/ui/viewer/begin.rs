@@ -30,7 +30,7 @@ impl Viewer {
     pub(in crate::ui) fn begin_session(&mut self, text: &str, warnings: Vec<String>) {
         let home = self.sequence.folder.join("sensor.toml");
         // The text differs from the empty file, so it counts as a change that can be saved.
-        let mut session = Session::new("", &home, false);
+        let mut session = Session::new("", &home, None);
         session.set_text(text);
         self.set_session(session);
         warnings.into_iter().for_each(|w| self.add_note(w));

@@ -7,6 +7,7 @@ mod begin;
 mod changes;
 mod companions;
 mod jobs;
+mod outputs;
 mod request_key;
 mod sequence_work;
 mod threads;
@@ -40,6 +41,7 @@ use crate::work::{Engine, FrameView, Job, Wake};
 use changes::Changes;
 pub(super) use changes::Leave;
 use companions::Companions;
+pub(super) use outputs::replaced;
 use request_key::RequestKey;
 use sequence_work::SequenceWork;
 
@@ -308,6 +310,9 @@ impl Viewer {
     }
 
     pub(super) fn set_session(&mut self, session: Session) {
+        // A question about the file of the old session would be answered for the new one.
+        self.cancel_save();
+        self.path_dialog.take_if(|dialog| dialog.replaces);
         self.session = Some(session);
         self.requested = None;
         self.body = 0;

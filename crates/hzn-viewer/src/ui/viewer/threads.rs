@@ -137,7 +137,7 @@ impl Viewer {
         self.engine.open(self.request.inputs.clone());
         // A sensor that the user opened stays if the new pictures come without one.
         match opened.sensor {
-            Some(s) => self.session = Some(Session::new(&s.text, &s.home, s.is_file)),
+            Some(s) => self.session = Some(Session::new(&s.text, &s.home, s.as_read)),
             None if self.session.is_none() => self.add_note(
                 "There is no sensor.toml, so the pictures are shown but not processed. Make one in the panel \
                  “Stages”, open one, or drop it on the window.",

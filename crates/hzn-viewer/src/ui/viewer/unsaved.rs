@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 use super::Viewer;
 use super::changes::Leave;
 use crate::model::{Session, Unsaved, autosave};
-use crate::ui::path_dialog::{PathDialog, Purpose};
 use crate::work::open::Request;
 
 /// Time from a change until it is autosaved, so that a slider that moves does not write a file with every step.
@@ -62,12 +61,11 @@ impl Viewer {
     /// Takes the answer "Save" to the question.
     pub(in crate::ui) fn save_and_leave(&mut self, ctx: &egui::Context) {
         let Some(leave) = self.changes.question.take() else { return };
-        let Some(session) = &self.session else { return self.go_on(leave, Some(ctx)) };
-        self.changes.after_save = Some(leave);
-        match session.path().map(std::path::Path::to_owned) {
-            Some(path) => self.save_to(&path),
-            None => self.ask(PathDialog::new(Purpose::SaveSensor, session.home())),
+        if self.session.is_none() {
+            return self.go_on(leave, Some(ctx));
         }
+        self.changes.after_save = Some(leave);
+        self.save();
     }
 
     /// Takes the answer "Discard changes" to the question.
