@@ -19,6 +19,9 @@ pub struct Unsaved {
     /// Fingerprint of the file as it was last read or written. Earlier versions did not store it.
     #[serde(default)]
     pub as_read: Option<Fingerprint>,
+    /// True if the user opened the file himself, so that it stays when other pictures are opened.
+    #[serde(default)]
+    pub is_opened_by_user: bool,
     /// Text as it was read or last saved.
     pub saved: String,
     /// Text with the changes.
@@ -34,6 +37,7 @@ impl Unsaved {
             home: absolute(session.home()),
             is_file: session.path().is_some(),
             as_read: session.as_read(),
+            is_opened_by_user: session.is_opened_by_user(),
             saved: session.saved().text().to_owned(),
             text: session.sheet().text().to_owned(),
             inputs: inputs.iter().map(|p| absolute(p)).collect(),
@@ -44,7 +48,7 @@ impl Unsaved {
         let as_read = self.is_file.then(|| self.as_read.unwrap_or_else(|| Fingerprint::of(&self.saved)));
         let mut session = Session::new(&self.saved, &self.home, as_read);
         session.set_text(&self.text);
-        session
+        if self.is_opened_by_user { session.opened_by_user() } else { session }
     }
 }
 
@@ -111,7 +115,7 @@ mod tests {
         let text = "preset = \"hzn\"\n";
         // The number of bits was added to the text of the file.
         let as_read = Some(Fingerprint::of("before"));
-        let mut session = Session::new(text, Path::new("/flight/sensor.toml"), as_read);
+        let mut session = Session::new(text, Path::new("/flight/sensor.toml"), as_read).opened_by_user();
         session.set("binarize", "scale", 0, Some(1.5.into()));
         let unsaved = Unsaved::of_session(&session, &[PathBuf::from("/flight")]);
         let own = Autosave::in_folder(dir.path());
@@ -125,7 +129,7 @@ mod tests {
         assert_eq!((&found, path), (&unsaved, lost));
         let mut again = found.into_session();
         assert!(again.is_changed() && again.sheet().text().contains("scale = 1.5"));
-        assert_eq!(again.as_read(), as_read);
+        assert!(again.as_read() == as_read && again.is_opened_by_user());
         again.undo();
         assert!(!again.is_changed());
         own.remove();

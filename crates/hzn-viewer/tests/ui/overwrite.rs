@@ -1,14 +1,25 @@
 //! Tests of the files that could be lost: no file of another flight, of another program or of another kind is written
 //! without a question.
 
+use std::path::{Path, PathBuf};
+
 use egui::{Key, Modifiers, Role};
 use egui_kittest::kittest::Queryable;
+use hzn_viewer::model::Autosave;
 use hzn_viewer::ui::Viewer;
+use hzn_viewer::work::open::Request;
 
 use crate::window::*;
 
 const CTRL: Modifiers = Modifiers::COMMAND;
 const SHIFT: Modifiers = Modifiers::SHIFT;
+
+/// Returns a folder of pictures without a sensor.toml.
+fn bare_folder() -> (tempfile::TempDir, PathBuf) {
+    let (dir, pictures) = folder();
+    std::fs::remove_file(pictures.join("sensor.toml")).unwrap();
+    (dir, pictures)
+}
 
 fn scale_to(window: &mut Window, scale: f64) {
     window.get_by_role_and_label(Role::Slider, "scale").set_value_accesskit(scale);
@@ -31,6 +42,110 @@ fn shows(window: &Window, words: &str) -> bool {
 
 fn text(window: &Window) -> String {
     window.state().session().unwrap().sheet().text().to_owned()
+}
+
+/// Opens pictures and waits until they are on the screen.
+fn open_and_wait(window: &mut Window, what: &Path) {
+    open(window, what);
+    let inputs = [what.to_owned()];
+    until(window, "not opened", |v| v.sequence().inputs == inputs && v.sequence().complete && v.is_settled());
+}
+
+#[test]
+fn a_folder_without_a_sensor_takes_none_of_another_flight() {
+    let (first_dir, first) = folder();
+    let (_bare_dir, bare) = bare_folder();
+    let mut window = window_on(&first);
+    menu(&mut window, "Compare", "with preset dlr-2022");
+    open_and_wait(&mut window, &bare);
+    assert!(window.state().session().is_none(), "the sensor of the first flight ends with its pictures");
+    assert!(frame_view(&window).answers.is_empty(), "so does the preset that was compared with it");
+    said(&mut window, "There is no sensor.toml, so the pictures are shown but not processed");
+
+    // The sensor of a recording ends with the recording, also after it was saved.
+    open_and_wait(&mut window, &first);
+    let recording = first_dir.path().join("run.mcap");
+    run_into(&mut window, &recording);
+    open_and_wait(&mut window, &recording);
+    assert!(window.state().session().is_some());
+    window.key_press_modifiers(CTRL | SHIFT, Key::S);
+    path(&mut window, &first_dir.path().join("kept.toml"), "Write");
+    said(&mut window, "Saved");
+    open_and_wait(&mut window, &bare);
+    assert!(window.state().session().is_none());
+}
+
+#[test]
+fn a_sensor_that_the_user_opened_stays_and_its_path_is_shown() {
+    let (dir, pictures) = folder();
+    let (_bare_dir, bare) = bare_folder();
+    let own = another_sensor(dir.path());
+    let mut window = window_on(&pictures);
+    open(&mut window, &own);
+    settled(&mut window);
+    open_and_wait(&mut window, &bare);
+    assert_eq!(window.state().session().unwrap().path(), Some(own.as_path()));
+    said(&mut window, &format!("The one that you opened stays: {}", own.display()));
+    // The title has only the names; the paths are in its tooltip.
+    window.get_by_label("pictures   other.toml").hover();
+    window.run_steps(60);
+    assert!(shows(&window, &format!("Sensor: {}", own.display())));
+    assert!(shows(&window, &format!("Pictures: {}", bare.display())));
+    scale_to(&mut window, 1.5);
+    save(&mut window);
+    said(&mut window, &format!("Saved: {}", own.display()));
+
+    // The file that the command line names is one that the user opened.
+    let request = Request { inputs: vec![pictures], sensor: Some(own.clone()), ..Request::default() };
+    window.state_mut().open(request);
+    settled(&mut window);
+    open_and_wait(&mut window, &bare);
+    assert_eq!(window.state().session().unwrap().path(), Some(own.as_path()));
+}
+
+#[test]
+fn changes_that_are_made_while_pictures_are_opened_are_not_lost() {
+    let (_dir, pictures) = folder();
+    let (_bare_dir, bare) = bare_folder();
+    let mut window = window_on(&pictures);
+    let request = Request { inputs: vec![bare.clone()], ..Request::default() };
+    window.state_mut().open(request);
+    window.state_mut().session_mut().unwrap().set("binarize", "scale", 0, Some(1.5.into()));
+    let begin = std::time::Instant::now();
+    while window.query_by_label("Unsaved changes").is_none() {
+        assert!(begin.elapsed().as_secs() < 60, "there is no question");
+        window.step();
+    }
+    window.run_steps(2);
+    assert_eq!((window.state().sequence().inputs.as_slice(), window.state().sequence().len()), (&[pictures][..], 4));
+    click(&mut window, "Discard changes");
+    until(&mut window, "not opened", |v| v.sequence().inputs == [bare.clone()] && v.is_settled());
+}
+
+#[test]
+fn restored_changes_do_not_come_to_other_pictures() {
+    let (dir, pictures) = folder();
+    let (_other_dir, other) = folder();
+    let store = dir.path().join("config").join("viewer.json");
+    let mut window = stored_window(&store);
+    open(&mut window, &pictures);
+    settled(&mut window);
+    scale_to(&mut window, 1.5);
+    let own = store.with_file_name(format!("unsaved-{}.json", std::process::id()));
+    until(&mut window, "not autosaved", |_| own.exists());
+    // The window crashes, and its pictures are moved away. No process has this number.
+    std::fs::rename(&own, store.with_file_name("unsaved-4294967295.json")).unwrap();
+    drop(window);
+    std::fs::remove_dir_all(&pictures).unwrap();
+
+    let mut later = stored_window(&store);
+    later.run_steps(3);
+    click(&mut later, "Restore changes");
+    said(&mut later, "the next window offers them again");
+    open_and_wait(&mut later, &other);
+    assert_eq!(later.state().session().unwrap().path(), Some(other.join("sensor.toml").as_path()));
+    assert_eq!(text(&later), SENSOR);
+    assert!(Autosave::find_lost(store.parent().unwrap()).is_some());
 }
 
 #[test]

@@ -34,6 +34,8 @@ pub struct Session {
     /// Fingerprint of this file as it was last read or written. The saved text can differ from it by the number of bits
     /// of the pictures, which is added when the pictures are opened.
     as_read: Option<Fingerprint>,
+    /// The user opened the file himself. Any other session ends with its pictures.
+    is_opened_by_user: bool,
     /// Path that messages name. A camera `file` is looked for in the same folder.
     home: PathBuf,
     saved: Sheet,
@@ -62,6 +64,7 @@ impl Session {
         let mut session = Self {
             path: as_read.map(|_| home.to_owned()),
             as_read,
+            is_opened_by_user: false,
             home: home.to_owned(),
             saved: sheet.clone(),
             sheet,
@@ -87,6 +90,15 @@ impl Session {
     pub fn open(path: &Path) -> Result<Self, Problem> {
         let text = read_file(path)?;
         Ok(Self::new(&text, path, Some(Fingerprint::of(&text))))
+    }
+
+    /// Returns the session as one whose file the user opened himself.
+    pub fn opened_by_user(self) -> Self {
+        Self { is_opened_by_user: true, ..self }
+    }
+    /// Returns true if the user opened the file himself. Any other session ends with its pictures.
+    pub fn is_opened_by_user(&self) -> bool {
+        self.is_opened_by_user
     }
 
     /// Returns the text.

@@ -131,7 +131,7 @@ impl Viewer {
                     return;
                 }
                 let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                self.other = Some((name, session));
+                self.other = Some((name, session.opened_by_user()));
             }
             Err(problem) => self.add_problem(problem.to_string()),
         }

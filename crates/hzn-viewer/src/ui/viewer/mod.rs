@@ -70,8 +70,8 @@ pub struct Viewer {
     pub(super) frame_view: Option<FrameView>,
     pub(super) toasts: Toasts,
     pub(super) changes: Changes,
-    /// Session that comes back once its sequence is open.
-    restoring: Option<Session>,
+    /// Session that comes back once its sequence is open, and the file that keeps it until then.
+    restoring: Option<(Session, PathBuf)>,
     /// The window closes at its next frame.
     close_now: bool,
     /// Version of the session that the results belong to.
@@ -199,6 +199,8 @@ impl Viewer {
     /// Opens another sequence.
     pub fn open(&mut self, request: Request) {
         self.messages_before = self.toasts.len();
+        // A session that waits for its sequence does not come to another one.
+        self.restoring = None;
         self.opening = Some(open::start(request.clone(), Arc::clone(&self.wake)));
         for path in &request.inputs {
             self.settings.add_recent(path);
@@ -213,7 +215,7 @@ impl Viewer {
             && one.extension().is_some_and(|e| e == "toml")
         {
             match Session::open(one) {
-                Ok(session) => self.leave(Leave::Sensor(Box::new(session)), None),
+                Ok(session) => self.leave(Leave::Sensor(Box::new(session.opened_by_user())), None),
                 Err(problem) => self.add_problem(problem.to_string()),
             }
             return;

@@ -11,7 +11,7 @@ use crate::work::open::Request;
 const AUTOSAVE_AFTER: Duration = Duration::from_millis(700);
 
 impl Viewer {
-    fn has_changes(&self) -> bool {
+    pub(super) fn has_changes(&self) -> bool {
         self.session.as_ref().is_some_and(Session::is_changed)
     }
 
@@ -88,17 +88,17 @@ impl Viewer {
     /// Brings the changes of a window that crashed back, together with its sequence.
     pub(in crate::ui) fn restore_lost(&mut self) {
         let Some((unsaved, path)) = self.changes.lost.take() else { return };
-        let _ = std::fs::remove_file(path);
         let inputs = unsaved.inputs.clone();
         let session = unsaved.into_session();
         let here = self.request.inputs.iter().map(|path| autosave::absolute(path));
         if !inputs.is_empty() && !here.eq(inputs.iter().cloned()) {
             // The changes belong to another sequence than the one that is open.
             self.open(Request { inputs, fps: self.request.fps, ..Request::default() });
-            self.restoring = Some(session);
+            self.restoring = Some((session, path));
         } else if self.opening.is_some() && self.sequence.inputs != self.request.inputs {
-            self.restoring = Some(session);
+            self.restoring = Some((session, path));
         } else {
+            let _ = std::fs::remove_file(path);
             self.set_session(session);
         }
     }
