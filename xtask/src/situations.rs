@@ -26,7 +26,7 @@ const fn shot(name: &'static str, open: &'static str, frame: &'static str, situa
     Shot { name, open: Some(open), frame, situation }
 }
 
-const SHOTS: [Shot; 9] = [
+const SHOTS: [Shot; 11] = [
     Shot { name: "welcome", open: None, frame: "0", situation: None },
     shot("ok", "rocket.mcap", "5", None),
     shot("refused", "discs", "1", Some("stages")),
@@ -36,6 +36,8 @@ const SHOTS: [Shot; 9] = [
     shot("wizard", "bare", "0", Some("wizard")),
     shot("navigation", "left.mcap", "30", Some("navigation")),
     shot("circle", "rocket.mcap", "5", Some("circle")),
+    shot("replace", "rocket", "5", Some("replace")),
+    shot("changed", "rocket", "5", Some("changed")),
 ];
 
 /// Makes all pictures in target/xtask/situations.

@@ -1,6 +1,6 @@
 //! From the command line to the window.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -30,6 +30,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         bail!("--fps: must be a finite number above 0");
     }
     let shot = args.screenshot.clone();
+    if let Some(shot) = &shot {
+        check_shot(shot, &args.input)?;
+    }
     // A screenshot for documents must not depend on the settings of an earlier run.
     let store = if shot.is_some() || args.measure.is_some() { None } else { Settings::default_path() };
     let mut settings = store.as_deref().map(Settings::load).unwrap_or_default();
@@ -77,6 +80,21 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     window.map_err(|e| anyhow!("{e}")).context("the window cannot be opened (it needs a display and OpenGL)")?;
     let outcome = outcome.lock().map_err(|_| anyhow!("the window ended with an error"))?.take();
     outcome.unwrap_or(Ok(()))
+}
+
+/// Checks that a screenshot replaces neither a file of another kind nor a file that is opened.
+///
+/// # Errors
+/// The name does not end in `.png`, or the file is one of the inputs or lies in a folder that is opened.
+fn check_shot(shot: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
+    if hzn_run::source::ending(shot) != "png" {
+        bail!("--screenshot {}: the file name must end in .png", shot.display());
+    }
+    let opens = |file: &Path, input: &PathBuf| input.canonicalize().is_ok_and(|input| file.starts_with(input));
+    if shot.canonicalize().is_ok_and(|file| inputs.iter().any(|input| opens(&file, input))) {
+        bail!("--screenshot {}: is one of the files that are opened; choose another name", shot.display());
+    }
+    Ok(())
 }
 
 /// Returns true if the system can show its own dialogs. On Linux they come over the session bus.
@@ -186,10 +204,28 @@ fn print_answers(viewer: &Viewer) {
     }
 }
 
-fn save(image: &ColorImage, path: &std::path::Path) -> anyhow::Result<()> {
+fn save(image: &ColorImage, path: &Path) -> anyhow::Result<()> {
     let [w, h] = image.size;
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
     let picture =
         image::RgbImage::from_raw(w as u32, h as u32, bytes).ok_or_else(|| anyhow!("the window has no size"))?;
     hzn_run::overlay::save(&picture, path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_screenshot_replaces_nothing_that_is_opened() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str| dir.path().join(name);
+        for name in ["flight.mcap", "a.png", "shot.png"] {
+            std::fs::write(file(name), b"").unwrap();
+        }
+        let refused = |shot: &str, input: &Path| check_shot(&file(shot), &[input.to_owned()]).is_err();
+        assert!(refused("flight.mcap", &file("flight.mcap")) && refused("shot", &file("flight.mcap")));
+        assert!(refused("a.png", &file("a.png")) && refused("a.png", &dir.path().join(".")));
+        assert!(!refused("shot.png", &file("flight.mcap")) && !refused("new.png", dir.path()));
+    }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Session, atomic_file};
+use super::{Fingerprint, Session, atomic_file};
 
 /// Start of the names of autosaved sessions; the number of the process follows.
 const STEM: &str = "unsaved-";
@@ -16,6 +16,12 @@ pub struct Unsaved {
     pub home: PathBuf,
     /// True if `home` exists as the file of the session.
     pub is_file: bool,
+    /// Fingerprint of the file as it was last read or written. Earlier versions did not store it.
+    #[serde(default)]
+    pub as_read: Option<Fingerprint>,
+    /// True if the user opened the file himself, so that it stays when other pictures are opened.
+    #[serde(default)]
+    pub is_opened_by_user: bool,
     /// Text as it was read or last saved.
     pub saved: String,
     /// Text with the changes.
@@ -30,6 +36,8 @@ impl Unsaved {
         Self {
             home: absolute(session.home()),
             is_file: session.path().is_some(),
+            as_read: session.as_read(),
+            is_opened_by_user: session.is_opened_by_user(),
             saved: session.saved().text().to_owned(),
             text: session.sheet().text().to_owned(),
             inputs: inputs.iter().map(|p| absolute(p)).collect(),
@@ -37,9 +45,10 @@ impl Unsaved {
     }
     /// Returns the session with its changes. Undo goes back to the saved text.
     pub fn into_session(self) -> Session {
-        let mut session = Session::new(&self.saved, &self.home, self.is_file);
+        let as_read = self.is_file.then(|| self.as_read.unwrap_or_else(|| Fingerprint::of(&self.saved)));
+        let mut session = Session::new(&self.saved, &self.home, as_read);
         session.set_text(&self.text);
-        session
+        if self.is_opened_by_user { session.opened_by_user() } else { session }
     }
 }
 
@@ -103,7 +112,10 @@ mod tests {
     #[test]
     fn changes_of_a_window_that_crashed_come_back() {
         let dir = tempfile::tempdir().unwrap();
-        let mut session = Session::new("preset = \"hzn\"\n", Path::new("/flight/sensor.toml"), true);
+        let text = "preset = \"hzn\"\n";
+        // The number of bits was added to the text of the file.
+        let as_read = Some(Fingerprint::of("before"));
+        let mut session = Session::new(text, Path::new("/flight/sensor.toml"), as_read).opened_by_user();
         session.set("binarize", "scale", 0, Some(1.5.into()));
         let unsaved = Unsaved::of_session(&session, &[PathBuf::from("/flight")]);
         let own = Autosave::in_folder(dir.path());
@@ -117,6 +129,7 @@ mod tests {
         assert_eq!((&found, path), (&unsaved, lost));
         let mut again = found.into_session();
         assert!(again.is_changed() && again.sheet().text().contains("scale = 1.5"));
+        assert!(again.as_read() == as_read && again.is_opened_by_user());
         again.undo();
         assert!(!again.is_changed());
         own.remove();

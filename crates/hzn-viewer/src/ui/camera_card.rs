@@ -71,7 +71,7 @@ mod tests {
                           cx_px = 319.5\ncy_px = 239.5\n";
 
     fn session() -> Session {
-        Session::new(CAMERA, Path::new("s.toml"), false)
+        Session::new(CAMERA, Path::new("s.toml"), None)
     }
 
     fn numbers(s: &Session) -> Vec<f64> {

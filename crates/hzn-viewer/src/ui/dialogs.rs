@@ -1,7 +1,5 @@
 //! Draws the dialog for paths and the differences from the saved file.
 
-use std::path::Path;
-
 use egui::{Key, RichText};
 
 use super::path_dialog::Purpose;
@@ -11,6 +9,9 @@ use super::viewer::Viewer;
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     diff(viewer, ctx);
     let Some(path_dialog) = &mut viewer.path_dialog else { return };
+    if path_dialog.replaces {
+        return;
+    }
     if path_dialog.is_hidden() {
         return ctx.request_repaint_after(std::time::Duration::from_millis(100));
     }
@@ -28,12 +29,13 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
             field.request_focus();
         }
         accepted |= field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
-        let exists = Path::new(path_dialog.text.trim()).exists();
-        if path_dialog.purpose.writes() && exists && !Path::new(path_dialog.text.trim()).is_dir() {
-            ui.colored_label(ui.visuals().warn_fg_color, "A file of this name exists; it would be replaced.");
-        } else {
-            ui.label("");
+        if field.changed() {
+            path_dialog.refused = None;
         }
+        match &path_dialog.refused {
+            Some(why) => ui.colored_label(theme::warning(ui.visuals().dark_mode), why),
+            None => ui.label(""),
+        };
         ui.horizontal(|ui| {
             accepted |= ui.button(if path_dialog.purpose.writes() { "Write" } else { "Open this" }).clicked();
             closed |= ui.button("Cancel").clicked();

@@ -116,7 +116,7 @@ mod tests {
     fn a_dragged_threshold_keeps_the_method_where_it_can() {
         let camera = "[camera]\nwidth = 64\nheight = 48\nmodel = \"pinhole\"\nfx_px = 60.0\nfy_px = 60.0\n\
                       cx_px = 31.5\ncy_px = 23.5\n";
-        let session = |binarize: &str| Session::new(&format!("{camera}{binarize}"), Path::new("s.toml"), false);
+        let session = |binarize: &str| Session::new(&format!("{camera}{binarize}"), Path::new("s.toml"), None);
         let mut otsu = session("");
         set_threshold(&mut otsu, 0, 120.0, Some(80.0));
         assert_eq!((method(&otsu, 0), otsu.number("binarize", "scale", 0)), (Some("otsu"), Some(1.5)));

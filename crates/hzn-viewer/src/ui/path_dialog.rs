@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, bounded};
 
+use crate::model::autosave::absolute;
+
 /// Purpose of the path that the user enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
@@ -37,7 +39,7 @@ impl Purpose {
             Self::SaveSensor => "Comments are kept",
             Self::Compare => "Another sensor.toml for the same camera",
             Self::Picture => "PNG in the picture's own size",
-            Self::Video => "The ending sets the format: .mp4, .mkv, .webm; needs ffmpeg on PATH",
+            Self::Video => "The ending sets the format: .mp4, .mkv, .webm, .mov or .avi; needs ffmpeg on PATH",
             Self::Table => ".csv or .jsonl, with the results that are shown",
             Self::Plots => {
                 ".svg, or .png with 2700 pixels across: the plots over time that are chosen below the picture"
@@ -49,6 +51,27 @@ impl Purpose {
     pub(super) fn writes(self) -> bool {
         !matches!(self, Self::Open | Self::Compare)
     }
+    /// Returns the endings that the file may have; none if every file is possible.
+    fn endings(self) -> &'static [&'static str] {
+        match self {
+            Self::Open => &[],
+            Self::SaveSensor | Self::Compare => &["toml"],
+            Self::Picture => &["png"],
+            Self::Video => &["mp4", "mkv", "webm", "mov", "avi"],
+            Self::Table => &["csv", "jsonl"],
+            Self::Plots => &["svg", "png"],
+            Self::Rerun => &["mcap"],
+        }
+    }
+    /// Returns the reason why no file of this path may be written: its ending belongs to another kind of file, or the
+    /// path is a folder.
+    pub(super) fn refuse(self, path: &Path) -> Option<String> {
+        if !self.endings().contains(&hzn_run::source::ending(path).as_str()) {
+            let endings: Vec<String> = self.endings().iter().map(|e| format!(".{e}")).collect();
+            return Some(format!("The file name must end in {}.", endings.join(" or ")));
+        }
+        path.is_dir().then(|| "This is a folder; add the name of a file.".to_owned())
+    }
 }
 
 /// The dialog while the user enters a path.
@@ -56,6 +79,10 @@ pub(super) struct PathDialog {
     pub(super) purpose: Purpose,
     /// The path as it is typed.
     pub(super) text: String,
+    /// Reason why the path was refused, until it is changed.
+    pub(super) refused: Option<String>,
+    /// The user is asked whether the file of this path is replaced.
+    pub(super) replaces: bool,
     /// Receives the answer of the system's dialog while that is open.
     pub(super) browsing: Option<Receiver<Option<PathBuf>>>,
     /// The field of the path takes the focus when it is drawn next.
@@ -80,7 +107,14 @@ const NO_DIALOG: Duration = Duration::from_millis(300);
 
 impl PathDialog {
     pub(super) fn new(purpose: Purpose, start: &Path) -> Self {
-        Self { purpose, text: start.display().to_string(), browsing: None, focus: true, native: None }
+        let text = start.display().to_string();
+        Self { purpose, text, refused: None, replaces: false, browsing: None, focus: true, native: None }
+    }
+
+    /// Returns the path that is typed. A path to write is absolute, so that messages show where the file is.
+    pub(super) fn path(&self) -> PathBuf {
+        let typed = Path::new(self.text.trim());
+        if self.purpose.writes() { absolute(typed) } else { typed.to_owned() }
     }
 
     /// Opens the system's dialog on a separate thread, because it stays open as long as the user wants.
@@ -92,6 +126,9 @@ impl PathDialog {
             let mut dialog = rfd::FileDialog::new().set_title(purpose.title());
             if let Some(start) = start.filter(|p| p.is_dir()) {
                 dialog = dialog.set_directory(start);
+            }
+            if !purpose.endings().is_empty() {
+                dialog = dialog.add_filter(purpose.title(), purpose.endings());
             }
             let picked = match (purpose.writes(), folder) {
                 (true, _) => {
@@ -118,18 +155,45 @@ impl PathDialog {
     }
 
     /// Takes the answer of the system's dialog into the text. Without the system's dialog alone, a path for writing is
-    /// shown first, so that the user can check it; the system's dialog itself asks before it replaces a file.
+    /// shown first, so that the user can check it.
     pub(super) fn take_answer(&mut self) -> Answer {
         let Some(answer) = self.browsing.as_ref().and_then(|b| b.try_recv().ok()) else { return Answer::Open };
         self.browsing = None;
         let native = self.native.take();
         match (answer, native) {
             (Some(path), _) => {
-                self.text = path.display().to_string();
+                (self.text, self.refused) = (path.display().to_string(), None);
                 if native.is_some() || !self.purpose.writes() { Answer::Accepted } else { Answer::Open }
             }
             (None, Some(since)) if since.elapsed() > NO_DIALOG => Answer::Cancelled,
             (None, _) => Answer::Open,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_file_has_its_own_endings() {
+        let endings = ["toml", "png", "mp4", "mkv", "webm", "mov", "avi", "csv", "jsonl", "svg", "mcap", "bak"];
+        let allowed = |purpose: Purpose| {
+            let allows = |ending: &&str| purpose.refuse(Path::new(&format!("/none/a.{ending}"))).is_none();
+            endings.into_iter().filter(allows).collect::<Vec<_>>()
+        };
+        assert_eq!(allowed(Purpose::SaveSensor), ["toml"]);
+        assert_eq!(allowed(Purpose::Picture), ["png"]);
+        assert_eq!(allowed(Purpose::Video), ["mp4", "mkv", "webm", "mov", "avi"]);
+        assert_eq!(allowed(Purpose::Table), ["csv", "jsonl"]);
+        assert_eq!(allowed(Purpose::Plots), ["png", "svg"]);
+        assert_eq!(allowed(Purpose::Rerun), ["mcap"]);
+        let refuse = |name: &str| Purpose::SaveSensor.refuse(Path::new(name));
+        assert_eq!(refuse("/none/A.TOML"), None);
+        for name in ["", "/none/a", "/none/.toml", "/none/a.toml.bak", "/none/a.toml.part"] {
+            assert_eq!(refuse(name).as_deref(), Some("The file name must end in .toml."), "{name}");
+        }
+        let folder = tempfile::Builder::new().suffix(".toml").tempdir().unwrap();
+        assert!(Purpose::SaveSensor.refuse(folder.path()).is_some_and(|why| why.contains("folder")));
     }
 }

@@ -1,8 +1,13 @@
-//! Questions before changes go, and about the changes of a window that crashed.
+//! Questions before changes go, before a file is replaced, and about the changes of a window that crashed.
 
-use egui::{Id, Modal};
+use std::path::Path;
 
-use super::viewer::{Leave, Viewer};
+use egui::{Id, Modal, RichText, Ui};
+
+use super::path_dialog::Purpose;
+use super::viewer::{Leave, Viewer, replaced};
+use crate::model::FileChange;
+use crate::model::autosave::absolute;
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     if let Some(leave) = &viewer.changes.question {
@@ -12,6 +17,11 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
             Leave::Sensor(_) => "You open another sensor.toml",
         };
         unsaved(viewer, ctx, what);
+    } else if let Some(change) = viewer.changes.of_file {
+        changed_file(viewer, ctx, change);
+    } else if let Some(dialog) = viewer.path_dialog.as_ref().filter(|dialog| dialog.replaces) {
+        let (purpose, path) = (dialog.purpose, dialog.path());
+        existing_file(viewer, ctx, purpose, &path);
     } else if viewer.changes.lost.is_some() && viewer.path_dialog.is_none() {
         lost(viewer, ctx);
     }
@@ -19,14 +29,14 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
 
 /// Asks what to do with changes that are not saved.
 fn unsaved(viewer: &mut Viewer, ctx: &egui::Context, what: &str) {
-    let home = viewer.session.as_ref().map(|s| s.home().display().to_string()).unwrap_or_default();
+    let home = viewer.session.as_ref().map(|s| absolute(s.home())).unwrap_or_default();
     let (mut save, mut discard, mut cancel) = (false, false, false);
     let shown = Modal::new(Id::unique("unsaved")).show(ctx, |ui| {
         ui.set_max_width(460.0);
         ui.heading("Unsaved changes");
         ui.add_space(4.0);
         ui.label(format!("{what}, and the changes of this sensor.toml are not saved:"));
-        ui.add(egui::Label::new(egui::RichText::new(home).monospace()).wrap());
+        path_label(ui, &home);
         ui.add_space(8.0);
         ui.horizontal(|ui| {
             save = ui.button("Save changes").clicked();
@@ -43,16 +53,88 @@ fn unsaved(viewer: &mut Viewer, ctx: &egui::Context, what: &str) {
     }
 }
 
+/// Asks what to do with a sensor.toml that another program changed.
+fn changed_file(viewer: &mut Viewer, ctx: &egui::Context, change: FileChange) {
+    let home = viewer.session.as_ref().map(|s| absolute(s.home())).unwrap_or_default();
+    let exists = change == FileChange::Changed;
+    let (mut reload, mut overwrite, mut cancel) = (false, false, false);
+    let shown = Modal::new(Id::unique("changed file")).show(ctx, |ui| {
+        ui.set_max_width(460.0);
+        ui.heading(if exists { "The file has changed" } else { "The file was removed" });
+        ui.add_space(4.0);
+        let what = if exists { "changed" } else { "removed" };
+        ui.label(format!("Another program {what} this file after the window read it:"));
+        path_label(ui, &home);
+        if exists {
+            ui.label("“Reload” shows the text of the file; undo brings the text of this window back.");
+            ui.label("“Overwrite” writes the text of this window; the text of the file is lost.");
+        }
+        ui.add_space(8.0);
+        ui.horizontal(|ui| {
+            reload = exists && ui.button("Reload").clicked();
+            overwrite = ui.button(if exists { "Overwrite" } else { "Write it again" }).clicked();
+            cancel = ui.button("Cancel").clicked();
+        });
+    });
+    if reload {
+        viewer.reload_file();
+    } else if overwrite {
+        viewer.overwrite_file();
+    } else if cancel || shown.should_close() {
+        viewer.cancel_save();
+    }
+}
+
+/// Asks whether a file that exists is replaced.
+fn existing_file(viewer: &mut Viewer, ctx: &egui::Context, purpose: Purpose, path: &Path) {
+    let lost = replaced(purpose, path);
+    let (mut replace, mut keep) = (false, false);
+    let shown = Modal::new(Id::unique("existing file")).show(ctx, |ui| {
+        ui.set_max_width(460.0);
+        ui.heading("Replace the file?");
+        ui.add_space(4.0);
+        let lost = lost.as_deref().unwrap_or(path);
+        let is_part = lost != path;
+        ui.label(if is_part { "A run that did not end has left this file:" } else { "This file exists already:" });
+        path_label(ui, lost);
+        let size = lost.metadata().map(|m| m.len()).unwrap_or_default();
+        ui.label(format!("It has {}, which would be lost.", size_in_words(size)));
+        ui.add_space(8.0);
+        ui.horizontal(|ui| {
+            replace = ui.button("Replace").clicked();
+            keep = ui.button("Choose another name").clicked();
+        });
+    });
+    if replace {
+        viewer.replace_file();
+    } else if keep || shown.should_close() {
+        viewer.keep_file();
+    }
+}
+
+fn path_label(ui: &mut Ui, path: &Path) {
+    ui.add(egui::Label::new(RichText::new(path.display().to_string()).monospace()).wrap());
+}
+
+fn size_in_words(bytes: u64) -> String {
+    match bytes {
+        0..1_000 => format!("{bytes} bytes"),
+        1_000..1_000_000 => format!("{:.1} kB", bytes as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", bytes as f64 / 1e6),
+        _ => format!("{:.1} GB", bytes as f64 / 1e9),
+    }
+}
+
 /// Asks whether the changes of a window that crashed come back.
 fn lost(viewer: &mut Viewer, ctx: &egui::Context) {
-    let home = viewer.changes.lost.as_ref().map(|(u, _)| u.home.display().to_string()).unwrap_or_default();
+    let home = viewer.changes.lost.as_ref().map(|(u, _)| u.home.clone()).unwrap_or_default();
     let (mut restore, mut later, mut discard) = (false, false, false);
     let shown = Modal::new(Id::unique("lost")).show(ctx, |ui| {
         ui.set_max_width(460.0);
         ui.heading("Changes of an earlier window");
         ui.add_space(4.0);
         ui.label("A window ended before its changes of this sensor.toml were saved:");
-        ui.add(egui::Label::new(egui::RichText::new(home).monospace()).wrap());
+        path_label(ui, &home);
         ui.add_space(8.0);
         ui.horizontal(|ui| {
             let hint = "Opens the pictures of that window with the changed sensor.toml";

@@ -4,8 +4,10 @@ use clap::ValueEnum;
 
 use super::command::Command;
 use super::panels::Panel;
+use super::path_dialog::{PathDialog, Purpose};
 use super::viewer::Viewer;
 use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
+use crate::model::{FileChange, Session};
 
 /// A situation of the window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -22,6 +24,10 @@ pub enum Situation {
     Navigation,
     /// The image circle is being dragged.
     Circle,
+    /// The window asks before it replaces a sensor.toml.
+    Replace,
+    /// Another program changed the sensor.toml that is saved.
+    Changed,
 }
 
 impl Viewer {
@@ -41,6 +47,12 @@ impl Viewer {
                 self.panels.open(Panel::Plots, &mut self.settings);
             }
             Situation::Circle => self.run(Command::Circle, ctx),
+            Situation::Replace => {
+                let dialog = |s: &Session| PathDialog::new(Purpose::SaveSensor, s.home());
+                self.path_dialog = self.session.as_ref().map(dialog);
+                self.accept_path();
+            }
+            Situation::Changed => self.changes.of_file = Some(FileChange::Changed),
         }
     }
 }

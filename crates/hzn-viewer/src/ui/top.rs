@@ -7,6 +7,7 @@ use super::Command;
 use super::panels::Panel;
 use super::path_dialog::{PathDialog, Purpose};
 use super::viewer::Viewer;
+use crate::model::autosave::absolute;
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     egui::Panel::top("top").show(ui, |ui| {
@@ -57,8 +58,22 @@ fn title(viewer: &Viewer, ui: &mut Ui) {
             let changed = if session.is_changed() { "unsaved: " } else { "" };
             add(&format!("   {changed}{name}"), ui.visuals().weak_text_color());
         }
-        ui.add(egui::Label::new(text).truncate());
+        let label = egui::Label::new(text).truncate().show_tooltip_when_elided(false);
+        ui.add(label).on_hover_text(full_paths(viewer));
     });
+}
+
+/// Returns the full paths of what is open, because several flights have files of the same name.
+fn full_paths(viewer: &Viewer) -> String {
+    let inputs = viewer.sequence.inputs.as_slice();
+    let first = inputs.first().map(|p| format!("Pictures: {}", absolute(p).display()));
+    let more = (inputs.len() > 1).then(|| format!("and {} more", inputs.len() - 1));
+    let sensor = viewer.session.as_ref().map(|session| {
+        let home = absolute(session.home());
+        let what = if session.path().is_some() { "Sensor" } else { "The sensor has no file yet. Proposed path" };
+        format!("{what}: {}", home.display())
+    });
+    [first, more, sensor].into_iter().flatten().collect::<Vec<_>>().join("\n")
 }
 
 fn menu_entry(viewer: &mut Viewer, ui: &mut Ui, command: Command, on: bool) {

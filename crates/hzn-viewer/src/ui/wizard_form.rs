@@ -61,7 +61,7 @@ mod tests {
         assert!(wizard.states_fov, "this picture has no EXIF");
         wizard.fov_deg = 90.0;
         let (text, _) = wizard.write().unwrap();
-        let session = Session::new(&text, Path::new("sensor.toml"), false);
+        let session = Session::new(&text, Path::new("sensor.toml"), None);
         assert!(session.problem().is_none(), "{:?}", session.problem());
         let config = session.config().unwrap();
         assert!((config.camera.fx_px - 320.0).abs() < 0.5, "half of the width is at 45 degrees");

@@ -10,7 +10,7 @@ use hzn_run::source::{self, Item, Payload, Raw, Source, TimeSource};
 use hzn_sim::truth::{self, Truth};
 
 use super::Wake;
-use crate::model::{Entry, Place};
+use crate::model::{Entry, Fingerprint, Place};
 
 /// Request to open a sequence, with the files that belong to it.
 #[derive(Debug, Clone, Default)]
@@ -38,8 +38,8 @@ pub struct SensorText {
     pub text: String,
     /// Path of the file. A text from a recording has the path at which it would be saved.
     pub home: PathBuf,
-    /// True if the text comes from a file.
-    pub is_file: bool,
+    /// Fingerprint of the file; `None` if the text comes from a recording.
+    pub as_read: Option<Fingerprint>,
 }
 
 /// Everything that was opened except the pictures.
@@ -136,7 +136,7 @@ fn read_companions(request: &Request, folder: &Path, recorded_sensor: Option<Sen
     let file =
         |named: &Option<PathBuf>, name: &str| named.clone().or_else(|| Some(folder.join(name)).filter(|p| p.exists()));
     let mut sensor_file = |path: &Path| match hzn_calib::limited::read_text(path, hzn_calib::limited::SETTINGS_BYTES) {
-        Ok(text) => Some(SensorText { text, home: path.to_owned(), is_file: true }),
+        Ok(text) => Some(SensorText { as_read: Some(Fingerprint::of(&text)), text, home: path.to_owned() }),
         Err(e) => {
             opened.notes.push(format!("{}: cannot be read: {e}", path.display()));
             None
@@ -192,7 +192,7 @@ fn open_recording(path: &Path, request: &Request, events: &EventSender) -> Resul
     let recorded_sensor = index.sensor_toml().map(|text| SensorText {
         text: text.to_owned(),
         home: folder.join("sensor.toml"),
-        is_file: false,
+        as_read: None,
     });
     // The truth of simulated pictures stays with the pictures: `flight.mcap` next to `flight/truth.csv`.
     let mut request = request.clone();

@@ -5,6 +5,7 @@ mod companions;
 mod exports;
 mod found;
 mod mouse;
+mod overwrite;
 mod tune;
 mod window;
 mod wrong;

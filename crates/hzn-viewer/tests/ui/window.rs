@@ -128,16 +128,36 @@ pub(crate) fn settled(window: &mut Window) {
     until(window, "the frame is not there", Viewer::is_settled);
 }
 
-/// Types a path into the dialog.
+/// Types a path into the dialog, and accepts it.
 pub(crate) fn path(window: &mut Window, path: &Path, accept: &str) {
+    type_path(window, path);
+    window.get_by_label(accept).click();
+    window.run_steps(2);
+}
+
+/// Types a path into the dialog.
+pub(crate) fn type_path(window: &mut Window, path: &Path) {
     window.run_steps(3);
     window.get_by_role_and_label(Role::TextInput, "Path").focus();
     window.run_steps(2);
     window.key_press_modifiers(Modifiers::COMMAND, Key::A);
     window.get_by_role_and_label(Role::TextInput, "Path").type_text(&path.display().to_string());
     window.run_steps(2);
-    window.get_by_label(accept).click();
+}
+
+/// Agrees to replace a file that exists.
+pub(crate) fn replace(window: &mut Window) {
+    window.get_by_label("Replace").click();
     window.run_steps(2);
+}
+
+/// Checks that the dialog refuses the path with these words, and closes it.
+pub(crate) fn refused(window: &mut Window, words: &str) {
+    window.run_steps(2);
+    assert!(window.query_by_label_contains(words).is_some(), "{words}");
+    window.get_by_label("Cancel").click();
+    window.run_steps(3);
+    assert!(window.query_by_label_contains(words).is_none());
 }
 
 /// Opens a path by typing it.

@@ -5,16 +5,25 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use hzn_calib::Problem;
 use hzn_calib::keys::{self, Form, Key};
+use hzn_calib::{Problem, limited};
 use hzn_core::{Config, Preset};
 use toml_edit::Value;
 
-use super::atomic_file;
 use super::sheet::{self, Sheet};
+use super::{Fingerprint, atomic_file};
 
 /// Largest number of steps that can be undone.
 const MAX_UNDO: usize = 500;
+
+/// What another program did to the file of a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileChange {
+    /// The file has another content, or it cannot be read.
+    Changed,
+    /// The file does not exist any more.
+    Removed,
+}
 
 /// A sensor.toml that is being edited. Only the text is kept: a change of a parameter changes the text, and the text is
 /// then read like every sensor.toml.
@@ -22,6 +31,11 @@ const MAX_UNDO: usize = 500;
 pub struct Session {
     /// File that [`Session::save`] last wrote or that the text was read from; `None` if the text came from a recording.
     path: Option<PathBuf>,
+    /// Fingerprint of this file as it was last read or written. The saved text can differ from it by the number of bits
+    /// of the pictures, which is added when the pictures are opened.
+    as_read: Option<Fingerprint>,
+    /// The user opened the file himself. Any other session ends with its pictures.
+    is_opened_by_user: bool,
     /// Path that messages name. A camera `file` is looked for in the same folder.
     home: PathBuf,
     saved: Sheet,
@@ -43,11 +57,14 @@ pub struct Session {
 }
 
 impl Session {
-    /// Begins with a text. `home` is the file that contains the text, or its default path.
-    pub fn new(text: &str, home: &Path, is_file: bool) -> Self {
+    /// Begins with a text. `home` is the file that contains the text, or its default path. `as_read` is the fingerprint
+    /// of the file; `None` if the text does not come from a file.
+    pub fn new(text: &str, home: &Path, as_read: Option<Fingerprint>) -> Self {
         let sheet = Sheet::new(text);
         let mut session = Self {
-            path: is_file.then(|| home.to_owned()),
+            path: as_read.map(|_| home.to_owned()),
+            as_read,
+            is_opened_by_user: false,
             home: home.to_owned(),
             saved: sheet.clone(),
             sheet,
@@ -71,9 +88,17 @@ impl Session {
     /// # Errors
     /// The file cannot be read. An error in its text is not an error here but a [`Session::problem`].
     pub fn open(path: &Path) -> Result<Self, Problem> {
-        let text = hzn_calib::limited::read_text(path, hzn_calib::limited::SETTINGS_BYTES)
-            .map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
-        Ok(Self::new(&text, path, true))
+        let text = read_file(path)?;
+        Ok(Self::new(&text, path, Some(Fingerprint::of(&text))))
+    }
+
+    /// Returns the session as one whose file the user opened himself.
+    pub fn opened_by_user(self) -> Self {
+        Self { is_opened_by_user: true, ..self }
+    }
+    /// Returns true if the user opened the file himself. Any other session ends with its pictures.
+    pub fn is_opened_by_user(&self) -> bool {
+        self.is_opened_by_user
     }
 
     /// Returns the text.
@@ -87,6 +112,10 @@ impl Session {
     /// Returns the file of the text.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
+    }
+    /// Returns the fingerprint of the file as it was last read or written.
+    pub fn as_read(&self) -> Option<Fingerprint> {
+        self.as_read
     }
     /// Returns the default path for saving.
     pub fn home(&self) -> &Path {
@@ -236,7 +265,7 @@ impl Session {
         let mut table: toml::Table = self.sheet.text().parse().unwrap_or_default();
         table.retain(|key, _| KEPT.contains(&key));
         let text = format!("preset = \"{}\"\n{table}", preset.name());
-        Self::new(&text, &self.home, false)
+        Self::new(&text, &self.home, None)
     }
 
     /// Ends a step, for example when a slider is released.
@@ -272,6 +301,46 @@ impl Session {
         self.replace(Sheet::new(text), None);
     }
 
+    /// Returns what happened to the file of the session since it was last read or written. A file that already has the
+    /// text of the session has nothing to lose, so it counts as unchanged.
+    pub fn file_change(&self) -> Option<FileChange> {
+        let path = self.path.as_deref()?;
+        match limited::read(path, limited::SETTINGS_BYTES) {
+            Ok(content) => {
+                let is_same = self.as_read == Some(Fingerprint::of(&content));
+                (!is_same && content != self.sheet.text().as_bytes()).then_some(FileChange::Changed)
+            }
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Some(FileChange::Removed),
+            // A file that cannot be read may have any content.
+            Err(_) => Some(FileChange::Changed),
+        }
+    }
+
+    /// Reads the file again, as one step, so that undo brings the text of the window back.
+    ///
+    /// # Errors
+    /// The file cannot be read, or the text does not come from a file.
+    pub fn reload(&mut self) -> Result<(), Problem> {
+        let path = self.path.as_deref().unwrap_or(&self.home);
+        let text = read_file(path)?;
+        let as_read = Some(Fingerprint::of(&text));
+        let mut sheet = Sheet::new(text);
+        // If the number of bits was added to the text that was read first, it is added again.
+        let is_completed = self.as_read != Some(Fingerprint::of(self.saved.text()));
+        let bits = sheet::Key { section: "input", name: "bits", body: 0 };
+        if is_completed
+            && sheet.get(bits).is_none()
+            && let Some(value) = self.saved.get(bits).and_then(|v| v.parse().ok())
+        {
+            sheet = sheet.with_value(bits, Some(value)).unwrap_or(sheet);
+        }
+        (self.saved, self.as_read) = (sheet.clone(), as_read);
+        self.replace(sheet, None);
+        // The differences from the saved text are new, even if the text of the window is the same.
+        self.read();
+        Ok(())
+    }
+
     /// Writes the text to `path`, which becomes the file of the session. The file is written completely or not at all.
     ///
     /// # Errors
@@ -279,6 +348,7 @@ impl Session {
     pub fn save(&mut self, path: &Path) -> Result<(), String> {
         atomic_file::write(path, self.sheet.text().as_bytes())?;
         self.saved = self.sheet.clone();
+        self.as_read = Some(Fingerprint::of(self.sheet.text()));
         self.saved_values = self.values.clone();
         self.differing.clear();
         (self.path, self.home) = (Some(path.to_owned()), path.to_owned());
@@ -336,6 +406,11 @@ impl Session {
             Err(problem) => self.problem = Some(problem),
         }
     }
+}
+
+/// Reads the text of a sensor.toml.
+fn read_file(path: &Path) -> Result<String, Problem> {
+    limited::read_text(path, limited::SETTINGS_BYTES).map_err(|e| Problem::new(path, format!("cannot be read: {e}")))
 }
 
 fn number(value: &toml::Value) -> Option<f64> {

@@ -7,7 +7,7 @@ const TEXT: &str = "preset = \"hzn\"\n[camera]\nwidth = 640\nheight = 480\nfx_px
                                     mine\n";
 
 fn session() -> Session {
-    Session::new(TEXT, Path::new("sensor.toml"), false)
+    Session::new(TEXT, Path::new("sensor.toml"), None)
 }
 
 fn threshold(s: &Session) -> f64 {
@@ -148,10 +148,76 @@ fn under_another_preset_the_camera_stays() {
 
 #[test]
 fn an_unreadable_text_is_no_end() {
-    let mut s = Session::new("preset = ", Path::new("sensor.toml"), false);
+    let mut s = Session::new("preset = ", Path::new("sensor.toml"), None);
     assert!(s.config().is_none() && s.problem().is_some());
     s.replace(Sheet::new(TEXT), None);
     assert!(s.config().is_some() && s.problem().is_none());
     assert_eq!(tidy(0.000123456), 0.00012346);
     assert_eq!(tidy(123456.7), 123457.0);
+}
+
+#[test]
+fn a_change_by_another_program_is_noticed() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("sensor.toml");
+    let theirs = TEXT.replace("3.0", "4.0");
+    std::fs::write(&path, TEXT).unwrap();
+    let mut s = Session::open(&path).unwrap();
+    s.set("reject", "threshold_px", 0, Some(5.0.into()));
+    assert_eq!(s.file_change(), None);
+    std::fs::write(&path, &theirs).unwrap();
+    assert_eq!(s.file_change(), Some(FileChange::Changed));
+    // The file has the text of the session, so nothing would be lost.
+    std::fs::write(&path, s.sheet().text()).unwrap();
+    assert_eq!(s.file_change(), None);
+    // A file that is larger than a sensor.toml can be is not read.
+    std::fs::write(&path, vec![b'#'; 2 << 20]).unwrap();
+    assert_eq!(s.file_change(), Some(FileChange::Changed));
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(s.file_change(), Some(FileChange::Removed));
+    s.save(&path).unwrap();
+    assert_eq!(s.file_change(), None);
+    assert_eq!(session().file_change(), None, "a text from a recording has no file");
+}
+
+#[test]
+fn the_text_of_the_file_is_read_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("sensor.toml");
+    let theirs = TEXT.replace("3.0", "4.0");
+    std::fs::write(&path, TEXT).unwrap();
+    let mut s = Session::open(&path).unwrap();
+    s.set("reject", "threshold_px", 0, Some(5.0.into()));
+    std::fs::write(&path, &theirs).unwrap();
+    s.reload().unwrap();
+    assert_eq!((threshold(&s), s.is_changed(), s.file_change()), (4.0, false, None));
+    s.undo();
+    assert_eq!((threshold(&s), s.is_changed()), (5.0, true));
+    // The same text in the window and in the file leaves no difference.
+    std::fs::write(&path, s.sheet().text()).unwrap();
+    s.reload().unwrap();
+    assert!(!s.is_changed() && !s.differs("reject", "threshold_px", 0));
+    std::fs::remove_file(&path).unwrap();
+    assert!(s.reload().is_err() && threshold(&s) == 5.0);
+}
+
+#[test]
+fn the_bits_that_the_pictures_show_stay_after_a_reload() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("sensor.toml");
+    std::fs::write(&path, TEXT).unwrap();
+    let completed = format!("{TEXT}\n[input]\nbits = 12\n");
+    let mut s = Session::new(&completed, &path, Some(Fingerprint::of(TEXT)));
+    assert_eq!(s.file_change(), None, "the window added the bits, no other program");
+    let bits = |s: &Session| s.config().unwrap().input.bits;
+    let theirs = TEXT.replace("3.0", "4.0");
+    std::fs::write(&path, &theirs).unwrap();
+    s.reload().unwrap();
+    assert_eq!((threshold(&s), bits(&s), s.is_changed()), (4.0, Some(12), false));
+    std::fs::write(&path, format!("{theirs}\n[input]\nbits = 10\n")).unwrap();
+    s.reload().unwrap();
+    assert_eq!(bits(&s), Some(10), "the file knows better");
+    std::fs::write(&path, theirs).unwrap();
+    s.reload().unwrap();
+    assert_eq!(bits(&s), None, "the other program removed its own key");
 }

@@ -1,14 +1,14 @@
 //! The actions of keys, menus and buttons.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use hzn_core::Preset;
 
 use super::Viewer;
-use crate::model::{CircleEdit, Look, MaskEdit, Session};
+use crate::model::{CircleEdit, Look, MaskEdit, Session, autosave};
 use crate::ui::Command;
 use crate::ui::panels::Panel;
-use crate::ui::path_dialog::{Answer, PathDialog, Purpose};
+use crate::ui::path_dialog::{PathDialog, Purpose};
 
 impl Viewer {
     /// Executes a command.
@@ -21,7 +21,7 @@ impl Viewer {
             Command::Save => self.save(),
             Command::SaveAs => {
                 if let Some(session) = &self.session {
-                    self.ask(PathDialog::new(Purpose::SaveSensor, session.home()));
+                    self.ask(PathDialog::new(Purpose::SaveSensor, &autosave::absolute(session.home())));
                 }
             }
             Command::Undo => self.session.iter_mut().for_each(Session::undo),
@@ -88,28 +88,6 @@ impl Viewer {
         self.path_dialog = Some(dialog);
     }
 
-    fn save(&mut self) {
-        let Some(session) = &self.session else { return };
-        let Some(path) = session.path().map(Path::to_owned) else {
-            // The text comes from a recording, so the user has to confirm the path.
-            self.ask(PathDialog::new(Purpose::SaveSensor, session.home()));
-            return;
-        };
-        self.save_to(&path);
-    }
-
-    /// Saves the sensor.toml to `path`, which becomes the file of the session.
-    pub(in crate::ui) fn save_to(&mut self, path: &Path) {
-        match self.session.as_mut().map(|s| s.save(path)) {
-            Some(Ok(())) => {
-                self.add_note(format!("Saved: {}", path.display()));
-                self.continue_after_save();
-            }
-            Some(Err(why)) => self.add_problem(why),
-            None => {}
-        }
-    }
-
     fn go_refused(&mut self, back: bool) {
         match self.rows.next_refused(self.playback.frame(), back, self.body, self.group.as_ref()) {
             Some(frame) => self.playback.go(frame, self.sequence.len()),
@@ -153,43 +131,9 @@ impl Viewer {
                     return;
                 }
                 let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                self.other = Some((name, session));
+                self.other = Some((name, session.opened_by_user()));
             }
             Err(problem) => self.add_problem(problem.to_string()),
-        }
-    }
-
-    /// Takes the answer of the system's dialog for paths.
-    pub(super) fn poll_path_dialog(&mut self) {
-        match self.path_dialog.as_mut().map(PathDialog::take_answer) {
-            Some(Answer::Accepted) => self.accept_path(),
-            Some(Answer::Cancelled) => self.cancel_path(),
-            _ => {}
-        }
-    }
-
-    /// Closes the dialog without a path.
-    pub(in crate::ui) fn cancel_path(&mut self) {
-        self.path_dialog = None;
-        self.changes.after_save = None;
-    }
-
-    /// Does what the path of the dialog is for, and closes the dialog.
-    pub(in crate::ui) fn accept_path(&mut self) {
-        let Some(path_dialog) = self.path_dialog.take() else { return };
-        let path = PathBuf::from(path_dialog.text.trim());
-        if path.as_os_str().is_empty() {
-            return;
-        }
-        match path_dialog.purpose {
-            Purpose::Open => self.open_paths(vec![path]),
-            Purpose::SaveSensor => self.save_to(&path),
-            Purpose::Compare => self.compare_with_file(&path),
-            Purpose::Picture => self.export_picture(path),
-            Purpose::Video => self.export_video(path),
-            Purpose::Table => self.export_table(path),
-            Purpose::Plots => self.export_plots(path),
-            Purpose::Rerun => self.run_into(path),
         }
     }
 
@@ -209,55 +153,5 @@ impl Viewer {
         self.circle = starts.then(CircleEdit::default);
         self.mask = None;
         self.settings.undistorted &= !starts;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use crossbeam_channel::bounded;
-
-    use super::*;
-    use crate::model::Settings;
-
-    /// Returns a viewer in which the system's dialog has given this answer.
-    fn browsed(purpose: Purpose, answer: Option<PathBuf>) -> Viewer {
-        let mut viewer = Viewer::new(Settings::default(), None, Arc::new(|| {}));
-        let (send, receive) = bounded(1);
-        viewer.path_dialog =
-            Some(PathDialog { browsing: Some(receive), ..PathDialog::new(purpose, Path::new("/typed")) });
-        viewer.poll_path_dialog();
-        assert!(viewer.path_dialog.as_ref().is_some_and(|a| a.browsing.is_some()), "the user takes time");
-        send.send(answer).unwrap();
-        viewer.poll_path_dialog();
-        viewer
-    }
-
-    #[test]
-    fn the_dialog_of_the_system_needs_no_second_one() {
-        let native = |age_ms: u64, answer: Option<&str>| {
-            let mut dialog = PathDialog::new(Purpose::Table, Path::new("/typed"));
-            let (send, receive) = bounded(1);
-            dialog.browsing = Some(receive);
-            dialog.native = std::time::Instant::now().checked_sub(std::time::Duration::from_millis(age_ms));
-            assert!(dialog.is_hidden());
-            send.send(answer.map(PathBuf::from)).unwrap();
-            (dialog.take_answer(), dialog.is_hidden())
-        };
-        assert_eq!(native(5000, Some("/picked.csv")), (Answer::Accepted, false));
-        assert_eq!(native(5000, None), (Answer::Cancelled, false));
-        assert_eq!(native(0, None), (Answer::Open, false), "the system has no dialog, so the path is typed");
-    }
-
-    #[test]
-    fn what_is_picked_is_opened_and_a_name_to_write_is_looked_at_first() {
-        let picked = PathBuf::from("/picked/flight.mcap");
-        let opened = browsed(Purpose::Open, Some(picked.clone()));
-        assert!(opened.path_dialog.is_none() && opened.settings.recent == [picked.clone()]);
-        let named = browsed(Purpose::Table, Some(picked.clone()));
-        assert!(named.path_dialog.is_some_and(|a| a.text == "/picked/flight.mcap" && a.browsing.is_none()));
-        let left = browsed(Purpose::Open, None);
-        assert!(left.path_dialog.is_some_and(|a| a.text == "/typed") && left.settings.recent.is_empty());
     }
 }

@@ -8,7 +8,8 @@ use hzn_core::Config;
 use hzn_sim::truth::Truth;
 
 use super::Viewer;
-use crate::model::{Place, Session};
+use super::changes::Leave;
+use crate::model::{Place, Session, autosave};
 use crate::ui::wizard_form::Wizard;
 use crate::work::demo;
 use crate::work::open::Request;
@@ -28,9 +29,9 @@ impl Viewer {
 
     /// Begins a session with a text that is not saved yet.
     pub(in crate::ui) fn begin_session(&mut self, text: &str, warnings: Vec<String>) {
-        let home = self.sequence.folder.join("sensor.toml");
+        let home = autosave::absolute(&self.sequence.folder.join("sensor.toml"));
         // The text differs from the empty file, so it counts as a change that can be saved.
-        let mut session = Session::new("", &home, false);
+        let mut session = Session::new("", &home, None);
         session.set_text(text);
         self.set_session(session);
         warnings.into_iter().for_each(|w| self.add_note(w));
@@ -47,7 +48,8 @@ impl Viewer {
     pub(in crate::ui) fn open_demo(&mut self) {
         let folder = self.demo_folder();
         if demo::is_complete(&folder) {
-            self.open(Request { inputs: vec![folder], fps: self.request.fps, ..Request::default() });
+            let request = Request { inputs: vec![folder], fps: self.request.fps, ..Request::default() };
+            self.leave(Leave::Sequence(Box::new(request)), None);
         } else {
             self.start_job("Rendering the demo flight", move |progress| demo::render(&folder, progress));
         }

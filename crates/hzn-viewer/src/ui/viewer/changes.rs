@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::model::{Autosave, Session, Unsaved};
+use crate::model::{Autosave, FileChange, Session, Unsaved};
 use crate::work::open::Request;
 
 /// What the user wants to do, and what would lose the changes.
@@ -24,6 +24,8 @@ pub(in crate::ui) struct Changes {
     pub(in crate::ui) question: Option<Leave>,
     /// What follows once the sensor.toml is saved under a path that the user is asked for.
     pub(in crate::ui) after_save: Option<Leave>,
+    /// Another program changed the file that is to be saved, and the user is asked what to do.
+    pub(in crate::ui) of_file: Option<FileChange>,
     /// The window may close: there is nothing to lose, or the user answered.
     pub(in crate::ui) may_close: bool,
     /// A session of a window that ended with changes, and its file.

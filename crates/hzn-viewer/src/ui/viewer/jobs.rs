@@ -1,6 +1,6 @@
 //! Starts and ends the work on files and on the whole sequence, which runs on other threads.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::Viewer;
@@ -18,13 +18,6 @@ impl Viewer {
             return;
         };
         let Some(config) = session.config().map(Arc::clone) else { return };
-        let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-        if let Some(open) = &self.sequence.recording
-            && same(&output, open)
-        {
-            self.add_problem(format!("{}: is the recording that is open; write to another file", output.display()));
-            return;
-        }
         let task = sweep::Task {
             sequence: self.sequence.clone(),
             config,

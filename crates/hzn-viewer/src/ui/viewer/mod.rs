@@ -7,6 +7,7 @@ mod begin;
 mod changes;
 mod companions;
 mod jobs;
+mod outputs;
 mod request_key;
 mod sequence_work;
 mod threads;
@@ -40,6 +41,7 @@ use crate::work::{Engine, FrameView, Job, Wake};
 use changes::Changes;
 pub(super) use changes::Leave;
 use companions::Companions;
+pub(super) use outputs::replaced;
 use request_key::RequestKey;
 use sequence_work::SequenceWork;
 
@@ -68,8 +70,8 @@ pub struct Viewer {
     pub(super) frame_view: Option<FrameView>,
     pub(super) toasts: Toasts,
     pub(super) changes: Changes,
-    /// Session that comes back once its sequence is open.
-    restoring: Option<Session>,
+    /// Session that comes back once its sequence is open, and the file that keeps it until then.
+    restoring: Option<(Session, PathBuf)>,
     /// The window closes at its next frame.
     close_now: bool,
     /// Version of the session that the results belong to.
@@ -197,6 +199,8 @@ impl Viewer {
     /// Opens another sequence.
     pub fn open(&mut self, request: Request) {
         self.messages_before = self.toasts.len();
+        // A session that waits for its sequence does not come to another one.
+        self.restoring = None;
         self.opening = Some(open::start(request.clone(), Arc::clone(&self.wake)));
         for path in &request.inputs {
             self.settings.add_recent(path);
@@ -211,7 +215,7 @@ impl Viewer {
             && one.extension().is_some_and(|e| e == "toml")
         {
             match Session::open(one) {
-                Ok(session) => self.leave(Leave::Sensor(Box::new(session)), None),
+                Ok(session) => self.leave(Leave::Sensor(Box::new(session.opened_by_user())), None),
                 Err(problem) => self.add_problem(problem.to_string()),
             }
             return;
@@ -308,6 +312,9 @@ impl Viewer {
     }
 
     pub(super) fn set_session(&mut self, session: Session) {
+        // A question about the file of the old session would be answered for the new one.
+        self.cancel_save();
+        self.path_dialog.take_if(|dialog| dialog.replaces);
         self.session = Some(session);
         self.requested = None;
         self.body = 0;

@@ -4,12 +4,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::Viewer;
+use super::changes::Leave;
 use super::request_key::RequestKey;
 use super::sequence_work::SequenceWork;
 use crate::model::settings::Layer;
-use crate::model::{Place, Processed, ResultHistory, Sequence, Session, View};
+use crate::model::{Place, Processed, ResultHistory, Sequence, Session, View, autosave};
 use crate::work::check::Check;
-use crate::work::open;
+use crate::work::open::{self, SensorText};
 use crate::work::sweep::{self, Sweep};
 use crate::work::{FrameRequest, FrameView, Setup};
 
@@ -27,7 +28,10 @@ impl Viewer {
     pub(in crate::ui) fn poll(&mut self, ctx: &egui::Context) {
         let opening_events: Vec<open::Event> = self.opening.iter().flat_map(|r| r.try_iter()).collect();
         for event in opening_events {
-            self.handle_opening(event);
+            // An opening that ended has no further events.
+            if self.opening.is_some() {
+                self.handle_opening(event);
+            }
         }
         let frame_views: Vec<FrameView> = self.engine.answers().collect();
         for frame_view in frame_views {
@@ -92,6 +96,11 @@ impl Viewer {
 
     fn handle_opening(&mut self, event: open::Event) {
         match event {
+            open::Event::Opened(_) if self.has_changes() && self.restoring.is_none() => {
+                // The user went on with his work while the files were opened.
+                self.opening = None;
+                self.changes.question = Some(Leave::Sequence(Box::new(self.request.clone())));
+            }
             open::Event::Opened(opened) => self.begin_sequence(*opened),
             open::Event::Pictures(pictures) => {
                 self.engine.set_recording(pictures);
@@ -109,6 +118,9 @@ impl Viewer {
             open::Event::End { cut_off, note } => self.complete_sequence(cut_off, note),
             open::Event::Failed(why) => {
                 self.opening = None;
+                if self.restoring.take().is_some() {
+                    self.add_note("The changes of the earlier window are kept; the next window offers them again.");
+                }
                 self.add_problem(why);
             }
         }
@@ -135,21 +147,42 @@ impl Viewer {
         self.search_companions();
         self.playback.go(self.request.frame, usize::MAX);
         self.engine.open(self.request.inputs.clone());
-        // A sensor that the user opened stays if the new pictures come without one.
-        match opened.sensor {
-            Some(s) => self.session = Some(Session::new(&s.text, &s.home, s.is_file)),
-            None if self.session.is_none() => self.add_note(
-                "There is no sensor.toml, so the pictures are shown but not processed. Make one in the panel \
-                 “Stages”, open one, or drop it on the window.",
-            ),
-            None => {}
-        }
-        if let Some(session) = self.restoring.take() {
-            self.session = Some(session);
-        }
+        self.begin_sensor(opened.sensor);
         for note in opened.notes {
             self.add_note(note);
         }
+    }
+
+    /// Replaces the session by that of the new pictures. The old one ends with its pictures, because saving would
+    /// otherwise write into the folder of another flight. Only a file that the user opened himself stays.
+    fn begin_sensor(&mut self, found: Option<SensorText>) {
+        // A form or a path that is still being entered belongs to the old pictures.
+        self.wizard = None;
+        self.cancel_save();
+        self.path_dialog.take_if(|dialog| dialog.purpose.writes());
+        let is_named = self.request.sensor.is_some();
+        let found = found.map(|s| Session::new(&s.text, &s.home, s.as_read));
+        let found = found.map(|s| if is_named { s.opened_by_user() } else { s });
+        let kept = self.session.take().filter(Session::is_opened_by_user);
+        if let Some((session, path)) = self.restoring.take() {
+            let _ = std::fs::remove_file(path);
+            self.session = Some(session);
+        } else if let Some(session) = found {
+            self.session = Some(session);
+        } else if let Some(session) = kept {
+            let home = autosave::absolute(session.home());
+            self.session = Some(session);
+            return self
+                .add_note(format!("There is no sensor.toml. The one that you opened stays: {}", home.display()));
+        } else {
+            self.add_note(
+                "There is no sensor.toml, so the pictures are shown but not processed. Make one in the panel \
+                 “Stages”, open one, or drop it on the window.",
+            );
+        }
+        // A preset that is compared has the camera of the old session.
+        let has_session = self.session.is_some();
+        self.other.take_if(|(_, other)| !has_session || !other.is_opened_by_user());
     }
 
     /// Marks the sequence as complete, and tells the user what it lacks.

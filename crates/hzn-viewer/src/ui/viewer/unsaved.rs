@@ -5,14 +5,13 @@ use std::time::{Duration, Instant};
 use super::Viewer;
 use super::changes::Leave;
 use crate::model::{Session, Unsaved, autosave};
-use crate::ui::path_dialog::{PathDialog, Purpose};
 use crate::work::open::Request;
 
 /// Time from a change until it is autosaved, so that a slider that moves does not write a file with every step.
 const AUTOSAVE_AFTER: Duration = Duration::from_millis(700);
 
 impl Viewer {
-    fn has_changes(&self) -> bool {
+    pub(super) fn has_changes(&self) -> bool {
         self.session.as_ref().is_some_and(Session::is_changed)
     }
 
@@ -62,12 +61,11 @@ impl Viewer {
     /// Takes the answer "Save" to the question.
     pub(in crate::ui) fn save_and_leave(&mut self, ctx: &egui::Context) {
         let Some(leave) = self.changes.question.take() else { return };
-        let Some(session) = &self.session else { return self.go_on(leave, Some(ctx)) };
-        self.changes.after_save = Some(leave);
-        match session.path().map(std::path::Path::to_owned) {
-            Some(path) => self.save_to(&path),
-            None => self.ask(PathDialog::new(Purpose::SaveSensor, session.home())),
+        if self.session.is_none() {
+            return self.go_on(leave, Some(ctx));
         }
+        self.changes.after_save = Some(leave);
+        self.save();
     }
 
     /// Takes the answer "Discard changes" to the question.
@@ -90,17 +88,17 @@ impl Viewer {
     /// Brings the changes of a window that crashed back, together with its sequence.
     pub(in crate::ui) fn restore_lost(&mut self) {
         let Some((unsaved, path)) = self.changes.lost.take() else { return };
-        let _ = std::fs::remove_file(path);
         let inputs = unsaved.inputs.clone();
         let session = unsaved.into_session();
         let here = self.request.inputs.iter().map(|path| autosave::absolute(path));
         if !inputs.is_empty() && !here.eq(inputs.iter().cloned()) {
             // The changes belong to another sequence than the one that is open.
             self.open(Request { inputs, fps: self.request.fps, ..Request::default() });
-            self.restoring = Some(session);
+            self.restoring = Some((session, path));
         } else if self.opening.is_some() && self.sequence.inputs != self.request.inputs {
-            self.restoring = Some(session);
+            self.restoring = Some((session, path));
         } else {
+            let _ = std::fs::remove_file(path);
             self.set_session(session);
         }
     }
