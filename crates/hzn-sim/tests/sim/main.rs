@@ -2,8 +2,10 @@
 
 mod ellipsoid;
 mod encounter;
+mod in_view;
 mod limb;
 mod picture;
 mod sensitivity;
 mod shutter;
 mod unchanged;
+mod vehicle;

@@ -1,12 +1,10 @@
 //! No command replaces a file that it reads, whatever path leads there and whether files may be replaced or not.
 #![cfg(unix)]
 
-mod common;
-
 use std::fs;
 use std::os::unix::fs::symlink;
 
-use common::{Place, SENSOR};
+use crate::common::{Place, SENSOR};
 
 const TRUTH: &str = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,moon_x,\
                      moon_y,moon_z,qw,qx,qy,qz\n0000.png,0,earth-sphere,1,0,0.93,0.37,70.38,400,,,,,,,1,0,0,0\n";

@@ -1,13 +1,11 @@
 //! What a terminal would obey reaches no terminal: neither from a name nor from the content of a file.
 #![cfg(unix)]
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use common::{Place, SENSOR};
+use crate::common::{Place, SENSOR};
 use hzn_core::status::Status;
 use hzn_mcap::{FrameRecord, Options, Row, RowMeta, Writer};
 
@@ -159,7 +157,7 @@ fn files_and_pipes_get_the_bytes_as_they_are() {
     place.run(&["run", &folder, "-q", "-o", "a.csv"]).expect(3);
     place.run(&["run", &folder, "-q", "-o", "a.jsonl"]).expect(3);
     assert!(piped.contains(EVIL) && place.read("row.csv").contains(EVIL));
-    assert_eq!(common::without_time(&piped), common::without_time(&place.read("a.csv")));
+    assert_eq!(crate::common::without_time(&piped), crate::common::without_time(&place.read("a.csv")));
     assert!(place.read("a.jsonl").contains(r"aGk\u0007"), "JSON has its own escapes");
     // The content of a scene is no message either.
     let scene = place.run(&["simulate", "enceladus", "--show"]).expect(0).out + "# \u{202e}\tx\n";
