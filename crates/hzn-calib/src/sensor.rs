@@ -86,11 +86,11 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     // Values of a preset follow from the camera, which is therefore read first.
     let camera = merge_camera(read(table.clone())?.camera, from_file);
     let starting_values = starting_values(preset, camera.clone());
-    let mut table = table;
+    let mut complete = table;
     if let Ok(values) = DeTable::parse(&starting_values) {
-        merge_missing(table.get_mut(), values.into_inner());
+        merge_missing(complete.get_mut(), values.into_inner());
     }
-    let config = Config { camera, ..read(table)? };
+    let config = Config { camera, ..read(complete)? };
     if let Some(what) = plausible::explain_five_coefficients(&config.camera) {
         return Err(problem_at_key("camera.k", None, what, text, path, &places));
     }
