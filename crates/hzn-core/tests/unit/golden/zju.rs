@@ -44,7 +44,7 @@ fn references<T: Real>(tolerance: f64) {
             let error = (got.e.map(Real::to_f64) - expected).norm();
             assert!(error < tolerance, "{} {axis}: {error:e}", case["id"]);
             // The reference is scaled to M₃₃ = 1.
-            let [v1, v2, v3, v4, v5, v6] = got.quadric.unwrap().numbers().map(Real::to_f64);
+            let [v1, v2, v3, v4, v5, v6] = got.quadric().unwrap().numbers().map(Real::to_f64);
             let ours = M3::new(v1 + v6, v2 / 2.0, v4 / 2.0, v2 / 2.0, v3 + v6, v5 / 2.0, v4 / 2.0, v5 / 2.0, v6) / v6;
             let theirs = M3::from(rows(&case[m]));
             let error = (ours - theirs).norm() / theirs.norm();
