@@ -24,7 +24,8 @@
 // The altitude or the position in `HznKnown` is impossible, or a part of a vector is NaN.
 #define HZN_KNOWN -6
 
-// There is no sensor at this pointer: it was not opened, or its memory was overwritten.
+// There is no sensor at this pointer: it was not opened, or bits of its memory have changed since the last call. It
+// must be opened again.
 #define HZN_NOT_OPEN -7
 
 // The program was compiled with the header of another version of this library.

@@ -17,6 +17,7 @@ use hzn_core::{FlightWorkspace, Prior, Sensor};
 use hzn_flight::Parameters;
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::parameters::Refused;
+use hzn_twice::KeptTwice;
 
 pub mod rows;
 pub mod types;
@@ -48,7 +49,8 @@ pub const HZN_REFUSED: i32 = -4;
 pub const HZN_PICTURE: i32 = -5;
 /// The altitude or the position in `HznKnown` is impossible, or a part of a vector is NaN.
 pub const HZN_KNOWN: i32 = -6;
-/// There is no sensor at this pointer: it was not opened, or its memory was overwritten.
+/// There is no sensor at this pointer: it was not opened, or bits of its memory have changed since the last call. It
+/// must be opened again.
 pub const HZN_NOT_OPEN: i32 = -7;
 /// The program was compiled with the header of another version of this library.
 pub const HZN_OTHER_INTERFACE: i32 = -8;
@@ -84,15 +86,23 @@ const _: () = assert!(size_of::<HznSensor>() <= HZN_WORKSPACE_SIZE && align_of::
 const MAGIC: u64 = 0x687A_6E20_6F70_656E;
 
 /// A sensor. Its content is hidden: only pointers to it are passed.
+// Any bytes are a valid sensor, so a bit that flips between two calls makes none invalid.
 #[derive(Debug)]
 pub struct HznSensor {
     magic: u64,
+    kept: KeptTwice<Kept>,
+    /// Each picture fills it anew.
+    workspace: FlightWorkspace,
+}
+
+/// What outlives a call.
+#[derive(Debug)]
+struct Kept {
     /// Number of the parameter that was refused last; 0: none.
     refused: u16,
     /// The parameters from [`hzn_set`]; they are in use after [`hzn_apply`].
     pending: Parameters,
     sensor: Sensor<f32>,
-    workspace: FlightWorkspace,
 }
 
 /// Returns the number of bytes that a sensor needs.
@@ -113,7 +123,7 @@ pub extern "C" fn hzn_version() -> u32 {
     hzn_flight::VERSION
 }
 
-/// Returns the sensor at a pointer, or the error.
+/// Returns the sensor at a pointer, or the error. Compares what outlives a call with its copy.
 ///
 /// # Safety
 /// `sensor` is null or points to readable and writable memory of the size of a sensor.
@@ -128,8 +138,9 @@ unsafe fn open_sensor<'a>(sensor: *mut HznSensor) -> Result<&'a mut HznSensor, i
     if unsafe { (&raw const (*sensor).magic).read() } != MAGIC {
         return Err(HZN_NOT_OPEN);
     }
-    // SAFETY: `hzn_open` has made a sensor here.
-    Ok(unsafe { &mut *sensor })
+    // SAFETY: `hzn_open` has made a sensor here, and any bytes are one.
+    let sensor = unsafe { &mut *sensor };
+    if sensor.kept.is_intact() { Ok(sensor) } else { Err(HZN_NOT_OPEN) }
 }
 
 /// Makes a sensor in `memory`, with every parameter at its default, and writes a pointer to it to `out`. `interface`
@@ -150,16 +161,17 @@ pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, interface: u32,
     }
     let pending = Parameters::defaults();
     let Ok(sensor) = Sensor::new(&pending.sensor) else { return HZN_REFUSED };
-    // SAFETY: `place` is aligned and has room, as checked. Nothing there is dropped, because there is no sensor yet. A
-    // workspace consists of arrays of numbers: all bytes are valid, and zeros are an empty workspace.
-    unsafe {
-        (&raw mut (*place).pending).write(pending);
-        (&raw mut (*place).sensor).write(sensor);
-        ptr::write_bytes(&raw mut (*place).workspace, 0, 1);
-        (&raw mut (*place).refused).write(0);
-        (&raw mut (*place).magic).write(MAGIC);
-        out.write(place);
-    }
+    // SAFETY: `place` is aligned and has room, as checked. A sensor consists of numbers and of bytes that are not read
+    // before they are written: all bytes are valid, and zeros are an empty workspace.
+    let opened = unsafe {
+        ptr::write_bytes(place, 0, 1);
+        &mut *place
+    };
+    opened.kept.set(Kept { refused: 0, pending, sensor });
+    opened.kept.complete();
+    opened.magic = MAGIC;
+    // SAFETY: `out` is not null, and the caller guarantees the rest.
+    unsafe { out.write(place) };
     0
 }
 
@@ -174,10 +186,10 @@ pub unsafe extern "C" fn hzn_set(sensor: *mut HznSensor, number: u16, value: f64
         Ok(sensor) => sensor,
         Err(code) => return code,
     };
-    match sensor.pending.set(number, value) {
+    sensor.kept.change(|kept| match kept.pending.set(number, value) {
         Ok(()) => 0,
-        Err(refused) => sensor.refuse(&refused),
-    }
+        Err(refused) => kept.refuse(&refused),
+    })
 }
 
 /// Writes the value of a parameter, as it was set last, to `value`.
@@ -199,7 +211,7 @@ pub unsafe extern "C" fn hzn_get(sensor: *const HznSensor, number: u16, value: *
     };
     // SAFETY: the pointer is neither null nor unaligned, and the caller guarantees the rest.
     let value = unsafe { &mut *value };
-    match sensor.pending.get(number) {
+    match sensor.kept.get().pending.get(number) {
         Some(found) => {
             *value = found;
             0
@@ -220,18 +232,7 @@ pub unsafe extern "C" fn hzn_apply(sensor: *mut HznSensor) -> i32 {
         Ok(sensor) => sensor,
         Err(code) => return code,
     };
-    let new = sensor.pending.check().and_then(|()| Sensor::new(&sensor.pending.sensor).map_err(Refused::Config));
-    match new {
-        Ok(new) => {
-            (sensor.sensor, sensor.refused) = (new, 0);
-            0
-        }
-        Err(refused) => {
-            sensor.pending = Parameters::new(sensor.sensor.config().clone());
-            sensor.refuse(&refused);
-            HZN_REFUSED
-        }
-    }
+    sensor.kept.change(Kept::apply)
 }
 
 /// Returns the number of the parameter that `hzn_set` or `hzn_apply` refused last; 0: none, or the sensor is not open.
@@ -242,7 +243,7 @@ pub unsafe extern "C" fn hzn_apply(sensor: *mut HznSensor) -> i32 {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hzn_refused(sensor: *const HznSensor) -> u16 {
     // SAFETY: the caller guarantees it. The sensor is only read.
-    unsafe { open_sensor(sensor.cast_mut()) }.map_or(0, |sensor| sensor.refused)
+    unsafe { open_sensor(sensor.cast_mut()) }.map_or(0, |sensor| sensor.kept.get().refused)
 }
 
 /// Finds the limb. Every valid picture gets a status, which is returned, and an answer in `out`.
@@ -271,7 +272,9 @@ pub unsafe extern "C" fn hzn_process(
         Ok(sensor) => sensor,
         Err(code) => return code,
     };
-    let camera = sensor.sensor.camera();
+    let HznSensor { kept, workspace, .. } = sensor;
+    let sensor = &kept.get().sensor;
+    let camera = sensor.camera();
     if (picture.width, picture.height) != (camera.width().into(), camera.height().into()) {
         return HZN_PICTURE;
     }
@@ -283,8 +286,8 @@ pub unsafe extern "C" fn hzn_process(
     let layout = Layout { width: picture.width, height: picture.height, stride: picture.stride, channels: 1, bits: 8 };
     let Ok(grey) = Grey::try_new(pixels, layout) else { return HZN_PICTURE };
     // SAFETY: the caller guarantees it.
-    let Some(expected) = (unsafe { expect(&sensor.sensor, known) }) else { return HZN_KNOWN };
-    let report = sensor.sensor.process(&mut sensor.workspace, &grey, &expected, &Unobserved);
+    let Some(expected) = (unsafe { expect(sensor, known) }) else { return HZN_KNOWN };
+    let report = sensor.process(workspace, &grey, &expected, &Unobserved);
     *out = to_answer(&PictureAnswer::from_report(&report));
     i32::from(out.status)
 }
@@ -302,7 +305,22 @@ unsafe fn expect(sensor: &Sensor<f32>, known: *const HznKnown) -> Option<Expecte
     sensor.expect(&prior).ok()
 }
 
-impl HznSensor {
+impl Kept {
+    /// Makes the sensor of the parameters that were set, and returns the code.
+    fn apply(&mut self) -> i32 {
+        let new = self.pending.check().and_then(|()| Sensor::new(&self.pending.sensor).map_err(Refused::Config));
+        match new {
+            Ok(new) => {
+                (self.sensor, self.refused) = (new, 0);
+                0
+            }
+            Err(refused) => {
+                self.pending = Parameters::new(self.sensor.config().clone());
+                self.refuse(&refused);
+                HZN_REFUSED
+            }
+        }
+    }
     /// Keeps what was refused, and returns the code.
     fn refuse(&mut self, refused: &Refused) -> i32 {
         self.refused = refused.number();

@@ -55,17 +55,19 @@ pub unsafe extern "C" fn hzn_process_rows(
         Ok(sensor) => sensor,
         Err(code) => return code,
     };
+    let HznSensor { kept, workspace, .. } = sensor;
+    let sensor = &kept.get().sensor;
     // SAFETY: the caller guarantees it.
-    let Some(expected) = (unsafe { expect(&sensor.sensor, known) }) else { return HZN_KNOWN };
+    let Some(expected) = (unsafe { expect(sensor, known) }) else { return HZN_KNOWN };
     // SAFETY: the memory is aligned and has room. It consists of arrays of numbers, and zeros are empty ones.
     let rows = unsafe {
         ptr::write_bytes(place, 0, 1);
         &mut *place
     };
-    let camera = sensor.sensor.camera();
+    let camera = sensor.camera();
     let (width, height) = (usize::from(camera.width()), camera.height());
     let Some(row) = rows.row.get_mut(..width) else { return HZN_NO_ROWS };
-    let Ok(mut stream) = sensor.sensor.rows(&mut rows.buffers, 8, &expected) else { return HZN_NO_ROWS };
+    let Ok(mut stream) = sensor.rows(&mut rows.buffers, 8, &expected) else { return HZN_NO_ROWS };
     for _ in 0..height {
         // SAFETY: the caller guarantees it.
         let ended = unsafe { next_row(context, row.as_mut_ptr(), width) };
@@ -76,7 +78,7 @@ pub unsafe extern "C" fn hzn_process_rows(
             return HZN_NO_ROWS;
         }
     }
-    let report = stream.finish(&mut sensor.workspace, &Unobserved);
+    let report = stream.finish(workspace, &Unobserved);
     *out = to_answer(&PictureAnswer::from_report(&report));
     i32::from(out.status)
 }
