@@ -16,7 +16,8 @@ pub enum Board {
     An386,
     /// Cortex-M7, double precision.
     An500,
-    /// Cortex-M4F with 192 KiB of RAM, which takes the rows of a picture one by one. It has only the image `flight`.
+    /// Cortex-M4F with 192 KiB of RAM. It has only the images `flight`, which takes the rows of a picture one by one,
+    /// and `example`.
     Stm32F405,
 }
 
@@ -182,14 +183,30 @@ pub fn measure_rows(board: Board, cases: &[Case]) -> Vec<Measured> {
 /// # Panics
 /// Panics if QEMU or the image fails.
 pub fn run_chain(board: Board, picture: &[u8]) -> [u32; 11] {
-    let dir = tempfile::tempdir().expect("a temporary folder can be made");
-    std::fs::write(dir.path().join("picture.bin"), picture).expect("the folder is writable");
-    let status = board.qemu(&board.image("chain"), 10).args(["-serial", "null"]).current_dir(dir.path()).status();
-    let status = status.expect("qemu-system-arm is installed");
-    assert!(status.success(), "{}: the image ended with {status}", board.name());
-    let answer = std::fs::read(dir.path().join("answer.bin")).expect("the image wrote its answer");
+    let answer = run_picture(board, "chain", picture);
     let mut words = answer.as_chunks::<4>().0.iter().map(|w| u32::from_le_bytes(*w));
     std::array::from_fn(|_| words.next().expect("eleven words are written"))
+}
+
+/// Runs a picture of 64×48 pixels through the image `example`. Returns the bytes of the answer, as [`answer_bytes`],
+/// and the largest stack in bytes.
+///
+/// # Panics
+/// Panics if QEMU or the image fails.
+pub fn run_example(picture: &[u8]) -> (Vec<u8>, u32) {
+    let mut answer = run_picture(Board::Stm32F405, "example", picture);
+    let stack_bytes = answer.split_off(answer.len() - 4);
+    (answer, u32::from_le_bytes(stack_bytes.try_into().expect("four bytes")))
+}
+
+/// Runs an image that reads `picture.bin` and writes `answer.bin`, and returns what it writes.
+fn run_picture(board: Board, image: &str, picture: &[u8]) -> Vec<u8> {
+    let dir = tempfile::tempdir().expect("a temporary folder can be made");
+    std::fs::write(dir.path().join("picture.bin"), picture).expect("the folder is writable");
+    let status = board.qemu(&board.image(image), 10).args(["-serial", "null"]).current_dir(dir.path()).status();
+    let status = status.expect("qemu-system-arm is installed");
+    assert!(status.success(), "{}: the image ended with {status}", board.name());
+    std::fs::read(dir.path().join("answer.bin")).expect("the image wrote its answer")
 }
 
 fn run(board: Board, image: &str, cases: &[Case]) -> Vec<Measured> {

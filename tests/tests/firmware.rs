@@ -11,7 +11,7 @@ use hzn_core::{Config, FlightHorizon, Prior, camera};
 use hzn_flight::flight::{Buffers, Lists};
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_sim::{Disc, Sky};
-use hzn_tests::emulated::{Board, Case, answer_bytes, measure, measure_rows, run_chain};
+use hzn_tests::emulated::{Board, Case, answer_bytes, measure, measure_rows, run_chain, run_example};
 use hzn_tests::flight_image::{Bench, hzn_run};
 use hzn_tests::real::Photograph;
 use hzn_tests::stack_bound::stack_bound;
@@ -356,4 +356,29 @@ fn the_sensor_alone_answers_with_the_same_bits() {
         ok += u32::from(report.status == Status::Ok);
     }
     assert!(ok >= 3, "{ok} answers");
+}
+
+/// Tests the lines that the documents show (`links.rs` compares them with the image), on a board with 192 KiB of RAM,
+/// of which 64 KiB are for the stack.
+#[test]
+#[ignore = "needs the images: cargo xtask firmware"]
+fn the_example_of_the_documents_fits_into_192_kib() {
+    let mut sensor = Config::new(camera::Config::ideal(camera::Model::Pinhole, 64, 48, 60.0));
+    sensor.body.altitude_km = Some(230.0);
+    // The limb of a body as wide as the Earth at 230 km, 75 degrees below the optical axis.
+    let pixel = |i: u16| {
+        let (x, y) = ((f64::from(i % 64) - 31.5) / 60.0, (f64::from(i / 64) - 23.5) / 60.0);
+        let (sin, cos) = 75f64.to_radians().sin_cos();
+        let along = (y * sin + cos) / (x * x + y * y + 1.0).sqrt();
+        (110.0 + 90.0 * ((along - 74.8f64.to_radians().cos()) * 60.0).clamp(-1.0, 1.0)) as u8
+    };
+    let prior = Prior { altitude_m: Some(231.5e3), ..Prior::default() };
+    let case = Case { name: "example".into(), sensor, prior, bytes: (0..64 * 48).map(pixel).collect() };
+    let host = case.answer_on_host();
+    assert_eq!(host.status, Status::Ok as u8);
+    let (there, stack_bytes) = run_example(&case.bytes);
+    assert_eq!(there, answer_bytes(&host));
+    let bound = stack_bound(&Board::Stm32F405.image("example")).unwrap().bytes;
+    println!("most stack {stack_bytes} bytes, at most {bound} by the calls");
+    assert!((4096..=bound).contains(&stack_bytes) && bound < 64 * 1024);
 }

@@ -1,4 +1,5 @@
-//! Tests that every link between the documents of the repository leads to an existing path.
+//! Tests that every link between the documents of the repository leads to an existing path, and that the documents show
+//! the code of an image that runs.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -53,4 +54,26 @@ fn every_link_leads_somewhere() {
     }
     assert!(checked > 30, "{checked}");
     assert!(broken.is_empty(), "{broken:#?}");
+}
+
+/// Tests that the lines which the documents show are those of the image `example`, which runs on a board with 192 KiB
+/// of RAM (`firmware.rs`). Only the picture has another source there.
+#[test]
+fn the_example_of_the_documents_is_that_of_the_image() {
+    let read = |file: &str| fs::read_to_string(root().join(file)).unwrap();
+    let strip = |line: &str| line.trim_start_matches("//! ").split("//").next().unwrap_or_default().trim().to_owned();
+    let image = read("firmware/stm32f405/src/bin/example.rs");
+    let image: Vec<String> = image.lines().map(strip).collect();
+    for file in ["README.md", "book/guide/first-steps.md", "crates/hzn-core/README.md", "crates/hzn-core/src/lib.rs"] {
+        let text = read(file);
+        let block = text.split("```").find(|block| block.contains("FlightWorkspace::new()")).unwrap_or_default();
+        let lines = block.lines().skip(1).map(strip);
+        let has_own_source = |line: &String| {
+            line.is_empty() || ["use ", "let data", "println!", "# "].iter().any(|start| line.starts_with(start))
+        };
+        let shown: Vec<String> = lines.filter(|line| !has_own_source(line)).collect();
+        let foreign: Vec<&String> = shown.iter().filter(|line| !image.contains(line)).collect();
+        assert!(foreign.is_empty(), "{file}: the image does not have {foreign:#?}");
+        assert!(shown.len() >= 5, "{file}: {shown:#?}");
+    }
 }

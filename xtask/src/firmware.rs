@@ -21,7 +21,7 @@ struct Board {
 const BOARDS: [Board; 3] = [
     Board { name: "an386", package: "hzn-mps2", flags: "", images: &IMAGES },
     Board { name: M7, package: "hzn-mps2", flags: M7_FLAGS, images: &IMAGES },
-    Board { name: "stm32f405", package: "hzn-stm32f405", flags: "", images: &["flight"] },
+    Board { name: "stm32f405", package: "hzn-stm32f405", flags: "", images: &["example", "flight"] },
 ];
 const M7: &str = "an500";
 const M7_FLAGS: &str = "-C target-cpu=cortex-m7";

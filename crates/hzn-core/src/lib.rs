@@ -32,16 +32,24 @@
 //! ```
 //! use hzn_core::camera::{self, Model};
 //! use hzn_core::image::{Grey, Layout};
-//! use hzn_core::{Config, FlightHorizon, Prior};
+//! use hzn_core::observer::Unobserved;
+//! use hzn_core::{Config, FlightWorkspace, Prior, Sensor};
+//! use static_cell::ConstStaticCell;
+//!
+//! // The lists of a picture, 85 KB of zeros. In a static they take no flash and never pass over the stack.
+//! static WORKSPACE: ConstStaticCell<FlightWorkspace> = ConstStaticCell::new(FlightWorkspace::new());
 //!
 //! let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
 //! config.body.altitude_km = Some(230.0);
-//! let mut horizon = FlightHorizon::new(&config)?;
+//! let sensor = Sensor::<f32>::new(&config)?;
+//! let workspace = WORKSPACE.try_take().ok_or("the workspace is in use")?;
+//!
 //! // The sky is above, the ground below, of a body as wide as the Earth.
 //! let data: Vec<u8> = (0..64 * 48).map(|i| if i / 64 < 20 { 5 } else { 200 }).collect();
-//! let picture = Grey::try_new(&data, Layout::packed(64, 48, 1, 8))?;
-//! let expected = horizon.expect(&Prior::default())?;
-//! let report = horizon.process(&picture, &expected);
+//! let picture = Grey::try_new(&data[..], Layout::packed(64, 48, 1, 8))?;
+//! // The altitude of this picture, in metres, replaces that of the configuration.
+//! let expected = sensor.expect(&Prior { altitude_m: Some(231.5e3), ..Prior::default() })?;
+//! let report = sensor.process(workspace, &picture, &expected, &Unobserved);
 //! println!("{} at stage {}", report.status, report.stage.name());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -52,6 +60,9 @@
 //! |---|---|---|---|---|
 //! | [`FlightHorizon`] | f32 | 2048 | 2048 | below 92 KiB |
 //! | [`HostHorizon`] | f64 | 16384 | 16384 | below 1.5 MiB |
+//!
+//! The example above is the form for a microcontroller: tests run it on an emulated board with 192 KiB of RAM. A
+//! [`FlightHorizon`] does not fit there, because [`Horizon::new`] returns it over the stack.
 //!
 //! # Features
 //!

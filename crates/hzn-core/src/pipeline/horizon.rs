@@ -20,7 +20,8 @@ pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 
 /// A horizon sensor: a [`Sensor`] with its [`Workspace`].
 ///
-/// It is large: keep it in a `Box`. A flight computer keeps the two parts apart, the workspace in a `static`.
+/// It is large: keep it in a `Box`. A flight computer keeps the two parts apart, the workspace in a `static`, as the
+/// example of the crate does.
 ///
 /// # Example
 ///
@@ -54,6 +55,9 @@ pub struct Horizon<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usi
 
 impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Horizon<T, POINTS, BLOCKS, WORDS> {
     /// Makes a sensor. Checks the whole configuration first.
+    ///
+    /// The sensor passes over the caller's stack, also on its way into a `static`: a [`FlightHorizon`] needs more than
+    /// 92 KB there.
     ///
     /// # Errors
     /// Returns the first field that is out of its limits.
