@@ -89,6 +89,11 @@ pub fn usage(message: impl std::fmt::Display) -> Stop {
     Stop { exit: Exit::Usage, error: anyhow::anyhow!("{message}") }
 }
 
+/// Returns the error for a file of which nothing could be read.
+pub fn unreadable(message: impl std::fmt::Display) -> Stop {
+    Stop { exit: Exit::SomeUnreadable, error: anyhow::anyhow!("{message}") }
+}
+
 /// Returns the error for something that failed.
 pub fn failed(message: impl std::fmt::Display) -> Stop {
     Stop { exit: Exit::Failed, error: anyhow::anyhow!("{message}") }
