@@ -1,5 +1,6 @@
 """Tests of an archive on a real cluster of two processes."""
 
+import math
 import os
 import signal
 import threading
@@ -110,6 +111,26 @@ def test_reports_come_from_workers(client, small):
         assert np.array_equal(hzn.overlay(image, report), hzn.overlay(image, here))
 
 
+@pytest.mark.parametrize("format", ["parquet", "mcap"])
+def test_a_picture_without_an_altitude_costs_no_other(client, archive, tmp_path, format):
+    sensor = hzn.Sensor(camera=SMALL, body={"kind": "earth-sphere"}, candidates={"min_points": 20})
+    known = [{"altitude_km": 400.0}, {}, {"altitude_km": math.nan}, {"altitude_km": 12.0}, {"altitude_km": 400.0}]
+    urls = list(zip(archive, known, strict=False))
+    result = process_archive(urls, sensor, client=client, out=str(tmp_path / format), format=format, retries=0)
+    (shard,) = [shard.removeprefix("file://") for shard in result.shards]
+    table = parquet.read_table(shard).to_pydict() if format == "parquet" else hzn.read_mcap(shard)
+    without = "no-altitude"
+    assert list(table["status"]) == ["ok", without, without, without, "ok"]
+    assert [f["file"] for f in result.failed] == archive[1:4]
+    details = [f["detail"] for f in result.failed]
+    assert details[0] == details[1] and details[0].startswith("no altitude: set body.altitude_km")
+    assert details[2].startswith("altitude 12 km is below the limb height ")
+    # Without this picture's own data, the parameters' altitude counts.
+    sensor.parameters = sensor.parameters | {"body": {"kind": "earth-sphere", "altitude_km": 400.0}}
+    result = process_archive(urls, sensor, client=client, out=str(tmp_path / format), format=format, retries=0)
+    assert [f["file"] for f in result.failed] == archive[3:4]
+
+
 def test_what_an_archive_refuses(client, archive, small, tmp_path):
     out = str(tmp_path)
     for urls, sensor, more, what in [
@@ -120,5 +141,13 @@ def test_what_an_archive_refuses(client, archive, small, tmp_path):
     ]:
         with pytest.raises(hzn.ConfigError, match=what):
             process_archive(urls, sensor, client=client, out=out, **more)
-    with pytest.raises(hzn.ConfigError, match="attitude"):
-        process_archive([(archive[0], {"attitude": [2, 0, 0, 0]})], small, client=client, out=out, retries=0)
+    # Impossible data are refused before anything is processed, with the name of the picture.
+    for known, what in [
+        ({"attitude": [2, 0, 0, 0]}, "attitude: a quaternion"),
+        ({"altitude_km": -9000.0}, "altitude_km must be"),
+        ({"altitude_km": "high"}, "must be real number"),
+        ({"altitude": 400.0}, "altitude"),
+    ]:
+        with pytest.raises(hzn.ConfigError, match=f"{archive[1]}: .*{what}"):
+            process_archive([archive[0], (archive[1], known)], small, client=client, out=out)
+    assert list(tmp_path.iterdir()) == []

@@ -14,7 +14,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from ._hzn import ConfigError, Report, Sensor, __version__, _process_encoded, _write_mcap
+from ._hzn import (
+    ConfigError,
+    Report,
+    Sensor,
+    __version__,
+    _check_prior,
+    _Prior,
+    _process_encoded,
+    _write_mcap,
+)
 
 try:
     import fsspec  # type: ignore[import-untyped]
@@ -64,8 +73,9 @@ def process_archive(
     Parameters
     ----------
     urls
-        URLs or paths of picture files; or pairs of a URL or path and a dictionary of keyword arguments of
-        `hzn.Sensor.process` (``altitude_km`` and so on).
+        URLs or paths of picture files; or pairs of a URL or path and a dictionary of what is known of the picture: the
+        keyword arguments of `hzn.Sensor.process` from ``altitude_km`` to ``time_s``. A picture without a usable
+        altitude gets a row with the status ``no-altitude``.
     sensor
         The sensor. ``binarize.method = "track"`` is refused, because its threshold depends on the picture before.
     client
@@ -88,7 +98,7 @@ def process_archive(
     Raises
     ------
     ConfigError
-        There are no pictures, or the sensor or an option is invalid.
+        There are no pictures; the sensor or an option is invalid; or an altitude, position or attitude is impossible.
     Exception
         A shard failed after all retries. The other shards are written, and the next run makes the missing ones.
     """
@@ -103,6 +113,11 @@ def process_archive(
         raise ConfigError(
             "binarize.method: track takes its threshold from the previous picture, which another worker may have"
         )
+    for url, known in pictures:
+        try:
+            _check_prior(sensor, _Prior(**known))
+        except (ConfigError, TypeError) as error:
+            raise ConfigError(f"{url}: {error}") from None
     client = client or get_client()
     filesystem, folder = fsspec.core.url_to_fs(out)
     filesystem.makedirs(folder, exist_ok=True)
@@ -168,7 +183,7 @@ def _picture(sensor: Sensor, index: int, url: str, known: Mapping[str, Any]) -> 
             data, why = file.read(), ""
     except OSError as error:
         data, why = None, f"cannot be read: {error}"
-    return _process_encoded(sensor, index, url, data, why, sensor.expect(**known))
+    return _process_encoded(sensor, index, url, data, why, _Prior(**known))
 
 
 def _table(reports: Sequence[Report]) -> Any:
