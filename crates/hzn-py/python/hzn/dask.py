@@ -121,7 +121,7 @@ def process_archive(
     client = client or get_client()
     filesystem, folder = fsspec.core.url_to_fs(out)
     filesystem.makedirs(folder, exist_ok=True)
-    existing = set(filesystem.ls(folder, detail=False))
+    existing = set(_list(filesystem, folder))
     names: list[str] = []
     tasks = []
     for first in range(0, len(pictures), shard_frames):
@@ -143,11 +143,21 @@ def process_archive(
     )
 
 
+def _list(filesystem: Any, folder: str) -> list[str]:
+    """Return the paths of the files in a folder."""
+    # Other processes write into the folder, too.
+    filesystem.invalidate_cache()
+    try:
+        return list(filesystem.ls(folder, detail=False))
+    except FileNotFoundError:
+        # An object store has no empty folders: the folder exists from its first file on.
+        return []
+
+
 def _sweep(filesystem: Any, folder: str, names: Sequence[str]) -> None:
     """Remove the files of workers that died between writing a shard and renaming it."""
     own = {os.path.basename(name) for name in names}
-    filesystem.invalidate_cache()
-    for path in filesystem.ls(folder, detail=False):
+    for path in _list(filesystem, folder):
         # The file name is NAME.PROCESS.part.
         if path.endswith(".part") and os.path.basename(path).rsplit(".", 2)[0] in own:
             filesystem.rm(path)
