@@ -104,7 +104,9 @@ pub(crate) fn fuse<'py>(
     let settings = settings(given)?;
     let mut inputs = Inputs::default();
     for path in &recordings {
-        inputs.recordings.push(input::recording(path).map_err(to_exception)?);
+        let recording = input::recording(path).map_err(to_exception)?;
+        recording.lost.as_ref().map_or(Ok(()), |lost| errors::warn(py, lost))?;
+        inputs.recordings.push(recording);
     }
     for (name, rows) in &mounts {
         let found = inputs.recordings.iter_mut().find(|r| r.name == *name);
