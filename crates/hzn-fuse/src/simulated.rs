@@ -156,6 +156,7 @@ fn recording(
         rows: Vec::new(),
         without_time: 0,
         other_bodies: 0,
+        incomplete: 0,
     })
 }
 

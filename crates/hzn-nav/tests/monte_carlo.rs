@@ -290,7 +290,7 @@ fn the_covariance_stays_positive_definite() {
             flight.truth.attitude = filter.nominal().attitude;
             for camera in 0..2 {
                 let seen = flight.direction(camera, 1.0);
-                filter.update_direction(&seen);
+                filter.update_direction(&seen).unwrap();
             }
             let position = filter.nominal().position_m;
             filter.update_position(&position, 5.0).unwrap();

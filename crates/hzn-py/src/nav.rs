@@ -212,16 +212,16 @@ impl Filter {
             by_limb_height: by_limb_height.into(),
             is_limb,
         };
-        self.filter.update_direction(&measurement).map(taken)
+        self.filter.update_direction(&measurement).ok().map(taken)
     }
     fn update_position(&mut self, position: Three, sigma: f64) -> Option<Taken> {
-        self.filter.update_position(&position.into(), sigma).map(taken)
+        self.filter.update_position(&position.into(), sigma).ok().map(taken)
     }
     fn update_velocity(&mut self, velocity: Three, sigma: f64) -> Option<Taken> {
-        self.filter.update_velocity(&velocity.into(), sigma).map(taken)
+        self.filter.update_velocity(&velocity.into(), sigma).ok().map(taken)
     }
     fn update_attitude(&mut self, attitude: Rows, sigma: f64) -> PyResult<Option<Taken>> {
-        Ok(self.filter.update_attitude(&rotation("attitude", &attitude)?, sigma).map(taken))
+        Ok(self.filter.update_attitude(&rotation("attitude", &attitude)?, sigma).ok().map(taken))
     }
     /// Time, attitude, velocity, position.
     fn state(&self) -> (f64, Rows, Three, Three) {

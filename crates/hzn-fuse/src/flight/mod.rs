@@ -67,7 +67,9 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     counts.restarts = fused.counts.restarts;
     counts.waiting = fused.counts.waiting;
     counts.without_reference = fused.counts.without_reference;
-    counts.unusable += fused.counts.unusable;
+    for ((source, why), count) in std::mem::take(&mut fused.counts.unusable) {
+        counts.add_unusable(source, why, count);
+    }
     fused.counts = counts;
     notes.append(&mut fused.notes);
     fused.notes = notes;

@@ -83,6 +83,8 @@ pub struct Recording {
     pub without_time: usize,
     /// Rows with an answer that are not used, because nobody knows where their body is.
     pub other_bodies: usize,
+    /// Rows with an answer that are not used, because a number of the axis, the position or a covariance is missing.
+    pub incomplete: usize,
 }
 
 /// Reads a recording of `hzn run`: .mcap, .csv or .jsonl.
@@ -128,6 +130,7 @@ impl Recording {
             rows: Vec::new(),
             without_time: 0,
             other_bodies: 0,
+            incomplete: 0,
         };
         for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.status == Status::Ok) {
             let body = match row.body.as_str() {
@@ -143,7 +146,9 @@ impl Recording {
                 recording.without_time += 1;
                 continue;
             };
-            recording.seen.extend(seen(row, index, time_s, body, limb_sigma_km));
+            let seen = seen(row, index, time_s, body, limb_sigma_km);
+            recording.incomplete += usize::from(seen.is_none());
+            recording.seen.extend(seen);
         }
         recording.rows = rows;
         Ok(recording)

@@ -6,15 +6,14 @@
 
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
-use super::blocks::{put, root, three_columns, three_rows};
+use super::blocks::{put, three_columns, three_rows};
 use super::predict::rate_of;
+use super::spectrum::Spectrum;
+use super::unusable::Unusable;
 use super::update::Innovation;
 use super::{Camera, Filter};
 use crate::gravity::earth_rate;
-use crate::layout::Layout;
-
-/// Added to the covariance of the slow error, rad²: the covariance of a direction has rank 2.
-const EPSILON_RAD2: f64 = 1e-14;
+use crate::layout::{CameraPlaces, Layout};
 
 /// A direction that a camera measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +25,7 @@ pub struct DirectionMeasurement {
     /// The same direction in ECEF, a unit vector.
     pub reference: Vector3<f64>,
     /// Covariance of the measured direction in the camera frame, rad², of rank 2. It belongs to the slow error.
+    /// Rounding to single precision does no harm.
     pub covariance_rad2: Matrix3<f64>,
     /// Derivative of the measured direction by the limb height, per km (camera frame); zero for the Sun.
     pub by_limb_height: Vector3<f64>,
@@ -53,19 +53,27 @@ impl DirectionMeasurement {
             self.measured.iter().chain(&self.reference).chain(&self.covariance_rad2).chain(&self.by_limb_height);
         numbers.copied().all(f64::is_finite)
     }
+
+    /// Returns the measured direction as a unit vector, and its covariance without the effects of rounding.
+    pub(super) fn checked(&self) -> Result<(Vector3<f64>, Spectrum), Unusable> {
+        if !self.is_finite() {
+            return Err(Unusable::NotFinite);
+        }
+        let measured = self.measured.try_normalize(1e-6).ok_or(Unusable::NoDirection)?;
+        Ok((measured, Spectrum::of_direction(&self.covariance_rad2, &measured)?))
+    }
 }
 
 impl<const N: usize> Filter<N> {
-    /// Takes a direction at the time of the state. `None` if there is no such camera or a number is not finite; nothing
-    /// changes then.
-    pub fn update_direction(&mut self, m: &DirectionMeasurement) -> Option<Innovation<2>> {
-        if !m.is_finite() {
-            return None;
-        }
-        let (measured, reference) = (m.measured.try_normalize(1e-6)?, m.reference.try_normalize(1e-6)?);
-        let camera = *self.cameras.get(m.camera)?.as_ref()?;
-        let places = *self.layout.cameras.get(m.camera)?;
-        self.set_slow_covariance(m.camera, &m.covariance_rad2, None)?;
+    /// Takes a direction at the time of the state.
+    ///
+    /// # Errors
+    /// See [`Unusable`].
+    pub fn update_direction(&mut self, m: &DirectionMeasurement) -> Result<Innovation<2>, Unusable> {
+        let (measured, covariance) = m.checked()?;
+        let reference = m.reference.try_normalize(1e-6).ok_or(Unusable::NoDirection)?;
+        self.set_slow_covariance(m.camera, &covariance, None)?;
+        let (camera, places) = self.camera_places(m.camera)?;
         let (rate, attitude) = self.at_clock(&camera);
         let (predicted, by_attitude, by_mount) = predict_direction(&attitude, &camera.mount, &reference);
         let mut by_errors = SMatrix::<f64, 3, N>::zeros();
@@ -101,7 +109,7 @@ impl<const N: usize> Filter<N> {
         let mut noise = SMatrix::<f64, 2, 2>::identity() * (white * white);
         if places.slow_error.is_none() {
             // Without a slow error, the covariance is noise of each direction.
-            noise += across * m.covariance_rad2 * across.transpose();
+            noise += across * covariance.matrix() * across.transpose();
         }
         self.update(value, &(across * by_errors), &noise)
     }
@@ -120,17 +128,17 @@ impl<const N: usize> Filter<N> {
     pub(super) fn set_slow_covariance(
         &mut self,
         which: usize,
-        covariance_rad2: &Matrix3<f64>,
+        covariance: &Spectrum,
         recorded: Option<&mut SMatrix<f64, N, N>>,
-    ) -> Option<()> {
-        let Some(place) = self.layout.cameras.get(which)?.slow_error else { return Some(()) };
-        let camera = self.cameras.get_mut(which)?.as_mut()?;
-        let new = (covariance_rad2 + covariance_rad2.transpose()) * 0.5 + Matrix3::identity() * EPSILON_RAD2;
-        let new_root = root(&new, 1)?;
+    ) -> Result<(), Unusable> {
+        let (_, places) = self.camera_places(which)?;
+        let Some(place) = places.slow_error else { return Ok(()) };
+        let Some(camera) = self.cameras.get_mut(which).and_then(Option::as_mut) else { return Ok(()) };
+        let new = covariance.matrix();
         match camera.slow_covariance {
             None => put(&mut self.covariance, (place.first, place.first), &new),
             Some(old) => {
-                let change = new_root * root(&old, -1)?;
+                let change = covariance.root() * Spectrum::of(&old).inverse_root();
                 camera.slow_error = change * camera.slow_error;
                 if let Some(recorded) = recorded {
                     let rows = change * three_rows(recorded, place.first);
@@ -143,7 +151,13 @@ impl<const N: usize> Filter<N> {
             }
         }
         camera.slow_covariance = Some(new);
-        Some(())
+        Ok(())
+    }
+
+    /// Returns a camera, and the places of its errors.
+    pub(super) fn camera_places(&self, which: usize) -> Result<(Camera, CameraPlaces), Unusable> {
+        let camera = self.cameras.get(which).and_then(Option::as_ref).ok_or(Unusable::NoCamera)?;
+        Ok((*camera, self.layout.cameras.get(which).copied().unwrap_or_default()))
     }
 }
 

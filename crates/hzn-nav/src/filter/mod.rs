@@ -11,7 +11,9 @@ mod chi2;
 mod direction;
 mod limb_latitude;
 mod predict;
+mod spectrum;
 mod states;
+mod unusable;
 mod update;
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
@@ -26,6 +28,7 @@ use limb_latitude::LatitudeTerm;
 pub use chi2::chi2_limit;
 pub use direction::{DirectionMeasurement, predict_direction};
 pub use predict::Step;
+pub use unusable::Unusable;
 pub use update::Innovation;
 
 /// Corrections of the instruments: the estimates of their errors.

@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::blocks::{put_three, set};
-use super::{DirectionMeasurement, Filter, Step};
+use super::{DirectionMeasurement, Filter, Step, Unusable};
 use crate::layout::{Layout, Place};
 use crate::strapdown::Imu;
 
@@ -64,11 +64,16 @@ impl<const N: usize> Filter<N> {
     }
 
     /// Prepares the slow error of the camera for a direction, as [`Filter::update_direction`] does before the update,
-    /// and multiplies the change onto `transition`. `None` if the direction is not usable.
-    pub fn prepare_direction(&mut self, m: &DirectionMeasurement, transition: &mut SMatrix<f64, N, N>) -> Option<()> {
-        if !m.is_finite() {
-            return None;
-        }
-        self.set_slow_covariance(m.camera, &m.covariance_rad2, Some(transition))
+    /// and multiplies the change onto `transition`.
+    ///
+    /// # Errors
+    /// See [`Unusable`].
+    pub fn prepare_direction(
+        &mut self,
+        m: &DirectionMeasurement,
+        transition: &mut SMatrix<f64, N, N>,
+    ) -> Result<(), Unusable> {
+        let (_, covariance) = m.checked()?;
+        self.set_slow_covariance(m.camera, &covariance, Some(transition))
     }
 }
