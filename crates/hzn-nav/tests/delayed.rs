@@ -45,6 +45,7 @@ fn direction(truth: &Nominal, sun: bool) -> Measurement {
     let covariance_rad2 = (Matrix3::identity() - measured * measured.transpose()) * (0.1 * DEG).powi(2);
     Measurement::Direction(DirectionMeasurement {
         camera: usize::from(sun),
+        body: 0,
         measured,
         reference,
         covariance_rad2,

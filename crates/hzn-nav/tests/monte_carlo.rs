@@ -127,7 +127,7 @@ impl Flight {
         let white = self.three(WHITE);
         let measured = (seen + self.slow[camera] + by_limb_height * self.height_km + white).normalize();
         let covariance_rad2 = (Matrix3::identity() - measured * measured.transpose()) * SLOW[camera].powi(2);
-        DirectionMeasurement { camera, measured, reference, covariance_rad2, by_limb_height, is_limb: true }
+        DirectionMeasurement { camera, body: 0, measured, reference, covariance_rad2, by_limb_height, is_limb: true }
     }
 }
 

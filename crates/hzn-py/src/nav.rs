@@ -176,7 +176,7 @@ impl Filter {
         let [attitude_rad, velocity_m_s, position_m] = sigmas;
         let options = settings.options(None, StartSigmas { attitude_rad, velocity_m_s, position_m });
         let mount = |(i, rows): (usize, &Rows)| {
-            Ok(settings.camera_options(&i.to_string(), rotation(&format!("mounts[{i}]"), rows)?))
+            Ok(settings.camera_options(&i.to_string(), rotation(&format!("mounts[{i}]"), rows)?, 1))
         };
         let cameras = mounts.iter().enumerate().map(mount).collect::<PyResult<Vec<_>>>()?;
         let filter = hzn_nav::filter::Filter::new(start, &options, &cameras).map_err(errors::config)?;
@@ -206,6 +206,7 @@ impl Filter {
         let covariance_rad2 = Matrix3::from_fn(|i, j| covariance[i][j]);
         let measurement = DirectionMeasurement {
             camera,
+            body: 0,
             measured: measured.into(),
             reference: reference.into(),
             covariance_rad2,

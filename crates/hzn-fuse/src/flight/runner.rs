@@ -12,7 +12,7 @@ use super::events::{Event, Source};
 use super::first::{first_attitude, sight_sigma, sigmas};
 use super::reference::limb_axis;
 use crate::error::Error;
-use crate::input::{Body, Sample, Seen};
+use crate::input::{Body, Recording, Sample, Seen};
 use crate::results::{Begin, Epoch, Fused, Innovation, Kind, Triad};
 use crate::settings::{Limb, Settings};
 use crate::smooth::Recorded;
@@ -33,6 +33,8 @@ pub(super) struct Runner<'a, const N: usize> {
     flight: Flight<'a>,
     settings: &'a Settings,
     cameras: Vec<CameraOptions>,
+    /// The bodies of each camera, in the order of their slow errors.
+    bodies: Vec<Vec<Body>>,
     filter: Filter<N>,
     begin: Begin,
     reckoning: DeadReckoning,
@@ -54,8 +56,11 @@ impl<'a, const N: usize> Runner<'a, N> {
     /// Finds the first attitude and makes a filter there.
     pub(super) fn new(flight: &Flight<'a>, settings: &'a Settings, record: bool) -> Result<Self, Error> {
         let recordings = &flight.inputs.recordings;
-        let cameras: Vec<CameraOptions> =
-            recordings.iter().zip(flight.mounts).map(|(r, mount)| settings.camera_options(&r.name, *mount)).collect();
+        let bodies: Vec<Vec<Body>> = recordings.iter().map(Recording::bodies).collect();
+        let options = |((r, mount), bodies): ((&Recording, &UnitQuaternion<f64>), &Vec<Body>)| {
+            settings.camera_options(&r.name, *mount, bodies.len())
+        };
+        let cameras: Vec<CameraOptions> = recordings.iter().zip(flight.mounts).zip(&bodies).map(options).collect();
         let reckoning = DeadReckoning::new(flight.samples);
         let found = first_attitude(flight, settings, &cameras, &reckoning)?;
         let limb_sigma_km = recordings.iter().filter_map(|r| r.limb_sigma_km).reduce(f64::max);
@@ -72,6 +77,7 @@ impl<'a, const N: usize> Runner<'a, N> {
             flight: *flight,
             settings,
             cameras,
+            bodies,
             unaided: found.state,
             filter,
             begin: found.begin,
@@ -195,6 +201,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         let nominal = self.filter.nominal();
         let measurement = DirectionMeasurement {
             camera,
+            body: self.bodies.get(camera)?.iter().position(|body| *body == seen.body)?,
             measured: seen.axis,
             reference: seen.reference.or_else(|| limb_axis(seen.body, &nominal.position_m))?,
             covariance_rad2: seen.covariance_rad2,

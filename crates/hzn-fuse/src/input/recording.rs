@@ -153,6 +153,14 @@ impl Recording {
         recording.rows = rows;
         Ok(recording)
     }
+
+    /// Returns the bodies that the camera saw.
+    pub fn bodies(&self) -> Vec<Body> {
+        let mut bodies: Vec<Body> = self.seen.iter().map(|seen| seen.body).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        bodies
+    }
 }
 
 fn is_earth(name: &str) -> bool {

@@ -20,6 +20,8 @@ use crate::layout::{CameraPlaces, Layout};
 pub struct DirectionMeasurement {
     /// Number of the camera, from 0.
     pub camera: usize,
+    /// Number of the body among those that the camera sees, from 0: each has a slow error of its own.
+    pub body: usize,
     /// Unit vector in the camera frame.
     pub measured: Vector3<f64>,
     /// The same direction in ECEF, a unit vector.
@@ -72,8 +74,9 @@ impl<const N: usize> Filter<N> {
     pub fn update_direction(&mut self, m: &DirectionMeasurement) -> Result<Innovation<2>, Unusable> {
         let (measured, covariance) = m.checked()?;
         let reference = m.reference.try_normalize(1e-6).ok_or(Unusable::NoDirection)?;
-        self.set_slow_covariance(m.camera, &covariance, None)?;
+        self.set_slow_covariance((m.camera, m.body), &covariance, None)?;
         let (camera, places) = self.camera_places(m.camera)?;
+        let slow_place = places.slow_errors.get(m.body).copied().flatten();
         let (rate, attitude) = self.at_clock(&camera);
         let (predicted, by_attitude, by_mount) = predict_direction(&attitude, &camera.mount, &reference);
         let mut by_errors = SMatrix::<f64, 3, N>::zeros();
@@ -82,9 +85,9 @@ impl<const N: usize> Filter<N> {
             put(&mut by_errors, (0, place.first), &by_mount);
         }
         let mut slow = Vector3::zeros();
-        if let Some(place) = places.slow_error {
+        if let Some(place) = slow_place {
             put(&mut by_errors, (0, place.first), &Matrix3::identity());
-            slow = camera.slow_error;
+            slow = camera.slow_errors.get(m.body).copied().unwrap_or_default();
         }
         if let Some(place) = places.clock {
             let body = attitude.inverse() * reference;
@@ -107,7 +110,7 @@ impl<const N: usize> Filter<N> {
         let value = across * (measured - predicted - slow - height);
         let white = camera.options.white_rad;
         let mut noise = SMatrix::<f64, 2, 2>::identity() * (white * white);
-        if places.slow_error.is_none() {
+        if slow_place.is_none() {
             // Without a slow error, the covariance is noise of each direction.
             noise += across * covariance.matrix() * across.transpose();
         }
@@ -127,19 +130,24 @@ impl<const N: usize> Filter<N> {
     /// all others.
     pub(super) fn set_slow_covariance(
         &mut self,
-        which: usize,
+        (which, body): (usize, usize),
         covariance: &Spectrum,
         recorded: Option<&mut SMatrix<f64, N, N>>,
     ) -> Result<(), Unusable> {
-        let (_, places) = self.camera_places(which)?;
-        let Some(place) = places.slow_error else { return Ok(()) };
-        let Some(camera) = self.cameras.get_mut(which).and_then(Option::as_mut) else { return Ok(()) };
+        let (own, places) = self.camera_places(which)?;
+        if body >= own.options.bodies {
+            return Err(Unusable::NoBody);
+        }
+        let camera = self.cameras.get_mut(which).and_then(Option::as_mut).ok_or(Unusable::NoCamera)?;
+        let place = places.slow_errors.get(body).copied().flatten();
+        let errors = camera.slow_errors.get_mut(body).zip(camera.slow_covariances.get_mut(body));
+        let (Some(place), Some((slow_error, slow_covariance))) = (place, errors) else { return Ok(()) };
         let new = covariance.matrix();
-        match camera.slow_covariance {
+        match *slow_covariance {
             None => put(&mut self.covariance, (place.first, place.first), &new),
             Some(old) => {
                 let change = covariance.root() * Spectrum::of(&old).inverse_root();
-                camera.slow_error = change * camera.slow_error;
+                *slow_error = change * *slow_error;
                 if let Some(recorded) = recorded {
                     let rows = change * three_rows(recorded, place.first);
                     put(recorded, (place.first, 0), &rows);
@@ -150,7 +158,7 @@ impl<const N: usize> Filter<N> {
                 put(&mut self.covariance, (0, place.first), &columns);
             }
         }
-        camera.slow_covariance = Some(new);
+        *slow_covariance = Some(new);
         Ok(())
     }
 

@@ -30,7 +30,9 @@ impl<const N: usize> Filter<N> {
         let cameras = || self.cameras.iter().flatten().zip(other.cameras.iter().flatten()).zip(&layout.cameras);
         for ((a, b), places) in cameras() {
             put_block(places.misalignment, (b.mount.inverse() * a.mount).scaled_axis());
-            put_block(places.slow_error, a.slow_error - b.slow_error);
+            for ((a, b), place) in a.slow_errors.iter().zip(b.slow_errors).zip(places.slow_errors) {
+                put_block(place, a - b);
+            }
         }
         if let Some(place) = layout.limb_height {
             set(&mut error, (place.first, 0), a.limb_height_km - b.limb_height_km);
@@ -74,6 +76,6 @@ impl<const N: usize> Filter<N> {
         transition: &mut SMatrix<f64, N, N>,
     ) -> Result<(), Unusable> {
         let (_, covariance) = m.checked()?;
-        self.set_slow_covariance(m.camera, &covariance, Some(transition))
+        self.set_slow_covariance((m.camera, m.body), &covariance, Some(transition))
     }
 }

@@ -5,6 +5,8 @@
 pub enum Unusable {
     /// The filter has no camera of this number.
     NoCamera,
+    /// The camera sees fewer bodies than this number.
+    NoBody,
     /// A number is not finite.
     NotFinite,
     /// The direction or its reference is a vector of length 0.
@@ -20,6 +22,7 @@ impl Unusable {
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::NoCamera => "the filter has no camera of this number",
+            Self::NoBody => "the camera has no body of this number",
             Self::NotFinite => "a number is not finite",
             Self::NoDirection => "the direction has length 0",
             Self::NegativeVariance => "the covariance has a negative variance",
