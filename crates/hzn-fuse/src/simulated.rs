@@ -156,6 +156,7 @@ fn recording(
         without_time: 0,
         lost: None,
         other_bodies: 0,
+        incomplete: 0,
     })
 }
 

@@ -86,6 +86,8 @@ pub struct Recording {
     pub lost: Option<String>,
     /// Rows with an answer that are not used, because nobody knows where their body is.
     pub other_bodies: usize,
+    /// Rows with an answer that are not used, because a number of the axis, the position or a covariance is missing.
+    pub incomplete: usize,
 }
 
 /// Reads a recording of `hzn run`: .mcap, .csv or .jsonl.
@@ -133,6 +135,7 @@ impl Recording {
             without_time: 0,
             lost: None,
             other_bodies: 0,
+            incomplete: 0,
         };
         for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.status == Status::Ok) {
             let body = match row.body.as_str() {
@@ -148,10 +151,20 @@ impl Recording {
                 recording.without_time += 1;
                 continue;
             };
-            recording.seen.extend(seen(row, index, time_s, body, limb_sigma_km));
+            let seen = seen(row, index, time_s, body, limb_sigma_km);
+            recording.incomplete += usize::from(seen.is_none());
+            recording.seen.extend(seen);
         }
         recording.rows = rows;
         Ok(recording)
+    }
+
+    /// Returns the bodies that the camera saw.
+    pub fn bodies(&self) -> Vec<Body> {
+        let mut bodies: Vec<Body> = self.seen.iter().map(|seen| seen.body).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        bodies
     }
 }
 
