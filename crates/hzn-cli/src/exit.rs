@@ -102,6 +102,11 @@ pub fn usage(message: impl std::fmt::Display) -> Stop {
     Stop::new(Exit::Usage, anyhow::anyhow!("{message}"))
 }
 
+/// Returns the error for a file of which nothing could be read.
+pub fn unreadable(message: impl std::fmt::Display) -> Stop {
+    Stop { exit: Exit::SomeUnreadable, error: anyhow::anyhow!("{message}") }
+}
+
 /// Returns the error for something that failed.
 pub fn failed(message: impl std::fmt::Display) -> Stop {
     Stop::new(Exit::Failed, anyhow::anyhow!("{message}"))

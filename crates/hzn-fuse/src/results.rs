@@ -1,5 +1,7 @@
 //! What comes out of a flight.
 
+use std::collections::BTreeMap;
+
 use hzn_nav::filter::{Corrections, Filter};
 use hzn_nav::gravity::earth_rate;
 use hzn_nav::layout::{Layout, Place};
@@ -214,14 +216,23 @@ pub struct Counts {
     pub before_start: usize,
     /// Measurements outside the time of the inertial unit.
     pub outside: usize,
-    /// Measurements with a number that is not finite.
-    pub unusable: usize,
+    /// Measurements that the filter cannot use, by their source and the reason.
+    pub unusable: BTreeMap<(String, &'static str), usize>,
     /// Directions whose reference is not known.
     pub without_reference: usize,
     /// Directions while the attitude was not known well enough for the filter.
     pub waiting: usize,
     /// How often the filter began again.
     pub restarts: usize,
+}
+
+impl Counts {
+    /// Counts measurements of a source that the filter cannot use.
+    pub(crate) fn add_unusable(&mut self, source: impl Into<String>, why: &'static str, count: usize) {
+        if count > 0 {
+            *self.unusable.entry((source.into(), why)).or_default() += count;
+        }
+    }
 }
 
 /// The results of a flight.

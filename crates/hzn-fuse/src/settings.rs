@@ -325,14 +325,15 @@ impl Settings {
         }
     }
 
-    /// Returns the options of a camera with its mount.
-    pub fn camera_options(&self, name: &str, mount: nalgebra::UnitQuaternion<f64>) -> CameraOptions {
+    /// Returns the options of a camera with its mount, that sees a number of bodies.
+    pub fn camera_options(&self, name: &str, mount: nalgebra::UnitQuaternion<f64>, bodies: usize) -> CameraOptions {
         let camera = self.camera(name);
         CameraOptions {
             mount,
             misalignment: camera.misalignment_deg.block(f64::to_radians(1.0)),
             slow_error: mode(camera.slow_error),
             slow_error_time_s: camera.slow_error_time_s,
+            bodies,
             white_rad: camera.white_rad,
             clock: camera.clock_s.block(1.0),
         }

@@ -104,10 +104,9 @@ fn recording(
     errors: &mut dyn Errors,
     limb_height_km: f64,
 ) -> Result<Recording, ScenarioError> {
-    let flight = one.flight()?;
     let told = one.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
     let mut seen = Vec::new();
-    for (row, frame) in flight.frames.iter().enumerate() {
+    for (row, frame) in one.flight()?.frames.iter().enumerate() {
         let known = one.frame_row(frame);
         let pose = &frame.scene.pose;
         let to_camera = rotation(pose.cam_to_ecef_wxyz).inverse();
@@ -155,7 +154,9 @@ fn recording(
         seen,
         rows: Vec::new(),
         without_time: 0,
+        lost: None,
         other_bodies: 0,
+        incomplete: 0,
     })
 }
 

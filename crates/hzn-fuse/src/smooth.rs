@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector, UnitQuaternion};
 
 use crate::results::Epoch;
 
-/// Most measurements that a smoother keeps; each takes about 75 kB.
+/// Most measurements that a smoother keeps; each takes 80 to 160 kB.
 pub const MAX_EPOCHS: usize = 40_000;
 
 /// A filter before and after a measurement.

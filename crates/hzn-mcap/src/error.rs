@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::container::REWRITE;
+
 /// Why a recording could not be written or read. The message names a remedy if there is one.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -67,6 +69,14 @@ pub enum Error {
         path: PathBuf,
         /// The data, their place and the reason.
         detail: String,
+    },
+    /// The data are compressed with a method that hzn does not know.
+    #[error("{} is compressed with {compression:?}, which hzn does not read: {REWRITE}", path.display())]
+    Compression {
+        /// The file.
+        path: PathBuf,
+        /// Name of the compression.
+        compression: String,
     },
     /// The unfinished run was made with another sensor.toml.
     #[error(

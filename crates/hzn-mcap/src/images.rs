@@ -6,7 +6,7 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::cdr;
-use crate::container::{Channel, Chunk, Inflation, MAGIC, Message, Op, Record, Scanner, Schemas};
+use crate::container::{Channel, Chunk, ChunkFault, Inflation, MAGIC, Message, Op, Record, Scanner, Schemas};
 use crate::error::Error;
 use crate::frame::EncodedImage;
 use crate::messages;
@@ -23,8 +23,8 @@ pub struct InputImage {
 /// Iterates over the pictures of one topic of an MCAP in file order. It needs the memory of one chunk.
 ///
 /// It reads `foxglove.CompressedImage` and `foxglove.RawImage` in protobuf, and ROS 2's `sensor_msgs/msg/Image` and
-/// `sensor_msgs/msg/CompressedImage` in CDR. Chunks may be uncompressed or compressed with zstd. A file that was cut
-/// off gives all complete pictures.
+/// `sensor_msgs/msg/CompressedImage` in CDR. Chunks may be uncompressed or compressed with zstd or LZ4. A file that
+/// was cut off gives all complete pictures.
 pub struct ImageReader {
     scanner: Scanner<BufReader<File>>,
     path: PathBuf,
@@ -69,8 +69,8 @@ impl ImageReader {
         })
     }
 
-    /// Returns why the recording ended early (cut off or damaged); `None` for a complete one. Valid after the last
-    /// picture.
+    /// Returns why the recording ended early (cut off, damaged, or compressed with an unknown method); `None` for a
+    /// complete one. Valid after the last picture.
     pub fn broken(&self) -> Option<&str> {
         self.broken.as_deref()
     }
@@ -100,9 +100,12 @@ impl ImageReader {
                     chunk.index.declared.iter().for_each(|(op, _, content)| self.declare(*op, content));
                     Chunk::messages(&plain).for_each(|message| self.add(&message));
                 }
-                Err(why) => {
-                    let cut = !ends_as_mcap(&self.path);
-                    self.broken = Some(if cut { CUT_OFF.to_owned() } else { format!("is damaged ({why})") });
+                Err(fault) => {
+                    self.broken = Some(match fault {
+                        ChunkFault::Compression(_) => format!("cannot be read: {fault}"),
+                        ChunkFault::Damaged(_) if !ends_as_mcap(&self.path) => CUT_OFF.to_owned(),
+                        ChunkFault::Damaged(why) => format!("is damaged ({why})"),
+                    });
                     return Ok(false);
                 }
             },

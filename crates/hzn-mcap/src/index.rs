@@ -1,52 +1,29 @@
 //! An index of the pictures and reports in a recording, so that any picture can be shown at once.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use crate::container::{Channel, Chunk, Fields, Inflation, MAGIC, MAX_RECORD_BYTES, Message, Op, Record, Schemas};
+use crate::container::{
+    Channel, Chunk, ChunkFault, Fields, Inflation, MAGIC, MAX_RECORD_BYTES, Message, Op, Record, Schemas,
+};
 use crate::error::Error;
 use crate::frame::{CandidateEdge, PicturePrior};
-use crate::images::{InputImage, decoder};
+use crate::images::decoder;
 use crate::messages;
+use crate::pictures::{Pictures, Place, fill, next_record};
 use crate::row::Row;
 use crate::topics::Topic;
 use crate::writer::SENSOR_TOML;
-
-/// The place of one picture in the file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
-    /// Offset of the chunk's record in the file; `None` for a message outside of chunks.
-    chunk: Option<u64>,
-    /// Offset of the message's record: in the file, or in the uncompressed records of a compressed chunk.
-    message: u64,
-    /// Channel of the message.
-    channel: u16,
-    /// Log time in nanoseconds.
-    log_time_ns: u64,
-    /// Sequence number.
-    sequence: u32,
-}
-
-impl Place {
-    /// Returns the sequence number of the message; in recordings of hzn it is the index of the frame.
-    pub fn sequence(&self) -> u32 {
-        self.sequence
-    }
-    /// Returns the log time in seconds.
-    pub fn log_time_s(&self) -> f64 {
-        self.log_time_ns as f64 * 1e-9
-    }
-}
 
 /// An entry of the index. Entries are in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum IndexEntry {
     /// A picture, which is not read yet.
     Picture(Place),
-    /// The result of one picture and body.
-    Report(Box<Row>, Vec<CandidateEdge>, Box<PicturePrior>),
+    /// The result of one picture and body, with the place of its message.
+    Report(Place, Box<Row>, Vec<CandidateEdge>, Box<PicturePrior>),
 }
 
 /// Goes through a recording without reading its uncompressed pictures. The recording may be one of hzn, or one of any
@@ -61,10 +38,11 @@ pub struct Index {
     schemas: Schemas,
     /// Channels with pictures.
     pictures: BTreeMap<u16, Channel>,
-    reports: Option<u16>,
+    reports: BTreeSet<u16>,
     complete: bool,
     inflation: Inflation,
     broken_chunks: u64,
+    unknown_compression: Option<String>,
 }
 
 impl Index {
@@ -87,11 +65,13 @@ impl Index {
             sensor_toml: None,
             schemas: Schemas::default(),
             pictures: BTreeMap::new(),
-            reports: None,
+            reports: BTreeSet::new(),
             complete: false,
             inflation: Inflation::default(),
             broken_chunks: 0,
+            unknown_compression: None,
         };
+        index.read_summary().map_err(read)?;
         while let Some((op, length)) = index.read_head().map_err(read)? {
             if matches!(op, Op::CHUNK | Op::MESSAGE | Op::DATA_END) {
                 index.file.seek_relative(-9).map_err(read)?;
@@ -111,14 +91,20 @@ impl Index {
     pub fn is_complete(&self) -> bool {
         self.complete
     }
-    /// Returns the number of chunks with damaged contents so far.
+    /// Returns the number of chunks so far that cannot be read. They are damaged, unless
+    /// [`Self::unknown_compression`] has a name.
     pub fn broken_chunks(&self) -> u64 {
         self.broken_chunks
     }
+    /// Returns the name of a compression that hzn does not know, if chunks so far have one.
+    pub fn unknown_compression(&self) -> Option<&str> {
+        self.unknown_compression.as_deref()
+    }
 
-    /// Returns whether a channel with reports was found so far.
+    /// Returns whether a channel with reports was found so far. In a recording that was closed properly, this is known
+    /// from the beginning.
     pub fn has_reports(&self) -> bool {
-        self.reports.is_some()
+        !self.reports.is_empty()
     }
     /// Returns the number of channels with pictures that were found so far.
     pub fn channels(&self) -> usize {
@@ -145,9 +131,9 @@ impl Index {
             Op::CHUNK => self.read_chunk(length, found),
             Op::MESSAGE => {
                 let start = self.position;
-                let Some(content) = self.read_content(length)? else { return Ok(Ok(false)) };
-                let message = Message::parse(&content);
-                Ok(message.map_or(Ok(()), |m| self.add_message(&m, None, start, found)).map(|()| true))
+                self.position += 9 + length;
+                let is_whole = self.file.get_ref().metadata()?.len() >= self.position;
+                if is_whole { self.read_message(length, None, start, found) } else { Ok(Ok(false)) }
             }
             _ => {
                 let Some(content) = self.read_content(length)? else { return Ok(Ok(false)) };
@@ -174,9 +160,15 @@ impl Index {
     fn read_compressed_chunk(&mut self, length: u64, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
         let start = self.position;
         let Some(content) = self.read_content(length)? else { return Ok(Ok(false)) };
-        let Ok((chunk, plain)) = Chunk::parse(&Record { op: Op::CHUNK, content }, &mut self.inflation) else {
-            self.broken_chunks += 1;
-            return Ok(Ok(true));
+        let (chunk, plain) = match Chunk::parse(&Record { op: Op::CHUNK, content }, &mut self.inflation) {
+            Ok(read) => read,
+            Err(fault) => {
+                self.broken_chunks += 1;
+                if let ChunkFault::Compression(name) = fault {
+                    self.unknown_compression.get_or_insert(name);
+                }
+                return Ok(Ok(true));
+            }
         };
         for (op, _, content) in &chunk.index.declared {
             self.read_declaration(*op, content);
@@ -211,39 +203,57 @@ impl Index {
                 self.broken_chunks += 1;
                 break;
             }
-            let mut skip = length;
-            if op == Op::MESSAGE && length >= 22 {
-                let mut head = [0; 22];
-                if !fill(&mut self.file, &mut head)? {
-                    break;
-                }
-                skip -= 22;
-                let Some(m) = Message::parse(&head) else { break };
-                let mut data = Vec::new();
-                if self.reports == Some(m.channel) {
-                    data.resize(skip as usize, 0);
-                    skip = 0;
-                    if !fill(&mut self.file, &mut data)? {
+            match op {
+                Op::MESSAGE => match self.read_message(length, Some(start), offset, found)? {
+                    Ok(true) => {}
+                    Ok(false) => break,
+                    Err(e) => return Ok(Err(e)),
+                },
+                Op::SCHEMA | Op::CHANNEL => {
+                    let mut content = vec![0; length as usize];
+                    if !fill(&mut self.file, &mut content)? {
                         break;
                     }
+                    self.read_declaration(op, &content);
                 }
-                if let Err(e) = self.add_message(&Message { data: &data, ..m }, Some(start), offset, found) {
-                    return Ok(Err(e));
-                }
-            } else if matches!(op, Op::SCHEMA | Op::CHANNEL) {
-                let mut content = vec![0; length as usize];
-                if !fill(&mut self.file, &mut content)? {
-                    break;
-                }
-                self.read_declaration(op, &content);
-                skip = 0;
+                _ => self.file.seek_relative(length as i64)?,
             }
-            self.file.seek_relative(skip as i64)?;
             offset += 9 + length;
         }
         self.file.seek(SeekFrom::Start(end))?;
         self.position = end;
         Ok(Ok(is_whole))
+    }
+
+    /// Reads the head of a message, and the data of a report. The record begins at `at`; its own head is read already.
+    /// Returns `false` if the file ends before.
+    fn read_message(
+        &mut self,
+        length: u64,
+        chunk: Option<u64>,
+        at: u64,
+        found: &mut Vec<IndexEntry>,
+    ) -> io::Result<Result<bool, Error>> {
+        // Channel, sequence number and two times.
+        let mut head = [0; 22];
+        let Some(rest) = length.checked_sub(22) else {
+            self.file.seek_relative(length as i64)?;
+            return Ok(Ok(true));
+        };
+        if !fill(&mut self.file, &mut head)? {
+            return Ok(Ok(false));
+        }
+        let Some(m) = Message::parse(&head) else { return Ok(Ok(false)) };
+        let mut data = Vec::new();
+        if self.reports.contains(&m.channel) {
+            (&mut self.file).take(rest).read_to_end(&mut data)?;
+            if data.len() as u64 != rest {
+                return Ok(Ok(false));
+            }
+        } else {
+            self.file.seek_relative(rest as i64)?;
+        }
+        Ok(self.add_message(&Message { data: &data, ..m }, chunk, at, found).map(|()| true))
     }
 
     fn add_message(
@@ -253,16 +263,17 @@ impl Index {
         at: u64,
         found: &mut Vec<IndexEntry>,
     ) -> Result<(), Error> {
-        if self.reports == Some(m.channel) {
+        let (channel, log_time_ns, sequence) = (m.channel, m.log_time_ns, m.sequence);
+        let place = Place { chunk, message: at, channel, log_time_ns, sequence };
+        if self.reports.contains(&m.channel) {
             let broken = |e: serde_json::Error| Error::Decode {
                 path: self.path.clone(),
                 detail: format!("report of frame {}: {e}", m.sequence),
             };
             let (row, candidates, prior) = messages::parse_report(m.data).map_err(broken)?;
-            found.push(IndexEntry::Report(Box::new(row), candidates, Box::new(prior)));
+            found.push(IndexEntry::Report(place, Box::new(row), candidates, Box::new(prior)));
         } else if self.pictures.contains_key(&m.channel) {
-            let (channel, log_time_ns, sequence) = (m.channel, m.log_time_ns, m.sequence);
-            found.push(IndexEntry::Picture(Place { chunk, message: at, channel, log_time_ns, sequence }));
+            found.push(IndexEntry::Picture(place));
         }
         Ok(())
     }
@@ -279,8 +290,8 @@ impl Index {
     /// Reads a record outside of chunks, or one that a chunk declares.
     fn read_declaration(&mut self, op: u8, content: &[u8]) {
         if let Some((id, channel)) = self.schemas.declare(op, content) {
-            if channel.topic == Topic::Report.name() && channel.schema == Topic::Report.schema().0 {
-                self.reports = Some(id);
+            if Topic::of(&channel) == Some(Topic::Report) {
+                self.reports.insert(id);
             } else if decoder(&channel.schema, &channel.encoding).is_some()
                 && self.pictures.values().all(|first| first.topic == channel.topic)
             {
@@ -291,6 +302,41 @@ impl Index {
             let text = Fields(content).attached(SENSOR_TOML).map(|data| String::from_utf8_lossy(data).into_owned());
             self.sensor_toml = self.sensor_toml.take().or(text);
         }
+    }
+
+    /// Finds the channels of the reports in the summary at the end of the file. Other writers may declare them only
+    /// when the first reports come, after many pictures.
+    fn read_summary(&mut self) -> io::Result<()> {
+        let beginning = self.position;
+        // The footer is a record of 20 bytes. The magic bytes follow it.
+        const END_BYTES: usize = 9 + 20 + MAGIC.len();
+        let mut end = [0; END_BYTES];
+        let size = self.file.get_ref().metadata()?.len();
+        let Some(footer) = size.checked_sub(END_BYTES as u64) else { return Ok(()) };
+        self.file.seek(SeekFrom::Start(footer))?;
+        let is_read = fill(&mut self.file, &mut end)?;
+        let mut f = Fields(&end);
+        let start = match (f.u8(), f.u64(), f.u64()) {
+            (Some(Op::FOOTER), Some(20), Some(start)) if is_read && end.ends_with(&MAGIC) && start > 0 => start,
+            _ => footer,
+        };
+        self.file.seek(SeekFrom::Start(start))?;
+        let mut schemas = Schemas::default();
+        while let Some((op, length)) = self.read_head()? {
+            match op {
+                Op::SCHEMA | Op::CHANNEL => {
+                    let Some(content) = self.read_content(length)? else { break };
+                    let channel = schemas.declare(op, &content);
+                    let reports = channel.filter(|(_, channel)| Topic::of(channel) == Some(Topic::Report));
+                    self.reports.extend(reports.map(|(id, _)| id));
+                }
+                Op::FOOTER => break,
+                _ => self.file.seek_relative(length as i64)?,
+            }
+        }
+        self.file.seek(SeekFrom::Start(beginning))?;
+        self.position = beginning;
+        Ok(())
     }
 
     /// Reads kind and length of the record at `position`.
@@ -312,90 +358,4 @@ impl Index {
         self.position += 9 + length;
         Ok((content.len() as u64 == length).then_some(content))
     }
-}
-
-/// Returns the next of some uncompressed records: its offset, kind and content.
-fn next_record<'a>(rest: &mut Fields<'a>, size: usize) -> Option<(u64, u8, &'a [u8])> {
-    let offset = (size - rest.0.len()) as u64;
-    let (op, length) = (rest.u8()?, rest.u64()?);
-    Some((offset, op, rest.bytes(usize::try_from(length).ok()?)?))
-}
-
-fn fill(file: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
-    match file.read_exact(buffer) {
-        Ok(()) => Ok(true),
-        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
-        Err(e) => Err(e),
-    }
-}
-
-/// Reads pictures of a recording in any order.
-#[derive(Debug)]
-pub struct Pictures {
-    file: File,
-    path: PathBuf,
-    channels: BTreeMap<u16, Channel>,
-}
-
-impl Pictures {
-    /// Reads the picture at a place.
-    ///
-    /// # Errors
-    /// The file cannot be read. A picture that cannot be decoded is no error of this function: `image` then has the
-    /// reason.
-    pub fn read(&mut self, place: &Place) -> Result<InputImage, Error> {
-        let read = |source| Error::Read { path: self.path.clone(), source };
-        let message = match place.chunk {
-            None => read_record(&mut self.file, place.message).map_err(read)?.map(|r| r.content),
-            Some(at) => read_message_in_chunk(&mut self.file, at, place.message).map_err(read)?,
-        };
-        let broken = |why: &str| InputImage { time_s: place.log_time_s(), image: Err(why.to_owned()) };
-        let Some(message) = message.as_deref().and_then(Message::parse) else {
-            return Ok(broken("the recording does not contain the picture any more, or is damaged at its place"));
-        };
-        let channel = self.channels.get(&place.channel);
-        let Some((channel, decode)) = channel.and_then(|c| Some((c, decoder(&c.schema, &c.encoding)?))) else {
-            return Ok(broken("is on a channel without pictures"));
-        };
-        Ok(match decode(&channel.schema, message.data) {
-            Ok((image, time_s)) => {
-                InputImage { time_s: time_s.unwrap_or_else(|| place.log_time_s()), image: Ok(image) }
-            }
-            Err(why) => broken(&why),
-        })
-    }
-}
-
-fn read_record(file: &mut File, at: u64) -> io::Result<Option<Record>> {
-    file.seek(SeekFrom::Start(at))?;
-    let mut head = [0; 9];
-    if !fill(file, &mut head)? {
-        return Ok(None);
-    }
-    let mut f = Fields(&head);
-    let (Some(op), Some(length)) = (f.u8(), f.u64()) else { return Ok(None) };
-    if length > MAX_RECORD_BYTES {
-        return Ok(None);
-    }
-    let mut content = Vec::new();
-    file.take(length).read_to_end(&mut content)?;
-    Ok((content.len() as u64 == length).then_some(Record { op, content }))
-}
-
-/// Returns the content of a message. `message` is its offset in the file, or in the uncompressed records of the chunk
-/// at `chunk` if that is compressed.
-fn read_message_in_chunk(file: &mut File, chunk: u64, message: u64) -> io::Result<Option<Vec<u8>>> {
-    file.seek(SeekFrom::Start(chunk + 9 + 28))?;
-    let mut length = [0; 4];
-    if !fill(file, &mut length)? {
-        return Ok(None);
-    }
-    if length == [0; 4] {
-        return Ok(read_record(file, message)?.map(|r| r.content));
-    }
-    // One chunk is read at a time, so only the limit of a chunk matters.
-    let parsed = read_record(file, chunk)?.and_then(|r| Chunk::parse(&r, &mut Inflation::default()).ok());
-    let Some((_, plain)) = parsed else { return Ok(None) };
-    let mut rest = Fields(plain.get(message as usize..).unwrap_or_default());
-    Ok(next_record(&mut rest, plain.len()).map(|(_, _, content)| content.to_vec()))
 }

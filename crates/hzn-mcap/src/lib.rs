@@ -25,6 +25,10 @@
 //! would need little space compared with the pictures, but without pictures ten times the space. Every chunk, the data
 //! and the summary have CRCs. The `sequence` of a message is the index of its frame.
 //!
+//! Recordings that other programs have written again are read too: with any chunks or none, and compressed with zstd,
+//! with LZ4 or not at all. Pictures are recognised by their channels, and frames are put together by log time and
+//! sequence.
+//!
 //! | topic | schema | encoding |
 //! |---|---|---|
 //! | `/hzn/report` | `hzn.Report`, the row plus `candidate_edges` and `given` | JSON |
@@ -47,6 +51,7 @@ mod index;
 mod messages;
 pub mod palette;
 mod part;
+mod pictures;
 mod reader;
 mod recover;
 mod row;
@@ -54,6 +59,7 @@ mod series;
 mod series_reader;
 mod status_name;
 mod topics;
+mod waiting;
 mod writer;
 
 pub use error::Error;
@@ -62,8 +68,9 @@ pub use frame::{
     PicturePrior,
 };
 pub use images::{ImageReader, InputImage};
-pub use index::{Index, IndexEntry, Pictures, Place};
+pub use index::{Index, IndexEntry};
 pub use part::{create_part, is_being_written, open_part, part_path, publish, rename, sync, sync_name};
+pub use pictures::{Pictures, Place};
 pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};
 pub use row::{Row, RowMeta, roll_pitch_deg};

@@ -1,16 +1,17 @@
 //! Reads frames from a recording, one batch at a time, also from broken files.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use crate::container::{Chunk, Fields, Inflation, Message, Op, Record, Scanner, Schemas};
+use crate::container::{Chunk, ChunkFault, Fields, Inflation, Message, Op, Record, Scanner, Schemas};
 use crate::drawing;
 use crate::error::Error;
-use crate::frame::{Annotations, Attitude, EncodedImage, FrameRecord, LogLine};
+use crate::frame::FrameRecord;
 use crate::messages;
 use crate::topics::Topic;
+use crate::waiting::Waiting;
 use crate::writer::SENSOR_TOML;
 
 /// The parts of each frame that are read.
@@ -19,12 +20,18 @@ pub enum Contents {
     /// Everything.
     #[default]
     All,
-    /// Everything except the pictures, which are skipped without being read.
+    /// Everything except the pictures. They are skipped without being read where the file allows it: in chunks of
+    /// pictures without compression, as hzn writes them, and outside of chunks.
     WithoutImages,
 }
 
+/// Size of the buffer while the pictures are skipped. Between them only heads of records are read, so a larger buffer
+/// would be filled with the beginnings of pictures.
+const HEADS_BYTES: usize = 64;
+
 /// Iterates over the frames of a recording in the order in which they were written. It needs the memory of one batch of
-/// frames. A file that was cut off gives every finished frame; [`Reader::is_complete`] then returns `false`.
+/// frames, or of one chunk if other programs wrote larger ones. A file that was cut off gives every finished frame;
+/// [`Reader::is_complete`] then returns `false`.
 #[derive(Debug)]
 pub struct Reader {
     scanner: Scanner<BufReader<File>>,
@@ -36,25 +43,17 @@ pub struct Reader {
     /// Topics by channel id, because the ids of other writers may differ.
     topics: BTreeMap<u16, Topic>,
     schemas: Schemas,
-    images: Parts<EncodedImage>,
+    contents: Contents,
+    waiting: Waiting,
     ready: VecDeque<FrameRecord>,
     complete: bool,
     inflation: Inflation,
     broken_chunks: u64,
+    unknown_compression: Option<String>,
+    /// Channels with the topic of the reports, but with another schema.
+    foreign_reports: BTreeSet<u16>,
+    unread_reports: u64,
     done: bool,
-}
-
-/// Parts of frames by their sequence number, in the order of the file.
-type Parts<T> = BTreeMap<u32, VecDeque<T>>;
-
-/// Takes the first part of a frame.
-fn take_part<T>(parts: &mut Parts<T>, sequence: u32) -> Option<T> {
-    let queue = parts.get_mut(&sequence)?;
-    let part = queue.pop_front();
-    if queue.is_empty() {
-        parts.remove(&sequence);
-    }
-    part
 }
 
 impl Reader {
@@ -66,22 +65,25 @@ impl Reader {
         let path = path.as_ref();
         let read = |source| Error::Read { path: path.to_path_buf(), source };
         let file = File::open(path).map_err(read)?;
-        let scanner = Scanner::try_new(BufReader::with_capacity(1 << 16, file)).map_err(read)?;
-        let mut scanner = scanner.ok_or_else(|| Error::NotMcap { path: path.to_path_buf() })?;
-        scanner.skip_plain_chunks(contents == Contents::WithoutImages);
+        let capacity = if contents == Contents::All { 1 << 16 } else { HEADS_BYTES };
+        let scanner = Scanner::try_new(BufReader::with_capacity(capacity, file)).map_err(read)?;
         let mut reader = Self {
-            scanner,
+            scanner: scanner.ok_or_else(|| Error::NotMcap { path: path.to_path_buf() })?,
             path: path.to_path_buf(),
             sensor_toml: None,
             metadata: BTreeMap::new(),
             peeked: None,
             topics: BTreeMap::new(),
             schemas: Schemas::default(),
-            images: BTreeMap::new(),
+            contents,
+            waiting: Waiting::default(),
             ready: VecDeque::new(),
             complete: false,
             inflation: Inflation::default(),
             broken_chunks: 0,
+            unknown_compression: None,
+            foreign_reports: BTreeSet::new(),
+            unread_reports: 0,
             done: false,
         };
         while let Some(record) = reader.scanner.next().map_err(read)? {
@@ -108,16 +110,31 @@ impl Reader {
     pub fn is_complete(&self) -> bool {
         self.complete
     }
-    /// Returns the number of chunks with damaged contents so far; their frames are missing.
+    /// Returns the number of chunks so far that cannot be read; their frames are missing. They are damaged, unless
+    /// [`Self::unknown_compression`] has a name.
     pub fn broken_chunks(&self) -> u64 {
         self.broken_chunks
+    }
+    /// Returns the name of a compression that hzn does not know, if chunks so far have one.
+    pub fn unknown_compression(&self) -> Option<&str> {
+        self.unknown_compression.as_deref()
+    }
+    /// Returns the number of messages so far that are on the topic of the reports, but have another schema.
+    pub fn unread_reports(&self) -> u64 {
+        self.unread_reports
     }
 
     /// Reads a record outside of chunks, or one that a chunk declares.
     fn read_declaration(&mut self, record: &Record) {
         if let Some((id, channel)) = self.schemas.declare(record.op, &record.content) {
-            let is_same = |t: &Topic| t.name() == channel.topic && t.schema().0 == channel.schema;
-            self.topics.extend(Topic::ALL.into_iter().find(is_same).map(|topic| (id, topic)));
+            let topic = Topic::of(&channel);
+            self.topics.extend(topic.map(|topic| (id, topic)));
+            if self.contents == Contents::WithoutImages && matches!(topic, Some(Topic::Image | Topic::RawImage)) {
+                self.scanner.skip_channel(id);
+            }
+            if topic.is_none() && channel.topic == Topic::Report.name() {
+                self.foreign_reports.insert(id);
+            }
         }
         let mut f = Fields(&record.content);
         match record.op {
@@ -136,59 +153,64 @@ impl Reader {
 
     /// Assembles frames from the messages of a chunk.
     fn read_chunk(&mut self, record: &Record) -> Result<(), Error> {
-        let Ok((chunk, plain)) = Chunk::parse(record, &mut self.inflation) else {
-            self.broken_chunks += 1;
-            return Ok(());
+        let (chunk, plain) = match Chunk::parse(record, &mut self.inflation) {
+            Ok(read) => read,
+            Err(fault) => {
+                self.broken_chunks += 1;
+                if let ChunkFault::Compression(name) = fault {
+                    self.unknown_compression.get_or_insert(name);
+                }
+                return Ok(());
+            }
         };
         for (op, _, content) in chunk.index.declared {
             self.read_declaration(&Record { op, content });
         }
-        let mut annotations = Parts::<Annotations>::new();
-        let mut attitudes = Parts::<Attitude>::new();
-        let mut logs = Parts::<LogLine>::new();
-        for m in Chunk::messages(&plain) {
-            let Some(&topic) = self.topics.get(&m.channel) else { continue };
-            let broken = |what: &str, e: String| Error::Decode {
-                path: self.path.clone(),
-                detail: format!("{what} of frame {}: {e}", m.sequence),
-            };
-            match topic {
-                Topic::Image | Topic::RawImage => {
-                    let schema = if topic == Topic::Image { "foxglove.CompressedImage" } else { "foxglove.RawImage" };
-                    let image = messages::parse_image(schema, m.data).map_err(|e| broken("picture", e))?;
-                    self.images.entry(m.sequence).or_default().push_back(image);
-                }
-                Topic::Annotations => {
-                    let a = drawing::parse(m.data).map_err(|e| broken("annotations", e.to_string()))?;
-                    annotations.entry(m.sequence).or_default().push_back(a);
-                }
-                Topic::Transform => {
-                    let t = messages::parse_transform(m.data).map_err(|e| broken("attitude", e.to_string()))?;
-                    attitudes.entry(m.sequence).or_default().extend(t);
-                }
-                Topic::Log => {
-                    let line = messages::parse_log(m.data).map_err(|e| broken("message", e.to_string()))?;
-                    logs.entry(m.sequence).or_default().push_back(line);
-                }
-                Topic::Report => {
-                    let (row, candidates, prior) =
-                        messages::parse_report(m.data).map_err(|e| broken("report", e.to_string()))?;
-                    self.ready.push_back(FrameRecord {
-                        row,
-                        candidates,
-                        image: take_part(&mut self.images, m.sequence),
-                        annotations: take_part(&mut annotations, m.sequence).unwrap_or_default(),
-                        attitude: take_part(&mut attitudes, m.sequence),
-                        prior,
-                        log: logs.remove(&m.sequence).unwrap_or_default().into(),
-                    });
-                }
-                Topic::Calibration | Topic::Axis => {}
+        Chunk::messages(&plain).try_for_each(|message| self.read_message(&message))
+    }
+
+    /// Adds a part to its frame; a report finishes the frame.
+    fn read_message(&mut self, m: &Message<'_>) -> Result<(), Error> {
+        let Some(&topic) = self.topics.get(&m.channel) else {
+            self.unread_reports += u64::from(self.foreign_reports.contains(&m.channel));
+            return Ok(());
+        };
+        let broken = |what: &str, e: String| Error::Decode {
+            path: self.path.clone(),
+            detail: format!("{what} of frame {}: {e}", m.sequence),
+        };
+        match topic {
+            Topic::Image | Topic::RawImage if self.contents == Contents::WithoutImages => {}
+            Topic::Image | Topic::RawImage => {
+                let schema = if topic == Topic::Image { "foxglove.CompressedImage" } else { "foxglove.RawImage" };
+                let image = messages::parse_image(schema, m.data).map_err(|e| broken("picture", e))?;
+                self.waiting.add_to(m).images.push_back(image);
             }
-        }
-        if chunk.compression == "zstd" {
-            // Pictures of a batch come before its reports, so the remaining pictures belong to no frame.
-            self.images.clear();
+            Topic::Annotations => {
+                let a = drawing::parse(m.data).map_err(|e| broken("annotations", e.to_string()))?;
+                self.waiting.add_to(m).annotations.push_back(a);
+            }
+            Topic::Transform => {
+                let t = messages::parse_transform(m.data).map_err(|e| broken("attitude", e.to_string()))?;
+                self.waiting.add_to(m).attitudes.extend(t);
+            }
+            Topic::Log => {
+                let line = messages::parse_log(m.data).map_err(|e| broken("message", e.to_string()))?;
+                self.waiting.add_to(m).log.push(line);
+            }
+            Topic::Report => {
+                let (row, candidates, prior) =
+                    messages::parse_report(m.data).map_err(|e| broken("report", e.to_string()))?;
+                let mut frame = FrameRecord { candidates, prior, ..FrameRecord::new(row) };
+                self.waiting.take(m, |parts| {
+                    frame.image = parts.images.pop_front();
+                    frame.annotations = parts.annotations.pop_front().unwrap_or_default();
+                    frame.attitude = parts.attitudes.pop_front();
+                    frame.log = std::mem::take(&mut parts.log);
+                });
+                self.ready.push_back(frame);
+            }
+            Topic::Calibration | Topic::Axis => {}
         }
         Ok(())
     }
@@ -201,6 +223,11 @@ impl Reader {
         let Some(record) = record else { return Ok(false) };
         match record.op {
             Op::CHUNK => self.read_chunk(&record)?,
+            Op::MESSAGE => {
+                if let Some(message) = Message::parse(&record.content) {
+                    self.read_message(&message)?;
+                }
+            }
             Op::DATA_END => {
                 self.complete = true;
                 return Ok(false);
@@ -232,9 +259,4 @@ impl Iterator for Reader {
             }
         }
     }
-}
-
-/// Counts the reports in the uncompressed records of a chunk; `channel` is the channel of the reports.
-pub(crate) fn count_reports(plain: &[u8], channel: u16) -> u64 {
-    Chunk::messages(plain).filter(|m: &Message<'_>| m.channel == channel).count() as u64
 }

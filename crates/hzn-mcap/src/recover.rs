@@ -1,13 +1,14 @@
 //! Closes and continues recordings that were cut off.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Read};
 use std::path::{Path, PathBuf};
 
-use crate::container::{Chunk, Container, Fields, Inflation, MAGIC, Op, Record, Scanner};
+use crate::container::{Chunk, ChunkFault, Container, Fields, Inflation, MAGIC, Message, Op, Record, Scanner};
 use crate::error::{Error, while_writing};
 use crate::part::{open_part, part_path, publish};
-use crate::reader::{Contents, Reader, count_reports};
+use crate::reader::{Contents, Reader};
 use crate::topics::Topic;
 use crate::writer::{LIBRARY, Options, Writer, open_container, refuse_existing};
 
@@ -39,7 +40,8 @@ pub struct Resumed {
 /// which must not exist.
 ///
 /// # Errors
-/// `input` cannot be read or is not an MCAP; `output` exists or cannot be written.
+/// `input` cannot be read, is not an MCAP, or has a compression that hzn does not read; `output` exists or cannot be
+/// written.
 pub fn recover(input: impl AsRef<Path>, output: impl AsRef<Path>) -> Result<Recovered, Error> {
     recover_while(input, output, |_, _| true)
 }
@@ -175,9 +177,10 @@ fn copy_frames(
     let mut copier = FrameCopier {
         out,
         found: Recovered::default(),
-        report_channel: None,
+        report_channels: BTreeSet::new(),
         waiting: Vec::new(),
         inflation: Inflation::default(),
+        unknown_compression: None,
     };
     let mut kept_to = scanner.position();
     while let Some(record) = scanner.next().map_err(read)? {
@@ -190,8 +193,11 @@ fn copy_frames(
             kept_to = size;
             break;
         }
-        if copier.add(&record).map_err(write)? {
+        if copier.add(record).map_err(write)? {
             kept_to = scanner.position();
+        }
+        if let Some(compression) = copier.unknown_compression.take() {
+            return Err(Error::Compression { path: input.to_path_buf(), compression });
         }
     }
     Ok(Recovered { dropped_bytes: size.saturating_sub(kept_to), ..copier.found })
@@ -201,52 +207,75 @@ fn copy_frames(
 struct FrameCopier<'a> {
     out: &'a mut Container<BufWriter<File>>,
     found: Recovered,
-    /// Channel of the reports, if it is declared.
-    report_channel: Option<u16>,
-    /// Chunks with pictures, which wait for their reports.
-    waiting: Vec<Chunk>,
+    /// Channels of the reports that are declared so far.
+    report_channels: BTreeSet<u16>,
+    /// Parts of frames, which wait for their reports.
+    waiting: Vec<Part>,
     inflation: Inflation,
+    unknown_compression: Option<String>,
+}
+
+/// A part of a recording that contains messages.
+enum Part {
+    Chunk(Chunk),
+    /// A message outside of chunks.
+    Message(Record),
 }
 
 impl FrameCopier<'_> {
     /// Adds a record that is not the end of the data. It returns `false` if the record waits for another.
-    fn add(&mut self, record: &Record) -> io::Result<bool> {
+    fn add(&mut self, record: Record) -> io::Result<bool> {
         match record.op {
-            Op::CHUNK => match Chunk::parse(record, &mut self.inflation) {
-                Ok((chunk, plain)) => return self.add_chunk(chunk, &plain),
-                Err(_) => self.found.broken_chunks += 1,
+            Op::CHUNK => match Chunk::parse(&record, &mut self.inflation) {
+                Ok((chunk, plain)) => {
+                    chunk.index.declared.iter().for_each(|(op, _, content)| self.read_declaration(*op, content));
+                    let reports = Chunk::messages(&plain).filter(|m| self.is_report(m)).count();
+                    return self.add_part(Part::Chunk(chunk), reports as u64);
+                }
+                Err(ChunkFault::Compression(name)) => self.unknown_compression = Some(name),
+                Err(ChunkFault::Damaged(_)) => self.found.broken_chunks += 1,
             },
+            Op::MESSAGE => {
+                let reports = Message::parse(&record.content).filter(|m| self.is_report(m)).iter().count();
+                return self.add_part(Part::Message(record), reports as u64);
+            }
             // The message indexes are written again.
             Op::MESSAGE_INDEX => {}
             op => {
-                if op == Op::CHANNEL {
-                    self.report_channel = self.report_channel.or(report_id(&record.content));
-                }
-                self.out.copy(record)?;
+                self.read_declaration(op, &record.content);
+                self.out.copy(&record)?;
             }
         }
         Ok(true)
     }
 
-    /// Writes a chunk and the chunks that wait for it, unless it has to wait too.
-    fn add_chunk(&mut self, chunk: Chunk, plain: &[u8]) -> io::Result<bool> {
-        for (op, _, content) in &chunk.index.declared {
-            if *op == Op::CHANNEL {
-                self.report_channel = self.report_channel.or(report_id(content));
-            }
+    /// Takes notice of a channel of reports.
+    fn read_declaration(&mut self, op: u8, content: &[u8]) {
+        if op == Op::CHANNEL {
+            self.report_channels.extend(report_id(content));
         }
-        let frames = self.report_channel.map_or(0, |id| count_reports(plain, id));
-        self.waiting.push(chunk);
-        if self.report_channel.is_some() && frames == 0 {
+    }
+
+    fn is_report(&self, message: &Message<'_>) -> bool {
+        self.report_channels.contains(&message.channel)
+    }
+
+    /// Writes a part and the parts that wait for it, unless it has to wait too.
+    fn add_part(&mut self, part: Part, reports: u64) -> io::Result<bool> {
+        self.waiting.push(part);
+        if !self.report_channels.is_empty() && reports == 0 {
             return Ok(false);
         }
         self.write_waiting()?;
-        self.found.frames += frames;
+        self.found.frames += reports;
         Ok(true)
     }
 
     fn write_waiting(&mut self) -> io::Result<()> {
-        self.waiting.drain(..).try_for_each(|chunk| self.out.chunk(&chunk))
+        self.waiting.drain(..).try_for_each(|part| match part {
+            Part::Chunk(chunk) => self.out.chunk(&chunk),
+            Part::Message(record) => self.out.copy(&record),
+        })
     }
 }
 

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use crate::container::{Channel, Chunk, Fields, Inflation, Message, Op, Scanner, Schemas};
+use crate::container::{Channel, Chunk, ChunkFault, Fields, Inflation, Message, Op, Scanner, Schemas};
 use crate::error::Error;
 
 /// Returns whether a recording has an attachment with this name before its first chunk. Only the beginning is read. A
@@ -32,7 +32,7 @@ pub fn begins_with_attachment(path: impl AsRef<Path>, name: &str) -> Result<bool
 /// needed for one chunk. A file that was cut off or damaged gives the messages before that place.
 ///
 /// # Errors
-/// The file cannot be read or is not an MCAP.
+/// The file cannot be read, is not an MCAP, or has a compression that hzn does not read.
 pub fn read_series(
     path: impl AsRef<Path>,
     wants: impl Fn(&str) -> bool,
@@ -55,7 +55,13 @@ pub fn read_series(
         match record.op {
             Op::DATA_END => break,
             Op::CHUNK => {
-                let Ok((chunk, plain)) = Chunk::parse(&record, &mut inflation) else { break };
+                let (chunk, plain) = match Chunk::parse(&record, &mut inflation) {
+                    Ok(read) => read,
+                    Err(ChunkFault::Compression(compression)) => {
+                        return Err(Error::Compression { path: path.to_path_buf(), compression });
+                    }
+                    Err(ChunkFault::Damaged(_)) => break,
+                };
                 for (op, _, content) in &chunk.index.declared {
                     channels.extend(schemas.declare(*op, content));
                 }

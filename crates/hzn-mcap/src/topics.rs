@@ -7,6 +7,7 @@ use foxglove::messages::{
 use hzn_core::status::Status;
 use serde_json::{Map, Value, json};
 
+use crate::container::Channel;
 use crate::row::Row;
 
 /// Schema of the fields on `/hzn/report` that are not columns of a row.
@@ -62,6 +63,12 @@ impl Topic {
         Self::Log,
         Self::RawImage,
     ];
+
+    /// Returns the topic of a channel that a recording declares; `None` if hzn has no such topic, or if its messages
+    /// have another schema there.
+    pub(crate) fn of(channel: &Channel) -> Option<Self> {
+        Self::ALL.into_iter().find(|topic| topic.name() == channel.topic && topic.schema().0 == channel.schema)
+    }
 
     pub(crate) fn id(self) -> u16 {
         self as u16

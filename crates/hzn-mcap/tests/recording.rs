@@ -1,28 +1,16 @@
 //! Tests of recordings: written, read back, cut off anywhere, closed and continued.
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
+mod common;
 
-use hzn_core::camera;
+use std::fs;
+use std::path::Path;
+
+use common::{SENSOR, frame, index, options, read, write};
 use hzn_core::status::Status;
 use hzn_mcap::{
-    Annotations, Attitude, CandidateEdge, Contents, EncodedImage, Error, FrameRecord, ImageFormat, ImageReader, Index,
-    IndexEntry, LogLevel, LogLine, Options, PicturePrior, Place, Reader, Row, RowMeta, Writer, part_path, recover,
+    Contents, EncodedImage, Error, ImageFormat, ImageReader, Index, Options, Reader, Row, Writer, part_path, recover,
     resume,
 };
-
-const SENSOR: &str = "preset = \"hzn\"\n";
-
-fn options() -> Options {
-    Options {
-        sensor_toml: SENSOR.into(),
-        metadata: BTreeMap::from([("hzn_version".to_owned(), "0.0.0".to_owned())]),
-        camera: Some(camera::Config::ideal(camera::Model::Pinhole, 640, 480, 400.0)),
-        force: false,
-        durable: false,
-    }
-}
 
 #[test]
 fn the_finished_size_is_known_before() {
@@ -47,71 +35,6 @@ fn the_finished_size_is_known_before() {
     }
     // The bound of long recordings is close.
     assert!(closest < 1.02, "{closest}");
-}
-
-/// Returns frame `i`. Frames differ in most parts; every third has no answer, every fourth has no picture.
-fn frame(i: u64) -> FrameRecord {
-    let f = i as f64;
-    let meta = RowMeta {
-        index: i,
-        file: format!("{i:04}.png"),
-        time_s: Some(100.0 + f * 0.1),
-        body: "earth".into(),
-        altitude_km: Some(230.0),
-    };
-    let mut row = Row::unprocessed(&meta, Status::Unreadable, "cut off");
-    if !i.is_multiple_of(3) {
-        row.status = Status::Ok;
-        row.detail.clear();
-        (row.axis_x, row.axis_y, row.axis_z) = (Some(0.0), Some(0.6), Some(0.8));
-        row.rms_px = Some(0.1 + f);
-    }
-    FrameRecord {
-        row,
-        candidates: vec![CandidateEdge {
-            length_px: i as u32,
-            points: 7,
-            inliers: 5,
-            rms_px: Some(0.25),
-            verdict: "chosen".into(),
-        }],
-        image: (i % 4 != 1).then(|| EncodedImage {
-            format: ImageFormat::Png,
-            // The bytes do not compress, like those of a picture.
-            bytes: (0..2000u64).map(|k| ((k * k * 2_654_435_761 + i * 40_503) >> 13) as u8).collect(),
-        }),
-        annotations: Annotations {
-            edges: vec![vec![[0.0, f], [1.0, f]], vec![[5.0, 5.0], [6.0, 7.5]]],
-            inliers: vec![[0.25, f]],
-            rejected: vec![[3.0, 4.0]],
-            limb: vec![vec![[0.0, 0.0], [1.0, 1.0]]],
-            axes: vec![[320.0, 200.0]],
-        },
-        attitude: i
-            .is_multiple_of(2)
-            .then_some(Attitude { q_ecef_from_camera_wxyz: [0.5, 0.5, 0.5, 0.5], position_m: [6.6e6, f, 0.0] }),
-        prior: PicturePrior {
-            altitude_km: Some(230.0),
-            position_km: Some([6601.0, f, 0.1]),
-            ..PicturePrior::default()
-        },
-        log: vec![LogLine { level: LogLevel::Warning, message: format!("frame {i}") }],
-    }
-}
-
-fn read(path: &Path) -> Vec<FrameRecord> {
-    Reader::open(path, Contents::All).unwrap().map(Result::unwrap).collect()
-}
-
-fn write(path: &Path, frames: u64, batch: u64) -> PathBuf {
-    let mut writer = Writer::create(path, &options()).unwrap();
-    for i in 0..frames {
-        writer.write(&frame(i)).unwrap();
-        if i % batch == batch - 1 {
-            writer.flush().unwrap();
-        }
-    }
-    writer.finish().unwrap()
 }
 
 #[test]
@@ -363,24 +286,6 @@ fn frames_are_finished_within_the_interval() {
     assert_eq!(read(writer.part()).len(), 1);
 }
 
-/// Returns everything that an index finds, and the index.
-fn index(path: &Path) -> (Vec<Place>, Vec<(Row, PicturePrior)>, Index) {
-    let (mut pictures, mut rows) = (vec![], vec![]);
-    let mut index = Index::open(path).unwrap();
-    while let Some(part) = index.next_part().unwrap() {
-        for found in part {
-            match found {
-                IndexEntry::Picture(place) => pictures.push(place),
-                IndexEntry::Report(row, candidates, prior) => {
-                    assert_eq!(candidates, frame(row.index).candidates);
-                    rows.push((*row, *prior));
-                }
-            }
-        }
-    }
-    (pictures, rows, index)
-}
-
 #[test]
 fn any_picture_is_found_by_its_place() {
     let dir = tempfile::tempdir().unwrap();
@@ -422,26 +327,4 @@ fn a_cut_recording_is_indexed_as_far_as_it_goes() {
     assert_eq!(last, 9);
     fs::write(&cut, b"no recording at all").unwrap();
     assert!(matches!(Index::open(&cut), Err(Error::NotMcap { .. })));
-}
-
-/// Other writers compress pictures together with all other data.
-#[test]
-fn pictures_in_compressed_chunks_are_found_too() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("theirs.mcap");
-    let mut writer = mcap::Writer::new(std::io::BufWriter::new(fs::File::create(&path).unwrap())).unwrap();
-    let ours = write(&dir.path().join("out.mcap"), 8, 3);
-    let bytes = fs::read(&ours).unwrap();
-    for message in mcap::MessageStream::new(&bytes).unwrap() {
-        writer.write(&message.unwrap()).unwrap();
-    }
-    writer.finish().unwrap();
-    drop(writer);
-    let (pictures, rows, found) = index(&path);
-    assert_eq!(rows.len(), 8);
-    let mut reader = found.pictures().unwrap();
-    for place in &pictures {
-        assert_eq!(reader.read(place).unwrap().image.ok(), frame(place.sequence().into()).image);
-    }
-    assert_eq!(pictures.len(), index(&ours).0.len());
 }

@@ -6,7 +6,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::filter::{DirectionMeasurement, Filter, Step};
+use crate::filter::{DirectionMeasurement, Filter, Step, Unusable};
 use crate::strapdown::{Imu, Nominal};
 
 /// A measurement.
@@ -29,8 +29,8 @@ pub enum Outcome {
     Taken,
     /// The gate refused it.
     Gated,
-    /// A number is not finite, or its camera does not exist.
-    Unusable,
+    /// The filter cannot use it.
+    Unusable(Unusable),
 }
 
 /// Why a measurement was not accepted into the list.
@@ -249,17 +249,17 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
             Measurement::Attitude(q, sigma) => self.filter.update_attitude(q, *sigma).map(|i| i.taken),
         };
         match taken {
-            Some(true) => {
+            Ok(true) => {
                 self.counts.taken += 1;
                 Outcome::Taken
             }
-            Some(false) => {
+            Ok(false) => {
                 self.counts.gated += 1;
                 Outcome::Gated
             }
-            None => {
+            Err(why) => {
                 self.counts.unusable += 1;
-                Outcome::Unusable
+                Outcome::Unusable(why)
             }
         }
     }

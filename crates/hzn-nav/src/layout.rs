@@ -4,6 +4,8 @@ use crate::options::{Block, CameraOptions, Mode, Options};
 
 /// Largest number of cameras.
 pub const MAX_CAMERAS: usize = 4;
+/// Largest number of bodies that a camera sees: limb, Sun, Moon.
+pub const MAX_BODIES: usize = 3;
 
 /// Place of an error in the vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,8 +23,8 @@ pub struct Place {
 pub struct CameraPlaces {
     /// Error of the mount (camera frame), rad.
     pub misalignment: Option<Place>,
-    /// Slow error of the direction (camera frame).
-    pub slow_error: Option<Place>,
+    /// Slow error of the direction to each body (camera frame).
+    pub slow_errors: [Option<Place>; MAX_BODIES],
     /// Clock offset, s.
     pub clock: Option<Place>,
 }
@@ -76,10 +78,13 @@ impl Layout {
         layout.limb_latitude = layout.place(options.limb_latitude, 2);
         for (i, camera) in cameras.iter().take(MAX_CAMERAS).enumerate() {
             let misalignment = layout.place(camera.misalignment, 3);
-            let slow_error = layout.place(Block { mode: camera.slow_error, sigma: 1.0 }, 3);
+            let mut slow_errors = [None; MAX_BODIES];
+            for place in slow_errors.iter_mut().take(camera.bodies) {
+                *place = layout.place(Block { mode: camera.slow_error, sigma: 1.0 }, 3);
+            }
             let clock = layout.place(camera.clock, 1);
             if let Some(places) = layout.cameras.get_mut(i) {
-                *places = CameraPlaces { misalignment, slow_error, clock };
+                *places = CameraPlaces { misalignment, slow_errors, clock };
             }
         }
         layout
@@ -110,7 +115,7 @@ impl Layout {
             self.limb_height,
             self.limb_latitude,
         ];
-        let cameras = self.cameras.iter().flat_map(|c| [c.misalignment, c.slow_error, c.clock]);
+        let cameras = self.cameras.iter().flat_map(|c| [c.misalignment, c.clock].into_iter().chain(c.slow_errors));
         imu.into_iter().chain(cameras).flatten()
     }
 }

@@ -100,6 +100,9 @@ pub struct CameraOptions {
     pub slow_error: Mode,
     /// Correlation time of the slow error, s.
     pub slow_error_time_s: f64,
+    /// Number of bodies that the camera sees, from 1 to [`MAX_BODIES`](crate::layout::MAX_BODIES). Each has a slow error
+    /// of its own: limb and Sun in one picture do not share their errors.
+    pub bodies: usize,
     /// White noise of a direction, rad.
     pub white_rad: f64,
     /// The time that is added to the camera's clock to give that of the inertial unit, s.
@@ -113,6 +116,7 @@ impl Default for CameraOptions {
             misalignment: Block::estimated(core::f64::consts::PI / 180.0),
             slow_error: Mode::Considered,
             slow_error_time_s: 20.0,
+            bodies: 1,
             white_rad: 0.005,
             clock: Block::OFF,
         }

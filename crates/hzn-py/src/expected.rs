@@ -10,18 +10,16 @@ use crate::state::State;
 #[doc = doc!("Expected")]
 #[pyclass(frozen, module = "hzn")]
 pub(crate) struct Expected {
-    pub(crate) data: FrameData,
     pub(crate) core: CoreExpected<f64>,
 }
 
 impl Expected {
-    pub(crate) fn new(state: &State, data: FrameData, body: usize) -> PyResult<Self> {
+    pub(crate) fn new(state: &State, data: &FrameData, body: usize) -> PyResult<Self> {
         let bodies = state.config.each_body().len();
         if body >= bodies {
             return Err(errors::config(format!("body: {body} is refused: must be 0 to {}", bodies - 1)));
         }
-        let core = state.expect_body(body, &data)?;
-        Ok(Self { data, core })
+        Ok(Self { core: state.expect_body(body, data)? })
     }
 }
 

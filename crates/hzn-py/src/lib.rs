@@ -24,6 +24,7 @@ mod notebook;
 mod overlay;
 mod parameters;
 mod pickled;
+mod prior;
 mod recording;
 mod report;
 mod sensor;
@@ -50,13 +51,15 @@ mod _hzn {
     #[pymodule_export]
     use crate::overlay::overlay;
     #[pymodule_export]
+    use crate::prior::Prior;
+    #[pymodule_export]
     use crate::recording::{Frame, Recording, open_mcap, read_mcap, write_mcap};
     #[pymodule_export]
     use crate::report::Report;
     #[pymodule_export]
     use crate::sensor::Sensor;
     #[pymodule_export]
-    use crate::sequence::{Item, Sequence, process_encoded};
+    use crate::sequence::{Item, Sequence, check_prior, process_encoded};
     #[pymodule_export]
     use crate::simulation::{SimulatedFrame, Simulation, design, evaluate};
     #[pymodule_export]

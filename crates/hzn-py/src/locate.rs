@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use crate::camera::{Camera, rows};
 use crate::errors;
-use crate::sensor::{check_attitude, direction};
+use crate::prior::{check_attitude, direction};
 
 /// How the position is fitted.
 #[derive(Clone, Copy)]

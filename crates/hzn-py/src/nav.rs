@@ -104,7 +104,9 @@ pub(crate) fn fuse<'py>(
     let settings = settings(given)?;
     let mut inputs = Inputs::default();
     for path in &recordings {
-        inputs.recordings.push(input::recording(path).map_err(to_exception)?);
+        let recording = input::recording(path).map_err(to_exception)?;
+        recording.lost.as_ref().map_or(Ok(()), |lost| errors::warn(py, lost))?;
+        inputs.recordings.push(recording);
     }
     for (name, rows) in &mounts {
         let found = inputs.recordings.iter_mut().find(|r| r.name == *name);
@@ -176,7 +178,7 @@ impl Filter {
         let [attitude_rad, velocity_m_s, position_m] = sigmas;
         let options = settings.options(None, StartSigmas { attitude_rad, velocity_m_s, position_m });
         let mount = |(i, rows): (usize, &Rows)| {
-            Ok(settings.camera_options(&i.to_string(), rotation(&format!("mounts[{i}]"), rows)?))
+            Ok(settings.camera_options(&i.to_string(), rotation(&format!("mounts[{i}]"), rows)?, 1))
         };
         let cameras = mounts.iter().enumerate().map(mount).collect::<PyResult<Vec<_>>>()?;
         let filter = hzn_nav::filter::Filter::new(start, &options, &cameras).map_err(errors::config)?;
@@ -206,22 +208,23 @@ impl Filter {
         let covariance_rad2 = Matrix3::from_fn(|i, j| covariance[i][j]);
         let measurement = DirectionMeasurement {
             camera,
+            body: 0,
             measured: measured.into(),
             reference: reference.into(),
             covariance_rad2,
             by_limb_height: by_limb_height.into(),
             is_limb,
         };
-        self.filter.update_direction(&measurement).map(taken)
+        self.filter.update_direction(&measurement).ok().map(taken)
     }
     fn update_position(&mut self, position: Three, sigma: f64) -> Option<Taken> {
-        self.filter.update_position(&position.into(), sigma).map(taken)
+        self.filter.update_position(&position.into(), sigma).ok().map(taken)
     }
     fn update_velocity(&mut self, velocity: Three, sigma: f64) -> Option<Taken> {
-        self.filter.update_velocity(&velocity.into(), sigma).map(taken)
+        self.filter.update_velocity(&velocity.into(), sigma).ok().map(taken)
     }
     fn update_attitude(&mut self, attitude: Rows, sigma: f64) -> PyResult<Option<Taken>> {
-        Ok(self.filter.update_attitude(&rotation("attitude", &attitude)?, sigma).map(taken))
+        Ok(self.filter.update_attitude(&rotation("attitude", &attitude)?, sigma).ok().map(taken))
     }
     /// Time, attitude, velocity, position.
     fn state(&self) -> (f64, Rows, Three, Three) {

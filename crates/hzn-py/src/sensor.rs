@@ -6,15 +6,15 @@ use std::sync::{Arc, PoisonError, RwLock};
 use hzn_calib::{FrameData, plausible, sensor};
 use hzn_core::Config;
 use hzn_core::body::PriorError;
-use hzn_core::status::Status;
 use hzn_mcap::{Row, RowMeta};
-use hzn_run::engine::Traces;
+use hzn_run::engine::{Traces, Unprocessed};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::camera::Camera;
 use crate::expected::Expected;
 use crate::image::{Array, View};
+use crate::prior::Prior;
 use crate::report::Report;
 use crate::state::State;
 use crate::{errors, parameters};
@@ -95,8 +95,19 @@ impl Sensor {
         rate_rad_s: Option<[f64; 3]>,
         time_s: Option<f64>,
     ) -> PyResult<Expected> {
-        let data = collect_prior(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?;
-        Expected::new(&self.state(), data, body)
+        let known = Prior::new(
+            altitude_km,
+            position_km,
+            attitude,
+            attitude_sigma_deg,
+            rate_rad_s,
+            None,
+            None,
+            None,
+            None,
+            time_s,
+        )?;
+        Expected::new(&self.state(), &known.data, body)
     }
 
     #[doc = doc!("Sensor.process")]
@@ -120,13 +131,18 @@ impl Sensor {
         bits: Option<u8>,
         detail: bool,
     ) -> PyResult<Report> {
-        let data = FrameData {
+        let Prior { data } = Prior::new(
+            altitude_km,
+            position_km,
+            attitude,
+            attitude_sigma_deg,
+            rate_rad_s,
             range_km,
             range_sigma_km,
-            pole_camera: direction("pole", pole)?,
-            sun_camera: direction("sun", sun)?,
-            ..collect_prior(altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s)?
-        };
+            pole,
+            sun,
+            time_s,
+        )?;
         let state = self.state();
         let array = Array::from_object(image)?;
         state.check_size(&array)?;
@@ -152,12 +168,9 @@ impl Sensor {
             let row = Row::from_report(&meta, &found, Some(elapsed_us));
             Ok(Report::new(row, &found, traces.get(which), &state.camera))
         };
-        let reports: Vec<Report> =
-            processed.into_iter().zip(bodies).enumerate().map(report).collect::<PyResult<_>>()?;
-        if reports.iter().all(|report| !report.is_answer())
-            && let Some(tip) = array.unused_bits(bits)
-        {
-            errors::warn(py, format_args!("nothing found: {tip}"))?;
+        let reports = processed.into_iter().zip(bodies).enumerate().map(report).collect::<PyResult<Vec<_>>>()?;
+        if reports.iter().all(|report| !report.is_answer()) {
+            warn_of_unused_bits(py, &array, bits)?;
         }
         Ok(Report::from_bodies(py, reports)?.with_image(image, bits))
     }
@@ -206,15 +219,26 @@ fn read_sections(sections: &Bound<'_, PyDict>) -> PyResult<Config> {
     parameters::config(&sections)
 }
 
-/// Returns the report on a picture of which nothing can be expected. Every rocket starts below the limb height, and its
-/// flight goes on, so this is no error.
+/// Returns the report on a picture of which nothing can be expected, because the altitude is unknown or no limb is
+/// visible from there. Every rocket starts below the limb height, and its flight goes on, so this is no error; wrong
+/// arguments are.
 fn report_without_limb(meta: &RowMeta, why: PriorError) -> PyResult<Report> {
     match why {
-        PriorError::BelowLimb { .. } => {
-            Ok(Report::from_row(Row::unprocessed(meta, Status::NoAltitude, why.to_string())))
+        PriorError::NoAltitude
+        | PriorError::BelowLimb { .. }
+        | PriorError::Inside { .. }
+        | PriorError::TooSmall { .. }
+        | PriorError::Fills { .. } => {
+            let Unprocessed { status, why, .. } = why.into();
+            Ok(Report::from_row(Row::unprocessed(meta, status, why)))
         }
         why => Err(errors::config(why)),
     }
+}
+
+/// Warns of unused bits in a picture in which nothing was found.
+fn warn_of_unused_bits(py: Python<'_>, array: &Array<'_>, bits: Option<u8>) -> PyResult<()> {
+    array.unused_bits(bits).map_or(Ok(()), |tip| errors::warn(py, format_args!("nothing found: {tip}")))
 }
 
 /// Returns the data of a picture for its row.
@@ -225,46 +249,4 @@ fn row_meta(data: &FrameData, body: &hzn_core::body::Config) -> RowMeta {
         altitude_km: hzn_run::sink::altitude_km(Some(data), body),
         ..RowMeta::default()
     }
-}
-
-/// Checks a direction in the camera frame.
-pub(crate) fn direction(name: &str, v: Option<[f64; 3]>) -> PyResult<Option<[f64; 3]>> {
-    let is_direction = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>() > 1e-18 && v.iter().all(|x| x.is_finite());
-    match v {
-        Some(v) if !is_direction(&v) => Err(errors::config(format!("{name}: three finite numbers that are not all 0"))),
-        v => Ok(v),
-    }
-}
-
-/// Checks a quaternion.
-pub(crate) fn check_attitude(q: [f64; 4]) -> PyResult<[f64; 4]> {
-    if (q.iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() < 0.01 {
-        return Ok(q);
-    }
-    Err(errors::config("attitude: a quaternion (w, x, y, z) of length 1 is expected"))
-}
-
-/// Collects the prior of a picture, with the checks that the core cannot make.
-fn collect_prior(
-    altitude_km: Option<f64>,
-    position_km: Option<[f64; 3]>,
-    attitude: Option<[f64; 4]>,
-    attitude_sigma_deg: Option<f64>,
-    rate_rad_s: Option<[f64; 3]>,
-    time_s: Option<f64>,
-) -> PyResult<FrameData> {
-    let attitude = attitude.map(check_attitude).transpose()?;
-    if time_s.is_some_and(|t| !t.is_finite()) {
-        return Err(errors::config("time_s: must be a finite number"));
-    }
-    Ok(FrameData {
-        time_s,
-        utc_s: time_s,
-        altitude_km,
-        position_km,
-        camera_to_ecef_wxyz: attitude,
-        attitude_sigma_deg,
-        rate_rad_s,
-        ..FrameData::default()
-    })
 }

@@ -11,7 +11,7 @@ use hzn_run::{Error, Kind};
 use pyo3::prelude::*;
 
 use crate::errors;
-use crate::expected::Expected;
+use crate::prior::Prior;
 use crate::report::Report;
 use crate::sensor::Sensor;
 use crate::state::State;
@@ -103,6 +103,17 @@ impl Sequence {
     }
 }
 
+/// Raises a `ConfigError` if the sensor refuses these data, as `hzn run` refuses a frames.csv before it begins.
+#[pyfunction]
+#[pyo3(name = "_check_prior")]
+pub(crate) fn check_prior(sensor: &Sensor, known: &Prior) -> PyResult<()> {
+    let state = sensor.state();
+    match state.lend(|sensor| engine::find_refused(&state.config, sensor, &known.data))? {
+        Some(why) => Err(errors::config(why)),
+        None => Ok(()),
+    }
+}
+
 /// Decodes and processes the contents of a picture file. `data` is `None` if the file could not be read, for the reason
 /// `why`.
 #[pyfunction]
@@ -114,11 +125,11 @@ pub(crate) fn process_encoded(
     name: String,
     data: Option<Vec<u8>>,
     why: String,
-    expected: &Expected,
+    known: &Prior,
 ) -> PyResult<Report> {
     let state = sensor.state();
-    let time_s = expected.data.time_s.or(Some(index as f64));
-    let row = FrameData { file: name.clone(), time_s, ..expected.data.clone() };
+    let time_s = known.data.time_s.or(Some(index as f64));
+    let row = FrameData { file: name.clone(), time_s, ..known.data.clone() };
     let plan = default_plan(&state, None);
     let payload = data.map_or(Payload::Broken(why), Payload::Encoded);
     process_item(

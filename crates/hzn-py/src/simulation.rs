@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera as Lens;
 use hzn_core::image::Layout;
+use hzn_run::results::Results;
 use hzn_run::scene;
 use hzn_run::source::picture::{Picture, Samples};
 use hzn_sim::evaluate::{Evaluation, pair};
@@ -208,8 +209,9 @@ pub(crate) fn evaluate<'py>(
     let mut camera = camera.map(|c| c.config.clone());
     let mut rows = match results.extract::<PathBuf>() {
         Ok(path) => {
-            let (rows, sensor) = hzn_run::results::read(&path).map_err(to_exception)?;
-            let recorded = sensor.and_then(|t| hzn_calib::sensor::parse(&t, Path::new("sensor.toml")).ok());
+            let Results { rows, sensor_toml, lost } = hzn_run::results::read(&path).map_err(to_exception)?;
+            lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
+            let recorded = sensor_toml.and_then(|t| hzn_calib::sensor::parse(&t, Path::new("sensor.toml")).ok());
             camera = camera.or(recorded.map(|s| s.config.camera));
             rows
         }

@@ -1,5 +1,6 @@
 """Tests of an archive on a real cluster of two processes."""
 
+import math
 import os
 import signal
 import threading
@@ -13,7 +14,9 @@ from conftest import CAMERA, limb, pgm
 
 dask = pytest.importorskip("dask")
 import distributed  # noqa: E402
+import fsspec  # noqa: E402
 import pyarrow.parquet as parquet  # noqa: E402
+from moto.server import ThreadedMotoServer  # noqa: E402
 
 from hzn.dask import process_archive  # noqa: E402
 
@@ -110,6 +113,72 @@ def test_reports_come_from_workers(client, small):
         assert np.array_equal(hzn.overlay(image, report), hzn.overlay(image, here))
 
 
+@pytest.mark.parametrize("format", ["parquet", "mcap"])
+def test_a_picture_without_an_altitude_costs_no_other(client, archive, tmp_path, format):
+    sensor = hzn.Sensor(camera=SMALL, body={"kind": "earth-sphere"}, candidates={"min_points": 20})
+    known = [{"altitude_km": 400.0}, {}, {"altitude_km": math.nan}, {"altitude_km": 12.0}, {"altitude_km": 400.0}]
+    urls = list(zip(archive, known, strict=False))
+    result = process_archive(urls, sensor, client=client, out=str(tmp_path / format), format=format, retries=0)
+    (shard,) = [shard.removeprefix("file://") for shard in result.shards]
+    table = parquet.read_table(shard).to_pydict() if format == "parquet" else hzn.read_mcap(shard)
+    without = "no-altitude"
+    assert list(table["status"]) == ["ok", without, without, without, "ok"]
+    assert [f["file"] for f in result.failed] == archive[1:4]
+    details = [f["detail"] for f in result.failed]
+    assert details[0] == details[1] and details[0].startswith("no altitude: set body.altitude_km")
+    assert details[2].startswith("altitude 12 km is below the limb height ")
+    # Without this picture's own data, the parameters' altitude counts.
+    sensor.parameters = sensor.parameters | {"body": {"kind": "earth-sphere", "altitude_km": 400.0}}
+    result = process_archive(urls, sensor, client=client, out=str(tmp_path / format), format=format, retries=0)
+    assert [f["file"] for f in result.failed] == archive[3:4]
+
+
+@pytest.fixture
+def bucket(client, monkeypatch):
+    """Return a new bucket of a server that speaks the protocol of S3, for this process and the workers."""
+    server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    server.start()
+    host, port = server.get_host_and_port()
+    environment = {
+        "AWS_ENDPOINT_URL": f"http://{host}:{port}",
+        "AWS_ACCESS_KEY_ID": "hzn",
+        "AWS_SECRET_ACCESS_KEY": "hzn",
+        "AWS_DEFAULT_REGION": "us-east-1",
+    }
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    client.run(lambda: os.environ.update(environment))
+    fsspec.filesystem("s3").mkdir("flights")
+    yield "s3://flights"
+    server.stop()
+
+
+def test_an_archive_in_an_object_store(client, archive, small, bucket):
+    files = fsspec.filesystem("s3")
+    for path in archive[:30]:
+        files.put_file(path, f"flights/pictures/{os.path.basename(path)}")
+    urls = [f"{bucket}/pictures/{os.path.basename(path)}" for path in archive[:30]] + [f"{bucket}/pictures/lost.pgm"]
+    # The folder does not exist before its first shard.
+    result = process_archive(urls, small, client=client, out=f"{bucket}/out/a", shard_frames=20, retries=0)
+    assert (result.frames, len(result.shards), result.skipped) == (31, 2, 0)
+    assert all(shard.startswith("s3://flights/out/a/part-") for shard in result.shards)
+    assert [f["file"] for f in result.failed] == urls[-1:]
+    tables = [parquet.read_table(files.open(shard)).to_pydict() for shard in result.shards]
+    found = [axis for table in tables for axis in table["axis_y"]]
+    assert found[:-1] == [small.process(np.ascontiguousarray(limb(i)[::4, ::4])).to_dict()["axis_y"] for i in range(30)]
+    # Another program removes a shard and leaves the unfinished file of a worker; the next run makes what is missing.
+    store = fsspec.filesystem("s3", skip_instance_cache=True)
+    lost = result.shards[1].removeprefix("s3://")
+    store.mv(lost, f"{lost}.77.part")
+    again = process_archive(urls, small, client=client, out=f"{bucket}/out/a", shard_frames=20, retries=0)
+    assert (again.shards, again.skipped) == (result.shards, 1)
+    store.invalidate_cache()
+    assert sorted(store.ls("flights/out/a")) == sorted(shard.removeprefix("s3://") for shard in result.shards)
+    for out in (f"{bucket}/out/m", bucket):
+        recorded = process_archive(urls, small, client=client, out=out, format="mcap", retries=0)
+        assert [f["file"] for f in recorded.failed] == urls[-1:]
+
+
 def test_what_an_archive_refuses(client, archive, small, tmp_path):
     out = str(tmp_path)
     for urls, sensor, more, what in [
@@ -120,5 +189,13 @@ def test_what_an_archive_refuses(client, archive, small, tmp_path):
     ]:
         with pytest.raises(hzn.ConfigError, match=what):
             process_archive(urls, sensor, client=client, out=out, **more)
-    with pytest.raises(hzn.ConfigError, match="attitude"):
-        process_archive([(archive[0], {"attitude": [2, 0, 0, 0]})], small, client=client, out=out, retries=0)
+    # Impossible data are refused before anything is processed, with the name of the picture.
+    for known, what in [
+        ({"attitude": [2, 0, 0, 0]}, "attitude: a quaternion"),
+        ({"altitude_km": -9000.0}, "altitude_km must be"),
+        ({"altitude_km": "high"}, "must be real number"),
+        ({"altitude": 400.0}, "altitude"),
+    ]:
+        with pytest.raises(hzn.ConfigError, match=f"{archive[1]}: .*{what}"):
+            process_archive([archive[0], (archive[1], known)], small, client=client, out=out)
+    assert list(tmp_path.iterdir()) == []

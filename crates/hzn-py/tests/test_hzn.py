@@ -81,12 +81,13 @@ def test_what_is_no_picture_is_refused(sensor, image, what):
 @pytest.mark.parametrize(
     ("known", "what"),
     [
-        ({"altitude_km": float("nan")}, "altitude_km"),
+        ({"altitude_km": float("inf")}, "altitude_km"),
         ({"altitude_km": -3.0}, "altitude_km"),
         ({"position_km": [np.nan, 0, 0]}, "x_km"),
         ({"position_km": [1000.0, 0, 0]}, "x_km|outside"),
         ({"attitude": [2.0, 0, 0, 0]}, "attitude"),
         ({"attitude_sigma_deg": -1.0, "attitude": [1.0, 0, 0, 0]}, "attitude_sigma_deg"),
+        ({"time_s": float("inf")}, "time_s"),
     ],
 )
 def test_what_cannot_be_known_is_refused(sensor, known, what):

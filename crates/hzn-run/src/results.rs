@@ -7,13 +7,24 @@ use hzn_mcap::{Contents, Reader, Row};
 
 use crate::checked_row::{from_csv, from_json};
 use crate::error::{Error, failed, unusable};
-use crate::source::ending;
+use crate::source::{describe_recording_loss, ending};
 
-/// Reads all rows of results, and the sensor.toml if the file is an MCAP with one.
+/// Results that were read.
+#[derive(Debug, Default)]
+pub struct Results {
+    /// All rows that can be read.
+    pub rows: Vec<Row>,
+    /// The text of the sensor.toml, if the file is an MCAP with one.
+    pub sensor_toml: Option<String>,
+    /// What is missing in the file; `None` if it is complete.
+    pub lost: Option<String>,
+}
+
+/// Reads all rows of results.
 ///
 /// # Errors
 /// The file does not exist, is not a file of results of `hzn run`, or is broken.
-pub fn read(file: &Path) -> Result<(Vec<Row>, Option<String>), Error> {
+pub fn read(file: &Path) -> Result<Results, Error> {
     if !file.is_file() {
         return Err(unusable(format!("{}: no such file", file.display())));
     }
@@ -21,9 +32,12 @@ pub fn read(file: &Path) -> Result<(Vec<Row>, Option<String>), Error> {
         "mcap" => {
             let mut reader = Reader::open(file, Contents::WithoutImages).map_err(failed)?;
             let rows = reader.by_ref().map(|f| f.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)?;
-            Ok((rows, reader.sensor_toml().map(str::to_owned)))
+            let sensor_toml = reader.sensor_toml().map(str::to_owned);
+            Ok(Results { rows, sensor_toml, lost: describe_recording_loss(&reader, file, "read") })
         }
-        kind @ ("csv" | "jsonl") => Ok((rows(file, kind)?.collect::<Result<_, _>>()?, None)),
+        kind @ ("csv" | "jsonl") => {
+            Ok(Results { rows: rows(file, kind)?.collect::<Result<_, _>>()?, ..Results::default() })
+        }
         _ => Err(unusable(format!("{}: results of `hzn run` are expected: .mcap, .csv or .jsonl", file.display()))),
     }
 }

@@ -93,6 +93,7 @@ impl Recorded {
                     let covariance_rad2 = Matrix3::from_rows(&[9, 12, 15].map(|i| three(i).transpose()));
                     let direction = DirectionMeasurement {
                         camera: r[2] as usize,
+                        body: 0,
                         measured: three(3),
                         reference: three(6),
                         covariance_rad2,

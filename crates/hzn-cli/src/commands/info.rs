@@ -46,7 +46,7 @@ fn recording(file: &Path) -> Result<Described, Stop> {
     for frame in reader.by_ref() {
         summary.add(&frame.map_err(failed)?.row);
     }
-    if summary.frames == 0 && reader.sensor_toml().is_none() {
+    if summary.frames == 0 && reader.sensor_toml().is_none() && reader.unread_reports() == 0 {
         return foreign(file);
     }
     let mut out = kind_line("recording of hzn run") + &summary.text();
@@ -56,7 +56,9 @@ fn recording(file: &Path) -> Result<Described, Stop> {
     if !reader.is_complete() {
         out.push_str(&unfinished(file));
     }
-    if reader.broken_chunks() > 0 {
+    if let Some(compression) = reader.unknown_compression() {
+        out.push_str(&format!("compression      {compression:?}, which hzn does not read\n"));
+    } else if reader.broken_chunks() > 0 {
         out.push_str(&format!("damaged parts    {}\n", reader.broken_chunks()));
     }
     if let Some(Ok(sensor)) = reader.sensor_toml().map(|t| hzn_calib::sensor::parse(t, Path::new("sensor.toml"))) {
@@ -64,7 +66,7 @@ fn recording(file: &Path) -> Result<Described, Stop> {
         out.push_str(&format!("camera           {} x {} px, {}\n", c.width, c.height, c.model.name()));
     }
     // An unfinished file without broken parts is not damaged: its run still goes on, or --resume continues it.
-    let unfinished = ending(file) == "part" && reader.broken_chunks() == 0;
+    let unfinished = ending(file) == "part" && reader.broken_chunks() == 0 && reader.unread_reports() == 0;
     Ok((out, source::describe_recording_loss(&reader, file, "counted").filter(|_| !unfinished)))
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use hzn_mcap::part_path;
 use hzn_run::{disk, explain, sink, source};
 
-use crate::exit::{Exit, Outcome, failed, usage};
+use crate::exit::{Exit, Outcome, failed, unreadable, usage};
 use crate::tell;
 
 /// Close a file that a crash left unfinished
@@ -99,8 +99,15 @@ fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> 
                 file.display()
             ))
         }
+        e @ hzn_mcap::Error::Compression { .. } => unreadable(e),
         e => failed(e),
     })?;
+    let had_results = || hzn_mcap::Index::open(file).is_ok_and(|index| index.has_reports());
+    if found.frames == 0 && found.broken_chunks > 0 && had_results() {
+        std::fs::remove_file(&recovering)?;
+        let parts = explain::counted(found.broken_chunks, "damaged part");
+        return Err(unreadable(format!("{}: no result is left, because the file has {parts}", file.display())));
+    }
     hzn_mcap::rename(&recovering, path)?;
     if found.broken_chunks > 0 {
         tell::warning(format_args!("{} damaged parts were left out; their pictures are missing", found.broken_chunks));

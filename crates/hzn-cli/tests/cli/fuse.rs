@@ -121,3 +121,98 @@ fn settings_are_printed_with_their_defaults_and_read_again() {
     let read = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
     assert!(read("a.csv") == read("b.csv"), "the printed defaults are the defaults");
 }
+
+/// A short flight with pictures, from beginning to end through the binary.
+const SCENE: &str = r#"
+name = "short"
+utc = 2019-06-13T10:30:00Z
+[capture]
+from_s = 100.0
+to_s = 140.0
+frames = 41
+[camera]
+width = 320
+height = 240
+model = "pinhole"
+fx_px = 200.0
+fy_px = 200.0
+cx_px = 159.5
+cy_px = 119.5
+[trajectory.rocket]
+[attitude.pointing]
+off_nadir_deg = [70.0, 75.0]
+azimuth_deg = [0.0, 120.0]
+[world.visible]
+[detector]
+read_noise = 0.02
+[imu]
+rate_hz = 20
+[gnss]
+"#;
+
+/// The single-precision covariances of `hzn run --flight` are slightly indefinite; the filter takes them all the same.
+#[test]
+fn every_answer_of_the_flight_program_is_used() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let hzn = |args: &[&str]| {
+        let out = assert_cmd::Command::cargo_bin("hzn").unwrap().current_dir(at).args(args).output().unwrap();
+        assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
+        String::from_utf8(out.stdout).unwrap()
+    };
+    std::fs::write(at.join("short.toml"), SCENE).unwrap();
+    std::fs::write(at.join("mount.toml"), "[mount]\nq_body_from_camera_wxyz = [1.0, 0.0, 0.0, 0.0]\n").unwrap();
+    hzn(&["simulate", "short.toml", "-o", "out"]);
+    // The first attitude is that of a star tracker: the scene has no second direction.
+    let vehicle = std::fs::read_to_string(at.join("out/vehicle.csv")).unwrap();
+    let fields: Vec<&str> = vehicle.lines().nth(2).unwrap().split(',').collect();
+    let attitude = format!("time_s,qw,qx,qy,qz,sigma_deg\n{},{},0.5\n", fields[0], fields[7..].join(","));
+    std::fs::write(at.join("attitude.csv"), attitude).unwrap();
+    let fuse = || {
+        let files = ["--imu", "out/imu.csv", "--gnss", "out/gnss.csv", "--attitude", "attitude.csv"];
+        let camera = ["fuse", "--nadir", "cam.csv", "--mount", "cam=mount.toml", "-o", "nav.csv", "--force"];
+        hzn(&[&camera[..], &files].concat())
+    };
+    let fused = |flight: &[&str]| {
+        hzn(&[&["run", "out", "-o", "cam.csv", "--force"], flight].concat());
+        let said = fuse();
+        assert!(said.contains("cam, limb              40 taken, 0 refused"), "{said}");
+        assert!(!said.contains("not usable"), "{said}");
+        hzn_fuse::read_back::read_solution(&at.join("nav.csv")).unwrap().states
+    };
+    let (host, flight) = (fused(&[]), fused(&["--flight"]));
+    assert_eq!(host.len(), flight.len());
+    for (a, b) in host.iter().zip(&flight) {
+        let apart = [a.yaw_deg - b.yaw_deg, a.pitch_deg - b.pitch_deg, a.roll_deg - b.roll_deg];
+        let sigmas = [a.sigma_x_deg, a.sigma_y_deg, a.sigma_z_deg];
+        let smallest = sigmas.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        assert!(apart.iter().all(|d| d.abs() < 0.01 * smallest), "{} s: {apart:?} of {smallest}", a.time_s);
+    }
+
+    // What cannot be used is counted with its reason.
+    let recording = std::fs::read_to_string(at.join("cam.csv")).unwrap();
+    let column = |name: &str| recording.lines().next().unwrap().split(',').position(|n| n == name).unwrap();
+    let (xx, yy) = (column("cov_xx"), column("cov_yy"));
+    // Results of earlier versions have no checksum in the last column.
+    let spoil = |(number, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        let sum = cells.pop().unwrap();
+        assert!(number > 0 || sum == "crc32");
+        match number {
+            20 => cells[xx] = "-1e-4".into(),
+            21 => cells[yy].clear(),
+            _ => {}
+        }
+        cells.join(",") + "\n"
+    };
+    let spoiled: String = recording.lines().enumerate().map(spoil).collect();
+    std::fs::write(at.join("cam.csv"), spoiled).unwrap();
+    let said = fuse();
+    for line in [
+        "not usable             2\n",
+        "  cam                  1: a number of the axis, the position or a covariance is missing\n",
+        "  cam, limb            1: the covariance has a negative variance\n",
+    ] {
+        assert!(said.contains(line), "{line} in {said}");
+    }
+}

@@ -164,7 +164,7 @@ fn recovered(folder: &Path, ending: &str, bytes: &[u8]) -> Option<Vec<hzn_mcap::
 }
 
 fn rows(file: &Path) -> Vec<hzn_mcap::Row> {
-    let rows = hzn_run::results::read(file).unwrap().0;
+    let rows = hzn_run::results::read(file).unwrap().rows;
     rows.into_iter().map(|row| hzn_mcap::Row { elapsed_us: None, ..row }).collect()
 }
 

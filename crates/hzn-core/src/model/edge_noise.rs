@@ -60,7 +60,35 @@ section! {
     }
 }
 
+/// Ratio of the edge length to the correlation length, with `rms`. The fit absorbs the longest wavelengths of the
+/// errors (shift, tilt and curvature of the whole edge). The residuals show the shorter wavelengths, and best those of
+/// about half the edge. The spectrum of a Gauss-Markov process is flat above the wavelength 2πL, which is 0.52 edge
+/// lengths for this ratio. The model thus assumes that the absorbed wavelengths are as strong as the longest ones in
+/// the residuals.
+pub(crate) const LENGTHS_PER_EDGE: f64 = 12.0;
+
+/// Value of a tilt at the ends of the edge if its RMS along the edge is 1: √3.
+pub(crate) const END_PER_RMS: f64 = 1.732_050_807_568_877_2;
+
 impl Config {
+    /// Returns the values that a picture gives whose residuals have this RMS, along an edge of this length. With `reml`
+    /// the correlation length is that of `rms`.
+    pub fn measured(&self, rms_px: f64, edge_px: f64) -> Self {
+        let (length_px, common) = match self.noise {
+            Noise::Rms => (edge_px / LENGTHS_PER_EDGE, rms_px),
+            Noise::Reml => (edge_px / LENGTHS_PER_EDGE, 0.0),
+            Noise::Given => (0.0, 0.0),
+        };
+        Self {
+            noise: Noise::Given,
+            sigma_px: self.sigma_px.max(rms_px),
+            correlation_px: self.correlation_px.max(length_px),
+            bias_px: self.bias_px.max(common),
+            tilt_px: self.tilt_px.max(common * END_PER_RMS),
+            ..*self
+        }
+    }
+
     /// Makes a known noise model from these values, without a common shift or tilt.
     pub fn given(sigma_px: f64, correlation_px: f64) -> Self {
         Self { noise: Noise::Given, sigma_px, correlation_px, bias_px: 0.0, tilt_px: 0.0, ..Self::default() }

@@ -58,7 +58,7 @@ pub(super) fn events(
         let (total, times) = (events.len(), events.iter().map(|e| e.time_s).filter(|t| t.is_finite()));
         let (first, last) =
             times.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b): (f64, f64), t| (a.min(t), b.max(t)));
-        counts.unusable += events.iter().filter(|e| !e.time_s.is_finite()).count();
+        counts.add_unusable(name, "the time is not finite", events.iter().filter(|e| !e.time_s.is_finite()).count());
         let inside: Vec<Event> = events.into_iter().filter(|e| (from_s..=to_s).contains(&e.time_s)).collect();
         counts.outside += total - inside.len();
         if inside.is_empty() && total > 0 {
@@ -88,6 +88,11 @@ pub(super) fn events(
     let attitudes = inputs.attitudes.iter().enumerate();
     let attitudes = attitudes.map(|(i, a)| Event { time_s: a.time_s, source: Source::Attitude(i) });
     add("attitude", attitudes.collect(), notes)?;
+    for one in &inputs.recordings {
+        counts.add_unusable(&one.name, "the row has no time", one.without_time);
+        counts.add_unusable(&one.name, "the direction from the vehicle to this body is not known", one.other_bodies);
+        counts.add_unusable(&one.name, "a number of the axis, the position or a covariance is missing", one.incomplete);
+    }
     all.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     Ok(all)
 }

@@ -20,8 +20,19 @@ use runner::Runner;
 
 pub(crate) use reference::limb_axis;
 
-/// Most components of the error: the vehicle's 28, and 7 of each camera.
-const STATES: usize = 30 + 7 * MAX_CAMERAS;
+/// Most components of the error without the cameras.
+const VEHICLE_STATES: usize = 30;
+/// Most components of the error of a camera besides its slow errors: mount and clock. A slow error has three more.
+const CAMERA_STATES: usize = 4;
+/// Most components of the error of a flight, by the largest number of bodies that each of its cameras sees.
+const fn states(bodies: usize) -> usize {
+    VEHICLE_STATES + MAX_CAMERAS * (CAMERA_STATES + 3 * bodies)
+}
+
+/// Memory for the states of four cameras that see one, two or three bodies each.
+const FEW: usize = states(1);
+const SOME: usize = states(2);
+const MANY: usize = states(3);
 
 /// Smallest angle between two mounts that count as different, rad.
 const SAME_MOUNT_RAD: f64 = 1e-4;
@@ -51,27 +62,45 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     let mut notes = Vec::new();
     let events = events(inputs, span_s, &mut counts, &mut notes)?;
     let flight = Flight { inputs, mounts: &mounts, samples: &samples, events: &events };
-    let mut fused = Runner::<STATES>::new(&flight, settings, false)?.run(wanted.rate_hz)?.0;
-    if wanted.smoothed {
-        if events.len() > MAX_EPOCHS {
-            let what = "measurements, more than a smoother can keep";
-            return Err(Error::unusable(format!("{} {what} ({MAX_EPOCHS}); leave the smoother out", events.len())));
-        }
-        let all = estimate_all(settings);
-        let (_, recorded) = Runner::<STATES>::new(&flight, &all, true)?.run(wanted.rate_hz)?;
-        fused.smoothed = smooth(&recorded);
-    }
+    // The time of a step grows with the square of the memory for states, so that few bodies get a small filter.
+    let slow_errors = |r: &Recording| CAMERA_STATES + 3 * r.bodies().len();
+    let needed = VEHICLE_STATES + inputs.recordings.iter().map(slow_errors).sum::<usize>();
+    let mut fused = match needed {
+        ..=FEW => replay::<FEW>(&flight, settings, wanted)?,
+        ..=SOME => replay::<SOME>(&flight, settings, wanted)?,
+        _ => replay::<MANY>(&flight, settings, wanted)?,
+    };
     fused.back = flight.back(&fused);
     fused.cameras = inputs.recordings.iter().map(|r| r.name.clone()).collect();
     counts.before_start = fused.counts.before_start;
     counts.restarts = fused.counts.restarts;
     counts.waiting = fused.counts.waiting;
     counts.without_reference = fused.counts.without_reference;
-    counts.unusable += fused.counts.unusable;
+    for ((source, why), count) in std::mem::take(&mut fused.counts.unusable) {
+        counts.add_unusable(source, why, count);
+    }
     fused.counts = counts;
     notes.append(&mut fused.notes);
     fused.notes = notes;
     fused.notes.extend(doubts(&fused));
+    Ok(fused)
+}
+
+/// Runs the filter, with memory for N states, and the smoother if it is wanted.
+fn replay<const N: usize>(flight: &Flight<'_>, settings: &Settings, wanted: Wanted) -> Result<Fused, Error> {
+    let mut fused = Runner::<N>::new(flight, settings, false)?.run(wanted.rate_hz)?.0;
+    if wanted.smoothed {
+        if flight.events.len() > MAX_EPOCHS {
+            let what = "measurements, more than a smoother can keep";
+            return Err(Error::unusable(format!(
+                "{} {what} ({MAX_EPOCHS}); leave the smoother out",
+                flight.events.len()
+            )));
+        }
+        let all = estimate_all(settings);
+        let (_, recorded) = Runner::<N>::new(flight, &all, true)?.run(wanted.rate_hz)?;
+        fused.smoothed = smooth(&recorded);
+    }
     Ok(fused)
 }
 

@@ -1,6 +1,6 @@
 //! The filter over the samples and measurements of a flight.
 
-use hzn_nav::filter::{DirectionMeasurement, Filter};
+use hzn_nav::filter::{DirectionMeasurement, Filter, Unusable};
 use hzn_nav::layout::Layout;
 use hzn_nav::options::{CameraOptions, StartSigmas};
 use hzn_nav::strapdown::{Imu, Nominal};
@@ -12,7 +12,7 @@ use super::events::{Event, Source};
 use super::first::{first_attitude, sight_sigma, sigmas};
 use super::reference::limb_axis;
 use crate::error::Error;
-use crate::input::{Body, Sample, Seen};
+use crate::input::{Body, Recording, Sample, Seen};
 use crate::results::{Begin, Epoch, Fused, Innovation, Kind, Triad};
 use crate::settings::{Limb, Settings};
 use crate::smooth::Recorded;
@@ -25,11 +25,16 @@ const FEWEST_REFUSED: usize = 5;
 /// 1-sigma of the attitude above which directions are not taken one by one, rad (15°).
 const LARGE_RAD: f64 = 0.26;
 
+/// Whether the filter could use a measurement, or why not.
+type Used = Result<(), &'static str>;
+
 /// A filter on its way through a flight.
 pub(super) struct Runner<'a, const N: usize> {
     flight: Flight<'a>,
     settings: &'a Settings,
     cameras: Vec<CameraOptions>,
+    /// The bodies of each camera, in the order of their slow errors.
+    bodies: Vec<Vec<Body>>,
     filter: Filter<N>,
     begin: Begin,
     reckoning: DeadReckoning,
@@ -51,8 +56,11 @@ impl<'a, const N: usize> Runner<'a, N> {
     /// Finds the first attitude and makes a filter there.
     pub(super) fn new(flight: &Flight<'a>, settings: &'a Settings, record: bool) -> Result<Self, Error> {
         let recordings = &flight.inputs.recordings;
-        let cameras: Vec<CameraOptions> =
-            recordings.iter().zip(flight.mounts).map(|(r, mount)| settings.camera_options(&r.name, *mount)).collect();
+        let bodies: Vec<Vec<Body>> = recordings.iter().map(Recording::bodies).collect();
+        let options = |((r, mount), bodies): ((&Recording, &UnitQuaternion<f64>), &Vec<Body>)| {
+            settings.camera_options(&r.name, *mount, bodies.len())
+        };
+        let cameras: Vec<CameraOptions> = recordings.iter().zip(flight.mounts).zip(&bodies).map(options).collect();
         let reckoning = DeadReckoning::new(flight.samples);
         let found = first_attitude(flight, settings, &cameras, &reckoning)?;
         let limb_sigma_km = recordings.iter().filter_map(|r| r.limb_sigma_km).reduce(f64::max);
@@ -69,6 +77,7 @@ impl<'a, const N: usize> Runner<'a, N> {
             flight: *flight,
             settings,
             cameras,
+            bodies,
             unaided: found.state,
             filter,
             begin: found.begin,
@@ -147,13 +156,13 @@ impl<'a, const N: usize> Runner<'a, N> {
             let _ = self.filter.prepare_direction(&measurement, &mut self.transition);
         }
         let before = self.record.then(|| self.filter.clone());
-        let is_used = match event.source {
+        let used = match event.source {
             Source::Camera(camera, index) => self.measure_camera(event, camera, index),
             Source::Gnss(index) => self.measure_fix(event.time_s, index),
             Source::Attitude(index) => self.measure_attitude(event.time_s, index),
         };
-        if !is_used {
-            self.out.counts.unusable += 1;
+        if let Err(why) = used {
+            self.out.counts.add_unusable(self.source_name(event.source), why, 1);
         }
         if let Some(before) = before {
             self.recorded.push(Recorded {
@@ -168,6 +177,19 @@ impl<'a, const N: usize> Runner<'a, N> {
         }
     }
 
+    /// Returns the name of a source for the counts.
+    fn source_name(&self, source: Source) -> String {
+        match source {
+            Source::Camera(camera, index) => {
+                let recording = self.flight.inputs.recordings.get(camera);
+                let body = recording.and_then(|r| r.seen.get(index)).map_or("", |seen| seen.body.name());
+                format!("{}, {body}", recording.map_or("", |r| &r.name))
+            }
+            Source::Gnss(_) => "gnss".to_owned(),
+            Source::Attitude(_) => Kind::Attitude.name().to_owned(),
+        }
+    }
+
     /// Returns the direction of an event, and how the filter takes it; `None` for a source without a direction.
     fn direction(&self, event: &Event) -> Option<(Seen, DirectionMeasurement)> {
         let Source::Camera(camera, index) = event.source else { return None };
@@ -179,6 +201,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         let nominal = self.filter.nominal();
         let measurement = DirectionMeasurement {
             camera,
+            body: self.bodies.get(camera)?.iter().position(|body| *body == seen.body)?,
             measured: seen.axis,
             reference: seen.reference.or_else(|| limb_axis(seen.body, &nominal.position_m))?,
             covariance_rad2: seen.covariance_rad2,
@@ -188,14 +211,14 @@ impl<'a, const N: usize> Runner<'a, N> {
         Some((seen, measurement))
     }
 
-    fn measure_camera(&mut self, event: &Event, camera: usize, index: usize) -> bool {
+    fn measure_camera(&mut self, event: &Event, camera: usize, index: usize) -> Used {
         let time_s = event.time_s;
         let Some((seen, measurement)) = self.direction(event) else {
             return self.measure_centre(time_s, camera, index);
         };
         let reference = measurement.reference;
         if !measurement.is_finite() {
-            return false;
+            return Err(Unusable::NotFinite.as_str());
         }
         let told = self.cameras.get(camera).map_or_else(UnitQuaternion::identity, |c| c.mount);
         let mount = self.filter.camera(camera).map_or(told, |c| c.mount);
@@ -210,9 +233,9 @@ impl<'a, const N: usize> Runner<'a, N> {
             // The equations of the update hold for small angles; they would spoil the mounts.
             self.out.counts.waiting += 1;
             self.begin_again(time_s, "the attitude was not known any more");
-            return true;
+            return Ok(());
         }
-        let Some(done) = self.filter.update_direction(&measurement) else { return false };
+        let done = self.filter.update_direction(&measurement).map_err(Unusable::as_str)?;
         self.keep(time_s, Some(camera), Kind::Direction(seen.body), &done);
         if let Some(innovation) = self.out.innovations.last_mut() {
             innovation.angle_rad = Some(angle);
@@ -221,7 +244,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         }
         self.verdicts.push((seen.body, done.taken));
         self.restart_if_lost(time_s, seen.body);
-        true
+        Ok(())
     }
 
     /// Returns whether the attitude is less well known than the filter's equations can take.
@@ -230,17 +253,15 @@ impl<'a, const N: usize> Runner<'a, N> {
     }
 
     /// Takes the position of the body's centre.
-    fn measure_centre(&mut self, time_s: f64, camera: usize, index: usize) -> bool {
+    fn measure_centre(&mut self, time_s: f64, camera: usize, index: usize) -> Used {
         let seen = self.flight.inputs.recordings.get(camera).and_then(|r| r.seen.get(index));
         let Some(centre) = seen.and_then(|seen| seen.centre) else {
             self.out.counts.without_reference += 1;
-            return true;
+            return Ok(());
         };
-        let Some(done) = self.filter.update_centre(camera, &centre.position_m, &centre.covariance_m2) else {
-            return false;
-        };
-        self.keep(time_s, Some(camera), Kind::Centre, &done);
-        true
+        let done = self.filter.update_centre(camera, &centre.position_m, &centre.covariance_m2);
+        self.keep(time_s, Some(camera), Kind::Centre, &done.map_err(Unusable::as_str)?);
+        Ok(())
     }
 
     /// Makes an attitude of two directions at almost one time, without the filter.
@@ -290,25 +311,24 @@ impl<'a, const N: usize> Runner<'a, N> {
         self.out.notes.push(format!("at {time_s:.1} s the filter began again: {why}"));
     }
 
-    fn measure_fix(&mut self, time_s: f64, index: usize) -> bool {
-        let Some(fix) = self.flight.inputs.gnss.get(index) else { return false };
+    fn measure_fix(&mut self, time_s: f64, index: usize) -> Used {
+        let Some(fix) = self.flight.inputs.gnss.get(index) else { return Ok(()) };
         let [position_sigma, velocity_sigma] = sigmas(fix, self.settings);
-        let Some(done) = self.filter.update_position(&fix.position_m, position_sigma) else { return false };
+        let done = self.filter.update_position(&fix.position_m, position_sigma).map_err(Unusable::as_str)?;
         self.keep(time_s, None, Kind::Position, &done);
-        if fix.velocity_m_s.iter().all(|x| x.is_finite())
-            && let Some(done) = self.filter.update_velocity(&fix.velocity_m_s, velocity_sigma)
-        {
+        if fix.velocity_m_s.iter().all(|x| x.is_finite()) {
+            let done = self.filter.update_velocity(&fix.velocity_m_s, velocity_sigma).map_err(Unusable::as_str)?;
             self.keep(time_s, None, Kind::Velocity, &done);
         }
-        true
+        Ok(())
     }
 
-    fn measure_attitude(&mut self, time_s: f64, index: usize) -> bool {
-        let Some(seen) = self.flight.inputs.attitudes.get(index) else { return false };
-        let Some(attitude) = seen.body_to_ecef else { return false };
-        let Some(done) = self.filter.update_attitude(&attitude, seen.sigma_rad) else { return false };
+    fn measure_attitude(&mut self, time_s: f64, index: usize) -> Used {
+        let Some(seen) = self.flight.inputs.attitudes.get(index) else { return Ok(()) };
+        let attitude = seen.body_to_ecef.ok_or("qw, qx, qy, qz are not a unit quaternion")?;
+        let done = self.filter.update_attitude(&attitude, seen.sigma_rad).map_err(Unusable::as_str)?;
         self.keep(time_s, None, Kind::Attitude, &done);
-        true
+        Ok(())
     }
 
     fn keep<const M: usize>(

@@ -5,6 +5,7 @@ use std::path::Path;
 use hzn_core::status::Status;
 use hzn_core::{Config, camera};
 use hzn_mcap::Row;
+use hzn_run::results::Results;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::mount;
@@ -81,8 +82,12 @@ pub struct Recording {
     pub rows: Vec<Row>,
     /// Rows with an answer that are not used, because they have no time.
     pub without_time: usize,
+    /// What is missing in the file; `None` if it was read as a whole.
+    pub lost: Option<String>,
     /// Rows with an answer that are not used, because nobody knows where their body is.
     pub other_bodies: usize,
+    /// Rows with an answer that are not used, because a number of the axis, the position or a covariance is missing.
+    pub incomplete: usize,
 }
 
 /// Reads a recording of `hzn run`: .mcap, .csv or .jsonl.
@@ -90,7 +95,7 @@ pub struct Recording {
 /// # Errors
 /// The file is not a recording, or its mount is not a rotation.
 pub fn recording(path: &Path) -> Result<Recording, Error> {
-    let (rows, sensor_toml) = hzn_run::results::read(path)?;
+    let Results { rows, sensor_toml, lost } = hzn_run::results::read(path)?;
     let config = match &sensor_toml {
         None => None,
         Some(text) => Some(hzn_calib::sensor::parse(text, Path::new("sensor.toml")).map_err(Error::unusable)?.config),
@@ -99,6 +104,7 @@ pub fn recording(path: &Path) -> Result<Recording, Error> {
     let shown = path.display();
     let recording =
         Recording::new(name, rows, config.as_ref()).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
+    let recording = Recording { lost, ..recording };
     if recording.seen.is_empty() && recording.without_time > 0 {
         let what = "no picture has a time; a filter needs one: give the sequence a frames.csv with times";
         return Err(Error::unusable(format!("{shown}: {what}")));
@@ -127,7 +133,9 @@ impl Recording {
             seen: Vec::new(),
             rows: Vec::new(),
             without_time: 0,
+            lost: None,
             other_bodies: 0,
+            incomplete: 0,
         };
         for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.status == Status::Ok) {
             let body = match row.body.as_str() {
@@ -143,10 +151,20 @@ impl Recording {
                 recording.without_time += 1;
                 continue;
             };
-            recording.seen.extend(seen(row, index, time_s, body, limb_sigma_km));
+            let seen = seen(row, index, time_s, body, limb_sigma_km);
+            recording.incomplete += usize::from(seen.is_none());
+            recording.seen.extend(seen);
         }
         recording.rows = rows;
         Ok(recording)
+    }
+
+    /// Returns the bodies that the camera saw.
+    pub fn bodies(&self) -> Vec<Body> {
+        let mut bodies: Vec<Body> = self.seen.iter().map(|seen| seen.body).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        bodies
     }
 }
 

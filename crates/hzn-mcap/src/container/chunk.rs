@@ -1,6 +1,7 @@
 //! Chunks: groups of messages, compressed or not, with a CRC.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 
 use super::op::{Fields, Op, Put};
 use super::{Inflation, Record};
@@ -110,6 +111,28 @@ impl Index {
     }
 }
 
+/// Why a chunk cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum ChunkFault {
+    /// The chunk is compressed with a method that hzn does not know; its name.
+    #[error("its data are compressed with {0:?}, which hzn does not read: {REWRITE}")]
+    Compression(String),
+    /// The chunk is damaged; what is wrong.
+    #[error("{0}")]
+    Damaged(String),
+}
+
+/// Remedy against an unknown compression.
+pub(crate) const REWRITE: &str = "write the file again with zstd, with lz4 or without compression";
+
+/// Reads a chunk that is compressed with the frame format of LZ4. `size` is its size when it is uncompressed.
+fn read_lz4(records: &[u8], size: u64) -> std::io::Result<Vec<u8>> {
+    let mut plain = Vec::new();
+    // One byte more shows that the size is wrong.
+    lz4_flex::frame::FrameDecoder::new(records).take(size + 1).read_to_end(&mut plain)?;
+    Ok(plain)
+}
+
 /// A chunk as it is in the file, with the data for its index.
 #[derive(Debug)]
 pub(crate) struct Chunk {
@@ -127,8 +150,10 @@ impl Chunk {
     /// Parses a chunk record, checks its CRC and reads its records. It returns the chunk and its uncompressed records.
     ///
     /// # Errors
-    /// The reason why it is not valid.
-    pub(crate) fn parse(record: &Record, inflation: &mut Inflation) -> Result<(Self, Vec<u8>), String> {
+    /// The reason why it cannot be read.
+    pub(crate) fn parse(record: &Record, inflation: &mut Inflation) -> Result<(Self, Vec<u8>), ChunkFault> {
+        let damaged = ChunkFault::Damaged;
+        let cannot = |e: &dyn std::fmt::Display| damaged(format!("a chunk cannot be uncompressed: {e}"));
         let mut f = Fields(&record.content);
         let mut head = || {
             let (_first, _last, size, crc) = (f.u64()?, f.u64()?, f.u64()?, f.u32()?);
@@ -136,29 +161,30 @@ impl Chunk {
             let length = f.u64()?;
             Some((size, crc, compression, f.bytes(usize::try_from(length).ok()?)?.to_vec()))
         };
-        let (size, crc, compression, records) = head().ok_or("a chunk is not valid")?;
+        let (size, crc, compression, records) = head().ok_or_else(|| damaged("a chunk is not valid".into()))?;
         let plain = match compression.as_str() {
             "" => records.clone(),
-            "zstd" if !inflation.admit(records.len() as u64, size) => {
-                return Err(format!(
-                    "a chunk of {} bytes claims to have {size} when it is uncompressed",
-                    records.len()
-                ));
+            "zstd" | "lz4" if !inflation.admit(records.len() as u64, size) => {
+                let stored = records.len();
+                return Err(damaged(format!(
+                    "a chunk of {stored} bytes claims to have {size} when it is uncompressed"
+                )));
             }
             // A wrong size is an error of the decoder, which never writes beyond it.
             "zstd" => {
-                let size = usize::try_from(size).map_err(|e| e.to_string())?;
-                zstd::bulk::decompress(&records, size).map_err(|e| format!("a chunk cannot be uncompressed: {e}"))?
+                let size = usize::try_from(size).map_err(|e| cannot(&e))?;
+                zstd::bulk::decompress(&records, size).map_err(|e| cannot(&e))?
             }
-            other => return Err(format!("chunks compressed with {other} are not supported; use zstd")),
+            "lz4" => read_lz4(&records, size).map_err(|e| cannot(&e))?,
+            _ => return Err(ChunkFault::Compression(compression)),
         };
         if plain.len() as u64 != size {
-            return Err(format!("a chunk has {} bytes instead of {size}", plain.len()));
+            return Err(damaged(format!("a chunk has {} bytes instead of {size}", plain.len())));
         }
         if crc != 0 && crc32fast::hash(&plain) != crc {
-            return Err("the CRC of a chunk is wrong".to_owned());
+            return Err(damaged("the CRC of a chunk is wrong".into()));
         }
-        let index = Index::read(&plain).ok_or("the records of a chunk are not valid")?;
+        let index = Index::read(&plain).ok_or_else(|| damaged("the records of a chunk are not valid".into()))?;
         Ok((Self { compression, size, crc, records, index }, plain))
     }
 

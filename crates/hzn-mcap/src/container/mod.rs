@@ -12,7 +12,7 @@ mod scan;
 mod write;
 
 pub(crate) use channel::{Channel, Schemas};
-pub(crate) use chunk::{Chunk, ChunkBuilder, Message};
+pub(crate) use chunk::{Chunk, ChunkBuilder, ChunkFault, Message, REWRITE};
 pub(crate) use inflation::Inflation;
 pub(crate) use op::{Fields, Op};
 pub(crate) use scan::{Record, Scanner};

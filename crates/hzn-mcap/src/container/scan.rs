@@ -1,6 +1,7 @@
 //! Reads records one after the other from a file that may end anywhere.
 
-use std::io::{self, Read, Seek, SeekFrom};
+use std::collections::BTreeSet;
+use std::io::{self, Read, Seek};
 
 use super::op::{Fields, Op};
 use super::{MAGIC, MAX_RECORD_BYTES};
@@ -18,7 +19,8 @@ pub(crate) struct Record {
 pub(crate) struct Scanner<R> {
     source: R,
     position: u64,
-    skip_plain_chunks: bool,
+    /// Channels whose messages are left out.
+    skipped: BTreeSet<u16>,
 }
 
 impl<R: Read + Seek> Scanner<R> {
@@ -30,12 +32,13 @@ impl<R: Read + Seek> Scanner<R> {
             Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
             Err(e) => return Err(e),
         }
-        Ok((magic == MAGIC).then_some(Self { source, position: MAGIC.len() as u64, skip_plain_chunks: false }))
+        Ok((magic == MAGIC).then_some(Self { source, position: MAGIC.len() as u64, skipped: BTreeSet::new() }))
     }
 
-    /// Skips uncompressed chunks, which have the pictures, without reading them.
-    pub(crate) fn skip_plain_chunks(&mut self, skip: bool) {
-        self.skip_plain_chunks = skip;
+    /// Leaves out the messages of a channel. They are not read if they are outside of chunks, or in an uncompressed
+    /// chunk that contains nothing else. Any other chunk is read as a whole, because its CRC covers all of it.
+    pub(crate) fn skip_channel(&mut self, id: u16) {
+        self.skipped.insert(id);
     }
 
     /// Returns the size of the file up to the end of the last complete record, in bytes.
@@ -57,23 +60,13 @@ impl<R: Read + Seek> Scanner<R> {
             if op == 0 || length > MAX_RECORD_BYTES {
                 return Ok(None);
             }
-            let mut content = Vec::new();
-            if op == Op::CHUNK && self.skip_plain_chunks {
-                // Times, sizes and CRC, then the length of the name of the compression: 0 for none.
-                let mut start = [0; 32];
-                if length < 32 || !self.fill(&mut start)? {
-                    return Ok(None);
-                }
-                if start[28..] == [0; 4] {
-                    self.source.seek(SeekFrom::Current(length as i64 - 32))?;
-                    self.position += 9 + length;
-                    continue;
-                }
-                content.extend_from_slice(&start);
+            if !self.skipped.is_empty() && self.skip_content(op, length)? {
+                self.position += 9 + length;
+                continue;
             }
-            let rest = length - content.len() as u64;
-            // The stated length may be wrong in a broken file, so no memory is reserved for it.
-            (&mut self.source).take(rest).read_to_end(&mut content)?;
+            // The stated length may be wrong in a broken file, so only little memory is reserved for it.
+            let mut content = Vec::with_capacity(length.min(1 << 16) as usize);
+            (&mut self.source).take(length).read_to_end(&mut content)?;
             if content.len() as u64 != length {
                 return Ok(None);
             }
@@ -82,11 +75,170 @@ impl<R: Read + Seek> Scanner<R> {
         }
     }
 
+    /// Goes to the end of a record if it contains only messages that are left out. Otherwise, and if the file ends
+    /// before, the source stays at the beginning of the record's content.
+    fn skip_content(&mut self, op: u8, length: u64) -> io::Result<bool> {
+        let mut read = 0;
+        let skip = match op {
+            Op::MESSAGE => self.is_skipped(length, &mut read)?,
+            Op::CHUNK => self.has_only_skipped(length, &mut read)?,
+            _ => false,
+        };
+        let target = if skip { length } else { 0 };
+        self.source.seek_relative(target as i64 - read as i64)?;
+        Ok(skip)
+    }
+
+    /// Returns whether a message of `length` bytes is left out. `read` counts the bytes by which the source moves.
+    fn is_skipped(&mut self, length: u64, read: &mut u64) -> io::Result<bool> {
+        let mut channel = [0; 2];
+        if length < 2 || !self.fill(&mut channel)? {
+            return Ok(false);
+        }
+        *read += 2;
+        Ok(self.skipped.contains(&u16::from_le_bytes(channel)))
+    }
+
+    /// Returns whether a chunk of `length` bytes is uncompressed and contains only messages that are left out. `read`
+    /// counts the bytes by which the source moves.
+    fn has_only_skipped(&mut self, length: u64, read: &mut u64) -> io::Result<bool> {
+        // Times, sizes and CRC, the length of the name of the compression (0 for none), and the length of the records.
+        let mut start = [0; 40];
+        if length < 40 || !self.fill(&mut start)? {
+            return Ok(false);
+        }
+        *read += 40;
+        if start[28..32] != [0; 4] {
+            return Ok(false);
+        }
+        while *read < length {
+            let mut head = [0; 9];
+            if !self.fill(&mut head)? {
+                return Ok(false);
+            }
+            *read += 9;
+            let mut f = Fields(&head);
+            let (Some(Op::MESSAGE), Some(size)) = (f.u8(), f.u64()) else { return Ok(false) };
+            let before = *read;
+            if size > length.saturating_sub(before) || !self.is_skipped(size, read)? {
+                return Ok(false);
+            }
+            self.source.seek_relative(size as i64 - 2)?;
+            *read = before + size;
+        }
+        Ok(*read == length)
+    }
+
     fn fill(&mut self, buffer: &mut [u8]) -> io::Result<bool> {
         match self.source.read_exact(buffer) {
             Ok(()) => Ok(true),
             Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
             Err(e) => Err(e),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::SeekFrom;
+
+    use super::*;
+    use crate::container::{ChunkBuilder, Container};
+
+    /// A file that counts the bytes that are read from it.
+    struct Counted {
+        file: io::Cursor<Vec<u8>>,
+        bytes: u64,
+    }
+
+    impl Read for Counted {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            let n = self.file.read(buffer)?;
+            self.bytes += n as u64;
+            Ok(n)
+        }
+    }
+
+    impl Seek for Counted {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.file.seek(to)
+        }
+    }
+
+    const REPORT: u16 = 1;
+    const PICTURE: u16 = 2;
+    const PICTURE_BYTES: usize = 100_000;
+
+    fn push(chunk: &mut ChunkBuilder, channel: u16, bytes: usize) {
+        chunk.push(channel, 0, 0, |data| data.resize(data.len() + bytes, 7));
+    }
+
+    /// Reads all records of a file without the pictures. Returns the kinds of the records and the number of bytes read.
+    fn scan(file: Vec<u8>) -> (Vec<u8>, u64) {
+        let counted = Counted { file: io::Cursor::new(file), bytes: 0 };
+        let mut scanner = Scanner::try_new(counted).unwrap().unwrap();
+        scanner.skip_channel(PICTURE);
+        let mut kinds = Vec::new();
+        while let Some(record) = scanner.next().unwrap() {
+            kinds.push(record.op);
+        }
+        (kinds, scanner.source.bytes)
+    }
+
+    /// Returns a file with chunks of five pictures and, if `apart` is false, of their reports.
+    fn file(chunks: usize, apart: bool) -> Vec<u8> {
+        let mut out = Container::try_new(Vec::new(), "hzn").unwrap();
+        for _ in 0..chunks {
+            let (mut pictures, mut reports) = (ChunkBuilder::default(), ChunkBuilder::default());
+            for _ in 0..5 {
+                push(&mut pictures, PICTURE, PICTURE_BYTES);
+                push(if apart { &mut reports } else { &mut pictures }, REPORT, 100);
+            }
+            out.chunk(&pictures.take(false).unwrap()).unwrap();
+            if apart {
+                out.chunk(&reports.take(true).unwrap()).unwrap();
+            }
+        }
+        out.finish().unwrap()
+    }
+
+    #[test]
+    fn chunks_of_pictures_are_not_read() {
+        let (kinds, bytes) = scan(file(20, true));
+        let chunks = kinds.iter().filter(|op| **op == Op::CHUNK).count();
+        assert_eq!(chunks, 20, "the chunks with reports");
+        // Of a picture only the head of its message is read, and its two entries in indexes.
+        let size = file(20, true).len() as u64;
+        assert!(size > 100 * PICTURE_BYTES as u64 && bytes < 25_000, "{bytes} of {size} bytes");
+    }
+
+    #[test]
+    fn a_chunk_with_other_messages_is_read_as_a_whole() {
+        let (kinds, bytes) = scan(file(2, false));
+        assert_eq!(kinds.iter().filter(|op| **op == Op::CHUNK).count(), 2);
+        assert!(bytes > 10 * PICTURE_BYTES as u64, "{bytes}");
+    }
+
+    #[test]
+    fn messages_outside_of_chunks_are_left_out_too() {
+        let mut out = Container::try_new(Vec::new(), "hzn").unwrap();
+        for channel in [PICTURE, REPORT, PICTURE, PICTURE, REPORT] {
+            let mut content = channel.to_le_bytes().to_vec();
+            content.resize(22 + if channel == PICTURE { PICTURE_BYTES } else { 100 }, 0);
+            out.copy(&Record { op: Op::MESSAGE, content }).unwrap();
+        }
+        let (kinds, bytes) = scan(out.finish().unwrap());
+        assert_eq!(kinds.iter().filter(|op| **op == Op::MESSAGE).count(), 2);
+        assert!(bytes < 1_000, "{bytes}");
+    }
+
+    #[test]
+    fn a_cut_file_ends_before_the_record_that_is_cut() {
+        let whole = file(1, true);
+        let (kinds, _) = scan(whole.clone());
+        for n in [60, 70, 79, 80, 100, 150, PICTURE_BYTES, whole.len() - 700] {
+            let (cut, _) = scan(whole[..n].to_vec());
+            assert!(cut.len() < kinds.len() && kinds.starts_with(&cut), "cut at {n}: {cut:?}");
         }
     }
 }

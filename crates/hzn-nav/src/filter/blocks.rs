@@ -1,7 +1,7 @@
 //! Parts of vectors and matrices at places that are only known at run time. A place outside does nothing, so that no
 //! panic is linked; the layout has no such place.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
 
 /// Returns three components of a vector.
 pub(super) fn three<const N: usize>(vector: &SVector<f64, N>, first: usize) -> Vector3<f64> {
@@ -75,65 +75,11 @@ pub(super) fn scale_column<const R: usize, const C: usize>(
     }
 }
 
-/// Returns the symmetric root of a positive definite matrix, or its inverse with −1. `None` if an eigenvalue is not
-/// positive.
-pub(super) fn root(matrix: &Matrix3<f64>, sign: i32) -> Option<Matrix3<f64>> {
-    let (values, vectors) = eigen(matrix);
-    let mut roots = Vector3::zeros();
-    for (root, value) in roots.iter_mut().zip(&values) {
-        if !(*value > 0.0) {
-            return None;
-        }
-        *root = if sign < 0 { 1.0 / libm::sqrt(*value) } else { libm::sqrt(*value) };
-    }
-    Some(vectors * Matrix3::from_diagonal(&roots) * vectors.transpose())
-}
-
-/// Returns eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi's rotations.
-fn eigen(matrix: &Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
-    let (mut a, mut v) = (*matrix, Matrix3::identity());
-    // Five sweeps are enough for doubles; the convergence is quadratic.
-    for _ in 0..6 {
-        rotate::<0, 1>(&mut a, &mut v);
-        rotate::<0, 2>(&mut a, &mut v);
-        rotate::<1, 2>(&mut a, &mut v);
-    }
-    (a.diagonal(), v)
-}
-
-/// Makes the component (P, Q) of a symmetric matrix zero.
-fn rotate<const P: usize, const Q: usize>(a: &mut Matrix3<f64>, v: &mut Matrix3<f64>) {
-    let off = a[(P, Q)];
-    if off == 0.0 {
-        return;
-    }
-    let theta = (a[(Q, Q)] - a[(P, P)]) / (2.0 * off);
-    let t = libm::copysign(1.0, theta) / (libm::fabs(theta) + libm::sqrt(theta * theta + 1.0));
-    let c = 1.0 / libm::sqrt(t * t + 1.0);
-    let s = t * c;
-    let mut j = Matrix3::identity();
-    (j[(P, P)], j[(Q, Q)], j[(P, Q)], j[(Q, P)]) = (c, c, s, -s);
-    *a = j.transpose() * *a * j;
-    // The rotation leaves this number at the size of rounding errors.
-    (a[(P, Q)], a[(Q, P)]) = (0.0, 0.0);
-    *v *= j;
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use nalgebra::Matrix3;
 
-    #[test]
-    fn roots_of_covariances_of_any_size() {
-        let turn = nalgebra::UnitQuaternion::from_euler_angles(0.3, -1.2, 2.0).to_rotation_matrix().into_inner();
-        for sizes in [[1.0, 1.0, 1.0], [1e-6, 3e-7, 1e-14], [4.0, 1e-3, 2.0], [1e-14, 1e-14, 1.0]] {
-            let matrix = turn * Matrix3::from_diagonal(&Vector3::from(sizes)) * turn.transpose();
-            let whole = root(&matrix, 1).unwrap();
-            assert!((whole * whole - matrix).norm() < 1e-14 * matrix.norm(), "{sizes:?}");
-            assert!((whole * root(&matrix, -1).unwrap() - Matrix3::identity()).norm() < 1e-5, "{sizes:?}");
-            assert_eq!(root(&(matrix - Matrix3::identity() * 10.0), 1), None);
-        }
-    }
+    use super::*;
 
     #[test]
     fn places_outside_do_nothing() {

@@ -8,25 +8,29 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::blocks::put;
 use super::limb_latitude::RADIUS_KM;
+use super::spectrum::Spectrum;
+use super::unusable::Unusable;
 use super::update::Innovation;
 use super::{Filter, predict_direction};
 use crate::layout::Layout;
 
 impl<const N: usize> Filter<N> {
     /// Takes the position of the Earth's centre in the camera frame (m) with its covariance (m²), without the part of
-    /// the limb height. `None` if there is no such camera or a number is not finite; nothing changes then. The axis of
-    /// the same picture must not be taken too.
+    /// the limb height. The axis of the same picture must not be taken too.
+    ///
+    /// # Errors
+    /// See [`Unusable`].
     pub fn update_centre(
         &mut self,
         camera: usize,
         centre_m: &Vector3<f64>,
         covariance_m2: &Matrix3<f64>,
-    ) -> Option<Innovation<3>> {
+    ) -> Result<Innovation<3>, Unusable> {
         if !centre_m.iter().chain(covariance_m2).copied().all(f64::is_finite) {
-            return None;
+            return Err(Unusable::NotFinite);
         }
-        let places = *self.layout.cameras.get(camera)?;
-        let own = *self.cameras.get(camera)?.as_ref()?;
+        let (own, places) = self.camera_places(camera)?;
+        let covariance = Spectrum::of_position(covariance_m2)?.matrix();
         let to_centre = -self.nominal.position_m;
         let (predicted, by_attitude, by_mount) = predict_direction(&self.nominal.attitude, &own.mount, &to_centre);
         let to_camera = (self.nominal.attitude * own.mount).inverse().to_rotation_matrix().into_inner();
@@ -51,7 +55,7 @@ impl<const N: usize> Filter<N> {
             }
         }
         let white = own.options.white_rad * libm::sqrt(predicted.norm_squared());
-        let noise = (covariance_m2 + covariance_m2.transpose()) * 0.5 + Matrix3::identity() * (white * white);
+        let noise = covariance + Matrix3::identity() * (white * white);
         self.update(centre_m - predicted - height, &by_errors, &noise)
     }
 }

@@ -6,26 +6,28 @@
 
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
-use super::blocks::{put, root, three_columns, three_rows};
+use super::blocks::{put, three_columns, three_rows};
 use super::predict::rate_of;
+use super::spectrum::Spectrum;
+use super::unusable::Unusable;
 use super::update::Innovation;
 use super::{Camera, Filter};
 use crate::gravity::earth_rate;
-use crate::layout::Layout;
-
-/// Added to the covariance of the slow error, rad²: the covariance of a direction has rank 2.
-const EPSILON_RAD2: f64 = 1e-14;
+use crate::layout::{CameraPlaces, Layout};
 
 /// A direction that a camera measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DirectionMeasurement {
     /// Number of the camera, from 0.
     pub camera: usize,
+    /// Number of the body among those that the camera sees, from 0: each has a slow error of its own.
+    pub body: usize,
     /// Unit vector in the camera frame.
     pub measured: Vector3<f64>,
     /// The same direction in ECEF, a unit vector.
     pub reference: Vector3<f64>,
     /// Covariance of the measured direction in the camera frame, rad², of rank 2. It belongs to the slow error.
+    /// Rounding to single precision does no harm.
     pub covariance_rad2: Matrix3<f64>,
     /// Derivative of the measured direction by the limb height, per km (camera frame); zero for the Sun.
     pub by_limb_height: Vector3<f64>,
@@ -53,19 +55,28 @@ impl DirectionMeasurement {
             self.measured.iter().chain(&self.reference).chain(&self.covariance_rad2).chain(&self.by_limb_height);
         numbers.copied().all(f64::is_finite)
     }
+
+    /// Returns the measured direction as a unit vector, and its covariance without the effects of rounding.
+    pub(super) fn checked(&self) -> Result<(Vector3<f64>, Spectrum), Unusable> {
+        if !self.is_finite() {
+            return Err(Unusable::NotFinite);
+        }
+        let measured = self.measured.try_normalize(1e-6).ok_or(Unusable::NoDirection)?;
+        Ok((measured, Spectrum::of_direction(&self.covariance_rad2, &measured)?))
+    }
 }
 
 impl<const N: usize> Filter<N> {
-    /// Takes a direction at the time of the state. `None` if there is no such camera or a number is not finite; nothing
-    /// changes then.
-    pub fn update_direction(&mut self, m: &DirectionMeasurement) -> Option<Innovation<2>> {
-        if !m.is_finite() {
-            return None;
-        }
-        let (measured, reference) = (m.measured.try_normalize(1e-6)?, m.reference.try_normalize(1e-6)?);
-        let camera = *self.cameras.get(m.camera)?.as_ref()?;
-        let places = *self.layout.cameras.get(m.camera)?;
-        self.set_slow_covariance(m.camera, &m.covariance_rad2, None)?;
+    /// Takes a direction at the time of the state.
+    ///
+    /// # Errors
+    /// See [`Unusable`].
+    pub fn update_direction(&mut self, m: &DirectionMeasurement) -> Result<Innovation<2>, Unusable> {
+        let (measured, covariance) = m.checked()?;
+        let reference = m.reference.try_normalize(1e-6).ok_or(Unusable::NoDirection)?;
+        self.set_slow_covariance((m.camera, m.body), &covariance, None)?;
+        let (camera, places) = self.camera_places(m.camera)?;
+        let slow_place = places.slow_errors.get(m.body).copied().flatten();
         let (rate, attitude) = self.at_clock(&camera);
         let (predicted, by_attitude, by_mount) = predict_direction(&attitude, &camera.mount, &reference);
         let mut by_errors = SMatrix::<f64, 3, N>::zeros();
@@ -74,9 +85,9 @@ impl<const N: usize> Filter<N> {
             put(&mut by_errors, (0, place.first), &by_mount);
         }
         let mut slow = Vector3::zeros();
-        if let Some(place) = places.slow_error {
+        if let Some(place) = slow_place {
             put(&mut by_errors, (0, place.first), &Matrix3::identity());
-            slow = camera.slow_error;
+            slow = camera.slow_errors.get(m.body).copied().unwrap_or_default();
         }
         if let Some(place) = places.clock {
             let body = attitude.inverse() * reference;
@@ -99,9 +110,9 @@ impl<const N: usize> Filter<N> {
         let value = across * (measured - predicted - slow - height);
         let white = camera.options.white_rad;
         let mut noise = SMatrix::<f64, 2, 2>::identity() * (white * white);
-        if places.slow_error.is_none() {
+        if slow_place.is_none() {
             // Without a slow error, the covariance is noise of each direction.
-            noise += across * m.covariance_rad2 * across.transpose();
+            noise += across * covariance.matrix() * across.transpose();
         }
         self.update(value, &(across * by_errors), &noise)
     }
@@ -119,19 +130,24 @@ impl<const N: usize> Filter<N> {
     /// all others.
     pub(super) fn set_slow_covariance(
         &mut self,
-        which: usize,
-        covariance_rad2: &Matrix3<f64>,
+        (which, body): (usize, usize),
+        covariance: &Spectrum,
         recorded: Option<&mut SMatrix<f64, N, N>>,
-    ) -> Option<()> {
-        let Some(place) = self.layout.cameras.get(which)?.slow_error else { return Some(()) };
-        let camera = self.cameras.get_mut(which)?.as_mut()?;
-        let new = (covariance_rad2 + covariance_rad2.transpose()) * 0.5 + Matrix3::identity() * EPSILON_RAD2;
-        let new_root = root(&new, 1)?;
-        match camera.slow_covariance {
+    ) -> Result<(), Unusable> {
+        let (own, places) = self.camera_places(which)?;
+        if body >= own.options.bodies {
+            return Err(Unusable::NoBody);
+        }
+        let camera = self.cameras.get_mut(which).and_then(Option::as_mut).ok_or(Unusable::NoCamera)?;
+        let place = places.slow_errors.get(body).copied().flatten();
+        let errors = camera.slow_errors.get_mut(body).zip(camera.slow_covariances.get_mut(body));
+        let (Some(place), Some((slow_error, slow_covariance))) = (place, errors) else { return Ok(()) };
+        let new = covariance.matrix();
+        match *slow_covariance {
             None => put(&mut self.covariance, (place.first, place.first), &new),
             Some(old) => {
-                let change = new_root * root(&old, -1)?;
-                camera.slow_error = change * camera.slow_error;
+                let change = covariance.root() * Spectrum::of(&old).inverse_root();
+                *slow_error = change * *slow_error;
                 if let Some(recorded) = recorded {
                     let rows = change * three_rows(recorded, place.first);
                     put(recorded, (place.first, 0), &rows);
@@ -142,8 +158,14 @@ impl<const N: usize> Filter<N> {
                 put(&mut self.covariance, (0, place.first), &columns);
             }
         }
-        camera.slow_covariance = Some(new);
-        Some(())
+        *slow_covariance = Some(new);
+        Ok(())
+    }
+
+    /// Returns a camera, and the places of its errors.
+    pub(super) fn camera_places(&self, which: usize) -> Result<(Camera, CameraPlaces), Unusable> {
+        let camera = self.cameras.get(which).and_then(Option::as_ref).ok_or(Unusable::NoCamera)?;
+        Ok((*camera, self.layout.cameras.get(which).copied().unwrap_or_default()))
     }
 }
 

@@ -11,12 +11,14 @@ mod chi2;
 mod direction;
 mod limb_latitude;
 mod predict;
+mod spectrum;
 mod states;
+mod unusable;
 mod update;
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 
-use crate::layout::{Layout, MAX_CAMERAS, Place};
+use crate::layout::{Layout, MAX_BODIES, MAX_CAMERAS, Place};
 use crate::options::{CameraOptions, Options};
 use crate::strapdown::{Imu, Nominal};
 
@@ -26,6 +28,7 @@ use limb_latitude::LatitudeTerm;
 pub use chi2::chi2_limit;
 pub use direction::{DirectionMeasurement, predict_direction};
 pub use predict::Step;
+pub use unusable::Unusable;
 pub use update::Innovation;
 
 /// Corrections of the instruments: the estimates of their errors.
@@ -65,12 +68,12 @@ pub struct Camera {
     pub options: CameraOptions,
     /// The mount with the estimated misalignment: rotation from the camera to the body frame.
     pub mount: UnitQuaternion<f64>,
-    /// Estimate of the slow error of a direction (camera frame).
-    pub slow_error: Vector3<f64>,
+    /// Estimate of the slow error of the direction to each body (camera frame).
+    pub slow_errors: [Vector3<f64>; MAX_BODIES],
     /// Estimate of the clock offset, s.
     pub clock_s: f64,
-    /// Covariance of the slow error of the last direction, rad²; `None` before the first one.
-    slow_covariance: Option<nalgebra::Matrix3<f64>>,
+    /// Covariance of each slow error, that of the last direction, rad²; `None` before the first one.
+    slow_covariances: [Option<nalgebra::Matrix3<f64>>; MAX_BODIES],
 }
 
 /// Why a filter cannot be made.
@@ -143,9 +146,9 @@ impl<const N: usize> Filter<N> {
             *slot = Some(Camera {
                 options: *options,
                 mount: options.mount,
-                slow_error: Vector3::zeros(),
+                slow_errors: [Vector3::zeros(); MAX_BODIES],
                 clock_s: 0.0,
-                slow_covariance: None,
+                slow_covariances: [None; MAX_BODIES],
             });
         }
         filter.fill_covariance(cameras);
@@ -255,7 +258,9 @@ impl<const N: usize> Filter<N> {
         for (camera, places) in self.cameras.iter_mut().flatten().zip(&layout.cameras) {
             let turn = UnitQuaternion::from_scaled_axis(of(places.misalignment));
             camera.mount = UnitQuaternion::new_normalize((camera.mount * turn).into_inner());
-            camera.slow_error += of(places.slow_error);
+            for (error, place) in camera.slow_errors.iter_mut().zip(places.slow_errors) {
+                *error += of(place);
+            }
             camera.clock_s += one(places.clock);
         }
     }

@@ -169,18 +169,21 @@ impl<const N: usize> Filter<N> {
     /// Lets the slow errors of the cameras forget: Φ = exp(−Δt/T), Q = (1 − Φ²) P_c.
     fn fade_slow_errors(&mut self, dt: f64, mut recorded: Option<&mut SMatrix<f64, N, N>>) {
         for (camera, places) in self.cameras.iter_mut().flatten().zip(&self.layout.cameras) {
-            let (Some(place), Some(target)) = (places.slow_error, camera.slow_covariance) else { continue };
             let keep = libm::exp(-dt / camera.options.slow_error_time_s);
-            camera.slow_error *= keep;
-            for i in place.first..place.first + place.len {
-                scale_row(&mut self.covariance, i, keep);
-                scale_column(&mut self.covariance, i, keep);
-                if let Some(recorded) = &mut recorded {
-                    scale_row(recorded, i, keep);
+            let errors = camera.slow_errors.iter_mut().zip(camera.slow_covariances).zip(places.slow_errors);
+            for ((error, target), place) in errors {
+                let (Some(place), Some(target)) = (place, target) else { continue };
+                *error *= keep;
+                for i in place.first..place.first + place.len {
+                    scale_row(&mut self.covariance, i, keep);
+                    scale_column(&mut self.covariance, i, keep);
+                    if let Some(recorded) = &mut recorded {
+                        scale_row(recorded, i, keep);
+                    }
                 }
+                let own = three_rows(&three_columns(&self.covariance, place.first), place.first);
+                put(&mut self.covariance, (place.first, place.first), &(own + target * (1.0 - keep * keep)));
             }
-            let own = three_rows(&three_columns(&self.covariance, place.first), place.first);
-            put(&mut self.covariance, (place.first, place.first), &(own + target * (1.0 - keep * keep)));
         }
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::blocks::{put_three, set};
-use super::{DirectionMeasurement, Filter, Step};
+use super::{DirectionMeasurement, Filter, Step, Unusable};
 use crate::layout::{Layout, Place};
 use crate::strapdown::Imu;
 
@@ -30,7 +30,9 @@ impl<const N: usize> Filter<N> {
         let cameras = || self.cameras.iter().flatten().zip(other.cameras.iter().flatten()).zip(&layout.cameras);
         for ((a, b), places) in cameras() {
             put_block(places.misalignment, (b.mount.inverse() * a.mount).scaled_axis());
-            put_block(places.slow_error, a.slow_error - b.slow_error);
+            for ((a, b), place) in a.slow_errors.iter().zip(b.slow_errors).zip(places.slow_errors) {
+                put_block(place, a - b);
+            }
         }
         if let Some(place) = layout.limb_height {
             set(&mut error, (place.first, 0), a.limb_height_km - b.limb_height_km);
@@ -64,11 +66,16 @@ impl<const N: usize> Filter<N> {
     }
 
     /// Prepares the slow error of the camera for a direction, as [`Filter::update_direction`] does before the update,
-    /// and multiplies the change onto `transition`. `None` if the direction is not usable.
-    pub fn prepare_direction(&mut self, m: &DirectionMeasurement, transition: &mut SMatrix<f64, N, N>) -> Option<()> {
-        if !m.is_finite() {
-            return None;
-        }
-        self.set_slow_covariance(m.camera, &m.covariance_rad2, Some(transition))
+    /// and multiplies the change onto `transition`.
+    ///
+    /// # Errors
+    /// See [`Unusable`].
+    pub fn prepare_direction(
+        &mut self,
+        m: &DirectionMeasurement,
+        transition: &mut SMatrix<f64, N, N>,
+    ) -> Result<(), Unusable> {
+        let (_, covariance) = m.checked()?;
+        self.set_slow_covariance((m.camera, m.body), &covariance, Some(transition))
     }
 }

@@ -5,6 +5,7 @@ use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use super::Filter;
 use super::blocks::{scale_row, set};
 use super::chi2::chi2_limit;
+use super::unusable::Unusable;
 use crate::layout::Layout;
 
 /// An innovation: measured minus predicted.
@@ -21,20 +22,25 @@ pub struct Innovation<const M: usize> {
 }
 
 impl<const N: usize> Filter<N> {
-    /// Takes a measurement of M numbers with an innovation, its derivative by the errors, and its noise. `None` if the
-    /// covariance of the innovation is not positive definite, or a number is not finite; the state is then unchanged.
+    /// Takes a measurement of M numbers with an innovation, its derivative by the errors, and its noise.
+    ///
+    /// # Errors
+    /// The covariance of the innovation is not positive definite, or a number is not finite.
     pub(super) fn update<const M: usize>(
         &mut self,
         value: SVector<f64, M>,
         by_errors: &SMatrix<f64, M, N>,
         noise: &SMatrix<f64, M, M>,
-    ) -> Option<Innovation<M>> {
+    ) -> Result<Innovation<M>, Unusable> {
+        if !value.iter().all(|x| x.is_finite()) {
+            return Err(Unusable::NotFinite);
+        }
         let cross: SMatrix<f64, N, M> = self.covariance * by_errors.transpose();
         let covariance = by_errors * cross + noise;
-        let inverse = covariance.cholesky()?.inverse();
+        let inverse = covariance.cholesky().ok_or(Unusable::Innovation)?.inverse();
         let nis = value.dot(&(inverse * value));
         if !nis.is_finite() {
-            return None;
+            return Err(Unusable::Innovation);
         }
         let taken = nis <= chi2_limit(M, self.options.gate_probability);
         if taken {
@@ -45,7 +51,7 @@ impl<const N: usize> Filter<N> {
             self.apply(&(gain * value));
             self.reduce_covariance(&gain, &cross, by_errors, noise);
         }
-        Some(Innovation { value, covariance, nis, taken })
+        Ok(Innovation { value, covariance, nis, taken })
     }
 
     /// P ← (I − K H) P (I − K H)ᵀ + K R Kᵀ, factor by factor and in place: a copy of P would not fit the stack of a
@@ -75,22 +81,35 @@ impl<const N: usize> Filter<N> {
     }
 
     /// Takes a position in ECEF (m) with the 1-sigma of each component.
-    pub fn update_position(&mut self, position_m: &Vector3<f64>, sigma_m: f64) -> Option<Innovation<3>> {
+    ///
+    /// # Errors
+    /// See [`Unusable`].
+    pub fn update_position(&mut self, position_m: &Vector3<f64>, sigma_m: f64) -> Result<Innovation<3>, Unusable> {
         self.update_three(position_m - self.nominal.position_m, Layout::POSITION, sigma_m)
     }
 
     /// Takes a velocity in ECEF (m/s) with the 1-sigma of each component.
-    pub fn update_velocity(&mut self, velocity_m_s: &Vector3<f64>, sigma_m_s: f64) -> Option<Innovation<3>> {
+    ///
+    /// # Errors
+    /// See [`Unusable`].
+    pub fn update_velocity(&mut self, velocity_m_s: &Vector3<f64>, sigma_m_s: f64) -> Result<Innovation<3>, Unusable> {
         self.update_three(velocity_m_s - self.nominal.velocity_m_s, Layout::VELOCITY, sigma_m_s)
     }
 
     /// Takes an attitude (body to ECEF), for example of a star tracker, with the 1-sigma about each axis.
-    pub fn update_attitude(&mut self, attitude: &UnitQuaternion<f64>, sigma_rad: f64) -> Option<Innovation<3>> {
+    ///
+    /// # Errors
+    /// See [`Unusable`].
+    pub fn update_attitude(
+        &mut self,
+        attitude: &UnitQuaternion<f64>,
+        sigma_rad: f64,
+    ) -> Result<Innovation<3>, Unusable> {
         let error = (attitude * self.nominal.attitude.inverse()).scaled_axis();
         self.update_three(error, Layout::ATTITUDE, sigma_rad)
     }
 
-    fn update_three(&mut self, value: Vector3<f64>, first: usize, sigma: f64) -> Option<Innovation<3>> {
+    fn update_three(&mut self, value: Vector3<f64>, first: usize, sigma: f64) -> Result<Innovation<3>, Unusable> {
         let mut by_errors = SMatrix::<f64, 3, N>::zeros();
         for i in 0..3 {
             set(&mut by_errors, (i, first + i), 1.0);

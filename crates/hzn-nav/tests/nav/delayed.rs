@@ -2,7 +2,7 @@
 
 use crate::common::Draws;
 use hzn_nav::delayed::{Delayed, Measurement, Outcome, Refused};
-use hzn_nav::filter::{DirectionMeasurement, Filter, FilterError};
+use hzn_nav::filter::{DirectionMeasurement, Filter, FilterError, Unusable};
 use hzn_nav::gravity::gravity;
 use hzn_nav::options::{CameraOptions, ImuOptions, Options};
 use hzn_nav::start::{Seen, first_attitude, propagate_back};
@@ -43,6 +43,7 @@ fn direction(truth: &Nominal, sun: bool) -> Measurement {
     let covariance_rad2 = (Matrix3::identity() - measured * measured.transpose()) * (0.1 * DEG).powi(2);
     Measurement::Direction(DirectionMeasurement {
         camera: usize::from(sun),
+        body: 0,
         measured,
         reference,
         covariance_rad2,
@@ -123,7 +124,7 @@ fn broken_input_is_counted() {
     assert_eq!(delayed.push(0.99, position), Err(Refused::Full));
     let mut outcomes = Vec::new();
     delayed.finish(|_, _, outcome| outcomes.push(outcome));
-    assert_eq!(outcomes, [Outcome::Unusable, Outcome::Gated]);
+    assert_eq!(outcomes, [Outcome::Unusable(Unusable::NotFinite), Outcome::Gated]);
     // A gap of 20 s, and saturation: the sigma of the attitude grows.
     let before = delayed.filter().sigmas(0).norm();
     delayed.push_sample(&imu(21.0), false, none);
@@ -151,10 +152,15 @@ fn what_does_not_fit_is_refused() {
     let mut filter = filter();
     let Measurement::Direction(mut m) = direction(&start(), false) else { unreachable!() };
     m.camera = 3;
-    assert!(filter.update_direction(&m).is_none());
+    assert_eq!(filter.update_direction(&m).unwrap_err(), Unusable::NoCamera);
     m.camera = 0;
+    m.covariance_rad2 *= -1.0;
+    assert_eq!(filter.update_direction(&m).unwrap_err(), Unusable::NegativeVariance);
+    m.covariance_rad2.m12 = f64::NAN;
+    assert_eq!(filter.update_direction(&m).unwrap_err(), Unusable::NotFinite);
+    m.covariance_rad2 = Matrix3::identity() * 1e-6;
     m.measured = Vector3::zeros();
-    assert!(filter.update_direction(&m).is_none());
+    assert_eq!(filter.update_direction(&m).unwrap_err(), Unusable::NoDirection);
 }
 
 #[test]

@@ -105,6 +105,7 @@ fn watch(filter: &mut Filter<20>, seed: u64, limbs: usize) {
         let error = attitude.inverse() * limb.tilt_rad + by_half_angle * limb.half_angle_rad;
         let measurement = DirectionMeasurement {
             camera: 0,
+            body: 0,
             measured: (seen + error + noise).normalize(),
             reference,
             covariance_rad2: Matrix3::zeros(),

@@ -305,6 +305,8 @@ class Sensor:
     ) -> Report:
         """Find the limb in a picture.
 
+        NaN, or an array of NaN, is an unknown value, as in a table of pandas with gaps.
+
         Parameters
         ----------
         image
@@ -342,8 +344,9 @@ class Sensor:
         Returns
         -------
         Report
-            Report of the first body; `Report.others` has the reports of further bodies. Below the limb height, where
-            every rocket starts, the status is ``no-altitude``.
+            Report of the first body; `Report.others` has the reports of further bodies. If the altitude is unknown, or
+            if it is not above the limb height, as at the start of every rocket, the status is ``no-altitude`` and
+            `Report.detail` has the reason.
 
         Raises
         ------
@@ -983,6 +986,22 @@ class _Sequence:
 
 @final
 class _Item: ...
+@final
+class _Prior:
+    def __new__(
+        cls,
+        *,
+        altitude_km: float | None = None,
+        position_km: Sequence[float] | None = None,
+        attitude: Sequence[float] | None = None,
+        attitude_sigma_deg: float | None = None,
+        rate_rad_s: Sequence[float] | None = None,
+        range_km: float | None = None,
+        range_sigma_km: float | None = None,
+        pole: Sequence[float] | None = None,
+        sun: Sequence[float] | None = None,
+        time_s: float | None = None,
+    ) -> _Prior: ...
 
 def _process_encoded(
     sensor: Sensor,
@@ -990,8 +1009,9 @@ def _process_encoded(
     name: str,
     data: bytes | None,
     why: str,
-    expected: Expected,
+    known: _Prior,
 ) -> Report: ...
+def _check_prior(sensor: Sensor, known: _Prior) -> None: ...
 def _write_mcap(path: _Path, sensor: Sensor, reports: Sequence[Report]) -> None: ...
 def _evaluate(
     results: _Path | Iterable[Report], truth: _Path | Sequence[Mapping[str, Any]], camera: Camera | None

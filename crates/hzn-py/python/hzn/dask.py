@@ -14,7 +14,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from ._hzn import ConfigError, Report, Sensor, __version__, _process_encoded, _write_mcap
+from ._hzn import (
+    ConfigError,
+    Report,
+    Sensor,
+    __version__,
+    _check_prior,
+    _Prior,
+    _process_encoded,
+    _write_mcap,
+)
 
 try:
     import fsspec  # type: ignore[import-untyped]
@@ -64,8 +73,9 @@ def process_archive(
     Parameters
     ----------
     urls
-        URLs or paths of picture files; or pairs of a URL or path and a dictionary of keyword arguments of
-        `hzn.Sensor.process` (``altitude_km`` and so on).
+        URLs or paths of picture files; or pairs of a URL or path and a dictionary of what is known of the picture: the
+        keyword arguments of `hzn.Sensor.process` from ``altitude_km`` to ``time_s``. A picture without a usable
+        altitude gets a row with the status ``no-altitude``.
     sensor
         The sensor. ``binarize.method = "track"`` is refused, because its threshold depends on the picture before.
     client
@@ -88,7 +98,7 @@ def process_archive(
     Raises
     ------
     ConfigError
-        There are no pictures, or the sensor or an option is invalid.
+        There are no pictures; the sensor or an option is invalid; or an altitude, position or attitude is impossible.
     Exception
         A shard failed after all retries. The other shards are written, and the next run makes the missing ones.
     """
@@ -103,10 +113,15 @@ def process_archive(
         raise ConfigError(
             "binarize.method: track takes its threshold from the previous picture, which another worker may have"
         )
+    for url, known in pictures:
+        try:
+            _check_prior(sensor, _Prior(**known))
+        except (ConfigError, TypeError) as error:
+            raise ConfigError(f"{url}: {error}") from None
     client = client or get_client()
     filesystem, folder = fsspec.core.url_to_fs(out)
     filesystem.makedirs(folder, exist_ok=True)
-    existing = set(filesystem.ls(folder, detail=False))
+    existing = set(_list(filesystem, folder))
     names: list[str] = []
     tasks = []
     for first in range(0, len(pictures), shard_frames):
@@ -128,11 +143,21 @@ def process_archive(
     )
 
 
+def _list(filesystem: Any, folder: str) -> list[str]:
+    """Return the paths of the files in a folder."""
+    # Other processes write into the folder, too.
+    filesystem.invalidate_cache()
+    try:
+        return list(filesystem.ls(folder, detail=False))
+    except FileNotFoundError:
+        # An object store has no empty folders: the folder exists from its first file on.
+        return []
+
+
 def _sweep(filesystem: Any, folder: str, names: Sequence[str]) -> None:
     """Remove the files of workers that died between writing a shard and renaming it."""
     own = {os.path.basename(name) for name in names}
-    filesystem.invalidate_cache()
-    for path in filesystem.ls(folder, detail=False):
+    for path in _list(filesystem, folder):
         # The file name is NAME.PROCESS.part.
         if path.endswith(".part") and os.path.basename(path).rsplit(".", 2)[0] in own:
             filesystem.rm(path)
@@ -168,7 +193,7 @@ def _picture(sensor: Sensor, index: int, url: str, known: Mapping[str, Any]) -> 
             data, why = file.read(), ""
     except OSError as error:
         data, why = None, f"cannot be read: {error}"
-    return _process_encoded(sensor, index, url, data, why, sensor.expect(**known))
+    return _process_encoded(sensor, index, url, data, why, _Prior(**known))
 
 
 def _table(reports: Sequence[Report]) -> Any:

@@ -185,7 +185,8 @@ class Filter:
         Returns
         -------
         Innovation or None
-            None if there is no such camera or a number is not finite.
+            None if there is no such camera, a number is not finite, or the covariance has a negative variance. The
+            rounding of a covariance to single precision does no harm.
         """
         return _innovation(
             self._filter.update_direction(

@@ -25,7 +25,7 @@ pub use annotate::annotate;
 pub use outcome::{BodyOutcome, Finished, Unprocessed};
 pub use plan::Plan;
 pub use process::process_one;
-pub use sensor::{AnySensor, LastAnswer, Processed, check_frames};
+pub use sensor::{AnySensor, LastAnswer, Processed, check_frames, find_refused};
 pub use sequence::{End, Sink, run};
 pub use trace::{Trace, Traces, Watch};
 pub use widen::widen_report;

@@ -287,16 +287,19 @@ fn run<P: Pixels, T: Real + Into<f64>, O: Observer<T>, const POINTS: usize, cons
 pub fn check_frames(config: &Config, flight: bool, frames: Option<&Frames>) -> Result<(), Problem> {
     let Some(frames) = frames else { return Ok(()) };
     let Ok(sensor) = AnySensor::new(config, flight) else { return Ok(()) };
-    if config.each_body().iter().any(|body| config.fits_position(body)) {
-        return Ok(());
-    }
     for row in &frames.rows {
-        for half_angle in sensor.expected_half_angles_rad(Some(row)) {
-            match half_angle {
-                Ok(_) | Err(PriorError::NoAltitude | PriorError::BelowLimb { .. }) => {}
-                Err(why) => return Err(frames.problem_of_prior(row, why)),
-            }
+        if let Some(why) = find_refused(config, &sensor, row) {
+            return Err(frames.problem_of_prior(row, why));
         }
     }
     Ok(())
+}
+
+/// Returns why the data of a picture are refused before anything is processed, as in [`check_frames`].
+pub fn find_refused(config: &Config, sensor: &AnySensor, data: &FrameData) -> Option<PriorError> {
+    if config.each_body().iter().any(|body| config.fits_position(body)) {
+        return None;
+    }
+    let each = sensor.expected_half_angles_rad(Some(data)).into_iter();
+    each.filter_map(Result::err).find(|why| !matches!(why, PriorError::NoAltitude | PriorError::BelowLimb { .. }))
 }

@@ -33,9 +33,8 @@ impl Rerun {
                 let what = "contains results without their pictures; give the pictures themselves";
                 return Err(unusable(format!("{}: {what}", path.display())));
             }
-            RecordedPictures::Damaged(parts) => {
-                let parts = explain::counted(parts, "damaged part");
-                let what = format!("no picture is left: the file has {parts}; give the pictures themselves");
+            RecordedPictures::Damaged(why) => {
+                let what = format!("no picture is left: {why}; give the pictures themselves");
                 return Err(unusable(format!("{}: {what}", path.display())));
             }
             RecordedPictures::Lost => {
@@ -55,8 +54,8 @@ enum RecordedPictures {
     Present,
     /// The file has only results.
     LeftOut,
-    /// The file has damaged parts, and no picture outside of them.
-    Damaged(u64),
+    /// The file has parts that cannot be read, and no picture outside of them. The text says why.
+    Damaged(String),
     /// The file contains nothing that is complete.
     Lost,
 }
@@ -73,7 +72,9 @@ fn find_pictures(path: &Path) -> Result<RecordedPictures, hzn_mcap::Error> {
         any |= !part.is_empty();
     }
     if index.broken_chunks() > 0 {
-        return Ok(RecordedPictures::Damaged(index.broken_chunks()));
+        let parts = explain::counted(index.broken_chunks(), "damaged part");
+        let why = index.unknown_compression().map_or_else(|| format!("the file has {parts}"), unknown_compression);
+        return Ok(RecordedPictures::Damaged(why));
     }
     Ok(if any || index.is_complete() { RecordedPictures::LeftOut } else { RecordedPictures::Lost })
 }
@@ -123,9 +124,24 @@ impl Source for Rerun {
     }
 }
 
+/// Says that hzn does not know how a recording is compressed.
+fn unknown_compression(name: &str) -> String {
+    format!("its data are compressed with {name:?}; write it again with zstd, with lz4 or without compression")
+}
+
 /// Describes what is missing in a recording that was read to its end. `done` says what was done with the rest.
 pub fn describe_loss(reader: &Reader, path: &Path, done: &str) -> Option<String> {
     let name = path.display();
+    if let Some(compression) = reader.unknown_compression() {
+        return Some(format!("{name}: cannot be read: {}", unknown_compression(compression)));
+    }
+    if reader.unread_reports() > 0 {
+        let messages = explain::counted(reader.unread_reports(), "message");
+        let what = "cannot be read as results, because the channel has another schema than hzn.Report";
+        return Some(format!(
+            "{name}: {messages} on /hzn/report {what}; keep the schema when the file is written again"
+        ));
+    }
     match reader.broken_chunks() {
         0 if reader.is_complete() => None,
         0 => Some(format!("{name}: was cut off; its finished pictures were {done} (`hzn recover` closes it)")),

@@ -13,7 +13,7 @@ mod planet;
 
 pub use cameras::{CameraOnVehicle, Clock};
 pub use exposure::Exposure;
-pub use noise::{FIT_PICTURES, Fit};
+pub use noise::{FIT_PICTURES, Fit, median_rms_px};
 pub use planet::BodyFrameRow;
 
 use std::path::{Path as FilePath, PathBuf};

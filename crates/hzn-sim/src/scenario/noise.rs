@@ -217,6 +217,25 @@ impl Fit {
     }
 }
 
+/// Returns the median RMS of the residuals of a sensor that looks for one body, in pixels, on `pictures` pictures of
+/// the scenario with another seed. `None` if no picture has an answer.
+///
+/// # Errors
+/// Fails like [`crate::Scene::render`].
+pub fn median_rms_px(scenario: &Scenario, sensor: &Config, pictures: u32) -> Result<Option<f64>, ScenarioError> {
+    let other = Scenario { seed: scenario.seed.wrapping_add((SEEDS + 1) * OTHER_SEED), ..scenario.clone() };
+    let [from_s, to_s] = scenario.span_s();
+    let time_s = |i: u32| from_s + (to_s - from_s) * (f64::from(i) + 0.5) / f64::from(pictures);
+    let flight = other.flight_with_times(&(0..pictures).map(time_s).collect::<Vec<_>>())?;
+    let mut rendered = Vec::with_capacity(flight.frames.len());
+    for frame in &flight.frames {
+        rendered.push(frame.render().map_err(|e| ScenarioError::new("[trajectory]", e.to_string()))?);
+    }
+    let pairs: Vec<_> = flight.frames.iter().zip(&rendered).collect();
+    let processed = process_all(scenario, sensor, &pairs);
+    Ok((!processed.is_empty()).then(|| median(processed.iter().map(|p| p.rms_px))))
+}
+
 /// Returns the times of the pictures of seed number `seed_index` (from 0). The pictures of all seeds together are
 /// `pictures`, spread evenly over the whole span. The pictures of one seed are far apart.
 fn picture_times_s([from_s, to_s]: [f64; 2], seed_index: u64, pictures: u32) -> Vec<f64> {
@@ -238,6 +257,8 @@ struct Processed<'a> {
     /// Edge points of the answer with their weights, in order.
     points: WeightedPoints,
     error_rad: f64,
+    /// RMS of the residuals, pixels.
+    rms_px: f64,
     nees: f64,
     /// Logarithm of the covariance's determinant.
     log_det: f64,
@@ -276,6 +297,7 @@ fn process_all<'a>(
             frame,
             points: points.into_iter().filter(|p| p.1 > 0.0).collect(),
             error_rad: solution.axis.angle_rad(&axis),
+            rms_px: solution.rms_px,
             nees: full.try_inverse().map_or(f64::NAN, |inverse| d.dot(&(inverse * d))),
             log_det: (full.determinant() / scale).ln(),
         });

@@ -1,5 +1,6 @@
 //! Camera, body and position of a sensor that does not exist yet.
 
+use hzn_core::body::PriorError;
 use hzn_core::camera;
 use hzn_core::error::ConfigError;
 use nalgebra::{Matrix3, Vector3};
@@ -35,6 +36,9 @@ pub enum DesignError {
     /// The camera is out of its limits.
     #[error(transparent)]
     Camera(#[from] ConfigError),
+    /// The sensor refuses what it is told of the place.
+    #[error("{0}")]
+    Prior(PriorError),
     /// The camera is not above the limb.
     #[error("the camera at {altitude_km} km is not above the limb at {limb_height_km} km, or the body has no radius")]
     Inside {

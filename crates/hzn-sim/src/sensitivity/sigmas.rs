@@ -36,6 +36,8 @@ pub struct Sigmas {
     pub fused: DirectionSigmas,
     /// Sigmas with an exactly known half-angle.
     pub known: DirectionSigmas,
+    /// Largest sigma in any direction of the fused solution: the `sigma_max_deg` of `hzn run`.
+    pub largest_deg: f64,
     /// Sigmas by equation 33 of Braun & Barf 2022 (unweighted least squares in the plane of a pinhole picture); `None`
     /// for other lenses.
     pub braun_barf: Option<DirectionSigmas>,
@@ -60,11 +62,7 @@ impl Sigmas {
     /// Returns `None` if the points do not determine a direction with a free half-angle.
     fn new(design: &Design, camera: &Camera<f64>, half_angle_rad: f64, samples: &[LimbSample]) -> Option<Self> {
         let e = Vector3::from(design.axis());
-        // `tilt` points towards the optical axis and `across` is perpendicular to it. If the camera looks straight
-        // down, any plane is suitable.
-        let z = Vector3::z();
-        let tilt = (z - e * e.z).try_normalize(1e-9).unwrap_or_else(|| (Vector3::y() - e * e.y).normalize());
-        let across = e.cross(&tilt);
+        let (tilt, across) = tangent(&e);
         let variance = design.sigma_px * design.sigma_px;
         let rho = |s: &LimbSample| match s.step_px {
             Some(step) if design.correlation_px > 0.0 => (-step / design.correlation_px).exp(),
@@ -106,6 +104,7 @@ impl Sigmas {
             free: direction_sigmas(upper(free)),
             fused: direction_sigmas(upper(fused)),
             known: direction_sigmas(known),
+            largest_deg: root_deg(upper(fused).symmetric_eigenvalues().max()),
             braun_barf: paper.map(|p| DirectionSigmas {
                 pitch_deg: root_deg(tilt.dot(&(p * tilt))),
                 roll_deg: root_deg(across.dot(&(p * across))),
@@ -145,6 +144,14 @@ impl Plane {
         let n = self.normal.try_inverse()?;
         Some(n * correlated(&self.rows) * n * variance)
     }
+}
+
+/// Returns two unit vectors across the direction to the body. The first points towards the optical axis. If the camera
+/// looks straight down, any plane is suitable.
+pub(super) fn tangent(e: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let z = Vector3::z();
+    let tilt = (z - e * e.z).try_normalize(1e-9).unwrap_or_else(|| (Vector3::y() - e * e.y).normalize());
+    (tilt, e.cross(&tilt))
 }
 
 fn root_deg(variance: f64) -> f64 {

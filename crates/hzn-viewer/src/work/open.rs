@@ -1,6 +1,6 @@
 //! Opening of a sequence. Pictures are reported as they are found, so that a long recording is on the screen at once.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
@@ -242,8 +242,8 @@ fn open_recording(path: &Path, request: &Request, events: &EventSender) -> Resul
 struct FrameJoiner {
     name: String,
     frames: Option<Frames>,
-    /// Pictures whose results have not been read yet, by sequence number.
-    pending: HashMap<u32, hzn_mcap::Place>,
+    /// Pictures whose results have not been read yet, by log time and sequence number.
+    pending: HashMap<(u64, u32), VecDeque<hzn_mcap::Place>>,
     /// Number of pictures so far, in a recording without results.
     pictures_only: u64,
     /// The last picture; results of further bodies may follow.
@@ -251,12 +251,22 @@ struct FrameJoiner {
 }
 
 impl FrameJoiner {
+    /// Takes the first picture of a frame.
+    fn take_pending(&mut self, frame: (u64, u32)) -> Option<hzn_mcap::Place> {
+        let places = self.pending.get_mut(&frame)?;
+        let place = places.pop_front();
+        if places.is_empty() {
+            self.pending.remove(&frame);
+        }
+        place
+    }
+
     fn join(&mut self, part: Vec<IndexEntry>, has_reports: bool) -> Vec<(Entry, Vec<Row>)> {
         let mut out = Vec::new();
         for found in part {
             match found {
                 IndexEntry::Picture(place) if has_reports => {
-                    self.pending.insert(place.sequence(), place);
+                    self.pending.entry(place.frame()).or_default().push_back(place);
                 }
                 IndexEntry::Picture(place) => {
                     let name = format!("{}#{:06}", self.name, self.pictures_only);
@@ -268,7 +278,7 @@ impl FrameJoiner {
                     };
                     out.push((Entry { name, time_s, data, place: Place::Recorded(place) }, Vec::new()));
                 }
-                IndexEntry::Report(row, _, given) => {
+                IndexEntry::Report(at, row, _, given) => {
                     if let Some((entry, rows)) = &mut self.last
                         && rows.first().is_some_and(|r| r.index == row.index)
                         && entry.name == row.file
@@ -278,7 +288,7 @@ impl FrameJoiner {
                     }
                     out.extend(self.last.take());
                     let data = hzn_run::source::recorded_prior(&row, &given);
-                    let place = self.pending.remove(&(row.index as u32)).map_or(Place::Nowhere, Place::Recorded);
+                    let place = self.take_pending(at.frame()).map_or(Place::Nowhere, Place::Recorded);
                     let entry = Entry { name: row.file.clone(), time_s: row.time_s, data: Some(data), place };
                     self.last = Some((entry, vec![*row]));
                 }

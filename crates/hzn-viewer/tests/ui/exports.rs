@@ -66,7 +66,7 @@ fn the_table_holds_what_is_shown() {
     menu(&mut window, "Export", "Save results as CSV…");
     path(&mut window, &csv, "Write");
     said(&mut window, "Written");
-    let (rows, _) = hzn_run::results::read(&csv).map_err(|e| e.to_string()).unwrap();
+    let rows = hzn_run::results::read(&csv).map_err(|e| e.to_string()).unwrap().rows;
     let statuses: Vec<Status> = rows.iter().map(|r| r.status).collect();
     assert_eq!(statuses, [Status::Ok, Status::Ok, Status::Ok, Status::NoLimb]);
     assert_eq!(rows[0].axis(), answer(&window).2, "to the last bit");

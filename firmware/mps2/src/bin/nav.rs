@@ -90,6 +90,7 @@ fn push(flight: &mut Flight, record: &Record) {
         let covariance_rad2 = Matrix3::from_rows(&[9, 12, 15].map(|from| three(record, from).transpose()));
         let direction = DirectionMeasurement {
             camera: third as usize,
+            body: 0,
             measured: three(record, 3),
             reference: three(record, 6),
             covariance_rad2,

@@ -9,12 +9,13 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera;
 use hzn_mcap::Row;
+use hzn_run::results::Results;
 use hzn_run::source::ending;
 use hzn_run::{disk, sink};
 use hzn_sim::Truth;
 use hzn_sim::evaluate::{Answer, Evaluation, pair};
 
-use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::exit::{Exit, Outcome, Stop, failed, unreadable, usage};
 use crate::files;
 use crate::tell;
 use report::Report;
@@ -60,8 +61,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     read.extend([args.results.clone(), truth_path.clone()]);
     read.extend(truth.iter().map(|t| folder.join(&t.file)));
     files::check_outputs(&read, &args.output, args.force)?;
-    let (rows, recorded_sensor) = hzn_run::results::read(&args.results)?;
-    let sensor = sensor(args.sensor.as_deref(), recorded_sensor.as_deref(), folder)?;
+    let Results { rows, sensor_toml, lost } = hzn_run::results::read(&args.results)?;
+    if let Some(lost) = lost.as_ref().filter(|_| rows.is_empty()) {
+        return Err(unreadable(lost));
+    }
+    let sensor = sensor(args.sensor.as_deref(), sensor_toml.as_deref(), folder)?;
     let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok());
     if camera.is_none() {
         tell::line("note: no sensor.toml is available (--sensor): the length of limb in view is left out");
@@ -87,7 +91,8 @@ pub(super) fn run(args: &Args) -> Outcome {
         std::fs::write(path, bytes).map_err(|e| disk::cannot_write(path, &e))?;
     }
     tell::result(text::report(&report, &worst))?;
-    Ok(Exit::Done)
+    lost.iter().for_each(tell::warning);
+    Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
 }
 
 fn sensor(sensor: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result<Option<hzn_core::Config>, Stop> {

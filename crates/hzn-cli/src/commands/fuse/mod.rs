@@ -11,7 +11,7 @@ use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{self, Inputs};
 use hzn_fuse::{Settings, truth};
 
-use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::exit::{Exit, Outcome, Stop, unreadable, usage};
 use crate::tell::{self, one_line};
 pub(super) use args::Args;
 use args::names;
@@ -52,14 +52,20 @@ pub(super) fn run(args: &Args) -> Outcome {
     summary::print(&fused, truth.as_deref())?;
     let written: Vec<String> = written.iter().map(one_line).collect();
     tell::result(format_args!("\n{}\n", written.join("\n")))?;
-    Ok(Exit::Done)
+    let lost: Vec<_> = inputs.recordings.iter().filter_map(|recording| recording.lost.as_ref()).collect();
+    lost.iter().for_each(tell::warning);
+    Ok(if lost.is_empty() { Exit::Done } else { Exit::SomeUnreadable })
 }
 
 /// Reads all inputs.
 fn inputs(args: &Args) -> Result<Inputs, Stop> {
     let mut inputs = Inputs::default();
     for path in &args.nadir {
-        inputs.recordings.push(input::recording(path)?);
+        let recording = input::recording(path)?;
+        if let Some(lost) = recording.lost.as_ref().filter(|_| recording.rows.is_empty()) {
+            return Err(unreadable(lost));
+        }
+        inputs.recordings.push(recording);
     }
     let known = names(&inputs);
     for (name, file) in &args.mount {

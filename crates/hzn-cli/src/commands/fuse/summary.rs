@@ -65,7 +65,7 @@ pub(super) fn lines(fused: &Fused, truth: Option<&[VehicleRow]>) -> Vec<(String,
         );
     }
     for (name, value) in counts(&fused.counts) {
-        line(name, value);
+        line(&name, value);
     }
     if let Some(truth) = truth {
         for (name, epochs) in [("filter", &fused.epochs), ("smoother", &fused.smoothed)] {
@@ -111,7 +111,7 @@ fn tallies(fused: &Fused) -> Vec<(String, Tally)> {
     all.into_iter().map(|((camera, kind), tally)| (name(camera, kind), tally)).collect()
 }
 
-fn counts(counts: &Counts) -> Vec<(&'static str, String)> {
+fn counts(counts: &Counts) -> Vec<(String, String)> {
     let all = [
         ("samples", counts.samples),
         ("  not finite", counts.samples_not_finite),
@@ -121,13 +121,15 @@ fn counts(counts: &Counts) -> Vec<(&'static str, String)> {
         ("  saturated", counts.saturated),
         ("before the start", counts.before_start),
         ("outside the samples", counts.outside),
-        ("not usable", counts.unusable),
         ("without a reference", counts.without_reference),
         ("while unknown", counts.waiting),
         ("new starts", counts.restarts),
+        ("not usable", counts.unusable.values().sum()),
     ];
     let shown = all.into_iter().filter(|(name, count)| *count > 0 || *name == "samples");
-    shown.map(|(name, count)| (name, count.to_string())).collect()
+    let reasons =
+        counts.unusable.iter().map(|((source, why), count)| (format!("  {source}"), format!("{count}: {why}")));
+    shown.map(|(name, count)| (name.to_owned(), count.to_string())).chain(reasons).collect()
 }
 
 /// Returns the errors against the truth in words.

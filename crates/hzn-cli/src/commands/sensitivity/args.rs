@@ -34,7 +34,8 @@ pub(crate) struct Args {
     /// The lens
     #[arg(long, value_enum, default_value_t = Lens::Pinhole, conflicts_with = "sensor")]
     pub(super) lens: Lens,
-    /// Take camera, body and noise from this sensor.toml
+    /// Take camera, body and errors from this sensor.toml: the sigmas are then those of the sensor itself, with every
+    /// term of its error budget, at a known position without an attitude
     #[arg(short, long, value_name = "FILE")]
     pub(super) sensor: Option<PathBuf>,
     /// Bodies: earth, moon, sun, a planet or moon by name, or a radius in kilometres; several with commas
@@ -55,7 +56,7 @@ pub(crate) struct Args {
     /// Turn of the camera about its optical axis, degrees
     #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true)]
     pub(super) roll: Values,
-    /// For `yaw`: latitude of the camera as seen from the centre of the body, degrees
+    /// For `yaw` and `--sensor`: latitude of the camera, degrees; for `yaw` as seen from the centre of the body
     #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true)]
     pub(super) latitude: Values,
     /// For `yaw`: direction of view from north over east, degrees
@@ -65,10 +66,11 @@ pub(crate) struct Args {
     /// the limb height]
     #[arg(long, value_name = "KM")]
     pub(super) second_harmonic: Option<f64>,
-    /// 1-sigma of an edge point, pixels [default: 1]
+    /// 1-sigma of an edge point, pixels [default: 1]. With `--sensor` and `noise = "rms"` it is the RMS of the
+    /// residuals [default: that of the simulated scene next to the sensor.toml]
     #[arg(long, value_name = "PX")]
     pub(super) sigma_px: Option<f64>,
-    /// Correlation length of the errors along the edge, pixels [default: 300]
+    /// Correlation length of the errors along the edge, pixels [default: 300; with `--sensor` that of the sensor]
     #[arg(long, value_name = "PX")]
     pub(super) correlation_px: Option<f64>,
     /// Also write the table (.csv) or a plot over the first range (.svg); may be given twice

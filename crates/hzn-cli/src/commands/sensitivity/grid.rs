@@ -1,10 +1,15 @@
 //! The grid of designs: every combination of the quantities on the command line.
 
+use std::path::Path;
+
+use hzn_core::Config;
+use hzn_core::body::Kind;
 use hzn_core::camera::{self, Model};
-use hzn_sim::sensitivity::Design;
+use hzn_sim::sensitivity::{Design, SensorPlace, Sigmas};
 
 use super::args::{Args, Lens, Size, What};
 use super::body::Body;
+use super::noise::{EdgeNoise, noise_of};
 use crate::exit::{Stop, usage};
 
 /// One quantity with its values.
@@ -19,34 +24,32 @@ pub(super) struct Axis {
 /// The grid of all designs: one design for each combination of the axes' values.
 pub(super) struct Grid<'a> {
     args: &'a Args,
-    sensor: Option<hzn_core::Config>,
+    /// For each body a sensor that looks for it, with its noise; empty without `--sensor`.
+    sensors: Vec<(Config, EdgeNoise)>,
     bodies: Vec<Body>,
     pub(super) axes: Vec<Axis>,
 }
 
 impl<'a> Grid<'a> {
     pub(super) fn new(args: &'a Args) -> Result<Self, Stop> {
-        let mut sensor = None;
-        if let Some(path) = &args.sensor {
-            let mut config = hzn_calib::sensor::load(path)?.config;
-            match config.bodies.as_slice() {
-                [] => {}
-                [one] => config.body = one.clone(),
-                _ if !args.body.is_empty() => {}
-                several => {
-                    let names: Vec<&str> = several.iter().map(|b| b.kind.name()).collect();
-                    let what = format!("looks for several bodies ({}); name one with --body", names.join(", "));
-                    return Err(usage(format!("{}: {what}", path.display())));
-                }
-            }
-            sensor = Some(config);
-        }
+        let sensor = args.sensor.as_deref().map(|path| load(path, !args.body.is_empty())).transpose()?;
         let body = sensor.as_ref().map(|s| &s.body);
         let bodies = match (args.body.is_empty(), body) {
             (false, _) => args.body.clone(),
             (true, Some(body)) => vec![Body::from_config(body)],
             (true, None) => vec![Body::EARTH],
         };
+        if let Some(px) = args.sigma_px.filter(|px| !(*px > 0.0)) {
+            return Err(usage(format!("--sigma-px: {px} is refused: must be above 0")));
+        }
+        let mut sensors = Vec::new();
+        if let (Some(sensor), Some(path)) = (&sensor, &args.sensor) {
+            for body in &bodies {
+                let one = looking_for(sensor, body);
+                let noise = EdgeNoise::of_sensor(path, &one, args.sigma_px)?;
+                sensors.push((one, noise));
+            }
+        }
         let altitude = match (&args.altitude, body.and_then(|b| b.altitude_km)) {
             (Some(values), _) => values.0.clone(),
             (None, Some(km)) => vec![km],
@@ -64,70 +67,134 @@ impl<'a> Grid<'a> {
         if let Some(heights) = &args.limb_height {
             axis("limb_height_km", "limb height [km]", &heights.0);
         }
-        if args.what == What::Yaw {
+        if args.what == What::Yaw || sensor.is_some() {
             axis("latitude_deg", "latitude [deg]", &args.latitude.0);
+        }
+        if args.what == What::Yaw {
             axis("azimuth_deg", "azimuth of the view [deg]", &args.azimuth.0);
         }
         axis("depression_deg", "depression [deg]", &args.depression.0);
         axis("roll_deg", "roll of the camera [deg]", &args.roll.0);
         let radii: Vec<f64> = bodies.iter().map(|b| b.radius_km).collect();
         axis("radius_km", "radius [km]", &radii);
-        Ok(Self { args, sensor, bodies, axes })
+        Ok(Self { args, sensors, bodies, axes })
     }
 
     pub(super) fn value(&self, place: &[f64], column: &str) -> Option<f64> {
         self.axes.iter().zip(place).find(|(a, _)| a.column == column).map(|(_, v)| *v)
     }
 
+    fn body_number(&self, place: &[f64]) -> usize {
+        let radius_km = self.value(place, "radius_km");
+        self.bodies.iter().position(|b| Some(b.radius_km) == radius_km).unwrap_or(0)
+    }
+
     /// Returns the body of a place in the grid.
     pub(super) fn body(&self, place: &[f64]) -> Body {
-        let radius_km = self.value(place, "radius_km");
-        self.bodies.iter().find(|b| Some(b.radius_km) == radius_km).copied().unwrap_or(Body::EARTH)
+        self.bodies.get(self.body_number(place)).copied().unwrap_or(Body::EARTH)
+    }
+
+    /// Returns the edge noise of each sensor and where it comes from, in words.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let note = |(one, noise): &(Config, EdgeNoise)| {
+            let model = noise_of(one).noise.name();
+            format!(
+                "edge noise of {}: {:.3} px, {} (noise = {model:?})",
+                one.body.kind.name(),
+                noise.rms_px,
+                noise.source
+            )
+        };
+        self.sensors.iter().map(note).collect()
+    }
+
+    /// Returns the sigmas of a place in the grid; `None` if too little limb is in view.
+    pub(super) fn sigmas(&self, place: &[f64], design: &Design) -> Result<Option<Sigmas>, Stop> {
+        let Some((one, noise)) = self.sensors.get(self.body_number(place)) else {
+            return design.sigmas().map_err(usage);
+        };
+        let mut sensor = one.clone();
+        sensor.body.limb_height_km = design.limb_height_km;
+        sensor.body.limb_height_sigma_km = design.limb_height_sigma_km;
+        sensor.body.altitude_sigma_km = design.altitude_sigma_km;
+        let place = SensorPlace {
+            sensor,
+            altitude_km: design.altitude_km,
+            latitude_deg: self.value(place, "latitude_deg").unwrap_or(0.0),
+            depression_deg: design.depression_deg,
+            roll_deg: design.roll_deg,
+            rms_px: noise.rms_px,
+            correlation_px: self.args.correlation_px,
+        };
+        place.sigmas().map_err(usage)
     }
 
     pub(super) fn design(&self, place: &[f64]) -> Result<Design, Stop> {
         let args = self.args;
         let value = |column: &str| self.value(place, column);
-        let own = self.sensor.as_ref().map(|s| (&s.body, &s.covariance));
-        let camera = match &self.sensor {
-            Some(sensor) => sensor.camera.clone(),
+        let sensor = self.sensors.get(self.body_number(place));
+        let camera = match sensor {
+            Some((sensor, _)) => sensor.camera.clone(),
             None => lens(args.lens, args.size, value("fov_deg").unwrap_or(f64::NAN), value("rows_px"))?,
         };
         let body = self.body(place);
-        let radius_km = body.radius_km;
+        let own = sensor.map(|(s, _)| &s.body);
         let positive = |name: &str, x: f64| match x >= 0.0 && x.is_finite() {
             true => Ok(x),
             false => Err(usage(format!("--{name}: {x} is refused: must be 0 or more"))),
         };
-        // With --body, the limb height of the sensor.toml is not used, because it belongs to another body.
-        let limb_height = own.filter(|_| args.body.is_empty()).map_or(body.limb_height_km, |(b, _)| b.limb_height_km);
-        let sigma_px = args.sigma_px.or(own.map(|(_, c)| c.sigma_px)).unwrap_or(1.0);
-        if !(sigma_px > 0.0) {
-            return Err(usage(format!("--sigma-px: {sigma_px} is refused: must be above 0")));
-        }
-        let limb_height_sigma = args.limb_height_sigma.or(body.limb_height_sigma_km);
-        Ok(Design {
+        let limb_height = own.map_or(body.limb_height_km, |b| b.limb_height_km);
+        let own_sigma = own.map(|b| b.limb_height_sigma_km).or(body.limb_height_sigma_km);
+        let altitude_sigma = args.altitude_sigma.or(own.map(|b| b.altitude_sigma_km)).unwrap_or(0.5);
+        let noise = |limb_px: f64| sensor.map(|(s, noise)| noise_of(s).measured(noise.rms_px, limb_px));
+        let mut design = Design {
             camera,
-            radius_km,
+            radius_km: body.radius_km,
             altitude_km: value("altitude_km").unwrap_or(f64::NAN),
-            altitude_sigma_km: positive(
-                "altitude-sigma",
-                args.altitude_sigma.or(own.map(|(b, _)| b.altitude_sigma_km)).unwrap_or(0.5),
-            )?,
+            altitude_sigma_km: positive("altitude-sigma", altitude_sigma)?,
             limb_height_km: value("limb_height_km").unwrap_or(limb_height),
-            limb_height_sigma_km: positive(
-                "limb-height-sigma",
-                limb_height_sigma.or(own.map(|(b, _)| b.limb_height_sigma_km)).unwrap_or(2.0),
-            )?,
+            limb_height_sigma_km: positive("limb-height-sigma", args.limb_height_sigma.or(own_sigma).unwrap_or(2.0))?,
             depression_deg: value("depression_deg").unwrap_or(0.0),
             roll_deg: value("roll_deg").unwrap_or(0.0),
-            sigma_px,
-            correlation_px: positive(
-                "correlation-px",
-                args.correlation_px.or(own.map(|(_, c)| c.correlation_px)).unwrap_or(300.0),
-            )?,
-        })
+            sigma_px: noise(0.0).map_or(args.sigma_px.unwrap_or(1.0), |n| n.sigma_px),
+            correlation_px: positive("correlation-px", args.correlation_px.unwrap_or(300.0))?,
+        };
+        if args.correlation_px.is_none() && sensor.is_some() {
+            // The correlation length depends on the length of the edge.
+            let limb_px = design.sigmas().map_err(usage)?.map_or(0.0, |s| s.limb_px);
+            design.correlation_px = noise(limb_px).map_or(design.correlation_px, |n| n.correlation_px);
+        }
+        Ok(design)
     }
+}
+
+/// Reads a sensor.toml. A sensor that looks for several bodies is refused unless the command line names one.
+fn load(path: &Path, is_body_named: bool) -> Result<Config, Stop> {
+    let mut config = hzn_calib::sensor::load(path)?.config;
+    match config.bodies.as_slice() {
+        [] => {}
+        [one] => config.body = one.clone(),
+        _ if is_body_named => {}
+        several => {
+            let names: Vec<&str> = several.iter().map(|b| b.kind.name()).collect();
+            let what = format!("looks for several bodies ({}); name one with --body", names.join(", "));
+            return Err(usage(format!("{}: {what}", path.display())));
+        }
+    }
+    Ok(config)
+}
+
+/// Returns the sensor that looks only for this body. What it knows of another body does not count.
+fn looking_for(sensor: &Config, body: &Body) -> Config {
+    let own = sensor.each_body().iter().find(|own| Body::from_config(own).radius_km == body.radius_km).cloned();
+    let other = || hzn_core::body::Config {
+        radius_km: Some(body.radius_km),
+        limb_height_km: body.limb_height_km,
+        limb_height_sigma_km: body.limb_height_sigma_km.unwrap_or(2.0),
+        altitude_sigma_km: sensor.body.altitude_sigma_km,
+        ..hzn_core::body::Config::of_kind(Kind::Sphere, None)
+    };
+    Config { body: own.unwrap_or_else(other), bodies: Default::default(), ..sensor.clone() }
 }
 
 /// Returns a camera with this lens and this field of view across the width, in degrees.

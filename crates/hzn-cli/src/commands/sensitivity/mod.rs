@@ -4,6 +4,7 @@ mod args;
 mod body;
 mod charts;
 mod grid;
+mod noise;
 mod sigma;
 mod study;
 mod sweep;

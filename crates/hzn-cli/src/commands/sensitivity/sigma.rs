@@ -6,19 +6,20 @@ use super::args::Args;
 use super::grid::{Grid, combinations};
 use super::study::Study;
 use super::table::Table;
-use crate::exit::{Stop, usage};
+use crate::exit::Stop;
 use crate::plot::{Chart, Series, Style};
 
 type Pick = fn(&Sigmas) -> Option<f64>;
 
 /// Columns of the result: name in files, head in the text (empty: only in files), value.
-const COLUMNS: [(&str, &str, Pick); 11] = [
+const COLUMNS: [(&str, &str, Pick); 12] = [
     ("half_angle_deg", "half-angle", |s| Some(s.half_angle_deg)),
     ("limb_px", "limb px", |s| Some(s.limb_px)),
     ("roll_free_deg", "roll free", |s| Some(s.free.roll_deg)),
     ("pitch_free_deg", "pitch free", |s| Some(s.free.pitch_deg)),
     ("roll_fused_deg", "roll fused", |s| Some(s.fused.roll_deg)),
     ("pitch_fused_deg", "pitch fused", |s| Some(s.fused.pitch_deg)),
+    ("sigma_max_deg", "sigma max", |s| Some(s.largest_deg)),
     ("roll_known_deg", "roll known", |s| Some(s.known.roll_deg)),
     ("pitch_known_deg", "pitch known", |s| Some(s.known.pitch_deg)),
     ("roll_braun_barf_33_deg", "", |s| s.braun_barf.map(|t| t.roll_deg)),
@@ -33,7 +34,7 @@ pub(super) fn compute(args: &Args) -> Result<Study, Stop> {
     let mut unseen = Vec::new();
     for place in combinations(&grid.axes) {
         let design = grid.design(&place)?;
-        let sigmas = design.sigmas().map_err(usage)?;
+        let sigmas = grid.sigmas(&place, &design)?;
         if sigmas.is_none() {
             unseen.push(design);
         }
@@ -48,7 +49,7 @@ pub(super) fn compute(args: &Args) -> Result<Study, Stop> {
     for (column, head, value) in COLUMNS {
         table.column(column, head, results.iter().map(|(_, s)| s.as_ref().and_then(value)));
     }
-    let mut notes = Vec::new();
+    let mut notes = grid.notes();
     if let (Some(design), Ok(dip)) = (unseen.first(), unseen.first().map_or(Ok(0.0), Design::dip_deg)) {
         let n = unseen.len();
         let (of, km) = (results.len(), design.altitude_km);

@@ -37,7 +37,7 @@ pub(super) fn compute(args: &Args) -> Result<Study, Stop> {
         table.column(column, head, results.iter().map(|(_, s)| s.as_ref().map(value)));
     }
     let unseen = results.iter().filter(|(_, s)| s.is_none()).count();
-    let notes = (unseen > 0).then(|| {
+    let note = (unseen > 0).then(|| {
         format!(
             "{unseen} of {} designs do not determine the rotation: too little limb is in view (--depression 90 looks \
              at the centre), the body is a sphere, or the camera is above its pole",
@@ -53,7 +53,11 @@ pub(super) fn compute(args: &Args) -> Result<Study, Stop> {
         chart
     });
     // A plot over one quantity has one line for each column.
-    Ok(Study { table, chart: chart.filter(|_| swept.len() == 1), notes: notes.into_iter().collect() })
+    Ok(Study {
+        table,
+        chart: chart.filter(|_| swept.len() == 1),
+        notes: grid.notes().into_iter().chain(note).collect(),
+    })
 }
 
 fn design(grid: &Grid<'_>, args: &Args, place: &[f64]) -> Result<ThirdAxis, Stop> {

@@ -6,23 +6,13 @@ use crate::base::linalg::basis;
 use crate::base::real::Real;
 use crate::geometry::block::Block;
 use crate::model::body::Expected;
-use crate::model::edge_noise::{Config, Noise};
+use crate::model::edge_noise::{Config, END_PER_RMS, LENGTHS_PER_EDGE, Noise};
 use crate::stages::fit::Fit;
-
-/// Ratio of the edge length to the correlation length, with `rms`. The fit absorbs the longest wavelengths of the
-/// errors (shift, tilt and curvature of the whole edge). The residuals show the shorter wavelengths, and best those of
-/// about half the edge. The spectrum of a Gauss-Markov process is flat above the wavelength 2πL, which is 0.52 edge
-/// lengths for this ratio. The model thus assumes that the absorbed wavelengths are as strong as the longest ones in
-/// the residuals.
-const LENGTHS_PER_EDGE: f64 = 12.0;
 
 /// Returns the correlation length that is assumed for the residuals of the edge, in pixels.
 pub(crate) fn measured_length_px<T: Real>(fit: &Fit<T>) -> T {
     fit.arc_px / T::from_f64(LENGTHS_PER_EDGE)
 }
-
-/// Value of a tilt at the ends of the edge if its RMS along the edge is 1: √3.
-const END_PER_RMS: f64 = 1.732_050_807_568_877_2;
 
 /// The noise model of one edge.
 pub(super) struct EdgeNoiseModel<T> {

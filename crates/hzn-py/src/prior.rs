@@ -1,0 +1,78 @@
+//! What is known of a picture before it is processed.
+
+use hzn_calib::FrameData;
+use pyo3::prelude::*;
+
+use crate::errors;
+
+/// What is known of a picture, from Python's arguments. A table of pandas has NaN for a gap. NaN, or an array of NaN,
+/// is therefore an unknown value, like an empty cell of a frames.csv.
+#[pyclass(frozen, name = "_Prior", module = "hzn._hzn")]
+pub(crate) struct Prior {
+    pub(crate) data: FrameData,
+}
+
+#[pymethods]
+impl Prior {
+    #[new]
+    #[pyo3(signature = (*, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
+                        rate_rad_s = None, range_km = None, range_sigma_km = None, pole = None, sun = None,
+                        time_s = None))]
+    pub(crate) fn new(
+        altitude_km: Option<f64>,
+        position_km: Option<[f64; 3]>,
+        attitude: Option<[f64; 4]>,
+        attitude_sigma_deg: Option<f64>,
+        rate_rad_s: Option<[f64; 3]>,
+        range_km: Option<f64>,
+        range_sigma_km: Option<f64>,
+        pole: Option<[f64; 3]>,
+        sun: Option<[f64; 3]>,
+        time_s: Option<f64>,
+    ) -> PyResult<Self> {
+        let time_s = number(time_s);
+        if time_s.is_some_and(f64::is_infinite) {
+            return Err(errors::config("time_s: must be a finite number"));
+        }
+        let data = FrameData {
+            time_s,
+            utc_s: time_s,
+            altitude_km: number(altitude_km),
+            position_km: numbers(position_km),
+            camera_to_ecef_wxyz: numbers(attitude).map(check_attitude).transpose()?,
+            attitude_sigma_deg: number(attitude_sigma_deg),
+            rate_rad_s: numbers(rate_rad_s),
+            range_km: number(range_km),
+            range_sigma_km: number(range_sigma_km),
+            pole_camera: direction("pole", numbers(pole))?,
+            sun_camera: direction("sun", numbers(sun))?,
+            ..FrameData::default()
+        };
+        Ok(Self { data })
+    }
+}
+
+fn number(x: Option<f64>) -> Option<f64> {
+    x.filter(|x| !x.is_nan())
+}
+
+fn numbers<const N: usize>(x: Option<[f64; N]>) -> Option<[f64; N]> {
+    x.filter(|x| !x.iter().all(|x| x.is_nan()))
+}
+
+/// Checks a direction in the camera frame.
+pub(crate) fn direction(name: &str, v: Option<[f64; 3]>) -> PyResult<Option<[f64; 3]>> {
+    let is_direction = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>() > 1e-18 && v.iter().all(|x| x.is_finite());
+    match v {
+        Some(v) if !is_direction(&v) => Err(errors::config(format!("{name}: three finite numbers that are not all 0"))),
+        v => Ok(v),
+    }
+}
+
+/// Checks a quaternion.
+pub(crate) fn check_attitude(q: [f64; 4]) -> PyResult<[f64; 4]> {
+    if (q.iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() < 0.01 {
+        return Ok(q);
+    }
+    Err(errors::config("attitude: a quaternion (w, x, y, z) of length 1 is expected"))
+}
