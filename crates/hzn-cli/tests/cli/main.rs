@@ -22,6 +22,7 @@ mod position_input;
 mod power_cut;
 mod rerun;
 mod resume;
+mod rewritten;
 mod run;
 mod sensitivity;
 mod simulate;

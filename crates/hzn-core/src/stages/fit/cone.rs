@@ -29,8 +29,9 @@ pub(crate) struct Fit<T> {
     pub(crate) sums: Sums<T>,
     /// Means of Bᵀs.
     pub(crate) mean: [T; 2],
-    /// The elliptic cone of the methods that fit one. Its covariance is not the one of the normal equations.
-    quadric: Option<Quadric<T>>,
+    /// The elliptic cone of the methods that fit one. Its covariance is not the one of the normal equations. Read
+    /// it by [`Self::quadric`].
+    pub(crate) quadric: Option<Quadric<T>>,
 }
 
 impl<T: Real> Fit<T> {

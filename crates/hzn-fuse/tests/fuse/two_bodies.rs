@@ -1,8 +1,6 @@
 //! Limb and Sun in one camera: each has a slow error of its own, whether they come in one recording or in two.
 
-mod common;
-
-use common::{flight, scene};
+use crate::common::{flight, scene};
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{Body, Inputs, Recording};
 use hzn_fuse::{Settings, fuse, truth};

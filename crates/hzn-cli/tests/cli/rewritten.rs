@@ -1,11 +1,9 @@
 //! Recordings that another program has written again, through the commands that read recordings.
 
-mod common;
-
 use std::fs;
 use std::io::BufWriter;
 
-use common::{Place, without_time};
+use crate::common::{Place, without_time};
 use mcap::{Compression, WriteOptions};
 
 const TRUTH: &str = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,moon_x,\

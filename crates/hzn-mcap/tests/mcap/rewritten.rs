@@ -1,13 +1,11 @@
 //! Tests of recordings that another program has written again: with another compression, without chunks, in another
 //! order, with the numbers of the messages left out.
 
-mod common;
-
 use std::fs;
 use std::io::BufWriter;
 use std::path::Path;
 
-use common::{SENSOR, frame, index, read, write};
+use crate::common::{SENSOR, frame, index, read, write};
 use hzn_mcap::{Contents, Error, ImageReader, Index, IndexEntry, Reader, Row, recover};
 use mcap::{Compression, WriteOptions};
 

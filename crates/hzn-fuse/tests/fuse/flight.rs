@@ -1,8 +1,6 @@
 //! Simulated flights through `fuse`: right ones, and ones whose data misbehave.
 
-mod common;
-
-use common::{flight, scene};
+use crate::common::{flight, scene};
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{Attitude, Body, Centre, Inputs};
 use hzn_fuse::results::Kind;
@@ -280,7 +278,7 @@ fn positions_from_the_limb_are_taken_where_they_are_asked_for() {
     scene.gnss.as_mut().unwrap().outages_s = vec![[150.0, 430.0]];
     let mut inputs = flight(&scene);
     let path = scene.path().unwrap();
-    let mut draws = common::Draws(11);
+    let mut draws = crate::common::Draws(11);
     for (one, recording) in scene.by_camera().iter().zip(&mut inputs.recordings) {
         let [w, x, y, z] = one.true_mount_wxyz();
         let mount = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));

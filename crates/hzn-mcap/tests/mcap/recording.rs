@@ -1,11 +1,9 @@
 //! Tests of recordings: written, read back, cut off anywhere, closed and continued.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{SENSOR, frame, index, options, read, write};
+use crate::common::{SENSOR, frame, index, options, read, write};
 use hzn_core::status::Status;
 use hzn_mcap::{
     Contents, EncodedImage, Error, ImageFormat, ImageReader, Index, Options, Reader, Row, Writer, part_path, recover,
