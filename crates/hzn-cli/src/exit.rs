@@ -104,7 +104,7 @@ pub fn usage(message: impl std::fmt::Display) -> Stop {
 
 /// Returns the error for a file of which nothing could be read.
 pub fn unreadable(message: impl std::fmt::Display) -> Stop {
-    Stop { exit: Exit::SomeUnreadable, error: anyhow::anyhow!("{message}") }
+    Stop::new(Exit::SomeUnreadable, anyhow::anyhow!("{message}"))
 }
 
 /// Returns the error for something that failed.
