@@ -81,7 +81,7 @@ fn files() -> Result<Seeds, Box<dyn std::error::Error>> {
     seeds.push(("mcap/seed-whole".into(), recording.clone()));
     seeds.push(("mcap/seed-cut".into(), recording[..recording.len() * 2 / 3].to_vec()));
     seeds.push(("mcap/seed-head".into(), recording[..64.min(recording.len())].to_vec()));
-    let rows: Vec<_> = hzn_run::results::read(&path)?.0;
+    let rows: Vec<_> = hzn_run::results::read(&path)?.rows;
     for (which, ending) in [(0, "csv"), (1, "jsonl")] {
         let table = folder.path().join(format!("a.{ending}"));
         let mut file = hzn_run::sink::RowFile::create(&table, hzn_run::sink::Existing::Replace)?;
