@@ -30,7 +30,7 @@ pub(super) fn inputs(
         let name = format!("{}-{}-{}-{}.jsonl", scene.name, scene.seed, one.capture.frames, one.name);
         let file = kept.map(|dir| dir.join(name));
         let rows = match &file {
-            Some(file) if file.exists() => hzn_run::results::read(file).map_err(|e| anyhow!("{e}"))?.0,
+            Some(file) if file.exists() => hzn_run::results::read(file).map_err(|e| anyhow!("{e}"))?.rows,
             _ => process(&one, &config, None)?,
         };
         if let Some(file) = file.filter(|file| !file.exists()) {
