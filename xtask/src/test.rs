@@ -22,7 +22,7 @@ pub(crate) fn run(only: &[String]) -> Result<(), String> {
     all.step("tests of hzn-core alone", |s| s.cargo_test(&["--package", "hzn-core"]));
     all.step("undefined behaviour", |_| miri::test());
     all.step("feature sets of hzn-core", |_| {
-        // Without features it is built for the tests above. A feature chooses by `cfg!`, so most code is always compiled.
+        // The tests above build it without features. A feature chooses by `cfg!`, so most code is always compiled.
         ["std,_edges", "serde", "dlr,zju,horace,erf,kalibr,position,reml"].into_iter().try_for_each(check_core_with)
     });
     all.step("documents", |_| steps::run(cargo(&["doc", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings")));

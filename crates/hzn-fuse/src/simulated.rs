@@ -104,7 +104,6 @@ fn recording(
     errors: &mut dyn Errors,
     limb_height_km: f64,
 ) -> Result<Recording, ScenarioError> {
-    let told = one.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
     let mut seen = Vec::new();
     for (row, frame) in one.flight()?.frames.iter().enumerate() {
         let known = one.frame_row(frame);
@@ -147,7 +146,7 @@ fn recording(
     }
     Ok(Recording {
         name: one.name.clone(),
-        mount: Some(rotation(told)),
+        mount: Some(rotation(one.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz))),
         camera: Some(one.camera.clone()),
         limb_sigma_km: None,
         clock_offset_s: 0.0,

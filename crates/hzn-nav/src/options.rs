@@ -100,8 +100,8 @@ pub struct CameraOptions {
     pub slow_error: Mode,
     /// Correlation time of the slow error, s.
     pub slow_error_time_s: f64,
-    /// Number of bodies that the camera sees, from 1 to [`MAX_BODIES`](crate::layout::MAX_BODIES). Each has a slow error
-    /// of its own: limb and Sun in one picture do not share their errors.
+    /// Number of bodies that the camera sees, from 1 to [`MAX_BODIES`](crate::layout::MAX_BODIES). Each has a slow
+    /// error of its own: limb and Sun in one picture do not share their errors.
     pub bodies: usize,
     /// White noise of a direction, rad.
     pub white_rad: f64,

@@ -65,11 +65,14 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     // The time of a step grows with the square of the memory for states, so that few bodies get a small filter.
     let slow_errors = |r: &Recording| CAMERA_STATES + 3 * r.bodies().len();
     let needed = VEHICLE_STATES + inputs.recordings.iter().map(slow_errors).sum::<usize>();
-    let mut fused = match needed {
-        ..=FEW => replay::<FEW>(&flight, settings, wanted)?,
-        ..=SOME => replay::<SOME>(&flight, settings, wanted)?,
-        _ => replay::<MANY>(&flight, settings, wanted)?,
+    let replay = if needed <= FEW {
+        replay::<FEW>
+    } else if needed <= SOME {
+        replay::<SOME>
+    } else {
+        replay::<MANY>
     };
+    let mut fused = replay(&flight, settings, wanted)?;
     fused.back = flight.back(&fused);
     fused.cameras = inputs.recordings.iter().map(|r| r.name.clone()).collect();
     counts.before_start = fused.counts.before_start;

@@ -147,14 +147,15 @@ mod tests {
         reader.read_to_end(&mut read).unwrap();
         assert_eq!(read, kept.concat());
         assert_eq!(reader.stream_position().unwrap(), read.len() as u64);
-        // The file is truncated at each byte: what precedes the end is read, and nothing is read twice.
+        // The file is truncated at each byte: what precedes the end is read, and nothing is read twice. Of a chunk whose
+        // head is truncated the kind is not known, so that the part of the head is read, too.
         for len in SIGNATURE.len()..file.len() {
             let mut reader = WithoutProfiles::new(Cursor::new(&file[..len])).unwrap();
             reader.read_to_end(&mut Vec::new()).unwrap();
             reader.rewind().unwrap();
             let mut part = Vec::new();
             reader.read_to_end(&mut part).unwrap();
-            assert!(read.starts_with(&part), "{len}");
+            assert!(read.starts_with(&part[..part.len().saturating_sub(HEAD - 1)]), "{len}");
         }
     }
 

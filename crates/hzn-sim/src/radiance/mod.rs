@@ -101,7 +101,9 @@ impl Axes {
 
     /// Checks that the sorted rows have each key once, and radiance at the lowest height.
     fn check(&self, rows: &[NumberedRow]) -> Result<(), String> {
-        if let Some([(first, _), (again, r)]) = rows.array_windows().find(|[(_, a), (_, b)]| a.key() == b.key()) {
+        if let Some([(first, _), (again, r)]) =
+            rows.windows(2).find(|two| matches!(two, [(_, a), (_, b)] if a.key() == b.key()))
+        {
             return Err(format!("line {again}: {} is already in line {first}", describe(r.key())));
         }
         let mut keys = rows.iter().map(|(_, r)| r.key());

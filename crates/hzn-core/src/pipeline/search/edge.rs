@@ -170,9 +170,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         outcome.verdict = Verdict::Uncertain;
         let mut budget = self.observer.wants_budget().then(ErrorBudget::new);
         let fused = covariance::fuse(blocks, fit, expected, self.noise, &config.estimate, camera, budget.as_mut())?;
-        if let Some(budget) = &budget {
-            self.observer.budget(outcome.number, budget);
-        }
+        budget.iter().for_each(|budget| self.observer.budget(outcome.number, budget));
 
         enter(self.report, self.observer, Stage::Select);
         let (b1, b2) = basis(&fused.e);
