@@ -187,6 +187,7 @@ fn the_filter_flies_with_the_solution_of_this_machine() {
         // A flight computer of 100 million instructions a second must not be full.
         let most = if board == Board::An500 { 300e3 } else { 8e6 };
         assert!((1e3..most).contains(&mean), "{board:?}: {mean}");
-        assert!(last[17] < 100.0 * 1024.0, "{board:?}: {} bytes of stack", last[17]);
+        // Each camera has memory for the slow errors of three bodies; the filter is moved when it is made.
+        assert!(last[17] < 104.0 * 1024.0, "{board:?}: {} bytes of stack", last[17]);
     }
 }

@@ -7,3 +7,4 @@ mod limb_latitude;
 mod monte_carlo;
 mod planets;
 mod printed;
+mod sizes;
