@@ -1,5 +1,4 @@
-//! What the memory of a filter costs that has room for one, two or three bodies on each of four cameras: 58, 70 or 82
-//! errors.
+//! The cost of a filter with memory for one, two or three bodies on each of four cameras: 58, 70 or 82 errors.
 
 use std::time::Instant;
 
@@ -37,8 +36,8 @@ fn step_us<const N: usize>() -> f64 {
 
 #[test]
 fn the_memory_is_mostly_the_covariance() {
-    for (states, bytes) in [(58, size_of::<Filter<58>>()), (70, size_of::<Filter<70>>()), (82, size_of::<Filter<82>>())]
-    {
+    let sizes = [size_of::<Filter<58>>(), size_of::<Filter<70>>(), size_of::<Filter<82>>()];
+    for (states, bytes) in [58, 70, 82].into_iter().zip(sizes) {
         let covariance = states * states * size_of::<f64>();
         assert!(bytes > covariance && bytes < covariance + 8192, "{states}: {bytes} bytes");
     }
