@@ -147,8 +147,8 @@ mod tests {
         reader.read_to_end(&mut read).unwrap();
         assert_eq!(read, kept.concat());
         assert_eq!(reader.stream_position().unwrap(), read.len() as u64);
-        // The file is truncated at each byte: what precedes the end is read, and nothing is read twice. Of a chunk whose
-        // head is truncated the kind is not known, so that the part of the head is read, too.
+        // The file is truncated at each byte. All that precedes the end is read, and nothing is read twice. If the head
+        // of a chunk is truncated, its kind is unknown, so the part of the head is read, too.
         for len in SIGNATURE.len()..file.len() {
             let mut reader = WithoutProfiles::new(Cursor::new(&file[..len])).unwrap();
             reader.read_to_end(&mut Vec::new()).unwrap();
