@@ -7,14 +7,15 @@ use crate::common::{KINDS, garbage};
 use hzn_core::body::{Kind, Prior};
 use hzn_core::camera::{self, Model};
 use hzn_core::edge_points::SubPixel;
+use hzn_core::error_budget::ErrorBudget;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::observer::Border;
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::retry::Combine;
 use hzn_core::status::Status;
 use hzn_core::verdict::Verdict;
-use hzn_core::{Config, FlightHorizon, HostHorizon, Observer, Preset, Report, contour, covariance, fit, retry};
-use hzn_core::{consensus, threshold};
+use hzn_core::{Config, Expected, FlightHorizon, HostHorizon, Observer, Preset, Report, Solution};
+use hzn_core::{consensus, contour, covariance, fit, retry, threshold};
 use proptest::prelude::*;
 
 /// Makes a configuration for a sphere of 20° angular radius and a pinhole with f = 60 px times `scale`. The radius of
@@ -59,8 +60,22 @@ struct Watch {
     points: RefCell<Vec<ImagePoint<f64>>>,
     border: RefCell<Vec<Pixel>>,
     read: Cell<(u16, u16)>,
+    fits: Cell<u32>,
+    budgets: Cell<u32>,
 }
 impl Observer<f64> for Watch {
+    fn wants_fit(&self) -> bool {
+        true
+    }
+    fn fit(&self, _: u32, _: &Solution<f64>, _: &Expected<f64>) {
+        self.fits.set(self.fits.get() + 1);
+    }
+    fn wants_budget(&self) -> bool {
+        true
+    }
+    fn budget(&self, _: u32, _: &ErrorBudget<f64>) {
+        self.budgets.set(self.budgets.get() + 1);
+    }
     fn level(&self, _: u16, _: f64, _: u32) {
         self.levels.set(self.levels.get() + 1);
     }
@@ -151,6 +166,14 @@ fn a_smaller_copy_is_looked_at_in_the_pictures_own_coordinates() {
     }
     let (x, y) = watch.read.get();
     assert!(x > 300 && y > 200, "the whole picture is read: {x} {y}");
+    assert!(watch.fits.get() > 0 && watch.budgets.get() > 0, "{} {}", watch.fits.get(), watch.budgets.get());
+    // Behind a pointer, an observer receives the same.
+    let other = Watch::default();
+    let pointed = answer(&config, &data, &(&other as &dyn Observer<f64>));
+    assert_eq!(pointed.solution.map(|s| s.axis.xyz()), report.solution.map(|s| s.axis.xyz()));
+    let seen = |w: &Watch| (w.levels.get(), w.read.get(), w.fits.get(), w.budgets.get(), w.border.borrow().clone());
+    assert_eq!(seen(&other), seen(&watch));
+    assert_eq!(*other.points.borrow(), *watch.points.borrow());
     config.input.scale_to_height = Some(300);
     assert_eq!(config.check().unwrap_err().field, "input.scale_to_height");
 }
