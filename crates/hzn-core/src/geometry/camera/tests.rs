@@ -30,6 +30,7 @@ fn lenses() -> Vec<Config> {
     lenses
 }
 
+#[cfg(feature = "kalibr")]
 fn with(model: Model, k: &[f64], focal_px: f64) -> Config {
     Config {
         k: heapless::Vec::from_slice(k).unwrap(),
@@ -39,6 +40,7 @@ fn with(model: Model, k: &[f64], focal_px: f64) -> Config {
 }
 
 /// Compares the lenses with the papers' equations in space, for rays of any length.
+#[cfg(feature = "kalibr")]
 #[test]
 fn kalibr_lenses_project_as_their_papers_say() {
     let double_sphere = |[xi, alpha]: [f64; 2], [x, y, z]: [f64; 3]| {

@@ -128,7 +128,7 @@ impl<T: Real> Target<T> {
     }
 
     /// Sets the known distance, metres.
-    #[cfg(test)]
+    #[cfg(all(test, feature = "position"))]
     pub(crate) fn set_range(&mut self, length_m: T, sigma_m: T) {
         self.range = Some(Range { length_m, sigma_m, is_height: false });
     }

@@ -32,7 +32,7 @@ use crate::stages::fit::{self, Fit};
 pub use crate::model::edge_noise::{Config, Method, Noise};
 pub use crate::model::error_budget::{ErrorBudget, Term};
 pub(crate) use answer::Fused;
-#[cfg(test)]
+#[cfg(all(test, feature = "position"))]
 pub(crate) use answer::Located;
 use fusion::fused;
 pub(crate) use gauss_markov::correlated;

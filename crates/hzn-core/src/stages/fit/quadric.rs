@@ -77,7 +77,7 @@ impl<T: Real> Quadric<T> {
     }
 
     /// Returns the six unknowns.
-    #[cfg(test)]
+    #[cfg(all(test, feature = "zju"))]
     pub(crate) fn numbers(&self) -> [T; N] {
         self.v
     }
