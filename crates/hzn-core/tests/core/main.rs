@@ -2,7 +2,6 @@
 
 mod architecture;
 mod common;
-mod long;
 mod precision;
 #[cfg(all(feature = "dlr", feature = "erf", feature = "horace", feature = "zju"))]
 mod published;

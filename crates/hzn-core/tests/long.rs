@@ -1,6 +1,10 @@
-//! Many pictures through one sensor: the answers are those of the first pass, whatever came in between.
+//! Many pictures through one sensor: the answers are those of the first pass, whatever came in between. The test looks
+//! at the memory of its process, so it has a process of its own.
 
-use crate::common::{KINDS, garbage};
+#[path = "core/common/mod.rs"]
+mod common;
+
+use common::{KINDS, garbage};
 use hzn_core::body::Prior;
 use hzn_core::camera::{self, Model};
 use hzn_core::image::{Grey, Layout};
