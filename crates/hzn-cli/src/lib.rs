@@ -42,7 +42,7 @@ pub fn main() -> Exit {
 /// Parses the command line. clap itself prints help and usage errors, and exits with 0 or 2.
 fn parse() -> commands::Cli {
     commands::Cli::try_parse().unwrap_or_else(|error| {
-        // clap prints refused arguments as they are, so it gets them once more without what a terminal would obey.
+        // clap prints refused arguments as they are, so it gets them once more without control characters.
         let shown = std::env::args_os().map(|word| tell::one_line(word.to_string_lossy()));
         commands::Cli::try_parse_from(shown).err().unwrap_or(error).exit()
     })

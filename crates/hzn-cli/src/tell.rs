@@ -1,7 +1,7 @@
 //! Output to the user: results on stdout, messages on stderr.
 //!
-//! This is the only place of the program that writes to a terminal. Texts from files, names and recordings are part of
-//! what is printed, so each function makes visible what a terminal would obey ([`hzn_run::terminal`]).
+//! This is the only place of the program that writes to a terminal. Messages contain texts from files, names and
+//! recordings. Each function therefore makes control characters visible ([`hzn_run::terminal`]).
 //!
 //! Unlike `println!` and `eprintln!`, nothing here panics if the other end is closed.
 

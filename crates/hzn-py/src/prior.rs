@@ -1,11 +1,11 @@
-//! What is known of a picture before it is processed.
+//! Altitude, position, attitude and other values that are given with a picture.
 
 use hzn_calib::FrameData;
 use pyo3::prelude::*;
 
 use crate::errors;
 
-/// What is known of a picture, from Python's arguments. A table of pandas has NaN for a gap. NaN, or an array of NaN,
+/// The values that are given with a picture, from Python's arguments. A table of pandas has NaN for a gap. NaN, or an array of NaN,
 /// is therefore an unknown value, like an empty cell of a frames.csv.
 #[pyclass(frozen, name = "_Prior", module = "hzn._hzn")]
 pub(crate) struct Prior {

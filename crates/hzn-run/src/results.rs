@@ -16,7 +16,7 @@ pub struct Results {
     pub rows: Vec<Row>,
     /// The text of the sensor.toml, if the file is an MCAP with one.
     pub sensor_toml: Option<String>,
-    /// What is missing in the file; `None` if it is complete.
+    /// The damage of the file in words; `None` if it is complete.
     pub lost: Option<String>,
 }
 

@@ -24,7 +24,7 @@ fn place() -> Place {
     place
 }
 
-/// What is left out or changed when a recording is written again.
+/// The way in which a recording is written again.
 #[derive(Clone, Copy, PartialEq)]
 enum Change {
     Nothing,

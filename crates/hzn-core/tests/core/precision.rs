@@ -56,8 +56,8 @@ proptest! {
     }
 }
 
-/// A disc of the Sun has few points, so that one point on the other side of a limit matters: in about 5 of 10 000 discs
-/// the precisions differ by more than an eighth of sigma, or one of them refuses the answer.
+/// A disc of the Sun has few points, so that one point on the other side of a limit matters: for a few discs the
+/// precisions differ by more than an eighth of sigma, or one of them refuses the answer.
 #[test]
 fn single_precision_is_far_below_sigma_for_almost_every_sun() {
     const DISCS: u64 = 400;

@@ -82,7 +82,7 @@ pub struct Recording {
     pub rows: Vec<Row>,
     /// Rows with an answer that are not used, because they have no time.
     pub without_time: usize,
-    /// What is missing in the file; `None` if it was read as a whole.
+    /// The damage of the file in words; `None` if it was read as a whole.
     pub lost: Option<String>,
     /// Rows with an answer that are not used, because nobody knows where their body is.
     pub other_bodies: usize,

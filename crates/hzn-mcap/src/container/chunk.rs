@@ -114,10 +114,10 @@ impl Index {
 /// Why a chunk cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum ChunkFault {
-    /// The chunk is compressed with a method that hzn does not know; its name.
+    /// The chunk is compressed with a method that hzn does not know; the text is its name.
     #[error("its data are compressed with {0:?}, which hzn does not read: {REWRITE}")]
     Compression(String),
-    /// The chunk is damaged; what is wrong.
+    /// The chunk is damaged; the text names the fault.
     #[error("{0}")]
     Damaged(String),
 }

@@ -152,7 +152,7 @@ impl AnySensor {
     }
 
     /// Processes a picture without a record. The usual kinds of pictures have their own compiled pipelines; with the
-    /// enum, every pixel costs a branch (1.4 times the time of a picture).
+    /// enum, every pixel costs a branch.
     fn process_unwatched(&mut self, view: &ImageView<'_>, data: Option<&FrameData>) -> Vec<Processed> {
         let now_s = self.take_time(data);
         let last = &self.last;

@@ -1,4 +1,4 @@
-//! Recordings for tests, and what is read of them.
+//! Makes recordings for tests, and reads them.
 #![allow(dead_code, reason = "each test file takes what it needs")]
 #![allow(unreachable_pub, reason = "shared between test files")]
 
