@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 
 use crate::errors;
 
-/// The values that are given with a picture, from Python's arguments. A table of pandas has NaN for a gap. NaN, or an array of NaN,
-/// is therefore an unknown value, like an empty cell of a frames.csv.
+/// The values that are given with a picture, from Python's arguments. A table of pandas has NaN for a gap. NaN, or an
+/// array of NaN, is therefore an unknown value, like an empty cell of a frames.csv.
 #[pyclass(frozen, name = "_Prior", module = "hzn._hzn")]
 pub(crate) struct Prior {
     pub(crate) data: FrameData,
