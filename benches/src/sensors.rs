@@ -48,7 +48,7 @@ pub(crate) fn flight_sensor(config: &Config) -> Result<Sensor<f32, 2048, 256, 51
 /// Makes the same sensor with fewer points, as for a flight computer that is short of time.
 pub(crate) fn sensor_with_fewer_points(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
     let mut config = config.clone();
-    config.candidates.keep_points = FEWER;
+    config.edge_points.keep_points = FEWER;
     flight_sensor(&config)
 }
 
@@ -60,7 +60,7 @@ pub(crate) fn host_sensor(config: &Config) -> Result<Sensor<f64, 16384, 2048, 65
 /// Makes a sensor in f32 that keeps every point of an edge.
 pub(crate) fn sensor_with_every_point(config: &Config) -> Result<Sensor<f32, 16384, 2048, 16384>, String> {
     let mut config = config.clone();
-    config.candidates.keep_points = 0;
+    config.edge_points.keep_points = 0;
     Ok(Sensor::from_horizon(Box::new(Horizon::new(&config).map_err(|e| e.to_string())?)))
 }
 

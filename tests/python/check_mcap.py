@@ -26,7 +26,7 @@ SCHEMAS = {
     "/tf": {"foxglove.FrameTransform"},
     "/log": {"foxglove.Log"},
 }
-FRAMES = {"/tf": ("ecef", "camera")}
+FRAMES = {"/tf": ("fixed", "camera")}
 SIGNATURES = {"png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff"}
 
 

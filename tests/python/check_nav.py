@@ -49,8 +49,8 @@ def check_ck(folder: Path, rows: list[dict[str, str]]) -> None:
         ticks = round((float(row["time_s"]) - begin) * 1e6)
         matrix, _ = spice.ckgp(1000 * SPACECRAFT, ticks, 0.0, "ITRF93")
         # SPICE's matrix turns vectors from ITRF93 into the frame of the vehicle.
-        body_to_ecef = rotation(*(float(row[name]) for name in ("qw", "qx", "qy", "qz")))
-        worst = max(worst, np.abs(matrix - body_to_ecef.T).max())
+        fixed_from_vehicle = rotation(*(float(row[name]) for name in ("qw", "qx", "qy", "qz")))
+        worst = max(worst, np.abs(matrix - fixed_from_vehicle.T).max())
     assert worst < 1e-8, worst
     print(f"CK: {len(rows)} attitudes, differences below {worst:.1e}")
 

@@ -107,7 +107,7 @@ pub fn measure((sensor, scenes): &(Config, Vec<Scene>)) -> [Tally; 2] {
         let picture = scene.render().expect("the scene is valid");
         let error_rad = [0, 3, 5].map(|k| ATTITUDE_SIGMA_DEG.to_radians() * SIGMAS[(i + k) % FRAMES]);
         let position: Prior<f64> = crate::prior_of_scene(scene);
-        let attitude = Prior { cam_to_ecef: scene.pose.disturbed(error_rad).cam_to_ecef(), ..position };
+        let attitude = Prior { fixed_from_camera: scene.pose.disturbed(error_rad).fixed_from_camera(), ..position };
         for (tally, known) in tallies.iter_mut().zip([attitude, position]) {
             let answer = process(&mut sensors.host, &picture.view(), &known);
             tally.add(answer.ok().as_ref(), [truth.axis_x, truth.axis_y, truth.axis_z]);

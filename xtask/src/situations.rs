@@ -83,7 +83,7 @@ fn prepare(folder: &Path) -> Result<(), Trouble> {
     }
     if missing("discs") {
         hzn(folder, &["simulate", "full-disc", "-o", "discs", "--frames", "4"])?;
-        change(&folder.join("discs/sensor.toml"), "[binarize]", "[binarize]\nmethod = \"fixed\"\nlevel = 0.8")?;
+        change(&folder.join("discs/sensor.toml"), "[threshold]", "[threshold]\nmethod = \"fixed\"\nlevel = 0.8")?;
     }
     if missing("wrong-focal") {
         copy(&folder.join("rocket"), &folder.join("wrong-focal"), |_| true)?;

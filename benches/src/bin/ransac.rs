@@ -130,7 +130,7 @@ fn compare(runs: u32) -> Result<(), String> {
                 let found = match &contender.method {
                     Some(method) => {
                         let method = consensus::Config { seed, ..*method };
-                        let found = edges.reject(&expected, &method);
+                        let found = edges.consensus(&expected, &method);
                         // Without an answer, all draws were made.
                         (found.map(|a| a.axis), found.map_or(method.max_draws, |a| a.draws))
                     }

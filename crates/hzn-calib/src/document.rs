@@ -10,6 +10,7 @@ use crate::Problem;
 use crate::camera_section::camera_from_file;
 use crate::located::{check_list_lengths, find_places, translate_serde_error, translate_syntax_error};
 use crate::merge::merge_missing;
+use crate::migrate::refuse_old_names;
 
 /// Reads `text` as a `T`. `path` is used in messages, and the path of a camera `file` is relative to its folder.
 /// `check` tests the value after it has been read. It returns the key, as `[section] key`, and the rule that is broken.
@@ -23,6 +24,7 @@ pub fn parse<T: DeserializeOwned>(
 ) -> Result<T, Problem> {
     let mut table = DeTable::parse(text).map_err(|e| translate_syntax_error(&e, text, path))?;
     let places = find_places(table.get_ref());
+    refuse_old_names(text, path, &places)?;
     check_list_lengths(text, path, &places)?;
     let camera = match camera_from_file(table.get_mut(), text, path)? {
         Some(camera) => toml::to_string(&camera).unwrap_or_default(),
@@ -96,8 +98,8 @@ mod tests {
         assert_eq!(error(""), "scene.toml: capture: the section [capture] is missing");
         // serde alone would read the first four numbers.
         for mount in ["[attitude_mount]\n", "[[cameras]]\nmount."] {
-            let message = error(&format!("{mount}q_body_from_camera_wxyz = [1, 0, 0, 0, 0]\n"));
-            assert!(message.ends_with("q_body_from_camera_wxyz: has 5 numbers; at most 4 are allowed"), "{message}");
+            let message = error(&format!("{mount}q_vehicle_from_camera_wxyz = [1, 0, 0, 0, 0]\n"));
+            assert!(message.ends_with("q_vehicle_from_camera_wxyz: has 5 numbers; at most 4 are allowed"), "{message}");
         }
     }
 

@@ -34,6 +34,7 @@ pub mod lens_error;
 pub mod limited;
 mod located;
 mod merge;
+pub mod migrate;
 mod nearest;
 pub mod noise;
 pub mod plausible;

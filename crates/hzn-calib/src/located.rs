@@ -27,10 +27,10 @@ impl KeyPlace {
     }
 }
 
-/// Formats `reject.threshold_px` as it is in the file: `[reject] threshold_px`. A key of the second of several tables
-/// is `[[bodies]] 2 radius_km`. The third of several lists is `[mask] polygons_px 3`, and the second list in it is
-/// `[mask] polygons_px 3.2`.
-fn field_name(path: &[String]) -> String {
+/// Formats `consensus.threshold_px` as it is in the file: `[consensus] threshold_px`. A key of the second of several
+/// tables is `[[bodies]] 2 radius_km`. The third of several lists is `[mask] polygons_px 3`, and the second list in it
+/// is `[mask] polygons_px 3.2`.
+pub(crate) fn field_name(path: &[String]) -> String {
     let nth = |place: &String| place.parse::<usize>().ok().map(|n| n + 1);
     let key = |rest: &[String]| {
         let names = rest.iter().take_while(|part| nth(part).is_none()).count();
@@ -82,7 +82,7 @@ pub(crate) fn find_places(table: &DeTable<'_>) -> Vec<KeyPlace> {
 /// length, and would read only the first values of others.
 pub(crate) fn check_list_lengths(text: &str, path: &Path, places: &[KeyPlace]) -> Result<(), Problem> {
     const ROWS: &str = "limb_height_by_latitude_km";
-    const QUATERNION: &str = "q_body_from_camera_wxyz";
+    const QUATERNION: &str = "q_vehicle_from_camera_wxyz";
     for place in places {
         let parts: Vec<&str> = place.path.iter().map(String::as_str).collect();
         let (max, what) = match parts[..] {
@@ -95,7 +95,7 @@ pub(crate) fn check_list_lengths(text: &str, path: &Path, places: &[KeyPlace]) -
             ["mask", "polygons_px", _, _]
             | ["body", ROWS, _]
             | ["bodies", _, ROWS, _]
-            | ["select", "altitude_limits_km"] => (2, "numbers"),
+            | ["gates", "altitude_limits_km"] => (2, "numbers"),
             _ => continue,
         };
         if place.items > max {

@@ -48,10 +48,10 @@ pub(crate) const MAX_ALTITUDE_KM: f64 = 40_000.0;
 pub fn find_implausible(config: &Config) -> Vec<Implausible> {
     let mut found = check_camera(&config.camera);
     if let Some(mount) = &config.mount
-        && mount.q_body_from_camera_wxyz == [0.0, 0.0, 0.0, 1.0]
+        && mount.q_vehicle_from_camera_wxyz == [0.0, 0.0, 0.0, 1.0]
     {
         let what = "is half a turn about the optical axis, because the scalar comes first; no rotation is [1, 0, 0, 0]";
-        found.push(Implausible::new("mount.q_body_from_camera_wxyz", what));
+        found.push(Implausible::new("mount.q_vehicle_from_camera_wxyz", what));
     }
     let several = !config.bodies.is_empty();
     for (which, body) in (0u8..).zip(config.each_body()) {

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// An error and its place. It is displayed as `sensor.toml:14: [reject] threshold_pxx: unknown key; did you mean …`.
+/// An error and its place. It is displayed as `sensor.toml:14: [consensus] threshold_pxx: unknown key; did you mean …`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Problem {
     /// The file.
@@ -12,7 +12,7 @@ pub struct Problem {
     pub line: Option<usize>,
     /// Column in characters, from 1; set only if the line alone does not show the place.
     pub column: Option<usize>,
-    /// The field, for example `[reject] threshold_px` or `altitude_km`.
+    /// The field, for example `[consensus] threshold_px` or `altitude_km`.
     pub field: Option<String>,
     /// The error and a remedy.
     pub what: String,

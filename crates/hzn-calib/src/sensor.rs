@@ -21,6 +21,7 @@ use crate::located::{
     translate_syntax_error,
 };
 use crate::merge::{merge_missing, take};
+use crate::migrate::refuse_old_names;
 use crate::nearest::suggestion;
 use crate::{Problem, limited, plausible};
 
@@ -59,6 +60,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     let mut table = DeTable::parse(text).map_err(|e| translate_syntax_error(&e, text, path))?;
     // The place of every key, for errors that are found after the table is consumed.
     let places = find_places(table.get_ref());
+    refuse_old_names(text, path, &places)?;
     let preset = match take(table.get_mut(), "preset") {
         None => Preset::default(),
         Some((value, span)) => find_preset(value.as_str().unwrap_or_default())
@@ -211,13 +213,13 @@ mod tests {
     #[test]
     fn several_bodies_have_their_own_levels() {
         let two = "[[bodies]]\nkind = \"earth\"\naltitude_km = 400\n[[bodies]]\nkind = \
-                                               \"sun\"\n[bodies.binarize]\nmethod = \"fixed\"\nlevel = 0.9\n";
+                                               \"sun\"\n[bodies.threshold]\nmethod = \"fixed\"\nlevel = 0.9\n";
         let config = parse(&format!("{CAMERA}{two}"), Path::new("s.toml")).unwrap().config;
         assert_eq!((config.each_body().len(), config.each_body()[0].altitude_km), (2, Some(400.0)));
-        assert_eq!(config.each_body()[1].binarize.unwrap().level, 0.9);
+        assert_eq!(config.each_body()[1].threshold.unwrap().level, 0.9);
         assert_eq!(
             error(&two.replace("0.9", "-1")),
-            "sensor.toml:16: [[bodies]] 2 binarize.level: -1 is refused: must be above 0"
+            "sensor.toml:16: [[bodies]] 2 threshold.level: -1 is refused: must be above 0"
         );
         assert_eq!(
             error(&two.replace("400", "-400")),
@@ -229,7 +231,7 @@ mod tests {
         );
         assert_eq!(
             error(&two.replace("level =", "levels =")),
-            "sensor.toml:16: [[bodies]] 2 binarize.levels: unknown key; did you mean level?"
+            "sensor.toml:16: [[bodies]] 2 threshold.levels: unknown key; did you mean level?"
         );
         assert_eq!(
             error(&format!("[body]\nkind = \"earth\"\n{two}")),
@@ -243,27 +245,30 @@ mod tests {
     #[test]
     fn misspelt_names_suggest_the_right_one() {
         assert_eq!(
-            error("[reject]\nthreshold_pxx = 3.0\n"),
-            "sensor.toml:10: [reject] threshold_pxx: unknown key; did you mean threshold_px?"
+            error("[consensus]\nthreshold_pxx = 3.0\n"),
+            "sensor.toml:10: [consensus] threshold_pxx: unknown key; did you mean threshold_px?"
         );
-        assert_eq!(error("[rejct]\nseed = 3\n"), "sensor.toml:9: rejct: unknown section or key; did you mean reject?");
         assert_eq!(
-            error("[reject]\nmethod = \"twopoint\"\n"),
-            "sensor.toml:10: [reject] method: \"twopoint\" is not a valid value; did you mean two-point?"
+            error("[consnsus]\nseed = 3\n"),
+            "sensor.toml:9: consnsus: unknown section or key; did you mean consensus?"
+        );
+        assert_eq!(
+            error("[consensus]\nmethod = \"twopoint\"\n"),
+            "sensor.toml:10: [consensus] method: \"twopoint\" is not a valid value; did you mean two-point?"
         );
         let preset = parse(&format!("preset = \"hznn\"\n{CAMERA}"), Path::new("s.toml")).unwrap_err();
         assert_eq!(preset.to_string(), "s.toml:1: preset: no preset \"hznn\"; did you mean hzn?");
         assert_eq!(
-            error("[gate]\ncolour = 1\n"),
-            "sensor.toml:10: [gate] colour: unknown key; valid here: min_mean, max_mean"
+            error("[brightness]\ncolour = 1\n"),
+            "sensor.toml:10: [brightness] colour: unknown key; valid here: min_mean, max_mean"
         );
     }
 
     #[test]
     fn wrong_values_name_the_limit() {
         assert_eq!(
-            error("[reject]\nthreshold_px = -3\n"),
-            "sensor.toml:10: [reject] threshold_px: -3 is refused: must be above 0"
+            error("[consensus]\nthreshold_px = -3\n"),
+            "sensor.toml:10: [consensus] threshold_px: -3 is refused: must be above 0"
         );
         assert_eq!(
             error("[body]\naltitude_km = nan\n"),
@@ -285,8 +290,8 @@ mod tests {
             "sensor.toml:9: [body] radius_km: a sphere needs its radius in km"
         );
         assert_eq!(
-            error("[reject]\nthreshold_px = \"3\"\n"),
-            "sensor.toml:10: [reject] threshold_px: invalid type: string \"3\", expected a number"
+            error("[consensus]\nthreshold_px = \"3\"\n"),
+            "sensor.toml:10: [consensus] threshold_px: invalid type: string \"3\", expected a number"
         );
         let twisted = CAMERA.replace("pinhole", "kannala-brandt") + "k = [-0.9]\n";
         let message = parse(&twisted, Path::new("s.toml")).unwrap_err().to_string();
@@ -333,11 +338,11 @@ mod tests {
             "s.toml:2: [camera] width: invalid type: number `640.5`: must be a whole number, between 2 and 65535"
         );
         for (text, what) in [
-            ("[candidates]\nkeep_points = 99999\n", "keep_points: 99999 is refused: must be 0 (all) or 16 to 65535"),
-            ("[candidates]\nmin_points = -1\n", "min_points: -1 is refused: must be between 8 and 65535"),
-            ("[select]\nmin_inliers = 65536\n", "min_inliers: 65536 is refused: must be between 8 and 65535"),
-            ("[reject]\nseed = -1\n", "seed: -1 is refused: must be between 0 and 4294967295"),
-            ("[reject]\nmax_draws = 5000000000\n", "max_draws: 5000000000 is refused: must be between 1 and 100000"),
+            ("[edge_points]\nkeep_points = 99999\n", "keep_points: 99999 is refused: must be 0 (all) or 16 to 65535"),
+            ("[edge_points]\nmin_points = -1\n", "min_points: -1 is refused: must be between 8 and 65535"),
+            ("[gates]\nmin_inliers = 65536\n", "min_inliers: 65536 is refused: must be between 8 and 65535"),
+            ("[consensus]\nseed = -1\n", "seed: -1 is refused: must be between 0 and 4294967295"),
+            ("[consensus]\nmax_draws = 5000000000\n", "max_draws: 5000000000 is refused: must be between 1 and 100000"),
             ("[input]\nbits = 300\n", "bits: 300 is refused: must be between 8 and 16"),
         ] {
             assert!(error(text).ends_with(what), "{}", error(text));
@@ -370,8 +375,8 @@ mod tests {
         // serde alone would read the first numbers of these lists and ignore the others.
         for (text, what) in [
             (
-                "[mount]\nq_body_from_camera_wxyz = [1, 0, 0, 0, 0]\n",
-                "[mount] q_body_from_camera_wxyz: has 5 numbers; at most 4",
+                "[mount]\nq_vehicle_from_camera_wxyz = [1, 0, 0, 0, 0]\n",
+                "[mount] q_vehicle_from_camera_wxyz: has 5 numbers; at most 4",
             ),
             (
                 "[mask]\npolygons_px = [[[1, 2], [3, 4, 5], [5, 6]]]\n",
@@ -381,7 +386,7 @@ mod tests {
                 "[body]\nlimb_height_by_latitude_km = [[0, 20, 1]]\n",
                 "[body] limb_height_by_latitude_km 1: has 3 numbers; at most 2",
             ),
-            ("[select]\naltitude_limits_km = [1, 2, 3]\n", "[select] altitude_limits_km: has 3 numbers; at most 2"),
+            ("[gates]\naltitude_limits_km = [1, 2, 3]\n", "[gates] altitude_limits_km: has 3 numbers; at most 2"),
         ] {
             assert_eq!(error(text), format!("sensor.toml:10: {what} are allowed"));
         }
@@ -412,9 +417,10 @@ mod tests {
                      480]\n";
         std::fs::write(dir.path().join("camchain.yaml"), chain).unwrap();
         let path = dir.path().join("sensor.toml");
-        std::fs::write(&path, "[camera]\nfile = \"camchain.yaml\"\ntheta_max_deg = 50\n[reject]\nseed = 7\n").unwrap();
+        std::fs::write(&path, "[camera]\nfile = \"camchain.yaml\"\ntheta_max_deg = 50\n[consensus]\nseed = 7\n")
+            .unwrap();
         let config = load(&path).unwrap().config;
-        assert_eq!((config.camera.fy_px, config.camera.theta_max_deg, config.reject.seed), (301.0, Some(50.0), 7));
+        assert_eq!((config.camera.fy_px, config.camera.theta_max_deg, config.consensus.seed), (301.0, Some(50.0), 7));
         std::fs::write(&path, "[camera]\nfile = \"camchain.yaml\"\nwidth = 50\n").unwrap();
         assert!(load(&path).unwrap_err().to_string().contains(":3: [camera] width: cannot be next to `file`"));
         std::fs::write(&path, "[camera]\nfile = \"other.yaml\"\n").unwrap();

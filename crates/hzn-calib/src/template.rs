@@ -20,7 +20,7 @@ mod tests {
     #[test]
     fn every_key_is_there() {
         // The template describes these two tables in words.
-        let in_words = ["body.binarize", "body.covariance"];
+        let in_words = ["body.threshold", "body.covariance"];
         for key in crate::keys::all().filter(|k| !in_words.contains(&k.path)) {
             let there = |l: &str| l.trim_start_matches("# ").starts_with(&format!("{} =", key.name()));
             assert!(super::SENSOR_TOML.lines().any(there), "{}", key.path);
@@ -35,7 +35,7 @@ mod tests {
         for line in commented.iter().filter(|l| !l.contains("file =") && !l.contains("camera =")) {
             let text = super::SENSOR_TOML
                 .replace(*line, &line[2..])
-                .replace("# [mount]", if line.contains("q_body") { "[mount]" } else { "" });
+                .replace("# [mount]", if line.contains("q_vehicle") { "[mount]" } else { "" });
             if let Err(e) = crate::sensor::parse(&text, Path::new("template.toml")) {
                 // The value may be refused. The name must exist.
                 assert!(!e.what.contains("unknown"), "{e}");

@@ -65,8 +65,8 @@ impl Refusals {
     pub(crate) fn further(&self) -> Option<String> {
         match self.further {
             0 => None,
-            1 => Some("1 answer came from a further look at another threshold (recover.levels)".to_owned()),
-            n => Some(format!("{n} answers came from a further look at another threshold (recover.levels)")),
+            1 => Some("1 answer came from a further look at another threshold (retry.levels)".to_owned()),
+            n => Some(format!("{n} answers came from a further look at another threshold (retry.levels)")),
         }
     }
 

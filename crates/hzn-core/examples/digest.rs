@@ -51,8 +51,8 @@ fn main() {
     for model in MODELS {
         let mut config = Config::new(camera::Config::ideal(model, WIDTH as u16, HEIGHT as u16, 60.0));
         config.body.altitude_km = Some(300.0);
-        config.candidates.min_points = 8;
-        config.select.min_inliers = 8;
+        config.edge_points.min_points = 8;
+        config.gates.min_inliers = 8;
         let mut host = Box::new(HostHorizon::new(&config).expect("the configuration is valid"));
         let mut flight = Box::new(FlightHorizon::new(&config).expect("the configuration is valid"));
         let (double, single) = (host.expect(&Prior::default()), flight.expect(&Prior::default()));

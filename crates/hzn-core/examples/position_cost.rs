@@ -1,4 +1,4 @@
-//! The cost of a position: the time of one clean picture with `estimate.position`, divided by the time without it.
+//! The cost of a position: the time of one clean picture with `fit.position`, divided by the time without it.
 //!
 //! Run it with `cargo run --release --example position_cost -p hzn-core --features std,position`. The pictures take
 //! turns, and each ratio is of two neighbouring times, so that other programs on the machine disturb it little.
@@ -69,7 +69,7 @@ fn median_ratio<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: 
 ) -> Result<f64, Error> {
     let prior = Prior {
         position_m: Some(centre_km.map(|x| T::from_f64(-x * 1e3))),
-        cam_to_ecef: Rotation::assume_from_quaternion([T::from_f64(1.0), T::ZERO, T::ZERO, T::ZERO]),
+        fixed_from_camera: Rotation::assume_from_quaternion([T::from_f64(1.0), T::ZERO, T::ZERO, T::ZERO]),
         attitude_sigma_rad: Some(T::from_f64(1e-3)),
         ..Prior::default()
     };
@@ -77,7 +77,7 @@ fn median_ratio<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: 
     let mut sensors = Vec::new();
     for position in [false, true] {
         let mut config = config.clone();
-        config.estimate.position = Some(position);
+        config.fit.position = Some(position);
         sensors.push(Box::new(Horizon::<T, POINTS, BLOCKS, WORDS>::new(&config)?));
     }
     let mut ratios = Vec::new();

@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut config = Config::new(lens);
     config.body.altitude_km = Some(200.0);
     // Rows are gone once they are through, so there is no second look at the picture.
-    config.recover.levels.clear();
+    config.retry.levels.clear();
     let sensor = Sensor::<f32>::new(&config)?;
     let mut workspace = Box::new(FlightWorkspace::new());
     let mut buffers = Box::new(Buffers::new());

@@ -13,7 +13,7 @@
 //!
 //! | stage | parameters | input | output |
 //! |---|---|---|---|
-//! | [`threshold`] | [`threshold::Config`], [`threshold::Gate`] | a sparse sample of the picture | the threshold |
+//! | [`threshold`] | [`threshold::Config`], [`threshold::Brightness`] | a sparse sample of pixels | the level |
 //! | [`contour`] | [`contour::Config`] | pixels at the border, then along the edges | border pixels of the edges |
 //! | [`edge_points`] | [`edge_points::Config`] | border pixels | sub-pixel points at the local mid-level |
 //! | rays | [`camera::Config`] | edge points | unit rays with their derivatives |

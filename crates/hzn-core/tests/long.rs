@@ -32,8 +32,8 @@ fn processor_s() -> f64 {
 fn the_answers_repeat_and_the_memory_does_not_grow() {
     let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 96, 64, 60.0));
     config.body.altitude_km = Some(300.0);
-    config.candidates.min_points = 8;
-    config.select.min_inliers = 8;
+    config.edge_points.min_points = 8;
+    config.gates.min_inliers = 8;
     let mut host = HostHorizon::boxed(&config).unwrap();
     let mut flight = FlightHorizon::boxed(&config).unwrap();
     let expected = (host.expect(&Prior::default()).unwrap(), flight.expect(&Prior::default()).unwrap());

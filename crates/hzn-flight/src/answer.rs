@@ -50,10 +50,10 @@ record! {
         axis: [f32; 3],
         /// Covariance of `axis`, rad².
         cov: [f32; 6],
-        /// The same direction in ECEF; NaN without a position.
-        axis_ecef: [f32; 3],
+        /// The same direction in the fixed frame of the body (for the Earth ECEF); NaN without a position.
+        axis_fixed: [f32; 3],
         /// The same direction in the vehicle's frame; NaN without a mounting.
-        axis_body: [f32; 3],
+        axis_vehicle: [f32; 3],
         /// Half-angle of the free fit, rad.
         half_angle_rad: f32,
         /// Half-angle of the answer, rad.
@@ -88,7 +88,7 @@ record! {
         cos_free_per_px: f32,
         /// Derivative of the axis by the cosine of the expected half-angle, in the camera frame.
         axis_by_cos: [f32; 3],
-        /// Position of the body's centre from the camera, in the camera frame, m; only with `estimate.position`.
+        /// Position of the body's centre from the camera, in the camera frame, m; only with `fit.position`.
         position_m: [f32; 3],
         /// Covariance of `position_m`, m².
         pos_cov_m2: [f32; 6],
@@ -123,11 +123,12 @@ const NAN: f32 = f32::NAN;
 
 impl Direction {
     /// What a picture without a direction has.
+    // NaN, because the packet has a fixed size and 0 could be taken for a value.
     pub const NONE: Self = Self {
         axis: [NAN; 3],
         cov: [NAN; 6],
-        axis_ecef: [NAN; 3],
-        axis_body: [NAN; 3],
+        axis_fixed: [NAN; 3],
+        axis_vehicle: [NAN; 3],
         half_angle_rad: NAN,
         fused_half_angle_rad: NAN,
         altitude_est_m: NAN,
@@ -143,8 +144,8 @@ impl Direction {
         Self {
             axis: s.axis.xyz(),
             cov: s.covariance.upper_rad2,
-            axis_ecef: s.axis_ecef.map_or([NAN; 3], |a| a.xyz()),
-            axis_body: s.axis_body.map_or([NAN; 3], |a| a.xyz()),
+            axis_fixed: s.axis_fixed.map_or([NAN; 3], |a| a.xyz()),
+            axis_vehicle: s.axis_vehicle.map_or([NAN; 3], |a| a.xyz()),
             half_angle_rad: s.half_angle_rad,
             fused_half_angle_rad: s.fused_half_angle_rad,
             altitude_est_m,
@@ -174,6 +175,7 @@ impl Position {
     };
 
     fn from_solution(s: &Solution<f32>) -> Option<Self> {
+        // Without both there is no packet, because its 140 bytes would say nothing.
         if s.free.is_none() && s.position.is_none() {
             return None;
         }
@@ -270,14 +272,15 @@ impl PictureAnswer {
             };
             candidates.push(candidate).ok()?;
         }
+        // Double precision, so that the rows of `hzn telemetry` have the columns and the type of those of `hzn run`.
         let widen = |v: [f32; 3]| v.map(f64::from);
         let solution = match &self.direction {
             None => None,
             Some(d) => Some(Solution {
                 axis: UnitVec3::try_new(widen(d.axis))?,
                 covariance: Cov3::from_upper(d.cov.map(f64::from)),
-                axis_ecef: UnitVec3::try_new(widen(d.axis_ecef)),
-                axis_body: UnitVec3::try_new(widen(d.axis_body)),
+                axis_fixed: UnitVec3::try_new(widen(d.axis_fixed)),
+                axis_vehicle: UnitVec3::try_new(widen(d.axis_vehicle)),
                 half_angle_rad: d.half_angle_rad.into(),
                 fused_half_angle_rad: d.fused_half_angle_rad.into(),
                 altitude_m: (!d.altitude_est_m.is_nan())
@@ -306,7 +309,7 @@ impl PictureAnswer {
                 edge_points: o.edge_points,
                 draws: o.draws,
                 work: o.work,
-                // Pictures of the flight software do not come row by row.
+                // Telemetry does not have it, so the number is missing for a picture that came row by row.
                 cut_points: 0,
                 looks: o.looks.into(),
             },
@@ -376,8 +379,8 @@ mod tests {
         let direction = Direction {
             axis: [0.1, 0.2, 0.97],
             cov: [1e-8, 2e-9, 3e-9, 4e-8, 5e-9, 6e-9],
-            axis_ecef: [0.0, 0.6, 0.8],
-            axis_body: [1.0, 0.0, 0.0],
+            axis_fixed: [0.0, 0.6, 0.8],
+            axis_vehicle: [1.0, 0.0, 0.0],
             half_angle_rad: 1.2,
             fused_half_angle_rad: 1.21,
             altitude_est_m: 230e3,

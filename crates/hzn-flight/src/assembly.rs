@@ -62,6 +62,7 @@ impl Assembly {
     /// Removes the packets of another picture.
     fn begin(&mut self, picture: u32) {
         if picture != self.picture {
+            // The science packet of the picture before was lost, so that these packets have no answer.
             *self = Self { picture, ..Self::default() };
         }
     }
@@ -73,6 +74,7 @@ impl Assembly {
         for (place, edge) in answer.edges.iter_mut().zip(&come.edges) {
             *place = Some(*edge);
         }
+        // The answer says how many were sent, so that a lost packet is noticed.
         let missing_candidates = answer.outcome.listed.saturating_sub(come.edges.len() as u8);
         Assembled { exposure, answer, navigation: come.navigation, missing_candidates }
     }

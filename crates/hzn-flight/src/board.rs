@@ -30,6 +30,7 @@ pub struct Image {
 pub const BUILD: u32 = match option_env!("HZN_BUILD") {
     Some(digits) => match u32::from_str_radix(digits, 10) {
         Ok(build) => build,
+        // This panic stops the compiler, so that no image has a wrong number. No image contains it.
         Err(_) => panic!("HZN_BUILD must be a whole number"),
     },
     None => 0,
@@ -53,8 +54,10 @@ pub trait Board {
         None
     }
     /// Returns the next byte that was received, if there is one.
+    // One byte at a time, so that the inbox can stop after a packet: the other bytes wait in the serial port.
     fn receive(&mut self) -> Option<u8>;
     /// Sends bytes. Returns when the line has taken them.
+    // The port must be done with the bytes when it returns, because their memory is used for the next packet.
     fn send(&mut self, bytes: &[u8]);
     /// Returns whether there is the lift-off signal: its plug is pulled out when the rocket leaves.
     fn lift_off(&mut self) -> bool;
@@ -63,6 +66,7 @@ pub trait Board {
     /// Returns whether the watchdog caused the last reset.
     fn was_watchdog_reset(&mut self) -> bool;
     /// Tells the watchdog that the program makes progress.
+    // The loop calls it once a turn. A timer must not, because it would run on when the loop hangs.
     fn feed_watchdog(&mut self);
     /// Returns whether the camera answers.
     fn camera_answers(&mut self) -> bool;
@@ -71,6 +75,7 @@ pub trait Board {
     fn next_picture(&mut self) -> Option<Picture>;
     /// Shows the picture that was taken last: all of its pixels with [`Viewer::see`], or its rows with
     /// [`Viewer::rows`], as the camera sends them. Called at most once for a picture.
+    // Not part of `next_picture`, because size and prior are checked before, and rows are refused before they come.
     fn show(&mut self, viewer: &mut Viewer<'_>);
     /// Reads copy 1 or 2 of the parameters from memory.
     fn read_copy(&mut self, copy: u8, into: &mut [u8]);
@@ -83,6 +88,7 @@ pub trait Board {
         Image::default()
     }
     /// Returns words that a reset leaves unchanged and power-on does not; any words if there is no such memory.
+    // Any words will do, because they have a checksum, which random words and zeros do not have.
     fn read_retained(&mut self) -> [u32; RETAINED_WORDS] {
         [0; RETAINED_WORDS]
     }

@@ -6,6 +6,7 @@
 pub struct Writer<'a> {
     out: &'a mut [u8],
     len: usize,
+    // It stays set. Otherwise a shorter number that still fits would follow a gap.
     full: bool,
 }
 
@@ -16,6 +17,7 @@ impl<'a> Writer<'a> {
     }
     /// Appends bytes.
     pub fn bytes(&mut self, bytes: &[u8]) {
+        // `get_mut`, because an index out of bounds would be a panic path of the flight image.
         match self.out.get_mut(self.len..).and_then(|rest| rest.get_mut(..bytes.len())) {
             Some(room) if !self.full => {
                 room.copy_from_slice(bytes);
@@ -42,6 +44,7 @@ impl<'a> Writer<'a> {
     }
     /// Appends a single-precision number, IEEE 754.
     pub fn f32(&mut self, x: f32) {
+        // The bits are sent, so that the ground gets every bit of an answer, and NaN for what is not known.
         self.u32(x.to_bits());
     }
     /// Appends a double-precision number, IEEE 754.
@@ -70,6 +73,7 @@ impl<'a> Reader<'a> {
         self.rest
     }
     fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        // `rest` moves only if the whole number is there, so that a number that is cut off is not read in part.
         let (first, rest) = self.rest.split_first_chunk()?;
         self.rest = rest;
         Some(*first)

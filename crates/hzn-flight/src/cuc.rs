@@ -13,6 +13,14 @@ pub enum Epoch {
 }
 
 /// A time.
+///
+/// ```
+/// use hzn_flight::cuc::Cuc;
+///
+/// let time = Cuc::tai(1_500_000);
+/// assert_eq!(time.to_bytes(), [0x1F, 0, 0, 0, 1, 0x80, 0, 0]); // one and a half seconds
+/// assert_eq!(Cuc::from_bytes(time.to_bytes()), Some(time));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Cuc {
     /// What the time counts from.
@@ -22,6 +30,8 @@ pub struct Cuc {
 }
 
 /// Extension no; time code 001 (epoch 1958) or 010 (epoch of the agency); 4 bytes of seconds; 3 bytes of fraction.
+// The P-field is sent, because both epochs occur in one stream: the clock is correlated only after the start. Four
+// bytes of seconds since 1958 last until 2094. Three bytes of fraction, because two would have steps of 15 µs.
 const TAI: u8 = 0b0001_1111;
 const START: u8 = 0b0010_1111;
 const US_PER_S: u64 = 1_000_000;
@@ -44,8 +54,10 @@ impl Cuc {
             Epoch::Start => START,
             Epoch::Tai => TAI,
         };
+        // The remainder has 20 bits, so that the shift cannot overflow.
         let fraction = ((self.us % US_PER_S) << 24) / US_PER_S;
         let code = (self.us / US_PER_S) << 24 | fraction;
+        // The mask cuts seconds from 2^32 on, because they would change the P-field.
         (u64::from(p_field) << 56 | code & (u64::MAX >> 8)).to_be_bytes()
     }
     /// Reads a code; `None` if its P-field is another.
@@ -54,10 +66,12 @@ impl Cuc {
         let epoch = match p_field {
             TAI => Epoch::Tai,
             START => Epoch::Start,
+            // The first version of telemetry had microseconds here, whose first byte is 0.
             _ => return None,
         };
         let code = u64::from_be_bytes(bytes) & (u64::MAX >> 8);
         let (seconds, fraction) = (code >> 24, code & 0xFF_FFFF);
+        // It rounds to the nearest, because `to_bytes` rounds down. Otherwise most times would lose 1 µs.
         Some(Self { epoch, us: seconds * US_PER_S + ((fraction * US_PER_S + (1 << 23)) >> 24) })
     }
 }

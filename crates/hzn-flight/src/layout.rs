@@ -42,6 +42,7 @@ pub fn user_data(apid: Apid) -> Option<&'static [Part]> {
 }
 
 /// Returns the number of bytes of the user data of a packet; `None` for telecommands.
+// The sizes come from the tables, so that the bit budget counts the bytes that are really sent.
 pub fn user_bytes(apid: Apid) -> Option<usize> {
     let bytes = |field: &Field| field.kind.bytes() * field.parts.len();
     let part = |part: &Part| part.times * part.table.iter().map(bytes).sum::<usize>();

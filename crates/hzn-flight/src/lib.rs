@@ -50,6 +50,7 @@ pub mod view;
 pub use parameters::Parameters;
 
 /// Version of this crate: major, minor and patch in one byte each, from the second byte on.
+// The major version is in the highest byte in use, so that a later version is a larger number.
 pub const VERSION: u32 = number(env!("CARGO_PKG_VERSION_MAJOR")) << 16
     | number(env!("CARGO_PKG_VERSION_MINOR")) << 8
     | number(env!("CARGO_PKG_VERSION_PATCH"));

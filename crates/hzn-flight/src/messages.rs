@@ -163,6 +163,8 @@ numbered_enum! {
 impl Event {
     /// Returns the severity of the event.
     pub const fn severity(self) -> Severity {
+        // Only warnings are limited (`flight::reports`), because they can come with every picture or every few bytes.
+        // The others follow a start, a change or a telecommand, so that they cannot flood the line.
         match self {
             Self::Started | Self::ModeChanged | Self::Stored | Self::ClockSet => Severity::Information,
             Self::CopyBroken
@@ -196,6 +198,7 @@ record! {
         /// Copy of the parameters in use: 1, 2, or 0 for the defaults.
         parameter_copy: u8,
         /// Status of the last picture; 255 before the first.
+        // Not 0, because 0 is the status `ok`.
         last_status: u8,
         /// Generation of the parameters; 0 for the defaults.
         parameter_generation: u32,
@@ -233,6 +236,7 @@ record! {
         /// Number of memory errors that were repaired.
         repairs: u16,
         /// Sequence count of the last telecommand that was taken; 65535 before the first.
+        // A count has 14 bits, so that 65535 cannot be one.
         last_sequence: u16,
         /// Packets on the line that are no telecommands for this computer.
         foreign: u32,
@@ -364,11 +368,13 @@ record! {
         /// Number of the parameter.
         number: u16,
         /// Its value; NaN: not set.
+        // A double holds the values of all parameters exactly, so that one form serves all.
         value: f64,
     }
 }
 
 /// Number of pixels in a packet with a part of an edge. Those after [`EdgePart::count`] are 0.
+// The number is fixed, because ground systems decode packets by tables without counts.
 pub const EDGE_PIXELS: usize = 64;
 
 record! {

@@ -2,6 +2,8 @@
 
 /// Makes an enumeration from its variants, each with a number and a word. It gets the items `ALL`, `from_number` and
 /// `name`.
+// The numbers are written out, because counted ones would change with a variant that is put between others. Number and
+// word stand together, so that packets, commands and tables agree.
 macro_rules! numbered_enum {
     (
         $(#[$doc:meta])*
@@ -21,6 +23,7 @@ macro_rules! numbered_enum {
             pub const ALL: &'static [Self] = &[$(Self::$variant),*];
             /// Returns the variant with the number `n`, if there is one.
             pub fn from_number(n: $number) -> Option<Self> {
+                // A search, because a conversion of the number would need unsafe code.
                 Self::ALL.iter().copied().find(|&x| x as $number == n)
             }
             /// Returns the word for the variant in messages and commands.

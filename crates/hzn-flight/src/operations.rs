@@ -64,10 +64,12 @@ operations! {
     /// Number of pictures from one housekeeping packet to the next.
     @300 "telemetry.housekeeping_every" housekeeping_every: u16 = 10, [1.0, 65535.0];
     /// Longest time from one housekeeping packet to the next, s.
+    // With 5 s the computer is heard from within ten seconds, even if one packet is lost.
     @301 "telemetry.housekeeping_s" housekeeping_s: u16 = 5, [1.0, 3600.0];
     /// APID of housekeeping, a multiple of 16. The other APIDs have fixed distances from it.
     @302 "line.apid_base" apid_base: u16 = 256, [0.0, 1792.0];
     /// A telecommand is taken if its sequence count is 1 to this number above that of the last one; 0: any count.
+    // At most half of the 16 384 counts, so that a replay of one of the last 8191 telecommands is refused.
     @303 "line.sequence_window" sequence_window: u16 = 0, [0.0, 8192.0];
     /// The mode after the start: 0 standby, 1 flight.
     @304 "boot.mode" boot_mode: u16 = 0, [0.0, 1.0];
@@ -75,6 +77,7 @@ operations! {
     @305 "boot.shut_down_after_s" shut_down_after_s: Option<f64> = None, [1.0, 1e6];
     /// Most bits of the packets of pictures in a second; NaN: no limit. The packets of a picture are sent whole or not
     /// at all.
+    // At most 1e9, because the bit budget multiplies it by up to an hour in microseconds, in 64 bits.
     @306 "telemetry.science_bits_s" science_bits_s: Option<f64> = None, [1.0, 1e9];
 }
 
@@ -87,12 +90,14 @@ impl Operations {
             let is_good = value.is_nan() || value >= low && value <= high;
             (!is_good).then_some((id, value))
         };
+        // Limits cannot say that a number is a multiple of 16, so the base has a check of its own.
         let base = (ApidBase::try_new(self.apid_base).is_none()).then_some((302, f64::from(self.apid_base)));
         Self::NUMBERS.iter().find_map(out_of_limits).or(base)
     }
 
     /// Returns the APIDs of this computer.
     pub fn base(&self) -> ApidBase {
+        // `check` refused other numbers before. The default, because a flight computer may not panic.
         ApidBase::try_new(self.apid_base).unwrap_or_default()
     }
 }

@@ -15,8 +15,10 @@ use crate::cuc::Cuc;
 use crate::numbered::numbered_enum;
 
 /// The sync marker before every packet.
+// A space packet has no marker of its own, so a receiver would otherwise have to try every byte.
 pub const SYNC: [u8; 4] = [0x1A, 0xCF, 0xFC, 0x1D];
 /// Most bytes of a packet, including the sync marker.
+// The length field allows 64 KiB. With this limit a damaged length asks for at most 89 ms of a line with 115 200 baud.
 pub const MAX_BYTES: usize = 1024;
 /// Number of bytes of a packet without its user data: marker, both headers, checksum.
 pub const OVERHEAD: usize = SYNC.len() + HEADER + TIME + CRC;
@@ -27,6 +29,7 @@ const CRC: usize = 2;
 /// The sequence flags of a packet that is not a segment of a larger one.
 const UNSEGMENTED: u16 = 0b11;
 /// The table makes a byte cost eight instructions; without it a byte costs about fifty.
+// Polynomial and start are those of ECSS-E-ST-70-41C, so that ground systems know them.
 const CRC16: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_IBM_3740);
 
 numbered_enum! {
@@ -89,6 +92,8 @@ impl ApidBase {
     /// Returns the subject of a packet; `None` if the packet belongs to something else on the line.
     pub fn subject(self, packet: &Packet<'_>) -> Option<Apid> {
         let apid = Apid::ALL.iter().copied().find(|&a| self.apid(a) == packet.apid)?;
+        // The type counts, because a telecommand of one base has the APID of housekeeping of the base 0xC0 above it. A
+        // segment is refused, because a part of a telecommand would be carried out as a whole one.
         (packet.is_command == (apid == Apid::Command) && packet.is_whole).then_some(apid)
     }
 }
@@ -103,7 +108,9 @@ pub fn write(
     time: Option<Cuc>,
     user: impl FnOnce(&mut Writer<'_>),
 ) -> Option<usize> {
+    // The user data are written before the header, because it has their length.
     let mut body = Writer::new(out.get_mut(SYNC.len() + HEADER..)?);
+    // A telecommand has zeros in place of a time, so that both types have headers of one length.
     body.bytes(&time.map_or([0; TIME], Cuc::to_bytes));
     user(&mut body);
     let len = body.finish()?;
@@ -112,11 +119,13 @@ pub fn write(
     head.bytes(&SYNC);
     head.u16(command << 12 | 1 << 11 | base.apid(apid));
     head.u16(UNSEGMENTED << 14 | sequence & 0x3FFF);
+    // CCSDS 133.0-B counts from 0, because no packet is without data: 0 means one byte.
     head.u16(u16::try_from(len + CRC - 1).ok()?);
     head.finish()?;
     let end = SYNC.len() + HEADER + len;
     let crc = CRC16.checksum(out.get(SYNC.len()..end)?);
     out.get_mut(end..end + CRC)?.copy_from_slice(&crc.to_be_bytes());
+    // A longer packet is not sent, because `length` would refuse it at the receiver.
     (end + CRC <= MAX_BYTES).then_some(end + CRC)
 }
 
@@ -144,6 +153,8 @@ pub(crate) fn length(header: &[u8; SYNC.len() + HEADER]) -> Option<usize> {
     let id = u16::from_be_bytes([i0, i1]);
     let following = usize::from(u16::from_be_bytes([n0, n1])) + 1;
     let whole = SYNC.len() + HEADER + following;
+    // These bits are the same in all packets of hzn. A header without them is damaged, and would otherwise hold the
+    // line until its length has come.
     let is_possible = id >> 13 == 0 && id & 1 << 11 != 0 && following >= TIME + CRC && whole <= MAX_BYTES;
     is_possible.then_some(whole)
 }
@@ -159,6 +170,7 @@ pub(crate) fn read(bytes: &[u8]) -> Option<Packet<'_>> {
 
 /// Reads the fields of a packet whose checksum is known to be right.
 pub(crate) fn parse(bytes: &[u8]) -> Option<Packet<'_>> {
+    // The checksum was computed before, once, because the inbox looks at a packet again for every byte after it.
     let (checked, _) = bytes.get(SYNC.len()..)?.split_last_chunk::<CRC>()?;
     let mut from = Reader::new(checked);
     let (id, sequence, _, time) = (from.u16()?, from.u16()?, from.u16()?, from.u64()?);
@@ -196,11 +208,21 @@ pub enum Scan<'a> {
 
 /// Searches for the first packet in `bytes`, as a receiver on the ground does. A flight computer is stricter: see
 /// [`crate::inbox`].
+///
+/// ```
+/// use hzn_flight::packet::{Apid, ApidBase, MAX_BYTES, Scan, scan, write};
+///
+/// let mut line = [0u8; MAX_BYTES];
+/// let length = write(&mut line, ApidBase::DEFAULT, Apid::Command, 7, None, |out| out.bytes(&[1, 2, 3]));
+/// let Scan::Packet { end, packet } = scan(&line) else { panic!("the packet is whole") };
+/// assert_eq!((Some(end), packet.user), (length, [1, 2, 3].as_slice()));
+/// ```
 pub fn scan(bytes: &[u8]) -> Scan<'_> {
     let Some(marker) = bytes.windows(SYNC.len()).position(|w| w == SYNC) else {
         // The last bytes may be the beginning of a marker.
         return Scan::More { skip: bytes.len().saturating_sub(SYNC.len() - 1) };
     };
+    // Only the marker is left out, because a damaged length may reach over the next packet.
     let bad = Scan::Bad { skip: marker + SYNC.len() };
     let from = bytes.get(marker..).unwrap_or_default();
     let Some(header) = from.first_chunk() else { return Scan::More { skip: marker } };

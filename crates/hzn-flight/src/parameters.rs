@@ -13,6 +13,18 @@ use hzn_core::region::{MAX_CORNERS, MAX_POLYGONS, Polygon};
 use crate::operations::Operations;
 
 /// The parameters of a flight computer.
+///
+/// ```
+/// use hzn_flight::Parameters;
+/// use hzn_flight::parameters::{Refused, name};
+///
+/// let mut parameters = Parameters::defaults();
+/// assert_eq!((name(81), parameters.get(81)), (Some("consensus.threshold_px"), Some(3.0)));
+/// parameters.set(81, 2.5)?;
+/// assert_eq!(parameters.sensor.consensus.threshold_px, 2.5);
+/// assert_eq!(parameters.set(9999, 1.0), Err(Refused::Unknown(9999)));
+/// # Ok::<(), Refused>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     /// The sensor.
@@ -115,6 +127,7 @@ impl Parameters {
     pub fn sensor_numbers(&self) -> impl Iterator<Item = u16> + '_ {
         let polygons = &self.sensor.mask.polygons_px;
         let corners = (CORNER..).step_by(usize::from(POLYGON)).zip(polygons);
+        // Counts of corners come before corners, because `set` refuses a corner that does not exist.
         Config::numbers()
             .chain(CORNERS..CORNERS + MAX_POLYGONS as u16)
             .chain(corners.flat_map(|(first, polygon)| first..first + 2 * polygon.len() as u16))
@@ -152,10 +165,12 @@ impl Parameters {
         }
         if let Some(i) = index_within(id, CORNERS, MAX_POLYGONS as u16) {
             let mut corners = 0_u16;
+            // Set as a key with this type, so that numbers that are not whole are refused.
             corners.set_number(0, value).ok_or(refused)?;
             let corners = usize::from(corners);
             let polygons = &mut c.mask.polygons_px;
             if corners == 0 {
+                // The later polygons go, too, because polygons have numbers without gaps.
                 polygons.truncate(i);
                 return Ok(());
             }
@@ -167,6 +182,7 @@ impl Parameters {
             return polygon.resize(corners, [0.0; 2]).map_err(|_| refused);
         }
         if let Some(i) = index_within(id, CORNER, MAX_POLYGONS as u16 * POLYGON) {
+            // A corner cannot be unset, so that NaN, which unsets other parameters, is refused.
             let value = Some(value).filter(|x| x.is_finite()).ok_or(refused)?;
             let polygon = c.mask.polygons_px.get_mut(i / usize::from(POLYGON)).ok_or(refused)?;
             let corner = polygon.get_mut(i % usize::from(POLYGON) / 2).ok_or(refused)?;
@@ -181,6 +197,8 @@ impl Parameters {
     /// # Errors
     /// Returns the first key that a flight computer cannot take.
     pub fn check_flyable(&self) -> Result<(), &'static str> {
+        // A second set of parameters gets the numbers alone, as in flight. A key without a number then shows as a
+        // difference, so that it is refused instead of dropped.
         let sensor = Config::new(self.sensor.camera.clone());
         let mut flown = Self { sensor, operations: self.operations.clone() };
         for id in self.numbers() {
@@ -210,6 +228,7 @@ impl Parameters {
             return Err(Refused::Value(WORK, f64::from(work)));
         }
         self.sensor.check().map_err(Refused::Config)?;
+        // The lens is checked, too, because `Sensor::new` does both: what passes here makes a sensor.
         Camera::<f32>::try_new(&self.sensor.camera).map(drop).map_err(Refused::Config)
     }
 }
@@ -230,8 +249,8 @@ mod tests {
         p.sensor.camera.model = Model::KannalaBrandt;
         p.sensor.camera.k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
         p.sensor.camera.theta_max_deg = Some(54.0);
-        p.sensor.mount = Some(Mount { q_body_from_camera_wxyz: [0.6, 0.0, 0.8, 0.0] });
-        p.sensor.select.min_arc_px = Some(55.5);
+        p.sensor.mount = Some(Mount { q_vehicle_from_camera_wxyz: [0.6, 0.0, 0.8, 0.0] });
+        p.sensor.gates.min_arc_px = Some(55.5);
         for n in [3usize, 16, 4] {
             let polygon = (0..n).map(|i| [i as f64 * 7.5, 3.0 - (i * i) as f64]).collect();
             p.sensor.mask.polygons_px.push(polygon).unwrap();

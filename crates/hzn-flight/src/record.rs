@@ -37,6 +37,7 @@ pub struct Field {
 pub(crate) trait FieldType: Copy {
     const PARTS: &'static [&'static str] = &[""];
     const KIND: Kind;
+    // A constant, so that the budget and the limits of the line know the size of a packet before it is written.
     const BYTES: usize = Self::KIND.bytes() * Self::PARTS.len();
     fn write(self, out: &mut Writer<'_>);
     fn read(from: &mut Reader<'_>) -> Option<Self>;
@@ -54,6 +55,7 @@ macro_rules! field_types {
                 from.$t()
             }
             fn numbers(self) -> impl Iterator<Item = f64> {
+                // A double is exact up to 2^53, which is 285 years in microseconds, so that one type serves all fields.
                 core::iter::once(self as f64)
             }
         }
@@ -93,6 +95,7 @@ vector_types! {
 }
 
 /// Defines a record with its conversion to bytes and back, and its table.
+// One definition makes the struct, its bytes and the table for ground systems, so that they cannot differ.
 macro_rules! record {
     ($(#[doc = $doc:literal])* $name:ident { $($(#[doc = $field_doc:literal])* $field:ident: $t:ty,)* }) => {
         $(#[doc = $doc])*
@@ -108,6 +111,7 @@ macro_rules! record {
                 name: stringify!($field),
                 parts: <$t as $crate::record::FieldType>::PARTS,
                 kind: <$t as $crate::record::FieldType>::KIND,
+                // The documentation is also the text of the dictionary, so that it is written once.
                 description: concat!($($field_doc),*),
             }),*];
             /// Number of bytes of the fields.

@@ -30,10 +30,12 @@ pub enum Choice {
 }
 
 /// Reads both copies by way of `buffer` and returns the chosen one of those that are valid.
+// Not inlined, because the parameters that it reads would otherwise stay on the stack of its caller.
 #[inline(never)]
 pub fn load(board: &mut impl Board, buffer: &mut [u8], choice: Choice) -> Loaded {
     let mut out = Loaded { parameters: Parameters::defaults(), copy: 0, generation: 0, broken: [None; 2] };
     for (copy, broken) in (1u8..).zip(&mut out.broken) {
+        // Both copies pass through one buffer, because a second one would take 4 KB of RAM.
         board.read_copy(copy, buffer);
         match table::read(buffer) {
             Ok((parameters, generation)) => {
@@ -64,11 +66,14 @@ pub fn save(
     generation: u32,
     buffer: &mut [u8],
 ) -> Result<(u8, u32), u8> {
+    // The copy in use is not touched, so that a power cut at any byte leaves it whole.
     let copy = if current == 1 { 2 } else { 1 };
+    // Wrapping, because no flash lives through 2^32 writes.
     let generation = generation.wrapping_add(1);
     let written = table::write(parameters, generation, buffer)
         .and_then(|n| buffer.get(..n))
         .is_some_and(|bytes| board.write_copy(copy, bytes));
+    // It is read back, because a memory may report success and keep other bytes.
     board.read_copy(copy, buffer);
     if written && table::generation(buffer) == Some(generation) { Ok((copy, generation)) } else { Err(copy) }
 }

@@ -18,12 +18,14 @@ use crate::parameters::Refused;
 const MAGIC: [u8; 4] = *b"HZNP";
 const VERSION: u16 = 1;
 const HEADER: usize = 12;
+// Each value has its number, so that a table of an earlier version, without the newer parameters, can still be read.
 const ENTRY: usize = 10;
 
 /// CRC-32 as in zlib. Its table, 1 KB, makes the check of the program image at the start five times faster.
 pub(crate) const CRC32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// Most bytes of a table.
+// The largest table fits, one with eight polygons of 16 corners, so that storing never fails for want of room.
 pub const MAX_BYTES: usize = 4096;
 
 /// Why bytes are not a valid table.
@@ -60,6 +62,7 @@ pub fn write(parameters: &Parameters, generation: u32, out: &mut [u8]) -> Option
         end += ENTRY;
         count += 1;
     }
+    // The header comes last, because only now the number of entries is known.
     out.get_mut(..4)?.copy_from_slice(&MAGIC);
     out.get_mut(4..6)?.copy_from_slice(&VERSION.to_le_bytes());
     out.get_mut(6..8)?.copy_from_slice(&count.to_le_bytes());
@@ -76,12 +79,14 @@ pub fn write(parameters: &Parameters, generation: u32, out: &mut [u8]) -> Option
 /// The bytes are not a complete table, or its parameters are refused.
 pub fn read(bytes: &[u8]) -> Result<(Parameters, u32), TableError> {
     let (entries, generation) = split(bytes)?;
+    // A table is taken as a whole or not at all, because its values were checked in combination.
     let mut parameters = Parameters::defaults();
     for entry in entries.chunks_exact(ENTRY) {
         if let (Some(id), Some(value)) = (entry.first_chunk(), entry.last_chunk()) {
             parameters.set(u16::from_le_bytes(*id), f64::from_le_bytes(*value)).map_err(TableError::Refused)?;
         }
     }
+    // They are checked here, so that parameters that were loaded always make a sensor: the start relies on it.
     parameters.check().map_err(TableError::Refused)?;
     Ok((parameters, generation))
 }
@@ -95,6 +100,7 @@ pub fn generation(bytes: &[u8]) -> Option<u32> {
 fn split(bytes: &[u8]) -> Result<(&[u8], u32), TableError> {
     let header: &[u8; HEADER] = bytes.first_chunk().ok_or(TableError::Header)?;
     let [m0, m1, m2, m3, v0, v1, n0, n1, g0, g1, g2, g3] = *header;
+    // Another error than a wrong checksum, because erased memory is no damage: event 2 tells them apart.
     if [m0, m1, m2, m3] != MAGIC || u16::from_le_bytes([v0, v1]) != VERSION {
         return Err(TableError::Header);
     }

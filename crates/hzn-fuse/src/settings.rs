@@ -237,6 +237,16 @@ impl Settings {
     ///
     /// # Errors
     /// The file cannot be read, or a key or value is refused; the message has the line and the key.
+    ///
+    /// ```
+    /// # let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("fuse.toml");
+    /// std::fs::write(&path, "[limb_height]\nsigma_km = -1.0\n")?;
+    /// let refused = hzn_fuse::Settings::load(&path).unwrap_err().to_string();
+    /// let why = "fuse.toml:2: [limb_height] sigma_km: -1 is refused: must be 0 or more";
+    /// assert!(refused.ends_with(why), "{refused}");
+    /// # Ok::<(), std::io::Error>(())
+    /// ```
     pub fn load(path: &Path) -> Result<Self, Error> {
         let text = limited::read_text(path, limited::SETTINGS_BYTES)
             .map_err(|e| Error::unusable(format!("{}: {e}", path.display())))?;

@@ -108,7 +108,7 @@ fn recording(
     for (row, frame) in one.flight()?.frames.iter().enumerate() {
         let known = one.frame_row(frame);
         let pose = &frame.scene.pose;
-        let to_camera = rotation(pose.cam_to_ecef_wxyz).inverse();
+        let to_camera = rotation(pose.q_fixed_from_camera_wxyz).inverse();
         for &kind in &one.bodies {
             if !is_in_view(one, frame, kind)? {
                 continue;
@@ -146,7 +146,7 @@ fn recording(
     }
     Ok(Recording {
         name: one.name.clone(),
-        mount: Some(rotation(one.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz))),
+        mount: Some(rotation(one.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_vehicle_from_camera_wxyz))),
         camera: Some(one.camera.clone()),
         limb_sigma_km: None,
         clock_offset_s: 0.0,
@@ -178,7 +178,7 @@ fn true_direction(one: &Scenario, frame: &FlightFrame, kind: Kind) -> Option<(Bo
         _ => {
             let truth = frame.scene.body_truth(kind, "", frame.time_s).ok()?;
             let axis = Vector3::new(truth.axis_x, truth.axis_y, truth.axis_z);
-            (Body::Limb, rotation(frame.scene.pose.cam_to_ecef_wxyz) * axis)
+            (Body::Limb, rotation(frame.scene.pose.q_fixed_from_camera_wxyz) * axis)
         }
     })
 }
@@ -217,7 +217,7 @@ pub fn write(scenario: &Scenario, inputs: &Inputs, folder: &Path) -> Result<(), 
             out.serialize(row(seen)).map_err(Error::failed)?;
         }
         if let Some(q) = recording.mount {
-            let text = format!("[mount]\nq_body_from_camera_wxyz = [{}, {}, {}, {}]\n", q.w, q.i, q.j, q.k);
+            let text = format!("[mount]\nq_vehicle_from_camera_wxyz = [{}, {}, {}, {}]\n", q.w, q.i, q.j, q.k);
             std::fs::write(folder.join(format!("{}.toml", recording.name)), text).map_err(Error::failed)?;
         }
     }

@@ -143,12 +143,12 @@ impl Annotations {
     }
 }
 
-/// Attitude and position of the camera in ECEF.
+/// Attitude and position of the camera in the fixed frame (ECEF for the Earth).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Attitude {
-    /// Quaternion from the camera frame to ECEF, scalar first.
-    pub q_ecef_from_camera_wxyz: [f64; 4],
-    /// Position of the camera in ECEF, metres; zeros if it is unknown.
+    /// Quaternion from the camera frame to the fixed frame, scalar first.
+    pub q_fixed_from_camera_wxyz: [f64; 4],
+    /// Position of the camera in the fixed frame, metres; zeros if it is unknown.
     pub position_m: [f64; 3],
 }
 
@@ -162,12 +162,12 @@ pub struct PicturePrior {
     /// Altitude, kilometres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub altitude_km: Option<f64>,
-    /// Position in ECEF, kilometres.
+    /// Position in the fixed frame, kilometres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_km: Option<[f64; 3]>,
-    /// Prior attitude, camera to ECEF, scalar first.
+    /// Prior attitude, from the camera to the fixed frame, scalar first.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub q_ecef_from_camera_wxyz: Option<[f64; 4]>,
+    pub q_fixed_from_camera_wxyz: Option<[f64; 4]>,
     /// 1-sigma of that attitude, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attitude_sigma_deg: Option<f64>,
@@ -199,7 +199,7 @@ pub struct BodyOrientation {
     pub body: String,
     /// Rotation from the camera to the axes of the body, scalar first.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub q_body_from_camera_wxyz: Option<[f64; 4]>,
+    pub q_vehicle_from_camera_wxyz: Option<[f64; 4]>,
     /// Direction of its north pole in the camera frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pole_camera: Option<[f64; 3]>,

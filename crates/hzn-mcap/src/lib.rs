@@ -31,12 +31,12 @@
 //!
 //! | topic | schema | encoding |
 //! |---|---|---|
-//! | `/hzn/report` | `hzn.Report`, the row plus `candidate_edges` and `given` | JSON |
+//! | `/hzn/report` | `hzn.Report`, the row plus `candidate_edges` and `prior` | JSON |
 //! | `/camera/image` | `foxglove.CompressedImage`, or `foxglove.RawImage` for raw frames | protobuf |
 //! | `/camera/calibration` | `foxglove.CameraCalibration`, at the start and at most once a second | protobuf |
 //! | `/camera/annotations` | `foxglove.ImageAnnotations`, pixel corner at integers (+0.5) | protobuf |
 //! | `/hzn/axis` | `foxglove.PoseInFrame` in frame `camera`, x along the axis | protobuf |
-//! | `/tf` | `foxglove.FrameTransform`, `camera` in `ecef` | protobuf |
+//! | `/tf` | `foxglove.FrameTransform`, `camera` in `fixed` | protobuf |
 //! | `/log` | `foxglove.Log` | protobuf |
 #![forbid(unsafe_code)]
 

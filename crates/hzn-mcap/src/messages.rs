@@ -15,8 +15,8 @@ use crate::topics::Topic;
 
 /// Name of the camera frame.
 const CAMERA: &str = "camera";
-/// Name of the frame of the camera's attitude.
-const ECEF: &str = "ecef";
+/// Name of the frame that is fixed in the body, for the camera's attitude.
+const FIXED: &str = "fixed";
 
 /// Converts a time in seconds to a log time in nanoseconds. Foxglove's messages cannot represent times before 0 and
 /// after the year 2106. These times are clamped to the limit, and NaN becomes 0; the row keeps the exact time.
@@ -44,7 +44,7 @@ pub(crate) fn report(frame: &FrameRecord) -> Vec<u8> {
     map.retain(|_, v| !v.is_null());
     map.insert("candidate_edges".into(), serde_json::to_value(&frame.candidates).unwrap_or_default());
     if frame.prior != PicturePrior::default() {
-        map.insert("given".into(), serde_json::to_value(&frame.prior).unwrap_or_default());
+        map.insert("prior".into(), serde_json::to_value(&frame.prior).unwrap_or_default());
     }
     serde_json::to_vec(&map).unwrap_or_default()
 }
@@ -54,7 +54,7 @@ pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>, Pict
     let mut value: Value = serde_json::from_slice(data)?;
     let mut part = |key: &str| value.as_object_mut().and_then(|map| map.remove(key));
     let edges = part("candidate_edges").unwrap_or(Value::Array(Vec::new()));
-    let prior = part("given").map_or(Ok(PicturePrior::default()), serde_json::from_value)?;
+    let prior = part("prior").map_or(Ok(PicturePrior::default()), serde_json::from_value)?;
     Ok((serde_json::from_value(value)?, serde_json::from_value(edges)?, prior))
 }
 
@@ -190,11 +190,11 @@ pub(crate) fn axis([x, y, z]: [f64; 3], ns: u64) -> PoseInFrame {
 }
 
 pub(crate) fn transform(attitude: &Attitude, ns: u64) -> FrameTransform {
-    let [w, x, y, z] = attitude.q_ecef_from_camera_wxyz;
+    let [w, x, y, z] = attitude.q_fixed_from_camera_wxyz;
     let [px, py, pz] = attitude.position_m;
     FrameTransform {
         timestamp: stamp(ns),
-        parent_frame_id: ECEF.into(),
+        parent_frame_id: FIXED.into(),
         child_frame_id: CAMERA.into(),
         translation: Some(Vector3 { x: px, y: py, z: pz }),
         rotation: Some(Quaternion { x, y, z, w }),
@@ -205,7 +205,7 @@ pub(crate) fn parse_transform(data: &[u8]) -> Result<Option<Attitude>, prost::De
     let m = FrameTransform::decode(data)?;
     Ok(m.rotation
         .zip(m.translation)
-        .map(|(q, t)| Attitude { q_ecef_from_camera_wxyz: [q.w, q.x, q.y, q.z], position_m: [t.x, t.y, t.z] }))
+        .map(|(q, t)| Attitude { q_fixed_from_camera_wxyz: [q.w, q.x, q.y, q.z], position_m: [t.x, t.y, t.z] }))
 }
 
 /// Returns a log line. The message begins with the picture's name, because the log panel does not show `file`.

@@ -1,6 +1,6 @@
 //! The flat result: one row per picture and body, the same in CSV, JSON Lines and MCAP.
 
-use hzn_core::frames::{Body, UnitVec3};
+use hzn_core::frames::{UnitVec3, Vehicle};
 use hzn_core::real::Real;
 use hzn_core::report::Position;
 use hzn_core::status::{Stage, Status};
@@ -132,11 +132,11 @@ columns! {
         cov_zz: Option<f64>,
         /// Larger of the axis's two standard deviations, degrees.
         sigma_max_deg: Option<f64>,
-        /// The same direction in ECEF, x; only if the position is known.
+        /// The same direction in the fixed frame of the body (for the Earth ECEF), x; only if the position is known.
         axis_e_x: Option<f64>,
-        /// The same direction in ECEF, y.
+        /// The same direction in the fixed frame, y.
         axis_e_y: Option<f64>,
-        /// The same direction in ECEF, z.
+        /// The same direction in the fixed frame, z.
         axis_e_z: Option<f64>,
         /// Half-angle of the fit with a free half-angle, degrees.
         half_angle_deg: Option<f64>,
@@ -192,13 +192,13 @@ columns! {
         /// Derivative of the axis by the cosine of the expected half-angle, z.
         axis_by_cos_z: Option<f64>,
         /// Position of the body's centre in the camera frame, x, kilometres; only with
-        /// `estimate.position`.
+        /// `fit.position`.
         position_x_km: Option<f64>,
         /// Position of the body's centre in the camera frame, y, kilometres; only with
-        /// `estimate.position`.
+        /// `fit.position`.
         position_y_km: Option<f64>,
         /// Position of the body's centre in the camera frame, z, kilometres; only with
-        /// `estimate.position`.
+        /// `fit.position`.
         position_z_km: Option<f64>,
         /// Covariance of that position, xx, km².
         pos_cov_xx_km2: Option<f64>,
@@ -219,7 +219,7 @@ columns! {
         /// Position of the camera in the axes of the body, z, kilometres.
         body_fixed_z_km: Option<f64>,
         /// Rotation of the body about the line to it, relative to the given orientation, degrees; right-handed about
-        /// the direction to the body. Only if its 1σ is below `estimate.yaw_limit_deg`.
+        /// the direction to the body. Only if its 1σ is below `fit.yaw_limit_deg`.
         yaw_deg: Option<f64>,
         /// 1σ of that rotation, degrees.
         yaw_sigma_deg: Option<f64>,
@@ -271,7 +271,7 @@ impl Row {
         [self.cov_xx, self.cov_xy, self.cov_xz, self.cov_yy, self.cov_yz, self.cov_zz] =
             s.covariance.upper_rad2.map(number);
         self.sigma_max_deg = deg(s.covariance.sigma_max_rad());
-        if let Some(e) = &s.axis_ecef {
+        if let Some(e) = &s.axis_fixed {
             [self.axis_e_x, self.axis_e_y, self.axis_e_z] = e.xyz().map(number);
         }
         self.half_angle_deg = deg(s.half_angle_rad);
@@ -298,7 +298,7 @@ impl Row {
         }
         self.rms_px = number(s.rms_px);
         self.inliers = Some(s.inliers);
-        if let Some(body) = &s.axis_body {
+        if let Some(body) = &s.axis_vehicle {
             let [roll, pitch] = roll_pitch_deg(body);
             (self.roll_deg, self.pitch_deg) = (finite(roll), finite(pitch));
         }
@@ -359,7 +359,7 @@ impl Row {
 /// The vehicle's axes are x forward, y right, z down. If the body is along +z, both angles are 0. Positive roll puts
 /// the right side (+y) down, −180 to 180. Positive pitch puts the nose (+x) up, −90 to 90. In the order yaw, pitch,
 /// roll the direction is (−sin p, sin r cos p, cos r cos p).
-pub fn roll_pitch_deg<T: Real>(to_body: &UnitVec3<Body, T>) -> [f64; 2] {
+pub fn roll_pitch_deg<T: Real>(to_body: &UnitVec3<Vehicle, T>) -> [f64; 2] {
     let [x, y, z] = to_body.xyz().map(Real::to_f64);
     [y.atan2(z).to_degrees(), (-x).atan2(y.hypot(z)).to_degrees()]
 }
@@ -372,7 +372,7 @@ fn finite(x: f64) -> Option<f64> {
 /// Describes the last stage, the verdict of each candidate, and the number of looks if there was more than one.
 fn describe<T: Real>(report: &Report<T>) -> String {
     let mut text = format!("ended at {}", report.stage.name());
-    if report.status == Status::NoLimb && report.stage == Stage::Binarize {
+    if report.status == Status::NoLimb && report.stage == Stage::Threshold {
         text.push_str(
             ": dark and lit differ by less than 3 % of full scale; the body fills the picture or is not in it",
         );

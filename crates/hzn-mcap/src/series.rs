@@ -23,10 +23,27 @@ pub struct Placed<'a> {
     /// Position, m.
     pub position_m: [f64; 3],
     /// Attitude as a quaternion to the frame, scalar first.
-    pub q_wxyz: [f64; 4],
+    pub q_frame_from_placed_wxyz: [f64; 4],
 }
 
 /// A recording that is being written. It gets its name when it is finished.
+///
+/// ```
+/// use hzn_mcap::{SeriesWriter, read_series};
+/// use serde_json::json;
+///
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("nav.mcap");
+/// let mut series = SeriesWriter::create(&path)?;
+/// series.json("/nav/state", "hzn.NavState", 0.5, &json!({ "time_s": 0.5 }))?;
+/// series.finish()?;
+///
+/// let mut messages = Vec::new();
+/// let is_state = |topic: &str| topic == "/nav/state";
+/// read_series(&path, is_state, |_, json| messages.push(String::from_utf8_lossy(json).into_owned()))?;
+/// assert_eq!(messages, ["{\"time_s\":0.5}"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct SeriesWriter {
     writer: mcap::Writer<BufWriter<File>>,
     path: PathBuf,
@@ -170,7 +187,7 @@ fn to_io(error: mcap::McapError) -> std::io::Error {
 }
 
 fn parts(placed: &Placed<'_>) -> (Vector3, Quaternion) {
-    let ([x, y, z], [w, i, j, k]) = (placed.position_m, placed.q_wxyz);
+    let ([x, y, z], [w, i, j, k]) = (placed.position_m, placed.q_frame_from_placed_wxyz);
     (Vector3 { x, y, z }, Quaternion { x: i, y: j, z: k, w })
 }
 

@@ -49,6 +49,22 @@ pub struct Options {
 
 /// A recording that is being written. If it is dropped without [`Writer::finish`], its `.part` file stays with every
 /// frame written so far, for [`resume`](crate::resume) or [`recover`](crate::recover).
+///
+/// ```
+/// use hzn_core::status::Status;
+/// use hzn_mcap::{Contents, FrameRecord, Options, Reader, Row, RowMeta, Writer};
+///
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("flight.mcap");
+/// let mut writer = Writer::create(&path, &Options::default())?;
+/// let meta = RowMeta { file: "0001.png".into(), time_s: Some(12.5), body: "earth".into(), ..RowMeta::default() };
+/// writer.write(&FrameRecord::new(Row::unprocessed(&meta, Status::NoAltitude, "no altitude is known")))?;
+/// writer.finish()?;
+///
+/// let frames: Vec<FrameRecord> = Reader::open(&path, Contents::All)?.collect::<Result<_, _>>()?;
+/// assert_eq!((frames.len(), frames[0].row.file.as_str()), (1, "0001.png"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Writer {
     /// `None` after the end or after a failure.

@@ -83,7 +83,7 @@ impl Time {
     }
 
     /// Converts ecliptic longitude and latitude of date (degrees) to ECEF.
-    fn ecliptic_to_ecef(&self, longitude_deg: f64, latitude_deg: f64) -> Vector3<f64> {
+    fn fixed_from_ecliptic(&self, longitude_deg: f64, latitude_deg: f64) -> Vector3<f64> {
         let (se, ce) = (sin(self.obliquity_deg), cos(self.obliquity_deg));
         let (sb, cb) = (sin(latitude_deg), cos(latitude_deg));
         let (y, z) = (cb * sin(longitude_deg), sb);
@@ -116,7 +116,7 @@ pub fn sun(unix_s: f64) -> Place {
     let longitude = mean_longitude + centre - 0.00569 + time.nutation_deg - 0.0025 + 0.00179 * sin(elongation);
     let eccentricity = 0.016708634 - 0.000042037 * t;
     let distance_au = 1.000001018 * (1.0 - eccentricity * eccentricity) / (1.0 + eccentricity * cos(anomaly + centre));
-    Place::from_vector(time.ecliptic_to_ecef(longitude, 0.0), distance_au * AU_KM * 1e3)
+    Place::from_vector(time.fixed_from_ecliptic(longitude, 0.0), distance_au * AU_KM * 1e3)
 }
 
 /// Returns the Moon as seen from the Earth's centre. `unix_s` is UTC in seconds since 1970.
@@ -166,7 +166,7 @@ pub fn moon(unix_s: f64) -> Place {
             - 171.0 * cos(l + 2.0 * d)
             - 152.0 * cos(l + s - 2.0 * d);
     Place::from_vector(
-        time.ecliptic_to_ecef(mean + longitude_correction + time.nutation_deg, latitude),
+        time.fixed_from_ecliptic(mean + longitude_correction + time.nutation_deg, latitude),
         distance_km * 1e3,
     )
 }

@@ -58,7 +58,7 @@ pub(crate) fn locate<'py>(
     let sensor = Sensor::new(&config).map_err(errors::config)?;
     let lit = direction("lit", lit)?.and_then(UnitVec3::try_new);
     let data = FrameData {
-        camera_to_ecef_wxyz: Some(check_attitude(attitude)?),
+        q_fixed_from_camera_wxyz: Some(check_attitude(attitude)?),
         attitude_sigma_deg: Some(0.0),
         ..FrameData::default()
     };
@@ -115,7 +115,7 @@ fn place(
     let mut edges = Edges::for_body(sensor, expected, points, &lit);
     let fitted: Fitted<f64> = match method {
         Method::Robust => {
-            let start = edges.reject(expected, &sensor.config().reject)?;
+            let start = edges.consensus(expected, &sensor.config().consensus)?;
             edges.fit(sensor, &start, expected)?
         }
         _ => edges.fit_position(expected)?,

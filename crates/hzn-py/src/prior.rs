@@ -39,7 +39,7 @@ impl Prior {
             utc_s: time_s,
             altitude_km: number(altitude_km),
             position_km: numbers(position_km),
-            camera_to_ecef_wxyz: numbers(attitude).map(check_attitude).transpose()?,
+            q_fixed_from_camera_wxyz: numbers(attitude).map(check_attitude).transpose()?,
             attitude_sigma_deg: number(attitude_sigma_deg),
             rate_rad_s: numbers(rate_rad_s),
             range_km: number(range_km),

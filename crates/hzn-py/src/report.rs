@@ -209,9 +209,9 @@ impl Report {
     fn axis<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         vector(py, [self.row.axis_x, self.row.axis_y, self.row.axis_z])
     }
-    #[doc = doc!("Report.axis_ecef")]
+    #[doc = doc!("Report.axis_fixed")]
     #[getter]
-    fn axis_ecef<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+    fn axis_fixed<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         vector(py, [self.row.axis_e_x, self.row.axis_e_y, self.row.axis_e_z])
     }
     #[doc = doc!("Report.covariance")]

@@ -156,8 +156,8 @@ pub(crate) fn find_threshold(
     found.map(|l| l.level).map_err(|status| errors::other(format!("no threshold: {}", status.name())))
 }
 
-/// Returns every edge of a picture at a threshold, with at least `candidates.min_points` border pixels, in the order in
-/// which the sensor examines them.
+/// Returns every edge of a picture at a threshold, with at least `edge_points.min_points` border pixels, in the order
+/// in which the sensor examines them.
 #[pyfunction]
 #[pyo3(name = "_borders", signature = (sensor, image, level, expected, bits = None))]
 pub(crate) fn find_borders<'py>(
@@ -227,7 +227,7 @@ pub(crate) fn find_consensus(
 ) -> PyResult<Option<Cone>> {
     let state = sensor.state();
     state.core()?;
-    Ok(errors::detached(py, || rays.edges().reject(&expected.core, &state.config.reject))?.map(Cone))
+    Ok(errors::detached(py, || rays.edges().consensus(&expected.core, &state.config.consensus))?.map(Cone))
 }
 
 #[pyfunction]
@@ -235,7 +235,7 @@ pub(crate) fn find_consensus(
 pub(crate) fn exclude_body(sensor: &Sensor, rays: &Rays, found: &Cone) -> PyResult<u32> {
     let state = sensor.state();
     state.core()?;
-    Ok(rays.edges().withdraw(&found.0.axis, found.0.cos_half_angle, &state.config.reject))
+    Ok(rays.edges().withdraw(&found.0.axis, found.0.cos_half_angle, &state.config.consensus))
 }
 
 #[pyfunction]

@@ -46,7 +46,7 @@ def archive(tmp_path_factory):
 @pytest.fixture
 def small():
     body = {"kind": "earth-sphere", "altitude_km": 400.0}
-    return hzn.Sensor(camera=SMALL, body=body, candidates={"min_points": 20})
+    return hzn.Sensor(camera=SMALL, body=body, edge_points={"min_points": 20})
 
 
 def columns(archive):
@@ -89,7 +89,7 @@ def test_two_thousand_frames_and_a_worker_that_dies(client, archive, small, tmp_
     assert again.skipped == 39 and columns(again)["axis_y"] == found["axis_y"]
     assert {p for p in out.iterdir() if p.stat().st_mtime_ns != times[p]} == {lost}
     # With another sensor these shards do not count.
-    other = hzn.Sensor(**{**small.parameters, "reject": {"seed": 5}})
+    other = hzn.Sensor(**{**small.parameters, "consensus": {"seed": 5}})
     assert process_archive(archive[:60], other, client=client, out=str(out), shard_frames=50).skipped == 0
 
 
@@ -115,7 +115,7 @@ def test_reports_come_from_workers(client, small):
 
 @pytest.mark.parametrize("format", ["parquet", "mcap"])
 def test_a_picture_without_an_altitude_costs_no_other(client, archive, tmp_path, format):
-    sensor = hzn.Sensor(camera=SMALL, body={"kind": "earth-sphere"}, candidates={"min_points": 20})
+    sensor = hzn.Sensor(camera=SMALL, body={"kind": "earth-sphere"}, edge_points={"min_points": 20})
     known = [{"altitude_km": 400.0}, {}, {"altitude_km": math.nan}, {"altitude_km": 12.0}, {"altitude_km": 400.0}]
     urls = list(zip(archive, known, strict=False))
     result = process_archive(urls, sensor, client=client, out=str(tmp_path / format), format=format, retries=0)
@@ -185,7 +185,7 @@ def test_what_an_archive_refuses(client, archive, small, tmp_path):
         ([], small, {}, "urls"),
         (archive, small, {"format": "csv"}, "format"),
         (archive, small, {"shard_frames": 0}, "shard_frames"),
-        (archive, hzn.Sensor(camera=SMALL, binarize={"method": "track"}), {}, "track"),
+        (archive, hzn.Sensor(camera=SMALL, threshold={"method": "track"}), {}, "track"),
     ]:
         with pytest.raises(hzn.ConfigError, match=what):
             process_archive(urls, sensor, client=client, out=out, **more)

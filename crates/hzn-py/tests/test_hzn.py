@@ -97,9 +97,9 @@ def test_what_cannot_be_known_is_refused(sensor, known, what):
 
 def test_parameters_name_their_fault():
     with pytest.raises(hzn.ConfigError, match="did you mean threshold_px"):
-        hzn.Sensor(**PARAMETERS, reject={"threshold_pxx": 3.0})
+        hzn.Sensor(**PARAMETERS, consensus={"threshold_pxx": 3.0})
     with pytest.raises(hzn.ConfigError, match="must be above 0"):
-        hzn.Sensor(**PARAMETERS, reject={"threshold_px": -1.0})
+        hzn.Sensor(**PARAMETERS, consensus={"threshold_px": -1.0})
     with pytest.raises(hzn.ConfigError, match="camera"):
         hzn.Sensor()
     with pytest.raises(hzn.ConfigError, match="hzn init"):
@@ -110,24 +110,24 @@ def test_parameters_name_their_fault():
 def test_parameters_are_read_set_pickled_and_copied(sensor):
     parameters = sensor.parameters
     assert parameters["camera"]["fx_px"] == 300.0
-    parameters["reject"]["seed"] = 7
+    parameters["consensus"]["seed"] = 7
     other = hzn.Sensor(**parameters)
-    assert other != sensor and other.parameters["reject"]["seed"] == 7
+    assert other != sensor and other.parameters["consensus"]["seed"] == 7
     for twin in (pickle.loads(pickle.dumps(sensor)), copy.deepcopy(sensor), hzn.Sensor(**sensor.parameters)):
         assert twin == sensor
         assert np.array_equal(twin.process(limb()).axis, sensor.process(limb()).axis)
         twin.parameters = parameters
         assert twin == other and twin != sensor
     assert hzn.Sensor(**PARAMETERS, flight=True) != sensor
-    parameters["reject"]["seed"] = -7
+    parameters["consensus"]["seed"] = -7
     with pytest.raises(hzn.ConfigError, match="seed"):
         sensor.parameters = parameters
-    assert sensor.parameters["reject"]["seed"] == 1 and sensor.process(limb()).ok
+    assert sensor.parameters["consensus"]["seed"] == 1 and sensor.process(limb()).ok
 
 
 def test_a_sensor_of_keywords(sensor):
     assert hzn.Sensor(camera=sensor.camera, body=PARAMETERS["body"]) == sensor
-    assert hzn.Sensor(**PARAMETERS, reject={"seed": np.uint32(1)}) == sensor
+    assert hzn.Sensor(**PARAMETERS, consensus={"seed": np.uint32(1)}) == sensor
     sun = hzn.Sensor(camera=sensor.camera, preset="sun")
     assert sun.parameters["body"]["kind"] == "sun"
     with pytest.raises(hzn.ConfigError, match="rejct"):
@@ -164,7 +164,7 @@ def test_detail_and_overlay(sensor):
     image = limb()
     report = sensor.process(image, detail=True)
     assert report.inliers.shape[1] == 2 and len(report.inliers) > 100
-    assert set(report.stages_us) >= {"contour", "estimate"} and report.candidates[0]["verdict"] == "chosen"
+    assert set(report.stages_us) >= {"contour", "fit"} and report.candidates[0]["verdict"] == "chosen"
     # Inliers lie on the limb, where the brightness is halfway between dark and lit.
     column = report.inliers[np.argmin(abs(report.inliers[:, 0] - 160))]
     assert abs(image[int(round(column[1])), int(round(column[0]))].astype(int) - 110) < 100

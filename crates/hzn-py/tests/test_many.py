@@ -172,9 +172,9 @@ def test_a_table_beside_the_pictures_and_a_file_that_is_cut(sensor, tmp_path):
 
 
 def test_a_tracked_level_goes_from_picture_to_picture():
-    sensor = hzn.Sensor(**PARAMETERS, binarize={"method": "track"})
+    sensor = hzn.Sensor(**PARAMETERS, threshold={"method": "track"})
     reports = list(sensor.process_many([limb(i) for i in range(6)], jobs=4))
-    alone = hzn.Sensor(**PARAMETERS, binarize={"method": "track"})
+    alone = hzn.Sensor(**PARAMETERS, threshold={"method": "track"})
     assert [r.level for r in reports] == [alone.process(limb(i)).level for i in range(6)]
 
 

@@ -50,8 +50,8 @@ def test_the_stages_of_each_body():
     """With several bodies, each has its own threshold, and the second excludes the points on the limb of the first."""
     camera = dict(CAMERA, fx_px=3000.0, fy_px=3000.0)
     bodies = [
-        {"radius_km": 100.0, "altitude_km": 3900.0, "binarize": {"method": "fixed", "level": 60}},
-        {"radius_km": 50.0, "altitude_km": 3950.0, "binarize": {"method": "fixed", "level": 90}},
+        {"radius_km": 100.0, "altitude_km": 3900.0, "threshold": {"method": "fixed", "level": 60}},
+        {"radius_km": 50.0, "altitude_km": 3950.0, "threshold": {"method": "fixed", "level": 90}},
     ]
     bodies = [dict(b, kind="sphere", limb_height_km=0.0, limb_height_sigma_km=1.0) for b in bodies]
     sensor = hzn.Sensor(camera=camera, bodies=bodies)
@@ -153,16 +153,6 @@ def test_what_the_stages_refuse(sensor):
     with pytest.raises(hzn.ConfigError, match="flight"):
         hzn.threshold.level(hzn.Sensor(**sensor.parameters, flight=True), image)
     assert hzn.consensus.keep(sensor, rays) is None or hzn.fit.cone(sensor, rays, hzn.consensus.keep(sensor, rays)) is None
-
-
-@pytest.mark.parametrize(("old", "new"), [("binarize", "threshold"), ("contours", "contour"), ("ransac", "consensus")])
-def test_old_names_of_stages_work_and_warn(old, new):
-    sys.modules.pop(f"hzn.{old}", None)
-    vars(hzn).pop(old, None)
-    with pytest.warns(DeprecationWarning, match=f"hzn.{old} is now hzn.{new}"):
-        module = getattr(hzn, old)
-    public = [name for name in vars(getattr(hzn, new)) if not name.startswith("_")]
-    assert all(getattr(module, name) is getattr(getattr(hzn, new), name) for name in public)
 
 
 def test_the_distribution_is_hzn_sensor():

@@ -27,7 +27,7 @@ def statuses(path: str) -> dict[str, int]:
 
 def sequence(folder: str) -> list[str]:
     sensor = hzn.Sensor(camera=hzn.Camera.from_opencv(np.eye(3), size=(4, 4)), preset="sun")
-    sensor.parameters = {**sensor.parameters, "reject": {"seed": 2}}
+    sensor.parameters = {**sensor.parameters, "consensus": {"seed": 2}}
     known = [(np.zeros((4, 4), np.uint8), {"altitude_km": 3.0})]
     found: list[str] = [r.status for images in (folder, known) for r in sensor.process_many(images, jobs=2)]
     with hzn.open_mcap("flight.mcap") as recording:
@@ -42,9 +42,9 @@ def keys(body: hzn.keys.Body) -> float:
     camera = hzn.Camera(width=4, height=4, fx_px=3.0, fy_px=3.0, cx_px=1.5, cy_px=1.5, k=np.zeros(4))
     sensor = hzn.Sensor(camera=camera, preset="hzn", body=body, reject=reject, mask={"polygons_px": [[(0, 0), (1, 1)]]})
     sensor = hzn.Sensor(**sensor.parameters, flight=True)
-    hzn.Sensor(camera={"file": "camchain.yaml"}, bodies=[body, {"kind": "sun", "binarize": {"method": "fixed"}}])
+    hzn.Sensor(camera={"file": "camchain.yaml"}, bodies=[body, {"kind": "sun", "threshold": {"method": "fixed"}}])
     parameters = sensor.parameters
-    parameters["reject"]["threshold_px"] = 2.0
+    parameters["consensus"]["threshold_px"] = 2.0
     sensor.parameters = parameters
     return parameters["camera"]["fx_px"]
 
@@ -52,13 +52,13 @@ def keys(body: hzn.keys.Body) -> float:
 def wrong_keys(camera: hzn.Camera) -> None:
     # Each line is an error of the type checker. A line without its error fails the check, because its comment is unused.
     hzn.Sensor(camera=camera, rejct={})  # type: ignore[call-arg]
-    hzn.Sensor(camera=camera, reject={"treshold_px": 2.0})  # type: ignore[typeddict-unknown-key]
-    hzn.Sensor(camera=camera, reject={"threshold_px": "2"})  # type: ignore[typeddict-item]
+    hzn.Sensor(camera=camera, consensus={"treshold_px": 2.0})  # type: ignore[typeddict-unknown-key]
+    hzn.Sensor(camera=camera, consensus={"threshold_px": "2"})  # type: ignore[typeddict-item]
     hzn.Sensor(camera=camera, body={"kind": "vulcan"})  # type: ignore[typeddict-item]
     hzn.Sensor(camera=camera, preset="dlr")  # type: ignore[arg-type]
     hzn.Sensor(body={"altitude_km": 230.0})  # type: ignore[call-arg]
     hzn.Camera(widht=4)  # type: ignore[call-arg]
-    hzn.Sensor(camera=camera).parameters["reject"]["treshold_px"] = 2.0  # type: ignore[typeddict-unknown-key]
+    hzn.Sensor(camera=camera).parameters["consensus"]["treshold_px"] = 2.0  # type: ignore[typeddict-unknown-key]
 
 
 def simulated() -> float:

@@ -11,58 +11,57 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Chosen => "the answer".into(),
         Verdict::Passed => "passed every gate, but another fits better".into(),
         Verdict::NoConsensus => "too few edge points agree on one limb".into(),
-        Verdict::FewInliers => format!("fewer than {} inliers (select.min_inliers)", s.min_inliers),
+        Verdict::FewInliers => format!("fewer than {} inliers (gates.min_inliers)", s.min_inliers),
         Verdict::ShortArc => short_arc_text(s.min_arc_px),
-        Verdict::Residuals => format!("rms above {} px (select.max_rms_px)", s.max_rms_px),
+        Verdict::Residuals => format!("rms above {} px (gates.max_rms_px)", s.max_rms_px),
         Verdict::HalfAngle => format!(
-            "half-angle more than {} sigma from the expected one (select.max_half_angle_sigma)",
+            "half-angle more than {} sigma from the expected one (gates.max_half_angle_sigma)",
             s.max_half_angle_sigma
         ),
-        Verdict::Uncertain => format!("sigma above {} deg (select.max_sigma_deg)", s.max_sigma_deg),
+        Verdict::Uncertain => format!("sigma above {} deg (gates.max_sigma_deg)", s.max_sigma_deg),
         Verdict::NoFit => "the fit did not converge".into(),
         Verdict::Indistinct => {
             "the edge is clutter: many of its points lie close to the fitted limb but not on it, or \
                                 a part of it follows the limb by chance"
                 .into()
         }
-        Verdict::NoSky => "the region beyond the fitted limb is not sky (select.max_lit_sky)".into(),
+        Verdict::NoSky => "the region beyond the fitted limb is not sky (gates.max_lit_sky)".into(),
         Verdict::Taken => "this limb was already assigned to another body".into(),
         Verdict::OutOfView => {
-            "the expected limb around the fitted axis is outside the picture (select.limb_in_view)".into()
+            "the expected limb around the fitted axis is outside the picture (gates.limb_in_view)".into()
         }
         Verdict::Straight => {
-            "a straight line fits the edge nearly as well (select.min_evidence), or its curvature is too uncertain to \
-             say on which side the body is (select.min_side_sigma)"
+            "a straight line fits the edge nearly as well (gates.min_evidence), or its curvature is too uncertain to \
+             say on which side the body is (gates.min_side_sigma)"
                 .into()
         }
-        Verdict::Radius => "no allowed altitude gives a limb of this half-angle (select.altitude_limits_km)".into(),
+        Verdict::Radius => "no allowed altitude gives a limb of this half-angle (gates.altitude_limits_km)".into(),
         Verdict::Unsupported => "the picture shows no edge along a part of the fitted limb".into(),
         Verdict::Circle => format!(
             "a circle in the picture fits more than {} times better than the limb: it is a lens flare \
-             (select.max_rival_ratio)",
+             (gates.max_rival_ratio)",
             s.max_rival_ratio
         ),
         Verdict::Polyline => format!(
             "straight lines fit more than {} times better than the limb: it is an iris or a part of the vehicle \
-             (select.max_rival_ratio)",
+             (gates.max_rival_ratio)",
             s.max_rival_ratio
         ),
-        Verdict::Departure => "the edge leaves the fitted limb smoothly (select.max_departure)".into(),
+        Verdict::Departure => "the edge leaves the fitted limb smoothly (gates.max_departure)".into(),
         Verdict::Band => {
-            "behind the edge there is a narrow band and then the sky again, not the body (select.max_band)".into()
+            "behind the edge there is a narrow band and then the sky again, not the body (gates.max_band)".into()
         }
         Verdict::Faint => "the brightness hardly changes across the edge, as in twilight".into(),
-        Verdict::Glow => "light reaches high above the edge: it is airglow or aurora (select.max_glow)".into(),
+        Verdict::Glow => "light reaches high above the edge: it is airglow or aurora (gates.max_glow)".into(),
         Verdict::Attitude => format!(
-            "the axis is more than {} sigma from the given attitude (select.max_attitude_sigma)",
+            "the axis is more than {} sigma from the given attitude (gates.max_attitude_sigma)",
             s.max_attitude_sigma
         ),
         Verdict::Sun => {
-            "the given Sun does not light this limb (select.max_unlit); a thermal camera sets body.sunlit = false"
-                .into()
+            "the given Sun does not light this limb (gates.max_unlit); a thermal camera sets body.sunlit = false".into()
         }
         Verdict::Rate => {
-            "the axis is farther from the last answer than the vehicle can turn (select.max_rate_deg_s)".into()
+            "the axis is farther from the last answer than the vehicle can turn (gates.max_rate_deg_s)".into()
         }
     }
 }
@@ -70,8 +69,8 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
 /// Returns the meaning of [`Verdict::ShortArc`]; without a limit in pixels, it is a part of the picture's diagonal.
 fn short_arc_text(min_arc_px: Option<f64>) -> String {
     match min_arc_px {
-        Some(px) => format!("inliers cover less than {px} px (select.min_arc_px)"),
-        None => "inliers cover less than a tenth of the picture's diagonal (select.min_arc_px)".into(),
+        Some(px) => format!("inliers cover less than {px} px (gates.min_arc_px)"),
+        None => "inliers cover less than a tenth of the picture's diagonal (gates.min_arc_px)".into(),
     }
 }
 
@@ -95,9 +94,9 @@ pub fn status_text(status: Status) -> &'static str {
     match status {
         Status::Ok => "the answer",
         Status::NoLimb => "no edge can be a limb, or the whole picture has one brightness",
-        Status::TooDark => "the picture is darker than gate.min_mean allows",
-        Status::TooBright => "the picture is brighter than gate.max_mean allows",
-        Status::TooFewPoints => "only short edges were found (candidates.min_points)",
+        Status::TooDark => "the picture is darker than brightness.min_mean allows",
+        Status::TooBright => "the picture is brighter than brightness.max_mean allows",
+        Status::TooFewPoints => "only short edges were found (edge_points.min_points)",
         Status::Ambiguous => "two directions fit about equally well",
         Status::Rejected => "an edge failed a gate",
         Status::Truncated => "the picture has more edges than the work budget allows (limits.max_work)",
@@ -142,23 +141,23 @@ pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
 /// Returns advice that follows from the status of a picture.
 fn status_tip(r: &Report<f64>) -> Option<&'static str> {
     Some(match r.status {
-        Status::TooDark => "the picture is darker than gate.min_mean allows: lower it, or expose longer",
-        Status::TooBright => "the picture is brighter than gate.max_mean allows: raise it, or expose shorter",
+        Status::TooDark => "the picture is darker than brightness.min_mean allows: lower it, or expose longer",
+        Status::TooBright => "the picture is brighter than brightness.max_mean allows: raise it, or expose shorter",
         Status::TooFewPoints => {
             "only short edges were found, for example of stars, noise or hot pixels. Is the body in view? If the body \
-             is very small, lower candidates.min_points"
+             is very small, lower edge_points.min_points"
         }
         Status::Truncated => {
             "the edges of the picture cost more than the work budget: raise limits.max_work, mask structure in view, \
-             or set a threshold above the clouds (binarize.method = \"fixed\")"
+             or set a threshold above the clouds (threshold.method = \"fixed\")"
         }
         Status::Ambiguous => "two directions fit about equally well: mask structure in view (mask.polygons_px)",
-        Status::NoLimb if r.stage == Stage::Binarize => {
+        Status::NoLimb if r.stage == Stage::Threshold => {
             "the whole picture has one brightness: nothing is in view, or the exposure does not show it"
         }
         Status::NoLimb if r.candidates.is_empty() => {
-            "no edge is long enough. Is the limb in view? If it is, try another threshold (binarize.scale, or \
-             binarize.level if binarize.method is \"fixed\")"
+            "no edge is long enough. Is the limb in view? If it is, try another threshold (threshold.scale, or \
+             threshold.level if threshold.method is \"fixed\")"
         }
         _ => return None,
     })
@@ -169,7 +168,7 @@ const VERDICT_TIPS: &[(&[Verdict], &str)] = &[
     (
         &[Verdict::NoConsensus, Verdict::FewInliers],
         "no candidate has the form of the expected limb: check altitude_km, the focal length and the lens model; a \
-         larger reject.threshold_px tolerates a poor calibration",
+         larger consensus.threshold_px tolerates a poor calibration",
     ),
     (
         &[Verdict::HalfAngle],
@@ -178,12 +177,12 @@ const VERDICT_TIPS: &[(&[Verdict], &str)] = &[
     ),
     (
         &[Verdict::Residuals],
-        "the edge does not follow the limb closely: check the calibration, or raise select.max_rms_px",
+        "the edge does not follow the limb closely: check the calibration, or raise gates.max_rms_px",
     ),
     (
         &[Verdict::ShortArc, Verdict::Uncertain],
         "too little of the limb is in view for a good answer: if a less accurate answer is sufficient, lower \
-         select.min_arc_px or raise select.max_sigma_deg",
+         gates.min_arc_px or raise gates.max_sigma_deg",
     ),
     (
         &[Verdict::Unsupported],

@@ -40,7 +40,7 @@ struct Args {
     /// First seed
     #[arg(long, default_value_t = 0)]
     first: u64,
-    /// `reject.threshold_px`, several separated by commas; without it, the default
+    /// `consensus.threshold_px`, several separated by commas; without it, the default
     #[arg(long, value_delimiter = ',')]
     threshold: Vec<f64>,
     /// Give a prior attitude with this error, degrees (1σ)
@@ -62,7 +62,7 @@ struct Args {
     /// Write the listed pictures into this folder, with the fitted limb
     #[arg(long)]
     png: Option<PathBuf>,
-    /// Set a key of sensor.toml, for example `select.max_half_angle_sigma=3`; may be given several times
+    /// Set a key of sensor.toml, for example `gates.max_half_angle_sigma=3`; may be given several times
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -166,7 +166,7 @@ fn examine(
     for &threshold in thresholds {
         let mut config = set(&Config::new(trial.scene.camera.clone()), &args.set)?;
         if let Some(px) = threshold {
-            config.reject.threshold_px = px;
+            config.consensus.threshold_px = px;
         }
         let watch = Watch::default();
         let prior = PriorKnowledge { attitude_sigma_deg: args.attitude };

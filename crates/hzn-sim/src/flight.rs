@@ -157,14 +157,14 @@ impl FlightFrame {
     /// axis).
     pub fn prior_with_attitude(&self, sigma_rad: f64) -> hzn_core::Prior<f64> {
         hzn_core::Prior {
-            cam_to_ecef: self.disturbed_pose(sigma_rad).cam_to_ecef(),
+            fixed_from_camera: self.disturbed_pose(sigma_rad).fixed_from_camera(),
             attitude_sigma_rad: Some(sigma_rad),
             ..self.prior()
         }
     }
     /// Returns the attitude that a navigation system with this error (1-sigma, about each axis) would report.
-    pub(crate) fn told_attitude_wxyz(&self, sigma_rad: f64) -> [f64; 4] {
-        self.disturbed_pose(sigma_rad).cam_to_ecef_wxyz
+    pub(crate) fn told_q_fixed_from_camera_wxyz(&self, sigma_rad: f64) -> [f64; 4] {
+        self.disturbed_pose(sigma_rad).q_fixed_from_camera_wxyz
     }
     fn disturbed_pose(&self, sigma_rad: f64) -> Pose {
         let draws = Counter::new(self.scene.seed, Stream::AttitudePrior);
@@ -367,9 +367,9 @@ mod tests {
     fn attitude_prior_is_off_by_about_its_sigma() {
         let frame = &rocket(320, 180, 2, 1).frames[0];
         let z = hzn_core::frames::UnitVec3::try_new([0.0, 0.0, 1.0]).unwrap();
-        let prior = frame.prior_with_attitude(0.05).cam_to_ecef.unwrap().apply(&z);
-        let is = frame.scene.pose.cam_to_ecef().unwrap().apply(&z);
+        let prior = frame.prior_with_attitude(0.05).fixed_from_camera.unwrap().apply(&z);
+        let is = frame.scene.pose.fixed_from_camera().unwrap().apply(&z);
         assert!((1e-3..0.3).contains(&prior.angle_rad(&is)));
-        assert!(frame.prior().cam_to_ecef.is_none());
+        assert!(frame.prior().fixed_from_camera.is_none());
     }
 }

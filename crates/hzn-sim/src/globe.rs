@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn height_over_a_sphere_is_plain_geometry() {
-        let pose = Pose { position_m: [0.0, 0.0, -2000.0], cam_to_ecef_wxyz: [1.0, 0.0, 0.0, 0.0] };
+        let pose = Pose { position_m: [0.0, 0.0, -2000.0], q_fixed_from_camera_wxyz: [1.0, 0.0, 0.0, 0.0] };
         let view = View::try_new(Globe { a_m: 1000.0, b_m: 1000.0 }, &pose).unwrap();
         for angle in [0.1f64, 0.5, 0.6, 1.2] {
             let hit = view.intersect([angle.sin(), 0.0, angle.cos()]);

@@ -52,7 +52,7 @@ impl LimbCircle {
     }
 
     /// Returns the unit direction (ECEF) of the limb at an azimuth about its axis: 0 is east, π/2 is axis × east.
-    pub fn ray_ecef(&self, azimuth_rad: f64) -> [f64; 3] {
+    pub fn ray_fixed(&self, azimuth_rad: f64) -> [f64; 3] {
         let (sin, cos) = libm::sincos(azimuth_rad);
         // The half-angle α at this azimuth follows exactly from cot² α = cot² α_E cos² φ + cot² α_M sin² φ.
         let cot = (self.cot2_east * cos * cos + self.cot2_meridian * sin * sin).sqrt();
@@ -60,8 +60,8 @@ impl LimbCircle {
     }
 
     /// Returns the azimuth of a direction (ECEF) about the axis, in radians from −π to π.
-    pub fn azimuth_rad(&self, direction_ecef: [f64; 3]) -> f64 {
-        let d = Vector3::from(direction_ecef);
+    pub fn azimuth_rad(&self, direction_fixed: [f64; 3]) -> f64 {
+        let d = Vector3::from(direction_fixed);
         libm::atan2(d.dot(&self.third), d.dot(&self.east))
     }
 }
@@ -95,13 +95,13 @@ struct GlobeOutline<'a> {
 impl GlobeOutline<'_> {
     /// Returns the ray (ECEF, unit) of the limb at an azimuth.
     fn ray(&self, azimuth_rad: f64) -> [f64; 3] {
-        let mut ray = self.circle.ray_ecef(azimuth_rad);
+        let mut ray = self.circle.ray_fixed(azimuth_rad);
         if !self.scene.limb_height_by_latitude_km.is_empty() {
             // The limb height moves the tangent point by a few kilometres, and this changes the limb height by metres.
             // Three rounds converge.
             for _ in 0..3 {
                 let Ok(circle) = LimbCircle::from_height(self.scene, self.painter.limb_height_m(ray)) else { break };
-                ray = circle.ray_ecef(azimuth_rad);
+                ray = circle.ray_fixed(azimuth_rad);
             }
         }
         ray

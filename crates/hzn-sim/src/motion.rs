@@ -59,8 +59,8 @@ mod tests {
     #[test]
     fn poses_are_spread_over_the_exposure() {
         let motion = Motion { rate_radps: [0.0, 0.0, 2.0], exposure_s: 0.01, readout_s: 0.1 };
-        let pose = Pose { position_m: [7e6, 0.0, 0.0], cam_to_ecef_wxyz: [1.0, 0.0, 0.0, 0.0] };
-        let about_z = |p: &Pose| 2.0 * libm::asin(p.cam_to_ecef_wxyz[3]);
+        let pose = Pose { position_m: [7e6, 0.0, 0.0], q_fixed_from_camera_wxyz: [1.0, 0.0, 0.0, 0.0] };
+        let about_z = |p: &Pose| 2.0 * libm::asin(p.q_fixed_from_camera_wxyz[3]);
         let top = motion.poses(&pose, 0.0, 101, 1e-3);
         // The blur is 20 mrad at 1 mrad per pixel.
         assert_eq!(top.len(), 17);

@@ -1,7 +1,7 @@
 //! Position and attitude of the camera.
 
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, from_geodetic, geodetic};
-use hzn_core::frames::{Cam, Ecef, Rotation};
+use hzn_core::frames::{Cam, Fixed, Rotation};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ pub struct Pose {
     /// Position in metres: in ECEF for the Earth, otherwise in the body's own frame with the origin at its centre.
     pub position_m: [f64; 3],
     /// Quaternion, scalar first, that converts camera coordinates to ECEF coordinates.
-    pub cam_to_ecef_wxyz: [f64; 4],
+    pub q_fixed_from_camera_wxyz: [f64; 4],
 }
 
 /// Direction in which a camera looks, relative to the geodetic vertical at its position.
@@ -66,37 +66,37 @@ impl Pose {
 
     /// Returns the pose of a camera at `position_m` whose axes x, y, z point along these three ECEF directions. The
     /// directions must be orthogonal, right-handed and of unit length.
-    pub fn from_axes(position_m: [f64; 3], axes_ecef: [[f64; 3]; 3]) -> Self {
-        let columns = axes_ecef.map(Vector3::from);
+    pub fn from_axes(position_m: [f64; 3], axes_fixed: [[f64; 3]; 3]) -> Self {
+        let columns = axes_fixed.map(Vector3::from);
         let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&columns));
         let q = UnitQuaternion::from_rotation_matrix(&rotation);
-        Self { position_m, cam_to_ecef_wxyz: [q.w, q.i, q.j, q.k] }
+        Self { position_m, q_fixed_from_camera_wxyz: [q.w, q.i, q.j, q.k] }
     }
 
     /// Returns the attitude as a typed rotation; `None` if the quaternion has no length or is not finite.
-    pub fn cam_to_ecef(&self) -> Option<Rotation<Cam, Ecef, f64>> {
+    pub fn fixed_from_camera(&self) -> Option<Rotation<Cam, Fixed, f64>> {
         // The name of the field states the direction: camera to ECEF.
-        Rotation::assume_from_quaternion(self.cam_to_ecef_wxyz)
+        Rotation::assume_from_quaternion(self.q_fixed_from_camera_wxyz)
     }
 
     /// Returns the pose rotated about the camera's own axes by the rotation vector `error_rad` (camera frame, radians).
     /// A navigation system with this error would report the returned attitude.
     pub fn disturbed(&self, error_rad: [f64; 3]) -> Self {
-        let [w, x, y, z] = self.cam_to_ecef_wxyz;
+        let [w, x, y, z] = self.q_fixed_from_camera_wxyz;
         let q = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z))
             * UnitQuaternion::from_scaled_axis(Vector3::from(error_rad));
-        Self { cam_to_ecef_wxyz: [q.w, q.i, q.j, q.k], ..*self }
+        Self { q_fixed_from_camera_wxyz: [q.w, q.i, q.j, q.k], ..*self }
     }
 
     /// Returns the quaternion at unit length, scalar first.
-    pub(crate) fn unit_quaternion_wxyz(&self) -> [f64; 4] {
-        let n = self.cam_to_ecef_wxyz.iter().map(|x| x * x).sum::<f64>().sqrt();
-        self.cam_to_ecef_wxyz.map(|x| x / n)
+    pub(crate) fn unit_q_fixed_from_camera_wxyz(&self) -> [f64; 4] {
+        let n = self.q_fixed_from_camera_wxyz.iter().map(|x| x * x).sum::<f64>().sqrt();
+        self.q_fixed_from_camera_wxyz.map(|x| x / n)
     }
 
     /// Returns the matrix that converts camera coordinates to ECEF coordinates.
     pub(crate) fn matrix(&self) -> Matrix3<f64> {
-        let [w, x, y, z] = self.cam_to_ecef_wxyz;
+        let [w, x, y, z] = self.q_fixed_from_camera_wxyz;
         *UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z)).to_rotation_matrix().matrix()
     }
 }
@@ -107,7 +107,7 @@ mod tests {
     use hzn_core::frames::UnitVec3;
 
     fn axis(pose: &Pose, cam: [f64; 3]) -> Vector3<f64> {
-        Vector3::from(pose.cam_to_ecef().unwrap().apply(&UnitVec3::try_new(cam).unwrap()).xyz())
+        Vector3::from(pose.fixed_from_camera().unwrap().apply(&UnitVec3::try_new(cam).unwrap()).xyz())
     }
 
     #[test]

@@ -184,7 +184,7 @@ impl Measure {
         // Every step sets another scale, so that every step is a change.
         let scale = 1.0 + 0.002 * (self.times.len() % 100) as f64 + 0.001;
         if let Some(session) = viewer.session_mut() {
-            session.set("binarize", "scale", 0, Some(scale.into()));
+            session.set("threshold", "scale", 0, Some(scale.into()));
             session.end_step();
         }
         self.seen = false;

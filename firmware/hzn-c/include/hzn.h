@@ -91,7 +91,8 @@ typedef struct {
 typedef struct {
   // Altitude in metres: geodetic for the Earth, above the radius for other bodies.
   float altitude_m;
-  // Position of the camera in ECEF, metres. If it is known, the altitude is not used.
+  // Position of the camera in the fixed frame of the body (for the Earth ECEF), metres. If it is known, the altitude is
+  // not used.
   float position_m[3];
   // Rate of rotation of the camera in the camera frame, rad/s; it has an effect only with a rolling shutter.
   float rate_rad_s[3];
@@ -120,10 +121,10 @@ typedef struct {
   float axis[3];
   // Covariance of `axis`: xx, xy, xz, yy, yz, zz, rad².
   float cov_rad2[6];
-  // The same direction in ECEF; NaN without a position.
-  float axis_ecef[3];
+  // The same direction in the fixed frame of the body (for the Earth ECEF); NaN without a position.
+  float axis_fixed[3];
   // The same direction in the vehicle's frame; NaN without a mounting.
-  float axis_body[3];
+  float axis_vehicle[3];
   // Half-angle of the free fit, rad.
   float half_angle_rad;
   // Altitude from the free fit, m; NaN for Sun and Moon.

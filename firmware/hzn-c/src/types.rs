@@ -41,9 +41,9 @@ pub struct HznAnswer {
     /// Covariance of `axis`: xx, xy, xz, yy, yz, zz, rad².
     pub cov_rad2: [f32; 6],
     /// The same direction in ECEF; NaN without a position.
-    pub axis_ecef: [f32; 3],
+    pub axis_fixed: [f32; 3],
     /// The same direction in the vehicle's frame; NaN without a mounting.
-    pub axis_body: [f32; 3],
+    pub axis_vehicle: [f32; 3],
     /// Half-angle of the free fit, rad.
     pub half_angle_rad: f32,
     /// Altitude from the free fit, m; NaN for Sun and Moon.
@@ -111,8 +111,8 @@ pub(crate) fn to_answer(a: &PictureAnswer) -> HznAnswer {
     HznAnswer {
         axis: d.map_or([nan; 3], |d| d.axis),
         cov_rad2: d.map_or([nan; 6], |d| d.cov),
-        axis_ecef: d.map_or([nan; 3], |d| d.axis_ecef),
-        axis_body: d.map_or([nan; 3], |d| d.axis_body),
+        axis_fixed: d.map_or([nan; 3], |d| d.axis_fixed),
+        axis_vehicle: d.map_or([nan; 3], |d| d.axis_vehicle),
         half_angle_rad: d.map_or(nan, |d| d.half_angle_rad),
         altitude_m: d.map_or(nan, |d| d.altitude_est_m),
         altitude_sigma_m: d.map_or(nan, |d| d.altitude_est_sigma_m),
@@ -144,8 +144,8 @@ fn to_edge(e: Edge) -> HznEdge {
 pub(crate) const NO_ANSWER: HznAnswer = HznAnswer {
     axis: [f32::NAN; 3],
     cov_rad2: [f32::NAN; 6],
-    axis_ecef: [f32::NAN; 3],
-    axis_body: [f32::NAN; 3],
+    axis_fixed: [f32::NAN; 3],
+    axis_vehicle: [f32::NAN; 3],
     half_angle_rad: f32::NAN,
     altitude_m: f32::NAN,
     altitude_sigma_m: f32::NAN,

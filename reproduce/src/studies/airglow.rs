@@ -139,7 +139,7 @@ pub(super) fn night_side(effort: &Effort) -> anyhow::Result<Section> {
                 for tone in [Tone::Linear, Tone::Srgb] {
                     let flight = flight(ground, aurora, camera, tone, pictures)?;
                     let mut trusting = flight.sensor.clone();
-                    trusting.select.max_glow = 1e6;
+                    trusting.gates.max_glow = 1e6;
                     let sensors = [
                         Sensor::new(names[0], flight.sensor.clone()),
                         Sensor::new(names[1], trusting),

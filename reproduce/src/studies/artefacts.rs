@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::setup::Effort;
 use crate::section::Section;
 
-/// Values of `reject.threshold_px` in addition to the default, in pixels.
+/// Values of `consensus.threshold_px` in addition to the default, in pixels.
 const THRESHOLDS_PX: [f64; 6] = [0.5, 1.0, 1.5, 2.0, 3.0, 5.0];
 /// Error of the prior attitude, 1σ about each axis in degrees.
 const ATTITUDE_DEG: f64 = 5.0;
@@ -26,7 +26,7 @@ const MAX_LISTED: usize = 24;
 fn sensor(trial: &Trial, threshold_px: Option<f64>) -> Config {
     let mut config = Config::new(trial.scene.camera.clone());
     if let Some(px) = threshold_px {
-        config.reject.threshold_px = px;
+        config.consensus.threshold_px = px;
     }
     config
 }
@@ -91,7 +91,7 @@ pub(super) fn campaign(effort: &Effort) -> anyhow::Result<Section> {
          wide), equidistant lenses (to 140°) and lenses of Kannala and Brandt (60° to 150°), from 60 to 600 km, 8 \
          bits, with noise of 0.2 to 2.5 % of full scale; `hzn_sim::artefact` has the ranges of each kind. Known to the \
          sensor: the camera and the position, for the lower half of the table also an attitude that is wrong by \
-         {ATTITUDE_DEG}° (1σ about each axis). Every setting but `reject.threshold_px` has its default. The table \
+         {ATTITUDE_DEG}° (1σ about each axis). Every setting but `consensus.threshold_px` has its default. The table \
          counts the pictures that are answered. If the half-angle of a disc is within three sigmas of the expected \
          one, its shape cannot distinguish it from a limb; these discs have a row of their own.",
         Kind::ALL.len() * count

@@ -61,7 +61,7 @@ impl Rendered {
             || HostHorizon::boxed(&config),
             |horizon, (frame, picture)| {
                 let horizon = horizon.as_mut().ok()?;
-                let known = hzn_core::Prior { cam_to_ecef: None, ..frame.prior() };
+                let known = hzn_core::Prior { fixed_from_camera: None, ..frame.prior() };
                 let expected = horizon.expect(&known).ok()?;
                 let points = PointRecorder::default();
                 let solution = horizon.process_observed(&picture.view(), &expected, &points).solution?;

@@ -72,7 +72,7 @@ fn find_discs_under_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
                 ..config.body
             };
             let level = disc.dark + (disc.lit - disc.dark) * part;
-            config.binarize = threshold::Config { method: Method::Fixed, level, ..config.binarize };
+            config.threshold = threshold::Config { method: Method::Fixed, level, ..config.threshold };
             let mut horizon = HostHorizon::boxed(&config)?;
             let layout = Layout::packed(with_discs.lens.width.into(), with_discs.lens.height.into(), 1, 8);
             let expected = horizon.expect(&Prior::default())?;
@@ -89,7 +89,7 @@ pub(super) fn second_look(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(60);
     let mut s = Section::default();
     s.text(format!(
-        "{count} pictures per scene, once with `recover.levels = []` and once by default. The sensor has a limb height \
+        "{count} pictures per scene, once with `retry.levels = []` and once by default. The sensor has a limb height \
          of 18 ± 7 km and the default noise. The scenes are the discs of `full-disc`, and `horace` through HORACE's \
          real camera (8 mm, 3.75 µm, 1024×768: 27.0°×20.4°)."
     ));
@@ -101,7 +101,7 @@ pub(super) fn second_look(effort: &Effort) -> anyhow::Result<Section> {
         let mut several = flight.sensor.clone();
         (several.body.limb_height_km, several.body.limb_height_sigma_km) = (18.0, 7.0);
         let mut once = several.clone();
-        once.recover.levels.clear();
+        once.retry.levels.clear();
         let sensors = [Sensor::new("one look", once), Sensor::new("default", several)];
         for (sensor, cases) in sensors.iter().zip(fly(&flight, &sensors)?) {
             rows.push([format!("`{name}`"), sensor.name.clone()].into_iter().chain(cells(&evaluate(&cases))).collect());
@@ -236,8 +236,8 @@ impl Photograph {
     /// Returns the answer at a fixed brightness threshold (part of full scale) and a consensus threshold in pixels.
     fn answer_with_threshold(&self, level: f64, threshold_px: f64) -> anyhow::Result<Option<MeasuredAxis>> {
         let mut config = self.sensor.clone();
-        config.binarize = threshold::Config { method: Method::Fixed, level, ..config.binarize };
-        config.reject.threshold_px = threshold_px;
+        config.threshold = threshold::Config { method: Method::Fixed, level, ..config.threshold };
+        config.consensus.threshold_px = threshold_px;
         let mut horizon = HostHorizon::boxed(&config)?;
         let layout = Layout::packed(self.rgb.width(), self.rgb.height(), 3, 8);
         let view = ImageView::from_bytes(self.rgb.as_raw(), layout, Channel::Mean)?;

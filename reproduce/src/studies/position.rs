@@ -68,7 +68,7 @@ fn normal(index: usize) -> [f64; 4] {
 fn prior(scene: &Scene, error: [f64; 3]) -> Prior<f64> {
     let sigma_rad = ATTITUDE_SIGMA_DEG.to_radians();
     let told = scene.pose.disturbed(error.map(|e| sigma_rad * e));
-    Prior { cam_to_ecef: told.cam_to_ecef(), attitude_sigma_rad: Some(sigma_rad), ..scene.told_prior() }
+    Prior { fixed_from_camera: told.fixed_from_camera(), attitude_sigma_rad: Some(sigma_rad), ..scene.told_prior() }
 }
 
 fn fly(name: &str, first_seed: u64, focal_px: f64, pictures: usize) -> anyhow::Result<Flown> {

@@ -52,7 +52,7 @@ fn scenes(count: usize) -> anyhow::Result<Vec<(&'static str, Flight)>> {
     let third = |k: usize| Flight { frames: infrared.frames[k * count..(k + 1) * count].to_vec(), ..infrared.clone() };
     let (mut sun, _) = simulated("sun-moon", count)?;
     sun.sensor.body = sun.sensor.bodies.first().cloned().ok_or_else(|| anyhow!("the scene sun-moon has no bodies"))?;
-    sun.sensor.binarize = sun.sensor.body.binarize.unwrap_or(sun.sensor.binarize);
+    sun.sensor.threshold = sun.sensor.body.threshold.unwrap_or(sun.sensor.threshold);
     sun.sensor.covariance = sun.sensor.body.covariance.unwrap_or(sun.sensor.covariance);
     sun.sensor.bodies.clear();
     Ok(vec![
@@ -72,7 +72,7 @@ fn sensor(preset: Preset, flight: &Flight, level: f64) -> Sensor {
     let mut config = setup::preset(preset, flight, flight.sensor.body.clone());
     match preset {
         Preset::Hzn => config = flight.sensor.clone(),
-        Preset::Dlr2022 => config.binarize.level = level,
+        Preset::Dlr2022 => config.threshold.level = level,
         _ => {}
     }
     Sensor::new(&format!("`{}`", preset.name()), config)
@@ -82,7 +82,7 @@ fn sensor(preset: Preset, flight: &Flight, level: f64) -> Sensor {
 /// a fraction of full scale.
 fn median_threshold(flight: &Flight) -> anyhow::Result<f64> {
     if flight.sensor.body.kind == Kind::Sun {
-        return Ok(flight.sensor.binarize.level);
+        return Ok(flight.sensor.threshold.level);
     }
     let mut horizon = HostHorizon::boxed(&flight.sensor)?;
     let step = flight.frames.len().div_ceil(THRESHOLD_PICTURES).max(1);

@@ -53,7 +53,7 @@ pub(super) fn untold(one: &Scenario) -> Config {
     let mut sensor = one.sensor();
     sensor.covariance = hzn_core::covariance::Config::default();
     for body in &mut sensor.bodies {
-        *body = body::Config { kind: body.kind, binarize: body.binarize, ..body::Config::default() };
+        *body = body::Config { kind: body.kind, threshold: body.threshold, ..body::Config::default() };
     }
     sensor
 }

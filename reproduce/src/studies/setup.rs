@@ -45,7 +45,7 @@ pub(super) fn halton(mut index: usize, base: usize) -> f64 {
 pub(super) fn preset(preset: Preset, flight: &Flight, body: body::Config) -> Config {
     let own = Config::preset(preset, flight.sensor.camera.clone());
     let covariance::Config { noise, sigma_px, correlation_px, .. } = flight.sensor.covariance;
-    // If the noise comes from the residuals of the pictures, there is no given noise for a published system.
+    // If the noise comes from the residuals of the pictures, there is no told noise for a published system.
     let covariance = match noise {
         covariance::Noise::Given => covariance::Config { sigma_px, correlation_px, ..own.covariance },
         _ => own.covariance,

@@ -47,7 +47,7 @@ pub(super) fn orbits(effort: &Effort) -> anyhow::Result<Section> {
          the sigma that the sensor is told; `default` is the sigma of the limb height itself. σ at latitudes 0°, 30° \
          and 60° is that of `hzn sensitivity yaw`. NEES has one degree of freedom (1 is ideal). It counts the runs \
          whose reported σ is below 20°, because a rotation is periodic; `below 1°` is the share of runs that \
-         `estimate.yaw_limit_deg` lets through by default. The rules were chosen on other seeds.",
+         `fit.yaw_limit_deg` lets through by default. The rules were chosen on other seeds.",
     ));
     let mut rows = Vec::new();
     for (number, (kind, altitude_km, harmonic_km)) in ORBITS.into_iter().enumerate() {
@@ -114,8 +114,8 @@ impl Orbit {
         };
         let mut config =
             Config { body, covariance: covariance::Config::given(SIGMA_PX, CORRELATION_PX), ..Config::new(camera) };
-        config.estimate.position = Some(true);
-        config.estimate.yaw_limit_deg = 180.0;
+        config.fit.position = Some(true);
+        config.fit.yaw_limit_deg = 180.0;
         Self { config, equator }
     }
 
@@ -134,14 +134,14 @@ impl Orbit {
         let [a, b, told, _] = normal(number);
         let harmonic_km = camera.second_harmonic_km;
         let points = camera.limb_points([a * harmonic_km, b * harmonic_km], FIRST_SEED + number as u64)?;
-        let (body_to_cam, position_km) = camera.pose();
-        let sight = UnitVec3::try_new((body_to_cam * -position_km).into()).context("no direction")?;
+        let (camera_from_fixed, position_km) = camera.pose();
+        let sight = UnitVec3::try_new((camera_from_fixed * -position_km).into()).context("no direction")?;
         let yaw_rad = (TOLD_SIGMA_DEG * told).to_radians();
         let axis = nalgebra::Unit::new_normalize(Vector3::from(sight.xyz()));
-        let told = Rotation3::from_axis_angle(&axis, -yaw_rad).into_inner() * body_to_cam;
+        let told = Rotation3::from_axis_angle(&axis, -yaw_rad).into_inner() * camera_from_fixed;
         let sensor = Sensor::<f64>::new(&self.config)?;
         let prior = Prior {
-            cam_to_ecef: Rotation::assume_from_quaternion(quaternion(&told.transpose())),
+            fixed_from_camera: Rotation::assume_from_quaternion(quaternion(&told.transpose())),
             attitude_sigma_rad: Some(0.0),
             ..Prior::default()
         };

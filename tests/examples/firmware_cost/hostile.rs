@@ -33,7 +33,7 @@ fn hostile_picture(seed: u32) -> Case {
     sensor.contour.line_spacing_px = [None, Some(1), Some(2), Some(3), Some(4), Some(8), Some(16)][draw(7) as usize];
     sensor.camera.theta_max_deg = [None, None, Some(12.0), Some(25.0), Some(40.0)][draw(5) as usize];
     if draw(5) == 0 {
-        sensor.candidates.keep_points = 0;
+        sensor.edge_points.keep_points = 0;
     }
     for _ in 0..[0, 0, 1, 3, 8][draw(5) as usize] {
         let corners = [3, 4, 8, 16][draw(4) as usize];

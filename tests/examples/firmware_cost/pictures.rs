@@ -44,7 +44,7 @@ impl Pictures {
         let by_rows = [("clean", true), ("cloudy", false)].map(|(kind, clean)| {
             let mut cases = frames(640, 480, clean, 3);
             for case in &mut cases {
-                case.sensor.binarize.method = Method::Fixed;
+                case.sensor.threshold.method = Method::Fixed;
             }
             (kind, cases)
         });
@@ -74,7 +74,7 @@ fn frames(width: u16, height: u16, clean: bool, count: usize) -> Vec<Case> {
 
 /// Sets the number of points that a flight computer keeps when it is short of time.
 fn with_fewer_points(mut case: Case) -> Case {
-    case.sensor.candidates.keep_points = 200;
+    case.sensor.edge_points.keep_points = 200;
     Case { name: format!("{}, keep_points = 200", case.name), ..case }
 }
 

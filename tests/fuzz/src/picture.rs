@@ -22,8 +22,8 @@ fn config(input: &mut Input<'_>, width: u16, height: u16) -> Config {
     config.body.kind = [Kind::Earth, Kind::EarthSphere, Kind::Sun, Kind::Moon, Kind::Sphere][input.below(5)];
     config.body.radius_km = (config.body.kind == Kind::Sphere).then_some(1000.0);
     config.body.altitude_km = Some(60.0 + 10.0 * f64::from(input.byte()));
-    config.candidates.min_points = 8;
-    config.select.min_inliers = 8;
+    config.edge_points.min_points = 8;
+    config.gates.min_inliers = 8;
     let numbers: Vec<u16> = Config::numbers().collect();
     for _ in 0..input.below(5) {
         let before = config.clone();
@@ -116,11 +116,11 @@ pub(crate) fn any_rows(bytes: &[u8]) {
     let mut config = config(&mut input, WIDTH as u16, HEIGHT as u16);
     // The size is one of the numbers.
     (config.camera.width, config.camera.height) = (WIDTH as u16, HEIGHT as u16);
-    config.binarize.method = Method::Fixed;
-    config.binarize.level = f64::from(1 + input.byte() % 254);
-    config.recover.levels.clear();
-    config.recover.frame_px = 0;
-    let gates = &mut config.select;
+    config.threshold.method = Method::Fixed;
+    config.threshold.level = f64::from(1 + input.byte() % 254);
+    config.retry.levels.clear();
+    config.retry.frame_px = 0;
+    let gates = &mut config.gates;
     (gates.max_band, gates.max_departure, gates.max_glow, gates.max_lit_sky) = (1.0, 1e6, 1e6, 1.0);
     let pixels = input.rest();
     let (Ok(sensor), false) = (Sensor::<f32>::new(&config), pixels.is_empty()) else { return };

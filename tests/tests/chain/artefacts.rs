@@ -24,7 +24,7 @@ fn outcomes(
     let picture = trial.render().unwrap();
     let mut outcome = |threshold_px: &Option<f64>| {
         let mut config = Config::new(trial.scene.camera.clone());
-        config.reject.threshold_px = threshold_px.unwrap_or(config.reject.threshold_px);
+        config.consensus.threshold_px = threshold_px.unwrap_or(config.consensus.threshold_px);
         process_trial(horizon, &config, trial, &picture, prior, &Unobserved).unwrap()
     };
     thresholds_px.iter().map(&mut outcome).collect()

@@ -163,7 +163,7 @@ fn the_moon_is_no_larger_than_it_blooms() {
 #[test]
 fn the_level_follows_the_limb_of_the_picture_before() {
     let mut config = config(Preset::Sun, 800.0);
-    config.binarize.method = hzn_core::threshold::Method::Track;
+    config.threshold.method = hzn_core::threshold::Method::Track;
     let mut sensors = Sensors::new(&config);
     let axis = direction(&config, 310.2, 250.4);
     // Each picture has two thirds of the brightness of the one before. No fixed threshold fits all of them, and the
@@ -200,12 +200,12 @@ fn earth_and_moon_in_one_picture() {
         kind,
         limb_height_km: if kind == Kind::Earth { 18.7 } else { 0.0 },
         limb_height_sigma_km: if kind == Kind::Earth { 2.0 } else { 0.0 },
-        binarize: Some(Config::preset(preset, camera.clone()).binarize),
+        threshold: Some(Config::preset(preset, camera.clone()).threshold),
         ..body::Config::default()
     };
     let mut moon = body(Kind::Moon, Preset::Moon);
     // The Moon's ground is dark compared with clouds and air.
-    if let Some(own) = &mut moon.binarize {
+    if let Some(own) = &mut moon.threshold {
         own.level = 0.06;
     }
     config.bodies = [body(Kind::Earth, Preset::Hzn), moon].into_iter().collect();
@@ -214,7 +214,7 @@ fn earth_and_moon_in_one_picture() {
     for (n, (u, v)) in [(400.3, 240.6), (860.8, 120.2), (640.1, 560.9)].into_iter().enumerate() {
         let look = Look { azimuth_rad: 0.7, depression_rad: 17f64.to_radians(), roll_rad: 0.0 };
         let pose = Pose::looking(position_m(30.0, 20.0, 400.0), look);
-        let ecef = |s: [f64; 3]| pose.cam_to_ecef().unwrap().apply(&UnitVec3::try_new(s).unwrap()).xyz();
+        let ecef = |s: [f64; 3]| pose.fixed_from_camera().unwrap().apply(&UnitVec3::try_new(s).unwrap()).xyz();
         let moon = ecef(lens.unproject(ImagePoint { u, v }).unwrap().xyz());
         let mut scene = Scene::new(camera.clone(), pose);
         scene.world = World::Visible(Box::new(Visible { sun_in_view: false, ..Visible::default() }));

@@ -34,8 +34,8 @@ fn process(scene: &Scene, counts_per_px: f64) -> Report<f64> {
     let data: Vec<u8> = (0..usize::from(WIDTH) * usize::from(HEIGHT)).map(pixel).collect();
     let view = ImageView::from_bytes(&data, Layout::packed(WIDTH.into(), HEIGHT.into(), 1, 8), Channel::Mean).unwrap();
     let mut sensor = Config::new(scene.camera.clone());
-    sensor.binarize = threshold::Config { method: threshold::Method::Fixed, level: AT_LIMB, ..Default::default() };
-    sensor.recover.levels.clear();
+    sensor.threshold = threshold::Config { method: threshold::Method::Fixed, level: AT_LIMB, ..Default::default() };
+    sensor.retry.levels.clear();
     let mut host = Sensors::new(&sensor).host;
     let expected = host.expect(&prior_of_scene(scene)).unwrap();
     host.process(&view, &expected).clone()

@@ -91,7 +91,7 @@ fn same_bits_as_here() {
 #[ignore = "needs the images: cargo xtask firmware"]
 fn rows_have_the_bits_of_the_picture() {
     let mut flight = rocket(640, 480, 8, 6);
-    flight.sensor.binarize = threshold::Config { method: threshold::Method::Fixed, level: 60.0, ..Default::default() };
+    flight.sensor.threshold = threshold::Config { method: threshold::Method::Fixed, level: 60.0, ..Default::default() };
     let cases: Vec<Case> = flight
         .frames
         .iter()
@@ -129,7 +129,7 @@ fn the_flight_loop_takes_rows_on_a_small_board() {
         frame.scene.disc = Disc::default();
         frame.scene.sky = Sky { stars: 0, ..frame.scene.sky };
     }
-    flight.sensor.binarize = threshold::Config { method: threshold::Method::Fixed, level: 60.0, ..Default::default() };
+    flight.sensor.threshold = threshold::Config { method: threshold::Method::Fixed, level: 60.0, ..Default::default() };
     flight.sensor.body.altitude_km = Some(180.0);
     flight.sensor.body.altitude_sigma_km = 60.0;
     let bench = Bench::new(Board::Stm32F405);
@@ -198,14 +198,14 @@ fn an_exchange_over_the_line() {
         pictures.insert(4, (vec![7; 1000], 3));
         bench.write_frames(&pictures);
         let mut before = flight.sensor.clone();
-        before.reject.threshold_px = 5.0;
+        before.consensus.threshold_px = 5.0;
         bench.write_parameter_copy(1, &before, 1);
 
         let mut commands =
-            vec!["set reject.threshold_px 2.5 covariance.sigma_px 0.2", "read reject.threshold_px", "dump-edges"];
+            vec!["set consensus.threshold_px 2.5 covariance.sigma_px 0.2", "read consensus.threshold_px", "dump-edges"];
         commands.extend(["process-once"; 11]);
-        // This is more than `gate.max_mean`, whose value only the flight computer knows.
-        commands.extend(["set gate.min_mean 0.99", "arm", "mode shut-down"]);
+        // This is more than `brightness.max_mean`, whose value only the flight computer knows.
+        commands.extend(["set brightness.min_mean 0.99", "arm", "mode shut-down"]);
         let mut args = vec!["telecommand", "-o", "commands.bin"];
         args.extend(commands);
         hzn_run(dir, &args);
@@ -216,7 +216,7 @@ fn an_exchange_over_the_line() {
         assert_housekeeping(board, &bench);
 
         let mut after = before;
-        after.reject.threshold_px = 2.5;
+        after.consensus.threshold_px = 2.5;
         after.covariance.sigma_px = 0.2;
         std::fs::write(bench.path("pictures/sensor.toml"), toml::to_string(&after).unwrap()).unwrap();
         hzn_run(dir, &["run", "pictures", "--flight", "-o", "here.csv"]);
@@ -246,7 +246,7 @@ fn save_pictures(flight: &Flight, folder: &Path) -> Vec<(Vec<u8>, u32)> {
 fn assert_events(printed: &str) {
     assert!(printed.contains("started with copy 1 of the parameters, generation 1"), "{printed}");
     assert!(printed.contains("parameters stored in copy 2, generation 2"), "{printed}");
-    assert!(printed.contains("parameter 81 reject.threshold_px = 2.5"), "{printed}");
+    assert!(printed.contains("parameter 81 consensus.threshold_px = 2.5"), "{printed}");
     assert!(printed.contains("edge of picture 1, candidate"), "{printed}");
     assert!(
         printed.contains("picture of wrong size (1000, 307200)") && printed.contains("pictures lost (3, 0)"),

@@ -58,11 +58,11 @@ fn a_free_half_angle_has_no_derivative() {
     let flown = flight::rocket(640, 360, 3, 4172);
     let frame = &flown.frames[1];
     let mut config = flown.sensor.clone();
-    config.estimate.half_angle = hzn_core::fit::HalfAngle::Free;
+    config.fit.half_angle = hzn_core::fit::HalfAngle::Free;
     let (told, _) = answer(&config, &frame.render().unwrap(), &frame.prior());
     assert_eq!(told.axis_by_cos, Some([0.0; 3]));
     assert_eq!(told.free.unwrap().covariance.upper_rad2, told.covariance.upper_rad2);
-    config.estimate.half_angle = hzn_core::fit::HalfAngle::Known;
+    config.fit.half_angle = hzn_core::fit::HalfAngle::Known;
     let (told, _) = answer(&config, &frame.render().unwrap(), &frame.prior());
     assert!(told.free.is_none() && vector(told.axis_by_cos.unwrap()).norm() > 0.0);
 }

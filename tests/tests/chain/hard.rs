@@ -89,10 +89,10 @@ fn edge_half_cloud_half_limb() {
         // clouds remain inliers, and their errors are alike over hundreds of pixels. The default noise model covers
         // that, but not the noise model of a clean limb.
         let mut sensor = sensor(&s);
-        sensor.reject.threshold_px = 1.0;
+        sensor.consensus.threshold_px = 1.0;
         sensor.covariance = covariance::Config::default();
         answers += assert_found_or_refused(&format!("half cloud {seed}"), &s, &sensor, [0.25; 2]);
-        sensor.select.max_band = 1.0;
+        sensor.gates.max_band = 1.0;
         bands_allowed += assert_found_or_refused(&format!("half cloud {seed}, bands allowed"), &s, &sensor, [0.25; 2]);
     }
     println!("{answers} of 16 answers, {bands_allowed} with bands allowed");
@@ -101,7 +101,7 @@ fn edge_half_cloud_half_limb() {
 
 /// Tests a bright band with two edges. At a distance of about 1700 km, 16 km are 5 px here, so the inner edge would be
 /// off by half a degree. Over ground as dark as the sky, a band may also be airglow or a flare. The sensor refuses it
-/// unless `select.max_band` allows bands.
+/// unless `gates.max_band` allows bands.
 #[test]
 fn bright_band_has_two_edges() {
     for seed in 0..4 {
@@ -111,7 +111,7 @@ fn bright_band_has_two_edges() {
             let what = format!("band of {depth_km} km, {seed}");
             let mut sensor = sensor(&s);
             assert_eq!(assert_found_or_refused(&what, &s, &sensor, [0.05; 2]), 0, "{what}");
-            sensor.select.max_band = 1.0;
+            sensor.gates.max_band = 1.0;
             assert_found(&what, &s, &sensor, [0.05; 2]);
         }
     }
@@ -217,7 +217,8 @@ fn depth_and_colour_change_nothing() {
     let answer = |view: &ImageView<'_>, level: f64| -> [Result<Answer, Status>; 2] {
         let mut sensor = sensor(&s);
         // The threshold is fixed, so that its rounding between two counts has no effect.
-        sensor.binarize = threshold::Config { method: threshold::Method::Fixed, level, ..threshold::Config::default() };
+        sensor.threshold =
+            threshold::Config { method: threshold::Method::Fixed, level, ..threshold::Config::default() };
         let (host, flight) = Sensors::new(&sensor).both(view, &s);
         [host, flight]
     };

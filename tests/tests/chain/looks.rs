@@ -26,7 +26,7 @@ fn fixed_threshold_config(lens: &camera::Config, altitude_km: f64, level: f64) -
         limb_height_sigma_km: 2.0,
         ..config.body
     };
-    config.binarize = threshold::Config { method: Method::Fixed, level, ..config.binarize };
+    config.threshold = threshold::Config { method: Method::Fixed, level, ..config.threshold };
     config
 }
 
@@ -90,7 +90,7 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     let mut axes = vec![answer(&p.sensor).axis];
     for level in [0.08, 0.12, 0.16, 0.2, 0.3, 0.4, 0.5] {
         let mut sensor = p.sensor.clone();
-        sensor.binarize = threshold::Config { method: Method::Fixed, level, ..sensor.binarize };
+        sensor.threshold = threshold::Config { method: Method::Fixed, level, ..sensor.threshold };
         let found = answer(&sensor);
         println!(
             "level {level}: {} of {} points, RMS {:.2} px, {:.5?}",
@@ -102,8 +102,8 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     }
     // If the frame is not left out, the picture's own outline belongs to the edge. The sensor then has no answer, or
     // fewer than half of the points are inliers.
-    p.sensor.recover.frame_px = 0;
-    p.sensor.binarize = threshold::Config { method: Method::Fixed, level: 0.08, ..p.sensor.binarize };
+    p.sensor.retry.frame_px = 0;
+    p.sensor.threshold = threshold::Config { method: Method::Fixed, level: 0.08, ..p.sensor.threshold };
     let with = process(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default());
     assert!(
         with.is_err() || with.is_ok_and(|a| 2 * a.inliers < a.points && a.error_deg(axes[0]) < a.sigma_deg()),
@@ -135,7 +135,7 @@ fn half_lit_discs_are_looked_at_again() {
         let pose = Pose::looking(position_m(120.0 * random(5) - 60.0, 20.0, altitude_km), look_to);
         let (phase, side) = ((60.0 + 40.0 * random(6)).to_radians(), turn * random(7));
         let sun = [phase.sin() * side.cos(), phase.sin() * side.sin(), -phase.cos()];
-        let direction = pose.cam_to_ecef().unwrap().apply(&UnitVec3::try_new(sun).unwrap()).xyz();
+        let direction = pose.fixed_from_camera().unwrap().apply(&UnitVec3::try_new(sun).unwrap()).xyz();
         let mut scene = Scene::new(lens.clone(), pose);
         let clouds =
             Clouds { cover: 0.3 + 0.3 * random(8), brightness: 0.9, seed: n.into(), ..Visible::default().clouds };
@@ -147,7 +147,7 @@ fn half_lit_discs_are_looked_at_again() {
         let mut config = Config::new(lens);
         (config.body.limb_height_km, config.body.limb_height_sigma_km) = (17.0, 7.0);
         let mut again = HostHorizon::boxed(&config).unwrap();
-        config.recover.levels.clear();
+        config.retry.levels.clear();
         let mut once = HostHorizon::boxed(&config).unwrap();
         let [one, several] = [&mut once, &mut again].map(|horizon| {
             let expected = horizon.expect(&hzn_tests::prior_of_scene(&scene)).unwrap();
@@ -182,7 +182,7 @@ fn a_thermal_array_answers_by_default() {
     let mut known = sensor.clone();
     // This sensor gives the bound: a known half-angle, and independent points with the errors of the points in the
     // picture.
-    known.estimate.half_angle = hzn_core::fit::HalfAngle::Known;
+    known.fit.half_angle = hzn_core::fit::HalfAngle::Known;
     (known.covariance.sigma_px, known.covariance.correlation_px) = (1e-3, 0.0);
     let [mut sensor, mut known] = [sensor, known].map(|c| HostHorizon::boxed(&c).unwrap());
     let (mut tally, mut bound_deg2, mut count) = (Tally::default(), 0.0, 0.0);

@@ -59,7 +59,7 @@ impl Recorded {
         let truth = scene.path().unwrap().state(SPAN_S[0]);
         let start = Nominal {
             time_s: SPAN_S[0],
-            attitude: UnitQuaternion::from_scaled_axis(Vector3::new(0.02, -0.01, 0.015)) * truth.body_to_ecef,
+            attitude: UnitQuaternion::from_scaled_axis(Vector3::new(0.02, -0.01, 0.015)) * truth.fixed_from_vehicle,
             velocity_m_s: truth.velocity_mps,
             position_m: truth.position_m,
         };

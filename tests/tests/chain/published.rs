@@ -48,7 +48,7 @@ fn braun_barf_with_payload_in_view() {
     let tally = fly(&flight, Preset::Dlr2022, |_| {});
     assert_eq!(tally.answered(), tally.frames, "{tally}");
     assert!(tally.rms_deg() < 0.3 && tally.worst_deg() < 1.0, "{tally}");
-    let tally = fly(&flight, Preset::Dlr2022, |config| config.estimate.method = fit::Method::Conic);
+    let tally = fly(&flight, Preset::Dlr2022, |config| config.fit.method = fit::Method::Conic);
     assert!(tally.answered() * 2 >= tally.frames && tally.worst_deg() < 20.0, "{tally}");
 }
 
@@ -65,8 +65,8 @@ fn wang_on_an_infrared_earth() {
         // The chain `hzn` uses the known size of the Earth, here with the best edge points.
         let best = fly(&part, Preset::Hzn, |config| {
             config.covariance = flight.sensor.covariance;
-            config.candidates.sub_pixel = SubPixel::Erf;
-            config.candidates.keep_points = 0;
+            config.edge_points.sub_pixel = SubPixel::Erf;
+            config.edge_points.keep_points = 0;
         });
         assert_eq!(best.answered(), best.frames, "{best}");
         assert!(best.rms_deg() < tally.rms_deg() && best.rms_deg() < 0.04, "{best} against {tally}");
@@ -80,8 +80,8 @@ fn wang_on_an_infrared_earth() {
 /// full size.
 fn anywhere(config: &mut Config) {
     config.input.scale_to_height = None;
-    config.select.altitude_limits_km = Some([1.0, 1000.0]);
-    config.select.radius_margin = 0.5;
+    config.gates.altitude_limits_km = Some([1.0, 1000.0]);
+    config.gates.radius_margin = 0.5;
 }
 
 /// Tests HORACE where it is right: the camera points at the Earth. These are the first frames of a swing that starts

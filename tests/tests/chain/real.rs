@@ -59,7 +59,7 @@ fn process_both(photograph: &Photograph) -> BothAnswers {
 fn change_with_threshold_deg(photograph: &Photograph, axis: [f64; 3]) -> f64 {
     let moved = [0.8, 1.2].map(|scale| {
         let mut sensor = photograph.sensor.clone();
-        sensor.binarize.scale = scale;
+        sensor.threshold.scale = scale;
         let answer = process(&mut Sensors::new(&sensor).host, &photograph.view(), &Prior::default());
         answer.map_or(f64::INFINITY, |a| a.error_deg(axis))
     });
@@ -168,7 +168,7 @@ fn airglow_is_no_limb() {
     }
     // The edge of the airglow has the form of a limb. Only the light above it shows what it is.
     let mut night = Photograph::load("iss030e102170-night.jpg");
-    night.sensor.select.max_glow = 1e6;
+    night.sensor.gates.max_glow = 1e6;
     let believed = process(&mut Sensors::new(&night.sensor).host, &night.view(), &Prior::default());
     let error_deg = believed.expect("the airglow passes the other gates").error_deg(NIGHT_AXIS);
     assert!(error_deg > 2.0, "{error_deg}°");

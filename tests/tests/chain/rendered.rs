@@ -93,7 +93,7 @@ fn white_noise_against_the_bound() {
     let camera = Camera::ideal(Model::Pinhole, 320, 240, 277.0);
     let mut sensor = hzn_core::Config::new(camera.clone());
     sensor.body.kind = hzn_core::body::Kind::EarthSphere;
-    sensor.estimate.half_angle = hzn_core::fit::HalfAngle::Known;
+    sensor.fit.half_angle = hzn_core::fit::HalfAngle::Known;
     // This is less than the error of any edge point, so the covariance follows from the residuals.
     sensor.covariance = hzn_core::covariance::Config::given(1e-3, 0.0);
     let look = Look { azimuth_rad: 0.3, depression_rad: 0.25, roll_rad: 0.2 };

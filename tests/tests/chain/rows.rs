@@ -56,7 +56,7 @@ fn cases() -> Vec<Case> {
         let (w, h) = (view.width(), view.height());
         let bytes = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| view.at(x, y) as u8).collect();
         let mut sensor = photograph.sensor.clone();
-        sensor.candidates.keep_points = 600;
+        sensor.edge_points.keep_points = 600;
         cases.push(Case { name: file.into(), sensor, prior: Prior::default(), bytes });
     }
     cases
@@ -89,12 +89,12 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
         // Both get the threshold that the picture itself gives.
         let own = case.process_whole(&Sensor::new(&case.sensor).unwrap(), &EdgePoints::default()).level;
         let mut config = case.sensor.clone();
-        config.binarize.method = Method::Fixed;
-        config.binarize.level = own.max(1).into();
+        config.threshold.method = Method::Fixed;
+        config.threshold.level = own.max(1).into();
         // These gates read brightness, and none is left of rows that are gone. A dark frame cannot be searched for
         // either.
-        (config.select.max_band, config.select.max_departure) = (1.0, 1e6);
-        config.recover.frame_px = 0;
+        (config.gates.max_band, config.gates.max_departure) = (1.0, 1e6);
+        config.retry.frame_px = 0;
         let sensor = Sensor::new(&config).unwrap();
         let (there, here) = (EdgePoints::default(), EdgePoints::default());
         let (want, got) = (case.process_whole(&sensor, &there), case.process_rows(&sensor, &here));
@@ -141,8 +141,8 @@ fn memory_without_a_frame() {
     for frame in &flight.frames {
         let case = hzn_tests::emulated::Case::rendered(frame.file.clone(), &flight.sensor, frame);
         let mut config = case.sensor.clone();
-        config.binarize.method = Method::Fixed;
-        config.binarize.level = 60.0;
+        config.threshold.method = Method::Fixed;
+        config.threshold.level = 60.0;
         let sensor = Sensor::new(&config).unwrap();
         let expected = sensor.expect(&case.prior).unwrap();
         let mut rows = Box::new(Vga::new());

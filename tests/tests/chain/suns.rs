@@ -13,7 +13,7 @@ fn frames(seed: u64) -> (Config, Vec<FlightFrame>) {
     let mut config = scene.sensor();
     // The limb height of the scene is not told.
     for body in &mut config.bodies {
-        *body = body::Config { kind: body.kind, binarize: body.binarize, ..body::Config::default() };
+        *body = body::Config { kind: body.kind, threshold: body.threshold, ..body::Config::default() };
     }
     (config, scene.flight().unwrap().frames)
 }

@@ -51,7 +51,7 @@ impl Frames {
         }
         let row = self.rows.iter().find(|row| row.range_km.is_some() || row.pole_camera.is_some())?;
         let column = if row.range_km.is_some() { "range_km" } else { "pole_x, pole_y, pole_z" };
-        let what = format!("{column} is used only for a position; set estimate.position = true in sensor.toml");
+        let what = format!("{column} is used only for a position; set fit.position = true in sensor.toml");
         Some(self.problem(row, what))
     }
 

@@ -27,7 +27,7 @@ pub struct FrameData {
     /// Position in ECEF, kilometres.
     pub position_km: Option<[f64; 3]>,
     /// Prior attitude, camera to ECEF, scalar first.
-    pub camera_to_ecef_wxyz: Option<[f64; 4]>,
+    pub q_fixed_from_camera_wxyz: Option<[f64; 4]>,
     /// 1-sigma of that attitude in degrees.
     pub attitude_sigma_deg: Option<f64>,
     /// Direction to the Sun in the camera frame.
@@ -50,7 +50,7 @@ pub struct Orientation {
     /// Name of the body, see [`Kind::name`](hzn_core::body::Kind::name).
     pub body: String,
     /// Rotation from the camera to the axes of the body, scalar first.
-    pub camera_to_body_wxyz: Option<[f64; 4]>,
+    pub q_fixed_from_camera_wxyz: Option<[f64; 4]>,
     /// Direction of its north pole in the camera frame.
     pub pole_camera: Option<[f64; 3]>,
 }
@@ -65,7 +65,9 @@ impl FrameData {
         Prior {
             altitude_m: self.altitude_km.or(default_altitude_km).map(|km| T::from_f64(km * 1e3)),
             position_m: self.position_km.map(|p| p.map(|km| T::from_f64(km * 1e3))),
-            cam_to_ecef: self.camera_to_ecef_wxyz.and_then(|q| Rotation::assume_from_quaternion(q.map(T::from_f64))),
+            fixed_from_camera: self
+                .q_fixed_from_camera_wxyz
+                .and_then(|q| Rotation::assume_from_quaternion(q.map(T::from_f64))),
             attitude_sigma_rad: self.attitude_sigma_deg.map(|deg| T::from_f64(deg.to_radians())),
             level: None,
             sun: self.sun_camera.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))),
@@ -88,7 +90,7 @@ impl FrameData {
         }
         let own = self.other_bodies.iter().find(|other| other.body == body.kind.name()).cloned().unwrap_or_default();
         let row = Self {
-            camera_to_ecef_wxyz: own.camera_to_body_wxyz,
+            q_fixed_from_camera_wxyz: own.q_fixed_from_camera_wxyz,
             pole_camera: own.pole_camera,
             position_km: None,
             altitude_km: None,
@@ -101,7 +103,7 @@ impl FrameData {
 
     fn check_attitude(&self) -> Result<(), PriorError> {
         let length = |q: [f64; 4]| q.iter().map(|x| x * x).sum::<f64>().sqrt();
-        match self.camera_to_ecef_wxyz {
+        match self.q_fixed_from_camera_wxyz {
             Some(q) if (length(q) - 1.0).abs() > MAX_LENGTH_ERROR => Err(PriorError::Attitude),
             _ => Ok(()),
         }
@@ -149,7 +151,7 @@ impl Frames {
             PriorError::Position => row.position_km.map(|[x, y, z]| format!("{x}, {y}, {z}")),
             PriorError::AttitudeSigma => row.attitude_sigma_deg.map(|deg| format!("{deg}")),
             PriorError::Rate => row.rate_rad_s.map(|[x, y, z]| format!("{x}, {y}, {z}")),
-            PriorError::Attitude => row.camera_to_ecef_wxyz.map(|[w, x, y, z]| format!("{w}, {x}, {y}, {z}")),
+            PriorError::Attitude => row.q_fixed_from_camera_wxyz.map(|[w, x, y, z]| format!("{w}, {x}, {y}, {z}")),
             PriorError::Range => row.range_km.map(|km| format!("{km}")),
             PriorError::RangeSigma => row.range_sigma_km.map(|km| format!("{km}")),
             _ => None,

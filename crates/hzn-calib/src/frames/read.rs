@@ -178,7 +178,7 @@ impl<'a> Row<'a> {
             utc_s: self.utc()?,
             altitude_km: self.number("altitude_km")?,
             position_km: self.vector(["x_km", "y_km", "z_km"])?,
-            camera_to_ecef_wxyz: self.vector(["qw", "qx", "qy", "qz"])?,
+            q_fixed_from_camera_wxyz: self.vector(["qw", "qx", "qy", "qz"])?,
             attitude_sigma_deg: self.number("attitude_sigma_deg")?,
             sun_camera: self.vector(["sun_x", "sun_y", "sun_z"])?,
             rate_rad_s: self.vector(["rate_x", "rate_y", "rate_z"])?,
@@ -218,7 +218,7 @@ impl<'a> Row<'a> {
             self.check_direction(&pole.join(", "), pole_camera)?;
             found.push(Orientation {
                 body: body.to_owned(),
-                camera_to_body_wxyz: self.vector([&*q[0], &*q[1], &*q[2], &*q[3]])?,
+                q_fixed_from_camera_wxyz: self.vector([&*q[0], &*q[1], &*q[2], &*q[3]])?,
                 pole_camera,
             });
         }
@@ -300,9 +300,9 @@ mod tests {
         let (row, of_kind) = (f.get("a").unwrap(), |kind| body::Config::of_kind(kind, None));
         assert_eq!(row.for_body(0, &of_kind(Kind::Jupiter)).unwrap_err(), PriorError::Attitude);
         let enceladus = row.for_body(1, &of_kind(Kind::Enceladus)).unwrap();
-        assert_eq!((enceladus.camera_to_ecef_wxyz, enceladus.range_km), (Some([1.0, 0.0, 0.0, 0.0]), None));
+        assert_eq!((enceladus.q_fixed_from_camera_wxyz, enceladus.range_km), (Some([1.0, 0.0, 0.0, 0.0]), None));
         let saturn = row.for_body(2, &of_kind(Kind::Saturn)).unwrap();
-        assert_eq!((saturn.camera_to_ecef_wxyz, saturn.pole_camera), (None, Some([0.0, 0.0, 1.0])));
+        assert_eq!((saturn.q_fixed_from_camera_wxyz, saturn.pole_camera), (None, Some([0.0, 0.0, 1.0])));
         assert!(read("file,pole_x,pole_y,pole_z\na,0,0,0\n").unwrap_err().contains("pole_z: has no direction"));
         let other = "file,pole_saturn_x,pole_saturn_y,pole_saturn_z\na,0,0,0\n";
         assert!(read(other).unwrap_err().contains("pole_saturn_z: has no direction"));

@@ -78,12 +78,12 @@ pub fn in_section(section: &str) -> impl Iterator<Item = &'static Key> {
     all().filter(move |key| key.section() == section)
 }
 
-/// Returns the key of a path, for example `reject.threshold_px`; `None` if there is no such key.
+/// Returns the key of a path, for example `consensus.threshold_px`; `None` if there is no such key.
 pub fn find(path: &str) -> Option<&'static Key> {
     all().find(|key| key.path == path)
 }
 
-/// Returns the key of a path in parts, for example `reject`, `threshold_px`. For `[[bodies]]` the path contains the
+/// Returns the key of a path in parts, for example `consensus`, `threshold_px`. For `[[bodies]]` the path contains the
 /// number of the body.
 pub(crate) fn find_parts(path: &[String]) -> Option<&'static Key> {
     let names: Vec<&str> = path.iter().map(String::as_str).filter(|part| part.parse::<usize>().is_err()).collect();

@@ -48,7 +48,7 @@ fn section(table: &Table, defaults: &toml::Table) -> Value {
         "camera" => {
             schema["anyOf"] = json!([{"required": ["file"]}, {"required": required}]);
         }
-        "mount" => schema["required"] = json!(["q_body_from_camera_wxyz"]),
+        "mount" => schema["required"] = json!(["q_vehicle_from_camera_wxyz"]),
         _ => {}
     }
     schema

@@ -45,7 +45,7 @@ fn row(key: &Key, defaults: &toml::Table) -> String {
     };
     let flight = match (key.flight, key.path) {
         (Some(_), "camera.k") => "8 to 12".to_owned(),
-        (Some(_), "mount.q_body_from_camera_wxyz") => "20 to 23".to_owned(),
+        (Some(_), "mount.q_vehicle_from_camera_wxyz") => "20 to 23".to_owned(),
         (None, "mask.polygons_px") => "200 to 207, 1000 on".to_owned(),
         (Some(number), _) => number.to_string(),
         (None, _) => "–".to_owned(),

@@ -27,7 +27,7 @@ pub fn text() -> String {
         if table.name == "body" {
             out += &comment(
                 "For several bodies in one picture, write one [[bodies]] for each instead of [body]. It has the same \
-                 keys, and may have a [bodies.binarize] and a [bodies.covariance].",
+                 keys, and may have a [bodies.threshold] and a [bodies.covariance].",
             );
         }
     }

@@ -53,7 +53,7 @@ fn every_key_has_a_sentence() {
 #[test]
 fn limits_are_checked() {
     // For these keys the limit depends on another value.
-    let depends = ["gate.max_mean", "gate.min_mean", "select.sun_size", "select.moon_size", "body.range_km"];
+    let depends = ["brightness.max_mean", "brightness.min_mean", "gates.sun_size", "gates.moon_size", "body.range_km"];
     let mut checked = 0;
     for key in all().filter(|k| !depends.contains(&k.path)) {
         match key.limits {
@@ -66,7 +66,7 @@ fn limits_are_checked() {
             }
             Limits::Number { low, above, high } => {
                 let list = |x: String| match key.form {
-                    Form::Numbers if key.path == "recover.levels" => format!("[{x}]"),
+                    Form::Numbers if key.path == "retry.levels" => format!("[{x}]"),
                     Form::Numbers => format!("[{x}, {x}]"),
                     _ => x,
                 };
@@ -96,16 +96,16 @@ fn limits_are_checked() {
 #[test]
 fn entries_say_unit_method_and_limits() {
     let key = |path: &str| find(path).unwrap();
-    assert_eq!(key("reject.threshold_px").unit(), "px");
-    assert_eq!(key("select.max_rate_deg_s").unit(), "deg/s");
-    assert_eq!(key("reject.threshold_px").limits, Limits::Number { low: 0.0, above: true, high: 1000.0 });
-    assert_eq!(key("binarize.level").method(), Some("fixed"));
-    assert_eq!(key("binarize.factor").method(), Some("dynamic"));
+    assert_eq!(key("consensus.threshold_px").unit(), "px");
+    assert_eq!(key("gates.max_rate_deg_s").unit(), "deg/s");
+    assert_eq!(key("consensus.threshold_px").limits, Limits::Number { low: 0.0, above: true, high: 1000.0 });
+    assert_eq!(key("threshold.level").method(), Some("fixed"));
+    assert_eq!(key("threshold.factor").method(), Some("dynamic"));
     assert_eq!(key("body.altitude_reference").method(), None);
-    let words: Vec<_> = key("recover.combine").choices.iter().map(|c| c.name).collect();
+    let words: Vec<_> = key("retry.combine").choices.iter().map(|c| c.name).collect();
     assert_eq!(words, ["median", "mean"]);
     assert_eq!(limits_in_words(key("limits.max_work")), "10000 to 1e9");
-    assert_eq!(limits_in_words(key("fit.half_angle".replace("fit", "estimate").as_str())), "`fused`, `known`, `free`");
+    assert_eq!(limits_in_words(key("fit.half_angle")), "`fused`, `known`, `free`");
 }
 
 #[test]

@@ -38,7 +38,7 @@ pub fn config_for_calibration(sensor: &Config) -> Option<Config> {
     wide.bodies.clear();
     [wide.body.limb_height_km, wide.body.limb_height_sigma_km] = WIDE_KM;
     wide.body.limb_height_by_latitude_km.clear();
-    wide.select.max_sigma_deg = ANY_SIGMA_DEG;
+    wide.gates.max_sigma_deg = ANY_SIGMA_DEG;
     Some(wide)
 }
 

@@ -231,7 +231,7 @@ pub(crate) struct Azimuth {
 impl Azimuth {
     /// Creates the offsets for a limb cone from the camera's attitude; `None` without an attitude.
     pub(crate) fn new(cone: &LimbCone<f64>, prior: &Prior<f64>) -> Option<Self> {
-        let east: UnitVec3<_, f64> = prior.cam_to_ecef?.inverse().apply(&cone.east);
+        let east: UnitVec3<_, f64> = prior.fixed_from_camera?.inverse().apply(&cone.east);
         Some(Self {
             east: Vector3::from(east.xyz()),
             cot2_east: cone.cot2_east,

@@ -132,7 +132,7 @@ impl Sighting {
 /// Returns the prior without its attitude if that is too uncertain to show which part of the limb is visible.
 pub(crate) fn with_useful_attitude(prior: &Prior<f64>) -> Prior<f64> {
     let sigma = prior.attitude_sigma_rad.unwrap_or(ATTITUDE_SIGMA_RAD);
-    Prior { cam_to_ecef: prior.cam_to_ecef.filter(|_| sigma < USELESS_ATTITUDE_RAD), ..*prior }
+    Prior { fixed_from_camera: prior.fixed_from_camera.filter(|_| sigma < USELESS_ATTITUDE_RAD), ..*prior }
 }
 
 /// Returns the rays of the edge points (camera frame), each with its share of the picture's limb height. The shares sum
@@ -231,7 +231,7 @@ fn latitudes(geometry: &Geometry, cone: &Cone, prior: &Prior<f64>, attitude_sigm
         let p = camera - ray * camera.dot(&ray);
         geodetic([p.x, p.y, p.z], WGS84_A_M, WGS84_B_M).1.to_degrees()
     };
-    match prior.cam_to_ecef {
+    match prior.fixed_from_camera {
         Some(attitude) if attitude_sigma_rad < USELESS_ATTITUDE_RAD => {
             let visible = cone.rays.iter().zip(cone.shares()).filter_map(|(ray, share)| {
                 let ray = hzn_core::frames::UnitVec3::try_new([ray.x, ray.y, ray.z])?;

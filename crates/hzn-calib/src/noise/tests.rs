@@ -65,8 +65,8 @@ pub(crate) fn solution(axis: Vector3<f64>, half_angle_rad: f64) -> Solution<f64>
     Solution {
         axis: UnitVec3::try_new([axis.x, axis.y, axis.z]).unwrap(),
         covariance: Cov3::from_upper([1e-8, 0.0, 0.0, 1e-8, 0.0, 1e-8]),
-        axis_ecef: None,
-        axis_body: None,
+        axis_fixed: None,
+        axis_vehicle: None,
         half_angle_rad,
         fused_half_angle_rad: half_angle_rad,
         altitude_m: None,
@@ -268,7 +268,7 @@ fn a_longer_focal_length_raises_the_limb_as_predicted() {
 const SENSOR: &str = "# mine\npreset = \"hzn\"\n\n[camera]\nwidth = 960\nheight = 720\nmodel = \"equidistant\"\nfx_px \
     = 600.0\n\
                       fy_px = 600.0\ncx_px = 479.5\ncy_px = 359.5\n\n[body]\nkind = \"earth-sphere\"\n# the old guess\n\
-                      limb_height_km = 12.0 # from a book\nlimb_height_sigma_km = 3.0\n\n[reject]\nthreshold_px = \
+                      limb_height_km = 12.0 # from a book\nlimb_height_sigma_km = 3.0\n\n[consensus]\nthreshold_px = \
                       2.5\n";
 
 #[test]

@@ -29,7 +29,7 @@ const ROUNDS: usize = 3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mount {
     /// Rotation from the real to the nominal camera frame, scalar first.
-    pub correction_wxyz: [f64; 4],
+    pub q_nominal_from_camera_wxyz: [f64; 4],
     /// The correction as a rotation vector (camera frame), in degrees.
     pub correction_deg: [f64; 3],
     /// Covariance of the rotation vector, in deg².
@@ -120,7 +120,7 @@ pub(super) fn from_pictures(
 
 /// Returns the limb axis that position and attitude predict, in the nominal camera frame.
 fn predict_axis(limb_km: f64, body: &body::Config, view: &View) -> Option<Vector3<f64>> {
-    let (position, attitude) = (view.prior.position_m?, view.prior.cam_to_ecef?);
+    let (position, attitude) = (view.prior.position_m?, view.prior.fixed_from_camera?);
     let axis = match body.kind {
         Kind::Earth => LimbCone::try_new(position, WGS84_A_M + limb_km * 1e3, WGS84_B_M + limb_km * 1e3)?.axis,
         _ => hzn_core::frames::UnitVec3::try_new(position.map(|x| -x))?,
@@ -161,7 +161,7 @@ fn solve(mut pairs: Vec<Pair>) -> Result<Mount, MountRefusal> {
     let quaternion = UnitQuaternion::from_rotation_matrix(&rotation);
     let degrees2 = 1f64.to_degrees().powi(2);
     Ok(Mount {
-        correction_wxyz: [quaternion.w, quaternion.i, quaternion.j, quaternion.k],
+        q_nominal_from_camera_wxyz: [quaternion.w, quaternion.i, quaternion.j, quaternion.k],
         correction_deg: rotation.scaled_axis().map(f64::to_degrees).into(),
         covariance_deg2: core::array::from_fn(|i| core::array::from_fn(|j| inverse[(i, j)] * degrees2)),
         sigma_deg: core::array::from_fn(|i| inverse[(i, i)].sqrt().to_degrees()),

@@ -221,12 +221,12 @@ fn mounted(turn: Rotation3<f64>, spread: f64) -> (Flight, Vec<View>) {
         let below = 0.6 * spread * draws.uniform();
         let roll = core::f64::consts::TAU * draws.uniform() * spread;
         let down = Vector3::new(below.sin() * roll.cos(), below.sin() * roll.sin(), below.cos());
-        let cam_to_ecef = Rotation3::from_euler_angles(draws.uniform(), draws.uniform(), draws.uniform());
-        let position = cam_to_ecef * down * -distance;
+        let fixed_from_camera = Rotation3::from_euler_angles(draws.uniform(), draws.uniform(), draws.uniform());
+        let position = fixed_from_camera * down * -distance;
         view.axis = (turn.inverse() * down).into();
         view.prior.position_m = Some(position.into());
-        let q = UnitQuaternion::from_rotation_matrix(&cam_to_ecef);
-        view.prior.cam_to_ecef = Rotation::assume_from_quaternion([q.w, q.i, q.j, q.k]);
+        let q = UnitQuaternion::from_rotation_matrix(&fixed_from_camera);
+        view.prior.fixed_from_camera = Rotation::assume_from_quaternion([q.w, q.i, q.j, q.k]);
     }
     (flight, views)
 }

@@ -50,7 +50,7 @@ pub struct Track {
     /// 1-sigma of the focal length before the flight, in percent.
     pub focal_sigma_before_percent: f64,
     /// Rotation from the real to the nominal camera frame, scalar first.
-    pub correction_wxyz: [f64; 4],
+    pub q_nominal_from_camera_wxyz: [f64; 4],
     /// The same as a rotation vector (camera frame), in degrees, with the 1-sigma of each component.
     pub correction_deg: [[f64; 2]; 3],
     /// Standard deviation of a coordinate of a point, in pixels.
@@ -235,7 +235,7 @@ impl Fit {
             parameters: lens.list,
             focal_percent: lens.focal_percent,
             focal_sigma_before_percent: unknowns.focal_sigma_percent(),
-            correction_wxyz: [correction.w, correction.i, correction.j, correction.k],
+            q_nominal_from_camera_wxyz: [correction.w, correction.i, correction.j, correction.k],
             correction_deg: core::array::from_fn(|i| {
                 [turn[i].to_degrees(), self.covariance[(i, i)].sqrt().to_degrees()]
             }),

@@ -33,9 +33,9 @@ pub struct Found<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct FoundMount<'a> {
     /// The mount with which the attitudes were computed: rotation from the camera to the body frame, scalar first.
-    pub nominal_wxyz: [f64; 4],
+    pub q_vehicle_from_nominal_wxyz: [f64; 4],
     /// Rotation from the real to the nominal camera frame, scalar first.
-    pub correction_wxyz: [f64; 4],
+    pub q_nominal_from_camera_wxyz: [f64; 4],
     /// 1-sigma about each axis of the camera, in degrees.
     pub sigma_deg: [f64; 3],
     /// The pictures, for example `38 limb pictures of flight`.
@@ -96,7 +96,7 @@ impl Written {
         let item = document.entry("mount").or_insert_with(|| Item::Table(Table::new()));
         let table = item.as_table_like_mut().ok_or("mount is not a section")?;
         let of = |[w, i, j, k]: [f64; 4]| UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
-        let q = of(mount.nominal_wxyz) * of(mount.correction_wxyz);
+        let q = of(mount.q_vehicle_from_nominal_wxyz) * of(mount.q_nominal_from_camera_wxyz);
         let value = Array::from_iter([q.w, q.i, q.j, q.k].map(|x| (x * 1e9).round() / 1e9));
         let [x, y, z] = mount.sigma_deg.map(two_digits);
         let why = format!(
@@ -104,7 +104,7 @@ impl Written {
             mount.source
         );
         let mut keys = self.keys;
-        set(table, "[mount]", "q_body_from_camera_wxyz", value.into(), &why, &mut keys);
+        set(table, "[mount]", "q_vehicle_from_camera_wxyz", value.into(), &why, &mut keys);
         Ok(Self { text: document.to_string(), keys })
     }
 }

@@ -32,10 +32,10 @@ fn read(text: &str) -> Config {
 
 /// Changes two values, and returns the keys that change them in a file.
 fn change(config: &mut Config) -> String {
-    config.reject.seed += 1;
-    config.select.radius_margin_px += 7.0;
-    let seed = format!("[reject]\nseed = {}\n", config.reject.seed);
-    format!("{seed}[select]\nradius_margin_px = {}\n", config.select.radius_margin_px)
+    config.consensus.seed += 1;
+    config.gates.radius_margin_px += 7.0;
+    let seed = format!("[consensus]\nseed = {}\n", config.consensus.seed);
+    format!("{seed}[gates]\nradius_margin_px = {}\n", config.gates.radius_margin_px)
 }
 
 #[test]

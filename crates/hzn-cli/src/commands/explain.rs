@@ -169,7 +169,7 @@ impl Explained<'_> {
         };
         line("picture", self.layout());
         line("expected", self.expected());
-        line("binarize", self.threshold());
+        line("threshold", self.threshold());
         self.further_looks(&mut line);
         self.edges(&mut line);
         self.candidates(&mut line);
@@ -223,7 +223,7 @@ impl Explained<'_> {
             0 => String::new(),
             n => format!("; {n} border pixels dropped because a list was full"),
         };
-        let shortest = self.config.candidates.min_points;
+        let shortest = self.config.edge_points.min_points;
         line("candidates", format!("{} edges of at least {shortest} px{dropped}", c.candidates));
     }
 
@@ -239,7 +239,7 @@ impl Explained<'_> {
             let numbers = format!("{:>4} {:>8} {:>8} {:>8} {rms:>8}", k.number, k.length_px, k.points, k.inliers);
             line(
                 "",
-                format!("{numbers}  {}: {}", k.verdict.name(), explain::verdict_text(k.verdict, &self.config.select)),
+                format!("{numbers}  {}: {}", k.verdict.name(), explain::verdict_text(k.verdict, &self.config.gates)),
             );
         }
         let more = (r.counters.candidates as usize).saturating_sub(r.candidates.len());
@@ -254,14 +254,14 @@ impl Explained<'_> {
             let what = "points are at the global threshold, because no local mid-level was found";
             line("sub-pixel", format!("{} of {} {what}", c.fallback_points, c.edge_points));
         }
-        if self.report.stage >= Stage::Reject {
-            let reject = &self.config.reject;
-            let noisy = match reject.noise_sigma {
+        if self.report.stage >= Stage::Consensus {
+            let consensus = &self.config.consensus;
+            let noisy = match consensus.noise_sigma {
                 0.0 => String::new(),
                 sigmas => format!(", and on a noisy edge up to {sigmas} times its noise"),
             };
-            let px = reject.threshold_px;
-            line("reject", format!("{} draws; points up to {px} px from the limb can belong to it{noisy}", c.draws));
+            let px = consensus.threshold_px;
+            line("consensus", format!("{} draws; points up to {px} px from the limb can belong to it{noisy}", c.draws));
         }
     }
 
@@ -296,7 +296,7 @@ impl Explained<'_> {
         let full = (1u32 << self.picture.layout.bits) - 1;
         match (self.trace.level(), self.report.status) {
             (_, Status::TooDark | Status::TooBright) => {
-                let g = &self.config.gate;
+                let g = &self.config.brightness;
                 format!("mean brightness is outside of {} to {} of full scale", g.min_mean, g.max_mean)
             }
             (Some((level, mean, n)), _) => {
@@ -360,11 +360,11 @@ impl Explained<'_> {
         if let Some(what) = self.shutter() {
             line("shutter", what);
         }
-        if let Some(e) = s.axis_ecef {
+        if let Some(e) = s.axis_fixed {
             let [x, y, z] = e.xyz();
             line("axis, ECEF", format!("{x:.7}, {y:.7}, {z:.7} (the same direction, from the position)"));
         }
-        if let Some(b) = s.axis_body {
+        if let Some(b) = s.axis_vehicle {
             let [roll, pitch] = hzn_mcap::roll_pitch_deg(&b);
             line("attitude", format!("roll {roll:.4} deg, pitch {pitch:.4} deg"));
         }

@@ -146,7 +146,7 @@ fn priors(file: &Path) -> Result<String, Stop> {
         ("UTC", with(|r| r.utc_s.is_some())),
         ("altitude", with(|r| r.altitude_km.is_some())),
         ("position", with(|r| r.position_km.is_some())),
-        ("attitude", with(|r| r.camera_to_ecef_wxyz.is_some())),
+        ("attitude", with(|r| r.q_fixed_from_camera_wxyz.is_some())),
         ("Sun", with(|r| r.sun_camera.is_some())),
     ] {
         out.push_str(&format!("{:<16} {n}\n", format!("with {name}")));

@@ -14,6 +14,7 @@ mod ground;
 mod info;
 mod init;
 mod lens_model;
+mod migrate;
 mod recover;
 mod run;
 mod sensitivity;
@@ -63,6 +64,7 @@ enum Command {
     Fuse(Box<fuse::Args>),
     Simulate(simulate::Args),
     Init(init::Args),
+    Migrate(migrate::Args),
     Evaluate(evaluate::Args),
     Sensitivity(Box<sensitivity::Args>),
     Calibrate(calibrate::Args),
@@ -90,6 +92,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Fuse(args) => fuse::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Init(args) => init::run(&args),
+        Command::Migrate(args) => migrate::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Sensitivity(args) => sensitivity::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),

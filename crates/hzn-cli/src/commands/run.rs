@@ -261,7 +261,7 @@ impl Watch {
         if let Some(further) = self.refusals.further() {
             tell::line(format_args!("note: {further}"));
         }
-        if let Some((why, frame)) = self.refusals.commonest(&plan.config.select) {
+        if let Some((why, frame)) = self.refusals.commonest(&plan.config.gates) {
             let nothing = !self.progress.any_answered() && stored == 0;
             let found = if nothing { "nothing was found in any picture; " } else { "" };
             let more = frame.map(|frame| {

@@ -10,11 +10,11 @@ fn wrong_keys_and_values_of_the_sensor() {
         place.write("in/sensor.toml", format!("{}{rest}", crate::common::SENSOR).as_bytes());
         place.run(&["run", "in"]).expect(2).err
     };
-    insta::assert_snapshot!(with("[reject]\nthreshold_pxx = 3.0\n"), @"error: in/sensor.toml:16: [reject] \
+    insta::assert_snapshot!(with("[consensus]\nthreshold_pxx = 3.0\n"), @"error: in/sensor.toml:16: [consensus] \
         threshold_pxx: unknown key; did you mean threshold_px?");
-    insta::assert_snapshot!(with("[reject]\nthreshold_px = -1\n"), @"error: in/sensor.toml:16: [reject] threshold_px: \
+    insta::assert_snapshot!(with("[consensus]\nthreshold_px = -1\n"), @"error: in/sensor.toml:16: [consensus] threshold_px: \
         -1 is refused: must be above 0");
-    insta::assert_snapshot!(with("[binarize]\nmethod = \"otzu\"\n"), @r#"error: in/sensor.toml:16: [binarize] method: "otzu" is not a valid value; did you mean otsu?"#);
+    insta::assert_snapshot!(with("[threshold]\nmethod = \"otzu\"\n"), @r#"error: in/sensor.toml:16: [threshold] method: "otzu" is not a valid value; did you mean otsu?"#);
     let camera = |from: &str, to: &str| {
         place.write("in/sensor.toml", crate::common::SENSOR.replace(from, to).as_bytes());
         place.run(&["run", "in"]).expect(2).err
@@ -52,7 +52,7 @@ fn wrong_rows_of_frames_csv() {
                                    (kilometres), not -3");
     let err = with("file,x_km,y_km,z_km\n0000.png,6000,0,-0.5\n").expect(2).err;
     insta::assert_snapshot!(err, @"error: in/frames.csv:2: 0000.png: x_km, y_km, z_km must be finite and outside the \
-                                   body (ECEF, kilometres), not 6000, 0, -0.5");
+                                   body (fixed frame, kilometres), not 6000, 0, -0.5");
     let err = with("file,altitude_km,attitude_sigma_deg\n0000.png,400,-1\n").expect(2).err;
     insta::assert_snapshot!(err, @"error: in/frames.csv:2: 0000.png: attitude_sigma_deg must be a finite number, 0 or \
                                    more, not -1");

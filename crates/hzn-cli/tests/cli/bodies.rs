@@ -8,7 +8,7 @@ fn earth_and_sun(n: usize) -> Place {
     let place = Place::new();
     let one = "[body]\nkind = \"earth-sphere\"\naltitude_km = 400.0\n";
     let two = "[[bodies]]\nkind = \"earth-sphere\"\naltitude_km = 400.0\n\n[[bodies]]\nkind = \"sun\"\n\
-               [bodies.binarize]\nmethod = \"fixed\"\nlevel = 0.9\n[bodies.covariance]\nsigma_px = 3.0\n";
+               [bodies.threshold]\nmethod = \"fixed\"\nlevel = 0.9\n[bodies.covariance]\nsigma_px = 3.0\n";
     assert!(SENSOR.contains(one));
     place.write("in/sensor.toml", SENSOR.replace(one, two).as_bytes());
     for i in 0..n {
@@ -68,8 +68,8 @@ fn a_sun_next_to_the_earth_has_its_own_threshold() {
     let rows = without_time(&place.run(&["run", "in"]).expect(0).out);
     // Without this section the result is the same. With the Earth's threshold, the Earth would be taken for the bright
     // body.
-    let told = place.read("in/sensor.toml").replace("[bodies.binarize]\nmethod = \"fixed\"\nlevel = 0.9\n", "");
-    assert!(!told.contains("bodies.binarize"));
+    let told = place.read("in/sensor.toml").replace("[bodies.threshold]\nmethod = \"fixed\"\nlevel = 0.9\n", "");
+    assert!(!told.contains("bodies.threshold"));
     place.write("in/sensor.toml", told.as_bytes());
     assert_eq!(without_time(&place.run(&["run", "in"]).expect(0).out), rows);
 }

@@ -149,7 +149,7 @@ fn the_lens_comes_from_the_sun() {
     assert!(ran.out.contains("discs with a direction"), "{}", ran.out);
     let text = place.read("new.toml");
     assert!((value(&text, "fx_px") / 1500.0 - 1.0).abs() < 0.002, "{}", ran.out);
-    assert!(text.contains("q_body_from_camera_wxyz") && text.contains("discs of Sun or Moon in flight"), "{text}");
+    assert!(text.contains("q_vehicle_from_camera_wxyz") && text.contains("discs of Sun or Moon in flight"), "{text}");
     place.run(&["calibrate", "check", "flight", "-s", "mine.toml", "-q"]).expect(2).says("only for Sun and Moon");
     place.write("none.csv", b"file\n");
     place

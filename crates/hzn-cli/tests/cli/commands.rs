@@ -61,7 +61,7 @@ fn explain_shows_every_stage() {
     let place = Place::with_pictures(2);
     let out = place.run(&["explain", "in/0001.png", "--overlay", "o.png"]).expect(0).out;
     for word in
-        ["picture", "expected", "binarize", "contour", "candidates", "chosen", "status      ok", "sigma", "time"]
+        ["picture", "expected", "threshold", "contour", "candidates", "chosen", "status      ok", "sigma", "time"]
     {
         assert!(out.contains(word), "{word} in {out}");
     }
@@ -258,16 +258,19 @@ fn a_telecommand_has_values_that_can_be() {
         ran.err.trim_end().split_once("\": ").unwrap().1.to_owned()
     };
     assert_eq!(refused("camera.fx_px nan"), "camera.fx_px cannot be nan: it must be a finite number above 0");
-    assert_eq!(refused("gate.max_mean 1.5"), "gate.max_mean cannot be 1.5: it must be a finite number from 0 to 1");
     assert_eq!(
-        refused("binarize.method 7"),
-        "binarize.method cannot be 7: it must be one of 0 otsu, 1 fixed, 2 dynamic"
+        refused("brightness.max_mean 1.5"),
+        "brightness.max_mean cannot be 1.5: it must be a finite number from 0 to 1"
+    );
+    assert_eq!(
+        refused("threshold.method 7"),
+        "threshold.method cannot be 7: it must be one of 0 otsu, 1 fixed, 2 dynamic"
     );
     assert!(refused("camera.width 640.5").contains("cannot be 640.5: it must be a whole number from"));
-    assert!(refused("reject.threshold_px -1").contains("above 0, to 1000"));
+    assert!(refused("consensus.threshold_px -1").contains("above 0, to 1000"));
     assert!(refused("camera.theta_max_deg 200").contains("or NaN to leave it out"));
     assert!(refused("telemetry.housekeeping_every 0").contains("from 1 to 65535"));
-    assert!(refused("select.max_rms_px much").contains("cannot be much: it must be"));
+    assert!(refused("gates.max_rms_px much").contains("cannot be much: it must be"));
     assert!(refused("200 inf").contains("mask corners cannot be inf"));
     place.run(&["telecommand", "known -5"]).expect(2).says("the altitude -5 km is refused: must be above 0");
     place.run(&["telecommand", "known 230 1e40 0 0"]).expect(2).says("not a finite number of kilometres");
@@ -290,7 +293,7 @@ fn a_telecommand_has_values_that_can_be() {
     place.run(&["telecommand", "time 2026-01-01T00:00:00.5Z pulse"]).expect(2).says("a whole second");
     place.run(&["telecommand", "stage"]).expect(2).says("there is no such command");
     // A choice by name gives the same command as by number. An optional value may be NaN.
-    let (named, numbered) = (set("binarize.method fixed"), set("50 1"));
+    let (named, numbered) = (set("threshold.method fixed"), set("50 1"));
     assert!(named.status.success() && named.stdout == numbered.stdout);
     for pair in ["camera.theta_max_deg NaN", "1000 -3.5", "camera.k -0.1", "200 4 201 3 body.kind moon"] {
         assert!(set(pair).status.success(), "{pair}");

@@ -125,11 +125,11 @@ fn a_flight_with_commands_and_a_crash() {
     first.wait_for("flight mode");
     let mut ground = Running::start(place.command(&["telemetry", &connect, "-o", "sent.csv", "--send", "report"]));
     ground.wait_for("report: done");
-    command(&["mode standby", "set reject.threshold_px 2.5", "mode flight"]).expect(0).says("mode flight: done");
+    command(&["mode standby", "set consensus.threshold_px 2.5", "mode flight"]).expect(0).says("mode flight: done");
     let mut pipe = first.stdin();
     feed(&mut pipe, &pictures[..BEFORE], |i| {
         if i == BEFORE / 2 {
-            command(&["ping", "read reject.threshold_px"]).expect(0).says("reject.threshold_px = 2.5");
+            command(&["ping", "read consensus.threshold_px"]).expect(0).says("consensus.threshold_px = 2.5");
         }
     });
     first.signal(Signal::SIGKILL);
@@ -139,11 +139,11 @@ fn a_flight_with_commands_and_a_crash() {
     second.wait_for("answers were recovered");
     second.wait_for("reset by the watchdog");
     // The parameters are those of the first run, although sensor.toml has others.
-    second.wait_for("has other values than sensor.toml for reject.threshold_px");
+    second.wait_for("has other values than sensor.toml for consensus.threshold_px");
     ground.wait_for("connected");
     let mut pipe = second.stdin();
     feed(&mut pipe, &pictures[BEFORE..], |_| ());
-    command(&["read reject.threshold_px"]).expect(0).says("reject.threshold_px = 2.5");
+    command(&["read consensus.threshold_px"]).expect(0).says("consensus.threshold_px = 2.5");
     second.signal(Signal::SIGTERM);
     let (code, said) = second.end();
     assert_eq!(code, Some(0), "{said}");
@@ -162,7 +162,7 @@ fn compare_with_run(place: &Place, pictures: &[Vec<u8>]) {
         let image = image::GrayImage::from_raw(320, 240, picture.clone()).unwrap();
         image.save(place.path(&format!("in/{i:04}.png"))).unwrap();
     }
-    let sensor = crate::common::SENSOR.to_owned() + "\n[reject]\nthreshold_px = 2.5\n";
+    let sensor = crate::common::SENSOR.to_owned() + "\n[consensus]\nthreshold_px = 2.5\n";
     place.write("in/sensor.toml", sensor.as_bytes());
     place.run(&["run", "in", "--flight", "-o", "flight.csv"]).expect(0);
     place.run(&["run", "in", "-o", "host.csv"]).expect(0);

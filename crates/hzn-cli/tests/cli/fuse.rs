@@ -80,11 +80,11 @@ fn wrong_inputs_are_refused_in_words() {
         stderr
     };
     assert!(refused(&[]).contains("left: nobody says how the camera is mounted; give --mount left=FILE"));
-    let mirror = "[mount]\nbody_from_camera = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]\n";
+    let mirror = "[mount]\nvehicle_from_camera = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]\n";
     std::fs::write(at.join("mirror.toml"), mirror).unwrap();
     let text = refused(&["--mount", "left=mirror.toml", "--mount", "right=right.toml"]);
     assert!(
-        text.contains("mirror.toml: [mount] body_from_camera: the determinant is -1, so the matrix mirrors"),
+        text.contains("mirror.toml: [mount] vehicle_from_camera: the determinant is -1, so the matrix mirrors"),
         "{text}"
     );
     let text = refused(&["--mount", "left=left.toml", "--mount", "right=left.toml"]);
@@ -182,7 +182,7 @@ fn every_answer_of_the_flight_program_is_used() {
         String::from_utf8(out.stdout).unwrap()
     };
     std::fs::write(at.join("short.toml"), SCENE).unwrap();
-    std::fs::write(at.join("mount.toml"), "[mount]\nq_body_from_camera_wxyz = [1.0, 0.0, 0.0, 0.0]\n").unwrap();
+    std::fs::write(at.join("mount.toml"), "[mount]\nq_vehicle_from_camera_wxyz = [1.0, 0.0, 0.0, 0.0]\n").unwrap();
     hzn(&["simulate", "short.toml", "-o", "out"]);
     // The first attitude is that of a star tracker: the scene has no second direction.
     let vehicle = std::fs::read_to_string(at.join("out/vehicle.csv")).unwrap();

@@ -21,7 +21,7 @@ fn an_answer_farther_than_the_vehicle_can_turn_is_refused() {
     let place = turned();
     let all = place.run(&["run", "in"]).expect(0);
     assert!(statuses(&all.out).iter().all(|(status, _)| status == "ok"), "{}", all.out);
-    place.write("in/sensor.toml", format!("{SENSOR}\n[select]\nmax_rate_deg_s = 1.0\n").as_bytes());
+    place.write("in/sensor.toml", format!("{SENSOR}\n[gates]\nmax_rate_deg_s = 1.0\n").as_bytes());
     let slow = statuses(&place.run(&["run", "in"]).expect(0).out);
     assert_eq!([&slow[0].0, &slow[1].0, &slow[2].0], ["ok", "rejected", "ok"], "{slow:?}");
     assert!(slow[1].1.contains("rate"), "{slow:?}");
@@ -34,7 +34,7 @@ fn an_answer_farther_than_the_vehicle_can_turn_is_refused() {
 #[test]
 fn resume_goes_on_from_the_last_answer() {
     let place = turned();
-    place.write("in/sensor.toml", format!("{SENSOR}\n[select]\nmax_rate_deg_s = 1.0\n").as_bytes());
+    place.write("in/sensor.toml", format!("{SENSOR}\n[gates]\nmax_rate_deg_s = 1.0\n").as_bytes());
     for ending in ["csv", "jsonl"] {
         let (whole, part) = (format!("whole.{ending}"), format!("part.{ending}"));
         place.run(&["run", "in", "-o", &whole]).expect(0);

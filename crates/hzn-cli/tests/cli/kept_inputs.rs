@@ -152,8 +152,9 @@ const CASES: &[Case] = &[
     ("state/parameters-1.bin", &["fly", "-", "--sensor", "state/parameters-1.bin", "--state", "state"]),
 ];
 
-/// The commands that write no file, or read none that the user names.
-const WITHOUT: &[&str] = &["info", "view", "completions", "demo", "help"];
+/// The commands that write no file, or read none that the user names; and `migrate`, whose task is to rewrite its
+/// input.
+const WITHOUT: &[&str] = &["info", "view", "completions", "demo", "help", "migrate"];
 
 /// Returns a folder with an input of each kind, and links to them.
 fn place() -> Place {
@@ -175,7 +176,7 @@ fn place() -> Place {
     place.write("in/truth.csv", TRUTH.as_bytes());
     place.write("lens.csv", CAMERA.as_bytes());
     place.write("lens.toml", b"[camera]\nfile = \"lens.csv\"\n[body]\naltitude_km = 400.0\n");
-    place.write("n.tf", b"[mount]\nq_body_from_camera_wxyz = [1.0, 0.0, 0.0, 0.0]\n");
+    place.write("n.tf", b"[mount]\nq_vehicle_from_camera_wxyz = [1.0, 0.0, 0.0, 0.0]\n");
     place.write("t.bin", b"no packet");
     let scene = place.run(&["simulate", "enceladus", "--show"]).expect(0).out;
     for name in ["scene.toml", "sim/scene.toml"] {

@@ -16,6 +16,7 @@ mod fly;
 mod fuse;
 mod gates;
 mod kept_inputs;
+mod migrate;
 mod outputs;
 mod pictures;
 mod position_input;

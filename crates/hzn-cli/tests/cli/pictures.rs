@@ -46,7 +46,7 @@ fn sixteen_bits_are_not_cut_to_eight() {
     // All brightness lies within one step of 8 bits, and so does the threshold.
     place.write(
         "in/sensor.toml",
-        format!("{}[binarize]\nmethod = \"fixed\"\nlevel = 622.0\n", crate::common::SENSOR).as_bytes(),
+        format!("{}[threshold]\nmethod = \"fixed\"\nlevel = 622.0\n", crate::common::SENSOR).as_bytes(),
     );
     let faint: Vec<u16> = limb(320, 240, 0.0).into_raw().into_iter().map(|v| 0x0200 + u16::from(v)).collect();
     let faint = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(320, 240, faint).unwrap();

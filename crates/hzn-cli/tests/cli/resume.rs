@@ -143,7 +143,7 @@ fn another_sensor_is_not_appended() {
             // A recording contains its sensor.
             .says(if out == "a.mcap" { "was begun with another sensor.toml" } else { "now gives another result" });
         assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
-        place.write("other.toml", format!("{}[reject]\nseed = 2\n", crate::common::SENSOR).as_bytes());
+        place.write("other.toml", format!("{}[consensus]\nseed = 2\n", crate::common::SENSOR).as_bytes());
         let ran = place.run(&["run", "in", "-o", out, "--resume", "-s", "other.toml"]);
         assert!(ran.code == 2 && ran.err.contains("--force"), "{out}: {}", ran.err);
         assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");

@@ -243,7 +243,7 @@ fn each_camera_of_a_scene_has_a_folder() {
     let camera = |name: &str, q: &str| {
         format!(
             "[[cameras]]\nname = \"{name}\"\nmount_error_deg = 0.5\nclock.offset_s = \
-             0.2\nmount.q_body_from_camera_wxyz = {q}\n"
+             0.2\nmount.q_vehicle_from_camera_wxyz = {q}\n"
         )
     };
     let cameras = camera("fore", "[1, 0, 0, 0]") + &camera("aft", "[0, 0, 1, 0]");
@@ -309,7 +309,7 @@ fn two_cameras_follow_the_vehicle_of_the_first_one() {
     // The second camera is turned by 90 degrees about its axis.
     let mounts = [[0.8, 0.6, 0.0, 0.0], [0.565_685_425, 0.424_264_069, -0.424_264_069, 0.565_685_425]];
     let camera =
-        |name: &str, q: [f64; 4]| format!("[[cameras]]\nname = {name:?}\nmount.q_body_from_camera_wxyz = {q:?}\n");
+        |name: &str, q: [f64; 4]| format!("[[cameras]]\nname = {name:?}\nmount.q_vehicle_from_camera_wxyz = {q:?}\n");
     let scene = format!("{SCENE}{}{}", camera("first", mounts[0]), camera("second", mounts[1]));
     std::fs::write(at.join("my.toml"), scene).unwrap();
     let (code, _, stderr) = hzn(at, "2", &["simulate", "my.toml", "-o", "out", "-q"]);

@@ -50,7 +50,7 @@ fn disc(position: bool) -> (Place, PictureAnswer) {
     let place = Place::new();
     let body = "kind = \"sphere\"\nradius_km = 1000.0\nlimb_height_km = 0.0\naltitude_km = 2863.7033";
     let sensor = crate::common::SENSOR.replace("kind = \"earth-sphere\"\naltitude_km = 400.0", body);
-    place.write("in/sensor.toml", format!("{sensor}\n[estimate]\nposition = {position}\n").as_bytes());
+    place.write("in/sensor.toml", format!("{sensor}\n[fit]\nposition = {position}\n").as_bytes());
     let picture = GrayImage::from_fn(320, 240, |x, y| {
         let (u, v) = ((f64::from(x) - 159.5) / 300.0, (f64::from(y) - 119.5) / 300.0);
         let cos = (0.05 * u + 0.08 * v + 1.0) / ((1.0 + u * u + v * v) * (1.0 + 0.0025 + 0.0064)).sqrt();
@@ -144,7 +144,7 @@ fn what_is_missing_refused_or_of_another_version_is_told() {
     for text in [
         "2017-01-01T00:00:00.000Z  clock correlated with 2017-01-01T00:00:00.000Z, changed by 12 ms",
         "command 9 (navigate): a number of a vector is missing: position_y_m",
-        "command 10 (set): value refused; nothing changed: parameter 81 reject.threshold_px",
+        "command 10 (set): value refused; nothing changed: parameter 81 consensus.threshold_px",
         "1 answers without some of their candidates",
         "1 packets of version 1",
     ] {

@@ -19,6 +19,7 @@ pub struct ConfigError {
 impl ConfigError {
     /// Makes the error for a value that needs a feature which is not in this build: a `word`, or any value but the
     /// default.
+    // The value is NaN because a word has no number, and `Display` leaves it out for this limit.
     pub(crate) const fn lacks(field: &'static str, word: Option<&'static str>, feature: &'static str) -> Self {
         Self { field, value: f64::NAN, limit: Limit::Feature { word, feature }, body: None }
     }
@@ -91,6 +92,7 @@ impl fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 /// Checks one field; the `check` of every stage uses it.
+// The caller passes `ok` and not its negation, so that NaN fails every comparison and is refused.
 pub(crate) fn require(ok: bool, field: &'static str, value: f64, limit: Limit) -> Result<(), ConfigError> {
     if ok { Ok(()) } else { Err(ConfigError { field, value, limit, body: None }) }
 }

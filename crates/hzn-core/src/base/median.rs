@@ -5,9 +5,11 @@ use crate::base::real::Real;
 /// Returns the median of values from 0 to `most`, with an error of at most `most`/4096.
 pub(crate) fn median_of_reals<T: Real>(values: &[T], most: T) -> T {
     let (mut low, mut high) = (T::ZERO, most);
+    // Twelve halvings give 1/4096 of the range. The count is fixed so that the time does not depend on the values.
     for _ in 0..12 {
         let middle = (low + high) * T::from_f64(0.5);
         let below = values.iter().filter(|v| **v <= middle).count();
+        // At least half of the values always lie at or below `high`, which is why it is returned and not the middle.
         if 2 * below >= values.len() { high = middle } else { low = middle }
     }
     high
@@ -19,6 +21,7 @@ pub(crate) fn median_of_counts(values: &[u16]) -> u16 {
     while low < high {
         let middle = (low + high) / 2;
         let below = values.iter().filter(|&&v| u32::from(v) <= middle).count();
+        // The values are whole numbers, so the next candidate is `middle + 1`; with `middle` the loop would not end.
         if 2 * below >= values.len() { high = middle } else { low = middle + 1 }
     }
     low as u16

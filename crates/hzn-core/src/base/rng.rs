@@ -2,12 +2,18 @@
 
 /// PCG32 with a 64-bit state (O'Neill 2014, XSH-RR).
 #[derive(Debug, Clone)]
+// The generator is fixed and not that of a crate, because another version of a crate would give other draws, and with
+// them other answers in the last digits.
 pub(crate) struct Rng(u64);
 
 impl Rng {
     /// Seeds the generator.
     pub(crate) fn new(seed: u32) -> Self {
+        // The product spreads the seeds over the whole state: with 0, 1, 2, ... as states the first numbers would be
+        // related.
         let mut rng = Self(u64::from(seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x853C_49E6_748F_EA9B);
+        // An output is computed from the state before the step, so the first one depends on the seed alone. It is left
+        // out.
         rng.next();
         rng
     }
@@ -21,6 +27,8 @@ impl Rng {
 
     /// Returns a random number below `n`; 0 when `n` is 0. The probabilities are equal to within n/2³².
     pub(crate) fn below(&mut self, n: u32) -> u32 {
+        // A product and a shift replace the remainder of a division, which is slower on a Cortex-M and has a panic path
+        // for 0.
         ((u64::from(self.next()) * u64::from(n)) >> 32) as u32
     }
 }

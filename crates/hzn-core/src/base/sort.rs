@@ -6,6 +6,7 @@ use core::mem::swap;
 /// items may change places. If `less` is not an order, the result is some permutation of the items.
 pub(crate) fn by<X>(items: &mut [X], less: impl Fn(&X, &X) -> bool) {
     let n = items.len();
+    // The heap is built from its last parent upwards, so that both branches below a root are heaps already.
     for root in (0..n / 2).rev() {
         sink(items, root, n, &less);
     }
@@ -22,6 +23,8 @@ fn sink<X>(items: &mut [X], mut root: usize, end: usize, less: &impl Fn(&X, &X) 
         if left >= end {
             return;
         }
+        // `get` instead of an index: the compiler cannot see that both are within the list, and would link a panic
+        // path.
         let is_less = |a: usize, b: usize| items.get(a).zip(items.get(b)).is_some_and(|(a, b)| less(a, b));
         let child = if left + 1 < end && is_less(left, left + 1) { left + 1 } else { left };
         if !is_less(root, child) {
@@ -33,6 +36,7 @@ fn sink<X>(items: &mut [X], mut root: usize, end: usize, less: &impl Fn(&X, &X) 
 }
 
 fn exchange<X>(items: &mut [X], a: usize, b: usize) {
+    // `swap` of a slice would panic for an index outside it; here nothing happens.
     if let Ok([a, b]) = items.get_disjoint_mut([a, b]) {
         swap(a, b);
     }

@@ -41,10 +41,10 @@ pub struct Config {
     pub input: Input,
     /// Brightness gate.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub gate: threshold::Gate,
+    pub brightness: threshold::Brightness,
     /// Threshold between dark and lit.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub binarize: threshold::Config,
+    pub threshold: threshold::Config,
     /// Parts of the picture that never count.
     #[cfg_attr(feature = "serde", serde(default))]
     pub mask: region::Config,
@@ -53,22 +53,22 @@ pub struct Config {
     pub contour: contour::Config,
     /// Edges that are examined, and their sub-pixel points.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub candidates: edge_points::Config,
+    pub edge_points: edge_points::Config,
     /// Consensus and outlier rejection.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub reject: consensus::Config,
+    pub consensus: consensus::Config,
     /// The fit.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub estimate: fit::Config,
+    pub fit: fit::Config,
     /// Noise model of the edge points.
     #[cfg_attr(feature = "serde", serde(default))]
     pub covariance: covariance::Config,
     /// Gates of an answer.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub select: gates::Config,
-    /// Further looks and subdivision, for a picture without an answer.
+    pub gates: gates::Config,
+    /// Further looks and division, for a picture without an answer.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub recover: retry::Config,
+    pub retry: retry::Config,
     /// Work budget of a picture.
     #[cfg_attr(feature = "serde", serde(default))]
     pub limits: work::Config,
@@ -79,7 +79,7 @@ section! {
     "mount" pub struct Mount: Copy without defaults {
         /// Quaternion that converts camera coordinates to vehicle coordinates, scalar first; with it the results have
         /// roll and pitch.
-        @20 q_body_from_camera_wxyz: [f64; 4], serde(), ["unit quaternion"]
+        @20 q_vehicle_from_camera_wxyz: [f64; 4], serde(), ["unit quaternion"]
             { unset: "no mounting", example: "[1.0, 0.0, 0.0, 0.0]" };
     }
 }
@@ -129,16 +129,16 @@ impl Config {
             body: body::Config::default(),
             bodies: heapless::Vec::new(),
             input: Input::default(),
-            gate: threshold::Gate::default(),
-            binarize: threshold::Config::default(),
+            brightness: threshold::Brightness::default(),
+            threshold: threshold::Config::default(),
             mask: region::Config::default(),
             contour: contour::Config::default(),
-            candidates: edge_points::Config::default(),
-            reject: consensus::Config::default(),
-            estimate: fit::Config::default(),
+            edge_points: edge_points::Config::default(),
+            consensus: consensus::Config::default(),
+            fit: fit::Config::default(),
             covariance: covariance::Config::default(),
-            select: gates::Config::default(),
-            recover: retry::Config::default(),
+            gates: gates::Config::default(),
+            retry: retry::Config::default(),
             limits: work::Config::default(),
         }
     }
@@ -152,10 +152,10 @@ impl Config {
     /// other body in the picture is also brighter than the sky.
     pub fn threshold_of(&self, which: u8) -> &threshold::Config {
         let body = self.each_body().get(usize::from(which));
-        match body.and_then(|b| b.binarize.as_ref()) {
+        match body.and_then(|b| b.threshold.as_ref()) {
             Some(own) => own,
             None if !self.bodies.is_empty() && body.is_some_and(body::Config::blooms) => &threshold::SUN,
-            None => &self.binarize,
+            None => &self.threshold,
         }
     }
     /// Returns the noise model of body number `which`: that of the body, or else that of the sensor.
@@ -166,17 +166,20 @@ impl Config {
     /// Returns whether the threshold of a body, or a gate, depends on the previous picture. Pictures must then come in
     /// order.
     pub fn tracks(&self) -> bool {
-        if self.select.max_rate_deg_s.is_some() {
+        // The gate compares with the last answer. On several threads that would be the answer of another time.
+        if self.gates.max_rate_deg_s.is_some() {
             return true;
         }
         (0..self.each_body().len()).any(|which| self.threshold_of(which as u8).method == threshold::Method::Track)
     }
-    /// Returns whether the fit gives the position of a body of this sensor: `estimate.position`, which by default is
+    /// Returns whether the fit gives the position of a body of this sensor: `fit.position`, which by default is
     /// true for `ellipsoid` and the planets with a name. The Sun has no position, because its limb blooms.
     pub fn fits_position(&self, body: &body::Config) -> bool {
         cfg!(feature = "position")
+            // The edge of a Sun that blooms lies outside its disc, so its radius would give a distance that is too
+            // small.
             && body.kind != body::Kind::Sun
-            && self.estimate.position.unwrap_or_else(|| body.is_ellipsoid())
+            && self.fit.position.unwrap_or_else(|| body.is_ellipsoid())
     }
     /// Refuses methods that do not work in the scaled space of a body.
     fn check_position(&self) -> Result<(), ConfigError> {
@@ -185,22 +188,20 @@ impl Config {
         }
         let rule = |holds: bool, field, rule| require(holds, field, f64::NAN, Limit::Rule(rule));
         rule(
-            self.estimate.half_angle != fit::HalfAngle::Known,
-            "estimate.half_angle",
-            "a position needs the half-angle: write \"fused\" or \"free\", or estimate.position = false",
+            self.fit.half_angle != fit::HalfAngle::Known,
+            // The distance is the half-angle: with a known one there would be nothing left to measure.
+            "fit.half_angle",
+            "a position needs the half-angle: write \"fused\" or \"free\", or fit.position = false",
         )?;
         rule(
-            matches!(
-                self.estimate.method,
-                fit::Method::Sphere | fit::Method::LeastSquares | fit::Method::GeneralisedTls
-            ),
-            "estimate.method",
-            "a position needs \"sphere\", \"least-squares\" or \"generalised-tls\", or estimate.position = false",
+            matches!(self.fit.method, fit::Method::Sphere | fit::Method::LeastSquares | fit::Method::GeneralisedTls),
+            "fit.method",
+            "a position needs \"sphere\", \"least-squares\" or \"generalised-tls\", or fit.position = false",
         )?;
         rule(
             self.covariance.method == covariance::Method::Sandwich,
             "covariance.method",
-            "a position needs \"sandwich\", or estimate.position = false",
+            "a position needs \"sandwich\", or fit.position = false",
         )
     }
     /// Returns the same bodies as [`Self::each_body`], for changes.
@@ -223,33 +224,37 @@ impl Config {
     /// ```
     pub fn check(&self) -> Result<(), ConfigError> {
         if let Some(mount) = &self.mount {
-            let q = mount.q_body_from_camera_wxyz;
+            let q = mount.q_vehicle_from_camera_wxyz;
             let n2: f64 = q.iter().map(|x| x * x).sum();
             require(
+                // One percent allows for a quaternion that was written with three digits; it is normalised later. More
+                // is a typing error.
                 (n2 - 1.0).abs() < 0.01,
-                "mount.q_body_from_camera_wxyz",
+                "mount.q_vehicle_from_camera_wxyz",
                 n2,
                 Limit::Rule("the quaternion's squared length must be 1 (scalar first)"),
             )?;
         }
         for (which, body) in self.each_body().iter().enumerate() {
+            // The number of the body is added here, because the check of a body does not know its place in the list.
             body.check().map_err(|e| ConfigError { body: (!self.bodies.is_empty()).then_some(which as u8), ..e })?;
         }
-        self.gate.check()?;
-        self.binarize.check_keys()?;
+        self.brightness.check()?;
+        self.threshold.check_keys()?;
         self.mask.check(&self.camera)?;
         self.contour.check()?;
-        self.candidates.check()?;
-        self.reject.check_keys()?;
-        self.estimate.check_keys()?;
+        self.edge_points.check()?;
+        self.consensus.check_keys()?;
+        self.fit.check_keys()?;
         self.check_position()?;
         self.covariance.check_keys()?;
-        self.recover.check_keys()?;
+        self.retry.check_keys()?;
         self.limits.check_keys()?;
         self.input.check_keys()?;
         if let Some(rows) = self.input.scale_to_height {
+            // The upper limit is at least 16, so that the message never names a range from 16 to a smaller number.
             between("input.scale_to_height", f64::from(rows), 16.0, f64::from(self.camera.height.max(16)))?;
         }
-        self.select.check()
+        self.gates.check()
     }
 }

@@ -5,7 +5,7 @@ use super::{Config, Input, Mount, retry};
 use crate::base::keys::{Section, Table};
 use crate::geometry::camera;
 use crate::image::region;
-use crate::model::threshold::Gate;
+use crate::model::threshold::Brightness;
 use crate::model::{body, edge_noise, threshold, work};
 use crate::stages::{consensus, contour, edge_points, fit, gates};
 
@@ -13,10 +13,13 @@ use crate::stages::{consensus, contour, edge_points, fit, gates};
 macro_rules! sections {
     ($($field:ident: $section:ty),+ $(,)?) => {
         /// The sections of sensor.toml with their keys.
+        // `[mount]` stands apart because it has no default: a sensor without a mount has no section to read or write.
         pub const SECTIONS: &[Table] = &[$(<$section>::TABLE),+, Mount::TABLE];
 
         impl Config {
-            /// Returns the key of a number in flight, for example `reject.threshold_px` for 81.
+            /// Returns the key of a number in flight, for example `consensus.threshold_px` for 81.
+            // The sections are asked one after the other, because one table of all numbers would have to be kept equal
+            // to them by hand.
             pub fn path(id: u16) -> Option<&'static str> {
                 $(
                     if let Some(path) = <$section>::path(id) {
@@ -55,11 +58,15 @@ macro_rules! sections {
                     }
                 )+
                 Mount::path(id)?;
+                // NaN unsets the mount, because a flight computer stores NaN for every number of a key that is left
+                // out.
                 if number.is_nan() {
                     self.mount = None;
                     return Some(true);
                 }
-                self.mount.get_or_insert(Mount { q_body_from_camera_wxyz: [0.0; 4] }).set_number(id, number)
+                // The four numbers arrive one by one. The zeros are no rotation, so that [`Config::check`] refuses a
+                // mount that was set only in part.
+                self.mount.get_or_insert(Mount { q_vehicle_from_camera_wxyz: [0.0; 4] }).set_number(id, number)
             }
 
             /// Returns the first key without a number in flight whose value differs from that of `other`.
@@ -79,15 +86,15 @@ sections! {
     camera: camera::Config,
     body: body::Config,
     input: Input,
-    gate: Gate,
-    binarize: threshold::Config,
+    brightness: Brightness,
+    threshold: threshold::Config,
     mask: region::Config,
     contour: contour::Config,
-    candidates: edge_points::Config,
-    reject: consensus::Config,
-    estimate: fit::Config,
+    edge_points: edge_points::Config,
+    consensus: consensus::Config,
+    fit: fit::Config,
     covariance: edge_noise::Config,
-    select: gates::Config,
-    recover: retry::Config,
+    gates: gates::Config,
+    retry: retry::Config,
     limits: work::Config,
 }

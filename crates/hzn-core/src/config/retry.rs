@@ -1,4 +1,4 @@
-//! `[recover]`: further looks and subdivision, when the first look at a picture gives no answer.
+//! `[retry]`: further looks and division, when the first look at a picture gives no answer.
 
 use crate::base::keys::{choices, section};
 
@@ -26,8 +26,8 @@ choices! {
 pub const MAX_LEVELS: usize = 4;
 
 section! {
-    /// `[recover]` of sensor.toml: further looks at a picture without an answer.
-    "recover" pub struct Config {
+    /// `[retry]` of sensor.toml: further looks at a picture without an answer.
+    "retry" pub struct Config {
         /// Thresholds of further looks, on a scale from the mean of the dark pixels (0) to the first look's threshold
         /// (1); `[]` allows only one look.
         ///
@@ -37,6 +37,7 @@ section! {
         /// only.
         @- levels: heapless::Vec<f64, MAX_LEVELS> = levels(), [0.05 to 4.0];
         /// Lowest threshold of a further look, in standard deviations of the dark pixels' noise above their mean.
+        // Below three deviations a threshold follows the noise of the sky: there the limb was found 25 km too high.
         @- min_sigma: f64 = 3.0, [0.0 to 100.0];
         /// Smallest fraction of an edge's points that must lie on the limb in a further look.
         ///
@@ -48,6 +49,7 @@ section! {
         /// Demosaicing leaves one to four rows and columns black. A frame is dark on all sides, and at least an eighth
         /// of the pixels next to it are lit. Next to a lit body, a frame would join the limb to the outline of the
         /// picture.
+        // Eight pixels are twice what demosaicing leaves.
         @- frame_px: u16 = 8, [0.0 to 64.0];
         /// The step that follows when no edge of the whole picture gives an answer.
         @- method: Method = Method::None, [choice];
@@ -60,6 +62,8 @@ section! {
 
 /// The thresholds at 0.5 and 0.25 are for a limb that is dimmer than clouds. The threshold at 2 is for a limb under a
 /// glare, or with lit air above it.
+// With these looks the scene `horace` answers 40 instead of 35 of 46 limbs, and none of 14 pictures without a limb,
+// which is why there are three of them.
 const LEVELS: [f64; 3] = [0.5, 0.25, 2.0];
 
 fn levels() -> heapless::Vec<f64, MAX_LEVELS> {

@@ -22,6 +22,7 @@ pub(crate) struct Circle<T> {
 impl<T: Real> Circle<T> {
     /// Fits a circle to the points. `None` with fewer than three points, or when they lie on a line.
     pub(crate) fn fit(points: impl Iterator<Item = [T; 2]> + Clone) -> Option<Self> {
+        // The points come as an iterator that is run three times, because a list of them would need memory.
         let (mut n, mut x, mut y) = (T::ZERO, T::ZERO, T::ZERO);
         for p in points.clone() {
             n += T::one();
@@ -38,6 +39,7 @@ impl<T: Real> Circle<T> {
             spread += u * u + v * v;
         }
         let scale = (spread / n).sqrt();
+        // Equal points have no spread, and the coordinates are divided by it.
         if !(scale > T::ZERO && scale.is_finite()) {
             return None;
         }

@@ -13,15 +13,19 @@ pub(crate) fn through_two<T: Real>(s1: &V3<T>, s2: &V3<T>, c: T) -> Option<[V3<T
     let n = s1.cross(s2);
     let n2 = n.dot(&n);
     let sum = one + s1.dot(s2);
+    // For closer rays the radicand, a small difference over n², has hardly a correct digit; opposite rays have no mean
+    // direction. Therefore neither is a pair.
     if !(n2 > T::EPSILON * T::from_f64(100.0) && sum > T::EPSILON * T::from_f64(100.0)) {
         return None;
     }
     let a = c / sum;
     let radicand = (one - (a + a) * a * sum) / n2;
+    // A negative radicand means that the rays are more than 2α apart: no cone of this half-angle touches both.
     if !(radicand >= T::zero()) {
         return None;
     }
     let (mid, off) = ((s1 + s2) * a, n * radicand.sqrt());
+    // Both signs are hypotheses, because the two points alone do not say on which side the body is.
     Some([mid + off, mid - off])
 }
 
@@ -36,6 +40,7 @@ pub(crate) fn through_three<T: Real>(s1: &V3<T>, s2: &V3<T>, s3: &V3<T>) -> Opti
     }
     let e = n * (T::one() / n2.sqrt());
     let c = e.dot(s1);
+    // A plane has two normals. The axis is the one towards the rays, because limb rays are less than 90° from it.
     Some(if c < T::zero() { (-e, -c) } else { (e, c) })
 }
 
@@ -61,13 +66,17 @@ impl<T: Real> Azimuth<T> {
     #[inline(always)]
     pub(crate) fn offset(&self, s: [T; 3], d: T, east_along: T) -> T {
         let one = T::one();
+        // A ray along the axis has no azimuth, and the floor avoids a division by 0.
         let transverse = (one - d * d).max(T::EPSILON);
         // The component of the ray's transverse part along east; east itself is transverse to the axis.
         let along = s[0] * self.east.x + s[1] * self.east.y + s[2] * self.east.z - d * east_along;
+        // Rounding can make the quotient larger than 1, and the cotangent would leave the range between the two
+        // half-angles.
         let cos2 = (along * along / transverse).min(one);
         let cot2 = self.cot2_meridian + (self.cot2_east - self.cot2_meridian) * cos2;
         let [first, second] = self.harmonics_cos;
         let mut height = second * (one - cos2 - cos2);
+        // The test saves a root a point for bodies whose limb height does not vary with latitude.
         if first != T::ZERO {
             // North may lie some degrees off the tangent plane. This changes only a small part of a small term.
             let along = s[0] * self.north.x + s[1] * self.north.y + s[2] * self.north.z;

@@ -1,4 +1,4 @@
-//! A rectangle of a picture or of a smaller copy of it. The subdivision of a picture examines these rectangles.
+//! A rectangle of a picture or of a smaller copy of it. The division of a picture examines these rectangles.
 
 use crate::base::real::Real;
 use crate::geometry::pixel::{ImagePoint, Pixel};
@@ -23,6 +23,8 @@ impl Crop {
         let copy = match height {
             Some(h) if h < picture[1] => {
                 let (w, h, full) = (u32::from(picture[0]), u32::from(h), u32::from(picture[1]));
+                // The width is rounded and not cut off, so that the copy keeps the shape of the picture as well as
+                // whole pixels allow.
                 [((w * h + full / 2) / full).min(w).max(1) as u16, h.max(1) as u16]
             }
             _ => picture,
@@ -43,8 +45,10 @@ impl Crop {
     /// Cuts the rectangle into halves across the longer side; `None` when it is a single pixel.
     pub(crate) fn halves(&self) -> Option<[Self; 2]> {
         let (mut a, mut b) = (*self, *self);
+        // The longer side is cut, so that parts stay compact and a piece of limb is not cut more often than necessary.
         if self.width >= self.height {
             a.width = self.width / 2;
+            // The second half takes the odd pixel; with two equal halves a column would belong to no part.
             b.width = self.width - a.width;
             b.x0 = self.x0 + a.width;
         } else {
@@ -64,6 +68,8 @@ impl Crop {
     pub(crate) fn picture_point<T: Real>(&self, p: ImagePoint<T>) -> ImagePoint<T> {
         let ([sx, sy], half) = (self.scale(), T::from_f64(0.5));
         ImagePoint {
+            // Half a pixel is added before and taken away after the scale, because pixel centres are at integers and
+            // the corner of the picture at −½.
             u: (p.u + half + T::from_f64(f64::from(self.x0))) * sx - half,
             v: (p.v + half + T::from_f64(f64::from(self.y0))) * sy - half,
         }
@@ -80,6 +86,7 @@ impl Crop {
 
     /// Returns the pixel of the picture that contains the centre of a pixel of the crop.
     pub(crate) fn pixel(&self, x: u16, y: u16) -> Pixel {
+        // The place is computed in integers, so that the same pixel is found on every machine.
         let place = |at: u16, first: u16, k: usize| {
             let at = 2 * (u64::from(at) + u64::from(first)) + 1;
             let last = u64::from(self.full[k]).saturating_sub(1);

@@ -2,13 +2,13 @@
 //! that a wrong product does not compile.
 //!
 //! ```text
-//!   Cam            Ecef               Body
-//!   x right        x Greenwich        the vehicle's own,
-//!   y down         z north pole       tied to Cam by [mount]
-//!   z forward      WGS-84, rotating
+//!   Cam            Fixed                        Vehicle
+//!   x right        rotates with the body:       the vehicle's own,
+//!   y down         for the Earth it is ECEF,    tied to Cam by [mount]
+//!   z forward      z to the north pole
 //! ```
 //!
-//! All frames are right-handed. The types do not protect against a wrong *time* (an ECEF attitude of another instant)
+//! All frames are right-handed. The types do not protect against a wrong *time* (an attitude of another instant)
 //! or against rays of another camera.
 
 use core::marker::PhantomData;
@@ -19,13 +19,15 @@ use crate::base::real::Real;
 
 /// Camera frame: x right, y down, z along the optical axis, out of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+// The frames are types without values, so that they cost nothing at run time.
 pub enum Cam {}
-/// Earth-centred, Earth-fixed frame (WGS-84): x to Greenwich on the equator, z to the north pole.
+/// The frame that is fixed in the body: its origin is the body's centre, z points to the north pole, and x to the prime
+/// meridian on the equator. For the Earth it is ECEF with the ellipsoid of WGS-84.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ecef {}
-/// The vehicle's body frame; the mounting rotation ties it to the camera frame.
+pub enum Fixed {}
+/// The frame of the vehicle; the mounting rotation ties it to the camera frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Body {}
+pub enum Vehicle {}
 
 /// A direction: three numbers of unit length in frame `F`.
 ///
@@ -43,6 +45,7 @@ pub struct UnitVec3<F, T> {
     frame: PhantomData<F>,
 }
 
+// The traits are written by hand, because a derive would demand them of the frame `F` in every generic function.
 impl<F, T: Clone> Clone for UnitVec3<F, T> {
     fn clone(&self) -> Self {
         Self { v: self.v.clone(), frame: PhantomData }
@@ -80,6 +83,7 @@ impl<F, T: Real> UnitVec3<F, T> {
     /// Returns the angle between two directions of the same frame in radians; it is accurate for small angles too.
     pub fn angle_rad(&self, other: &Self) -> T {
         let c = self.v.cross(&other.v);
+        // The arc cosine would lose half of the digits of a small angle.
         c.dot(&c).sqrt().atan2(self.v.dot(&other.v))
     }
 }
@@ -163,6 +167,7 @@ impl<F, T: Real> Cov3<F, T> {
         let [xx, xy, xz, yy, yz, zz] = self.upper_rad2;
         let half = (xx + yy + zz) * T::from_f64(0.5);
         let minors = (xx * yy - xy * xy) + (xx * zz - xz * xz) + (yy * zz - yz * yz);
+        // Rounding can make the radicand slightly negative when both deviations are equal.
         (half + (half * half - minors).max(T::zero()).sqrt()).max(T::zero()).sqrt()
     }
 }
@@ -170,14 +175,14 @@ impl<F, T: Real> Cov3<F, T> {
 /// A rotation that converts coordinates from frame `A` to frame `B`.
 ///
 /// ```
-/// use hzn_core::frames::{Body, Cam, Rotation, UnitVec3};
+/// use hzn_core::frames::{Cam, Rotation, UnitVec3, Vehicle};
 ///
 /// // The camera looks along the vehicle's x axis: camera z is x, camera x is y, camera y is z.
-/// let cam_to_body = Rotation::<Cam, Body, f64>::assume_from_quaternion([0.5, 0.5, 0.5, 0.5]).expect("a rotation");
+/// let mount = Rotation::<Cam, Vehicle, f64>::assume_from_quaternion([0.5, 0.5, 0.5, 0.5]).expect("a rotation");
 /// let boresight = UnitVec3::<Cam, f64>::try_new([0.0, 0.0, 1.0]).expect("not of length zero");
-/// let [x, y, z] = cam_to_body.apply(&boresight).xyz();
+/// let [x, y, z] = mount.apply(&boresight).xyz();
 /// assert!((x - 1.0).abs() < 1e-15 && y.abs() < 1e-15 && z.abs() < 1e-15);
-/// let back = cam_to_body.inverse().apply(&cam_to_body.apply(&boresight));
+/// let back = mount.inverse().apply(&mount.apply(&boresight));
 /// assert!(back.angle_rad(&boresight) < 1e-12);
 /// ```
 #[derive(Debug)]
@@ -205,6 +210,7 @@ impl<A, B, T: Real> Rotation<A, B, T> {
         if !(n2 > T::from_f64(1e-12) && n2.is_finite()) {
             return None;
         }
+        // Division by the squared length normalises the quaternion without a root.
         let s = T::from_f64(2.0) / n2;
         let one = T::one();
         Some(Self {
@@ -235,9 +241,9 @@ impl<A, B, T: Real> Rotation<A, B, T> {
 /// Mixing frames does not compile:
 ///
 /// ```compile_fail
-/// use hzn_core::frames::{Cam, Ecef, UnitVec3};
+/// use hzn_core::frames::{Cam, Fixed, UnitVec3};
 /// let a = UnitVec3::<Cam, f64>::try_new([0.0, 0.0, 1.0]).unwrap();
-/// let b = UnitVec3::<Ecef, f64>::try_new([0.0, 0.0, 1.0]).unwrap();
+/// let b = UnitVec3::<Fixed, f64>::try_new([0.0, 0.0, 1.0]).unwrap();
 /// let _ = a.dot(&b);
 /// ```
 #[allow(dead_code, reason = "carries the compile-fail example above")]
@@ -251,12 +257,12 @@ mod tests {
     fn quaternion_turns_from_a_to_b_and_back() {
         let half = core::f64::consts::FRAC_1_SQRT_2;
         // A turn of +90° about z converts x to y.
-        let r = Rotation::<Cam, Body, f64>::assume_from_quaternion([half, 0.0, 0.0, half]).unwrap();
+        let r = Rotation::<Cam, Vehicle, f64>::assume_from_quaternion([half, 0.0, 0.0, half]).unwrap();
         let x = UnitVec3::try_new([1.0, 0.0, 0.0]).unwrap();
         let y = r.apply(&x);
         assert!((y.xyz()[1] - 1.0).abs() < 1e-15);
         assert!(r.inverse().apply(&y).angle_rad(&x) < 1e-15);
-        assert!(Rotation::<Cam, Body, f64>::assume_from_quaternion([0.0; 4]).is_none());
+        assert!(Rotation::<Cam, Vehicle, f64>::assume_from_quaternion([0.0; 4]).is_none());
     }
 
     #[test]

@@ -3,6 +3,8 @@
 
 /// A pixel of the picture, with integer coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+// Sixteen bits are enough because a picture has at most 65535 columns and rows; the lists of border pixels take half of
+// the memory that way.
 pub struct Pixel {
     /// Column, from 0 at the left.
     pub x: u16,

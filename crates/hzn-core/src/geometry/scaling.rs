@@ -21,16 +21,18 @@ pub(crate) struct Scaling<T> {
 }
 
 impl<T: Real> Scaling<T> {
-    /// Makes the map for an ellipsoid with the given semi-axes, in units of their mean. The columns of `body_to_cam`
-    /// are the axes of the body in the camera frame.
-    pub(crate) fn new(semi_axes: [T; 3], body_to_cam: &M3<T>) -> Self {
+    /// Makes the map for an ellipsoid with the given semi-axes, in units of their mean. The columns of
+    /// `camera_from_fixed` are the axes of the body in the camera frame.
+    pub(crate) fn new(semi_axes: [T; 3], camera_from_fixed: &M3<T>) -> Self {
         let [a, b, c] = semi_axes;
         let one = T::one();
+        // A sphere gets the exact identity. The sums below would leave rounding in it, and `is_uniform` would not see
+        // the sphere.
         if a == b && b == c {
             return Self { to: M3::identity() * (one / a), from: M3::identity() * a };
         }
         // R D Rᵀ = c I + (a − c) x xᵀ + (b − c) y yᵀ keeps small differences between the axes exact.
-        let m = body_to_cam;
+        let m = camera_from_fixed;
         let (x, y) = (V3::new(m.m11, m.m21, m.m31), V3::new(m.m12, m.m22, m.m32));
         let root = |a: T, b: T, c: T| M3::identity() * c + x * x.transpose() * (a - c) + y * y.transpose() * (b - c);
         Self { to: root(one / a, one / b, one / c), from: root(a, b, c) }
@@ -59,6 +61,7 @@ impl<T: Real> Scaling<T> {
     #[inline(always)]
     pub(crate) fn add_length(&self, block: &Block<T>, along: &[T; LANES], derivative: &mut [[T; LANES]; 2]) {
         for l in 0..LANES {
+            // Plain sums are used instead of nalgebra's product, so that the loop becomes vector instructions.
             let w = times(&self.from, [block.s[0][l], block.s[1][l], block.s[2][l]]);
             let per = -along[l] / dot(w, w).max(T::from_f64(1e-20));
             let [gu, gv] = block.gradient_at(l, &V3::from(times(&self.from, w).map(|x| x * per)));
@@ -94,6 +97,7 @@ impl<T: Real> Scaling<T> {
     fn scaled(&self, s: [T; 3], [au, av, bu, bv]: [T; 4]) -> ([T; 3], [T; 4]) {
         let one = T::one();
         let long = times(&self.to, s);
+        // The floor is for cleared points, whose ray may be 0: the quotient stays finite.
         let per_length = one / dot(long, long).max(T::from_f64(1e-20)).sqrt();
         let [x, y, z] = long.map(|c| c * per_length);
         let (from, to) = (one / (one + s[2]), one / (one + z));
@@ -169,11 +173,11 @@ impl<T: Real> ScaledCone<T> {
 mod tests {
     use super::*;
     use crate::geometry::camera::{self, Camera};
-    use crate::geometry::frames::{Body, Cam, Rotation};
+    use crate::geometry::frames::{Cam, Rotation, Vehicle};
     use crate::geometry::pixel::ImagePoint;
 
     fn rotation() -> M3<f64> {
-        Rotation::<Body, Cam, f64>::assume_from_quaternion([0.3, -0.5, 0.7, 0.2]).unwrap().to_matrix()
+        Rotation::<Vehicle, Cam, f64>::assume_from_quaternion([0.3, -0.5, 0.7, 0.2]).unwrap().to_matrix()
     }
 
     #[test]

@@ -42,6 +42,7 @@ impl<T: Real> Section<T> {
         let flat2 = x * x + y * y;
         let flat = flat2.sqrt();
         let delta = flat2 - cos * cos;
+        // An ellipse behind the camera solves the same equation, because the squared cone has a second nappe.
         if z < T::ZERO && delta <= T::ZERO {
             return None;
         }
@@ -86,14 +87,17 @@ impl<T: Real> Section<T> {
         // Δ times the principal x.
         let lever = self.delta * u + self.offset;
         let radicand = self.sin * self.sin + self.delta * v * v;
+        // Without this branch the root would be NaN, and a point far to the side would have no distance.
         if radicand < T::ZERO {
             return lever / self.delta;
         }
         let root = self.cos * radicand.sqrt();
+        // Near the wrong branch the quotient below would be small, because the conic is 0 on both branches.
         if self.delta > T::ZERO && lever < T::ZERO {
             // The point lies near the branch that the camera does not see.
             return (lever - root) / self.delta;
         }
+        // The sign is that of the lever, so that the two terms of the divisor never cancel.
         let root = if lever < T::ZERO { -root } else { root };
         let c2 = self.cos * self.cos;
         // (p·e)² − c² |p|² is Δ u² + 2 offset u + (e_z² − c²) − c² v², with e_z² − c² = sin²α − c² − Δ.

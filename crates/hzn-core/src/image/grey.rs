@@ -34,14 +34,18 @@ pub(super) fn check<S: Sample>(data: &[S], l: Layout) -> Result<Grey<'_, S>, Ima
     if l.bits < 8 || l.bits > S::BITS {
         return Err(ImageError::Bits);
     }
+    // The last row needs no padding behind it, because a view of a larger picture ends with the last sample of its last
+    // row.
     let row = usize::from(width) * usize::from(l.channels);
     if l.stride < row {
         return Err(ImageError::Stride);
     }
+    // The product may overflow on 32-bit targets, and a wrapped size would accept a buffer that is too short.
     let need = l.stride.checked_mul(usize::from(height) - 1).and_then(|n| n.checked_add(row));
     if need.is_none_or(|n| n > data.len()) {
         return Err(ImageError::TooShort);
     }
+    // The shift is in 32 bits because 1 << 16 does not fit 16.
     let full_scale = ((1u32 << l.bits) - 1) as u16;
     Ok(Grey { data, stride: l.stride, width, height, full_scale })
 }
@@ -80,17 +84,21 @@ impl<S: Sample> Pixels for Grey<'_, S> {
     }
     #[inline(always)]
     fn read(&self, index: usize) -> u16 {
+        // `get` links no panic path. The check of the size makes the 0 unreachable for pixels of the picture.
         self.data.get(index).map_or(0, |&s| s.into())
     }
     #[inline(always)]
     fn three(&self, index: usize) -> [u16; 3] {
         match self.data.get(index..index + 3) {
+            // The check of three neighbours at once saves two of three comparisons; edge points read most pixels this
+            // way.
             Some(&[a, b, c]) => [a.into(), b.into(), c.into()],
             _ => [0, 1, 2].map(|k| self.read(index + k)),
         }
     }
     #[inline(always)]
     fn run_length(&self, index: usize, count: usize, level: u16, lit: bool) -> usize {
+        // The samples are contiguous here, so the search lines compare eight bytes at a time.
         self.data.get(index..index + count).map_or(0, |samples| S::run_length(samples, level, lit))
     }
 }

@@ -44,10 +44,12 @@ impl core::error::Error for ImageError {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Columns.
+    // The fields are wider than a picture may be, so that a larger picture is refused instead of cut off by a cast.
     pub width: u32,
     /// Rows.
     pub height: u32,
     /// Samples from the start of a row to the start of the next; at least `width * channels`.
+    // The stride is in samples and not in bytes, because a slice of words is indexed in words.
     pub stride: usize,
     /// Interleaved samples per pixel: 1 grey, 3 RGB, 4 RGBA.
     pub channels: u8,

@@ -32,6 +32,7 @@ use crate::geometry::block::Lit;
 pub trait Pixels {
     /// Whether the picture arrived row by row and is no longer in memory. The edge points then come from
     /// [`Self::streamed_point`] only.
+    // It is a constant and not a method, so that a build for pictures in memory has no code for rows.
     const STREAMED: bool = false;
     /// Returns the number of columns, 1 to 65535.
     fn width(&self) -> u16;
@@ -42,6 +43,7 @@ pub trait Pixels {
     /// Returns the index of column `x`, row `y` in memory, for [`Self::read`].
     fn index(&self, x: u16, y: u16) -> usize;
     /// Returns the index distance from a column to the next.
+    // Steps let a stage walk along a row by addition. Otherwise each read would multiply a row by its stride.
     fn across(&self) -> usize;
     /// Returns the index distance from a row to the next.
     fn down(&self) -> usize;
@@ -50,6 +52,7 @@ pub trait Pixels {
     /// Returns the brightness at an index and at the two columns to the right of it.
     #[inline(always)]
     fn three(&self, index: usize) -> [u16; 3] {
+        // A picture that knows its memory replaces this by one check; the default serves every other layout.
         [0, 1, 2].map(|k| self.read(index + k * self.across()))
     }
     /// Counts the pixels from an index to the right, at most `count`, before the first dark pixel (if `lit` is true) or
@@ -75,6 +78,7 @@ pub trait Pixels {
 #[derive(Debug, Clone, Copy)]
 pub struct StreamedPoint {
     /// Distance from the pixel's centre, away from the light, px; NaN if no point was found.
+    // The type is f32 in both precisions, because the points of all border pixels of a picture are stored.
     pub(crate) towards_dark_px: f32,
     pub(crate) lit: Lit,
     /// Whether the point is located at the picture's threshold, because no local mid-level was found.

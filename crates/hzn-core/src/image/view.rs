@@ -45,6 +45,8 @@ impl<'a> ImageView<'a> {
     }
 }
 
+// The kind is matched at every read, so that one compiled pipeline serves all four. A flight computer avoids the match:
+// it uses the kinds themselves.
 macro_rules! forward {
     ($self:ident, $p:ident => $e:expr) => {
         match $self {

@@ -23,6 +23,7 @@ impl<'a> Border<'a> {
     /// Returns the pixels in order.
     pub fn pixels(&self) -> impl ExactSizeIterator<Item = Pixel> + use<'a> {
         let crop = self.crop;
+        // The conversion is made on request, so that a picture without an observer does not pay for it.
         self.pixels.iter().map(move |p| crop.map_or(*p, |crop| crop.pixel(p.x, p.y)))
     }
     /// Returns the number of pixels.

@@ -8,6 +8,7 @@ use crate::model::body::Expected;
 
 /// A source of error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+// The numbers are fixed because they are the indices of the arrays below.
 #[repr(u8)]
 pub enum Term {
     /// Errors of the edge points, correlated along the edge.
@@ -81,6 +82,8 @@ impl<T: Real> ErrorBudget<T> {
     /// divided among its sources.
     pub(crate) fn project(&mut self, b1: &V3<T>, b2: &V3<T>, [k1, k2]: [T; 2], prior: [T; 2], expected: &Expected<T>) {
         for (axis, p) in self.axis.iter_mut().zip(&self.fit) {
+            // The gain is applied to each term alone, because the update is linear: the terms add up to the whole
+            // covariance.
             let p13 = p.m13 - k1 * p.m33;
             let p23 = p.m23 - k2 * p.m33;
             let p11 = p.m11 - k1 * p.m13 - k1 * p13;
@@ -88,6 +91,7 @@ impl<T: Real> ErrorBudget<T> {
             let p22 = p.m22 - k2 * p.m23 - k2 * p23;
             *axis = Cov3::from_tangent(b1, b2, [p11, p12, p22]);
         }
+        // Without any sigma of the half-angle the parts would be 0/0.
         let total = expected.limb_sigma_parts_m.iter().fold(T::ZERO, |sum, s| sum + *s * *s).max(T::from_f64(1e-30));
         for (axis, sigma) in self.axis.iter_mut().skip(FIT_TERMS).zip(expected.limb_sigma_parts_m) {
             let part = sigma * sigma / total;

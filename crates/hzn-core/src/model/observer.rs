@@ -46,6 +46,8 @@ use crate::model::status::Stage;
 /// assert!(reads.0.get() > 0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+// The methods are called from loops over pixels; as a type parameter an observer that does nothing leaves no
+// instruction there, which a list of callbacks would.
 pub trait Observer<T> {
     /// The search for body number `which`, from 0, begins. This is not called when there is only one body.
     fn body(&self, _which: u8) {}

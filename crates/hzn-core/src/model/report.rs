@@ -2,15 +2,17 @@
 
 use crate::base::linalg::basis;
 use crate::base::real::Real;
-use crate::geometry::frames::{Body, Cam, Cov3, Ecef, UnitVec3};
+use crate::geometry::frames::{Cam, Cov3, Fixed, UnitVec3, Vehicle};
 use crate::geometry::scaling::ScaledCone;
 use crate::model::status::{Stage, Status};
 use crate::model::verdict::Verdict;
 
 /// Maximum number of bodies in one picture.
+// Three are Earth, Sun and Moon in one picture. Every body adds a configuration and a report to the static memory.
 pub const MAX_BODIES: usize = 3;
 
 /// Maximum number of candidates that a report lists. Further candidates are only counted, except for the chosen one.
+// The list is bounded because a report has a fixed size and a cloudy picture may have hundreds of edges.
 pub const MAX_LISTED: usize = 16;
 
 /// Reports of several bodies, in the order of the search.
@@ -72,8 +74,9 @@ impl<T> Report<T> {
     /// Makes the report on a picture that is not processed yet.
     pub(crate) fn empty() -> Self {
         Self {
+            // A report that is never finished must not look like an answer.
             status: Status::Rejected,
-            stage: Stage::Binarize,
+            stage: Stage::Threshold,
             level: 0,
             next_level: None,
             counters: Counters::default(),
@@ -91,6 +94,7 @@ impl<T> Report<T> {
         self.counters.edge_points = chosen.points;
         chosen.verdict = verdict;
         let place = self.candidates.iter().position(|c| c.number == chosen.number);
+        // The last place is given up, so that the others keep the order of following.
         let place = place.unwrap_or(self.candidates.len().saturating_sub(1));
         if let Some(listed) = self.candidates.get_mut(place) {
             *listed = chosen;
@@ -118,7 +122,7 @@ pub struct Counters {
     pub draws: u32,
     /// Cost of the picture, in the unit of `limits.max_work`.
     pub work: u32,
-    /// Number of looks: 1, or more if the first look gives no answer (`[recover]`).
+    /// Number of looks: 1, or more if the first look gives no answer (`[retry]`).
     pub looks: u32,
 }
 
@@ -177,7 +181,7 @@ pub struct Position<T> {
     pub body_fixed_m: Option<[T; 3]>,
     /// Rotation of the body about the line to it, relative to the given orientation, and its 1-sigma, radians:
     /// right-handed about the direction from the camera to the body. `None` if the 1-sigma is above
-    /// `estimate.yaw_limit_deg`. The third axis of an attitude, from the shape of the limb.
+    /// `fit.yaw_limit_deg`. The third axis of an attitude, from the shape of the limb.
     pub yaw_rad: Option<(T, T)>,
     /// The limb of the body in its scaled space.
     pub(crate) limb: ScaledCone<T>,
@@ -233,11 +237,11 @@ pub struct Solution<T> {
     pub axis: UnitVec3<Cam, T>,
     /// Covariance of `axis`, rad², rank 2.
     pub covariance: Cov3<Cam, T>,
-    /// The same direction in ECEF, computed from the position; only for `earth` with a position. A filter needs both
-    /// directions.
-    pub axis_ecef: Option<UnitVec3<Ecef, T>>,
+    /// The same direction in the fixed frame, computed from the position; only for `earth` with a position. A filter
+    /// needs both directions.
+    pub axis_fixed: Option<UnitVec3<Fixed, T>>,
     /// The same direction in the vehicle's body frame, when there is a mounting.
-    pub axis_body: Option<UnitVec3<Body, T>>,
+    pub axis_vehicle: Option<UnitVec3<Vehicle, T>>,
     /// Half-angle of the fit with a free half-angle in radians, before the expected one is fused.
     pub half_angle_rad: T,
     /// Half-angle of the answer (after the fusion) in radians. The fitted limb is drawn with it.
@@ -251,7 +255,7 @@ pub struct Solution<T> {
     /// on it. A wrong limb height moves the cosines of all pictures alike, so that a filter needs this derivative.
     /// `None` when the answer came by telemetry.
     pub axis_by_cos: Option<[T; 3]>,
-    /// The position of the body's centre, with `estimate.position`; `None` if the arc is too short for a position.
+    /// The position of the body's centre, with `fit.position`; `None` if the arc is too short for a position.
     pub position: Option<Position<T>>,
     /// Weighted RMS distance of the inliers from the limb in pixels.
     pub rms_px: T,

@@ -16,10 +16,11 @@ pub enum Status {
     Ok = 0,
     /// No edge in the picture is a limb of the body.
     #[default]
+    // The default is an outcome without an answer, so that a status that nobody set never looks like one.
     NoLimb = 1,
-    /// The mean brightness is below `gate.min_mean`.
+    /// The mean brightness is below `brightness.min_mean`.
     TooDark = 2,
-    /// The mean brightness is above `gate.max_mean`.
+    /// The mean brightness is above `brightness.max_mean`.
     TooBright = 3,
     /// Edges were found, but none has enough points to be fitted.
     TooFewPoints = 4,
@@ -69,6 +70,7 @@ impl Status {
 
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // `pad` and not `write_str`, so that a width in a format string is kept.
         f.pad(self.name())
     }
 }
@@ -79,46 +81,46 @@ impl fmt::Display for Status {
 pub enum Stage {
     /// Brightness gate and threshold.
     #[default]
-    Binarize = 0,
+    Threshold = 0,
     /// Search along the border and border following.
     Contour = 1,
     /// Sub-pixel edge points of a candidate.
-    Candidates = 2,
+    EdgePoints = 2,
     /// Rays of the edge points.
-    Undistort = 3,
+    Rays = 3,
     /// Consensus: the cone that most rays agree on, and the outliers.
-    Reject = 4,
+    Consensus = 4,
     /// Fit of the cone.
-    Estimate = 5,
+    Fit = 5,
     /// Covariance of the fit.
     Covariance = 6,
     /// Gates, and the choice of the best candidate.
-    Select = 7,
+    Gates = 7,
 }
 
 impl Stage {
     /// All stages in order.
     pub const ALL: [Self; 8] = [
-        Self::Binarize,
+        Self::Threshold,
         Self::Contour,
-        Self::Candidates,
-        Self::Undistort,
-        Self::Reject,
-        Self::Estimate,
+        Self::EdgePoints,
+        Self::Rays,
+        Self::Consensus,
+        Self::Fit,
         Self::Covariance,
-        Self::Select,
+        Self::Gates,
     ];
     /// Returns the name used in files and messages.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Binarize => "binarize",
+            Self::Threshold => "threshold",
             Self::Contour => "contour",
-            Self::Candidates => "candidates",
-            Self::Undistort => "undistort",
-            Self::Reject => "reject",
-            Self::Estimate => "estimate",
+            Self::EdgePoints => "edge_points",
+            Self::Rays => "rays",
+            Self::Consensus => "consensus",
+            Self::Fit => "fit",
             Self::Covariance => "covariance",
-            Self::Select => "select",
+            Self::Gates => "gates",
         }
     }
 }

@@ -19,8 +19,8 @@ choices! {
 }
 
 section! {
-    /// `[binarize]` of sensor.toml: the threshold between dark and lit.
-    "binarize" pub struct Config: Copy {
+    /// `[threshold]` of sensor.toml: the threshold between dark and lit.
+    "threshold" pub struct Config: Copy {
         /// Method that finds the threshold.
         @50 method: Method = Method::Otsu, [choice];
         /// For `fixed`: a pixel is lit at this value or above, in the picture's own counts; a value below 1 is a
@@ -36,11 +36,14 @@ section! {
 }
 
 /// Threshold that separates the Sun from everything else, at 0.9 of full scale.
+// A Sun among other bodies is clipped, and everything else that is lit stays below 0.9. Otsu's threshold would lie
+// between sky and ground, and a Sun would be looked for on clouds. It is a static because a reference to it is
+// returned.
 pub(crate) static SUN: Config = Config { method: Method::Fixed, level: 0.9, factor: 1.0, scale: 1.0 };
 
 section! {
-    /// `[gate]` of sensor.toml: the brightness that a picture must have to be processed.
-    "gate" pub struct Gate: Copy {
+    /// `[brightness]` of sensor.toml: the brightness that a picture must have to be processed.
+    "brightness" pub struct Brightness: Copy {
         /// Smallest mean brightness of the picture, as a fraction of full scale.
         @40 min_mean: f64 = 0.0, [0.0 to 1.0];
         /// Largest mean brightness of the picture, as a fraction of full scale; not below `min_mean`.
@@ -48,11 +51,11 @@ section! {
     }
 }
 
-impl Gate {
+impl Brightness {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         self.check_keys()?;
         let limit = Limit::Between(self.min_mean, 1.0);
-        require(self.max_mean >= self.min_mean, "gate.max_mean", self.max_mean, limit)
+        require(self.max_mean >= self.min_mean, "brightness.max_mean", self.max_mean, limit)
     }
 }
 

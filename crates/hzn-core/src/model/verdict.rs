@@ -6,6 +6,7 @@ macro_rules! verdicts {
     ($($(#[$doc:meta])* $variant:ident = $number:literal, $name:literal;)*) => {
         /// The verdict on a candidate.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        // Telemetry sends the number, therefore a number never changes.
         #[repr(u8)]
         pub enum Verdict {
             $($(#[$doc])* $variant = $number,)*
@@ -31,15 +32,15 @@ verdicts! {
     Passed = 1, "passed";
     /// No cone goes through enough of the candidate's points.
     NoConsensus = 2, "no-consensus";
-    /// The candidate has fewer inliers than `select.min_inliers`.
+    /// The candidate has fewer inliers than `gates.min_inliers`.
     FewInliers = 3, "few-inliers";
-    /// The inliers cover less than `select.min_arc_px`.
+    /// The inliers cover less than `gates.min_arc_px`.
     ShortArc = 4, "short-arc";
-    /// The RMS is above `select.max_rms_px`.
+    /// The RMS is above `gates.max_rms_px`.
     Residuals = 5, "residuals";
     /// The fitted half-angle disagrees with the expected one.
     HalfAngle = 6, "half-angle";
-    /// The standard deviation is above `select.max_sigma_deg`.
+    /// The standard deviation is above `gates.max_sigma_deg`.
     Uncertain = 7, "uncertain";
     /// The fit did not converge, was singular, or the work budget was used up.
     NoFit = 8, "no-fit";

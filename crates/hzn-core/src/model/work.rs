@@ -21,6 +21,8 @@ section! {
 }
 
 /// Default budget for each border pixel that the lists hold.
+// With the 2048 border pixels of a flight computer this gives 245 760 units. A unit costs at most 80 instructions, so
+// that a picture costs at most 20 million.
 const DEFAULT_PER_PIXEL: u32 = 120;
 
 /// Cost to begin to follow an edge.
@@ -30,10 +32,13 @@ pub(crate) const READ: u32 = 1;
 /// Cost of a step of the border follower that tests all neighbours. The reads of the mask come on top.
 pub(crate) const LOOK_AROUND: u32 = 5;
 /// Cost to begin a run of steps that test only the threshold. The distance to the masks comes on top.
+// A run of one step takes 353 instructions. When it cost one unit, and reads of the mask cost nothing, stripes of one
+// pixel took 63 million instructions within a budget of 20 million.
 pub(crate) const RUN: u32 = 4;
 /// Returns the cost of a search line from one column to another. A pixel takes few instructions, but the search for a
 /// small body has lines on every row.
 pub(crate) fn line_cost(from: u16, to: u16) -> u32 {
+    // Fifteen pixels of a search line cost one step, because eight bytes are compared at once.
     u32::from(to.saturating_sub(from)) / 15
 }
 /// Returns the cost to scan the picture's border at every `stride`-th pixel, each with a read of the mask.
@@ -50,6 +55,8 @@ pub(crate) const POINT: u32 = 19;
 /// Additional cost of a point on a wide edge or next to the border: it reads up to 45 pixels.
 pub(crate) const SLOW_POINT: u32 = 18;
 /// Cost to check these reads against border and image circle, one by one.
+// The costs of the checks were chosen on 5120 hostile pictures and tested on 1024 others; before, pictures with masks
+// and an image circle took up to 29.6 million instructions.
 pub(crate) const CHECKS: u32 = 20;
 /// Cost to compare these reads with the bounding box of a polygon.
 pub(crate) const BOXES: u32 = 7;
@@ -76,6 +83,7 @@ pub(crate) const ORDER: u32 = 20;
 /// Cost of a part of a picture, before anything is found in it.
 pub(crate) const PART: u32 = 1000;
 /// Cost to fit a block of eight points and to compute its share of the covariance.
+// The cost is charged once for all passes of the fit and the covariance, because the number of passes has a limit.
 pub(crate) const FIT: u32 = 230;
 /// Cost of the gates of a fit.
 pub(crate) const GATES: u32 = 1000;
@@ -91,6 +99,7 @@ pub(crate) struct WorkBudget {
 impl WorkBudget {
     /// Makes the budget for lists that hold `pixels` border pixels, where a sub-pixel point costs `point`.
     pub(crate) fn new(config: &Config, pixels: usize, point: u32) -> Self {
+        // The budget grows with the cost of a point, so that a dearer method has room for the same number of edges.
         let a_pixel = DEFAULT_PER_PIXEL - POINT + point;
         let total = config.max_work.unwrap_or(a_pixel.saturating_mul(pixels as u32));
         Self { total, remaining: total, truncated: false }
@@ -106,6 +115,8 @@ impl WorkBudget {
     #[inline]
     pub(crate) fn try_spend(&mut self, cost: u32) -> bool {
         let rest = self.remaining.checked_sub(cost);
+        // The rest is given up together with the refusal, so that no cheaper work goes on in a picture that counts as
+        // truncated.
         self.truncated |= rest.is_none();
         self.remaining = rest.unwrap_or(0);
         rest.is_some()

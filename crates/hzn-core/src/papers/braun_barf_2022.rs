@@ -20,19 +20,19 @@ use crate::stages::{consensus, covariance, edge_points, fit, threshold};
 /// direct nadir, the overbound of its covariance, and none of the gates of `hzn`.
 pub(super) fn preset(config: &mut Config) {
     set_given_noise(config);
-    config.binarize.method = threshold::Method::Fixed;
-    config.candidates.sub_pixel = edge_points::SubPixel::None;
-    config.candidates.keep_points = 0;
-    config.reject.method = consensus::Method::Ransac;
-    config.estimate.method = fit::Method::Direct;
-    config.estimate.half_angle = fit::HalfAngle::Free;
+    config.threshold.method = threshold::Method::Fixed;
+    config.edge_points.sub_pixel = edge_points::SubPixel::None;
+    config.edge_points.keep_points = 0;
+    config.consensus.method = consensus::Method::Ransac;
+    config.fit.method = fit::Method::Direct;
+    config.fit.half_angle = fit::HalfAngle::Free;
     config.covariance.method = covariance::Method::BraunBarf;
     config.covariance.overbound = true;
     disable_gates(config);
-    config.select.limb_in_view = true;
+    config.gates.limb_in_view = true;
     // The value of section 7.3, for the Earth. This limit applies to the mean and not to the sum, in focal lengths
     // squared.
-    config.select.max_section_residual = Some(0.025);
+    config.gates.max_section_residual = Some(0.025);
 }
 
 /// Returns `Passed`, or the gate that the fit fails.

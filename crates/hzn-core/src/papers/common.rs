@@ -10,7 +10,7 @@ pub(super) fn set_given_noise(config: &mut Config) {
     config.body.limb_height_sigma_km = 2.0;
     [config.body.clipped_height_km, config.body.clipped_sigma_km] = [0.0; 2];
     config.covariance = covariance::Config::given(1.0, 300.0);
-    config.reject.noise_sigma = 0.0;
+    config.consensus.noise_sigma = 0.0;
 }
 
 /// Leaves only the gates that every fit must pass, and raises the work budget: some of these methods examine every
@@ -18,13 +18,13 @@ pub(super) fn set_given_noise(config: &mut Config) {
 pub(super) fn disable_gates(config: &mut Config) {
     config.limits.max_work = Some(200_000_000);
     // The published systems look only once.
-    config.recover.levels.clear();
-    config.recover.frame_px = 0;
-    config.select.min_arc_px = Some(0.0);
-    config.select.max_rms_px = 1e6;
-    config.select.max_half_angle_sigma = 1e6;
-    config.select.max_sigma_deg = 180.0;
-    config.select.min_support = 0.0;
-    config.select.max_lit_sky = 1.0;
-    config.select.trust_every_shape();
+    config.retry.levels.clear();
+    config.retry.frame_px = 0;
+    config.gates.min_arc_px = Some(0.0);
+    config.gates.max_rms_px = 1e6;
+    config.gates.max_half_angle_sigma = 1e6;
+    config.gates.max_sigma_deg = 180.0;
+    config.gates.min_support = 0.0;
+    config.gates.max_lit_sky = 1.0;
+    config.gates.trust_every_shape();
 }

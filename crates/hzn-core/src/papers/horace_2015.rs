@@ -20,26 +20,26 @@ use crate::stages::{consensus, contour, edge_points, fit, threshold};
 /// is 7. The copy's height, the brightness gate and the shortest edge are numbers of `hzn`.
 pub(super) fn preset(config: &mut Config) {
     set_given_noise(config);
-    config.gate.min_mean = 0.02;
-    config.gate.max_mean = 0.9;
-    config.binarize.method = threshold::Method::Dynamic;
-    config.binarize.factor = 0.75;
+    config.brightness.min_mean = 0.02;
+    config.brightness.max_mean = 0.9;
+    config.threshold.method = threshold::Method::Dynamic;
+    config.threshold.factor = 0.75;
     // All lengths are in pixels of the copy.
     let rows = config.camera.height.min(HORACE_ROWS);
     config.input.scale_to_height = (rows < config.camera.height).then_some(rows);
     config.contour.method = contour::Method::Raster;
     config.contour.erode_threshold = 7;
-    config.candidates.sub_pixel = edge_points::SubPixel::None;
-    config.candidates.min_points = 100;
-    config.candidates.keep_points = 0;
-    config.reject.method = consensus::Method::None;
-    config.estimate.method = fit::Method::Circle;
-    config.estimate.half_angle = fit::HalfAngle::Free;
-    config.recover.method = retry::Method::Division;
+    config.edge_points.sub_pixel = edge_points::SubPixel::None;
+    config.edge_points.min_points = 100;
+    config.edge_points.keep_points = 0;
+    config.consensus.method = consensus::Method::None;
+    config.fit.method = fit::Method::Circle;
+    config.fit.half_angle = fit::HalfAngle::Free;
+    config.retry.method = retry::Method::Division;
     disable_gates(config);
-    config.select.altitude_limits_km = Some([20.0, 100.0]);
-    config.select.radius_margin = 0.0;
-    config.select.radius_margin_px = 5000.0 * f64::from(rows) / 768.0;
+    config.gates.altitude_limits_km = Some([20.0, 100.0]);
+    config.gates.radius_margin = 0.0;
+    config.gates.radius_margin_px = 5000.0 * f64::from(rows) / 768.0;
 }
 
 /// Number of rows of the copy that `horace-2015` processes.

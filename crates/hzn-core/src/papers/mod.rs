@@ -74,7 +74,7 @@ impl Config {
             Preset::Moon => {
                 set_disc(&mut config, Kind::Moon, 0.25);
                 // At most half of the Moon's limb is lit, and less than that is bright.
-                config.select.min_support = 0.25;
+                config.gates.min_support = 0.25;
             }
             Preset::Dlr2022 => braun_barf_2022::preset(&mut config),
             Preset::Zju2022 => wang_2022::preset(&mut config),
@@ -88,7 +88,7 @@ impl Config {
 /// blooming disc lies within 3 px, by the same amount in all directions (Braun & Barf 2022, section 5).
 fn set_disc(config: &mut Config, kind: Kind, level: f64) {
     config.body.kind = kind;
-    config.binarize = threshold::Config { method: threshold::Method::Fixed, level, ..config.binarize };
+    config.threshold = threshold::Config { method: threshold::Method::Fixed, level, ..config.threshold };
     config.covariance = covariance::Config { sigma_px: 3.0, correlation_px: 300.0, bias_px: 0.0, ..config.covariance };
 }
 

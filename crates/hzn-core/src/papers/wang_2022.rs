@@ -8,17 +8,17 @@ use crate::stages::{consensus, contour, edge_points, fit};
 /// pre-verification, an elliptic cone by total least squares, weighted if the limb leaves the picture, and no gates.
 ///
 /// Their threshold is 1°, which is 1.6 px with their lens (384×288, 92 px/rad). For another lens, set
-/// `reject.threshold_px` accordingly.
+/// `consensus.threshold_px` accordingly.
 pub(super) fn preset(config: &mut Config) {
     set_given_noise(config);
     config.contour.method = contour::Method::Sobel;
-    config.candidates.sub_pixel = edge_points::SubPixel::Zernike;
-    config.candidates.keep_points = 0;
-    config.reject.method = consensus::Method::RansacPreverify;
-    config.reject.threshold_px = 1.6;
-    config.reject.max_draws = 20_000;
-    config.estimate.method = fit::Method::Wtls;
-    config.estimate.weigh_above_deg = 60.0;
-    config.estimate.half_angle = fit::HalfAngle::Free;
+    config.edge_points.sub_pixel = edge_points::SubPixel::Zernike;
+    config.edge_points.keep_points = 0;
+    config.consensus.method = consensus::Method::RansacPreverify;
+    config.consensus.threshold_px = 1.6;
+    config.consensus.max_draws = 20_000;
+    config.fit.method = fit::Method::Wtls;
+    config.fit.weigh_above_deg = 60.0;
+    config.fit.half_angle = fit::HalfAngle::Free;
     disable_gates(config);
 }

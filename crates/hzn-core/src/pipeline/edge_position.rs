@@ -39,6 +39,7 @@ impl<T: Real> Edges<T> {
         let target = expected.target()?;
         let (e, k) = fit::closed::least_squares(&self.blocks)?;
         let one = T::one();
+        // k = 1 − cos is given instead of the cosine, because for a small disc the cosine is 1 in single precision.
         let (cos, sin) = (one - k, (k * (one + one - k)).sqrt());
         let (n, kappa) = (e / cos, sin * sin / (cos * cos));
         let by_n = fit::closed::least_squares_covariance(&self.blocks, &n)?;

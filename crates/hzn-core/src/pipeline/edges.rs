@@ -3,7 +3,7 @@
 //! Feature `_edges`.
 //!
 //! ```text
-//! Sensor::level → Sensor::borders → Edges::pick → reject → fit → fuse
+//! Sensor::level → Sensor::borders → Edges::pick → consensus → fit → fuse
 //! ```
 
 use super::found_limb::FoundLimb;
@@ -101,14 +101,15 @@ impl<T: Real> Sensor<T> {
     pub fn level<P: Pixels>(&self, picture: &P, expected: &Expected<T>) -> Result<Level<T>, Status> {
         let config = self.config();
         let levels = config.threshold_of(expected.which);
-        let seed = config.reject.seed;
-        threshold::split(picture, self.region(), &config.gate, levels, expected.level, seed, &Unobserved)
+        let seed = config.consensus.seed;
+        threshold::split(picture, self.region(), &config.brightness, levels, expected.level, seed, &Unobserved)
     }
 
     /// Returns the border pixels of every edge of a picture at a threshold, in order along each edge. The edges are in
     /// the order in which the pipeline examines them. `[limits]` does not apply: all edges are returned.
     pub fn borders<P: Pixels>(&self, picture: &P, level: u16, expected: &Expected<T>) -> Vec<Vec<Pixel>> {
         let (mut border, mut marks) = (vec![Pixel { x: 0, y: 0 }; HOST_POINTS], vec![0; HOST_WORDS]);
+        // No edge is judged here, so that the blocks of edge points can be empty.
         let lists = Lists { border: &mut border, blocks: &mut [], marks: &mut marks };
         let borders = Borders::default();
         let binary = BinaryPicture::new(picture, &self.region, level, &borders).with_blooming(expected.blooms());
@@ -131,7 +132,7 @@ impl<T> Observer<T> for Borders {
 }
 
 impl<T: Real> Edges<T> {
-    /// Makes edge points in the order of the list, as the stage `candidates` does. The lit side of each point is the
+    /// Makes edge points in the order of the list, as the stage `edge_points` does. The lit side of each point is the
     /// side of the direction `lit`.
     pub fn new(camera: &Camera<T>, points: &[ImagePoint<T>], lit: &UnitVec3<Cam, T>) -> Self {
         let side = |p: &ImagePoint<T>| {
@@ -150,13 +151,13 @@ impl<T: Real> Edges<T> {
         Self::from_points(camera, points.iter().map(|(p, lit)| (*p, Lit::from_gradient(*lit))).collect())
     }
 
-    /// Locates the edge points of a border, as the stage `candidates` does.
+    /// Locates the edge points of a border, as the stage `edge_points` does.
     pub fn pick<P: Pixels>(sensor: &Sensor<T>, picture: &P, level: u16, border: &[Pixel]) -> Self {
         let binary = BinaryPicture::new(picture, sensor.region(), level, &Unobserved)
             .with_blooming(sensor.config().body.blooms());
         let mut blocks = vec![Block::<T>::default(); border.len().div_ceil(LANES)];
         let made =
-            edge_points::locate_edge_points(&binary, &sensor.config().candidates, border, 0, &mut blocks, u32::MAX);
+            edge_points::locate_edge_points(&binary, &sensor.config().edge_points, border, 0, &mut blocks, u32::MAX);
         let point = |i: usize| (blocks[i / LANES].point(i % LANES), blocks[i / LANES].lit(i % LANES));
         let clipped = T::from_i32(made.clipped as i32) / T::from_i32(made.count.max(1) as i32);
         Self { clipped, ..Self::from_points(sensor.camera(), (0..made.count as usize).map(point).collect()) }
@@ -189,6 +190,8 @@ impl<T: Real> Edges<T> {
     pub fn set_weights(&mut self, weights: &[T]) {
         for (i, &weight) in weights.iter().enumerate().take(self.points.len()) {
             let block = &mut self.blocks[i / LANES];
+            // A point without a ray has no derivative. A weight would let it take part in the fit with a distance that
+            // is not finite.
             let seen = block.m.iter().any(|m| m[i % LANES] != T::ZERO);
             block.weight[i % LANES] = if seen { weight } else { T::ZERO };
         }
@@ -212,7 +215,7 @@ impl<T: Real> Edges<T> {
     }
 
     /// Rejects outliers and returns the consensus; `None` if there is none.
-    pub fn reject(&mut self, expected: &Expected<T>, config: &consensus::Config) -> Option<ConsensusCone<T>> {
+    pub fn consensus(&mut self, expected: &Expected<T>, config: &consensus::Config) -> Option<ConsensusCone<T>> {
         let (count, mut work) = (self.points.len() as u32, WorkBudget::unlimited());
         let expected = &expected.clipped(self.clipped);
         let threshold = self.threshold(expected, config);
@@ -227,9 +230,9 @@ impl<T: Real> Edges<T> {
         let expected = &expected.clipped(self.clipped);
         let start =
             consensus::Consensus { e: *start.axis.v(), c: start.cos_half_angle, draws: start.draws, all: start.all };
-        let threshold = self.threshold(expected, &config.reject).px;
+        let threshold = self.threshold(expected, &config.consensus).px;
         let noise = sensor.config.noise_model_of(expected.which);
-        fit::fit(&mut self.blocks, &start, expected, &self.camera, threshold, &config.estimate, noise).map(Fitted)
+        fit::fit(&mut self.blocks, &start, expected, &self.camera, threshold, &config.fit, noise).map(Fitted)
     }
 
     /// Makes a fit of a cone that was fitted elsewhere: computes the normal equations of the weighted points at this
@@ -242,9 +245,9 @@ impl<T: Real> Edges<T> {
     pub fn fuse(&self, sensor: &Sensor<T>, fit: &Fitted<T>, expected: &Expected<T>) -> Option<Fused<T>> {
         let noise = sensor.config.noise_model_of(expected.which);
         let expected = &expected.clipped(self.clipped);
+        // The expected size depends on the direction, which is known only after the fit.
         let expected = &expected.seen_along(&fit.0.e);
-        let fused =
-            covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().estimate, &self.camera, None)?;
+        let fused = covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().fit, &self.camera, None)?;
         let answer = Fused {
             axis: UnitVec3::assume_unit(fused.e),
             covariance: Cov3::from_tangent(&basis(&fused.e).0, &basis(&fused.e).1, fused.p),

@@ -28,6 +28,7 @@ impl<T: Real> FoundLimb<T> {
     pub(super) fn new(solution: &Solution<T>) -> Self {
         Self {
             e: *solution.axis.v(),
+            // The fused half-angle is used and not the fitted one, because it is the better one on a short arc.
             c: solution.fused_half_angle_rad.sin_cos().1,
             scaled: solution.position.as_ref().map(|position| position.limb),
         }
@@ -51,6 +52,7 @@ impl<T: Real> FoundLimb<T> {
             for lane in 0..LANES {
                 let (r, gradient) = self.offset(&block.ray(lane), camera);
                 let [gu, gv] = block.gradient_at(lane, &gradient);
+                // Squares are compared, so that no point needs a root or a division.
                 if block.weight[lane] > T::ZERO && r * r <= limit * limit * (gu * gu + gv * gv) {
                     block.clear(lane);
                     count += 1;
@@ -63,6 +65,7 @@ impl<T: Real> FoundLimb<T> {
     /// Returns cos α − s·e for a ray of `camera`, and the vector v with d(s·e) = v·ds.
     #[inline(always)]
     fn offset(&self, ray: &V3<T>, camera: &Camera<T>) -> (T, V3<T>) {
+        // The rays of the two bodies may be in different scaled spaces; without positions one product is enough.
         if cfg!(feature = "position") && (self.scaled.is_some() || camera.scaling().is_some()) {
             let limb = self.scaled.unwrap_or(ScaledCone { e: self.e, c: self.c, scaling: None });
             return limb.offset_from(ray, camera.scaling());

@@ -21,6 +21,8 @@ use crate::stages::threshold::{self, Level};
 
 /// Returns whether the look gave no answer and a further look may give one. In a glow, every threshold has an edge.
 fn goes_on<T>(report: &Report<T>) -> bool {
+    // A picture that is too dark or too bright stays so at every threshold, and one without budget cannot be searched
+    // again.
     matches!(report.status, Status::NoLimb | Status::TooFewPoints | Status::Rejected) && !report.glows()
 }
 
@@ -30,6 +32,12 @@ impl<T: Real> Sensor<T> {
     ///
     /// Without an answer, the report has the threshold of the first look. Its status is `rejected` if one of the looks
     /// was rejected, otherwise that of the last look with `no-limb` or `too-few-points`.
+    // The sample for the threshold is charged here, because the budget does not exist when it is read. A frame that is
+    // found stays for all looks, because it belongs to the camera and not to the threshold. `rejected` is kept, because
+    // a rejected edge says more about the picture than a later look that found nothing. The noise is measured only
+    // before a second look, so that a picture with an answer does not pay for its reads. Thresholds within this noise
+    // are passed over: there the limb was found 25 km too high. The first threshold is reported, because the user can
+    // set this one.
     pub(super) fn look_at_levels<P: Pixels, O: Observer<T>>(
         &self,
         mut lists: Lists<'_, T>,
@@ -43,7 +51,7 @@ impl<T: Real> Sensor<T> {
         let config = &self.config;
         // A `fixed` threshold is kept: there are no other thresholds.
         let fixed = config.threshold_of(expected.which).method == threshold::Method::Fixed;
-        let mut others = if fixed { [].iter() } else { config.recover.levels.iter() };
+        let mut others = if fixed { [].iter() } else { config.retry.levels.iter() };
         let (mut work, read) = (budget::new(config, lists.border.len()), work::READ + self.region.mask_cost());
         work.charge(first.drawn * read);
         let mut within = None;
@@ -57,7 +65,7 @@ impl<T: Real> Sensor<T> {
                     .with_contrast(first.contrast)
             };
             if within.is_none() {
-                let frame = look(&self.region).dark_frame_px(config.recover.frame_px, &mut work);
+                let frame = look(&self.region).dark_frame_px(config.retry.frame_px, &mut work);
                 if frame > 0 {
                     observer.dark_frame(frame);
                     within = Some(self.region.without_frame(frame));
@@ -76,8 +84,8 @@ impl<T: Real> Sensor<T> {
             }
             let lowest = *lowest.get_or_insert_with(|| {
                 work.charge(threshold::NOISE_READS * read);
-                let noise = threshold::dark_noise(picture, &self.region, first.level, config.reject.seed, observer);
-                first.dark + noise * T::from_f64(config.recover.min_sigma)
+                let noise = threshold::dark_noise(picture, &self.region, first.level, config.consensus.seed, observer);
+                first.dark + noise * T::from_f64(config.retry.min_sigma)
             });
             let mut levels = others.by_ref().map(|&part| first.at_fraction(part));
             let Some(level) = levels.find(|&level| T::from_i32(level.into()) >= lowest) else { break };

@@ -14,8 +14,10 @@ use crate::model::report::MAX_BODIES;
 use crate::model::report::{Report, Reports};
 
 /// The sensor of a workstation: f64, at most 16384 border pixels of an edge.
+// The workstation computes in f64, because elliptic cones on short arcs need it.
 pub type HostHorizon = Horizon<f64, HOST_POINTS, 2048, HOST_WORDS>;
 /// The sensor of a flight computer: f32, at most 2048 border pixels of an edge.
+// f32 is enough here, because Gauss-Newton on the sphere loses at most 4e-6 degrees by it.
 pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 
 /// A horizon sensor: a [`Sensor`] with its [`Workspace`].
@@ -93,14 +95,15 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     /// # use hzn_core::{Config, FlightHorizon};
     /// let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
     /// let mut horizon = FlightHorizon::new(&config)?;
-    /// config.reject.threshold_px = -1.0;
+    /// config.consensus.threshold_px = -1.0;
     /// let error = horizon.reconfigure(&config).unwrap_err();
-    /// assert_eq!(error.field, "reject.threshold_px");
-    /// assert_eq!(horizon.config().reject.threshold_px, 3.0);
+    /// assert_eq!(error.field, "consensus.threshold_px");
+    /// assert_eq!(horizon.config().consensus.threshold_px, 3.0);
     /// # Ok::<(), hzn_core::error::ConfigError>(())
     /// ```
     pub fn reconfigure(&mut self, config: &Config) -> Result<(), ConfigError> {
         self.sensor = Sensor::new(config)?;
+        // A threshold of the old configuration may belong to another body or another scale of counts.
         self.levels = [None; MAX_BODIES];
         Ok(())
     }
@@ -158,6 +161,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         expected: &[Expected<T>],
         observer: &O,
     ) -> Reports<T> {
+        // The list is cut at its capacity before it is collected, because `collect` would panic beyond it.
         let known: heapless::Vec<Expected<T>, MAX_BODIES> =
             expected.iter().take(MAX_BODIES).map(|e| self.remembered(e)).collect();
         let reports = self.sensor.process_each(&mut self.workspace, picture, &known, observer);

@@ -3,11 +3,12 @@
 //! Each candidate goes from its border to a verdict before the next one begins. Edges are examined in the order in
 //! which they are likely to be the limb: first those next to the longest dark stretches of the border, then every other
 //! edge that begins at the border, then closed edges. The search ends when an edge passes every gate and is certain
-//! (`select.certain_support`, `select.certain_share`). Otherwise the best of all edges that begin at the border is
+//! (`gates.certain_support`, `gates.certain_share`). Otherwise the best of all edges that begin at the border is
 //! chosen; closed edges are examined only if none of these edges gives an answer. A picture without an answer is
-//! examined again, at other thresholds (`[recover]`).
+//! examined again, at other thresholds (`[retry]`).
 
 mod budget;
+mod division;
 #[cfg(any(test, feature = "_edges"))]
 pub mod edge_position;
 #[cfg(any(test, feature = "_edges"))]
@@ -19,7 +20,6 @@ mod process;
 mod row_stream;
 mod search;
 mod sensor;
-mod subdivide;
 mod workspace;
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::config::{Config, Mount};
 use crate::geometry::camera::Camera;
-use crate::geometry::frames::{Body, Cam, Rotation};
+use crate::geometry::frames::{Cam, Rotation, Vehicle};
 use crate::geometry::pixel::ImagePoint;
 use crate::image::region::Region;
 use crate::model::body::{Expected, Prior, PriorError};
@@ -13,6 +13,7 @@ use crate::model::body::{Expected, Prior, PriorError};
 /// Diameter of the smallest disc whose position is fitted, pixels.
 const SMALLEST_DISC_PX: f64 = 8.0;
 /// Without a known distance, the search finds discs down to this part of the picture's shorter side.
+// The size decides how dense the search lines are, and every line costs work; therefore it is a part of the picture.
 const SIDES: f64 = 40.0;
 /// Intervals on each side of the picture, at whose ends the border is compared with the predicted limb. The inside of a
 /// limb is convex, so that the corners alone decide in a picture without distortion.
@@ -55,7 +56,7 @@ pub struct Sensor<T> {
     pub(super) config: Config,
     pub(super) camera: Camera<T>,
     pub(super) region: Region<T>,
-    pub(super) cam_to_body: Option<Rotation<Cam, Body, T>>,
+    pub(super) vehicle_from_camera: Option<Rotation<Cam, Vehicle, T>>,
 }
 impl<T: Real> Sensor<T> {
     /// Makes a sensor. Checks the whole configuration first.
@@ -67,10 +68,10 @@ impl<T: Real> Sensor<T> {
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         config.check()?;
         let camera = Camera::try_new(&config.camera)?;
-        let turn = |m: Mount| Rotation::assume_from_quaternion(m.q_body_from_camera_wxyz.map(T::from_f64));
+        let turn = |m: Mount| Rotation::assume_from_quaternion(m.q_vehicle_from_camera_wxyz.map(T::from_f64));
         Ok(Self {
             region: Region::new(&config.mask, &camera),
-            cam_to_body: config.mount.and_then(turn),
+            vehicle_from_camera: config.mount.and_then(turn),
             camera,
             config: config.clone(),
         })
@@ -150,6 +151,7 @@ impl<T: Real> Sensor<T> {
             [(u, zero), (u, low), (zero, v), (right, v)]
         });
         let rays = border.filter_map(|(u, v)| self.camera.ray(ImagePoint { u, v }));
+        // The smallest angle over the border decides: one place near the limb is enough to search the picture.
         let inside = rays.map(|ray| angle_to_limb(ray.direction().v())).reduce(|a, b| a.min(b));
         match inside {
             Some(beyond) if beyond > attitude_sigma * T::from_f64(FILLS_SIGMAS) && beyond > T::ZERO => {

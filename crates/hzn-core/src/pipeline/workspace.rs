@@ -37,6 +37,8 @@ pub(super) struct Lists<'a, T> {
 
 impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Workspace<T, POINTS, BLOCKS, WORDS> {
     /// Makes empty lists.
+    // The function is `const`, so that a static is filled at compile time. A value that was moved into a static passed
+    // over the stack first, which ended in a hard fault on a board with 192 KiB of RAM.
     pub const fn new() -> Self {
         Self { border: [Pixel { x: 0, y: 0 }; POINTS], blocks: [Block::EMPTY; BLOCKS], marks: [0; WORDS] }
     }
@@ -47,6 +49,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Work
 
 impl<T> Lists<'_, T> {
     /// Borrows the same lists for one of several looks.
+    // A look needs the lists for itself, and the next look needs them again.
     pub(super) fn reborrow(&mut self) -> Lists<'_, T> {
         Lists { border: self.border, blocks: self.blocks, marks: self.marks }
     }

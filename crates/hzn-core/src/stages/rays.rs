@@ -17,6 +17,7 @@ pub(crate) fn to_rays<T: Real>(camera: &Camera<T>, blocks: &mut [Block<T>]) {
         before_u[1..].copy_from_slice(&us[..LANES - 1]);
         before_v[1..].copy_from_slice(&vs[..LANES - 1]);
         (u, v) = (us[LANES - 1], vs[LANES - 1]);
+        // The distances are computed here, because the rays replace the image points a moment later.
         let mut step_px = [T::ZERO; LANES];
         for l in 0..LANES {
             let (du, dv) = (us[l] - before_u[l], vs[l] - before_v[l]);

@@ -27,11 +27,11 @@ fn config(preset: Preset, scale: u16) -> Config {
     config.body.radius_km = Some(1000.0);
     config.body.altitude_km = Some(1923.8);
     config.body.limb_height_km = 0.0;
-    config.candidates.min_points = 30;
+    config.edge_points.min_points = 30;
     // HORACE's values are for its camera and rocket.
     config.input.scale_to_height = None;
-    config.select.altitude_limits_km = Some([1800.0, 2000.0]);
-    (config.select.radius_margin, config.select.radius_margin_px) = (0.5, 0.0);
+    config.gates.altitude_limits_km = Some([1800.0, 2000.0]);
+    (config.gates.radius_margin, config.gates.radius_margin_px) = (0.5, 0.0);
     config
 }
 
@@ -121,9 +121,9 @@ fn braun_barf_on_the_sun() {
     let mut config = Config::preset(Preset::Dlr2022, camera::Config::ideal(Model::Pinhole, 160, 120, 1235.0));
     config.body.kind = Kind::Sun;
     config.body.altitude_km = None;
-    config.candidates.min_points = 16;
+    config.edge_points.min_points = 16;
     config.covariance.sigma_px = 3.0;
-    config.select.max_section_residual = Some(0.5e-5);
+    config.gates.max_section_residual = Some(0.5e-5);
     for (u, v, bloom_px) in [(80.0, 60.0, 0.0), (31.3, 77.6, 1.5), (120.9, 20.2, 3.0)] {
         let radius = 1235.0 * 0.2666f64.to_radians().tan() + bloom_px;
         let data = disc(&config, u, v, radius);
@@ -195,15 +195,15 @@ fn spoilt(config: &Config) -> Vec<u8> {
 #[test]
 fn halves_answer_where_the_whole_does_not() {
     let mut config = config(Preset::Horace2015, 4);
-    config.select.radius_margin = 0.03;
+    config.gates.radius_margin = 0.03;
     let data = spoilt(&config);
-    config.recover.method = retry::Method::None;
+    config.retry.method = retry::Method::None;
     let report = answer(&config, &data, &Watch::default());
     assert_eq!(report.status, Status::Rejected, "{:?}", report.candidates);
     assert!(report.candidates.iter().any(|c| c.verdict == Verdict::Radius));
-    config.recover.method = retry::Method::Division;
+    config.retry.method = retry::Method::Division;
     for combine in [Combine::Median, Combine::Mean] {
-        config.recover.combine = combine;
+        config.retry.combine = combine;
         let watch = Watch::default();
         let report = answer(&config, &data, &watch);
         let off = off_deg(&report, [0.0, 0.0, 1.0]);
@@ -215,7 +215,7 @@ fn halves_answer_where_the_whole_does_not() {
         assert!(solution.covariance.sigma_max_rad() > 0.0 && report.counters.candidates > solution.candidate);
     }
     // No half is large enough to be cut again, so there are the whole picture and two halves.
-    config.recover.least_part = 1.0;
+    config.retry.least_part = 1.0;
     let watch = Watch::default();
     let _ = answer(&config, &data, &watch);
     assert_eq!(watch.levels.get(), 3);
@@ -226,18 +226,18 @@ fn halves_answer_where_the_whole_does_not() {
 fn the_radius_check_of_horace_is_in_pixels() {
     let camera = camera::Config::ideal(Model::Pinhole, 1024, 768, 2133.3);
     let own = Config::preset(Preset::Horace2015, camera);
-    assert_eq!(own.binarize.factor, 0.75);
-    assert_eq!((own.select.altitude_limits_km, own.input.scale_to_height), (Some([20.0, 100.0]), Some(240)));
-    assert!((own.select.radius_margin_px * 768.0 / 240.0 - 5000.0).abs() < 1e-9);
+    assert_eq!(own.threshold.factor, 0.75);
+    assert_eq!((own.gates.altitude_limits_km, own.input.scale_to_height), (Some([20.0, 100.0]), Some(240)));
+    assert!((own.gates.radius_margin_px * 768.0 / 240.0 - 5000.0).abs() < 1e-9);
     // The radius of the disc is 87.4 px. Limits that begin 3 px above it reject the disc, unless the margin is wider.
     let mut config = config(Preset::Horace2015, 4);
-    config.recover.method = retry::Method::None;
+    config.retry.method = retry::Method::None;
     let data = disc(&config, 191.5, 127.5, 240.0 * 20f64.to_radians().tan());
     let altitude_of = |radius_px: f64| 1000.0 / (radius_px / 240.0).atan().sin() - 1000.0;
-    config.select.radius_margin = 0.0;
-    config.select.altitude_limits_km = Some([altitude_of(110.0), altitude_of(90.4)]);
+    config.gates.radius_margin = 0.0;
+    config.gates.altitude_limits_km = Some([altitude_of(110.0), altitude_of(90.4)]);
     for (margin_px, passes) in [(0.0, false), (1.5, false), (5.0, true)] {
-        config.select.radius_margin_px = margin_px;
+        config.gates.radius_margin_px = margin_px;
         let report = answer(&config, &data, &Watch::default());
         assert_eq!(report.solution.is_some(), passes, "{margin_px} {:?}", report.candidates);
         assert!(passes || report.candidates.iter().any(|c| c.verdict == Verdict::Radius), "{:?}", report.candidates);
@@ -248,7 +248,7 @@ fn the_radius_check_of_horace_is_in_pixels() {
 #[test]
 fn division_ends_at_pictures_that_are_too_dark_or_too_bright() {
     let mut config = config(Preset::Horace2015, 2);
-    config.recover.least_part = 1.0 / 64.0;
+    config.retry.least_part = 1.0 / 64.0;
     for (value, status) in [(0, Status::TooDark), (255, Status::TooBright)] {
         let watch = Watch::default();
         let data = vec![value; 192 * 128];
@@ -266,7 +266,7 @@ fn division_ends_at_pictures_that_are_too_dark_or_too_bright() {
 #[test]
 fn a_picture_with_more_pixels_than_bits_is_truncated() {
     let mut config = config(Preset::Horace2015, 4);
-    config.recover.method = retry::Method::None;
+    config.retry.method = retry::Method::None;
     let data = disc(&config, 191.5, 127.5, 87.0);
     let mut flight = FlightHorizon::boxed(&config).unwrap();
     let expected = flight.expect(&Prior::default()).unwrap();
@@ -289,12 +289,12 @@ fn limits_are_checked_by_name() {
     assert_eq!(refused(&|c| c.contour.erode_size_px = 4), "contour.erode_size_px");
     assert_eq!(refused(&|c| c.contour.erode_threshold = 10), "contour.erode_threshold");
     assert_eq!(refused(&|c| c.contour.erode_threshold = 0), "contour.erode_threshold");
-    assert_eq!(refused(&|c| c.select.altitude_limits_km = Some([5.0, 4.0])), "select.altitude_limits_km");
-    assert_eq!(refused(&|c| c.select.altitude_limits_km = Some([-1.0, 4.0])), "select.altitude_limits_km");
-    assert_eq!(refused(&|c| c.select.radius_margin = f64::NAN), "select.radius_margin");
-    assert_eq!(refused(&|c| c.select.radius_margin_px = -1.0), "select.radius_margin_px");
-    assert_eq!(refused(&|c| c.select.max_section_residual = Some(0.0)), "select.max_section_residual");
-    assert_eq!(refused(&|c| c.recover.least_part = 0.001), "recover.least_part");
+    assert_eq!(refused(&|c| c.gates.altitude_limits_km = Some([5.0, 4.0])), "gates.altitude_limits_km");
+    assert_eq!(refused(&|c| c.gates.altitude_limits_km = Some([-1.0, 4.0])), "gates.altitude_limits_km");
+    assert_eq!(refused(&|c| c.gates.radius_margin = f64::NAN), "gates.radius_margin");
+    assert_eq!(refused(&|c| c.gates.radius_margin_px = -1.0), "gates.radius_margin_px");
+    assert_eq!(refused(&|c| c.gates.max_section_residual = Some(0.0)), "gates.max_section_residual");
+    assert_eq!(refused(&|c| c.retry.least_part = 0.001), "retry.least_part");
     assert_eq!(refused(&|c| c.input.scale_to_height = Some(8)), "input.scale_to_height");
 }
 
@@ -311,39 +311,39 @@ proptest! {
         config.camera.theta_max_deg = circle.then_some(30.0);
         config.body.kind = [Kind::Earth, Kind::EarthSphere, Kind::Sun, Kind::Moon][body];
         config.body.radius_km = None;
-        config.candidates.min_points = 8;
-        config.select.min_inliers = 8;
-        config.select.limb_in_view = gates;
-        config.select.max_section_residual = gates.then_some(0.025);
-        config.select.altitude_limits_km = gates.then_some([0.0, 5000.0]);
+        config.edge_points.min_points = 8;
+        config.gates.min_inliers = 8;
+        config.gates.limb_in_view = gates;
+        config.gates.max_section_residual = gates.then_some(0.025);
+        config.gates.altitude_limits_km = gates.then_some([0.0, 5000.0]);
         if mask {
             let triangle = [[10.0, 10.0], [50.0, 5.0], [30.0, 60.0]];
             config.mask.polygons_px.push(triangle.into_iter().collect()).unwrap();
         }
         let pick = methods.map(|m| m % 3);
         config.contour.method = CONTOURS[methods[0] % 4];
-        config.reject.method = [
+        config.consensus.method = [
             consensus::Method::None,
             consensus::Method::Ransac,
             consensus::Method::TwoPoint,
             consensus::Method::RansacPreverify,
             consensus::Method::Mlesac,
         ][methods[1] % 5];
-        config.estimate.method = [
+        config.fit.method = [
             fit::Method::Sphere, fit::Method::Direct, fit::Method::Conic, fit::Method::Circle,
             fit::Method::Tls, fit::Method::Wtls,
         ][methods[2]];
-        config.estimate.half_angle = [
+        config.fit.half_angle = [
             fit::HalfAngle::Free, fit::HalfAngle::Fused, fit::HalfAngle::Known,
         ][pick[3]];
         config.covariance.method = [covariance::Method::Sandwich, covariance::Method::BraunBarf][pick[4] % 2];
         config.covariance.overbound = pick[5] == 0;
-        config.candidates.sub_pixel =
+        config.edge_points.sub_pixel =
             [SubPixel::None, SubPixel::Linear, SubPixel::Zernike, SubPixel::Erf][methods[4] % 4];
         use threshold::Method::{Dynamic, Fixed, Otsu};
-        config.binarize.method = [Otsu, Dynamic, Fixed][pick[5]];
+        config.threshold.method = [Otsu, Dynamic, Fixed][pick[5]];
         config.input.scale_to_height = scaled.then_some(33);
-        config.recover.method = if divided { retry::Method::Division } else { retry::Method::None };
+        config.retry.method = if divided { retry::Method::Division } else { retry::Method::None };
         let data = garbage(kind, seed, level);
         let report = answer(&config, &data, &Watch::default());
         prop_assert_eq!(report.status == Status::Ok, report.solution.is_some());

@@ -31,13 +31,13 @@ fn config(mask: bool, circle: bool) -> Config {
     let mut config = Config::new(camera::Config::ideal(Model::Equidistant, W as u16, H as u16, 60.0));
     config.camera.theta_max_deg = circle.then_some(40.0);
     config.body.altitude_km = Some(300.0);
-    config.candidates.min_points = 8;
-    config.select.min_inliers = 8;
-    config.binarize.method = Method::Fixed;
-    config.binarize.level = 100.0;
+    config.edge_points.min_points = 8;
+    config.gates.min_inliers = 8;
+    config.threshold.method = Method::Fixed;
+    config.threshold.level = 100.0;
     // There is only one look at a picture that comes row by row.
-    config.recover.levels.clear();
-    config.recover.frame_px = 0;
+    config.retry.levels.clear();
+    config.retry.frame_px = 0;
     if mask {
         let triangle = [[10.0, 10.0], [50.0, 5.0], [30.0, 60.0]];
         config.mask.polygons_px.push(triangle.into_iter().collect()).unwrap();
@@ -149,7 +149,7 @@ fn the_picture_ends_where_the_lists_do() {
 #[test]
 fn the_level_comes_from_the_picture_before() {
     let mut config = config(false, false);
-    config.binarize.method = Method::Otsu;
+    config.threshold.method = Method::Otsu;
     let sensor = Sensor::<f32>::new(&config).unwrap();
     let data = garbage(4, 1, 40);
     let want = whole(&sensor, &data, &Unobserved);

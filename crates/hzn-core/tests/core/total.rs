@@ -16,8 +16,8 @@ fn config(model: Model, circle: bool, mask: bool, kind: Kind) -> Config {
     config.camera.theta_max_deg = circle.then_some(30.0);
     config.body.kind = kind;
     config.body.altitude_km = Some(300.0);
-    config.candidates.min_points = 8;
-    config.select.min_inliers = 8;
+    config.edge_points.min_points = 8;
+    config.gates.min_inliers = 8;
     if mask {
         let triangle = [[10.0, 10.0], [50.0, 5.0], [30.0, 60.0]];
         config.mask.polygons_px.push(triangle.into_iter().collect()).unwrap();
@@ -115,9 +115,9 @@ proptest! {
         let model = if wide { Model::Equidistant } else { Model::Pinhole };
         let mut config = Config::preset(Preset::ALL[preset], camera::Config::ideal(model, 96, 64, 60.0));
         config.body.altitude_km = Some(300.0);
-        config.candidates.min_points = 8;
-        config.select.min_inliers = 8;
-        config.select.max_rms_px = 1e6;
+        config.edge_points.min_points = 8;
+        config.gates.min_inliers = 8;
+        config.gates.max_rms_px = 1e6;
         let data = garbage(kind, seed, level);
         let picture = Grey::try_new(&data, Layout::packed(96, 64, 1, 8)).unwrap();
         let mut host = HostHorizon::boxed(&config).unwrap();

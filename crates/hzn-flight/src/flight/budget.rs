@@ -20,10 +20,14 @@ impl BitBudget {
     pub(super) fn allows(&mut self, bits: u32, rate: f64, now_us: u64) -> bool {
         // The limits of the parameter keep the product below 2^64.
         let (rate, cost) = (rate as u64, u64::from(bits) * US_PER_S);
+        // At most an hour counts, so that the product stays below 2^64.
         let passed_us = now_us.saturating_sub(self.since_us).min(US_PER_S * 3600);
         self.since_us = now_us;
+        // More than a second's bits are not saved, because a burst would fill the line after a pause. One picture may
+        // need more: otherwise it would never be sent.
         self.credit = self.credit.saturating_add(passed_us.saturating_mul(rate)).min(cost.max(rate * US_PER_S));
         let rest = self.credit.checked_sub(cost);
+        // A picture that is not sent costs nothing, so that a small one may be sent after it.
         self.credit = rest.unwrap_or(self.credit);
         rest.is_some()
     }

@@ -5,6 +5,8 @@ use crate::board::Picture;
 /// Longest wait for a picture while the period is not known well yet.
 const FIRST_US: u64 = 2_000_000;
 /// Number of intervals that the mean period is taken over. One early or late picture moves it little.
+// The last interval alone was used before. With pictures a fifth of a period early or late it can be 0.6 periods, and
+// one and a half times 0.6 is shorter than the wait for a picture in time.
 const MEAN_OF: u64 = 8;
 
 /// The time and the period of the pictures.
@@ -35,6 +37,7 @@ impl CameraWatch {
     pub(super) fn note(&mut self, picture: &Picture, now_us: u64) {
         let since_us = self.last_exposure_us.and_then(|last| picture.exposure_us.checked_sub(last)).unwrap_or(0);
         // A plain division would be a panic path of the flight image.
+        // Lost pictures count, because the camera took them: the computer was late.
         let interval_us = since_us.checked_div(u64::from(picture.lost).saturating_add(1));
         self.add_interval(interval_us.unwrap_or(0));
         self.last_exposure_us = Some(picture.exposure_us);
@@ -42,6 +45,7 @@ impl CameraWatch {
     }
 
     fn add_interval(&mut self, interval_us: u64) {
+        // A mean over two rates would be the period of neither.
         if interval_us == 0 || interval_us.abs_diff(self.period_us) > self.period_us / 2 {
             (self.period_us, self.intervals) = (interval_us, u64::from(interval_us > 0));
             return;
@@ -55,10 +59,12 @@ impl CameraWatch {
     pub(super) fn becomes_silent(&mut self, now_us: u64) -> Option<u64> {
         let waited_us = now_us.saturating_sub(self.waiting_since_us);
         let least_us = if self.intervals < MEAN_OF { FIRST_US } else { 0 };
+        // One and a half periods, so that a picture may be a fifth late, and the event comes within two.
         let longest_us = least_us.max(self.period_us.saturating_add(self.period_us / 2));
         if self.is_silent || waited_us <= longest_us {
             return None;
         }
+        // Reported once, because a dead camera would otherwise send an event in every turn.
         self.is_silent = true;
         Some(waited_us)
     }

@@ -32,6 +32,7 @@ impl Clock {
     pub(super) fn at(&self, clock_us: u64) -> Cuc {
         match self.offset_us {
             Some(offset) => Cuc::tai(clock_us.wrapping_add(offset)),
+            // Another P-field, so that the ground does not take the time since the start for TAI.
             None => Cuc::since_start(clock_us),
         }
     }
@@ -40,18 +41,22 @@ impl Clock {
     pub(super) fn clock_us(&self, time: Cuc) -> Option<u64> {
         match time.epoch {
             Epoch::Start => Some(time.us),
+            // Wrapping, so that values may be older than the start: their time is then negative in two's complement.
             Epoch::Tai => self.offset_us.map(|offset| time.us.wrapping_sub(offset)),
         }
     }
 
     /// Takes note of the last pulse: it comes with each whole second of TAI.
     pub(super) fn note_pulse(&mut self, pulse_us: Option<u64>) {
+        // A board reports a pulse until the next one comes. It corrects the clock once.
         let Some(pulse) = pulse_us.filter(|_| pulse_us != self.pulse_us) else { return };
         self.pulse_us = Some(pulse);
+        // The pulse is kept nevertheless, because the first telecommand `time` may speak of it.
         let Some(offset) = self.offset_us else { return };
         let tai = pulse.wrapping_add(offset);
         let nearest = (tai.wrapping_add(SECOND_US / 2)) / SECOND_US * SECOND_US;
         self.follows_pulses = nearest.abs_diff(tai) < FURTHEST_US;
+        // A disturbance is not followed, because it would move the time of every packet.
         if self.follows_pulses {
             self.offset_us = Some(nearest.wrapping_sub(pulse));
         }
@@ -60,6 +65,7 @@ impl Clock {
     /// Correlates the clock: the time was `time` at the last pulse, or else at `now_us`. Returns the change of the
     /// offset in microseconds; `None` at the first time.
     pub(super) fn correlate(&mut self, time: Cuc, at_pulse: bool, now_us: u64) -> Result<Option<u64>, Code> {
+        // The ground means the pulse of this second. An older one would make an error of whole seconds.
         let pulse = self.pulse_us.filter(|pulse| now_us.saturating_sub(*pulse) <= OLDEST_PULSE_US);
         let clock_us = if at_pulse { pulse.ok_or(Code::NoPulse)? } else { now_us };
         // A pulse comes at a whole second.
@@ -68,6 +74,7 @@ impl Clock {
         }
         let offset = time.us.wrapping_sub(clock_us);
         self.follows_pulses = at_pulse;
+        // The event has the change, so that the ground sees how far off the earlier times were.
         Ok(self.offset_us.replace(offset).map(|before| before.abs_diff(offset)))
     }
 

@@ -11,8 +11,10 @@ use crate::packet::{self, Apid, ApidBase, MAX_BYTES};
 pub(super) struct Line {
     /// Memory for the packet that is sent.
     pub(super) out: [u8; MAX_BYTES],
+    // CCSDS 133.0-B counts each APID by itself, so that a receiver of one of them notices a lost packet.
     sequences: [u16; Apid::ALL.len()],
     /// The APIDs of this computer; `None` until the parameters are loaded.
+    // `None` instead of the default, whose number is not 0: the buffers would no longer be all zeros.
     base: Option<ApidBase>,
     pub(super) clock: Clock,
 }

@@ -21,6 +21,7 @@ pub(super) fn send(edge: &LongestEdge, line: &mut Line, board: &mut impl Board, 
         };
         line.send(board, Apid::Edge, time, |out| {
             head.write(out);
+            // Filled up with zeros, because every packet has a fixed size.
             for place in 0..EDGE_PIXELS {
                 let pixel = part_pixels.get(place).map_or(EdgePixel::default(), |p| EdgePixel { x: p.x, y: p.y });
                 pixel.write(out);

@@ -19,8 +19,10 @@ impl<B: Board> Flight<'_, B> {
     /// there is one. Changed values are made anew.
     #[inline(never)]
     pub(super) fn check_memory(&mut self, expected: Option<&mut KeptTwice<Expected<f32>>>) -> bool {
+        // Two copies show that a bit changed, but not in which of them. Therefore neither is used any more.
         let is_sensor_intact = self.sensor.is_intact();
         let is_known_intact = self.known.is_intact() && expected.is_none_or(KeptTwice::is_intact);
+        // Both are compared before one is repaired, so that each of them has its event.
         if is_sensor_intact && is_known_intact {
             return true;
         }
@@ -29,6 +31,7 @@ impl<B: Board> Flight<'_, B> {
             self.report_repair(SENSOR);
         }
         if !is_known_intact {
+            // These values are stored nowhere else. Until navigation sends others, those of the parameters are used.
             self.known.set(Known::default());
             self.known.complete();
             self.report_repair(KNOWN);
@@ -49,11 +52,13 @@ impl<B: Board> Flight<'_, B> {
     /// Reads the stored parameters again, and makes the sensor anew. Parameters that were not stored are lost.
     #[inline(never)]
     fn reload_parameters(&mut self) {
+        // The copy that was in use, because after resets by the watchdog it may be the older one.
         let choice = Choice::Copy(self.state.parameter_copy);
         // The buffer of the table is written.
         self.staged = 0;
         let loaded = store::load(&mut self.board, &mut self.buffers.table, choice);
         // The parameters were checked when they were read, so they make a sensor.
+        // Sensor and parameters of the flight software are stored together, so both are replaced.
         if self.renew_sensor(&loaded.parameters) {
             self.sensor.complete();
             self.operations.set(loaded.parameters.operations);

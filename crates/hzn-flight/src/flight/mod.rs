@@ -3,7 +3,8 @@
 //! | part | idea |
 //! |---|---|
 //! | `self_check` | the checks at the start |
-//! | `recovery` | resets, lift-off, shut-down |
+//! | `recovery` | counts of resets, detection of lift-off |
+//! | `mode_changes` | the mode after a reset, at lift-off, at the end of the flight |
 //! | `listen` | the telecommand that arrives, and its acknowledgement |
 //! | `telecommands` | the functions of telecommands |
 //! | `parameter_commands` | the functions that read and change parameters |
@@ -11,10 +12,12 @@
 //! | `memory` | bits that changed in memory |
 //! | `science` | the packets of a picture, within the bit budget |
 //! | `clock` | the time of packets, and its correlation |
-//! | `navigation` | position, velocity and rate, with time and expiry |
+//! | `navigation` | position, velocity and rate, with their time |
+//! | `prior` | the prior of a picture from these values, until they expire |
 //! | `camera_watch` | pictures that do not come |
 //! | `longest_edge` | the packets of the edge that a command asks for |
-//! | `reports` | housekeeping and events |
+//! | `reports` | limits of what is sent, flags of housekeeping |
+//! | `housekeeping` | housekeeping and events are sent |
 //! | `line` | packets on the line, with their counts |
 
 use hzn_core::Sensor;
@@ -30,20 +33,19 @@ pub use crate::view::Lists;
 use crate::view::LongestEdge;
 
 mod budget;
-mod camera_turn;
 mod camera_watch;
 mod clock;
+mod housekeeping;
 mod line;
 mod listen;
 mod longest_edge;
 mod memory;
+mod mode_changes;
 mod navigation;
-mod navigation_turn;
 mod parameter_commands;
 mod pictures;
+mod prior;
 mod recovery;
-mod recovery_turn;
-mod report_turn;
 mod reports;
 mod science;
 mod self_check;
@@ -62,6 +64,7 @@ pub struct Buffers {
     line: Line,
     inbox: Inbox,
     /// A table of parameters on its way from or to memory, or parameters that wait for their commit.
+    // One memory for both saves 4 KB. A table that passes through it removes the parameters that wait.
     table: [u8; table::MAX_BYTES],
     edge: LongestEdge,
 }
@@ -87,6 +90,7 @@ pub struct Flight<'a, B> {
     board: B,
     buffers: &'a mut Buffers,
     workspace: &'a mut Lists,
+    // Kept twice, because they are used for the whole flight: every answer after a flipped bit would be wrong.
     sensor: KeptTwice<Sensor<f32>>,
     operations: KeptTwice<Operations>,
     /// Whether the parameters in use differ from the stored ones.
@@ -221,19 +225,25 @@ impl<'a, B: Board> Flight<'a, B> {
 
     /// Runs one turn of the loop, with at most one telecommand and one picture. Call it for ever.
     pub fn turn(&mut self) {
+        // Nothing else feeds it, so that any part of a turn that hangs ends in a reset.
         self.board.feed_watchdog();
         if let Some(broken) = self.start.take() {
             self.begin(broken);
         }
+        // The copies are made here, because a move may change the unused bytes between fields.
         self.sensor.complete();
         self.known.complete();
+        // Before they act: a wrong `boot.shut_down_after_s`, for example, would end the flight in this turn.
         self.check_operations();
         let now_us = self.board.now_us();
         let pulse_us = self.board.pulse_us();
+        // Before `listen`, so that a telecommand `time` finds the last pulse.
         self.buffers.line.clock.note_pulse(pulse_us);
+        // Before `listen`, so that no telecommand writes parameters while power is being cut.
         if self.mode == Mode::ShutDown || self.follow_vehicle(now_us) {
             return;
         }
+        // Before the picture, so that a prior or a mode that has just come holds for it.
         self.listen();
         let wanted = self.mode == Mode::Flight || self.mode == Mode::Standby && self.process_once;
         if wanted {
@@ -254,8 +264,10 @@ impl<'a, B: Board> Flight<'a, B> {
             return;
         }
         let from = core::mem::replace(&mut self.mode, mode);
+        // A request for a picture would otherwise act when standby returns.
         self.process_once = false;
         let now_us = self.board.now_us();
+        // Pictures were perhaps not taken in the mode before, so their period is not known.
         self.camera.start(now_us);
         self.send_event(Event::ModeChanged, from as u32, mode as u32);
         self.send_housekeeping();

@@ -45,9 +45,12 @@ pub(super) struct Motion {
 impl Motion {
     /// Returns the time from the values to the exposure, s; negative if the exposure was before.
     pub(super) fn age_s(&self, exposure_us: u64) -> f32 {
+        // The difference is taken in whole numbers, because an f32 of microseconds has steps of 256 µs after an hour.
+        // It has a sign, because values may be predicted.
         exposure_us.wrapping_sub(self.epoch_us).cast_signed() as f32 * 1e-6
     }
     fn has_expired(&self, exposure_us: u64) -> bool {
+        // In both directions, because a prediction is as uncertain as an old value.
         self.expires_s.is_some_and(|limit| self.age_s(exposure_us).abs() > limit)
     }
 }
@@ -73,6 +76,7 @@ impl Known {
     pub(super) fn state_at(&self, picture: u32, exposure_us: u64) -> Option<NavigationState> {
         let prior = self.at(exposure_us);
         let state = if prior.is_some() { NavigationState::USED } else { NavigationState::EXPIRED };
+        // Expired values are sent as they came, so that the ground sees what was not used.
         let prior = prior.unwrap_or(self.prior);
         if prior.altitude_m.is_none() && prior.position_m.is_none() && prior.rate_rad_s.is_none() {
             return None;
@@ -99,6 +103,7 @@ fn move_freely(r: [f32; 3], v: [f32; 3], t: f32) -> [f32; 3] {
     let [vx, vy, _] = v;
     let a =
         [-pull * x + 2.0 * OMEGA * vy + OMEGA * OMEGA * x, -pull * y - 2.0 * OMEGA * vx + OMEGA * OMEGA * y, -pull * z];
+    // `get`, because an index would be a panic path of the flight image.
     core::array::from_fn(|i| match (r.get(i), v.get(i), a.get(i)) {
         (Some(r), Some(v), Some(a)) => r + (v + 0.5 * a * t) * t,
         _ => 0.0,
@@ -118,6 +123,7 @@ pub(super) fn read_prior(from: &mut Reader<'_>) -> Result<Known, Refusal> {
     let cut_off = (Code::Arguments, 0);
     let (altitude_m, position_m) = from.f32().zip(from.floats()).ok_or(cut_off)?;
     let rate = match from.rest() {
+        // The rate may be left out, because the first version of the telecommand did not have it.
         [] => [f32::NAN; 3],
         _ => from.floats().ok_or(cut_off)?,
     };
@@ -131,6 +137,7 @@ pub(super) fn read_prior(from: &mut Reader<'_>) -> Result<Known, Refusal> {
 fn epoch_us(epoch: u64, clock: &Clock) -> Result<u64, Refusal> {
     let bytes = epoch.to_be_bytes();
     match (bytes, Cuc::from_bytes(bytes)) {
+        // No P-field is 0, so that a number of microseconds is never taken for a time code.
         (_, Some(time)) => clock.clock_us(time).ok_or((Code::NoClock, 1)),
         ([0, ..], None) => Ok(epoch),
         _ => Err((Code::Refused, 1)),
@@ -146,12 +153,14 @@ pub(super) fn read_navigation(from: &mut Reader<'_>, clock: &Clock, now_us: u64)
     let expires_s = (!n.expires_s.is_nan()).then_some(n.expires_s);
     let motion = Motion { epoch_us: epoch_us(n.epoch, clock)?, velocity_m_s, expires_s };
     let known = Known { prior: prior(n.altitude_m, position_m, rate)?, motion: Some(motion), ..Known::default() };
+    // Nearly twice the escape speed of the Earth, so it is an error of the sender.
     let is_fast = |x: &f32| x.abs() >= 2e4;
     let fastest = velocity_m_s.and_then(|v| (VELOCITY..).zip(v).find(|(_, x)| is_fast(x)));
     // A velocity without a position moves nothing.
     let moves_nothing = velocity_m_s.is_some() && known.prior.position_m.is_none();
     let checks = [
         (motion.age_s(now_us).abs() > LARGEST_AGE_S, 1),
+        // NaN says that the values do not expire, so that infinity is an error.
         (expires_s.is_some_and(|limit| limit <= 0.0 || limit.is_infinite()), 2),
         (moves_nothing, POSITION),
         (fastest.is_some(), fastest.map_or(0, |(place, _)| place)),

@@ -1,4 +1,4 @@
-//! The way of a picture from memory to its science packet.
+//! The way of a picture from memory to its science packet, and the event of a picture that does not come.
 
 use hzn_core::body::{Expected, Last};
 use hzn_core::status::Status;
@@ -7,10 +7,20 @@ use hzn_twice::KeptTwice;
 
 use super::{Buffers, Flight, longest_edge};
 use crate::board::{Board, Picture};
-use crate::messages::Event;
+use crate::messages::{Event, Mode};
 use crate::view::{Seen, StuckPlaces, Viewer};
 
 impl<B: Board> Flight<'_, B> {
+    /// Sends an event if the camera should have sent a picture by now. Only flight mode expects pictures.
+    pub(super) fn watch_camera(&mut self, now_us: u64) {
+        if self.mode == Mode::Flight
+            && let Some(waited_us) = self.camera.becomes_silent(now_us)
+        {
+            let waited_ms = u32::try_from(waited_us / 1000).unwrap_or(u32::MAX);
+            self.send_event(Event::CameraSilent, waited_ms, self.number);
+        }
+    }
+
     /// Processes a picture and sends its answer. A picture of the wrong size, or with an impossible prior, gets an
     /// event instead of an answer.
     #[inline(never)]
@@ -39,7 +49,9 @@ impl<B: Board> Flight<'_, B> {
             self.state.refused = self.state.refused.saturating_add(1);
             return;
         }
+        // After the check, because a new copy of a changed value would hide the change.
         self.remember(&report, picture.exposure_us, stuck.is_none());
+        // Without this, 3 of 5643 answers to such pictures were false, where the altitude is known to 100 km.
         if let Some(stuck) = stuck {
             self.state.stuck = self.state.stuck.saturating_add(1);
             self.send_event(Event::StuckPixels, stuck.stuck, stuck.places);
@@ -47,6 +59,7 @@ impl<B: Board> Flight<'_, B> {
         }
         let done_us = self.board.now_us();
         let calculation_us = u32::try_from(done_us.saturating_sub(start)).unwrap_or(u32::MAX);
+        // Before the packets are sent, because they have this number.
         self.count_picture(report.status, calculation_us);
         self.send_answer(&report, picture.exposure_us, done_us);
         if wanted {
@@ -90,6 +103,8 @@ impl<B: Board> Flight<'_, B> {
     /// Remembers what a picture says about the next one: its threshold, and its direction if that may be believed.
     fn remember(&mut self, report: &Report<f32>, exposure_us: u64, is_believed: bool) {
         let mut known = self.known.get().clone();
+        // The threshold is kept in any case, because it comes from the whole picture. A stuck direction would let the
+        // gate of the rate refuse the next, right one.
         known.level = report.next_level;
         if let Some(s) = report.solution.as_ref().filter(|_| is_believed) {
             let last = Last { axis: s.axis, sigma_rad: s.covariance.sigma_max_rad(), age_s: 0.0 };
@@ -115,6 +130,7 @@ impl<B: Board> Flight<'_, B> {
     /// Adds a processed picture to the counters.
     fn count_picture(&mut self, status: Status, calculation_us: u32) {
         let state = &mut self.state;
+        // It does not stop at its largest value, because the ground puts packets together by this number.
         self.number = self.number.wrapping_add(1);
         state.pictures = state.pictures.saturating_add(1);
         state.answers = state.answers.saturating_add(u32::from(status == Status::Ok));

@@ -44,12 +44,14 @@ impl Recovery {
     pub(super) fn begin(board: &mut impl Board) -> Self {
         let now_us = board.now_us();
         let [counts, since_ms, spare, check] = board.read_retained();
+        // A start was counted before words were kept, so that zeros are memory without any.
         let is_kept = counts != 0 && check == checksum([counts, since_ms, spare]);
         let (starts, resets) = if is_kept { ((counts >> 16) as u16, counts as u8) } else { (0, 0) };
         let lift_off_us = (is_kept && since_ms != ON_THE_GROUND)
             .then(|| now_us.cast_signed().saturating_sub(i64::from(since_ms) * 1000));
         let mut recovery = Self {
             starts: starts.saturating_add(1),
+            // Another reset ends the row, because the program did not hang.
             watchdog_resets: if board.was_watchdog_reset() { resets.saturating_add(1) } else { 0 },
             lift_off_us,
             line_was_off: false,
@@ -57,6 +59,7 @@ impl Recovery {
             kept_s: None,
             is_stable: false,
         };
+        // At once, because the count would miss a reset in the first turn.
         recovery.keep(board, now_us);
         recovery
     }
@@ -70,6 +73,7 @@ impl Recovery {
     pub(super) fn keep(&mut self, board: &mut impl Board, now_us: u64) {
         let since_us = self.lift_off_us.map(|at| now_us.cast_signed().saturating_sub(at));
         let since_ms = since_us.map_or(ON_THE_GROUND, |us| u32::try_from(us / 1000).unwrap_or(ON_THE_GROUND - 1));
+        // Only the kept count starts again, so that housekeeping still says why this run began.
         let resets = if self.is_stable { 0 } else { self.watchdog_resets };
         let words = [u32::from(self.starts) << 16 | u32::from(resets), since_ms, 0];
         let [counts, since_ms, spare] = words;
@@ -81,6 +85,7 @@ impl Recovery {
     /// Writes what has changed since the last turn.
     pub(super) fn keep_up(&mut self, board: &mut impl Board, now_us: u64) {
         let is_stable = now_us >= STABLE_US;
+        // At most once a second, because `hzn fly` keeps the words in a file.
         if is_stable != self.is_stable || self.since_lift_off_s(now_us) != self.kept_s {
             self.is_stable = is_stable;
             self.keep(board, now_us);
@@ -92,6 +97,7 @@ impl Recovery {
     pub(super) fn sees_lift_off(&mut self, line_is_off: bool, now_us: u64) -> bool {
         let is_edge = line_is_off && !self.line_was_off;
         self.line_was_off = line_is_off;
+        // The first lift-off counts, because a second change of the line would otherwise put off the shut-down.
         if is_edge && self.lift_off_us.is_none() {
             self.lift_off_us = Some(now_us.cast_signed());
         }

@@ -25,6 +25,7 @@ impl Limiter {
 
     /// Counts bytes that arrived: answers may have as many bytes.
     pub(super) fn add_received(&mut self, bytes: u16) {
+        // Not more than at the start, because a long exchange would otherwise pay for a flood.
         self.credit = self.credit.saturating_add(bytes).min(CREDIT);
     }
 
@@ -47,6 +48,7 @@ impl Limiter {
         if waited_us >= WARNING_US {
             let passed = waited_us / WARNING_US;
             self.warnings = self.warnings.saturating_add(u8::try_from(passed).unwrap_or(WARNINGS)).min(WARNINGS);
+            // Whole seconds, so that the rest of a second counts for the next warning.
             self.since_us += passed * WARNING_US;
         }
         let rest = self.warnings.checked_sub(1);

@@ -17,8 +17,10 @@ impl<B: Board> Flight<'_, B> {
     pub(super) fn send_answer(&mut self, report: &Report<f32>, exposure_us: u64, done_us: u64) {
         let navigation = self.known.get().state_at(self.number, exposure_us);
         let exposure = self.exposure(navigation.as_ref(), exposure_us, done_us);
+        // Sent before it is kept, so that a slow disk does not delay the packets.
         self.send_within_budget(report, &exposure, navigation);
         let is_kept = self.board.keep_answer(&exposure, report);
+        // Reported at the first one, because a full disk would otherwise send an event for each picture.
         if !is_kept && self.keeps_answers {
             self.send_event(Event::AnswersNotKept, self.number, 0);
         }
@@ -28,6 +30,7 @@ impl<B: Board> Flight<'_, B> {
     fn send_within_budget(&mut self, report: &Report<f32>, exposure: &Exposure, navigation: Option<NavigationState>) {
         let answer = PictureAnswer::from_report(report);
         let exposure_us = exposure.exposure_us;
+        // All packets or none, because without the science packet the others belong to no answer.
         if !self.has_budget(&answer, navigation.is_some(), exposure.done_us) {
             self.state.decimated = self.state.decimated.saturating_add(1);
             return;
@@ -56,6 +59,7 @@ impl<B: Board> Flight<'_, B> {
 
     fn exposure(&self, navigation: Option<&NavigationState>, exposure_us: u64, done_us: u64) -> Exposure {
         let config = self.sensor.get().config();
+        // The altitude that was used, so that values that have expired do not count.
         let known_m = navigation.filter(|n| n.state == NavigationState::USED).map(|n| n.altitude_m);
         let altitude_m = known_m.filter(|h| !h.is_nan()).or(config.body.altitude_km.map(|h| (h * 1000.0) as f32));
         Exposure {

@@ -9,6 +9,7 @@ impl<B: Board> Flight<'_, B> {
     /// configured is of no use, so the computer enters safe mode.
     pub(super) fn run_self_checks(&mut self, parameters: bool) {
         let camera = self.board.camera_answers();
+        // The memory of the packets, because nothing in it must survive.
         let memory = memory_works(&mut self.buffers.line.out, |_| ());
         let failed = u8::from(!camera) | u8::from(!memory) << 1 | u8::from(!parameters) << 2;
         self.state.self_check = failed;
@@ -22,8 +23,10 @@ impl<B: Board> Flight<'_, B> {
 /// Returns whether memory holds every bit, set and cleared. `meanwhile` changes the memory after each write; tests use
 /// it for stuck bits.
 fn memory_works(memory: &mut [u8], meanwhile: impl Fn(&mut [u8])) -> bool {
+    // Each bit differs from its neighbours, so that two that are connected are noticed, too.
     [0x55u8, 0xAA].iter().all(|&pattern| {
         memory.fill(pattern);
+        // Otherwise the compiler knows what was written, and reads nothing.
         meanwhile(core::hint::black_box(&mut *memory));
         core::hint::black_box(&*memory).iter().all(|&b| b == pattern)
     })

@@ -28,6 +28,7 @@ impl<B: Board> Flight<'_, B> {
             _ if !from.rest().is_empty() => Code::Arguments,
             Function::ProcessOnce if self.mode != Mode::Standby => Code::Mode,
             Function::ProcessOnce => {
+                // Only a request, because the picture is taken after the telecommands of a turn.
                 self.process_once = true;
                 Code::Done
             }
@@ -58,6 +59,7 @@ impl<B: Board> Flight<'_, B> {
             return Code::Arguments;
         }
         let now_us = self.board.now_us();
+        // Two telecommands are needed, because only a reset ends this mode.
         if mode == Mode::ShutDown && !self.recovery.is_armed(now_us) {
             return Code::NotArmed;
         }
@@ -90,6 +92,7 @@ impl<B: Board> Flight<'_, B> {
 
     /// Sets the counters to zero. What is no counter stays.
     fn reset_counters(&mut self) {
+        // The number of the last picture goes on, so that no number means two pictures.
         self.state = Housekeeping {
             pictures: 0,
             answers: 0,

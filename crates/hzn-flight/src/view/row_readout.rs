@@ -2,6 +2,7 @@
 //! neighbours, and in each row the longest run of equal dark pixels and the longest one of equal bright pixels.
 
 /// Shortest run that is kept; shorter ones never count as stuck.
+// Light and lens make shorter runs without a fault, so that these would refuse good limbs.
 pub(super) const SHORTEST: usize = 16;
 /// Room for the pairs of a sample. The step of a sample leaves at most twice as many pairs as it wants.
 const PAIRS: usize = 2 * SAMPLES;
@@ -32,6 +33,7 @@ impl Run {
 
 /// The longest runs of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+// Two runs instead of all pixels, because a board that takes rows has no memory for a picture.
 pub(super) struct RowRuns {
     dark: Run,
     bright: Run,
@@ -51,6 +53,7 @@ impl RowRuns {
             let before = before.iter().rev().take_while(is_equal).count();
             let longest = if u16::from(*value) < level { &mut found.dark } else { &mut found.bright };
             let length = before + after;
+            // Black and saturated runs would hide a stuck one, because they can be the longest.
             if length >= SHORTEST.max(usize::from(longest.length) + 1) && !matches!(*value, 0 | u8::MAX) {
                 *longest = Run { start: (x - before) as u16, length: length as u16, value: *value };
             }
@@ -90,6 +93,7 @@ impl RowSample {
 
     /// Takes the pairs of the next row.
     pub(super) fn take_row(&mut self, row: &[u8]) {
+        // A pair may reach into the next row, because that of a picture in memory does.
         if let (Some(a), Some(&b)) = (self.open.take(), row.first()) {
             self.add([a, b]);
         }

@@ -16,12 +16,15 @@ use super::row_readout::{RowRuns, RowSample, SHORTEST, sample_step};
 /// Probability of a run that noise does not allow.
 const RARE: f32 = 1e-6;
 /// Fewest pairs of pixels that give a share; with fewer, the share of the whole picture is used.
+// Otherwise a handful of pairs would decide how long a stuck run is.
 const FEWEST: u32 = 16;
 /// Largest share of equal neighbours that is known well enough from the sample.
+// Nearer to 1, a small error of the share would make a stuck run several times longer or shorter.
 const MOST_EQUAL: f32 = 0.9;
 /// Number of places that are looked at along an edge.
 pub(super) const PLACES: usize = 64;
 /// A limb is stuck if more than one in this many of its places is.
+// Fewer are outliers of the fit, which leaves them out by itself.
 const MOST_STUCK: u32 = 8;
 /// Places that are nearer to the fitted limb than this belong to it: the edge points may be a few pixels off the border
 /// pixels, and the limb of an ellipsoid is not quite a circle.
@@ -103,6 +106,7 @@ impl<'a> StuckWatch<'a> {
         for (pixel, is_stuck) in &self.places {
             let point = ImagePoint { u: f32::from(pixel.x), v: f32::from(pixel.y) };
             let Some(ray) = self.camera.unproject(point) else { continue };
+            // At first all places of the edge were counted, so that stuck places cost an answer that did not use them.
             if (ray.angle_rad(&limb.axis) - limb.fused_half_angle_rad).abs() < near {
                 count.places += 1;
                 count.stuck += u32::from(*is_stuck);
@@ -117,6 +121,7 @@ impl<'a> StuckWatch<'a> {
     /// Returns what was found along the limb of a candidate, if it is stuck.
     pub(super) fn found(&self, candidate: u32) -> Option<StuckPlaces> {
         let found = self.found.iter().find(|found| found.candidate == candidate);
+        // If the list is full, further limbs may be stuck without being in it, so that they count as stuck.
         found.or(self.found.last().filter(|_| self.found.is_full())).copied()
     }
 }
@@ -157,7 +162,9 @@ impl Equality {
     }
     fn of<I: Iterator<Item = [u8; 2]>>(pairs: impl Fn() -> I) -> Self {
         let (sum, count) = pairs().fold((0u32, 0u32), |(sum, count), [a, _]| (sum + u32::from(a), count + 1));
+        // The mean, because the threshold of a picture in memory is not known yet.
         let mean = sum.checked_div(count).unwrap_or(0) as u8;
+        // Two parts, because noise grows with the light, so that bright neighbours are equal less often.
         let (mut dark, mut bright) = (Pairs::default(), Pairs::default());
         for [a, b] in pairs().filter(|[a, _]| !matches!(*a, 0 | u8::MAX)) {
             let part = if a < mean { &mut dark } else { &mut bright };
@@ -172,6 +179,8 @@ impl Equality {
     /// Returns whether the pixels at a pixel of an edge are stuck: its own run or that of a neighbour.
     pub(super) fn is_stuck(&self, readout: Readout<'_>, at: Pixel) -> bool {
         let (x, y) = (usize::from(at.x), usize::from(at.y));
+        // The neighbours count, because an edge runs next to a stuck run as often as in it. Before the first column and
+        // row, the wrapped number is no place, so that `get` refuses it.
         let near = [(x, y), (x, y.wrapping_sub(1)), (x, y + 1), (x.wrapping_sub(1), y), (x + 1, y)];
         near.iter().any(|&(x, y)| match readout {
             Readout::Pixels(pixels, width) => self.is_in_stuck_run(pixels, width, x, y),
@@ -202,6 +211,7 @@ impl Equality {
         }
         let needed = needed as usize;
         let is_equal = |p: &&u8| **p == value;
+        // At most as many as needed, so that a long run costs no more.
         let after = row.get(x..).unwrap_or_default().iter().take(needed).take_while(is_equal).count();
         let before = row.get(..x).unwrap_or_default().iter().rev().take(needed - after).take_while(is_equal).count();
         after + before >= needed

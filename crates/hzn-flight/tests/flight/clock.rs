@@ -102,7 +102,7 @@ fn values_from_navigation_can_have_a_time_of_tai() {
         assert_eq!((state.picture, state.state), (1, 1));
         assert!((state.age_s - 10.0).abs() < 1e-2, "{state:?}");
         assert!((state.position_m[1] - 73e3).abs() < 100.0, "{state:?}");
-        let axis = h.science[0].1.direction.unwrap().axis_ecef;
+        let axis = h.science[0].1.direction.unwrap().axis_fixed;
         assert!(((-axis[1]).atan2(-axis[0]).to_degrees() - 0.633).abs() < 2e-3, "{axis:?}");
     });
 }

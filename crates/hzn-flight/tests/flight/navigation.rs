@@ -34,7 +34,7 @@ fn picture(f: &mut Flight<'_, Bench>) -> ([f32; 3], f32) {
     f.board().pictures.push_back((limb(), 0));
     f.turn();
     let science = take_sent(f).science;
-    (science[0].1.direction.unwrap().axis_ecef, science[0].0.altitude_m)
+    (science[0].1.direction.unwrap().axis_fixed, science[0].0.altitude_m)
 }
 
 #[test]

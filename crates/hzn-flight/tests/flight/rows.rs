@@ -9,7 +9,7 @@ use hzn_flight::view::RowMemory;
 
 use crate::bench::{Bench, HEIGHT, Rows, WIDTH, command, fly, limb, ready, send, take_sent};
 
-/// Parameters 50 and 51: `binarize.method` and `binarize.level`.
+/// Parameters 50 and 51: `threshold.method` and `threshold.level`.
 const FIXED_AT_100: [(u16, f64); 2] = [(50, 1.0), (51, 100.0)];
 
 fn by_rows() -> Bench {

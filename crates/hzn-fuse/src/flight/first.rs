@@ -41,7 +41,7 @@ pub(super) fn first_attitude(
             Source::Gnss(_) => None,
             Source::Attitude(index) => {
                 let seen = flight.inputs.attitudes.get(index);
-                seen.and_then(|a| Some((a.body_to_ecef?, Matrix3::identity() * a.sigma_rad.powi(2), 0, 0.0)))
+                seen.and_then(|a| Some((a.fixed_from_vehicle?, Matrix3::identity() * a.sigma_rad.powi(2), 0, 0.0)))
             }
             Source::Camera(camera, index) => {
                 let seen = flight.inputs.recordings.get(camera).and_then(|r| r.seen.get(index));

@@ -325,7 +325,7 @@ impl<'a, const N: usize> Runner<'a, N> {
 
     fn measure_attitude(&mut self, time_s: f64, index: usize) -> Used {
         let Some(seen) = self.flight.inputs.attitudes.get(index) else { return Ok(()) };
-        let attitude = seen.body_to_ecef.ok_or("qw, qx, qy, qz are not a unit quaternion")?;
+        let attitude = seen.fixed_from_vehicle.ok_or("qw, qx, qy, qz are not a unit quaternion")?;
         let done = self.filter.update_attitude(&attitude, seen.sigma_rad).map_err(Unusable::as_str)?;
         self.keep(time_s, None, Kind::Attitude, &done);
         Ok(())

@@ -13,7 +13,7 @@ pub struct Attitude {
     /// Time, s.
     pub time_s: f64,
     /// Rotation from the body frame to ECEF; `None` if the cells are not a quaternion.
-    pub body_to_ecef: Option<UnitQuaternion<f64>>,
+    pub fixed_from_vehicle: Option<UnitQuaternion<f64>>,
     /// 1-sigma about each axis, rad.
     pub sigma_rad: f64,
 }
@@ -30,8 +30,8 @@ pub fn attitudes(path: &Path) -> Result<Vec<Attitude>, Error> {
         let [time_s, w, x, y, z, sigma_deg] = row.try_into().unwrap_or([f64::NAN; 6]);
         let q = Quaternion::new(w, x, y, z);
         let is_unit = (q.norm() - 1.0).abs() < 0.01;
-        let body_to_ecef = is_unit.then(|| UnitQuaternion::from_quaternion(q));
-        Attitude { time_s, body_to_ecef, sigma_rad: sigma_deg.to_radians() }
+        let fixed_from_vehicle = is_unit.then(|| UnitQuaternion::from_quaternion(q));
+        Attitude { time_s, fixed_from_vehicle, sigma_rad: sigma_deg.to_radians() }
     };
     Ok(table.rows().map(attitude).collect())
 }

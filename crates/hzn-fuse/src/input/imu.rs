@@ -33,6 +33,16 @@ const NAMES: [&str; 8] = [
 ///
 /// # Errors
 /// The file cannot be read, a column is missing, or a cell is not a number.
+///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("imu.csv");
+/// let columns = "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2\n";
+/// std::fs::write(&path, columns.to_owned() + "0.00,0,0,0.1,9.8,0,0\n0.01,0,0,0.1,9.8,0,0\n")?;
+/// let samples = hzn_fuse::input::imu(&path)?;
+/// assert_eq!((samples.len(), samples[1].imu.time_s, samples[1].saturated), (2, 0.01, false));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn imu(path: &Path) -> Result<Vec<Sample>, Error> {
     let table = Table::read(path, &NAMES, 7)?;
     let sample = |row: &[f64]| {

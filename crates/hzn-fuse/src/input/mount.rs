@@ -21,13 +21,13 @@ struct File {
 /// `[mount]`: a quaternion, as in sensor.toml, or a matrix.
 #[derive(Debug, Deserialize)]
 struct Table {
-    q_body_from_camera_wxyz: Option<[f64; 4]>,
+    q_vehicle_from_camera_wxyz: Option<[f64; 4]>,
     /// Rows of the rotation from the camera to the body frame.
-    body_from_camera: Option<[[f64; 3]; 3]>,
+    vehicle_from_camera: Option<[[f64; 3]; 3]>,
 }
 
-/// Reads the mount (camera to body) from the table `[mount]` of a TOML file: `q_body_from_camera_wxyz`, or
-/// `body_from_camera` as a matrix with its rows.
+/// Reads the mount (camera to body) from the table `[mount]` of a TOML file: `q_vehicle_from_camera_wxyz`, or
+/// `vehicle_from_camera` as a matrix with its rows.
 ///
 /// # Errors
 /// The file cannot be read, has no such table, or the numbers are not a rotation.
@@ -40,16 +40,16 @@ pub fn mount(path: &Path) -> Result<UnitQuaternion<f64>, Error> {
         Error::unusable(format!("{shown}:{}: {}", before.matches('\n').count() + 1, e.message()))
     })?;
     let refuse = |what: String| Error::unusable(format!("{shown}: [mount] {what}"));
-    match (file.mount.q_body_from_camera_wxyz, file.mount.body_from_camera) {
+    match (file.mount.q_vehicle_from_camera_wxyz, file.mount.vehicle_from_camera) {
         (Some(wxyz), None) => of_quaternion(wxyz).map_err(refuse),
         (None, Some(rows)) => of_matrix(rows).map_err(refuse),
-        _ => Err(refuse("must have either q_body_from_camera_wxyz or body_from_camera".into())),
+        _ => Err(refuse("must have either q_vehicle_from_camera_wxyz or vehicle_from_camera".into())),
     }
 }
 
 /// Returns the mount of a sensor.toml.
 pub(super) fn of_config(mount: Mount) -> Result<UnitQuaternion<f64>, String> {
-    of_quaternion(mount.q_body_from_camera_wxyz)
+    of_quaternion(mount.q_vehicle_from_camera_wxyz)
 }
 
 fn of_quaternion([w, x, y, z]: [f64; 4]) -> Result<UnitQuaternion<f64>, String> {
@@ -57,16 +57,18 @@ fn of_quaternion([w, x, y, z]: [f64; 4]) -> Result<UnitQuaternion<f64>, String> 
     if (q.norm() - 1.0).abs() < 0.01 {
         return Ok(UnitQuaternion::from_quaternion(q));
     }
-    Err(format!("q_body_from_camera_wxyz: the length is {:.4}, but must be 1", q.norm()))
+    Err(format!("q_vehicle_from_camera_wxyz: the length is {:.4}, but must be 1", q.norm()))
 }
 
 fn of_matrix(rows: [[f64; 3]; 3]) -> Result<UnitQuaternion<f64>, String> {
     let m = Matrix3::from_fn(|i, j| rows[i][j]);
     if !((m * m.transpose() - Matrix3::identity()).amax() < TOLERANCE) {
-        return Err("body_from_camera: the rows must be perpendicular unit vectors".into());
+        return Err("vehicle_from_camera: the rows must be perpendicular unit vectors".into());
     }
     if m.determinant() < 0.0 {
-        return Err("body_from_camera: the determinant is -1, so the matrix mirrors; check the sign of one axis".into());
+        return Err(
+            "vehicle_from_camera: the determinant is -1, so the matrix mirrors; check the sign of one axis".into()
+        );
     }
     Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m)))
 }

@@ -8,10 +8,10 @@ use super::record::{InnovationRecord, StateRecord, innovations, states};
 use crate::error::Error;
 use crate::results::Fused;
 
-/// Name of the Earth-fixed frame.
-const ECEF: &str = "ecef";
+/// Name of the frame that is fixed in the Earth, as in recordings of `hzn run`.
+const FIXED: &str = "fixed";
 /// Name of the frame of the vehicle. `camera` is the name of the prior attitude's frame in recordings of `hzn run`.
-const BODY: &str = "nav_body";
+const VEHICLE: &str = "nav_vehicle";
 
 /// Writes a recording.
 ///
@@ -19,8 +19,8 @@ const BODY: &str = "nav_body";
 /// |---|---|---|
 /// | `/nav/state`, `/nav/back`, `/nav/smoothed` | `hzn.NavState` (JSON) | the solutions |
 /// | `/nav/innovation/SOURCE/KIND` | `hzn.NavInnovation` (JSON) | every innovation |
-/// | `/tf` | `foxglove.FrameTransform` | `nav_body` in `ecef`, and `nav_CAMERA` in `nav_body` |
-/// | `/nav/pose` | `foxglove.PoseInFrame` | the vehicle in `ecef` |
+/// | `/tf` | `foxglove.FrameTransform` | `nav_vehicle` in `fixed`, and `nav_CAMERA` in `nav_vehicle` |
+/// | `/nav/pose` | `foxglove.PoseInFrame` | the vehicle in `fixed` |
 ///
 /// # Errors
 /// The output cannot be written.
@@ -63,14 +63,15 @@ fn state(fused: &Fused, s: &StateRecord, out: &mut SeriesWriter) -> Result<(), h
     if s.phase != Phase::Filter {
         return Ok(());
     }
-    let vehicle = Placed { frame: ECEF, position_m: [s.x_m, s.y_m, s.z_m], q_wxyz: [s.qw, s.qx, s.qy, s.qz] };
-    out.transform(s.time_s, BODY, &vehicle)?;
+    let vehicle =
+        Placed { frame: FIXED, position_m: [s.x_m, s.y_m, s.z_m], q_frame_from_placed_wxyz: [s.qw, s.qx, s.qy, s.qz] };
+    out.transform(s.time_s, VEHICLE, &vehicle)?;
     out.pose("/nav/pose", s.time_s, &vehicle)?;
     let here = fused.epochs.partition_point(|e| e.state.time_s < s.time_s);
     let cameras = fused.epochs.get(here).map(|e| e.cameras.as_slice()).unwrap_or_default();
     for (name, camera) in fused.cameras.iter().zip(cameras) {
         let q = camera.mount;
-        let placed = Placed { frame: BODY, position_m: [0.0; 3], q_wxyz: [q.w, q.i, q.j, q.k] };
+        let placed = Placed { frame: VEHICLE, position_m: [0.0; 3], q_frame_from_placed_wxyz: [q.w, q.i, q.j, q.k] };
         out.transform(s.time_s, &format!("nav_{name}"), &placed)?;
     }
     Ok(())

@@ -244,7 +244,7 @@ fn innovation(fused: &Fused, i: &Innovation) -> InnovationRecord {
 }
 
 /// Returns yaw, pitch and roll against north, east and down (geodetic), degrees.
-fn yaw_pitch_roll_deg(body_to_ecef: &UnitQuaternion<f64>, position_m: &Vector3<f64>) -> [f64; 3] {
+fn yaw_pitch_roll_deg(fixed_from_vehicle: &UnitQuaternion<f64>, position_m: &Vector3<f64>) -> [f64; 3] {
     let (lat, _) = geodetic((*position_m).into(), WGS84_A_M, WGS84_B_M);
     let lon = position_m.y.atan2(position_m.x);
     let ((sl, cl), (so, co)) = (lat.sin_cos(), lon.sin_cos());
@@ -252,7 +252,7 @@ fn yaw_pitch_roll_deg(body_to_ecef: &UnitQuaternion<f64>, position_m: &Vector3<f
     let east = Vector3::new(-so, co, 0.0);
     let down = Vector3::new(-cl * co, -cl * so, -sl);
     let ned = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[north, east, down]));
-    let to_ned = UnitQuaternion::from_rotation_matrix(&ned).inverse() * body_to_ecef;
+    let to_ned = UnitQuaternion::from_rotation_matrix(&ned).inverse() * fixed_from_vehicle;
     let (roll, pitch, yaw) = to_ned.euler_angles();
     [yaw, pitch, roll].map(f64::to_degrees)
 }

@@ -56,7 +56,7 @@ fn a_flight_gives_attitude_mounts_clocks_and_the_way_back() {
     let last = fused.epochs.last().unwrap();
     for (one, state) in scene.by_camera().iter().zip(&last.cameras) {
         let rotation = |[w, x, y, z]: [f64; 4]| UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
-        let error = (state.mount.inverse() * rotation(one.true_mount_wxyz())).scaled_axis();
+        let error = (state.mount.inverse() * rotation(one.true_q_vehicle_from_camera_wxyz())).scaled_axis();
         let sigmas = error.component_div(&state.misalignment_sigma_rad).amax();
         assert!(sigmas < 3.5, "{}: {error} {}", one.name, state.misalignment_sigma_rad);
         let late_s = -(one.clock.offset_s + one.clock.latency_s);
@@ -190,9 +190,9 @@ fn a_lost_filter_begins_again() {
     let scene = scene(SEED);
     let mut inputs = flight(&scene);
     // A star tracker that is 40 degrees wrong, and says 0.1 degrees.
-    let truth = scene.path().unwrap().state(130.0).body_to_ecef;
+    let truth = scene.path().unwrap().state(130.0).fixed_from_vehicle;
     let wrong = truth * UnitQuaternion::from_scaled_axis(Vector3::x() * 40f64.to_radians());
-    inputs.attitudes = vec![Attitude { time_s: 70.0, body_to_ecef: Some(wrong), sigma_rad: 0.1f64.to_radians() }];
+    inputs.attitudes = vec![Attitude { time_s: 70.0, fixed_from_vehicle: Some(wrong), sigma_rad: 0.1f64.to_radians() }];
     let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
     assert_eq!((fused.begin.unwrap().directions, fused.counts.restarts), (0, 1), "{:?}", fused.notes);
     assert!(fused.notes.iter().any(|n| n.contains("began again")), "{:?}", fused.notes);
@@ -207,11 +207,11 @@ fn a_false_first_sun_is_found_out() {
     let mut inputs = flight(&scene);
     let path = scene.path().unwrap();
     for (one, recording) in scene.by_camera().iter().zip(&mut inputs.recordings) {
-        let [w, x, y, z] = one.true_mount_wxyz();
+        let [w, x, y, z] = one.true_q_vehicle_from_camera_wxyz();
         let mount = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         for seen in recording.seen.iter_mut().filter(|s| s.body == Body::Sun && s.time_s < 118.0) {
             let state = path.state(seen.time_s);
-            let nadir = (state.body_to_ecef * mount).inverse() * -state.position_m.normalize();
+            let nadir = (state.fixed_from_vehicle * mount).inverse() * -state.position_m.normalize();
             seen.axis = UnitQuaternion::from_scaled_axis(nadir * 0.7) * seen.axis;
         }
     }
@@ -280,12 +280,12 @@ fn positions_from_the_limb_are_taken_where_they_are_asked_for() {
     let path = scene.path().unwrap();
     let mut draws = crate::common::Draws(11);
     for (one, recording) in scene.by_camera().iter().zip(&mut inputs.recordings) {
-        let [w, x, y, z] = one.true_mount_wxyz();
+        let [w, x, y, z] = one.true_q_vehicle_from_camera_wxyz();
         let mount = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let late_s = one.clock.offset_s + one.clock.latency_s;
         for seen in recording.seen.iter_mut().filter(|s| s.body == Body::Limb) {
             let state = path.state(seen.time_s - late_s);
-            let centre = (state.body_to_ecef * mount).inverse() * -state.position_m;
+            let centre = (state.fixed_from_vehicle * mount).inverse() * -state.position_m;
             let noise = Vector3::from_fn(|_, _| 300.0 * draws.normal());
             let covariance_m2 = nalgebra::Matrix3::identity() * 300f64.powi(2);
             seen.centre = Some(Centre { position_m: centre + noise, covariance_m2 });

@@ -12,8 +12,8 @@ fn report<T: Real>(status: Status) -> Report<T> {
     let solution = Solution {
         axis: UnitVec3::try_new([number(0.0), number(0.6), number(0.8)]).unwrap(),
         covariance: Cov3::from_upper([number(4e-8), number(0.0), number(0.0), number(1e-8), number(0.0), number(0.0)]),
-        axis_ecef: None,
-        axis_body: UnitVec3::try_new([number(-0.5), number(0.0), number(0.75f64.sqrt())]),
+        axis_fixed: None,
+        axis_vehicle: UnitVec3::try_new([number(-0.5), number(0.0), number(0.75f64.sqrt())]),
         half_angle_rad: number(1.3),
         fused_half_angle_rad: number(1.3),
         altitude_m: Some((number(240e3), number(1e3))),
@@ -27,7 +27,7 @@ fn report<T: Real>(status: Status) -> Report<T> {
     };
     Report {
         status,
-        stage: Stage::Select,
+        stage: Stage::Gates,
         level: 80,
         next_level: None,
         counters: Counters { edge_points: 600, candidates: 2, ..Counters::default() },
@@ -63,14 +63,14 @@ fn only_ok_has_an_axis() {
     }
     let counters = Counters { looks: 4, ..Counters::default() };
     let again = Report { counters, ..report::<f64>(Status::NoLimb) };
-    assert_eq!(Row::from_report(&meta(), &again, None).detail, "ended at select in 4 looks");
+    assert_eq!(Row::from_report(&meta(), &again, None).detail, "ended at gates in 4 looks");
     let row = Row::unprocessed(&meta(), Status::Unreadable, "cut off");
     assert_eq!((row.status, row.axis(), row.edge_points), (Status::Unreadable, None, None));
 }
 
 #[test]
 fn roll_and_pitch_have_the_signs_they_are_documented_with() {
-    let at = |x: f64, y: f64, z: f64| roll_pitch_deg(&UnitVec3::<Body, f64>::try_new([x, y, z]).unwrap());
+    let at = |x: f64, y: f64, z: f64| roll_pitch_deg(&UnitVec3::<Vehicle, f64>::try_new([x, y, z]).unwrap());
     assert_eq!(at(0.0, 0.0, 1.0), [0.0, -0.0]);
     // With the right side down, the body is to the right. With the nose up, it is behind.
     assert!((at(0.0, 1.0, 1.0)[0] - 45.0).abs() < 1e-12);

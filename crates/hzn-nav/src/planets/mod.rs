@@ -75,14 +75,14 @@ impl Planet {
     }
 
     /// Returns the rotation from the ICRF to the body-fixed frame at a time, as in [`Planet::orientation`].
-    pub fn icrf_to_body_fixed(&self, tdb_days: f64) -> Matrix3<f64> {
-        self.orientation(tdb_days).icrf_to_body_fixed()
+    pub fn fixed_from_inertial(&self, tdb_days: f64) -> Matrix3<f64> {
+        self.orientation(tdb_days).fixed_from_inertial()
     }
 }
 
 impl Orientation {
     /// Returns the rotation from the ICRF to the body-fixed frame: R₃(W) R₁(90° − δ₀) R₃(90° + α₀).
-    pub fn icrf_to_body_fixed(&self) -> Matrix3<f64> {
+    pub fn fixed_from_inertial(&self) -> Matrix3<f64> {
         let about_z = |deg: f64| {
             let (s, c) = libm::sincos(deg.to_radians());
             Matrix3::new(c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0)

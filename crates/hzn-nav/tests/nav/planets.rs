@@ -68,12 +68,12 @@ fn jupiter_is_as_cassini_saw_it() {
     ];
     let jupiter = planets::find("jupiter").unwrap();
     for (utc, range_km, rows, sun_camera) in pictures {
-        let body_to_camera = Matrix3::from_fn(|i, j| rows[i][j]);
+        let camera_from_fixed = Matrix3::from_fn(|i, j| rows[i][j]);
         let [latitude, longitude] =
-            latitude_longitude_deg(&(body_to_camera.transpose() * Vector3::from(sun_camera).normalize()));
+            latitude_longitude_deg(&(camera_from_fixed.transpose() * Vector3::from(sun_camera).normalize()));
         // The light left Jupiter before the picture was taken.
         let days = time::tt_days_since_j2000(unix_s(utc)) - range_km / 299_792.458 / 86_400.0;
-        let sun = jupiter.icrf_to_body_fixed(days) * -jupiter_from_sun(days / 36_525.0);
+        let sun = jupiter.fixed_from_inertial(days) * -jupiter_from_sun(days / 36_525.0);
         let [expected_latitude, expected_longitude] = latitude_longitude_deg(&sun);
         println!("{latitude} {expected_latitude}, {longitude} {expected_longitude}");
         assert!((latitude - expected_latitude).abs() < 0.02, "{latitude} {expected_latitude}");
@@ -100,7 +100,7 @@ fn the_moon_shows_its_near_side() {
         let about_z = |a: f64| Matrix3::new(a.cos(), -a.sin(), 0.0, a.sin(), a.cos(), 0.0, 0.0, 0.0, 1.0);
         let about_y = |a: f64| Matrix3::new(a.cos(), 0.0, a.sin(), 0.0, 1.0, 0.0, -a.sin(), 0.0, a.cos());
         of_date = about_z(-half) * about_y(tilt) * about_z(-half) * of_date;
-        let libration = latitude_longitude_deg(&(moon.icrf_to_body_fixed(days) * -of_date));
+        let libration = latitude_longitude_deg(&(moon.fixed_from_inertial(days) * -of_date));
         assert!(libration[0].abs() < 6.95 && libration[1].abs() < 8.1, "{i} {libration:?}");
         (0..2).for_each(|k| sums[k] += libration[k]);
         count += 1.0;
@@ -133,8 +133,8 @@ fn orientations_are_those_of_spice() {
             numbers.split(',').map(|x| x.parse::<f64>().unwrap()).collect::<Vec<_>>().try_into().unwrap();
         let body = planets::find(name).unwrap();
         let theirs = planets::Orientation { right_ascension_deg: ra, declination_deg: dec, meridian_deg: w }
-            .icrf_to_body_fixed();
-        let turn = theirs * body.icrf_to_body_fixed(days).transpose();
+            .fixed_from_inertial();
+        let turn = theirs * body.fixed_from_inertial(days).transpose();
         // |R − I| of a rotation by a small angle a is √2 a.
         let angle = ((turn - Matrix3::identity()).norm() / 2f64.sqrt()).to_degrees();
         let pole = (turn.row(2).transpose() - Vector3::z()).norm().to_degrees();
@@ -192,7 +192,7 @@ fn bodies_turn_in_their_periods() {
 fn rotations_are_rotations_about_the_pole() {
     for body in &BODIES {
         let days = 8_000.25;
-        let (rotation, orientation) = (body.icrf_to_body_fixed(days), body.orientation(days));
+        let (rotation, orientation) = (body.fixed_from_inertial(days), body.orientation(days));
         assert!((rotation * rotation.transpose() - Matrix3::identity()).norm() < 1e-13, "{}", body.name);
         assert!((rotation.determinant() - 1.0).abs() < 1e-13);
         let pole = rotation * Vector3::from(orientation.pole_icrf());

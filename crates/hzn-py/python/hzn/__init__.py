@@ -39,12 +39,3 @@ from ._hzn import read_mcap as read_mcap
 from ._simulation import evaluate as evaluate
 from ._simulation import sensitivity as sensitivity
 from ._simulation import simulate as simulate
-
-
-def __getattr__(name: str) -> object:
-    """Import the stages under their old names, with a warning."""
-    if name in ("binarize", "contours", "ransac"):
-        import importlib
-
-        return importlib.import_module(f"{__name__}.{name}")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

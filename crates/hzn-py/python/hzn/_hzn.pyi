@@ -245,7 +245,7 @@ class Sensor:
         Examples
         --------
         >>> parameters = sensor.parameters
-        >>> parameters["reject"]["threshold_px"] = 2.0
+        >>> parameters["consensus"]["threshold_px"] = 2.0
         >>> sensor.parameters = parameters
         """
 
@@ -315,16 +315,16 @@ class Sensor:
         altitude_km
             Above WGS-84 for ``earth``, otherwise above the radius. Without it, the parameters' altitude is used.
         position_km
-            Position of the camera in ECEF, km, shape (3,). It overrides the altitude.
+            Position of the camera in the fixed frame of the body (for the Earth ECEF), km, shape (3,). It overrides the altitude.
         attitude
-            Prior attitude: unit quaternion (w, x, y, z) from the camera frame to ECEF, or to the axes of an ellipsoid.
+            Prior attitude: unit quaternion (w, x, y, z) from the camera frame to the fixed frame of the body.
         attitude_sigma_deg
             1-sigma of the prior attitude, degrees; without it, 5.
         rate_rad_s
             Rotation rate of the camera in the camera frame, rad/s, shape (3,). It corrects a rolling shutter
             (`camera.readout_s`).
         range_km
-            Distance of the camera from the body's centre, km, if the position is fitted (`estimate.position`). It needs
+            Distance of the camera from the body's centre, km, if the position is fitted (`fit.position`). It needs
             ``range_sigma_km``, here or in the parameters.
         range_sigma_km
             1-sigma of that distance, km.
@@ -334,7 +334,7 @@ class Sensor:
         sun
             Direction to the Sun in the camera frame, shape (3,).
         time_s
-            UTC in seconds since 1970. With a position, Sun and Moon get `Report.axis_ecef`.
+            UTC in seconds since 1970. With a position, Sun and Moon get `Report.axis_fixed`.
         bits
             Number of significant bits of uint16, 8 to 16. Without it, the sensor's `input.bits` is used, else 16. If
             nothing is found and the upper bits are unused, a warning says so.
@@ -373,7 +373,7 @@ class Sensor:
             (``altitude_km`` and so on). An iterable is read only as fast as it is processed: each thread takes some
             milliseconds' work or 8 MB at a time, and at least one picture.
         jobs
-            Number of threads; without it, one per core. With ``binarize.method = "track"`` there is only one.
+            Number of threads; without it, one per core. With ``threshold.method = "track"`` there is only one.
         progress
             Show a progress bar (needs the package tqdm).
 
@@ -438,8 +438,8 @@ class Report:
         """Unit vector to the body in the camera frame, shape (3,)."""
 
     @property
-    def axis_ecef(self) -> NDArray[np.float64] | None:
-        """The same direction in ECEF, shape (3,), if the position is known."""
+    def axis_fixed(self) -> NDArray[np.float64] | None:
+        """The same direction in the fixed frame of the body (for the Earth ECEF), shape (3,), if the position is known."""
 
     @property
     def covariance(self) -> NDArray[np.float64] | None:
@@ -470,7 +470,7 @@ class Report:
 
     @property
     def position_km(self) -> NDArray[np.float64] | None:
-        """Position of the body's centre in the camera frame, shape (3,), km, with ``estimate.position``.
+        """Position of the body's centre in the camera frame, shape (3,), km, with ``fit.position``.
 
         It holds the same information as `axis`; a filter must use only one of them.
         """
@@ -487,7 +487,7 @@ class Report:
     def yaw_deg(self) -> float | None:
         """Rotation of the body about the line to it, relative to the given attitude, degrees.
 
-        It is right-handed about the direction to the body, and None if its 1-sigma is above ``estimate.yaw_limit_deg``.
+        It is right-handed about the direction to the body, and None if its 1-sigma is above ``fit.yaw_limit_deg``.
         """
 
     @property

@@ -7,7 +7,7 @@ from ._hzn import Expected, Rays, Sensor, _keep, _withdraw
 
 
 def keep(sensor: Sensor, rays: Rays, expected: Expected | None = None) -> Cone | None:
-    """Reject outliers by the method of the sensor's ``[reject]``.
+    """Reject outliers by the method of the sensor's ``[consensus]``.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def withdraw(sensor: Sensor, rays: Rays, found: Cone) -> int:
     sensor
         Its parameters are used.
     rays
-        Points within three times ``reject.threshold_px`` of that limb get the weight 0.
+        Points within three times ``consensus.threshold_px`` of that limb get the weight 0.
     found
         Cone of the other body: ``Cone(fused.axis, fused.cos_half_angle)``.
 

@@ -16,12 +16,12 @@ def find(
     *,
     bits: int | None = None,
 ) -> list[NDArray[np.float64]]:
-    """Follow every edge that has at least ``candidates.min_points`` border pixels.
+    """Follow every edge that has at least ``edge_points.min_points`` border pixels.
 
     Parameters
     ----------
     sensor
-        Its ``[contour]``, ``[candidates]`` and ``[mask]`` are used.
+        Its ``[contour]``, ``[edge_points]`` and ``[mask]`` are used.
     image
         As for `hzn.Sensor.process`.
     level
@@ -55,7 +55,7 @@ def points(
     *,
     bits: int | None = None,
 ) -> Rays:
-    """Locate the edge with sub-pixel accuracy, by the method of the sensor's ``[candidates]``.
+    """Locate the edge with sub-pixel accuracy, by the method of the sensor's ``[edge_points]``.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def points(
     Returns
     -------
     Rays
-        At most ``candidates.keep_points`` points, evenly along the edge.
+        At most ``edge_points.keep_points`` points, evenly along the edge.
 
     Raises
     ------

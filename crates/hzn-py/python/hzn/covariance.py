@@ -11,7 +11,7 @@ from ._hzn import Cone, Expected, Rays, Sensor, _fuse
 
 
 class Fused(NamedTuple):
-    """The answer of a fit. `hzn.Sensor.process` also tests whether it is a limb at all (``[select]``)."""
+    """The answer of a fit. `hzn.Sensor.process` also tests whether it is a limb at all (``[gates]``)."""
 
     axis: NDArray[np.float64]
     """Unit vector to the body in the camera frame, shape (3,)."""

@@ -77,7 +77,7 @@ def process_archive(
         keyword arguments of `hzn.Sensor.process` from ``altitude_km`` to ``time_s``. A picture without a usable
         altitude gets a row with the status ``no-altitude``.
     sensor
-        The sensor. ``binarize.method = "track"`` is refused, because its threshold depends on the picture before.
+        The sensor. ``threshold.method = "track"`` is refused, because its threshold depends on the picture before.
     client
         A Dask client; without it, the current one.
     out
@@ -109,9 +109,9 @@ def process_archive(
         raise ConfigError(f"shard_frames: {shard_frames} is refused: must be 1 or more")
     if format not in ("parquet", "mcap"):
         raise ConfigError(f"format: {format!r} is refused: must be parquet or mcap")
-    if sensor.parameters["binarize"]["method"] == "track":
+    if sensor.parameters["threshold"]["method"] == "track":
         raise ConfigError(
-            "binarize.method: track takes its threshold from the previous picture, which another worker may have"
+            "threshold.method: track takes its threshold from the previous picture, which another worker may have"
         )
     for url, known in pictures:
         try:

@@ -7,7 +7,7 @@ from ._hzn import Fit as Fit
 
 
 def cone(sensor: Sensor, rays: Rays, start: Cone, expected: Expected | None = None) -> Fit | None:
-    """Fit a cone by the method of the sensor's ``[estimate]``.
+    """Fit a cone by the method of the sensor's ``[fit]``.
 
     Parameters
     ----------

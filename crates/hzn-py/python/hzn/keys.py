@@ -76,7 +76,7 @@ class Camera(TypedDict, total=False):
 class Mount(TypedDict):
     """How the camera is mounted in the vehicle."""
 
-    q_body_from_camera_wxyz: _Numbers
+    q_vehicle_from_camera_wxyz: _Numbers
     """Quaternion that converts camera coordinates to vehicle coordinates, scalar first; with it the results have
     roll and pitch. Values: unit quaternion. Default: no mounting."""
 
@@ -97,7 +97,7 @@ class Input(TypedDict, total=False):
     copy. Values: 16 to ``height``."""
 
 
-class Gate(TypedDict, total=False):
+class Brightness(TypedDict, total=False):
     """The brightness that a picture must have to be processed."""
 
     min_mean: float
@@ -107,7 +107,7 @@ class Gate(TypedDict, total=False):
     Default: 0.98."""
 
 
-class Binarize(TypedDict, total=False):
+class Threshold(TypedDict, total=False):
     """The threshold between dark and lit."""
 
     method: Literal["otsu", "fixed", "dynamic", "track"]
@@ -145,7 +145,7 @@ class Contour(TypedDict, total=False):
     Values: 1 to the square of ``erode_size_px``. Default: 9."""
 
 
-class Candidates(TypedDict, total=False):
+class Edge_points(TypedDict, total=False):
     """Edges that are candidates for the limb, and their edge points."""
 
     min_points: int
@@ -157,7 +157,7 @@ class Candidates(TypedDict, total=False):
     """How a border pixel becomes an edge point. Default: "linear"."""
 
 
-class Reject(TypedDict, total=False):
+class Consensus(TypedDict, total=False):
     """The cone that most edge points agree on, and their outliers."""
 
     method: Literal["two-point", "none", "ransac", "ransac-preverify", "mlesac"]
@@ -173,7 +173,7 @@ class Reject(TypedDict, total=False):
     """Largest number of draws; 800 find the limb among 80 % of outliers. Values: 1 to 100000. Default: 800."""
 
 
-class Estimate(TypedDict, total=False):
+class Fit(TypedDict, total=False):
     """The fit of the cone."""
 
     method: Literal["sphere", "direct", "conic", "tls", "wtls", "least-squares", "generalised-tls", "circle"]
@@ -186,7 +186,7 @@ class Estimate(TypedDict, total=False):
     false. Default: true for ``ellipsoid`` and the planets with a name."""
     yaw_limit_deg: float
     """The rotation about the line to the body is reported if its 1σ is below this, degrees; 0 never reports it. It
-    needs ``estimate.position`` and a body that is not a sphere. Values: 0 to 180 deg. Default: 1.0."""
+    needs ``fit.position`` and a body that is not a sphere. Values: 0 to 180 deg. Default: 1.0."""
     weigh_above_deg: float
     """For ``wtls``: points are weighted where the axis is farther from the optical axis than this, degrees; 0 always
     weights them. Values: 0 to 180 deg. Default: 0.0."""
@@ -216,7 +216,7 @@ class Covariance(TypedDict, total=False):
     false."""
 
 
-class Select(TypedDict, total=False):
+class Gates(TypedDict, total=False):
     """The gates that an answer must pass, and the choice among answers."""
 
     min_inliers: int
@@ -225,8 +225,8 @@ class Select(TypedDict, total=False):
     """Shortest length of edge that inliers must cover, px. Values: 0 to 1e6 px. Default: a tenth of the diagonal, or
     a third of the body's circumference if less."""
     max_rms_px: float
-    """Largest weighted RMS distance of the inliers from the limb, px; it grows as ``reject.noise_sigma`` raises the
-    largest distance of an inlier. Values: above 0 px. Default: 2.0."""
+    """Largest weighted RMS distance of the inliers from the limb, px; it grows as ``consensus.noise_sigma`` raises
+    the largest distance of an inlier. Values: above 0 px. Default: 2.0."""
     max_half_angle_sigma: float
     """Largest difference between the fitted and the expected half-angle, in standard deviations. Values: above 0.
     Default: 3.0."""
@@ -245,9 +245,9 @@ class Select(TypedDict, total=False):
     """Largest number of points close to the fitted limb that are no inliers, as a part of the inliers. Values: 0 to
     1e6. Default: 0.3333333333333333."""
     whole_edge: float
-    """Where at least this part of an edge's points are inliers, the edge is not checked with ``max_way``; 0 turns
+    """Where at least this part of an edge's points are inliers, the edge is not checked with ``max_path``; 0 turns
     the check off. Values: 0 to 1. Default: 0.8."""
-    max_way: float
+    max_path: float
     """Longest path along the inliers, as a multiple of the limb that they cover, where less than ``whole_edge`` of
     the points are inliers. Values: 1 to 1e6. Default: 3.0."""
     min_support_whole: float
@@ -263,7 +263,7 @@ class Select(TypedDict, total=False):
     """Residuals below this count as equal, px. Values: above 0 to 10000 px. Default: 0.03."""
     residual_floor_px: float
     """Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the given noise,
-    px; with 1e4 the gate uses the given noise. Values: 0 to 10000 px. Default: 0.1."""
+    px; with 1e4 the gate uses the told noise. Values: 0 to 10000 px. Default: 0.1."""
     max_departure: float
     """Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
     turns the gate off. Values: 0 to 1e6. Default: 0.2."""
@@ -336,7 +336,7 @@ class Select(TypedDict, total=False):
     Default: 0.0."""
 
 
-class Recover(TypedDict, total=False):
+class Retry(TypedDict, total=False):
     """Further looks at a picture without an answer."""
 
     levels: _Numbers
@@ -379,10 +379,10 @@ class Body(TypedDict, total=False):
     """Semi-axes of an ``ellipsoid`` along its own x, y and z axes (z to the north pole), km; not allowed for other
     bodies, because a planet with a name has its own. Values: three lengths above 0, for ``ellipsoid`` only."""
     radii_sigma_km: float
-    """1σ of each semi-axis, km, with ``estimate.position``. Values: 0 to 100000 km. Default: 0.0."""
+    """1σ of each semi-axis, km, with ``fit.position``. Values: 0 to 100000 km. Default: 0.0."""
     range_km: float | None
     """Distance of the camera from the body's centre for pictures without one in their prior, km, with
-    ``estimate.position``; it needs ``range_sigma_km``. Values: above 0 km."""
+    ``fit.position``; it needs ``range_sigma_km``. Values: above 0 km."""
     range_sigma_km: float | None
     """1σ of ``range_km``, and of the column ``range_km`` of frames.csv if that has no ``range_sigma_km``, km.
     Values: 0 to 1e12 km."""
@@ -401,7 +401,7 @@ class Body(TypedDict, total=False):
     Default: 7.0."""
     limb_height_harmonic_sigma_km: float | None
     """1σ of the part of the limb height that goes twice up and down along the limb, km. It decides how well the
-    rotation about the line to the body is known, see ``estimate.yaw_limit_deg``. Values: 0 to 10000 km. Default:
+    rotation about the line to the body is known, see ``fit.yaw_limit_deg``. Values: 0 to 10000 km. Default:
     ``limb_height_sigma_km``."""
     clipped_height_km: float
     """Height that overexposure adds to the limb, km; it is multiplied by the fraction of the limb that is clipped at
@@ -415,9 +415,9 @@ class Body(TypedDict, total=False):
     """Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun. In visible
     light, true is better: near the terminator the light fades, and the edge is too low there. Values: true or false.
     Default: true for all but ``earth``, ``earth-sphere`` and ``sun``."""
-    binarize: Binarize | None
-    """Threshold for this body, as a table with the keys of ``[binarize]``. Values: the keys of ``[binarize]``.
-    Default: ``[binarize]``; ``fixed`` at 0.9 for a ``sun`` among several bodies."""
+    threshold: Threshold | None
+    """Threshold for this body, as a table with the keys of ``[threshold]``. Values: the keys of ``[threshold]``.
+    Default: ``[threshold]``; ``fixed`` at 0.9 for a ``sun`` among several bodies."""
     covariance: Covariance | None
     """Noise model of edge points for this body, as a table with the keys of ``[covariance]``. Values: the keys of
     ``[covariance]``. Default: ``[covariance]``."""
@@ -436,25 +436,25 @@ class _Optional(TypedDict, total=False):
     """Several bodies in one picture, instead of ``body``. The sensor searches in this order, for Sun and Moon last."""
     input: Input
     """Conversion of a pixel to one brightness."""
-    gate: Gate
+    brightness: Brightness
     """The brightness that a picture must have to be processed."""
-    binarize: Binarize
+    threshold: Threshold
     """The threshold between dark and lit."""
     mask: Mask
     """Parts of the vehicle in view."""
     contour: Contour
     """The search for edges."""
-    candidates: Candidates
+    edge_points: Edge_points
     """Edges that are candidates for the limb, and their edge points."""
-    reject: Reject
+    consensus: Consensus
     """The cone that most edge points agree on, and their outliers."""
-    estimate: Estimate
+    fit: Fit
     """The fit of the cone."""
     covariance: Covariance
     """The errors of edge points as a Gauss-Markov process along the limb."""
-    select: Select
+    gates: Gates
     """The gates that an answer must pass, and the choice among answers."""
-    recover: Recover
+    retry: Retry
     """Further looks at a picture without an answer."""
     limits: Limits
     """The bound on the time of the worst picture."""

@@ -173,7 +173,7 @@ class Filter:
         measured
             Unit vector in the camera frame, for example `hzn.Report.axis`.
         reference
-            The same direction in ECEF, for example `hzn.Report.axis_ecef`.
+            The same direction in ECEF, for example `hzn.Report.axis_fixed`.
         covariance
             Its covariance, shape (3, 3), rad².
         by_limb_height

@@ -15,7 +15,7 @@ def level(
     *,
     bits: int | None = None,
 ) -> int:
-    """Find the threshold by the method of the sensor's ``[binarize]``.
+    """Find the threshold by the method of the sensor's ``[threshold]``.
 
     Parameters
     ----------

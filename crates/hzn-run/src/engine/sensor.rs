@@ -6,7 +6,7 @@ use hzn_calib::{FrameData, Frames, Problem};
 use hzn_core::body::{self, PriorError};
 use hzn_core::camera::Camera;
 use hzn_core::error::ConfigError;
-use hzn_core::frames::{Ecef, UnitVec3};
+use hzn_core::frames::{Fixed, UnitVec3};
 use hzn_core::image::{ImageView, Pixels};
 use hzn_core::real::Real;
 use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report};
@@ -26,13 +26,13 @@ pub struct AnySensor {
     /// The lens in f64, for drawing.
     camera: Camera<f64>,
     bodies: Vec<body::Kind>,
-    /// The last answer of each body, for `select.max_rate_deg_s`.
+    /// The last answer of each body, for `gates.max_rate_deg_s`.
     last: Vec<Option<LastAnswer>>,
-    /// The time of the next picture in seconds, for `select.max_rate_deg_s`.
+    /// The time of the next picture in seconds, for `gates.max_rate_deg_s`.
     time_s: Option<f64>,
 }
 
-/// The answer to an earlier picture, for `select.max_rate_deg_s`.
+/// The answer to an earlier picture, for `gates.max_rate_deg_s`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LastAnswer {
     /// The limb axis, camera frame.
@@ -196,9 +196,9 @@ impl AnySensor {
         }
         for (&body, processed) in self.bodies.iter().zip(&mut processed) {
             if let (Ok(Report { solution: Some(solution), .. }), Some(direction)) =
-                (&mut processed.report, data.and_then(|d| direction_ecef(body, d)))
+                (&mut processed.report, data.and_then(|d| direction_fixed(body, d)))
             {
-                solution.axis_ecef = Some(direction);
+                solution.axis_fixed = Some(direction);
             }
         }
         processed
@@ -206,7 +206,7 @@ impl AnySensor {
 }
 
 /// Returns the direction of Sun or Moon in ECEF, seen from the position at the time of the picture.
-fn direction_ecef(body: body::Kind, data: &FrameData) -> Option<UnitVec3<Ecef, f64>> {
+fn direction_fixed(body: body::Kind, data: &FrameData) -> Option<UnitVec3<Fixed, f64>> {
     let place = match body {
         body::Kind::Sun => ephemeris::sun(data.utc_s?),
         body::Kind::Moon => ephemeris::moon(data.utc_s?),

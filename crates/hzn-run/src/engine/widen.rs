@@ -33,8 +33,8 @@ pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Sol
     Some(Solution {
         axis: UnitVec3::try_new(s.axis.xyz().map(Into::into))?,
         covariance: Cov3::from_upper(s.covariance.upper_rad2.map(Into::into)),
-        axis_ecef: s.axis_ecef.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
-        axis_body: s.axis_body.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
+        axis_fixed: s.axis_fixed.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
+        axis_vehicle: s.axis_vehicle.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
         half_angle_rad: s.half_angle_rad.into(),
         fused_half_angle_rad: s.fused_half_angle_rad.into(),
         altitude_m: s.altitude_m.map(|(h, sigma)| (h.into(), sigma.into())),

@@ -49,8 +49,8 @@ pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
     if let Some(first) = records.first_mut() {
         if let Some(data) = &frame.data {
             first.prior = to_picture_prior(data);
-            first.attitude = data.camera_to_ecef_wxyz.map(|q| Attitude {
-                q_ecef_from_camera_wxyz: q,
+            first.attitude = data.q_fixed_from_camera_wxyz.map(|q| Attitude {
+                q_fixed_from_camera_wxyz: q,
                 position_m: data.position_km.unwrap_or_default().map(|km| km * 1e3),
             });
         }
@@ -93,7 +93,7 @@ fn to_picture_prior(data: &FrameData) -> PicturePrior {
         utc_s: data.utc_s,
         altitude_km: data.altitude_km,
         position_km: data.position_km,
-        q_ecef_from_camera_wxyz: data.camera_to_ecef_wxyz,
+        q_fixed_from_camera_wxyz: data.q_fixed_from_camera_wxyz,
         attitude_sigma_deg: data.attitude_sigma_deg,
         sun_camera: data.sun_camera,
         rate_rad_s: data.rate_rad_s,
@@ -107,7 +107,7 @@ fn to_picture_prior(data: &FrameData) -> PicturePrior {
 fn to_recorded_orientation(other: &Orientation) -> BodyOrientation {
     BodyOrientation {
         body: other.body.clone(),
-        q_body_from_camera_wxyz: other.camera_to_body_wxyz,
+        q_vehicle_from_camera_wxyz: other.q_fixed_from_camera_wxyz,
         pole_camera: other.pole_camera,
     }
 }

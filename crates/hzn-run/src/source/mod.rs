@@ -40,6 +40,17 @@ use crate::error::{Error, Remedy, unusable};
 ///
 /// # Errors
 /// An input does not exist, is of an unknown kind, or the mixture of inputs has no order.
+///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// for name in ["10.png", "9.png"] {
+///     image::GrayImage::new(64, 48).save(folder.path().join(name))?;
+/// }
+/// let mut source = hzn_run::source::open(&[folder.path().to_path_buf()], None, None)?;
+/// let first = source.next().ok_or("no picture")??;
+/// assert_eq!(first.name, "9.png"); // the order is that of the numbers in the names
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result<Box<dyn Source>, Error> {
     if let [one] = inputs
         && raw.is_none()

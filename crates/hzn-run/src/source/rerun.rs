@@ -159,7 +159,7 @@ pub fn recorded_prior(row: &Row, given: &PicturePrior) -> FrameData {
         utc_s: given.utc_s,
         altitude_km: given.altitude_km,
         position_km: given.position_km,
-        camera_to_ecef_wxyz: given.q_ecef_from_camera_wxyz,
+        q_fixed_from_camera_wxyz: given.q_fixed_from_camera_wxyz,
         attitude_sigma_deg: given.attitude_sigma_deg,
         sun_camera: given.sun_camera,
         rate_rad_s: given.rate_rad_s,
@@ -173,7 +173,7 @@ pub fn recorded_prior(row: &Row, given: &PicturePrior) -> FrameData {
 fn from_recorded_orientation(other: &BodyOrientation) -> Orientation {
     Orientation {
         body: other.body.clone(),
-        camera_to_body_wxyz: other.q_body_from_camera_wxyz,
+        q_fixed_from_camera_wxyz: other.q_vehicle_from_camera_wxyz,
         pole_camera: other.pole_camera,
     }
 }

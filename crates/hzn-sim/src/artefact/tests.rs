@@ -46,8 +46,8 @@ fn a_prior_attitude_is_off_by_its_sigma() {
     let trials = (0..200).map(|seed| Trial::without_limb(Kind::Ring, seed).unwrap());
     let squares: Vec<f64> = trials
         .map(|t| {
-            let prior = t.prior(Some(5.0)).cam_to_ecef.unwrap();
-            let truth = t.scene.pose.cam_to_ecef().unwrap();
+            let prior = t.prior(Some(5.0)).fixed_from_camera.unwrap();
+            let truth = t.scene.pose.fixed_from_camera().unwrap();
             let z = hzn_core::frames::UnitVec3::try_new([0.0, 0.0, 1.0]).unwrap();
             prior.apply(&z).angle_rad(&truth.apply(&z)).to_degrees().powi(2)
         })

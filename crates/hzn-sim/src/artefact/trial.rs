@@ -178,7 +178,8 @@ impl Trial {
         Prior {
             altitude_m: Some(Globe::new(&self.scene.body).altitude_m(pose.position_m)),
             position_m: Some(pose.position_m),
-            cam_to_ecef: sigma_rad.and_then(|s| pose.disturbed([0; 3].map(|_| s * dice.normal())).cam_to_ecef()),
+            fixed_from_camera: sigma_rad
+                .and_then(|s| pose.disturbed([0; 3].map(|_| s * dice.normal())).fixed_from_camera()),
             attitude_sigma_rad: sigma_rad,
             ..Prior::default()
         }
@@ -270,8 +271,8 @@ fn point_axis(position_m: [f64; 3], axis: Vector3<f64>, to: Vector3<f64>, turn_r
         let (sin, cos) = libm::sincos(turn);
         Matrix3::from_columns(&[e, a * cos + b * sin, b * cos - a * sin])
     };
-    let cam_to_ecef = frame(to, turn_rad) * frame(axis, 0.0).transpose();
-    Pose::from_axes(position_m, [0, 1, 2].map(|i| cam_to_ecef.column(i).into_owned().into()))
+    let fixed_from_camera = frame(to, turn_rad) * frame(axis, 0.0).transpose();
+    Pose::from_axes(position_m, [0, 1, 2].map(|i| fixed_from_camera.column(i).into_owned().into()))
 }
 
 /// Returns the half-angles of the cones that fit discs of the picture (middle and radius in pixels).

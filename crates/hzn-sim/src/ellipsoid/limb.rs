@@ -21,7 +21,7 @@ use crate::pose::Pose;
 /// use hzn_sim::{EdgeNoise, EllipsoidLimb, LimbArc, Pose};
 ///
 /// let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, 1024, 1024, 4000.0))?;
-/// let pose = Pose { position_m: [0.0, 0.0, -3e6], cam_to_ecef_wxyz: [1.0, 0.0, 0.0, 0.0] };
+/// let pose = Pose { position_m: [0.0, 0.0, -3e6], q_fixed_from_camera_wxyz: [1.0, 0.0, 0.0, 0.0] };
 /// let limb = EllipsoidLimb::try_new([256.6e3, 251.4e3, 248.3e3], &pose).ok_or("inside")?;
 /// let arc = LimbArc { middle_rad: 0.0, length_rad: std::f64::consts::FRAC_PI_2, count: 200 };
 /// let points = limb.points(&camera, arc, EdgeNoise::White { sigma_px: 0.3 }, 7);

@@ -89,8 +89,8 @@ impl Scenario {
 
     /// Returns the true attitude of the camera on the vehicle (rotation from the camera to the body frame). It differs
     /// from the told one by a random rotation in the camera frame.
-    pub fn true_mount_wxyz(&self) -> [f64; 4] {
-        let told = self.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
+    pub fn true_q_vehicle_from_camera_wxyz(&self) -> [f64; 4] {
+        let told = self.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_vehicle_from_camera_wxyz);
         if self.mount_error_deg == 0.0 {
             return told;
         }

@@ -85,9 +85,9 @@ impl Scenario {
             return refuse("[[vehicle]] polygon_px", part.polygon_px.len() as f64, "must have 3 to 16 corners");
         }
         for (table, mount) in [("mount", self.mount), ("attitude_mount", self.attitude_mount)] {
-            let n2: f64 = mount.iter().flat_map(|m| m.q_body_from_camera_wxyz).map(|x| x * x).sum();
+            let n2: f64 = mount.iter().flat_map(|m| m.q_vehicle_from_camera_wxyz).map(|x| x * x).sum();
             if mount.is_some() && !((n2 - 1.0).abs() < 0.01) {
-                let key = format!("[{table}] q_body_from_camera_wxyz");
+                let key = format!("[{table}] q_vehicle_from_camera_wxyz");
                 return refuse(&key, n2, "its squared length must be 1");
             }
         }

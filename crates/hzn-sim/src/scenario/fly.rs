@@ -54,7 +54,7 @@ impl Scenario {
             // There are at most three bodies; `check` refuses more.
             several => {
                 let with_threshold = |kind: Kind| hzn_core::body::Config {
-                    binarize: Some(hzn_core::Config::preset(preset(kind), self.camera.clone()).binarize),
+                    threshold: Some(hzn_core::Config::preset(preset(kind), self.camera.clone()).threshold),
                     ..body(kind)
                 };
                 sensor.bodies = several.iter().map(|&kind| with_threshold(kind)).collect();
@@ -227,7 +227,7 @@ impl Scenario {
         (0..3).for_each(|i| position_m[i] += error_m[i]);
         let mut row = measured.row();
         if let Some(sigma_deg) = self.known.attitude_sigma_deg {
-            let [w, x, y, z] = frame.told_attitude_wxyz(sigma_deg.to_radians());
+            let [w, x, y, z] = frame.told_q_fixed_from_camera_wxyz(sigma_deg.to_radians());
             (row.qw, row.qx, row.qy, row.qz) = (Some(w), Some(x), Some(y), Some(z));
             row.attitude_sigma_deg = Some(sigma_deg);
         }

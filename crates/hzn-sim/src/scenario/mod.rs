@@ -340,10 +340,10 @@ impl Scenario {
             Trajectory::Table(_) => [from_s, to_s],
             _ => [from_s, to_s.max(from_s + 1e-3)],
         };
-        let told = self.pointed_mount().map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
+        let told = self.pointed_mount().map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_vehicle_from_camera_wxyz);
         let start_unix_s = self.start_unix_s();
         let path = Path::try_new(&self.sized_trajectory(), &self.attitude, told, span, start_unix_s, self.seed)?;
-        Ok(path.with_camera(self.true_mount_wxyz()))
+        Ok(path.with_camera(self.true_q_vehicle_from_camera_wxyz()))
     }
 
     /// Returns the sensor's configuration of a body, with the limb height of the simulated limb.

@@ -387,8 +387,8 @@ mod tests {
         let pairs: Vec<_> = flight.frames.iter().zip(&pictures).collect();
         let mut sensor = scenario.sensor();
         // Open gates accept the answers for every covariance.
-        sensor.select.max_sigma_deg = 90.0;
-        sensor.select.max_half_angle_sigma = 1e6;
+        sensor.gates.max_sigma_deg = 90.0;
+        sensor.gates.max_half_angle_sigma = 1e6;
         let start = Fit {
             body: sensor.body.kind,
             limb_height_km: sensor.body.limb_height_km,

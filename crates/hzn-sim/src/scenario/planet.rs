@@ -82,7 +82,7 @@ impl Scenario {
     /// `[known]` has their errors. The position is not known: the sensor measures it. `None` for a scene at the Earth.
     pub fn body_frame_row(&self, frame: &FlightFrame) -> Option<BodyFrameRow> {
         self.ellipsoid()?;
-        let attitude = self.known.attitude_sigma_deg.map(|deg| frame.told_attitude_wxyz(deg.to_radians()));
+        let attitude = self.known.attitude_sigma_deg.map(|deg| frame.told_q_fixed_from_camera_wxyz(deg.to_radians()));
         let [qw, qx, qy, qz] = [0, 1, 2, 3].map(|i| attitude.map(|q| q[i]));
         let pose = &frame.scene.pose;
         let sun = frame.scene.sun_direction().ok()?;

@@ -120,7 +120,7 @@ fn frames_csv_says_what_is_known_and_no_more() {
     s.known = Known { position_sigma_km: 0.1, attitude_sigma_deg: Some(5.0), ..Known::default() };
     let noisy = s.frame_row(&flight.frames[1]);
     assert!(noisy.x_km != row.x_km && (noisy.x_km - row.x_km).abs() < 0.5);
-    let [w, x, y, z] = flight.frames[1].scene.pose.cam_to_ecef_wxyz;
+    let [w, x, y, z] = flight.frames[1].scene.pose.q_fixed_from_camera_wxyz;
     let dot = noisy.qw.unwrap() * w + noisy.qx.unwrap() * x + noisy.qy.unwrap() * y + noisy.qz.unwrap() * z;
     let off_deg = 2.0 * libm::acos(dot.abs().min(1.0)).to_degrees();
     assert!((1.0..25.0).contains(&off_deg), "{off_deg}");
@@ -137,8 +137,9 @@ fn several_cameras_fly_on_one_vehicle() {
     // The vehicle is the same, and the mounts differ from the told ones by about one degree, each in its own way.
     assert_eq!(left.path().unwrap().state(200.0), right.path().unwrap().state(200.0));
     let rotation = |[w, x, y, z]: [f64; 4]| UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
-    let error =
-        |s: &Scenario| rotation(s.mount.unwrap().q_body_from_camera_wxyz).inverse() * rotation(s.true_mount_wxyz());
+    let error = |s: &Scenario| {
+        rotation(s.mount.unwrap().q_vehicle_from_camera_wxyz).inverse() * rotation(s.true_q_vehicle_from_camera_wxyz())
+    };
     for one in [&left, &right] {
         assert!((0.2..4.0).contains(&error(one).angle().to_degrees()));
         assert_eq!(one.sensor().mount, one.mount);

@@ -56,7 +56,7 @@ impl SensorPlace {
         noise.correlation_px = self.correlation_px.unwrap_or(noise.correlation_px);
         let points = self.thinned(&edge);
         let sigmas = |half_angle| self.covariance(&camera, &points, half_angle_rad, half_angle, &noise);
-        let fused = sigmas(self.sensor.estimate.half_angle)?;
+        let fused = sigmas(self.sensor.fit.half_angle)?;
         let (Some(free), Some(known), Some(fused)) = (sigmas(HalfAngle::Free)?, sigmas(HalfAngle::Known)?, fused)
         else {
             return Ok(None);
@@ -111,7 +111,7 @@ impl SensorPlace {
 
     /// Returns as many points as the sensor keeps of an edge, evenly along it.
     fn thinned(&self, edge: &[LimbSample]) -> Vec<ImagePoint<f64>> {
-        let keep = match usize::from(self.sensor.candidates.keep_points) {
+        let keep = match usize::from(self.sensor.edge_points.keep_points) {
             0 => ALL_POINTS,
             keep => keep,
         };
@@ -128,10 +128,10 @@ impl SensorPlace {
         noise: &covariance::Config,
     ) -> Result<Option<Matrix3<f64>>, DesignError> {
         let mut config = self.sensor.clone();
-        config.estimate.half_angle = half_angle;
+        config.fit.half_angle = half_angle;
         config.body.covariance = Some(*noise);
         if half_angle == HalfAngle::Known {
-            config.estimate.position = Some(false);
+            config.fit.position = Some(false);
         }
         let sensor = Sensor::<f64>::new(&config)?;
         let expected = sensor.expect(&self.prior()).map_err(DesignError::Prior)?;

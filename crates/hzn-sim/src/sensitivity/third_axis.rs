@@ -123,16 +123,16 @@ impl ThirdAxis {
     }
 
     fn sight(&self) -> Result<Sight, DesignError> {
-        let (body_to_cam, place) = self.pose();
+        let (camera_from_fixed, place) = self.pose();
         let axes = self.radii_km.map(|a| a + self.limb_height_km);
         let scaled: f64 = place.iter().zip(axes).map(|(x, a)| (x / a).powi(2)).sum();
         if !(axes.iter().all(|a| *a > 0.0) && scaled > 1.0) {
             return Err(DesignError::Inside { altitude_km: self.altitude_km, limb_height_km: self.limb_height_km });
         }
         let diagonal = Matrix3::from_diagonal(&Vector3::from(axes));
-        let root = |d: Matrix3<f64>| body_to_cam * d * body_to_cam.transpose();
+        let root = |d: Matrix3<f64>| camera_from_fixed * d * camera_from_fixed.transpose();
         let inverse = Matrix3::from_diagonal(&Vector3::from(axes.map(|a| 1.0 / a)));
-        Ok(Sight { r: body_to_cam * -place, to: root(inverse), from: root(diagonal) })
+        Ok(Sight { r: camera_from_fixed * -place, to: root(inverse), from: root(diagonal) })
     }
 
     fn of_samples(&self, camera: &Camera<f64>, sight: &Sight, samples: &[LimbSample]) -> Option<ThirdAxisSigmas> {

@@ -221,7 +221,7 @@ impl Imu {
         let span_s = [self.from_s.unwrap_or(from_s), to_s];
         times(imu.rate_hz, span_s).map(move |(i, time_s)| {
             let state = path.state(time_s);
-            let force = state.body_to_ecef.inverse_transform_vector(&state.specific_force_mps2);
+            let force = state.fixed_from_vehicle.inverse_transform_vector(&state.specific_force_mps2);
             let first = 6 + 6 * i;
             let mut saturated = false;
             let mut measure = |truth: Vector3<f64>, first: u64, noise: f64, step: f64, range: f64| -> [f64; 3] {
@@ -334,7 +334,7 @@ mod tests {
         assert!(largest < limit && largest > 0.4 * limit, "{largest}");
         // Under thrust the force is along the vehicle, except for the angle `cone_deg`.
         let state = path.state(30.0);
-        let force = state.body_to_ecef.inverse_transform_vector(&state.specific_force_mps2);
+        let force = state.fixed_from_vehicle.inverse_transform_vector(&state.specific_force_mps2);
         assert!(force.x > 0.99 * force.norm() && force.x > 20.0);
     }
 
@@ -350,13 +350,13 @@ mod tests {
             ..Imu::default()
         };
         let start = 70.0005;
-        let mut q = path.state(70.0).body_to_ecef;
+        let mut q = path.state(70.0).fixed_from_vehicle;
         for row in exact.rows(&path, [start, start + 9.999], 1) {
             let w = Vector3::new(row.gyro_x_radps, row.gyro_y_radps, row.gyro_z_radps);
             let earth = q.inverse_transform_vector(&Vector3::new(0.0, 0.0, crate::trajectory::earth::EARTH_RATE));
             q *= nalgebra::UnitQuaternion::from_scaled_axis((w - earth) * 1e-3);
         }
-        let off = q.angle_to(&path.state(80.0).body_to_ecef);
+        let off = q.angle_to(&path.state(80.0).fixed_from_vehicle);
         assert!(off < 1e-4, "{off}");
     }
 
@@ -390,7 +390,7 @@ mod tests {
             let s = path.state(t);
             assert_eq!(s.specific_force_mps2.norm(), 0.0);
             let body = Vector3::from(tumble.inertia).component_mul(&s.rate_radps);
-            crate::trajectory::earth::from_ecef(path.sidereal_rad(t), &(s.body_to_ecef * body))
+            crate::trajectory::earth::from_ecef(path.sidereal_rad(t), &(s.fixed_from_vehicle * body))
         };
         let (a, b) = (momentum(0.0), momentum(600.0));
         assert!((a - b).norm() < 1e-3 * a.norm(), "{a} {b}");

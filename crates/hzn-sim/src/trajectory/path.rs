@@ -18,7 +18,7 @@ pub struct State {
     /// Acceleration by all forces except gravity, in ECEF, m/s².
     pub specific_force_mps2: Vector3<f64>,
     /// Rotation from vehicle axes to ECEF.
-    pub body_to_ecef: UnitQuaternion<f64>,
+    pub fixed_from_vehicle: UnitQuaternion<f64>,
     /// Rate of the vehicle relative to inertial space, in vehicle axes, rad/s.
     pub rate_radps: Vector3<f64>,
 }
@@ -44,14 +44,14 @@ impl Path {
     pub fn try_new(
         trajectory: &Trajectory,
         attitude: &Attitude,
-        camera_to_body_wxyz: [f64; 4],
+        q_fixed_from_camera_wxyz: [f64; 4],
         [from_s, to_s]: [f64; 2],
         start_unix_s: f64,
         seed: u64,
     ) -> Result<Self, (String, String)> {
         let trajectory = PreparedTrajectory::try_new(trajectory, [from_s, to_s], start_unix_s, seed)?;
         let attitude = PreparedAttitude::try_new(attitude, &trajectory, [from_s, to_s], seed)?;
-        let [w, x, y, z] = camera_to_body_wxyz;
+        let [w, x, y, z] = q_fixed_from_camera_wxyz;
         let camera_to_body = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         Ok(Self { trajectory, attitude, told_to_body: camera_to_body, camera_to_body })
     }
@@ -82,23 +82,23 @@ impl Path {
         self.trajectory.point(time_s)
     }
 
-    fn body_to_ecef(&self, time_s: f64) -> UnitQuaternion<f64> {
-        self.attitude.body_to_ecef(&self.trajectory, &self.told_to_body, time_s)
+    fn fixed_from_vehicle(&self, time_s: f64) -> UnitQuaternion<f64> {
+        self.attitude.fixed_from_vehicle(&self.trajectory, &self.told_to_body, time_s)
     }
 
     /// Returns the state of the vehicle at a time in seconds.
     pub fn state(&self, time_s: f64) -> State {
         let Point { position_m, velocity_mps, specific_force_mps2 } = self.point(time_s);
-        let body_to_ecef = self.body_to_ecef(time_s);
-        let earth = body_to_ecef.inverse_transform_vector(&Vector3::new(0.0, 0.0, EARTH_RATE));
+        let fixed_from_vehicle = self.fixed_from_vehicle(time_s);
+        let earth = fixed_from_vehicle.inverse_transform_vector(&Vector3::new(0.0, 0.0, EARTH_RATE));
         let rate_radps = self.rate_against_earth_radps(time_s) + earth;
-        State { position_m, velocity_mps, specific_force_mps2, body_to_ecef, rate_radps }
+        State { position_m, velocity_mps, specific_force_mps2, fixed_from_vehicle, rate_radps }
     }
 
     /// Returns the camera's pose at a time in seconds.
     pub fn camera(&self, time_s: f64) -> Pose {
-        let q = self.body_to_ecef(time_s) * self.camera_to_body;
-        Pose { position_m: self.point(time_s).position_m.into(), cam_to_ecef_wxyz: [q.w, q.i, q.j, q.k] }
+        let q = self.fixed_from_vehicle(time_s) * self.camera_to_body;
+        Pose { position_m: self.point(time_s).position_m.into(), q_fixed_from_camera_wxyz: [q.w, q.i, q.j, q.k] }
     }
 
     /// Returns the rate of the camera relative to ECEF, in the camera frame, rad/s. This rate blurs a picture.
@@ -108,7 +108,7 @@ impl Path {
 
     /// Returns the rate of the vehicle relative to ECEF, in vehicle axes, rad/s.
     fn rate_against_earth_radps(&self, time_s: f64) -> Vector3<f64> {
-        let [before, after] = [-RATE_STEP_S, RATE_STEP_S].map(|d| self.body_to_ecef(time_s + d));
+        let [before, after] = [-RATE_STEP_S, RATE_STEP_S].map(|d| self.fixed_from_vehicle(time_s + d));
         (before.inverse() * after).scaled_axis() / (2.0 * RATE_STEP_S)
     }
 }

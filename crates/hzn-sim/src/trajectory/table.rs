@@ -142,7 +142,7 @@ impl TableRows {
         Point { position_m, velocity_mps, specific_force_mps2: acceleration - gravity(&position_m) }
     }
 
-    pub(crate) fn camera_to_ecef(&self, time_s: f64) -> UnitQuaternion<f64> {
+    pub(crate) fn fixed_from_camera(&self, time_s: f64) -> UnitQuaternion<f64> {
         let (i, s) = self.bracket(time_s);
         match (self.turns.get(i), self.turns.get(i + 1)) {
             (Some(a), Some(b)) => a.try_slerp(b, s, 1e-9).unwrap_or(*a),

@@ -38,7 +38,7 @@ impl Path {
     /// Returns the truth about the vehicle at a time in seconds.
     pub fn vehicle(&self, time_s: f64) -> VehicleRow {
         let state = self.state(time_s);
-        let (x, v, q) = (state.position_m, state.velocity_mps, state.body_to_ecef);
+        let (x, v, q) = (state.position_m, state.velocity_mps, state.fixed_from_vehicle);
         VehicleRow {
             time_s,
             x_m: x.x,

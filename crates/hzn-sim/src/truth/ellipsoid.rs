@@ -16,7 +16,7 @@ impl Scene {
         let ([axis_x, axis_y, axis_z], cot2) = limb.axis_and_cot2();
         let sun = self.pose.matrix().transpose() * self.sun_direction()?;
         let [sun_x, sun_y, sun_z] = UnitVec3::<Cam, f64>::try_new(sun.into()).ok_or(SceneError::Sun)?.xyz().map(Some);
-        let [qw, qx, qy, qz] = self.pose.unit_quaternion_wxyz();
+        let [qw, qx, qy, qz] = self.pose.unit_q_fixed_from_camera_wxyz();
         let range_km = Vector3::from(limb.position_km()).norm();
         let half_angle_rad = libm::atan2(1.0, cot2.sqrt());
         let truth = Truth {
@@ -45,7 +45,7 @@ impl Scene {
     pub fn told_prior(&self) -> hzn_core::Prior<f64> {
         let sun = self.sun_direction().ok().map(|sun| self.pose.matrix().transpose() * sun);
         hzn_core::Prior {
-            cam_to_ecef: self.pose.cam_to_ecef(),
+            fixed_from_camera: self.pose.fixed_from_camera(),
             attitude_sigma_rad: Some(0.0),
             sun: sun.and_then(|sun| UnitVec3::try_new(sun.into())),
             ..hzn_core::Prior::default()

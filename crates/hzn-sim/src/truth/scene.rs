@@ -2,7 +2,7 @@
 
 use hzn_core::body::{AU_KM, Kind, MOON_RADIUS_KM, SUN_RADIUS_KM};
 use hzn_core::ellipsoid::LimbCone;
-use hzn_core::frames::{Ecef, UnitVec3};
+use hzn_core::frames::{Fixed, UnitVec3};
 use nalgebra::Vector3;
 
 use super::row::Truth;
@@ -22,20 +22,20 @@ impl Scene {
         let globe = Globe::new(&self.body);
         let raised = globe.raised(self.body.limb_height_km * 1e3);
         let cone = LimbCone::try_new(self.pose.position_m, raised.a_m, raised.b_m).ok_or(SceneError::Pose)?;
-        let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
+        let camera_from_fixed = self.pose.fixed_from_camera().ok_or(SceneError::Pose)?.inverse();
         let moon = self.moon_ecef_m.and_then(|moon| {
             let to = [0, 1, 2].map(|i| moon[i] - self.pose.position_m[i]);
-            Some(ecef_to_cam.apply(&UnitVec3::<Ecef, f64>::try_new(to)?).xyz())
+            Some(camera_from_fixed.apply(&UnitVec3::<Fixed, f64>::try_new(to)?).xyz())
         });
-        let [axis_x, axis_y, axis_z] = ecef_to_cam.apply(&cone.axis).xyz();
+        let [axis_x, axis_y, axis_z] = camera_from_fixed.apply(&cone.axis).xyz();
         let sun = match self.light {
             Light::Sun { direction, .. } => {
-                let direction = UnitVec3::<Ecef, f64>::try_new(direction).ok_or(SceneError::Sun)?;
-                Some(ecef_to_cam.apply(&direction).xyz())
+                let direction = UnitVec3::<Fixed, f64>::try_new(direction).ok_or(SceneError::Sun)?;
+                Some(camera_from_fixed.apply(&direction).xyz())
             }
             Light::Full | Light::Sector { .. } => None,
         };
-        let [qw, qx, qy, qz] = self.pose.unit_quaternion_wxyz();
+        let [qw, qx, qy, qz] = self.pose.unit_q_fixed_from_camera_wxyz();
         let to_centre_km = self.pose.matrix().transpose() * -Vector3::from(self.pose.position_m) * 1e-3;
         let truth = Truth {
             file: file.to_owned(),
@@ -70,9 +70,9 @@ impl Scene {
     pub fn body_truth(&self, kind: Kind, file: &str, time_s: f64) -> Result<Truth, SceneError> {
         let truth = self.truth(file, time_s)?;
         let Some(disc) = self.sky_disc(kind)? else { return Ok(truth) };
-        let ecef_to_cam = self.pose.cam_to_ecef().ok_or(SceneError::Pose)?.inverse();
-        let direction = UnitVec3::<Ecef, f64>::try_new(disc.direction).ok_or(SceneError::Sun)?;
-        let [axis_x, axis_y, axis_z] = ecef_to_cam.apply(&direction).xyz();
+        let camera_from_fixed = self.pose.fixed_from_camera().ok_or(SceneError::Pose)?.inverse();
+        let direction = UnitVec3::<Fixed, f64>::try_new(disc.direction).ok_or(SceneError::Sun)?;
+        let [axis_x, axis_y, axis_z] = camera_from_fixed.apply(&direction).xyz();
         let seen = Truth {
             body: kind.name().to_owned(),
             limb: u8::from(self.has_limb(kind)?),

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use hzn_core::camera::{Camera, Config, Model};
 use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M};
-use hzn_core::frames::{Ecef, UnitVec3};
+use hzn_core::frames::{Fixed, UnitVec3};
 use hzn_sim::{
     Detector, EdgeNoise, Ellipsoid, EllipsoidLimb, Haze, Light, LimbArc, Picture, Pose, Reflection, Ring, Scene,
     Trials, World, pose::position_m,
@@ -62,7 +62,7 @@ fn limb_rays_touch_and_have_their_azimuth() {
         let axes_m = Vector3::from(radii_km) * 1e3;
         let pose = towards_centre(position_km.map(|x: f64| x * 1e3), 0.7);
         let limb = EllipsoidLimb::try_new(axes_m.into(), &pose).unwrap();
-        let rotation = pose.cam_to_ecef().unwrap();
+        let rotation = pose.fixed_from_camera().unwrap();
         for i in 0..360 {
             let azimuth = f64::from(i).to_radians() - PI + 1e-3;
             let ray = limb.ray(azimuth);
@@ -75,12 +75,12 @@ fn limb_rays_touch_and_have_their_azimuth() {
             assert!((closest.norm() - 1.0).abs() < 1e-9, "{radii_km:?} {i} {:e}", closest.norm() - 1.0);
             assert!(y.dot(&s) < 0.0, "the limb is in front of the camera");
         }
-        let truth_km = rotation.inverse().apply(&UnitVec3::<Ecef, f64>::try_new(pose.position_m.map(|x| -x)).unwrap());
+        let truth_km = rotation.inverse().apply(&UnitVec3::<Fixed, f64>::try_new(pose.position_m.map(|x| -x)).unwrap());
         let range_km = Vector3::from(position_km).norm();
         let want = Vector3::from(truth_km.xyz()) * range_km;
         assert!((Vector3::from(limb.position_km()) - want).norm() < 1e-9 * range_km);
     }
-    let inside = Pose { position_m: [0.0, 0.0, 1e3], cam_to_ecef_wxyz: [1.0, 0.0, 0.0, 0.0] };
+    let inside = Pose { position_m: [0.0, 0.0, 1e3], q_fixed_from_camera_wxyz: [1.0, 0.0, 0.0, 0.0] };
     assert_eq!(EllipsoidLimb::try_new([2e3; 3], &inside), None);
 }
 
@@ -348,7 +348,7 @@ fn exact_points_give_back_the_position() {
     let radii_m = [256.6e3, 251.4e3, 248.3e3];
     let pose = towards_centre([1.2e6, -2e6, 0.7e6], 0.5);
     let limb = EllipsoidLimb::try_new(radii_m, &pose).unwrap();
-    let rotation = pose.cam_to_ecef().unwrap();
+    let rotation = pose.fixed_from_camera().unwrap();
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for ray in limb.rays(LimbArc { middle_rad: 2.0, length_rad: 2.0, count: 60 }) {
         let body = Vector3::from(rotation.apply(&UnitVec3::try_new(ray).unwrap()).xyz());

@@ -38,9 +38,9 @@ fn circle_and_truth_equal_spice() {
 
         let circle = LimbCircle::new(&scene).unwrap();
         for ray in case["rays_ecef"].as_array().unwrap() {
-            let ray = UnitVec3::<hzn_core::frames::Ecef, f64>::try_new(three(ray)).unwrap();
+            let ray = UnitVec3::<hzn_core::frames::Fixed, f64>::try_new(three(ray)).unwrap();
             let azimuth = circle.azimuth_rad(ray.xyz());
-            let ours = UnitVec3::try_new(circle.ray_ecef(azimuth)).unwrap();
+            let ours = UnitVec3::try_new(circle.ray_fixed(azimuth)).unwrap();
             assert!(ours.angle_rad(&ray) < 1e-9, "{} {:e}", case["id"], ours.angle_rad(&ray));
         }
     }
@@ -144,7 +144,7 @@ fn rendered_edge_is_on_the_limb_of_a_small_disc() {
     // The Moon has a diameter of 100 pixels.
     let mut scene = clean(
         camera(Model::Pinhole, &[]),
-        Pose { position_m: [0.0, 0.0, -14.1e6], cam_to_ecef_wxyz: [1.0, 0.02, -0.03, 0.4] },
+        Pose { position_m: [0.0, 0.0, -14.1e6], q_fixed_from_camera_wxyz: [1.0, 0.02, -0.03, 0.4] },
     );
     scene.body.kind = hzn_core::body::Kind::Moon;
     scene.body.limb_height_km = 0.0;

@@ -135,7 +135,7 @@ fn impossible_scenes_are_refused() {
     assert_eq!(s.render().unwrap_err(), SceneError::Pose);
     assert_eq!(s.truth("", 0.0).unwrap_err(), SceneError::Pose);
     let mut s = scene();
-    s.pose.cam_to_ecef_wxyz = [0.0; 4];
+    s.pose.q_fixed_from_camera_wxyz = [0.0; 4];
     assert_eq!(s.render().unwrap_err(), SceneError::Pose);
     assert_eq!(s.limb_points(3, EdgeNoise::None).unwrap_err(), SceneError::Pose);
     let mut s = scene();

@@ -130,7 +130,7 @@ fn the_sensor_reports_what_the_design_says() {
             limb_height_sigma_km: 1.0,
             ..body::Config::default()
         };
-        config.candidates.keep_points = 0;
+        config.edge_points.keep_points = 0;
         config.covariance = covariance::Config::given(1.0, 100.0);
         let promised = sigmas(&Design {
             camera: camera.clone(),

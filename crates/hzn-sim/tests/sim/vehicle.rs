@@ -16,7 +16,7 @@ fn camera(name: &str, mount: [f64; 3], mount_error_deg: f64) -> CameraOnVehicle 
     let q = UnitQuaternion::from_scaled_axis(Vector3::from(mount));
     CameraOnVehicle {
         name: name.into(),
-        mount: Mount { q_body_from_camera_wxyz: [q.w, q.i, q.j, q.k] },
+        mount: Mount { q_vehicle_from_camera_wxyz: [q.w, q.i, q.j, q.k] },
         mount_error_deg,
         clock: hzn_sim::scenario::Clock::default(),
         vehicle: Vec::new(),
@@ -49,7 +49,7 @@ fn check(scene: &Scenario) -> Path {
         for frame in alone.flight().unwrap().frames {
             let truth = frame.scene.truth(&frame.file, frame.time_s).unwrap();
             let row = path.vehicle(frame.time_s);
-            let q = rotation([row.qw, row.qx, row.qy, row.qz]) * rotation(one.true_mount_wxyz());
+            let q = rotation([row.qw, row.qx, row.qy, row.qz]) * rotation(one.true_q_vehicle_from_camera_wxyz());
             let error_rad = q.angle_to(&rotation([truth.qw, truth.qx, truth.qy, truth.qz]));
             assert!(error_rad < 1e-7, "{} {}: {error_rad}", one.name, frame.time_s);
             compared += 1;
@@ -92,7 +92,7 @@ fn the_first_camera_points_and_the_second_one_follows() {
         .iter()
         .map(|frame| {
             let pose = &frame.scene.pose;
-            let axis = rotation(pose.cam_to_ecef_wxyz) * Vector3::z();
+            let axis = rotation(pose.q_fixed_from_camera_wxyz) * Vector3::z();
             // Straight down is the normal of the ellipsoid, up to 0.2 degrees from the centre of the Earth.
             axis.angle(&-Vector3::from(pose.position_m)).to_degrees()
         })
@@ -118,7 +118,7 @@ fn a_table_has_the_attitude_of_the_first_camera() {
     for (time_s, lat_deg) in [(0.0, 0.0), (750.0, 40.0), (1500.0, 80.0)] {
         let look = Look::off_nadir(0.5, 0.01 * lat_deg, 0.02 * lat_deg);
         let pose = Pose::looking(position_m(lat_deg, 10.0, 600.0), look);
-        let ([x, y, z], [w, i, j, k]) = (pose.position_m.map(|m| m * 1e-3), pose.cam_to_ecef_wxyz);
+        let ([x, y, z], [w, i, j, k]) = (pose.position_m.map(|m| m * 1e-3), pose.q_fixed_from_camera_wxyz);
         text += &format!("{time_s},{x},{y},{z},{w},{i},{j},{k}\n");
     }
     let scene = scene("tumble", |scene| {

@@ -116,7 +116,7 @@ mod tests {
         // The number of bits was added to the text of the file.
         let as_read = Some(Fingerprint::of("before"));
         let mut session = Session::new(text, Path::new("/flight/sensor.toml"), as_read).opened_by_user();
-        session.set("binarize", "scale", 0, Some(1.5.into()));
+        session.set("threshold", "scale", 0, Some(1.5.into()));
         let unsaved = Unsaved::of_session(&session, &[PathBuf::from("/flight")]);
         let own = Autosave::in_folder(dir.path());
         own.write(&unsaved).unwrap();

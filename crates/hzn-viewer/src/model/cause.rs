@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn a_row_of_a_file_tells_its_first_verdict() {
         let meta = RowMeta { index: 0, file: "a".into(), time_s: None, body: "earth".into(), altitude_km: None };
-        let mut row = Row::unprocessed(&meta, Status::Rejected, "ended at select: half-angle, short-arc");
+        let mut row = Row::unprocessed(&meta, Status::Rejected, "ended at gates: half-angle, short-arc");
         assert_eq!(Cause::from_row(&row).reason, Some(Reason::Verdict(Verdict::HalfAngle)));
         row.detail = "ended at contour".into();
         assert_eq!(Cause::from_row(&row).reason, None);

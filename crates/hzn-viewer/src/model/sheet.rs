@@ -9,7 +9,7 @@ pub struct Sheet(String);
 /// A key: its section (empty at the top level) and its name. With several bodies, `body` is the index of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Key<'a> {
-    /// Section, for example `reject`.
+    /// Section, for example `consensus`.
     pub section: &'a str,
     /// Name, for example `threshold_px`.
     pub name: &'a str,
@@ -151,7 +151,7 @@ fn table<'a>(document: &'a mut DocumentMut, key: Key<'_>, create: bool) -> Optio
     let is_of_body = match key.section {
         "body" => true,
         // The threshold and the edge errors of a body override those of the sensor.
-        "binarize" | "covariance" => has_own_section(root, key, is_list),
+        "threshold" | "covariance" => has_own_section(root, key, is_list),
         _ => false,
     };
     if !is_of_body {
@@ -188,7 +188,7 @@ fn section<'a>(root: &'a mut Table, name: &str, create: bool) -> Option<&'a mut 
 mod tests {
     use super::*;
 
-    const TEXT: &str = "# mine\npreset = \"hzn\"   # best\n\n[reject]  # outliers\nthreshold_px = 3.0     # \
+    const TEXT: &str = "# mine\npreset = \"hzn\"   # best\n\n[consensus]  # outliers\nthreshold_px = 3.0     # \
                                                 wide\n\n[body]\nkind = \"earth\"\n";
 
     fn key<'a>(section: &'a str, name: &'a str) -> Key<'a> {
@@ -197,10 +197,10 @@ mod tests {
 
     #[test]
     fn everything_but_the_value_stays() {
-        let sheet = Sheet::new(TEXT).with_value(key("reject", "threshold_px"), Some(4.5.into())).unwrap();
+        let sheet = Sheet::new(TEXT).with_value(key("consensus", "threshold_px"), Some(4.5.into())).unwrap();
         assert_eq!(sheet.text(), TEXT.replace("3.0", "4.5"));
         assert_eq!(sheet.diff(&Sheet::new(TEXT)), ["-threshold_px = 3.0     # wide", "+threshold_px = 4.5     # wide"]);
-        let back = sheet.with_value(key("reject", "threshold_px"), Some(3.0.into())).unwrap();
+        let back = sheet.with_value(key("consensus", "threshold_px"), Some(3.0.into())).unwrap();
         assert_eq!(back.text(), TEXT);
         assert!(back.diff(&Sheet::new(TEXT)).is_empty());
         let preset = back.with_value(key("", "preset"), Some("sun".into())).unwrap();
@@ -209,23 +209,23 @@ mod tests {
 
     #[test]
     fn changed_lines_are_below_their_sections() {
-        let sheet = Sheet::new(TEXT).with_value(key("reject", "threshold_px"), Some(4.5.into())).unwrap();
-        let sheet = sheet.with_value(key("gate", "max_mean"), Some(0.5.into())).unwrap();
+        let sheet = Sheet::new(TEXT).with_value(key("consensus", "threshold_px"), Some(4.5.into())).unwrap();
+        let sheet = sheet.with_value(key("brightness", "max_mean"), Some(0.5.into())).unwrap();
         let diff = sheet.diff_by_section(&Sheet::new(TEXT));
         let sections: Vec<&str> = diff.iter().map(|(section, _)| section.as_str()).collect();
         // The empty line before a new section belongs to the section before it.
-        assert_eq!(sections, ["[reject]", "[body]", "[gate]"]);
+        assert_eq!(sections, ["[consensus]", "[body]", "[brightness]"]);
         assert_eq!(diff[0].1.len(), 2);
         assert!(diff[2].1.contains(&"+max_mean = 0.5".to_owned()));
     }
 
     #[test]
     fn new_keys_and_sections_are_appended() {
-        let sheet = Sheet::new(TEXT).with_value(key("reject", "seed"), Some(7.into())).unwrap();
+        let sheet = Sheet::new(TEXT).with_value(key("consensus", "seed"), Some(7.into())).unwrap();
         assert!(sheet.text().contains("# wide\nseed = 7\n"), "{}", sheet.text());
-        let sheet = sheet.with_value(key("gate", "max_mean"), Some(0.5.into())).unwrap();
-        assert!(sheet.text().ends_with("kind = \"earth\"\n\n[gate]\nmax_mean = 0.5\n"), "{}", sheet.text());
-        let sheet = sheet.with_value(key("gate", "max_mean"), None).unwrap();
+        let sheet = sheet.with_value(key("brightness", "max_mean"), Some(0.5.into())).unwrap();
+        assert!(sheet.text().ends_with("kind = \"earth\"\n\n[brightness]\nmax_mean = 0.5\n"), "{}", sheet.text());
+        let sheet = sheet.with_value(key("brightness", "max_mean"), None).unwrap();
         assert!(!sheet.text().contains("max_mean"));
         // Removing a missing value changes nothing and inserts nothing.
         assert_eq!(Sheet::new(TEXT).with_value(key("mask", "polygons_px"), None).unwrap().text(), TEXT);
@@ -233,20 +233,21 @@ mod tests {
 
     #[test]
     fn a_body_of_several_has_its_own_values() {
-        let text = "[binarize]\nscale = 1.0\n[[bodies]]\nkind = \"earth\"\n[[bodies]]\nkind = \
-            \"sun\"\n[bodies.binarize]\nlevel = 0.9\n";
+        let text = "[threshold]\nscale = 1.0\n[[bodies]]\nkind = \"earth\"\n[[bodies]]\nkind = \
+            \"sun\"\n[bodies.threshold]\nlevel = 0.9\n";
         let changed = |section, name, body, value: f64| {
             Sheet::new(text).with_value(Key { section, name, body }, Some(value.into())).unwrap().text().to_owned()
         };
         assert!(changed("body", "altitude_km", 1, 5.0).contains("kind = \"sun\"\naltitude_km = 5.0\n"));
-        assert_eq!(changed("binarize", "level", 1, 0.5), text.replace("0.9", "0.5"));
-        assert_eq!(changed("binarize", "scale", 0, 2.0), text.replace("1.0", "2.0"));
+        assert_eq!(changed("threshold", "level", 1, 0.5), text.replace("0.9", "0.5"));
+        assert_eq!(changed("threshold", "scale", 0, 2.0), text.replace("1.0", "2.0"));
         assert!(Sheet::new("mask = 3").with_value(key("mask", "x"), Some(1.into())).is_err());
     }
 
     #[test]
     fn inline_tables_are_tables() {
-        let sheet = Sheet::new("reject = { seed = 1 }\n").with_value(key("reject", "seed"), Some(2.into())).unwrap();
-        assert_eq!(sheet.text(), "reject = { seed = 2 }\n");
+        let sheet =
+            Sheet::new("consensus = { seed = 1 }\n").with_value(key("consensus", "seed"), Some(2.into())).unwrap();
+        assert_eq!(sheet.text(), "consensus = { seed = 2 }\n");
     }
 }

@@ -97,7 +97,7 @@ fn threshold_cause(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult, otsu: 
     if same > 1 {
         wrapped(ui, &format!("The same holds for {same} of {all} frames."));
     }
-    let hint = "Sets binarize.method = \"otsu\" and binarize.scale = 1";
+    let hint = "Sets threshold.method = \"otsu\" and threshold.scale = 1";
     if otsu.answered && ui.button("Use Otsu's threshold").on_hover_text(hint).clicked() {
         use_otsu(viewer);
     }
@@ -108,7 +108,7 @@ fn use_otsu(viewer: &mut Viewer) {
     let body = viewer.body;
     let Some(session) = &mut viewer.session else { return };
     let name = threshold::Method::Otsu.name();
-    session.set_all(&[("binarize", "method", Some(name.into())), ("binarize", "scale", None)], body);
+    session.set_all(&[("threshold", "method", Some(name.into())), ("threshold", "scale", None)], body);
 }
 
 fn wrapped(ui: &mut Ui, text: &str) {

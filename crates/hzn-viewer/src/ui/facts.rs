@@ -20,18 +20,18 @@ const fn card(title: &'static str, stage: Option<Stage>, sections: &'static [&'s
 
 /// All cards, in the order in which a picture is processed.
 pub(super) const CARDS: &[Card] = &[
-    card("Picture", None, &["input", "gate"], false),
+    card("Picture", None, &["input", "brightness"], false),
     card("Body", None, &["body"], false),
-    card("Threshold", Some(Stage::Binarize), &["binarize"], true),
+    card("Threshold", Some(Stage::Threshold), &["threshold"], true),
     card("Mask", None, &["mask"], false),
     card("Contour", Some(Stage::Contour), &["contour"], false),
-    card("Edge points", Some(Stage::Candidates), &["candidates"], true),
-    card("Rays", Some(Stage::Undistort), &["camera"], false),
-    card("Consensus", Some(Stage::Reject), &["reject"], true),
-    card("Fit", Some(Stage::Estimate), &["estimate"], false),
+    card("Edge points", Some(Stage::EdgePoints), &["edge_points"], true),
+    card("Rays", Some(Stage::Rays), &["camera"], false),
+    card("Consensus", Some(Stage::Consensus), &["consensus"], true),
+    card("Fit", Some(Stage::Fit), &["fit"], false),
     card("Covariance", Some(Stage::Covariance), &["covariance"], false),
-    card("Gates", Some(Stage::Select), &["select"], false),
-    card("Further looks", None, &["recover"], false),
+    card("Gates", Some(Stage::Gates), &["gates"], false),
+    card("Further looks", None, &["retry"], false),
     card("Work budget", None, &["limits"], false),
 ];
 
@@ -53,8 +53,8 @@ pub(super) fn lines(card: &Card, frame_view: &FrameView, outcome: &Outcome, answ
         "Further looks" if c.looks > 1 => vec![format!("{} looks, each with another threshold", c.looks)],
         "Work budget" => vec![format!("{} steps of work", c.work)],
         "Edge points" if reached(Stage::Contour) => edge_points(report, config),
-        "Rays" if reached(Stage::Undistort) => vec![format!("{} points became rays", c.edge_points)],
-        "Consensus" if reached(Stage::Reject) => consensus(report, answer),
+        "Rays" if reached(Stage::Rays) => vec![format!("{} points became rays", c.edge_points)],
+        "Consensus" if reached(Stage::Consensus) => consensus(report, answer),
         "Fit" => answer.solution().map_or_else(Vec::new, |s| fit(s, answer)),
         "Covariance" => answer.solution().map_or_else(Vec::new, |s| covariance(s, answer)),
         "Gates" => gates(report),
@@ -93,7 +93,7 @@ fn threshold(answer: &BodyResult, config: &Config) -> Vec<String> {
     match (report.status, answer.sample) {
         (Status::TooDark | Status::TooBright, _) => vec![format!(
             "mean brightness is outside of {} to {} of full scale",
-            config.gate.min_mean, config.gate.max_mean
+            config.brightness.min_mean, config.brightness.max_mean
         )],
         (_, Some((mean, n))) => {
             vec![format!("threshold {} counts, mean {mean:.1} counts in a sample of {n} pixels", report.level)]
@@ -118,7 +118,7 @@ fn contour(report: &Report<f64>, outcome: &Outcome) -> Vec<String> {
 fn edge_points(report: &Report<f64>, config: &Config) -> Vec<String> {
     let c = report.counters;
     let edges = if c.candidates == 1 { "edge" } else { "edges" };
-    let mut out = vec![format!("{} {edges} of {} px or more", c.candidates, config.candidates.min_points)];
+    let mut out = vec![format!("{} {edges} of {} px or more", c.candidates, config.edge_points.min_points)];
     if c.fallback_points > 0 {
         out.push(format!("{} points were located at the global threshold", c.fallback_points));
     }
@@ -173,7 +173,7 @@ fn gates(report: &Report<f64>) -> Vec<String> {
     }
 }
 
-/// Shortens the detail of a row without an answer, for example `ended at select: short-arc, short-arc`: a verdict of
+/// Shortens the detail of a row without an answer, for example `ended at gates: short-arc, short-arc`: a verdict of
 /// several edges appears once, with its count.
 pub(super) fn shorten_detail(detail: &str) -> String {
     let Some((stage, verdicts)) = detail.split_once(": ") else { return detail.to_owned() };
@@ -194,8 +194,8 @@ mod tests {
 
     #[test]
     fn a_verdict_of_many_edges_is_said_once() {
-        let long = "ended at select: residuals, short-arc, no-fit, short-arc, short-arc";
-        assert_eq!(shorten_detail(long), "ended at select: residuals, short-arc ×3, no-fit");
+        let long = "ended at gates: residuals, short-arc, no-fit, short-arc, short-arc";
+        assert_eq!(shorten_detail(long), "ended at gates: residuals, short-arc ×3, no-fit");
         assert_eq!(shorten_detail("ended at contour"), "ended at contour");
     }
 

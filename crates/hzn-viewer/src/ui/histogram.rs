@@ -16,7 +16,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let Some(histogram) = viewer.frame_view.as_ref().and_then(|f| f.histogram.clone()) else { return };
     let answer = viewer.answer();
     let level = answer.and_then(|a| a.row.level).filter(|l| *l > 0);
-    let scale = |s: &Session| s.number("binarize", "scale", viewer.body).unwrap_or(1.0);
+    let scale = |s: &Session| s.number("threshold", "scale", viewer.body).unwrap_or(1.0);
     let own = viewer.session.as_ref().filter(|s| method(s, viewer.body) == Some(Method::Otsu.name()));
     // Otsu's threshold is known from a trial, or it is the threshold in use without its factor.
     let otsu = answer
@@ -52,7 +52,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
 }
 
 fn method(session: &Session, body: usize) -> Option<&str> {
-    session.value("binarize", "method", body).and_then(|m| m.as_str())
+    session.value("threshold", "method", body).and_then(|m| m.as_str())
 }
 
 /// Moves the threshold. With Otsu's method the factor is changed, so that the threshold still follows each picture.
@@ -61,13 +61,13 @@ fn set_threshold(session: &mut Session, body: usize, value: f64, otsu: Option<f6
     match otsu.filter(|o| by_factor && *o > 0.0) {
         Some(otsu) => {
             let scale = (value / otsu).clamp(0.1, 10.0);
-            session.set("binarize", "scale", body, Some(Session::tidy_value(scale)));
+            session.set("threshold", "scale", body, Some(Session::tidy_value(scale)));
         }
         None => {
             if method(session, body) != Some(Method::Fixed.name()) {
-                session.set("binarize", "method", body, Some(Method::Fixed.name().into()));
+                session.set("threshold", "method", body, Some(Method::Fixed.name().into()));
             }
-            session.set("binarize", "level", body, Some(Value::from(value.round())));
+            session.set("threshold", "level", body, Some(Value::from(value.round())));
         }
     }
 }
@@ -116,16 +116,16 @@ mod tests {
     fn a_dragged_threshold_keeps_the_method_where_it_can() {
         let camera = "[camera]\nwidth = 64\nheight = 48\nmodel = \"pinhole\"\nfx_px = 60.0\nfy_px = 60.0\n\
                       cx_px = 31.5\ncy_px = 23.5\n";
-        let session = |binarize: &str| Session::new(&format!("{camera}{binarize}"), Path::new("s.toml"), None);
+        let session = |threshold: &str| Session::new(&format!("{camera}{threshold}"), Path::new("s.toml"), None);
         let mut otsu = session("");
         set_threshold(&mut otsu, 0, 120.0, Some(80.0));
-        assert_eq!((method(&otsu, 0), otsu.number("binarize", "scale", 0)), (Some("otsu"), Some(1.5)));
-        let mut fixed = session("[binarize]\nmethod = \"fixed\"\nlevel = 200.0\n");
+        assert_eq!((method(&otsu, 0), otsu.number("threshold", "scale", 0)), (Some("otsu"), Some(1.5)));
+        let mut fixed = session("[threshold]\nmethod = \"fixed\"\nlevel = 200.0\n");
         set_threshold(&mut fixed, 0, 90.4, Some(80.0));
-        assert_eq!((method(&fixed, 0), fixed.number("binarize", "level", 0)), (Some("fixed"), Some(90.0)));
-        let mut dynamic = session("[binarize]\nmethod = \"dynamic\"\n");
+        assert_eq!((method(&fixed, 0), fixed.number("threshold", "level", 0)), (Some("fixed"), Some(90.0)));
+        let mut dynamic = session("[threshold]\nmethod = \"dynamic\"\n");
         set_threshold(&mut dynamic, 0, 90.4, None);
-        assert_eq!((method(&dynamic, 0), dynamic.number("binarize", "level", 0)), (Some("fixed"), Some(90.0)));
+        assert_eq!((method(&dynamic, 0), dynamic.number("threshold", "level", 0)), (Some("fixed"), Some(90.0)));
         assert!(dynamic.problem().is_none(), "{:?}", dynamic.problem());
     }
 }

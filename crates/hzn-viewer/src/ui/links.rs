@@ -45,11 +45,8 @@ mod tests {
 
     #[test]
     fn keys_are_found_in_advice() {
-        let tip = "lower select.min_arc_px or raise select.max_sigma_deg; check altitude_km (binarize.scale).";
-        assert_eq!(
-            named_keys(tip),
-            ["select.min_arc_px", "select.max_sigma_deg", "body.altitude_km", "binarize.scale"]
-        );
+        let tip = "lower gates.min_arc_px or raise gates.max_sigma_deg; check altitude_km (threshold.scale).";
+        assert_eq!(named_keys(tip), ["gates.min_arc_px", "gates.max_sigma_deg", "body.altitude_km", "threshold.scale"]);
         assert!(named_keys("Is the limb in view?").is_empty());
     }
 }

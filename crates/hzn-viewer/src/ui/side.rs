@@ -117,7 +117,7 @@ fn answer(viewer: &mut Viewer, ui: &mut Ui) {
             }
             row("RMS", format!("{:.3} px", s.rms_px));
             row("inliers", s.inliers.to_string());
-            if let Some(body) = &s.axis_body {
+            if let Some(body) = &s.axis_vehicle {
                 let [roll, pitch] = hzn_mcap::roll_pitch_deg(body);
                 row("roll", format!("{roll:.3}°"));
                 row("pitch", format!("{pitch:.3}°"));

@@ -38,7 +38,7 @@ impl Viewer {
             Situation::Compare => self.run(Command::Compare, ctx),
             Situation::Parameters => {
                 self.panels.open(Panel::Stages, &mut self.settings);
-                self.focus_key = Some("binarize.scale");
+                self.focus_key = Some("threshold.scale");
             }
             Situation::Wizard => self.open_wizard(),
             Situation::Navigation => {

@@ -241,7 +241,7 @@ fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
     if report.candidates.is_empty() {
         return;
     }
-    let select = viewer.frame_view.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.select);
+    let select = viewer.frame_view.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.gates);
     egui::Grid::new("candidates").num_columns(7).spacing(vec2(10.0, 2.0)).show(ui, |ui| {
         for head in ["", "length px", "points", "inliers", "RMS px", "verdict", ""] {
             ui.weak(RichText::new(head).size(11.5));

@@ -39,7 +39,7 @@ mod tests {
 
     #[test]
     fn the_values_reach_both_ends() {
-        let key = hzn_calib::keys::find("binarize.scale").unwrap();
+        let key = hzn_calib::keys::find("threshold.scale").unwrap();
         let mut window =
             StudyWindow { key, study: None, range: [0.5, 2.0], logarithmic: true, done: 0, tallies: Vec::new() };
         let values = window.values();

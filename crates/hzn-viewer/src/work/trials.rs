@@ -29,25 +29,25 @@ pub struct OtsuTrial {
 }
 
 fn uses_otsu(config: &Config) -> bool {
-    let of_body = config.each_body().iter().all(|b| b.binarize.is_none());
-    of_body && config.binarize.method == threshold::Method::Otsu && config.binarize.scale == 1.0
+    let of_body = config.each_body().iter().all(|b| b.threshold.is_none());
+    of_body && config.threshold.method == threshold::Method::Otsu && config.threshold.scale == 1.0
 }
 
 fn with_otsu(config: &Config) -> Config {
     let mut config = config.clone();
-    config.binarize = threshold::Config::default();
-    config.each_body_mut().iter_mut().for_each(|b| b.binarize = None);
+    config.threshold = threshold::Config::default();
+    config.each_body_mut().iter_mut().for_each(|b| b.threshold = None);
     config
 }
 
 /// Returns the configuration of a sensor that fits a cone of any half-angle to each edge.
 fn with_any_cone(config: &Config) -> Config {
     let mut config = config.clone();
-    config.reject.method = consensus::Method::Ransac;
-    config.estimate.half_angle = fit::HalfAngle::Free;
-    config.select.max_half_angle_sigma = 1e6;
+    config.consensus.method = consensus::Method::Ransac;
+    config.fit.half_angle = fit::HalfAngle::Free;
+    config.gates.max_half_angle_sigma = 1e6;
     // The first look finds the limb of most pictures. Further looks would cost several times as much.
-    config.recover.levels.clear();
+    config.retry.levels.clear();
     config
 }
 

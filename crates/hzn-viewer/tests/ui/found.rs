@@ -120,7 +120,7 @@ fn a_plot_without_values_says_why() {
     let (_dir, mut window) = window_on_flight();
     window.get_by_label("Roll, pitch").click();
     window.run_steps(4);
-    let why = "Roll and pitch need the mounting of the camera: set [mount] q_body_from_camera_wxyz in sensor.toml.";
+    let why = "Roll and pitch need the mounting of the camera: set [mount] q_vehicle_from_camera_wxyz in sensor.toml.";
     assert!(window.query_by_label(why).is_some());
     assert!(window.query_by_label("Plot Roll, pitch").is_none());
 }
@@ -338,7 +338,7 @@ fn an_invalid_sensor_file_has_a_badge_and_a_cure() {
     open(&mut window, &pictures);
     until(&mut window, "not shown", |v| v.frame_view().is_some());
     assert!(window.query_by_label("invalid sensor.toml").is_some());
-    window.get_by_label("Remove binarize.scale").click();
+    window.get_by_label("Remove threshold.scale").click();
     settled(&mut window);
     assert_eq!(answer(&window).0, Status::Ok);
 }

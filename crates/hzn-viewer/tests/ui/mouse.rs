@@ -274,7 +274,7 @@ fn the_threshold_is_dragged_in_the_histogram() {
     let place = |part: f32| pos2(bars.left() + part * bars.width(), bars.center().y);
     drag(&mut window, place(0.4), place(0.8));
     settled(&mut window);
-    let scale = window.state().session().unwrap().number("binarize", "scale", 0).unwrap();
+    let scale = window.state().session().unwrap().number("threshold", "scale", 0).unwrap();
     assert!(scale > 1.0, "Otsu's method is kept, with another factor: {scale}");
     assert!(answer(&window).1 > before.1, "{:?}", answer(&window));
     window.get_by_label("Undo").click();
@@ -286,10 +286,10 @@ fn the_threshold_is_dragged_in_the_histogram() {
 #[test]
 fn a_parameter_is_swept_and_a_click_takes_a_value() {
     let (_dir, mut window) = window_on_flight();
-    let scale = |w: &Window| w.state().session().unwrap().number("binarize", "scale", 0).unwrap();
+    let scale = |w: &Window| w.state().session().unwrap().number("threshold", "scale", 0).unwrap();
     let name = window.get_by_role_and_label(egui::accesskit::Role::Label, "scale").rect();
     click_with(&mut window, name.left_center() + egui::vec2(4.0, 0.0), PointerButton::Secondary);
-    window.get_by_label("Sweep binarize.scale over the sequence…").click();
+    window.get_by_label("Sweep threshold.scale over the sequence…").click();
     window.run_steps(3);
     window.get_by_label("Start").click();
     for _ in 0..3000 {

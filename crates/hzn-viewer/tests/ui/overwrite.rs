@@ -110,7 +110,7 @@ fn changes_that_are_made_while_pictures_are_opened_are_not_lost() {
     let mut window = window_on(&pictures);
     let request = Request { inputs: vec![bare.clone()], ..Request::default() };
     window.state_mut().open(request);
-    window.state_mut().session_mut().unwrap().set("binarize", "scale", 0, Some(1.5.into()));
+    window.state_mut().session_mut().unwrap().set("threshold", "scale", 0, Some(1.5.into()));
     let begin = std::time::Instant::now();
     while window.query_by_label("Unsaved changes").is_none() {
         assert!(begin.elapsed().as_secs() < 60, "there is no question");

@@ -144,7 +144,7 @@ fn a_refused_value_is_said_in_place() {
     settled(&mut window);
     // Wherever the slider is set, the value of the sensor stays within its limits.
     let config = window.state().session().unwrap().config().unwrap().clone();
-    assert!((0.1..=10.0).contains(&config.binarize.scale));
+    assert!((0.1..=10.0).contains(&config.threshold.scale));
     assert_eq!(before.0, Status::Ok);
 }
 

@@ -36,7 +36,7 @@ cy_px = 119.5
 kind = \"earth-sphere\"   # no positions here
 altitude_km = 240.0
 
-[binarize]
+[threshold]
 scale = 1.0     # times Otsu's level
 ";
 

@@ -23,7 +23,7 @@ use static_cell::ConstStaticCell;
 const WIDTH: u16 = 1920;
 const HEIGHT: u16 = 1080;
 
-/// Has room for the 600 points of an edge that the default `candidates.keep_points` keeps.
+/// Has room for the 600 points of an edge that the default `edge_points.keep_points` keeps.
 type Lists = Workspace<f32, 2048, 76, 512>;
 static WORKSPACE: ConstStaticCell<Lists> = ConstStaticCell::new(Lists::new());
 

@@ -116,7 +116,7 @@ impl Score {
         let last = fused.epochs.last()?;
         let (mut sum, mut nees, mut count) = (0.0, 0.0, 0.0);
         for (one, camera) in scene.by_camera().iter().zip(&last.cameras) {
-            let [w, x, y, z] = one.true_mount_wxyz();
+            let [w, x, y, z] = one.true_q_vehicle_from_camera_wxyz();
             let truth = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
             let error = (camera.mount.inverse() * truth).scaled_axis();
             sum += error.norm_squared();

@@ -43,7 +43,7 @@ fn scene(effort: &Effort) -> anyhow::Result<Scenario> {
         }
     }
     // Axes of the vehicle are those of the camera.
-    scene.mount = Some(Mount { q_body_from_camera_wxyz: [1.0, 0.0, 0.0, 0.0] });
+    scene.mount = Some(Mount { q_vehicle_from_camera_wxyz: [1.0, 0.0, 0.0, 0.0] });
     scene.imu = Some(vehicle::imu());
     scene.gnss = Some(vehicle::gnss());
     Ok(scene)
@@ -96,7 +96,7 @@ fn pictures(scene: &Scenario, rows: &[Row]) -> anyhow::Result<Nadir> {
 /// Returns the errors of the filter's nadir in the camera within a span of time.
 fn filtered(scene: &Scenario, fused: &Fused, span_s: [f64; 2]) -> anyhow::Result<Nadir> {
     let path = scene.path()?;
-    let [w, x, y, z] = scene.true_mount_wxyz();
+    let [w, x, y, z] = scene.true_q_vehicle_from_camera_wxyz();
     let mount = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
     let mut nadir = Nadir::default();
     for epoch in fused.epochs.iter().filter(|e| (span_s[0]..span_s[1]).contains(&e.state.time_s)) {
@@ -116,7 +116,7 @@ fn add_start(scene: &Scenario, inputs: &mut Inputs) -> anyhow::Result<()> {
     let truth = UnitQuaternion::from_quaternion(Quaternion::new(row.qw, row.qx, row.qy, row.qz));
     let sigma_rad = START_DEG.to_radians();
     let error = UnitQuaternion::from_scaled_axis(Vector3::new(1.0, -1.0, 1.0) * sigma_rad);
-    inputs.attitudes.push(Attitude { time_s: 1.0, body_to_ecef: Some(truth * error), sigma_rad });
+    inputs.attitudes.push(Attitude { time_s: 1.0, fixed_from_vehicle: Some(truth * error), sigma_rad });
     Ok(())
 }
 

@@ -161,10 +161,11 @@ fn write(
     let mut written = sky::into_sensor_toml(&sensor.text, found).map_err(failed)?;
     match mount {
         Some(Ok(mount)) => {
-            let nominal_wxyz = sensor.config.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
+            let q_vehicle_from_nominal_wxyz =
+                sensor.config.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_vehicle_from_camera_wxyz);
             let source = &format!("{} of {input}", counted(mount.pictures as u64, "limb picture"));
-            let Mount { correction_wxyz, sigma_deg, .. } = mount;
-            let mount = FoundMount { nominal_wxyz, correction_wxyz, sigma_deg, source };
+            let Mount { q_nominal_from_camera_wxyz, sigma_deg, .. } = mount;
+            let mount = FoundMount { q_vehicle_from_nominal_wxyz, q_nominal_from_camera_wxyz, sigma_deg, source };
             written = written.with_mount(&mount).map_err(failed)?;
         }
         Some(Err(why)) => return Err(failed(format!("{input}: no sensor.toml is written: --mount: {why}"))),

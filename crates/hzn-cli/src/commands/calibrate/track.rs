@@ -72,8 +72,8 @@ fn direction(kind: Kind, data: &FrameData) -> Option<[f64; 3]> {
         Kind::Moon => ephemeris::moon(unix_s).seen_from(position_m?),
         _ => position_m.map_or_else(|| ephemeris::sun(unix_s), |at| ephemeris::sun(unix_s).seen_from(at)),
     };
-    let attitude = Rotation::<hzn_core::frames::Cam, hzn_core::frames::Ecef, f64>::assume_from_quaternion(
-        data.camera_to_ecef_wxyz?,
+    let attitude = Rotation::<hzn_core::frames::Cam, hzn_core::frames::Fixed, f64>::assume_from_quaternion(
+        data.q_fixed_from_camera_wxyz?,
     )?;
     Some(attitude.inverse().apply(&UnitVec3::try_new(place.direction)?).xyz())
 }
@@ -86,9 +86,15 @@ fn write(args: &Args, sensor: &Sensor, track: &Track, input: &str) -> Outcome {
     let found = Found { camera: &track.camera, parameters: &track.parameters, source };
     let mut written = sky::into_sensor_toml(&sensor.text, found).map_err(failed)?;
     if args.mount {
-        let nominal_wxyz = sensor.config.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_body_from_camera_wxyz);
+        let q_vehicle_from_nominal_wxyz =
+            sensor.config.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_vehicle_from_camera_wxyz);
         let sigma_deg = track.correction_deg.map(|[_, sigma]| sigma);
-        let mount = FoundMount { nominal_wxyz, correction_wxyz: track.correction_wxyz, sigma_deg, source };
+        let mount = FoundMount {
+            q_vehicle_from_nominal_wxyz,
+            q_nominal_from_camera_wxyz: track.q_nominal_from_camera_wxyz,
+            sigma_deg,
+            source,
+        };
         written = written.with_mount(&mount).map_err(failed)?;
     }
     write_sensors(args, &written)

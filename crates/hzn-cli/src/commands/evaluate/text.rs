@@ -44,7 +44,7 @@ pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
     line(
         "false answers",
         match without {
-            0 => "no picture is without a limb".into(),
+            0 => "not tested: every picture shows a limb".into(),
             n => format!("{} of {n} pictures without a limb", e.false_answers),
         },
     );

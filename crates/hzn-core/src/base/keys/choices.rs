@@ -3,6 +3,8 @@
 /// Declares an enumeration whose variants are words in sensor.toml; the first variant is the default. Each line has `@`
 /// and the number in flight or `-`, the variant, the word, and the feature that the variant needs. Every variant exists
 /// in every build; a build without the feature refuses the variant and names the feature.
+// The variants do not depend on features, because features of one crate are added up over a whole build: a variant that
+// one crate turns on would break every `match` of another crate.
 macro_rules! choices {
     (
         $(#[doc = $about:literal])+
@@ -46,6 +48,8 @@ macro_rules! choices {
 
         impl Default for $name {
             fn default() -> Self {
+                // The index is evaluated at compile time because it stands in a `const`; an index at run time would
+                // link a panic path.
                 const FIRST: $name = $name::ALL[0];
                 FIRST
             }
@@ -78,11 +82,14 @@ macro_rules! choices {
                 let number = match self {
                     $(Self::$variant => $crate::base::keys::flight!($id),)+
                 };
+                // A choice on the ground only has no number, so it reads as NaN, which no number in flight equals.
                 number.map_or(f64::NAN, f64::from)
             }
             fn set_number(&mut self, _place: u16, number: f64) -> Option<()> {
                 $(
                     if let Some(own) = $crate::base::keys::flight!($id)
+                        // The comparison is in f64 and not after a cast, because a cast would take 1.5 or 1e9 for a
+                        // valid choice.
                         && f64::from(own) == number
                     {
                         *self = Self::$variant;

@@ -8,7 +8,7 @@
 //! ```text
 //! section! {
 //!     /// What the section is for.
-//!     "reject" pub struct Config {
+//!     "consensus" pub struct Config {
 //!         /// One sentence: the meaning that every table shows.
 //!         ///
 //!         /// More for the reader of the Rust documentation.
@@ -33,7 +33,7 @@ pub(crate) use section::{section, table};
 /// One key of sensor.toml.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Key {
-    /// The key with its section, for example `reject.threshold_px`.
+    /// The key with its section, for example `consensus.threshold_px`.
     pub path: &'static str,
     /// The meaning: one sentence, then an empty line and the details.
     pub doc: &'static str,
@@ -54,7 +54,7 @@ pub struct Key {
 }
 
 impl Key {
-    /// Returns the section, for example `reject`.
+    /// Returns the section, for example `consensus`.
     pub fn section(&self) -> &'static str {
         self.path.split_once('.').map_or("", |(section, _)| section)
     }
@@ -71,6 +71,7 @@ impl Key {
 impl Key {
     /// Returns the unit that the name ends in, for example `px`, `km`, `deg`, `deg/s`; empty for plain numbers.
     pub fn unit(&self) -> &'static str {
+        // The longer ends come first, because `_s` would also match `_deg_s`.
         let ends = [("_deg_s", "deg/s"), ("_px", "px"), ("_km", "km"), ("_deg", "deg"), ("_percent", "%"), ("_s", "s")];
         ends.into_iter().find(|(end, _)| self.path.ends_with(end)).map_or("", |(_, unit)| unit)
     }
@@ -91,7 +92,7 @@ impl Key {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Table {
-    /// The name of the section, for example `reject`.
+    /// The name of the section, for example `consensus`.
     pub name: &'static str,
     /// The purpose of the section.
     pub doc: &'static str,
@@ -156,6 +157,7 @@ pub struct Choice {
 }
 
 /// The type of a key's value.
+// The methods have defaults that do nothing, so that a type on the ground only needs no code for flight.
 pub trait Value: Clone + PartialEq {
     /// Form of the value in a file.
     const FORM: Form;

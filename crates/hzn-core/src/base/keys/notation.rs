@@ -12,6 +12,7 @@ macro_rules! flight {
 
 /// Gives the place of the number `id` among the numbers of a key.
 macro_rules! place {
+    // The use of the identifier avoids a warning for sections that have no number in flight.
     (-, $ty:ty, $id:ident) => {{
         let _ = $id;
         None::<u16>
@@ -32,6 +33,8 @@ macro_rules! feature_name {
 }
 
 /// Gives the text of one option among several.
+// The wanted name is compared with the first option and the rest is searched again, because a macro cannot look up a
+// name in a list.
 macro_rules! option {
     ($wanted:ident) => { None };
     (needs needs $text:literal $($rest:tt)*) => { Some($text) };
@@ -85,6 +88,7 @@ macro_rules! check {
 /// Checks that a key keeps its default when its feature is not in this build.
 macro_rules! needs {
     ($value:expr, $default:tt, $path:expr, needs $feature:literal $($rest:tt)*) => {
+        // The default passes without the feature, so that a file that writes out every key loads in every build.
         if !cfg!(feature = $feature) && $value != $default {
             return Err($crate::base::error::ConfigError::lacks($path, None, $feature));
         }

@@ -18,6 +18,7 @@ macro_rules! section {
         $(#[doc = $about])+
         #[derive(Debug, Clone, $($derive,)? PartialEq)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        // Unknown keys are refused because a misspelt key would otherwise keep its default without a word.
         #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
         pub struct $name {
             $(
@@ -95,6 +96,8 @@ macro_rules! table {
                 }),+],
             };
 
+            // The numbers of all keys are a constant, so that a flight computer iterates over them without the table of
+            // keys, whose texts would take flash.
             const NUMBERS: &'static [(Option<u16>, u16)] = &[
                 $(($crate::base::keys::flight!($id), <$ty as $crate::base::keys::Value>::NUMBERS)),+
             ];
@@ -109,6 +112,8 @@ macro_rules! table {
                 Ok(())
             }
 
+            // The path is repeated as a literal and not read from the table, because a search in the table would link
+            // all its documentation into the image.
             fn path(id: u16) -> Option<&'static str> {
                 $(
                     if $crate::base::keys::place!($id, $ty, id).is_some() {
@@ -130,6 +135,8 @@ macro_rules! table {
             fn set_number(&mut self, id: u16, number: f64) -> Option<bool> {
                 $(
                     if let Some(place) = $crate::base::keys::place!($id, $ty, id) {
+                        // `Some(false)` is not `None`: the flight computer must tell a refused value from an unknown
+                        // number, because its acknowledgement says which of them it was.
                         return Some($crate::base::keys::Value::set_number(&mut self.$field, place, number).is_some());
                     }
                 )+

@@ -8,6 +8,7 @@ use crate::base::error::{ConfigError, Limit, require};
 pub(crate) fn check_number(path: &'static str, x: f64, low: f64, above: bool, high: f64) -> Result<(), ConfigError> {
     require(x.is_finite(), path, x, Limit::Finite)?;
     require(!above || x > low, path, x, Limit::Above(low))?;
+    // A limit of infinity would be printed as "between 0 and inf"; "at least" says what is meant.
     let limit = if high.is_finite() { Limit::Between(low, high) } else { Limit::AtLeast(low) };
     require(x >= low && x <= high, path, x, limit)
 }
@@ -21,6 +22,7 @@ impl Value for f64 {
         *self
     }
     fn set_number(&mut self, _place: u16, number: f64) -> Option<()> {
+        // NaN is refused here because it means "left out" for an option, and this number cannot be left out.
         *self = Some(number).filter(|x| x.is_finite())?;
         Some(())
     }
@@ -40,6 +42,8 @@ macro_rules! whole {
                 f64::from(*self)
             }
             fn set_number(&mut self, _place: u16, number: f64) -> Option<()> {
+                // The cast saturates and drops the fraction; the comparison afterwards refuses every number that it
+                // changed.
                 let whole = number as $t;
                 *self = (f64::from(whole) == number).then_some(whole)?;
                 Some(())
@@ -109,6 +113,8 @@ impl<const N: usize> Value for heapless::Vec<f64, N> {
     fn set_number(&mut self, place: u16, number: f64) -> Option<()> {
         let place = usize::from(place);
         let number = Some(number).filter(|x| x.is_finite())?;
+        // Missing numbers read as 0, so a 0 behind the end needs no element. Otherwise a restored list would be longer
+        // than the stored one, and would differ from it.
         while self.len() <= place && number != 0.0 {
             self.push(0.0).ok()?;
         }

@@ -3,6 +3,7 @@
 use crate::base::real::Real;
 
 /// Maximum number of sweeps over all pairs. Convergence is quadratic: six are enough for 6×6 in double precision.
+// The limit is there because a matrix with NaN never converges, and the function must end.
 const SWEEPS: usize = 16;
 
 /// Returns the eigenvalues of a symmetric N×N matrix, smallest first, and the unit eigenvectors as rows in the same
@@ -21,6 +22,7 @@ pub(crate) fn symmetric_eigen<T: Real, const N: usize>(mut m: [[T; N]; N]) -> ([
                 off += if i == j { T::ZERO } else { *x * *x };
             }
         }
+        // The negated comparison also ends the loop for NaN; `off <= limit` would run all sweeps.
         if !(off > all * T::EPSILON * T::EPSILON * T::from_f64(0.01)) {
             break;
         }
@@ -62,9 +64,11 @@ impl<T: Real, const N: usize> Triangle<T, N> {
         for i in 0..N {
             let (a, b) = (self.0[i][i], row[i]);
             let h2 = a * a + b * b;
+            // Squares of small numbers can be 0 in single precision; the rotation would then divide by 0.
             if b == T::ZERO || !(h2 > T::ZERO) {
                 continue;
             }
+            // One division serves both factors, because a division takes many times as long as a product.
             let per = T::one() / h2.sqrt();
             let (c, s) = (a * per, b * per);
             for j in i..N {
@@ -97,6 +101,8 @@ impl<T: Real, const N: usize> Triangle<T, N> {
             for p in 0..N {
                 for q in p + 1..N {
                     let (a, b, d) = (dot(&u[p], &u[p]), dot(&u[q], &u[q]), dot(&u[p], &u[q]));
+                    // The angle of two columns is compared with rounding, not with a fixed number, because the columns
+                    // may have any length.
                     if !(d * d > a * b * T::EPSILON * T::EPSILON) {
                         continue;
                     }
@@ -137,6 +143,8 @@ impl<T: Real, const N: usize> Triangle<T, N> {
 
     /// Returns the limit that the first `n` elements of the diagonal must exceed. `None` when there were no rows, or
     /// when a row is not finite.
+    // The limit is relative to the largest element, because rows may have any unit. With N rounding errors a diagonal
+    // element below it has no correct digit.
     fn floor(&self, n: usize) -> Option<T> {
         let largest = (0..n.min(N)).fold(T::ZERO, |l, i| l.max(self.0[i][i].abs()));
         (largest > T::ZERO && largest.is_finite()).then(|| largest * T::EPSILON * T::from_f64(N as f64))
@@ -172,10 +180,13 @@ fn rotation<T: Real>(a: T, b: T, d: T) -> Option<(T, T)> {
         return None;
     }
     let one = T::one();
+    // This form gives the smaller of the two angles, because the sweeps are proven to converge for it (Golub & Van
+    // Loan, 8.5). The larger one would exchange the two values.
     let tau = (b - a) / (d + d);
     let t = one / (tau.abs() + (one + tau * tau).sqrt());
     let t = if tau < T::ZERO { -t } else { t };
     let c = one / (one + t * t).sqrt();
+    // For a tiny `d` the square of `tau` is infinite, and `t` is 0: the rotation does nothing, which is right.
     (t.is_finite() && c.is_finite()).then_some((c, t * c))
 }
 
@@ -198,6 +209,7 @@ fn identity<T: Real, const N: usize>() -> [[T; N]; N] {
 }
 
 /// Sorts the values, smallest first, and the vectors with them, by insertion.
+// An insertion sort is enough because N is at most 6.
 fn sort<T: Real, const N: usize>(values: &mut [T; N], vectors: &mut [[T; N]; N]) {
     for end in 1..N {
         for i in (1..=end).rev() {

@@ -17,6 +17,7 @@ pub(crate) type M3<T> = nalgebra::Matrix3<T>;
 /// branch.
 pub(crate) fn basis<T: Real>(e: &V3<T>) -> (V3<T>, V3<T>) {
     let one = T::one();
+    // With the sign of z the divisor has at least length 1. Without it the basis would fail near e = −z.
     let sign = if e.z < T::zero() { -one } else { one };
     let a = -one / (sign + e.z);
     let b = e.x * e.y * a;
@@ -26,6 +27,7 @@ pub(crate) fn basis<T: Real>(e: &V3<T>) -> (V3<T>, V3<T>) {
 /// Scales `v` to unit length; `None` when its length is about 0 or not finite.
 pub(crate) fn unit<T: Real>(v: &V3<T>) -> Option<V3<T>> {
     let n2 = v.dot(v);
+    // The limit lies far above the smallest normal f32 (1e-38), so that the reciprocal of the root stays finite.
     (n2 > T::from_f64(1e-30) && n2.is_finite()).then(|| v * (T::one() / n2.sqrt()))
 }
 
@@ -38,9 +40,12 @@ pub(crate) fn invert_spd3<T: Real>(m: &[T; 6]) -> Option<M3<T>> {
         return None;
     }
     let one = T::one();
+    // The unknowns have different units (radians, cosines, lengths). With a diagonal of ones, one limit for the pivots
+    // serves all of them.
     let (sa, sd, sf) = (one / a.sqrt(), one / d.sqrt(), one / f.sqrt());
     let (b, c, e) = (b * sa * sd, c * sa * sf, e * sd * sf);
     // L of the scaled matrix [[1, b, c], [b, 1, e], [c, e, 1]].
+    // A pivot below some rounding errors is only rounding: its reciprocal would be a covariance without meaning.
     let floor = T::EPSILON * T::from_f64(16.0);
     let l22 = one - b * b;
     if !(l22 > floor) {
@@ -69,6 +74,7 @@ pub(crate) fn invert_spd3<T: Real>(m: &[T; 6]) -> Option<M3<T>> {
 
 /// Inverts a symmetric positive definite 2×2 matrix (xx, xy, yy); `None` when it is not safely positive definite.
 pub(crate) fn invert_spd2<T: Real>([a, b, d]: [T; 3]) -> Option<[T; 3]> {
+    // The determinant is compared with the product of the diagonal, so that the limit does not depend on units.
     let det = a * d - b * b;
     if !(a > T::zero() && d > T::zero() && det > T::EPSILON * T::from_f64(16.0) * a * d) {
         return None;

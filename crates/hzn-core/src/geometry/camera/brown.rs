@@ -35,20 +35,25 @@ impl<T: Real> Brown<T> {
             let q = t * t;
             1.0 + q * (3.0 * lens.k1 + q * (5.0 * lens.k2 + q * 7.0 * lens.k3))
         };
+        // 1.5 rad is the end because tan θ grows without limit towards 90°, and its rounding with it.
         let end = config.theta_max_deg.map_or(1.5, |deg| deg.to_radians().min(1.5));
         let mut theta = 0.0;
         // The tangential terms move the corner a little; a margin of 1 % allows for this.
         while theta < end && radius(libm::tan(theta)) < rho_corner * 1.01 {
+            // The slope must be positive 2° beyond the last ray, because near its root a small error of the image point
+            // becomes a large one of the angle.
             if slope(libm::tan(theta + 2f64.to_radians())) <= 0.0 {
                 let limit = theta.to_degrees() + 2.0;
                 let (field, value) =
                     config.theta_max_deg.map_or(("camera.k", k(0)), |deg| ("camera.theta_max_deg", deg));
                 return Err(ConfigError { field, value, limit: Limit::Monotone(limit), body: None });
             }
+            // Fixed steps are enough at load time, because the margin of 2° is 35 of them.
             theta += 1e-3;
         }
         let theta = theta.min(end);
         let rho = radius(libm::tan(theta)).min(rho_corner * 1.01);
+        // The checks are in f64 whatever the precision, so that a calibration is accepted or refused alike in both.
         let t = Brown {
             k1: T::from_f64(lens.k1),
             k2: T::from_f64(lens.k2),
@@ -97,6 +102,7 @@ impl<T: Real> Brown<T> {
         [
             [x * q, y * q],
             [x * q * q, y * q * q],
+            // The order is that of OpenCV: k3 stands behind p1 and p2.
             [two * x * y, q + two * y * y],
             [q + two * x * x, two * x * y],
             [x * q * q * q, y * q * q * q],
@@ -111,15 +117,20 @@ impl<T: Real> Brown<T> {
         let (mut x, mut y) = (xd, yd);
         let mut inverse = [T::one(), T::zero(), T::zero(), T::one()];
         let mut arrived = false;
+        // Newton's method doubles the digits at each step; twelve are far more than f64 needs. The limit is for points
+        // at which the lens has no inverse.
         for _ in 0..12 {
             let (px, py) = self.distort(x, y);
             let [a, b, c, d] = self.slope(x, y);
             let det = a * d - b * c;
+            // A determinant near 0 is the fold of the lens: beyond it two rays would share an image point.
             if !(det > T::from_f64(1e-3)) {
                 return None;
             }
             let s = T::one() / det;
             inverse = [d * s, -b * s, -c * s, a * s];
+            // The derivative is taken once more at the solution, because the ray's derivative must belong to the last x
+            // and y.
             if arrived {
                 break;
             }
@@ -129,6 +140,7 @@ impl<T: Real> Brown<T> {
             y += sy;
             arrived = sx.abs() + sy.abs() <= T::EPSILON * T::from_f64(8.0) * (T::one() + x.abs() + y.abs());
         }
+        // A point without convergence has no ray. A guess would be an edge point in a wrong direction.
         if !arrived {
             return None;
         }

@@ -59,6 +59,7 @@ impl Model {
     }
 
     /// Returns the index of a parameter in [`Self::intrinsics`]; `None` if the model does not have the parameter.
+    // A list of at most nine names is searched, because a calibration is loaded once.
     pub(super) fn index_of(self, which: Intrinsic) -> Option<usize> {
         self.intrinsics().iter().position(|intrinsic| *intrinsic == which)
     }
@@ -159,6 +160,7 @@ impl Config {
             model,
             fx_px: focal_px,
             fy_px: focal_px,
+            // Pixel centres are at integers, so the middle is (w − 1)/2; w/2 would shift every ray by half a pixel.
             cx_px: (f64::from(width) - 1.0) / 2.0,
             cy_px: (f64::from(height) - 1.0) / 2.0,
             k: heapless::Vec::new(),
@@ -196,6 +198,7 @@ impl Config {
             Some(2) => self.cx_px = value,
             Some(3) => self.cy_px = value,
             Some(index) => {
+                // Coefficients before this one count as 0 when they are left out, so they are filled in.
                 while self.k.len() < index - 3 && self.k.push(0.0).is_ok() {}
                 if let Some(k) = self.k.get_mut(index - 4) {
                     *k = value;
@@ -215,6 +218,7 @@ impl Config {
         for (i, &k) in self.k.iter().enumerate() {
             require(k.is_finite(), "camera.k", k, Limit::Finite)?;
             require(
+                // Further zeros pass because they change nothing: other programs fill their lists up with them.
                 i < most || k == 0.0,
                 "camera.k",
                 k,
@@ -229,6 +233,7 @@ impl Config {
         }
         let (first, second) = (self.coefficient(0), self.coefficient(1));
         let right = match self.model {
+            // The papers define the two lenses for these ranges only, so other values are typing errors.
             Model::DoubleSphere => first > -1.0 && first < 1.0 && (0.0..=1.0).contains(&second),
             Model::Eucm => (0.0..=1.0).contains(&first) && second > 0.0,
             _ => true,

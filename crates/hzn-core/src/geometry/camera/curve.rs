@@ -33,6 +33,7 @@ impl Curve<f64> {
             Model::DoubleSphere => Family::DoubleSphere,
             Model::Eucm => Family::Eucm,
             // Lenses of the plane have code of their own.
+            // An equidistant lens has no code of its own, because it is this polynomial with all coefficients 0.
             Model::KannalaBrandt | Model::Equidistant | Model::Pinhole | Model::BrownConrady => Family::KannalaBrandt,
         };
         Self { family, k: core::array::from_fn(|i| config.coefficient(i)) }
@@ -50,6 +51,8 @@ impl<T: Real> Curve<T> {
     pub(super) fn radius_and_slope(&self, theta: T) -> (T, T) {
         let [a, b, ..] = self.k;
         match self.family {
+            // The guard is a constant, so that a build without the feature has no code of these lenses, although the
+            // type is the same.
             Family::DoubleSphere if cfg!(feature = "kalibr") => double_sphere::radius_and_slope(&[a, b], theta),
             Family::Eucm if cfg!(feature = "kalibr") => eucm::radius_and_slope(&[a, b], theta),
             // `Config::check` refuses a family that is not built in.
@@ -70,6 +73,7 @@ impl<T: Real> Curve<T> {
             }
             _ => {
                 let q = theta * theta;
+                // Each power follows from the one before by one product, instead of a call of `pow`.
                 let mut power = theta * q * per;
                 for by in &mut by {
                     *by = power;
@@ -85,6 +89,7 @@ fn kannala_brandt<T: Real>(k: &[T; 4], theta: T) -> (T, T) {
     let t2 = theta * theta;
     let [k1, k2, k3, k4] = *k;
     let one = T::one();
+    // Horner's form has the fewest products and the smallest rounding.
     let r = theta * (one + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))));
     let d = one
         + t2 * (T::from_f64(3.0) * k1

@@ -16,6 +16,7 @@ pub(super) fn radius_and_slope<T: Real>(k: &[T; 2], theta: T) -> (T, T) {
     let z = xi + cos;
     let d = (sin * sin + z * z).sqrt();
     let below = alpha * d + (one - alpha) * z;
+    // The slope is an equation, because a difference of two radii would lose half of the digits.
     // d₂' = −ξ sin θ/d₂.
     let below_slope = -alpha * xi * sin / d - (one - alpha) * sin;
     (sin / below, (cos * below - sin * below_slope) / (below * below))

@@ -40,6 +40,7 @@ pub struct Projected {
     pub by_direction: [[f64; 3]; 2],
     /// Derivatives of u and v by the intrinsic parameters in the order of
     /// [`Model::intrinsics`](super::Model::intrinsics); px per unit of the parameter, and 0 behind the last one.
+    // The array has the length of the largest model, because the core has no heap.
     pub by_intrinsics: [[f64; INTRINSICS]; 2],
 }
 
@@ -95,11 +96,13 @@ impl Equation {
 fn radial(curve: &Curve<f64>, [x, y, z]: [f64; 3]) -> Option<Distorted> {
     let h = libm::sqrt(x * x + y * y);
     let n2 = h * h + z * z;
+    // Straight behind the camera every azimuth has the same direction, so the image point would be a circle.
     if !(n2 > 0.0) || (h == 0.0 && z < 0.0) {
         return None;
     }
     let theta = libm::atan2(h, z);
     let (r, slope) = curve.radius_and_slope(theta);
+    // A negative radius is behind the pole of r(θ): the point would appear on the wrong side of the axis.
     if !(r >= 0.0) {
         return None;
     }
@@ -117,6 +120,7 @@ fn radial(curve: &Curve<f64>, [x, y, z]: [f64; 3]) -> Option<Distorted> {
 
 fn planar(lens: &Brown<f64>, [x, y, z]: [f64; 3]) -> Option<Distorted> {
     let n = libm::sqrt(x * x + y * y + z * z);
+    // Nearer to the plane z = 0, x/z grows without limit, and so would the steps of a fit.
     if !(z > 1e-6 * n) {
         return None;
     }

@@ -33,6 +33,7 @@ pub struct Covariance {
     /// The parameters of the rows and columns: `fx_px`, `fy_px`, `cx_px`, `cy_px`, and the coefficients by their names,
     /// `k1` to `k4` of `kannala-brandt`, `k1, k2, p1, p2, k3` of `brown-conrady`. Parameters that are left out count as
     /// exact.
+    // The names are part of the key, because programs list the parameters in different orders.
     pub order: heapless::Vec<Intrinsic, INTRINSICS>,
     /// The matrix row by row, symmetric and positive semidefinite; in px² and the units of the coefficients.
     pub rows: heapless::Vec<heapless::Vec<f64, INTRINSICS>, INTRINSICS>,

@@ -7,6 +7,7 @@ use crate::base::real::Real;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Lens<T> {
     Radial(radial::Radial<T>),
+    // A pinhole is not a Brown lens with zeros, because its inverse is one square root and Brown's is an iteration.
     Pinhole,
     Brown(brown::Brown<T>),
 }
@@ -21,6 +22,7 @@ impl<T: Real> Lens<T> {
             Self::Radial(lens) => {
                 let h = (s.x * s.x + s.y * s.y).sqrt();
                 let theta = h.atan2(s.z);
+                // On the axis the direction of (x, y) does not matter, and h would be a divisor of 0.
                 let per = if h > zero { one / h } else { zero };
                 let radius = if h > zero { lens.radius(theta) * per } else { one };
                 let by_k = lens.by_coefficients(theta, per).map(|by| [s.x * by, s.y * by]);

@@ -14,6 +14,8 @@ use crate::base::real::Real;
 use crate::geometry::block::LANES;
 
 /// Maximum number of terms of each series; the number in use depends on the precision of `T`.
+// The rays are polynomials because of their cost: in a prototype on x86-64, 1913 rays took 2.9 µs by polynomials, 10.0
+// µs by a table with one Newton step, and 13.9 µs by Newton's method.
 const TERMS: usize = 24;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +44,7 @@ pub(super) type Lanes<T> = ([[T; LANES]; 3], [[T; LANES]; 4]);
 /// Returns the first root of r'(θ) below 180°, or the first pole of r(θ), in radians. It is bracketed on a fine grid
 /// and found by bisection. `None` if there is neither.
 pub(super) fn monotonic_limit(curve: &Curve<f64>) -> Option<f64> {
+    // A tenth of a degree brackets the first root; Newton's method could step over it to a later one.
     const STEPS: i32 = 1800;
     let at = |i: i32| core::f64::consts::PI * f64::from(i) / f64::from(STEPS);
     let grows = |theta: f64| {
@@ -49,6 +52,7 @@ pub(super) fn monotonic_limit(curve: &Curve<f64>) -> Option<f64> {
         slope > 0.0 && r >= 0.0
     };
     let (mut low, mut high) = (1..=STEPS).find(|&i| !grows(at(i))).map(|i| (at(i - 1), at(i)))?;
+    // Sixty halvings of the bracket reach the last bit of f64.
     for _ in 0..60 {
         let mid = 0.5 * (low + high);
         if grows(mid) { low = mid } else { high = mid }
@@ -59,10 +63,12 @@ pub(super) fn monotonic_limit(curve: &Curve<f64>) -> Option<f64> {
 /// Returns θ with r(θ) = ρ, by Newton's method from ρ θ_max/r(θ_max), clamped to 0…θ_max.
 #[inline(never)]
 fn invert<T: Real>(curve: &Curve<T>, rho: T, theta_max: T, r_max: T) -> T {
+    // From this start f64 needs at most five steps on lenses up to 110° off axis; from θ = ρ up to seven.
     let mut theta = rho * theta_max / r_max;
     for _ in 0..8 {
         let (r, d) = curve.radius_and_slope(theta);
         let step = (r - rho) / d;
+        // The clamp keeps a step from a flat part of the curve within the range that was checked.
         theta = (theta - step).max(T::zero()).min(theta_max);
         if step.abs() <= T::EPSILON * theta {
             break;
@@ -76,7 +82,10 @@ impl<T: Real> Radial<T> {
     pub(super) fn try_new(config: &Config, rho_corner: f64) -> Result<(Self, f64, f64), ConfigError> {
         let curve = Curve::new(config);
         let limit = monotonic_limit(&curve).unwrap_or(core::f64::consts::PI);
+        // Nearer to the root of r'(θ), 1/r' grows so fast that series fail by degrees.
         let margin = 2f64.to_radians();
+        // The lens need not be monotone beyond the picture: calibrations are often wild there, and would otherwise be
+        // refused.
         let usable = limit - margin;
         // `corner` is the angle of the corner, if the lens reaches it before the end of monotony.
         let corner = (curve.radius_and_slope(usable).0 >= rho_corner)
@@ -108,6 +117,7 @@ impl<T: Real> Radial<T> {
     fn series(curve: &Curve<f64>, theta_max: f64, r_max: f64) -> Inverse<T> {
         let values = |rho: f64| -> [f64; 3] {
             if rho == 0.0 {
+                // At the centre sin θ/ρ is 0/0; its limit is 1/r'(0), which is not 1 for the lenses of Kalibr.
                 let slope = 1.0 / curve.radius_and_slope(0.0).1;
                 return [slope, 1.0, slope];
             }
@@ -115,10 +125,14 @@ impl<T: Real> Radial<T> {
             let (sin, cos) = libm::sincos(theta);
             [sin / rho, cos, 1.0 / curve.radius_and_slope(theta).1]
         };
+        // The series is in ρ², because all three functions are even in ρ: half of the terms would be 0 otherwise, and a
+        // ray would need a root.
         let rho_of = |t: f64| libm::sqrt(0.5 * (t + 1.0)) * r_max;
         let mut terms = [[0.0f64; 3]; TERMS];
         let n = TERMS as f64;
         for node in 0..TERMS {
+            // Chebyshev nodes are dense at both ends. Equally spaced nodes would let a polynomial of this degree swing
+            // there.
             let angle = core::f64::consts::PI * (node as f64 + 0.5) / n;
             let v = values(rho_of(libm::cos(angle)));
             for (order, term) in terms.iter_mut().enumerate() {
@@ -139,7 +153,11 @@ impl<T: Real> Radial<T> {
                 direction <= tolerance && (got[2] - want[2]).abs() <= (1e-6 * want[2]).max(tolerance)
             })
         };
+        // The shortest series that is good enough is kept, because each term costs three products a ray. Single
+        // precision needs fewer.
         for used in 4..=TERMS {
+            // Powers of t are kept in place of Chebyshev's polynomials, because Horner's form needs one sum a term less
+            // than Clenshaw's.
             let powers = powers(terms.get(..used).unwrap_or_default());
             if good(powers.get(..used).unwrap_or_default()) {
                 return Inverse::Series {
@@ -174,6 +192,8 @@ impl<T: Real> Radial<T> {
         }
         let (mut s, mut m) = ([zero; 3], [zero; 4]);
         for l in 0..LANES {
+            // The floor keeps the quotient finite at the centre, so that the loop needs no branch; the products with x
+            // and y make it vanish there.
             let k = (dtheta[l] - sin[l]) / rho2[l].max(T::from_f64(1e-24));
             let xy = k * x[l] * y[l];
             s[0][l] = x[l] * sin[l];

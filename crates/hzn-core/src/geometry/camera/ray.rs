@@ -26,6 +26,8 @@ pub struct Ray<T> {
     pub(crate) s: V3<T>,
     /// `[∂a/∂u, ∂a/∂v, ∂b/∂u, ∂b/∂v]`, where a and b are the coordinates of the ray's change in the tangent basis that
     /// [`tangent`] spans at `s`; radians per pixel.
+    // Four numbers in a tangent basis replace the six of the derivative, because the ray keeps its length. An edge
+    // point is smaller by two numbers.
     pub(crate) m: [T; 4],
 }
 
@@ -34,6 +36,7 @@ pub struct Ray<T> {
 #[inline(always)]
 pub(crate) fn tangent<T: Real>(s: &V3<T>) -> [V3<T>; 2] {
     let one = T::one();
+    // `linalg::basis` would not do here: it changes its sign at z = 0, which a lens wider than 180° sees.
     let q = one / (one + s.z);
     let xy = -s.x * s.y * q;
     [V3::new(one - s.x * s.x * q, xy, -s.x), V3::new(xy, one - s.y * s.y * q, -s.y)]
@@ -62,6 +65,7 @@ impl<T: Real> Ray<T> {
 pub(super) fn radial_ray<T: Real>(x: T, y: T, scale: T, cos: T, dtheta: T) -> (V3<T>, [T; 4]) {
     let s = V3::new(x * scale, y * scale, cos);
     let rho2 = x * x + y * y;
+    // At the centre the derivative is a multiple of the identity. Below this limit rho2 would be a divisor near 0.
     let k = if rho2 > T::from_f64(1e-24) { (dtheta - scale) / rho2 } else { T::zero() };
     let xy = k * x * y;
     (s, [scale + k * x * x, xy, xy, scale + k * y * y])

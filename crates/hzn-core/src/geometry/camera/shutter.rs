@@ -13,6 +13,7 @@ use crate::geometry::pixel::ImagePoint;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Turning<T> {
     /// Rotation from one row to the next, radians, in the camera's axes.
+    // The rotation is kept for one row, because rate and readout time always appear as this product.
     per_row: V3<T>,
     /// The row that is exposed at the picture's time.
     middle: T,
@@ -53,7 +54,10 @@ impl<T: Real> Turning<T> {
         in_row_frame: impl Fn(&V3<T>) -> Option<ImagePoint<T>>,
     ) -> Option<ImagePoint<T>> {
         let mut p = in_row_frame(s)?;
+        // The count is fixed, so that the time does not depend on the rate and a hopeless rate ends.
         for _ in 0..ROW_ITERATIONS {
+            // The row of the image point decides the rotation, and the rotation decides the row; therefore it is an
+            // iteration.
             p = in_row_frame(&rotate(s, &(self.per_row * (self.middle - p.v))))?;
         }
         Some(p)
@@ -63,6 +67,7 @@ impl<T: Real> Turning<T> {
 /// Turns `s` by the rotation vector `angle`, with tan(φ/2) to third order: the error is below 1e-6 rad up to 15°.
 fn rotate<T: Real>(s: &V3<T>, angle: &V3<T>) -> V3<T> {
     let square = angle.dot(angle);
+    // Sine and cosine would be exact, but this runs for every edge point, and a turn within a readout is small.
     let half = angle * (T::from_f64(0.5) + square * T::from_f64(1.0 / 24.0));
     let first = half.cross(s);
     s + (first + half.cross(&first)) * (T::from_f64(2.0) / (T::one() + half.dot(&half)))

@@ -11,6 +11,7 @@ use crate::base::real::Real;
 
 /// 1-sigma changes of all parameters at once. The modes are independent of each other; their outer products add up to
 /// the covariance.
+// Independent modes replace the matrix, so that each one moves the fit once and the covariance adds up squares.
 pub(super) type Modes<T> = heapless::Vec<[T; INTRINSICS], INTRINSICS>;
 
 /// Returns the modes of a calibration, from its covariance or, without one, from its scalar sigmas. There are none when
@@ -25,6 +26,8 @@ pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
             let rule = "this lens model does not have the parameter";
             require(place.is_some(), field, n as f64, Limit::Rule(rule))?;
             require(
+                // A parameter that is listed twice would have two variances, and the second would silently replace the
+                // first.
                 !places.clone().take(n).any(|p| p == place),
                 field,
                 n as f64,
@@ -64,6 +67,8 @@ pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
 }
 
 /// A pivot of the decomposition counts as 0 when it is at most this fraction of its diagonal element.
+// A semidefinite matrix has pivots of 0, for example for two focal lengths that are fully correlated. Rounding of the
+// file makes them slightly negative.
 const ROUNDING: f64 = 1e-9;
 
 /// Returns the columns of the lower triangle L with L Lᵀ = `rows`. A matrix that is not symmetric or not positive
@@ -78,6 +83,8 @@ fn triangle(rows: &[heapless::Vec<f64, INTRINSICS>]) -> Result<[[f64; INTRINSICS
         for i in 0..n {
             require(at(i, j).is_finite(), field, at(i, j), Limit::Finite)?;
             let scale = libm::sqrt((at(i, i) * at(j, j)).abs());
+            // The margin is for printed digits. A larger difference would be a typing error, or a triangle without its
+            // other half.
             if (at(i, j) - at(j, i)).abs() > 1e-6 * scale {
                 refused(at(i, j), "must be symmetric")?;
             }
@@ -96,6 +103,7 @@ fn triangle(rows: &[heapless::Vec<f64, INTRINSICS>]) -> Result<[[f64; INTRINSICS
         let root = if is_zero { 0.0 } else { libm::sqrt(pivot) };
         for i in j..n {
             let value = left(&columns, i);
+            // With a variance of 0 the covariances must be 0, too; otherwise the matrix has a negative eigenvalue.
             if is_zero && value.abs() > libm::sqrt(ROUNDING * at(i, i).abs() * at(j, j)) {
                 refused(value, rule)?;
             }

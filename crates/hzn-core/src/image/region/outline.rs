@@ -3,11 +3,14 @@
 use crate::base::real::Real;
 
 /// Maximum number of corners of one polygon.
+// The capacity is fixed because there is no heap. Every corner also costs work at each test of an edge point next to
+// it.
 pub const MAX_CORNERS: usize = 16;
 
 /// The corners of a polygon and its bounding box, in pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Outline<T> {
+    // The bounding box is stored, because it decides most tests: an edge point next to no mask costs four comparisons.
     pub(super) low: [T; 2],
     pub(super) high: [T; 2],
     pub(super) corners: heapless::Vec<[T; 2], MAX_CORNERS>,
@@ -53,6 +56,7 @@ impl<T: Real> Outline<T> {
             }
             a = b;
         }
+        // A square without a side in it may still lie in the middle of the polygon.
         !self.covers(p)
     }
     /// Returns whether the polygon covers a point, by the even-odd rule.
@@ -63,6 +67,8 @@ impl<T: Real> Outline<T> {
         let Some(&last) = self.corners.last() else { return false };
         let (mut inside, mut a) = (false, last);
         for &b in &self.corners {
+            // The half-open comparison counts a corner for one of its two sides only; it also makes the divisor
+            // nonzero.
             if (a[1] > y) != (b[1] > y) && x < (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]) + a[0] {
                 inside = !inside;
             }

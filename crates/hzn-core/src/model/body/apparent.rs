@@ -2,7 +2,7 @@
 
 use crate::base::real::Real;
 use crate::geometry::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
-use crate::geometry::frames::{Ecef, UnitVec3};
+use crate::geometry::frames::{Fixed, UnitVec3};
 
 use super::{
     AU_KM, AltitudeReference, Config, Kind, LOWEST_ALTITUDE_M, MOON_DISTANCE_KM, MOON_RADIUS_KM, Prior, PriorError,
@@ -32,6 +32,7 @@ pub(super) struct ApparentBody<T> {
 impl<T: Real> ApparentBody<T> {
     pub(super) fn new(body: &Config, prior: &Prior<T>) -> Result<Self, PriorError> {
         match (body.kind, prior.position_m) {
+            // Only the Earth has its ellipsoid here, because the shape of other bodies is fitted in scaled space.
             (Kind::Earth, Some(p)) => Self::ellipsoid(body, p),
             _ => Self::sphere(body, prior),
         }
@@ -41,6 +42,8 @@ impl<T: Real> ApparentBody<T> {
     fn ellipsoid(body: &Config, p: [T; 3]) -> Result<Self, PriorError> {
         let km = T::from_f64(1000.0);
         let (mut limb, mut harmonics) = (T::from_f64(body.limb_height_km) * km, [T::zero(); 2]);
+        // The limb height is added to the semi-axes instead of the true parallel surface, because the two differ by at
+        // most 0.14 m for 100 km of height on the Earth.
         let raised = |limb: T| {
             let (a, b) = (T::from_f64(WGS84_A_M) + limb, T::from_f64(WGS84_B_M) + limb);
             LimbCone::try_new(p, a, b).ok_or(PriorError::Position)
@@ -58,12 +61,14 @@ impl<T: Real> ApparentBody<T> {
             (limb, harmonics) = (mean * km, [first * km, second * km]);
             cone = raised(limb);
         }
+        // The cone is checked after this test, because "below the limb height" says more than "no cone".
         if !(h > limb) {
             return Err(below_limb_error(h, limb));
         }
         let cone = cone?;
         let (sin, _) = cone.mean_half_angle_rad().sin_cos();
         Ok(Self {
+            // This is sin α = (R + d)/(R + H) solved for R, so that the equations of the sphere hold for the ellipsoid.
             radius: (sin * h - limb) / (T::one() - sin),
             altitude: h,
             sin,
@@ -89,6 +94,7 @@ impl<T: Real> ApparentBody<T> {
                 }
                 h
             }
+            // The distances of Sun and Moon are constants, because the half-angle of both is free.
             (_, _, Kind::Sun) => T::from_f64((AU_KM - SUN_RADIUS_KM) * 1e3),
             (_, _, Kind::Moon) => T::from_f64((MOON_DISTANCE_KM - MOON_RADIUS_KM) * 1e3),
             (_, Some(h), _) => h,
@@ -114,8 +120,8 @@ impl<T: Real> ApparentBody<T> {
         Ok(Self { radius: r, altitude, sin, limb, harmonics, ellipsoid: None, unknown_m, unknown_second_m })
     }
 
-    /// Returns the limb axis in ECEF that follows from the position; `None` without a position.
-    pub(super) fn axis_ecef(&self, body: &Config, prior: &Prior<T>) -> Option<UnitVec3<Ecef, T>> {
+    /// Returns the limb axis in the fixed frame that follows from the position; `None` without a position.
+    pub(super) fn axis_fixed(&self, body: &Config, prior: &Prior<T>) -> Option<UnitVec3<Fixed, T>> {
         match (&self.ellipsoid, prior.position_m, body.kind) {
             (Some(cone), ..) => Some(cone.axis),
             (None, Some(p), kind) if !matches!(kind, Kind::Earth | Kind::Sun | Kind::Moon) => {

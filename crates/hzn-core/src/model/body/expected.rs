@@ -3,7 +3,7 @@
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::ellipsoid::LimbCone;
-use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
+use crate::geometry::frames::{Cam, Fixed, Rotation, UnitVec3};
 
 use super::apparent::{ApparentBody, below_limb_error};
 use super::position::Target;
@@ -49,10 +49,10 @@ pub struct Expected<T> {
     pub(crate) limb_sigma_parts_m: [T; 4],
     /// Height that clipping adds to a limb that is clipped everywhere, and its 1-sigma; metres.
     pub(crate) clipped_m: [T; 2],
-    /// The limb cone of the ellipsoid (ECEF), when the position is known.
+    /// The limb cone of the ellipsoid in the fixed frame, when the position is known.
     pub(crate) ellipsoid: Option<LimbCone<T>>,
-    /// Prior attitude, camera to ECEF.
-    pub(crate) cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
+    /// Prior attitude, from the camera to the fixed frame.
+    pub(crate) fixed_from_camera: Option<Rotation<Cam, Fixed, T>>,
     /// Difference of the limb from the mean cone as a function of azimuth about the axis: first and second harmonic of
     /// cos α, counted from north.
     pub(crate) harmonics_cos: [T; 2],
@@ -91,6 +91,7 @@ pub struct Expected<T> {
 
 /// Refuses impossible numbers of a prior, and returns the 1-sigma of its attitude in radians.
 fn check<T: Real>(prior: &Prior<T>) -> Result<T, PriorError> {
+    // The negated comparisons refuse NaN, which is neither above nor below a limit.
     if prior.altitude_m.is_some_and(|h| !(h > T::from_f64(LOWEST_ALTITUDE_M) && h.is_finite())) {
         return Err(PriorError::Altitude);
     }
@@ -108,8 +109,10 @@ fn check<T: Real>(prior: &Prior<T>) -> Result<T, PriorError> {
 }
 
 /// Returns the prior attitude, if it is better than an unknown one.
-fn useful_attitude<T: Real>(prior: &Prior<T>, sigma_rad: T) -> Option<Rotation<Cam, Ecef, T>> {
-    prior.cam_to_ecef.filter(|_| sigma_rad < T::from_f64(USELESS_ATTITUDE_RAD))
+fn useful_attitude<T: Real>(prior: &Prior<T>, sigma_rad: T) -> Option<Rotation<Cam, Fixed, T>> {
+    // An attitude with a larger error is worse than none: it would put the shape of the limb at a wrong azimuth, and
+    // the covariance would call it known.
+    prior.fixed_from_camera.filter(|_| sigma_rad < T::from_f64(USELESS_ATTITUDE_RAD))
 }
 
 impl<T> Expected<T> {
@@ -157,6 +160,11 @@ impl<T: Real> Expected<T> {
     }
 
     /// Computes the expected cone of the limb, from the altitude or the position of the camera.
+    // ∂cos/∂d = −sin·∂α/∂d = −tan/(R + H), ∂cos/∂H = sin tan/(R + H). A higher limb makes the cone wider. The shape of
+    // the ellipsoid adds half the difference between the cosines of its two half-angles. A camera at the limb height is
+    // refused, because cos α is 0 there and tan α, by which every term is scaled, would be infinite. The sigma of the
+    // altitude is left out for a free half-angle, because this angle says nothing about the distance. The parts of the
+    // sigma are kept apart, because clipping adds its own later and `hzn explain` prints each of them.
     fn of_limb(body: &Config, prior: &Prior<T>, attitude_sigma: T) -> Result<Self, PriorError> {
         let km = T::from_f64(1000.0);
         let limb_sigma = T::from_f64(body.limb_height_sigma_km) * km;
@@ -169,12 +177,9 @@ impl<T: Real> Expected<T> {
         let cos = cos2.sqrt();
         let free = body.half_angle_is_free();
         let altitude_sigma = if free { T::zero() } else { T::from_f64(body.altitude_sigma_km) * km };
-        // ∂cos/∂d = −sin·∂α/∂d = −tan/(R + H), ∂cos/∂H = sin tan/(R + H).
         let tan = sin / cos;
         let scale = tan / (seen.radius + seen.altitude);
         let known = useful_attitude(prior, attitude_sigma);
-        // A higher limb makes the cone wider. The shape of the ellipsoid adds half the difference between the cosines
-        // of its two half-angles.
         let harmonics_cos = seen.harmonics.map(|h| -scale * h);
         let own = seen.ellipsoid.as_ref().map_or(T::zero(), |cone: &LimbCone<T>| {
             let (east, meridian) = cone.half_angles_rad();
@@ -189,7 +194,7 @@ impl<T: Real> Expected<T> {
             [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1]) + scale * seen.unknown_second_m];
         let limb_sigma_parts_m = [limb_sigma, sin * altitude_sigma, seen.unknown_m, T::zero()];
         let variance = limb_sigma_parts_m.iter().fold(T::zero(), |sum, s| sum + *s * *s);
-        let axis_ecef = seen.axis_ecef(body, prior);
+        let predicted = prior.fixed_from_camera.zip(seen.axis_fixed(body, prior));
         Ok(Self {
             cos,
             sin,
@@ -197,13 +202,13 @@ impl<T: Real> Expected<T> {
             limb_sigma_parts_m,
             clipped_m: [body.clipped_height_km, body.clipped_sigma_km].map(|h| T::from_f64(h) * km),
             ellipsoid: seen.ellipsoid,
-            cam_to_ecef: known,
+            fixed_from_camera: known,
             harmonics_cos,
             unknown_harmonics_cos,
             level: prior.level,
             sun: prior.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
             sun_seen: prior.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),
-            predicted: prior.cam_to_ecef.zip(axis_ecef).map(|(r, a)| (*r.inverse().apply(&a).v(), attitude_sigma)),
+            predicted: predicted.map(|(r, a)| (*r.inverse().apply(&a).v(), attitude_sigma)),
             last: prior.last,
             rate_rad_s: prior.rate_rad_s,
             radius_m: seen.radius,
@@ -236,9 +241,10 @@ impl<T: Real> Expected<T> {
         }
         let [height, sigma] = self.clipped_m.map(|h| h * part);
         let distance = (self.radius_m + self.limb_m) / self.sin;
+        // The limit keeps cos α above 0 for a camera just above the limb, where a higher limb would enclose it.
         let sin = (self.sin + height / distance).min(T::one() - T::from_f64(1e-6));
         let cos = (T::one() - sin * sin).sqrt();
-        // ∂cos/∂d = −tan/(R + H), as in `new`.
+        // ∂cos/∂d = −tan/(R + H), as in `of_limb`.
         let scale = sin / (cos * distance);
         let [limb, altitude, radius, _] = self.limb_sigma_parts_m;
         let limb_sigma_parts_m = [limb, altitude, radius, sigma];
@@ -297,11 +303,11 @@ impl<T: Real> Expected<T> {
         Some((height, -distance * cos / sin))
     }
 
-    /// Returns the limb axis in ECEF, when the position is known.
-    pub(crate) fn axis_ecef(&self) -> Option<UnitVec3<Ecef, T>> {
+    /// Returns the limb axis in the fixed frame, when the position is known.
+    pub(crate) fn axis_fixed(&self) -> Option<UnitVec3<Fixed, T>> {
         if let Some(target) = self.target() {
             let (axis, _) = target.limb_cone(target.predicted_m.as_ref()?)?;
-            return Some(UnitVec3::assume_unit(target.body_to_cam.transpose() * axis));
+            return Some(UnitVec3::assume_unit(target.camera_from_fixed.transpose() * axis));
         }
         self.ellipsoid.as_ref().map(|c| c.axis)
     }
@@ -357,14 +363,15 @@ mod tests {
         let body = Config::default();
         let frame = Prior {
             position_m: Some([4.9e6, 0.0, 4.9e6]),
-            cam_to_ecef: Rotation::assume_from_quaternion([1.0, 0.0, 0.0, 0.0]),
+            fixed_from_camera: Rotation::assume_from_quaternion([1.0, 0.0, 0.0, 0.0]),
             ..Prior::default()
         };
         let sigma = |deg: f64| {
             let frame = Prior { attitude_sigma_rad: Some(deg.to_radians()), ..frame };
             Expected::<f64>::new(&body, &frame).unwrap().unknown_harmonics_cos[1]
         };
-        let [_, none] = Expected::new(&body, &Prior { cam_to_ecef: None, ..frame }).unwrap().unknown_harmonics_cos;
+        let [_, none] =
+            Expected::new(&body, &Prior { fixed_from_camera: None, ..frame }).unwrap().unknown_harmonics_cos;
         assert!(none > 1e-5);
         assert_eq!(sigma(0.0), 0.0);
         assert!((sigma(10.0) / none - 2.0 * 10f64.to_radians()).abs() < 1e-12);

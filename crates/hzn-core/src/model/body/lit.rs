@@ -17,6 +17,7 @@ impl<T: Real> Expected<T> {
     /// moves; there a point does not count ([`Self::lowest_sun`]).
     pub(crate) fn is_lit(&self, s: &V3<T>, e: &V3<T>, c: T, focal_px: T) -> bool {
         let lowest = |sun: &V3<T>| self.lowest_sun(sun, e, c, focal_px);
+        // The comparison is with sin α times the elevation, so that no point needs a division.
         self.sun.as_ref().is_none_or(|sun| s.dot(sun) * c - e.dot(sun) > lowest(sun))
     }
 
@@ -28,16 +29,21 @@ impl<T: Real> Expected<T> {
     /// terminator is nearer to the limb than a part of a pixel, ρ φ²/2, the whole limb is lit.
     #[inline(always)]
     fn lowest_sun(&self, sun: &V3<T>, e: &V3<T>, c: T, focal_px: T) -> T {
+        // Only a position needs this: its range follows from the size of the disc, which the moved edge at the cusps
+        // would change.
         if self.target().is_some() {
             let sin = (T::one() - c * c).max(T::ZERO).sqrt();
             let along = e.dot(sun);
             let sin_phase2 = (T::one() - along * along).max(T::ZERO);
             let radius_px = focal_px * sin;
+            // The sign is tested because a new Moon, with the Sun behind it, has the same small sine.
             let is_full = along < T::ZERO && radius_px * sin_phase2 < T::from_f64(2.0 * TERMINATOR_PX);
+            // The floor is there so that the quotient stays finite for a disc of no size.
             let last_pixel = (T::from_f64(2.0) / radius_px.max(T::one())).sqrt();
             let lowest = sin * last_pixel.min(sin_phase2.sqrt() * T::from_f64(CUSP));
             return if is_full { -T::one() } else { lowest };
         }
+        // A build without positions does not read the arguments and would warn about them.
         let _ = (sun, e, c, focal_px);
         T::ZERO
     }

@@ -40,6 +40,7 @@ impl Kind {
 }
 
 /// Semi-axes, limb height, its sigma, scale height; kilometres.
+// One line a body can be compared with the tables of the report; rustfmt would break them.
 #[rustfmt::skip]
 fn shape_and_limb(kind: Kind) -> Option<([f64; 3], f64, f64, f64)> {
     Some(match kind {

@@ -3,17 +3,21 @@
 use crate::base::linalg::{M3, V3, basis, symmetric_eigen, unit};
 use crate::base::real::Real;
 use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
-use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
+use crate::geometry::frames::{Cam, Fixed, Rotation, UnitVec3};
 use crate::geometry::scaling::Scaling;
 
 use super::{AltitudeReference, Config, Kind, Prior, PriorError};
 
 /// A position and a distance in one prior must agree within this many sigmas of the distance.
+// A true pair differs by more about once in two million cases; therefore a larger difference is an error of units or
+// time.
 const AGREE_SIGMAS: f64 = 5.0;
 /// Distances that differ by less than this agree in any case, metres.
+// A distance that is told as exact has a sigma near 0, and a rounded position would contradict it without this floor.
 const AGREE_M: f64 = 100.0;
 
 /// Rounds a length to the nearest metre, for messages.
+// The messages need i64, because the distance of an outer planet in metres does not fit 32 bits.
 fn rounded_m<T: Real>(m: T) -> i64 {
     libm::round(m.to_f64()) as i64
 }
@@ -39,7 +43,7 @@ pub(crate) struct Target<T> {
     /// Semi-axes with the limb height, in units of `unit_m`.
     pub(crate) semi_axes: [T; 3],
     /// The axes of the body in the camera frame, as columns.
-    pub(crate) body_to_cam: M3<T>,
+    pub(crate) camera_from_fixed: M3<T>,
     /// Whether the prior has an attitude, so that the camera has a place in the axes of the body.
     pub(crate) has_attitude: bool,
     /// 1-sigma of the orientation about each axis, radians; 0 for a sphere.
@@ -70,7 +74,7 @@ impl<T: Real> Target<T> {
     pub(super) fn new(
         body: &Config,
         prior: &Prior<T>,
-        attitude: Option<Rotation<Cam, Ecef, T>>,
+        attitude: Option<Rotation<Cam, Fixed, T>>,
         attitude_sigma_rad: T,
     ) -> Result<Option<Self>, PriorError> {
         let Some(radii_km) = body.figure_km() else { return Ok(None) };
@@ -78,17 +82,20 @@ impl<T: Real> Target<T> {
         let limb = T::from_f64(body.mean_limb_height_km()) * km;
         let axes_m = radii_km.map(|r| T::from_f64(r) * km + limb);
         let is_sphere = axes_m[0] == axes_m[1] && axes_m[1] == axes_m[2];
-        let rotation = attitude.map(|cam_to_body| cam_to_body.inverse().to_matrix());
+        let rotation = attitude.map(|fixed_from_camera| fixed_from_camera.inverse().to_matrix());
+        // An attitude comes first because it fixes all three axes; a pole fixes two, which is enough for a body of
+        // revolution.
         let rotation = rotation.or(oriented_by_pole(prior, &axes_m)?).or(is_sphere.then(M3::identity));
-        let Some(body_to_cam) = rotation else { return Ok(None) };
+        let Some(camera_from_fixed) = rotation else { return Ok(None) };
         let unit_m = (axes_m[0] + axes_m[1] + axes_m[2]) / T::from_f64(3.0);
         let semi_axes = axes_m.map(|a| a / unit_m);
         let target = Self {
-            scaling: Scaling::new(semi_axes, &body_to_cam),
+            scaling: Scaling::new(semi_axes, &camera_from_fixed),
             unit_m,
             semi_axes,
-            body_to_cam,
+            camera_from_fixed,
             has_attitude: attitude.is_some(),
+            // A turned sphere has the same limb.
             attitude_sigma_rad: if is_sphere { T::ZERO } else { attitude_sigma_rad },
             limb_sigma_m: T::from_f64(body.limb_height_sigma_km) * km,
             second_harmonic_sigma_m: T::from_f64(
@@ -99,13 +106,14 @@ impl<T: Real> Target<T> {
             range: range(body, prior, limb)?,
             is_in_sunlight: body.is_seen_in_sunlight(),
             is_earth: body.kind == Kind::Earth,
-            predicted_m: attitude.and(prior.position_m).map(|x| -(body_to_cam * V3::from(x))),
+            predicted_m: attitude.and(prior.position_m).map(|x| -(camera_from_fixed * V3::from(x))),
         };
         target.check_outside()?;
         Ok(Some(target))
     }
 
     /// Refuses a camera inside the body.
+    // Inside the body no cone exists: sin α would be above 1, and every later root NaN.
     fn check_outside(&self) -> Result<(), PriorError> {
         let inside = |distance_m: T, axis: T| PriorError::Inside {
             distance_m: rounded_m(distance_m),
@@ -117,6 +125,7 @@ impl<T: Real> Target<T> {
                 return Err(inside(r.dot(r).sqrt(), r.dot(r).sqrt() / self.unit_m / scaled.dot(&scaled).sqrt()));
             }
         }
+        // The smallest semi-axis is the limit, because without a direction the camera may stand above it.
         let smallest = self.semi_axes.iter().fold(T::one(), |least, a| least.min(*a));
         match self.range {
             Some(range) if !range.is_height && !(range.length_m > smallest * self.unit_m) => {
@@ -140,9 +149,11 @@ impl<T: Real> Target<T> {
             return Some(range.length_m);
         }
         let [a, b] = [WGS84_A_M, WGS84_B_M].map(T::from_f64);
-        let d = self.body_to_cam.transpose() * -u;
+        let d = self.camera_from_fixed.transpose() * -u;
         let surface = T::one() / ((d.x * d.x + d.y * d.y) / (a * a) + d.z * d.z / (b * b)).sqrt();
         // The height is measured along the normal of the ellipsoid, which is not the direction to the centre.
+        // One correction is enough: at the first guess the height is wrong by the square of the angle between normal
+        // and centre.
         let distance = surface + range.length_m;
         let (height, _) = geodetic([d.x * distance, d.y * distance, d.z * distance], a, b);
         Some(distance + range.length_m - height)
@@ -179,7 +190,7 @@ impl<T: Real> Target<T> {
 
     /// Returns the position of the camera in the axes of the body, metres, for the centre `r` (camera frame).
     pub(crate) fn body_fixed(&self, r: &V3<T>) -> V3<T> {
-        -(self.body_to_cam.transpose() * r)
+        -(self.camera_from_fixed.transpose() * r)
     }
 }
 
@@ -205,6 +216,7 @@ impl<T: Real> Target<T> {
         let ([one, two, positive], [.., axis]) = symmetric_eigen(rows);
         let cot2 = -(one + two) / (positive + positive);
         let axis = V3::from(axis);
+        // An eigenvector has no sign; the body lies on the side of its centre.
         let axis = if axis.dot(&r) < 0.0 { -axis } else { axis };
         let half_angle = libm::atan2(1.0, libm::sqrt(cot2));
         half_angle.is_finite().then(|| (axis.map(T::from_f64), T::from_f64(half_angle)))
@@ -227,6 +239,7 @@ fn oriented_by_pole<T: Real>(prior: &Prior<T>, [a, b, _]: &[T; 3]) -> Result<Opt
     if a != b {
         return Err(PriorError::Pole);
     }
+    // Any two axes across the pole will do, because the body is one of revolution.
     let (x, y) = basis(pole);
     Ok(Some(M3::from_columns(&[x, y, *pole])))
 }
@@ -273,6 +286,7 @@ fn range<T: Real>(body: &Config, prior: &Prior<T>, limb_m: T) -> Result<Option<R
     {
         return Err(super::apparent::below_limb_error(height.length_m, limb_m));
     }
+    // One metre keeps the variance above 0, by which the fusion divides.
     let tiny = T::from_f64(1.0);
     Ok(by_range.or(by_position).or(by_height).map(|range| Range { sigma_m: range.sigma_m.max(tiny), ..range }))
 }

@@ -1,12 +1,13 @@
 //! The prior of one picture: what is known about it before it is processed.
 
-use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
+use crate::geometry::frames::{Cam, Fixed, Rotation, UnitVec3};
 
 /// The data known about one picture before it is processed. Every field may be missing.
 ///
 /// # Example
 ///
-/// A position in ECEF determines the cone of the ellipsoid. An attitude, good to a few degrees, corrects its shape:
+/// A position in the fixed frame (ECEF for the Earth) determines the cone of the ellipsoid. An attitude, good to a few
+/// degrees, corrects its shape:
 ///
 /// ```
 /// use hzn_core::Prior;
@@ -14,22 +15,22 @@ use crate::geometry::frames::{Cam, Ecef, Rotation, UnitVec3};
 ///
 /// let prior = Prior::<f64> {
 ///     position_m: Some([6_771e3, 0.0, 0.0]),
-///     // The quaternion is scalar first, and takes coordinates from the camera to ECEF.
-///     cam_to_ecef: Rotation::assume_from_quaternion([0.5, 0.5, 0.5, 0.5]),
+///     // The quaternion is scalar first, and converts coordinates from the camera to the fixed frame.
+///     fixed_from_camera: Rotation::assume_from_quaternion([0.5, 0.5, 0.5, 0.5]),
 ///     attitude_sigma_rad: Some(3f64.to_radians()),
 ///     ..Prior::default()
 /// };
-/// assert!(prior.altitude_m.is_none() && prior.cam_to_ecef.is_some());
+/// assert!(prior.altitude_m.is_none() && prior.fixed_from_camera.is_some());
 /// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Prior<T> {
     /// Altitude in metres: geodetic above WGS-84 for `earth`, else above the radius. It must be above the limb height.
     pub altitude_m: Option<T>,
-    /// Position of the camera in ECEF, metres. A known position replaces the altitude.
+    /// Position of the camera in the fixed frame, metres. A known position replaces the altitude.
     pub position_m: Option<[T; 3]>,
-    /// A prior attitude, camera to ECEF; an accuracy of a few degrees is enough. It gives the azimuth for the
-    /// ellipsoid's correction. With a position it is also a gate, see `select.max_attitude_sigma`.
-    pub cam_to_ecef: Option<Rotation<Cam, Ecef, T>>,
+    /// A prior attitude, from the camera to the fixed frame; an accuracy of a few degrees is enough. It gives the
+    /// azimuth for the ellipsoid's correction. With a position it is also a gate, see `gates.max_attitude_sigma`.
+    pub fixed_from_camera: Option<Rotation<Cam, Fixed, T>>,
     /// Direction of the body's north pole in the camera frame, for a body of revolution whose position is fitted. An
     /// attitude takes its place.
     pub pole: Option<UnitVec3<Cam, T>>,
@@ -39,15 +40,15 @@ pub struct Prior<T> {
     /// 1-sigma of that distance in metres.
     pub range_sigma_m: Option<T>,
     /// Threshold that the previous picture proposes, in counts: the `next_level` of its report, for
-    /// `binarize.method = "track"`. A [`Horizon`](crate::Horizon) stores this value between pictures.
+    /// `threshold.method = "track"`. A [`Horizon`](crate::Horizon) stores this value between pictures.
     pub level: Option<u16>,
-    /// Direction to the Sun in the camera frame. It is used by a gate, see `select.max_unlit`.
+    /// Direction to the Sun in the camera frame. It is used by a gate, see `gates.max_unlit`.
     pub sun: Option<UnitVec3<Cam, T>>,
     /// 1-sigma of the prior attitude about the axis in radians, 0 or more; 5 degrees if it is left out. It widens the
     /// covariance by the part of the ellipsoid's shape that then remains uncertain. From 30 degrees on, the attitude
     /// does not correct the shape at all.
     pub attitude_sigma_rad: Option<T>,
-    /// The last answer, for `select.max_rate_deg_s`.
+    /// The last answer, for `gates.max_rate_deg_s`.
     pub last: Option<Last<T>>,
     /// The camera's rate of rotation in its own axes, rad/s, up to 1000. It is for a camera with a rolling shutter
     /// (`camera.readout_s`), whose rows are exposed at different times. The picture's time is that of its middle row.
@@ -128,7 +129,7 @@ impl core::fmt::Display for PriorError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::Altitude => "altitude_km must be a finite number above -1 (kilometres)",
-            Self::Position => "x_km, y_km, z_km must be finite and outside the body (ECEF, kilometres)",
+            Self::Position => "x_km, y_km, z_km must be finite and outside the body (fixed frame, kilometres)",
             Self::BelowLimb { altitude_m, limb_m } => {
                 let [altitude, limb] = [altitude_m, limb_m].map(|m| f64::from(*m) / 1e3);
                 let place = if altitude < limb { "below" } else { "not above" };

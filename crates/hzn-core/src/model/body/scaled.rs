@@ -7,6 +7,7 @@ use crate::base::linalg::{V3, unit};
 use crate::base::real::Real;
 
 /// 1-sigma of the cosine of a half-angle of which nothing is known.
+// Cosines lie between 0 and 1, so that this sigma gives the expected half-angle hardly any weight.
 const UNKNOWN_COS: f64 = 1.0;
 
 impl<T: Real> Expected<T> {
@@ -21,6 +22,7 @@ impl<T: Real> Expected<T> {
     ) -> Result<Self, PriorError> {
         let km = T::from_f64(1000.0);
         let to_direction = target.predicted_m.and_then(|r| unit(&r));
+        // With a direction the size is exact and has no unknown part; only without one is the mean semi-axis used.
         let along = to_direction.and_then(|u| target.size_along(&u)).map(|(sin, _)| (sin, T::ZERO));
         let size = along.or_else(|| target.size_anywhere());
         let (sin, unknown_m) = size.unwrap_or((smallest_rad.sin_cos().0, T::ZERO));
@@ -35,7 +37,7 @@ impl<T: Real> Expected<T> {
             limb_sigma_parts_m: [target.limb_sigma_m, sin * range_sigma, unknown_m, T::ZERO],
             clipped_m: [body.clipped_height_km, body.clipped_sigma_km].map(|h| T::from_f64(h) * km),
             ellipsoid: None,
-            cam_to_ecef: None,
+            fixed_from_camera: None,
             harmonics_cos: [T::ZERO; 2],
             unknown_harmonics_cos: [T::ZERO; 2],
             level: prior.level,
@@ -53,6 +55,8 @@ impl<T: Real> Expected<T> {
             which: 0,
             target: Some(target),
         };
+        // Without a distance the sigma stays at its unknown value: the limb height of a body of unknown size says
+        // nothing.
         if size.is_some() {
             expected.sigma_cos = expected.sigma_cos_of_parts();
             expected.set_uneven_limb(body);
@@ -78,6 +82,7 @@ impl<T: Real> Expected<T> {
         let most = heights().fold(f64::MIN, |a, b| if b > a { b } else { a });
         let least = heights().fold(f64::MAX, |a, b| if b < a { b } else { a });
         if most > least {
+            // Half of the difference, in metres: 1000/2.
             let amplitude = T::from_f64((most - least) * 500.0) * self.cos_per_m();
             self.unknown_harmonics_cos = [amplitude; 2];
         }

@@ -20,8 +20,11 @@ use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M};
 /// k of the Earth in metres.
 pub(super) const EARTH_K_M: f64 = (WGS84_A_M - WGS84_B_M) * 2.0 / 3.0;
 /// RMS of P₂(sin φ) over evenly distributed latitudes: √(11/32).
+// The distribution of the polar orbit is used because it gives the larger radius error; a smaller sigma would be wrong
+// for a sensor that flies there.
 const RADIUS_RMS: f64 = 0.586_301_969_977_929_6;
 /// RMS of cos²φ over the globe: √(8/15).
+// Here the globe gives the larger value, for the same reason.
 const SECOND_RMS: f64 = 0.730_296_743_340_221_5;
 
 /// Returns the 1-sigma of the radius of the equivalent sphere (with the same half-angle) about the mean radius, metres:

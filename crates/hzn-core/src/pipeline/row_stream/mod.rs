@@ -11,7 +11,7 @@
 //!   out evenly. `dropped` counts the pixels.
 //! - If an edge is so wide that its plateau lies beyond the rows in memory, the last of these rows stands for the
 //!   plateau. `cut_points` counts these points.
-//! - There is only one look: `[recover]` has no effect, a dark frame is not found, and a picture without an answer
+//! - There is only one look: `[retry]` has no effect, a dark frame is not found, and a picture without an answer
 //!   stays without one.
 //! - The contrast that the local mid-level of an edge needs is a fraction of full scale, because the contrast of the
 //!   picture itself is known only after its last row.
@@ -45,6 +45,7 @@ use runs::Runs;
 
 /// Rows that must follow a border pixel's row before the pixel is measured. At least the same number of rows before the
 /// pixel's row is then in memory.
+// With 32 rows in memory and the pixel's own one, both sides have at least 15 rows for the plateaus of a wide edge.
 const AHEAD: u16 = 15;
 
 /// The memory that a picture needs in addition to a [`Workspace`] when it comes row by row.
@@ -180,15 +181,15 @@ impl<T: Real> Sensor<T> {
         if WINDOW < window || HEIGHT < usize::from(height) {
             return Err(RowStreamError::Room { window, height: height.into() });
         }
-        if !matches!(config.candidates.sub_pixel, SubPixel::Linear | SubPixel::None) {
-            return Err(RowStreamError::Method("candidates.sub_pixel"));
+        if !matches!(config.edge_points.sub_pixel, SubPixel::Linear | SubPixel::None) {
+            return Err(RowStreamError::Method("edge_points.sub_pixel"));
         }
         if config.contour.method != contour::Method::BorderFollowing {
             return Err(RowStreamError::Method("contour.method"));
         }
         if cfg!(feature = "horace") {
-            if config.recover.method != crate::config::retry::Method::None {
-                return Err(RowStreamError::Method("recover.method"));
+            if config.retry.method != crate::config::retry::Method::None {
+                return Err(RowStreamError::Method("retry.method"));
             }
             if config.input.scale_to_height.is_some() {
                 return Err(RowStreamError::Method("input.scale_to_height"));
@@ -202,8 +203,9 @@ impl<T: Real> Sensor<T> {
         Ok(RowStream {
             sensor: self,
             expected,
+            // A fixed threshold needs no earlier picture, so that the first picture can have an answer.
             level: threshold::fixed_level::<T>(levels, full_scale).or(expected.level),
-            samples: RowSampler::new(config.reject.seed, full_scale, &self.region),
+            samples: RowSampler::new(config.consensus.seed, full_scale, &self.region),
             window: RecentRows::new(&mut rows.window, width, height, full_scale),
             runs: Runs::new(&mut rows.run_ends, &mut rows.turns, width),
             points: Points::new(&mut rows.point_ends, &mut rows.points),
@@ -225,14 +227,18 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
     /// The row has another length, or the picture already has all its rows. Nothing changes then.
     pub fn push_row(&mut self, row: &[S]) -> Result<(), RowStreamError> {
         let camera = &self.sensor.camera;
+        // The length is checked before anything is stored, so that a refused row can be sent again.
         if row.len() != usize::from(camera.width()) {
             return Err(RowStreamError::Length);
         }
         if self.rows == camera.height() {
             return Err(RowStreamError::Finished);
         }
+        // The sample is drawn from every row, also from those that no longer fit: it gives the threshold of the next
+        // picture.
         self.samples.row(&self.sensor.region, self.rows, row, &Unobserved);
         self.rows += 1;
+        // After a row that did not fit, no other is stored: a gap would join edges that do not touch.
         if let (Some(level), false) = (self.level, self.full) {
             self.window.push(row);
             self.full = !self.runs.push(row.iter().map(|&s| s.into() >= level));
@@ -266,10 +272,10 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
         observer: &O,
         report: &mut Report<T>,
     ) {
-        observer.enter(Stage::Binarize);
+        observer.enter(Stage::Threshold);
         let config = &self.sensor.config;
         let levels = config.threshold_of(self.expected.which);
-        let next = match self.samples.split::<T, O>(&config.gate, levels, None, observer) {
+        let next = match self.samples.split::<T, O>(&config.brightness, levels, None, observer) {
             Ok(found) => found.level,
             Err(status) => {
                 report.status = status;
@@ -284,13 +290,16 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
         report.level = level;
         report.stage = Stage::Contour;
         observer.enter(Stage::Contour);
+        // The picture ends with the last row that was stored, so that an edge ends there as at the border of a picture.
         let region = self.sensor.region.first_rows(self.runs.rows());
         for y in self.runs.rows().saturating_sub(AHEAD)..self.runs.rows() {
             self.measure(y, level, &region);
         }
         let picture = Memory { runs: &self.runs, points: &self.points, width: region.width(), height: region.height() };
         let lists = workspace.lists();
+        // An edge needs a dark row or column next to a lit one; a single row has no border to follow.
         if picture.height > 1 {
+            // The picture has two shades, therefore its threshold is 1.
             let binary = BinaryPicture::new(&picture, &region, 1, observer).with_blooming(self.expected.blooms());
             let work = budget::new(&self.sensor.config, lists.border.len());
             let own = self.sensor.camera_for(self.expected);
@@ -303,6 +312,7 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
         report.counters.dropped += self.points.dropped();
         if self.full {
             report.counters.dropped += u32::from(self.rows - self.runs.rows()) * u32::from(picture.width);
+            // An answer from the first rows has passed every gate, so it counts.
             if report.solution.is_none() {
                 report.status = Status::Truncated;
             }
@@ -311,7 +321,7 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
 
     /// Measures the edge points of a row. The rows around it must have arrived.
     fn measure(&mut self, y: u16, level: u16, region: &Region<T>) {
-        let config = &self.sensor.config.candidates;
+        let config = &self.sensor.config.edge_points;
         let binary = BinaryPicture::new(&self.window, region, level, &Unobserved).with_blooming(self.expected.blooms());
         self.runs.each_border(y, |x| {
             if region.contains(x, y) && self.points.wants(x, y) {
@@ -347,6 +357,7 @@ impl Pixels for Memory<'_> {
         1
     }
     fn index(&self, x: u16, y: u16) -> usize {
+        // Row and column lie in separate halves of the index, so that a read needs no division by the width.
         usize::from(y) << 16 | usize::from(x)
     }
     fn across(&self) -> usize {

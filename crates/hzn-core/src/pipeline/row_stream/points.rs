@@ -38,6 +38,7 @@ pub(super) struct Points<'a> {
 
 impl<'a> Points<'a> {
     pub(super) fn new(ends: &'a mut [u16], points: &'a mut [Point]) -> Self {
+        // The ends of the rows have 16 bits, which is half of the memory of a `usize` on a flight computer.
         let room = points.len().min(usize::from(u16::MAX));
         let points = points.get_mut(..room).unwrap_or_default();
         Self { ends, points, rows: 0, used: 0, thinned: 0, dropped: 0 }
@@ -50,6 +51,8 @@ impl<'a> Points<'a> {
 
     fn kept(x: u16, y: u16, thinned: u32) -> bool {
         let n = (u32::from(y) << 16 | u32::from(x)).wrapping_mul(0x9E37_79B1);
+        // A rule such as every second column would leave out whole stretches of vertical edges. The hash thins all
+        // directions alike, and it is nested: what is left out at one level stays out at the next.
         (n ^ n >> 15).wrapping_mul(0x2C1B_3C6D).checked_shr(32 - thinned).unwrap_or(0) == 0
     }
 
@@ -59,6 +62,7 @@ impl<'a> Points<'a> {
             if self.used < self.points.len() {
                 return true;
             }
+            // The limit is there so that the loop ends for a memory without any room.
             if self.thinned > 24 {
                 break;
             }
@@ -69,11 +73,13 @@ impl<'a> Points<'a> {
     }
 
     /// Leaves out every second pixel of the finished rows and of row `y`, which is not finished.
+    // The attribute keeps the loop out of the path of a usual picture, which never thins.
     #[cold]
     fn halve(&mut self, y: u16) {
         self.thinned += 1;
         let (mut from, mut to) = (0, 0);
         for row in 0..=y {
+            // The row in progress has no end yet.
             let end = if row < self.rows {
                 self.ends.get(usize::from(row)).map_or(0, |&e| usize::from(e))
             } else {
@@ -123,6 +129,7 @@ impl<'a> Points<'a> {
         let at = |y: u16| self.ends.get(usize::from(y)).map_or(0, |&e| usize::from(e));
         let start = if y == 0 { 0 } else { at(y - 1) };
         let row = self.points.get(start..at(y))?;
+        // A row is searched by halves because its points are sorted by column; a clouded row may have hundreds.
         let found = row.get(row.partition_point(|p| p.x < x)).filter(|p| p.x == x)?;
         let Point { towards_dark_px, lit, marks, .. } = *found;
         let has = |mark: u8| marks & mark > 0;

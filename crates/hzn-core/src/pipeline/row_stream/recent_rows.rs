@@ -5,6 +5,8 @@ use core::cell::Cell;
 use crate::image::{Pixels, Sample};
 
 /// Rows of the picture that are kept in memory.
+// A power of two makes the remainder of the row a mask. With 32 rows the plateaus of edges up to 15 rows away are in
+// memory.
 pub const ROWS_HELD: u16 = 32;
 
 /// The last [`ROWS_HELD`] rows. A read of an older or a later row returns the first or the last of these rows instead,
@@ -17,6 +19,7 @@ pub(super) struct RecentRows<'a, S> {
     full_scale: u16,
     /// Number of rows so far.
     rows: u16,
+    // A cell, because reads of a picture take `&self`.
     beyond: Cell<u32>,
 }
 
@@ -68,6 +71,8 @@ impl<S: Sample> Pixels for RecentRows<'_, S> {
     #[inline]
     fn read(&self, index: usize) -> u16 {
         let (x, y) = (index & 0xFFFF, (index >> 16) as u16);
+        // The nearest row stands for one that is gone, because the brightness of a plateau changes little; a 0 would
+        // look like sky.
         let held = y.max(self.rows.saturating_sub(ROWS_HELD)).min(self.rows.saturating_sub(1));
         if held != y {
             self.beyond.set(self.beyond.get() + 1);

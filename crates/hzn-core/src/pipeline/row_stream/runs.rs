@@ -22,6 +22,8 @@ impl<'a> Runs<'a> {
 
     /// Adds the next row as a whole. Returns false and adds nothing if it does not fit.
     pub(super) fn push(&mut self, row: impl Iterator<Item = bool>) -> bool {
+        // The row is written beyond the used part and counted only at its end, so that a row that does not fit leaves
+        // no trace.
         let (mut used, mut before) = (self.used, false);
         for (lit, x) in row.zip(0u16..) {
             if lit != before {
@@ -31,6 +33,7 @@ impl<'a> Runs<'a> {
         }
         if before {
             let Some(turn) = self.turns.get_mut(used) else { return false };
+            // The closing turn makes every lit run a pair, so that the loops need no special case at the right end.
             (*turn, used) = (self.width, used + 1);
         }
         let Some(end) = self.ends.get_mut(usize::from(self.rows)) else { return false };
@@ -54,6 +57,8 @@ impl<'a> Runs<'a> {
 
     #[inline]
     pub(super) fn lit(&self, x: u16, y: u16) -> bool {
+        // The parity of the number of changes before a column is its shade. A bitmap would answer faster, but 640×480
+        // pixels would take 38 KB.
         self.row(y).partition_point(|&turn| turn <= x) % 2 == 1
     }
 
@@ -68,6 +73,7 @@ impl<'a> Runs<'a> {
             let &[start, end] = run else { continue };
             let mut x = start;
             while x < end {
+                // Inside a run only the first and last pixel have a dark neighbour in their own row.
                 let at_end = if x == start { x } else { end - 1 };
                 let next = beside.iter_mut().flatten().map(|row| row.next_near(x)).fold(at_end, u16::min);
                 if next < end {
@@ -98,6 +104,7 @@ impl<'a> Dark<'a> {
                 0 => 0,
                 n => match self.turns.get(2 * n - 1) {
                     Some(&turn) => turn,
+                    // The largest column stands for "no more", so that the minimum over both rows needs no option.
                     None => return u16::MAX,
                 },
             };
@@ -105,6 +112,7 @@ impl<'a> Dark<'a> {
             if start < end && x <= end {
                 return x.max(start.saturating_sub(1));
             }
+            // The position is kept between calls, so that a row is passed once and not once for each pixel.
             self.at += 1;
         }
     }

@@ -33,9 +33,9 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             self.short += 1;
             return;
         }
-        let keep = u32::from(self.sensor.config.candidates.keep_points);
+        let keep = u32::from(self.sensor.config.edge_points.keep_points);
         let points = (edge.pixels().len() as u32).min(if keep == 0 { u32::MAX } else { keep });
-        let point = budget::point_cost(self.sensor.config.candidates.sub_pixel, binary.mask_cost());
+        let point = budget::point_cost(self.sensor.config.edge_points.sub_pixel, binary.mask_cost());
         if !self.work.try_spend(points.saturating_mul(point)) {
             return;
         }
@@ -91,9 +91,9 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         border: &[Pixel],
         outcome: &mut Candidate<T>,
     ) -> Option<Points> {
-        self.enter(Stage::Candidates);
+        self.enter(Stage::EdgePoints);
         let most_extra = self.work.remaining();
-        let config = &self.sensor.config.candidates;
+        let config = &self.sensor.config.edge_points;
         let points = edge_points::locate_edge_points(binary, config, border, outcome.number, self.blocks, most_extra);
         if points.extra_cost >= most_extra {
             self.work.exhaust();
@@ -118,11 +118,11 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let (config, camera) = (&self.sensor.config, self.camera);
         let used = (points.count as usize).div_ceil(LANES);
         let blocks = self.blocks.get_mut(..used)?;
-        enter(self.report, self.observer, Stage::Undistort);
+        enter(self.report, self.observer, Stage::Rays);
         rays::to_rays(camera, blocks);
 
-        enter(self.report, self.observer, Stage::Reject);
-        let configured_px = T::from_f64(config.reject.threshold_px);
+        enter(self.report, self.observer, Stage::Consensus);
+        let configured_px = T::from_f64(config.consensus.threshold_px);
         let on_another: u32 = self.taken.iter().map(|t| t.withdraw(blocks, camera, configured_px)).sum();
         if on_another * 2 > points.count {
             outcome.verdict = Verdict::Taken;
@@ -130,17 +130,17 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         }
         let (fx, fy) = camera.focal_px();
         let focal = (fx + fy) * T::from_f64(0.5);
-        let threshold = Threshold::new(blocks, points.count, expected, focal, &config.reject);
+        let threshold = Threshold::new(blocks, points.count, expected, focal, &config.consensus);
         let work = &mut self.work;
-        let consensus = consensus::find(blocks, points.count, expected, focal, threshold, &config.reject, work)?;
+        let consensus = consensus::find(blocks, points.count, expected, focal, threshold, &config.consensus, work)?;
         self.report.counters.draws += consensus.draws;
 
-        enter(self.report, self.observer, Stage::Estimate);
+        enter(self.report, self.observer, Stage::Fit);
         outcome.verdict = Verdict::NoFit;
         if !self.work.try_spend(used as u32 * work::FIT + work::GATES) {
             return None;
         }
-        let fit = fit::fit(blocks, &consensus, expected, camera, threshold.px, &config.estimate, self.noise)?;
+        let fit = fit::fit(blocks, &consensus, expected, camera, threshold.px, &config.fit, self.noise)?;
         outcome.inliers = fit.inliers;
         outcome.rms_px = fit.rms_px;
         for place in 0..points.count {
@@ -169,21 +169,21 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let expected = refined.as_ref().unwrap_or(expected);
         outcome.verdict = Verdict::Uncertain;
         let mut budget = self.observer.wants_budget().then(ErrorBudget::new);
-        let fused = covariance::fuse(blocks, fit, expected, self.noise, &config.estimate, camera, budget.as_mut())?;
+        let fused = covariance::fuse(blocks, fit, expected, self.noise, &config.fit, camera, budget.as_mut())?;
         budget.iter().for_each(|budget| self.observer.budget(outcome.number, budget));
 
-        enter(self.report, self.observer, Stage::Select);
+        enter(self.report, self.observer, Stage::Gates);
         let (b1, b2) = basis(&fused.e);
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         let sigma = covariance.sigma_max_rad();
         self.show_fit(fit, &fused, covariance, expected, outcome.number);
-        let (made, factor, gates) = (points.count, threshold.factor, &config.select);
+        let (made, factor, gates) = (points.count, threshold.factor, &config.gates);
         let judged = gates::judge(fit, &fused, sigma, expected, blocks, made, factor, binary, camera, gates);
         outcome.verdict = match judged.verdict {
-            Verdict::Passed => papers::verdict(fit, expected, blocks, camera, binary.region, &config.select),
+            Verdict::Passed => papers::verdict(fit, expected, blocks, camera, binary.region, &config.gates),
             failed => failed,
         };
-        let fewest = T::from_i32(points.count as i32) * T::from_f64(config.recover.min_part);
+        let fewest = T::from_i32(points.count as i32) * T::from_f64(config.retry.min_part);
         if self.report.counters.looks > 0 && T::from_i32(fit.inliers as i32) < fewest {
             outcome.verdict = Verdict::NoConsensus;
             return None;
@@ -194,7 +194,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         if outcome.verdict != Verdict::Passed || !sigma.is_finite() {
             return None;
         }
-        if config.estimate.half_angle == fit::HalfAngle::Fused
+        if config.fit.half_angle == fit::HalfAngle::Fused
             && !self.is_side_known(fit, &fused, expected)
             && !expected.free
         {
@@ -203,10 +203,10 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         }
         let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number)?;
         let share = T::from_i32(fit.inliers as i32)
-            > T::from_i32(points.count as i32) * T::from_f64(config.select.certain_share);
+            > T::from_i32(points.count as i32) * T::from_f64(config.gates.certain_share);
         // The reflection of a Sun in the lens may look as good as the Sun, so every edge is examined.
         let certain = !expected.free
-            && judged.support > T::from_f64(config.select.certain_support)
+            && judged.support > T::from_f64(config.gates.certain_support)
             && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
         let next = (self.needs_next_threshold && !P::STREAMED)
             .then(|| gates::middle_level(&fused.e, blocks, fit.inliers, binary, camera));
@@ -228,7 +228,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
     /// A body on the other side of the same edge would have the half-angle π − α. The half-angle that the edge itself
     /// gives must be much nearer to α: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ must exceed `min_side_sigma`² variances.
     fn is_side_known(&self, fit: &Fit<T>, fused: &Fused<T>, expected: &Expected<T>) -> bool {
-        let sides = T::from_f64(self.sensor.config.select.min_side_sigma);
+        let sides = T::from_f64(self.sensor.config.gates.min_side_sigma);
         fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * expected.cos * T::from_f64(4.0))
     }
 
@@ -249,8 +249,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let solution = Solution {
             axis,
             covariance,
-            axis_ecef: expected.axis_ecef(),
-            axis_body: self.sensor.cam_to_body.as_ref().map(|r| r.apply(&axis)),
+            axis_fixed: expected.axis_fixed(),
+            axis_vehicle: self.sensor.vehicle_from_camera.as_ref().map(|r| r.apply(&axis)),
             half_angle_rad: half_angle(fit.k),
             fused_half_angle_rad: half_angle(fit.k - (fused.c - fit.c)),
             altitude_m: fused.var_free_cos.and_then(|v| expected.altitude(fit.c, v)),
@@ -289,7 +289,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         Some(Solution {
             axis,
             covariance: Cov3::from_tangent(&b1, &b2, placed.p),
-            axis_body: self.sensor.cam_to_body.as_ref().map(|r| r.apply(&axis)),
+            axis_vehicle: self.sensor.vehicle_from_camera.as_ref().map(|r| r.apply(&axis)),
             half_angle_rad,
             fused_half_angle_rad,
             altitude_m: placed.altitude_m,

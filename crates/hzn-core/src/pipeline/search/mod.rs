@@ -73,7 +73,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             noise: config.noise_model_of(expected.which),
             needs_next_threshold: config.threshold_of(expected.which).method == threshold::Method::Track,
             min_points: config
-                .candidates
+                .edge_points
                 .min_points
                 .min(gates::small_disc_points(expected.sin, &sensor.camera, 2))
                 .min(gates::small_picture_points(&sensor.camera, 2)),
@@ -106,7 +106,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let limit = if self.expected.free {
             new.solution.half_angle_rad.max(old.solution.half_angle_rad)
         } else {
-            T::from_f64(self.sensor.config.select.ambiguous_deg.to_radians())
+            T::from_f64(self.sensor.config.gates.ambiguous_deg.to_radians())
         };
         let apart = new.solution.axis.angle_rad(&old.solution.axis) > limit;
         let (better, other) = if new.judged.score < old.judged.score { (new, old) } else { (old, new) };
@@ -122,7 +122,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         report.counters.work = work.spent();
         report.counters.looks += 1;
         if let Some(best) = self.best {
-            let factor = T::from_f64(self.sensor.config.select.ambiguous_score);
+            let factor = T::from_f64(self.sensor.config.gates.ambiguous_score);
             let is_close = |rival: T| rival < best.judged.score * factor || self.expected.free;
             if !best.certain && self.rival.is_some_and(is_close) {
                 report.status = Status::Ambiguous;

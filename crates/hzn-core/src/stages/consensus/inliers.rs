@@ -28,8 +28,10 @@ impl<T: Real> Threshold<T> {
     /// edge with more scatter belongs to something else.
     pub(crate) fn new(blocks: &[Block<T>], count: u32, expected: &Expected<T>, focal_px: T, config: &Config) -> Self {
         let told = T::from_f64(config.threshold_px);
+        // A disc with a free half-angle has no limb height whose sigma could bound its noise.
         let most = if expected.free { told } else { told.max(expected.limb_sigma_rad() * focal_px) };
         let factor = T::from_f64(config.noise_sigma);
+        // The noise is measured only if it may change the threshold, because it is a pass over all points.
         let px = if most > told && factor > T::ZERO {
             told.max((factor * noise::point_to_point(blocks, count)).min(most))
         } else {

@@ -34,6 +34,7 @@ pub(super) fn find<T: Real>(
         return None;
     }
     // Outliers are up to one radian from the limb, on both sides.
+    // The threshold is turned into a sigma, so that all methods have the same key.
     let mixture = Mixture { sigma: threshold.px / T::from_f64(SIGMAS), range: focal_px * T::from_f64(2.0) };
     let mut rng = Rng::new(config.seed);
     let mut best: Option<(V3<T>, T, T)> = None;
@@ -73,6 +74,7 @@ impl<T: Real> Mixture<T> {
 
     /// Returns −Σ ln of the likelihood, and the share of inliers.
     fn cost(&self, blocks: &[Block<T>], e: &V3<T>, c: T) -> (T, T) {
+        // Nothing is known of the share before, so that the steps begin in the middle.
         let mut share = T::from_f64(0.5);
         for _ in 0..STEPS {
             let outlier = (T::one() - share) / self.range;

@@ -37,6 +37,7 @@ pub(crate) fn find<T: Real>(
 ) -> Option<Consensus<T>> {
     let best = match config.method {
         Method::None => {
+            // The ends and the middle are used, because points far apart give the best start for the fit.
             let (a, b) = (ray(blocks, 0)?, ray(blocks, count.saturating_sub(1))?);
             let mid = ray(blocks, count / 2)?;
             let (e, c) = through_three(&a, &mid, &b)?;
@@ -55,6 +56,7 @@ pub(crate) fn find<T: Real>(
     for block in blocks {
         let g = block.gradient(&best.e);
         for lane in 0..LANES {
+            // The closure runs only for points that pass the first test, because it costs a root.
             let lit = || expected.is_lit(&block.ray(lane), &best.e, best.c, focal_px);
             if !(block.is_lit_along(lane, [g[0][lane], g[1][lane]]) && lit()) {
                 block.weight[lane] = T::ZERO;

@@ -27,6 +27,7 @@ pub(super) fn point_to_point<T: Real>(blocks: &[Block<T>], count: u32) -> T {
             break;
         }
     }
+    // A median and not an RMS, because the outliers are still among the points here.
     median::median_of_reals(&all, most) * T::from_f64(1.0 / (0.6745 * 1.224_744_871))
 }
 

@@ -20,6 +20,8 @@ use crate::geometry::cone::through_three;
 use crate::model::work::{DRAW, SCORE, WorkBudget};
 
 /// Largest number of accepted hypotheses, k_max.
+// The number counts accepted cones only: with 286 draws in all, 29 % of the pictures with 80 % of outliers were solved
+// instead of 99 %.
 const HYPOTHESES: u32 = 287;
 /// Number of points in a draw.
 const SAMPLE: usize = 5;
@@ -51,6 +53,8 @@ pub(super) fn find<T: Real>(
         let near = count_inliers(blocks, &e, c, limit2);
         if near > most {
             (best, most) = (Some((e, c)), near);
+            // More than half cannot be beaten by another edge, which is why the paper ends here. Beyond 50 % of
+            // outliers it never happens, and the method is then slower than classic RANSAC.
             if near * T::from_f64(2.0) > T::from_f64(f64::from(count)) {
                 break;
             }

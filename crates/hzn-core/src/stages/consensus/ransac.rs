@@ -28,8 +28,10 @@ pub(super) fn find<T: Real>(
     }
     let limit2 = threshold.px * threshold.px;
     let mut rng = Rng::new(config.seed);
+    // A cone always goes through its own three points, therefore more than three must agree.
     let (mut best, mut most) = (None, T::from_f64(3.5));
     let (mut draws, mut enough) = (0, config.max_draws);
+    // Every draw is compared with every point, so that its whole cost is known before it.
     let a_draw = DRAW + blocks.len() as u32 * SCORE;
     while draws < enough.max(MIN_DRAWS).min(config.max_draws) && work.try_spend(a_draw) {
         draws += 1;

@@ -28,11 +28,14 @@ pub(super) fn draw_cone<T: Real>(blocks: &[Block<T>], count: u32, rng: &mut Rng)
 /// are inliers.
 pub(super) fn required_draws<T: Real>(w: T) -> u32 {
     let p = w * w * w;
+    // For p = 1 the logarithm would be infinite.
     if p > T::from_f64(0.99) {
         MIN_DRAWS
     } else if p > T::from_f64(1e-4) {
+        // −4.6 is ln 0.01: the probability that no draw succeeds is then one percent.
         (T::from_f64(-4.6) / (T::one() - p).ln()).to_i32().clamp(1, MOST as i32) as u32
     } else {
+        // For a smaller p, 1 − p keeps few digits of p in single precision, so that the quotient would be noise.
         MOST
     }
 }
@@ -42,6 +45,7 @@ pub(super) fn distances2<T: Real>(b: &Block<T>, e: &V3<T>, c: T) -> [T; LANES] {
     let g = b.gradient(e);
     core::array::from_fn(|l| {
         let r = c - (b.s[0][l] * e.x + b.s[1][l] * e.y + b.s[2][l] * e.z);
+        // A cleared point has no gradient; the floor turns it into a very large distance instead of NaN.
         r * r / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(1e-20))
     })
 }

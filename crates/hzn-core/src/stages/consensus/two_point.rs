@@ -11,9 +11,11 @@ use crate::model::body::Expected;
 use crate::model::work::{DRAW, SCORE, WorkBudget};
 
 /// Largest number of blocks that are scored.
+// A part of the points suffices to rank cones, because neighbours have correlated errors.
 const SCORED: usize = 20;
 
 /// Smallest number of draws, even if the first one fits well.
+// The first cone goes through two points with their noise; a few more draws find one whose points are better.
 pub(super) const MIN_DRAWS: u32 = 6;
 
 /// Sigma of the expected half-angle in radians.
@@ -25,6 +27,10 @@ pub(super) fn ray<T: Real>(blocks: &[Block<T>], i: u32) -> Option<V3<T>> {
     blocks.get(i as usize / LANES).map(|b| b.ray(i as usize % LANES))
 }
 
+// Above one degree (0.0175) the expected half-angle is worse than that of three points, so that two points would draw
+// wrong cones. Every n-th block is scored instead of the first ones, so that the whole edge takes part. A cone must
+// cost at most 0.95 of `nothing`, because rounding alone could otherwise make one. The last limit is 0.06 and not a
+// tenth, because an inlier still costs its squared distance.
 pub(super) fn search<T: Real>(
     blocks: &[Block<T>],
     count: u32,
@@ -140,6 +146,7 @@ fn score<T: Real>(blocks: &[Block<T>], scored: usize, e: &V3<T>, c: T, limit2: T
         for l in 0..LANES {
             let r = c - (b.s[0][l] * e.x + b.s[1][l] * e.y + b.s[2][l] * e.z);
             let d2 = r * r / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(1e-20));
+            // Truncated squares prefer the better of two cones with the same inliers, which a count of inliers cannot.
             total[l] += d2.min(limit2);
         }
     }

@@ -40,6 +40,8 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
         }
     }
     if work.try_spend(edge.pixels().len() as u32 * work::ORDER) {
+        // The later stages need the order, because the distance between neighbours decides how far their errors are
+        // correlated.
         sort_about_common_circle::<T>(edge.pixels_mut());
     }
     edge
@@ -56,6 +58,7 @@ fn is_edge<T: Real, P: Pixels, O: Observer<T>>(
     let mut lit = 0;
     for v in y - reach..=y + reach {
         for u in x - reach..=x + reach {
+            // The outline of a mask is no edge, so a masked neighbour takes the pixel out.
             if binary.region.masked(u, v) {
                 return false;
             }

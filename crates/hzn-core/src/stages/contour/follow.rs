@@ -29,6 +29,7 @@ pub(super) const WEST: u8 = 4;
 /// 1/`CONTRAST_PART` of the contrast of the picture. In both cases `LEAST_CONTRAST` counts are necessary.
 const FULL_SCALE_PART: i32 = 64;
 const CONTRAST_PART: i32 = 16;
+// A step of one count is the rounding of the values, therefore its contour line is no edge.
 const LEAST_CONTRAST: i32 = 2;
 
 /// The picture as the follower sees it: lit and dark pixels of a region.
@@ -45,6 +46,7 @@ pub(crate) struct BinaryPicture<'a, T, P, O> {
     /// Cost of a read of the mask, in the unit of the work budget.
     mask: u32,
     /// Cost of the reads since the last payment to the budget.
+    // The cost is collected in a cell and paid in turns, because a payment at every read would cost more than the read.
     owed: Cell<u32>,
     /// The eight moves, twice: a search over eight directions can begin at any of the first eight without wrapping.
     moves: [Move; 16],
@@ -75,6 +77,7 @@ impl Move {
             dx,
             dy,
             word: ((dy as u32) << 16).wrapping_add(dx as u32),
+            // The step is an offset in memory, so that a step needs no product of row and stride.
             offset: dx as isize * picture.across() as isize + dy as isize * picture.down() as isize,
         }
     }
@@ -140,6 +143,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     /// Returns whether a polygon covers the pixel.
     #[inline(always)]
     pub(crate) fn masked(&self, x: u16, y: u16) -> bool {
+        // The flag is tested inline and the polygons are not: most cameras have no mask, and the loop stays small.
         self.region.has_mask() && self.is_covered(x, y)
     }
     #[inline(never)]
@@ -184,6 +188,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         let mut walk = Walk { at: start, index: self.picture.index(start.x, start.y), back: dark, twice_area: 0 };
         let mut away = false;
         loop {
+            // The run is also limited by the budget, so that it can never spend more than is left.
             let free = self.free_steps(walk.at, start, marks).min(*steps);
             if free > 0 {
                 *steps = steps.saturating_sub(free + work::RUN + self.cost());
@@ -196,6 +201,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
             if *steps == 0 {
                 return End::OutOfSteps;
             }
+            // At the first look the follower stands at its start, too, but has not been around.
             let home = (away && walk.at == start).then_some(dark);
             away = true;
             let seen = self.look(&walk, home, marks);
@@ -227,6 +233,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     /// Returns the number of steps from here in which only the threshold needs to be checked.
     #[inline]
     fn free_steps(&self, here: Pixel, start: Pixel, marks: &Marks<'_>) -> u32 {
+        // Each step moves by at most one pixel in x and y; within this distance the walk cannot reach its start.
         let home = here.x.abs_diff(start.x).max(here.y.abs_diff(start.y));
         let most = home.min(marks.rows_away(here.y)).min(RUN as u16);
         if most == 0 {
@@ -239,6 +246,8 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
     /// Does `n` free steps, at most [`RUN`], if not every pixel is stored.
     #[inline(never)]
     fn run_thinned(&self, walk: &mut Walk, n: usize, edge: &mut Thinned<'_>) {
+        // A thinned edge stores few of its pixels. The run writes them to a short list first, so that its loop has no
+        // test of the stride.
         let mut passed = [Pixel::default(); RUN];
         let passed = passed.get_mut(..n).unwrap_or_default();
         self.run(walk, passed);
@@ -254,10 +263,12 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         for slot in passed {
             *slot = pixel(at);
             let first = usize::from(last.first & 7);
+            // The slice of the doubled list needs no wrap-around in the loop, which is why the moves are there twice.
             for turn in self.moves.get(first..first + 8).unwrap_or_default() {
                 let there = index.wrapping_add_signed(turn.offset);
                 let to = at.wrapping_add(turn.word);
                 self.observer.pixel(to as u16, (to >> 16) as u16);
+                // No bounds, masks or marks are tested here: the clearance has shown that the run cannot meet them.
                 if self.picture.read(there) >= self.level {
                     twice_area += (2 * i32::from(at as u16) + turn.dx) * turn.dy;
                     (at, index, last) = (to, there, turn);
@@ -304,6 +315,7 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
             let (x, y) = (nx as u16, ny as u16);
             self.observer.pixel(x, y);
             if self.picture.read(walk.index.wrapping_add_signed(step.offset)) >= self.level {
+                // The mask is read only for bright pixels, because it can only make a pixel dark.
                 if !self.masked(x, y) {
                     return Seen::Lit { direction, cut };
                 }

@@ -20,8 +20,11 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
     /// Returns the width of the frame in pixels, at most `most`; 0 if there is none. The light must begin abruptly at
     /// the inner side of the frame. The light of a disc or a glare grows from the border of the picture inwards, and is
     /// no sign of a frame.
+    // A photograph of the satellite OPS-SAT has such a frame of one pixel, which joined its limb to the outline of the
+    // picture; therefore every picture is tested.
     pub(crate) fn dark_frame_px(&self, most: u16, work: &mut WorkBudget) -> u16 {
         let (w, h) = (self.region.width(), self.region.height());
+        // At most a quarter is cut off on each side, so that a picture cannot vanish behind its frame.
         let most = most.min(w.min(h).saturating_sub(1) / 4);
         let around = 2 * (u32::from(w) + u32::from(h));
         let is_dark = |lit: u32, stride: u16| lit * SPECKS * u32::from(stride) <= around;
@@ -38,6 +41,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'_, T, P, O> {
             if is_lit(lit, 1) {
                 return px;
             }
+            // Light that begins in the middle of the frame grows gradually, so it belongs to a disc or a glare.
             if !is_dark(lit, 1) {
                 return 0;
             }

@@ -19,10 +19,13 @@ pub(crate) struct Marks<'a> {
 }
 
 /// Number of places in the table that are tried for a crossing.
+// The number bounds the work of a crossing. A table that is nearly full would otherwise be searched from end to end.
 const MAX_PROBES: usize = 16;
 
 /// Rounds `spacing` down to a power of two.
 fn rounded(spacing: u16) -> u16 {
+    // The spacing is a power of two because the follower tests every row: the remainder is then a mask and not a
+    // division.
     1 << (15 - spacing.clamp(1, 1 << 14).leading_zeros())
 }
 
@@ -37,6 +40,7 @@ impl<'a> Marks<'a> {
         let found = (0..15).map(|k| 1u16 << k).find(|&s| s >= narrow && s <= widest && fit(s));
         let (spacing, used) = found.map_or((narrow, words.len()), |s| (s, needed(s) as usize));
         if let Some(words) = words.get_mut(..used) {
+            // Only the words in use are cleared, so that a small picture does not pay for the room of a large one.
             words.fill(0);
         }
         Self { words, width: u32::from(width), spacing, offset: spacing / 2, bits: found.is_some(), full: false }
@@ -62,6 +66,7 @@ impl<'a> Marks<'a> {
     /// Returns the entry of a crossing in the table (0 is an empty place), and the places where it may be.
     fn key(&self, x: u16, y: u16) -> (u32, impl Iterator<Item = usize> + use<>) {
         let key = (u32::from(y) << 16 | u32::from(x)) + 1;
+        // The product spreads neighbouring crossings, which would otherwise fall into one cluster of places.
         let (n, first) = (self.words.len().max(1), key.wrapping_mul(0x9e37_79b1) >> 7);
         (key, (0..MAX_PROBES).map(move |k| (first as usize + k) % n))
     }
@@ -75,6 +80,7 @@ impl<'a> Marks<'a> {
             }
             return;
         }
+        // In a full table every attempt would cost all probes.
         if self.full {
             return;
         }

@@ -45,6 +45,8 @@ section! {
         /// For `erode`: side of the square neighbourhood, px.
         @- erode_size_px: u16 = 3, ["odd, 3 to 31"] { needs: "horace" };
         /// For `erode`: a lit pixel with fewer lit pixels in its neighbourhood, itself included, is an edge pixel.
+        // With 9 of 3×3 pixels, every lit pixel with a dark neighbour is an edge pixel. HORACE's five of eight
+        // neighbours are 7 here, because the pixel itself counts, too.
         @- erode_threshold: u16 = 9, ["1 to the square of `erode_size_px`"] { needs: "horace" };
     }
 }
@@ -53,6 +55,7 @@ impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         self.check_keys()?;
         let (size, threshold) = (f64::from(self.erode_size_px), f64::from(self.erode_threshold));
+        // An even square has no pixel in its middle.
         let odd = (3..=31).contains(&self.erode_size_px) && self.erode_size_px % 2 == 1;
         require(odd, "contour.erode_size_px", size, Limit::Rule("must be an odd number from 3 to 31"))?;
         let limit = Limit::Between(1.0, size * size);

@@ -11,12 +11,15 @@ pub(super) fn sort_about_common_circle<T: Real>(pixels: &mut [Pixel]) {
     let place = |p: &Pixel| [T::from_i32(i32::from(p.x)), T::from_i32(i32::from(p.y))];
     let Some(circle) = Circle::fit(pixels.iter().map(place)) else { return };
     // This value grows with the angle from −x over −y, from 0 to 4.
+    // Quotients order the pixels as the arc tangent would. They are used instead of it, because the sort computes two
+    // of them at every comparison.
     let angle = |p: &Pixel| -> T {
         let [x, y] = place(p);
         let (x, y) = (x - circle.centre[0], y - circle.centre[1]);
         let along = x / (x.abs() + y.abs()).max(T::from_f64(1e-20));
         if y < T::ZERO { T::one() + along } else { T::from_f64(3.0) - along }
     };
+    // The angles are computed again at each comparison, because there is no memory for one number a pixel.
     sort::by(pixels, |a, b| angle(a) < angle(b));
     let Some((first, last)) = pixels.first().zip(pixels.last()) else { return };
     let (mut widest, mut start) = (angle(first) + T::from_f64(4.0) - angle(last), 0);

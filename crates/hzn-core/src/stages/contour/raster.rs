@@ -63,7 +63,9 @@ pub(crate) fn each_border<T: Real, P: Pixels, O: Observer<T>>(
 ) -> Scanned {
     let (width, height) = (binary.region.width(), binary.region.height());
     let need = (usize::from(width) * usize::from(height)).div_ceil(32);
+    // Without a bit for every pixel the scan would find borders inside of others, so it does not begin.
     let Some(words) = words.get_mut(..need) else { return Scanned::Truncated };
+    // The words still hold the marks of the body that was looked for before.
     words.fill(0);
     let mut bits = Bits { words, width: usize::from(width) };
     for y in 0..height {
@@ -72,6 +74,7 @@ pub(crate) fn each_border<T: Real, P: Pixels, O: Observer<T>>(
             let lit = is_lit_inside(binary, i32::from(x), i32::from(y));
             if lit && !before && outside && !bits.get(x, y) {
                 let start = At { pixel: Pixel { x, y }, back: WEST };
+                // The first walk only counts, because it is known after it whether and where the border is cut.
                 let Some(border) = follow(binary, start, u32::MAX, &mut bits, steps, |_, _| true) else {
                     return Scanned::Truncated;
                 };

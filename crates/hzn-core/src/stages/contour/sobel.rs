@@ -19,6 +19,7 @@ use crate::model::observer::Observer;
 use crate::model::work::{self, WorkBudget};
 
 /// Smallest ratio of the gradient of an edge to the root mean square of all gradients, squared.
+// The ratio is squared, so that no pixel needs a root.
 const LEAST: u64 = 4;
 
 /// Returns the edge pixels of the picture, sorted by their angle about the common circle. Pixels next to the end of the
@@ -33,12 +34,14 @@ pub(crate) fn edges<'a, T: Real, P: Pixels, O: Observer<T>>(
     let look = work::gradient_cost(binary.mask_cost());
     each_pixel(binary, look, work, |x, y, _| {
         if let Some((gx, gy)) = gradient(binary, x, y) {
+            // Squares of 16-bit gradients over a picture of 65535×65535 pixels exceed 64 bits.
             sum = sum.saturating_add(square(gx, gy));
             count += 1;
         }
     });
     // In a picture without any gradient no pixel is above this limit.
     let least = LEAST * (sum / count.max(1));
+    // The gradients are computed a second time, because there is no memory for one number a pixel.
     each_pixel(binary, look, work, |x, y, work| {
         if let Some((gx, gy)) = gradient(binary, x, y)
             && square(gx, gy) > least
@@ -114,6 +117,7 @@ fn is_largest<T: Real, P: Pixels, O: Observer<T>>(
     let here = along((gx, gy));
     let (before, after) = if across { ((x - 1, y), (x + 1, y)) } else { ((x, y - 1), (x, y + 1)) };
     let beside = |(x, y): (u16, u16)| gradient(binary, x, y).map(along);
+    // Strict on one side only: otherwise a crest of two equal pixels would have two edge pixels, or none.
     beside(before).is_none_or(|g| g < here) && beside(after).is_none_or(|g| g <= here)
 }
 

@@ -26,6 +26,8 @@ impl<'a> Thinned<'a> {
             return;
         }
         if self.len == self.buffer.len() {
+            // A list that stopped here would cut the limb into a short arc. Half of the pixels lose nothing, because
+            // edge points are fewer anyway.
             self.halve();
             if self.wait > 0 {
                 self.wait -= 1;
@@ -42,6 +44,7 @@ impl<'a> Thinned<'a> {
     /// Returns the places of the next `n` pixels, which the caller must write; `None` if not all of them are stored.
     #[inline]
     pub(crate) fn places(&mut self, n: usize) -> Option<&mut [Pixel]> {
+        // With a stride some of the pixels are skipped, so that there is no place for each of them.
         if self.stride > 1 {
             return None;
         }
@@ -67,6 +70,7 @@ impl<'a> Thinned<'a> {
 
     #[cold]
     fn halve(&mut self) {
+        // The loop goes upwards, so that a pixel is read before its place is written.
         let kept = self.len.div_ceil(2);
         for i in 0..kept {
             if let Some(&p) = self.buffer.get(2 * i)

@@ -13,6 +13,7 @@ pub(crate) struct Fused<T> {
     /// Covariance (11, 12, 22) on the tangent basis of `e`, rad².
     pub(crate) p: [T; 3],
     /// Covariance (11, 12, 22) of the freely fitted axis on its own tangent basis, rad².
+    // It is kept for a filter that treats the limb height as one error of all pictures: fused covariances hide it.
     pub(crate) free_p: [T; 3],
     /// Derivative of the axis by the cosine of the expected half-angle, on the tangent basis of the fitted axis.
     pub(crate) by_cos: [T; 2],

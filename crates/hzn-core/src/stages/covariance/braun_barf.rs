@@ -35,6 +35,7 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
         c: fit.c,
         p: across,
         free_p: across,
+        // The expected half-angle is not fused in the paper, so that its terms are 0.
         by_cos: [T::ZERO; 2],
         var_free_cos: Some(var_c),
         chi2: T::ZERO,
@@ -64,6 +65,8 @@ pub(crate) fn covariance<T: Real>(blocks: &[Block<T>], e: &V3<T>, length_px: T) 
             if !(z > T::from_f64(LEAST_Z)) {
                 continue;
             }
+            // One z comes from p = s/s_z and the other from the error of the point. Near z = 0 the point of the plane
+            // lies at infinity, which is why it is passed over.
             let row = normal.row(&b.ray(l)) * (b.weight[l] / (z * z));
             let rho = if length_px > T::ZERO { (b.step_px[l] / length_px).exp_neg() } else { T::ZERO };
             for (k, a) in carried.iter_mut().enumerate() {

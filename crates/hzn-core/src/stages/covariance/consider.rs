@@ -1,4 +1,5 @@
-//! Errors of what a position fit takes for given: limb height, orientation and semi-axes of the body (math.md, 13.4).
+//! Errors of the inputs that a position fit does not estimate: limb height, orientation and semi-axes of the body
+//! (math.md, 13.4).
 //!
 //! Each parameter moves the limb in scaled space by an angle dθ. With the outward vector q' = u cos α − e sin α at the
 //! limb (a unit vector), the surface point q = U⁻¹q' and the normal U q' in the camera frame, in units of the mean
@@ -40,15 +41,17 @@ impl<T: Real> Sensitivity<T> {
     /// Sums the signals over a part of the points. `None` if the part does not determine the cone.
     pub(crate) fn new(blocks: &[Block<T>], fit: &Fit<T>, target: &Target<T>) -> Option<Self> {
         let (b1, b2) = basis(&fit.e);
+        // The sine comes from 1 − cos α, because for a small disc the cosine is 1 in single precision.
         let sin = (fit.k * (T::one() + fit.c)).max(T::ZERO).sqrt();
         let (tan, zero) = (sin / fit.c, V3::zeros());
-        let to_body = target.body_to_cam.transpose();
+        let to_body = target.camera_from_fixed.transpose();
         let mut normal = [T::ZERO; 6];
         let (mut limb, mut rotation, mut axes, mut light) = (zero, [zero; 3], [zero; 3], [zero; 2]);
         // The limb of a sphere does not feel a rotation, and exact semi-axes have no error.
         let turns = !target.scaling.is_uniform();
         let reshapes = target.radii_sigma_m > T::ZERO;
         part(blocks, fit).for_each(|row| {
+            // The part has its own normal equations, so that a signal which the cone can follow is fitted completely.
             row.add_to(&mut normal);
             let per = T::one() / (row.x * row.x + row.y * row.y).max(T::from_f64(1e-20)).sqrt();
             let outward = (b1 * row.x + b2 * row.y) * (per * fit.c) - fit.e * sin;

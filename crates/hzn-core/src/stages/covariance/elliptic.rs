@@ -26,6 +26,7 @@ pub(super) fn covariance<T: Real>(blocks: &[Block<T>], quadric: &Quadric<T>, len
             }
         }
     }
+    // The last point has no successor, so that its term counts in full (its ρ is 0).
     for c in carried {
         p += c * c.transpose();
     }

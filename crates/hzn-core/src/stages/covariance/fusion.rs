@@ -15,18 +15,21 @@ pub(super) fn fused<T: Real>(
     p: &M3<T>,
     edge: EdgeNoise<T>,
     expected: &Expected<T>,
-    estimate: &fit::Config,
+    config: &fit::Config,
     budget: Option<&mut ErrorBudget<T>>,
 ) -> Option<Fused<T>> {
     let (b1, b2) = basis(&fit.e);
     let var_c = expected.sigma_cos * expected.sigma_cos;
     let var_free = fit.free.then_some(p.m33);
     let free_p = [p.m11, p.m12, p.m22];
-    if !fit.free || estimate.half_angle == fit::HalfAngle::Free || expected.free {
-        return Some(unfused(fit, p, edge, expected, estimate, budget));
+    // A half-angle that was not fitted cannot be fused: its variance and its correlation with the axis do not exist.
+    if !fit.free || config.half_angle == fit::HalfAngle::Free || expected.free {
+        return Some(unfused(fit, p, edge, expected, config, budget));
     }
     let total = p.m33 + var_c;
     let difference = expected.cos - fit.c;
+    // The axis moves with the half-angle, because on an arc both are known only together: on a short arc the fusion
+    // makes sigma three to six times smaller.
     let k = V3::new(p.m13, p.m23, p.m33) * (T::one() / total);
     let e = unit(&(fit.e + b1 * (k.x * difference) + b2 * (k.y * difference)))?;
     if let Some(budget) = budget {
@@ -47,6 +50,7 @@ pub(super) fn fused<T: Real>(
         free_p,
         by_cos: [k.x, k.y],
         var_free_cos: var_free,
+        // The test is made before the fusion. Afterwards both half-angles agree by construction.
         chi2: difference * difference / total,
         edge,
         located: None,
@@ -59,7 +63,7 @@ fn unfused<T: Real>(
     p: &M3<T>,
     edge: EdgeNoise<T>,
     expected: &Expected<T>,
-    estimate: &fit::Config,
+    config: &fit::Config,
     budget: Option<&mut ErrorBudget<T>>,
 ) -> Fused<T> {
     let (b1, b2) = basis(&fit.e);
@@ -67,7 +71,8 @@ fn unfused<T: Real>(
     let (var_free, free_p) = (fit.free.then_some(p.m33), [p.m11, p.m12, p.m22]);
     // If the half-angle is fixed at the expected one, its error causes a proportional error of the axis.
     let k = fixed_half_angle_gain(fit);
-    let var_c = if estimate.half_angle == fit::HalfAngle::Known { T::ZERO } else { var_c };
+    // A half-angle that is told as known counts as exact.
+    let var_c = if config.half_angle == fit::HalfAngle::Known { T::ZERO } else { var_c };
     let (k, var_c) = k.filter(|_| !fit.free).map_or(([T::ZERO; 2], T::ZERO), |k| (k, var_c));
     if let Some(budget) = budget {
         budget.project(&b1, &b2, [T::ZERO; 2], k.map(|k| k * var_c.sqrt()), expected);

@@ -13,6 +13,7 @@ pub(crate) fn correlated<T: Real>(
     mean: [T; 2],
     length_px: T,
 ) -> [T; 6] {
+    // Six sums of four lanes stay in registers; with eight lanes they would not.
     let mut sums = [[T::ZERO; HALF_LANES]; 6];
     // c for the errors in u and for those in v.
     let mut c = [[T::ZERO; 3]; 2];
@@ -28,6 +29,7 @@ pub(crate) fn correlated<T: Real>(
             q[2][l] = -w;
         }
         let mut rho = [T::ZERO; LANES];
+        // White noise has no correlation, and exp(−∞) need not be computed.
         if per_length > T::ZERO {
             for l in 0..LANES {
                 rho[l] = block.step_px[l] * per_length;
@@ -40,6 +42,8 @@ pub(crate) fn correlated<T: Real>(
         for l in 0..LANES {
             gap[l] = T::one() - rho[l] * rho[l];
         }
+        // The chain from lane to lane is kept apart from the products, so that the products become vector instructions.
+        // In a prototype the double sum over 1913 points took 15 µs this way instead of 44 µs.
         let mut before = [[[T::ZERO; LANES]; 3]; 2];
         for (before, (c, g)) in before.iter_mut().zip(c.iter_mut().zip(&g)) {
             for i in 0..3 {

@@ -47,7 +47,7 @@ pub(crate) fn fuse<T: Real>(
     fit: &Fit<T>,
     expected: &Expected<T>,
     config: &Config,
-    estimate: &fit::Config,
+    fit_config: &fit::Config,
     camera: &Camera<T>,
     mut budget: Option<&mut ErrorBudget<T>>,
 ) -> Option<Fused<T>> {
@@ -57,7 +57,7 @@ pub(crate) fn fuse<T: Real>(
     let noise = noise::EdgeNoiseModel::new(fit, config);
     if let Some(quadric) = fit.quadric() {
         let p = elliptic::covariance(blocks, quadric, noise.length_px) * noise.variance;
-        return fused(fit, &p, noise.edge(p.m33), expected, estimate, budget);
+        return fused(fit, &p, noise.edge(p.m33), expected, fit_config, budget);
     }
     let response = response(&fit.sums, fit.mean, fit.free)?;
     let mut p = sandwich(&response, &noise.correlated(blocks, fit, expected));
@@ -67,18 +67,19 @@ pub(crate) fn fuse<T: Real>(
         }
     };
     add(Term::EdgeNoise, &p);
+    // The part of the edge noise is taken before the other terms are added, because a gate replaces this part alone.
     let edge = noise.edge(p.m33);
     common::add_terms(blocks, fit, expected, &noise, camera, |term, more| {
         p += more;
         add(term, more);
     })?;
     if let Some(target) = expected.target().filter(|_| fit.free) {
-        let mut fused = position::fused(blocks, fit, &p, edge, expected, target, estimate, budget)?;
+        let mut fused = position::fused(blocks, fit, &p, edge, expected, target, fit_config, budget)?;
         if let Some(located) = &mut fused.located {
-            let limit_rad = estimate.yaw_limit_deg.to_radians();
+            let limit_rad = fit_config.yaw_limit_deg.to_radians();
             located.turn = third_axis::measured(blocks, fit, expected, target, config, camera, limit_rad);
         }
         return Some(fused);
     }
-    fused(fit, &p, edge, expected, estimate, budget)
+    fused(fit, &p, edge, expected, fit_config, budget)
 }

@@ -11,6 +11,7 @@ use crate::stages::fit::Fit;
 
 /// Returns the correlation length that is assumed for the residuals of the edge, in pixels.
 pub(crate) fn measured_length_px<T: Real>(fit: &Fit<T>) -> T {
+    // The length is a part of the edge and not a number of pixels, so that it scales with the resolution.
     fit.arc_px / T::from_f64(LENGTHS_PER_EDGE)
 }
 
@@ -43,6 +44,8 @@ impl<T: Real> EdgeNoiseModel<T> {
             Noise::Given | Noise::Reml => (T::ZERO, T::ZERO),
         };
         Self {
+            // Residuals only raise the variance: the fit absorbs the longest waves of the errors, so that it does not
+            // see them.
             variance: (told * told).max(rms_px * rms_px),
             length_px: T::from_f64(config.correlation_px).max(length_px),
             shift_px: T::from_f64(config.bias_px).max(common),

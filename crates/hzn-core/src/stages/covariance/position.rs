@@ -23,6 +23,7 @@ use crate::stages::fit::{self, Fit, HalfAngle};
 /// covariance describes the position (math.md, 13.5).
 const GATE_SIGMAS: f64 = 5.0;
 /// Iterations of the fusion with a known distance.
+// With one linear update the NEES was 84 (20° arc, 1 px, range known to 0.1 %), with three iterations 3.4; ideal is 3.
 const ITERATIONS: usize = 3;
 
 /// Computes the position, and fuses the known distance. If the arc is too short for a position, the answer is the
@@ -34,19 +35,20 @@ pub(super) fn fused<T: Real>(
     edge: EdgeNoise<T>,
     expected: &Expected<T>,
     target: &Target<T>,
-    estimate: &fit::Config,
+    config: &fit::Config,
     budget: Option<&mut ErrorBudget<T>>,
 ) -> Option<Fused<T>> {
-    let by_direction = fusion::fused(fit, p, edge, expected, estimate, budget)?;
+    let by_direction = fusion::fused(fit, p, edge, expected, config, budget)?;
     let sin = (fit.k * (T::one() + fit.c)).max(T::ZERO).sqrt();
     if !is_determined(fit, sin, p.m33) || !is_lit_inside(blocks, fit) {
+        // With a known distance the half-angle is the expected one, so that the direction needs no fitted half-angle.
         return target.range.map(|_| by_direction);
     }
     let given = Sensitivity::new(blocks, fit, target)?;
     let light_px = if target.is_in_sunlight { edge.shift_px } else { T::ZERO };
     let lights = light(&given, expected, &fit.e).map(|v| v * light_px);
     let free = located(fit, sin, p, target, &given, &lights);
-    let range = target.range.filter(|_| estimate.half_angle != HalfAngle::Free);
+    let range = target.range.filter(|_| config.half_angle != HalfAngle::Free);
     let (found, chi2) = match range {
         None => (free, T::ZERO),
         Some(range) => with_range(&free, target, range.sigma_m / target.unit_m)?,
@@ -95,6 +97,8 @@ fn located<T: Real>(
     let g = by_cone(target, &fit.e, sin, fit.c) * grown;
     let mut errors = *p;
     let mut add = |v: &V3<T>, sigma: T| errors += v * v.transpose() * (sigma * sigma);
+    // The errors are added before the distance is fused, because they are common to direction and distance: 1 km of
+    // limb height moves the position by r/a km and is often the largest term.
     add(&given.by_limb, target.limb_sigma_m / target.unit_m);
     given.by_rotation.iter().for_each(|v| add(v, target.attitude_sigma_rad));
     given.by_axis.iter().for_each(|v| add(v, target.radii_sigma_m / target.unit_m));
@@ -134,6 +138,8 @@ pub(crate) fn with_range<T: Real>(free: &Located<T>, target: &Target<T>, sigma: 
         let distance = target.range_m(&u)? / target.unit_m;
         let pu = p * u;
         let total = u.dot(&pu) + sigma * sigma;
+        // The measurement is linearised about the last x, but the state starts from the fit again. Otherwise the same
+        // distance would count three times.
         let innovation = distance - x.dot(&u) - u.dot(&(start - x));
         x = start + pu * (innovation / total);
         covariance = p - pu * pu.transpose() * (T::one() / total);
@@ -162,6 +168,7 @@ fn answer<T: Real>(fitted: &Fused<T>, found: Located<T>, chi2: T, target: &Targe
         e,
         c,
         p: [form(&g1, &g1), form(&g1, &g2), form(&g2, &g2)],
+        // The fused distance is no half-angle; its derivative by the expected cosine does not exist.
         by_cos: [T::ZERO; 2],
         chi2,
         located: Some(found),

@@ -51,8 +51,10 @@ pub fn likelihood(rows: impl IntoIterator<Item = Row>, length_px: f64, white: f6
     let (mut sums, mut ln_v, mut n) = ([[0.0; 4]; 4], 0.0, 0.0);
     for row in rows {
         let rho = libm::exp(-row.step_px / length_px);
+        // The first point has no point before it, therefore it carries nothing over.
         let rho = if n > 0.0 { rho } else { 0.0 };
         variance = rho * rho * variance + (1.0 - rho * rho) * alike;
+        // Two points at one place with ν = 0 have no variance of their own; the floor avoids a division by 0.
         let total = (variance + white).max(1e-12);
         let (gain, weight) = (variance / total, 1.0 / total);
         let [a, b, c] = row.columns;
@@ -87,10 +89,12 @@ pub fn likelihood(rows: impl IntoIterator<Item = Row>, length_px: f64, white: f6
 /// Correlation lengths in the average, in standard deviations of ln L.
 const LENGTHS: [f64; 7] = [-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5];
 /// Standard deviation of ln L.
+// A flat prior made the sigma of a disc three times too large.
 const SPREAD: f64 = 0.7;
 /// Ratio of the edge length to the most likely L.
 const LENGTHS_PER_EDGE: f64 = 4.0;
 /// White parts in the average.
+// Without a white part the likelihood chose an L of some 5 px in most scenes, and sigma was far too small.
 const WHITES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 0.95];
 /// Largest ratio of sigma to the RMS of the residuals. It limits processes with a very long correlation length: they
 /// hardly vary along the edge, so that any sigma would be possible.
@@ -140,6 +144,8 @@ impl Posterior {
         }
         let mut total = 0.0;
         for model in models.iter_mut().flatten() {
+            // The smallest value is subtracted first, because the exponential of a likelihood of hundreds of points is
+            // 0.
             model.weight = libm::exp(0.5 * (least - model.weight));
             total += model.weight;
         }
@@ -172,6 +178,7 @@ pub(super) fn averaged<T: Real>(
             *x += part * T::from_f64(variance);
         }
     };
+    // The white parts of all models are added up first, because their sum over pairs does not depend on L.
     add(of_length(0.0), posterior.mean(|m| m.variance_px2 * m.white));
     for models in &posterior.models {
         let length_px = models.first()?.length_px;

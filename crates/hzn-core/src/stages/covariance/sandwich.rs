@@ -12,6 +12,7 @@ pub(crate) fn response<T: Real>(sums: &fit::Sums<T>, [m1, m2]: [T; 2], free: boo
     if free {
         return Some(M3::new(one, zero, zero, zero, one, zero, m1, m2, one) * fit::inverse(sums)?);
     }
+    // With a fixed half-angle only the axis is unknown, so that the upper block alone is inverted.
     let [a, b, d] = invert_spd2(sums.normal_fixed([m1, m2]))?;
     // The rows are Bᵀs = h₁₂ − m h₃.
     Some(M3::new(a, b, -(a * m1 + b * m2), b, d, -(b * m1 + d * m2), zero, zero, zero))

@@ -38,6 +38,8 @@ pub(super) fn measured<T: Real>(
     camera: &Camera<T>,
     limit_rad: f64,
 ) -> Option<Turn<T>> {
+    // The sums over all points in double precision are dear. With the default sigma of the limb height the Earth never
+    // gets below the limit, therefore this is tested first.
     if !can_reach(target, limit_rad) {
         return None;
     }
@@ -48,6 +50,7 @@ pub(super) fn measured<T: Real>(
     // The rotation itself is no noise: what it explains leaves the residuals.
     let explained = sums.projected * sums.projected / (sums.square * fit.sums.weight.to_f64());
     let rms_px = fit.rms_px.to_f64();
+    // Otherwise a body that is turned by a large angle would raise the noise by its own signal.
     let left_px = libm::sqrt((rms_px * rms_px - explained).max(0.0));
     let noise = &EdgeNoiseModel::with_residuals(fit, T::from_f64(left_px), config);
     let sigmas = signal_sigmas(&limb, expected, target, noise);
@@ -111,7 +114,7 @@ struct Limb {
     from: M3<f64>,
     /// The direction to the body, and two directions perpendicular to it.
     sight: [V3<f64>; 3],
-    body_to_cam: M3<f64>,
+    camera_from_fixed: M3<f64>,
     semi_axes: [f64; 3],
 }
 
@@ -148,7 +151,7 @@ impl Limb {
             to,
             from,
             sight: [u, across, down],
-            body_to_cam: double(target.body_to_cam),
+            camera_from_fixed: double(target.camera_from_fixed),
             semi_axes: target.semi_axes.map(|a| a.to_f64()),
         })
     }
@@ -177,6 +180,8 @@ impl Limb {
             h: V3::new(self.sin * azimuth[0], self.sin * azimuth[1], -1.0),
             x: 0.0,
             w: weight / g2,
+            // 1 − σ·e is half of the squared distance of two unit vectors. The difference of cosines would lose the
+            // digits of a small disc.
             residual: 0.5 * d.dot(&d) - self.k,
             gradient,
             azimuth,
@@ -221,7 +226,8 @@ impl Limb {
         let normal = self.to * row.outward;
         let height = self.per_radian() * libm::sqrt(normal.dot(&normal));
         let turned = self.by_rotation(row);
-        let (n, q) = (self.body_to_cam.tr_mul(&normal), self.body_to_cam.tr_mul(&(self.from * row.outward)));
+        let (n, q) =
+            (self.camera_from_fixed.tr_mul(&normal), self.camera_from_fixed.tr_mul(&(self.from * row.outward)));
         let radius = |i: usize| self.per_radian() * n[i] * q[i] / self.semi_axes[i];
         let shift = libm::hypot(row.gradient[0], row.gradient[1]);
         [

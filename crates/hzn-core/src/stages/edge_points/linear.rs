@@ -39,8 +39,11 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let gradient = near.gradient();
     let (lit, dx, dy) = orientation(gradient)?;
     let level = i32::from(binary.level);
+    // The Sun's glare has no plateau, and the mid-level would follow it: at the threshold of the picture the points are
+    // five times as accurate.
     if binary.blooms {
         let [_, inner, outer] = near.across(lit);
+        // The level is kept between both values, so that the point stays within the pixel pair that has the border.
         let level4 = (4 * level).max(outer + 1).min(inner);
         let part = T::from_i32(inner - level4) / T::from_i32((inner - outer).max(1));
         return (inner > outer).then(|| EdgePoint::plain(point_off(p, (dx, dy), part), lit));
@@ -51,6 +54,8 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     // because in haze through a long lens the clouds begin just below.
     let steep = gradient.0.abs().max(gradient.1.abs());
     let line = Line::new(&around, (dx, dy), 1);
+    // Sharp edges take this short way; on wide edges it would end before the plateaus, and the limb would move with the
+    // light.
     if FREE && (2 * level < steep || line.at(FADED, 0).is_some_and(|v| 2 * v < level)) {
         let Crossing { part, fallback, clipped, .. } = line.crossing(near.across(lit))?;
         return Some(EdgePoint { point: point_off(p, (dx, dy), part), lit, fallback, clipped });
@@ -72,6 +77,7 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
 }
 
 /// Largest number of times that a profile is read again about its crossing.
+// The number bounds the cost: each time the whole profile is read again.
 const CLIMBS: u32 = 4;
 
 /// Reads a profile again about its crossing, until the crossing is in the middle of the profile. This is necessary if
@@ -88,6 +94,7 @@ fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
 ) -> WideCrossing<T> {
     let mut whole = 0;
     for _ in 0..CLIMBS {
+        // The sum is positive, so that the cast rounds down for both signs.
         let moved = (found.off + T::from_i32(FARTHEST)).to_i32() - FARTHEST - whole;
         if !found.rising || moved.abs() < step {
             break;
@@ -144,6 +151,7 @@ fn is_line_clear<T: Real, P: Pixels, O: Observer<T>>(
     (dx, _): (i32, i32),
     margin: u16,
 ) -> bool {
+    // A line needs only one pixel on each side, so that edges along the picture's border keep the fast way.
     let margins = if dx == 0 { [1, margin] } else { [margin, 1] };
     !binary.region.has_mask() && binary.region.is_inside_by_each(p.x, p.y, margins)
 }
@@ -182,6 +190,7 @@ fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let k = whole - half / 2;
     let (a, b) = (pixels.smoothed(k)?, pixels.smoothed(k + half)?);
     let fine = T::from_i32(k) + T::from_i32(half * (2 * a - mid2)) / T::from_i32((2 * (a - b)).max(1));
+    // In noise the short interval may have hardly any slope; its crossing would then lie anywhere.
     let off = if (fine - coarse).abs() <= T::from_i32(half) { fine } else { coarse };
     Some(WideCrossing { off, fallback, clipped, rising })
 }

@@ -71,6 +71,7 @@ pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
     let every = border.len().div_ceil(keep.max(1)).max(1);
     let mut made = Points::default();
     let mut place = 0;
+    // The first point lies half a step from the end, so that the points are centred on the edge.
     for &pixel in border.iter().skip(every / 2).step_by(every) {
         if made.extra_cost >= most_extra {
             break;
@@ -87,6 +88,8 @@ pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
         };
         let Some(found) = found else { continue };
         let Some(block) = blocks.get_mut(place / LANES) else { break };
+        // A block is cleared when its first point comes. Clearing all blocks in advance would write memory that no edge
+        // uses.
         if place % LANES == 0 {
             *block = Block::default();
         }
@@ -109,10 +112,13 @@ fn locate<T: Real, P: Pixels, O: Observer<T>>(
     extra_cost: &mut u32,
 ) -> Option<EdgePoint<T>> {
     match config.sub_pixel {
+        // The border pixel's centre lies inside the disc: without the half pixel every disc would be half a pixel too
+        // small.
         SubPixel::None => half_pixel(binary, p),
         SubPixel::Erf if cfg!(feature = "erf") => erf::locate(binary, p).and_then(towards_light),
         SubPixel::Zernike if cfg!(feature = "zju") => zernike::locate(binary, p).and_then(towards_light),
         // `Config::check` refuses a method that is not built in.
+        // The test is made once a point, so that the reads of most points need no test of their own.
         _ if is_clear(binary, p, MARGIN as u16) => linear::<T, P, O, true>(binary, p, extra_cost),
         _ => linear::<T, P, O, false>(binary, p, extra_cost),
     }

@@ -13,6 +13,7 @@ pub(super) const SIDE: usize = 7;
 /// Brightness of the pixels about a pixel, in counts.
 pub(super) struct Patch<T> {
     /// Rows from the top, each from the left.
+    // The pixels are copied, because the fit reads each of them up to six times.
     pub(super) rows: [[T; SIDE]; SIDE],
 }
 

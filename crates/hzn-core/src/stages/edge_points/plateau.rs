@@ -57,14 +57,19 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         let (mut near, mut far) = (outwards.next(), outwards.next());
         loop {
             let (n, f) = (or_here(near, v), or_here(far, v));
+            // Six counts (24 in fourths) are the least contrast, so that noise of a dark picture does not keep the walk
+            // going.
             let contrast = beyond(v, other).max(24);
             if 12 * beyond(n, v) > contrast {
                 (k, v, near) = (k + out, n, far);
             } else if 6 * beyond(f, v) > contrast {
+                // Two steps are tested, because one alone can stand still in noise while the profile goes on.
                 (k, v, near) = (k + 2 * out, f, outwards.next());
             } else {
                 // Further pixels on the same level are part of the mean.
                 let level = match (6 * beyond(v, n) < contrast, 6 * beyond(v, f) < contrast) {
+                    // The mean of three has less noise than one; pixels that already fall again are left out, because
+                    // they belong to another edge.
                     (true, true) => (v + n + f) / 3,
                     (true, false) => (v + n) / 2,
                     (false, true) => (v + f) / 2,
@@ -87,6 +92,8 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         // The plateaus are read in one row, because a mean over several pixels is taken. The crossing is read in three
         // rows.
         let (bright, inner) = self.plateau::<true>(first_lit, first_dark);
+        // The dark side is measured against the lit plateau, because the first lit pixel may lie in the middle of the
+        // edge.
         let (dim, outer) = self.plateau::<false>(first_dark, bright);
         let contrast = bright - dim;
         let level4 = i32::from(binary.level) * 4;
@@ -115,6 +122,7 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
             (k, b) = (k - 1, a);
             a = self.smoothed(k)?;
         }
+        // Between equal values there is no crossing, and the quotient would be infinite.
         if a <= b {
             return None;
         }

@@ -28,6 +28,7 @@ pub(super) fn orientation((gx, gy): (i32, i32)) -> Option<(Lit, i32, i32)> {
     if gx == 0 && gy == 0 {
         return None;
     }
+    // Along the axis of the larger gradient the brightness changes fastest, so that noise moves the crossing least.
     let lit = if gx.abs() >= gy.abs() {
         if gx > 0 { Lit::Right } else { Lit::Left }
     } else if gy > 0 {

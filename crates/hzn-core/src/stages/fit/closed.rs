@@ -39,6 +39,8 @@ fn solve_rows<T: Real>(blocks: &[Block<T>]) -> Option<Rows<T>> {
         let along = T::one() - d.dot(&d) * T::from_f64(0.5);
         [x, y, along, (x * x + y * y) / (T::one() + along)]
     };
+    // The columns are scaled to unit length and solved by rotations, because the product HᵀH loses the disc of a far
+    // body: at 1000 radii, on an arc of 20°, the error would be 2 %.
     let mut squares = [T::ZERO; 4];
     for (block, lane) in weighted(blocks) {
         squares.iter_mut().zip(row(block, lane)).for_each(|(sum, x)| *sum += x * x);
@@ -91,6 +93,7 @@ pub(crate) fn generalised_tls<T: Real>(blocks: &[Block<T>]) -> AxisAndK<T> {
             c += j * j.transpose();
         }
     }
+    // C is factored and never S, because S is singular for rays without noise.
     let l_inverse = inverse_root(&c)?;
     let m = l_inverse * s * l_inverse.transpose();
     let (_, vectors) = symmetric_eigen([[m.m11, m.m12, m.m13], [m.m12, m.m22, m.m23], [m.m13, m.m23, m.m33]]);

@@ -49,6 +49,7 @@ pub(super) fn count_points<T: Real>(blocks: &[Block<T>], cone: Cone<T>) -> Fit<T
         let on = block.weight.map(|w| if w > T::ZERO { T::one() } else { T::ZERO });
         for l in 0..LANES {
             inliers[l] += on[l];
+            // Only steps between two inliers count: a gap is no evidence for a limb.
             arc[l] += on[l] * before * block.step_px[l];
             before = on[l];
         }
@@ -98,6 +99,7 @@ impl<T: Real> State<T> {
     }
     /// sin of the half-angle.
     pub(super) fn sin(&self) -> T {
+        // 1 − c² would cancel for a small disc; k (1 + c) is the same number without a difference.
         (self.k * (T::one() + self.c())).max(T::ZERO).sqrt()
     }
     /// Does a step and returns its size in radians; `None` if the new axis has no direction.

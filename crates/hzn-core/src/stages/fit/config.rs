@@ -1,4 +1,4 @@
-//! `[estimate]` of sensor.toml: the fit of the cone.
+//! `[fit]` of sensor.toml: the fit of the cone.
 
 use crate::base::keys::{choices, section};
 
@@ -7,6 +7,9 @@ choices! {
     pub enum HalfAngle {
         /// The half-angle is fitted freely, then fused with the expected one by their covariances; the result is never
         /// worse than the better of the two.
+        // It is the default because it is never worse than the others. From 80 km, with errors of 1 px over 300 px, the
+        // RMS is 0.54° (known), 0.18° (free) and 0.18° (fused) if the limb height is known to 8 km; it is 0.05°, 0.18°
+        // and 0.05° if it is known to 50 m.
         @0 Fused = "fused";
         /// The half-angle is the expected one, exactly.
         @1 Known = "known";
@@ -39,8 +42,8 @@ choices! {
 }
 
 section! {
-    /// `[estimate]` of sensor.toml: the fit of the cone.
-    "estimate" pub struct Config: Copy {
+    /// `[fit]` of sensor.toml: the fit of the cone.
+    "fit" pub struct Config: Copy {
         /// How the cone is fitted.
         @- method: Method = Method::Sphere, [choice];
         /// Which half-angle the fitted cone has.
@@ -52,7 +55,7 @@ section! {
         @- position: Option<bool> = None, ["true or false"]
             { needs: "position", unset: "true for `ellipsoid` and the planets with a name", example: "true" };
         /// The rotation about the line to the body is reported if its 1σ is below this, degrees; 0 never reports it. It
-        /// needs `estimate.position` and a body that is not a sphere.
+        /// needs `fit.position` and a body that is not a sphere.
         ///
         /// At 1 degree it is as good as a magnetometer. The second harmonic of the limb height decides: see
         /// `body.limb_height_harmonic_sigma_km`.

@@ -25,6 +25,8 @@ pub(crate) fn fit<T: Real>(blocks: &[Block<T>]) -> Option<(V3<T>, T)> {
     let mut best: Option<(T, V3<T>, T)> = None;
     for conic in plane.conics(blocks)? {
         let Some((e, c)) = cone(&plane.rays(&conic), &plane.towards) else { continue };
+        // The two curves are compared in pixels, because their algebraic residuals have different constraints and no
+        // common unit.
         let off = distance2(blocks, &e, c);
         if off.is_finite() && best.is_none_or(|(b, _, _)| off < b) {
             best = Some((off, e, c));
@@ -142,6 +144,8 @@ impl<T: Real> Plane<T> {
         for value in m.iter() {
             largest = largest.max(value.abs());
         }
+        // The scale of a conic is free. With 1 as the largest entry, squares stay in the range of single precision,
+        // which would otherwise depend on it.
         let by = T::one() / largest.max(T::from_f64(1e-30));
         core::array::from_fn(|i| core::array::from_fn(|j| m[(i, j)] * by))
     }

@@ -33,6 +33,7 @@ pub(crate) fn fit_position_from<T: Real>(
 /// Returns a cone, given by axis and 1 − cos of the half-angle, with the normal equations at it.
 pub(super) fn cone_at<T: Real>(blocks: &mut [Block<T>], e: V3<T>, k: T) -> Option<Cone<T>> {
     let e = unit(&e)?;
+    // Outside of these limits no angle has this cosine; the comparison also refuses NaN.
     if !(k > T::ZERO && k < T::from_f64(2.0)) {
         return None;
     }

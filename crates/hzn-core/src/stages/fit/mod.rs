@@ -88,6 +88,7 @@ pub(crate) fn fit<T: Real>(
 }
 
 /// Converts the cosine of a half-angle to 1 − cos.
+// The published equations give a cosine, therefore a small disc has lost its digits before this line.
 fn with_k<T: Real>((e, c): (V3<T>, T)) -> (V3<T>, T) {
     (e, T::one() - c)
 }

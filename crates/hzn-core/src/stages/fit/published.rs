@@ -20,6 +20,7 @@ pub(super) fn fit_by<T: Real>(
     threshold_px: T,
     find: impl FnOnce(&[Block<T>]) -> Option<(V3<T>, T)>,
 ) -> Option<Cone<T>> {
+    // These methods have no robust weights, so that outliers must be left out before.
     if !start.all {
         let limit2 = threshold_px * threshold_px;
         for b in blocks.iter_mut() {
@@ -54,6 +55,8 @@ pub(super) fn elliptic<T: Real>(
         Some((found.e, T::one() - found.c))
     })?;
     let found = quadric?;
+    // The distances are those from the elliptic cone, because distances from a circular one would count its ellipticity
+    // as noise.
     let sums = Sums { weight: found.weight, cost: found.cost, ..cone.sums };
     Some(Cone { sums, quadric, ..cone })
 }

@@ -19,6 +19,8 @@ use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 
 /// Number of unknowns: the matrix of the cone up to its scale.
+// Wang et al. have five unknowns and M₃₃ = 1. Six of length 1 are used here, because M₃₃ is 0 for a limb through the
+// image centre.
 const N: usize = 6;
 /// Largest number of iterations of the weights.
 const ITERATIONS: usize = 12;
@@ -64,6 +66,8 @@ impl<T: Real> Quadric<T> {
         each(blocks, |block, lane| {
             let point = Point::new(block, lane, &v);
             let (row, q) = point.row(&v, weighted);
+            // Rows are rotated into a triangle instead of adding up products, because the two extra unknowns are nearly
+            // undetermined on an arc.
             triangle.push(row.map(|x| x / q.sqrt()));
             weight += T::one();
             cost += point.residual * point.residual / point.q;
@@ -85,6 +89,7 @@ impl<T: Real> Quadric<T> {
     /// Returns the change of (axis, axis, cos α) per error of a point along its gradient, and the gradient by (u, v).
     #[inline]
     pub(crate) fn influence(&self, block: &Block<T>, lane: usize) -> ([T; 3], [T; 2]) {
+        // The response is computed again for each point, because the blocks have no room for six numbers more.
         let point = Point::new(block, lane, &self.v);
         let (row, q) = point.row(&self.v, self.weighted);
         let weight = block.weight[lane & 7] / q;

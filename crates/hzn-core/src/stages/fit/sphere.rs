@@ -16,6 +16,7 @@ use crate::stages::consensus::Consensus;
 const TUKEY: f64 = 4.685;
 
 /// Largest number of robust iterations. `SETTLE` is the largest number of iterations with fixed weights.
+// A pass less was tried: it changes the robust weights, and with them single answers.
 const ROBUST: usize = 10;
 
 /// Number of blocks that the first robust iterations use.
@@ -53,6 +54,8 @@ pub(super) fn sphere<T: Real>(
         Some(settled) => (settled, true),
         // For Sun and Moon there is no expected half-angle to use instead.
         None if expected.free => return None,
+        // A short arc does not determine a half-angle. The expected one is then fixed, and its error is added to the
+        // covariance.
         None => (settle(blocks, State { k: T::one() - expected.cos, ..robust }, None, false, azimuth)?, false),
     };
     Some(Cone { at, mean, sums, free, quadric: None })
@@ -71,7 +74,10 @@ pub(super) fn robust<T: Real>(
     noise: &edge_noise::Config,
     azimuth: Option<&Azimuth<T>>,
 ) -> Option<(State<T>, Sums<T>)> {
+    // With a floor of half a threshold a clean edge keeps its own tails; above two thresholds the clutter would take
+    // part.
     let (widest, narrowest) = (threshold_px * T::from_f64(2.0), threshold_px * T::from_f64(0.5));
+    // The cut-off begins wide, so that a consensus which is a little off does not lose the limb on one side.
     let mut cutoff = threshold_px * T::from_f64(3.0);
     let prior = HalfAngleRow::new(blocks, expected, config, noise);
     let e = unit(&start.e)?;
@@ -102,6 +108,7 @@ pub(super) fn robust<T: Real>(
         if settled {
             break;
         }
+        // The size is compared with the sine of the half-angle, so that small discs are fitted as well as large ones.
         if size < T::from_f64(1e-3) * at.sin() {
             every = 1;
         }
@@ -128,6 +135,7 @@ fn settle<T: Real>(
     for _ in 0..SETTLE {
         let (b1, b2) = basis(&at.e);
         let mean = at.mean;
+        // The sums of the last robust pass are those of the first step, which saves a pass.
         let known = first.take();
         let mut sums = known.unwrap_or_else(|| pass(blocks, &at.e, &b1, &b2, at.k, mean, &Weights::Kept, azimuth));
         let step = if free { sums.step(mean, None, at.c())? } else { sums.step_known(mean)? };

@@ -29,6 +29,6 @@ pub(super) fn verdict<T: Real>(e: &V3<T>, sigma_max_rad: T, expected: &Expected<
     Verdict::Passed
 }
 
-/// Allowed distance between two answers in sigmas, in addition to the turn. `select.max_rate_deg_s` limits the turn
+/// Allowed distance between two answers in sigmas, in addition to the turn. `gates.max_rate_deg_s` limits the turn
 /// itself.
 const LAST_SIGMAS: f64 = 4.0;

@@ -1,11 +1,11 @@
-//! `[select]` of sensor.toml: the gates that an answer must pass, and the choice among answers.
+//! `[gates]` of sensor.toml: the gates that an answer must pass, and the choice among answers.
 
 use crate::base::error::{ConfigError, between};
 use crate::base::keys::{Section, section};
 
 section! {
-    /// `[select]` of sensor.toml: the gates that an answer must pass, and the choice among answers.
-    "select" pub struct Config: Copy {
+    /// `[gates]` of sensor.toml: the gates that an answer must pass, and the choice among answers.
+    "gates" pub struct Config: Copy {
         /// Fewest inliers; a small body or picture needs fewer.
         ///
         /// For a small disc, one third of its circumference in pixels is enough; in a picture of fewer than 80 rows or
@@ -18,8 +18,8 @@ section! {
             unset: "a tenth of the diagonal, or a third of the body's circumference if less",
             example: "60.0",
         };
-        /// Largest weighted RMS distance of the inliers from the limb, px; it grows as `reject.noise_sigma` raises the
-        /// largest distance of an inlier.
+        /// Largest weighted RMS distance of the inliers from the limb, px; it grows as `consensus.noise_sigma` raises
+        /// the largest distance of an inlier.
         @112 max_rms_px: f64 = 2.0, [above 0.0];
         /// Largest difference between the fitted and the expected half-angle, in standard deviations.
         @113 max_half_angle_sigma: f64 = 3.0, [above 0.0];
@@ -48,14 +48,14 @@ section! {
         /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has other points
         /// close to it.
         @- max_nearby: f64 = 1.0 / 3.0, [0.0 to 1e6];
-        /// Where at least this part of an edge's points are inliers, the edge is not checked with `max_way`; 0 turns
+        /// Where at least this part of an edge's points are inliers, the edge is not checked with `max_path`; 0 turns
         /// the check off.
         @- whole_edge: f64 = 0.8, [0.0 to 1.0];
         /// Longest path along the inliers, as a multiple of the limb that they cover, where less than `whole_edge` of
         /// the points are inliers.
         ///
         /// A cloud's edge winds, and a part of it may lie on a limb by chance.
-        @- max_way: f64 = 3.0, [1.0 to 1e6];
+        @- max_path: f64 = 3.0, [1.0 to 1e6];
         /// For the Sun: smallest part of the fitted limb in view that edge points must cover, where `min_support` is
         /// above 0.
         ///
@@ -78,7 +78,7 @@ section! {
         /// Sampling and interpolation cause about this residual even for a perfect edge.
         @- rival_floor_px: f64 = 0.03, [above 0.0 to 1e4];
         /// Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the given
-        /// noise, px; with 1e4 the gate uses the given noise.
+        /// noise, px; with 1e4 the gate uses the told noise.
         @- residual_floor_px: f64 = 0.1, [0.0 to 1e4];
         /// Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
         /// turns the gate off.
@@ -180,9 +180,9 @@ impl Config {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         self.check_keys()?;
         if let Some([low, high]) = self.altitude_limits_km {
-            between("select.altitude_limits_km", high, low, 1e9)?;
+            between("gates.altitude_limits_km", high, low, 1e9)?;
         }
-        for (name, [smallest, largest]) in [("select.sun_size", self.sun_size), ("select.moon_size", self.moon_size)] {
+        for (name, [smallest, largest]) in [("gates.sun_size", self.sun_size), ("gates.moon_size", self.moon_size)] {
             between(name, largest, smallest, 1e6)?;
         }
         Ok(())

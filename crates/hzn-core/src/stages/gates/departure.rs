@@ -186,11 +186,11 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
 }
 
 /// Returns whether the edge continues next to the cone and keeps its contrast there. There are two cases. Either the
-/// continuation is smooth and longer than `select.max_departure` of the longest run of inliers. Or edge points cover
-/// less than `select.min_support_abrupt` of the limb in view; then any continuation counts. `noise_px` is the noise
+/// continuation is smooth and longer than `gates.max_departure` of the longest run of inliers. Or edge points cover
+/// less than `gates.min_support_abrupt` of the limb in view; then any continuation counts. `noise_px` is the noise
 /// from point to point. `support` is the part of the limb in view that edge points cover.
 ///
-/// A continuation is smooth if it turns from box to box by less than `select.departure_turn_deg`, plus an allowance for
+/// A continuation is smooth if it turns from box to box by less than `gates.departure_turn_deg`, plus an allowance for
 /// the noise of the boxes.
 pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
     blocks: &[Block<T>],

@@ -35,7 +35,7 @@ fn dark_angle<T: Real>(sin: T, c: T, expected: &Expected<T>) -> Option<T> {
 
 /// Returns whether a limb of cosine `c` may belong to a glow: if the light above it, above the sky farther out, is
 /// more than `most` of the step from the sky to the body. `false` if the body's air is unknown, or if the picture shows
-/// too little of the sky. `most` is `select.max_glow`.
+/// too little of the sky. `most` is `gates.max_glow`.
 pub(super) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
     places: &Places<T>,
     c: T,

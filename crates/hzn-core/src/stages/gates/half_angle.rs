@@ -1,4 +1,4 @@
-//! Compares the fitted half-angle with the expected one, using the noise of the residuals instead of the given noise.
+//! Compares the fitted half-angle with the expected one, using the noise of the residuals instead of the told noise.
 
 use super::config::Config;
 use crate::base::linalg::basis;
@@ -8,11 +8,11 @@ use crate::model::body::Expected;
 use crate::stages::covariance::{self, Fused};
 use crate::stages::fit::Fit;
 
-/// Returns whether the half-angles differ by more than the residuals allow. If an edge is smoother than the given noise
-/// says, its curvature is also more accurate than the given noise allows.
+/// Returns whether the half-angles differ by more than the residuals allow. If an edge is smoother than the told noise
+/// says, its curvature is also more accurate than the told noise allows.
 ///
 /// The test is (c₀ − ĉ)² / (P₃₃ + σ_c² + other given variances). P₃₃ uses the RMS of the residuals, at least
-/// `select.residual_floor_px`, and the correlation length from the length of the edge
+/// `gates.residual_floor_px`, and the correlation length from the length of the edge
 /// ([`covariance::measured_length_px`]). P₃₃ grows with the square of the RMS, and at most in proportion to the
 /// correlation length. The points are evaluated again only if this bound does not decide the test.
 pub(super) fn disagrees<T: Real>(

@@ -113,7 +113,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
 /// Returns whether only a part of a winding edge is on the cone; this may happen by chance.
 fn is_by_chance<T: Real>(fit: &Fit<T>, points: u32, covered_px: T, config: &Config) -> bool {
     let whole = T::from_i32(fit.inliers as i32) >= T::from_i32(points as i32) * T::from_f64(config.whole_edge);
-    !whole && fit.arc_px > covered_px * T::from_f64(config.max_way)
+    !whole && fit.arc_px > covered_px * T::from_f64(config.max_path)
 }
 
 /// Tests whether the sky is beyond the fitted limb and the body is inside it. The function fills `places` with the

@@ -20,6 +20,7 @@ const LEAST_COUNTS: f64 = 4.0;
 /// bits may use only a thousand counts.
 #[derive(Debug)]
 pub(super) struct Histogram {
+    // Sixteen bits are enough because a sample has at most 4096 pixels; the histogram takes 512 bytes.
     pub(super) bins: [u16; BINS],
     pub(super) sum: u64,
     pub(super) count: u32,
@@ -128,11 +129,14 @@ impl Histogram {
         }
         let scale = self.width::<T>();
         let contrast = (lit - dark) * scale;
+        // The first test suffices for most pictures, so that the spread is computed only for those of low contrast.
         let apart = contrast >= T::from_f64(LEAST_CONTRAST * f64::from(full_scale)) || {
             let spread = self.spread::<T>(first, dark) * scale;
             contrast >= (spread * T::from_f64(LEAST_SPREADS)).max(T::from_f64(LEAST_COUNTS))
         };
         // The lit class begins one bin above the dark class.
+        // The middle of equally good thresholds is as far from the dark class as from the lit one, so that noise
+        // crosses neither.
         let level = T::from_f64(f64::from(first + last)) * T::from_f64(0.5) + T::one() + self.offset();
         (apart && contrast >= T::from_f64(2.0)).then_some(level * scale)
     }

@@ -17,7 +17,7 @@ use crate::model::observer::Observer;
 use crate::model::status::Status;
 
 pub(crate) use crate::model::threshold::SUN;
-pub use crate::model::threshold::{Config, Gate, Method};
+pub use crate::model::threshold::{Brightness, Config, Method};
 pub use level::Level;
 pub(crate) use level::fixed_level;
 pub(crate) use sample::RowSampler;
@@ -31,18 +31,19 @@ use sample::{SIDES_LOG2, SIGMA_PER_MEAN_DISTANCE, Sample};
 pub fn split<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,
     region: &Region<T>,
-    gate: &Gate,
+    brightness: &Brightness,
     config: &Config,
     last: Option<u16>,
     seed: u32,
     observer: &O,
 ) -> Result<Level<T>, Status> {
+    // The coarse sample comes first, because every further row costs lines of memory that are in no cache.
     for side_log2 in SIDES_LOG2 {
         let mut sample = Sample::new(seed, side_log2, picture.full_scale(), region);
         while let Some(y) = sample.row() {
             sample.take(region, observer, |x| Some(picture.at(x, y)));
         }
-        if let Some(decided) = sample.decide(gate, config, last, observer) {
+        if let Some(decided) = sample.decide(brightness, config, last, observer) {
             return decided;
         }
     }
@@ -66,6 +67,8 @@ pub(crate) fn dark_noise<T: Real, P: Pixels, O: Observer<T>>(
     let mut sample = Sample::new(seed, SIDES_LOG2[0], picture.full_scale(), region);
     while let Some(y) = sample.row() {
         sample.take(region, observer, |x| {
+            // Differences of neighbours show the noise without the slope of the brightness, which a deviation from the
+            // mean includes.
             let next = x.checked_add(1).filter(|&next| region.contains(next, y) && !region.masked(next, y))?;
             let (here, there) = (picture.at(x, y), picture.at(next, y));
             (here < level && there < level).then(|| here.abs_diff(there))

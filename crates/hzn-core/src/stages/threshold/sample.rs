@@ -8,16 +8,18 @@ use crate::image;
 use crate::image::region::Region;
 use crate::model::observer::Observer;
 use crate::model::status::Status;
-use crate::model::threshold::{Config, Gate, Method};
+use crate::model::threshold::{Brightness, Config, Method};
 
 /// Ratio of sigma to the mean distance between two values of a normal distribution: √π/2.
 pub(super) const SIGMA_PER_MEAN_DISTANCE: f64 = 0.886_226_925_452_758;
 
 /// Number of cells along each side of the first and of the second sample, as powers of two.
+// 256 pixels suffice for a limb. The second sample of 4096 is for a body that falls between them.
 pub(super) const SIDES_LOG2: [u32; 2] = [4, 6];
 
 /// Both samples of a picture that arrives row by row.
 #[derive(Debug)]
+// Both samples are drawn at once, because the rows do not come again when the first one does not decide.
 pub(crate) struct RowSampler([Sample; SIDES_LOG2.len()]);
 
 impl RowSampler {
@@ -33,6 +35,7 @@ impl RowSampler {
         observer: &O,
     ) {
         for sample in &mut self.0 {
+            // A picture with fewer rows than cells samples a row several times.
             while sample.row() == Some(y) {
                 sample.take(region, observer, |x| Some(row.get(usize::from(x)).map_or(0, |&s| s.into())));
             }
@@ -41,12 +44,12 @@ impl RowSampler {
     /// Finds the threshold as [`split`] does.
     pub(crate) fn split<T: Real, O: Observer<T>>(
         &self,
-        gate: &Gate,
+        brightness: &Brightness,
         config: &Config,
         last: Option<u16>,
         observer: &O,
     ) -> Result<Level<T>, Status> {
-        self.0.iter().find_map(|s| s.decide(gate, config, last, observer)).unwrap_or(Err(Status::NoLimb))
+        self.0.iter().find_map(|s| s.decide(brightness, config, last, observer)).unwrap_or(Err(Status::NoLimb))
     }
 }
 
@@ -73,6 +76,7 @@ impl Sample {
     /// Draws a pixel coordinate in cell number `cell` of a side of `length` pixels.
     fn draw(&mut self, cell: u32, length: u16) -> u16 {
         let length = u32::from(length);
+        // 65 535 times 65 535 just fits 32 bits, so that no wider product is needed.
         ((cell * length + ((length * self.rng.below(65536)) >> 16)) >> self.side_log2) as u16
     }
 
@@ -106,7 +110,7 @@ impl Sample {
     /// Returns the threshold, or the reason why there is none; `None` if a finer sample has to decide.
     pub(super) fn decide<T: Real, O: Observer<T>>(
         &self,
-        gate: &Gate,
+        brightness: &Brightness,
         config: &Config,
         last: Option<u16>,
         observer: &O,
@@ -114,15 +118,17 @@ impl Sample {
         let (sample, full) = (&self.histogram, u32::from(self.full_scale));
         let mean = sample.mean::<T>()?;
         let fraction = mean / T::from_f64(f64::from(full));
-        if fraction < T::from_f64(gate.min_mean) {
+        if fraction < T::from_f64(brightness.min_mean) {
             return Some(Err(Status::TooDark));
         }
-        if fraction > T::from_f64(gate.max_mean) {
+        if fraction > T::from_f64(brightness.max_mean) {
             return Some(Err(Status::TooBright));
         }
         let level = match config.method {
             Method::Fixed => fixed_level::<T>(config, self.full_scale),
             Method::Dynamic => Some(counts(mean * T::from_f64(config.factor))),
+            // Without an answer in the previous picture there is nothing to follow, so that Otsu's threshold begins
+            // again.
             Method::Track if last.is_some() => last,
             Method::Otsu | Method::Track => sample.otsu::<T>(full).map(|l| counts(l * T::from_f64(config.scale))),
         };

@@ -7,9 +7,9 @@ use crate::image::{Grey, Layout};
 use crate::model::observer::Unobserved;
 use std::vec::Vec;
 
-fn level(data: &[u16], bits: u8, gate: Gate, config: Config) -> Result<Level<f64>, Status> {
+fn level(data: &[u16], bits: u8, brightness: Brightness, config: Config) -> Result<Level<f64>, Status> {
     let picture = Grey::try_new(data, Layout::packed(64, 64, 1, bits)).unwrap();
-    split(&picture, &Region::whole(64, 64), &gate, &config, None, 1, &Unobserved)
+    split(&picture, &Region::whole(64, 64), &brightness, &config, None, 1, &Unobserved)
 }
 
 /// The upper part is dark, the lower part is lit.
@@ -19,10 +19,10 @@ fn halves(dark: u16, lit: u16) -> Vec<u16> {
 
 #[test]
 fn otsu_stands_half_way_between_two_values() {
-    let found = level(&halves(10, 210), 8, Gate::default(), Config::default()).unwrap();
+    let found = level(&halves(10, 210), 8, Brightness::default(), Config::default()).unwrap();
     assert_eq!((found.level, found.samples), (110, 256));
     // With 12 bits, the threshold is in the counts of the picture.
-    let found = level(&halves(100, 3900), 12, Gate::default(), Config::default()).unwrap();
+    let found = level(&halves(100, 3900), 12, Brightness::default(), Config::default()).unwrap();
     assert!(found.level.abs_diff(2000) <= 16, "{}", found.level);
 }
 
@@ -30,22 +30,22 @@ fn otsu_stands_half_way_between_two_values() {
 fn fixed_and_dynamic_follow_the_configuration() {
     let data = halves(10, 210);
     let fixed = Config { method: Method::Fixed, level: 77.0, ..Config::default() };
-    assert_eq!(level(&data, 8, Gate::default(), fixed).unwrap().level, 77);
+    assert_eq!(level(&data, 8, Brightness::default(), fixed).unwrap().level, 77);
     let part = Config { level: 0.9, ..fixed };
-    assert_eq!(level(&data, 8, Gate::default(), part).unwrap().level, 229);
-    assert_eq!(level(&data, 12, Gate::default(), part).unwrap().level, 3685);
+    assert_eq!(level(&data, 8, Brightness::default(), part).unwrap().level, 229);
+    assert_eq!(level(&data, 12, Brightness::default(), part).unwrap().level, 3685);
     let dynamic = Config { method: Method::Dynamic, factor: 0.5, ..Config::default() };
-    let found = level(&data, 8, Gate::default(), dynamic).unwrap();
+    let found = level(&data, 8, Brightness::default(), dynamic).unwrap();
     assert_eq!(f64::from(found.level), (found.mean * 0.5).floor());
     assert!((found.mean - 135.0).abs() < 10.0);
 }
 
 #[test]
 fn gates_and_flat_pictures_have_their_status() {
-    let gate = Gate { min_mean: 0.1, max_mean: 0.9 };
-    assert_eq!(level(&halves(1, 2), 8, gate, Config::default()).unwrap_err(), Status::TooDark);
-    assert_eq!(level(&halves(250, 255), 8, gate, Config::default()).unwrap_err(), Status::TooBright);
-    assert_eq!(level(&halves(100, 100), 8, gate, Config::default()).unwrap_err(), Status::NoLimb);
+    let brightness = Brightness { min_mean: 0.1, max_mean: 0.9 };
+    assert_eq!(level(&halves(1, 2), 8, brightness, Config::default()).unwrap_err(), Status::TooDark);
+    assert_eq!(level(&halves(250, 255), 8, brightness, Config::default()).unwrap_err(), Status::TooBright);
+    assert_eq!(level(&halves(100, 100), 8, brightness, Config::default()).unwrap_err(), Status::NoLimb);
 }
 
 #[test]
@@ -55,14 +55,14 @@ fn a_thermal_camera_uses_a_small_part_of_its_words() {
     let noise = |i: usize| (i * 7919 % 41) as u16;
     for sky in [0, 7000, 30_000] {
         let data: Vec<u16> = halves(sky, sky + 1200).iter().enumerate().map(|(i, v)| v + noise(i)).collect();
-        let found = level(&data, 16, Gate::default(), Config::default()).unwrap();
+        let found = level(&data, 16, Brightness::default(), Config::default()).unwrap();
         assert!(found.level.abs_diff(sky + 620) < 40, "{sky}: {found:?}");
         assert!((found.contrast - 1200.0).abs() < 40.0 && (found.dark - f64::from(sky) - 20.0).abs() < 40.0);
         // Half of the light is found at every brightness of the sky.
         assert!(found.at_fraction(0.5).abs_diff(sky + 320) < 40, "{sky}: {}", found.at_fraction(0.5));
         // Noise alone does not form two classes.
         let flat: Vec<u16> = (0..64 * 64).map(|i| sky + noise(i)).collect();
-        assert_eq!(level(&flat, 16, Gate::default(), Config::default()).unwrap_err(), Status::NoLimb);
+        assert_eq!(level(&flat, 16, Brightness::default(), Config::default()).unwrap_err(), Status::NoLimb);
     }
 }
 
@@ -131,6 +131,6 @@ fn a_small_body_is_found_by_the_finer_sample() {
     let data: Vec<u16> = (0..64 * 64)
         .map(|i| if (29..34).contains(&(i % 64)) && (29..34).contains(&(i / 64)) { 200 } else { 0 })
         .collect();
-    let found = level(&data, 8, Gate::default(), Config::default()).unwrap();
+    let found = level(&data, 8, Brightness::default(), Config::default()).unwrap();
     assert!((90..=110).contains(&found.level), "{}", found.level);
 }

@@ -13,7 +13,7 @@ fn limb_cone<T: Real>(tolerance_deg: f64) {
         }
         let position = triple(&case["r_ecef_m"]);
         let cone = LimbCone::<T>::try_new(position.map(T::from_f64), T::from_f64(a), T::from_f64(b)).unwrap();
-        let want = UnitVec3::<Ecef, T>::try_new(triple(&case["limb_axis_ecef"]).map(T::from_f64)).unwrap();
+        let want = UnitVec3::<Fixed, T>::try_new(triple(&case["limb_axis_ecef"]).map(T::from_f64)).unwrap();
         let off = cone.axis.angle_rad(&want).to_f64().to_degrees();
         assert!(off < tolerance_deg, "{}: axis {off:e}", case["id"]);
         let (east, meridian) = cone.half_angles_rad();
@@ -47,7 +47,7 @@ fn azimuth_correction_removes_the_ellipsoid_bias() {
         let q = quaternion(&r);
         let frame = Prior {
             position_m: Some(triple(&case["r_ecef_m"])),
-            cam_to_ecef: Rotation::assume_from_quaternion(q),
+            fixed_from_camera: Rotation::assume_from_quaternion(q),
             ..Prior::default()
         };
         let body = body::Config { limb_height_km: num(&case["atmosphere_d_m"]) / 1e3, ..body::Config::default() };
@@ -65,7 +65,7 @@ fn azimuth_correction_removes_the_ellipsoid_bias() {
         for (with, worst) in [(true, &mut worst.0), (false, &mut worst.1)] {
             let mut frame = frame;
             if !with {
-                frame.cam_to_ecef = None;
+                frame.fixed_from_camera = None;
             }
             let expected = Expected::new(&body, &frame).unwrap();
             // Only half of the limb is used: over a full circle the correction would cancel.

@@ -157,7 +157,7 @@ fn a_full_covariance_beats_the_scalars_and_says_the_same_where_it_is_the_same() 
 }
 
 /// The parts of all sources add up to the whole covariance. Measured noise never gives a smaller covariance than the
-/// given noise.
+/// told noise.
 #[test]
 fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
     for (name, right, half_angle_deg, towards) in scenes() {

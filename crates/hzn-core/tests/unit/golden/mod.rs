@@ -23,7 +23,7 @@ use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::geometry::camera::{Camera, Config as CameraConfig, Model};
 use crate::geometry::ellipsoid::LimbCone;
-use crate::geometry::frames::{Cam, Cov3, Ecef, Rotation, UnitVec3};
+use crate::geometry::frames::{Cam, Cov3, Fixed, Rotation, UnitVec3};
 use crate::geometry::pixel::ImagePoint;
 use crate::model::body::{self, Expected, Prior};
 use crate::model::work::WorkBudget;
@@ -64,7 +64,7 @@ fn direction<T: Real>(v: [f64; 3]) -> UnitVec3<Cam, T> {
     UnitVec3::try_new(v.map(T::from_f64)).unwrap()
 }
 
-/// Makes edge points as the stage `candidates` does. The lit side is the side of the axis `e`.
+/// Makes edge points as the stage `edge_points` does. The lit side is the side of the axis `e`.
 fn blocks<T: Real>(camera: &Camera<T>, points: &[(f64, f64)], e: &UnitVec3<Cam, T>) -> Vec<Block<T>> {
     let points: Vec<_> = points.iter().map(|&(u, v)| ImagePoint { u: T::from_f64(u), v: T::from_f64(v) }).collect();
     Edges::new(camera, &points, e).blocks

@@ -169,7 +169,7 @@ fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
         let attitude: [[f64; 3]; 3] = core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]));
         let frame = Prior::<T> {
             position_m: Some(position.map(T::from_f64)),
-            cam_to_ecef: Rotation::assume_from_quaternion(quaternion(&attitude).map(T::from_f64)),
+            fixed_from_camera: Rotation::assume_from_quaternion(quaternion(&attitude).map(T::from_f64)),
             attitude_sigma_rad: Some(T::from_f64(YAW_SIGMA_RAD)),
             ..Prior::default()
         };

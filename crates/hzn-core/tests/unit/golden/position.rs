@@ -36,10 +36,12 @@ impl<T: Real> Case<T> {
         };
         config.covariance = covariance::Config::given(num(&value["sigma_px"]), 0.0);
         let sensor = Sensor::new(&config).unwrap();
-        let body_to_cam = rows(&value["camera_from_body"]);
-        let cam_to_body: [[f64; 3]; 3] = core::array::from_fn(|i| core::array::from_fn(|j| body_to_cam[j][i]));
-        let attitude = Rotation::<Cam, Ecef, T>::assume_from_quaternion(quaternion(&cam_to_body).map(T::from_f64));
-        let prior = Prior { cam_to_ecef: attitude, attitude_sigma_rad: Some(T::ZERO), ..Prior::default() };
+        let camera_from_fixed = rows(&value["camera_from_body"]);
+        let fixed_from_camera: [[f64; 3]; 3] =
+            core::array::from_fn(|i| core::array::from_fn(|j| camera_from_fixed[j][i]));
+        let attitude =
+            Rotation::<Cam, Fixed, T>::assume_from_quaternion(quaternion(&fixed_from_camera).map(T::from_f64));
+        let prior = Prior { fixed_from_camera: attitude, attitude_sigma_rad: Some(T::ZERO), ..Prior::default() };
         let expected = sensor.expect(&prior).unwrap();
         Self {
             truth_km: Vec3::from(triple(&value["r_km"])),

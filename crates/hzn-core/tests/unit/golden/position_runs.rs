@@ -40,8 +40,8 @@ impl Scene {
             ..body::Config::of_kind(body::Kind::Ellipsoid, Some(radii_km))
         };
         let sensor = Sensor::new(&config).unwrap();
-        let cam_to_ecef = Rotation::assume_from_quaternion(q);
-        let prior = Prior { cam_to_ecef, attitude_sigma_rad: Some(0.0), ..Prior::default() };
+        let fixed_from_camera = Rotation::assume_from_quaternion(q);
+        let prior = Prior { fixed_from_camera, attitude_sigma_rad: Some(0.0), ..Prior::default() };
         let expected = sensor.expect(&prior).unwrap();
         let (sin, cos) = libm::sincos(off_deg.to_radians());
         Self { name, sensor, expected, r: V3::new(sin, 0.0, cos) * distance, points_per_turn: 1257.0 }

@@ -64,7 +64,7 @@ pub fn frame(i: u64) -> FrameRecord {
         },
         attitude: i
             .is_multiple_of(2)
-            .then_some(Attitude { q_ecef_from_camera_wxyz: [0.5, 0.5, 0.5, 0.5], position_m: [6.6e6, f, 0.0] }),
+            .then_some(Attitude { q_fixed_from_camera_wxyz: [0.5, 0.5, 0.5, 0.5], position_m: [6.6e6, f, 0.0] }),
         prior: PicturePrior {
             altitude_km: Some(230.0),
             position_km: Some([6601.0, f, 0.1]),

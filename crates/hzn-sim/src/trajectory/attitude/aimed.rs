@@ -41,7 +41,7 @@ impl Aimed {
 
     /// Returns the attitude of the camera (camera to body-fixed) at a fraction of the time, 0 to 1. `phase` is the
     /// start of the motion around the aim, radians.
-    pub(super) fn camera_to_body_fixed(&self, sight: &Sight, fraction: f64, phase: f64) -> UnitQuaternion<f64> {
+    pub(super) fn fixed_from_camera(&self, sight: &Sight, fraction: f64, phase: f64) -> UnitQuaternion<f64> {
         let at = |[first, last]: [f64; 2]| first + (last - first) * fraction;
         let side = |v: &Vector3<f64>, deg: f64| {
             let (sin, cos) = libm::sincos(deg.to_radians());
@@ -56,7 +56,7 @@ impl Aimed {
         let wander = self.wander_deg.to_radians();
         let swing = |cycles: f64| libm::sin(phase + TAU * cycles * fraction);
         let [w, x, y, z] =
-            pose.disturbed([wander * swing(3.1), wander * swing(2.3 + 0.2 * phase), 0.0]).cam_to_ecef_wxyz;
+            pose.disturbed([wander * swing(3.1), wander * swing(2.3 + 0.2 * phase), 0.0]).q_fixed_from_camera_wxyz;
         UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z))
     }
 }

@@ -103,34 +103,36 @@ impl PreparedAttitude {
     }
 
     /// Returns the attitude of the vehicle at a time.
-    pub(super) fn body_to_ecef(
+    pub(super) fn fixed_from_vehicle(
         &self,
         trajectory: &PreparedTrajectory,
         camera_to_body: &UnitQuaternion<f64>,
         time_s: f64,
     ) -> UnitQuaternion<f64> {
-        let camera_to_ecef = match self {
+        let fixed_from_camera = match self {
             Self::Steps(steps) => {
                 let q = steps.interpolate(time_s);
                 let earth = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), trajectory.sidereal_rad(time_s));
                 return earth.inverse() * q;
             }
             Self::Pointing { pointing, span_s } => {
-                pointing.camera_to_ecef(trajectory.point(time_s).position_m, *span_s, time_s)
+                pointing.fixed_from_camera(trajectory.point(time_s).position_m, *span_s, time_s)
             }
             Self::Towards { towards, span_s, phase } => {
                 let times_s = [time_s, trajectory.unix_s(time_s)];
-                towards.camera_to_ecef(trajectory.point(time_s).position_m, *span_s, times_s, *phase)
+                towards.fixed_from_camera(trajectory.point(time_s).position_m, *span_s, times_s, *phase)
             }
             Self::Aimed { aimed, span_s: [from_s, to_s], phase } => {
                 let fraction = ((time_s - from_s) / (to_s - from_s).max(1e-9)).clamp(0.0, 1.0);
-                let aim = |sight| aimed.camera_to_body_fixed(&sight, fraction, *phase);
+                let aim = |sight| aimed.fixed_from_camera(&sight, fraction, *phase);
                 // An aimed attitude was prepared only for an encounter.
                 trajectory.sight(time_s).map_or_else(UnitQuaternion::identity, aim)
             }
             // The attitude of a table was prepared only for a table with attitudes.
-            Self::Table => trajectory.rows().map_or_else(UnitQuaternion::identity, |rows| rows.camera_to_ecef(time_s)),
+            Self::Table => {
+                trajectory.rows().map_or_else(UnitQuaternion::identity, |rows| rows.fixed_from_camera(time_s))
+            }
         };
-        camera_to_ecef * camera_to_body.inverse()
+        fixed_from_camera * camera_to_body.inverse()
     }
 }

@@ -37,7 +37,7 @@ impl Pointing {
     }
 
     /// Returns the attitude of the camera at a position in ECEF.
-    pub(super) fn camera_to_ecef(
+    pub(super) fn fixed_from_camera(
         &self,
         position_m: Vector3<f64>,
         [from_s, to_s]: [f64; 2],
@@ -77,7 +77,7 @@ impl Towards {
 
     /// Returns the attitude of the camera at a position in ECEF, at a time that is also given as UTC. `phase` is the
     /// start of the motion around the bodies, radians.
-    pub(super) fn camera_to_ecef(
+    pub(super) fn fixed_from_camera(
         &self,
         position_m: Vector3<f64>,
         [from_s, to_s]: [f64; 2],
@@ -104,6 +104,6 @@ impl Towards {
 }
 
 fn quaternion(pose: &Pose) -> UnitQuaternion<f64> {
-    let [w, x, y, z] = pose.cam_to_ecef_wxyz;
+    let [w, x, y, z] = pose.q_fixed_from_camera_wxyz;
     UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
 }

@@ -166,7 +166,7 @@ impl Session {
             return body_values?.get(name);
         }
         let own_section =
-            body_values.and_then(|b| b.get(section)).filter(|_| matches!(section, "binarize" | "covariance"));
+            body_values.and_then(|b| b.get(section)).filter(|_| matches!(section, "threshold" | "covariance"));
         own_section.or_else(|| values.get(section))?.get(name)
     }
 

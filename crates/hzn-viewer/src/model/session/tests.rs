@@ -3,7 +3,7 @@
 use super::*;
 
 const TEXT: &str = "preset = \"hzn\"\n[camera]\nwidth = 640\nheight = 480\nfx_px = 500.0\nfy_px = 500.0\ncx_px = \
-                                    319.5\ncy_px = 239.5\nmodel = \"pinhole\"\n[reject]\nthreshold_px = 3.0 # \
+                                    319.5\ncy_px = 239.5\nmodel = \"pinhole\"\n[consensus]\nthreshold_px = 3.0 # \
                                     mine\n";
 
 fn session() -> Session {
@@ -11,14 +11,14 @@ fn session() -> Session {
 }
 
 fn threshold(s: &Session) -> f64 {
-    s.config().unwrap().reject.threshold_px
+    s.config().unwrap().consensus.threshold_px
 }
 
 #[test]
 fn a_change_counts_and_is_undone() {
     let mut s = session();
     assert!(!s.is_changed() && s.problem().is_none());
-    s.set("reject", "threshold_px", 0, Some(5.0.into()));
+    s.set("consensus", "threshold_px", 0, Some(5.0.into()));
     assert_eq!(threshold(&s), 5.0);
     assert!(s.is_changed() && s.can_undo());
     s.undo();
@@ -35,24 +35,24 @@ fn a_change_counts_and_is_undone() {
 #[test]
 fn one_value_goes_back_to_the_files() {
     let mut s = session();
-    s.set("reject", "threshold_px", 0, Some(5.0.into()));
-    s.set("gate", "max_mean", 0, Some(0.5.into()));
-    assert!(s.differs("reject", "threshold_px", 0) && !s.differs("reject", "seed", 0));
-    s.restore("reject", "threshold_px", 0);
-    s.restore("gate", "max_mean", 0);
-    assert!(!s.differs("reject", "threshold_px", 0));
-    assert_eq!((threshold(&s), s.config().unwrap().gate.max_mean), (3.0, 0.98));
+    s.set("consensus", "threshold_px", 0, Some(5.0.into()));
+    s.set("brightness", "max_mean", 0, Some(0.5.into()));
+    assert!(s.differs("consensus", "threshold_px", 0) && !s.differs("consensus", "seed", 0));
+    s.restore("consensus", "threshold_px", 0);
+    s.restore("brightness", "max_mean", 0);
+    assert!(!s.differs("consensus", "threshold_px", 0));
+    assert_eq!((threshold(&s), s.config().unwrap().brightness.max_mean), (3.0, 0.98));
 }
 
 #[test]
 fn a_drag_is_one_step() {
     let mut s = session();
     for x in [3.1, 3.7, 4.4] {
-        s.set("reject", "threshold_px", 0, Some(x.into()));
+        s.set("consensus", "threshold_px", 0, Some(x.into()));
     }
     s.end_step();
-    s.set("reject", "threshold_px", 0, Some(9.0.into()));
-    s.set("gate", "max_mean", 0, Some(0.5.into()));
+    s.set("consensus", "threshold_px", 0, Some(9.0.into()));
+    s.set("brightness", "max_mean", 0, Some(0.5.into()));
     s.undo();
     s.undo();
     assert_eq!(threshold(&s), 4.4);
@@ -64,9 +64,9 @@ fn a_drag_is_one_step() {
 #[test]
 fn a_refused_value_is_said_and_the_last_good_one_counts() {
     let mut s = session();
-    s.set("reject", "threshold_px", 0, Some((-1.0).into()));
+    s.set("consensus", "threshold_px", 0, Some((-1.0).into()));
     let what = s.problem().unwrap().to_string();
-    assert!(what.contains("[reject] threshold_px") && what.contains("above 0"), "{what}");
+    assert!(what.contains("[consensus] threshold_px") && what.contains("above 0"), "{what}");
     assert_eq!(threshold(&s), 3.0);
     s.undo();
     assert!(s.problem().is_none());
@@ -75,38 +75,38 @@ fn a_refused_value_is_said_and_the_last_good_one_counts() {
 #[test]
 fn values_are_those_that_count() {
     let s = session();
-    assert_eq!(s.number("reject", "threshold_px", 0), Some(3.0));
-    assert_eq!(s.number("candidates", "keep_points", 0), Some(600.0), "the preset's");
-    assert_eq!(s.number("select", "min_arc_px", 0), None);
-    assert_eq!(s.value("binarize", "method", 0).unwrap().as_str(), Some("otsu"));
+    assert_eq!(s.number("consensus", "threshold_px", 0), Some(3.0));
+    assert_eq!(s.number("edge_points", "keep_points", 0), Some(600.0), "the preset's");
+    assert_eq!(s.number("gates", "min_arc_px", 0), None);
+    assert_eq!(s.value("threshold", "method", 0).unwrap().as_str(), Some("otsu"));
 }
 
 #[test]
 fn a_slider_reaches_as_far_while_it_is_moved_as_before() {
     let dir = tempfile::tempdir().unwrap();
     let mut s = session();
-    let magnitude = |s: &Session| s.usual_magnitude("binarize", "scale", 0);
+    let magnitude = |s: &Session| s.usual_magnitude("threshold", "scale", 0);
     assert_eq!(magnitude(&s), 1.0);
-    s.set("binarize", "scale", 0, Some(0.15.into()));
-    assert_eq!((s.number("binarize", "scale", 0), magnitude(&s)), (Some(0.15), 1.0));
+    s.set("threshold", "scale", 0, Some(0.15.into()));
+    assert_eq!((s.number("threshold", "scale", 0), magnitude(&s)), (Some(0.15), 1.0));
     s.save(&dir.path().join("sensor.toml")).unwrap();
     assert_eq!(magnitude(&s), 0.1);
     // Without a saved value, the value in effect sets the magnitude.
-    assert_eq!(s.usual_magnitude("select", "min_arc_px", 0), 1.0);
-    s.set("select", "min_arc_px", 0, Some(120.0.into()));
-    assert_eq!(s.usual_magnitude("select", "min_arc_px", 0), 100.0);
+    assert_eq!(s.usual_magnitude("gates", "min_arc_px", 0), 1.0);
+    s.set("gates", "min_arc_px", 0, Some(120.0.into()));
+    assert_eq!(s.usual_magnitude("gates", "min_arc_px", 0), 100.0);
 }
 
 #[test]
 fn whole_numbers_stay_whole() {
     let mut s = session();
     let key = |path: &str| keys::find(path).unwrap();
-    s.set_number(key("candidates.keep_points"), 0, 299.7);
+    s.set_number(key("edge_points.keep_points"), 0, 299.7);
     s.set_number(key("contour.line_spacing_px"), 0, 4.2);
-    s.set_number(key("reject.threshold_px"), 0, 3.0000001);
+    s.set_number(key("consensus.threshold_px"), 0, 3.0000001);
     assert!(s.problem().is_none(), "{:?}", s.problem());
     let config = s.config().unwrap();
-    assert_eq!((config.candidates.keep_points, config.contour.line_spacing_px), (300, Some(4)));
+    assert_eq!((config.edge_points.keep_points, config.contour.line_spacing_px), (300, Some(4)));
     assert_eq!(threshold(&s), 3.0);
 }
 
@@ -124,7 +124,7 @@ fn saved_is_what_is_read_again() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("sensor.toml");
     let mut s = session();
-    s.set("reject", "threshold_px", 0, Some(5.0.into()));
+    s.set("consensus", "threshold_px", 0, Some(5.0.into()));
     s.save(&path).unwrap();
     assert!(!s.is_changed());
     let again = Session::open(&path).unwrap();
@@ -138,7 +138,7 @@ fn saved_is_what_is_read_again() {
 #[test]
 fn under_another_preset_the_camera_stays() {
     let mut s = session();
-    s.set("reject", "threshold_px", 0, Some(5.0.into()));
+    s.set("consensus", "threshold_px", 0, Some(5.0.into()));
     let other = s.under_preset(Preset::Dlr2022);
     assert!(other.problem().is_none(), "{:?}", other.problem());
     let (a, b) = (s.config().unwrap(), other.config().unwrap());
@@ -163,7 +163,7 @@ fn a_change_by_another_program_is_noticed() {
     let theirs = TEXT.replace("3.0", "4.0");
     std::fs::write(&path, TEXT).unwrap();
     let mut s = Session::open(&path).unwrap();
-    s.set("reject", "threshold_px", 0, Some(5.0.into()));
+    s.set("consensus", "threshold_px", 0, Some(5.0.into()));
     assert_eq!(s.file_change(), None);
     std::fs::write(&path, &theirs).unwrap();
     assert_eq!(s.file_change(), Some(FileChange::Changed));
@@ -187,7 +187,7 @@ fn the_text_of_the_file_is_read_again() {
     let theirs = TEXT.replace("3.0", "4.0");
     std::fs::write(&path, TEXT).unwrap();
     let mut s = Session::open(&path).unwrap();
-    s.set("reject", "threshold_px", 0, Some(5.0.into()));
+    s.set("consensus", "threshold_px", 0, Some(5.0.into()));
     std::fs::write(&path, &theirs).unwrap();
     s.reload().unwrap();
     assert_eq!((threshold(&s), s.is_changed(), s.file_change()), (4.0, false, None));
@@ -196,7 +196,7 @@ fn the_text_of_the_file_is_read_again() {
     // The same text in the window and in the file leaves no difference.
     std::fs::write(&path, s.sheet().text()).unwrap();
     s.reload().unwrap();
-    assert!(!s.is_changed() && !s.differs("reject", "threshold_px", 0));
+    assert!(!s.is_changed() && !s.differs("consensus", "threshold_px", 0));
     std::fs::remove_file(&path).unwrap();
     assert!(s.reload().is_err() && threshold(&s) == 5.0);
 }

@@ -69,7 +69,7 @@ pub(super) fn under_pointer(
     if let Some((outcome, answer)) = outcome.and_then(|o| Some((o, o.bodies.get(body)?)))
         && let Some(r) = Residual::rejected_at(&answer.residuals, p, REJECTED_REACH / placement.scale())
     {
-        let limit = outcome.config.reject.threshold_px;
+        let limit = outcome.config.consensus.threshold_px;
         text += &format!("   rejected point: {:+.2} px from the fitted limb (threshold_px {limit})", r.distance_px);
     }
     Some(text)

@@ -278,7 +278,8 @@ fn why_empty(viewer: &Viewer, quantity: &Quantity) -> String {
     match quantity.name {
         _ if viewer.rows.is_empty() => "No frame is processed yet.".into(),
         "Roll, pitch" if session.config().is_some_and(|c| c.mount.is_none()) => {
-            "Roll and pitch need the mounting of the camera: set [mount] q_body_from_camera_wxyz in sensor.toml.".into()
+            "Roll and pitch need the mounting of the camera: set [mount] q_vehicle_from_camera_wxyz in sensor.toml."
+                .into()
         }
         "Error (truth)" => "No answer has a truth to compare with.".into(),
         _ if !answered => "No frame has an answer yet, so there is nothing to plot.".into(),

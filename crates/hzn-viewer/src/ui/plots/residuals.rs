@@ -33,7 +33,7 @@ fn chosen(viewer: &Viewer) -> (String, Vec<Residual>) {
 
 /// Plots the residuals of the edge points along the fitted limb; returns the picture point that was clicked.
 pub(super) fn show(viewer: &Viewer, ui: &mut Ui, height: f32) -> Option<[f64; 2]> {
-    let threshold = viewer.frame_view.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.reject.threshold_px);
+    let threshold = viewer.frame_view.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.consensus.threshold_px);
     let (title, all) = chosen(viewer);
     let points = |kept: bool| -> PlotPoints<'_> {
         all.iter().filter(|r| (r.weight > 0.0) == kept).map(|r| [r.azimuth_deg, r.distance_px]).collect()

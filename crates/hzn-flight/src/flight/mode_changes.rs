@@ -1,4 +1,4 @@
-//! The flight loop starts after a reset, and shuts down.
+//! The mode after a reset, and its changes by the lines of the vehicle: lift-off, loss of power, end of the flight.
 
 use super::Flight;
 use super::recovery::{OLDER_AFTER, SAFE_AFTER};
@@ -12,6 +12,7 @@ impl<B: Board> Flight<'_, B> {
         if resets >= OLDER_AFTER {
             self.send_event(Event::OlderParameters, self.state.parameter_copy.into(), resets.into());
         }
+        // Neither copy of the parameters ended the resets, so the computer processes nothing and listens.
         if resets >= SAFE_AFTER {
             self.send_event(Event::SafeAfterResets, resets.into(), 0);
             self.enter_mode(Mode::Safe);
@@ -23,6 +24,8 @@ impl<B: Board> Flight<'_, B> {
 
     /// Follows the lines of the vehicle. Returns whether the computer has shut down.
     pub(super) fn follow_vehicle(&mut self, now_us: u64) -> bool {
+        // The change counts and not the state, so that a commanded standby lasts. It is also noted outside standby,
+        // because the time to the shut-down runs in every mode.
         let line_is_off = self.board.lift_off();
         if self.recovery.sees_lift_off(line_is_off, now_us) && self.mode == Mode::Standby {
             self.enter_mode(Mode::Flight);

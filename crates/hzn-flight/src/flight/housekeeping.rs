@@ -1,4 +1,4 @@
-//! The flight loop sends events and housekeeping.
+//! Sends housekeeping when its time has come, and events.
 
 use super::Flight;
 use super::reports::{ARMED, CAMERA_SILENT, LIFTED_OFF, NOT_STORED, STAGED};
@@ -18,6 +18,7 @@ impl<B: Board> Flight<'_, B> {
 
     pub(super) fn send_housekeeping(&mut self) {
         let now_us = self.board.now_us();
+        // Both limits start again, so that pictures and time together do not send twice as often.
         (self.since_housekeeping, self.housekeeping_us) = (0, now_us);
         let bit = |is_set: bool, bit: u8| if is_set { bit } else { 0 };
         let state = &mut self.state;
@@ -39,7 +40,9 @@ impl<B: Board> Flight<'_, B> {
     /// Sends an event. There may be too many warnings; then they are counted.
     pub(super) fn send_event(&mut self, event: Event, a: u32, b: u32) {
         let now_us = self.board.now_us();
+        // Noise causes this event, so it needs as many bytes on the line. Otherwise more would go out than comes in.
         let is_caused_by_line = event == Event::CommandRejected;
+        // The warnings are asked first, so that one that is withheld does not use up the bytes for answers.
         if event.severity() == Severity::Warning && !self.limiter.allows_warning(now_us)
             || is_caused_by_line && !self.limiter.allows_answer(EventRecord::BYTES)
         {

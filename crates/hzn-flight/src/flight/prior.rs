@@ -1,4 +1,4 @@
-//! The flight loop takes values from navigation, and lets them expire.
+//! The prior of a picture: values that navigation sent, until they expire.
 
 use super::Flight;
 use super::navigation::{Known, Refusal};
@@ -17,9 +17,12 @@ impl<B: Board> Flight<'_, B> {
         let sensor = self.sensor.get();
         let is_earth = matches!(sensor.config().body.kind, Kind::Earth | Kind::EarthSphere);
         let moves = known.motion.is_some_and(|motion| motion.velocity_m_s.is_some());
+        // They are tried now, so that the ground learns from the acknowledgement that they are impossible, and not by
+        // an event for each picture. Free fall is computed with the gravity and the rotation of the Earth.
         if sensor.expect(&known.prior).is_err() || moves && !is_earth {
             return Code::Refused;
         }
+        // The last answer and the threshold come from pictures, so that new values from navigation do not replace them.
         let Known { last, level, .. } = *self.known.get();
         self.known.set(Known { last, level, ..known });
         self.known.complete();
@@ -32,6 +35,7 @@ impl<B: Board> Flight<'_, B> {
         if let Some(prior) = self.known.get().at(exposure_us) {
             return prior;
         }
+        // Once, because the event would otherwise come with every picture.
         if !self.has_expired {
             self.has_expired = true;
             let age_s = self.known.get().motion.map_or(0.0, |motion| motion.age_s(exposure_us).abs());

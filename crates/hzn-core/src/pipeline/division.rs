@@ -51,7 +51,7 @@ impl<T: Real> Sensor<T> {
             self.look_at_crop(lists.reborrow(), whole, picture, expected, taken, observer, None, report);
         }
         let divisible = !matches!(report.status, Status::Ok | Status::TooDark | Status::TooBright) && !report.glows();
-        if self.config.recover.method == Method::Division && divisible {
+        if self.config.retry.method == Method::Division && divisible {
             self.divide(lists, whole, picture, expected, taken, observer, report);
         }
     }
@@ -72,7 +72,7 @@ impl<T: Real> Sensor<T> {
         let mut work = budget::new(&self.config, lists.border.len());
         work.charge(report.counters.work);
         let mut cut = false;
-        let least = f64::from(whole.area()) * self.config.recover.least_part;
+        let least = f64::from(whole.area()) * self.config.retry.least_part;
         let mut answers = Answers::<T>::new();
         let mut chosen = heapless::Vec::<Candidate<T>, ANSWERS>::new();
         let mut waiting = heapless::Vec::<Crop, WAITING>::new();
@@ -110,10 +110,10 @@ impl<T: Real> Sensor<T> {
 
     /// Writes the answer of the parts into the report, if there is one.
     fn conclude_parts(&self, answers: &mut Answers<T>, chosen: &[Candidate<T>], report: &mut Report<T>) {
-        if let Some(mut answer) = combine_answers(answers, self.config.recover.combine) {
-            answer.axis_body = self.cam_to_body.as_ref().map(|r| r.apply(&answer.axis));
+        if let Some(mut answer) = combine_answers(answers, self.config.retry.combine) {
+            answer.axis_vehicle = self.vehicle_from_camera.as_ref().map(|r| r.apply(&answer.axis));
             report.status = Status::Ok;
-            report.stage = Stage::Select;
+            report.stage = Stage::Gates;
             if let Some(edge) = chosen.iter().find(|c| c.number == answer.candidate) {
                 report.choose(*edge, Verdict::Chosen);
             }
@@ -139,7 +139,7 @@ impl<T: Real> Sensor<T> {
             config,
             camera: self.camera.for_crop(&crop),
             region: self.region.for_crop(&crop),
-            cam_to_body: self.cam_to_body,
+            vehicle_from_camera: self.vehicle_from_camera,
         };
         let at = |x: u16, y: u16| picture.at(x, y);
         let picture = Cropped::new(&at, picture.full_scale(), crop);
