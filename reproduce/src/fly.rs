@@ -5,8 +5,9 @@ use std::time::Instant;
 use anyhow::Context;
 use hzn_core::body::Kind;
 use hzn_core::{Config, HostHorizon, Report};
-use hzn_sim::evaluate::{Answer, Case, Evaluation, MeasuredDirection, pair};
-use hzn_sim::{Flight, FlightFrame, Picture, Truth};
+use hzn_evaluate::{Answer, Case, Evaluation, MeasuredDirection, pair};
+use hzn_files::truth::Truth;
+use hzn_sim::{Flight, FlightFrame, Picture};
 use rayon::prelude::*;
 
 /// Sensor, with the parts of the prior that it gets.
@@ -160,7 +161,7 @@ pub(crate) fn evaluate(cases: &[Case]) -> Evaluation {
 /// Returns the cells of an evaluation: answered, false answers, RMS, 95 %, worst, NEES with its interval.
 pub(crate) fn cells(e: &Evaluation) -> Vec<String> {
     let none = || "–".to_owned();
-    let error = |value: fn(&hzn_sim::evaluate::Errors) -> f64| e.errors.as_ref().map_or_else(none, |x| deg(value(x)));
+    let error = |value: fn(&hzn_evaluate::Errors) -> f64| e.errors.as_ref().map_or_else(none, |x| deg(value(x)));
     let without = e.frames - e.with_limb;
     vec![
         format!("{}/{}", e.answered, e.with_limb),

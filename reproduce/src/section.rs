@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Context;
-use hzn_cli::plot::Chart;
+use hzn_plot::Chart;
 
 /// Result of a study.
 #[derive(Debug, Default)]

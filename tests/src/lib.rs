@@ -6,12 +6,14 @@
 //! | [`sensors`] | both precisions of the sensor behind one call |
 //! | [`tally`] | errors, sigmas and NEES of many answers |
 //! | [`table`] | accuracy by altitude, noise, visible arc and lens |
+//! | [`artefact`] | pictures with flares, windows, panels or ground instead of a limb |
 //! | [`disc`] | discs of Sun and Moon |
 //! | [`emulated`] | the firmware in QEMU |
 //! | [`flight_image`] | the flight image in QEMU, with its camera, its flash and its serial line |
 //! | [`stack_bound`] | a bound of a firmware image's stack, from its disassembly |
 //! | [`real`] | photographs with their sensor.toml, and the fitted limb drawn over them |
 
+pub mod artefact;
 pub mod disc;
 pub mod emulated;
 pub mod flight_image;

@@ -33,7 +33,7 @@ impl Photograph {
     /// Panics if one of them cannot be read.
     pub fn load(file: &str) -> Self {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/real").join(file);
-        let sensor = hzn_calib::sensor::load(&path.with_extension("toml")).unwrap_or_else(|e| panic!("{e}"));
+        let sensor = hzn_files::sensor::load(&path.with_extension("toml")).unwrap_or_else(|e| panic!("{e}"));
         let rgb = image::open(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).into_rgb8();
         Self { name: file.replace('/', "-").replace(['.'], "-"), sensor: sensor.config, rgb }
     }

@@ -90,6 +90,6 @@ fn main() -> ExitCode {
 
 /// Writes the documents that are derived from the keys of sensor.toml.
 fn write_keys() -> Result<(), String> {
-    let mut cargo = steps::cargo(&["run", "--quiet", "-p", "hzn-calib", "--example", "keys", "--", "."]);
+    let mut cargo = steps::cargo(&["run", "--quiet", "-p", "hzn-files", "--example", "keys", "--", "."]);
     steps::run(&mut cargo).map_err(steps::Trouble::into_message)
 }

@@ -8,9 +8,8 @@ use std::fmt;
 
 use hzn_core::camera::{Camera, Config, Equation, Intrinsic, Model};
 use hzn_core::pixel::ImagePoint;
+use hzn_files::camera_file::{Loaded, Omni};
 use nalgebra::{DMatrix, DVector};
-
-use crate::camera_file::{Loaded, Omni};
 
 /// Largest angle off axis that a lens of the plane can show usefully, in degrees: there the picture is 57 focal lengths
 /// wide.

@@ -9,10 +9,10 @@
 
 use std::path::{Path, PathBuf};
 
+use hzn_files::{Problem, limited};
 use serde::{Deserialize, Serialize};
 
 use crate::calibrated::{Calibrated, Residual};
-use crate::{Problem, limited};
 
 /// Name of the table next to pictures.
 const NAME: &str = "residuals.csv";

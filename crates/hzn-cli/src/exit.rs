@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use hzn_calib::Problem;
+use hzn_files::Problem;
 use hzn_run::{Kind, Remedy};
 
 /// Exit codes. The numbers are fixed: scripts rely on them.
@@ -72,7 +72,7 @@ impl From<hzn_run::Error> for Stop {
         };
         let error = match error.remedy().and_then(option) {
             Some(option) => anyhow::anyhow!("{error}; {option}"),
-            None => error.into_cause(),
+            None => anyhow::Error::from_boxed(error.into_cause()),
         };
         Self::new(exit, error)
     }
@@ -89,6 +89,24 @@ fn option(remedy: Remedy) -> Option<&'static str> {
         Remedy::Headerless => "--raw reads files without a header",
         _ => return None,
     })
+}
+
+impl From<hzn_ground::Error> for Stop {
+    fn from(error: hzn_ground::Error) -> Self {
+        match error {
+            hzn_ground::Error::Unusable(message) => usage(message),
+            hzn_ground::Error::Sensor(problem) => problem.into(),
+            hzn_ground::Error::Output(error) => error.into(),
+            hzn_ground::Error::System(error) => error.into(),
+            error => failed(error),
+        }
+    }
+}
+
+impl From<hzn_plot::Error> for Stop {
+    fn from(error: hzn_plot::Error) -> Self {
+        Self::new(Exit::Failed, error.into())
+    }
 }
 
 impl From<Problem> for Stop {

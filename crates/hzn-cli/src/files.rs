@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_calib::{limited, named_camera_file};
+use hzn_files::{files_of_sensor, named_camera_file};
 use hzn_run::disk;
 use hzn_run::source::{Source, ending};
 
@@ -22,18 +22,12 @@ pub(crate) fn check_outputs(read: &[PathBuf], written: &[PathBuf], force: bool) 
 pub(crate) fn of_sequence(source: &dyn Source, sensor: &SensorArgs, input: &InputArgs) -> Vec<PathBuf> {
     let mut files = source.files();
     match (sensor.path(source), source.sensor_toml()) {
-        (Some(path), _) => files.extend(of_sensor(&path)),
+        (Some(path), _) => files.extend(files_of_sensor(&path)),
         (None, Some(text)) => files.extend(named_camera_file(text, &source.folder().join("sensor.toml"))),
         (None, None) => {}
     }
     files.extend(input.frames_path(source));
     files
-}
-
-/// Returns a sensor.toml or scene.toml with the camera file that it names.
-pub(crate) fn of_sensor(path: &Path) -> Vec<PathBuf> {
-    let text = limited::read_text(path, limited::SETTINGS_BYTES).unwrap_or_default();
-    [path.to_owned()].into_iter().chain(named_camera_file(&text, path)).collect()
 }
 
 /// Returns what a command that writes pictures into a folder can replace there: everything with the ending of a

@@ -3,7 +3,7 @@
 //!
 //! `main.rs` turns the result of [`main`] into an exit code. Each command has one file in [`commands`] and is built
 //! from the parts of `hzn-run`. This crate has the arguments, the progress bar, the exit codes ([`exit`]) and the
-//! charts of reports ([`plot`]).
+//! reports.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic when the output is closed; `tell` does not")]
 
@@ -12,11 +12,9 @@ pub mod commands;
 pub mod exit;
 mod files;
 mod html;
-pub mod plot;
 mod progress;
 mod refusals;
 mod setup;
-mod tai;
 mod tell;
 
 use clap::Parser;

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
-use hzn_calib::{FrameData, Frames, Sensor, plausible};
 use hzn_core::Config;
 use hzn_core::body::{self, PriorError};
 use hzn_core::config::Orient;
+use hzn_files::truth::Truth;
+use hzn_files::{FrameData, Frames, Sensor, plausible};
 use hzn_run::disk;
 use hzn_run::engine::{self, AnySensor};
 use hzn_run::source::{self, Raw, Source};
-use hzn_sim::Truth;
 
 use crate::exit::{Exit, Stop, usage};
 use crate::tell;
@@ -62,9 +62,9 @@ impl SensorArgs {
     pub(crate) fn load(&self, source: &dyn Source) -> Result<Sensor, Stop> {
         let folder = source.folder();
         let mut sensor = match (self.path(source), source.sensor_toml()) {
-            (Some(path), _) => hzn_calib::sensor::load(&path)?,
+            (Some(path), _) => hzn_files::sensor::load(&path)?,
             // If the text names a camera file, the file is expected next to the recording.
-            (None, Some(text)) => hzn_calib::sensor::parse(text, &folder.join("sensor.toml"))
+            (None, Some(text)) => hzn_files::sensor::parse(text, &folder.join("sensor.toml"))
                 .map_err(|e| usage(format!("the sensor.toml in the recording: {e}; --sensor FILE replaces it")))?,
             (None, None) => {
                 let what = format!("no sensor: give --sensor FILE, or put a sensor.toml into {}", folder_name(&folder));
@@ -84,7 +84,7 @@ impl SensorArgs {
             }
             // With the changed text, a recording is processed again with the same altitude.
             sensor.text = with_altitude(&sensor.text, km, &changed);
-            hzn_calib::sensor::check(&sensor.config).map_err(|e| usage(format!("--altitude-km: {e}")))?;
+            hzn_files::sensor::check(&sensor.config).map_err(|e| usage(format!("--altitude-km: {e}")))?;
             let doubts = plausible::find_implausible(&sensor.config);
             if let Some(doubt) = doubts.iter().find(|d| d.key == "body.altitude_km") {
                 tell::warning(format_args!("--altitude-km: {}", doubt.what));
@@ -113,7 +113,7 @@ impl InputArgs {
     /// Reads frames.csv, if there is one, and checks every row against the sensor. Warnings are printed to stderr.
     pub(crate) fn frames(&self, source: &dyn Source, sensor: &Sensor, flight: bool) -> Result<Option<Frames>, Stop> {
         let Some(path) = self.frames_path(source) else { return Ok(None) };
-        let frames = hzn_calib::frames::load(&path)?;
+        let frames = hzn_files::frames::load(&path)?;
         for warning in &frames.warnings {
             tell::warning(warning);
         }

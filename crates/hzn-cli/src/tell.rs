@@ -7,7 +7,9 @@
 
 use std::fmt::Display;
 use std::io::{self, Write};
+use std::sync::Arc;
 
+use hzn_fly::tell::Tell;
 pub(crate) use hzn_run::terminal::one_line;
 use hzn_run::terminal::{FileOnStdout, lines};
 
@@ -43,6 +45,11 @@ pub(crate) fn bytes(bytes: &[u8]) -> io::Result<()> {
 /// Prints a line to stderr. If stderr is closed, the message is lost and the work goes on.
 pub(crate) fn line(text: impl Display) {
     let _ = writeln!(io::stderr().lock(), "{}", one_line(text));
+}
+
+/// Returns what shows the lines of a library on stderr, from any thread.
+pub(crate) fn to_stderr() -> Tell {
+    Arc::new(|text: &str| line(text))
 }
 
 /// Prints a warning to stderr. It stops nothing, but the user should read it.

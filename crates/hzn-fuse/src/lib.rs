@@ -9,7 +9,7 @@
 //! | [`start`] | the first attitude from directions in a window of time |
 //! | [`smooth`] | the smoothed solution |
 //! | [`results`] | what comes out |
-//! | [`simulated`] | recordings of simulated flights without pictures |
+//! | `simulated` | recordings of simulated flights without pictures, with the feature of this name |
 //! | [`sink`] | results as files: CSV, MCAP, AEM, CK, frames.csv |
 //! | [`read_back`] | these files (CSV, MCAP) back into numbers |
 
@@ -21,6 +21,7 @@ pub mod input;
 pub mod read_back;
 pub mod results;
 pub mod settings;
+#[cfg(feature = "simulated")]
 pub mod simulated;
 pub mod sink;
 pub mod smooth;

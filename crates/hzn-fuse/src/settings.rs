@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use hzn_calib::limited;
+use hzn_files::limited;
 use hzn_nav::options::{Block, CameraOptions, ImuOptions, Mode, Options, StartSigmas};
 use serde::{Deserialize, Serialize};
 
@@ -250,7 +250,7 @@ impl Settings {
     pub fn load(path: &Path) -> Result<Self, Error> {
         let text = limited::read_text(path, limited::SETTINGS_BYTES)
             .map_err(|e| Error::unusable(format!("{}: {e}", path.display())))?;
-        hzn_calib::document::parse(&text, path, Self::check).map_err(Error::unusable)
+        hzn_files::document::parse(&text, path, Self::check).map_err(Error::unusable)
     }
 
     /// Fails for the first value that is out of its limits, with its key and the rule.

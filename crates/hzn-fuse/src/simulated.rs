@@ -12,7 +12,7 @@ use hzn_sim::{FlightFrame, Scenario, ScenarioError};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::error::Error;
-use crate::flight::limb_axis;
+use crate::flight::reference::limb_axis;
 use crate::input::{Body, Fix, Inputs, Recording, Sample, Seen};
 
 /// Half-angle of the discs of Sun and Moon, rad.

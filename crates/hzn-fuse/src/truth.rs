@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hzn_sim::trajectory::VehicleRow;
+use hzn_files::vehicle::VehicleRow;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::error::Error;

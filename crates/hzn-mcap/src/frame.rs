@@ -2,6 +2,7 @@
 
 use hzn_core::Report;
 use hzn_core::real::Real;
+use hzn_files::FrameData;
 use serde::{Deserialize, Serialize};
 
 use crate::row::Row;
@@ -19,8 +20,9 @@ pub struct FrameRecord {
     pub annotations: Annotations,
     /// Attitude of the camera, if it is known.
     pub attitude: Option<Attitude>,
-    /// The prior of the picture. With it the same answer can be computed again.
-    pub prior: PicturePrior,
+    /// The prior of the picture. With it the same answer can be computed again. Name, line and time are not stored, as
+    /// the row has them.
+    pub prior: FrameData,
     /// Messages about this frame.
     pub log: Vec<LogLine>,
 }
@@ -34,7 +36,7 @@ impl FrameRecord {
             image: None,
             annotations: Annotations::default(),
             attitude: None,
-            prior: PicturePrior::default(),
+            prior: FrameData::default(),
             log: Vec::new(),
         }
     }
@@ -150,59 +152,6 @@ pub struct Attitude {
     pub q_fixed_from_camera_wxyz: [f64; 4],
     /// Position of the camera in the fixed frame, metres; zeros if it is unknown.
     pub position_m: [f64; 3],
-}
-
-/// The prior of a picture: the columns of frames.csv as numbers.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default)]
-pub struct PicturePrior {
-    /// UTC in seconds since 1970.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub utc_s: Option<f64>,
-    /// Altitude, kilometres.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub altitude_km: Option<f64>,
-    /// Position in the fixed frame, kilometres.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position_km: Option<[f64; 3]>,
-    /// Prior attitude, from the camera to the fixed frame, scalar first.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub q_fixed_from_camera_wxyz: Option<[f64; 4]>,
-    /// 1-sigma of that attitude, degrees.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub attitude_sigma_deg: Option<f64>,
-    /// Direction to the Sun in the camera frame.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sun_camera: Option<[f64; 3]>,
-    /// Rate of rotation of the camera in the camera frame, rad/s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rate_rad_s: Option<[f64; 3]>,
-    /// Direction of the body's north pole in the camera frame.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pole_camera: Option<[f64; 3]>,
-    /// Distance from the body's centre, kilometres.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub range_km: Option<f64>,
-    /// 1-sigma of that distance, kilometres.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub range_sigma_km: Option<f64>,
-    /// Orientations of further bodies.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub other_bodies: Vec<BodyOrientation>,
-}
-
-/// The orientation of a body that is not the first one of the sensor.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default)]
-pub struct BodyOrientation {
-    /// Name of the body.
-    pub body: String,
-    /// Rotation from the camera to the axes of the body, scalar first.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub q_vehicle_from_camera_wxyz: Option<[f64; 4]>,
-    /// Direction of its north pole in the camera frame.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pole_camera: Option<[f64; 3]>,
 }
 
 /// Severity of a message.

@@ -5,11 +5,13 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use hzn_files::FrameData;
+
 use crate::container::{
     Channel, Chunk, ChunkFault, Fields, Inflation, MAGIC, MAX_RECORD_BYTES, Message, Op, Record, Schemas,
 };
 use crate::error::Error;
-use crate::frame::{CandidateEdge, PicturePrior};
+use crate::frame::CandidateEdge;
 use crate::images::decoder;
 use crate::messages;
 use crate::pictures::{Pictures, Place, fill, next_record};
@@ -23,7 +25,7 @@ pub enum IndexEntry {
     /// A picture, which is not read yet.
     Picture(Place),
     /// The result of one picture and body, with the place of its message.
-    Report(Place, Box<Row>, Vec<CandidateEdge>, Box<PicturePrior>),
+    Report(Place, Box<Row>, Vec<CandidateEdge>, Box<FrameData>),
 }
 
 /// Goes through a recording without reading its uncompressed pictures. The recording may be one of hzn, or one of any

@@ -63,10 +63,7 @@ mod waiting;
 mod writer;
 
 pub use error::Error;
-pub use frame::{
-    Annotations, Attitude, BodyOrientation, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine,
-    PicturePrior,
-};
+pub use frame::{Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
 pub use images::{ImageReader, InputImage};
 pub use index::{Index, IndexEntry};
 pub use part::{create_part, is_being_written, open_part, part_path, publish, rename, sync, sync_name};

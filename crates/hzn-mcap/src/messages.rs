@@ -6,10 +6,11 @@ use foxglove::messages::{
     Vector3, log::Level,
 };
 use hzn_core::camera;
+use hzn_files::FrameData;
 use prost::Message;
 use serde_json::{Map, Value};
 
-use crate::frame::{Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine, PicturePrior};
+use crate::frame::{Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
 use crate::row::Row;
 use crate::topics::Topic;
 
@@ -43,18 +44,20 @@ pub(crate) fn report(frame: &FrameRecord) -> Vec<u8> {
     };
     map.retain(|_, v| !v.is_null());
     map.insert("candidate_edges".into(), serde_json::to_value(&frame.candidates).unwrap_or_default());
-    if frame.prior != PicturePrior::default() {
-        map.insert("prior".into(), serde_json::to_value(&frame.prior).unwrap_or_default());
+    if let Ok(Value::Object(prior)) = serde_json::to_value(&frame.prior)
+        && !prior.is_empty()
+    {
+        map.insert("prior".into(), prior.into());
     }
     serde_json::to_vec(&map).unwrap_or_default()
 }
 
 /// Reads a report: the row, the candidates, and the prior of the picture.
-pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>, PicturePrior), serde_json::Error> {
+pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>, FrameData), serde_json::Error> {
     let mut value: Value = serde_json::from_slice(data)?;
     let mut part = |key: &str| value.as_object_mut().and_then(|map| map.remove(key));
     let edges = part("candidate_edges").unwrap_or(Value::Array(Vec::new()));
-    let prior = part("prior").map_or(Ok(PicturePrior::default()), serde_json::from_value)?;
+    let prior = part("prior").map_or(Ok(FrameData::default()), serde_json::from_value)?;
     Ok((serde_json::from_value(value)?, serde_json::from_value(edges)?, prior))
 }
 

@@ -91,8 +91,8 @@ impl Calibration {
 
     #[doc = doc!("Calibration.to_toml")]
     fn to_toml(&self) -> PyResult<String> {
-        let format = hzn_calib::camera_file::Format::Sensor;
-        hzn_calib::camera_file::write(&self.calibrated.camera, format).map_err(errors::config)
+        let format = hzn_files::camera_file::Format::Sensor;
+        hzn_files::camera_file::write(&self.calibrated.camera, format).map_err(errors::config)
     }
 
     fn __repr__(&self) -> String {

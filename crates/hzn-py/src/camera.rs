@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use hzn_calib::{camera_file, sensor};
 use hzn_core::camera::{self, Config, Model, Ray};
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
+use hzn_files::{camera_file, sensor};
 use numpy::ndarray::{Array2, Array3, ArrayView2, Axis};
 use numpy::{AllowTypeChange, PyArray2, PyArray3, PyArrayLike2, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;

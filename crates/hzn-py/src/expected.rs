@@ -1,7 +1,7 @@
 //! `hzn.Expected`.
 
-use hzn_calib::FrameData;
 use hzn_core::Expected as CoreExpected;
+use hzn_files::FrameData;
 use pyo3::prelude::*;
 
 use crate::errors;

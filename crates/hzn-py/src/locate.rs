@@ -1,10 +1,10 @@
 //! `hzn.locate`: the position of a body from limb points that were found elsewhere.
 
-use hzn_calib::FrameData;
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pipeline::edges::{Edges, Fitted};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::{Config, Expected, Sensor, body, covariance};
+use hzn_files::FrameData;
 use numpy::ndarray::{arr1, arr2};
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;

@@ -53,7 +53,7 @@ fn rows(m: &Matrix3<f64>) -> Rows {
 
 fn settings(given: &Bound<'_, PyAny>) -> PyResult<Settings> {
     let text = toml::to_string(&parameters::from_python(given)?).map_err(errors::config)?;
-    hzn_calib::document::parse(&text, Path::new("settings"), Settings::check).map_err(errors::config)
+    hzn_files::document::parse(&text, Path::new("settings"), Settings::check).map_err(errors::config)
 }
 
 /// Attitude (body to reference) of two directions; None if they are too close.

@@ -13,7 +13,7 @@ use crate::errors;
 /// Reads sections and checks them like a sensor.toml.
 pub(crate) fn config(sections: &Bound<'_, PyDict>) -> PyResult<Config> {
     let text = toml::to_string(&from_python(sections)?).map_err(errors::config)?;
-    Ok(hzn_calib::sensor::parse(&text, Path::new("parameters")).map_err(errors::config)?.config)
+    Ok(hzn_files::sensor::parse(&text, Path::new("parameters")).map_err(errors::config)?.config)
 }
 
 /// Converts to plain Python data: dicts, lists, numbers, text.

@@ -1,6 +1,6 @@
 //! Altitude, position, attitude and other values that are given with a picture.
 
-use hzn_calib::FrameData;
+use hzn_files::FrameData;
 use pyo3::prelude::*;
 
 use crate::errors;

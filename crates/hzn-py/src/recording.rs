@@ -49,7 +49,7 @@ pub(crate) fn read_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyD
 pub(crate) fn open_mcap(py: Python<'_>, path: PathBuf) -> PyResult<Recording> {
     let reader = errors::detached(py, || Reader::open(&path, Contents::All))?.map_err(errors::other)?;
     let text = reader.sensor_toml().map(str::to_owned);
-    let config = text.as_deref().and_then(|t| hzn_calib::sensor::parse(t, Path::new("sensor.toml")).ok());
+    let config = text.as_deref().and_then(|t| hzn_files::sensor::parse(t, Path::new("sensor.toml")).ok());
     Ok(Recording {
         sensor_toml: text,
         metadata: reader.metadata().clone(),
@@ -116,7 +116,7 @@ impl Recording {
     #[doc = doc!("Recording.sensor")]
     fn sensor(&self) -> PyResult<Sensor> {
         let text = self.sensor_toml.as_deref().ok_or_else(|| errors::other("the recording contains no sensor.toml"))?;
-        let parsed = hzn_calib::sensor::parse(text, Path::new("sensor.toml")).map_err(errors::config)?;
+        let parsed = hzn_files::sensor::parse(text, Path::new("sensor.toml")).map_err(errors::config)?;
         Sensor::from_config(parsed.config, false)
     }
     #[doc = doc!("Recording.close")]

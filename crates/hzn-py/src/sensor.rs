@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use hzn_calib::{FrameData, plausible, sensor};
 use hzn_core::Config;
 use hzn_core::body::PriorError;
+use hzn_files::{FrameData, plausible, sensor};
 use hzn_mcap::{Row, RowMeta};
 use hzn_run::engine::{Traces, Unprocessed};
 use pyo3::prelude::*;

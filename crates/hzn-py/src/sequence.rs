@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use hzn_calib::FrameData;
+use hzn_files::FrameData;
 use hzn_run::engine::{self, Finished, Plan};
 use hzn_run::source::{self, Payload, Source};
 use hzn_run::{Error, Kind};
@@ -53,12 +53,12 @@ impl Sequence {
             let bits = (given.or(found.map(|f| f.bits)), found.filter(|f| f.bits < 16));
             let table = source.folder().join("frames.csv");
             let has_sensor = source.sensor_toml().is_some();
-            let frames = (!has_sensor && table.exists()).then(|| hzn_calib::frames::load(&table)).transpose();
+            let frames = (!has_sensor && table.exists()).then(|| hzn_files::frames::load(&table)).transpose();
             let frames = frames.map_err(errors::config)?;
             engine::check_frames(&state.config, state.flight, frames.as_ref()).map_err(errors::config)?;
             Ok((source, frames, bits))
         })??;
-        for warning in frames.iter().flat_map(|f: &hzn_calib::Frames| f.check_sensor(&state.config)) {
+        for warning in frames.iter().flat_map(|f: &hzn_files::Frames| f.check_sensor(&state.config)) {
             errors::warn(py, warning)?;
         }
         let (bits, found) = bits;
@@ -141,7 +141,7 @@ pub(crate) fn process_encoded(
     )
 }
 
-fn default_plan(state: &State, frames: Option<hzn_calib::Frames>) -> Plan {
+fn default_plan(state: &State, frames: Option<hzn_files::Frames>) -> Plan {
     Plan {
         config: state.config.clone(),
         flight: state.flight,

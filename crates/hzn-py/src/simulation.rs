@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera as Lens;
 use hzn_core::image::Layout;
+use hzn_evaluate::{Answer, Evaluation, pair};
+use hzn_files::truth::Truth;
 use hzn_run::results::Results;
-use hzn_run::scene;
 use hzn_run::source::picture::{Picture, Samples};
-use hzn_sim::evaluate::{Evaluation, pair};
-use hzn_sim::scenario::{FIT_PICTURES, Fit};
+use hzn_sim::scenario::{self, FIT_PICTURES, Fit};
 use hzn_sim::sensitivity::Design;
-use hzn_sim::{Flight, FlightFrame, Scenario, Truth};
+use hzn_sim::{Flight, FlightFrame, Scenario};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -42,13 +42,13 @@ impl Simulation {
         camera: Option<&str>,
     ) -> PyResult<Self> {
         let scenario = if let Ok(name) = scene.extract::<PathBuf>() {
-            scene::load(&name.to_string_lossy(), frames, seed)
+            scenario::load(&name.to_string_lossy(), frames, seed)
         } else {
             let text = toml::to_string(&parameters::from_python(scene)?).map_err(errors::config)?;
             // JSON has no dates, but the start time in a scene.toml is a date and not text.
-            scene::parse(&unquoted_date(&text), Path::new("scene"), frames, seed)
+            scenario::parse(&unquoted_date(&text), Path::new("scene"), frames, seed)
         };
-        let mut scenario = scenario.map_err(to_exception)?;
+        let mut scenario = scenario.map_err(errors::config)?;
         if let Some(name) = camera {
             scenario = scenario.with_camera(name).map_err(errors::config)?;
         }
@@ -201,7 +201,7 @@ pub(crate) fn evaluate<'py>(
     let truth = match truth.extract::<PathBuf>() {
         Ok(path) => {
             let path = if path.is_dir() { path.join("truth.csv") } else { path };
-            hzn_sim::truth::load(&path).map_err(errors::config)?
+            hzn_files::truth::load(&path).map_err(errors::config)?
         }
         Err(_) => serde_json::from_value::<Vec<Truth>>(parameters::from_python(truth)?)
             .map_err(|e| errors::config(format!("truth: {e}")))?,
@@ -211,7 +211,7 @@ pub(crate) fn evaluate<'py>(
         Ok(path) => {
             let Results { rows, sensor_toml, lost } = hzn_run::results::read(&path).map_err(to_exception)?;
             lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
-            let recorded = sensor_toml.and_then(|t| hzn_calib::sensor::parse(&t, Path::new("sensor.toml")).ok());
+            let recorded = sensor_toml.and_then(|t| hzn_files::sensor::parse(&t, Path::new("sensor.toml")).ok());
             camera = camera.or(recorded.map(|s| s.config.camera));
             rows
         }
@@ -235,7 +235,7 @@ pub(crate) fn evaluate<'py>(
     };
     let value = errors::detached(py, move || -> PyResult<Value> {
         let lens = camera.and_then(|c| Lens::<f64>::try_new(&c).ok());
-        let answers: Vec<_> = rows.drain(..).map(|r| hzn_run::sink::answer(&r)).collect();
+        let answers: Vec<_> = rows.drain(..).map(|r| Answer::from(&r)).collect();
         let cases = pair(&answers, &truth, lens.as_ref()).map_err(errors::other)?;
         Ok(json!({ "evaluations": Evaluation::by_body(&cases), "frames": cases }))
     })??;

@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use hzn_calib::FrameData;
 use hzn_core::{Config, Expected, Sensor as CoreSensor};
+use hzn_files::FrameData;
 use hzn_run::engine::AnySensor;
 use pyo3::prelude::*;
 

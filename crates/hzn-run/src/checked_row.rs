@@ -10,6 +10,8 @@
 
 use hzn_mcap::Row;
 
+use crate::error::{Error, failed};
+
 /// Name of the column with the checksum.
 pub const COLUMN: &str = "crc32";
 
@@ -19,10 +21,10 @@ pub(crate) fn header() -> String {
 }
 
 /// Returns a row as a line of CSV without its checksum and line end.
-fn to_csv(row: &Row) -> anyhow::Result<Vec<u8>> {
+fn to_csv(row: &Row) -> Result<Vec<u8>, Error> {
     let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
-    writer.serialize(row)?;
-    let mut line = writer.into_inner().map_err(|e| anyhow::anyhow!("{e}"))?;
+    writer.serialize(row).map_err(Error::failed)?;
+    let mut line = writer.into_inner().map_err(failed)?;
     line.truncate(line.trim_ascii_end().len());
     Ok(line)
 }
@@ -31,21 +33,21 @@ fn to_csv(row: &Row) -> anyhow::Result<Vec<u8>> {
 ///
 /// # Errors
 /// The row cannot be written as CSV.
-pub fn checksum(row: &Row) -> anyhow::Result<String> {
+pub fn checksum(row: &Row) -> Result<String, Error> {
     let line = to_csv(&Row { elapsed_us: None, ..row.clone() })?;
     Ok(format!("{:08x}", crc32fast::hash(&line)))
 }
 
 /// Returns one row as a line of CSV.
-pub(crate) fn csv_line(row: &Row) -> anyhow::Result<Vec<u8>> {
+pub(crate) fn csv_line(row: &Row) -> Result<Vec<u8>, Error> {
     let mut line = to_csv(row)?;
     line.extend_from_slice(format!(",{}\n", checksum(row)?).as_bytes());
     Ok(line)
 }
 
 /// Returns one row as a line of JSON.
-pub(crate) fn json_line(row: &Row) -> anyhow::Result<Vec<u8>> {
-    let mut line = serde_json::to_vec(row)?;
+pub(crate) fn json_line(row: &Row) -> Result<Vec<u8>, Error> {
+    let mut line = serde_json::to_vec(row).map_err(Error::failed)?;
     // The closing brace.
     line.pop();
     line.extend_from_slice(format!(",\"{COLUMN}\":\"{}\"}}\n", checksum(row)?).as_bytes());

@@ -1,8 +1,9 @@
 //! The reasons why a run cannot begin, or ends early.
 
+use std::error::Error as StdError;
 use std::fmt;
 
-use hzn_calib::Problem;
+use hzn_files::Problem;
 
 /// An error of a run, in words that name the file or the key.
 ///
@@ -10,7 +11,7 @@ use hzn_calib::Problem;
 #[derive(Debug)]
 pub struct Error {
     kind: Kind,
-    cause: anyhow::Error,
+    cause: Box<dyn StdError + Send + Sync>,
     remedy: Option<Remedy>,
 }
 
@@ -50,8 +51,13 @@ impl Error {
     pub fn remedy(&self) -> Option<Remedy> {
         self.remedy
     }
+    /// Returns an error for something that failed, with its causes. A source or a sink of another crate ends the run
+    /// with it.
+    pub fn failed(cause: impl Into<Box<dyn StdError + Send + Sync>>) -> Self {
+        Self { kind: Kind::Failed, cause: cause.into(), remedy: None }
+    }
     /// Returns the error with its causes.
-    pub fn into_cause(self) -> anyhow::Error {
+    pub fn into_cause(self) -> Box<dyn StdError + Send + Sync> {
         self.cause
     }
     pub(crate) fn with_remedy(self, remedy: Remedy) -> Self {
@@ -61,21 +67,22 @@ impl Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:#}", self.cause)
+        write!(f, "{}", self.cause)?;
+        let mut cause = self.cause.source();
+        while let Some(error) = cause {
+            write!(f, ": {error}")?;
+            cause = error.source();
+        }
+        Ok(())
     }
 }
 
-impl std::error::Error for Error {}
-
-impl From<anyhow::Error> for Error {
-    fn from(cause: anyhow::Error) -> Self {
-        Self { kind: Kind::Failed, cause, remedy: None }
-    }
-}
+// The causes are in the text already, so they are no sources.
+impl StdError for Error {}
 
 impl From<std::io::Error> for Error {
     fn from(error: std::io::Error) -> Self {
-        Self { kind: Kind::Failed, cause: error.into(), remedy: None }
+        Self::failed(error)
     }
 }
 
@@ -87,10 +94,42 @@ impl From<Problem> for Error {
 
 /// Returns an error for an input, a path or a configuration that cannot be used.
 pub(crate) fn unusable(message: impl fmt::Display) -> Error {
-    Error { kind: Kind::Unusable, cause: anyhow::anyhow!("{message}"), remedy: None }
+    Error { kind: Kind::Unusable, cause: message.to_string().into(), remedy: None }
 }
 
 /// Returns an error for something that failed.
 pub(crate) fn failed(message: impl fmt::Display) -> Error {
-    Error { kind: Kind::Failed, cause: anyhow::anyhow!("{message}"), remedy: None }
+    Error::failed(message.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use super::*;
+
+    /// An error with a cause.
+    #[derive(Debug)]
+    struct Outer(io::Error);
+
+    impl fmt::Display for Outer {
+        fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("the table is lost")
+        }
+    }
+
+    impl StdError for Outer {
+        fn source(&self) -> Option<&(dyn StdError + 'static)> {
+            Some(&self.0)
+        }
+    }
+
+    #[test]
+    fn an_error_names_its_causes_and_keeps_them() {
+        let error = Error::failed(Outer(io::Error::new(io::ErrorKind::BrokenPipe, "closed")));
+        assert_eq!((error.to_string().as_str(), error.kind()), ("the table is lost: closed", Kind::Failed));
+        let cause = error.into_cause();
+        let io = cause.source().and_then(|e| e.downcast_ref::<io::Error>()).unwrap();
+        assert_eq!(io.kind(), io::ErrorKind::BrokenPipe);
+    }
 }

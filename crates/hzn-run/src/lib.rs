@@ -4,8 +4,7 @@
 //! A [`source`] hands out pictures in order. The [`engine`] processes them with the sensor on all cores. A [`sink`]
 //! takes the results in order. [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of
 //! their rows. [`overlay`] draws the result over a picture, and [`explain`] describes in words what happened to it.
-//! [`scene`] reads the scenes for the simulator. [`disk`] has the errors of files that cannot be written. [`terminal`]
-//! makes text from files safe for a terminal.
+//! [`disk`] has the errors of files that cannot be written. [`terminal`] makes text from files safe for a terminal.
 //!
 //! The command line, the Python package and the viewer are built on this crate. It prints nothing, and its [`Error`]
 //! contains no exit code and no name of an option.
@@ -19,7 +18,6 @@ mod error;
 pub mod explain;
 pub mod overlay;
 pub mod results;
-pub mod scene;
 pub mod sink;
 pub mod source;
 pub mod terminal;

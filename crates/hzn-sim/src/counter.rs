@@ -6,7 +6,7 @@
 
 /// The purpose of the numbers. Different uses of one seed must not share their numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Stream {
+pub enum Stream {
     /// Noise of the detector, one number per pixel.
     Detector = 1,
     /// The choice of hot pixels.
@@ -47,7 +47,7 @@ pub(crate) enum Stream {
 
 /// A sequence of random numbers, read by index.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Counter {
+pub struct Counter {
     key: u64,
 }
 
@@ -60,22 +60,23 @@ fn mix(mut z: u64) -> u64 {
 }
 
 impl Counter {
-    pub(crate) fn new(seed: u64, stream: Stream) -> Self {
+    /// Returns the sequence of a seed and a purpose.
+    pub fn new(seed: u64, stream: Stream) -> Self {
         Self { key: mix(seed ^ (stream as u64).wrapping_mul(0xD1B5_4A32_D192_ED03)) }
     }
     /// Returns 64 random bits.
     #[inline(always)]
-    pub(crate) fn bits(&self, index: u64) -> u64 {
+    pub fn bits(&self, index: u64) -> u64 {
         mix(self.key.wrapping_add(index.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
     }
     /// Returns a uniform number between 0 and 1, without the ends.
     #[inline(always)]
-    pub(crate) fn uniform(&self, index: u64) -> f64 {
+    pub fn uniform(&self, index: u64) -> f64 {
         ((self.bits(index) >> 11) as f64 + 0.5) * (1.0 / 9_007_199_254_740_992.0)
     }
     /// Returns two independent normal numbers (mean 0, variance 1) by the method of Box and Muller.
     #[inline(always)]
-    pub(crate) fn normal_pair(&self, index: u64) -> [f32; 2] {
+    pub fn normal_pair(&self, index: u64) -> [f32; 2] {
         let bits = self.bits(index);
         // With 32 bits the radius reaches 6.7 sigma at most. No picture shows a difference from an unlimited
         // distribution.
@@ -86,7 +87,7 @@ impl Counter {
         [radius * cos, radius * sin]
     }
     /// Returns one normal number (mean 0, variance 1).
-    pub(crate) fn normal(&self, index: u64) -> f64 {
+    pub fn normal(&self, index: u64) -> f64 {
         f64::from(self.normal_pair(index)[0])
     }
 }

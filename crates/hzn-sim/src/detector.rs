@@ -90,9 +90,11 @@ impl Default for Detector {
 
 /// Light on the detector as fractions of full scale, row by row.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Plane {
-    pub(crate) width: usize,
-    pub(crate) data: Vec<f32>,
+pub struct Plane {
+    /// Number of columns.
+    pub width: usize,
+    /// The pixels, row by row.
+    pub data: Vec<f32>,
 }
 
 /// Returns one side of the Gaussian's weights, the centre first. The weights of both sides sum to one.
@@ -108,12 +110,13 @@ fn kernel(sigma: f64) -> Vec<f32> {
 }
 
 impl Plane {
-    pub(crate) fn height(&self) -> usize {
+    /// Returns the number of rows.
+    pub fn height(&self) -> usize {
         self.data.len() / self.width
     }
 
     /// Blurs the plane by a Gaussian. Beyond the border the outermost pixels are repeated.
-    pub(crate) fn blurred(mut self, sigma_px: f64) -> Self {
+    pub fn blurred(mut self, sigma_px: f64) -> Self {
         let k = kernel(sigma_px);
         let reach = k.len() - 1;
         if reach == 0 {
@@ -155,7 +158,7 @@ impl Plane {
 
 impl Detector {
     /// Adds noise and hot pixels to one plane, or to three planes for colours, and quantises them.
-    pub(crate) fn expose(&self, light: &[Plane], seed: u64) -> Picture {
+    pub fn expose(&self, light: &[Plane], seed: u64) -> Picture {
         let bits = self.bits.clamp(8, 16);
         let (width, height) = light.first().map_or((0, 0), |p| (p.width as u16, p.height() as u16));
         let samples = if bits == 8 {

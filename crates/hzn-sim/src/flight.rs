@@ -4,6 +4,7 @@ use core::f64::consts::{FRAC_PI_2, TAU};
 
 use hzn_core::camera::{self, Model};
 use hzn_core::{body, covariance, region};
+use hzn_files::truth::Truth;
 use serde::{Deserialize, Serialize};
 
 use crate::counter::{Counter, Stream};
@@ -15,7 +16,6 @@ use crate::picture::Picture;
 use crate::pose::{Look, Pose, position_m};
 use crate::scene::{Band, Disc, Profile, Scene, Sky, World};
 use crate::texture::Clouds;
-use crate::truth::Truth;
 
 /// A sequence of pictures and the sensor's configuration for it.
 #[derive(Debug, Clone, PartialEq)]

@@ -20,7 +20,7 @@ pub(crate) fn lens_without_circle(config: &camera::Config) -> Result<Camera<f64>
 }
 
 /// Removes all light beyond the image circle and in the blind centre.
-pub(crate) fn apply_image_circle(light: Plane, camera: &Camera<f64>) -> Plane {
+pub fn apply_image_circle(light: Plane, camera: &Camera<f64>) -> Plane {
     let light = darken(light, camera.image_circle_px(), |radius2| radius2 > 1.0);
     darken(light, camera.blind_centre_px(), |radius2| radius2 < 1.0)
 }

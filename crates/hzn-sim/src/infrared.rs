@@ -12,9 +12,9 @@ use crate::globe::{Globe, RayHit, View};
 use crate::pose::Pose;
 use crate::radiance::{Grid, Radiance, mean_over_globe};
 use crate::texture::{CellCache, CloudField, Clouds};
-use hzn_calib::limited;
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
+use hzn_files::limited;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

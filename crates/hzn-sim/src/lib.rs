@@ -1,6 +1,6 @@
 //! Scenes with exact truth for the horizon sensor.
 //!
-//! A [`Scene`] holds everything that one picture depends on. The rendered [`Picture`] and the [`Truth`] follow from it,
+//! A [`Scene`] holds everything that one picture depends on. The rendered [`Picture`] and the truth follow from it,
 //! and so do edge points on the limb without rendering. The picture uses the same lens models as the sensor.
 //!
 //! | module | content |
@@ -16,35 +16,31 @@
 //! | [`optics`] | fall-off and stray light |
 //! | [`motion`] | rotation during a picture |
 //! | [`foreground`] | structure of the vehicle in the picture |
-//! | [`artefact`] | pictures with flares, windows, panels or ground instead of a limb |
 //! | `height` | height of the limb by latitude |
 //! | `render` | the light on every pixel |
-//! | `image_circle` | the image circle of the lens in a rendered picture |
+//! | [`image_circle`] | the image circle of the lens in a rendered picture |
 //! | [`detector`] | blur, noise, quantisation |
 //! | [`picture`] | the rendered picture, and its file |
 //! | [`limb`] | the limb as a line in the picture, and edge points on it |
 //! | `edge_errors` | the errors of edge points |
 //! | [`truth`] | the truth about a scene |
-//! | [`scenario`] | a whole sequence in one description: scene.toml |
+//! | [`scenario`] | a whole sequence in one description: scene.toml, by name or from a file |
 //! | [`trajectory`] | rocket, orbit, table; attitude; inertial sensors and satellite navigation receiver |
-//! | [`utc`] | dates and seconds |
-//! | [`evaluate`] | answers compared with the truth: their number, accuracy and covariances |
 //! | [`sensitivity`] | covariances by design, without rendering |
+//! | [`counter`] | random numbers by index |
 //! | [`painted`] | uniform discs that are painted very fast |
 //! | [`flight`] | built-in sequences of scenes, with the sensor that takes them |
 
-pub mod artefact;
-mod counter;
+pub mod counter;
 pub mod detector;
 mod edge_errors;
 pub mod ellipsoid;
 pub mod error;
-pub mod evaluate;
 pub mod flight;
 pub mod foreground;
 pub mod globe;
 mod height;
-mod image_circle;
+pub mod image_circle;
 pub mod infrared;
 pub mod limb;
 pub mod motion;
@@ -61,7 +57,6 @@ pub mod sensitivity;
 pub mod texture;
 pub mod trajectory;
 pub mod truth;
-pub mod utc;
 pub mod visible;
 
 pub use detector::{Detector, Tone};
@@ -79,5 +74,4 @@ pub use pose::{Look, Pose};
 pub use scenario::{Scenario, ScenarioError};
 pub use scene::{Band, Disc, Light, Profile, Scene, Sky, World};
 pub use texture::Clouds;
-pub use truth::Truth;
 pub use visible::Visible;

@@ -40,7 +40,10 @@ impl Scene {
     }
 
     /// Returns the light on every pixel before blur and exposure: one plane, or three for colours.
-    pub(crate) fn light(&self) -> Result<Vec<Plane>, SceneError> {
+    ///
+    /// # Errors
+    /// Fails like [`Scene::render`].
+    pub fn light(&self) -> Result<Vec<Plane>, SceneError> {
         let camera = lens_without_circle(&self.camera)?;
         let motion = self.motion.filter(|m| m.is_significant(pixel_rad(&camera)));
         let mut planes = match &self.world {

@@ -209,7 +209,7 @@ fn save(image: &ColorImage, path: &Path) -> anyhow::Result<()> {
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
     let picture =
         image::RgbImage::from_raw(w as u32, h as u32, bytes).ok_or_else(|| anyhow!("the window has no size"))?;
-    hzn_run::overlay::save(&picture, path)
+    Ok(hzn_run::overlay::save(&picture, path)?)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use hzn_core::Config;
 use hzn_core::camera::{self, Model};
-use hzn_sim::evaluate::Case;
+use hzn_evaluate::Case;
 use hzn_sim::flight::leo_infrared;
 use hzn_sim::pose::position_m;
 use hzn_sim::radiance::Radiance;

@@ -5,7 +5,7 @@ use hzn_calib::noise::{self, Calibration, PointRecorder, Sighting};
 use hzn_core::body;
 use hzn_core::camera::Camera;
 use hzn_core::{Config, HostHorizon};
-use hzn_sim::evaluate::Case;
+use hzn_evaluate::Case;
 use hzn_sim::scenario::Fit;
 use hzn_sim::{Flight, FlightFrame, Picture, Scenario};
 use rayon::prelude::*;

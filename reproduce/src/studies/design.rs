@@ -1,7 +1,7 @@
 //! Calculates figures 6 to 8 and 19 to 22 of Braun & Barf 2022, without pictures.
 
-use hzn_cli::plot::{Chart, Series, Style};
 use hzn_core::camera::{self, Model};
+use hzn_plot::{Chart, Series, Style};
 use hzn_sim::sensitivity::chart::{Vertical, Visibility};
 use hzn_sim::sensitivity::{Design, Sigmas, reference};
 

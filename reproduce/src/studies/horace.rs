@@ -4,7 +4,7 @@ use anyhow::{Context, anyhow};
 use hzn_core::Preset;
 use hzn_core::camera::{self, Model};
 use hzn_core::{Config, body};
-use hzn_sim::evaluate::Evaluation;
+use hzn_evaluate::Evaluation;
 use hzn_sim::flight::rocket;
 use hzn_sim::pose::position_m;
 use hzn_sim::scenario::FIT_PICTURES;
@@ -60,8 +60,7 @@ pub(super) fn criteria(effort: &Effort) -> anyhow::Result<Section> {
     let sensors = [Sensor::new("hzn", flight.sensor.clone()), Sensor::new("horace-2015", horace)];
     let flown = fly(&flight, &sensors)?;
     let row = |name: String, e: &Evaluation| {
-        let error =
-            |value: fn(&hzn_sim::evaluate::Errors) -> f64| e.errors.as_ref().map_or("–".into(), |x| deg(value(x)));
+        let error = |value: fn(&hzn_evaluate::Errors) -> f64| e.errors.as_ref().map_or("–".into(), |x| deg(value(x)));
         vec![
             name,
             format!("{}/{}", e.answered, e.with_limb),
@@ -172,9 +171,8 @@ fn add_turning_flights(s: &mut Section, scene: &Flight, count: usize) -> anyhow:
         ];
         for (sensor, cases) in sensors.iter().zip(fly(&flight, &sensors)?) {
             let e = evaluate(&cases);
-            let error = |value: fn(&hzn_sim::evaluate::Errors) -> f64| {
-                e.errors.as_ref().map_or("–".into(), |x| deg(value(x)))
-            };
+            let error =
+                |value: fn(&hzn_evaluate::Errors) -> f64| e.errors.as_ref().map_or("–".into(), |x| deg(value(x)));
             let without = e.frames - e.with_limb;
             rows.push(vec![
                 turning.name(),

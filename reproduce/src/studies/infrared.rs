@@ -1,9 +1,9 @@
 //! Measures figures 5 to 8 of Wang, Wang & Jin 2022, and the infrared flight in low orbit.
 
-use hzn_cli::plot::{Chart, Series, Style};
 use hzn_core::Preset;
 use hzn_core::{Config, body};
-use hzn_sim::evaluate::{Case, Evaluation};
+use hzn_evaluate::{Case, Evaluation};
+use hzn_plot::{Chart, Series, Style};
 use hzn_sim::flight::leo_infrared;
 use hzn_sim::pose::position_m;
 use hzn_sim::scenario::FIT_PICTURES;

@@ -228,7 +228,7 @@ impl MeasuredAxis {
 impl Photograph {
     fn load(name: &str) -> anyhow::Result<Self> {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/real").join(name);
-        let mut sensor = hzn_calib::sensor::load(&path.with_extension("toml"))?.config;
+        let mut sensor = hzn_files::sensor::load(&path.with_extension("toml"))?.config;
         (sensor.body.limb_height_km, sensor.body.limb_height_sigma_km) = (17.0, 7.0);
         Ok(Self { sensor, rgb: image::open(&path).with_context(|| path.display().to_string())?.into_rgb8() })
     }

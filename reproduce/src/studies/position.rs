@@ -2,7 +2,7 @@
 
 use hzn_core::camera::{Config as CameraConfig, Model};
 use hzn_core::{Config, HostHorizon, Prior, body};
-use hzn_sim::evaluate::{Answer, Case, Evaluation, MeasuredDirection, MeasuredPosition, pair};
+use hzn_evaluate::{Answer, Case, Evaluation, MeasuredDirection, MeasuredPosition, pair};
 use hzn_sim::{Detector, Ellipsoid, Reflection, Scene, Surface, Trials};
 
 use super::setup::{Effort, halton};

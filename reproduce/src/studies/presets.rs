@@ -5,7 +5,7 @@ use hzn_core::HostHorizon;
 use hzn_core::Preset;
 use hzn_core::body::Kind;
 use hzn_core::image::Pixels;
-use hzn_sim::evaluate::Case;
+use hzn_evaluate::Case;
 use hzn_sim::{Flight, Picture};
 
 use super::setup::{self, Effort, OTHER_SEEDS, simulated};
@@ -102,8 +102,7 @@ fn row(scene: &str, preset: &str, flown: &Flown) -> Vec<String> {
     let all = evaluate(&flown.cases);
     let good: Vec<Case> = flown.cases.iter().filter(|c| !gross(c)).cloned().collect();
     let good = evaluate(&good);
-    let error =
-        |value: fn(&hzn_sim::evaluate::Errors) -> f64| good.errors.as_ref().map_or("–".into(), |x| deg(value(x)));
+    let error = |value: fn(&hzn_evaluate::Errors) -> f64| good.errors.as_ref().map_or("–".into(), |x| deg(value(x)));
     let without = all.frames - all.with_limb;
     let mut times = flown.elapsed_us.clone();
     times.sort_by(f64::total_cmp);

@@ -79,11 +79,11 @@ fn pictures(root: &Path) -> anyhow::Result<Vec<String>> {
 fn process(path: &Path) -> anyhow::Result<Report<f64>> {
     let own = path.with_extension("toml");
     let toml = if own.exists() { own } else { path.with_file_name("sensor.toml") };
-    let config = hzn_calib::sensor::load(&toml)?.config;
+    let config = hzn_files::sensor::load(&toml)?.config;
     let frames = path.with_file_name("frames.csv");
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let prior = if frames.exists() {
-        let frames = hzn_calib::frames::load(&frames)?;
+        let frames = hzn_files::frames::load(&frames)?;
         frames.get(&name).context("frames.csv has no row of the picture")?.to_prior(None)
     } else {
         Prior::default()

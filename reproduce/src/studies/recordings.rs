@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use anyhow::anyhow;
-use hzn_calib::frames::{FrameData, Frames};
 use hzn_core::Config;
 use hzn_core::body::{self, Kind};
+use hzn_files::frames::{FrameData, Frames};
 use hzn_fuse::input::{Inputs, Recording};
 use hzn_fuse::simulated;
 use hzn_mcap::{Row, RowMeta};

@@ -1,8 +1,9 @@
 //! Errors of directions in pictures, and flights that draw from them.
 
+use hzn_files::truth::Truth;
 use hzn_fuse::input::{Body, Inputs};
 use hzn_fuse::simulated::{Errors, Moment};
-use hzn_sim::{Scenario, Truth};
+use hzn_sim::Scenario;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// Time for which errors come from one flight and camera, s.

@@ -1,8 +1,8 @@
 //! Measures accuracy and honesty on the scenes of `hzn simulate`, as a user finds them with simulate, run and evaluate.
 
 use hzn_core::Preset;
+use hzn_evaluate::Case;
 use hzn_sim::Flight;
-use hzn_sim::evaluate::Case;
 use hzn_sim::scenario::FIT_PICTURES;
 
 use super::setup::{Effort, OTHER_SEEDS, preset, simulated};

@@ -52,7 +52,7 @@ fn pictures() -> Seeds {
 fn texts() -> Seeds {
     // The targets leave out texts that name another file.
     let without_files = |text: &str| text.replace("file", "fil").into_bytes();
-    let mut seeds = vec![("sensor_toml/seed-template".into(), without_files(hzn_calib::template::SENSOR_TOML))];
+    let mut seeds = vec![("sensor_toml/seed-template".into(), without_files(hzn_files::template::SENSOR_TOML))];
     for (name, _, text) in hzn_sim::scenario::BUILTIN {
         seeds.push((format!("scene_toml/seed-{name}"), without_files(text)));
     }

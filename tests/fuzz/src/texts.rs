@@ -21,7 +21,7 @@ fn with_text(bytes: &[u8], read: impl FnOnce(&str, &Path)) {
 }
 
 pub(crate) fn sensor_toml(bytes: &[u8]) {
-    with_text(bytes, |text, path| match hzn_calib::sensor::parse(text, path) {
+    with_text(bytes, |text, path| match hzn_files::sensor::parse(text, path) {
         // What was read and checked makes a sensor, or the refusal names the key.
         Ok(sensor) => {
             if let Err(e) = HostHorizon::boxed(&sensor.config) {
@@ -34,7 +34,7 @@ pub(crate) fn sensor_toml(bytes: &[u8]) {
 
 pub(crate) fn frames_csv(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
-    let Ok(frames) = hzn_calib::frames::parse(text, Path::new(NOWHERE)) else { return };
+    let Ok(frames) = hzn_files::frames::parse(text, Path::new(NOWHERE)) else { return };
     for kind in [Kind::Earth, Kind::EarthSphere, Kind::Moon] {
         let warnings = frames.check_altitudes(kind, 6371.0);
         assert!(warnings.len() < 10, "{} warnings", warnings.len());
@@ -48,14 +48,14 @@ pub(crate) fn frames_csv(bytes: &[u8]) {
 
 pub(crate) fn scene_toml(bytes: &[u8]) {
     with_text(bytes, |text, path| {
-        let _ = hzn_run::scene::parse(text, path, Some(3), None);
+        let _ = hzn_sim::scenario::parse(text, path, Some(3), None);
     });
 }
 
 pub(crate) fn camera_file(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     for name in [None, Some("cam1")] {
-        if let Ok(camera) = hzn_calib::camera_file::parse(text, Path::new(NOWHERE), name) {
+        if let Ok(camera) = hzn_files::camera_file::parse(text, Path::new(NOWHERE), name) {
             let _ = hzn_core::camera::Camera::<f64>::try_new(&camera);
         }
     }
@@ -68,7 +68,7 @@ pub(crate) fn tables(bytes: &[u8]) {
         0 => drop(hzn_fuse::input::imu(path)),
         1 => drop(hzn_fuse::input::gnss(path)),
         2 => drop(hzn_fuse::input::attitudes(path)),
-        3 => drop(hzn_sim::truth::load(path)),
+        3 => drop(hzn_files::truth::load(path)),
         4 => drop(hzn_calib::points::table::load(path, [640, 480])),
         _ => drop(hzn_fuse::Settings::load(path)),
     });

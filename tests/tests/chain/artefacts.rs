@@ -3,7 +3,7 @@
 
 use hzn_core::observer::Unobserved;
 use hzn_core::{Config, HostHorizon, camera};
-use hzn_sim::artefact::{Kind, Outcome, PriorKnowledge, Trial, process_trial};
+use hzn_tests::artefact::{Kind, Outcome, PriorKnowledge, Trial, process_trial};
 
 /// Number of pictures of each kind.
 const PICTURES_PER_KIND: u64 = 15;

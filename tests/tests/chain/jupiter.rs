@@ -19,7 +19,7 @@ fn folder() -> &'static Path {
 }
 
 fn sensor() -> Config {
-    hzn_calib::sensor::load(&folder().join("sensor.toml")).unwrap_or_else(|e| panic!("{e}")).config
+    hzn_files::sensor::load(&folder().join("sensor.toml")).unwrap_or_else(|e| panic!("{e}")).config
 }
 
 fn process(config: &Config, file: &str) -> Report<f64> {
@@ -27,7 +27,7 @@ fn process(config: &Config, file: &str) -> Report<f64> {
 }
 
 fn process_observed(config: &Config, file: &str, observer: &impl Observer<f64>) -> Report<f64> {
-    let frames = hzn_calib::frames::load(&folder().join("frames.csv")).unwrap_or_else(|e| panic!("{e}"));
+    let frames = hzn_files::frames::load(&folder().join("frames.csv")).unwrap_or_else(|e| panic!("{e}"));
     let mut horizon = HostHorizon::boxed(config).unwrap();
     let expected = horizon.expect(&frames.get(file).unwrap().to_prior(None)).unwrap();
     let picture = image::open(folder().join(file)).unwrap().into_luma8();

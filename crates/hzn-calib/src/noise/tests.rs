@@ -280,8 +280,8 @@ fn the_keys_are_written_and_all_other_text_stays() {
         assert!(text.contains(kept), "{kept} in {text}");
     }
     assert!(text.contains("measured on 16 pictures of flight by `hzn calibrate noise`"), "{text}");
-    let read = crate::sensor::parse(text, std::path::Path::new("sensor.toml")).unwrap().config;
-    let mut applied = crate::sensor::parse(SENSOR, std::path::Path::new("sensor.toml")).unwrap().config;
+    let read = hzn_files::sensor::parse(text, std::path::Path::new("sensor.toml")).unwrap().config;
+    let mut applied = hzn_files::sensor::parse(SENSOR, std::path::Path::new("sensor.toml")).unwrap().config;
     c.apply(&mut applied);
     assert_eq!(read, applied);
     // A second calibration replaces the comments of the first and does not repeat them.
@@ -297,8 +297,8 @@ fn of_several_bodies_the_earth_gets_its_own_noise() {
     );
     let c = Calibration::new(&earth(), &flight(16, 90.0, 18.7, 0.5, Noise(0.3, 40.0, 0.5), 11)).unwrap();
     let written = into_sensor_toml(&bodies, &c, "flight").unwrap();
-    let read = crate::sensor::parse(&written.text, std::path::Path::new("sensor.toml")).unwrap().config;
-    let mut applied = crate::sensor::parse(&bodies, std::path::Path::new("sensor.toml")).unwrap().config;
+    let read = hzn_files::sensor::parse(&written.text, std::path::Path::new("sensor.toml")).unwrap().config;
+    let mut applied = hzn_files::sensor::parse(&bodies, std::path::Path::new("sensor.toml")).unwrap().config;
     c.apply(&mut applied);
     assert_eq!(read, applied);
     let wide = super::config_for_calibration(&read).unwrap();

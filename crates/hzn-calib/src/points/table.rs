@@ -13,9 +13,7 @@
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
-
-use crate::nearest::suggestion;
-use crate::{Problem, limited};
+use hzn_files::{Problem, limited, suggestion};
 
 /// Largest difference of the length of a unit vector from 1.
 const MAX_LENGTH_ERROR: f64 = 0.01;

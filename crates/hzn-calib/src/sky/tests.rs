@@ -191,14 +191,14 @@ fn altitudes_of_other_pictures_raise_an_alarm() {
 fn the_written_file_is_read_back() {
     let flight = Flight::new(lens(90.0), 1006);
     let found = estimate(&Unknowns::new(&told(&flight.lens), &[]), &flight.body(), &flight.views(), DEFAULT).unwrap();
-    let before = crate::camera_file::write(&told(&flight.lens), crate::camera_file::Format::Sensor).unwrap();
+    let before = hzn_files::camera_file::write(&told(&flight.lens), hzn_files::camera_file::Format::Sensor).unwrap();
     let written = into_sensor_toml(
         &format!("# mine\n{before}"),
         Found { camera: &found.camera, parameters: &found.parameters, source: "40 limb pictures of flight" },
     )
     .unwrap();
     assert!(written.text.starts_with("# mine") && written.text.contains("by `hzn calibrate sky`"), "{}", written.text);
-    let read = crate::sensor::parse(&written.text, std::path::Path::new("s.toml")).unwrap().config.camera;
+    let read = hzn_files::sensor::parse(&written.text, std::path::Path::new("s.toml")).unwrap().config.camera;
     for p in &found.parameters {
         let value = read.intrinsic(p.which).unwrap();
         assert!((value - p.value).abs() <= 0.02 * p.sigma, "{p:?} {value}");

@@ -1,4 +1,3 @@
-//! Tests of camera files and of sensor.toml.
+//! Tests of the conversion of lenses.
 
-mod camera_files;
-mod presets;
+mod conversion;

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use hzn_evaluate::{Answer, Evaluation, pair};
+use hzn_files::truth::Truth;
 use hzn_mcap::{Contents, Reader, Row};
 use hzn_run::{disk, explain, overlay, sink};
-use hzn_sim::evaluate::{Evaluation, pair};
-use hzn_sim::{Flight, Truth};
+use hzn_sim::Flight;
 
 use super::{evaluate, run as sequence};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
@@ -212,7 +213,7 @@ fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
 
 /// Compares the results with the truth, in words and numbers.
 fn flight_text(rows: &[Row], truth: &[Truth]) -> Result<String, Stop> {
-    let answers: Vec<_> = rows.iter().map(sink::answer).collect();
+    let answers: Vec<_> = rows.iter().map(Answer::from).collect();
     let cases = pair(&answers, truth, None).map_err(failed)?;
     let mut out = String::from("Rendered rocket flight, against the truth\n");
     let mut line = |name: &str, value: String| out.push_str(&format!("  {name:<22} {value}\n"));

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use hzn_calib::FrameData;
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Report, Solution, body, threshold};
+use hzn_files::FrameData;
 use hzn_mcap::Annotations;
 use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
 use hzn_run::source::{self, Item, Picture, Source};

@@ -1,7 +1,6 @@
 //! `hzn fly`: the flight software on a Linux computer.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use hzn_fly::camera::Ended;
 use hzn_fly::flight::{Settings, Source, Summary, fly};
@@ -10,7 +9,6 @@ use hzn_run::disk;
 use hzn_run::source::Raw;
 
 use crate::exit::{Exit, Outcome, failed, usage};
-use crate::files;
 use crate::tell;
 
 /// Fly: process a camera's pictures on this Linux computer, with telecommands and telemetry
@@ -53,11 +51,11 @@ pub(super) fn run(args: Args) -> Outcome {
     if let Some(Address::Udp { remote: None, .. }) = &args.line {
         return Err(usage("--line: udp needs the ground's address too, as in udp:0.0.0.0:5001,192.168.1.2:5000"));
     }
-    let sensor = args.sensor.as_deref().map(hzn_calib::sensor::load).transpose()?;
+    let sensor = args.sensor.as_deref().map(hzn_files::sensor::load).transpose()?;
     sensor.iter().flat_map(|sensor| &sensor.warnings).for_each(tell::warning);
     let from_systemd = || std::env::var_os("STATE_DIRECTORY").map(PathBuf::from);
     let state = args.state.or_else(from_systemd).unwrap_or_else(|| "hzn-fly".into());
-    let read = args.sensor.as_deref().map(files::of_sensor).unwrap_or_default();
+    let read = args.sensor.as_deref().map(hzn_files::files_of_sensor).unwrap_or_default();
     disk::refuse_inputs(&read, &hzn_fly::flash::files(&state))?;
     let settings = Settings {
         source: if args.source.as_os_str() == "-" { Source::Stdin } else { Source::Device(args.source) },
@@ -68,8 +66,7 @@ pub(super) fn run(args: Args) -> Outcome {
         state,
         log_bytes: args.log_mb * 1_000_000,
     };
-    let summary = fly(settings, Arc::new(|text: &str| tell::line(text)))
-        .map_err(|e| if e.is_usage { usage(e) } else { failed(e) })?;
+    let summary = fly(settings, tell::to_stderr()).map_err(|e| if e.is_usage { usage(e) } else { failed(e) })?;
     tell_summary(&summary);
     match summary.ended {
         Some(Ended::Failed(why)) => Err(failed(why)),

@@ -61,7 +61,7 @@ fn recording(file: &Path) -> Result<Described, Stop> {
     } else if reader.broken_chunks() > 0 {
         out.push_str(&format!("damaged parts    {}\n", reader.broken_chunks()));
     }
-    if let Some(Ok(sensor)) = reader.sensor_toml().map(|t| hzn_calib::sensor::parse(t, Path::new("sensor.toml"))) {
+    if let Some(Ok(sensor)) = reader.sensor_toml().map(|t| hzn_files::sensor::parse(t, Path::new("sensor.toml"))) {
         let c = sensor.config.camera;
         out.push_str(&format!("camera           {} x {} px, {}\n", c.width, c.height, c.model.name()));
     }
@@ -137,8 +137,8 @@ fn other_columns(header: &csv::StringRecord) -> Vec<String> {
 
 /// Describes a frames.csv.
 fn priors(file: &Path) -> Result<String, Stop> {
-    let frames = hzn_calib::frames::load(file)?;
-    let with = |has: fn(&hzn_calib::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
+    let frames = hzn_files::frames::load(file)?;
+    let with = |has: fn(&hzn_files::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
     let mut out = kind_line("frames.csv, the priors of pictures");
     out.push_str(&format!("pictures         {}\n", frames.rows.len()));
     for (name, n) in [
@@ -159,7 +159,7 @@ fn priors(file: &Path) -> Result<String, Stop> {
 }
 
 fn truth(file: &Path) -> Result<String, Stop> {
-    let rows = hzn_sim::truth::load(file).map_err(usage)?;
+    let rows = hzn_files::truth::load(file).map_err(usage)?;
     let mut bodies = BTreeMap::<&str, [usize; 2]>::new();
     for row in &rows {
         let [seen, all] = bodies.entry(&row.body).or_default();
@@ -209,17 +209,17 @@ fn kind_line(kind: &str) -> String {
 
 fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
     if kind != "toml" {
-        let camera = hzn_calib::camera_file::load(file, None)?;
+        let camera = hzn_files::camera_file::load(file, None)?;
         return Ok(kind_line("camera file") + &super::camera::describe(&hzn_core::Config::new(camera))?);
     }
-    let text = hzn_calib::limited::read_text(file, hzn_calib::limited::SETTINGS_BYTES)
+    let text = hzn_files::limited::read_text(file, hzn_files::limited::SETTINGS_BYTES)
         .map_err(|e| failed(format!("{}: cannot be read: {e}", file.display())))?;
     // The function that reads the text below reports its errors.
     let table = text.parse::<toml::Table>().unwrap_or_default();
     if table.contains_key("trajectory") && table.contains_key("capture") {
-        return scene(&hzn_run::scene::parse(&text, file, None, None)?);
+        return scene(&hzn_sim::scenario::parse(&text, file, None, None)?);
     }
-    let sensor = hzn_calib::sensor::load(file)?;
+    let sensor = hzn_files::sensor::load(file)?;
     sensor.warnings.iter().for_each(tell::warning);
     Ok(kind_line("sensor.toml") + &super::camera::describe(&sensor.config)?)
 }

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use hzn_calib::start::{self, CameraFacts};
 use hzn_core::camera::Model;
+use hzn_files::start::{self, CameraFacts};
 use hzn_run::disk;
 use hzn_run::source::{self, Payload, Source};
 
@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let write = |text: &str| std::fs::write(&args.output, text).map_err(|e| disk::cannot_write(&args.output, &e));
     let Some(mut source) = source else {
-        write(hzn_calib::template::SENSOR_TOML)?;
+        write(hzn_files::template::SENSOR_TOML)?;
         tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));
         return Ok(Exit::Done);
     };

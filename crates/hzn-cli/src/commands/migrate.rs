@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use hzn_calib::limited;
-use hzn_calib::migrate;
+use hzn_files::limited;
+use hzn_files::migrate;
 use hzn_run::{disk, explain};
 
 use crate::exit::{Exit, Outcome, failed, usage};

@@ -22,7 +22,6 @@ mod simulate;
 mod telecommand;
 mod telemetry;
 mod view;
-mod xtce;
 
 use clap::{CommandFactory, Parser, Subcommand};
 

@@ -3,10 +3,10 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use hzn_calib::{Frames, Sensor};
 use hzn_core::body::PriorError;
 use hzn_core::config::Orient;
 use hzn_core::status::Status;
+use hzn_files::{Frames, Sensor};
 use hzn_mcap::Row;
 use hzn_run::engine::{self, AnySensor, BodyOutcome, End, Finished, Plan};
 use hzn_run::sink::{self, Existing, Output, StoredResults};

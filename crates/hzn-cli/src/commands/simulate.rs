@@ -5,13 +5,12 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use hzn_core::status::Status;
-use hzn_run::{disk, explain, scene};
-use hzn_sim::scenario::{BUILTIN, FIT_PICTURES, Fit};
+use hzn_run::{disk, explain};
+use hzn_sim::scenario::{self, BUILTIN, FIT_PICTURES, Fit};
 use hzn_sim::{Flight, FlightFrame, Scenario};
 use rayon::prelude::*;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
-use crate::files;
 use crate::progress::Progress;
 use crate::setup::{clear_rendered, rendered, stop_flag};
 use crate::tell::{self, one_line};
@@ -65,12 +64,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let name = args.scene.as_deref().unwrap_or_default();
     if args.show {
-        tell::file(format_args!("{}\n", scene::source(name)?.1.trim_end()))?;
+        tell::file(format_args!("{}\n", scenario::source(name)?.1.trim_end()))?;
         return Ok(Exit::Done);
     }
-    let mut scenario = scene::load(name, args.frames, args.seed)?;
+    let mut scenario = scenario::load(name, args.frames, args.seed)?;
     let from = Path::new(name).parent().unwrap_or(Path::new(""));
-    let mut read = files::of_sensor(Path::new(name));
+    let mut read = hzn_files::files_of_sensor(Path::new(name));
     read.extend(scenario.files_mut().into_iter().map(|(_, file)| from.join(file)));
     let files = files(&mut scenario, from)?;
     let folder = args.output.clone().unwrap_or_default();
@@ -80,7 +79,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     // All errors of the scene are reported before anything is written.
     let mut cameras = Vec::new();
     for one in scenario.by_camera() {
-        let flight = one.flight().map_err(|e| scene::refused(name, &e))?;
+        let flight = one.flight().map_err(|e| scenario::refused(name, &e))?;
         let folder = if scenario.cameras.is_empty() { folder.clone() } else { folder.join(&one.name) };
         cameras.push(Sequence { scenario: one, flight, folder });
     }
@@ -133,7 +132,7 @@ fn written(args: &Args, folder: &Path, cameras: &[Sequence], files: &[(String, V
 fn check_folder(args: &Args, folder: &Path, text: &str, files: &[(String, Vec<u8>)]) -> Result<(), Stop> {
     let scene_toml = folder.join("scene.toml");
     if args.resume {
-        match hzn_calib::limited::read_text(&scene_toml, hzn_calib::limited::SETTINGS_BYTES) {
+        match hzn_files::limited::read_text(&scene_toml, hzn_files::limited::SETTINGS_BYTES) {
             Ok(before) if before == text => {}
             Ok(_) => {
                 let what = "is another scene, or another number of pictures or seed; --force starts over";
@@ -192,7 +191,7 @@ fn sensors(cameras: &[Sequence], name: &str, args: &Args) -> Result<(), Stop> {
     }
     let progress = Mutex::new(Progress::new(Some(FIT_PICTURES.into()), 0, args.quiet));
     let seen = |_: usize, _: usize| progress.lock().map(|mut p| p.count([Status::Ok])).unwrap_or(());
-    let fits = Fit::measure(&first.scenario, FIT_PICTURES, &seen).map_err(|e| scene::refused(name, &e))?;
+    let fits = Fit::measure(&first.scenario, FIT_PICTURES, &seen).map_err(|e| scenario::refused(name, &e))?;
     if let Ok(p) = progress.into_inner() {
         p.finish();
     }

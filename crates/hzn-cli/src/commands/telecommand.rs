@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use hzn_fly::link::Address;
+use hzn_ground::{Commander, Incoming, encode, loaded_files, write_packet};
 use hzn_run::disk;
 
-use super::ground::{Commander, Incoming, encode, loaded_files, write_packet};
 use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome};
 use crate::files;
@@ -52,13 +52,16 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
+    let tell = tell::to_stderr();
     if let Some(address) = &args.to {
-        return Incoming::open(address)?.command(Commander::new(args.apids.apid_base, args.sequence, &args.commands)?);
+        let commander = Commander::new(args.apids.apid_base, args.sequence, &args.commands, tell.clone())?;
+        let is_done = Incoming::open(address)?.command(commander, &tell)?;
+        return Ok(if is_done { Exit::Done } else { Exit::Failed });
     }
     let mut out = Vec::new();
     let mut sequence = args.sequence;
     for command in &args.commands {
-        for user in encode(command)? {
+        for user in encode(command, &tell)? {
             out.extend(write_packet(args.apids.apid_base, sequence, command, &user)?);
             sequence = (sequence + 1) & 0x3FFF;
         }

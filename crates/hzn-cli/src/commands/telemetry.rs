@@ -1,13 +1,15 @@
 //! `hzn telemetry`: decodes the telemetry of a flight computer.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use hzn_calib::limited;
+use hzn_files::limited;
 use hzn_fly::link::Address;
+use hzn_ground::{Commander, Incoming, Station, loaded_files, xtce};
 use hzn_run::disk;
 
-use super::ground::{Commander, Incoming, Station, loaded_files, show};
-use super::xtce;
+use super::ground::show;
 use crate::apid::ApidArgs;
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
@@ -76,15 +78,30 @@ pub(super) fn run(args: &Args) -> Outcome {
     disk::refuse_inputs(&read_files, &written)?;
     let bytes = if live.is_some() { Vec::new() } else { read(file)? };
     let (base, output, housekeeping) = (args.apids.apid_base, args.output.as_deref(), args.housekeeping.as_deref());
-    let mut station = Station::new(base, output, housekeeping, args.force)?;
+    let tell = tell::to_stderr();
+    let mut station = Station::new(base, output, housekeeping, args.force, tell.clone())?;
     let mut rest = bytes;
     if let Some(live) = live {
-        let commander = Commander::new(base, 0, &args.send)?;
-        rest = if args.screen { show(live, &mut station, commander)? } else { live.listen(&mut station, commander)? };
+        let commander = Commander::new(base, 0, &args.send, tell.clone())?;
+        rest = if args.screen {
+            show(live, &mut station, commander)?
+        } else {
+            live.listen(&mut station, commander, &stop_flag(), &tell)?
+        };
     } else {
         station.take(&mut rest)?;
     }
-    station.finish(&rest, &name)
+    station.finish(&rest, &name)?;
+    Ok(Exit::Done)
+}
+
+/// Returns a flag that Ctrl-C or a request to terminate sets.
+fn stop_flag() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let shared = Arc::clone(&flag);
+    // Without a handler, Ctrl-C ends the program at once; the output can still be recovered.
+    drop(ctrlc::set_handler(move || shared.store(true, Ordering::SeqCst)));
+    flag
 }
 
 /// Largest stream that is read, in bytes.

@@ -67,7 +67,7 @@ fn a_map_of_the_picture() {
     place.run(&["camera", "show", "a.toml", "--picture", "map.png"]).expect(2).says("exists already");
     let map = image::open(place.path("map.png")).unwrap().to_rgb8();
     // An ideal pinhole has the most degrees a pixel on its axis: the middle is yellow, the corner is dark blue.
-    let sensor = hzn_calib::sensor::parse(crate::common::SENSOR, std::path::Path::new("a.toml")).unwrap().config.camera;
+    let sensor = hzn_files::sensor::parse(crate::common::SENSOR, std::path::Path::new("a.toml")).unwrap().config.camera;
     let scale = 1000.0 / f64::from(sensor.width.max(sensor.height));
     let at = |u: f64, v: f64| map.get_pixel((u * scale) as u32, 56 + (v * scale) as u32).0;
     assert!(at(2.0, 2.0)[1] < 40, "{:?}", at(2.0, 2.0));

@@ -315,10 +315,10 @@ fn two_cameras_follow_the_vehicle_of_the_first_one() {
     let (code, _, stderr) = hzn(at, "2", &["simulate", "my.toml", "-o", "out", "-q"]);
     assert_eq!(code, 0, "{stderr}");
     let mut table = csv::Reader::from_path(at.join("out/vehicle.csv")).unwrap();
-    let vehicle: Vec<hzn_sim::trajectory::VehicleRow> = table.deserialize().collect::<Result<_, _>>().unwrap();
+    let vehicle: Vec<hzn_files::vehicle::VehicleRow> = table.deserialize().collect::<Result<_, _>>().unwrap();
     for (name, mount) in ["first", "second"].into_iter().zip(mounts) {
         assert!(!at.join("out").join(name).join("vehicle.csv").exists());
-        let truth = hzn_sim::truth::load(&at.join("out").join(name).join("truth.csv")).unwrap();
+        let truth = hzn_files::truth::load(&at.join("out").join(name).join("truth.csv")).unwrap();
         assert_eq!(truth.len(), 5);
         for (i, row) in truth.iter().enumerate() {
             let at_time = vehicle.iter().find(|v| (v.time_s - row.time_s).abs() < 1e-6).unwrap();

@@ -76,7 +76,7 @@ fn answers_to_short_limbs_are_answers_and_not_false() {
         std::fs::write(at.join("my.toml"), scene).unwrap();
         let told = hzn(at, &["simulate", "my.toml", "-o", "out", "-q"]);
         assert!(told.contains(&format!("limb of the {body} in view in {pictures}\n")), "{name}: {told}");
-        let truth = hzn_sim::truth::load(&at.join("out/truth.csv")).unwrap();
+        let truth = hzn_files::truth::load(&at.join("out/truth.csv")).unwrap();
         assert_eq!(truth.iter().filter(|row| row.has_limb()).count(), pictures, "{name}");
         hzn(at, &["run", "out", "-o", "out.csv", "-q"]);
         let told = hzn(at, &["evaluate", "out.csv", "--truth", "out/truth.csv", "-o", "e.json"]);

@@ -58,7 +58,7 @@ fn disc(position: bool) -> (Place, PictureAnswer) {
         Luma([(20.0 + 180.0 * (0.5 + inside_px / 2.0).clamp(0.0, 1.0)) as u8])
     });
     picture.save(place.path("in/disc.png")).unwrap();
-    let config = hzn_calib::sensor::load(&place.path("in/sensor.toml")).unwrap().config;
+    let config = hzn_files::sensor::load(&place.path("in/sensor.toml")).unwrap().config;
     let mut horizon = Box::new(FlightHorizon::new(&config).unwrap());
     let grey = Grey::try_new(picture.as_raw(), Layout::packed(320, 240, 1, 8)).unwrap();
     let expected = horizon.expect(&Prior::default()).unwrap();

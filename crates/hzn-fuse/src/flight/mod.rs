@@ -3,7 +3,7 @@
 mod data;
 mod events;
 mod first;
-mod reference;
+pub(crate) mod reference;
 mod runner;
 
 use hzn_nav::layout::MAX_CAMERAS;
@@ -17,8 +17,6 @@ use crate::smooth::{MAX_EPOCHS, smooth};
 use data::Flight;
 use events::{clean, events};
 use runner::Runner;
-
-pub(crate) use reference::limb_axis;
 
 /// Most components of the error without the cameras.
 const VEHICLE_STATES: usize = 30;

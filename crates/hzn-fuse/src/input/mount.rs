@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use hzn_calib::limited;
 use hzn_core::config::Mount;
+use hzn_files::limited;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use serde::Deserialize;
 

@@ -98,7 +98,7 @@ pub fn recording(path: &Path) -> Result<Recording, Error> {
     let Results { rows, sensor_toml, lost } = hzn_run::results::read(path)?;
     let config = match &sensor_toml {
         None => None,
-        Some(text) => Some(hzn_calib::sensor::parse(text, Path::new("sensor.toml")).map_err(Error::unusable)?.config),
+        Some(text) => Some(hzn_files::sensor::parse(text, Path::new("sensor.toml")).map_err(Error::unusable)?.config),
     };
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let shown = path.display();

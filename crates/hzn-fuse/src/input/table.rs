@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hzn_calib::limited;
+use hzn_files::limited;
 
 use crate::error::Error;
 

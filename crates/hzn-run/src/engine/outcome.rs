@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use hzn_calib::FrameData;
 use hzn_core::Report;
 use hzn_core::body::PriorError;
 use hzn_core::status::Status;
+use hzn_files::FrameData;
 
 use super::plan::Plan;
 use super::sensor::Processed;

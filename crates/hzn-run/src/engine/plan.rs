@@ -1,7 +1,7 @@
 //! The settings of a run.
 
-use hzn_calib::Frames;
 use hzn_core::Config;
+use hzn_files::Frames;
 
 use super::sensor::LastAnswer;
 

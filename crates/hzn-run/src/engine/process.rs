@@ -9,6 +9,7 @@ use super::outcome::{BodyOutcome, Finished};
 use super::plan::Plan;
 use super::sensor::AnySensor;
 use super::trace::Traces;
+use crate::error::{Error, failed};
 use crate::overlay;
 use crate::source::Item;
 
@@ -16,7 +17,7 @@ use crate::source::Item;
 ///
 /// # Errors
 /// An overlay cannot be written.
-pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: Item) -> anyhow::Result<Finished> {
+pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: Item) -> Result<Finished, Error> {
     let time = item.time_source(plan.frames.as_ref());
     let data = item.take_prior(plan.frames.as_ref());
     let decoded = item.payload.decode(Some(&plan.config));
@@ -66,7 +67,7 @@ pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: It
     if plan.keep_picture {
         finished.picture = match original {
             Some(bytes) => Some(bytes),
-            None => Some(picture.to_png().map_err(|e| anyhow::anyhow!("{}: {e}", finished.name))?),
+            None => Some(picture.to_png().map_err(|e| failed(format!("{}: {e}", finished.name)))?),
         };
     }
     Ok(finished)

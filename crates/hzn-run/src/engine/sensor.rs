@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use hzn_calib::{FrameData, Frames, Problem};
 use hzn_core::body::{self, PriorError};
 use hzn_core::camera::Camera;
 use hzn_core::error::ConfigError;
@@ -10,6 +9,7 @@ use hzn_core::frames::{Fixed, UnitVec3};
 use hzn_core::image::{ImageView, Pixels};
 use hzn_core::real::Real;
 use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report};
+use hzn_files::{FrameData, Frames, Problem};
 use hzn_nav::ephemeris;
 
 use super::trace::{Clock, Traces, Watch};

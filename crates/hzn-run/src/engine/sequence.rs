@@ -10,6 +10,7 @@ use super::outcome::Finished;
 use super::plan::Plan;
 use super::process::process_one;
 use super::sensor::AnySensor;
+use crate::error::{Error, failed};
 use crate::source::{Item, Source};
 
 /// The destination of processed pictures, in order.
@@ -18,12 +19,12 @@ pub trait Sink {
     ///
     /// # Errors
     /// It could not be written; the run ends.
-    fn write(&mut self, frame: &mut Finished) -> anyhow::Result<()>;
+    fn write(&mut self, frame: &mut Finished) -> Result<(), Error>;
     /// Makes everything written so far safe against a crash of this program.
     ///
     /// # Errors
     /// As for `write`.
-    fn flush(&mut self) -> anyhow::Result<()>;
+    fn flush(&mut self) -> Result<(), Error>;
 }
 
 /// The way in which a run ended.
@@ -55,14 +56,14 @@ pub fn run(
     stop: &AtomicBool,
     sink: &mut dyn Sink,
     seen: &mut dyn FnMut(&Finished),
-) -> anyhow::Result<End> {
+) -> Result<End, Error> {
     let threads = plan.threads.max(1);
     let window = 2 * threads + 2;
     let (job_in, job_out) = bounded::<Job>(window);
-    let (result_in, result_out) = bounded::<anyhow::Result<Finished>>(window);
+    let (result_in, result_out) = bounded::<Result<Finished, Error>>(window);
     let (ticket_in, ticket_out) = bounded::<()>(window);
     for _ in 0..window {
-        ticket_in.send(())?;
+        ticket_in.send(()).map_err(Error::failed)?;
     }
     // Set when the writer stops with an error, so that the source ends too.
     let give_up = AtomicBool::new(false);
@@ -80,7 +81,7 @@ pub fn run(
         }
         // With the channels closed, the threads end.
         drop((result_out, ticket_in));
-        let read = source_end.join().unwrap_or_else(|_| Err(anyhow::anyhow!("reading the input failed")));
+        let read = source_end.join().unwrap_or_else(|_| Err(failed("reading the input failed")));
         written?;
         if stop.load(Ordering::Relaxed) {
             // After Ctrl-C an error of the source is expected, because the same signal can reach it.
@@ -98,7 +99,7 @@ fn read_source(
     tickets: &Receiver<()>,
     jobs: &Sender<Job>,
     stopped: impl Fn() -> bool,
-) -> anyhow::Result<()> {
+) -> Result<(), Error> {
     for index in first.. {
         if tickets.recv().is_err() || stopped() {
             break;
@@ -117,10 +118,10 @@ fn read_source(
 }
 
 /// Processes jobs with a sensor of its own, until there are no more.
-fn process_jobs(plan: &Plan, jobs: &Receiver<Job>, results: &Sender<anyhow::Result<Finished>>) {
+fn process_jobs(plan: &Plan, jobs: &Receiver<Job>, results: &Sender<Result<Finished, Error>>) {
     let mut sensor = match AnySensor::new(&plan.config, plan.flight) {
         Ok(sensor) => sensor,
-        Err(e) => return drop(results.send(Err(e.into()))),
+        Err(e) => return drop(results.send(Err(Error::failed(e)))),
     };
     sensor.remember(&plan.last);
     for Job { index, item } in jobs {
@@ -133,11 +134,11 @@ fn process_jobs(plan: &Plan, jobs: &Receiver<Job>, results: &Sender<anyhow::Resu
 /// Writes the results in the order of the pictures, and returns a ticket for each. Flushes the sink regularly.
 fn write_in_order(
     first: u64,
-    results: &Receiver<anyhow::Result<Finished>>,
+    results: &Receiver<Result<Finished, Error>>,
     tickets: &Sender<()>,
     sink: &mut dyn Sink,
     seen: &mut dyn FnMut(&Finished),
-) -> anyhow::Result<()> {
+) -> Result<(), Error> {
     let mut next = first;
     let mut waiting = BTreeMap::new();
     let mut flush_at: Option<Instant> = None;

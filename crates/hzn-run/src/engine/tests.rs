@@ -7,6 +7,7 @@ use hzn_core::image::Layout;
 use hzn_core::{Config, camera};
 
 use super::{End, Finished, Plan, Sink, run};
+use crate::error::Error;
 use crate::source::{Item, Payload, Picture, Source, TimeSource, picture::Samples};
 
 /// A source that counts the pictures that were handed out but not yet written.
@@ -17,7 +18,7 @@ struct Counted<'a> {
 }
 
 impl Source for Counted<'_> {
-    fn next(&mut self) -> Option<anyhow::Result<Item>> {
+    fn next(&mut self) -> Option<Result<Item, Error>> {
         self.left = self.left.checked_sub(1)?;
         let pending = self.pending.fetch_add(1, Ordering::SeqCst) + 1;
         self.largest.fetch_max(pending, Ordering::SeqCst);
@@ -44,12 +45,12 @@ impl Source for Counted<'_> {
 struct Slow<'a>(&'a AtomicU64);
 
 impl Sink for Slow<'_> {
-    fn write(&mut self, _frame: &mut Finished) -> anyhow::Result<()> {
+    fn write(&mut self, _frame: &mut Finished) -> Result<(), Error> {
         std::thread::sleep(Duration::from_millis(1));
         self.0.fetch_sub(1, Ordering::SeqCst);
         Ok(())
     }
-    fn flush(&mut self) -> anyhow::Result<()> {
+    fn flush(&mut self) -> Result<(), Error> {
         Ok(())
     }
 }

@@ -17,6 +17,8 @@ use canvas::{Canvas, Colour};
 use hzn_mcap::Annotations;
 use hzn_mcap::palette::{AXIS, EDGE, INLIER, LIMB, REJECTED};
 
+use crate::error::{Error, failed};
+
 const TRUTH: Colour = [230, 159, 0];
 
 /// Returns the file name of the overlay of a picture: its name, with `.png` added unless it ends in it. Two pictures
@@ -145,20 +147,22 @@ fn legend(canvas: &mut Canvas, drawing: &Annotations, truth: bool, title: &str) 
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn save(image: &RgbImage, path: &Path) -> anyhow::Result<()> {
+pub fn save(image: &RgbImage, path: &Path) -> Result<(), Error> {
     // The picture is encoded in memory first, because the encoder has its own words for a full disk.
-    let bytes = png(image).map_err(|e| e.context(path.display().to_string()))?;
-    std::fs::write(path, bytes).map_err(|e| anyhow::anyhow!(crate::disk::advice(path, &e)))
+    let bytes = png(image).map_err(|e| failed(format!("{}: {e}", path.display())))?;
+    std::fs::write(path, bytes).map_err(|e| failed(crate::disk::advice(path, &e)))
 }
 
 /// Encodes a picture as PNG.
 ///
 /// # Errors
 /// The picture has no pixels.
-pub fn png(image: &RgbImage) -> anyhow::Result<Vec<u8>> {
+pub fn png(image: &RgbImage) -> Result<Vec<u8>, Error> {
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     let mut bytes = Vec::new();
-    image.write_with_encoder(PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub))?;
+    image
+        .write_with_encoder(PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub))
+        .map_err(Error::failed)?;
     Ok(bytes)
 }
 

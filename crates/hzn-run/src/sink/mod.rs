@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Config;
 use hzn_mcap::{Contents, Options, Reader, part_path};
 
-pub use record::{altitude_km, answer, records, rows};
+pub use record::{altitude_km, records, rows};
 pub use stored::StoredResults;
 
 use crate::disk::{advice, cannot_write, refuse_existing};
@@ -234,7 +234,7 @@ impl Output {
         if self.was_final {
             return self.finish();
         }
-        self.flush().map_err(Error::from)
+        self.flush()
     }
 
     /// Removes the unfinished file. A file that already has the final name is not changed.
@@ -252,9 +252,9 @@ impl Output {
 }
 
 impl Sink for Output {
-    fn write(&mut self, frame: &mut Finished) -> anyhow::Result<()> {
+    fn write(&mut self, frame: &mut Finished) -> Result<(), Error> {
         match &mut self.kind {
-            Kind::Mcap(writer) => Ok(writer.write_bodies(&records(frame, &self.config))?),
+            Kind::Mcap(writer) => writer.write_bodies(&records(frame, &self.config)).map_err(Error::failed),
             Kind::Text(text) => {
                 let written = rows(frame, &self.config).iter().try_for_each(|row| text.write(row));
                 written.map_err(|e| text.write_error(e))
@@ -262,9 +262,9 @@ impl Sink for Output {
         }
     }
 
-    fn flush(&mut self) -> anyhow::Result<()> {
+    fn flush(&mut self) -> Result<(), Error> {
         match &mut self.kind {
-            Kind::Mcap(writer) => Ok(writer.flush()?),
+            Kind::Mcap(writer) => writer.flush().map_err(Error::failed),
             Kind::Text(text) => text.flush().map_err(|e| text.write_error(e)),
         }
     }
@@ -301,8 +301,8 @@ impl RowFile {
     ///
     /// # Errors
     /// The disk fails.
-    pub fn write(&mut self, row: &hzn_mcap::Row) -> anyhow::Result<()> {
-        self.text.write(row).map_err(|e| anyhow::anyhow!(advice(&self.path, &e)))
+    pub fn write(&mut self, row: &hzn_mcap::Row) -> Result<(), Error> {
+        self.text.write(row).map_err(|e| failed(advice(&self.path, &e)))
     }
     /// Removes the unfinished file. A file that already has the final name is not changed.
     pub fn discard(self) {

@@ -9,6 +9,7 @@ use hzn_mcap::Row;
 use super::stored::StoredResults;
 use crate::checked_row::{csv_line, from_csv, from_json, header, json_line};
 use crate::disk::run_advice;
+use crate::error::{Error, failed};
 use crate::terminal::FileOnStdout;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,11 +129,11 @@ impl Text {
     }
 
     /// Returns the error for a failed write of a run's results, with advice.
-    pub(crate) fn write_error(&self, error: io::Error) -> anyhow::Error {
+    pub(crate) fn write_error(&self, error: io::Error) -> Error {
         match &self.out {
-            Out::File { part, .. } => anyhow::anyhow!(run_advice(part, &error)),
+            Out::File { part, .. } => failed(run_advice(part, &error)),
             Out::Stdout(_) if error.kind() == io::ErrorKind::BrokenPipe => error.into(),
-            Out::Stdout(_) => anyhow::anyhow!("results cannot be written to stdout: {error}"),
+            Out::Stdout(_) => failed(format!("results cannot be written to stdout: {error}")),
         }
     }
 

@@ -1,7 +1,7 @@
 //! What a camera wrote into the picture's EXIF: the time of exposure, and its lens.
 
 use exif::{In, Tag, Value};
-use hzn_calib::start;
+use hzn_files::start;
 
 /// Returns `DateTimeOriginal` with its fraction, in seconds since 1970. EXIF rarely has a time zone: UTC is assumed.
 pub(super) fn time_s(block: Vec<u8>) -> Option<f64> {
@@ -12,7 +12,7 @@ pub(super) fn time_s(block: Vec<u8>) -> Option<f64> {
     };
     let stamp = text(Tag::DateTimeOriginal)?;
     let (date, clock) = stamp.split_once(' ')?;
-    let whole = hzn_calib::time::unix_seconds(&format!("{}T{clock}", date.replace(':', "-")))?;
+    let whole = hzn_files::time::unix_seconds(&format!("{}T{clock}", date.replace(':', "-")))?;
     let fraction = text(Tag::SubSecTimeOriginal).and_then(|t| format!("0.{t}").parse::<f64>().ok()).unwrap_or(0.0);
     Some(whole + fraction)
 }

@@ -88,7 +88,7 @@ impl Files {
 }
 
 impl Source for Files {
-    fn next(&mut self) -> Option<anyhow::Result<Item>> {
+    fn next(&mut self) -> Option<Result<Item, Error>> {
         let path = self.paths.get(self.next)?.clone();
         self.next += 1;
         let name = self.name(&path);

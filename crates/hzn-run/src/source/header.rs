@@ -27,7 +27,7 @@ pub(super) fn read_exif_time(path: &Path) -> Option<Option<f64>> {
 }
 
 /// Returns the lens data from the file's EXIF. `None` if the header cannot be read or there is no EXIF.
-pub(super) fn read_lens(path: &Path) -> Option<hzn_calib::start::Exif> {
+pub(super) fn read_lens(path: &Path) -> Option<hzn_files::start::Exif> {
     let mut decoder = open(path)?;
     decoder.exif_metadata().ok().flatten().and_then(exif::lens)
 }

@@ -1,6 +1,6 @@
 //! A picture on its way from the source to a thread, with the origin of its time.
 
-use hzn_calib::{FrameData, Frames};
+use hzn_files::{FrameData, Frames};
 
 use super::payload::Payload;
 

@@ -85,6 +85,6 @@ pub fn exif_time_s(path: &Path) -> Option<f64> {
 }
 
 /// Returns the lens data from a picture file's EXIF.
-pub fn exif_lens(path: &Path) -> Option<hzn_calib::start::Exif> {
+pub fn exif_lens(path: &Path) -> Option<hzn_files::start::Exif> {
     header::read_lens(path)
 }

@@ -62,7 +62,7 @@ impl FromStr for Raw {
             let bits = name.strip_prefix("mono").and_then(|n| n.parse::<u8>().ok()).filter(|n| (9..16).contains(n));
             let hint = match bits {
                 Some(bits) => format!("; did you mean mono16, with bits = {bits} in [input] of sensor.toml?"),
-                None => hzn_calib::nearest(name, names()).map(|n| format!("; did you mean {n}?")).unwrap_or_default(),
+                None => hzn_files::nearest(name, names()).map(|n| format!("; did you mean {n}?")).unwrap_or_default(),
             };
             return Err(format!(
                 "there is no format {name:?}{hint} (the formats are {})",

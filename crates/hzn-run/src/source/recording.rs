@@ -56,10 +56,10 @@ impl Recording {
         format!("{}#{index:06}", self.name)
     }
 
-    fn read(&mut self) -> Option<anyhow::Result<Item>> {
+    fn read(&mut self) -> Option<Result<Item, Error>> {
         let image = match self.reader.next()? {
             Ok(image) => image,
-            Err(e) => return Some(Err(e.into())),
+            Err(e) => return Some(Err(Error::failed(e))),
         };
         let name = self.frame_name(self.index);
         self.index += 1;
@@ -83,7 +83,7 @@ pub(super) fn known_size(image: &EncodedImage) -> Option<(u32, u32)> {
 }
 
 impl Source for Recording {
-    fn next(&mut self) -> Option<anyhow::Result<Item>> {
+    fn next(&mut self) -> Option<Result<Item, Error>> {
         match self.first.take() {
             Some(item) => Some(Ok(item)),
             None => self.read(),

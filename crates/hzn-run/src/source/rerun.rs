@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_calib::{FrameData, Orientation};
-use hzn_mcap::{BodyOrientation, Contents, FrameRecord, Index, IndexEntry, PicturePrior, Reader, Row};
+use hzn_files::FrameData;
+use hzn_mcap::{Contents, FrameRecord, Index, IndexEntry, Reader, Row};
 
 use super::item::{Item, TimeSource};
 use super::payload::Payload;
@@ -80,7 +80,7 @@ fn find_pictures(path: &Path) -> Result<RecordedPictures, hzn_mcap::Error> {
 }
 
 fn item(record: FrameRecord) -> Item {
-    let data: FrameData = recorded_prior(&record.row, &record.prior);
+    let data = recorded_prior(&record.row, record.prior);
     let picture = record
         .image
         .map_or_else(|| Payload::Broken("the recording does not contain this picture".into()), Payload::from_recorded);
@@ -88,12 +88,12 @@ fn item(record: FrameRecord) -> Item {
 }
 
 impl Source for Rerun {
-    fn next(&mut self) -> Option<anyhow::Result<Item>> {
+    fn next(&mut self) -> Option<Result<Item, Error>> {
         loop {
             match self.reader.next()? {
                 Ok(record) if self.last.replace(record.row.index) == Some(record.row.index) => {}
                 Ok(record) => return Some(Ok(item(record))),
-                Err(e) => return Some(Err(e.into())),
+                Err(e) => return Some(Err(Error::failed(e))),
             }
         }
     }
@@ -150,30 +150,7 @@ pub fn describe_loss(reader: &Reader, path: &Path, done: &str) -> Option<String>
     }
 }
 
-/// Returns the row of frames.csv for a picture, from the prior that a recording stores.
-pub fn recorded_prior(row: &Row, given: &PicturePrior) -> FrameData {
-    FrameData {
-        file: row.file.clone(),
-        line: 0,
-        time_s: row.time_s,
-        utc_s: given.utc_s,
-        altitude_km: given.altitude_km,
-        position_km: given.position_km,
-        q_fixed_from_camera_wxyz: given.q_fixed_from_camera_wxyz,
-        attitude_sigma_deg: given.attitude_sigma_deg,
-        sun_camera: given.sun_camera,
-        rate_rad_s: given.rate_rad_s,
-        pole_camera: given.pole_camera,
-        range_km: given.range_km,
-        range_sigma_km: given.range_sigma_km,
-        other_bodies: given.other_bodies.iter().map(from_recorded_orientation).collect(),
-    }
-}
-
-fn from_recorded_orientation(other: &BodyOrientation) -> Orientation {
-    Orientation {
-        body: other.body.clone(),
-        q_fixed_from_camera_wxyz: other.q_vehicle_from_camera_wxyz,
-        pole_camera: other.pole_camera,
-    }
+/// Returns the row of frames.csv for a picture, from its result and the prior that a recording stores.
+pub fn recorded_prior(row: &Row, given: FrameData) -> FrameData {
+    FrameData { file: row.file.clone(), time_s: row.time_s, ..given }
 }

@@ -14,7 +14,7 @@ pub(super) const MAX_SIZES_READ: usize = 32;
 /// A sequence of pictures in order.
 pub trait Source: Send {
     /// Returns the next picture; `None` at the end. An error ends the sequence.
-    fn next(&mut self) -> Option<anyhow::Result<Item>>;
+    fn next(&mut self) -> Option<Result<Item, Error>>;
     /// Returns the number of pictures, if it is known before.
     fn total(&self) -> Option<u64>;
     /// Returns names and sizes (width, height in pixels) of some of the pictures, from their headers alone. Pictures

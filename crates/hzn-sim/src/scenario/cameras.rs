@@ -1,6 +1,7 @@
 //! Several cameras on a vehicle, their mounts and their clocks.
 
 use hzn_core::config::Mount;
+use hzn_files::utc;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +9,6 @@ use super::{Part, Scenario, ScenarioError};
 use crate::counter::{Counter, Stream};
 use crate::flight::Stamp;
 use crate::trajectory::Path;
-use crate::utc;
 
 /// `[clock]`: the clock of a camera. A picture that is taken at t gets the time stamp t + offset + latency + jitter.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

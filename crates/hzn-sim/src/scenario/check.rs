@@ -2,12 +2,12 @@
 
 use hzn_core::body::Kind;
 use hzn_core::camera::Camera;
+use hzn_files::utc;
 
 use super::{Format, Scenario, ScenarioError};
 use crate::infrared::Infrared;
 use crate::scene::World;
 use crate::texture::Clouds;
-use crate::utc;
 use crate::visible::Visible;
 
 /// A key, its value, and the smallest and largest allowed value.

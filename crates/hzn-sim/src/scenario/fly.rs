@@ -3,6 +3,7 @@
 use hzn_core::Preset;
 use hzn_core::body::Kind;
 use hzn_core::region;
+use hzn_files::utc;
 
 use super::{Format, Scenario, ScenarioError};
 use crate::counter::{Counter, Stream};
@@ -12,7 +13,6 @@ use crate::foreground::Foreground;
 use crate::motion::Motion;
 use crate::scene::{Light, Scene, World};
 use crate::trajectory::Path;
-use crate::utc;
 use hzn_nav::ephemeris;
 
 /// Largest number of pictures over which the exposure is followed before a wanted picture.

@@ -7,12 +7,14 @@
 mod cameras;
 mod check;
 mod exposure;
+mod file;
 mod fly;
 mod noise;
 mod planet;
 
 pub use cameras::{CameraOnVehicle, Clock};
 pub use exposure::Exposure;
+pub use file::{load, parse, refused, source};
 pub use noise::{FIT_PICTURES, Fit, median_rms_px};
 pub use planet::BodyFrameRow;
 
@@ -22,6 +24,7 @@ use hzn_core::body::{self, Kind};
 use hzn_core::camera;
 use hzn_core::config::Mount;
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
+use hzn_files::utc;
 use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;
@@ -29,7 +32,6 @@ use crate::optics::Optics;
 use crate::scene::World;
 use crate::trajectory::instruments::{Gnss, Imu};
 use crate::trajectory::{Attitude, Path, Trajectory};
-use crate::utc;
 
 /// Scenes that come with hzn: name, description, text of the scene.toml.
 pub const BUILTIN: [(&str, &str, &str); 13] = [

@@ -33,4 +33,4 @@ pub use path::{Path, State};
 pub use position::Trajectory;
 pub use rocket::Rocket;
 pub use table::Table;
-pub use vehicle::{MAX_RATE_HZ, VehicleRow};
+pub use vehicle::MAX_RATE_HZ;

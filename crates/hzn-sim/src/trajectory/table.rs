@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_calib::limited;
+use hzn_files::limited;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 

@@ -1,38 +1,11 @@
 //! The truth about the vehicle, for vehicle.csv.
 
-use serde::{Deserialize, Serialize};
+use hzn_files::vehicle::VehicleRow;
 
 use super::path::Path;
 
 /// Most rows a second in vehicle.csv.
 pub const MAX_RATE_HZ: f64 = 10.0;
-
-/// A row of vehicle.csv: the true state of the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct VehicleRow {
-    /// Time in seconds.
-    pub time_s: f64,
-    /// First component of the position in ECEF, metres.
-    pub x_m: f64,
-    /// Second component of the position.
-    pub y_m: f64,
-    /// Third component of the position.
-    pub z_m: f64,
-    /// First component of the velocity relative to the Earth in ECEF, m/s.
-    pub vx_mps: f64,
-    /// Second component of the velocity.
-    pub vy_mps: f64,
-    /// Third component of the velocity.
-    pub vz_mps: f64,
-    /// Attitude as a quaternion from the vehicle's axes to ECEF, scalar part.
-    pub qw: f64,
-    /// First vector component of the attitude.
-    pub qx: f64,
-    /// Second vector component of the attitude.
-    pub qy: f64,
-    /// Third vector component of the attitude.
-    pub qz: f64,
-}
 
 impl Path {
     /// Returns the truth about the vehicle at a time in seconds.

@@ -1,9 +1,9 @@
 //! The truth about a scene with an ellipsoid.
 
 use hzn_core::frames::{Cam, UnitVec3};
+use hzn_files::truth::Truth;
 use nalgebra::Vector3;
 
-use super::row::Truth;
 use crate::ellipsoid::{Ellipsoid, EllipsoidLimb};
 use crate::error::SceneError;
 use crate::scene::Scene;

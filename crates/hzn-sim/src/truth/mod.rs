@@ -1,48 +1,19 @@
-//! The truth about a scene: a row of truth.csv, and the file.
+//! The truth about a scene.
 
 mod ellipsoid;
-mod file;
 mod in_view;
-mod row;
 mod scene;
 
-pub use file::{TruthError, load, parse};
 pub use in_view::{LIMB_IN_VIEW_PX, OUTLINE_SHARE, SIDE_SHARE};
-pub use row::Truth;
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use super::*;
     use crate::pose::{Look, Pose, position_m};
     use crate::scene::{Light, Scene};
     use hzn_core::camera::{Config, Model};
 
     fn scene(look: Look) -> Scene {
         Scene::new(Config::ideal(Model::Pinhole, 640, 480, 400.0), Pose::looking(position_m(0.0, 0.0, 200.0), look))
-    }
-
-    #[test]
-    fn a_table_is_read_back_and_wrong_cells_are_named() {
-        let rows = [scene(Look::default()).truth("a.png", 1.5).unwrap()];
-        let mut table = csv::Writer::from_writer(Vec::new());
-        rows.iter().for_each(|r| table.serialize(r).unwrap());
-        let text = String::from_utf8(table.into_inner().unwrap()).unwrap();
-        let path = Path::new("truth.csv");
-        let read = parse(&text, path).unwrap();
-        assert_eq!((read[0].file.as_str(), read[0].sun_x, read[0].axis_y), ("a.png", None, rows[0].axis_y));
-        let says = |text: &str| parse(text, path).unwrap_err().to_string();
-        assert_eq!(says(&text.replace(",1.5,", ",soon,")), "truth.csv:2: time_s: invalid float literal");
-        assert_eq!(says(&text.replace(",1.5,", ",nan,")), "truth.csv:2: time_s: NaN is not a finite number");
-        assert_eq!(
-            says(&text.replace("axis_x", "x")),
-            "truth.csv:1: axis_x: this column is missing; is it a truth.csv?"
-        );
-        assert_eq!(says(text.lines().next().unwrap()), "truth.csv: has no rows");
-        let shown = rows[0].half_angle_deg.to_string();
-        assert!(says(&text.replace(&shown, "97")).contains("half_angle_deg: 97 is not a half-angle"));
-        assert!(load(Path::new("/nowhere/truth.csv")).unwrap_err().to_string().ends_with("no such file"));
     }
 
     #[test]

@@ -3,9 +3,9 @@
 use hzn_core::body::{AU_KM, Kind, MOON_RADIUS_KM, SUN_RADIUS_KM};
 use hzn_core::ellipsoid::LimbCone;
 use hzn_core::frames::{Fixed, UnitVec3};
+use hzn_files::truth::Truth;
 use nalgebra::Vector3;
 
-use super::row::Truth;
 use crate::error::SceneError;
 use crate::globe::Globe;
 use crate::scene::{Light, Scene, World};

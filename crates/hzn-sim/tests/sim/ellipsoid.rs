@@ -115,7 +115,7 @@ fn truth_of_the_earth_is_that_of_its_own_world() {
     same.light = earth.light;
     let (a, b) = (earth.truth("a.png", 1.0).unwrap(), same.truth("a.png", 1.0).unwrap());
     let near = |x: f64, y: f64| assert!((x - y).abs() < 1e-9, "{x} {y}");
-    let numbers = |t: &hzn_sim::Truth| {
+    let numbers = |t: &hzn_files::truth::Truth| {
         let [x, y, z] = t.position_km().unwrap();
         let (sun, phase) = (t.sun_x.unwrap(), t.phase_deg.unwrap());
         [t.axis_x, t.axis_y, t.axis_z, t.half_angle_deg, t.qw, sun, phase, x, y, z]

@@ -21,7 +21,7 @@ fn encounter(scenario: &mut Scenario) -> &mut Encounter {
 }
 
 /// Diameter of the disc of a truth in pixels, for a pinhole of this focal length.
-fn diameter_px(truth: &hzn_sim::Truth, focal_px: f64) -> f64 {
+fn diameter_px(truth: &hzn_files::truth::Truth, focal_px: f64) -> f64 {
     2.0 * focal_px * truth.half_angle_deg.to_radians().tan()
 }
 
@@ -43,7 +43,7 @@ fn scenes_have_the_sizes_and_phases_that_they_promise() {
             let phase_deg = truths[i].phase_deg.unwrap();
             assert!((phase_deg - phases_deg[k]).abs() < 1e-6, "{name} {phase_deg}");
         }
-        assert!(truths.iter().all(hzn_sim::Truth::has_limb), "{name}");
+        assert!(truths.iter().all(hzn_files::truth::Truth::has_limb), "{name}");
         assert_eq!(truths[0].body, if name == "geo" { "ellipsoid" } else { name });
     }
 }

@@ -155,7 +155,8 @@ fn truth_and_frames_have_the_columns_of_their_files() {
     let header = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,\
                   moon_x,moon_y,moon_z,qw,qx,qy,qz,position_x_km,position_y_km,position_z_km,phase_deg";
     assert_eq!(text.lines().next(), Some(header));
-    let back: hzn_sim::Truth = csv::Reader::from_reader(text.as_bytes()).deserialize().next().unwrap().unwrap();
+    let back: hzn_files::truth::Truth =
+        csv::Reader::from_reader(text.as_bytes()).deserialize().next().unwrap().unwrap();
     assert_eq!(back, frame.truth().unwrap());
 
     let mut frames = csv::Writer::from_writer(Vec::new());

@@ -1,8 +1,8 @@
 //! The quantities that can be plotted over time.
 
+use hzn_evaluate::{MeasuredPosition, PositionMiss};
+use hzn_files::truth::Truth;
 use hzn_mcap::Row;
-use hzn_sim::evaluate::{MeasuredPosition, PositionMiss};
-use hzn_sim::truth::Truth;
 
 /// A quantity that can be plotted over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hzn_calib::FrameData;
+use hzn_files::FrameData;
 use hzn_run::source::Raw;
 
 /// One picture of the sequence.

@@ -1,6 +1,6 @@
 //! The ranges of sliders.
 
-use hzn_calib::keys::Limits;
+use hzn_files::keys::Limits;
 
 /// Range of a slider, and whether its scale is logarithmic.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn every_slider_begins_within_its_limits() {
-        for key in hzn_calib::keys::all() {
+        for key in hzn_files::keys::all() {
             for magnitude in [0.0, 0.01, 1.0, 300.0] {
                 let Some(range) = SliderRange::from_limits(&key.limits, magnitude) else { continue };
                 let Limits::Number { low, high, .. } = key.limits else { unreachable!() };

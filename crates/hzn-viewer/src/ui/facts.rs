@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn every_section_has_a_card_and_every_stage() {
-        for key in hzn_calib::keys::all() {
+        for key in hzn_files::keys::all() {
             let elsewhere = ["", "mount", "bodies"];
             let shown = CARDS.iter().any(|c| c.sections.contains(&key.section()));
             assert!(shown || elsewhere.contains(&key.section()), "{}", key.path);

@@ -1,7 +1,7 @@
 //! Names of keys in texts, as links that open the card of the key.
 
 use egui::{RichText, Ui};
-use hzn_calib::keys;
+use hzn_files::keys;
 
 use super::panels::Panel;
 use super::viewer::Viewer;

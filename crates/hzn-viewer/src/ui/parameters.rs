@@ -1,7 +1,7 @@
 //! The parameters of a stage: each key of sensor.toml is a slider, a choice or a switch.
 
 use egui::{ComboBox, Id, RichText, Slider, SliderClamping, Ui, vec2};
-use hzn_calib::keys::{self, Key, Limits};
+use hzn_files::keys::{self, Key, Limits};
 use toml_edit::Value;
 
 use super::camera_card;

@@ -2,8 +2,8 @@
 
 use egui::collapsing_header::CollapsingState;
 use egui::{Color32, ComboBox, RichText, Ui, vec2};
-use hzn_calib::keys;
 use hzn_core::status::Status;
+use hzn_files::keys;
 
 use super::facts::{self, CARDS, Card};
 use super::viewer::Viewer;

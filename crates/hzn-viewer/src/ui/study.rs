@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{DragValue, RichText, Ui};
 use egui_plot::{Line, Plot, Points, VLine};
-use hzn_calib::keys::Key;
+use hzn_files::keys::Key;
 
 use super::study_window::StudyWindow;
 use super::theme;

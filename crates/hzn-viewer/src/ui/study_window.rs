@@ -1,6 +1,6 @@
 //! The state of the window that sweeps a parameter.
 
-use hzn_calib::keys::Key;
+use hzn_files::keys::Key;
 
 use crate::work::study::{Study, Tally};
 
@@ -39,7 +39,7 @@ mod tests {
 
     #[test]
     fn the_values_reach_both_ends() {
-        let key = hzn_calib::keys::find("threshold.scale").unwrap();
+        let key = hzn_files::keys::find("threshold.scale").unwrap();
         let mut window =
             StudyWindow { key, study: None, range: [0.5, 2.0], logarithmic: true, done: 0, tallies: Vec::new() };
         let values = window.values();

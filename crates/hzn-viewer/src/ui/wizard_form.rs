@@ -1,7 +1,7 @@
 //! The form that makes a first sensor.toml from the pictures, a field of view and an altitude.
 
-use hzn_calib::start::{self, CameraFacts, Exif};
 use hzn_core::camera::Model;
+use hzn_files::start::{self, CameraFacts, Exif};
 
 /// The answers of the user, and what the picture itself says.
 #[derive(Debug, Clone, PartialEq)]

@@ -68,11 +68,11 @@ mod tests {
         assert!(!is_complete(dir.path()));
         render_frames(dir.path(), (96, 54), 2, &Progress::default()).unwrap();
         assert!(is_complete(dir.path()));
-        let truth = hzn_sim::truth::load(&dir.path().join("truth.csv")).unwrap();
-        let frames = hzn_calib::frames::load(&dir.path().join("frames.csv")).unwrap();
+        let truth = hzn_files::truth::load(&dir.path().join("truth.csv")).unwrap();
+        let frames = hzn_files::frames::load(&dir.path().join("frames.csv")).unwrap();
         assert_eq!((truth.len(), frames.rows.len()), (2, 2));
         assert!(truth.iter().all(|t| t.axis().is_some()) && frames.rows.iter().all(|r| r.position_km.is_some()));
         let text = std::fs::read_to_string(dir.path().join("sensor.toml")).unwrap();
-        assert!(hzn_calib::sensor::parse(&text, &dir.path().join("sensor.toml")).is_ok());
+        assert!(hzn_files::sensor::parse(&text, &dir.path().join("sensor.toml")).is_ok());
     }
 }

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use egui::{Color32, ColorImage};
-use hzn_calib::FrameData;
 use hzn_core::camera::Camera;
 use hzn_core::covariance::ErrorBudget;
 use hzn_core::image::ImageView;
@@ -16,6 +15,7 @@ use hzn_core::real::Real;
 use hzn_core::report::Candidate;
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Expected, Observer, Report, Solution, body};
+use hzn_files::FrameData;
 use hzn_mcap::{Row, RowMeta};
 use hzn_run::engine::trace::Edge;
 use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Trace, Traces, Watch};

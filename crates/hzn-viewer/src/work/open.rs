@@ -4,10 +4,10 @@ use std::collections::{HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
-use hzn_calib::Frames;
+use hzn_files::Frames;
+use hzn_files::truth::{self, Truth};
 use hzn_mcap::{Index, IndexEntry, Row};
 use hzn_run::source::{self, Item, Payload, Raw, Source, TimeSource};
-use hzn_sim::truth::{self, Truth};
 
 use super::Wake;
 use crate::model::{Entry, Fingerprint, Place};
@@ -135,7 +135,7 @@ fn read_companions(request: &Request, folder: &Path, recorded_sensor: Option<Sen
     let mut opened = Opened { folder: folder.to_owned(), ..Opened::default() };
     let file =
         |named: &Option<PathBuf>, name: &str| named.clone().or_else(|| Some(folder.join(name)).filter(|p| p.exists()));
-    let mut sensor_file = |path: &Path| match hzn_calib::limited::read_text(path, hzn_calib::limited::SETTINGS_BYTES) {
+    let mut sensor_file = |path: &Path| match hzn_files::limited::read_text(path, hzn_files::limited::SETTINGS_BYTES) {
         Ok(text) => Some(SensorText { as_read: Some(Fingerprint::of(&text)), text, home: path.to_owned() }),
         Err(e) => {
             opened.notes.push(format!("{}: cannot be read: {e}", path.display()));
@@ -147,7 +147,7 @@ fn read_companions(request: &Request, folder: &Path, recorded_sensor: Option<Sen
         (None, Some(recorded)) => Some(recorded),
         (None, None) => file(&None, "sensor.toml").and_then(|path| sensor_file(&path)),
     };
-    let frames = file(&request.frames, "frames.csv").and_then(|path| match hzn_calib::frames::load(&path) {
+    let frames = file(&request.frames, "frames.csv").and_then(|path| match hzn_files::frames::load(&path) {
         Ok(frames) => Some(frames),
         Err(problem) => {
             opened.notes.push(problem.to_string());
@@ -174,7 +174,7 @@ fn read_companions(request: &Request, folder: &Path, recorded_sensor: Option<Sen
 fn complete_sensor(opened: &mut Opened, source: &dyn Source) {
     let Some(sensor) = &mut opened.sensor else { return };
     // The session reports errors of the sensor.toml.
-    let Ok(parsed) = hzn_calib::sensor::parse(&sensor.text, &sensor.home) else { return };
+    let Ok(parsed) = hzn_files::sensor::parse(&sensor.text, &sensor.home) else { return };
     opened.notes.extend(parsed.warnings.iter().map(ToString::to_string));
     if parsed.config.input.bits.is_some() {
         return;
@@ -287,7 +287,7 @@ impl FrameJoiner {
                         continue;
                     }
                     out.extend(self.last.take());
-                    let data = hzn_run::source::recorded_prior(&row, &given);
+                    let data = hzn_run::source::recorded_prior(&row, *given);
                     let place = self.take_pending(at.frame()).map_or(Place::Nowhere, Place::Recorded);
                     let entry = Entry { name: row.file.clone(), time_s: row.time_s, data: Some(data), place };
                     self.last = Some((entry, vec![*row]));

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use hzn_mcap::Pictures;
+use hzn_run::Error;
 use hzn_run::source::{self, Payload, Source};
 
 use crate::model::Place;
@@ -25,12 +26,16 @@ impl Reader {
     ///
     /// # Errors
     /// The recording or the video can no longer be read.
-    pub(super) fn payload(&mut self, place: &Place) -> anyhow::Result<Payload> {
+    pub(super) fn payload(&mut self, place: &Place) -> Result<Payload, Error> {
         Ok(match place {
             Place::File(path) => Payload::File(path.clone()),
             Place::RawFile(path, raw) => Payload::RawFile(path.clone(), *raw),
             Place::Recorded(place) => match &mut self.recording {
-                Some(pictures) => pictures.read(place)?.image.map_or_else(Payload::Broken, Payload::from_recorded),
+                Some(pictures) => pictures
+                    .read(place)
+                    .map_err(Error::failed)?
+                    .image
+                    .map_or_else(Payload::Broken, Payload::from_recorded),
                 None => Payload::Broken("the recording is not open".into()),
             },
             Place::Video(index) => self.read_video(*index)?,
@@ -39,10 +44,10 @@ impl Reader {
     }
 
     /// Returns a picture of the video. A video is read forward only, so for an earlier picture it is reopened.
-    fn read_video(&mut self, index: u64) -> anyhow::Result<Payload> {
+    fn read_video(&mut self, index: u64) -> Result<Payload, Error> {
         let (source, next) = match &mut self.video {
             Some(video) if video.1 <= index => video,
-            video => video.insert((source::open(&self.inputs, None, None).map_err(hzn_run::Error::into_cause)?, 0)),
+            video => video.insert((source::open(&self.inputs, None, None)?, 0)),
         };
         while let Some(item) = source.next().transpose()? {
             *next += 1;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_calib::FrameData;
+use hzn_files::FrameData;
 use hzn_mcap::{Index, Pictures};
 use hzn_run::source::{Item, Source, TimeSource};
 
@@ -32,7 +32,7 @@ pub(super) fn open_pictures(path: &Path) -> Result<Pictures, String> {
 }
 
 impl Source for SequenceSource {
-    fn next(&mut self) -> Option<anyhow::Result<Item>> {
+    fn next(&mut self) -> Option<Result<Item, hzn_run::Error>> {
         let Entry { name, time_s, data, place } = self.entries.next()?;
         // The window's data of the picture are complete, so nothing is looked up elsewhere.
         let data = FrameData { file: name.clone(), time_s, ..data.unwrap_or_default() };

@@ -158,10 +158,10 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
 /// Sink for results that are not written.
 struct Nothing;
 impl Sink for Nothing {
-    fn write(&mut self, _: &mut Finished) -> anyhow::Result<()> {
+    fn write(&mut self, _: &mut Finished) -> Result<(), hzn_run::Error> {
         Ok(())
     }
-    fn flush(&mut self) -> anyhow::Result<()> {
+    fn flush(&mut self) -> Result<(), hzn_run::Error> {
         Ok(())
     }
 }

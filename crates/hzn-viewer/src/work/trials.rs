@@ -1,11 +1,11 @@
 //! Trials that find the cause of a refusal: the same picture with Otsu's threshold, and with a cone of any half-angle.
 
-use hzn_calib::FrameData;
 use hzn_core::error::ConfigError;
 use hzn_core::image::ImageView;
 use hzn_core::status::Status;
 use hzn_core::verdict::Verdict;
 use hzn_core::{Config, consensus, fit, threshold};
+use hzn_files::FrameData;
 use hzn_run::engine::trace::Edge;
 use hzn_run::engine::{AnySensor, Traces};
 

@@ -2,8 +2,8 @@
 //! height.
 
 use anyhow::anyhow;
-use hzn_calib::frames;
 use hzn_core::{Config, config::Mount};
+use hzn_files::frames;
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{Attitude, Body, Inputs, Recording};
 use hzn_fuse::settings::Treatment;

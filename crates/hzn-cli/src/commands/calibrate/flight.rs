@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use hzn_calib::noise::{self, WeightedPoints};
-use hzn_calib::{FrameData, Sensor};
 use hzn_core::{Prior, Solution};
+use hzn_files::{FrameData, Sensor};
 use hzn_run::engine::{self, End, Finished, Plan, Sink};
 use hzn_run::source::{Source, ending};
 
@@ -28,10 +28,10 @@ pub(super) fn check_endings(output: &[PathBuf]) -> Result<(), Stop> {
 struct NoSink;
 
 impl Sink for NoSink {
-    fn write(&mut self, _: &mut Finished) -> anyhow::Result<()> {
+    fn write(&mut self, _: &mut Finished) -> Result<(), hzn_run::Error> {
         Ok(())
     }
-    fn flush(&mut self) -> anyhow::Result<()> {
+    fn flush(&mut self) -> Result<(), hzn_run::Error> {
         Ok(())
     }
 }

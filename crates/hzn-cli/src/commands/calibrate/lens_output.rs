@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use hzn_calib::board::Calibrated;
-use hzn_calib::camera_file::{self, Format};
 use hzn_calib::residual_table;
+use hzn_files::camera_file::{self, Format};
 use hzn_run::disk;
 use hzn_run::source::ending;
 

@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use hzn_calib::board::{Calibrated, Residual, ViewResult};
 use hzn_core::camera::{Config, Equation, Intrinsic};
+use hzn_plot::{Chart, Series, Style};
 
 use super::lens_text::{self, Reasons};
 use crate::html::{STYLE, escape};
-use crate::plot::{Chart, Series, Style};
 
 /// Width of the pictures of the frame, in pixels of the page.
 const WIDTH: f64 = 640.0;

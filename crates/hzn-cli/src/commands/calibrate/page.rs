@@ -1,17 +1,17 @@
 //! The report as one page of HTML that needs no other file.
 
 use hzn_calib::noise::Calibration;
+use hzn_plot::{Chart, Series, Style};
 
 use super::text;
 use crate::html::{STYLE, escape};
-use crate::plot::{Chart, Series, Style};
 
 /// Returns a page with a title, lines of name and value, and plots.
 pub(super) fn simple(title: &str, lines: &[(String, String)], charts: &[Chart]) -> anyhow::Result<String> {
     let row =
         |(name, value): &(String, String)| format!("<tr><td>{}</td><td>{}</td></tr>", escape(name), escape(value));
     let rows: String = lines.iter().map(row).collect();
-    let plots = charts.iter().map(Chart::svg).collect::<anyhow::Result<String>>()?;
+    let plots = charts.iter().map(Chart::svg).collect::<Result<String, _>>()?;
     Ok(format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{STYLE}</style>\
          <h1>{0}</h1><table>{rows}</table><div class=\"plots\">{plots}</div></html>\n",

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use hzn_calib::Sensor;
 use hzn_calib::sky::{self, Estimate, Found, FoundMount, LimbPrior, Mount, MountRefusal, Unknowns, View};
+use hzn_files::Sensor;
 use hzn_run::disk;
 use hzn_run::engine::Plan;
 use hzn_run::explain::counted;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use hzn_calib::Sensor;
 use hzn_calib::sky::{Parameter, Unknowns, Written};
+use hzn_files::Sensor;
 use hzn_run::disk;
 use hzn_run::source::ending;
 

@@ -4,9 +4,9 @@ use hzn_calib::sky::{
     Check, Determined, Deviation, Estimate, MIN_PICTURES, Mount, MountRefusal, Observability, Track, Verdict,
 };
 use hzn_core::camera::Intrinsic;
+use hzn_plot::{Chart, Series, Style};
 use hzn_run::explain::counted;
 
-use crate::plot::{Chart, Series, Style};
 use crate::tell::one_line;
 
 /// A mount, or why there is none.

@@ -1,10 +1,10 @@
 //! `hzn calibrate sky` for a sensor that looks for the Sun or the Moon: the lens from the track of the disc.
 
 use hzn_calib::sky::{self, Found, FoundMount, Sight, Track};
-use hzn_calib::{FrameData, Sensor};
 use hzn_core::body::Kind;
 use hzn_core::camera::Camera;
 use hzn_core::frames::{Rotation, UnitVec3};
+use hzn_files::{FrameData, Sensor};
 use hzn_nav::ephemeris;
 use hzn_run::explain::counted;
 use hzn_run::source::ending;

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use hzn_calib::camera_file::{self, Format, Loaded};
 use hzn_calib::conversion;
 use hzn_core::camera::{self, Camera, Model};
+use hzn_files::camera_file::{self, Format, Loaded};
 use hzn_run::disk;
 use hzn_run::source::ending;
 
@@ -143,7 +143,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         tell::warning(format_args!("{} has {what}", lost.join(", ")));
     }
     let Some(path) = &args.output else { return Ok(tell::file(text)?) };
-    let read = args.file.as_deref().map(files::of_sensor).unwrap_or_default();
+    let read = args.file.as_deref().map(hzn_files::files_of_sensor).unwrap_or_default();
     files::check_outputs(&read, std::slice::from_ref(path), args.force)?;
     if to == To::Sensor {
         let comment = comment.map(|c| format!("# {c}\n")).unwrap_or_default();
@@ -215,7 +215,7 @@ fn load(args: &Args) -> Result<Loaded, Stop> {
         "toml" if args.camera.is_some() => {
             Err(usage(format!("--camera: {} contains one camera; leave out --camera", file.display())))
         }
-        "toml" => Ok(Loaded::Lens(hzn_calib::sensor::load(file)?.config.camera)),
+        "toml" => Ok(Loaded::Lens(hzn_files::sensor::load(file)?.config.camera)),
         _ => Ok(camera_file::load_any(file, args.camera.as_deref())?),
     }
 }

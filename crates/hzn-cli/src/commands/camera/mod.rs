@@ -47,10 +47,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         Command::Show { file, picture, force } => {
             if let Some(path) = picture {
                 check_map(path)?;
-                files::check_outputs(&files::of_sensor(file), std::slice::from_ref(path), *force)?;
+                files::check_outputs(&hzn_files::files_of_sensor(file), std::slice::from_ref(path), *force)?;
             }
             let config = load(file)?;
-            for doubt in hzn_calib::plausible::find_implausible(&config) {
+            for doubt in hzn_files::plausible::find_implausible(&config) {
                 tell::warning(format_args!("{}: {}: {}", file.display(), doubt.key, doubt.what));
             }
             tell::result(describe(&config)?)?;
@@ -70,11 +70,11 @@ fn check_map(path: &Path) -> Result<(), Stop> {
 
 fn load(file: &Path) -> Result<Config, Stop> {
     match ending(file).as_str() {
-        "toml" => Ok(hzn_calib::sensor::load(file)?.config),
+        "toml" => Ok(hzn_files::sensor::load(file)?.config),
         "csv" | "jsonl" | "mcap" => {
             Err(usage(format!("{}: a sensor.toml or a camera file (YAML, XML, JSON) is expected", file.display())))
         }
-        _ => Ok(Config::new(hzn_calib::camera_file::load(file, None)?)),
+        _ => Ok(Config::new(hzn_files::camera_file::load(file, None)?)),
     }
 }
 

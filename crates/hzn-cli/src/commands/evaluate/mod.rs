@@ -8,12 +8,12 @@ mod worst;
 use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera;
+use hzn_evaluate::{Answer, Evaluation, pair};
+use hzn_files::truth::Truth;
 use hzn_mcap::Row;
+use hzn_run::disk;
 use hzn_run::results::Results;
 use hzn_run::source::ending;
-use hzn_run::{disk, sink};
-use hzn_sim::Truth;
-use hzn_sim::evaluate::{Answer, Evaluation, pair};
 
 use crate::exit::{Exit, Outcome, Stop, failed, unreadable, usage};
 use crate::files;
@@ -55,9 +55,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let truth_path = if args.truth.is_dir() { args.truth.join("truth.csv") } else { args.truth.clone() };
     let folder = truth_path.parent().unwrap_or(Path::new(""));
-    let truth = hzn_sim::truth::load(&truth_path).map_err(usage)?;
+    let truth = hzn_files::truth::load(&truth_path).map_err(usage)?;
     let sensor_path = args.sensor.clone().unwrap_or_else(|| folder.join("sensor.toml"));
-    let mut read = files::of_sensor(&sensor_path);
+    let mut read = hzn_files::files_of_sensor(&sensor_path);
     read.extend([args.results.clone(), truth_path.clone()]);
     read.extend(truth.iter().map(|t| folder.join(&t.file)));
     files::check_outputs(&read, &args.output, args.force)?;
@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if camera.is_none() {
         tell::line("note: no sensor.toml is available (--sensor): the length of limb in view is left out");
     }
-    let answers: Vec<Answer> = rows.iter().map(sink::answer).collect();
+    let answers: Vec<Answer> = rows.iter().map(Answer::from).collect();
     let cases = pair(&answers, &truth, camera.as_ref())
         .map_err(|e| usage(format!("{} does not match {}: {e}", truth_path.display(), args.results.display())))?;
     warn_of_other_times(&rows, &truth);
@@ -98,10 +98,10 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn sensor(sensor: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result<Option<hzn_core::Config>, Stop> {
     let neighbour = folder.join("sensor.toml");
     Ok(match (sensor, recorded) {
-        (Some(path), _) => Some(hzn_calib::sensor::load(path)?.config),
+        (Some(path), _) => Some(hzn_files::sensor::load(path)?.config),
         // A recorded sensor.toml may name a camera file that is not here.
-        (None, Some(text)) => hzn_calib::sensor::parse(text, Path::new("sensor.toml")).ok().map(|s| s.config),
-        (None, None) if neighbour.exists() => Some(hzn_calib::sensor::load(&neighbour)?.config),
+        (None, Some(text)) => hzn_files::sensor::parse(text, Path::new("sensor.toml")).ok().map(|s| s.config),
+        (None, None) if neighbour.exists() => Some(hzn_files::sensor::load(&neighbour)?.config),
         (None, None) => None,
     })
 }

@@ -1,12 +1,12 @@
 //! The report as one page of HTML that needs no other file and no network.
 
 use base64::Engine;
-use hzn_sim::evaluate::{Case, Evaluation, Miss};
+use hzn_evaluate::{Case, Evaluation, Miss};
+use hzn_plot::{Chart, Series, Style};
 
 use super::report::Report;
 use super::text;
 use super::worst::Drawn;
-use crate::plot::{Chart, Series, Style};
 
 const STYLE: &str = "\
 body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;padding:0 1rem;color:#222}\

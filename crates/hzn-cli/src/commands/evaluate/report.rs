@@ -1,6 +1,6 @@
 //! The content of a report.
 
-use hzn_sim::evaluate::{Case, Evaluation};
+use hzn_evaluate::{Case, Evaluation};
 use serde::Serialize;
 
 /// Everything that a report shows. Its JSON is this structure.

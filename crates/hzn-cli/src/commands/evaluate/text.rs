@@ -1,6 +1,6 @@
 //! The report as text.
 
-use hzn_sim::evaluate::{Case, Evaluation, Group, Honesty};
+use hzn_evaluate::{Case, Evaluation, Group, Honesty};
 
 use super::report::Report;
 use crate::tell::one_line;
@@ -116,7 +116,7 @@ fn position_lines(e: &Evaluation) -> Vec<(&'static str, String)> {
         ));
     }
     if let Some([x, y]) = &e.classes {
-        let both = |f: fn(&hzn_sim::evaluate::ErrorClasses) -> f64| format!("{}, {}", deg(f(x)), deg(f(y)));
+        let both = |f: fn(&hzn_evaluate::ErrorClasses) -> f64| format!("{}, {}", deg(f(x)), deg(f(y)));
         out.push((
             "ECSS classes",
             format!(
@@ -150,8 +150,8 @@ pub(super) const COLUMNS: [&str; 7] = ["pictures", "answered", "RMS deg", "media
 /// Returns the rows of a group: the range, then the cells of [`COLUMNS`].
 pub(super) fn cells(group: &Group) -> Vec<(String, [String; 7])> {
     let none = || "-".to_owned();
-    let row = |r: &hzn_sim::evaluate::GroupRow| {
-        let e = |of: fn(&hzn_sim::evaluate::Errors) -> f64| r.errors.as_ref().map_or_else(none, |e| deg(of(e)));
+    let row = |r: &hzn_evaluate::GroupRow| {
+        let e = |of: fn(&hzn_evaluate::Errors) -> f64| r.errors.as_ref().map_or_else(none, |e| deg(of(e)));
         let honesty = r.honesty.as_ref();
         let n = honesty.map_or_else(none, |h| format!("{:.2} ({:.2}-{:.2})", h.nees, h.interval[0], h.interval[1]));
         let cells = [

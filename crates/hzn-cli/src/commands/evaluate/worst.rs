@@ -4,11 +4,11 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use hzn_core::camera::Camera;
+use hzn_evaluate::Case;
+use hzn_files::truth::Truth;
 use hzn_mcap::{Annotations, Contents, Reader};
 use hzn_run::overlay::{self, limb};
 use hzn_run::source::{Payload, ending};
-use hzn_sim::Truth;
-use hzn_sim::evaluate::Case;
 use image::RgbImage;
 
 use super::text::worst_line;

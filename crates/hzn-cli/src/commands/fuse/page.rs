@@ -3,11 +3,11 @@
 use hzn_fuse::Fused;
 use hzn_fuse::input::Body;
 use hzn_fuse::results::{CameraState, Epoch, Innovation, Kind};
+use hzn_plot::{Chart, Series, Style};
 use nalgebra::Vector3;
 
 use super::summary;
 use crate::html::{STYLE, escape};
-use crate::plot::{Chart, Series, Style};
 
 /// Rules of style in addition to those of all reports.
 const MORE_STYLE: &str = ".plots{grid-template-columns:repeat(auto-fit,minmax(520px,1fr));margin:1.5rem 0}\

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use hzn_files::vehicle::VehicleRow;
 use hzn_fuse::Fused;
 use hzn_fuse::results::{Counts, Epoch, Kind};
 use hzn_fuse::truth::{self, Miss};
-use hzn_sim::trajectory::VehicleRow;
 
 use crate::exit::Stop;
 use crate::tell::{self, one_line};

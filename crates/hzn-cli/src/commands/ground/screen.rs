@@ -2,12 +2,10 @@
 
 use std::time::{Duration, Instant};
 
+use hzn_ground::{Came, Commander, Incoming, Station};
 use hzn_mcap::LogLevel;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
-use super::commander::Commander;
-use super::incoming::{Came, Incoming};
-use super::station::Station;
 use super::view::View;
 use crate::exit::Stop;
 
@@ -36,27 +34,27 @@ fn run(
     commander: &mut Commander,
     terminal: &mut ratatui::DefaultTerminal,
 ) -> Result<Vec<u8>, Stop> {
-    station.counts.is_quiet = true;
+    station.mute();
     let mut view = View::new(incoming.name());
     let (mut rest, mut heard, mut drawn) = (Vec::new(), None::<Instant>, None::<Instant>);
     loop {
         match incoming.wait(&mut rest) {
             Came::Bytes => {
-                let before = station.counts.packets;
+                let before = station.counts().packets;
                 station.take(&mut rest)?;
-                if station.counts.packets > before {
+                if station.counts().packets > before {
                     heard = Some(Instant::now());
                 }
             }
             Came::Nothing => {}
             Came::End => return Ok(rest),
         }
-        let seen = std::mem::take(&mut station.counts.seen);
+        let seen = station.take_seen();
         for answered in incoming.command_next(commander, &seen)? {
             let level = if answered.is_done() { LogLevel::Info } else { LogLevel::Error };
             view.tell(level, format!("{:10}  {answered}", ""));
         }
-        incoming.notices.try_iter().for_each(|text| view.tell(LogLevel::Warning, format!("{:10}  {text}", "")));
+        incoming.take_notices().iter().for_each(|text| view.tell(LogLevel::Warning, format!("{:10}  {text}", "")));
         view.take(seen);
         station.flush_if_due()?;
         view.silent = heard.map(|at| at.elapsed());
@@ -69,15 +67,15 @@ fn run(
                     if let Some(last) = view.last_sequence().filter(|_| commander.is_idle()) {
                         commander.continue_after(last);
                     }
-                    if let Err(stop) = commander.add(&text) {
-                        view.tell(LogLevel::Error, format!("{:10}  {:#}", "", stop.error));
+                    if let Err(error) = commander.add(&text) {
+                        view.tell(LogLevel::Error, format!("{:10}  {error}", ""));
                     }
                 }
             }
             drawn = None;
         }
         if drawn.is_none_or(|at| at.elapsed() >= REDRAW) {
-            terminal.draw(|frame| view.draw(frame, &station.counts))?;
+            terminal.draw(|frame| view.draw(frame, station.counts()))?;
             drawn = Some(Instant::now());
         }
     }

@@ -7,6 +7,7 @@ use hzn_core::frames::{Cam, Cov3};
 use hzn_core::status::Status;
 use hzn_flight::assembly::Assembled;
 use hzn_flight::messages::{Housekeeping, Mode};
+use hzn_ground::{Seen, StreamCounts};
 use hzn_mcap::LogLevel;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -15,7 +16,6 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 
-use super::stream::{Seen, StreamCounts};
 use crate::tell::one_line;
 
 /// Length of the plots, s.
@@ -311,13 +311,13 @@ mod tests {
     fn what_a_terminal_obeys_is_shown() {
         let mut view = View::new("tcp:\u{202e}h:1");
         view.tell(LogLevel::Error, "load \x1b]52;c;aGk\x07\u{2066}".to_owned());
-        let shown = screen(&view, &StreamCounts::new(ApidBase::DEFAULT, true), 100, 30);
+        let shown = screen(&view, &StreamCounts::new(ApidBase::DEFAULT, None), 100, 30);
         assert!(shown.contains(r"tcp:\u{202e}h:1") && shown.contains(r"load \x1b]52;c;aGk\x07\u{2066}"), "{shown}");
     }
 
     #[test]
     fn a_flight_is_shown() {
-        let mut counts = StreamCounts::new(ApidBase::DEFAULT, true);
+        let mut counts = StreamCounts::new(ApidBase::DEFAULT, None);
         let mut view = View::new("tcp:flight:5000");
         insta::assert_snapshot!("screen_before", screen(&view, &counts, 100, 30));
         view.take((1..=500).map(answer).collect());

@@ -1,5 +1,6 @@
 //! Charts: which conic is visible from which altitude, and the error of treating the Earth as a sphere.
 
+use hzn_plot::{Chart, Series, Style};
 use hzn_sim::sensitivity::chart::{Vertical, Visibility};
 
 use super::args::Args;
@@ -7,7 +8,6 @@ use super::body::Body;
 use super::study::Study;
 use super::table::Table;
 use crate::exit::{Stop, usage};
-use crate::plot::{Chart, Series, Style};
 
 /// Computes fields of view by altitude (Braun & Barf 2022, figures 6 and 7).
 pub(super) fn visibility(args: &Args) -> Result<Study, Stop> {

@@ -170,7 +170,7 @@ impl<'a> Grid<'a> {
 
 /// Reads a sensor.toml. A sensor that looks for several bodies is refused unless the command line names one.
 fn load(path: &Path, is_body_named: bool) -> Result<Config, Stop> {
-    let mut config = hzn_calib::sensor::load(path)?.config;
+    let mut config = hzn_files::sensor::load(path)?.config;
     match config.bodies.as_slice() {
         [] => {}
         [one] => config.body = one.clone(),

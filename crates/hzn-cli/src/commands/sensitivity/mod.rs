@@ -28,7 +28,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             _ => return Err(usage(format!("{}: a table ends in .csv, a plot in .svg", path.display()))),
         }
     }
-    let read = args.sensor.as_deref().map(files::of_sensor).unwrap_or_default();
+    let read = args.sensor.as_deref().map(hzn_files::files_of_sensor).unwrap_or_default();
     files::check_outputs(&read, &args.output, args.force)?;
     let Study { table, chart, notes } = match args.what {
         What::Sigma => sigma::compute(args)?,

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use hzn_core::covariance::Noise;
 use hzn_core::{Config, covariance};
-use hzn_run::scene;
-use hzn_sim::scenario::median_rms_px;
+use hzn_sim::scenario::{self, median_rms_px};
 
 use crate::exit::{Stop, failed, usage};
 
@@ -43,9 +42,9 @@ impl EdgeNoise {
             )));
         }
         let name = scene_path.display().to_string();
-        let scenario = scene::load(&name, None, None)?;
+        let scenario = scenario::load(&name, None, None)?;
         let one = scenario.by_camera().into_iter().find(|one| one.camera == sensor.camera).unwrap_or(scenario);
-        let rms_px = median_rms_px(&one, sensor, PICTURES).map_err(|e| scene::refused(&name, &e))?;
+        let rms_px = median_rms_px(&one, sensor, PICTURES).map_err(|e| scenario::refused(&name, &e))?;
         let rms_px = rms_px.ok_or_else(|| failed(format!("{name}: no picture has an answer; give --sigma-px")))?;
         let source = format!("RMS of the residuals in {PICTURES} pictures of {name}");
         Ok(Self { rms_px, source })

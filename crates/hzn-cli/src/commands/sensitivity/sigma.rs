@@ -1,5 +1,6 @@
 //! Sigmas of the direction, for every combination of the design's quantities.
 
+use hzn_plot::{Chart, Series, Style};
 use hzn_sim::sensitivity::{Design, Sigmas};
 
 use super::args::Args;
@@ -7,7 +8,6 @@ use super::grid::{Grid, combinations};
 use super::study::Study;
 use super::table::Table;
 use crate::exit::Stop;
-use crate::plot::{Chart, Series, Style};
 
 type Pick = fn(&Sigmas) -> Option<f64>;
 

@@ -1,7 +1,8 @@
 //! The result of one subject, before it is written.
 
+use hzn_plot::Chart;
+
 use super::table::Table;
-use crate::plot::Chart;
 
 /// The result of one subject.
 pub(super) struct Study {

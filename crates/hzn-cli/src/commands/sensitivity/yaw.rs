@@ -1,5 +1,6 @@
 //! Sigma of the rotation about the line to a flattened body.
 
+use hzn_plot::{Chart, Series, Style};
 use hzn_sim::sensitivity::{ThirdAxis, ThirdAxisSigmas};
 
 use super::args::Args;
@@ -7,7 +8,6 @@ use super::grid::{Grid, combinations};
 use super::study::Study;
 use super::table::Table;
 use crate::exit::{Stop, usage};
-use crate::plot::{Chart, Series, Style};
 
 type Pick = fn(&ThirdAxisSigmas) -> f64;
 

@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::camera;
 use hzn_core::status::Status;
+use hzn_files::FrameData;
 use hzn_mcap::{
     Annotations, Attitude, CandidateEdge, Contents, EncodedImage, FrameRecord, ImageFormat, Index, IndexEntry,
-    LogLevel, LogLine, Options, PicturePrior, Place, Reader, Row, RowMeta, Writer,
+    LogLevel, LogLine, Options, Place, Reader, Row, RowMeta, Writer,
 };
 
 pub const SENSOR: &str = "preset = \"hzn\"\n";
@@ -65,11 +66,7 @@ pub fn frame(i: u64) -> FrameRecord {
         attitude: i
             .is_multiple_of(2)
             .then_some(Attitude { q_fixed_from_camera_wxyz: [0.5, 0.5, 0.5, 0.5], position_m: [6.6e6, f, 0.0] }),
-        prior: PicturePrior {
-            altitude_km: Some(230.0),
-            position_km: Some([6601.0, f, 0.1]),
-            ..PicturePrior::default()
-        },
+        prior: FrameData { altitude_km: Some(230.0), position_km: Some([6601.0, f, 0.1]), ..FrameData::default() },
         log: vec![LogLine { level: LogLevel::Warning, message: format!("frame {i}") }],
     }
 }
@@ -90,7 +87,7 @@ pub fn write(path: &Path, frames: u64, batch: u64) -> PathBuf {
 }
 
 /// Returns everything that an index finds, and the index.
-pub fn index(path: &Path) -> (Vec<Place>, Vec<(Row, PicturePrior)>, Index) {
+pub fn index(path: &Path) -> (Vec<Place>, Vec<(Row, FrameData)>, Index) {
     let (mut pictures, mut rows) = (vec![], vec![]);
     let mut index = Index::open(path).unwrap();
     while let Some(part) = index.next_part().unwrap() {

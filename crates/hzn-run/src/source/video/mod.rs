@@ -24,7 +24,7 @@ use super::item::Item;
 use super::payload::Payload;
 use super::picture::{Picture, Samples};
 use super::sequence::Source;
-use crate::error::{Error, unusable};
+use crate::error::{Error, failed, unusable};
 use crate::explain;
 use times::Times;
 use tool::{Running, ToolErrors, add_input, cannot_start, tool};
@@ -111,14 +111,14 @@ impl Video {
 
     /// Ends the video. [`Source::describe_loss`] describes what is missing at the end of a video or was lost in it. If
     /// no frame could be decoded, or ffmpeg was ended from outside, this is an error.
-    fn end(&mut self, rest: usize) -> Option<anyhow::Result<Item>> {
+    fn end(&mut self, rest: usize) -> Option<Result<Item, Error>> {
         self.ended = true;
         let name = self.path.display();
         let code = self.frames.wait().ok().and_then(|status| status.code());
         let error = self.errors.take().and_then(|errors| errors.join().ok()).unwrap_or_default().summary();
         let frames = explain::counted(self.index, "frame");
         let Some(code) = code.filter(|code| *code != STOPPED) else {
-            return Some(Err(anyhow::anyhow!("{name}: ffmpeg was ended from outside after {frames}")));
+            return Some(Err(failed(format!("{name}: ffmpeg was ended from outside after {frames}"))));
         };
         let missing = riff::missing_bytes(&self.path).map(|n| format!("{n} bytes are missing at its end"));
         let error = error.map(|error| format!("ffmpeg: {error}"));
@@ -127,7 +127,7 @@ impl Video {
         let why = missing.or(error).or(bad).or(torn);
         if self.index == 0 {
             let why = why.map(|why| format!(": {why}")).unwrap_or_default();
-            return Some(Err(anyhow::anyhow!("{name}: no frame of this video can be decoded{why}")));
+            return Some(Err(failed(format!("{name}: no frame of this video can be decoded{why}"))));
         }
         self.loss = why.map(|why| {
             format!("{name}: was cut off or is damaged ({why}); {frames} could be decoded and were processed")
@@ -206,7 +206,7 @@ impl Source for Video {
     fn bits(&self) -> Option<u8> {
         Some(self.bits)
     }
-    fn next(&mut self) -> Option<anyhow::Result<Item>> {
+    fn next(&mut self) -> Option<Result<Item, Error>> {
         if self.ended {
             return None;
         }
@@ -220,7 +220,7 @@ impl Source for Video {
                 Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
                 Err(e) => {
                     self.ended = true;
-                    return Some(Err(anyhow::anyhow!("{}: {e}", self.path.display())));
+                    return Some(Err(failed(format!("{}: {e}", self.path.display()))));
                 }
             }
         }

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use hzn_calib::keys::{self, Form, Key};
-use hzn_calib::{Problem, limited};
 use hzn_core::{Config, Preset};
+use hzn_files::keys::{self, Form, Key};
+use hzn_files::{Problem, limited};
 use toml_edit::Value;
 
 use super::sheet::{self, Sheet};
@@ -391,7 +391,7 @@ impl Session {
             let keys = keys::all().flat_map(with_bodies).map(key);
             self.differing.extend(self.sheet.differing(&self.saved, keys).iter().map(|k| (k.section, k.name, k.body)));
         }
-        match hzn_calib::sensor::parse(self.sheet.text(), &self.home) {
+        match hzn_files::sensor::parse(self.sheet.text(), &self.home) {
             Ok(sensor) => {
                 // An accepted configuration can be written as TOML. If it could not, only the sliders would lack their
                 // values.

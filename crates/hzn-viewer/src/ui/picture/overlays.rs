@@ -77,7 +77,7 @@ fn sky(viewer: &Viewer, frame_view: &FrameView, placement: &Placement<'_>) -> Ve
     out
 }
 
-fn from_ephemeris(data: &hzn_calib::FrameData, place: impl Fn(f64) -> hzn_nav::ephemeris::Place) -> Option<[f64; 3]> {
+fn from_ephemeris(data: &hzn_files::FrameData, place: impl Fn(f64) -> hzn_nav::ephemeris::Place) -> Option<[f64; 3]> {
     use hzn_core::frames::{Cam, Fixed, Rotation, UnitVec3};
     let turn = Rotation::<Cam, Fixed, f64>::assume_from_quaternion(data.q_fixed_from_camera_wxyz?)?.inverse();
     let seen = place(data.utc_s?).seen_from(data.position_km?.map(|km| km * 1e3));

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use hzn_calib::start::Exif;
 use hzn_core::Config;
-use hzn_sim::truth::Truth;
+use hzn_files::start::Exif;
+use hzn_files::truth::Truth;
 
 use super::Viewer;
 use super::changes::Leave;

@@ -20,7 +20,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::Receiver;
-use hzn_sim::truth::Truth;
+use hzn_files::truth::Truth;
 
 use super::offered::Offered;
 use super::panels::Panels;

@@ -1,0 +1,43 @@
+//! Reads and writes the files that describe a horizon sensor and its pictures.
+//!
+//! | file | read by | gives |
+//! |---|---|---|
+//! | `sensor.toml` | [`sensor::load`] | [`hzn_core::Config`], checked |
+//! | Kalibr camchain, OpenCV YAML, EuRoC `sensor.yaml` | [`camera_file::load`] | [`hzn_core::camera::Config`] |
+//! | `frames.csv` | [`frames::load`] | time, altitude, position, attitude of every picture |
+//! | `truth.csv` | [`truth::load`] | the truth about every picture of a simulation |
+//! | `vehicle.csv` | serde, row by row | the truth about the vehicle of a simulation ([`vehicle`]) |
+//!
+//! [`document`] reads TOML files of other crates with the same checks, for example scene.toml.
+//!
+//! [`start`] writes a sensor.toml for a camera without a calibration; [`migrate`] rewrites a file with old names.
+//!
+//! Every error is a [`Problem`]: it names the file, the line, the field and what was expected. For a misspelt name it
+//! suggests the nearest valid one. [`template`] is a commented sensor.toml to start from; [`keys`] describes every key.
+
+mod body_defaults;
+pub mod camera_file;
+mod camera_section;
+pub mod document;
+pub mod frames;
+pub mod keys;
+pub mod limited;
+mod located;
+mod merge;
+pub mod migrate;
+mod nearest;
+pub mod plausible;
+mod problem;
+pub mod sensor;
+pub mod start;
+pub mod template;
+pub mod time;
+pub mod truth;
+pub mod utc;
+pub mod vehicle;
+
+pub use camera_section::{files_of_sensor, named_camera_file};
+pub use frames::{FrameData, Frames, Orientation};
+pub use nearest::{nearest, suggestion};
+pub use problem::Problem;
+pub use sensor::Sensor;

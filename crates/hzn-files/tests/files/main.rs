@@ -1,0 +1,4 @@
+//! Tests of camera files and of sensor.toml.
+
+mod camera_files;
+mod presets;

@@ -1,0 +1,34 @@
+//! The ground station: the other end of a flight computer's line.
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`encode`] | the text of a command as packets |
+//! | [`commander`] | commands, each with its acknowledgement |
+//! | [`incoming`] | bytes that come, commands that go |
+//! | [`station`] | packets on their way from bytes to files |
+//! | [`stream`] | packets in words, and as rows |
+//! | `outputs` | the files that telemetry becomes |
+//! | [`tai`] | the time of the packets, and UTC |
+//! | [`xtce`] | the dictionary of the packets, for other ground systems |
+//!
+//! The crate prints nothing: whoever makes a [`Station`] or a [`Commander`] gives it a
+//! [`Tell`](hzn_fly::tell::Tell), which shows the messages.
+
+#![deny(clippy::print_stdout, clippy::print_stderr, reason = "a library prints nothing; the caller does")]
+
+pub mod commander;
+pub mod encode;
+mod error;
+pub mod incoming;
+mod outputs;
+pub mod station;
+pub mod stream;
+pub mod tai;
+pub mod xtce;
+
+pub use commander::{Answered, Commander};
+pub use encode::{encode, loaded_files, write_packet};
+pub use error::Error;
+pub use incoming::{Came, Incoming};
+pub use station::Station;
+pub use stream::{Seen, StreamCounts};

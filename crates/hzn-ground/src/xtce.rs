@@ -1,0 +1,219 @@
+//! The dictionary of telemetry as XTCE (OMG XTCE 1.2, CCSDS 660.1-G), from the tables of the records.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use hzn_core::status::{Stage, Status};
+use hzn_core::verdict::Verdict;
+use hzn_flight::layout::user_data;
+use hzn_flight::messages::{Code, Event, Mode, Severity};
+use hzn_flight::packet::{Apid, ApidBase};
+use hzn_flight::record::{Field, Kind};
+
+/// The fields before the user data, with their bits.
+const HEADERS: [(&str, usize, &str); 10] = [
+    ("packet_version", 3, "Version of the packet, 0."),
+    ("packet_type", 1, "0: telemetry."),
+    ("packet_has_secondary_header", 1, "1: there is a secondary header, which is the time."),
+    ("packet_apid", 11, "Application process identifier: the subject of the packet."),
+    ("packet_sequence_flags", 2, "3: the packet is not a segment."),
+    ("packet_sequence_count", 14, "Count of the packets with this APID."),
+    ("packet_length", 16, "Number of bytes after this field, minus 1."),
+    (
+        "time_p_field",
+        8,
+        "P-field of the time (CUC, CCSDS 301.0-B): 31 TAI since 1958, 47 since the start of the computer.",
+    ),
+    ("time_seconds", 32, "Whole seconds of the time."),
+    ("time_fraction", 24, "Fraction of the second, in 2^-24 s."),
+];
+const CHECKSUM: (&str, usize, &str) = ("packet_crc", 16, "CRC-16 of the packet (CCITT: polynomial 1021, start FFFF).");
+
+/// Endings of names, with their units.
+const UNITS: [(&str, &str); 11] = [
+    ("_rad_s", "rad/s"),
+    ("_m_s", "m/s"),
+    ("_us", "us"),
+    ("_s", "s"),
+    ("_m2", "m2"),
+    ("_m", "m"),
+    ("_per_px", "1/px"),
+    ("_px", "px"),
+    ("_rad", "rad"),
+    ("cov", "rad2"),
+    ("cov_free", "rad2"),
+];
+
+/// A number of a packet.
+struct Number {
+    name: String,
+    ty: String,
+    description: String,
+}
+
+/// Returns the labels of a field whose numbers have names.
+fn labels(packet: Apid, field: &str) -> Option<Vec<(u64, String)>> {
+    macro_rules! named {
+        ($list:expr) => {
+            Some($list.iter().map(|&x| (x as u64, x.name().to_owned())).collect())
+        };
+    }
+    let status = || Status::ALL.iter().map(|&s| (s as u64, s.name().to_owned()));
+    match (packet, field) {
+        (Apid::Housekeeping, "mode") => named!(Mode::ALL),
+        (Apid::Housekeeping, "last_status") => Some(status().chain([(255, "none".to_owned())]).collect()),
+        (Apid::Science, "status") => Some(status().collect()),
+        (Apid::Science, "stage") => named!(Stage::ALL),
+        (Apid::Candidate, "verdict") => named!(Verdict::ALL),
+        (Apid::Event, "number") => named!(Event::ALL),
+        (Apid::Event, "severity") => named!(Severity::ALL),
+        (Apid::Acknowledge, "code") => named!(Code::ALL),
+        _ => None,
+    }
+}
+
+/// A dictionary in the making.
+#[derive(Default)]
+struct Dictionary {
+    /// The types by their names.
+    types: BTreeMap<String, String>,
+    parameters: String,
+    containers: String,
+}
+
+impl Dictionary {
+    fn integer(&mut self, bits: usize, unit: &str) -> String {
+        let name = type_name(&format!("u{bits}"), unit);
+        let text = format!(
+            "<IntegerParameterType name=\"{name}\" signed=\"false\" sizeInBits=\"{bits}\">{}\
+             <IntegerDataEncoding encoding=\"unsigned\" sizeInBits=\"{bits}\"/></IntegerParameterType>",
+            unit_set(unit)
+        );
+        self.types.insert(name.clone(), text);
+        name
+    }
+
+    fn float(&mut self, bits: usize, unit: &str) -> String {
+        let name = type_name(&format!("f{bits}"), unit);
+        let text = format!(
+            "<FloatParameterType name=\"{name}\" sizeInBits=\"{bits}\">{}\
+             <FloatDataEncoding encoding=\"IEEE754_1985\" sizeInBits=\"{bits}\"/></FloatParameterType>",
+            unit_set(unit)
+        );
+        self.types.insert(name.clone(), text);
+        name
+    }
+
+    fn enumeration(&mut self, name: String, bits: usize, labels: &[(u64, String)]) -> String {
+        let entry =
+            |(value, label): &(u64, String)| format!("<Enumeration value=\"{value}\" label=\"{}\"/>", escape(label));
+        let list: String = labels.iter().map(entry).collect();
+        let text = format!(
+            "<EnumeratedParameterType name=\"{name}\"><UnitSet/>\
+             <IntegerDataEncoding encoding=\"unsigned\" sizeInBits=\"{bits}\"/>\
+             <EnumerationList>{list}</EnumerationList></EnumeratedParameterType>"
+        );
+        self.types.insert(name.clone(), text);
+        name
+    }
+
+    fn type_of(&mut self, packet: Apid, field: &Field) -> String {
+        if let Some(labels) = labels(packet, field.name) {
+            return self.enumeration(format!("{}_{}", packet.name(), field.name), 8 * field.kind.bytes(), &labels);
+        }
+        let unit = UNITS.iter().find(|(end, _)| field.name.ends_with(end)).map_or("", |(_, unit)| unit);
+        match field.kind {
+            Kind::Unsigned(bytes) => self.integer(8 * bytes, unit),
+            Kind::Float(bytes) => self.float(8 * bytes, unit),
+        }
+    }
+
+    /// Returns the numbers of a packet, in their order.
+    fn numbers(&mut self, packet: Apid) -> Vec<Number> {
+        let mut numbers = Vec::new();
+        for part in user_data(packet).unwrap_or_default() {
+            for time in 0..part.times {
+                let index = if part.times > 1 { format!("_{time:02}") } else { String::new() };
+                for field in part.table {
+                    let (ty, description) =
+                        (self.type_of(packet, field), field.description.replace(['[', ']', '`'], ""));
+                    numbers.extend(field.parts.iter().map(|part| Number {
+                        name: format!("{}_{}{part}{index}", packet.name(), field.name),
+                        ty: ty.clone(),
+                        description: description.trim().to_owned(),
+                    }));
+                }
+            }
+        }
+        numbers
+    }
+
+    fn add_parameter(&mut self, number: &Number) {
+        let Number { name, ty, description } = number;
+        let _ = writeln!(
+            self.parameters,
+            "      <Parameter name=\"{name}\" parameterTypeRef=\"{ty}\">\
+             <LongDescription>{}</LongDescription></Parameter>",
+            escape(description)
+        );
+    }
+
+    /// Adds a container with its entries; `base` is what makes it a packet of an APID.
+    fn add_container(&mut self, name: &str, is_abstract: bool, entries: &[&str], base: &str) {
+        let abstraction = if is_abstract { " abstract=\"true\"" } else { "" };
+        let _ =
+            writeln!(self.containers, "      <SequenceContainer name=\"{name}\"{abstraction}>\n        <EntryList>");
+        for entry in entries {
+            let _ = writeln!(self.containers, "          <ParameterRefEntry parameterRef=\"{entry}\"/>");
+        }
+        let _ = writeln!(self.containers, "        </EntryList>{base}\n      </SequenceContainer>");
+    }
+}
+
+fn type_name(kind: &str, unit: &str) -> String {
+    let unit = unit.replace('/', "_per_");
+    if unit.is_empty() { kind.to_owned() } else { format!("{kind}_{unit}") }
+}
+
+fn unit_set(unit: &str) -> String {
+    if unit.is_empty() { "<UnitSet/>".to_owned() } else { format!("<UnitSet><Unit>{unit}</Unit></UnitSet>") }
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// Returns the dictionary of a computer with these APIDs. The packets are those between the sync markers of the line.
+pub fn dictionary(base: ApidBase) -> String {
+    let mut d = Dictionary::default();
+    for (name, bits, description) in HEADERS.into_iter().chain([CHECKSUM]) {
+        let ty = d.integer(bits, "");
+        d.add_parameter(&Number { name: name.to_owned(), ty, description: description.to_owned() });
+    }
+    d.add_container("CCSDSPacket", true, &HEADERS.map(|(name, ..)| name), "");
+    for &apid in Apid::ALL.iter().filter(|&&apid| apid != Apid::Command) {
+        let numbers = d.numbers(apid);
+        numbers.iter().for_each(|number| d.add_parameter(number));
+        let entries: Vec<&str> = numbers.iter().map(|n| n.name.as_str()).chain([CHECKSUM.0]).collect();
+        let base = format!(
+            "\n        <BaseContainer containerRef=\"CCSDSPacket\"><RestrictionCriteria>\
+             <Comparison parameterRef=\"packet_apid\" value=\"{}\" useCalibratedValue=\"false\"/>\
+             </RestrictionCriteria></BaseContainer>",
+            base.apid(apid)
+        );
+        d.add_container(apid.name(), false, &entries, &base);
+    }
+    let types: String = d.types.values().map(|ty| format!("      {ty}\n")).collect();
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <SpaceSystem name=\"hzn\" xmlns=\"http://www.omg.org/spec/XTCE/20180204\" \
+         shortDescription=\"Telemetry of the hzn horizon sensor\">\n\
+         \x20 <Header version=\"{}\" validationStatus=\"Released\"/>\n\
+         \x20 <TelemetryMetaData>\n    <ParameterTypeSet>\n{types}    </ParameterTypeSet>\n\
+         \x20   <ParameterSet>\n{}    </ParameterSet>\n    <ContainerSet>\n{}    </ContainerSet>\n\
+         \x20 </TelemetryMetaData>\n</SpaceSystem>\n",
+        env!("CARGO_PKG_VERSION"),
+        d.parameters,
+        d.containers
+    )
+}
