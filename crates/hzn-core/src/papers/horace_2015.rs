@@ -1,14 +1,8 @@
-//! HORACE: preset, and gate on the radius of the circle (Barf 2014, (2.31) to (2.36)).
+//! Preset of HORACE (Barf 2014).
 
 use super::common::{disable_gates, set_given_noise};
-use crate::base::real::Real;
 use crate::config::Config;
 use crate::config::retry;
-use crate::geometry::camera::Camera;
-use crate::model::body::Expected;
-use crate::model::verdict::Verdict;
-use crate::stages::fit::Fit;
-use crate::stages::gates;
 use crate::stages::{consensus, contour, edge_points, fit, threshold};
 
 /// Sets the chain of HORACE: brightness gate, dynamic threshold, a smaller copy, outer borders of the whole picture, a
@@ -44,43 +38,3 @@ pub(super) fn preset(config: &mut Config) {
 
 /// Number of rows of the copy that `horace-2015` processes.
 const HORACE_ROWS: u16 = 240;
-
-/// Returns `Passed`, or `Radius` if the circle is too small or too large.
-pub(super) fn verdict<T: Real>(
-    fit: &Fit<T>,
-    expected: &Expected<T>,
-    camera: &Camera<T>,
-    config: &gates::Config,
-) -> Verdict {
-    let (fx, fy) = camera.focal_px();
-    let margin = Margin {
-        part: T::from_f64(config.radius_margin),
-        focal_lengths: T::from_f64(2.0 * config.radius_margin_px) / (fx + fy),
-    };
-    match config.altitude_limits_km {
-        Some(limits_km) if !is_wide_enough(fit.c, expected, limits_km.map(T::from_f64), &margin) => Verdict::Radius,
-        _ => Verdict::Passed,
-    }
-}
-
-/// Tolerance of the radius beyond its limits: a fraction of the limit, and a length.
-struct Margin<T> {
-    part: T,
-    focal_lengths: T,
-}
-
-/// Returns whether a circle of half-angle α, cos α = `c`, has a radius between those of the limb at the highest and the
-/// lowest altitude (Barf 2014, (2.31) to (2.36)), within `margin`. Radii are tangents of half-angles, in focal lengths.
-/// They are compared without a division, because the radius at altitude 0 is infinite.
-fn is_wide_enough<T: Real>(c: T, expected: &Expected<T>, [low, high]: [T; 2], margin: &Margin<T>) -> bool {
-    let (one, km) = (T::one(), T::from_f64(1000.0));
-    let sin_cos = |altitude: T| {
-        let limb = expected.radius_m + expected.limb_m;
-        let sin = (limb / (expected.radius_m + altitude * km)).min(one);
-        (sin, (one - sin * sin).max(T::ZERO).sqrt())
-    };
-    let ((s1, c1), (s2, c2)) = (sin_cos(high), sin_cos(low));
-    let s = (one - c * c).max(T::ZERO).sqrt();
-    let (part, more) = (margin.part, margin.focal_lengths * c);
-    c > T::ZERO && s * c1 >= c * s1 * (one - part) - more * c1 && s * c2 <= c * s2 * (one + part) + more * c2
-}

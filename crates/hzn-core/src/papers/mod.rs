@@ -1,4 +1,4 @@
-//! The presets of whole sensors, and the gates of published systems.
+//! The presets of whole sensors.
 
 mod braun_barf_2022;
 mod common;
@@ -7,18 +7,10 @@ mod wang_2022;
 
 use crate::base::error::ConfigError;
 use crate::base::keys::{Value, choices};
-use crate::base::real::Real;
 use crate::config::Config;
-use crate::geometry::block::Block;
 use crate::geometry::camera;
-use crate::geometry::camera::Camera;
-use crate::image::region::Region;
-use crate::model::body::Expected;
 use crate::model::body::Kind;
-use crate::model::verdict::Verdict;
 use crate::stages::covariance;
-use crate::stages::fit::Fit;
-use crate::stages::gates;
 use crate::stages::threshold;
 
 choices! {
@@ -90,26 +82,6 @@ fn set_disc(config: &mut Config, kind: Kind, level: f64) {
     config.body.kind = kind;
     config.threshold = threshold::Config { method: threshold::Method::Fixed, level, ..config.threshold };
     config.covariance = covariance::Config { sigma_px: 3.0, correlation_px: 300.0, bias_px: 0.0, ..config.covariance };
-}
-
-/// Applies the gates of published systems, which follow the gates of every fit. Returns `Passed`, or the first gate
-/// that the fit fails.
-pub(crate) fn verdict<T: Real>(
-    fit: &Fit<T>,
-    expected: &Expected<T>,
-    blocks: &[Block<T>],
-    camera: &Camera<T>,
-    region: &Region<T>,
-    config: &gates::Config,
-) -> Verdict {
-    let verdict = match cfg!(feature = "dlr") {
-        true => braun_barf_2022::verdict(fit, expected, blocks, camera, region, config),
-        false => Verdict::Passed,
-    };
-    match verdict {
-        Verdict::Passed if cfg!(feature = "horace") => horace_2015::verdict(fit, expected, camera, config),
-        verdict => verdict,
-    }
 }
 
 #[cfg(test)]

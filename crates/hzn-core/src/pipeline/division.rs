@@ -7,9 +7,8 @@
 //! bright, or too dark.
 
 use super::budget;
-use super::found_limb::FoundLimb;
+use super::look::Look;
 use super::sensor::Sensor;
-use super::workspace::Lists;
 use crate::base::linalg::{V3, basis, unit};
 use crate::base::real::Real;
 use crate::base::sort;
@@ -35,42 +34,25 @@ type Answers<T> = heapless::Vec<Solution<T>, ANSWERS>;
 
 impl<T: Real> Sensor<T> {
     /// Examines the whole picture, scaled if the configuration asks for it, and its parts if it has no answer.
-    pub(super) fn look_at_parts<P: Pixels, O: Observer<T>>(
-        &self,
-        mut lists: Lists<'_, T>,
-        picture: &P,
-        expected: &Expected<T>,
-        taken: &[FoundLimb<T>],
-        observer: &O,
-        report: &mut Report<T>,
-    ) {
-        let whole = Crop::whole([picture.width(), picture.height()], self.config.input.scale_to_height);
+    pub(super) fn look_at_parts<P: Pixels, O: Observer<T>>(&self, mut look: Look<'_, T, P, O>) {
+        let whole = Crop::whole([look.picture.width(), look.picture.height()], self.config.input.scale_to_height);
         if whole.is_all() {
-            self.look(lists.reborrow(), picture, expected, taken, observer, report);
+            self.look(look.reborrow());
         } else {
-            self.look_at_crop(lists.reborrow(), whole, picture, expected, taken, observer, None, report);
+            self.look_at_crop(look.reborrow(), whole, None);
         }
-        let divisible = !matches!(report.status, Status::Ok | Status::TooDark | Status::TooBright) && !report.glows();
-        if self.config.retry.method == Method::Division && divisible {
-            self.divide(lists, whole, picture, expected, taken, observer, report);
+        let ended = matches!(look.report.status, Status::Ok | Status::TooDark | Status::TooBright);
+        if self.config.retry.method == Method::Division && !ended && !look.report.glows() {
+            self.divide(look, whole);
         }
     }
 
     /// Looks at smaller and smaller parts of the picture, and combines the answers of the parts.
-    fn divide<P: Pixels, O: Observer<T>>(
-        &self,
-        mut lists: Lists<'_, T>,
-        whole: Crop,
-        picture: &P,
-        expected: &Expected<T>,
-        taken: &[FoundLimb<T>],
-        observer: &O,
-        report: &mut Report<T>,
-    ) {
-        let (status, level) = (report.status, report.level);
+    fn divide<P: Pixels, O: Observer<T>>(&self, mut look: Look<'_, T, P, O>, whole: Crop) {
+        let (status, level) = (look.report.status, look.report.level);
         // The work budget that the whole picture has left.
-        let mut work = budget::new(&self.config, lists.border.len());
-        work.charge(report.counters.work);
+        let mut work = budget::new(&self.config, look.lists.border.len());
+        work.charge(look.report.counters.work);
         let mut cut = false;
         let least = f64::from(whole.area()) * self.config.retry.least_part;
         let mut answers = Answers::<T>::new();
@@ -82,9 +64,9 @@ impl<T: Real> Sensor<T> {
             if !work.try_spend(work::PART) {
                 break;
             }
-            report.counters.work = 0;
-            let left = Some(work.remaining());
-            self.look_at_crop(lists.reborrow(), part, picture, expected, taken, observer, left, report);
+            look.report.counters.work = 0;
+            self.look_at_crop(look.reborrow(), part, Some(work.remaining()));
+            let report = &mut *look.report;
             work.charge(report.counters.work);
             cut |= report.status == Status::Truncated;
             if let Some(answer) = report.solution.take() {
@@ -101,6 +83,7 @@ impl<T: Real> Sensor<T> {
                 let _ = waiting.extend_from_slice(part.halves().as_ref().map_or(&[][..], |h| h));
             }
         }
+        let report = look.report;
         (report.status, report.level, report.counters.work) = (status, level, work.spent());
         if cut || work.was_truncated() {
             report.status = Status::Truncated;
@@ -122,17 +105,8 @@ impl<T: Real> Sensor<T> {
     }
 
     /// Examines a part with the part's own camera and region. `left` is the largest work that it may cost.
-    fn look_at_crop<P: Pixels, O: Observer<T>>(
-        &self,
-        lists: Lists<'_, T>,
-        crop: Crop,
-        picture: &P,
-        expected: &Expected<T>,
-        taken: &[FoundLimb<T>],
-        observer: &O,
-        left: Option<u32>,
-        report: &mut Report<T>,
-    ) {
+    fn look_at_crop<P: Pixels, O: Observer<T>>(&self, look: Look<'_, T, P, O>, crop: Crop, left: Option<u32>) {
+        let Look { lists, picture, expected, taken, observer, report } = look;
         let mut config = self.config.clone();
         config.limits.max_work = left.or(config.limits.max_work);
         let part = Sensor {
@@ -144,7 +118,7 @@ impl<T: Real> Sensor<T> {
         let at = |x: u16, y: u16| picture.at(x, y);
         let picture = Cropped::new(&at, picture.full_scale(), crop);
         let observer: &dyn Observer<T> = &Through { observer, crop };
-        part.look(lists, &picture, expected, taken, &observer, report);
+        part.look(Look { lists, picture: &picture, expected, taken, observer: &observer, report });
     }
 }
 

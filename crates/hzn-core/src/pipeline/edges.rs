@@ -6,7 +6,7 @@
 //! Sensor::level → Sensor::borders → Edges::pick → consensus → fit → fuse
 //! ```
 
-use super::found_limb::FoundLimb;
+use super::look::Look;
 use super::sensor::Sensor;
 use super::workspace::{HOST_POINTS, HOST_WORDS, Lists};
 use crate::base::linalg::basis;
@@ -17,6 +17,7 @@ use crate::geometry::frames::{Cam, Cov3, UnitVec3};
 use crate::geometry::pixel::{ImagePoint, Pixel};
 use crate::image::Pixels;
 use crate::model::body::Expected;
+use crate::model::found_limb::FoundLimb;
 use crate::model::observer::{Border, Observer, Unobserved};
 use crate::model::report::{Position, Report};
 use crate::model::status::Status;
@@ -113,7 +114,9 @@ impl<T: Real> Sensor<T> {
         let lists = Lists { border: &mut border, blocks: &mut [], marks: &mut marks };
         let borders = Borders::default();
         let binary = BinaryPicture::new(picture, &self.region, level, &borders).with_blooming(expected.blooms());
-        self.search(lists, &binary, WorkBudget::unlimited(), expected, &[], &mut Report::empty());
+        let report = &mut Report::empty();
+        let look = Look { lists, picture, expected, taken: &[], observer: &borders, report };
+        self.search(look, &binary, WorkBudget::unlimited());
         borders.0.into_inner()
     }
 }

@@ -6,12 +6,10 @@
 //! Each look is also another chance for a false answer: all looks have the same gates, and there are only a few looks.
 
 use super::budget;
-use super::found_limb::FoundLimb;
+use super::look::Look;
 use super::sensor::Sensor;
-use super::workspace::Lists;
 use crate::base::real::Real;
 use crate::image::Pixels;
-use crate::model::body::Expected;
 use crate::model::observer::Observer;
 use crate::model::report::Report;
 use crate::model::status::Status;
@@ -38,46 +36,39 @@ impl<T: Real> Sensor<T> {
     // before a second look, so that a picture with an answer does not pay for its reads. Thresholds within this noise
     // are passed over: there the limb was found 25 km too high. The first threshold is reported, because the user can
     // set this one.
-    pub(super) fn look_at_levels<P: Pixels, O: Observer<T>>(
-        &self,
-        mut lists: Lists<'_, T>,
-        picture: &P,
-        first: &Level<T>,
-        expected: &Expected<T>,
-        taken: &[FoundLimb<T>],
-        observer: &O,
-        report: &mut Report<T>,
-    ) {
+    pub(super) fn look_at_levels<P: Pixels, O: Observer<T>>(&self, mut look: Look<'_, T, P, O>, first: &Level<T>) {
         let config = &self.config;
+        let Look { picture, expected, observer, .. } = look;
         // A `fixed` threshold is kept: there are no other thresholds.
         let fixed = config.threshold_of(expected.which).method == threshold::Method::Fixed;
         let mut others = if fixed { [].iter() } else { config.retry.levels.iter() };
-        let (mut work, read) = (budget::new(config, lists.border.len()), work::READ + self.region.mask_cost());
+        let (mut work, read) = (budget::new(config, look.lists.border.len()), work::READ + self.region.mask_cost());
         work.charge(first.drawn * read);
         let mut within = None;
         let mut status = None;
         let mut lowest = None;
-        report.level = first.level;
+        look.report.level = first.level;
         loop {
-            let look = |region| {
-                BinaryPicture::new(picture, region, report.level, observer)
+            let level = look.report.level;
+            let split = |region| {
+                BinaryPicture::new(picture, region, level, observer)
                     .with_blooming(expected.blooms())
                     .with_contrast(first.contrast)
             };
             if within.is_none() {
-                let frame = look(&self.region).dark_frame_px(config.retry.frame_px, &mut work);
+                let frame = split(&self.region).dark_frame_px(config.retry.frame_px, &mut work);
                 if frame > 0 {
                     observer.dark_frame(frame);
                     within = Some(self.region.without_frame(frame));
                 }
             }
-            let binary = look(within.as_ref().unwrap_or(&self.region));
-            work = self.search(lists.reborrow(), &binary, work, expected, taken, report);
-            if !goes_on(report) {
+            let binary = split(within.as_ref().unwrap_or(&self.region));
+            work = self.search(look.reborrow(), &binary, work);
+            if !goes_on(look.report) {
                 break;
             }
             if status != Some(Status::Rejected) {
-                status = Some(report.status);
+                status = Some(look.report.status);
             }
             if others.len() == 0 || !work.try_spend(work::LOOK) {
                 break;
@@ -89,13 +80,13 @@ impl<T: Real> Sensor<T> {
             });
             let mut levels = others.by_ref().map(|&part| first.at_fraction(part));
             let Some(level) = levels.find(|&level| T::from_i32(level.into()) >= lowest) else { break };
-            report.level = level;
-            observer.look(report.counters.looks, report.level);
+            look.report.level = level;
+            observer.look(look.report.counters.looks, level);
         }
         if let Some(status) = status
-            && report.solution.is_none()
+            && look.report.solution.is_none()
         {
-            (report.status, report.level) = (status, first.level);
+            (look.report.status, look.report.level) = (status, first.level);
         }
     }
 }

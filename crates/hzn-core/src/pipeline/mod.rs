@@ -13,9 +13,9 @@ mod division;
 pub mod edge_position;
 #[cfg(any(test, feature = "_edges"))]
 pub mod edges;
-mod found_limb;
 mod further_looks;
 mod horizon;
+mod look;
 mod process;
 mod row_stream;
 mod search;

@@ -1,12 +1,13 @@
 //! The order of the stages: from a picture to its report.
 
-use super::found_limb::FoundLimb;
+use super::look::Look;
 use super::search::Search;
 use super::sensor::Sensor;
 use super::workspace::{Lists, Workspace};
 use crate::base::real::Real;
 use crate::image::Pixels;
 use crate::model::body::Expected;
+use crate::model::found_limb::FoundLimb;
 use crate::model::observer::Observer;
 use crate::model::report::{MAX_BODIES, Report, Reports};
 use crate::model::status::Stage;
@@ -66,77 +67,54 @@ impl<T: Real> Sensor<T> {
         let mut report = Report::empty();
         // A picture of another size has another calibration, so its rays would be wrong.
         if picture.width() == self.camera.width() && picture.height() == self.camera.height() {
+            let look = Look { lists, picture, expected, taken, observer, report: &mut report };
             // Without the feature there is no division, and the code for rectangles is left out of the image.
             if cfg!(feature = "horace") {
-                self.look_at_parts(lists, picture, expected, taken, observer, &mut report);
+                self.look_at_parts(look);
             } else {
-                self.look(lists, picture, expected, taken, observer, &mut report);
+                self.look(look);
             }
         }
         observer.leave();
         report
     }
 
-    pub(super) fn look<P: Pixels, O: Observer<T>>(
-        &self,
-        lists: Lists<'_, T>,
-        picture: &P,
-        expected: &Expected<T>,
-        taken: &[FoundLimb<T>],
-        observer: &O,
-        report: &mut Report<T>,
-    ) {
-        observer.enter(Stage::Threshold);
+    pub(super) fn look<P: Pixels, O: Observer<T>>(&self, look: Look<'_, T, P, O>) {
+        look.observer.enter(Stage::Threshold);
         let config = &self.config;
-        let levels = config.threshold_of(expected.which);
-        let level = match threshold::split(
-            picture,
-            &self.region,
-            &config.brightness,
-            levels,
-            expected.level,
-            config.consensus.seed,
-            observer,
-        ) {
-            Ok(level) => level,
-            Err(status) => {
-                report.status = status;
-                return;
-            }
-        };
-        self.look_at_levels(lists, picture, &level, expected, taken, observer, report);
+        let levels = config.threshold_of(look.expected.which);
+        let (last, seed) = (look.expected.level, config.consensus.seed);
+        match threshold::split(look.picture, &self.region, &config.brightness, levels, last, seed, look.observer) {
+            Ok(level) => self.look_at_levels(look, &level),
+            Err(status) => look.report.status = status,
+        }
     }
 
     /// Runs one look: everything after the threshold. Returns the rest of the work budget.
     #[inline(always)]
     pub(super) fn search<P: Pixels, O: Observer<T>>(
         &self,
-        lists: Lists<'_, T>,
+        look: Look<'_, T, P, O>,
         binary: &BinaryPicture<'_, T, P, O>,
         work: WorkBudget,
-        expected: &Expected<T>,
-        taken: &[FoundLimb<T>],
-        report: &mut Report<T>,
     ) -> WorkBudget {
         let config = &self.config;
         // The furthest stage is kept, because a further look begins again at an earlier one.
-        report.stage = report.stage.max(Stage::Contour);
-        binary.observer.enter(Stage::Contour);
-        let own = self.camera_for(expected);
+        look.report.stage = look.report.stage.max(Stage::Contour);
+        look.observer.enter(Stage::Contour);
+        let own = self.camera_for(look.expected);
         let camera = own.as_ref().unwrap_or(&self.camera);
-        let mut search = Search::new(self, camera, expected, taken, binary.observer, lists.blocks, work, report);
+        let (mut search, border, marks) = Search::new(self, camera, look, work);
         match config.contour.method {
-            contour::Method::Raster if cfg!(feature = "horace") => search.raster(binary, lists.border, lists.marks),
+            contour::Method::Raster if cfg!(feature = "horace") => search.raster(binary, border, marks),
             contour::Method::Erode if cfg!(feature = "horace") => {
-                search.judge_all_as_one(binary, |work| {
-                    contour::erode::edges(binary, &config.contour, lists.border, work)
-                });
+                search.judge_all_as_one(binary, |work| contour::erode::edges(binary, &config.contour, border, work));
             }
             contour::Method::Sobel if cfg!(feature = "zju") => {
-                search.judge_all_as_one(binary, |work| contour::sobel::edges(binary, lists.border, work))
+                search.judge_all_as_one(binary, |work| contour::sobel::edges(binary, border, work))
             }
             // `Config::check` refuses a method that is not built in.
-            _ => search.border_following(binary, lists.border, lists.marks),
+            _ => search.border_following(binary, border, marks),
         }
         search.conclude()
     }

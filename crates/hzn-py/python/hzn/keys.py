@@ -262,7 +262,7 @@ class Gates(TypedDict, total=False):
     rival_floor_px: float
     """Residuals below this count as equal, px. Values: above 0 to 10000 px. Default: 0.03."""
     residual_floor_px: float
-    """Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the given noise,
+    """Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the told noise,
     px; with 1e4 the gate uses the told noise. Values: 0 to 10000 px. Default: 0.1."""
     max_departure: float
     """Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6

@@ -23,6 +23,7 @@ mod runs;
 use core::fmt;
 
 use super::budget;
+use super::look::Look;
 use super::search::Search;
 use super::sensor::Sensor;
 use super::workspace::Workspace;
@@ -304,9 +305,10 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
             let work = budget::new(&self.sensor.config, lists.border.len());
             let own = self.sensor.camera_for(self.expected);
             let camera = own.as_ref().unwrap_or(&self.sensor.camera);
-            let mut judge = Search::new(self.sensor, camera, self.expected, &[], observer, lists.blocks, work, report);
-            judge.border_following(&binary, lists.border, lists.marks);
-            judge.conclude();
+            let look = Look { lists, picture: &picture, expected: self.expected, taken: &[], observer, report };
+            let (mut search, border, marks) = Search::new(self.sensor, camera, look, work);
+            search.border_following(&binary, border, marks);
+            search.conclude();
         }
         report.next_level = Some(next);
         report.counters.dropped += self.points.dropped();

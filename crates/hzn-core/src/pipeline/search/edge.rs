@@ -15,14 +15,14 @@ use crate::model::report::{Candidate, Free, Report, Solution};
 use crate::model::status::Stage;
 use crate::model::verdict::Verdict;
 use crate::model::work;
-use crate::papers;
 use crate::pipeline::budget;
 use crate::stages::consensus::{self, Threshold};
 use crate::stages::contour::{BinaryPicture, Thinned};
 use crate::stages::covariance::{self, Fused};
 use crate::stages::edge_points::{self, Points};
 use crate::stages::fit::{self, Fit};
-use crate::stages::{gates, rays};
+use crate::stages::gates::{self, Case, Cover, Passed};
+use crate::stages::rays;
 
 impl<T: Real, O: Observer<T>> Search<'_, T, O> {
     /// Takes a followed edge through every stage, and keeps its answer if it is the best so far.
@@ -175,42 +175,44 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         enter(self.report, self.observer, Stage::Gates);
         let (b1, b2) = basis(&fused.e);
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
-        let sigma = covariance.sigma_max_rad();
         self.show_fit(fit, &fused, covariance, expected, outcome.number);
-        let (made, factor, gates) = (points.count, threshold.factor, &config.gates);
-        let judged = gates::judge(fit, &fused, sigma, expected, blocks, made, factor, binary, camera, gates);
-        outcome.verdict = match judged.verdict {
-            Verdict::Passed => papers::verdict(fit, expected, blocks, camera, binary.region, &config.gates),
-            failed => failed,
+        let case = Case {
+            fit,
+            fused: &fused,
+            sigma_max_rad: covariance.sigma_max_rad(),
+            expected,
+            taken: self.taken,
+            blocks,
+            points: points.count,
+            min_inlier_share: self.min_inlier_share(),
+            raised: threshold.factor,
+            camera,
+            region: binary.region,
+            fit_config: &config.fit,
+            config: &config.gates,
+            cover: Cover::new(fit, &fused, blocks, camera, binary.region),
         };
-        let fewest = T::from_i32(points.count as i32) * T::from_f64(config.retry.min_part);
-        if self.report.counters.looks > 0 && T::from_i32(fit.inliers as i32) < fewest {
-            outcome.verdict = Verdict::NoConsensus;
-            return None;
-        }
-        if outcome.verdict == Verdict::Passed && expected.free && self.taken.iter().any(|t| t.hides(&fused.e)) {
-            outcome.verdict = Verdict::NoSky;
-        }
-        if outcome.verdict != Verdict::Passed || !sigma.is_finite() {
-            return None;
-        }
-        if config.fit.half_angle == fit::HalfAngle::Fused
-            && !self.is_side_known(fit, &fused, expected)
-            && !expected.free
-        {
-            outcome.verdict = Verdict::Straight;
-            return None;
-        }
+        let judged = gates::judge(&case, binary);
+        outcome.verdict = judged.err().unwrap_or(Verdict::Passed);
+        let Passed { glows } = judged.ok()?;
         let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number)?;
         let share = T::from_i32(fit.inliers as i32)
             > T::from_i32(points.count as i32) * T::from_f64(config.gates.certain_share);
         // The reflection of a Sun in the lens may look as good as the Sun, so every edge is examined.
         let certain = !expected.free
-            && judged.support > T::from_f64(config.gates.certain_support)
+            && case.cover.share > T::from_f64(config.gates.certain_support)
             && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
         let next = (self.needs_next_threshold && !P::STREAMED)
             .then(|| gates::middle_level(&fused.e, blocks, fit.inliers, binary, camera));
-        Some(Best { solution, outcome: *outcome, judged, certain, level: next.flatten() })
+        Some(Best { solution, outcome: *outcome, score: case.score(), glows, certain, level: next.flatten() })
+    }
+
+    /// Returns the smallest part of an edge's points that must be inliers. A further look is another chance for a false
+    /// answer, so it asks for more.
+    fn min_inlier_share(&self) -> f64 {
+        let config = &self.sensor.config;
+        let more = if self.report.counters.looks > 0 { config.retry.min_part } else { 0.0 };
+        config.gates.min_inlier_share.max(more)
     }
 
     /// Shows the fit of a candidate to the observer, if the observer wants it.
@@ -221,15 +223,6 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         {
             self.observer.fit(number, &solution, expected);
         }
-    }
-
-    /// Returns whether the curvature of the edge shows on which side of the edge the body is.
-    ///
-    /// A body on the other side of the same edge would have the half-angle π − α. The half-angle that the edge itself
-    /// gives must be much nearer to α: (ĉ + c₀)² − (ĉ − c₀)² = 4 ĉ c₀ must exceed `min_side_sigma`² variances.
-    fn is_side_known(&self, fit: &Fit<T>, fused: &Fused<T>, expected: &Expected<T>) -> bool {
-        let sides = T::from_f64(self.sensor.config.gates.min_side_sigma);
-        fused.var_free_cos.is_some_and(|v| v * sides * sides < fit.c * expected.cos * T::from_f64(4.0))
     }
 
     #[inline(always)]

@@ -3,12 +3,15 @@
 mod edge;
 mod order;
 
-use super::found_limb::FoundLimb;
+use super::look::Look;
 use super::sensor::Sensor;
+use super::workspace::Lists;
 use crate::base::real::Real;
 use crate::geometry::block::Block;
 use crate::geometry::camera::Camera;
+use crate::geometry::pixel::Pixel;
 use crate::model::body::Expected;
+use crate::model::found_limb::FoundLimb;
 use crate::model::observer::Observer;
 use crate::model::report::{Candidate, Report, Solution};
 use crate::model::status::Status;
@@ -19,7 +22,7 @@ use crate::stages::{covariance, gates, threshold};
 /// The search over the edges of one picture, which are judged one by one.
 pub(super) struct Search<'a, T, O> {
     sensor: &'a Sensor<T>,
-    /// Camera of the sensor, or [`Sensor::turning`] if the camera turns while the picture is read out.
+    /// Camera of the sensor, or [`Sensor::camera_for`] the picture.
     camera: &'a Camera<T>,
     expected: &'a Expected<T>,
     taken: &'a [FoundLimb<T>],
@@ -47,27 +50,27 @@ struct Best<T> {
     outcome: Candidate<T>,
     /// Threshold for the next picture.
     level: Option<u16>,
-    judged: gates::Judged<T>,
+    /// The smallest score wins.
+    score: T,
+    /// Whether light reaches higher above the limb than air does.
+    glows: bool,
     /// Whether the search can end: the answer explains most of the limb in view, and either most points of its edge are
     /// inliers or the residuals are small.
     certain: bool,
 }
 
 impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
-    /// Begins a search. `camera` is the camera of the sensor or [`Sensor::turning`], `taken` are the limbs found
-    /// before, `blocks` has room for the points of one edge, and `work` is the work budget of the look.
-    pub(super) fn new(
+    /// Begins a search, and returns it with the lists for the border and the marks of the edges. `camera` is the camera
+    /// of the sensor or [`Sensor::camera_for`], and `work` is the work budget of the look.
+    pub(super) fn new<P>(
         sensor: &'a Sensor<T>,
         camera: &'a Camera<T>,
-        expected: &'a Expected<T>,
-        taken: &'a [FoundLimb<T>],
-        observer: &'a O,
-        blocks: &'a mut [Block<T>],
+        look: Look<'a, T, P, O>,
         work: WorkBudget,
-        report: &'a mut Report<T>,
-    ) -> Self {
+    ) -> (Self, &'a mut [Pixel], &'a mut [u32]) {
+        let Look { lists: Lists { border, blocks, marks }, expected, taken, observer, report, .. } = look;
         let config = &sensor.config;
-        Self {
+        let search = Self {
             expected,
             taken,
             noise: config.noise_model_of(expected.which),
@@ -87,7 +90,8 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             report,
             camera,
             sensor,
-        }
+        };
+        (search, border, marks)
     }
 
     /// Returns whether the search is over: the limb is found, or the work budget is used up.
@@ -109,9 +113,9 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             T::from_f64(self.sensor.config.gates.ambiguous_deg.to_radians())
         };
         let apart = new.solution.axis.angle_rad(&old.solution.axis) > limit;
-        let (better, other) = if new.judged.score < old.judged.score { (new, old) } else { (old, new) };
+        let (better, other) = if new.score < old.score { (new, old) } else { (old, new) };
         if apart {
-            self.rival = Some(self.rival.map_or(other.judged.score, |r| r.min(other.judged.score)));
+            self.rival = Some(self.rival.map_or(other.score, |r| r.min(other.score)));
         }
         self.best = Some(better);
     }
@@ -123,12 +127,12 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         report.counters.looks += 1;
         if let Some(best) = self.best {
             let factor = T::from_f64(self.sensor.config.gates.ambiguous_score);
-            let is_close = |rival: T| rival < best.judged.score * factor || self.expected.free;
+            let is_close = |rival: T| rival < best.score * factor || self.expected.free;
             if !best.certain && self.rival.is_some_and(is_close) {
                 report.status = Status::Ambiguous;
                 return work;
             }
-            if best.judged.glows {
+            if best.glows {
                 report.choose(best.outcome, Verdict::Glow);
                 report.status = Status::Rejected;
                 return work;

@@ -1,34 +1,16 @@
-//! Attitude gates: compare the axis with a prior attitude and with the last answer.
+//! Gate: the axis agrees with the attitude of the prior.
 
-use super::config::Config;
-use crate::base::linalg::V3;
+use super::case::{Case, refuse_if};
+use super::turn::{angle_rad, combined_sigmas};
 use crate::base::real::Real;
-use crate::geometry::frames::{Cam, UnitVec3};
-use crate::model::body::Expected;
 use crate::model::verdict::Verdict;
 
-/// Returns `Attitude` if the axis is farther from the axis that the prior attitude and the position predict than both
-/// sigmas allow. Returns `Rate` if the axis is farther from the last answer than the vehicle can have turned. Otherwise
-/// returns `Passed`.
-pub(super) fn verdict<T: Real>(e: &V3<T>, sigma_max_rad: T, expected: &Expected<T>, config: &Config) -> Verdict {
-    let off = |other: &V3<T>| UnitVec3::<Cam, T>::assume_unit(*e).angle_rad(&UnitVec3::assume_unit(*other));
-    let within = |limit: T, sigma: T| (sigma * sigma + sigma_max_rad * sigma_max_rad).sqrt() * limit;
-    let sigmas = T::from_f64(config.max_attitude_sigma);
-    if let Some((axis, sigma)) = &expected.predicted
-        && config.max_attitude_sigma > 0.0
-        && !(off(axis) <= within(sigmas, *sigma))
-    {
-        return Verdict::Attitude;
-    }
-    if let (Some(rate), Some(last)) = (config.max_rate_deg_s, &expected.last) {
-        let turned = T::from_f64(rate.to_radians()) * last.age_s.abs();
-        if !(off(last.axis.v()) <= turned + within(T::from_f64(LAST_SIGMAS), last.sigma_rad)) {
-            return Verdict::Rate;
-        }
-    }
-    Verdict::Passed
+/// Refuses an axis that is farther from the axis that the prior attitude and the position predict than both sigmas
+/// allow.
+#[inline(always)]
+pub(super) fn refuse<T: Real>(case: &Case<'_, T>) -> Result<(), Verdict> {
+    let Some((axis, sigma)) = &case.expected.predicted else { return Ok(()) };
+    let limit = case.config.max_attitude_sigma;
+    let agrees = angle_rad(&case.fused.e, axis) <= combined_sigmas(case.sigma_max_rad, *sigma) * T::from_f64(limit);
+    refuse_if(limit > 0.0 && !agrees, Verdict::Attitude)
 }
-
-/// Allowed distance between two answers in sigmas, in addition to the turn. `gates.max_rate_deg_s` limits the turn
-/// itself.
-const LAST_SIGMAS: f64 = 4.0;

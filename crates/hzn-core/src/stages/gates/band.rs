@@ -1,11 +1,14 @@
-//! Band gate: a band has sky on both sides, for example a ring, a streak or the frame of a window. A limb has the body
+//! Gate: a band has sky on both sides, for example a ring, a streak or the frame of a window. A limb has the body
 //! inside. From some inliers, the gate reads the brightness along lines inwards.
 
+use super::case::{Case, refuse_if};
 use super::places::{Place, Places};
-use super::sky;
+use super::size::disc_px;
+use super::sky::Sky;
 use crate::base::real::Real;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
+use crate::model::verdict::Verdict;
 use crate::stages::contour::BinaryPicture;
 
 /// Number of places that are read along a line, evenly from the limb to the border of the region.
@@ -24,23 +27,32 @@ const MIN_SKY_SHARE: [i32; 2] = [2, 3];
 /// allows for blur and stray light.
 const SKY_PART: f64 = 0.1;
 
-/// Returns the part of the lines inwards that come back to the sky across a second edge, 0 to 1. The step of this edge
-/// must be at least `step` times that of the limb. A terminator fades and is no edge. `disc_px` is the diameter of the
-/// body's disc in pixels.
-pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
-    places: &Places<T>,
+/// Refuses a limb if too many of the lines inwards come back to the sky across a second edge. The step of this edge must
+/// be at least `band_step` times that of the limb. A terminator fades and is no edge.
+///
+/// Of a picture that came row by row, only lit and dark pixels are left, and a terminator is as steep as an edge. A disc
+/// that is whole in the picture may be a crescent, which is a band, too.
+pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
+    case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,
-    sky: &sky::Sky<T>,
-    disc_px: T,
-    step: T,
-) -> T {
+    places: &Places<T>,
+    sky: &Sky<T>,
+) -> Result<(), Verdict> {
+    let Case { expected, camera, config, .. } = *case;
+    let disc_px = disc_px(expected, camera);
+    let is_wide = disc_px > T::from_i32(camera.width().min(camera.height()).into());
+    if P::STREAMED || config.max_band >= 1.0 || !is_wide {
+        return Ok(());
+    }
+    let step = T::from_f64(config.band_step);
     let (mut looks, mut bands) = (0, 0);
     for place in places {
         let Some(is_band) = comes_back(place, binary, sky, disc_px, step) else { continue };
         looks += 1;
         bands += i32::from(is_band);
     }
-    T::from_i32(bands) / T::from_i32(looks.max(1))
+    let part = T::from_i32(bands) / T::from_i32(looks.max(1));
+    refuse_if(part >= T::from_f64(config.max_band), Verdict::Band)
 }
 
 /// Returns whether the line inwards from one inlier comes back to the sky across a second edge; `None` if the picture
@@ -49,7 +61,7 @@ pub(super) fn banded<T: Real, P: Pixels, O: Observer<T>>(
 fn comes_back<T: Real, P: Pixels, O: Observer<T>>(
     from: &Place<T>,
     binary: &BinaryPicture<'_, T, P, O>,
-    sky: &sky::Sky<T>,
+    sky: &Sky<T>,
     disc_px: T,
     step: T,
 ) -> Option<bool> {

@@ -1,8 +1,17 @@
-//! Rival circle: a lens flare is a circle in the image, but a limb is a circle only on the sphere.
+//! Gate: a lens flare is a circle in the image, but a limb is a circle only on the sphere.
 
-use super::shape::{Place, Shape};
+use super::case::refuse_if;
+use super::shape::{Place, Residuals, Shape};
 use crate::base::linalg::{V3, invert_spd3};
 use crate::base::real::Real;
+use crate::model::verdict::Verdict;
+
+/// Refuses an edge whose points fit a circle of the image better than the cone.
+pub(super) fn refuse<T: Real>(residuals: &Residuals<'_, T>) -> Result<(), Verdict> {
+    // Cone and circle have the same number of parameters.
+    let is_circle = || rms(residuals.shape).is_some_and(|rival_px| residuals.prefer(rival_px, T::ZERO));
+    refuse_if(residuals.allow_rival() && is_circle(), Verdict::Circle)
+}
 
 /// Number of Gauss-Newton steps. Two are enough from a circle through three of the points.
 const STEPS: usize = 2;
@@ -69,7 +78,7 @@ impl<T: Real> Circle<T> {
 }
 
 /// Returns the weighted RMS distance of the points from the best circle, in pixels; `None` if no circle fits.
-pub(super) fn rms<T: Real>(shape: &Shape<T>) -> Option<T> {
+fn rms<T: Real>(shape: &Shape<T>) -> Option<T> {
     let count = shape.len();
     let at = |i: usize| shape.get(i).map(|p: &Place<T>| p.at);
     let (first, middle, last) = (at(count / 6)?, at(count / 2)?, at(count - 1 - count / 6)?);

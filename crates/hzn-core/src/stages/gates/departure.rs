@@ -1,17 +1,16 @@
-//! Departure gate: an edge that continues smoothly next to the fitted cone is evidence against a limb, because a limb
+//! Gate: an edge that continues smoothly next to the fitted cone is evidence against a limb, because a limb
 //! stays on its cone.
 
-use super::config::Config;
+use super::case::{Case, refuse_if};
 use super::places::{MAX_PLACES, inliers};
-use super::shape::Curve;
+use super::shape::Residuals;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
-use crate::geometry::camera::Camera;
 use crate::geometry::frames::UnitVec3;
 use crate::image::Pixels;
-use crate::model::body::Expected;
 use crate::model::observer::Observer;
+use crate::model::verdict::Verdict;
 use crate::stages::contour::BinaryPicture;
 
 /// Length of edge over which points are averaged (a box), in pixels. It gives the direction to a few degrees.
@@ -75,32 +74,29 @@ struct Stretch<T> {
     points: i32,
 }
 
-/// An edge with the data that the gate needs.
+/// An edge with its residuals.
 struct Edge<'a, 'b, T, P, O> {
-    blocks: &'a [Block<T>],
-    points: usize,
-    curve: &'a Curve<T>,
-    camera: &'a Camera<T>,
+    case: &'a Case<'b, T>,
     binary: &'a BinaryPicture<'b, T, P, O>,
-    expected: &'a Expected<T>,
+    residuals: &'a Residuals<'a, T>,
 }
 
 impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
     fn block(&self, place: usize) -> Option<(&Block<T>, usize)> {
-        (place < self.points).then_some(())?;
-        Some((self.blocks.get(place / LANES)?, place % LANES))
+        (place < self.case.points as usize).then_some(())?;
+        Some((self.case.blocks.get(place / LANES)?, place % LANES))
     }
 
     /// Returns whether a point cannot be on the limb because the Sun does not light the limb there. The edge then
     /// continues as the terminator, which says nothing about the limb. This is known only for a position.
     fn is_terminator(&self, ray: &V3<T>) -> bool {
-        if self.expected.target().is_some() {
-            let (fx, fy) = self.camera.focal_px();
-            let focal_px = (fx + fy) * T::from_f64(0.5);
-            return !self.expected.is_lit(ray, self.curve.axis(), T::one() - self.curve.k(), focal_px);
+        let (expected, curve) = (self.case.expected, self.residuals.curve);
+        if expected.target().is_none() {
+            return false;
         }
-        let _ = (ray, self.expected);
-        false
+        let (fx, fy) = self.case.camera.focal_px();
+        let focal_px = (fx + fy) * T::from_f64(0.5);
+        !expected.is_lit(ray, curve.axis(), T::one() - curve.k(), focal_px)
     }
 
     /// Averages the points from `place` on over one box, in the direction `ahead`, and moves `place` past them.
@@ -112,12 +108,12 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
             if self.is_terminator(&block.ray(lane)) {
                 break;
             }
-            let Some(at) = self.camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { break };
+            let Some(at) = self.case.camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { break };
             // The step from the previous point in the order of the walk.
             let step = if ahead { Some((block, lane)) } else { self.block(here + 1) };
             sum.length += step.map_or(T::ZERO, |(b, l)| b.step_px[l]);
             sum.at = [sum.at[0] + at.u, sum.at[1] + at.v];
-            sum.off += self.curve.distance(block, lane);
+            sum.off += self.residuals.curve.distance(block, lane);
             sum.points += 1;
             *place = if ahead { Some(here + 1) } else { here.checked_sub(1) };
         }
@@ -130,7 +126,8 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
 
     /// Follows the edge beyond the end of a run of inliers, and adds its boxes that are not on the cone to `found`.
     #[inline(always)]
-    fn follow_beyond(&self, end: usize, ahead: bool, noise_px: T, config: &Config, found: &mut Continuation<T>) {
+    fn follow_beyond(&self, end: usize, ahead: bool, found: &mut Continuation<T>) {
+        let (noise_px, config) = (self.residuals.noise_px, self.case.config);
         let off_cone = noise_px.max(T::from_f64(config.rival_floor_px)) * T::from_f64(3.0);
         let turn = T::from_f64(config.departure_turn_deg.to_radians());
         // Two boxes within the run give the direction at its end.
@@ -178,47 +175,46 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
             let x = (at[0] - dy / norm * T::from_i32(px) + half).to_i32();
             let y = (at[1] + dx / norm * T::from_i32(px) + half).to_i32();
             let (x, y) = (u16::try_from(x).ok()?, u16::try_from(y).ok()?);
-            let counts = self.binary.region.contains(x, y) && !self.binary.masked(x, y);
-            counts.then(|| i32::from(self.binary.brightness(x, y)))
+            let binary = self.binary;
+            let counts = binary.region.contains(x, y) && !binary.masked(x, y);
+            counts.then(|| i32::from(binary.brightness(x, y)))
         };
         Some((side(ASIDE_PX)? - side(-ASIDE_PX)?).abs())
     }
 }
 
-/// Returns whether the edge continues next to the cone and keeps its contrast there. There are two cases. Either the
+/// Refuses an edge that continues next to the cone and keeps its contrast there. There are two cases. Either the
 /// continuation is smooth and longer than `gates.max_departure` of the longest run of inliers. Or edge points cover
-/// less than `gates.min_support_abrupt` of the limb in view; then any continuation counts. `noise_px` is the noise
-/// from point to point. `support` is the part of the limb in view that edge points cover.
+/// less than `gates.min_support_abrupt` of the limb in view; then any continuation counts.
 ///
 /// A continuation is smooth if it turns from box to box by less than `gates.departure_turn_deg`, plus an allowance for
 /// the noise of the boxes.
-pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
-    blocks: &[Block<T>],
-    [points, on_limb]: [u32; 2],
-    curve: &Curve<T>,
-    noise_px: T,
-    support: T,
+pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
+    case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,
-    camera: &Camera<T>,
-    expected: &Expected<T>,
-    config: &Config,
-) -> bool {
-    let edge = Edge { blocks, points: points as usize, curve, camera, binary, expected };
-    let Some(run) = longest(blocks) else { return false };
+    residuals: &Residuals<'_, T>,
+) -> Result<(), Verdict> {
+    let Case { fit, blocks, camera, config, .. } = *case;
+    // Of a picture that came row by row, only lit and dark pixels are left.
+    if P::STREAMED || fit.inliers >= case.points {
+        return Ok(());
+    }
+    let edge = Edge { case, binary, residuals };
+    let Some(run) = longest(blocks) else { return Ok(()) };
     let mut found = Continuation { away: T::ZERO, smooth: Mean::default(), near: Mean::default() };
     for ahead in [false, true] {
-        edge.follow_beyond(if ahead { run.last } else { run.first }, ahead, noise_px, config, &mut found);
+        edge.follow_beyond(if ahead { run.last } else { run.first }, ahead, &mut found);
     }
     let Continuation { away, smooth, near } = found;
     let is_long =
         away >= T::from_f64(2.0 * BOX_PX) && away > run.length.max(T::one()) * T::from_f64(config.max_departure);
-    let is_abrupt = near.count > 0 && support < T::from_f64(config.min_support_abrupt);
+    let is_abrupt = near.count > 0 && case.cover.share < T::from_f64(config.min_support_abrupt);
     if !(is_long || is_abrupt) {
-        return false;
+        return Ok(());
     }
     let mut on_cone = Mean::default();
-    for (block, lane) in inliers(blocks, on_limb, MAX_PLACES) {
-        let [gu, gv] = block.gradient_at(lane, curve.axis());
+    for (block, lane) in inliers(blocks, fit.inliers, MAX_PLACES) {
+        let [gu, gv] = block.gradient_at(lane, edge.residuals.curve.axis());
         if let Some(at) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) {
             on_cone.add(edge.contrast([at.u, at.v], [-gv, gu]));
         }
@@ -227,7 +223,7 @@ pub(super) fn departs<T: Real, P: Pixels, O: Observer<T>>(
     let kept = |beside: &Mean| {
         beside.count > 0 && beside.mean::<T>() >= on_cone.mean::<T>() * T::from_f64(config.departure_contrast)
     };
-    (is_long && kept(&smooth)) || (is_abrupt && kept(&near))
+    refuse_if((is_long && kept(&smooth)) || (is_abrupt && kept(&near)), Verdict::Departure)
 }
 
 /// The parts of an edge next to the cone that continue a run of inliers.

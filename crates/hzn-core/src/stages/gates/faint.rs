@@ -1,11 +1,14 @@
-//! Faint gate: a limb is a step of the brightness. Where the light of a twilight fades over a long distance, each
+//! Gate: a limb is a step of the brightness. Where the light of a twilight fades over a long distance, each
 //! threshold has an edge, too: a contour line of the brightness, which may have the form of a limb.
 
+use super::case::{Case, refuse_if};
 use super::places::{MAX_PLACES, Places, mean_brightness};
+use super::size::disc_px;
 use crate::base::median;
 use crate::base::real::Real;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
+use crate::model::verdict::Verdict;
 use crate::stages::contour::BinaryPicture;
 
 /// Distance from the limb at which the brightness on both sides is read, in pixels. So far the sub-pixel search looks
@@ -16,14 +19,20 @@ const PART_OF_DISC: f64 = 0.125;
 /// Fewest places at which both sides must be visible.
 const LEAST: usize = 3;
 
-/// Returns whether the step of the brightness at the limb is below the least contrast of an edge point. `false` if the
-/// picture shows too little of both sides. `disc_px` is the diameter of the body's disc in pixels.
-pub(super) fn is_faint<T: Real, P: Pixels, O: Observer<T>>(
-    places: &Places<T>,
+/// Refuses a limb whose step of the brightness is below the least contrast of an edge point. A picture that shows too
+/// little of both sides is no evidence.
+///
+/// Of a picture that came row by row, only lit and dark pixels are left. Where bands are allowed, the inside of the limb
+/// may be as dark as the sky.
+pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
+    case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,
-    disc_px: T,
-) -> bool {
-    let aside = T::from_f64(ASIDE_PX).min(disc_px * T::from_f64(PART_OF_DISC));
+    places: &Places<T>,
+) -> Result<(), Verdict> {
+    if P::STREAMED || case.config.max_band >= 1.0 {
+        return Ok(());
+    }
+    let aside = T::from_f64(ASIDE_PX).min(disc_px(case.expected, case.camera) * T::from_f64(PART_OF_DISC));
     let (mut body, mut sky) = (Counts::new(), Counts::new());
     for place in places {
         let at = |inwards_px: T| mean_brightness(place, inwards_px, binary);
@@ -32,10 +41,10 @@ pub(super) fn is_faint<T: Real, P: Pixels, O: Observer<T>>(
         }
     }
     if body.len() < LEAST {
-        return false;
+        return Ok(());
     }
     let [body, sky] = [&body, &sky].map(|all| i32::from(median::median_of_counts(all)));
-    body - sky < binary.least_contrast
+    refuse_if(body - sky < binary.least_contrast, Verdict::Faint)
 }
 
 type Counts = heapless::Vec<u16, MAX_PLACES>;

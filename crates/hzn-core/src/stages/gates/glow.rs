@@ -1,6 +1,7 @@
-//! Glow gate: airglow and aurora are layers of light high above the limb, and their edge has the form of a limb. Air
+//! Glow: airglow and aurora are layers of light high above the limb, and their edge has the form of a limb. Air
 //! fades within a few scale heights above the limb, so light that reaches higher is a glow.
 
+use super::case::Case;
 use super::places::{MAX_PLACES, Places, mean_brightness};
 use crate::base::median;
 use crate::base::real::Real;
@@ -33,18 +34,24 @@ fn dark_angle<T: Real>(sin: T, c: T, expected: &Expected<T>) -> Option<T> {
     (expected.scale_height_m > T::ZERO).then_some(height_m * by_height)
 }
 
-/// Returns whether a limb of cosine `c` may belong to a glow: if the light above it, above the sky farther out, is
-/// more than `most` of the step from the sky to the body. `false` if the body's air is unknown, or if the picture shows
-/// too little of the sky. `most` is `gates.max_glow`.
-pub(super) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
-    places: &Places<T>,
-    c: T,
+/// Returns whether a limb may belong to a glow: if the light above it, above the sky farther out, is more than
+/// `gates.max_glow` of the step from the sky to the body. `false` if the body's air is unknown, or if the picture shows
+/// too little of the sky.
+///
+/// This is no gate, although the verdict on an answer may be [`crate::model::verdict::Verdict::Glow`]: the edge stays in
+/// the choice, because another edge in the same glow is no better. If it wins, the picture has no answer.
+pub(crate) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
+    case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,
-    expected: &Expected<T>,
-    most: T,
+    places: &Places<T>,
 ) -> bool {
+    // Of a picture that came row by row, only lit and dark pixels are left.
+    if P::STREAMED {
+        return false;
+    }
+    let (c, most) = (case.fused.c, T::from_f64(case.config.max_glow));
     let sin = (T::one() - c * c).max(T::ZERO).sqrt();
-    let Some(dark) = dark_angle(sin, c, expected) else { return false };
+    let Some(dark) = dark_angle(sin, c, case.expected) else { return false };
     let blur = T::from_f64(BLUR_PX);
     let (mut body, mut air, mut sky) = (Counts::new(), Counts::new(), Counts::new());
     for place in places {

@@ -1,44 +1,14 @@
-//! Compares the fitted half-angle with the expected one, using the noise of the residuals instead of the told noise.
+//! Gate: the limb of the body has the expected size.
 
-use super::config::Config;
-use crate::base::linalg::basis;
+use super::case::{Case, refuse_if};
+use super::size::is_possible_size;
 use crate::base::real::Real;
-use crate::geometry::block::Block;
-use crate::model::body::Expected;
-use crate::stages::covariance::{self, Fused};
-use crate::stages::fit::Fit;
+use crate::model::verdict::Verdict;
 
-/// Returns whether the half-angles differ by more than the residuals allow. If an edge is smoother than the told noise
-/// says, its curvature is also more accurate than the told noise allows.
-///
-/// The test is (c₀ − ĉ)² / (P₃₃ + σ_c² + other given variances). P₃₃ uses the RMS of the residuals, at least
-/// `gates.residual_floor_px`, and the correlation length from the length of the edge
-/// ([`covariance::measured_length_px`]). P₃₃ grows with the square of the RMS, and at most in proportion to the
-/// correlation length. The points are evaluated again only if this bound does not decide the test.
-pub(super) fn disagrees<T: Real>(
-    fit: &Fit<T>,
-    fused: &Fused<T>,
-    expected: &Expected<T>,
-    blocks: &[Block<T>],
-    config: &Config,
-) -> bool {
-    let Some(var_free) = fused.var_free_cos.filter(|_| config.residual_floor_px > 0.0 && !expected.free) else {
-        return false;
-    };
-    let (edge, rest) = (fused.edge.var_cos, var_free - fused.edge.var_cos + expected.sigma_cos * expected.sigma_cos);
-    let difference = expected.cos - fit.c;
-    let chi = T::from_f64(config.max_half_angle_sigma);
-    // The half-angles disagree unless the variance from the edge is at least this value.
-    let needed = difference * difference / (chi * chi) - rest;
-    let sigma = fit.rms_px.max(T::from_f64(config.residual_floor_px));
-    let length = covariance::measured_length_px(fit);
-    let (smaller, shorter) = (sigma / fused.edge.sigma_px, length / fused.edge.length_px.max(T::from_f64(1e-6)));
-    let bound = edge * smaller * smaller * shorter.min(T::one());
-    if bound >= needed || (smaller >= T::one() && shorter >= T::one()) {
-        return false;
-    }
-    let (b1, b2) = basis(&fit.e);
-    let x = covariance::correlated(blocks, &fit.e, &b1, &b2, fit.mean, length.min(fused.edge.length_px));
-    let response = covariance::response(&fit.sums, fit.mean, true);
-    !response.is_some_and(|response| covariance::sandwich(&response, &x).m33 * sigma * sigma >= needed)
+/// Refuses a half-angle that differs from the expected one by more than the told noise allows. For a body with a free
+/// half-angle, the gate refuses a size that the body never has.
+pub(super) fn refuse<T: Real>(case: &Case<'_, T>) -> Result<(), Verdict> {
+    let chi = T::from_f64(case.config.max_half_angle_sigma);
+    let agrees = case.fused.chi2 <= chi * chi && is_possible_size(&case.fit.c, case.expected, case.camera, case.config);
+    refuse_if(!agrees, Verdict::HalfAngle)
 }

@@ -1,60 +1,30 @@
-//! Rival polyline: the iris of a lens and the parts of a vehicle have straight edges.
+//! Gate: the iris of a lens and the parts of a vehicle have straight edges.
 
-use super::shape::{Place, Shape};
+use super::case::refuse_if;
+use super::line::Line;
+use super::shape::{Residuals, Shape};
 use crate::base::real::Real;
+use crate::model::verdict::Verdict;
+
+/// Refuses an edge whose points fit a few straight pieces better than the cone.
+pub(super) fn refuse<T: Real>(residuals: &Residuals<'_, T>) -> Result<(), Verdict> {
+    // The additional parameters of a polyline reduce its residual for any points. With too few points, the comparison
+    // proves nothing.
+    let (points, turns) = (T::from_i32(residuals.shape.len() as i32), T::from_f64(PARAMETERS));
+    let left = points - T::from_f64(3.0) - turns;
+    let rival_px = || rms(residuals.shape, residuals.rms_px) * ((left + turns) / left).sqrt();
+    let is_polyline = residuals.allow_rival() && left > T::ZERO && residuals.prefer(rival_px(), turns);
+    refuse_if(is_polyline, Verdict::Polyline)
+}
 
 /// Largest number of straight pieces. A polygon of many corners touches a cone only near a few of its sides.
 const PIECES: usize = 4;
 /// Number of places where a piece may end, in addition to the end of the shape.
 const PLACES: usize = 40;
 
-/// Sums of points in a frame along one direction. On a straight line the second coordinate stays small, so that single
-/// precision suffices.
-struct Line<T> {
-    origin: [T; 2],
-    along: [T; 2],
-    n: T,
-    x: T,
-    y: T,
-    xx: T,
-    xy: T,
-    yy: T,
-}
-
-impl<T: Real> Line<T> {
-    fn new(origin: [T; 2], towards: [T; 2]) -> Self {
-        let (dx, dy) = (towards[0] - origin[0], towards[1] - origin[1]);
-        let length = (dx * dx + dy * dy).sqrt().max(T::from_f64(1e-6));
-        let zero = T::ZERO;
-        let along = [dx / length, dy / length];
-        Self { origin, along, n: zero, x: zero, y: zero, xx: zero, xy: zero, yy: zero }
-    }
-    fn add(&mut self, p: &Place<T>) {
-        let (dx, dy) = (p.at[0] - self.origin[0], p.at[1] - self.origin[1]);
-        let [ax, ay] = self.along;
-        let (x, y, w) = (dx * ax + dy * ay, dy * ax - dx * ay, p.w);
-        self.n += w;
-        self.x += w * x;
-        self.y += w * y;
-        self.xx += w * x * x;
-        self.xy += w * x * y;
-        self.yy += w * y * y;
-    }
-    /// Returns Σ w d² about the best straight line. The slope is small, so that distances along y are also those across
-    /// the line.
-    fn cost(&self) -> T {
-        let n = self.n.max(T::from_f64(1e-20));
-        let xx = self.xx - self.x * self.x / n;
-        let xy = self.xy - self.x * self.y / n;
-        let yy = self.yy - self.y * self.y / n;
-        let slope = xy / xx.max(T::from_f64(1e-6));
-        ((yy - xy * slope) / (T::one() + slope * slope)).max(T::ZERO)
-    }
-}
-
 /// Returns the weighted RMS distance of the points from the best polyline of up to four pieces, in pixels. The result
 /// is at most `worst_px`.
-pub(super) fn rms<T: Real>(shape: &Shape<T>, worst_px: T) -> T {
+fn rms<T: Real>(shape: &Shape<T>, worst_px: T) -> T {
     let places = PLACES.min(shape.len() / 4).max(1);
     let start = |place: usize| place * shape.len() / places;
     let weight = shape.iter().fold(T::ZERO, |sum, p| sum + p.w).max(T::from_f64(1e-20));
@@ -93,17 +63,11 @@ pub(super) fn rms<T: Real>(shape: &Shape<T>, worst_px: T) -> T {
 
 /// Number of parameters that a polyline has more than a cone: two for each piece and one for each joint, minus the
 /// three of the cone.
-pub(super) const PARAMETERS: f64 = (2 * PIECES + PIECES - 1 - 3) as f64;
-
-/// Returns the weighted RMS distance of the points from the best straight line, in pixels.
-pub(super) fn straight_rms<T: Real>(shape: &Shape<T>) -> T {
-    let (Some(first), Some(last)) = (shape.first(), shape.last()) else { return T::ZERO };
-    let mut line = Line::new(first.at, last.at);
-    shape.iter().for_each(|p| line.add(p));
-    (line.cost() / line.n.max(T::from_f64(1e-20))).sqrt()
-}
+const PARAMETERS: f64 = (2 * PIECES + PIECES - 1 - 3) as f64;
 
 /// Adds a piece of this cost from one place to another, for every number of pieces before it.
+// Not inlined: there are two calls, and the loop is unrolled.
+#[inline(never)]
 fn relax<T: Real>(best: &mut [[T; PLACES + 1]; PIECES + 1], from: usize, to: usize, cost: T) {
     let before: [Option<T>; PIECES] = core::array::from_fn(|k| best.get(k).and_then(|row| row.get(from)).copied());
     for (row, before) in best.iter_mut().skip(1).zip(before) {
@@ -115,7 +79,7 @@ fn relax<T: Real>(best: &mut [[T; PLACES + 1]; PIECES + 1], from: usize, to: usi
 
 #[cfg(test)]
 mod tests {
-    use super::super::shape::MOST;
+    use super::super::shape::{MOST, Place};
     use super::*;
 
     fn shape<T: Real>(at: impl Fn(f64) -> [f64; 2]) -> Shape<T> {

@@ -1,5 +1,7 @@
-//! The inliers as points of the picture with their residuals. The rival shapes are fitted to them.
+//! The inliers as points of the picture with their residuals from the cone. Rival shapes are fitted to them: circles,
+//! straight lines and polylines. A limb's points fit its cone as well as any of them.
 
+use super::config::Config;
 use crate::base::linalg::V3;
 use crate::base::median;
 use crate::base::real::Real;
@@ -61,10 +63,78 @@ impl<T: Real> Curve<T> {
     }
 }
 
-/// Returns the inliers, thinned to [`MOST`].
-pub(super) fn inliers<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, curve: &Curve<T>, camera: &Camera<T>) -> Shape<T> {
+/// The residuals of a fit, and what they say about a rival of the cone.
+pub(super) struct Residuals<'a, T> {
+    pub(super) curve: &'a Curve<T>,
+    pub(super) shape: &'a Shape<T>,
+    /// Weighted RMS, in pixels.
+    pub(super) rms_px: T,
+    /// Noise from point to point, in pixels.
+    pub(super) noise_px: T,
+    /// Number of independent residuals.
+    independent: T,
+    /// Residuals below this count as equal, in pixels.
+    floor_px: T,
+    max_ratio: T,
+    min_evidence: T,
+}
+
+impl<'a, T: Real> Residuals<'a, T> {
+    pub(super) fn new(curve: &'a Curve<T>, shape: &'a Shape<T>, config: &Config) -> Self {
+        Self {
+            curve,
+            shape,
+            rms_px: rms(shape),
+            noise_px: local_noise(shape),
+            independent: independent(shape),
+            floor_px: T::from_f64(config.rival_floor_px),
+            max_ratio: T::from_f64(config.max_rival_ratio),
+            min_evidence: T::from_f64(config.min_evidence),
+        }
+    }
+
+    /// Returns whether the points prove that they are on the cone and not on a curve with this RMS.
+    pub(super) fn prove_cone_over(&self, rival_px: T) -> bool {
+        self.evidence(rival_px, self.rms_px) > self.min_evidence
+    }
+
+    /// Returns whether the residuals are larger than noise.
+    pub(super) fn exceed_noise(&self) -> bool {
+        self.rms_px > self.max_ratio * self.noise_px.max(self.floor_px)
+    }
+
+    /// Returns whether some other curve may fit better. No smooth curve can fit better than the noise from point to
+    /// point.
+    pub(super) fn allow_rival(&self) -> bool {
+        self.exceed_noise() || self.evidence(self.rms_px, self.noise_px) > self.min_evidence
+    }
+
+    /// Returns whether a curve with this RMS replaces the cone: its residuals are far smaller, or the evidence for it is
+    /// large. `more` is the number of parameters that it has more than the cone; each needs more evidence.
+    pub(super) fn prefer(&self, rival_px: T, more: T) -> bool {
+        let needed = self.min_evidence + self.independent.ln() * more;
+        self.rms_px > self.max_ratio * rival_px.max(self.floor_px)
+            || (self.evidence(self.rms_px, rival_px) > needed && self.min_evidence > T::ZERO)
+    }
+
+    /// Returns the evidence against a curve with the first RMS, for one with the second: twice the logarithm of the
+    /// likelihood ratio, n ln(v/v').
+    fn evidence(&self, against_px: T, for_px: T) -> T {
+        let v = against_px.max(self.floor_px) / for_px.max(self.floor_px);
+        self.independent * (v * v).ln()
+    }
+}
+
+/// Fills `shape` with the inliers, thinned to [`MOST`]. A list that is returned would be copied.
+pub(super) fn collect_inliers<T: Real>(
+    blocks: &[Block<T>],
+    fit: &Fit<T>,
+    curve: &Curve<T>,
+    camera: &Camera<T>,
+    shape: &mut Shape<T>,
+) {
     let every = fit.inliers.div_ceil(MOST as u32).max(1);
-    let (mut shape, mut passed) = (Shape::new(), every / 2);
+    let mut passed = every / 2;
     for block in blocks {
         for lane in 0..LANES {
             let w = block.weight[lane];
@@ -78,15 +148,14 @@ pub(super) fn inliers<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, curve: &Curve<
             passed = 0;
             let Some(at) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
             if shape.push(Place { at: [at.u, at.v], r: curve.distance(block, lane), w }).is_err() {
-                return shape;
+                return;
             }
         }
     }
-    shape
 }
 
 /// Returns the weighted RMS of the residuals, in pixels.
-pub(super) fn rms<T: Real>(shape: &Shape<T>) -> T {
+fn rms<T: Real>(shape: &Shape<T>) -> T {
     let (mut cost, mut weight) = (T::ZERO, T::ZERO);
     for p in shape {
         cost += p.w * p.r * p.r;
@@ -97,7 +166,7 @@ pub(super) fn rms<T: Real>(shape: &Shape<T>) -> T {
 
 /// Returns the noise from point to point, in pixels; a misfit does not contribute. The noise comes from the median of
 /// |r_i − (r_{i−1} + r_{i+1})/2|, which is 0.6745 √1.5 times the sigma of independent errors.
-pub(super) fn local_noise<T: Real>(shape: &Shape<T>) -> T {
+fn local_noise<T: Real>(shape: &Shape<T>) -> T {
     let half = T::from_f64(0.5);
     let mut all = heapless::Vec::<T, MOST>::new();
     let mut most = T::ZERO;
@@ -135,6 +204,6 @@ fn correlated_points<T: Real>(shape: &Shape<T>) -> T {
 }
 
 /// Returns the number of independent residuals, at least 3.
-pub(super) fn independent<T: Real>(shape: &Shape<T>) -> T {
+fn independent<T: Real>(shape: &Shape<T>) -> T {
     (T::from_i32(shape.len() as i32) / correlated_points(shape).max(T::one())).max(T::from_f64(3.0))
 }

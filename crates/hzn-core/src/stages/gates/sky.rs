@@ -1,5 +1,6 @@
-//! Sky gate: the sky is beyond the fitted limb, except where an object is in front of it.
+//! The brightness of the sky beyond a fitted limb.
 
+use super::case::Case;
 use super::places::{MAX_PLACES, Places};
 use crate::base::median;
 use crate::base::real::Real;
@@ -22,12 +23,18 @@ pub(super) struct Sky<T> {
     pub(super) spread: T,
 }
 
-/// Reads the brightness from the limb outwards to the border of the region. Sky counts as lit from `lit_from` on.
+/// Reads the brightness from the limb outwards to the border of the region. Sky counts as lit from the threshold on; for
+/// a Sun or Moon, from `gates.dark_sky` of it on.
 pub(super) fn measure_sky<T: Real, P: Pixels, O: Observer<T>>(
-    places: &Places<T>,
+    case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,
-    lit_from: u16,
+    places: &Places<T>,
 ) -> Sky<T> {
+    let lit_from = if case.expected.free {
+        (T::from_i32(binary.level.into()) * T::from_f64(case.config.dark_sky)).to_i32().max(1) as u16
+    } else {
+        binary.level
+    };
     let (mut looks, mut lit) = (0, 0);
     let mut seen = heapless::Vec::<u16, { MAX_PLACES * OUTWARDS }>::new();
     for place in places {

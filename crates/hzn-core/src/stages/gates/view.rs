@@ -1,5 +1,6 @@
 //! Length of a fitted limb in the picture, and the length that its inliers cover.
 
+use super::places::inliers;
 use crate::base::linalg::{V3, basis};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES, sum};
@@ -7,10 +8,37 @@ use crate::geometry::camera::Camera;
 use crate::geometry::frames::UnitVec3;
 use crate::geometry::pixel::ImagePoint;
 use crate::image::region::Region;
+use crate::stages::covariance::Fused;
+use crate::stages::fit::Fit;
+
+/// What the inliers cover of a limb.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cover<T> {
+    /// Length along the limb, in pixels.
+    pub(crate) length_px: T,
+    /// Part of the limb in view, 0 to 1.
+    pub(crate) share: T,
+}
+
+impl<T: Real> Cover<T> {
+    pub(crate) fn new(
+        fit: &Fit<T>,
+        fused: &Fused<T>,
+        blocks: &[Block<T>],
+        camera: &Camera<T>,
+        region: &Region<T>,
+    ) -> Self {
+        let limb_px = inliers(blocks, fit.inliers, 1)
+            .next()
+            .map_or(T::ZERO, |(b, l)| limb_in_view(&fused.e, fused.c, &b.ray(l), camera, region));
+        let length_px = covered(&fused.e, blocks);
+        Self { length_px, share: (length_px / limb_px.max(T::one())).min(T::one()) }
+    }
+}
 
 /// Returns the length that the inliers cover along the limb about `e`, in pixels. Each step from one inlier to the next
 /// counts with its component along the limb, forwards or backwards. The path along a noisy edge is many times longer.
-pub(super) fn covered<T: Real>(e: &V3<T>, blocks: &[Block<T>]) -> T {
+fn covered<T: Real>(e: &V3<T>, blocks: &[Block<T>]) -> T {
     let mut length = [T::ZERO; LANES];
     // The point before and its weight: the previous lane, or the last lane of the previous block.
     let mut last = [T::ZERO; 4];
@@ -40,7 +68,7 @@ const STEPS: usize = 48;
 
 /// Returns the length of the limb of the cone (e, c) in the picture, in pixels. The function walks to both sides from
 /// the inlier `seen`, until the limb leaves the region or the walk has gone around. Masked parts do not count.
-pub(super) fn limb_in_view<T: Real>(e: &V3<T>, c: T, seen: &V3<T>, camera: &Camera<T>, region: &Region<T>) -> T {
+fn limb_in_view<T: Real>(e: &V3<T>, c: T, seen: &V3<T>, camera: &Camera<T>, region: &Region<T>) -> T {
     let sin = (T::one() - c * c).max(T::ZERO).sqrt();
     let (b1, b2) = basis(e);
     let (fx, fy) = camera.focal_px();

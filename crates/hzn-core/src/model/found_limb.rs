@@ -8,7 +8,7 @@ use crate::geometry::scaling::ScaledCone;
 use crate::model::report::Solution;
 
 /// The limb of a body that was found before in the same picture.
-pub(super) struct FoundLimb<T> {
+pub(crate) struct FoundLimb<T> {
     /// Axis of the limb in the camera frame, and the cosine of its half-angle.
     e: V3<T>,
     c: T,
@@ -25,7 +25,7 @@ const NEAR_DEG: f64 = 1.9;
 
 impl<T: Real> FoundLimb<T> {
     /// Takes the limb of an answer.
-    pub(super) fn new(solution: &Solution<T>) -> Self {
+    pub(crate) fn new(solution: &Solution<T>) -> Self {
         Self {
             e: *solution.axis.v(),
             // The fused half-angle is used and not the fitted one, because it is the better one on a short arc.
@@ -35,17 +35,17 @@ impl<T: Real> FoundLimb<T> {
     }
     /// Makes a limb that is circular in the camera frame.
     #[cfg(any(test, feature = "_edges"))]
-    pub(super) fn circular(e: V3<T>, c: T) -> Self {
+    pub(crate) fn circular(e: V3<T>, c: T) -> Self {
         Self { e, c, scaled: None }
     }
     /// Returns whether this body hides a Sun or Moon in a direction. The Earth looks smaller than [`NEAR_DEG`] from
     /// beyond half of the way to the Moon; only from there the Moon can be in front of it.
-    pub(super) fn hides(&self, direction: &V3<T>) -> bool {
+    pub(crate) fn hides(&self, direction: &V3<T>) -> bool {
         let (_, near) = T::from_f64(NEAR_DEG.to_radians()).sin_cos();
         self.c < near && self.e.dot(direction) > self.c
     }
     /// Removes the points on this limb and returns their number. The points are rays of `camera`.
-    pub(super) fn withdraw(&self, blocks: &mut [Block<T>], camera: &Camera<T>, threshold_px: T) -> u32 {
+    pub(crate) fn withdraw(&self, blocks: &mut [Block<T>], camera: &Camera<T>, threshold_px: T) -> u32 {
         let limit = threshold_px * T::from_f64(TAKEN_THRESHOLDS);
         let mut count = 0;
         for block in blocks {
