@@ -22,8 +22,18 @@ pub enum Board {
 }
 
 impl Board {
-    /// The boards with memory for pictures, which have every image.
-    pub const ALL: [Self; 2] = [Self::An386, Self::An500];
+    /// Returns the boards with memory for pictures, which have every image; only one of them if the variable
+    /// `HZN_BOARD` names it.
+    ///
+    /// # Panics
+    /// Panics if the variable names no such board.
+    pub fn with_pictures() -> Vec<Self> {
+        let boards = vec![Self::An386, Self::An500];
+        match std::env::var("HZN_BOARD").unwrap_or_default().as_str() {
+            "" => boards,
+            name => vec![boards.into_iter().find(|board| board.name() == name).expect("HZN_BOARD: an386 or an500")],
+        }
+    }
 
     /// Returns the name that the folders of the images use.
     pub fn name(self) -> &'static str {

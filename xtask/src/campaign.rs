@@ -1,4 +1,5 @@
-//! Runs the large campaigns that look for faults. `cargo xtask test` runs a small part of each.
+//! Runs the large campaigns that look for faults. `cargo xtask test` runs a small part of each, and with `--all` most of
+//! them whole.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -22,6 +23,7 @@ const MAX_INPUT_BYTES: u32 = 8192;
 
 const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TARGET]...
        cargo xtask campaign kill [RUNS]
+       cargo xtask campaign cuts [PICTURES]
        cargo xtask campaign long [PICTURES]
        cargo xtask campaign flips [TRIALS]
        cargo xtask campaign packets [COUNT]
@@ -33,6 +35,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   fuzz  runs every target (or those that are named) under libFuzzer for N seconds (60); --keep adds the inputs with
         new coverage to fuzz/corpus
   kill  kills RUNS (1000) runs of hzn at random moments and continues them
+  cuts  cuts the power after each step of runs of PICTURES (12) pictures
   long  processes PICTURES (100000) with hzn run, and ten times as many in one process
   flips flips TRIALS (20000) bits of pictures and of stored parameters, sticks as many pictures, and flips every bit
         of a sensor in memory
@@ -55,6 +58,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
     let done = match args.first().map(String::as_str) {
         Some("fuzz") => Request::parse(&args[1..]).and_then(|request| request.run().map_err(Trouble::into_message)),
         Some("kill") => kill(number(1000)?).map_err(Trouble::into_message),
+        Some("cuts") => cuts(number(12)?).map_err(Trouble::into_message),
         Some("long") => long(number(100_000)?).map_err(Trouble::into_message),
         Some("flips") => flips(number(20_000)?).map_err(Trouble::into_message),
         Some("packets") => packets(number(1_000_000)?).map_err(Trouble::into_message),
@@ -74,7 +78,7 @@ fn test(binary: &str, name: &str) -> Command {
     command
 }
 
-fn kill(runs: u64) -> Outcome {
+pub(crate) fn kill(runs: u64) -> Outcome {
     steps::run(test("cli", "campaign::killed_at_random_moments").env("HZN_KILLS", runs.to_string()))
 }
 
@@ -83,10 +87,20 @@ fn long(pictures: u64) -> Outcome {
     steps::run(test("cli", "campaign::a_long_run").env("HZN_PICTURES", pictures.to_string()))
 }
 
-fn flips(trials: u64) -> Outcome {
+pub(crate) fn flips(trials: u64) -> Outcome {
     let trials = trials.to_string();
     steps::run(test("flight", "flips::").env("HZN_FLIPS", &trials))?;
     steps::run(&mut test("flips", "every_flipped_bit_is_seen"))
+}
+
+/// Processes pictures with artefacts, with and without a limb: `pictures` of each kind.
+pub(crate) fn artefacts(pictures: u64) -> Outcome {
+    steps::run(test("chain", "artefacts::").env("HZN_ARTEFACTS", pictures.to_string()))
+}
+
+/// Cuts the power after each step of runs of so many pictures.
+pub(crate) fn cuts(pictures: u64) -> Outcome {
+    steps::run(test("cli", "power_cut::").env("HZN_CUTS", pictures.to_string()))
 }
 
 /// Sends telecommands with mixed damage to the flight software. A library of others writes them, in Python.

@@ -10,29 +10,55 @@ use crate::soft_double;
 use crate::steps::{self, Outcome, Steps, Trouble, cargo};
 use crate::test_build::build_tests;
 
+/// A core that the compiler knows. The images for it share one folder of the build, so that nothing is compiled twice.
+#[derive(Clone, Copy)]
+struct Core {
+    dir: &'static str,
+    /// Flags of the compiler.
+    flags: &'static str,
+}
+const M4: Core = Core { dir: "firmware/m4", flags: "" };
+const M7: Core = Core { dir: "firmware/m7", flags: "-C target-cpu=cortex-m7" };
+
 /// A board that QEMU emulates.
 struct Board {
     name: &'static str,
     package: &'static str,
-    /// Flags of the compiler for the core.
-    flags: &'static str,
+    core: Core,
     images: &'static [&'static str],
+    /// Images that are built and run in every check.
+    always: &'static [&'static str],
 }
+const AN386: Board = Board { name: "an386", package: "hzn-mps2", core: M4, images: &IMAGES, always: &["chain"] };
+const AN500: Board =
+    Board { name: "an500", package: "hzn-mps2", core: M7, images: &IMAGES, always: &["flight", "nav"] };
 const BOARDS: [Board; 3] = [
-    Board { name: "an386", package: "hzn-mps2", flags: "", images: &IMAGES },
-    Board { name: M7, package: "hzn-mps2", flags: M7_FLAGS, images: &IMAGES },
-    Board { name: "stm32f405", package: "hzn-stm32f405", flags: "", images: &["example", "flight"] },
+    AN386,
+    AN500,
+    Board { name: "stm32f405", package: "hzn-stm32f405", core: M4, images: &["example", "flight"], always: &[] },
 ];
-const M7: &str = "an500";
-const M7_FLAGS: &str = "-C target-cpu=cortex-m7";
 /// Images of the boards with memory for pictures.
 const IMAGES: [&str; 6] = ["chain", "flight", "line", "measure", "nav", "rows"];
-/// Folder of the port with a hardware library.
-const VENDOR_PORT: &str = "firmware/stm32h743";
 /// Document with the costs.
 const COSTS: &str = "book/results/firmware-cost.md";
 
 impl Board {
+    /// Builds these images and puts them where the tests find them: `target/firmware/BOARD/images`.
+    fn build_images(&self, toolchain: Toolchain, images: &[&str]) -> Outcome {
+        if images.is_empty() {
+            return Ok(());
+        }
+        let bins: Vec<&str> = images.iter().flat_map(|image| ["--bin", image]).collect();
+        let built = self.build(toolchain, "build", self.core.dir, &root(), &bins)?;
+        let folder = images_of(self.name);
+        fs::create_dir_all(&folder)?;
+        for image in images {
+            fs::copy(built.join(image), folder.join(image))?;
+            check_no_panics(self.name, image)?;
+        }
+        Ok(())
+    }
+
     /// Builds the images in a clone of this repository, or runs another verb of cargo with further arguments. Returns
     /// the folder of the images.
     fn build(
@@ -46,84 +72,112 @@ impl Board {
         let features = if self.package == "hzn-mps2" { &["--features", self.name][..] } else { &[] };
         let args = [&["--package", self.package], features, more].concat();
         let (mut command, built) = toolchain.cargo(verb, dir, &args);
-        steps::run(configure_for_firmware(&mut command, self.flags).current_dir(clone.join("firmware")))?;
+        steps::run(configure_for_firmware(&mut command, self.core.flags).current_dir(clone.join("firmware")))?;
         Ok(built)
     }
 }
 
-/// Builds every image and puts it where the tests find it: `target/firmware/BOARD/images`.
-pub(crate) fn build() -> Outcome {
+/// Builds hzn-core without default features.
+pub(crate) fn build_core() -> Outcome {
+    let (mut command, _) = Toolchain::find()?.cargo("build", M4.dir, &["--package", "hzn-core"]);
+    steps::run(configure_for_firmware(&mut command, M4.flags))
+}
+
+/// Builds every image, or those that run in every check.
+fn build(every_image: bool) -> Outcome {
     apt_install(&["qemu-system-arm", "binutils-arm-none-eabi", "gcc-arm-none-eabi"])?;
     let toolchain = Toolchain::find()?;
-    for board in BOARDS {
-        let built = board.build(toolchain, "build", &format!("firmware/{}", board.name), &root(), &[])?;
-        let images = images(board.name);
-        fs::create_dir_all(&images)?;
-        for image in board.images {
-            fs::copy(built.join(image), images.join(image))?;
-            check_no_panics(board.name, image)?;
-        }
-    }
-    Ok(())
+    BOARDS.iter().try_for_each(|b| b.build_images(toolchain, if every_image { b.images } else { b.always }))
 }
 
 /// Builds the images of a clone of this repository, and compares their bytes with the images here.
 pub(crate) fn is_the_same_elsewhere(clone: &Path) -> Outcome {
-    build()?;
+    build(true)?;
     for board in BOARDS {
         let dir = format!("xtask/elsewhere/{}", board.name);
         let built = board.build(Toolchain::find()?, "build", &dir, clone, &[])?;
         for image in board.images {
             steps::compare_bytes(
                 &format!("{} {image}", board.name),
-                &images(board.name).join(image),
+                &images_of(board.name).join(image),
                 &built.join(image),
             )?;
         }
     }
-    let here = build_vendor_port(VENDOR_PORT, &root())?;
+    let here = build_vendor_port(M7.dir, &root())?;
     let there = build_vendor_port("xtask/elsewhere/stm32h743", clone)?;
     steps::compare_bytes("stm32h743 flight", &here, &there)
 }
 
-/// Builds what the image tests need, then runs the tests and checks the costs and the C interface.
+/// Builds what the image tests need, then runs the tests and checks the C interface. With `--all` there are also the
+/// other images and the costs.
 pub(crate) fn test(steps: &mut Steps) -> Outcome {
-    build()?;
-    soft_double::check(&images("an386").join("measure"))?;
-    build_flight_image(METHODS)?;
-    let vendor_port = build_vendor_port(VENDOR_PORT, &root())?;
+    build(steps.all)?;
+    soft_double::check(&images_of(AN386.name).join("chain"))?;
     lint_and_document()?;
     build_tests()?;
+    if steps.all {
+        test_every_image(steps)?;
+    } else {
+        test_images_once(steps)?;
+    }
+    check_c_interface(steps.all)
+}
+
+/// Runs the flight image and the navigation on one board, and the sensor alone on the other.
+fn test_images_once(steps: &mut Steps) -> Outcome {
+    let alone = "firmware::the_sensor_alone";
+    run_image_tests(steps, AN386.name, &[alone])?;
+    // These need other images.
+    let other = ["firmware::same_bits", "firmware::rows_have", "small_board", "example_of_the_documents"];
+    let skipped = other.iter().chain([&alone]).flat_map(|name| ["--skip", name]);
+    let files = ["firmware::", "navigation::", "recovery::", "silence::"];
+    run_image_tests(steps, AN500.name, &files.into_iter().chain(skipped).collect::<Vec<_>>())?;
+    compare_costs("--check-sizes")
+}
+
+/// Runs every image, builds those that no emulator can run, and compares the costs with those of the page.
+fn test_every_image(steps: &mut Steps) -> Outcome {
+    soft_double::check(&images_of(AN386.name).join("measure"))?;
+    build_flight_image(METHODS)?;
+    let vendor_port = build_vendor_port(M7.dir, &root())?;
     steps::run(Command::new(target().join("debug/examples/stack_bound")).arg(vendor_port))?;
+    run_image_tests(steps, "", &["firmware::", "line_cost::", "navigation::", "recovery::", "silence::"])?;
+    compare_costs("--check")
+}
+
+/// Compares costs with those of the page. None of them may grow by more than 5 %.
+fn compare_costs(how: &str) -> Outcome {
+    steps::run(Command::new(target().join("debug/examples/firmware_cost")).args([how, COSTS]))
+}
+
+/// Runs the tests of images that `filters` name, on one board or, with an empty name, on all of them.
+fn run_image_tests(steps: &mut Steps, board: &str, filters: &[&str]) -> Outcome {
     // Without a package's name nothing is built again with other features.
-    let files = ["firmware::", "line_cost::", "navigation::", "recovery::", "silence::"];
-    steps.cargo_test(&[&["--test", "chain", "--", "--ignored"], &files[..]].concat())?;
-    steps::run(Command::new(target().join("debug/examples/firmware_cost")).args(["--check", COSTS]))?;
-    check_c_interface()
+    let mut command = cargo(&["test", "--no-fail-fast", "--test", "chain", "--", "--ignored"]);
+    steps.count_tests(command.args(filters).env("HZN_BOARD", board))
 }
 
 /// Runs the lints, the documentation build and the tests of the firmware workspace. A test checks that the C header
 /// agrees with the library.
 fn lint_and_document() -> Outcome {
-    let dir = target().join("firmware/host");
-    let here = ["--package", "hzn-c"];
-    let on_this_machine = |verb: &str| {
-        let mut command = cargo(&[verb]);
-        command.arg("--target-dir").arg(&dir).args(here);
-        command
+    let on_this_machine = |verb: &str, more: &[&str]| {
+        let mut command = cargo(&[verb, "--package", "hzn-c"]);
+        steps::run(command.args(more).env("RUSTDOCFLAGS", "-D warnings"))
     };
-    steps::run(configure_for_firmware(on_this_machine("test").arg("--quiet"), ""))?;
-    steps::run(configure_for_firmware(on_this_machine("clippy").args(["--all-targets", "--", "-D", "warnings"]), ""))?;
-    steps::run(configure_for_firmware(on_this_machine("doc").arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"), ""))?;
+    on_this_machine("test", &["--quiet"])?;
+    on_this_machine("clippy", &["--all-targets", "--", "-D", "warnings"])?;
+    on_this_machine("doc", &["--no-deps"])?;
     let toolchain = Toolchain::find()?;
     if matches!(toolchain, Toolchain::Debian) {
         println!("lints of the images are skipped: Debian's Rust has no clippy for the target");
         return Ok(());
     }
-    for board in BOARDS {
-        board.build(toolchain, "clippy", &format!("firmware/{}", board.name), &root(), &["--", "-D", "warnings"])?;
-    }
-    Ok(())
+    // The flags of a core change no lint, so all boards are checked with those of one.
+    BOARDS.iter().try_for_each(|board| {
+        let board = Board { core: M4, ..*board };
+        board.build(toolchain, "clippy", M4.dir, &root(), &["--", "-D", "warnings"]).map(|_| ())
+    })
 }
 
 /// Every feature that adds methods to hzn-core.
@@ -131,10 +185,10 @@ const METHODS: &[&str] = &["dlr", "zju", "horace", "erf"];
 
 /// Builds the flight image of an M7 with features of hzn-core. The linker shows that none of its methods can panic.
 fn build_flight_image(features: &[&str]) -> Result<PathBuf, Trouble> {
-    let chosen: Vec<String> = features.iter().map(|f| format!("hzn-core/{f}")).chain([M7.to_owned()]).collect();
+    let chosen: Vec<String> = features.iter().map(|f| format!("hzn-core/{f}")).chain([AN500.name.to_owned()]).collect();
     let args = ["--package", "hzn-mps2", "--bin", "flight", "--features", &chosen.join(",")];
-    let (mut command, built) = Toolchain::find()?.cargo("build", &format!("firmware/{M7}"), &args);
-    steps::run(configure_for_firmware(&mut command, M7_FLAGS))?;
+    let (mut command, built) = Toolchain::find()?.cargo("build", M7.dir, &args);
+    steps::run(configure_for_firmware(&mut command, M7.flags))?;
     Ok(built.join("flight"))
 }
 
@@ -142,7 +196,7 @@ fn build_flight_image(features: &[&str]) -> Result<PathBuf, Trouble> {
 /// run. Its hardware library can panic, so panics are not looked for.
 fn build_vendor_port(dir: &str, clone: &Path) -> Result<PathBuf, Trouble> {
     let (mut command, built) = Toolchain::find()?.cargo("build", dir, &["--package", "hzn-stm32h743"]);
-    steps::run(configure_for_firmware(&mut command, M7_FLAGS).current_dir(clone.join("firmware")))?;
+    steps::run(configure_for_firmware(&mut command, M7.flags).current_dir(clone.join("firmware")))?;
     steps::run(Command::new("arm-none-eabi-size").arg(built.join("flight")))?;
     Ok(built.join("flight"))
 }
@@ -170,7 +224,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         if args.iter().any(|a| a == "--by-feature") {
             return print_flash_by_feature();
         }
-        build()?;
+        build(true)?;
         let mut table = cargo(&["run", "--quiet", "--release", "--package", "hzn-tests", "--example", "firmware_cost"]);
         let write: &[&str] = if args.iter().any(|a| a == "--write") { &["--write", COSTS] } else { &[] };
         steps::run(table.arg("--").args(write))
@@ -187,14 +241,14 @@ fn configure_for_firmware<'a>(command: &'a mut Command, flags: &str) -> &'a mut 
     command
 }
 
-fn images(board: &str) -> PathBuf {
+fn images_of(board: &str) -> PathBuf {
     target().join("firmware").join(board).join("images")
 }
 
 /// Checks that nothing in an image can panic, and prints the size of the image. The linker ensures this already,
 /// because the panic handler calls a function that does not exist. The symbols must not contain a panic path either.
 fn check_no_panics(board: &str, image: &str) -> Outcome {
-    let path = images(board).join(image);
+    let path = images_of(board).join(image);
     let symbols = output(Command::new("arm-none-eabi-nm").arg(&path))
         .ok_or_else(|| Trouble::Failed(format!("{}: nm cannot read the symbols", path.display())))?;
     let panics: Vec<&str> = symbols.lines().filter(|l| l.contains("panicking")).collect();
@@ -204,16 +258,12 @@ fn check_no_panics(board: &str, image: &str) -> Outcome {
     steps::run(Command::new("arm-none-eabi-size").arg(&path))
 }
 
-/// Checks that the C example gives the same bits on this machine and in QEMU.
-fn check_c_interface() -> Outcome {
-    let toolchain = Toolchain::find()?;
-    let library = ["--package", "hzn-c", "--lib", "--crate-type", "staticlib", "--features", "standalone"];
-    let (mut command, there) = toolchain.cargo("rustc", &format!("firmware/{M7}"), &library);
-    steps::run(configure_for_firmware(&mut command, M7_FLAGS))?;
-    let here = target().join("firmware/host");
-    let mut command = cargo(&["rustc", "--profile", "flight"]);
-    steps::run(configure_for_firmware(command.arg("--target-dir").arg(&here).args(library), ""))?;
+/// Features and form of the library for C.
+const C_LIBRARY: [&str; 7] = ["--package", "hzn-c", "--lib", "--crate-type", "staticlib", "--features", "standalone"];
 
+/// Builds the C example and the package for this machine. With `in_qemu` the example must give the same bits there.
+fn check_c_interface(in_qemu: bool) -> Outcome {
+    steps::run(cargo(&["rustc", "--profile", "flight"]).args(C_LIBRARY))?;
     let c = root().join("firmware/hzn-c");
     let (example, include) = (c.join("example"), format!("-I{}", c.join("include").display()));
     let out = target().join("firmware/c");
@@ -222,10 +272,25 @@ fn check_c_interface() -> Outcome {
     steps::run(
         Command::new("cc")
             .args(flags)
-            .args([example.join("example.c"), example.join("host.c"), here.join("flight/libhzn.a")])
+            .args([example.join("example.c"), example.join("host.c"), target().join("flight/libhzn.a")])
             .arg("-o")
             .arg(out.join("host")),
     )?;
+    let host = output_of(&mut Command::new(out.join("host")))?;
+    println!("{host}");
+    if in_qemu {
+        let emulated = run_c_example_in_qemu(&example, &flags, &out)?;
+        if host != emulated {
+            return Err(Trouble::Failed(format!("the C example prints another result in QEMU:\n{emulated}")));
+        }
+    }
+    crate::c_package::check(&c, &target(), &out)
+}
+
+/// Builds the C example for the M7, and returns what it prints in QEMU.
+fn run_c_example_in_qemu(example: &Path, flags: &[&str], out: &Path) -> Result<String, Trouble> {
+    let (mut command, built) = Toolchain::find()?.cargo("rustc", M7.dir, &C_LIBRARY);
+    steps::run(configure_for_firmware(&mut command, M7.flags))?;
     steps::run(
         Command::new("arm-none-eabi-gcc")
             .args(flags)
@@ -239,21 +304,15 @@ fn check_c_interface() -> Outcome {
                 "-Wl,-z,noexecstack",
             ])
             .arg(format!("-T{}", example.join("an500.ld").display()))
-            .args([example.join("example.c"), example.join("startup.c"), there.join("libhzn.a")])
+            .args([example.join("example.c"), example.join("startup.c"), built.join("libhzn.a")])
             .args(["-lgcc", "-o"])
             .arg(out.join("an500")),
     )?;
-    let host = output_of(&mut Command::new(out.join("host")))?;
     let mut qemu = Command::new("timeout");
     qemu.args(["60", "qemu-system-arm", "-M", "mps2-an500", "-display", "none", "-monitor", "none", "-serial", "null"])
         .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
         .arg(out.join("an500"));
-    let emulated = output_of(&mut qemu)?;
-    println!("{host}");
-    if host != emulated {
-        return Err(Trouble::Failed(format!("the C example prints another result in QEMU:\n{emulated}")));
-    }
-    crate::c_package::check(&c, &here, &out)
+    output_of(&mut qemu)
 }
 
 /// Returns what a program prints on both streams; an error if the program fails.

@@ -7,7 +7,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use crate::machine::{apt_install, has, output, run_within, target};
-use crate::steps::{Outcome, Trouble, cargo, run};
+use crate::steps::{Trouble, cargo};
 
 /// Target of the Cortex-M4F and the Cortex-M7.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
@@ -68,11 +68,6 @@ impl Toolchain {
         command.args(["--target", TARGET, "--target-dir"]).arg(&dir).args(args);
         (command, dir.join(TARGET).join("flight"))
     }
-}
-
-/// Builds hzn-core without default features.
-pub(crate) fn run_step() -> Outcome {
-    run(&mut Toolchain::find()?.cargo("build", "flight", &["--package", "hzn-core"]).0)
 }
 
 fn with_rustup_hint(trouble: Trouble) -> Trouble {

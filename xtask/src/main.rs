@@ -1,7 +1,8 @@
 //! Runs the project's chores.
 //!
 //! ```text
-//! cargo xtask test       runs all checks: format, lints, tests, documents, flight build, files, demo
+//! cargo xtask test       runs all checks: format, lints, tests, documents, flight build, files, demo; --all runs
+//!                        them whole
 //! cargo xtask bench      compares hzn-core with the OpenCV recipe, in one run
 //! cargo xtask reproduce  compares our numbers with the published ones and writes book/results/reproduction.md
 //! cargo xtask firmware   builds the images for the flight computer and counts their instructions
@@ -36,7 +37,9 @@ use std::process::ExitCode;
 
 const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|keys|viewer> [OPTION]...
 
-  test [STEP]...     runs all steps, or those whose name contains one of the words;
+  test [--all] [STEP]...
+                     runs the steps of every check, or all steps whose name contains one of the words; --all runs the
+                     long steps, too, and each step whole: every image, notebook, campaign and ignored test;
                      CI=true turns a step that cannot run into a failure
   bench [ARG]...     compares hzn-core with the OpenCV recipe; arguments go to hzn-benches (see --help there)
   bench run [ARG]... compares `hzn run` on PNG, JPEG and headerless pictures with decoding alone

@@ -31,35 +31,83 @@ impl From<std::io::Error> for Trouble {
 
 pub(crate) type Outcome = Result<(), Trouble>;
 
+/// Step with a name, and when it runs.
+pub(crate) struct Step {
+    pub(crate) name: &'static str,
+    pub(crate) tier: Tier,
+    pub(crate) run: fn(&mut Steps) -> Outcome,
+}
+
+/// When a step runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Tier {
+    /// In every check.
+    Every,
+    /// Only with `--all`, or if its name is given: before a release, and every night.
+    All,
+}
+
+/// What the arguments of `cargo xtask test` ask for.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Selection {
+    /// Whether each step runs with all that it has, and whether the steps of [`Tier::All`] run, too.
+    all: bool,
+    /// Words that select steps: a step runs if its name contains one of them. If the list is empty, the tier selects.
+    words: Vec<String>,
+}
+
+impl Selection {
+    /// Reads the arguments. Each word must select one of the steps, so that a misspelt one is not a check that passes.
+    pub(crate) fn parse(args: &[String], steps: &[Step]) -> Result<Self, String> {
+        let (flags, words): (Vec<_>, Vec<_>) = args.iter().cloned().partition(|arg| arg.starts_with('-'));
+        if let Some(unknown) = flags.iter().find(|flag| *flag != "--all") {
+            return Err(format!("test: the option {unknown} is unknown; there is only --all"));
+        }
+        if let Some(word) = words.iter().find(|word| !steps.iter().any(|step| step.name.contains(word.as_str()))) {
+            let names: Vec<_> = steps.iter().map(|step| step.name).collect();
+            return Err(format!("test: no step has {word:?} in its name; the steps are: {}", names.join(", ")));
+        }
+        Ok(Self { all: !flags.is_empty(), words })
+    }
+
+    /// Returns whether a step runs.
+    fn has(&self, step: &Step) -> bool {
+        if self.words.is_empty() {
+            return self.all || step.tier == Tier::Every;
+        }
+        self.words.iter().any(|word| step.name.contains(word.as_str()))
+    }
+}
+
 /// Runs steps and remembers how they ended.
 pub(crate) struct Steps {
-    /// Words that select steps: a step runs if its name contains one of them. If the list is empty, all steps run.
-    only: Vec<String>,
+    /// Whether each step runs with all that it has, not with a small part of it.
+    pub(crate) all: bool,
     /// Whether a step that cannot run counts as a failure.
     strict: bool,
     began: Instant,
-    done: Vec<(String, Duration, Outcome)>,
+    done: Vec<(&'static str, Duration, Outcome)>,
     passed: u64,
     failed: u64,
 }
 
 impl Steps {
-    pub(crate) fn new(only: &[String]) -> Self {
-        Self {
-            only: only.to_vec(),
+    /// Runs the selected steps, and prints which of them ran. Returns an error if a step failed, or if a step was left
+    /// out with `CI=true`.
+    pub(crate) fn run(steps: &[Step], selection: &Selection) -> Result<(), String> {
+        let mut running = Self {
+            all: selection.all,
             strict: std::env::var("CI").is_ok_and(|v| v == "true"),
             began: Instant::now(),
             done: Vec::new(),
             passed: 0,
             failed: 0,
-        }
+        };
+        steps.iter().filter(|step| selection.has(step)).for_each(|step| running.run_step(step));
+        running.conclude()
     }
 
-    /// Runs one step if it is selected.
-    pub(crate) fn step(&mut self, name: &str, run: impl FnOnce(&mut Self) -> Outcome) {
-        if !self.only.is_empty() && !self.only.iter().any(|word| name.contains(word.as_str())) {
-            return;
-        }
+    fn run_step(&mut self, Step { name, run, .. }: &Step) {
         println!("\n== {name}");
         let start = Instant::now();
         let outcome = run(self);
@@ -73,14 +121,18 @@ impl Steps {
         if let Err(Trouble::Failed(why) | Trouble::Missing(why)) = &outcome {
             println!("   {why}");
         }
-        self.done.push((name.to_owned(), time, outcome));
+        self.done.push((name, time, outcome));
     }
 
     /// Runs `cargo test` with arguments and adds up its result lines.
     pub(crate) fn cargo_test(&mut self, args: &[&str]) -> Outcome {
-        let mut command = cargo(&["test", "--no-fail-fast"]);
-        command.args(args).stdout(Stdio::piped());
-        show(&command);
+        self.count_tests(cargo(&["test", "--no-fail-fast"]).args(args))
+    }
+
+    /// Runs a call of `cargo test` and adds up its result lines.
+    pub(crate) fn count_tests(&mut self, command: &mut Command) -> Outcome {
+        command.stdout(Stdio::piped());
+        show(command);
         let mut child = command.spawn()?;
         let out = child.stdout.take().ok_or_else(|| Trouble::Failed("cargo test has no standard output".into()))?;
         for line in BufReader::new(out).lines() {
@@ -98,9 +150,7 @@ impl Steps {
         }
     }
 
-    /// Prints which steps ran and which did not. Returns an error if a step failed, or if a step was left out with
-    /// `CI=true`.
-    pub(crate) fn conclude(self) -> Result<(), String> {
+    fn conclude(self) -> Result<(), String> {
         let mut wrong = 0;
         println!("\nsummary, {:.0} s in all", self.began.elapsed().as_secs_f64());
         for (name, time, outcome) in &self.done {
@@ -143,10 +193,11 @@ pub(crate) fn cargo_program() -> OsString {
     std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
 }
 
-/// Returns a call of the cargo that runs this program, with the committed versions and without input.
+/// Returns a call of the cargo that runs this program, with the committed versions and without input. Nothing is
+/// compiled incrementally: that takes longer the first time, and makes slower programs.
 pub(crate) fn cargo(args: &[&str]) -> Command {
     let mut command = Command::new(cargo_program());
-    command.args(args).arg("--locked").stdin(Stdio::null());
+    command.args(args).arg("--locked").env("CARGO_INCREMENTAL", "0").stdin(Stdio::null());
     command
 }
 
@@ -182,7 +233,36 @@ pub(crate) fn compare_bytes(name: &str, here: &Path, there: &Path) -> Outcome {
 
 #[cfg(test)]
 mod tests {
-    use super::parse_counts;
+    use super::{Selection, Step, Tier, parse_counts};
+
+    const STEPS: [Step; 3] = [
+        Step { name: "lints", tier: Tier::Every, run: |_| Ok(()) },
+        Step { name: "tests", tier: Tier::Every, run: |_| Ok(()) },
+        Step { name: "killed runs", tier: Tier::All, run: |_| Ok(()) },
+    ];
+
+    /// Returns whether each of the steps is selected by the arguments.
+    fn selected(args: &[&str]) -> Result<(bool, [bool; 3]), String> {
+        let args: Vec<String> = args.iter().map(|&arg| arg.to_owned()).collect();
+        let selection = Selection::parse(&args, &STEPS)?;
+        Ok((selection.all, STEPS.each_ref().map(|step| selection.has(step))))
+    }
+
+    #[test]
+    fn a_word_selects_steps_of_every_tier_and_all_is_everything() {
+        assert_eq!(selected(&[]), Ok((false, [true, true, false])));
+        assert_eq!(selected(&["--all"]), Ok((true, [true, true, true])));
+        assert_eq!(selected(&["lint", "run"]), Ok((false, [true, false, true])));
+        assert_eq!(selected(&["tests", "--all"]), Ok((true, [false, true, false])));
+    }
+
+    #[test]
+    fn unknown_words_and_options_are_refused() {
+        let refused = selected(&["lints", "wheels"]).unwrap_err();
+        assert!(refused.contains("\"wheels\"") && refused.contains("lints, tests, killed runs"), "{refused}");
+        let refused = selected(&["--al"]).unwrap_err();
+        assert!(refused.contains("--al is unknown"), "{refused}");
+    }
 
     #[test]
     fn result_lines_are_read() {

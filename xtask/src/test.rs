@@ -1,4 +1,7 @@
 //! Runs all checks, the cheapest first.
+//!
+//! Every check is to end in minutes, so a campaign that takes many runs a small part of itself there. `--all` runs the
+//! whole.
 
 use std::fs;
 use std::path::Path;
@@ -6,41 +9,77 @@ use std::process::Command;
 
 use crate::demo::{demo_dir, find_recordings, run_demo};
 use crate::machine::{apt_install, has, root, target};
-use crate::steps::{self, Outcome, Steps, cargo};
+use crate::steps::{self, Outcome, Selection, Step, Steps, Tier, cargo};
 use crate::test_build::build_tests;
-use crate::{campaign, firmware, flight_build, miri, python, viewer, wheel};
+use crate::{campaign, firmware, miri, python, viewer, wheel};
 
-pub(crate) fn run(only: &[String]) -> Result<(), String> {
-    std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
-    let mut all = Steps::new(only);
-    all.step("format", |_| steps::run(Command::new(steps::cargo_program()).args(["fmt", "--all", "--check"])));
-    all.step("lints", |_| steps::run(cargo(&["clippy", "--all-targets"]).args(["--", "-D", "warnings"])));
+const fn every(name: &'static str, run: fn(&mut Steps) -> Outcome) -> Step {
+    Step { name, tier: Tier::Every, run }
+}
+
+const fn long(name: &'static str, run: fn(&mut Steps) -> Outcome) -> Step {
+    Step { name, tier: Tier::All, run }
+}
+
+/// The steps. Those with `steps.all` or of the tier `long` do more with `--all`.
+const STEPS: &[Step] = &[
+    every("format", |_| steps::run(Command::new(steps::cargo_program()).args(["fmt", "--all", "--check"]))),
+    every("lints", |_| steps::run(cargo(&["clippy", "--all-targets"]).args(["--", "-D", "warnings"]))),
     // Video input needs a decoder. Without one, its tests pass without a check, which would go unseen.
-    all.step("ffmpeg", |_| if has("ffmpeg") { Ok(()) } else { apt_install(&["ffmpeg"]) });
-    all.step("tests", |s| s.cargo_test(&[]));
-    // A workspace build unites the features of all crates. Alone, the core is built as it flies.
-    all.step("tests of hzn-core alone", |s| s.cargo_test(&["--package", "hzn-core"]));
-    all.step("undefined behaviour", |_| miri::test());
-    all.step("feature sets of hzn-core", |_| {
+    every("ffmpeg", |_| if has("ffmpeg") { Ok(()) } else { apt_install(&["ffmpeg"]) }),
+    every("tests", |steps| steps.cargo_test(&[])),
+    every("tests of hzn-core alone", test_core_alone),
+    every("undefined behaviour", |_| miri::test()),
+    every("feature sets of hzn-core", |_| {
         // The tests above build it without features. A feature chooses by `cfg!`, so most code is always compiled.
         ["std,_edges", "serde", "dlr,zju,horace,erf,kalibr,position,reml"].into_iter().try_for_each(check_core_with)
-    });
-    all.step("documents", |_| steps::run(cargo(&["doc", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings")));
-    all.step("packages", |_| check_packages());
-    all.step("flight build", |_| flight_build::run_step());
-    all.step("firmware", firmware::test);
-    all.step("examples of hzn-core", |_| run_core_examples());
-    all.step("demo", |_| run_demo());
-    all.step("viewer", |_| viewer::test());
-    all.step("lenses against OpenCV", |_| compare_lenses_with_opencv());
-    all.step("simulator rendered again", |_| compare_simulator_with_python());
-    all.step("limbs of another program", |_| check_limbs_of_another_program());
-    all.step("files read by others", |_| read_files_with_other_readers());
-    all.step("wheel", |_| {
+    }),
+    every("documents", |_| steps::run(cargo(&["doc", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))),
+    every("packages", |_| check_packages()),
+    every("flight build", |_| firmware::build_core()),
+    every("firmware", firmware::test),
+    every("examples of hzn-core", |_| run_core_examples()),
+    every("demo", |_| run_demo()),
+    every("viewer", |_| viewer::test()),
+    every("lenses against OpenCV", |_| compare_lenses_with_opencv()),
+    every("simulator rendered again", |_| compare_simulator_with_python()),
+    every("limbs of another program", check_limbs_of_another_program),
+    every("files read by others", read_files_with_other_readers),
+    every("wheel", |steps| {
         build_tests()?;
-        wheel::run_step(&fs::canonicalize(target().join("debug/hzn"))?)
-    });
-    all.conclude()
+        wheel::run_step(&fs::canonicalize(target().join("debug/hzn"))?, steps.all)
+    }),
+    long("positions against Basilisk", |_| wheel::compare_with_basilisk()),
+    long("ignored tests", run_ignored_tests),
+    long("killed runs", |_| campaign::kill(1000)),
+    long("flipped bits", |_| campaign::flips(20_000)),
+    long("power cuts", |_| campaign::cuts(12)),
+    long("artefacts", |_| campaign::artefacts(15)),
+];
+
+/// Runs the steps that the arguments select.
+pub(crate) fn run(args: &[String]) -> Result<(), String> {
+    std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
+    Steps::run(STEPS, &Selection::parse(args, STEPS)?)
+}
+
+/// Runs the tests that take minutes. The step `firmware` runs those that need an image.
+fn run_ignored_tests(steps: &mut Steps) -> Outcome {
+    let others = ["firmware::", "line_cost::", "navigation::", "recovery::", "silence::", "damage::"];
+    let skipped = others.iter().flat_map(|name| ["--skip", name]);
+    steps.cargo_test(&["--tests", "--", "--ignored"].into_iter().chain(skipped).collect::<Vec<_>>())
+}
+
+/// Runs the tests of hzn-core without features. A workspace build unites the features of all crates; alone, the core is
+/// built as it flies.
+fn test_core_alone(steps: &mut Steps) -> Outcome {
+    let alone = ["--package", "hzn-core"];
+    if steps.all {
+        return steps.cargo_test(&alone);
+    }
+    // No feature changes what these compute, and they take longest.
+    let without = ["--lib", "--test", "core", "--", "--skip", "monte_carlo::", "--skip", "reference::"];
+    steps.cargo_test(&[&alone[..], &without].concat())
 }
 
 /// Compiles hzn-core alone with these features.
@@ -81,10 +120,11 @@ fn compare_simulator_with_python() -> Outcome {
 }
 
 /// Processes a few flights that a program in Python renders. `cargo xtask campaign pictures` takes many.
-fn check_limbs_of_another_program() -> Outcome {
+fn check_limbs_of_another_program(steps: &mut Steps) -> Outcome {
     build_tests()?;
     let mut campaign = campaign::limb_campaign(&target().join("debug/hzn"))?;
-    steps::run(campaign.args(["--check", "--list", "--flights", "2", "--first-seed", "1"]))
+    let flights = if steps.all { "10" } else { "1" };
+    steps::run(campaign.args(["--check", "--list", "--flights", flights, "--first-seed", "1"]))
 }
 
 /// Runs a script of tests/python. Its arguments are one of our programs and a folder that the script makes.
@@ -101,7 +141,7 @@ fn compare_in_python(script: &str, program: &str, folder: &str) -> Outcome {
 }
 
 /// Reads a sample and the recordings of the demo with the reference readers.
-fn read_files_with_other_readers() -> Outcome {
+fn read_files_with_other_readers(steps: &mut Steps) -> Outcome {
     let python = python::prepare_environment("tests", Path::new("tests/python/requirements.txt"))?;
     let sample = target().join("xtask").join("sample.mcap");
     fs::create_dir_all(sample.parent().unwrap_or(&sample))?;
@@ -116,5 +156,5 @@ fn read_files_with_other_readers() -> Outcome {
     let folder = target().join("xtask").join("telemetry");
     let programs = ["debug/hzn", "debug/examples/telemetry_packets"].map(|program| target().join(program));
     steps::run(Command::new(python).arg("tests/python/check_telemetry.py").args(programs).arg(folder))?;
-    campaign::packets(100_000)
+    campaign::packets(if steps.all { 100_000 } else { 1000 })
 }

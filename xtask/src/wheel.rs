@@ -9,12 +9,16 @@ use crate::python;
 use crate::steps::{self, Outcome, Trouble};
 
 const CRATE: &str = "crates/hzn-py";
+/// Profile with the settings of the tests, and the feature with which their dependencies fit: what the tests have
+/// compiled is not compiled again. With `--profile test`, cargo would build a test.
+const AS_IN_THE_TESTS: &[&str] = &["--profile", "dev", "--features", "as-in-the-tests"];
+const RELEASE: &[&str] = &["--profile", "release"];
 
 /// Builds the wheel, installs it into a separate environment, and checks stubs, behaviour, notebooks and documents.
-/// `hzn` is the program of the same build.
-pub(crate) fn run_step(hzn: &Path) -> Outcome {
+/// `hzn` is the program of the same build. The build of the site executes one notebook, or with `every_notebook` all.
+pub(crate) fn run_step(hzn: &Path, every_notebook: bool) -> Outcome {
     let folder = Path::new(CRATE);
-    let python = install_wheel("dev")?;
+    let python = install_wheel(AS_IN_THE_TESTS)?;
     let scratch = make_scratch()?;
     let tests = fs::canonicalize(folder.join("tests"))?;
     let module = |args: &[&str]| {
@@ -25,28 +29,32 @@ pub(crate) fn run_step(hzn: &Path) -> Outcome {
     let stubs = ["mypy.stubtest", "hzn", "--concise", "--allowlist"];
     steps::run(module(&stubs).arg(tests.join("stubtest.txt")))?;
     steps::run(module(&["mypy", "--strict", "--no-error-summary"]).arg(tests.join("typed.py")))?;
-    let basilisk = tests.join("basilisk");
-    steps::run(module(&["pytest", "-q", "-p", "no:cacheprovider", "--ignore"]).arg(&basilisk).arg(&tests))?;
-    compare_with_basilisk(&basilisk, &scratch)?;
+    let pytest = ["pytest", "-q", "-p", "no:cacheprovider", "--durations", "10", "--ignore"];
+    steps::run(module(&pytest).arg(tests.join("basilisk")).arg(&tests))?;
     // The site takes its reference from the docstrings. Its notebooks are executed during the build.
     let config = fs::canonicalize("mkdocs.yml")?;
     let mut site = module(&["mkdocs", "build", "--strict", "--quiet", "--config-file"]);
     site.env("NO_MKDOCS_2_WARNING", "1");
+    if !every_notebook {
+        site.env("HZN_UNEXECUTED", "methods.ipynb");
+    }
     steps::run(site.arg(config).arg("--site-dir").arg(scratch.join("python-site")))
 }
 
 /// Compares positions with those of Basilisk. It has an environment of its own, because it needs older packages.
-fn compare_with_basilisk(tests: &Path, scratch: &Path) -> Outcome {
+pub(crate) fn compare_with_basilisk() -> Outcome {
+    let tests = fs::canonicalize(Path::new(CRATE).join("tests/basilisk"))?;
+    build_wheel(AS_IN_THE_TESTS)?;
     let python = python::prepare_environment("basilisk", &tests.join("requirements.txt"))?;
-    install(&python, &find_wheel(&target().join("wheels"))?)?;
+    install(&python, &find_wheel(&wheels())?)?;
     let pytest = ["-m", "pytest", "-q", "-p", "no:cacheprovider"];
-    steps::run(Command::new(&python).args(pytest).arg(tests).current_dir(scratch))
+    steps::run(Command::new(&python).args(pytest).arg(tests).current_dir(make_scratch()?))
 }
 
 /// Measures the wheel of a release build.
 pub(crate) fn measure(args: &[String]) -> Outcome {
     let folder = fs::canonicalize(CRATE)?;
-    let python = install_wheel("release")?;
+    let python = install_wheel(RELEASE)?;
     let mut measure = Command::new(python);
     measure.arg(folder.join("benches/measure.py")).arg(fs::canonicalize("book/results")?.join("python-measured.md"));
     steps::run(measure.args(args).current_dir(make_scratch()?))
@@ -59,24 +67,34 @@ fn make_scratch() -> Result<PathBuf, Trouble> {
     Ok(fs::canonicalize(scratch)?)
 }
 
-/// Builds and installs the wheel of this profile, and returns the Python that has it.
-fn install_wheel(profile: &str) -> Result<PathBuf, Trouble> {
-    let folder = Path::new(CRATE);
-    let python = python::prepare_environment("wheel", &folder.join("tests/requirements.txt"))?;
-    let wheels = target().join("wheels");
-    if wheels.exists() {
-        fs::remove_dir_all(&wheels)?;
-    }
-    steps::run(&mut maturin(&python, folder, profile, &wheels))?;
-    install(&python, &find_wheel(&wheels)?)?;
+/// Builds and installs the wheel, and returns the Python that has it.
+fn install_wheel(how: &[&str]) -> Result<PathBuf, Trouble> {
+    let python = build_wheel(how)?;
+    install(&python, &find_wheel(&wheels())?)?;
     Ok(python)
 }
 
+/// Builds the wheel with these options of cargo, and returns the Python of the environment that has maturin.
+fn build_wheel(how: &[&str]) -> Result<PathBuf, Trouble> {
+    let folder = Path::new(CRATE);
+    let python = python::prepare_environment("wheel", &folder.join("tests/requirements.txt"))?;
+    if wheels().exists() {
+        fs::remove_dir_all(wheels())?;
+    }
+    steps::run(&mut maturin(&python, folder, how, &wheels()))?;
+    Ok(python)
+}
+
+/// Returns the folder of the wheel.
+fn wheels() -> PathBuf {
+    target().join("wheels")
+}
+
 /// Returns the call that builds the wheel of the package in `folder` into the folder `wheels`.
-fn maturin(python: &Path, folder: &Path, profile: &str, wheels: &Path) -> Command {
+fn maturin(python: &Path, folder: &Path, how: &[&str], wheels: &Path) -> Command {
     let mut maturin = Command::new(python);
-    maturin.args(["-m", "maturin", "build", "--locked", "--profile", profile, "--manifest-path"]);
-    maturin.arg(folder.join("Cargo.toml")).arg("--out").arg(wheels);
+    maturin.args(["-m", "maturin", "build", "--locked"]).args(how).arg("--manifest-path");
+    maturin.arg(folder.join("Cargo.toml")).arg("--out").arg(wheels).env("CARGO_INCREMENTAL", "0");
     maturin
 }
 
@@ -89,7 +107,7 @@ pub(crate) fn is_the_same_elsewhere(clone: &Path) -> Outcome {
         if wheels.exists() {
             fs::remove_dir_all(&wheels)?;
         }
-        let mut maturin = maturin(&python, &root.join(CRATE), "release", &wheels);
+        let mut maturin = maturin(&python, &root.join(CRATE), RELEASE, &wheels);
         steps::run(maturin.arg("--target-dir").arg(elsewhere.join(format!("{name}-target"))))?;
         find_wheel(&wheels)
     };

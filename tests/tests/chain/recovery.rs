@@ -23,7 +23,7 @@ fn shut_down_after_starts(bench: &Bench) -> Vec<u8> {
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn a_loop_of_resets_ends_in_safe_mode() {
-    for board in Board::ALL {
+    for board in Board::with_pictures() {
         let bench = Bench::new(board);
         let mut parameters = Parameters::new(rocket(640, 480, 1, 1).sensor);
         parameters.operations.boot_mode = 1;

@@ -2,7 +2,8 @@
 
 use crate::common::{Place, without_time};
 
-fn number(name: &str, default: u64) -> u64 {
+/// Returns the number that an environment variable gives, or else `default`.
+pub(crate) fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 

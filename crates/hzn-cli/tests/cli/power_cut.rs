@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
+use crate::campaign::number;
 use crate::common::Place;
 
 /// One step of the program.
@@ -234,7 +235,8 @@ fn replay(place: &Place, out: &str, before: &[(&str, Vec<u8>)], steps: &[Step], 
 
 #[test]
 fn a_power_cut_loses_no_finished_picture() {
-    let place = Place::with_pictures(12);
+    // The number of contents grows with that of the pictures, and so does the time to check one of them.
+    let place = Place::with_pictures(number("HZN_CUTS", 5) as usize);
     if !make_recorder(&place) {
         return;
     }
