@@ -9,6 +9,8 @@
 //! cargo xtask campaign   looks for faults: fuzzing, killed runs, long runs
 //! cargo xtask keys       writes the files that follow from the keys of sensor.toml: table, template, JSON schema,
 //!                        types of Python
+//! cargo xtask first-command
+//!                        measures what the README's first command costs on a clean clone
 //! cargo xtask viewer     makes the picture of the viewer's window in the documents, or pictures of all situations
 //! ```
 #![forbid(unsafe_code)]
@@ -19,6 +21,7 @@ mod campaign;
 mod demo;
 mod display;
 mod firmware;
+mod first_command;
 mod flight_build;
 mod machine;
 mod miri;
@@ -35,7 +38,7 @@ mod wheel;
 
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|keys|viewer> [OPTION]...
+const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|first-command|keys|viewer> [OPTION]...
 
   test [--all] [STEP]...
                      runs the steps of every check, or all steps whose name contains one of the words; --all runs the
@@ -54,6 +57,8 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into book/results/firmware-cost.md;
                      --by-feature prints only how much flash the methods of published systems take
+  first-command      clones the committed state, runs the README's first command there, and prints its wall time and
+                     processor time; what cargo downloads is downloaded before and not counted
   keys               writes the table of book/reference/sensor-toml.md, the template, the JSON schema and the
                      Python types (hzn.keys) from the keys in hzn-core
   viewer             makes book/images/viewer.png again; needs `cargo xtask test demo` first
@@ -71,6 +76,7 @@ fn main() -> ExitCode {
         "reproduce" => reproduce::run(rest),
         "campaign" => campaign::run(rest),
         "firmware" => firmware::run(rest),
+        "first-command" => first_command::run(),
         "keys" => write_keys(),
         "viewer" => viewer::run(rest),
         "help" | "-h" | "--help" => {

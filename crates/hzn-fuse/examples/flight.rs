@@ -6,8 +6,8 @@
 use std::path::Path;
 
 use hzn_fuse::simulated::{Errors, Moment, inputs, write};
+use hzn_nav::frames::{Cam, Covariance, Vector};
 use hzn_sim::Scenario;
-use nalgebra::{Matrix3, Vector3};
 
 /// 1-sigma of a direction, rad.
 const SIGMA_RAD: f64 = 0.05 * core::f64::consts::PI / 180.0;
@@ -28,13 +28,13 @@ impl White {
 }
 
 impl Errors for White {
-    fn draw(&mut self, _: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
-        let error = Vector3::from_fn(|_, _| SIGMA_RAD * self.normal());
-        (error, (Matrix3::identity() - axis * axis.transpose()) * SIGMA_RAD.powi(2))
+    fn draw(&mut self, _: &Moment, axis: &Vector<Cam>) -> (Vector<Cam>, Covariance<Cam>) {
+        let error = core::array::from_fn(|_| SIGMA_RAD * self.normal());
+        (error.into(), Covariance::across(axis, SIGMA_RAD.powi(2)))
     }
 
-    fn by_limb_height(&mut self, _: &Moment, _: &Vector3<f64>) -> Vector3<f64> {
-        Vector3::zeros()
+    fn by_limb_height(&mut self, _: &Moment, _: &Vector<Cam>) -> Vector<Cam> {
+        Vector::zeros()
     }
 }
 

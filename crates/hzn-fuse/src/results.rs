@@ -3,26 +3,27 @@
 use std::collections::BTreeMap;
 
 use hzn_nav::filter::{Corrections, Filter};
+use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::gravity::earth_rate;
 use hzn_nav::layout::{Layout, Place};
 use hzn_nav::strapdown::Nominal;
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
 use crate::input::Body;
 
 /// The estimated errors of a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraState {
-    /// Rotation vector from the told mount to the estimated one (camera frame), rad.
-    pub misalignment_rad: Vector3<f64>,
-    /// Its 1-sigma, rad.
+    /// Rotation vector from the told mount to the estimated one, rad.
+    pub misalignment_rad: Vector<Cam>,
+    /// Its 1-sigma about each axis of the camera, rad.
     pub misalignment_sigma_rad: Vector3<f64>,
     /// Time that the camera's clock is late, s.
     pub clock_s: f64,
     /// Its 1-sigma, s; 0 if it does not exist.
     pub clock_sigma_s: f64,
-    /// The estimated mount: rotation from the camera to the body frame.
-    pub mount: UnitQuaternion<f64>,
+    /// The estimated mount.
+    pub mount: Rotation<Cam, Vehicle>,
     /// Largest 1-sigma of the attitude of the camera against ECEF about any axis, rad.
     pub camera_sigma_rad: f64,
 }
@@ -30,10 +31,10 @@ pub struct CameraState {
 /// The solution at a time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Epoch {
-    /// Time, attitude (body to ECEF), velocity and position in ECEF.
+    /// Time, attitude, velocity and position.
     pub state: Nominal,
-    /// Covariance of the attitude: rotation vector in the body frame, rad².
-    pub attitude_covariance_rad2: Matrix3<f64>,
+    /// Covariance of the attitude: of a rotation vector, rad².
+    pub attitude_covariance_rad2: Covariance<Vehicle>,
     /// 1-sigma of the velocity (ECEF), m/s.
     pub velocity_sigma_m_s: Vector3<f64>,
     /// 1-sigma of the position (ECEF), m.
@@ -50,22 +51,22 @@ pub struct Epoch {
     pub limb_latitude_sigma_km: [f64; 2],
     /// The cameras, in the order of the recordings.
     pub cameras: Vec<CameraState>,
-    /// Rate of the vehicle against the Earth (body frame), rad/s.
-    pub rate_rad_s: Vector3<f64>,
+    /// Rate of the vehicle against the Earth, rad/s.
+    pub rate_rad_s: Vector<Vehicle>,
     /// Attitude of the strapdown solution from the start on without any aid.
-    pub unaided: Option<UnitQuaternion<f64>>,
+    pub unaided: Option<Rotation<Vehicle, Fixed>>,
 }
 
 impl Epoch {
     /// Returns the solution of a filter.
-    pub(crate) fn of<const N: usize>(filter: &Filter<N>, unaided: Option<UnitQuaternion<f64>>) -> Self {
+    pub(crate) fn of<const N: usize>(filter: &Filter<N>, unaided: Option<Rotation<Vehicle, Fixed>>) -> Self {
         let layout = filter.layout();
         let sigmas = |place: Option<Place>| place.map_or_else(Vector3::zeros, |p| filter.sigmas(p.first));
         let one = |place: Option<Place>| place.map_or(0.0, |p| filter.sigmas(p.first).x);
-        let to_body = filter.nominal().attitude.inverse().to_rotation_matrix().into_inner();
-        let ecef = filter.covariance().fixed_view::<3, 3>(Layout::ATTITUDE, Layout::ATTITUDE).into_owned();
+        let to_vehicle = filter.nominal().attitude.inverse();
+        let covariance = filter.covariance().fixed_view::<3, 3>(Layout::ATTITUDE, Layout::ATTITUDE).into_owned();
         let inertial = filter.last_imu().map(|imu| filter.corrections().correct(&imu).gyro_rad_s);
-        let rate = inertial.unwrap_or_default() - filter.nominal().attitude.inverse() * earth_rate();
+        let rate = inertial.unwrap_or_default() - to_vehicle * earth_rate();
         let camera = |which: usize| {
             let (camera, places) = (filter.camera(which)?, layout.cameras.get(which)?);
             Some(CameraState {
@@ -79,7 +80,7 @@ impl Epoch {
         };
         Self {
             state: *filter.nominal(),
-            attitude_covariance_rad2: to_body * ecef * to_body.transpose(),
+            attitude_covariance_rad2: Covariance::<Fixed>::from(covariance).rotated(&to_vehicle),
             velocity_sigma_m_s: filter.sigmas(Layout::VELOCITY),
             position_sigma_m: filter.sigmas(Layout::POSITION),
             corrections: *filter.corrections(),
@@ -96,22 +97,22 @@ impl Epoch {
         }
     }
 
-    /// Returns the 1-sigma of the attitude about the axes of the body, rad.
+    /// Returns the 1-sigma of the attitude about the axes of the vehicle, rad.
     pub fn attitude_sigma_rad(&self) -> Vector3<f64> {
-        self.attitude_covariance_rad2.diagonal().map(|v| v.max(0.0).sqrt())
+        self.attitude_covariance_rad2.as_inner().diagonal().map(|v| v.max(0.0).sqrt())
     }
 }
 
 /// Returns the largest 1-sigma of the attitude of a camera: attitude and misalignment have common errors.
 fn camera_sigma_rad<const N: usize>(
     filter: &Filter<N>,
-    mount: &UnitQuaternion<f64>,
+    mount: &Rotation<Cam, Vehicle>,
     misalignment: Option<Place>,
 ) -> f64 {
     let p = filter.covariance();
     let part = |i: usize, j: usize| p.fixed_view::<3, 3>(i, j).into_owned();
     let attitude = part(Layout::ATTITUDE, Layout::ATTITUDE);
-    let to_camera = (filter.nominal().attitude * mount).inverse().to_rotation_matrix().into_inner();
+    let to_camera = (filter.nominal().attitude * *mount).inverse().to_matrix();
     let mut total = to_camera * attitude * to_camera.transpose();
     if let Some(place) = misalignment {
         let cross = to_camera * part(Layout::ATTITUDE, place.first);
@@ -178,8 +179,8 @@ pub struct Innovation {
 pub struct Triad {
     /// Time, s.
     pub time_s: f64,
-    /// Attitude (body to ECEF).
-    pub attitude: UnitQuaternion<f64>,
+    /// Attitude.
+    pub attitude: Rotation<Vehicle, Fixed>,
     /// Its angle from the filter's attitude, rad.
     pub angle_rad: f64,
     /// Its angle from the unaided attitude, rad.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use hzn_files::limited;
+use hzn_nav::frames::{Cam, Rotation, Vehicle};
 use hzn_nav::options::{Block, CameraOptions, ImuOptions, Mode, Options, StartSigmas};
 use serde::{Deserialize, Serialize};
 
@@ -336,7 +337,7 @@ impl Settings {
     }
 
     /// Returns the options of a camera with its mount, that sees a number of bodies.
-    pub fn camera_options(&self, name: &str, mount: nalgebra::UnitQuaternion<f64>, bodies: usize) -> CameraOptions {
+    pub fn camera_options(&self, name: &str, mount: Rotation<Cam, Vehicle>, bodies: usize) -> CameraOptions {
         let camera = self.camera(name);
         CameraOptions {
             mount,

@@ -8,8 +8,9 @@ use hzn_core::body::Kind;
 use hzn_core::status::Status;
 use hzn_mcap::{Row, RowMeta};
 use hzn_nav::ephemeris;
+use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector};
 use hzn_sim::{FlightFrame, Scenario, ScenarioError};
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion};
 
 use crate::error::Error;
 use crate::flight::reference::limb_axis;
@@ -20,11 +21,10 @@ const DISC_RAD: f64 = 0.00465;
 
 /// A source of random numbers and errors.
 pub trait Errors {
-    /// Returns the error of a direction and the covariance that the sensor would tell, both in the camera frame. `axis`
-    /// is the true direction.
-    fn draw(&mut self, at: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>);
-    /// Returns the derivative of the measured axis by the limb height, 1/km (camera frame).
-    fn by_limb_height(&mut self, at: &Moment, axis: &Vector3<f64>) -> Vector3<f64>;
+    /// Returns the error of a direction and the covariance that the sensor would tell. `axis` is the true direction.
+    fn draw(&mut self, at: &Moment, axis: &Vector<Cam>) -> (Vector<Cam>, Covariance<Cam>);
+    /// Returns the derivative of the measured axis by the limb height, 1/km.
+    fn by_limb_height(&mut self, at: &Moment, axis: &Vector<Cam>) -> Vector<Cam>;
     /// Returns whether there is enough light for the body that is in view.
     fn has_light(&mut self, _at: &Moment) -> bool {
         true
@@ -42,10 +42,10 @@ pub struct Moment {
     pub time_s: f64,
     /// Altitude of the vehicle above the ellipsoid, km.
     pub altitude_km: f64,
-    /// Position of the vehicle in ECEF, m.
-    pub position_m: Vector3<f64>,
-    /// Rotation from the camera frame to ECEF.
-    pub to_ecef: UnitQuaternion<f64>,
+    /// Position of the vehicle, m.
+    pub position_m: Vector<Fixed>,
+    /// Attitude of the camera.
+    pub fixed_from_camera: Rotation<Cam, Fixed>,
 }
 
 /// Returns the inputs of a simulated flight: inertial unit and receiver as `hzn simulate` writes them, and a recording
@@ -81,8 +81,8 @@ pub fn instruments(scenario: &Scenario) -> Result<Inputs, ScenarioError> {
 fn sample(row: &hzn_sim::trajectory::instruments::ImuRow) -> Sample {
     let imu = hzn_nav::strapdown::Imu {
         time_s: row.time_s,
-        gyro_rad_s: Vector3::new(row.gyro_x_radps, row.gyro_y_radps, row.gyro_z_radps),
-        accel_m_s2: Vector3::new(row.accel_x_mps2, row.accel_y_mps2, row.accel_z_mps2),
+        gyro_rad_s: Vector::new(row.gyro_x_radps, row.gyro_y_radps, row.gyro_z_radps),
+        accel_m_s2: Vector::new(row.accel_x_mps2, row.accel_y_mps2, row.accel_z_mps2),
     };
     Sample { imu, saturated: row.saturated > 0 }
 }
@@ -90,8 +90,8 @@ fn sample(row: &hzn_sim::trajectory::instruments::ImuRow) -> Sample {
 fn fix(row: &hzn_sim::trajectory::instruments::GnssRow) -> Fix {
     Fix {
         time_s: row.time_s,
-        position_m: Vector3::new(row.x_m, row.y_m, row.z_m),
-        velocity_m_s: Vector3::new(row.vx_mps, row.vy_mps, row.vz_mps),
+        position_m: Vector::new(row.x_m, row.y_m, row.z_m),
+        velocity_m_s: Vector::new(row.vx_mps, row.vy_mps, row.vz_mps),
         position_sigma_m: row.position_sigma_m,
         velocity_sigma_m_s: row.velocity_sigma_mps,
     }
@@ -108,7 +108,8 @@ fn recording(
     for (row, frame) in one.flight()?.frames.iter().enumerate() {
         let known = one.frame_row(frame);
         let pose = &frame.scene.pose;
-        let to_camera = rotation(pose.q_fixed_from_camera_wxyz).inverse();
+        let fixed_from_camera: Rotation<Cam, Fixed> = rotation(pose.q_fixed_from_camera_wxyz);
+        let to_camera = fixed_from_camera.inverse();
         for &kind in &one.bodies {
             if !is_in_view(one, frame, kind)? {
                 continue;
@@ -120,18 +121,18 @@ fn recording(
                 time_s: frame.time_s,
                 altitude_km: known.altitude_km,
                 position_m: pose.position_m.into(),
-                to_ecef: to_camera.inverse(),
+                fixed_from_camera,
             };
             if !errors.has_light(&moment) {
                 continue;
             }
             let axis = to_camera * reference;
             // The sensor knows the position at the time of the stamp.
-            let told_m = Vector3::new(known.x_km, known.y_km, known.z_km) * 1e3;
+            let told_m = Vector::new(known.x_km, known.y_km, known.z_km) * 1e3;
             let reference = limb_axis(body, &told_m).unwrap_or(reference);
             let (error, covariance_rad2) = errors.draw(&moment, &axis);
             let by_limb_height =
-                if body == Body::Limb { errors.by_limb_height(&moment, &axis) } else { Vector3::zeros() };
+                if body == Body::Limb { errors.by_limb_height(&moment, &axis) } else { Vector::zeros() };
             seen.push(Seen {
                 time_s: known.time_s,
                 body,
@@ -168,27 +169,23 @@ fn is_in_view(one: &Scenario, frame: &FlightFrame, kind: Kind) -> Result<bool, S
     Ok(visible_px >= enough_px)
 }
 
-/// Returns the true direction of a body in ECEF; `None` if the picture has none.
-fn true_direction(one: &Scenario, frame: &FlightFrame, kind: Kind) -> Option<(Body, Vector3<f64>)> {
-    let position = Vector3::from(frame.scene.pose.position_m);
+/// Returns the true direction of a body; `None` if the picture has none.
+fn true_direction(one: &Scenario, frame: &FlightFrame, kind: Kind) -> Option<(Body, Vector<Fixed>)> {
+    let position_m = frame.scene.pose.position_m.into();
     let unix_s = one.start_unix_s() + frame.time_s;
     Some(match kind {
-        Kind::Sun => (Body::Sun, celestial(ephemeris::sun(unix_s), &position)),
-        Kind::Moon => (Body::Moon, celestial(ephemeris::moon(unix_s), &position)),
+        Kind::Sun => (Body::Sun, ephemeris::sun(unix_s).seen_from(position_m).direction),
+        Kind::Moon => (Body::Moon, ephemeris::moon(unix_s).seen_from(position_m).direction),
         _ => {
             let truth = frame.scene.body_truth(kind, "", frame.time_s).ok()?;
-            let axis = Vector3::new(truth.axis_x, truth.axis_y, truth.axis_z);
+            let axis = Vector::<Cam>::new(truth.axis_x, truth.axis_y, truth.axis_z);
             (Body::Limb, rotation(frame.scene.pose.q_fixed_from_camera_wxyz) * axis)
         }
     })
 }
 
-fn rotation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
-}
-
-fn celestial(place: ephemeris::Place, from_m: &Vector3<f64>) -> Vector3<f64> {
-    Vector3::from(place.seen_from((*from_m).into()).direction)
+fn rotation<A, B>([w, x, y, z]: [f64; 4]) -> Rotation<A, B> {
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).into()
 }
 
 /// Writes the inputs of a simulated flight as files: imu.csv, gnss.csv, vehicle.csv with the truth, and for each camera
@@ -217,7 +214,8 @@ pub fn write(scenario: &Scenario, inputs: &Inputs, folder: &Path) -> Result<(), 
             out.serialize(row(seen)).map_err(Error::failed)?;
         }
         if let Some(q) = recording.mount {
-            let text = format!("[mount]\nq_vehicle_from_camera_wxyz = [{}, {}, {}, {}]\n", q.w, q.i, q.j, q.k);
+            let [w, x, y, z] = q.wxyz();
+            let text = format!("[mount]\nq_vehicle_from_camera_wxyz = [{w}, {x}, {y}, {z}]\n");
             std::fs::write(folder.join(format!("{}.toml", recording.name)), text).map_err(Error::failed)?;
         }
     }
@@ -234,12 +232,12 @@ fn row(seen: &Seen) -> Row {
         altitude_km: None,
     };
     let mut row = Row::unprocessed(&meta, Status::Ok, "");
-    let (a, p) = (seen.axis, seen.covariance_rad2);
-    [row.axis_x, row.axis_y, row.axis_z] = [a.x, a.y, a.z].map(Some);
+    let p = seen.covariance_rad2.as_inner();
+    [row.axis_x, row.axis_y, row.axis_z] = seen.axis.xyz().map(Some);
     [row.cov_xx, row.cov_xy, row.cov_xz] = [p.m11, p.m12, p.m13].map(Some);
     [row.cov_yy, row.cov_yz, row.cov_zz] = [p.m22, p.m23, p.m33].map(Some);
     if let Some(e) = seen.reference {
-        [row.axis_e_x, row.axis_e_y, row.axis_e_z] = [e.x, e.y, e.z].map(Some);
+        [row.axis_e_x, row.axis_e_y, row.axis_e_z] = e.xyz().map(Some);
     }
     row
 }

@@ -7,7 +7,8 @@
 //! C = P⁺ₖ Φᵀ (P⁻ₖ₊₁)⁻¹, xˢₖ = x⁺ₖ + C (xˢₖ₊₁ − x⁻ₖ₊₁), Pˢₖ = P⁺ₖ + C (Pˢₖ₊₁ − P⁻ₖ₊₁) Cᵀ.
 
 use hzn_nav::filter::Filter;
-use nalgebra::{DMatrix, DVector, SMatrix, SVector, UnitQuaternion};
+use hzn_nav::frames::{Fixed, Rotation, Vehicle};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use crate::results::Epoch;
 
@@ -23,7 +24,7 @@ pub(crate) struct Recorded<const N: usize> {
     pub(crate) transition: SMatrix<f64, N, N>,
     /// Whether the filter began again here: nothing before is related.
     pub(crate) begins: bool,
-    pub(crate) unaided: Option<UnitQuaternion<f64>>,
+    pub(crate) unaided: Option<Rotation<Vehicle, Fixed>>,
 }
 
 /// Returns the smoothed solution, in the order of time.

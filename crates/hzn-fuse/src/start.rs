@@ -3,13 +3,14 @@
 //! Between the directions of the window the gyros carry the attitude, in a frame that does not turn. Of each camera and
 //! body the first and the last direction of the window count: others share their mount, and would say little more.
 
+use hzn_nav::frames::{Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::gravity::EARTH_RATE_RAD_S;
 use hzn_nav::vectors::{Direction, Wahba, davenport};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::input::{Body, Sample};
 
-/// A direction on the body, with its reference in ECEF.
+/// A direction on the vehicle, with its reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sight {
     /// Time, s.
@@ -18,30 +19,35 @@ pub struct Sight {
     pub camera: usize,
     /// The body.
     pub body: Body,
-    /// Unit vector in the frame of the vehicle.
-    pub on_vehicle: Vector3<f64>,
-    /// The same direction in ECEF, a unit vector.
-    pub reference: Vector3<f64>,
+    /// Unit vector.
+    pub on_vehicle: Vector<Vehicle>,
+    /// The same direction from outside, a unit vector.
+    pub reference: Vector<Fixed>,
     /// 1-sigma, rad, with the error of the mount.
     pub sigma_rad: f64,
 }
 
+/// The frame of the vehicle at its first sample. It does not turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AtFirst {}
+
 /// The attitude of the vehicle in a frame that does not turn, from the gyros alone.
 #[derive(Debug, Clone)]
 pub struct DeadReckoning {
-    steps: Vec<(f64, UnitQuaternion<f64>)>,
+    steps: Vec<(f64, Rotation<Vehicle, AtFirst>)>,
 }
 
 impl DeadReckoning {
     /// Integrates the gyros.
     pub fn new(samples: &[Sample]) -> Self {
-        let mut q = UnitQuaternion::identity();
-        let mut steps: Vec<(f64, UnitQuaternion<f64>)> = Vec::with_capacity(samples.len());
+        let mut q = Rotation::identity();
+        let mut steps: Vec<(f64, Rotation<Vehicle, AtFirst>)> = Vec::with_capacity(samples.len());
         let mut last: Option<&Sample> = None;
         for sample in samples {
             if let Some(last) = last {
                 let dt = sample.imu.time_s - last.imu.time_s;
-                q *= UnitQuaternion::from_scaled_axis((last.imu.gyro_rad_s + sample.imu.gyro_rad_s) * (0.5 * dt));
+                let rate_rad_s = last.imu.gyro_rad_s + sample.imu.gyro_rad_s;
+                q = q * Rotation::from_scaled_axis(rate_rad_s * (0.5 * dt));
             }
             steps.push((sample.imu.time_s, q));
             last = Some(sample);
@@ -50,13 +56,13 @@ impl DeadReckoning {
     }
 
     /// Returns the attitude at a time; outside the samples that of the nearest one.
-    pub fn at(&self, time_s: f64) -> UnitQuaternion<f64> {
+    pub fn at(&self, time_s: f64) -> Rotation<Vehicle, AtFirst> {
         let next = self.steps.partition_point(|(t, _)| *t < time_s);
         let before = next.checked_sub(1).and_then(|i| self.steps.get(i));
         match (before, self.steps.get(next)) {
             (Some((t0, a)), Some((t1, b))) => a.slerp(b, ((time_s - t0) / (t1 - t0)).clamp(0.0, 1.0)),
             (Some((_, q)), None) | (None, Some((_, q))) => *q,
-            (None, None) => UnitQuaternion::identity(),
+            (None, None) => Rotation::identity(),
         }
     }
 }
@@ -64,8 +70,7 @@ impl DeadReckoning {
 /// What sights say about the attitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sighted {
-    /// The attitude of the vehicle (body to ECEF) at the time of the last sight, with its covariance in ECEF, and the
-    /// number of sights that it is made of.
+    /// The attitude of the vehicle at the time of the last sight, and the number of sights that it is made of.
     Attitude(Wahba, usize),
     /// The sights contradict each other.
     Contradiction,
@@ -76,7 +81,8 @@ pub enum Sighted {
 /// Returns the attitude of the vehicle at the time of the last sight.
 pub fn attitude(sights: &[Sight], reckoning: &DeadReckoning) -> Sighted {
     let Some(end_s) = sights.last().map(|s| s.time_s) else { return Sighted::Nothing };
-    let turned = |time_s: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), EARTH_RATE_RAD_S * (time_s - end_s));
+    let about_pole = |angle_rad: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad);
+    let turned = |time_s: f64| Rotation::<Fixed, Fixed>::from(about_pole(EARTH_RATE_RAD_S * (time_s - end_s)));
     let chosen: Vec<&Sight> = sights
         .iter()
         .enumerate()
@@ -87,10 +93,10 @@ pub fn attitude(sights: &[Sight], reckoning: &DeadReckoning) -> Sighted {
         })
         .map(|(_, sight)| sight)
         .collect();
-    let directions: Vec<Direction> = chosen
+    let directions: Vec<Direction<AtFirst>> = chosen
         .iter()
         .map(|sight| Direction {
-            body: reckoning.at(sight.time_s) * sight.on_vehicle,
+            vehicle: reckoning.at(sight.time_s) * sight.on_vehicle,
             reference: turned(sight.time_s) * sight.reference,
             sigma_rad: sight.sigma_rad,
         })
@@ -101,7 +107,8 @@ pub fn attitude(sights: &[Sight], reckoning: &DeadReckoning) -> Sighted {
     let limit = freedom + 4.0 * (2.0 * freedom).sqrt() + 4.0;
     let attitude = wahba.attitude * reckoning.at(end_s);
     if wahba.chi2 < limit {
-        Sighted::Attitude(Wahba { attitude, ..wahba }, directions.len())
+        let Wahba { covariance_rad2, chi2, .. } = wahba;
+        Sighted::Attitude(Wahba { attitude, covariance_rad2, chi2 }, directions.len())
     } else {
         Sighted::Contradiction
     }

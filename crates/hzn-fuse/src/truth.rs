@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use hzn_files::vehicle::VehicleRow;
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use hzn_nav::frames::{Fixed, Rotation, Vector, Vehicle};
+use nalgebra::{Quaternion, UnitQuaternion};
 
 use crate::error::Error;
 use crate::results::Epoch;
@@ -13,12 +14,12 @@ use crate::results::Epoch;
 pub struct Miss {
     /// Time, s.
     pub time_s: f64,
-    /// Error of the attitude: rotation vector in the body frame from the solution to the truth, rad.
-    pub attitude_rad: Vector3<f64>,
+    /// Error of the attitude: rotation vector from the solution to the truth, rad.
+    pub attitude_rad: Vector<Vehicle>,
     /// Its square over its covariance; 3 on average.
     pub nees: f64,
-    /// Error of the position in ECEF, m.
-    pub position_m: Vector3<f64>,
+    /// Error of the position, m.
+    pub position_m: Vector<Fixed>,
 }
 
 /// Reads a vehicle.csv of `hzn simulate`.
@@ -45,8 +46,8 @@ fn miss(epoch: &Epoch, truth: &[VehicleRow]) -> Option<Miss> {
     }
     let part = if b.time_s > a.time_s { (time_s - a.time_s) / (b.time_s - a.time_s) } else { 0.0 };
     let q = |r: &VehicleRow| UnitQuaternion::from_quaternion(Quaternion::new(r.qw, r.qx, r.qy, r.qz));
-    let x = |r: &VehicleRow| Vector3::new(r.x_m, r.y_m, r.z_m);
-    let v = |r: &VehicleRow| Vector3::new(r.vx_mps, r.vy_mps, r.vz_mps);
+    let x = |r: &VehicleRow| Vector::new(r.x_m, r.y_m, r.z_m);
+    let v = |r: &VehicleRow| Vector::new(r.vx_mps, r.vy_mps, r.vz_mps);
     let dt = b.time_s - a.time_s;
     // Hermite's cubic for the position: the vehicle falls.
     let (s2, s3) = (part * part, part * part * part);
@@ -54,8 +55,9 @@ fn miss(epoch: &Epoch, truth: &[VehicleRow]) -> Option<Miss> {
         + v(a) * ((s3 - 2.0 * s2 + part) * dt)
         + x(b) * (3.0 * s2 - 2.0 * s3)
         + v(b) * ((s3 - s2) * dt);
-    let attitude = q(a).slerp(&q(b), part);
+    let attitude = Rotation::<Vehicle, Fixed>::from(q(a).slerp(&q(b), part));
     let error = (epoch.state.attitude.inverse() * attitude).scaled_axis();
-    let nees = epoch.attitude_covariance_rad2.try_inverse().map_or(f64::NAN, |p| error.dot(&(p * error)));
+    let information = epoch.attitude_covariance_rad2.as_inner().try_inverse();
+    let nees = information.map_or(f64::NAN, |p| error.as_inner().dot(&(p * error.as_inner())));
     Some(Miss { time_s, attitude_rad: error, nees, position_m: position - epoch.state.position_m })
 }

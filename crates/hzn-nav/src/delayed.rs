@@ -4,9 +4,8 @@
 //! in a list; both have a fixed size. The filter takes everything in the order of time when it is older than the lag.
 //! [`Delayed::now`] integrates the waiting samples, so that the solution for control has no lag.
 
-use nalgebra::{UnitQuaternion, Vector3};
-
 use crate::filter::{DirectionMeasurement, Filter, Step, Unusable};
+use crate::frames::{Fixed, Rotation, Vector, Vehicle};
 use crate::strapdown::{Imu, Nominal};
 
 /// A measurement.
@@ -14,12 +13,12 @@ use crate::strapdown::{Imu, Nominal};
 pub enum Measurement {
     /// A direction of a camera.
     Direction(DirectionMeasurement),
-    /// A position in ECEF with the 1-sigma of each component, m.
-    Position(Vector3<f64>, f64),
-    /// A velocity in ECEF with the 1-sigma of each component, m/s.
-    Velocity(Vector3<f64>, f64),
-    /// An attitude (body to ECEF) with the 1-sigma about each axis, rad.
-    Attitude(UnitQuaternion<f64>, f64),
+    /// A position with the 1-sigma of each component, m.
+    Position(Vector<Fixed>, f64),
+    /// A velocity relative to the Earth with the 1-sigma of each component, m/s.
+    Velocity(Vector<Fixed>, f64),
+    /// An attitude with the 1-sigma about each axis, rad.
+    Attitude(Rotation<Vehicle, Fixed>, f64),
 }
 
 /// What became of a measurement.
@@ -74,6 +73,36 @@ pub struct Counts {
 }
 
 /// A filter with memory for S waiting samples and M waiting measurements.
+///
+/// ```
+/// use hzn_nav::delayed::{Delayed, Measurement};
+/// use hzn_nav::filter::Filter;
+/// use hzn_nav::frames::{Rotation, Vector};
+/// use hzn_nav::options::Options;
+/// use hzn_nav::strapdown::{Imu, Nominal};
+///
+/// let start = Nominal {
+///     time_s: 0.0,
+///     attitude: Rotation::identity(),
+///     velocity_m_s: Vector::zeros(),
+///     position_m: Vector::new(6.9e6, 0.0, 0.0),
+/// };
+/// let filter = Filter::<28>::new(start, &Options::default(), &[])?;
+/// let mut delayed = Delayed::<28, 16, 4>::new(filter, 0.1); // 0.1 s behind the newest sample
+/// for k in 0..=20 {
+///     let time_s = 0.01 * f64::from(k);
+///     if k == 15 {
+///         // The receiver needed 0.05 s for this position.
+///         let late = Measurement::Position(start.position_m, 5.0);
+///         assert!(delayed.push(time_s - 0.05, late).is_ok());
+///     }
+///     let imu = Imu { time_s, gyro_rad_s: Vector::zeros(), accel_m_s2: Vector::zeros() };
+///     delayed.push_sample(&imu, false, |_, _, _| ());
+/// }
+/// assert_eq!(delayed.counts().taken, 1);
+/// assert!(delayed.filter().nominal().time_s <= 0.11 && delayed.now().time_s == 0.2);
+/// # Ok::<(), hzn_nav::filter::FilterError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Delayed<const N: usize, const S: usize, const M: usize> {
     filter: Filter<N>,
@@ -116,6 +145,8 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
 
     /// Returns the state at the newest sample: that of the filter, integrated with the waiting samples.
     pub fn now(&self) -> Nominal {
+        // All waiting samples are integrated at each call, because each update also changes the biases that are taken
+        // from them.
         let mut state = *self.filter.nominal();
         let mut from = self.filter.last_imu().map(|imu| self.filter.corrections().correct(&imu));
         for (sample, _) in self.samples.iter().take(self.waiting).flatten() {
@@ -132,6 +163,7 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
             self.counts.not_finite += 1;
             return;
         }
+        // Two samples of one time have no time between them, so nothing could be interpolated there.
         match self.newest_s {
             Some(newest) if imu.time_s == newest => self.counts.duplicates += 1,
             Some(newest) if imu.time_s < newest => self.counts.out_of_order += 1,
@@ -159,6 +191,8 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
     /// # Errors
     /// The measurement is not processed: see [`Refused`].
     pub fn push(&mut self, time_s: f64, measurement: Measurement) -> Result<(), Refused> {
+        // The filter does not go back, so a measurement from before its state is too late. Before the first sample the
+        // state has no time yet. A filter without lag gets a measurement before its sample, so a second is allowed.
         let refused = if !time_s.is_finite() {
             Some(Refused::NotFinite)
         } else if self.filter.last_imu().is_some() && time_s < self.filter.nominal().time_s {
@@ -217,6 +251,8 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
                 break;
             }
             remove_first(&mut self.measurements, &mut self.listed);
+            // The filter stops at the time of the measurement, because a vehicle that spins turns by degrees between
+            // two samples.
             if let Some(last) = self.filter.last_imu()
                 && time_s > last.time_s
                 && time_s < imu.time_s
@@ -265,7 +301,8 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
     }
 }
 
-/// Removes the first of the entries, whose number this is.
+/// Removes the first of the entries, whose number this is. The entries move, so that they are in order for
+/// [`Delayed::now`] and for the search of a place; there are some tens of them.
 fn remove_first<T>(list: &mut [T], entries: &mut usize) {
     if let Some(filled @ [_, ..]) = list.get_mut(..*entries) {
         filled.rotate_left(1);
@@ -275,10 +312,10 @@ fn remove_first<T>(list: &mut [T], entries: &mut usize) {
 
 /// Returns the sample at a part of the way between two.
 fn mix(from: &Imu, to: &Imu, part: f64) -> Imu {
-    let between = |a: &Vector3<f64>, b: &Vector3<f64>| a + (b - a) * part;
+    let between = |a: Vector<Vehicle>, b: Vector<Vehicle>| a + (b - a) * part;
     Imu {
         time_s: from.time_s + (to.time_s - from.time_s) * part,
-        gyro_rad_s: between(&from.gyro_rad_s, &to.gyro_rad_s),
-        accel_m_s2: between(&from.accel_m_s2, &to.accel_m_s2),
+        gyro_rad_s: between(from.gyro_rad_s, to.gyro_rad_s),
+        accel_m_s2: between(from.accel_m_s2, to.accel_m_s2),
     }
 }

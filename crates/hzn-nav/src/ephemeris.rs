@@ -12,40 +12,46 @@
 //! 2. Montenbruck & Gill, *Satellite Orbits*, section 3.3.2.
 
 use hzn_core::body::AU_KM;
-use nalgebra::Vector3;
 
+use crate::frames::{Fixed, Vector};
 use crate::time::{tt_days_since_j2000, ut_days_since_j2000};
 
 /// Position of a celestial body, from the Earth's centre or from another position.
+///
+/// ```
+/// use hzn_nav::ephemeris;
+/// use hzn_nav::frames::Vector;
+///
+/// let moon = ephemeris::moon(1_735_689_600.0); // 2025-01-01T00:00 UTC
+/// // The Moon is so near that its direction depends on the position of the observer.
+/// let seen = moon.seen_from(Vector::new(0.0, 0.0, 6.9e6));
+/// let parallax_deg = seen.direction.angle_rad(&moon.direction).to_degrees();
+/// assert!((parallax_deg - 0.9).abs() < 0.2, "{parallax_deg}");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Direction in ECEF, apparent, of unit length.
-    pub direction: [f64; 3],
+    /// Apparent direction, of unit length.
+    pub direction: Vector<Fixed>,
     /// Distance in metres.
     pub distance_m: f64,
 }
 
 impl Place {
-    /// Makes a place from a vector in ECEF of any length; only its direction counts.
-    fn from_vector(ecef: Vector3<f64>, distance_m: f64) -> Self {
-        Self { direction: (ecef / norm(&ecef)).into(), distance_m }
+    /// Makes a place from a vector of any length; only its direction counts.
+    fn from_vector(towards: Vector<Fixed>, distance_m: f64) -> Self {
+        Self { direction: towards / towards.norm(), distance_m }
     }
 
-    /// Returns the position in ECEF, metres.
-    pub fn position_m(&self) -> [f64; 3] {
-        self.direction.map(|x| x * self.distance_m)
+    /// Returns the position, metres.
+    pub fn position_m(&self) -> Vector<Fixed> {
+        self.direction * self.distance_m
     }
 
-    /// Returns the place of the body as seen from a position (ECEF, metres).
-    pub fn seen_from(&self, position_m: [f64; 3]) -> Self {
-        let d = Vector3::from(self.position_m()) - Vector3::from(position_m);
-        Self::from_vector(d, norm(&d))
+    /// Returns the place of the body as seen from a position (metres).
+    pub fn seen_from(&self, position_m: Vector<Fixed>) -> Self {
+        let d = self.position_m() - position_m;
+        Self::from_vector(d, d.norm())
     }
-}
-
-/// Returns the length of a vector. The norm of nalgebra needs the standard library's square root.
-fn norm(v: &Vector3<f64>) -> f64 {
-    libm::sqrt(v.dot(v))
 }
 
 /// Returns the sine of an angle in degrees.
@@ -83,13 +89,13 @@ impl Time {
     }
 
     /// Converts ecliptic longitude and latitude of date (degrees) to ECEF.
-    fn fixed_from_ecliptic(&self, longitude_deg: f64, latitude_deg: f64) -> Vector3<f64> {
+    fn fixed_from_ecliptic(&self, longitude_deg: f64, latitude_deg: f64) -> Vector<Fixed> {
         let (se, ce) = (sin(self.obliquity_deg), cos(self.obliquity_deg));
         let (sb, cb) = (sin(latitude_deg), cos(latitude_deg));
         let (y, z) = (cb * sin(longitude_deg), sb);
-        let equator = Vector3::new(cb * cos(longitude_deg), ce * y - se * z, se * y + ce * z);
+        let (x, y, z) = (cb * cos(longitude_deg), ce * y - se * z, se * y + ce * z);
         let (ss, cs) = (sin(self.sidereal_deg), cos(self.sidereal_deg));
-        Vector3::new(cs * equator.x + ss * equator.y, cs * equator.y - ss * equator.x, equator.z)
+        Vector::new(cs * x + ss * y, cs * y - ss * x, z)
     }
 }
 
@@ -102,6 +108,12 @@ pub fn sidereal_rad(unix_s: f64) -> f64 {
 }
 
 /// Returns the Sun as seen from the Earth's centre. `unix_s` is UTC in seconds since 1970.
+///
+/// ```
+/// let sun = hzn_nav::ephemeris::sun(1_718_916_660.0); // 2024-06-20T20:51 UTC, the solstice of June
+/// let [_, _, z] = sun.direction.xyz();
+/// assert!((z.asin().to_degrees() - 23.44).abs() < 0.01);
+/// ```
 pub fn sun(unix_s: f64) -> Place {
     let time = Time::from_unix_s(unix_s);
     let t = time.t;
@@ -112,7 +124,8 @@ pub fn sun(unix_s: f64) -> Place {
         + 0.000289 * sin(3.0 * anomaly);
     let elongation = 297.85 + 445267.1115 * t;
     // Aberration, and terms that were fitted to an ephemeris for 2000 to 2040. The largest of these is the Earth's
-    // motion about the common centre of mass with the Moon.
+    // motion about the common centre of mass with the Moon. Without the fitted terms the largest error is 0.0096°
+    // instead of 0.0061°, and aberration is 0.0057°, so none of them is left out.
     let longitude = mean_longitude + centre - 0.00569 + time.nutation_deg - 0.0025 + 0.00179 * sin(elongation);
     let eccentricity = 0.016708634 - 0.000042037 * t;
     let distance_au = 1.000001018 * (1.0 - eccentricity * eccentricity) / (1.0 + eccentricity * cos(anomaly + centre));
@@ -179,12 +192,11 @@ mod tests {
     fn read(text: &str) -> Vec<serde_json::Value> {
         serde_json::from_str::<serde_json::Value>(text).unwrap()["cases"].as_array().unwrap().clone()
     }
-    fn separation_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
-        let (a, b) = (Vector3::from(a), Vector3::from(b));
-        libm::atan2(norm(&a.cross(&b)), a.dot(&b)).to_degrees()
+    fn separation_deg(a: Vector<Fixed>, b: Vector<Fixed>) -> f64 {
+        libm::atan2(a.cross(&b).norm(), a.dot(&b)).to_degrees()
     }
-    fn vector(v: &serde_json::Value) -> [f64; 3] {
-        core::array::from_fn(|i| v[i].as_f64().unwrap())
+    fn vector(v: &serde_json::Value) -> Vector<Fixed> {
+        core::array::from_fn(|i| v[i].as_f64().unwrap()).into()
     }
 
     #[test]
@@ -212,7 +224,7 @@ mod tests {
             let error_deg = separation_deg(place.direction, truth);
             worst_deg = worst_deg.max(error_deg);
             square += error_deg * error_deg;
-            worst_km = worst_km.max((place.distance_m / 1e3 - norm(&Vector3::from(truth))).abs());
+            worst_km = worst_km.max((place.distance_m / 1e3 - truth.norm()).abs());
         }
         println!("{worst_deg}° at worst, {}° RMS, {worst_km} km", (square / cases.len() as f64).sqrt());
         assert!(worst_deg < 0.1 && worst_km < 600.0, "{worst_deg}° {worst_km} km");
@@ -222,7 +234,7 @@ mod tests {
     fn parallax_of_the_moon() {
         // From the equator below the Moon's meridian, the Moon is nearer by the Earth's radius.
         let moon = moon(1.6e9);
-        let under = moon.direction.map(|x| x * 6.378e6);
+        let under = moon.direction * 6.378e6;
         let seen = moon.seen_from(under);
         assert!((moon.distance_m - seen.distance_m - 6.378e6).abs() < 1.0);
         assert!(separation_deg(seen.direction, moon.direction) < 1e-5);

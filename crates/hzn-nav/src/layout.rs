@@ -1,4 +1,8 @@
 //! The places of the errors in the filter's vector.
+//!
+//! The places are found once, from the options. An error that is off takes no place, so that a smaller filter has
+//! memory for the others: the time of a step grows with the square of this memory. An error that is only considered has
+//! a place, because it widens the others.
 
 use crate::options::{Block, CameraOptions, Mode, Options};
 
@@ -55,7 +59,8 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// First component of the attitude error.
+    /// First component of the attitude error. These places are constants, so that the matrices of the prediction have a
+    /// size that the compiler knows.
     pub const ATTITUDE: usize = 0;
     /// First component of the velocity error.
     pub const VELOCITY: usize = 3;
@@ -80,6 +85,7 @@ impl Layout {
             let misalignment = layout.place(camera.misalignment, 3);
             let mut slow_errors = [None; MAX_BODIES];
             for place in slow_errors.iter_mut().take(camera.bodies) {
+                // The sigma comes with each direction, so the block has none of its own.
                 *place = layout.place(Block { mode: camera.slow_error, sigma: 1.0 }, 3);
             }
             let clock = layout.place(camera.clock, 1);

@@ -7,6 +7,7 @@
 //! | [`filter`] | the Schmidt-Kalman filter: directions, position, velocity and attitude aid the strapdown solution |
 //! | [`delayed`] | the filter at a fixed lag, for measurements that come late or out of order |
 //! | [`start`] | the first attitude from two directions, and integration back to an earlier time |
+//! | [`frames`] | vectors, rotations and covariances with their frames as types |
 //! | [`options`], [`layout`] | what the filter estimates, and the order of its states |
 //! | [`vectors`] | attitude from two or more directions: TRIAD, Wahba's problem |
 //! | [`ephemeris`] | positions of Sun and Moon |
@@ -19,6 +20,7 @@
 pub mod delayed;
 pub mod ephemeris;
 pub mod filter;
+pub mod frames;
 pub mod gravity;
 pub mod layout;
 pub mod options;

@@ -1,7 +1,11 @@
 //! What the filter estimates and how well everything is known at the start. The defaults are those of Braun & Barf
 //! 2022, table 3.
+//!
+//! Their noise is large, because it also covers vibration and unknown delays: the second number of
+//! [`ImuOptions::accel_noise`] and [`ImuOptions::gyro_noise`]. In simulated flights without vibration the covariance is
+//! therefore larger than the errors.
 
-use nalgebra::UnitQuaternion;
+use crate::frames::{Cam, Rotation, Vehicle};
 
 /// Standard gravity, m/s².
 const G_M_S2: f64 = 9.80665;
@@ -92,8 +96,8 @@ impl Default for ImuOptions {
 /// A sensor of directions: a horizon sensor or a Sun sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraOptions {
-    /// The mount that is told: rotation from the camera to the body frame.
-    pub mount: UnitQuaternion<f64>,
+    /// The mount that is told: rotation from the camera to the vehicle's frame.
+    pub mount: Rotation<Cam, Vehicle>,
     /// Error of the mount, rad.
     pub misalignment: Block,
     /// The slowly changing error of a direction. Its sigma comes with each direction.
@@ -101,7 +105,8 @@ pub struct CameraOptions {
     /// Correlation time of the slow error, s.
     pub slow_error_time_s: f64,
     /// Number of bodies that the camera sees, from 1 to [`MAX_BODIES`](crate::layout::MAX_BODIES). Each has a slow
-    /// error of its own: limb and Sun in one picture do not share their errors.
+    /// error of its own: limb and Sun in one picture do not share their errors. With one slow error for both, the
+    /// filter took the error of one for that of the other, and the NEES of the attitude was 18 to 38 (3 is ideal).
     pub bodies: usize,
     /// White noise of a direction, rad.
     pub white_rad: f64,
@@ -112,12 +117,15 @@ pub struct CameraOptions {
 impl Default for CameraOptions {
     fn default() -> Self {
         Self {
-            mount: UnitQuaternion::identity(),
+            mount: Rotation::identity(),
             misalignment: Block::estimated(core::f64::consts::PI / 180.0),
+            // An estimated slow error makes the filter over-confident: in 40 flights of a prototype the NEES of the
+            // attitude was 9.9 with it, and 3.5 with a considered one (3 is ideal).
             slow_error: Mode::Considered,
             slow_error_time_s: 20.0,
             bodies: 1,
             white_rad: 0.005,
+            // A clock offset moves a direction only while the vehicle turns, and cameras on one clock have none.
             clock: Block::OFF,
         }
     }
@@ -147,7 +155,8 @@ pub struct Options {
     pub imu: ImuOptions,
     /// What is known at the start.
     pub start: StartSigmas,
-    /// Error of the limb height, km. It is common to all cameras and constant.
+    /// Error of the limb height, km. It is common to all cameras and constant: an error that fades, as the slow error
+    /// does, would make the filter over-confident after many pictures.
     pub limb_height: Block,
     /// Change of the limb height with the latitude φ of the limb, km: two coefficients c₁ and c₂ with the same sigma.
     /// The height is c₁ sin φ + c₂ (3 sin² φ − 1)/2 above the constant one. The infrared limb is lower over the winter
@@ -164,7 +173,10 @@ impl Default for Options {
             imu: ImuOptions::default(),
             start: StartSigmas::default(),
             limb_height: Block::considered(7.0),
+            // It takes several orbits to estimate the change with the latitude, so it does not help a rocket.
             limb_latitude: Block { mode: Mode::Off, sigma: 0.0 },
+            // A right direction is refused once in 10 000 times. The false ones of the tests are 52° off, and all of
+            // them are refused.
             gate_probability: 1e-4,
         }
     }

@@ -1,8 +1,7 @@
 //! The start of a filter: an attitude from two directions, and the way back to an earlier time.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-
 use crate::filter::Filter;
+use crate::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use crate::layout::Layout;
 use crate::options::CameraOptions;
 use crate::strapdown::{Imu, Nominal};
@@ -13,19 +12,36 @@ use crate::vectors::{Direction, Wahba, davenport};
 pub struct Seen<'a> {
     /// The camera.
     pub camera: &'a CameraOptions,
-    /// Unit vector in the camera frame.
-    pub measured: Vector3<f64>,
-    /// The same direction in ECEF, a unit vector.
-    pub reference: Vector3<f64>,
+    /// Unit vector.
+    pub measured: Vector<Cam>,
+    /// The same direction from outside, a unit vector.
+    pub reference: Vector<Fixed>,
     /// 1-sigma of the direction across it, rad, without the error of the mount.
     pub sigma_rad: f64,
 }
 
-/// Returns the attitude of the body from at least two directions. The error of each mount widens the sigma of its
-/// direction. `None` if the directions do not determine the attitude.
+/// Returns the attitude of the vehicle from at least two directions. The error of each mount widens the sigma of its
+/// direction, because a camera may be mounted a degree off, which is more than the error of the direction itself.
+/// `None` if the directions do not determine the attitude.
+///
+/// ```
+/// use hzn_nav::frames::Vector;
+/// use hzn_nav::options::CameraOptions;
+/// use hzn_nav::start::{Seen, first_attitude};
+///
+/// let camera = CameraOptions::default();
+/// let [nadir, sun] = [Vector::new(-1.0, 0.0, 0.0), Vector::new(0.0, 0.0, 1.0)];
+/// let limb = Seen { camera: &camera, measured: Vector::new(0.0, 0.0, 1.0), reference: nadir, sigma_rad: 1e-3 };
+/// let seen = [limb, Seen { measured: Vector::new(1.0, 0.0, 0.0), reference: sun, ..limb }];
+/// let first = first_attitude(&seen).ok_or("the directions are too close")?;
+/// // The mount is known to 1°, and the white noise is 0.29°.
+/// let sigma_deg = first.covariance_rad2.as_inner().diagonal().max().sqrt().to_degrees();
+/// assert!((sigma_deg - 1.04).abs() < 0.005);
+/// # Ok::<(), &str>(())
+/// ```
 pub fn first_attitude(seen: &[Seen<'_>; 2]) -> Option<Wahba> {
     let direction = |s: &Seen<'_>| Direction {
-        body: s.camera.mount * s.measured,
+        vehicle: s.camera.mount * s.measured,
         reference: s.reference,
         sigma_rad: libm::hypot(libm::hypot(s.sigma_rad, s.camera.misalignment.sigma), s.camera.white_rad),
     };
@@ -50,15 +66,17 @@ pub fn propagate_back(state: &Nominal, samples: &[Imu]) -> Nominal {
 }
 
 impl<const N: usize> Filter<N> {
-    /// Sets the attitude and its covariance (rotation vector in ECEF, rad²). It becomes independent of all other
+    /// Sets the attitude and the covariance of its error, a rotation vector (rad²). It becomes independent of all other
     /// errors.
-    pub fn set_attitude(&mut self, attitude: &UnitQuaternion<f64>, covariance_rad2: &Matrix3<f64>) {
+    pub fn set_attitude(&mut self, attitude: &Rotation<Vehicle, Fixed>, covariance_rad2: &Covariance<Fixed>) {
         let (nominal, covariance) = self.parts_mut();
         nominal.attitude = *attitude;
+        // The correlations are those of the attitude that is given up, so they go with it.
         for i in Layout::ATTITUDE..Layout::ATTITUDE + 3 {
             covariance.row_mut(i).fill(0.0);
             covariance.column_mut(i).fill(0.0);
         }
+        let covariance_rad2 = covariance_rad2.as_inner();
         let symmetric = (covariance_rad2 + covariance_rad2.transpose()) * 0.5;
         covariance.fixed_view_mut::<3, 3>(Layout::ATTITUDE, Layout::ATTITUDE).copy_from(&symmetric);
     }

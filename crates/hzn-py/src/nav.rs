@@ -8,11 +8,12 @@ use hzn_fuse::input::{self, Inputs};
 use hzn_fuse::{Settings, sink};
 use hzn_nav::ephemeris::{self, Place};
 use hzn_nav::filter::{DirectionMeasurement, Innovation, Step};
+use hzn_nav::frames::{Fixed, Rotation, Vehicle};
 use hzn_nav::layout::MAX_CAMERAS;
 use hzn_nav::options::StartSigmas;
 use hzn_nav::strapdown::{Imu, Nominal};
 use hzn_nav::vectors::{Direction, davenport, triad};
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use pyo3::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -33,18 +34,18 @@ fn to_exception(error: hzn_fuse::Error) -> PyErr {
 }
 
 /// Returns a rotation from its matrix.
-fn rotation(name: &str, rows: &Rows) -> PyResult<UnitQuaternion<f64>> {
+fn rotation<A, B>(name: &str, rows: &Rows) -> PyResult<Rotation<A, B>> {
     let m = Matrix3::from_fn(|i, j| rows[i][j]);
     if !((m * m.transpose() - Matrix3::identity()).amax() < 1e-6 && m.determinant() > 0.0) {
         return Err(errors::config(format!(
             "{name}: a rotation matrix is expected (perpendicular unit rows, no mirror)"
         )));
     }
-    Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m)))
+    Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m)).into())
 }
 
-fn matrix(q: &UnitQuaternion<f64>) -> Rows {
-    rows(&q.to_rotation_matrix().into_inner())
+fn matrix<A, B>(rotation: &Rotation<A, B>) -> Rows {
+    rows(&rotation.to_matrix())
 }
 
 fn rows(m: &Matrix3<f64>) -> Rows {
@@ -56,26 +57,29 @@ fn settings(given: &Bound<'_, PyAny>) -> PyResult<Settings> {
     hzn_files::document::parse(&text, Path::new("settings"), Settings::check).map_err(errors::config)
 }
 
-/// Attitude (body to reference) of two directions; None if they are too close.
+/// Attitude (vehicle to reference) of two directions; None if they are too close.
 #[pyfunction]
 #[pyo3(name = "_triad")]
 pub(crate) fn triad_of(first: [Three; 2], second: [Three; 2]) -> Option<Rows> {
-    let direction =
-        |[body, reference]: [Three; 2]| Direction { body: body.into(), reference: reference.into(), sigma_rad: 1.0 };
+    let direction = |[vehicle, reference]: [Three; 2]| Direction::<Vehicle, Fixed> {
+        vehicle: vehicle.into(),
+        reference: reference.into(),
+        sigma_rad: 1.0,
+    };
     triad(&direction(first), &direction(second)).map(|q| matrix(&q))
 }
 
-/// Attitude (body to reference), covariance and misfit of directions; None if they do not determine it.
+/// Attitude (vehicle to reference), covariance and misfit of directions; None if they do not determine it.
 #[pyfunction]
 #[pyo3(name = "_wahba")]
 pub(crate) fn wahba_of(directions: Vec<(Three, Three, f64)>) -> Option<(Rows, Rows, f64)> {
-    let each = directions.iter().map(|(body, reference, sigma_rad)| Direction {
-        body: (*body).into(),
+    let each = directions.iter().map(|(vehicle, reference, sigma_rad)| Direction::<Vehicle, Fixed> {
+        vehicle: (*vehicle).into(),
         reference: (*reference).into(),
         sigma_rad: *sigma_rad,
     });
     let found = davenport(&each.collect::<Vec<_>>())?;
-    Some((matrix(&found.attitude), rows(&found.covariance_rad2), found.chi2))
+    Some((matrix(&found.attitude), rows(found.covariance_rad2.as_inner()), found.chi2))
 }
 
 /// Position of Sun or Moon in ECEF, metres.
@@ -83,7 +87,7 @@ pub(crate) fn wahba_of(directions: Vec<(Three, Three, f64)>) -> Option<(Rows, Ro
 #[pyo3(name = "_celestial")]
 pub(crate) fn celestial(moon: bool, unix_s: f64) -> Three {
     let place: Place = if moon { ephemeris::moon(unix_s) } else { ephemeris::sun(unix_s) };
-    place.position_m()
+    place.position_m().xyz()
 }
 
 /// Replays a flight. Returns the results as plain data.
@@ -211,7 +215,7 @@ impl Filter {
             body: 0,
             measured: measured.into(),
             reference: reference.into(),
-            covariance_rad2,
+            covariance_rad2: covariance_rad2.into(),
             by_limb_height: by_limb_height.into(),
             is_limb,
         };
@@ -229,7 +233,7 @@ impl Filter {
     /// Time, attitude, velocity, position.
     fn state(&self) -> (f64, Rows, Three, Three) {
         let s = self.filter.nominal();
-        (s.time_s, matrix(&s.attitude), s.velocity_m_s.into(), s.position_m.into())
+        (s.time_s, matrix(&s.attitude), s.velocity_m_s.xyz(), s.position_m.xyz())
     }
     fn covariance(&self) -> Vec<Vec<f64>> {
         let n = self.filter.layout().len;
@@ -242,7 +246,6 @@ impl Filter {
     /// Biases of gyros and accelerometers.
     fn biases(&self) -> (Three, Three) {
         let c = self.filter.corrections();
-        let three = |v: Vector3<f64>| -> Three { v.into() };
-        (three(c.gyro_bias), three(c.accel_bias))
+        (c.gyro_bias.xyz(), c.accel_bias.xyz())
     }
 }

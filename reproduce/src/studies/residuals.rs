@@ -3,8 +3,9 @@
 use hzn_files::truth::Truth;
 use hzn_fuse::input::{Body, Inputs};
 use hzn_fuse::simulated::{Errors, Moment};
+use hzn_nav::frames::{Cam, Covariance, Rotation, Vector};
 use hzn_sim::Scenario;
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 /// Time for which errors come from one flight and camera, s.
 const BLOCK_S: f64 = 20.0;
@@ -29,14 +30,16 @@ pub(super) struct Residuals {
 }
 
 /// Returns the rotation from the camera frame to that of a direction: z along it, x away from the boresight.
-fn frame(axis: &Vector3<f64>) -> Matrix3<f64> {
+fn frame(axis: &Vector<Cam>) -> Matrix3<f64> {
+    let axis = axis.as_inner();
     let away = axis * axis.z - Vector3::z();
     let x = away.try_normalize(1e-9).unwrap_or_else(Vector3::x);
     Matrix3::from_rows(&[x.transpose(), axis.cross(&x).transpose(), axis.transpose()])
 }
 
-fn off_axis_deg(axis: &Vector3<f64>) -> f64 {
-    axis.z.clamp(-1.0, 1.0).acos().to_degrees()
+fn off_axis_deg(axis: &Vector<Cam>) -> f64 {
+    let [_, _, z] = axis.xyz();
+    z.clamp(-1.0, 1.0).acos().to_degrees()
 }
 
 impl Residuals {
@@ -52,15 +55,15 @@ impl Residuals {
                 let kinds = one.bodies.iter().filter(|k| super::recordings::is_earth(**k) == (seen.body == Body::Limb));
                 let Some(&kind) = kinds.clone().next() else { continue };
                 let truth: Truth = frame_of.scene.body_truth(kind, &frame_of.file, frame_of.time_s)?;
-                let axis = Vector3::new(truth.axis_x, truth.axis_y, truth.axis_z);
+                let axis = Vector::new(truth.axis_x, truth.axis_y, truth.axis_z);
                 let to_frame = frame(&axis);
                 residuals.push(Residual {
                     body: seen.body,
                     off_axis_deg: off_axis_deg(&axis),
                     altitude_km: row.altitude_km.unwrap_or(0.0),
-                    error: to_frame * (seen.axis - axis),
-                    covariance: to_frame * seen.covariance_rad2 * to_frame.transpose(),
-                    by_limb_height: to_frame * seen.by_limb_height,
+                    error: to_frame * (seen.axis - axis).as_inner(),
+                    covariance: to_frame * seen.covariance_rad2.as_inner() * to_frame.transpose(),
+                    by_limb_height: to_frame * seen.by_limb_height.as_inner(),
                 });
             }
             cameras.push(residuals);
@@ -113,7 +116,7 @@ pub(super) struct Drawn<'a> {
 
 impl Drawn<'_> {
     /// Returns the error of the donor's direction that is most alike.
-    fn find(&self, at: &Moment, axis: &Vector3<f64>) -> Option<Residual> {
+    fn find(&self, at: &Moment, axis: &Vector<Cam>) -> Option<Residual> {
         let block = (at.time_s / BLOCK_S).floor() as u64;
         let lists: Vec<&Vec<Residual>> =
             self.donors.lists.iter().filter(|list| list.iter().any(|r| r.body == at.body)).collect();
@@ -129,16 +132,16 @@ impl Drawn<'_> {
 }
 
 impl Errors for Drawn<'_> {
-    fn draw(&mut self, at: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+    fn draw(&mut self, at: &Moment, axis: &Vector<Cam>) -> (Vector<Cam>, Covariance<Cam>) {
         let to_camera = frame(axis).transpose();
         match self.find(at, axis) {
-            Some(r) => (to_camera * r.error, to_camera * r.covariance * to_camera.transpose()),
-            None => (Vector3::zeros(), Matrix3::identity()),
+            Some(r) => ((to_camera * r.error).into(), (to_camera * r.covariance * to_camera.transpose()).into()),
+            None => (Vector::zeros(), Covariance::isotropic(1.0)),
         }
     }
 
-    fn by_limb_height(&mut self, at: &Moment, axis: &Vector3<f64>) -> Vector3<f64> {
-        self.find(at, axis).map_or_else(Vector3::zeros, |r| frame(axis).transpose() * r.by_limb_height)
+    fn by_limb_height(&mut self, at: &Moment, axis: &Vector<Cam>) -> Vector<Cam> {
+        self.find(at, axis).map_or_else(Vector::zeros, |r| (frame(axis).transpose() * r.by_limb_height).into())
     }
 }
 
@@ -157,8 +160,8 @@ pub(super) fn replace_one_in_fifty(inputs: &mut Inputs) {
         let limbs = recording.seen.iter_mut().filter(|s| s.body == Body::Limb);
         for (k, seen) in limbs.enumerate().filter(|(k, _)| mix((*k as u64) << 8 | camera as u64).is_multiple_of(50)) {
             let across = frame(&seen.axis).transpose() * Vector3::new((k as f64).cos(), (k as f64).sin(), 0.0);
-            seen.axis = UnitQuaternion::from_scaled_axis(across * 52f64.to_radians()) * seen.axis;
-            seen.covariance_rad2 = (Matrix3::identity() - seen.axis * seen.axis.transpose()) * sigma.powi(2);
+            seen.axis = Rotation::from_scaled_axis((across * 52f64.to_radians()).into()) * seen.axis;
+            seen.covariance_rad2 = Covariance::across(&seen.axis, sigma.powi(2));
         }
     }
 }

@@ -6,11 +6,12 @@ use hzn_fuse::input::{Inputs, Seen};
 use hzn_fuse::simulated::{Errors, Moment, inputs};
 use hzn_nav::delayed::{Counts, Delayed, Measurement};
 use hzn_nav::filter::{DirectionMeasurement, Filter};
+use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::options::{Block, CameraOptions, Options, StartSigmas};
 use hzn_nav::strapdown::{Imu, Nominal};
 use hzn_sim::Scenario;
 use hzn_tests::emulated::Board;
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::Matrix3;
 
 /// Numbers in a record of `nav.bin` and of `nav-results.bin`.
 const RECORD: usize = 32;
@@ -22,11 +23,12 @@ const SPAN_S: [f64; 2] = [120.0, 150.0];
 struct Exact;
 
 impl Errors for Exact {
-    fn draw(&mut self, _: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
-        (Vector3::zeros(), (Matrix3::identity() - axis * axis.transpose()) * 0.05f64.to_radians().powi(2))
+    fn draw(&mut self, _: &Moment, axis: &Vector<Cam>) -> (Vector<Cam>, Covariance<Cam>) {
+        (Vector::zeros(), Covariance::across(axis, 0.05f64.to_radians().powi(2)))
     }
-    fn by_limb_height(&mut self, _: &Moment, axis: &Vector3<f64>) -> Vector3<f64> {
-        (Vector3::z() - axis * axis.z) * 3e-4
+    fn by_limb_height(&mut self, _: &Moment, axis: &Vector<Cam>) -> Vector<Cam> {
+        let [_, _, z] = axis.xyz();
+        (Vector::new(0.0, 0.0, 1.0) - *axis * z) * 3e-4
     }
 }
 
@@ -36,15 +38,15 @@ fn record(numbers: impl IntoIterator<Item = f64>) -> [f64; RECORD] {
     record
 }
 
-fn wxyz(q: &UnitQuaternion<f64>) -> [f64; 4] {
-    [q.w, q.i, q.j, q.k]
+fn three<F>(record: &[f64; RECORD], from: usize) -> Vector<F> {
+    Vector::new(record[from], record[from + 1], record[from + 2])
 }
 
 /// The records of a flight: 100 samples and one picture of each camera a second.
 struct Recorded {
     start: Nominal,
     sigmas: [f64; 3],
-    mounts: [UnitQuaternion<f64>; 2],
+    mounts: [Rotation<Cam, Vehicle>; 2],
     records: Vec<[f64; RECORD]>,
 }
 
@@ -57,11 +59,12 @@ impl Recorded {
         scene.gnss.as_mut().unwrap().from_s = Some(SPAN_S[0]);
         let all: Inputs = inputs(&scene, &mut Exact, 0.0).unwrap();
         let truth = scene.path().unwrap().state(SPAN_S[0]);
+        let attitude = Rotation::<Vehicle, Fixed>::from(truth.fixed_from_vehicle);
         let start = Nominal {
             time_s: SPAN_S[0],
-            attitude: UnitQuaternion::from_scaled_axis(Vector3::new(0.02, -0.01, 0.015)) * truth.fixed_from_vehicle,
-            velocity_m_s: truth.velocity_mps,
-            position_m: truth.position_m,
+            attitude: Rotation::from_scaled_axis(Vector::new(0.02, -0.01, 0.015)) * attitude,
+            velocity_m_s: truth.velocity_mps.into(),
+            position_m: truth.position_m.into(),
         };
         let mounts = [0, 1].map(|i| all.recordings[i].mount.unwrap());
         Self { start, sigmas: [0.035, 1.0, 30.0], mounts, records: records(&all) }
@@ -69,9 +72,9 @@ impl Recorded {
 
     fn start_record(&self) -> [f64; RECORD] {
         let s = &self.start;
-        let numbers = [0.0, s.time_s].into_iter().chain(wxyz(&s.attitude));
-        let numbers = numbers.chain(s.velocity_m_s.iter().copied()).chain(s.position_m.iter().copied());
-        record(numbers.chain(self.sigmas).chain(self.mounts.iter().flat_map(wxyz)))
+        let numbers = [0.0, s.time_s].into_iter().chain(s.attitude.wxyz());
+        let numbers = numbers.chain(s.velocity_m_s.xyz()).chain(s.position_m.xyz());
+        record(numbers.chain(self.sigmas).chain(self.mounts.iter().flat_map(Rotation::wxyz)))
     }
 
     /// Runs the filter on this machine.
@@ -82,29 +85,28 @@ impl Recorded {
         let filter = Filter::<42>::new(self.start, &options, &self.mounts.map(camera)).unwrap();
         let mut flight = Delayed::<42, 64, 16>::new(filter, 0.5);
         for r in &self.records {
-            let three = |i: usize| Vector3::new(r[i], r[i + 1], r[i + 2]);
             let time_s = r[1];
             match r[0] as u32 {
                 1 => {
-                    let imu = Imu { time_s, gyro_rad_s: three(2), accel_m_s2: three(5) };
+                    let imu = Imu { time_s, gyro_rad_s: three(r, 2), accel_m_s2: three(r, 5) };
                     flight.push_sample(&imu, r[8] > 0.5, |_, _, _| ());
                 }
                 2 => {
-                    let covariance_rad2 = Matrix3::from_rows(&[9, 12, 15].map(|i| three(i).transpose()));
+                    let rows = [9, 12, 15].map(|i| three::<Cam>(r, i).into_inner().transpose());
                     let direction = DirectionMeasurement {
                         camera: r[2] as usize,
                         body: 0,
-                        measured: three(3),
-                        reference: three(6),
-                        covariance_rad2,
-                        by_limb_height: three(18),
+                        measured: three(r, 3),
+                        reference: three(r, 6),
+                        covariance_rad2: Matrix3::from_rows(&rows).into(),
+                        by_limb_height: three(r, 18),
                         is_limb: true,
                     };
                     flight.push(time_s, Measurement::Direction(direction)).unwrap();
                 }
                 _ => {
-                    flight.push(time_s, Measurement::Position(three(2), r[5])).unwrap();
-                    flight.push(time_s, Measurement::Velocity(three(6), r[9])).unwrap();
+                    flight.push(time_s, Measurement::Position(three(r, 2), r[5])).unwrap();
+                    flight.push(time_s, Measurement::Velocity(three(r, 6), r[9])).unwrap();
                 }
             }
         }
@@ -130,23 +132,23 @@ fn records(all: &Inputs) -> Vec<[f64; RECORD]> {
     // The boards write a result for every hundredth sample.
     for s in all.imu.iter().take(3000) {
         let i = &s.imu;
-        let numbers = [1.0, i.time_s].into_iter().chain(i.gyro_rad_s.iter().copied());
-        let numbers = numbers.chain(i.accel_m_s2.iter().copied()).chain([f64::from(u8::from(s.saturated))]);
+        let numbers = [1.0, i.time_s].into_iter().chain(i.gyro_rad_s.xyz());
+        let numbers = numbers.chain(i.accel_m_s2.xyz()).chain([f64::from(u8::from(s.saturated))]);
         out.push((i.time_s, record(numbers)));
     }
     for (camera, recording) in all.recordings.iter().enumerate() {
         let is_inside = |s: &&Seen| (SPAN_S[0] + 0.5..SPAN_S[1] - 0.5).contains(&s.time_s);
         for s in recording.seen.iter().filter(is_inside) {
             let reference = s.reference.unwrap();
-            let rows = s.covariance_rad2.transpose();
-            let numbers = [2.0, s.time_s, camera as f64].into_iter().chain(s.axis.iter().copied());
-            let numbers = numbers.chain(reference.iter().copied()).chain(rows.iter().copied());
-            out.push((s.time_s, record(numbers.chain(s.by_limb_height.iter().copied()))));
+            let rows = s.covariance_rad2.as_inner().transpose();
+            let numbers = [2.0, s.time_s, camera as f64].into_iter().chain(s.axis.xyz());
+            let numbers = numbers.chain(reference.xyz()).chain(rows.iter().copied());
+            out.push((s.time_s, record(numbers.chain(s.by_limb_height.xyz()))));
         }
     }
     for f in all.gnss.iter().filter(|f| f.time_s > SPAN_S[0] + 0.5) {
-        let numbers = [3.0, f.time_s].into_iter().chain(f.position_m.iter().copied()).chain([f.position_sigma_m]);
-        let numbers = numbers.chain(f.velocity_m_s.iter().copied()).chain([f.velocity_sigma_m_s]);
+        let numbers = [3.0, f.time_s].into_iter().chain(f.position_m.xyz()).chain([f.position_sigma_m]);
+        let numbers = numbers.chain(f.velocity_m_s.xyz()).chain([f.velocity_sigma_m_s]);
         out.push((f.time_s, record(numbers)));
     }
     out.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -164,8 +166,8 @@ fn the_filter_flies_with_the_solution_of_this_machine() {
         let results = flight.on_board(board, folder.path());
         assert_eq!(results.len(), 30, "{board:?}");
         let last = results.last().unwrap();
-        let q = UnitQuaternion::new_normalize(nalgebra::Quaternion::new(last[1], last[2], last[3], last[4]));
-        let x = Vector3::new(last[8], last[9], last[10]);
+        let q = Rotation::assume_from_quaternion([last[1], last[2], last[3], last[4]]).unwrap();
+        let x = Vector::new(last[8], last[9], last[10]);
         assert_eq!(last[18] as u64, counts.taken, "{board:?}");
         assert_eq!(last[0], here.time_s);
         // The order of additions and the fused products of the compilers differ.

@@ -3,18 +3,18 @@
 use std::path::Path;
 
 use hzn_fuse::simulated::{Errors, Moment, inputs, write};
+use hzn_nav::frames::{Cam, Covariance, Vector};
 use hzn_sim::Scenario;
-use nalgebra::{Matrix3, Vector3};
 
 /// Directions without errors that claim 0.05°.
 struct Exact;
 
 impl Errors for Exact {
-    fn draw(&mut self, _: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
-        (Vector3::zeros(), (Matrix3::identity() - axis * axis.transpose()) * 0.05f64.to_radians().powi(2))
+    fn draw(&mut self, _: &Moment, axis: &Vector<Cam>) -> (Vector<Cam>, Covariance<Cam>) {
+        (Vector::zeros(), Covariance::across(axis, 0.05f64.to_radians().powi(2)))
     }
-    fn by_limb_height(&mut self, _: &Moment, _: &Vector3<f64>) -> Vector3<f64> {
-        Vector3::zeros()
+    fn by_limb_height(&mut self, _: &Moment, _: &Vector<Cam>) -> Vector<Cam> {
+        Vector::zeros()
     }
 }
 

@@ -28,6 +28,9 @@ pub enum Fixed {}
 /// The frame of the vehicle; the mounting rotation ties it to the camera frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Vehicle {}
+/// A frame that does not turn against the stars: the ICRF, with z to the pole of J2000 and x to its equinox.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Inertial {}
 
 /// A direction: three numbers of unit length in frame `F`.
 ///

@@ -1,7 +1,7 @@
 //! A flight with its data in the order of time.
 
+use hzn_nav::frames::{Cam, Rotation, Vehicle};
 use hzn_nav::strapdown::Nominal;
-use nalgebra::UnitQuaternion;
 
 use super::events::Event;
 use crate::input::{Inputs, Sample};
@@ -11,7 +11,7 @@ use crate::results::Fused;
 #[derive(Clone, Copy)]
 pub(super) struct Flight<'a> {
     pub(super) inputs: &'a Inputs,
-    pub(super) mounts: &'a [UnitQuaternion<f64>],
+    pub(super) mounts: &'a [Rotation<Cam, Vehicle>],
     pub(super) samples: &'a [Sample],
     pub(super) events: &'a [Event],
 }

@@ -1,8 +1,8 @@
 //! The state at the start: an attitude from directions or a star tracker, position and velocity from the receiver.
 
+use hzn_nav::frames::{Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::options::CameraOptions;
 use hzn_nav::strapdown::Nominal;
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::data::Flight;
 use super::events::Source;
@@ -19,7 +19,7 @@ const FIX_S: f64 = 5.0;
 /// The state at the start.
 pub(super) struct Found {
     pub(super) state: Nominal,
-    pub(super) covariance_rad2: Matrix3<f64>,
+    pub(super) covariance_rad2: Covariance<Fixed>,
     pub(super) position_sigma_m: f64,
     pub(super) velocity_sigma_m_s: f64,
     pub(super) begin: Begin,
@@ -41,7 +41,7 @@ pub(super) fn first_attitude(
             Source::Gnss(_) => None,
             Source::Attitude(index) => {
                 let seen = flight.inputs.attitudes.get(index);
-                seen.and_then(|a| Some((a.fixed_from_vehicle?, Matrix3::identity() * a.sigma_rad.powi(2), 0, 0.0)))
+                seen.and_then(|a| Some((a.fixed_from_vehicle?, Covariance::isotropic(a.sigma_rad.powi(2)), 0, 0.0)))
             }
             Source::Camera(camera, index) => {
                 let seen = flight.inputs.recordings.get(camera).and_then(|r| r.seen.get(index));
@@ -52,7 +52,7 @@ pub(super) fn first_attitude(
                     let on_vehicle = options.mount * seen.axis;
                     Some(Sight { time_s: event.time_s, camera, body: seen.body, on_vehicle, reference, sigma_rad })
                 });
-                let Some(sight) = sight.filter(|s| s.on_vehicle.iter().all(|x| x.is_finite())) else { continue };
+                let Some(sight) = sight.filter(|s| s.on_vehicle.is_finite()) else { continue };
                 if !bodies.contains(&sight.body) {
                     bodies.push(sight.body);
                 }
@@ -97,14 +97,14 @@ fn no_attitude(bodies: &[Body], contradicts: bool, settings: &Settings) -> Error
 /// Returns the state at the start, with position and velocity of a fix near it.
 fn found_at(
     begin: Begin,
-    attitude: UnitQuaternion<f64>,
-    covariance_rad2: Matrix3<f64>,
+    attitude: Rotation<Vehicle, Fixed>,
+    covariance_rad2: Covariance<Fixed>,
     fix: &Fix,
     settings: &Settings,
 ) -> Found {
     let dt = begin.time_s - fix.time_s;
     let [position, velocity] = sigmas(fix, settings);
-    let moved = if fix.velocity_m_s.iter().all(|x| x.is_finite()) { fix.velocity_m_s } else { Vector3::zeros() };
+    let moved = if fix.velocity_m_s.is_finite() { fix.velocity_m_s } else { Vector::zeros() };
     let state =
         Nominal { time_s: begin.time_s, attitude, velocity_m_s: moved, position_m: fix.position_m + moved * dt };
     // The vehicle may accelerate by 10 g in between.
@@ -138,13 +138,13 @@ fn without_one_camera(sights: &[Sight], reckoning: &DeadReckoning) -> Sighted {
 fn fix_near(fixes: &[Fix], time_s: f64) -> Option<Fix> {
     let agrees = |a: &Fix, b: &Fix| {
         let dt = b.time_s - a.time_s;
-        let velocity = if a.velocity_m_s.iter().all(|x| x.is_finite()) { a.velocity_m_s } else { Vector3::zeros() };
-        let slack = if velocity == Vector3::zeros() { 1e4 * dt.abs() } else { 60.0 * dt * dt };
+        let velocity = if a.velocity_m_s.is_finite() { a.velocity_m_s } else { Vector::zeros() };
+        let slack = if velocity == Vector::zeros() { 1e4 * dt.abs() } else { 60.0 * dt * dt };
         (a.position_m + velocity * dt - b.position_m).norm() < 200.0 + slack
     };
     let is_usable = |i: usize, fix: &Fix| {
         let neighbours = [i.checked_sub(1), Some(i + 1)].into_iter().flatten().filter_map(|j| fixes.get(j));
-        fix.position_m.iter().all(|x| x.is_finite()) && neighbours.into_iter().any(|other| agrees(fix, other))
+        fix.position_m.is_finite() && neighbours.into_iter().any(|other| agrees(fix, other))
     };
     let near = fixes.iter().enumerate().filter(|(_, fix)| (fix.time_s - time_s).abs() <= FIX_S);
     let usable = near.filter(|(i, fix)| is_usable(*i, fix)).map(|(_, fix)| *fix);
@@ -162,7 +162,7 @@ pub(super) fn sigmas(fix: &Fix, settings: &Settings) -> [f64; 2] {
 
 /// Returns the 1-sigma of a direction on the vehicle, with the errors of mount and limb height.
 pub(super) fn sight_sigma(seen: &Seen, camera: Option<&CameraOptions>) -> f64 {
-    let own = seen.covariance_rad2.symmetric_eigenvalues().max().max(0.0).sqrt();
+    let own = seen.covariance_rad2.as_inner().symmetric_eigenvalues().max().max(0.0).sqrt();
     let (mount, white) = camera.map_or((0.0, 0.0), |c| (c.misalignment.sigma, c.white_rad));
     // The limb height is known to some kilometres.
     own.hypot(seen.by_limb_height.norm() * 7.0).hypot(mount).hypot(white)

@@ -6,8 +6,8 @@ mod first;
 pub(crate) mod reference;
 mod runner;
 
+use hzn_nav::frames::{Cam, Rotation, Vehicle};
 use hzn_nav::layout::MAX_CAMERAS;
-use nalgebra::UnitQuaternion;
 
 use crate::error::Error;
 use crate::input::{Inputs, Recording};
@@ -106,12 +106,12 @@ fn replay<const N: usize>(flight: &Flight<'_>, settings: &Settings, wanted: Want
 }
 
 /// Returns the mounts of all recordings.
-fn mounts(recordings: &[Recording]) -> Result<Vec<UnitQuaternion<f64>>, Error> {
+fn mounts(recordings: &[Recording]) -> Result<Vec<Rotation<Cam, Vehicle>>, Error> {
     if recordings.len() > MAX_CAMERAS {
         let what = "recordings of cameras; the filter has memory for";
         return Err(Error::unusable(format!("{} {what} {MAX_CAMERAS}", recordings.len())));
     }
-    let mut mounts: Vec<UnitQuaternion<f64>> = Vec::new();
+    let mut mounts: Vec<Rotation<Cam, Vehicle>> = Vec::new();
     for (i, one) in recordings.iter().enumerate() {
         let name = &one.name;
         let Some(mount) = one.mount else {

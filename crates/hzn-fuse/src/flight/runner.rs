@@ -1,11 +1,12 @@
 //! The filter over the samples and measurements of a flight.
 
 use hzn_nav::filter::{DirectionMeasurement, Filter, Unusable};
+use hzn_nav::frames::{Cam, Covariance, Rotation, Vector, Vehicle};
 use hzn_nav::layout::Layout;
 use hzn_nav::options::{CameraOptions, StartSigmas};
 use hzn_nav::strapdown::{Imu, Nominal};
 use hzn_nav::vectors::{Direction, triad};
-use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
+use nalgebra::SMatrix;
 
 use super::data::Flight;
 use super::events::{Event, Source};
@@ -57,7 +58,7 @@ impl<'a, const N: usize> Runner<'a, N> {
     pub(super) fn new(flight: &Flight<'a>, settings: &'a Settings, record: bool) -> Result<Self, Error> {
         let recordings = &flight.inputs.recordings;
         let bodies: Vec<Vec<Body>> = recordings.iter().map(Recording::bodies).collect();
-        let options = |((r, mount), bodies): ((&Recording, &UnitQuaternion<f64>), &Vec<Body>)| {
+        let options = |((r, mount), bodies): ((&Recording, &Rotation<Cam, Vehicle>), &Vec<Body>)| {
             settings.camera_options(&r.name, *mount, bodies.len())
         };
         let cameras: Vec<CameraOptions> = recordings.iter().zip(flight.mounts).zip(&bodies).map(options).collect();
@@ -71,7 +72,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         };
         let mut filter = Filter::<N>::new(found.state, &settings.options(limb_sigma_km, sigmas), &cameras)
             .map_err(Error::unusable)?;
-        let least = Matrix3::identity() * sigmas.attitude_rad.powi(2);
+        let least = Covariance::isotropic(sigmas.attitude_rad.powi(2));
         filter.set_attitude(&found.state.attitude, &(found.covariance_rad2 + least));
         Ok(Self {
             flight: *flight,
@@ -220,10 +221,10 @@ impl<'a, const N: usize> Runner<'a, N> {
         if !measurement.is_finite() {
             return Err(Unusable::NotFinite.as_str());
         }
-        let told = self.cameras.get(camera).map_or_else(UnitQuaternion::identity, |c| c.mount);
+        let told = self.cameras.get(camera).map_or_else(Rotation::identity, |c| c.mount);
         let mount = self.filter.camera(camera).map_or(told, |c| c.mount);
-        let angle = (self.filter.nominal().attitude * mount * seen.axis).angle(&reference);
-        let unaided = (self.unaided.attitude * told * seen.axis).angle(&reference);
+        let angle = (self.filter.nominal().attitude * mount * seen.axis).angle_rad(&reference);
+        let unaided = (self.unaided.attitude * told * seen.axis).angle_rad(&reference);
         let sigma_rad = sight_sigma(&seen, self.cameras.get(camera));
         let sight = Sight { time_s, camera, body: seen.body, on_vehicle: mount * seen.axis, reference, sigma_rad };
         self.pair(&sight);
@@ -240,7 +241,8 @@ impl<'a, const N: usize> Runner<'a, N> {
         if let Some(innovation) = self.out.innovations.last_mut() {
             innovation.angle_rad = Some(angle);
             innovation.unaided_rad = Some(unaided);
-            innovation.sensor_sigma_rad = Some(seen.covariance_rad2.symmetric_eigenvalues().max().max(0.0).sqrt());
+            innovation.sensor_sigma_rad =
+                Some(seen.covariance_rad2.as_inner().symmetric_eigenvalues().max().max(0.0).sqrt());
         }
         self.verdicts.push((seen.body, done.taken));
         self.restart_if_lost(time_s, seen.body);
@@ -270,7 +272,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         let Some(other) = other else { return };
         let earlier = self.reckoning.at(sight.time_s).inverse() * self.reckoning.at(other.time_s);
         let direction =
-            |s: &Sight, body: Vector3<f64>| Direction { body, reference: s.reference, sigma_rad: s.sigma_rad };
+            |s: &Sight, vehicle: Vector<Vehicle>| Direction { vehicle, reference: s.reference, sigma_rad: s.sigma_rad };
         let mut both = [direction(sight, sight.on_vehicle), direction(other, earlier * other.on_vehicle)];
         both.sort_by(|a, b| a.sigma_rad.total_cmp(&b.sigma_rad));
         let [first, second] = both;
@@ -303,7 +305,7 @@ impl<'a, const N: usize> Runner<'a, N> {
     /// Begins again with the attitude of the last directions, if they determine one and agree on it.
     fn begin_again(&mut self, time_s: f64, why: &str) {
         let Sighted::Attitude(wahba, _) = attitude(&self.sights, &self.reckoning) else { return };
-        let least = Matrix3::identity() * self.settings.start.attitude_deg.to_radians().powi(2);
+        let least = Covariance::isotropic(self.settings.start.attitude_deg.to_radians().powi(2));
         self.filter.set_attitude(&wahba.attitude, &(wahba.covariance_rad2 + least));
         self.verdicts.clear();
         self.begins = true;
@@ -316,7 +318,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         let [position_sigma, velocity_sigma] = sigmas(fix, self.settings);
         let done = self.filter.update_position(&fix.position_m, position_sigma).map_err(Unusable::as_str)?;
         self.keep(time_s, None, Kind::Position, &done);
-        if fix.velocity_m_s.iter().all(|x| x.is_finite()) {
+        if fix.velocity_m_s.is_finite() {
             let done = self.filter.update_velocity(&fix.velocity_m_s, velocity_sigma).map_err(Unusable::as_str)?;
             self.keep(time_s, None, Kind::Velocity, &done);
         }

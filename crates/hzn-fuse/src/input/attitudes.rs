@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::{Quaternion, UnitQuaternion};
+use hzn_nav::frames::{Fixed, Rotation, Vehicle};
 
 use super::table::Table;
 use crate::error::Error;
@@ -12,15 +12,15 @@ use crate::error::Error;
 pub struct Attitude {
     /// Time, s.
     pub time_s: f64,
-    /// Rotation from the body frame to ECEF; `None` if the cells are not a quaternion.
-    pub fixed_from_vehicle: Option<UnitQuaternion<f64>>,
+    /// Rotation from the vehicle's frame to ECEF; `None` if the cells are not a quaternion.
+    pub fixed_from_vehicle: Option<Rotation<Vehicle, Fixed>>,
     /// 1-sigma about each axis, rad.
     pub sigma_rad: f64,
 }
 
 const NAMES: [&str; 6] = ["time_s", "qw", "qx", "qy", "qz", "sigma_deg"];
 
-/// Reads a table with the columns `time_s`, `qw`, `qx`, `qy`, `qz` (body to ECEF) and `sigma_deg`.
+/// Reads a table with the columns `time_s`, `qw`, `qx`, `qy`, `qz` (vehicle to ECEF) and `sigma_deg`.
 ///
 /// # Errors
 /// The file cannot be read, a column is missing, or a cell is not a number.
@@ -28,9 +28,7 @@ pub fn attitudes(path: &Path) -> Result<Vec<Attitude>, Error> {
     let table = Table::read(path, &NAMES, 6)?;
     let attitude = |row: &[f64]| {
         let [time_s, w, x, y, z, sigma_deg] = row.try_into().unwrap_or([f64::NAN; 6]);
-        let q = Quaternion::new(w, x, y, z);
-        let is_unit = (q.norm() - 1.0).abs() < 0.01;
-        let fixed_from_vehicle = is_unit.then(|| UnitQuaternion::from_quaternion(q));
+        let fixed_from_vehicle = super::rotation([w, x, y, z]).ok();
         Attitude { time_s, fixed_from_vehicle, sigma_rad: sigma_deg.to_radians() }
     };
     Ok(table.rows().map(attitude).collect())

@@ -2,20 +2,20 @@
 
 use std::path::Path;
 
-use nalgebra::Vector3;
+use hzn_nav::frames::{Fixed, Vector};
 
 use super::table::Table;
 use crate::error::Error;
 
-/// A fix of the receiver, in ECEF; the velocity is relative to the Earth.
+/// A fix of the receiver; the velocity is relative to the Earth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fix {
     /// Time, s.
     pub time_s: f64,
     /// Position, m.
-    pub position_m: Vector3<f64>,
+    pub position_m: Vector<Fixed>,
     /// Velocity, m/s; not finite if there is none.
-    pub velocity_m_s: Vector3<f64>,
+    pub velocity_m_s: Vector<Fixed>,
     /// 1-sigma of each component of the position, m; NaN if the file does not have it.
     pub position_sigma_m: f64,
     /// 1-sigma of each component of the velocity, m/s; NaN if the file does not have it.
@@ -41,8 +41,8 @@ pub fn gnss(path: &Path) -> Result<Vec<Fix>, Error> {
             row.try_into().unwrap_or([f64::NAN; 9]);
         Fix {
             time_s,
-            position_m: Vector3::new(x, y, z),
-            velocity_m_s: Vector3::new(vx, vy, vz),
+            position_m: Vector::new(x, y, z),
+            velocity_m_s: Vector::new(vx, vy, vz),
             position_sigma_m,
             velocity_sigma_m_s,
         }

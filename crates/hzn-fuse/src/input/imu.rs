@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use hzn_nav::frames::Vector;
 use hzn_nav::strapdown::Imu;
-use nalgebra::Vector3;
 
 use super::table::Table;
 use crate::error::Error;
@@ -11,7 +11,7 @@ use crate::error::Error;
 /// A sample of the inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// Rates and specific forces (body frame).
+    /// Rates and specific forces.
     pub imu: Imu,
     /// Whether a channel was at its limit.
     pub saturated: bool,
@@ -47,7 +47,7 @@ pub fn imu(path: &Path) -> Result<Vec<Sample>, Error> {
     let table = Table::read(path, &NAMES, 7)?;
     let sample = |row: &[f64]| {
         let [time_s, gx, gy, gz, ax, ay, az, saturated] = row.try_into().unwrap_or([f64::NAN; 8]);
-        let imu = Imu { time_s, gyro_rad_s: Vector3::new(gx, gy, gz), accel_m_s2: Vector3::new(ax, ay, az) };
+        let imu = Imu { time_s, gyro_rad_s: Vector::new(gx, gy, gz), accel_m_s2: Vector::new(ax, ay, az) };
         Sample { imu, saturated: saturated > 0.5 }
     };
     Ok(table.rows().map(sample).collect())

@@ -7,11 +7,22 @@ mod mount;
 mod recording;
 mod table;
 
+use hzn_nav::frames::Rotation;
+use nalgebra::Quaternion;
+
 pub use attitudes::{Attitude, attitudes};
 pub use gnss::{Fix, gnss};
 pub use imu::{Sample, imu};
 pub use mount::mount;
 pub use recording::{Body, Centre, Recording, Seen, recording};
+
+/// Returns the rotation of a quaternion, scalar first; its length if that is not 1.
+fn rotation<A, B>(wxyz: [f64; 4]) -> Result<Rotation<A, B>, f64> {
+    let [w, x, y, z] = wxyz;
+    let length = Quaternion::new(w, x, y, z).norm();
+    let is_unit = (length - 1.0).abs() < 0.01;
+    Rotation::assume_from_quaternion(wxyz).filter(|_| is_unit).ok_or(length)
+}
 
 /// Everything that a flight recorded.
 #[derive(Debug, Clone, Default)]

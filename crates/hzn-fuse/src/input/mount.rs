@@ -4,7 +4,8 @@ use std::path::Path;
 
 use hzn_core::config::Mount;
 use hzn_files::limited;
-use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
+use hzn_nav::frames::{Cam, Rotation, Vehicle};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use serde::Deserialize;
 
 use crate::error::Error;
@@ -22,16 +23,16 @@ struct File {
 #[derive(Debug, Deserialize)]
 struct Table {
     q_vehicle_from_camera_wxyz: Option<[f64; 4]>,
-    /// Rows of the rotation from the camera to the body frame.
+    /// Rows of the rotation from the camera to the vehicle's frame.
     vehicle_from_camera: Option<[[f64; 3]; 3]>,
 }
 
-/// Reads the mount (camera to body) from the table `[mount]` of a TOML file: `q_vehicle_from_camera_wxyz`, or
+/// Reads the mount (camera to vehicle) from the table `[mount]` of a TOML file: `q_vehicle_from_camera_wxyz`, or
 /// `vehicle_from_camera` as a matrix with its rows.
 ///
 /// # Errors
 /// The file cannot be read, has no such table, or the numbers are not a rotation.
-pub fn mount(path: &Path) -> Result<UnitQuaternion<f64>, Error> {
+pub fn mount(path: &Path) -> Result<Rotation<Cam, Vehicle>, Error> {
     let shown = path.display();
     let text =
         limited::read_text(path, limited::SETTINGS_BYTES).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
@@ -48,19 +49,16 @@ pub fn mount(path: &Path) -> Result<UnitQuaternion<f64>, Error> {
 }
 
 /// Returns the mount of a sensor.toml.
-pub(super) fn of_config(mount: Mount) -> Result<UnitQuaternion<f64>, String> {
+pub(super) fn of_config(mount: Mount) -> Result<Rotation<Cam, Vehicle>, String> {
     of_quaternion(mount.q_vehicle_from_camera_wxyz)
 }
 
-fn of_quaternion([w, x, y, z]: [f64; 4]) -> Result<UnitQuaternion<f64>, String> {
-    let q = Quaternion::new(w, x, y, z);
-    if (q.norm() - 1.0).abs() < 0.01 {
-        return Ok(UnitQuaternion::from_quaternion(q));
-    }
-    Err(format!("q_vehicle_from_camera_wxyz: the length is {:.4}, but must be 1", q.norm()))
+fn of_quaternion(wxyz: [f64; 4]) -> Result<Rotation<Cam, Vehicle>, String> {
+    super::rotation(wxyz)
+        .map_err(|length| format!("q_vehicle_from_camera_wxyz: the length is {length:.4}, but must be 1"))
 }
 
-fn of_matrix(rows: [[f64; 3]; 3]) -> Result<UnitQuaternion<f64>, String> {
+fn of_matrix(rows: [[f64; 3]; 3]) -> Result<Rotation<Cam, Vehicle>, String> {
     let m = Matrix3::from_fn(|i, j| rows[i][j]);
     if !((m * m.transpose() - Matrix3::identity()).amax() < TOLERANCE) {
         return Err("vehicle_from_camera: the rows must be perpendicular unit vectors".into());
@@ -70,5 +68,5 @@ fn of_matrix(rows: [[f64; 3]; 3]) -> Result<UnitQuaternion<f64>, String> {
             "vehicle_from_camera: the determinant is -1, so the matrix mirrors; check the sign of one axis".into()
         );
     }
-    Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m)))
+    Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m)).into())
 }

@@ -5,8 +5,9 @@ use std::path::Path;
 use hzn_core::status::Status;
 use hzn_core::{Config, camera};
 use hzn_mcap::Row;
+use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_run::results::Results;
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::Matrix3;
 
 use super::mount;
 use crate::error::Error;
@@ -36,10 +37,10 @@ impl Body {
 /// The position of a body's centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Centre {
-    /// Position in the camera frame, m.
-    pub position_m: Vector3<f64>,
+    /// Position, m.
+    pub position_m: Vector<Cam>,
     /// Its covariance, m².
-    pub covariance_m2: Matrix3<f64>,
+    pub covariance_m2: Covariance<Cam>,
 }
 
 /// A direction that a camera measured.
@@ -49,14 +50,14 @@ pub struct Seen {
     pub time_s: f64,
     /// The body.
     pub body: Body,
-    /// Unit vector in the camera frame.
-    pub axis: Vector3<f64>,
+    /// Unit vector.
+    pub axis: Vector<Cam>,
     /// Its covariance without the error of the limb height, rad².
-    pub covariance_rad2: Matrix3<f64>,
-    /// The same direction in ECEF, if the recording has it.
-    pub reference: Option<Vector3<f64>>,
-    /// Derivative of the axis by the error of the limb height, 1/km (camera frame).
-    pub by_limb_height: Vector3<f64>,
+    pub covariance_rad2: Covariance<Cam>,
+    /// The same direction from outside, if the recording has it.
+    pub reference: Option<Vector<Fixed>>,
+    /// Derivative of the axis by the error of the limb height, 1/km.
+    pub by_limb_height: Vector<Cam>,
     /// The position of the body's centre, if the recording has it.
     pub centre: Option<Centre>,
     /// Index of the row in the recording.
@@ -68,8 +69,8 @@ pub struct Seen {
 pub struct Recording {
     /// Name of the camera: that of the file without its ending.
     pub name: String,
-    /// The mount (camera to body); `None` if the recording does not have it.
-    pub mount: Option<UnitQuaternion<f64>>,
+    /// The mount; `None` if the recording does not have it.
+    pub mount: Option<Rotation<Cam, Vehicle>>,
     /// The lens, if the recording has a sensor.toml.
     pub camera: Option<camera::Config>,
     /// 1-sigma of the limb height that the sensor was told, km.
@@ -174,25 +175,25 @@ fn is_earth(name: &str) -> bool {
 
 /// Returns the direction of a row; `None` if a number is missing.
 fn seen(row: &Row, index: usize, time_s: f64, body: Body, limb_sigma_km: Option<f64>) -> Option<Seen> {
-    let axis = Vector3::from(row.axis()?);
+    let axis = Vector::from(row.axis()?);
     let symmetric = |[xx, xy, xz, yy, yz, zz]: [f64; 6]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     let cov = [row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?];
-    let three = |x: [Option<f64>; 3]| Some(Vector3::new(x[0]?, x[1]?, x[2]?));
+    let three = |x: [Option<f64>; 3]| Some(Vector::new(x[0]?, x[1]?, x[2]?));
     let mut seen = Seen {
         time_s,
         body,
         axis,
-        covariance_rad2: symmetric(cov),
+        covariance_rad2: symmetric(cov).into(),
         reference: three([row.axis_e_x, row.axis_e_y, row.axis_e_z]),
-        by_limb_height: Vector3::zeros(),
+        by_limb_height: Vector::zeros(),
         centre: None,
         row: index,
     };
     if body == Body::Limb {
         seen.separate_limb_height(row, limb_sigma_km);
-        if let Some(position_km) = row.position_km().map(Vector3::from) {
+        if let Some(position_km) = row.position_km().map(Vector::from) {
             let covariance_km2 = symmetric(row.position_covariance_km2()?);
-            seen.centre = Some(Centre { position_m: position_km * 1e3, covariance_m2: covariance_km2 * 1e6 });
+            seen.centre = Some(Centre { position_m: position_km * 1e3, covariance_m2: (covariance_km2 * 1e6).into() });
         }
     }
     Some(seen)
@@ -209,12 +210,12 @@ impl Seen {
         else {
             return;
         };
-        let k = Vector3::new(x, y, z);
+        let k = Vector::new(x, y, z);
         if !(k.norm_squared() > 0.0) {
             return;
         }
         // axis = unit(axis_free + k (c₀ − ĉ)) gives the expected cosine c₀.
-        let axis_free = Vector3::new(free, row.axis_free_y.unwrap_or(0.0), row.axis_free_z.unwrap_or(0.0));
+        let axis_free = Vector::new(free, row.axis_free_y.unwrap_or(0.0), row.axis_free_z.unwrap_or(0.0));
         let moved = self.axis / self.axis.dot(&axis_free) - axis_free;
         let cos = half_angle_deg.to_radians().cos() + moved.dot(&k) / k.norm_squared();
         if !(cos > 0.0 && cos < 1.0) {
@@ -222,12 +223,13 @@ impl Seen {
         }
         let tan = (1.0 - cos * cos).sqrt() / cos;
         let by_limb_height = k * (tan / (hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M / 1e3 + altitude_km));
-        let own = by_limb_height * by_limb_height.transpose() * limb_sigma_km.unwrap_or(0.0).powi(2);
-        let mut rest = (self.covariance_rad2 - own).symmetric_eigen();
+        let height = by_limb_height.as_inner();
+        let own = height * height.transpose() * limb_sigma_km.unwrap_or(0.0).powi(2);
+        let mut rest = (self.covariance_rad2.into_inner() - own).symmetric_eigen();
         // A sensor that was told less would make the rest negative; its covariance then stays whole.
         if rest.eigenvalues.min() > -1e-3 * own.trace() {
             rest.eigenvalues.apply(|v| *v = v.max(0.0));
-            self.covariance_rad2 = rest.recompose();
+            self.covariance_rad2 = rest.recompose().into();
         }
         self.by_limb_height = by_limb_height;
     }

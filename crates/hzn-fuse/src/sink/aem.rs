@@ -1,7 +1,7 @@
 //! CCSDS attitude ephemeris message (AEM), version 1.0, in keyword = value notation.
 //!
 //! Source: CCSDS 504.0-B-1, section 4. The quaternion turns the axes of frame A onto those of frame B; it is that of
-//! the rotation from the body frame to ECEF, scalar last.
+//! the rotation from the vehicle's frame to ECEF, scalar last.
 
 use std::io::Write;
 
@@ -43,8 +43,8 @@ pub fn write_aem(fused: &Fused, options: &AemOptions, mut out: impl Write) -> Re
         iso(last)
     );
     for epoch in epochs {
-        let q = epoch.state.attitude;
-        text.push_str(&format!("{} {:.12} {:.12} {:.12} {:.12}\n", iso(epoch), q.i, q.j, q.k, q.w));
+        let [w, x, y, z] = epoch.state.attitude.wxyz();
+        text.push_str(&format!("{} {x:.12} {y:.12} {z:.12} {w:.12}\n", iso(epoch)));
     }
     text.push_str("DATA_STOP\n");
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(Error::failed)

@@ -62,13 +62,7 @@ pub fn write_ck(fused: &Fused, options: &CkOptions, path: &Path) -> Result<[Path
 /// Returns the words of the segment: quaternions, times, directory, the begin of the one interval, two counts.
 fn segment(epochs: &[&Epoch], ticks: impl Fn(&Epoch) -> f64) -> Vec<f64> {
     // SPICE's matrix turns vectors from the reference frame into that of the instrument.
-    let mut words: Vec<f64> = epochs
-        .iter()
-        .flat_map(|epoch| {
-            let q = epoch.state.attitude.inverse();
-            [q.w, q.i, q.j, q.k]
-        })
-        .collect();
+    let mut words: Vec<f64> = epochs.iter().flat_map(|epoch| epoch.state.attitude.inverse().wxyz()).collect();
     let times: Vec<f64> = epochs.iter().map(|e| ticks(e)).collect();
     words.extend(&times);
     words.extend(times.iter().skip(DIRECTORY - 1).step_by(DIRECTORY).take((times.len() - 1) / DIRECTORY));

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::io::Write;
 
-use nalgebra::{UnitQuaternion, Vector3};
+use hzn_nav::frames::{Cam, Fixed, Rotation, Vector};
 
 use super::Utc;
 use super::aem::{best, rising};
@@ -38,13 +38,12 @@ pub fn write_frames(fused: &Fused, recording: &Recording, utc: Option<Utc>, out:
         let found = row.time_s.and_then(|t| at(&epochs, camera, t + recording.clock_offset_s));
         match found {
             Some(known) => {
-                let q = known.attitude;
                 count += 1;
                 cells.push(String::new());
-                cells.extend(known.position_m.iter().map(|x| (x * 1e-3).to_string()));
-                cells.extend([q.w, q.i, q.j, q.k].map(|x| x.to_string()));
+                cells.extend(known.position_m.xyz().map(|x| (x * 1e-3).to_string()));
+                cells.extend(known.attitude.wxyz().map(|x| x.to_string()));
                 cells.push(known.sigma_rad.to_degrees().to_string());
-                cells.extend(known.rate_rad_s.iter().map(|x| x.to_string()));
+                cells.extend(known.rate_rad_s.xyz().map(|x| x.to_string()));
             }
             None => {
                 cells.push(number(row.altitude_km));
@@ -59,14 +58,14 @@ pub fn write_frames(fused: &Fused, recording: &Recording, utc: Option<Utc>, out:
 
 /// The solution at the time of a picture.
 struct Known {
-    /// Position in ECEF, m.
-    position_m: Vector3<f64>,
-    /// Rotation from the camera to ECEF.
-    attitude: UnitQuaternion<f64>,
+    /// Position, m.
+    position_m: Vector<Fixed>,
+    /// Attitude of the camera.
+    attitude: Rotation<Cam, Fixed>,
     /// Its largest 1-sigma, rad.
     sigma_rad: f64,
-    /// Rate against the Earth (camera frame), rad/s.
-    rate_rad_s: Vector3<f64>,
+    /// Rate against the Earth, rad/s.
+    rate_rad_s: Vector<Cam>,
 }
 
 /// Returns the solution at the time of a picture.

@@ -70,8 +70,7 @@ fn state(fused: &Fused, s: &StateRecord, out: &mut SeriesWriter) -> Result<(), h
     let here = fused.epochs.partition_point(|e| e.state.time_s < s.time_s);
     let cameras = fused.epochs.get(here).map(|e| e.cameras.as_slice()).unwrap_or_default();
     for (name, camera) in fused.cameras.iter().zip(cameras) {
-        let q = camera.mount;
-        let placed = Placed { frame: VEHICLE, position_m: [0.0; 3], q_frame_from_placed_wxyz: [q.w, q.i, q.j, q.k] };
+        let placed = Placed { frame: VEHICLE, position_m: [0.0; 3], q_frame_from_placed_wxyz: camera.mount.wxyz() };
         out.transform(s.time_s, &format!("nav_{name}"), &placed)?;
     }
     Ok(())

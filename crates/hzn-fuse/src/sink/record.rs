@@ -1,6 +1,7 @@
 //! One record for each solution and each innovation, the same in every kind of file.
 
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
+use hzn_nav::frames::{Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::strapdown::Nominal;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -145,27 +146,28 @@ pub fn innovations(fused: &Fused) -> impl Iterator<Item = InnovationRecord> + '_
 }
 
 fn bare(state: &Nominal) -> StateRecord {
-    let (x, v, q) = (state.position_m, state.velocity_m_s, state.attitude);
-    let [yaw_deg, pitch_deg, roll_deg] = yaw_pitch_roll_deg(&q, &x);
+    let [[x_m, y_m, z_m], [vx_mps, vy_mps, vz_mps]] = [state.position_m, state.velocity_m_s].map(|v| v.xyz());
+    let [qw, qx, qy, qz] = state.attitude.wxyz();
+    let [yaw_deg, pitch_deg, roll_deg] = yaw_pitch_roll_deg(&state.attitude, &state.position_m);
     StateRecord {
         time_s: state.time_s,
         phase: Phase::Back,
-        qw: q.w,
-        qx: q.i,
-        qy: q.j,
-        qz: q.k,
+        qw,
+        qx,
+        qy,
+        qz,
         sigma_x_deg: None,
         sigma_y_deg: None,
         sigma_z_deg: None,
         yaw_deg,
         pitch_deg,
         roll_deg,
-        x_m: x.x,
-        y_m: x.y,
-        z_m: x.z,
-        vx_mps: v.x,
-        vy_mps: v.y,
-        vz_mps: v.z,
+        x_m,
+        y_m,
+        z_m,
+        vx_mps,
+        vy_mps,
+        vz_mps,
         position_sigma_m: None,
         velocity_sigma_mps: None,
         gyro_bias_deg_h: None,
@@ -186,7 +188,7 @@ fn full(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
     let sigma = deg(epoch.attitude_sigma_rad());
     let camera = |(name, state): (&String, &CameraState)| CameraRecord {
         name: name.clone(),
-        misalignment_deg: deg(state.misalignment_rad),
+        misalignment_deg: deg(state.misalignment_rad.into_inner()),
         misalignment_sigma_deg: deg(state.misalignment_sigma_rad),
         clock_s: state.clock_s,
         clock_sigma_s: state.clock_sigma_s,
@@ -198,9 +200,9 @@ fn full(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
         sigma_z_deg: Some(sigma[2]),
         position_sigma_m: Some(epoch.position_sigma_m.max()),
         velocity_sigma_mps: Some(epoch.velocity_sigma_m_s.max()),
-        gyro_bias_deg_h: Some(per_hour(epoch.corrections.gyro_bias)),
+        gyro_bias_deg_h: Some(per_hour(epoch.corrections.gyro_bias.into_inner())),
         gyro_bias_sigma_deg_h: Some(per_hour(epoch.gyro_bias_sigma_rad_s)),
-        accel_bias_mps2: Some(epoch.corrections.accel_bias.into()),
+        accel_bias_mps2: Some(epoch.corrections.accel_bias.xyz()),
         accel_bias_sigma_mps2: Some(epoch.accel_bias_sigma_m_s2.into()),
         limb_height_km: Some(epoch.corrections.limb_height_km),
         limb_height_sigma_km: Some(epoch.limb_height_sigma_km),
@@ -244,15 +246,16 @@ fn innovation(fused: &Fused, i: &Innovation) -> InnovationRecord {
 }
 
 /// Returns yaw, pitch and roll against north, east and down (geodetic), degrees.
-fn yaw_pitch_roll_deg(fixed_from_vehicle: &UnitQuaternion<f64>, position_m: &Vector3<f64>) -> [f64; 3] {
-    let (lat, _) = geodetic((*position_m).into(), WGS84_A_M, WGS84_B_M);
-    let lon = position_m.y.atan2(position_m.x);
+fn yaw_pitch_roll_deg(fixed_from_vehicle: &Rotation<Vehicle, Fixed>, position_m: &Vector<Fixed>) -> [f64; 3] {
+    let [x, y, _] = position_m.xyz();
+    let (lat, _) = geodetic(position_m.xyz(), WGS84_A_M, WGS84_B_M);
+    let lon = y.atan2(x);
     let ((sl, cl), (so, co)) = (lat.sin_cos(), lon.sin_cos());
     let north = Vector3::new(-sl * co, -sl * so, cl);
     let east = Vector3::new(-so, co, 0.0);
     let down = Vector3::new(-cl * co, -cl * so, -sl);
     let ned = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[north, east, down]));
-    let to_ned = UnitQuaternion::from_rotation_matrix(&ned).inverse() * fixed_from_vehicle;
+    let to_ned = UnitQuaternion::from_rotation_matrix(&ned).inverse() * fixed_from_vehicle.as_inner();
     let (roll, pitch, yaw) = to_ned.euler_angles();
     [yaw, pitch, roll].map(f64::to_degrees)
 }

@@ -6,8 +6,8 @@ use hzn_fuse::input::{Attitude, Body, Centre, Inputs};
 use hzn_fuse::results::Kind;
 use hzn_fuse::settings::Limb;
 use hzn_fuse::{Fused, Settings, fuse, truth};
+use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_sim::Scenario;
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// A seed whose flight shows the Sun from T+111 s on.
 const SEED: u64 = 1;
@@ -20,6 +20,16 @@ fn settings() -> Settings {
     settings.camera.white_rad = 4e-4;
     settings.limb_height.sigma_km = Some(0.5);
     settings
+}
+
+fn true_mount(scene: &Scenario) -> Rotation<Cam, Vehicle> {
+    Rotation::assume_from_quaternion(scene.true_q_vehicle_from_camera_wxyz()).unwrap()
+}
+
+/// Returns the true position and attitude at a time.
+fn true_state(path: &hzn_sim::trajectory::Path, time_s: f64) -> (Vector<Fixed>, Rotation<Vehicle, Fixed>) {
+    let state = path.state(time_s);
+    (state.position_m.into(), state.fixed_from_vehicle.into())
 }
 
 fn misses(fused: &Fused, scene: &Scenario) -> Vec<truth::Miss> {
@@ -55,10 +65,9 @@ fn a_flight_gives_attitude_mounts_clocks_and_the_way_back() {
     assert!(sigma(&fused.smoothed[2]) < 0.7 * sigma(&fused.epochs[2]));
     let last = fused.epochs.last().unwrap();
     for (one, state) in scene.by_camera().iter().zip(&last.cameras) {
-        let rotation = |[w, x, y, z]: [f64; 4]| UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
-        let error = (state.mount.inverse() * rotation(one.true_q_vehicle_from_camera_wxyz())).scaled_axis();
-        let sigmas = error.component_div(&state.misalignment_sigma_rad).amax();
-        assert!(sigmas < 3.5, "{}: {error} {}", one.name, state.misalignment_sigma_rad);
+        let error = (state.mount.inverse() * true_mount(one)).scaled_axis();
+        let sigmas = error.as_inner().component_div(&state.misalignment_sigma_rad).amax();
+        assert!(sigmas < 3.5, "{}: {error:?} {}", one.name, state.misalignment_sigma_rad);
         let late_s = -(one.clock.offset_s + one.clock.latency_s);
         assert!((state.clock_s - late_s).abs() < 3.5 * state.clock_sigma_s, "{} {late_s}", state.clock_s);
         assert!(state.clock_sigma_s < 0.15);
@@ -66,8 +75,8 @@ fn a_flight_gives_attitude_mounts_clocks_and_the_way_back() {
     // Back to the first sample, through the saturated spin: position and velocity are those of the pad.
     let back = fused.back.first().unwrap();
     assert_eq!(back.time_s, 0.0);
-    let pad = scene.path().unwrap().state(0.0);
-    assert!((back.position_m - pad.position_m).norm() < 30e3, "{}", (back.position_m - pad.position_m).norm());
+    let (pad_m, _) = true_state(&scene.path().unwrap(), 0.0);
+    assert!((back.position_m - pad_m).norm() < 30e3, "{}", (back.position_m - pad_m).norm());
     let at_end = fused.back.last().unwrap();
     assert_eq!((at_end.time_s, at_end.attitude), (begin.time_s, fused.epochs[0].state.attitude));
     assert!(fused.triads.len() > 30 && fused.notes.len() <= 1, "{:?}", fused.notes);
@@ -124,12 +133,12 @@ fn written_results_are_read_back() {
 fn samples_that_misbehave_are_counted_and_do_no_harm() {
     let scene = scene(SEED);
     let mut inputs = flight(&scene);
-    inputs.imu[3000].imu.gyro_rad_s.x = f64::NAN;
+    inputs.imu[3000].imu.gyro_rad_s = Vector::new(f64::NAN, 0.0, 0.0);
     inputs.imu[3100] = inputs.imu[3099];
     inputs.imu[3200].imu.time_s = 100.0;
     inputs.imu.drain(5000..5040);
-    inputs.gnss[150].position_m.x = f64::INFINITY;
-    inputs.recordings[0].seen[40].axis.x = f64::NAN;
+    inputs.gnss[150].position_m = Vector::new(f64::INFINITY, 0.0, 0.0);
+    inputs.recordings[0].seen[40].axis = Vector::new(f64::NAN, 0.0, 0.0);
     let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
     let c = &fused.counts;
     assert_eq!((c.samples_not_finite, c.samples_duplicate, c.samples_out_of_order, c.gaps), (1, 1, 1, 1));
@@ -165,9 +174,8 @@ fn with_false_limbs(inputs: &mut Inputs) -> usize {
     let mut count = 0;
     for recording in &mut inputs.recordings {
         for seen in recording.seen.iter_mut().filter(|s| s.body == Body::Limb).step_by(25) {
-            let turn =
-                UnitQuaternion::from_scaled_axis(seen.axis.cross(&Vector3::z()).normalize() * 52f64.to_radians());
-            seen.axis = turn * seen.axis;
+            let across = seen.axis.cross(&Vector::new(0.0, 0.0, 1.0)).normalize();
+            seen.axis = Rotation::from_scaled_axis(across * 52f64.to_radians()) * seen.axis;
             count += 1;
         }
     }
@@ -190,8 +198,8 @@ fn a_lost_filter_begins_again() {
     let scene = scene(SEED);
     let mut inputs = flight(&scene);
     // A star tracker that is 40 degrees wrong, and says 0.1 degrees.
-    let truth = scene.path().unwrap().state(130.0).fixed_from_vehicle;
-    let wrong = truth * UnitQuaternion::from_scaled_axis(Vector3::x() * 40f64.to_radians());
+    let (_, truth) = true_state(&scene.path().unwrap(), 130.0);
+    let wrong = truth * Rotation::from_scaled_axis(Vector::new(40f64.to_radians(), 0.0, 0.0));
     inputs.attitudes = vec![Attitude { time_s: 70.0, fixed_from_vehicle: Some(wrong), sigma_rad: 0.1f64.to_radians() }];
     let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
     assert_eq!((fused.begin.unwrap().directions, fused.counts.restarts), (0, 1), "{:?}", fused.notes);
@@ -207,12 +215,11 @@ fn a_false_first_sun_is_found_out() {
     let mut inputs = flight(&scene);
     let path = scene.path().unwrap();
     for (one, recording) in scene.by_camera().iter().zip(&mut inputs.recordings) {
-        let [w, x, y, z] = one.true_q_vehicle_from_camera_wxyz();
-        let mount = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let mount = true_mount(one);
         for seen in recording.seen.iter_mut().filter(|s| s.body == Body::Sun && s.time_s < 118.0) {
-            let state = path.state(seen.time_s);
-            let nadir = (state.fixed_from_vehicle * mount).inverse() * -state.position_m.normalize();
-            seen.axis = UnitQuaternion::from_scaled_axis(nadir * 0.7) * seen.axis;
+            let (position_m, attitude) = true_state(&path, seen.time_s);
+            let nadir = (attitude * mount).inverse() * -position_m.normalize();
+            seen.axis = Rotation::from_scaled_axis(nadir * 0.7) * seen.axis;
         }
     }
     let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
@@ -251,7 +258,7 @@ fn inputs_that_contradict_each_other_are_refused_in_words() {
 fn a_wrong_mount_is_named() {
     let scene = scene(SEED);
     let mut inputs = flight(&scene);
-    let turned = UnitQuaternion::from_scaled_axis(Vector3::y() * 3.0);
+    let turned = Rotation::from_scaled_axis(Vector::new(0.0, 3.0, 0.0));
     inputs.recordings[0].mount = inputs.recordings[0].mount.map(|m| m * turned);
     let fused = fuse(&inputs, &settings(), Wanted::default()).unwrap();
     assert!(fused.notes.iter().any(|n| n.contains("of left were refused")), "{:?}", fused.notes);
@@ -280,14 +287,13 @@ fn positions_from_the_limb_are_taken_where_they_are_asked_for() {
     let path = scene.path().unwrap();
     let mut draws = crate::common::Draws(11);
     for (one, recording) in scene.by_camera().iter().zip(&mut inputs.recordings) {
-        let [w, x, y, z] = one.true_q_vehicle_from_camera_wxyz();
-        let mount = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let mount = true_mount(one);
         let late_s = one.clock.offset_s + one.clock.latency_s;
         for seen in recording.seen.iter_mut().filter(|s| s.body == Body::Limb) {
-            let state = path.state(seen.time_s - late_s);
-            let centre = (state.fixed_from_vehicle * mount).inverse() * -state.position_m;
-            let noise = Vector3::from_fn(|_, _| 300.0 * draws.normal());
-            let covariance_m2 = nalgebra::Matrix3::identity() * 300f64.powi(2);
+            let (position_m, attitude) = true_state(&path, seen.time_s - late_s);
+            let centre = (attitude * mount).inverse() * -position_m;
+            let noise = core::array::from_fn(|_| 300.0 * draws.normal()).into();
+            let covariance_m2 = Covariance::isotropic(300f64.powi(2));
             seen.centre = Some(Centre { position_m: centre + noise, covariance_m2 });
         }
     }

@@ -4,7 +4,7 @@ use crate::common::{flight, scene};
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{Body, Inputs, Recording};
 use hzn_fuse::{Settings, fuse, truth};
-use nalgebra::{UnitQuaternion, Vector3};
+use hzn_nav::frames::{Rotation, Vector};
 
 /// Number of flights.
 const FLIGHTS: u64 = 20;
@@ -24,7 +24,7 @@ fn by_body(inputs: &Inputs) -> Inputs {
     let of = |recording: &Recording, body: Body| {
         let seen = recording.seen.iter().copied().filter(|seen| seen.body == body).collect();
         // Two recordings of one time must have different mounts; this one is 0.01 degrees off.
-        let turn = UnitQuaternion::from_scaled_axis(Vector3::x() * if body == Body::Sun { 2e-4 } else { 0.0 });
+        let turn = Rotation::from_scaled_axis(Vector::new(if body == Body::Sun { 2e-4 } else { 0.0 }, 0.0, 0.0));
         let name = format!("{}-{}", recording.name, body.name());
         Recording { name, mount: recording.mount.map(|mount| mount * turn), seen, ..recording.clone() }
     };

@@ -1,9 +1,13 @@
 //! Limits of chi-square for the gates.
+//!
+//! The inverse has no closed form for one and three degrees of freedom, so the limit is found by bisection. A table
+//! would fix the probabilities, which are an option of the filter.
 
 /// Returns the value that chi-square with 1, 2 or 3 degrees of freedom exceeds with this probability.
 pub fn chi2_limit(freedom: usize, probability: f64) -> f64 {
     let probability = probability.clamp(1e-15, 0.5);
     let (mut low, mut high) = (0.0, 100.0);
+    // The count is fixed, so that the loop always ends. Eighty halvings of 100 are more than a double resolves.
     for _ in 0..80 {
         let middle = 0.5 * (low + high);
         if exceeds(freedom, middle) > probability { low = middle } else { high = middle }

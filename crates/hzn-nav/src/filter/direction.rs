@@ -2,9 +2,11 @@
 //!
 //! With the reference direction d in ECEF the camera sees ê = R_bcᵀ R_ebᵀ d. Its derivatives are R_bcᵀ R_ebᵀ [d×] by
 //! the attitude error, [ê×] by the misalignment, and 1 by the slow error. The covariance of the direction belongs to
-//! the slow error alone, or it would count twice. The innovation has the two components across ê.
+//! the slow error alone, or it would count twice. The innovation has the two components across ê, because the
+//! covariance of three is singular along ê when there is no white noise. The derivative by the position is left out:
+//! the 30 m of a receiver turn nadir by 4·10⁻⁶ rad.
 
-use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::blocks::{put, three_columns, three_rows};
 use super::predict::rate_of;
@@ -12,6 +14,7 @@ use super::spectrum::Spectrum;
 use super::unusable::Unusable;
 use super::update::Innovation;
 use super::{Camera, Filter};
+use crate::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use crate::gravity::earth_rate;
 use crate::layout::{CameraPlaces, Layout};
 
@@ -22,47 +25,48 @@ pub struct DirectionMeasurement {
     pub camera: usize,
     /// Number of the body among those that the camera sees, from 0: each has a slow error of its own.
     pub body: usize,
-    /// Unit vector in the camera frame.
-    pub measured: Vector3<f64>,
-    /// The same direction in ECEF, a unit vector.
-    pub reference: Vector3<f64>,
-    /// Covariance of the measured direction in the camera frame, rad², of rank 2. It belongs to the slow error.
-    /// Rounding to single precision does no harm.
-    pub covariance_rad2: Matrix3<f64>,
-    /// Derivative of the measured direction by the limb height, per km (camera frame); zero for the Sun.
-    pub by_limb_height: Vector3<f64>,
+    /// Unit vector.
+    pub measured: Vector<Cam>,
+    /// The same direction from outside, a unit vector.
+    pub reference: Vector<Fixed>,
+    /// Covariance of the measured direction, rad², of rank 2. It belongs to the slow error. Rounding to single
+    /// precision does no harm.
+    pub covariance_rad2: Covariance<Cam>,
+    /// Derivative of the measured direction by the limb height, per km; zero for the Sun.
+    pub by_limb_height: Vector<Cam>,
     /// Whether it is the axis of the Earth's limb. A limb height that changes with the latitude
     /// ([`Options::limb_latitude`](crate::options::Options::limb_latitude)) moves such a direction alone.
     pub is_limb: bool,
 }
 
-/// Returns the predicted direction in the camera frame with its derivatives by the attitude error (ECEF) and by the
-/// misalignment (camera frame).
+/// Returns the predicted direction with its derivatives by the attitude error (columns in ECEF) and by the misalignment
+/// (columns in the camera frame). Their rows are in the camera frame.
 pub fn predict_direction(
-    attitude: &UnitQuaternion<f64>,
-    mount: &UnitQuaternion<f64>,
-    reference: &Vector3<f64>,
-) -> (Vector3<f64>, Matrix3<f64>, Matrix3<f64>) {
-    let to_camera = (attitude * mount).inverse().to_rotation_matrix().into_inner();
-    let predicted = to_camera * reference;
-    (predicted, to_camera * reference.cross_matrix(), predicted.cross_matrix())
+    attitude: &Rotation<Vehicle, Fixed>,
+    mount: &Rotation<Cam, Vehicle>,
+    reference: &Vector<Fixed>,
+) -> (Vector<Cam>, Matrix3<f64>, Matrix3<f64>) {
+    let to_camera = (*attitude * *mount).inverse().to_matrix();
+    let predicted = to_camera * reference.as_inner();
+    (predicted.into(), to_camera * reference.as_inner().cross_matrix(), predicted.cross_matrix())
 }
 
 impl DirectionMeasurement {
     /// Returns whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
-        let numbers =
-            self.measured.iter().chain(&self.reference).chain(&self.covariance_rad2).chain(&self.by_limb_height);
-        numbers.copied().all(f64::is_finite)
+        self.measured.is_finite()
+            && self.reference.is_finite()
+            && self.covariance_rad2.is_finite()
+            && self.by_limb_height.is_finite()
     }
 
     /// Returns the measured direction as a unit vector, and its covariance without the effects of rounding.
-    pub(super) fn checked(&self) -> Result<(Vector3<f64>, Spectrum), Unusable> {
+    pub(super) fn checked(&self) -> Result<(Vector<Cam>, Spectrum), Unusable> {
         if !self.is_finite() {
             return Err(Unusable::NotFinite);
         }
         let measured = self.measured.try_normalize(1e-6).ok_or(Unusable::NoDirection)?;
-        Ok((measured, Spectrum::of_direction(&self.covariance_rad2, &measured)?))
+        Ok((measured, Spectrum::of_direction(self.covariance_rad2.as_inner(), measured.as_inner())?))
     }
 }
 
@@ -84,30 +88,31 @@ impl<const N: usize> Filter<N> {
         if let Some(place) = places.misalignment {
             put(&mut by_errors, (0, place.first), &by_mount);
         }
-        let mut slow = Vector3::zeros();
+        let mut slow = Vector::zeros();
         if let Some(place) = slow_place {
             put(&mut by_errors, (0, place.first), &Matrix3::identity());
             slow = camera.slow_errors.get(m.body).copied().unwrap_or_default();
         }
         if let Some(place) = places.clock {
-            let body = attitude.inverse() * reference;
-            put(&mut by_errors, (0, place.first), &(camera.mount.inverse() * rate_of(&body, &rate)));
+            let on_vehicle = attitude.inverse() * reference;
+            let by_clock = camera.mount.inverse() * rate_of(&on_vehicle, &rate);
+            put(&mut by_errors, (0, place.first), by_clock.as_inner());
         }
-        let mut height = Vector3::zeros();
+        let mut height = Vector::zeros();
         if let Some(place) = self.layout.limb_height {
-            put(&mut by_errors, (0, place.first), &m.by_limb_height);
+            put(&mut by_errors, (0, place.first), m.by_limb_height.as_inner());
             height = m.by_limb_height * self.corrections.limb_height_km;
         }
         if let Some((place, terms)) = self.limb_latitude().filter(|_| m.is_limb) {
             let to_camera = (attitude * camera.mount).inverse();
             for (i, (term, coefficient)) in terms.iter().zip(self.corrections.limb_latitude_km).enumerate() {
                 let by_coefficient = m.by_limb_height * term.height + to_camera * term.tilt;
-                put(&mut by_errors, (0, place.first + i), &by_coefficient);
+                put(&mut by_errors, (0, place.first + i), by_coefficient.as_inner());
                 height += by_coefficient * coefficient;
             }
         }
-        let across = basis(&predicted);
-        let value = across * (measured - predicted - slow - height);
+        let across = basis(predicted.as_inner());
+        let value = across * (measured - predicted - slow - height).into_inner();
         let white = camera.options.white_rad;
         let mut noise = SMatrix::<f64, 2, 2>::identity() * (white * white);
         if slow_place.is_none() {
@@ -117,17 +122,20 @@ impl<const N: usize> Filter<N> {
         self.update(value, &(across * by_errors), &noise)
     }
 
-    /// Returns the rate relative to the Earth (body frame) and the attitude at the time of the camera's clock.
-    fn at_clock(&self, camera: &Camera) -> (Vector3<f64>, UnitQuaternion<f64>) {
-        let inertial = self.last_imu.map_or_else(Vector3::zeros, |imu| self.corrections.correct(&imu).gyro_rad_s);
+    /// Returns the rate relative to the Earth and the attitude at the time of the camera's clock. The attitude turns by
+    /// the whole angle and not only to first order, because a spin makes the angle large.
+    fn at_clock(&self, camera: &Camera) -> (Vector<Vehicle>, Rotation<Vehicle, Fixed>) {
+        let inertial = self.last_imu.map_or_else(Vector::zeros, |imu| self.corrections.correct(&imu).gyro_rad_s);
         let rate = inertial - self.nominal.attitude.inverse() * earth_rate();
-        (rate, self.nominal.attitude * UnitQuaternion::from_scaled_axis(rate * camera.clock_s))
+        (rate, self.nominal.attitude * Rotation::from_scaled_axis(rate * camera.clock_s))
     }
 
     /// Gives the slow error the covariance of a new direction: ζ' = T ζ with T = √P_new √P_old⁻¹. The roots are the
     /// symmetric ones. Those of Cholesky turn the error within the plane across the direction when the direction moves
-    /// through the picture, and the innovations are then larger than their covariance. The error begins independent of
-    /// all others.
+    /// through the picture, and the innovations are then larger than their covariance: over 40 simulated flights their
+    /// mean square is 2.50 instead of 2.06 (2 is ideal), and the NEES of the attitude 3.6 instead of 2.4 (3 is ideal).
+    /// A ratio of standard deviations alone makes the whole covariance indefinite, in 98 % of 500 trials. The error
+    /// begins independent of all others.
     pub(super) fn set_slow_covariance(
         &mut self,
         (which, body): (usize, usize),
@@ -147,7 +155,7 @@ impl<const N: usize> Filter<N> {
             None => put(&mut self.covariance, (place.first, place.first), &new),
             Some(old) => {
                 let change = covariance.root() * Spectrum::of(&old).inverse_root();
-                *slow_error = change * *slow_error;
+                *slow_error = (change * slow_error.as_inner()).into();
                 if let Some(recorded) = recorded {
                     let rows = change * three_rows(recorded, place.first);
                     put(recorded, (place.first, 0), &rows);

@@ -7,23 +7,24 @@
 //! tilts the axis, and a fit of axis and half-angle takes exactly this tilt, whatever part of the limb is visible. For
 //! (3 sin² φ − 1)/2 a part with cos 2ψ is left, at most 3w²/4. It is neglected.
 
-use nalgebra::Vector3;
+use crate::frames::{Fixed, Vector};
 
-/// Mean radius of the Earth, km.
+/// Mean radius of the Earth, km. A sphere is enough here: the flattening moves the latitude of the limb by less than
+/// 0.2°, and the height changes by kilometres between equator and pole.
 pub(super) const RADIUS_KM: f64 = 6371.0;
 
 /// The effect of one coefficient.
 pub(super) struct LatitudeTerm {
     /// Mean height along the limb by the coefficient.
     pub(super) height: f64,
-    /// Tilt of the axis by the coefficient, rad/km (ECEF).
-    pub(super) tilt: Vector3<f64>,
+    /// Tilt of the axis by the coefficient, rad/km.
+    pub(super) tilt: Vector<Fixed>,
 }
 
 impl LatitudeTerm {
-    /// Returns the effects of the coefficients of degree 1 and 2 from a position in ECEF, m; `None` within the Earth.
-    pub(super) fn both(position_m: &Vector3<f64>) -> Option<[Self; 2]> {
-        let distance_m = libm::sqrt(position_m.norm_squared());
+    /// Returns the effects of the coefficients of degree 1 and 2 from a position, m; `None` within the Earth.
+    pub(super) fn both(position_m: &Vector<Fixed>) -> Option<[Self; 2]> {
+        let distance_m = position_m.norm();
         let up = position_m.try_normalize(1.0)?;
         let s = RADIUS_KM * 1e3 / distance_m;
         let cos_half = libm::sqrt(1.0 - s * s);
@@ -31,8 +32,10 @@ impl LatitudeTerm {
             return None;
         }
         let by_height = 1.0 / (distance_m * 1e-3 * cos_half);
-        let north = Vector3::z() - up * up.z;
-        let u = s * up.z;
+        // The vector to the north keeps its length cos φ₀, because the tilt has this factor: over a pole it is 0.
+        let [_, _, up_z] = up.xyz();
+        let north = Vector::new(0.0, 0.0, 1.0) - up * up_z;
+        let u = s * up_z;
         let w2 = cos_half * cos_half * north.norm_squared();
         let tilt = north * (cos_half * by_height);
         let second = Self { height: (3.0 * (u * u + 0.5 * w2) - 1.0) / 2.0, tilt: tilt * (3.0 * u) };

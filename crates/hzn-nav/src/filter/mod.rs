@@ -16,8 +16,9 @@ mod states;
 mod unusable;
 mod update;
 
-use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
 
+use crate::frames::{Cam, Rotation, Vector, Vehicle};
 use crate::layout::{Layout, MAX_BODIES, MAX_CAMERAS, Place};
 use crate::options::{CameraOptions, Options};
 use crate::strapdown::{Imu, Nominal};
@@ -35,17 +36,17 @@ pub use update::Innovation;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Corrections {
     /// Bias of the accelerometers, m/s².
-    pub accel_bias: Vector3<f64>,
+    pub accel_bias: Vector<Vehicle>,
     /// Scale factor errors of the accelerometers.
-    pub accel_scale: Vector3<f64>,
+    pub accel_scale: Vector<Vehicle>,
     /// Rotation of the accelerometers' axes, rad.
-    pub accel_misalignment: Vector3<f64>,
+    pub accel_misalignment: Vector<Vehicle>,
     /// Bias of the gyros, rad/s.
-    pub gyro_bias: Vector3<f64>,
+    pub gyro_bias: Vector<Vehicle>,
     /// Scale factor errors of the gyros.
-    pub gyro_scale: Vector3<f64>,
+    pub gyro_scale: Vector<Vehicle>,
     /// Rotation of the gyros' axes, rad.
-    pub gyro_misalignment: Vector3<f64>,
+    pub gyro_misalignment: Vector<Vehicle>,
     /// Error of the limb height, km.
     pub limb_height_km: f64,
     /// Coefficients of its change with the latitude, km: see [`Options::limb_latitude`].
@@ -66,10 +67,10 @@ impl Corrections {
 pub struct Camera {
     /// Its options.
     pub options: CameraOptions,
-    /// The mount with the estimated misalignment: rotation from the camera to the body frame.
-    pub mount: UnitQuaternion<f64>,
-    /// Estimate of the slow error of the direction to each body (camera frame).
-    pub slow_errors: [Vector3<f64>; MAX_BODIES],
+    /// The mount with the estimated misalignment: rotation from the camera to the vehicle's frame.
+    pub mount: Rotation<Cam, Vehicle>,
+    /// Estimate of the slow error of the direction to each body.
+    pub slow_errors: [Vector<Cam>; MAX_BODIES],
     /// Estimate of the clock offset, s.
     pub clock_s: f64,
     /// Covariance of each slow error, that of the last direction, rad²; `None` before the first one.
@@ -108,7 +109,39 @@ impl core::fmt::Display for FilterError {
 
 impl core::error::Error for FilterError {}
 
-/// The filter, with memory for N components of the error.
+/// The filter, with memory for N components of the error. The memory is a parameter of the type, because there is no
+/// heap; a smaller filter is faster.
+///
+/// ```
+/// use hzn_nav::filter::{DirectionMeasurement, Filter};
+/// use hzn_nav::frames::{Covariance, Rotation, Vector};
+/// use hzn_nav::layout::Layout;
+/// use hzn_nav::options::{CameraOptions, Options};
+/// use hzn_nav::strapdown::Nominal;
+///
+/// let start = Nominal {
+///     time_s: 0.0,
+///     attitude: Rotation::identity(),
+///     velocity_m_s: Vector::zeros(),
+///     position_m: Vector::new(6.9e6, 0.0, 0.0),
+/// };
+/// let mut filter = Filter::<40>::new(start, &Options::default(), &[CameraOptions::default()])?;
+/// // Camera, vehicle and Earth have the same axes here, and nadir is where the filter expects it.
+/// let nadir = DirectionMeasurement {
+///     camera: 0,
+///     body: 0,
+///     measured: Vector::new(-1.0, 0.0, 0.0),
+///     reference: Vector::new(-1.0, 0.0, 0.0),
+///     covariance_rad2: Covariance::across(&Vector::new(-1.0, 0.0, 0.0), 1e-6),
+///     by_limb_height: Vector::zeros(),
+///     is_limb: true,
+/// };
+/// assert!(filter.update_direction(&nadir)?.taken);
+/// // The attitude was known to 2°. A mount that is known to 1° improves it across nadir, but not about it.
+/// let sigmas_deg = filter.sigmas(Layout::ATTITUDE).map(f64::to_degrees);
+/// assert!((sigmas_deg.x - 2.0).abs() < 1e-9 && (sigmas_deg.y - 0.924).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Filter<const N: usize> {
     nominal: Nominal,
@@ -146,14 +179,16 @@ impl<const N: usize> Filter<N> {
             *slot = Some(Camera {
                 options: *options,
                 mount: options.mount,
-                slow_errors: [Vector3::zeros(); MAX_BODIES],
+                slow_errors: [Vector::zeros(); MAX_BODIES],
                 clock_s: 0.0,
                 slow_covariances: [None; MAX_BODIES],
             });
         }
         filter.fill_covariance(cameras);
         let finite = filter.covariance.iter().all(|x| x.is_finite() && *x >= 0.0)
-            && start.attitude.coords.iter().chain(&start.velocity_m_s).chain(&start.position_m).all(|x| x.is_finite())
+            && start.attitude.is_finite()
+            && start.velocity_m_s.is_finite()
+            && start.position_m.is_finite()
             && start.time_s.is_finite();
         if finite { Ok(filter) } else { Err(FilterError::NotFinite) }
     }
@@ -166,6 +201,7 @@ impl<const N: usize> Filter<N> {
     /// Fills the diagonal with the variances of the start.
     fn fill_covariance(&mut self, cameras: &[CameraOptions]) {
         let (layout, start, imu) = (self.layout, self.options.start, self.options.imu);
+        // A negative sigma becomes a negative variance, so that `new` finds and refuses it.
         let mut fill = |place: Place, sigma: f64| {
             for i in place.first..place.first + place.len {
                 set(&mut self.covariance, (i, i), sigma * libm::fabs(sigma));
@@ -229,7 +265,8 @@ impl<const N: usize> Filter<N> {
         &self.covariance
     }
 
-    /// Returns the 1-sigma of three components, for example of the attitude with [`Layout::ATTITUDE`].
+    /// Returns the 1-sigma of three components, for example of the attitude with [`Layout::ATTITUDE`]. Their axes are
+    /// those of the error: see [`Layout`].
     pub fn sigmas(&self, first: usize) -> Vector3<f64> {
         Vector3::from_fn(|i, _| self.covariance.get((first + i, first + i)).map_or(0.0, |v| libm::sqrt(v.max(0.0))))
     }
@@ -237,18 +274,18 @@ impl<const N: usize> Filter<N> {
     /// Moves the estimates by the errors, which become 0.
     fn apply(&mut self, error: &SVector<f64, N>) {
         let one = |place: Option<Place>| place.and_then(|p| error.get(p.first).copied()).unwrap_or(0.0);
-        let of = |place: Option<Place>| place.map_or_else(Vector3::zeros, |p| three(error, p.first));
-        let turn = UnitQuaternion::from_scaled_axis(three(error, Layout::ATTITUDE));
-        self.nominal.attitude = UnitQuaternion::new_normalize((turn * self.nominal.attitude).into_inner());
-        self.nominal.velocity_m_s += three(error, Layout::VELOCITY);
-        self.nominal.position_m += three(error, Layout::POSITION);
+        // The attitude error is in ECEF, so it multiplies from the left.
+        let turn = Rotation::from_scaled_axis(three(error, Layout::ATTITUDE).into());
+        self.nominal.attitude = (turn * self.nominal.attitude).renormalized();
+        self.nominal.velocity_m_s += three(error, Layout::VELOCITY).into();
+        self.nominal.position_m += three(error, Layout::POSITION).into();
         let (layout, c) = (self.layout, &mut self.corrections);
-        c.accel_bias += of(layout.accel_bias);
-        c.accel_scale += of(layout.accel_scale);
-        c.accel_misalignment += of(layout.accel_misalignment);
-        c.gyro_bias += of(layout.gyro_bias);
-        c.gyro_scale += of(layout.gyro_scale);
-        c.gyro_misalignment += of(layout.gyro_misalignment);
+        c.accel_bias += at(error, layout.accel_bias);
+        c.accel_scale += at(error, layout.accel_scale);
+        c.accel_misalignment += at(error, layout.accel_misalignment);
+        c.gyro_bias += at(error, layout.gyro_bias);
+        c.gyro_scale += at(error, layout.gyro_scale);
+        c.gyro_misalignment += at(error, layout.gyro_misalignment);
         c.limb_height_km += one(layout.limb_height);
         if let Some(place) = layout.limb_latitude {
             for (i, coefficient) in c.limb_latitude_km.iter_mut().enumerate() {
@@ -256,12 +293,19 @@ impl<const N: usize> Filter<N> {
             }
         }
         for (camera, places) in self.cameras.iter_mut().flatten().zip(&layout.cameras) {
-            let turn = UnitQuaternion::from_scaled_axis(of(places.misalignment));
-            camera.mount = UnitQuaternion::new_normalize((camera.mount * turn).into_inner());
-            for (error, place) in camera.slow_errors.iter_mut().zip(places.slow_errors) {
-                *error += of(place);
+            // The error is in the camera frame, as its derivative has it, so it multiplies from the right. Braun & Barf
+            // 2022 print it on the left (50): that diverges, see `tests/nav/printed.rs`.
+            let turn = Rotation::from_scaled_axis(at(error, places.misalignment));
+            camera.mount = (camera.mount * turn).renormalized();
+            for (slow, place) in camera.slow_errors.iter_mut().zip(places.slow_errors) {
+                *slow += at(error, place);
             }
             camera.clock_s += one(places.clock);
         }
     }
+}
+
+/// Returns the three components of an error; 0 if it is off.
+fn at<F, const N: usize>(error: &SVector<f64, N>, place: Option<Place>) -> Vector<F> {
+    place.map_or_else(Vector::zeros, |p| three(error, p.first).into())
 }

@@ -4,10 +4,11 @@
 //! error δω = −δb − diag(ω̃) δs + [ω̃×] δm − noise; the same holds for the specific force. With ψ in ECEF, ψ̇ = −ω_ie ×
 //! ψ + R δω, δv̇ = −[R f̂×] ψ + R δf + ∂g/∂x δx − 2 ω_ie × δv, δẋ = δv.
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, SMatrix};
 
 use super::blocks::{put, scale_column, scale_row, set, three_columns, three_rows};
 use super::{Corrections, Filter};
+use crate::frames::{Rotation, Vector, Vehicle};
 use crate::gravity::{earth_rate, gradient};
 use crate::layout::Layout;
 use crate::strapdown::Imu;
@@ -38,11 +39,11 @@ impl Corrections {
         let (gyro, accel) = (&imu.gyro_rad_s, &imu.accel_m_s2);
         Imu {
             time_s: imu.time_s,
-            gyro_rad_s: gyro
+            gyro_rad_s: *gyro
                 - self.gyro_bias
                 - self.gyro_scale.component_mul(gyro)
                 - self.gyro_misalignment.cross(gyro),
-            accel_m_s2: accel
+            accel_m_s2: *accel
                 - self.accel_bias
                 - self.accel_scale.component_mul(accel)
                 - self.accel_misalignment.cross(accel),
@@ -90,6 +91,8 @@ impl<const N: usize> Filter<N> {
         gap: bool,
         mut recorded: Option<&mut SMatrix<f64, N, N>>,
     ) {
+        // Besides the slow errors, only those of the vehicle change between measurements. Nine rows of the transition
+        // therefore differ from the identity, and the product takes 9 N² multiplications instead of N³.
         let (own, others) = self.linearise(last, imu);
         let half = own * (0.5 * dt);
         let mean = SMatrix::<f64, V, V>::identity() * dt + half * dt;
@@ -124,14 +127,15 @@ impl<const N: usize> Filter<N> {
         let (gyro, accel) = ((last.gyro_rad_s + imu.gyro_rad_s) * 0.5, (last.accel_m_s2 + imu.accel_m_s2) * 0.5);
         let middle = Imu { time_s: imu.time_s, gyro_rad_s: gyro, accel_m_s2: accel };
         let corrected = self.corrections.correct(&middle);
-        // The attitude in the middle of the step.
+        // The attitude in the middle of the step: that at its begin would err to first order while the vehicle turns.
         let dt = imu.time_s - self.nominal.time_s;
-        let turn = nalgebra::UnitQuaternion::from_scaled_axis(corrected.gyro_rad_s * (0.5 * dt));
-        let rotation = (self.nominal.attitude * turn).to_rotation_matrix().into_inner();
-        let spin = earth_rate().cross_matrix();
+        let turn = Rotation::from_scaled_axis(corrected.gyro_rad_s * (0.5 * dt));
+        let rotation = (self.nominal.attitude * turn).to_matrix();
+        let (gyro, accel) = (gyro.as_inner(), accel.as_inner());
+        let spin = earth_rate().as_inner().cross_matrix();
         let mut own = SMatrix::<f64, V, V>::zeros();
         own.fixed_view_mut::<3, 3>(a, a).copy_from(&-spin);
-        own.fixed_view_mut::<3, 3>(v, a).copy_from(&-(rotation * corrected.accel_m_s2).cross_matrix());
+        own.fixed_view_mut::<3, 3>(v, a).copy_from(&-(rotation * corrected.accel_m_s2.as_inner()).cross_matrix());
         own.fixed_view_mut::<3, 3>(v, v).copy_from(&(spin * -2.0));
         own.fixed_view_mut::<3, 3>(v, x).copy_from(&gradient(&self.nominal.position_m));
         own.fixed_view_mut::<3, 3>(x, v).copy_from(&Matrix3::identity());
@@ -141,11 +145,12 @@ impl<const N: usize> Filter<N> {
                 super::blocks::put(&mut others, (row, place.first), &block);
             }
         };
+        // The derivatives have the measured rate and force, because the errors are shares of what is measured.
         put(a, layout.gyro_bias, -rotation);
-        put(a, layout.gyro_scale, -rotation * Matrix3::from_diagonal(&gyro));
+        put(a, layout.gyro_scale, -rotation * Matrix3::from_diagonal(gyro));
         put(a, layout.gyro_misalignment, rotation * gyro.cross_matrix());
         put(v, layout.accel_bias, -rotation);
-        put(v, layout.accel_scale, -rotation * Matrix3::from_diagonal(&accel));
+        put(v, layout.accel_scale, -rotation * Matrix3::from_diagonal(accel));
         put(v, layout.accel_misalignment, rotation * accel.cross_matrix());
         (own, others)
     }
@@ -172,6 +177,7 @@ impl<const N: usize> Filter<N> {
             let keep = libm::exp(-dt / camera.options.slow_error_time_s);
             let errors = camera.slow_errors.iter_mut().zip(camera.slow_covariances).zip(places.slow_errors);
             for ((error, target), place) in errors {
+                // Before its first direction a slow error has no covariance, so there is nothing to fade.
                 let (Some(place), Some(target)) = (place, target) else { continue };
                 *error *= keep;
                 for i in place.first..place.first + place.len {
@@ -188,7 +194,7 @@ impl<const N: usize> Filter<N> {
     }
 }
 
-/// Returns the derivative of a vector in the body frame that is fixed in ECEF, for the clock offset.
-pub(super) fn rate_of(body: &Vector3<f64>, rate_rad_s: &Vector3<f64>) -> Vector3<f64> {
-    -rate_rad_s.cross(body)
+/// Returns the derivative of a vector that is fixed in ECEF, as the vehicle sees it, for the clock offset.
+pub(super) fn rate_of(seen: &Vector<Vehicle>, rate_rad_s: &Vector<Vehicle>) -> Vector<Vehicle> {
+    -rate_rad_s.cross(seen)
 }

@@ -91,7 +91,8 @@ fn checked(covariance: &Matrix3<f64>) -> Result<Matrix3<f64>, Unusable> {
     if is_covariance { Ok(symmetric) } else { Err(Unusable::NegativeVariance) }
 }
 
-/// Makes the component (P, Q) of a symmetric matrix zero.
+/// Makes the component (P, Q) of a symmetric matrix zero (Jacobi). The places are constants, so that no access can fail
+/// and no panic is linked.
 fn rotate<const P: usize, const Q: usize>(a: &mut Matrix3<f64>, v: &mut Matrix3<f64>) {
     let off = a[(P, Q)];
     if off == 0.0 {

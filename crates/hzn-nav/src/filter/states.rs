@@ -8,14 +8,15 @@ use crate::layout::{Layout, Place};
 use crate::strapdown::Imu;
 
 impl<const N: usize> Filter<N> {
-    /// Returns the error that leads from another state to this one: the argument of [`Filter::moved`].
+    /// Returns the error that leads from another state to this one: the argument of [`Filter::moved`]. Rotations are
+    /// therefore on the same side as there: the attitude's on the left, a mount's on the right.
     pub fn minus(&self, other: &Self) -> SVector<f64, N> {
         let mut error = SVector::<f64, N>::zeros();
         let mut put = |first: usize, value: Vector3<f64>| put_three(&mut error, first, &value);
         let (a, b) = (&self.nominal, &other.nominal);
-        put(Layout::ATTITUDE, (a.attitude * b.attitude.inverse()).scaled_axis());
-        put(Layout::VELOCITY, a.velocity_m_s - b.velocity_m_s);
-        put(Layout::POSITION, a.position_m - b.position_m);
+        put(Layout::ATTITUDE, (a.attitude * b.attitude.inverse()).scaled_axis().into_inner());
+        put(Layout::VELOCITY, (a.velocity_m_s - b.velocity_m_s).into_inner());
+        put(Layout::POSITION, (a.position_m - b.position_m).into_inner());
         let (layout, a, b) = (&self.layout, &self.corrections, &other.corrections);
         let blocks = [
             (layout.accel_bias, a.accel_bias - b.accel_bias),
@@ -26,12 +27,12 @@ impl<const N: usize> Filter<N> {
             (layout.gyro_misalignment, a.gyro_misalignment - b.gyro_misalignment),
         ];
         let mut put_block = |place: Option<Place>, value| place.into_iter().for_each(|p| put(p.first, value));
-        blocks.into_iter().for_each(|(place, value)| put_block(place, value));
+        blocks.into_iter().for_each(|(place, value)| put_block(place, value.into_inner()));
         let cameras = || self.cameras.iter().flatten().zip(other.cameras.iter().flatten()).zip(&layout.cameras);
         for ((a, b), places) in cameras() {
-            put_block(places.misalignment, (b.mount.inverse() * a.mount).scaled_axis());
+            put_block(places.misalignment, (b.mount.inverse() * a.mount).scaled_axis().into_inner());
             for ((a, b), place) in a.slow_errors.iter().zip(b.slow_errors).zip(places.slow_errors) {
-                put_block(place, a - b);
+                put_block(place, (*a - b).into_inner());
             }
         }
         if let Some(place) = layout.limb_height {
@@ -50,7 +51,8 @@ impl<const N: usize> Filter<N> {
         error
     }
 
-    /// Returns the state moved by an error, with another covariance.
+    /// Returns the state moved by an error, with another covariance. It is a copy, because a smoother keeps the states
+    /// of all measurements; it runs on the ground.
     #[must_use]
     pub fn moved(&self, error: &SVector<f64, N>, covariance: SMatrix<f64, N, N>) -> Self {
         let mut moved = self.clone();

@@ -16,7 +16,9 @@ mod table;
 pub use table::BODIES;
 
 use hzn_core::body::{Kind, MOON_RADIUS_KM};
-use nalgebra::Matrix3;
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use crate::frames::{Fixed, Inertial, Rotation, Vector};
 
 /// Shape and rotation of a body. Angles are in degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +48,18 @@ pub struct Orientation {
 }
 
 /// Returns the body with a name in lower case.
+///
+/// ```
+/// use hzn_nav::{planets, time};
+///
+/// let jupiter = planets::find("jupiter").ok_or("no such body")?;
+/// assert_eq!(jupiter.radii_km(), [71_492.0, 71_492.0, 66_854.0]);
+/// let days = time::tt_days_since_j2000(1_735_689_600.0); // 2025-01-01T00:00 UTC
+/// let pole = jupiter.orientation(days).pole();
+/// let in_its_own_frame = jupiter.fixed_from_inertial(days) * pole;
+/// assert!((in_its_own_frame.xyz()[2] - 1.0).abs() < 1e-15);
+/// # Ok::<(), &str>(())
+/// ```
 pub fn find(name: &str) -> Option<&'static Planet> {
     BODIES.iter().find(|body| body.name == name)
 }
@@ -75,27 +89,30 @@ impl Planet {
     }
 
     /// Returns the rotation from the ICRF to the body-fixed frame at a time, as in [`Planet::orientation`].
-    pub fn fixed_from_inertial(&self, tdb_days: f64) -> Matrix3<f64> {
+    pub fn fixed_from_inertial(&self, tdb_days: f64) -> Rotation<Inertial, Fixed> {
         self.orientation(tdb_days).fixed_from_inertial()
     }
 }
 
 impl Orientation {
     /// Returns the rotation from the ICRF to the body-fixed frame: R₃(W) R₁(90° − δ₀) R₃(90° + α₀).
-    pub fn fixed_from_inertial(&self) -> Matrix3<f64> {
+    pub fn fixed_from_inertial(&self) -> Rotation<Inertial, Fixed> {
+        // The axes turn by the angle, so the coordinates turn back.
+        let half = |deg: f64| libm::sincos(-0.5 * deg.to_radians());
         let about_z = |deg: f64| {
-            let (s, c) = libm::sincos(deg.to_radians());
-            Matrix3::new(c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0)
+            let (s, c) = half(deg);
+            Quaternion::new(c, 0.0, 0.0, s)
         };
-        let (s, c) = libm::sincos((90.0 - self.declination_deg).to_radians());
-        let tilt = Matrix3::new(1.0, 0.0, 0.0, 0.0, c, s, 0.0, -s, c);
-        about_z(self.meridian_deg) * tilt * about_z(90.0 + self.right_ascension_deg)
+        let (s, c) = half(90.0 - self.declination_deg);
+        let tilt = Quaternion::new(c, s, 0.0, 0.0);
+        let whole = about_z(self.meridian_deg) * tilt * about_z(90.0 + self.right_ascension_deg);
+        UnitQuaternion::new_normalize(whole).into()
     }
 
-    /// Returns the direction of the pole in the ICRF.
-    pub fn pole_icrf(&self) -> [f64; 3] {
+    /// Returns the direction of the pole.
+    pub fn pole(&self) -> Vector<Inertial> {
         let (sin_ra, cos_ra) = libm::sincos(self.right_ascension_deg.to_radians());
         let (sin_dec, cos_dec) = libm::sincos(self.declination_deg.to_radians());
-        [cos_dec * cos_ra, cos_dec * sin_ra, sin_dec]
+        Vector::new(cos_dec * cos_ra, cos_dec * sin_ra, sin_dec)
     }
 }

@@ -3,26 +3,27 @@
 use crate::common::Draws;
 use hzn_nav::delayed::{Delayed, Measurement, Outcome, Refused};
 use hzn_nav::filter::{DirectionMeasurement, Filter, FilterError, Unusable};
+use hzn_nav::frames::{Covariance, Rotation, Vector};
 use hzn_nav::gravity::gravity;
 use hzn_nav::options::{CameraOptions, ImuOptions, Options};
 use hzn_nav::start::{Seen, first_attitude, propagate_back};
 use hzn_nav::strapdown::{Imu, Nominal};
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::UnitQuaternion;
 
 const DEG: f64 = core::f64::consts::PI / 180.0;
 
 fn start() -> Nominal {
     Nominal {
         time_s: 0.0,
-        attitude: UnitQuaternion::from_euler_angles(0.2, -0.5, 1.0),
-        velocity_m_s: Vector3::new(100.0, -30.0, 900.0),
-        position_m: Vector3::new(2.4e6, 1.0e6, 6.0e6),
+        attitude: UnitQuaternion::from_euler_angles(0.2, -0.5, 1.0).into(),
+        velocity_m_s: Vector::new(100.0, -30.0, 900.0),
+        position_m: Vector::new(2.4e6, 1.0e6, 6.0e6),
     }
 }
 
 fn imu(time_s: f64) -> Imu {
     let (s, c) = (0.7 * time_s).sin_cos();
-    Imu { time_s, gyro_rad_s: Vector3::new(0.2 * s, 0.1 * c, 0.3), accel_m_s2: Vector3::new(5.0, s, c) }
+    Imu { time_s, gyro_rad_s: Vector::new(0.2 * s, 0.1 * c, 0.3), accel_m_s2: Vector::new(5.0, s, c) }
 }
 
 /// Returns the true states at the samples.
@@ -38,25 +39,24 @@ fn flight(count: u32, dt: f64) -> Vec<(Imu, Nominal)> {
 }
 
 fn direction(truth: &Nominal, sun: bool) -> Measurement {
-    let reference = if sun { Vector3::new(0.3, -0.8, 0.5).normalize() } else { -truth.position_m.normalize() };
-    let measured = truth.attitude.inverse() * reference;
-    let covariance_rad2 = (Matrix3::identity() - measured * measured.transpose()) * (0.1 * DEG).powi(2);
+    let reference = if sun { Vector::new(0.3, -0.8, 0.5).normalize() } else { -truth.position_m.normalize() };
+    // The cameras have the axes of the vehicle.
+    let measured = CameraOptions::default().mount.inverse() * (truth.attitude.inverse() * reference);
+    let covariance_rad2 = Covariance::across(&measured, (0.1 * DEG).powi(2));
     Measurement::Direction(DirectionMeasurement {
         camera: usize::from(sun),
         body: 0,
         measured,
         reference,
         covariance_rad2,
-        by_limb_height: Vector3::zeros(),
+        by_limb_height: Vector::zeros(),
         is_limb: true,
     })
 }
 
 fn filter() -> Filter<44> {
-    let told = Nominal {
-        attitude: UnitQuaternion::from_scaled_axis(Vector3::new(0.02, -0.02, 0.03)) * start().attitude,
-        ..start()
-    };
+    let told =
+        Nominal { attitude: Rotation::from_scaled_axis(Vector::new(0.02, -0.02, 0.03)) * start().attitude, ..start() };
     Filter::new(told, &Options::default(), &[CameraOptions::default(); 2]).unwrap()
 }
 
@@ -112,13 +112,13 @@ fn broken_input_is_counted() {
     delayed.push_sample(&imu(0.99), false, none);
     delayed.push_sample(&imu(0.5), false, none);
     delayed.push_sample(&Imu { time_s: f64::NAN, ..imu(1.0) }, false, none);
-    delayed.push_sample(&Imu { gyro_rad_s: Vector3::new(f64::INFINITY, 0.0, 0.0), ..imu(1.0) }, false, none);
+    delayed.push_sample(&Imu { gyro_rad_s: Vector::new(f64::INFINITY, 0.0, 0.0), ..imu(1.0) }, false, none);
     let position = Measurement::Position(start().position_m, 5.0);
     assert_eq!(delayed.push(0.1, position), Err(Refused::TooLate));
     assert_eq!(delayed.push(1e9, position), Err(Refused::FromTheFuture));
     assert_eq!(delayed.push(f64::NAN, position), Err(Refused::NotFinite));
-    let broken = Measurement::Position(Vector3::new(f64::NAN, 0.0, 0.0), 5.0);
-    let far = Measurement::Position(start().position_m + Vector3::new(0.0, 5e4, 0.0), 5.0);
+    let broken = Measurement::Position(Vector::new(f64::NAN, 0.0, 0.0), 5.0);
+    let far = Measurement::Position(start().position_m + Vector::new(0.0, 5e4, 0.0), 5.0);
     delayed.push(0.98, broken).unwrap();
     delayed.push(0.985, far).unwrap();
     assert_eq!(delayed.push(0.99, position), Err(Refused::Full));
@@ -144,7 +144,7 @@ fn what_does_not_fit_is_refused() {
     assert_eq!(error, FilterError::TooManyStates { needed: 52, memory: 40 });
     let five = [CameraOptions::default(); 5];
     assert_eq!(Filter::<60>::new(start(), &Options::default(), &five).unwrap_err(), FilterError::TooManyCameras);
-    let broken = Nominal { velocity_m_s: Vector3::new(f64::NAN, 0.0, 0.0), ..start() };
+    let broken = Nominal { velocity_m_s: Vector::new(f64::NAN, 0.0, 0.0), ..start() };
     assert_eq!(Filter::<40>::new(broken, &Options::default(), &[]).unwrap_err(), FilterError::NotFinite);
     let mut options = Options::default();
     options.imu.gyro_bias.sigma = -1.0;
@@ -154,12 +154,12 @@ fn what_does_not_fit_is_refused() {
     m.camera = 3;
     assert_eq!(filter.update_direction(&m).unwrap_err(), Unusable::NoCamera);
     m.camera = 0;
-    m.covariance_rad2 *= -1.0;
+    m.covariance_rad2 = (-m.covariance_rad2.into_inner()).into();
     assert_eq!(filter.update_direction(&m).unwrap_err(), Unusable::NegativeVariance);
-    m.covariance_rad2.m12 = f64::NAN;
+    m.covariance_rad2 = Covariance::isotropic(f64::NAN);
     assert_eq!(filter.update_direction(&m).unwrap_err(), Unusable::NotFinite);
-    m.covariance_rad2 = Matrix3::identity() * 1e-6;
-    m.measured = Vector3::zeros();
+    m.covariance_rad2 = Covariance::isotropic(1e-6);
+    m.measured = Vector::zeros();
     assert_eq!(filter.update_direction(&m).unwrap_err(), Unusable::NoDirection);
 }
 
@@ -175,16 +175,16 @@ fn the_first_attitude_and_the_way_back() {
             let Measurement::Direction(m) = direction(truth, sun) else { unreachable!() };
             let camera = &cameras[usize::from(sun)];
             let sigma = (camera.misalignment.sigma.powi(2) + camera.white_rad.powi(2) + (0.1 * DEG).powi(2)).sqrt();
-            let noise = Vector3::from_fn(|_, _| sigma * draws.normal());
-            let measured = UnitQuaternion::from_scaled_axis(noise) * m.measured;
+            let measured = Rotation::from_scaled_axis(draws.vector(sigma)) * m.measured;
             Seen { camera, measured, reference: m.reference, sigma_rad: 0.1 * DEG }
         });
         let first = first_attitude(&seen).unwrap();
-        let error = (truth.attitude * first.attitude.inverse()).scaled_axis();
-        nees += (error.transpose() * first.covariance_rad2.try_inverse().unwrap() * error)[(0, 0)] / 500.0;
+        let error = (truth.attitude * first.attitude.inverse()).scaled_axis().into_inner();
+        let covariance = first.covariance_rad2.as_inner();
+        nees += (error.transpose() * covariance.try_inverse().unwrap() * error)[(0, 0)] / 500.0;
         let mut filter = filter();
         filter.set_attitude(&first.attitude, &first.covariance_rad2);
-        assert!((filter.sigmas(0).x.powi(2) / first.covariance_rad2[(0, 0)] - 1.0).abs() < 1e-12);
+        assert!((filter.sigmas(0).x.powi(2) / covariance[(0, 0)] - 1.0).abs() < 1e-12);
     }
     assert!((2.6..3.4).contains(&nees), "{nees}");
     let samples: Vec<Imu> = all.iter().map(|(sample, _)| *sample).collect();

@@ -2,10 +2,11 @@
 
 use crate::common::Draws;
 use hzn_nav::filter::{DirectionMeasurement, Filter, predict_direction};
+use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::layout::Layout;
 use hzn_nav::options::{Block, CameraOptions, Mode, Options, StartSigmas};
 use hzn_nav::strapdown::{Imu, Nominal};
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::UnitQuaternion;
 
 const OFF: Block = Block { mode: Mode::Off, sigma: 0.0 };
 /// Time between two limbs, s.
@@ -16,9 +17,9 @@ const WHITE_RAD: f64 = 5e-4;
 fn start() -> Nominal {
     Nominal {
         time_s: 0.0,
-        attitude: UnitQuaternion::from_euler_angles(0.2, -0.5, 1.0),
-        velocity_m_s: Vector3::new(0.0, 0.0, 7.5e3),
-        position_m: Vector3::new(6.9e6, 1.0e6, 0.0),
+        attitude: UnitQuaternion::from_euler_angles(0.2, -0.5, 1.0).into(),
+        velocity_m_s: Vector::new(0.0, 0.0, 7.5e3),
+        position_m: Vector::new(6.9e6, 1.0e6, 0.0),
     }
 }
 
@@ -59,26 +60,27 @@ fn height_km(latitude_rad: f64) -> f64 {
 
 /// What an instrument at a position makes of a limb with the height [`height_km`] above the told one.
 struct Limb {
-    /// Error of the fitted axis, rad (ECEF).
-    tilt_rad: Vector3<f64>,
+    /// Error of the fitted axis, rad.
+    tilt_rad: Vector<Fixed>,
     /// Error of the fitted half-angle, rad.
     half_angle_rad: f64,
 }
 
 /// Fits axis and half-angle to the errors of the lines of sight around the whole limb.
-fn fit(position_m: &Vector3<f64>, height_km: impl Fn(f64) -> f64) -> Limb {
+fn fit(position_m: &Vector<Fixed>, height_km: impl Fn(f64) -> f64) -> Limb {
     const RADIUS_M: f64 = 6.371e6;
     let (up, distance_m) = (position_m.normalize(), position_m.norm());
-    let (a, b) = (up.cross(&Vector3::x()).normalize(), up.cross(&up.cross(&Vector3::x())).normalize());
+    let x = Vector::new(1.0, 0.0, 0.0);
+    let (a, b) = (up.cross(&x).normalize(), up.cross(&up.cross(&x)).normalize());
     let half_angle_rad = (RADIUS_M / distance_m).asin();
-    let mut limb = Limb { tilt_rad: Vector3::zeros(), half_angle_rad: 0.0 };
+    let mut limb = Limb { tilt_rad: Vector::zeros(), half_angle_rad: 0.0 };
     let count = 720;
     for k in 0..count {
         let (sin, cos) = (f64::from(k) / f64::from(count) * std::f64::consts::TAU).sin_cos();
         let out = a * cos + b * sin;
         let touched = up * half_angle_rad.sin() + out * half_angle_rad.cos();
         // The line of sight that touches a larger sphere there.
-        let larger = ((RADIUS_M + 1e3 * height_km(touched.z.asin())) / distance_m).asin() - half_angle_rad;
+        let larger = ((RADIUS_M + 1e3 * height_km(touched.xyz()[2].asin())) / distance_m).asin() - half_angle_rad;
         limb.tilt_rad += out * (larger * 2.0 / f64::from(count));
         limb.half_angle_rad += larger / f64::from(count);
     }
@@ -91,24 +93,26 @@ fn watch(filter: &mut Filter<20>, seed: u64, limbs: usize) {
     let mut draws = Draws(seed);
     let mut truth = filter.clone();
     for k in 0..limbs {
-        let imu = Imu { time_s: STEP_S * k as f64, gyro_rad_s: Vector3::zeros(), accel_m_s2: Vector3::zeros() };
+        let imu = Imu { time_s: STEP_S * k as f64, gyro_rad_s: Vector::zeros(), accel_m_s2: Vector::zeros() };
         filter.predict(&imu, false);
         truth.predict(&imu, false);
         let Nominal { attitude, position_m, .. } = *truth.nominal();
         let reference = -position_m.normalize();
-        let (seen, ..) = predict_direction(&attitude, &UnitQuaternion::identity(), &reference);
+        let mount = Rotation::<Cam, Vehicle>::identity();
+        let (seen, ..) = predict_direction(&attitude, &mount, &reference);
         let limb = fit(&position_m, height_km);
         let azimuth = 2.4 * k as f64;
-        let (a, b) = (seen.cross(&Vector3::x()).normalize(), seen.cross(&seen.cross(&Vector3::x())).normalize());
+        let x = Vector::new(1.0, 0.0, 0.0);
+        let (a, b) = (seen.cross(&x).normalize(), seen.cross(&seen.cross(&x)).normalize());
         let by_half_angle = (a * azimuth.cos() + b * azimuth.sin()) * 0.8;
-        let noise = Vector3::from_fn(|_, _| WHITE_RAD * draws.normal());
-        let error = attitude.inverse() * limb.tilt_rad + by_half_angle * limb.half_angle_rad;
+        let noise = draws.vector(WHITE_RAD);
+        let error = (attitude * mount).inverse() * limb.tilt_rad + by_half_angle * limb.half_angle_rad;
         let measurement = DirectionMeasurement {
             camera: 0,
             body: 0,
             measured: (seen + error + noise).normalize(),
             reference,
-            covariance_rad2: Matrix3::zeros(),
+            covariance_rad2: Covariance::isotropic(0.0),
             by_limb_height: by_half_angle * fit(&position_m, |_| 1.0).half_angle_rad,
             is_limb: true,
         };
@@ -147,7 +151,7 @@ fn a_considered_height_by_latitude_widens_the_attitude_only() {
         let mut filter = filter(latitude, 0.02);
         watch(&mut filter, 7, 1);
         // The rotation about nadir is not seen.
-        let nadir = -start().position_m.normalize();
+        let nadir = -start().position_m.normalize().into_inner();
         let attitude = filter.covariance().fixed_view::<3, 3>(Layout::ATTITUDE, Layout::ATTITUDE).into_owned();
         let across = attitude.trace() - nadir.dot(&(attitude * nadir));
         (across.sqrt(), filter.corrections().limb_latitude_km)

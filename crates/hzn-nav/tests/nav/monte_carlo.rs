@@ -2,6 +2,7 @@
 
 use crate::common::Draws;
 use hzn_nav::filter::{DirectionMeasurement, Filter, Innovation, Step};
+use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::gravity::gravity;
 use hzn_nav::layout::Layout;
 use hzn_nav::options::{Block, CameraOptions, Mode, Options};
@@ -17,7 +18,7 @@ const WHITE: f64 = 2e-4;
 const GNSS: [f64; 2] = [5.0, 0.1];
 
 fn cameras() -> [CameraOptions; 2] {
-    let mount = |roll: f64, pitch: f64, yaw: f64| UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    let mount = |roll: f64, pitch: f64, yaw: f64| UnitQuaternion::from_euler_angles(roll, pitch, yaw).into();
     let camera = |mount| CameraOptions { mount, white_rad: WHITE, ..CameraOptions::default() };
     [camera(mount(1.9, 0.1, -0.4)), camera(mount(-0.3, 1.2, 0.7))]
 }
@@ -34,13 +35,13 @@ struct Flight {
     draws: Draws,
     truth: Nominal,
     told: Nominal,
-    sun: Vector3<f64>,
-    mounts: [UnitQuaternion<f64>; 2],
-    slow: [Vector3<f64>; 2],
+    sun: Vector<Fixed>,
+    mounts: [Rotation<Cam, Vehicle>; 2],
+    slow: [Vector<Cam>; 2],
     height_km: f64,
     /// Time that the cameras' clocks are late, s.
     clock_s: [f64; 2],
-    errors: [Vector3<f64>; 6],
+    errors: [Vector<Vehicle>; 6],
     options: Options,
     last: Option<Imu>,
 }
@@ -49,19 +50,18 @@ impl Flight {
     fn new(seed: u64) -> Self {
         let options = options();
         let mut draws = Draws(seed);
-        let mut three = |sigma: f64| Vector3::from_fn(|_, _| sigma * draws.normal());
         let truth = Nominal {
             time_s: 0.0,
-            attitude: UnitQuaternion::from_scaled_axis(three(2.0)),
-            velocity_m_s: Vector3::new(1500.0, 300.0, 800.0),
-            position_m: Vector3::new(2.4e6, 1.0e6, 6.0e6),
+            attitude: Rotation::<Vehicle, Fixed>::identity() * Rotation::from_scaled_axis(draws.vector(2.0)),
+            velocity_m_s: Vector::new(1500.0, 300.0, 800.0),
+            position_m: Vector::new(2.4e6, 1.0e6, 6.0e6),
         };
         let start = options.start;
         let told = Nominal {
             time_s: 0.0,
-            attitude: UnitQuaternion::from_scaled_axis(three(start.attitude_rad)).inverse() * truth.attitude,
-            velocity_m_s: truth.velocity_m_s - three(start.velocity_m_s),
-            position_m: truth.position_m - three(start.position_m),
+            attitude: Rotation::from_scaled_axis(draws.vector(start.attitude_rad)).inverse() * truth.attitude,
+            velocity_m_s: truth.velocity_m_s - draws.vector(start.velocity_m_s),
+            position_m: truth.position_m - draws.vector(start.position_m),
         };
         let imu = options.imu;
         let blocks = [
@@ -72,17 +72,13 @@ impl Flight {
             imu.gyro_scale,
             imu.gyro_misalignment,
         ];
-        let errors = blocks.map(|b| three(b.sigma));
-        let mounts = cameras().map(|c| c.mount * UnitQuaternion::from_scaled_axis(three(c.misalignment.sigma)));
-        let slow = SLOW.map(&mut three);
-        let sun = Vector3::new(0.3, -0.8, 0.5).normalize();
+        let errors = blocks.map(|b| draws.vector(b.sigma));
+        let mounts = cameras().map(|c| c.mount * Rotation::from_scaled_axis(draws.vector(c.misalignment.sigma)));
+        let slow = SLOW.map(|sigma| draws.vector(sigma));
+        let sun = Vector::new(0.3, -0.8, 0.5).normalize();
         let height_km = options.limb_height.sigma * draws.normal();
         let clock_s = [0.0; 2];
         Self { draws, truth, told, sun, mounts, slow, height_km, clock_s, errors, options, last: None }
-    }
-
-    fn three(&mut self, sigma: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| sigma * self.draws.normal())
     }
 
     /// Moves the truth by a step, and returns the measured sample.
@@ -92,8 +88,8 @@ impl Flight {
         let thrust = if time_s < 40.0 { 30.0 } else { 0.0 };
         let real = Imu {
             time_s,
-            gyro_rad_s: Vector3::new(0.10 * s, 0.08 * c, 0.15),
-            accel_m_s2: Vector3::new(thrust, 0.3 * c, 0.2 * s),
+            gyro_rad_s: Vector::new(0.10 * s, 0.08 * c, 0.15),
+            accel_m_s2: Vector::new(thrust, 0.3 * c, 0.2 * s),
         };
         if let Some(last) = self.last {
             self.truth = self.truth.step(&last, &real);
@@ -105,26 +101,26 @@ impl Flight {
         let (gyro, accel) = (real.gyro_rad_s, real.accel_m_s2);
         Imu {
             time_s,
-            gyro_rad_s: gyro + bg + sg.component_mul(&gyro) + mg.cross(&gyro) + self.three(noise[0]),
-            accel_m_s2: accel + ba + sa.component_mul(&accel) + ma.cross(&accel) + self.three(noise[1]),
+            gyro_rad_s: gyro + bg + sg.component_mul(&gyro) + mg.cross(&gyro) + self.draws.vector(noise[0]),
+            accel_m_s2: accel + ba + sa.component_mul(&accel) + ma.cross(&accel) + self.draws.vector(noise[1]),
         }
     }
 
     /// Returns a direction of camera 0 (nadir) or 1 (Sun) after `dt_s` since the last one.
     fn direction(&mut self, camera: usize, dt_s: f64) -> DirectionMeasurement {
         let keep = (-dt_s / 20.0f64).exp();
-        let fresh = self.three(SLOW[camera] * (1.0 - keep * keep).sqrt());
+        let fresh = self.draws.vector(SLOW[camera] * (1.0 - keep * keep).sqrt());
         self.slow[camera] = self.slow[camera] * keep + fresh;
         let reference = if camera == 0 { -self.truth.position_m.normalize() } else { self.sun };
         // The picture was taken when the vehicle had turned further by the rate during the clock's error.
-        let rate = self.last.map_or_else(Vector3::zeros, |imu| imu.gyro_rad_s);
-        let later = UnitQuaternion::from_scaled_axis(rate * self.clock_s[camera]);
+        let rate = self.last.map_or_else(Vector::zeros, |imu| imu.gyro_rad_s);
+        let later = Rotation::from_scaled_axis(rate * self.clock_s[camera]);
         let seen = (self.truth.attitude * later * self.mounts[camera]).inverse() * reference;
         // The limb height tilts the axis about a fixed direction of the camera.
-        let by_limb_height = if camera == 0 { seen.cross(&Vector3::x()) * 3e-4 } else { Vector3::zeros() };
-        let white = self.three(WHITE);
+        let by_limb_height = if camera == 0 { seen.cross(&Vector::new(1.0, 0.0, 0.0)) * 3e-4 } else { Vector::zeros() };
+        let white = self.draws.vector(WHITE);
         let measured = (seen + self.slow[camera] + by_limb_height * self.height_km + white).normalize();
-        let covariance_rad2 = (Matrix3::identity() - measured * measured.transpose()) * SLOW[camera].powi(2);
+        let covariance_rad2 = Covariance::across(&measured, SLOW[camera].powi(2));
         DirectionMeasurement { camera, body: 0, measured, reference, covariance_rad2, by_limb_height, is_limb: true }
     }
 }
@@ -158,7 +154,7 @@ fn fly(flight: &mut Flight, options: &Options, cameras: &[CameraOptions], false_
                 }
                 let is_false = false_every.is_some_and(|n| camera == 0 && (step / 20) % n == 0);
                 if is_false {
-                    seen.measured = UnitQuaternion::from_scaled_axis(Vector3::y() * 52.0 * DEG) * seen.measured;
+                    seen.measured = Rotation::from_scaled_axis(Vector::new(0.0, 52.0 * DEG, 0.0)) * seen.measured;
                 }
                 let innovation = filter.update_direction(&seen).unwrap();
                 assert!(!(is_false && innovation.taken), "a false answer was taken");
@@ -168,8 +164,8 @@ fn fly(flight: &mut Flight, options: &Options, cameras: &[CameraOptions], false_
                 }
             }
             let truth = flight.truth;
-            let position = truth.position_m + flight.three(GNSS[0]);
-            let velocity = truth.velocity_m_s + flight.three(GNSS[1]);
+            let position = truth.position_m + flight.draws.vector(GNSS[0]);
+            let velocity = truth.velocity_m_s + flight.draws.vector(GNSS[1]);
             let mut keep = |i: Innovation<3>| flown.gnss.push(i.nis);
             keep(filter.update_position(&position, GNSS[0]).unwrap());
             keep(filter.update_velocity(&velocity, GNSS[1]).unwrap());
@@ -182,11 +178,11 @@ fn fly(flight: &mut Flight, options: &Options, cameras: &[CameraOptions], false_
     };
     let error = (flight.truth.attitude * nominal.attitude.inverse()).scaled_axis();
     flown.error_rad = error.norm();
-    flown.nees = nees(error, Layout::ATTITUDE);
-    flown.position_nees = nees(flight.truth.position_m - nominal.position_m, Layout::POSITION);
+    flown.nees = nees(error.into_inner(), Layout::ATTITUDE);
+    flown.position_nees = nees((flight.truth.position_m - nominal.position_m).into_inner(), Layout::POSITION);
     if let (Some(place), Some(camera)) = (filter.layout().cameras[0].misalignment, filter.camera(0)) {
         let error = (camera.mount.inverse() * flight.mounts[0]).scaled_axis();
-        flown.misalignment_nees = nees(error, place.first);
+        flown.misalignment_nees = nees(error.into_inner(), place.first);
     }
     if let (Some(place), Some(camera)) = (filter.layout().cameras[0].clock, filter.camera(0)) {
         let sigma = filter.covariance()[(place.first, place.first)].sqrt();
@@ -281,7 +277,7 @@ fn a_large_first_error_converges() {
     options.start.attitude_rad = 10.0 * DEG;
     for k in 0..10 {
         let mut flight = Flight::new(9400 + k);
-        let turn = UnitQuaternion::from_scaled_axis(flight.three(8.0 * DEG));
+        let turn = Rotation::from_scaled_axis(flight.draws.vector(8.0 * DEG));
         flight.told.attitude = turn * flight.truth.attitude;
         let flown = fly(&mut flight, &options, &cameras(), None);
         assert!(flown.error_rad < 1.0 * DEG, "{k}: {}°", flown.error_rad / DEG);
@@ -299,7 +295,7 @@ fn the_covariance_stays_positive_definite() {
     for step in 0..1_000_000u32 {
         let imu = Imu {
             time_s: DT_S * f64::from(step),
-            gyro_rad_s: Vector3::new(0.01, -0.02, 0.3),
+            gyro_rad_s: Vector::new(0.01, -0.02, 0.3),
             accel_m_s2: filter.nominal().attitude.inverse() * -gravity(&at),
         };
         filter.predict(&imu, false);

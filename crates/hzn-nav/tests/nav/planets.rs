@@ -1,15 +1,17 @@
 //! Shape and rotation of bodies, against values that do not come from the same table.
 
+use hzn_nav::frames::{Cam, Fixed, Inertial, Rotation, Vector};
 use hzn_nav::planets::{self, BODIES};
 use hzn_nav::{ephemeris, time};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 fn unix_s(year_day_s: [f64; 2]) -> f64 {
     year_day_s[0] * 86_400.0 + year_day_s[1]
 }
 
-fn latitude_longitude_deg(v: &Vector3<f64>) -> [f64; 2] {
-    [(v.z / v.norm()).asin().to_degrees(), v.y.atan2(v.x).to_degrees()]
+fn latitude_longitude_deg(v: &Vector<Fixed>) -> [f64; 2] {
+    let [x, y, z] = v.xyz();
+    [(z / v.norm()).asin().to_degrees(), y.atan2(x).to_degrees()]
 }
 
 fn wrapped_deg(deg: f64) -> f64 {
@@ -18,7 +20,7 @@ fn wrapped_deg(deg: f64) -> f64 {
 
 /// Direction from the Sun to Jupiter in the ICRF, from the approximate elements of E. M. Standish (JPL, for 1800 to
 /// 2050). Their error is about 0.1 degrees.
-fn jupiter_from_sun(t: f64) -> Vector3<f64> {
+fn jupiter_from_sun(t: f64) -> Vector<Inertial> {
     let e = 0.048_386_24 - 0.000_132_53 * t;
     let inclination = (1.304_396_95 - 0.001_837_14 * t).to_radians();
     let mean_longitude = 34.396_440_51 + 3_034.746_127_75 * t;
@@ -35,7 +37,7 @@ fn jupiter_from_sun(t: f64) -> Vector3<f64> {
         * about_x(inclination)
         * about_z((perihelion - node).to_radians())
         * in_plane.normalize();
-    about_x(23.439_28f64.to_radians()) * ecliptic
+    (about_x(23.439_28f64.to_radians()) * ecliptic).into()
 }
 
 /// Two pictures of Jupiter by Cassini's narrow-angle camera. Pole, prime meridian and Sun come from NAIF kernels, all
@@ -68,9 +70,10 @@ fn jupiter_is_as_cassini_saw_it() {
     ];
     let jupiter = planets::find("jupiter").unwrap();
     for (utc, range_km, rows, sun_camera) in pictures {
-        let camera_from_fixed = Matrix3::from_fn(|i, j| rows[i][j]);
-        let [latitude, longitude] =
-            latitude_longitude_deg(&(camera_from_fixed.transpose() * Vector3::from(sun_camera).normalize()));
+        let matrix = Rotation3::from_matrix(&Matrix3::from_fn(|i, j| rows[i][j]));
+        let camera_from_fixed = Rotation::<Fixed, Cam>::from(UnitQuaternion::from_rotation_matrix(&matrix));
+        let seen = camera_from_fixed.inverse() * Vector::<Cam>::from(sun_camera).normalize();
+        let [latitude, longitude] = latitude_longitude_deg(&seen);
         // The light left Jupiter before the picture was taken.
         let days = time::tt_days_since_j2000(unix_s(utc)) - range_km / 299_792.458 / 86_400.0;
         let sun = jupiter.fixed_from_inertial(days) * -jupiter_from_sun(days / 36_525.0);
@@ -90,7 +93,7 @@ fn the_moon_shows_its_near_side() {
     for i in 0..2000 {
         let unix_s = 946_728_000.0 + 86_400.0 * 7.3 * f64::from(i);
         let (sin, cos) = ephemeris::sidereal_rad(unix_s).sin_cos();
-        let [x, y, z] = ephemeris::moon(unix_s).direction;
+        let [x, y, z] = ephemeris::moon(unix_s).direction.xyz();
         // In the equinox of date; precession turns it by 0.014 degrees per year.
         let mut of_date = Vector3::new(cos * x - sin * y, sin * x + cos * y, z);
         let days = time::tt_days_since_j2000(unix_s);
@@ -100,7 +103,7 @@ fn the_moon_shows_its_near_side() {
         let about_z = |a: f64| Matrix3::new(a.cos(), -a.sin(), 0.0, a.sin(), a.cos(), 0.0, 0.0, 0.0, 1.0);
         let about_y = |a: f64| Matrix3::new(a.cos(), 0.0, a.sin(), 0.0, 1.0, 0.0, -a.sin(), 0.0, a.cos());
         of_date = about_z(-half) * about_y(tilt) * about_z(-half) * of_date;
-        let libration = latitude_longitude_deg(&(moon.fixed_from_inertial(days) * -of_date));
+        let libration = latitude_longitude_deg(&(moon.fixed_from_inertial(days) * -Vector::from(of_date)));
         assert!(libration[0].abs() < 6.95 && libration[1].abs() < 8.1, "{i} {libration:?}");
         (0..2).for_each(|k| sums[k] += libration[k]);
         count += 1.0;
@@ -134,7 +137,7 @@ fn orientations_are_those_of_spice() {
         let body = planets::find(name).unwrap();
         let theirs = planets::Orientation { right_ascension_deg: ra, declination_deg: dec, meridian_deg: w }
             .fixed_from_inertial();
-        let turn = theirs * body.fixed_from_inertial(days).transpose();
+        let turn = (theirs * body.fixed_from_inertial(days).inverse()).to_matrix();
         // |R − I| of a rotation by a small angle a is √2 a.
         let angle = ((turn - Matrix3::identity()).norm() / 2f64.sqrt()).to_degrees();
         let pole = (turn.row(2).transpose() - Vector3::z()).norm().to_degrees();
@@ -193,13 +196,13 @@ fn rotations_are_rotations_about_the_pole() {
     for body in &BODIES {
         let days = 8_000.25;
         let (rotation, orientation) = (body.fixed_from_inertial(days), body.orientation(days));
-        assert!((rotation * rotation.transpose() - Matrix3::identity()).norm() < 1e-13, "{}", body.name);
-        assert!((rotation.determinant() - 1.0).abs() < 1e-13);
-        let pole = rotation * Vector3::from(orientation.pole_icrf());
-        assert!((pole - Vector3::z()).norm() < 1e-13, "{}", body.name);
+        let matrix = rotation.to_matrix();
+        assert!((matrix * matrix.transpose() - Matrix3::identity()).norm() < 1e-13, "{}", body.name);
+        let pole = rotation * orientation.pole();
+        assert!((pole - Vector::new(0.0, 0.0, 1.0)).norm() < 1e-13, "{}", body.name);
         let node = (90.0 + orientation.right_ascension_deg).to_radians();
-        let from_node = rotation * Vector3::new(node.cos(), node.sin(), 0.0);
-        let angle = wrapped_deg(from_node.y.atan2(from_node.x).to_degrees() + orientation.meridian_deg);
+        let [x, y, _] = (rotation * Vector::new(node.cos(), node.sin(), 0.0)).xyz();
+        let angle = wrapped_deg(y.atan2(x).to_degrees() + orientation.meridian_deg);
         assert!(angle.abs() < 1e-9, "{}: {angle}", body.name);
         assert!(body.radii_km().iter().all(|r| *r > 1.0) && body.radii_km()[0] >= body.radii_km()[2]);
         assert_eq!(planets::find(body.name), Some(body));

@@ -3,7 +3,8 @@
 
 use crate::common::Draws;
 use hzn_nav::filter::predict_direction;
-use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
+use hzn_nav::frames::{Cam, Fixed, Rotation, Vector, Vehicle};
+use nalgebra::{SMatrix, SVector, UnitQuaternion};
 
 const DEG: f64 = core::f64::consts::PI / 180.0;
 /// 1-sigma of a direction, rad.
@@ -24,12 +25,12 @@ enum Feedback {
 /// attitude at the end, rad.
 fn fly(seed: u64, feedback: Feedback) -> f64 {
     let mut draws = Draws(seed);
-    let mut three = |sigma: f64| Vector3::from_fn(|_, _| sigma * draws.normal());
     let told = [UnitQuaternion::from_euler_angles(1.9, 0.1, -0.4), UnitQuaternion::from_euler_angles(-0.3, 1.2, 0.7)];
-    let mounts = told.map(|m| m * UnitQuaternion::from_scaled_axis(three(DEG)));
-    let references = [Vector3::new(-0.4, -0.2, -0.9).normalize(), Vector3::new(0.3, -0.8, 0.5).normalize()];
-    let mut truth = UnitQuaternion::from_scaled_axis(three(2.0));
-    let mut attitude = UnitQuaternion::from_scaled_axis(three(2.0 * DEG)) * truth;
+    let told = told.map(Rotation::<Cam, Vehicle>::from);
+    let mounts = told.map(|m| m * Rotation::from_scaled_axis(draws.vector(DEG)));
+    let references = [Vector::<Fixed>::new(-0.4, -0.2, -0.9).normalize(), Vector::new(0.3, -0.8, 0.5).normalize()];
+    let mut truth = Rotation::<Vehicle, Fixed>::identity() * Rotation::from_scaled_axis(draws.vector(2.0));
+    let mut attitude = Rotation::from_scaled_axis(draws.vector(2.0 * DEG)) * truth;
     let mut estimated = told;
     let mut p = SMatrix::<f64, N, N>::zeros();
     for i in 0..N {
@@ -37,10 +38,10 @@ fn fly(seed: u64, feedback: Feedback) -> f64 {
     }
     for second in 0..300 {
         let t = f64::from(second);
-        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.10 * (0.3 * t).sin(), 0.08 * (0.3 * t).cos(), 0.15));
+        let turn = Rotation::from_scaled_axis(Vector::new(0.10 * (0.3 * t).sin(), 0.08 * (0.3 * t).cos(), 0.15));
         (truth, attitude) = (truth * turn, attitude * turn);
         for (camera, reference) in references.iter().enumerate() {
-            let seen = (truth * mounts[camera]).inverse() * reference + three(NOISE);
+            let seen = (truth * mounts[camera]).inverse() * *reference + draws.vector(NOISE);
             let (predicted, by_attitude, by_mount) = predict_direction(&attitude, &estimated[camera], reference);
             let mut h = SMatrix::<f64, 3, N>::zeros();
             h.fixed_view_mut::<3, 3>(0, 0).copy_from(&by_attitude);
@@ -48,15 +49,16 @@ fn fly(seed: u64, feedback: Feedback) -> f64 {
             let noise = SMatrix::<f64, 3, 3>::identity() * NOISE.powi(2);
             let s = h * p * h.transpose() + noise;
             let k = p * h.transpose() * s.try_inverse().unwrap();
-            let error: SVector<f64, N> = k * (seen - predicted);
+            let error: SVector<f64, N> = k * (seen - predicted).into_inner();
             let left = SMatrix::<f64, N, N>::identity() - k * h;
             p = left * p * left.transpose() + k * noise * k.transpose();
-            let part = |first: usize| UnitQuaternion::from_scaled_axis(error.fixed_rows::<3>(first).into_owned());
-            attitude = part(0) * attitude;
+            let part = |first: usize| error.fixed_rows::<3>(first).into_owned();
+            attitude = Rotation::from_scaled_axis(part(0).into()) * attitude;
             for (i, mount) in estimated.iter_mut().enumerate() {
+                let turn = part(3 + 3 * i);
                 *mount = match feedback {
-                    Feedback::Camera => *mount * part(3 + 3 * i),
-                    Feedback::Printed => part(3 + 3 * i) * *mount,
+                    Feedback::Camera => *mount * Rotation::from_scaled_axis(turn.into()),
+                    Feedback::Printed => Rotation::from_scaled_axis(turn.into()) * *mount,
                 };
             }
         }

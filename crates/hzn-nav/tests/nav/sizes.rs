@@ -3,16 +3,16 @@
 use std::time::Instant;
 
 use hzn_nav::filter::Filter;
+use hzn_nav::frames::{Rotation, Vector};
 use hzn_nav::options::{CameraOptions, Options};
 use hzn_nav::strapdown::{Imu, Nominal};
-use nalgebra::{UnitQuaternion, Vector3};
 
 fn filter<const N: usize>() -> Filter<N> {
     let start = Nominal {
         time_s: 0.0,
-        attitude: UnitQuaternion::identity(),
-        velocity_m_s: Vector3::zeros(),
-        position_m: Vector3::new(6.6e6, 0.0, 0.0),
+        attitude: Rotation::identity(),
+        velocity_m_s: Vector::zeros(),
+        position_m: Vector::new(6.6e6, 0.0, 0.0),
     };
     Filter::new(start, &Options::default(), &[CameraOptions::default(); 2]).unwrap()
 }
@@ -25,8 +25,7 @@ fn step_us<const N: usize>() -> f64 {
         let begin = Instant::now();
         for i in 1..=200 {
             let time_s = f64::from(200 * turn + i) * 0.01;
-            let imu =
-                Imu { time_s, gyro_rad_s: Vector3::new(0.01, 0.0, 0.02), accel_m_s2: Vector3::new(0.0, 0.1, 9.0) };
+            let imu = Imu { time_s, gyro_rad_s: Vector::new(0.01, 0.0, 0.02), accel_m_s2: Vector::new(0.0, 0.1, 9.0) };
             filter.predict(&imu, false);
         }
         least = least.min(begin.elapsed().as_secs_f64() * 1e6 / 200.0);

@@ -56,7 +56,7 @@ def wahba(body: ArrayLike, reference: ArrayLike, sigma_rad: ArrayLike) -> tuple[
     Parameters
     ----------
     body
-        Directions in the body frame, shape (n, 3).
+        Directions in the frame of the vehicle, shape (n, 3).
     reference
         The same directions in the reference frame, shape (n, 3).
     sigma_rad
@@ -149,7 +149,7 @@ class Filter:
         )
 
     def predict(self, time_s: float, gyro: ArrayLike, accel: ArrayLike, *, saturated: bool = False) -> str:
-        """Move the state to a sample of the inertial unit: rates (rad/s) and specific forces (m/s²), body frame.
+        """Move the state to a sample of the inertial unit: rates (rad/s) and specific forces (m/s²), vehicle.
 
         Returns ``taken``, ``first``, ``gap``, ``duplicate``, ``out-of-order`` or ``not-finite``.
         """
@@ -218,7 +218,7 @@ class Filter:
 
     @property
     def attitude(self) -> _Array:
-        """Rotation from the body frame to ECEF, shape (3, 3)."""
+        """Rotation from the vehicle's frame to ECEF, shape (3, 3)."""
         return _array(self._filter.state()[1])
 
     @property

@@ -212,7 +212,7 @@ fn direction_fixed(body: body::Kind, data: &FrameData) -> Option<UnitVec3<Fixed,
         body::Kind::Moon => ephemeris::moon(data.utc_s?),
         _ => return None,
     };
-    UnitVec3::try_new(place.seen_from(data.position_km?.map(|km| km * 1e3)).direction)
+    place.seen_from(data.position_km?.map(|km| km * 1e3).into()).direction.to_unit()
 }
 
 /// The result of one body in one picture.

@@ -142,8 +142,8 @@ impl Scenario {
             World::Visible(world) => {
                 world.clouds.seed = world.clouds.seed.wrapping_add(self.seed);
                 world.ground.seed = world.ground.seed.wrapping_add(self.seed);
-                scene.light = Light::Sun { direction: ephemeris::sun(unix_s).direction, twilight_rad: 0.01 };
-                scene.moon_ecef_m = Some(ephemeris::moon(unix_s).position_m());
+                scene.light = Light::Sun { direction: ephemeris::sun(unix_s).direction.xyz(), twilight_rad: 0.01 };
+                scene.moon_ecef_m = Some(ephemeris::moon(unix_s).position_m().xyz());
             }
             World::Infrared(world) => {
                 if let Some(clouds) = &mut world.clouds {

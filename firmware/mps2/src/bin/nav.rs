@@ -15,10 +15,11 @@ use hzn_mps2::host::{File, exit};
 use hzn_mps2::watermark;
 use hzn_nav::delayed::{Delayed, Measurement};
 use hzn_nav::filter::{DirectionMeasurement, Filter};
+use hzn_nav::frames::{Cam, Rotation, Vector};
 use hzn_nav::layout::Layout;
 use hzn_nav::options::{Block, CameraOptions, Options, StartSigmas};
 use hzn_nav::strapdown::{Imu, Nominal};
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 use static_cell::StaticCell;
 
 /// Numbers in a record.
@@ -54,14 +55,14 @@ fn read(file: &mut File) -> Option<Record> {
     is_whole.then_some(record)
 }
 
-fn three(record: &Record, from: usize) -> Vector3<f64> {
+fn three<F>(record: &Record, from: usize) -> Vector<F> {
     let at = |i: usize| record.get(from + i).copied().unwrap_or(f64::NAN);
-    Vector3::new(at(0), at(1), at(2))
+    Vector::new(at(0), at(1), at(2))
 }
 
-fn rotation(record: &Record, from: usize) -> UnitQuaternion<f64> {
+fn rotation<A, B>(record: &Record, from: usize) -> Rotation<A, B> {
     let at = |i: usize| record.get(from + i).copied().unwrap_or(f64::NAN);
-    UnitQuaternion::new_unchecked(Quaternion::new(at(0), at(1), at(2), at(3)))
+    UnitQuaternion::new_unchecked(Quaternion::new(at(0), at(1), at(2), at(3))).into()
 }
 
 /// Makes the filter from the first record.
@@ -69,11 +70,8 @@ fn begin(record: &Record) -> Option<Flight> {
     let [_, time_s, ..] = *record;
     let start =
         Nominal { time_s, attitude: rotation(record, 2), velocity_m_s: three(record, 6), position_m: three(record, 9) };
-    let sigmas = three(record, 12);
-    let options = Options {
-        start: StartSigmas { attitude_rad: sigmas.x, velocity_m_s: sigmas.y, position_m: sigmas.z },
-        ..Options::default()
-    };
+    let [_, _, _, _, _, _, _, _, _, _, _, _, attitude_rad, velocity_m_s, position_m, ..] = *record;
+    let options = Options { start: StartSigmas { attitude_rad, velocity_m_s, position_m }, ..Options::default() };
     let camera = |from: usize| CameraOptions {
         mount: rotation(record, from),
         clock: Block::estimated(0.1),
@@ -87,15 +85,15 @@ fn begin(record: &Record) -> Option<Flight> {
 fn push(flight: &mut Flight, record: &Record) {
     let [kind, time_s, third, ..] = *record;
     if kind == 2.0 {
-        let covariance_rad2 = Matrix3::from_rows(&[9, 12, 15].map(|from| three(record, from).transpose()));
+        let rows = [9, 12, 15].map(|from| three::<Cam>(record, from).into_inner().transpose());
         let direction = DirectionMeasurement {
             camera: third as usize,
             body: 0,
             measured: three(record, 3),
             reference: three(record, 6),
-            covariance_rad2,
+            covariance_rad2: Matrix3::from_rows(&rows).into(),
             by_limb_height: three(record, 18),
-            is_limb: three(record, 18) != Vector3::zeros(),
+            is_limb: three::<Cam>(record, 18) != Vector::zeros(),
         };
         let _ = flight.push(time_s, Measurement::Direction(direction));
     } else {
@@ -148,20 +146,21 @@ fn write(flight: &Flight, costs: &Costs, timer: Timer, results: &mut File) -> Op
     let begin = timer.ticks();
     let now = flight.now();
     let ticks = timer.ticks().wrapping_sub(begin);
-    let (q, v, x) = (now.attitude, now.velocity_m_s, now.position_m);
+    let [qw, qx, qy, qz] = now.attitude.wxyz();
+    let [[vx, vy, vz], [x, y, z]] = [now.velocity_m_s, now.position_m].map(|vector| vector.xyz());
     let sigma = flight.filter().sigmas(Layout::ATTITUDE);
     let numbers = [
         now.time_s,
-        q.w,
-        q.i,
-        q.j,
-        q.k,
-        v.x,
-        v.y,
-        v.z,
-        x.x,
-        x.y,
-        x.z,
+        qw,
+        qx,
+        qy,
+        qz,
+        vx,
+        vy,
+        vz,
+        x,
+        y,
+        z,
         sigma.x,
         sigma.y,
         sigma.z,

@@ -4,8 +4,8 @@ use hzn_fuse::Fused;
 use hzn_fuse::input::Body;
 use hzn_fuse::results::Kind;
 use hzn_fuse::truth::{Miss, compare};
+use hzn_nav::frames::{Rotation, Vector, Vehicle};
 use hzn_sim::Scenario;
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// Times at which the tables are read, s.
 const AT_S: [f64; 2] = [300.0, 430.0];
@@ -84,7 +84,7 @@ pub(super) fn picture_cells(scene: &Scenario, fused: &Fused) -> anyhow::Result<V
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Score {
     /// Error of the attitude about each axis (rad) and χ², at each of the times.
-    at: [(Vector3<f64>, f64); 2],
+    at: [(Vector<Vehicle>, f64); 2],
     /// Whether an axis was beyond 3σ, at each of the times.
     beyond: [f64; 2],
     /// Mean χ² over the flight.
@@ -110,17 +110,17 @@ impl Score {
             let epoch = fused.epochs.iter().rev().find(|e| e.state.time_s <= time_s)?;
             let miss = before(&misses, time_s)?;
             let sigma = epoch.attitude_sigma_rad();
-            let over = miss.attitude_rad.iter().zip(&sigma).filter(|(e, s)| e.abs() > 3.0 * **s);
+            let error = miss.attitude_rad.xyz();
+            let over = error.iter().zip(&sigma).filter(|(e, s)| e.abs() > 3.0 * **s);
             Some(over.count() as f64 / 3.0)
         };
         let last = fused.epochs.last()?;
         let (mut sum, mut nees, mut count) = (0.0, 0.0, 0.0);
         for (one, camera) in scene.by_camera().iter().zip(&last.cameras) {
-            let [w, x, y, z] = one.true_q_vehicle_from_camera_wxyz();
-            let truth = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+            let truth = Rotation::assume_from_quaternion(one.true_q_vehicle_from_camera_wxyz())?;
             let error = (camera.mount.inverse() * truth).scaled_axis();
             sum += error.norm_squared();
-            nees += error.component_div(&camera.misalignment_sigma_rad).norm_squared();
+            nees += error.as_inner().component_div(&camera.misalignment_sigma_rad).norm_squared();
             count += 3.0;
         }
         let nis = |of: &dyn Fn(Kind) -> bool| {
@@ -179,7 +179,7 @@ impl Table {
         let scores: Vec<Score> = scores.into_iter().flatten().collect();
         let n = scores.len().max(1) as f64;
         let mean = |of: &dyn Fn(&Score) -> f64| scores.iter().map(of).sum::<f64>() / n;
-        let rms = |which: usize, axis: usize| mean(&|s| s.at[which].0[axis].powi(2)).sqrt().to_degrees();
+        let rms = |which: usize, axis: usize| mean(&|s| s.at[which].0.xyz()[axis].powi(2)).sqrt().to_degrees();
         let three = |which: usize| format!("{:.2}°, {:.2}°, {:.2}°", rms(which, 0), rms(which, 1), rms(which, 2));
         let beyond = |which: usize| format!("{:.1} %", 100.0 * mean(&|s| s.beyond[which]));
         let lost = scores.iter().filter(|s| s.lost).count();

@@ -4,11 +4,13 @@
 use anyhow::anyhow;
 use hzn_core::{Config, config::Mount};
 use hzn_files::frames;
+use hzn_files::vehicle::VehicleRow;
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{Attitude, Body, Inputs, Recording};
 use hzn_fuse::settings::Treatment;
 use hzn_fuse::{Fused, Settings, fuse, sink};
 use hzn_mcap::Row;
+use hzn_nav::frames::{Cam, Fixed, Rotation, Vector, Vehicle};
 use hzn_sim::Scenario;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -93,19 +95,24 @@ fn pictures(scene: &Scenario, rows: &[Row]) -> anyhow::Result<Nadir> {
     Ok(nadir)
 }
 
+/// Returns the true attitude of the vehicle.
+fn attitude(row: &VehicleRow) -> Rotation<Vehicle, Fixed> {
+    UnitQuaternion::from_quaternion(Quaternion::new(row.qw, row.qx, row.qy, row.qz)).into()
+}
+
 /// Returns the errors of the filter's nadir in the camera within a span of time.
 fn filtered(scene: &Scenario, fused: &Fused, span_s: [f64; 2]) -> anyhow::Result<Nadir> {
     let path = scene.path()?;
     let [w, x, y, z] = scene.true_q_vehicle_from_camera_wxyz();
-    let mount = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+    let mount = Rotation::<Cam, Vehicle>::from(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)));
     let mut nadir = Nadir::default();
     for epoch in fused.epochs.iter().filter(|e| (span_s[0]..span_s[1]).contains(&e.state.time_s)) {
         let Some(camera) = epoch.cameras.first() else { continue };
         let row = path.vehicle(epoch.state.time_s);
-        let truth = UnitQuaternion::from_quaternion(Quaternion::new(row.qw, row.qx, row.qy, row.qz)) * mount;
-        let down = -Vector3::new(row.x_m, row.y_m, row.z_m).normalize();
+        let truth = attitude(&row) * mount;
+        let down = -Vector::<Fixed>::new(row.x_m, row.y_m, row.z_m).normalize();
         let estimate = epoch.state.attitude * camera.mount;
-        nadir.add((estimate.inverse() * down).angle(&(truth.inverse() * down)));
+        nadir.add((estimate.inverse() * down).angle_rad(&(truth.inverse() * down)));
     }
     Ok(nadir)
 }
@@ -113,10 +120,9 @@ fn filtered(scene: &Scenario, fused: &Fused, span_s: [f64; 2]) -> anyhow::Result
 /// Adds one attitude at the start, with an error of [`START_DEG`].
 fn add_start(scene: &Scenario, inputs: &mut Inputs) -> anyhow::Result<()> {
     let row = scene.path()?.vehicle(1.0);
-    let truth = UnitQuaternion::from_quaternion(Quaternion::new(row.qw, row.qx, row.qy, row.qz));
     let sigma_rad = START_DEG.to_radians();
-    let error = UnitQuaternion::from_scaled_axis(Vector3::new(1.0, -1.0, 1.0) * sigma_rad);
-    inputs.attitudes.push(Attitude { time_s: 1.0, fixed_from_vehicle: Some(truth * error), sigma_rad });
+    let error = Rotation::from_scaled_axis(Vector::new(1.0, -1.0, 1.0) * sigma_rad);
+    inputs.attitudes.push(Attitude { time_s: 1.0, fixed_from_vehicle: Some(attitude(&row) * error), sigma_rad });
     Ok(())
 }
 

@@ -7,8 +7,8 @@ use hzn_fuse::simulated::{Errors, Moment, inputs};
 use hzn_fuse::truth::{Miss, compare};
 use hzn_fuse::{Fused, Settings, fuse};
 use hzn_nav::ephemeris;
+use hzn_nav::frames::{Cam, Covariance, Fixed, Vector};
 use hzn_sim::Scenario;
-use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::super::recordings::{self, untold};
@@ -27,26 +27,26 @@ const FLIGHTS: (usize, u64) = (6, 8100);
 /// Seed of the pictures whose errors the flights draw from.
 const PICTURES: (usize, u64) = (200, 8001);
 
-/// Returns the direction to the Sun in ECEF.
-fn to_sun(unix_s: f64, from_m: &Vector3<f64>) -> Vector3<f64> {
-    Vector3::from(ephemeris::sun(unix_s).seen_from((*from_m).into()).direction)
+/// Returns the direction to the Sun.
+fn to_sun(unix_s: f64, from_m: &Vector<Fixed>) -> Vector<Fixed> {
+    ephemeris::sun(unix_s).seen_from(*from_m).direction
 }
 
 /// Returns whether a position is in the Earth's shadow, a cylinder.
-fn is_eclipsed(unix_s: f64, position_m: &Vector3<f64>) -> bool {
+fn is_eclipsed(unix_s: f64, position_m: &Vector<Fixed>) -> bool {
     let sun = to_sun(unix_s, position_m);
     let along = position_m.dot(&sun);
-    along < 0.0 && (position_m - sun * along).norm() < WGS84_A_M
+    along < 0.0 && (*position_m - sun * along).norm() < WGS84_A_M
 }
 
-/// Returns the direction in ECEF from the Earth's centre to the limb's point in a direction; `None` if the position
+/// Returns the direction from the Earth's centre to the limb's point in a direction; `None` if the position
 /// lies within the Earth, or if the direction is vertical.
-fn limb_point(position_m: &Vector3<f64>, outward: &Vector3<f64>) -> Option<Vector3<f64>> {
+fn limb_point(position_m: &Vector<Fixed>, outward: &Vector<Fixed>) -> Option<Vector<Fixed>> {
     // The line of sight touches the sphere where its angle at the Earth's centre from the position is 90° − α, with the
     // half-angle α of the limb. The flattening moves the latitude by less than 0.2°.
     let distance_m = position_m.norm();
     let up = position_m.try_normalize(WGS84_A_M)?;
-    let along = (outward - up * outward.dot(&up)).try_normalize(1e-12)?;
+    let along = (*outward - up * outward.dot(&up)).try_normalize(1e-12)?;
     let sine = WGS84_A_M / distance_m;
     Some(up * sine + along * (1.0 - sine * sine).sqrt())
 }
@@ -58,10 +58,10 @@ struct Lit<'a> {
 }
 
 impl Errors for Lit<'_> {
-    fn draw(&mut self, at: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+    fn draw(&mut self, at: &Moment, axis: &Vector<Cam>) -> (Vector<Cam>, Covariance<Cam>) {
         self.drawn.draw(at, axis)
     }
-    fn by_limb_height(&mut self, at: &Moment, axis: &Vector3<f64>) -> Vector3<f64> {
+    fn by_limb_height(&mut self, at: &Moment, axis: &Vector<Cam>) -> Vector<Cam> {
         self.drawn.by_limb_height(at, axis)
     }
     fn has_light(&mut self, at: &Moment) -> bool {
@@ -70,7 +70,7 @@ impl Errors for Lit<'_> {
             return !is_eclipsed(unix_s, &at.position_m);
         }
         // The limb that the camera sees lies towards its boresight.
-        let boresight = at.to_ecef * Vector3::z();
+        let boresight = at.fixed_from_camera * Vector::new(0.0, 0.0, 1.0);
         limb_point(&at.position_m, &boresight).is_some_and(|point| point.dot(&to_sun(unix_s, &at.position_m)) > 0.0)
     }
 }
@@ -125,7 +125,7 @@ impl Figures {
             figures.square[dark] += miss.attitude_rad.norm_squared();
             figures.count[dark] += 3.0;
             figures.nees[dark] += miss.nees;
-            let beyond = miss.attitude_rad.iter().zip(&sigma).filter(|(e, s)| e.abs() > 3.0 * **s).count();
+            let beyond = miss.attitude_rad.xyz().iter().zip(&sigma).filter(|(e, s)| e.abs() > 3.0 * **s).count();
             figures.beyond[dark] += beyond as f64;
             figures.largest_rad = figures.largest_rad.max(miss.attitude_rad.norm());
             since = (miss.attitude_rad.norm() > 5f64.to_radians()).then(|| since.unwrap_or(miss.time_s));

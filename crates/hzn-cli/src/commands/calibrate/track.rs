@@ -67,7 +67,7 @@ fn direction(kind: Kind, data: &FrameData) -> Option<[f64; 3]> {
         return Some(given.xyz());
     }
     let unix_s = data.utc_s?;
-    let position_m = data.position_km.map(|p| p.map(|km| km * 1e3));
+    let position_m = data.position_km.map(|p| p.map(|km| km * 1e3).into());
     let place = match kind {
         Kind::Moon => ephemeris::moon(unix_s).seen_from(position_m?),
         _ => position_m.map_or_else(|| ephemeris::sun(unix_s), |at| ephemeris::sun(unix_s).seen_from(at)),
@@ -75,7 +75,7 @@ fn direction(kind: Kind, data: &FrameData) -> Option<[f64; 3]> {
     let attitude = Rotation::<hzn_core::frames::Cam, hzn_core::frames::Fixed, f64>::assume_from_quaternion(
         data.q_fixed_from_camera_wxyz?,
     )?;
-    Some(attitude.inverse().apply(&UnitVec3::try_new(place.direction)?).xyz())
+    Some(attitude.inverse().apply(&place.direction.to_unit()?).xyz())
 }
 
 fn write(args: &Args, sensor: &Sensor, track: &Track, input: &str) -> Outcome {

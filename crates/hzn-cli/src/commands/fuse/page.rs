@@ -42,12 +42,20 @@ fn charts(fused: &Fused) -> Vec<Chart> {
     }
     all.push(clocks(fused));
     let deg = |v: Vector3<f64>| v.map(|x| x.to_degrees() * 3600.0);
-    all.push(bias(fused, "Bias of the gyros (thin: 3 sigma)", "deg/h", &|e| deg(e.corrections.gyro_bias), &|e| {
-        deg(e.gyro_bias_sigma_rad_s)
-    }));
-    all.push(bias(fused, "Bias of the accelerometers (thin: 3 sigma)", "m/s²", &|e| e.corrections.accel_bias, &|e| {
-        e.accel_bias_sigma_m_s2
-    }));
+    all.push(bias(
+        fused,
+        "Bias of the gyros (thin: 3 sigma)",
+        "deg/h",
+        &|e| deg(*e.corrections.gyro_bias.as_inner()),
+        &|e| deg(e.gyro_bias_sigma_rad_s),
+    ));
+    all.push(bias(
+        fused,
+        "Bias of the accelerometers (thin: 3 sigma)",
+        "m/s²",
+        &|e| *e.corrections.accel_bias.as_inner(),
+        &|e| e.accel_bias_sigma_m_s2,
+    ));
     all.extend(innovations(fused));
     all
 }
@@ -124,9 +132,11 @@ fn mount(fused: &Fused, camera: usize) -> Chart {
     let of = |e: &Epoch, value: &dyn Fn(&CameraState) -> f64| e.cameras.get(camera).map_or(f64::NAN, value);
     let mut chart = over_time(format!("Mount of {name}: estimate against the told one (thin: 3 sigma)"), "deg");
     for (i, axis) in AXES.iter().enumerate() {
-        chart = chart.with_series(line(fused, axis, Style::Line, |e| of(e, &|c| c.misalignment_rad[i].to_degrees())));
+        chart =
+            chart.with_series(line(fused, axis, Style::Line, |e| of(e, &|c| c.misalignment_rad.xyz()[i].to_degrees())));
         for sign in [-3.0, 3.0] {
-            let bound = |c: &CameraState| (c.misalignment_rad[i] + sign * c.misalignment_sigma_rad[i]).to_degrees();
+            let bound =
+                |c: &CameraState| (c.misalignment_rad.xyz()[i] + sign * c.misalignment_sigma_rad[i]).to_degrees();
             chart = chart.with_series(line(fused, "", Style::Ideal, |e| of(e, &bound)));
         }
     }

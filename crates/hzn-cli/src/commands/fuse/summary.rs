@@ -34,7 +34,8 @@ pub(super) fn lines(fused: &Fused, truth: Option<&[VehicleRow]>) -> Vec<(String,
         line("end", format!("{:.2} s", last.state.time_s));
         line("attitude, 3 sigma", format!("{} deg at the end, about x, y, z of the vehicle", three(last)));
         for (name, camera) in fused.cameras.iter().zip(&last.cameras) {
-            let [a, b] = [camera.misalignment_rad, camera.misalignment_sigma_rad].map(|v| v.map(f64::to_degrees));
+            let [a, b] =
+                [camera.misalignment_rad.into_inner(), camera.misalignment_sigma_rad].map(|v| v.map(f64::to_degrees));
             line(
                 &format!("mount of {name}"),
                 format!(
@@ -138,7 +139,8 @@ fn errors(misses: &[Miss]) -> Option<String> {
     if misses.is_empty() {
         return None;
     }
-    let rms = |axis: usize| (misses.iter().map(|m| m.attitude_rad[axis].powi(2)).sum::<f64>() / n).sqrt().to_degrees();
+    let rms =
+        |axis: usize| (misses.iter().map(|m| m.attitude_rad.xyz()[axis].powi(2)).sum::<f64>() / n).sqrt().to_degrees();
     let nees = misses.iter().map(|m| m.nees).sum::<f64>() / n;
     let worst = misses.iter().map(|m| m.attitude_rad.norm()).fold(0.0, f64::max).to_degrees();
     let last = misses.last()?.attitude_rad.norm().to_degrees();

@@ -6,15 +6,15 @@ pub(crate) use draws::Draws;
 
 use hzn_fuse::input::Inputs;
 use hzn_fuse::simulated::{Errors, Moment, inputs};
+use hzn_nav::frames::{Cam, Covariance, Vector};
 use hzn_sim::Scenario;
-use nalgebra::{Matrix3, Vector3};
 
 /// Slow errors of limb and Sun with a time constant of 20 s, and a small white part.
 pub(crate) struct Slow {
     pub(crate) draws: Draws,
     /// 1-sigma, rad.
     pub(crate) sigma_rad: f64,
-    last: Vec<(Moment, Vector3<f64>)>,
+    last: Vec<(Moment, Vector<Cam>)>,
 }
 
 impl Slow {
@@ -22,13 +22,13 @@ impl Slow {
         Self { draws: Draws(seed), sigma_rad: sigma_deg.to_radians(), last: Vec::new() }
     }
 
-    fn three(&mut self, sigma: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| sigma * self.draws.normal())
+    fn three(&mut self, sigma: f64) -> Vector<Cam> {
+        core::array::from_fn(|_| sigma * self.draws.normal()).into()
     }
 }
 
 impl Errors for Slow {
-    fn draw(&mut self, at: &Moment, axis: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+    fn draw(&mut self, at: &Moment, axis: &Vector<Cam>) -> (Vector<Cam>, Covariance<Cam>) {
         let sigma = self.sigma_rad;
         let place = self.last.iter().position(|(m, _)| (m.camera, m.body) == (at.camera, at.body));
         let error = match place.map(|i| self.last.swap_remove(i)) {
@@ -39,13 +39,14 @@ impl Errors for Slow {
             None => self.three(sigma),
         };
         self.last.push((*at, error));
-        let covariance = (Matrix3::identity() - axis * axis.transpose()) * sigma.powi(2);
+        let covariance = Covariance::across(axis, sigma.powi(2));
         (error + self.three(2e-4), covariance)
     }
 
-    fn by_limb_height(&mut self, _: &Moment, axis: &Vector3<f64>) -> Vector3<f64> {
+    fn by_limb_height(&mut self, _: &Moment, axis: &Vector<Cam>) -> Vector<Cam> {
         // The limb pulls the axis towards the boresight, by about 0.02 degrees per km.
-        (Vector3::z() - axis * axis.z).normalize() * 3e-4
+        let [_, _, z] = axis.xyz();
+        (Vector::new(0.0, 0.0, 1.0) - *axis * z).normalize() * 3e-4
     }
 }
 

@@ -1,5 +1,7 @@
 //! Random numbers for the tests.
 
+use hzn_nav::frames::Vector;
+
 /// A generator that gives the same sequence on every machine.
 pub(crate) struct Draws(pub(crate) u64);
 
@@ -16,5 +18,9 @@ impl Draws {
     /// Returns a normal number with mean 0 and standard deviation 1.
     pub(crate) fn normal(&mut self) -> f64 {
         (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (core::f64::consts::TAU * self.uniform()).cos()
+    }
+    /// Returns a vector of three normal numbers with mean 0.
+    pub(crate) fn vector<F>(&mut self, sigma: f64) -> Vector<F> {
+        core::array::from_fn(|_| sigma * self.normal()).into()
     }
 }

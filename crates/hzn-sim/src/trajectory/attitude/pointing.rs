@@ -88,8 +88,8 @@ impl Towards {
         let n = self.bodies.len();
         let kind = self.bodies.get((fraction * n as f64) as usize).copied().unwrap_or(Kind::Sun);
         let axis: Vector3<f64> = match kind {
-            Kind::Sun => ephemeris::sun(unix_s).seen_from(position_m.into()).direction.into(),
-            Kind::Moon => ephemeris::moon(unix_s).seen_from(position_m.into()).direction.into(),
+            Kind::Sun => ephemeris::sun(unix_s).seen_from(position_m.into()).direction.into_inner(),
+            Kind::Moon => ephemeris::moon(unix_s).seen_from(position_m.into()).direction.into_inner(),
             _ => -position_m.normalize(),
         };
         let helper = if axis.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };

@@ -78,10 +78,10 @@ fn sky(viewer: &Viewer, frame_view: &FrameView, placement: &Placement<'_>) -> Ve
 }
 
 fn from_ephemeris(data: &hzn_files::FrameData, place: impl Fn(f64) -> hzn_nav::ephemeris::Place) -> Option<[f64; 3]> {
-    use hzn_core::frames::{Cam, Fixed, Rotation, UnitVec3};
+    use hzn_core::frames::{Cam, Fixed, Rotation};
     let turn = Rotation::<Cam, Fixed, f64>::assume_from_quaternion(data.q_fixed_from_camera_wxyz?)?.inverse();
-    let seen = place(data.utc_s?).seen_from(data.position_km?.map(|km| km * 1e3));
-    Some(turn.apply(&UnitVec3::try_new(seen.direction)?).xyz())
+    let seen = place(data.utc_s?).seen_from(data.position_km?.map(|km| km * 1e3).into());
+    Some(turn.apply(&seen.direction.to_unit()?).xyz())
 }
 
 fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Placement<'_>) {
