@@ -87,6 +87,8 @@ fn option(remedy: Remedy) -> Option<&'static str> {
         Remedy::Restart => "--force starts over",
         Remedy::NoTopic => "leave out --topic, or give an MCAP as the input",
         Remedy::Headerless => "--raw reads files without a header",
+        Remedy::Sensor => "--sensor FILE names another one",
+        Remedy::Altitude => "or give --altitude-km",
         _ => return None,
     })
 }

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use hzn_files::{files_of_sensor, named_camera_file};
 use hzn_run::disk;
+use hzn_run::open::{Request, frames_path, sensor_path};
 use hzn_run::source::{Source, ending};
 
 use crate::exit::Stop;
-use crate::setup::{InputArgs, SensorArgs};
 
 /// Refuses outputs that are read as well, also with `force`. Without it, refuses outputs that exist, too.
 ///
@@ -19,14 +19,14 @@ pub(crate) fn check_outputs(read: &[PathBuf], written: &[PathBuf], force: bool) 
 }
 
 /// Returns every file that is read for a sequence: the pictures, the sensor, its camera file, frames.csv.
-pub(crate) fn of_sequence(source: &dyn Source, sensor: &SensorArgs, input: &InputArgs) -> Vec<PathBuf> {
+pub(crate) fn of_sequence(source: &dyn Source, request: &Request) -> Vec<PathBuf> {
     let mut files = source.files();
-    match (sensor.path(source), source.sensor_toml()) {
+    match (sensor_path(request, source), source.sensor_toml()) {
         (Some(path), _) => files.extend(files_of_sensor(&path)),
         (None, Some(text)) => files.extend(named_camera_file(text, &source.folder().join("sensor.toml"))),
         (None, None) => {}
     }
-    files.extend(input.frames_path(source));
+    files.extend(frames_path(request, source));
     files
 }
 

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use hzn_files::FrameData;
 use hzn_run::engine::{self, Finished, Plan};
+use hzn_run::open::{Opened, Request, SensorChoice, open};
 use hzn_run::source::{self, Payload, Source};
 use hzn_run::{Error, Kind};
 use pyo3::prelude::*;
@@ -45,28 +46,20 @@ impl Sequence {
     #[new]
     fn new(py: Python<'_>, sensor: &Sensor, inputs: Vec<PathBuf>) -> PyResult<Self> {
         let state = sensor.state();
-        let (source, frames, bits) = errors::detached(py, || -> PyResult<_> {
-            let mut source = source::open(&inputs, None, None).map_err(to_exception)?;
-            source.want_channel(state.config.input.channel).map_err(to_exception)?;
-            let given = state.config.input.bits.or(source.bits());
-            let found = if given.is_none() { source::find_bits(source.as_ref()) } else { None };
-            let bits = (given.or(found.map(|f| f.bits)), found.filter(|f| f.bits < 16));
-            let table = source.folder().join("frames.csv");
-            let has_sensor = source.sensor_toml().is_some();
-            let frames = (!has_sensor && table.exists()).then(|| hzn_files::frames::load(&table)).transpose();
-            let frames = frames.map_err(errors::config)?;
-            engine::check_frames(&state.config, state.flight, frames.as_ref()).map_err(errors::config)?;
-            Ok((source, frames, bits))
+        let opened = errors::detached(py, || {
+            let own = hzn_files::Sensor { config: state.config.clone(), text: String::new(), warnings: Vec::new() };
+            let sensor = SensorChoice::Ready(Box::new(own));
+            open(&Request { inputs, sensor, flight: state.flight, ..Request::default() }).map_err(to_exception)
         })??;
-        for warning in frames.iter().flat_map(|f: &hzn_files::Frames| f.check_sensor(&state.config)) {
+        // `hzn run` refuses such a sequence. Here every picture gets its report, which says the same.
+        let doubts = [opened.check_size(), opened.check_altitude()];
+        let doubts = doubts.into_iter().filter_map(Result::err).map(|e| e.to_string());
+        let Opened { source, sensor, frames, warnings, notes } = opened;
+        for warning in doubts.chain(warnings).chain(notes) {
             errors::warn(py, warning)?;
         }
-        let (bits, found) = bits;
-        if let Some(found) = found {
-            errors::warn(py, found)?;
-        }
         let mut plan = default_plan(&state, frames);
-        plan.config.input.bits = bits;
+        plan.config.input.bits = sensor.config.input.bits;
         Ok(Self { state, plan, source: Mutex::new(source), next: AtomicU64::new(0) })
     }
 

@@ -40,6 +40,10 @@ pub enum Remedy {
     NoTopic,
     /// The caller may give the size and format of files without a header.
     Headerless,
+    /// The caller may give a sensor.toml.
+    Sensor,
+    /// The caller may give an altitude for all pictures.
+    Altitude,
 }
 
 impl Error {

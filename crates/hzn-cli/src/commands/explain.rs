@@ -8,12 +8,13 @@ use hzn_core::{Config, Report, Solution, body, threshold};
 use hzn_files::FrameData;
 use hzn_mcap::Annotations;
 use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
+use hzn_run::open::Opened;
 use hzn_run::source::{self, Item, Picture, Source};
 use hzn_run::{engine, explain, overlay, sink};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
-use crate::setup::{InputArgs, SensorArgs, check_altitude, find_input};
+use crate::setup::{self, InputArgs, SensorArgs};
 use crate::tell::{self, one_line};
 
 /// Show what happens to one picture: what is kept, what is dropped, and why
@@ -40,14 +41,14 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.overlay {
         check_overlay(path)?;
     }
-    let mut source = args.source.open(std::slice::from_ref(&args.frame))?;
-    let mut sensor = args.sensor.load(source.as_ref())?;
-    let notes = find_input(source.as_mut(), &mut sensor)?;
-    notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
-    let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
-    check_altitude(&sensor, source.as_ref(), frames.as_ref())?;
+    let inputs = std::slice::from_ref(&args.frame);
+    let opened = setup::open(inputs, &args.sensor, &args.source)?;
+    opened.notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
+    opened.check_altitude()?;
+    let Opened { mut source, sensor, frames, .. } = opened;
     if let Some(path) = &args.overlay {
-        let read = files::of_sequence(source.as_ref(), &args.sensor, &args.source);
+        let request = setup::request(inputs, &args.sensor, &args.source)?;
+        let read = files::of_sequence(source.as_ref(), &request);
         files::check_outputs(&read, std::slice::from_ref(path), args.force)?;
     }
     let mut item = item(source.as_mut(), args.index)?;

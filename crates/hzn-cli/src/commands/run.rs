@@ -9,6 +9,7 @@ use hzn_core::status::Status;
 use hzn_files::{Frames, Sensor};
 use hzn_mcap::Row;
 use hzn_run::engine::{self, AnySensor, BodyOutcome, End, Finished, Plan};
+use hzn_run::open::Opened;
 use hzn_run::sink::{self, Existing, Output, StoredResults};
 use hzn_run::source::{self, Source, ending};
 use hzn_run::{disk, explain};
@@ -17,7 +18,7 @@ use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
-use crate::setup::{InputArgs, SensorArgs, check_altitude, check_size, find_input, stop_flag};
+use crate::setup::{self, InputArgs, SensorArgs, stop_flag};
 use crate::tell;
 
 /// Process a sequence of pictures
@@ -84,13 +85,10 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     check_arguments(args)?;
-    let mut source = args.source.open(&args.input)?;
-    let mut sensor = args.sensor.load(source.as_ref())?;
-    let mut notes = source.notes();
-    notes.extend(find_input(source.as_mut(), &mut sensor)?);
-    check_size(source.as_ref(), &sensor)?;
-    let frames = args.source.frames(source.as_ref(), &sensor, args.sensor.flight)?;
-    check_altitude(&sensor, source.as_ref(), frames.as_ref())?;
+    let opened = setup::open(&args.input, &args.sensor, &args.source)?;
+    opened.check_size()?;
+    opened.check_altitude()?;
+    let Opened { mut source, sensor, frames, notes, .. } = opened;
     // The check is made only for folders, because the table next to a single picture also lists all others.
     if let Some(frames) = frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
         warn_of_missing_pictures(frames, &source.folder());
@@ -160,7 +158,8 @@ fn refuse_inputs(args: &Args, source: &dyn Source) -> Result<(), Stop> {
     }
     let drawn = args.overlay.as_deref().map(files::pictures_in).unwrap_or_default();
     let written: Vec<PathBuf> = args.output.iter().cloned().chain(drawn).collect();
-    Ok(disk::refuse_inputs(&files::of_sequence(source, &args.sensor, &args.source), &written)?)
+    let request = setup::request(&args.input, &args.sensor, &args.source)?;
+    Ok(disk::refuse_inputs(&files::of_sequence(source, &request), &written)?)
 }
 
 /// Makes the folder of the overlays. If `may_have_files` is true, the folder may already contain files.

@@ -72,7 +72,7 @@ fn the_sensor_of_another_camera_is_reported_once() {
     place.run(&["run", "in", "-o", "a.mcap"]).expect(0);
     let err = place.run(&["run", "in", "-s", "other.toml", "-o", "b.csv"]).expect(2).err;
     insta::assert_snapshot!(err, @"error: the sensor is for pictures of 640 x 480 px, but none of the pictures has this size: 0000.png \
-                                   is 320 x 240; give the sensor of this camera with --sensor, or set camera.width and \
+                                   is 320 x 240; use the sensor of this camera, or set camera.width and \
                                    height and scale focal lengths and centre with them");
     assert!(!place.path("b.csv.part").exists());
     place.run(&["run", "a.mcap", "-s", "other.toml"]).expect(2).says("0000.png is 320 x 240");
@@ -248,5 +248,5 @@ fn what_looks_wrong_is_a_warning_and_the_run_goes_on() {
     place
         .run(&["run", "in", "--altitude-km", "517500"])
         .expect(0)
-        .says("warning: --altitude-km: 517500 km is implausibly");
+        .says("warning: the altitude of all pictures: 517500 km is implausibly");
 }

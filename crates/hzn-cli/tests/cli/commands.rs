@@ -215,7 +215,7 @@ fn wrong_usage_is_2() {
     for (args, what) in [
         (&["--fps", "-1"][..], "--fps: must be above 0"),
         (&["--fps", "0"], "--fps: must be above 0"),
-        (&["--altitude-km", "-5"], "--altitude-km: body.altitude_km"),
+        (&["--altitude-km", "-5"], "the altitude of all pictures: body.altitude_km"),
         (&["-j", "0"], "0 is not in 1.."),
         (&["--no-images", "-o", "a.csv"], "--no-images: only an MCAP"),
         (&["--topic", "/x"], "only an MCAP has topics; leave out --topic"),

@@ -7,6 +7,7 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 use hzn_files::Frames;
 use hzn_files::truth::{self, Truth};
 use hzn_mcap::{Index, IndexEntry, Row};
+use hzn_run::open;
 use hzn_run::source::{self, Item, Payload, Raw, Source, TimeSource};
 
 use super::Wake;
@@ -170,19 +171,21 @@ fn read_companions(request: &Request, folder: &Path, recorded_sensor: Option<Sen
     (opened, frames)
 }
 
-/// Adds the warnings about the sensor.toml, and adds `bits` if the pictures show the number of bits of their samples.
-fn complete_sensor(opened: &mut Opened, source: &dyn Source) {
+/// Adds the warnings about the sensor.toml and about its pictures, and adds `bits` if the pictures show the number of
+/// bits of their samples. `hzn run` refuses some of these sequences; the window shows them, so that the sensor can be
+/// mended.
+fn complete_sensor(opened: &mut Opened, source: &mut dyn Source, frames: Option<&Frames>) {
     let Some(sensor) = &mut opened.sensor else { return };
     // The session reports errors of the sensor.toml.
-    let Ok(parsed) = hzn_files::sensor::parse(&sensor.text, &sensor.home) else { return };
+    let Ok(mut parsed) = hzn_files::sensor::parse(&sensor.text, &sensor.home) else { return };
     opened.notes.extend(parsed.warnings.iter().map(ToString::to_string));
-    if parsed.config.input.bits.is_some() {
-        return;
+    match open::complete(source, &mut parsed) {
+        Ok(notes) => opened.notes.extend(notes),
+        Err(why) => opened.notes.push(why.to_string()),
     }
-    if let Some(found) = source::find_bits(source) {
-        sensor.text = source::with_key(&sensor.text, "bits", i64::from(found.bits));
-        opened.notes.extend((found.bits < 16).then(|| found.to_string()));
-    }
+    sensor.text = parsed.text;
+    let checks = [open::check_size(source, &parsed.config), open::check_altitude(source, &parsed.config, frames)];
+    opened.notes.extend(checks.into_iter().filter_map(Result::err).map(|e| e.to_string()));
 }
 
 /// Opens a recording: one of ours with results and sensor, or one of another program with pictures only.
@@ -202,8 +205,8 @@ fn open_recording(path: &Path, request: &Request, events: &EventSender) -> Resul
     }
     let (mut opened, frames) = read_companions(&request, &folder, recorded_sensor);
     opened.title = title(path);
-    if let Ok(source) = source::open(std::slice::from_ref(&path.to_owned()), None, None) {
-        complete_sensor(&mut opened, source.as_ref());
+    if let Ok(mut source) = source::open(std::slice::from_ref(&path.to_owned()), None, None) {
+        complete_sensor(&mut opened, source.as_mut(), frames.as_ref());
     }
     events.send(Event::Opened(Box::new(opened)));
     let mut joiner = FrameJoiner { name: title(path), frames, pending: HashMap::new(), pictures_only: 0, last: None };
@@ -308,7 +311,7 @@ fn open_pictures(request: &Request, events: &EventSender) -> Result<(), String> 
         several => format!("{} pictures", several.len()),
     };
     opened.notes.extend(source.notes());
-    complete_sensor(&mut opened, source.as_ref());
+    complete_sensor(&mut opened, source.as_mut(), frames.as_ref());
     events.send(Event::Opened(Box::new(opened)));
     let mut batch = Vec::new();
     for index in 0u64.. {

@@ -4,14 +4,15 @@ use std::path::PathBuf;
 
 use hzn_calib::noise::{self, WeightedPoints};
 use hzn_core::{Prior, Solution};
-use hzn_files::{FrameData, Sensor};
+use hzn_files::{FrameData, Frames, Sensor};
 use hzn_run::engine::{self, End, Finished, Plan, Sink};
+use hzn_run::open::{self, Opened, Request, SensorChoice};
 use hzn_run::source::{Source, ending};
 
 use crate::commands::run::cores;
 use crate::exit::{Stop, usage};
 use crate::progress::Progress;
-use crate::setup::{InputArgs, check_altitude, stop_flag};
+use crate::setup::{self, InputArgs, SensorArgs, stop_flag};
 
 /// Refuses outputs of another kind.
 pub(super) fn check_endings(output: &[PathBuf]) -> Result<(), Stop> {
@@ -44,19 +45,20 @@ pub(super) fn with_wide_limb(sensor: &Sensor) -> Result<Sensor, Stop> {
     Ok(Sensor { config, ..sensor.clone() })
 }
 
+/// Opens the pictures with a sensor that was read before and then changed. Its warnings were printed then.
+pub(super) fn reopen(inputs: &[PathBuf], input: &InputArgs, flight: bool, sensor: Sensor) -> Result<Opened, Stop> {
+    let none = SensorArgs { sensor: None, altitude_km: None, flight };
+    let sensor = SensorChoice::Ready(Box::new(sensor));
+    let opened = open::open(&Request { sensor, ..setup::request(inputs, &none, input)? })?;
+    opened.check_altitude()?;
+    Ok(opened)
+}
+
 /// Returns the plan of the run.
-pub(super) fn plan(
-    input: &InputArgs,
-    flight: bool,
-    jobs: Option<u16>,
-    source: &dyn Source,
-    sensor: &Sensor,
-) -> Result<Plan, Stop> {
-    let frames = input.frames(source, sensor, flight)?;
-    check_altitude(sensor, source, frames.as_ref())?;
+pub(super) fn plan(input: &InputArgs, flight: bool, jobs: Option<u16>, frames: Option<Frames>, sensor: Sensor) -> Plan {
     let threads = if sensor.config.tracks() { 1 } else { jobs.map_or_else(cores, usize::from) };
-    Ok(Plan {
-        config: sensor.config.clone(),
+    Plan {
+        config: sensor.config,
         flight,
         threads,
         frames,
@@ -66,7 +68,7 @@ pub(super) fn plan(
         keep_picture: false,
         overlay: None,
         last: Vec::new(),
-    })
+    }
 }
 
 /// An answer of the pipeline with its edge points.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use hzn_calib::noise::{self, Calibration, Sighting};
 use hzn_core::camera::Camera;
+use hzn_run::open::Opened;
 use hzn_run::source::ending;
 use hzn_run::{disk, explain};
 
@@ -12,7 +13,7 @@ use super::{page, text};
 use crate::exit::{Exit, Outcome, failed, usage};
 use crate::files;
 use crate::progress::Progress;
-use crate::setup::{InputArgs, SensorArgs, check_size, find_input};
+use crate::setup::{self, InputArgs, SensorArgs};
 use crate::tell;
 
 /// Measure limb height and edge noise on the pictures of a flight
@@ -48,15 +49,14 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     check_endings(&args.output)?;
-    let mut source = args.source.open(&args.input)?;
-    let read = files::of_sequence(source.as_ref(), &args.sensor, &args.source);
+    let opened = setup::open(&args.input, &args.sensor, &args.source)?;
+    let read = files::of_sequence(opened.source.as_ref(), &setup::request(&args.input, &args.sensor, &args.source)?);
     files::check_outputs(&read, &args.output, args.force)?;
-    let mut sensor = args.sensor.load(source.as_ref())?;
-    let mut notes = source.notes();
-    notes.extend(find_input(source.as_mut(), &mut sensor)?);
-    check_size(source.as_ref(), &sensor)?;
-    let plan =
-        flight::plan(&args.source, args.sensor.flight, args.jobs, source.as_ref(), &flight::with_wide_limb(&sensor)?)?;
+    opened.check_size()?;
+    let wide = flight::with_wide_limb(&opened.sensor)?;
+    opened.check_altitude()?;
+    let Opened { mut source, sensor, frames, notes, .. } = opened;
+    let plan = flight::plan(&args.source, args.sensor.flight, args.jobs, frames, wide);
     let camera = Camera::try_new(&plan.config.camera).map_err(usage)?;
     if !args.quiet {
         notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));

@@ -7,7 +7,8 @@ use hzn_files::Sensor;
 use hzn_run::disk;
 use hzn_run::engine::Plan;
 use hzn_run::explain::counted;
-use hzn_run::source::ending;
+use hzn_run::open::Opened;
+use hzn_run::source::{self, ending};
 
 use super::flight::{self, check_endings};
 use super::sky_args::{Args, unknowns, write_sensors};
@@ -15,7 +16,7 @@ use super::{page, sky_text, track};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::files;
 use crate::progress::Progress;
-use crate::setup::{InputArgs, SensorArgs, check_size, find_input};
+use crate::setup::{self, InputArgs, SensorArgs};
 use crate::tell;
 
 /// Number of times that the pictures are processed at most. The first lens may be several percent wrong, and with it
@@ -34,8 +35,9 @@ pub(super) struct Pictures {
 
 pub(super) fn run(args: &Args) -> Outcome {
     check_endings(&args.output)?;
-    let read = files::of_sequence(args.source.open(&args.input)?.as_ref(), &args.sensor, &args.source);
-    files::check_outputs(&read, &args.output, args.force)?;
+    let request = setup::request(&args.input, &args.sensor, &args.source)?;
+    let source = source::open(&request.inputs, request.raw, request.topic.as_deref())?;
+    files::check_outputs(&files::of_sequence(source.as_ref(), &request), &args.output, args.force)?;
     let (sensor, notes) = load(&args.input, &args.sensor, &args.source)?;
     if !args.quiet {
         notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
@@ -57,12 +59,9 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 /// Loads the sensor for a flight, with notes for the user.
 pub(super) fn load(input: &[PathBuf], sensor: &SensorArgs, source: &InputArgs) -> Result<(Sensor, Vec<String>), Stop> {
-    let mut source = source.open(input)?;
-    let mut sensor = sensor.load(source.as_ref())?;
-    let mut notes = source.notes();
-    notes.extend(find_input(source.as_mut(), &mut sensor)?);
-    check_size(source.as_ref(), &sensor)?;
-    Ok((sensor, notes))
+    let opened = setup::open(input, sensor, source)?;
+    opened.check_size()?;
+    Ok((opened.sensor, opened.notes))
 }
 
 /// Returns the limb height of the sensor as a prior. The error of the altitude moves the limb by the same amount.
@@ -127,9 +126,9 @@ pub(super) fn views(
     quiet: bool,
     sensor: &Sensor,
 ) -> Result<Option<Pictures>, Stop> {
-    let mut source = source_args.open(input)?;
-    source.want_channel(sensor.config.input.channel)?;
-    let plan = flight::plan(source_args, flight, jobs, source.as_ref(), &flight::with_wide_limb(sensor)?)?;
+    let wide = flight::with_wide_limb(sensor)?;
+    let Opened { mut source, sensor, frames, .. } = flight::reopen(input, source_args, flight, wide)?;
+    let plan = flight::plan(source_args, flight, jobs, frames, sensor);
     let mut progress = Progress::new(source.total(), 0, quiet);
     let view = |a: flight::Answered<'_>| Some(View::new(a.name, a.points, a.prior, a.solution));
     let views = flight::measure_answers(&plan, source.as_mut(), &mut progress, view)?;

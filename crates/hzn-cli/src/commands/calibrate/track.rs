@@ -7,6 +7,7 @@ use hzn_core::frames::{Rotation, UnitVec3};
 use hzn_files::{FrameData, Sensor};
 use hzn_nav::ephemeris;
 use hzn_run::explain::counted;
+use hzn_run::open::Opened;
 use hzn_run::source::ending;
 
 use super::flight::{self, Answered};
@@ -32,9 +33,9 @@ pub(super) fn run(args: &Args, sensor: &Sensor) -> Outcome {
     used.config.camera.covariance = None;
     used.config.camera.focal_sigma_percent = unknowns.focal_sigma_percent();
     let camera = Camera::<f64>::try_new(&used.config.camera).map_err(usage)?;
-    let mut source = args.source.open(&args.input)?;
-    source.want_channel(used.config.input.channel)?;
-    let plan = flight::plan(&args.source, args.sensor.flight, args.jobs, source.as_ref(), &used)?;
+    let flight = args.sensor.flight;
+    let Opened { mut source, sensor: used, frames, .. } = flight::reopen(&args.input, &args.source, flight, used)?;
+    let plan = flight::plan(&args.source, flight, args.jobs, frames, used.clone());
     let mut progress = Progress::new(source.total(), 0, args.quiet);
     let kinds: Vec<Kind> = used.config.each_body().iter().map(|b| b.kind).collect();
     let sight = |a: Answered<'_>| {
