@@ -1,5 +1,5 @@
-//! Runs the large campaigns that look for faults. `cargo xtask test` runs a small part of each, and with `--all` most of
-//! them whole.
+//! Runs the large campaigns that look for faults. `cargo xtask test` runs a small part of each, and with `--all` most
+//! of them whole.
 
 use std::fs;
 use std::io::{BufRead, BufReader};

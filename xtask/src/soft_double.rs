@@ -24,10 +24,10 @@ const STAGES: [&str; 11] = [
     "stages::threshold",
 ];
 /// Functions that convert values of the configuration to single precision, once per picture or per candidate. Each has
-/// the number of places that may do so.
+/// the number of places that may do so, the larger one of the images `chain` and `measure`.
 const ALLOWED_CONVERSIONS: [(&str, usize); 14] = [
-    ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::candidate::{{closure}}", 34),
-    ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::judge_edge", 38),
+    ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::candidate::{{closure}}", 35),
+    ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::judge_edge", 40),
     ("hzn_core::stages::consensus::inliers::Threshold<T>::new", 3),
     ("hzn_core::stages::consensus::find", 2),
     ("hzn_core::stages::covariance::fuse", 5),

@@ -16,7 +16,7 @@ use crate::nearest::suggestion;
 pub(crate) struct KeyPlace {
     pub(crate) path: Vec<String>,
     pub(crate) key: Range<usize>,
-    value: Range<usize>,
+    pub(crate) value: Range<usize>,
     /// Number of items of a list; 0 for other values.
     items: usize,
 }

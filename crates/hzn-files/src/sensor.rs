@@ -135,9 +135,26 @@ fn merge_camera(section: camera::Config, from_file: Option<camera::Config>) -> c
     camera::Config { focal_sigma_percent, centre_sigma_px, covariance, readout_s, ..camera }
 }
 
+/// Returns a configuration as the text of a sensor.toml. It is a function of this crate, so that the code for all keys
+/// is compiled once and not again in each crate that writes a sensor.
+///
+/// # Errors
+/// A value is not TOML, for example an integer above 2⁶³.
+pub fn to_text(config: &Config) -> Result<String, toml::ser::Error> {
+    toml::to_string(config)
+}
+
+/// Returns a configuration as the table of a sensor.toml, as [`to_text`] does.
+///
+/// # Errors
+/// The errors of [`to_text`].
+pub fn to_table(config: &Config) -> Result<toml::Table, toml::ser::Error> {
+    toml::Table::try_from(config)
+}
+
 /// Writes the preset of a sensor with this camera as the text of a sensor.toml without camera.
 fn starting_values(preset: Preset, camera: camera::Config) -> String {
-    let mut table = match toml::Table::try_from(Config::preset(preset, camera)) {
+    let mut table = match to_table(&Config::preset(preset, camera)) {
         Ok(table) => table,
         Err(e) => unreachable!("plain numbers, texts and lists are TOML: {e}"),
     };

@@ -182,7 +182,7 @@ pub(crate) fn write_mcap(py: Python<'_>, path: PathBuf, sensor: &Sensor, reports
     let config = sensor.state().config.clone();
     let frames: Vec<Vec<FrameRecord>> = reports.iter().map(|r| r.get().each().map(Report::record).collect()).collect();
     errors::detached(py, || {
-        let sensor_toml = toml::to_string(&config).map_err(errors::other)?;
+        let sensor_toml = hzn_files::sensor::to_text(&config).map_err(errors::other)?;
         let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
         let camera = Some(config.camera);
         let options = hzn_mcap::Options { sensor_toml, metadata, camera, force: true, durable: false };

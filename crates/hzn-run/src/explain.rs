@@ -32,7 +32,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         }
         Verdict::Straight => {
             "a straight line fits the edge nearly as well (gates.min_evidence), or its curvature is too uncertain to \
-             say on which side the body is (gates.min_side_sigma)"
+             say on which side the body is"
                 .into()
         }
         Verdict::Radius => "no allowed altitude gives a limb of this half-angle (gates.altitude_limits_km)".into(),

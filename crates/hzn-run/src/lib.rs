@@ -1,10 +1,11 @@
 //! The run over a sequence of pictures: it turns files into directions with covariances, in files that other programs
 //! can read.
 //!
-//! [`open`] opens a sequence with its sensor, by the same rules for every program. A [`source`] hands out pictures in order. The [`engine`] processes them with the sensor on all cores. A [`sink`]
-//! takes the results in order. [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of
-//! their rows. [`overlay`] draws the result over a picture, and [`explain`] describes in words what happened to it.
-//! [`disk`] has the errors of files that cannot be written. [`terminal`] makes text from files safe for a terminal.
+//! [`open`] opens a sequence with its sensor, by the same rules for every program. A [`source`] hands out pictures in
+//! order. The [`engine`] processes them with the sensor on all cores. A [`sink`] takes the results in order.
+//! [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of their rows. [`overlay`] draws
+//! the result over a picture, and [`explain`] describes in words what happened to it. [`disk`] has the errors of files
+//! that cannot be written. [`terminal`] makes text from files safe for a terminal.
 //!
 //! The command line, the Python package and the viewer are built on this crate. It prints nothing, and its [`Error`]
 //! contains no exit code and no name of an option.

@@ -65,9 +65,9 @@ pub struct Opened {
 ///
 /// # let folder = tempfile::tempdir()?;
 /// image::GrayImage::new(320, 240).save(folder.path().join("0001.png"))?;
-/// let sensor = "[camera]\nwidth = 320\nheight = 240\nmodel = \"pinhole\"\nfx_px = 300.0\nfy_px = 300.0\ncx_px = 159.5\n\
-///               cy_px = 119.5\n[body]\naltitude_km = 400.0\n";
-/// std::fs::write(folder.path().join("sensor.toml"), sensor)?;
+/// let camera = "[camera]\nwidth = 320\nheight = 240\nmodel = \"pinhole\"\nfx_px = 300.0\nfy_px = 300.0\n";
+/// let rest = "cx_px = 159.5\ncy_px = 119.5\n[body]\naltitude_km = 400.0\n";
+/// std::fs::write(folder.path().join("sensor.toml"), camera.to_owned() + rest)?;
 /// let opened = open(&Request { inputs: vec![folder.path().to_path_buf()], ..Request::default() })?;
 /// opened.check_size()?;
 /// opened.check_altitude()?;

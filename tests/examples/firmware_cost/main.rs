@@ -1,9 +1,9 @@
 //! Measures what the firmware costs in QEMU: instructions by stage, and memory. It prints
 //! book/results/firmware-cost.md. `--check FILE` compares the result with an earlier one and fails if instructions,
-//! flash, static RAM or stack grew by more than 5 %; `--check-sizes FILE` does so for flash and static RAM of the images
-//! that are built in every check. `--search FROM TO` prints the most expensive of the pictures made with these seeds.
-//! `--hostile FROM TO` does the same with sensors that vary, too, on both boards, and fails if one of the pictures takes
-//! more than 20 million instructions, or a unit of work more than 80.
+//! flash, static RAM or stack grew by more than 5 %; `--check-sizes FILE` does so for flash and static RAM of the
+//! images that are built in every check. `--search FROM TO` prints the most expensive of the pictures made with these
+//! seeds. `--hostile FROM TO` does the same with sensors that vary, too, on both boards, and fails if one of the
+//! pictures takes more than 20 million instructions, or a unit of work more than 80.
 
 mod hostile;
 mod pictures;

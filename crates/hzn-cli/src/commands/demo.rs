@@ -144,7 +144,7 @@ fn process_photograph(places: &Places) -> Result<Vec<Row>, Stop> {
 
 /// Writes pictures, sensor.toml, frames.csv and truth.csv of the flight. Returns the truth.
 fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
-    let config = toml::to_string(&flight.sensor).map_err(failed)?;
+    let config = hzn_files::sensor::to_text(&flight.sensor).map_err(failed)?;
     let path = folder.join("sensor.toml");
     let text = format!("# The camera of a rendered rocket flight.\npreset = \"hzn\"\n\n{config}");
     std::fs::write(&path, text).map_err(|e| disk::cannot_write(&path, &e))?;

@@ -11,14 +11,14 @@ use crate::tell;
 
 /// Rewrite old names in sensor.toml, scene.toml and fuse.toml
 ///
-/// Each section and key of version 0.1.0 gets its new name; everything else stays as it is, comments too. If one of the
-/// files cannot be rewritten, none is.
+/// Each section and key of version 0.1.0 gets its new name, and the line of a key that is a constant now becomes a
+/// comment. Everything else stays as it is. If one of the files cannot be rewritten, none is.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The files to rewrite
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// Print what would be renamed, and write nothing
+    /// Print what would be changed, and write nothing
     #[arg(short = 'n', long)]
     dry_run: bool,
 }
@@ -30,21 +30,22 @@ pub(super) fn run(args: &Args) -> Outcome {
             .map_err(|e| usage(format!("{}: cannot be read: {e}", path.display())))?;
         // A link stays a link: the file that it leads to is written.
         let target = path.canonicalize().map_err(|e| failed(format!("{}: {e}", path.display())))?;
-        let (new, renamed) = migrate::migrate(&text, path).map_err(usage)?;
-        rewritten.push((path, target, new, renamed));
+        let (new, changes) = migrate::migrate(&text, path).map_err(usage)?;
+        rewritten.push((path, target, new, changes));
     }
-    for (path, target, new, renamed) in &rewritten {
+    for (path, target, new, changes) in &rewritten {
         let name = path.display();
-        if renamed.is_empty() {
+        if changes.is_empty() {
             tell::line(format_args!("{name}: has no old name"));
             continue;
         }
-        for one in renamed {
-            tell::line(format_args!("{name}:{}: {} is now {}", one.line, one.field, one.new));
+        for one in changes {
+            let what = one.new.map_or("a constant; its line is a comment".to_owned(), str::to_owned);
+            tell::line(format_args!("{name}:{}: {} is now {what}", one.line, one.field));
         }
         if !args.dry_run {
             disk::write_whole(target, new)?;
-            tell::line(format_args!("{name}: {} renamed", explain::counted(renamed.len() as u64, "name")));
+            tell::line(format_args!("{name}: {} rewritten", explain::counted(changes.len() as u64, "key")));
         }
     }
     Ok(Exit::Done)

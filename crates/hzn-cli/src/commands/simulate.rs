@@ -73,7 +73,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     read.extend(scenario.files_mut().into_iter().map(|(_, file)| from.join(file)));
     let files = files(&mut scenario, from)?;
     let folder = args.output.clone().unwrap_or_default();
-    let text = toml::to_string(&scenario).map_err(failed)?;
+    let text = scenario.to_text().map_err(failed)?;
     let scene_toml = folder.join("scene.toml");
     check_folder(args, &folder, &text, &files)?;
     // All errors of the scene are reported before anything is written.
@@ -224,8 +224,9 @@ fn sensor(scenario: &Scenario, flight: &Flight, fits: &[Fit]) -> Result<String, 
             fit.nees
         );
     }
-    let mut table = toml::Table::try_from(&sensor).map_err(failed)?;
-    let defaults = toml::Table::try_from(hzn_core::Config::new(sensor.camera.clone())).map_err(failed)?;
+    let mut table = hzn_files::sensor::to_table(&sensor).map_err(failed)?;
+    let defaults = hzn_files::sensor::to_table(&hzn_core::Config::new(sensor.camera.clone()));
+    let defaults = defaults.map_err(failed)?;
     if let Some(body) = scenario.body_table() {
         table.insert("body".into(), body.into());
     }
@@ -279,7 +280,7 @@ impl Sequence {
     /// Writes scene.toml, frames.csv and truth.csv.
     fn tables(&self) -> Result<(), Stop> {
         let Self { scenario, flight, folder } = self;
-        write(&folder.join("scene.toml"), &toml::to_string(scenario).map_err(failed)?)?;
+        write(&folder.join("scene.toml"), &scenario.to_text().map_err(failed)?)?;
         let mut known = table(folder, "frames.csv")?;
         let mut truth = table(folder, "truth.csv")?;
         for frame in &flight.frames {

@@ -13,10 +13,13 @@ fn an_old_sensor_toml_is_refused_and_rewritten() {
         let ran = place.run(command).expect(2);
         ran.says("[reject]: this name is now consensus; `hzn migrate in/sensor.toml` rewrites the file");
     }
-    place.run(&["migrate", "in/sensor.toml", "--dry-run"]).expect(0).says("[select] max_way is now max_path");
+    place
+        .run(&["migrate", "in/sensor.toml", "--dry-run"])
+        .expect(0)
+        .says("[select] max_way is now a constant; its line is a comment");
     assert_eq!(place.read("in/sensor.toml"), old);
-    place.run(&["migrate", "in/sensor.toml"]).expect(0).says("in/sensor.toml: 3 names renamed");
-    let new = OLD.replace("reject", "consensus").replace("select", "gates").replace("max_way", "max_path");
+    place.run(&["migrate", "in/sensor.toml"]).expect(0).says("in/sensor.toml: 3 keys rewritten");
+    let new = OLD.replace("reject", "consensus").replace("select", "gates").replace("max_way", "# max_way");
     assert_eq!(place.read("in/sensor.toml"), format!("{SENSOR}{new}"));
     place.run(&["run", "in"]).expect(0);
     place.run(&["migrate", "in/sensor.toml"]).expect(0).says("in/sensor.toml: has no old name");
@@ -37,7 +40,7 @@ fn scenes_and_flights_of_the_filter_are_rewritten_too() {
 fn one_file_that_cannot_be_rewritten_keeps_all_as_they_are() {
     let place = Place::with_pictures(1);
     place.write("a.toml", b"[reject]\nseed = 2\n");
-    place.write("b.toml", b"[gates]\nmin_inliers = 30\n[select]\nmax_way = 2.0\n");
+    place.write("b.toml", b"[gates]\nmin_inliers = 30\n[select]\nmax_rms_px = 2.0\n");
     place.run(&["migrate", "a.toml", "b.toml"]).expect(2).says("b.toml:3: [select]: the file has [gates] too");
     place.run(&["migrate", "a.toml", "lost.toml"]).expect(2).says("lost.toml: cannot be read");
     assert_eq!(place.read("a.toml"), "[reject]\nseed = 2\n");

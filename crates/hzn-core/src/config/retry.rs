@@ -39,11 +39,6 @@ section! {
         /// Lowest threshold of a further look, in standard deviations of the dark pixels' noise above their mean.
         // Below three deviations a threshold follows the noise of the sky: there the limb was found 25 km too high.
         @- min_sigma: f64 = 3.0, [0.0 to 100.0];
-        /// Smallest fraction of an edge's points that must lie on the limb in a further look.
-        ///
-        /// Every look is another chance for a false answer: a curve may fit a part of another edge by chance, for
-        /// example of the glow above a limb.
-        @- min_part: f64 = 0.5, [0.0 to 1.0];
         /// Widest dark frame around the picture that is detected and left out, px; 0 turns the detection off.
         ///
         /// Demosaicing leaves one to four rows and columns black. A frame is dark on all sides, and at least an eighth

@@ -3,8 +3,8 @@
 //! Each candidate goes from its border to a verdict before the next one begins. Edges are examined in the order in
 //! which they are likely to be the limb: first those next to the longest dark stretches of the border, then every other
 //! edge that begins at the border, then closed edges. The search ends when an edge passes every gate and is certain
-//! (`gates.certain_support`, `gates.certain_share`). Otherwise the best of all edges that begin at the border is
-//! chosen; closed edges are examined only if none of these edges gives an answer. A picture without an answer is
+//! (`CERTAIN_SUPPORT`, `CERTAIN_SHARE` in `search/edge.rs`). Otherwise the best of all edges that begin at the border
+//! is chosen; closed edges are examined only if none of these edges gives an answer. A picture without an answer is
 //! examined again, at other thresholds (`[retry]`).
 
 mod budget;

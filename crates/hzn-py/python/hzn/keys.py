@@ -239,30 +239,17 @@ class Gates(TypedDict, total=False):
     dark_sky: float
     """For Sun and Moon: a place in the sky counts as lit from this part of the threshold on. Values: above 0 to 1.
     Default: 0.25."""
-    min_inlier_share: float
-    """Smallest part of an edge's points that must be inliers. Values: 0 to 1. Default: 0.05."""
-    max_nearby: float
-    """Largest number of points close to the fitted limb that are no inliers, as a part of the inliers. Values: 0 to
-    1e6. Default: 0.3333333333333333."""
     whole_edge: float
-    """Where at least this part of an edge's points are inliers, the edge is not checked with ``max_path``; 0 turns
-    the check off. Values: 0 to 1. Default: 0.8."""
-    max_path: float
-    """Longest path along the inliers, as a multiple of the limb that they cover, where less than ``whole_edge`` of
-    the points are inliers. Values: 1 to 1e6. Default: 3.0."""
-    min_support_whole: float
-    """For the Sun: smallest part of the fitted limb in view that edge points must cover, where ``min_support`` is
-    above 0. Values: 0 to 1. Default: 0.7."""
+    """Where at least this part of an edge's points are inliers, the edge may wind; 0 turns the check off. Values: 0
+    to 1. Default: 0.8."""
     max_rival_ratio: float
     """Largest ratio of the cone's residual to that of a circle of the image or of four straight pieces; 1e6 turns
     the gate off. Values: 1 to 1e6. Default: 2.0."""
     min_evidence: float
     """Smallest evidence for the limb over a straight line, and largest evidence for a rival shape over the limb:
     twice the logarithm of the likelihood ratio; −1e6 turns the gate off. Values: −1e6 to 1e6. Default: 9.0."""
-    rival_floor_px: float
-    """Residuals below this count as equal, px. Values: above 0 to 10000 px. Default: 0.03."""
     residual_floor_px: float
-    """Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the told noise,
+    """Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the given noise,
     px; with 1e4 the gate uses the told noise. Values: 0 to 10000 px. Default: 0.1."""
     max_departure: float
     """Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
@@ -270,21 +257,12 @@ class Gates(TypedDict, total=False):
     min_support_abrupt: float
     """Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb without a
     loss of contrast; 0 turns the gate off. Values: 0 to 1. Default: 0.0."""
-    departure_turn_deg: float
-    """Largest turn between two lengths of 16 px of edge that counts as smooth, degrees. Values: 0 to 90 deg.
-    Default: 8.0."""
-    departure_contrast: float
-    """Smallest contrast of a continuation that counts, as a part of the limb's contrast. Values: 0 to 1e6. Default:
-    0.6."""
     max_glow: float
     """Largest brightness high above the limb, as a part of the brightness step at the limb; 1e6 turns the gate off.
     Values: 0 to 1e6. Default: 0.125."""
     max_band: float
     """Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky; 1
     turns the gate off. Values: 0 to 1. Default: 0.5."""
-    band_step: float
-    """Smallest brightness step of a second edge, as a part of the brightness step of the limb. Values: above 0 to 1.
-    Default: 0.4."""
     max_attitude_sigma: float
     """Largest angle between the axis and the axis that a given attitude and position predict, in standard
     deviations. Values: above 0 to 1e6. Default: 4.0."""
@@ -294,31 +272,6 @@ class Gates(TypedDict, total=False):
     max_unlit: float
     """Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does ``body.sunlit
     = false``. Values: 0 to 1. Default: 0.5."""
-    min_sun_elevation_deg: float
-    """Lowest elevation of the Sun that lights a limb, degrees; −18 is the end of twilight. Values: −90 to 90 deg.
-    Default: -18.0."""
-    min_side_sigma: float
-    """Smallest distance of the fitted half-angle from that of a body on the other side of the edge, in standard
-    deviations. Values: 0 to 1e6. Default: 4.0."""
-    ambiguous_deg: float
-    """Answers farther apart than this contradict each other, degrees. Values: 0 to 180 deg. Default: 5.0."""
-    ambiguous_score: float
-    """Of answers that contradict each other, the better one counts where its score is better by this factor. Values:
-    1 to 1e6. Default: 2.0."""
-    certain_support: float
-    """An answer ends the search where its edge covers more than this part of the limb in view; ``certain_share``
-    must hold, too. Values: 0 to 1. Default: 0.5."""
-    certain_share: float
-    """An answer ends the search where more than this part of its edge's points are inliers; ``certain_support`` must
-    hold, too. Values: 0 to 1. Default: 0.8."""
-    sun_size: _Numbers
-    """[smallest, largest] half-angle of a Sun, as multiples of its true one. Values: above 0 to 1e6. Default: [0.9,
-    12.0]."""
-    moon_size: _Numbers
-    """[smallest, largest] half-angle of a Moon, as multiples of its mean one. Values: above 0 to 1e6. Default: [0.5,
-    1.1]."""
-    moon_bloom_px: float
-    """Largest blooming by which a Moon may exceed ``moon_size``, px. Values: 0 to 1e6 px. Default: 10.0."""
     limb_in_view: bool
     """Whether a part of the limb with the expected half-angle about the fitted axis must lie in the picture. Values:
     true or false. Default: false."""
@@ -345,9 +298,6 @@ class Retry(TypedDict, total=False):
     min_sigma: float
     """Lowest threshold of a further look, in standard deviations of the dark pixels' noise above their mean. Values:
     0 to 100. Default: 3.0."""
-    min_part: float
-    """Smallest fraction of an edge's points that must lie on the limb in a further look. Values: 0 to 1. Default:
-    0.5."""
     frame_px: int
     """Widest dark frame around the picture that is detected and left out, px; 0 turns the detection off. Values: 0
     to 64 px. Default: 8."""

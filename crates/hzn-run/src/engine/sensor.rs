@@ -162,7 +162,11 @@ impl AnySensor {
             (Kind::Host(h), ImageView::Colour8(p)) => run_unwatched(h, p, data, last, now_s),
             (Kind::Host(h), ImageView::Colour16(p)) => run_unwatched(h, p, data, last, now_s),
             (Kind::Flight(h), ImageView::Grey8(p)) => run_unwatched(h, p, data, last, now_s),
-            (Kind::Flight(h), view) => run_unwatched(h, view, data, last, now_s),
+            // Kinds that few cameras of a flight computer have share the pipeline of the watched pictures.
+            (Kind::Flight(h), view) => {
+                let clock = Clock::default();
+                run(h, view, data, last, now_s, &(&clock as &dyn Observer<f32>), &clock)
+            }
         };
         self.conclude(processed, data, now_s)
     }

@@ -15,13 +15,20 @@ const HEAD: usize = 8;
 const CHECKSUM: u64 = 4;
 
 /// Returns a reader of a picture file that knows its format.
-pub(super) fn picture_reader<R: Read + Seek>(contents: R) -> io::Result<ImageReader<BufReader<WithoutProfiles<R>>>> {
-    ImageReader::new(BufReader::new(WithoutProfiles::new(contents)?)).with_guessed_format()
+pub(super) fn picture_reader<'a>(
+    contents: impl Read + Seek + 'a,
+) -> io::Result<ImageReader<BufReader<WithoutProfiles<'a>>>> {
+    ImageReader::new(BufReader::new(WithoutProfiles::new(Box::new(contents))?)).with_guessed_format()
 }
 
-/// Contents of a file. If the file is a PNG, chunks with a colour profile or a text are left out.
-pub(super) struct WithoutProfiles<R> {
-    contents: R,
+/// A file, or bytes in memory.
+trait Contents: Read + Seek {}
+impl<R: Read + Seek> Contents for R {}
+
+/// Contents of a file. If the file is a PNG, chunks with a colour profile or a text are left out. The contents are
+/// behind a pointer, so that all decoders are compiled once; a buffer reads through it 8 KiB at a time.
+pub(super) struct WithoutProfiles<'a> {
+    contents: Box<dyn Contents + 'a>,
     is_png: bool,
     /// Beginning of a chunk that is not left out, and the part of it that is still to be read.
     head: [u8; HEAD],
@@ -32,8 +39,8 @@ pub(super) struct WithoutProfiles<R> {
     position: u64,
 }
 
-impl<R: Read + Seek> WithoutProfiles<R> {
-    fn new(mut contents: R) -> io::Result<Self> {
+impl<'a> WithoutProfiles<'a> {
+    fn new(mut contents: Box<dyn Contents + 'a>) -> io::Result<Self> {
         let mut start = [0; SIGNATURE.len()];
         let len = read_up_to(&mut contents, &mut start)?;
         contents.rewind()?;
@@ -58,7 +65,7 @@ impl<R: Read + Seek> WithoutProfiles<R> {
     }
 }
 
-impl<R: Read + Seek> Read for WithoutProfiles<R> {
+impl Read for WithoutProfiles<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if !self.is_png {
             return self.contents.read(out);
@@ -81,7 +88,7 @@ impl<R: Read + Seek> Read for WithoutProfiles<R> {
 }
 
 /// A decoder of a PNG returns at most to the start of the file.
-impl<R: Read + Seek> Seek for WithoutProfiles<R> {
+impl Seek for WithoutProfiles<'_> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         match to {
             _ if !self.is_png => return self.contents.seek(to),
@@ -143,14 +150,14 @@ mod tests {
         let texts = [b"iCCP", b"iTXt", b"tEXt", b"zTXt"].map(|kind| chunk(kind, &[9; 300])).concat();
         let file = [start, &texts, exif, pixels, &texts, end].map(Vec::as_slice).concat();
         let mut read = Vec::new();
-        let mut reader = WithoutProfiles::new(Cursor::new(&file)).unwrap();
+        let mut reader = WithoutProfiles::new(Box::new(Cursor::new(&file))).unwrap();
         reader.read_to_end(&mut read).unwrap();
         assert_eq!(read, kept.concat());
         assert_eq!(reader.stream_position().unwrap(), read.len() as u64);
         // The file is truncated at each byte. All that precedes the end is read, and nothing is read twice. If the head
         // of a chunk is truncated, its kind is unknown, so the part of the head is read, too.
         for len in SIGNATURE.len()..file.len() {
-            let mut reader = WithoutProfiles::new(Cursor::new(&file[..len])).unwrap();
+            let mut reader = WithoutProfiles::new(Box::new(Cursor::new(&file[..len]))).unwrap();
             reader.read_to_end(&mut Vec::new()).unwrap();
             reader.rewind().unwrap();
             let mut part = Vec::new();
@@ -163,7 +170,7 @@ mod tests {
     fn other_files_are_read_whole() {
         for file in [&b"P5 1 1 255 x"[..], b"", b"\x89PNG"] {
             let mut read = Vec::new();
-            let mut reader = WithoutProfiles::new(Cursor::new(file)).unwrap();
+            let mut reader = WithoutProfiles::new(Box::new(Cursor::new(file))).unwrap();
             reader.read_to_end(&mut read).unwrap();
             assert_eq!(read, file);
             assert_eq!(reader.seek(SeekFrom::End(0)).unwrap(), file.len() as u64);

@@ -42,8 +42,7 @@ pub fn load(name: &str, frames: Option<u32>, seed: Option<u64>) -> Result<Scenar
 /// # Errors
 /// The first key or value that is refused.
 pub fn parse(text: &str, path: &Path, frames: Option<u32>, seed: Option<u64>) -> Result<Scenario, Problem> {
-    let pair = |e: ScenarioError| (e.field, e.what);
-    let mut scenario: Scenario = hzn_files::document::parse(text, path, |s: &Scenario| s.check().map_err(pair))?;
+    let mut scenario = Scenario::parse(text, path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     scenario.read_files(folder).map_err(|e| refused(path, &e))?;
     if let Some(frames) = frames {

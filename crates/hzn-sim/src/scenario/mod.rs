@@ -288,6 +288,24 @@ impl Scenario {
         Some(toml::from_str(text).expect("built-in scenes are valid"))
     }
 
+    /// Reads and checks the text of a scene.toml; `path` is used in messages. It does not read the files that the
+    /// scenario names.
+    ///
+    /// # Errors
+    /// The first key or value that is refused, with its line.
+    pub fn parse(text: &str, path: &FilePath) -> Result<Self, hzn_files::Problem> {
+        let check = |scenario: &Self| scenario.check().map_err(|e| (e.field, e.what));
+        hzn_files::document::parse(text, path, check)
+    }
+
+    /// Returns the scenario as the text of a scene.toml.
+    ///
+    /// # Errors
+    /// A value is not TOML, for example a seed above 2⁶³.
+    pub fn to_text(&self) -> Result<String, toml::ser::Error> {
+        toml::to_string(self)
+    }
+
     /// Reads the files that the scenario names (maps, tables); their paths are relative to `folder`.
     ///
     /// # Errors

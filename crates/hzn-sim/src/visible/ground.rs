@@ -41,7 +41,10 @@ impl Ground {
     pub fn read_map(&mut self, folder: &Path) -> Result<(), String> {
         if let Some(map) = &self.map {
             let path = folder.join(map);
-            let picture = image::open(&path).map_err(|e| format!("{}: {e}", path.display()))?.into_rgb8();
+            let refused = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
+            let file = std::fs::read(&path).map_err(|e| refused(&e))?;
+            // The decoders of memory are compiled in `image`, those of `image::open` would be compiled here.
+            let picture = image::load_from_memory(&file).map_err(|e| refused(&e))?.into_rgb8();
             self.texture = Some(Arc::new(Texture::new(&picture)));
         }
         Ok(())

@@ -52,7 +52,7 @@ fn render_frames(
     let truth = truth.into_inner().map_err(|e| format!("truth.csv: {e}"))?;
     write("frames.csv", frames.as_bytes())?;
     write("truth.csv", &truth)?;
-    let config = toml::to_string(&flight.sensor).map_err(|e| e.to_string())?;
+    let config = hzn_files::sensor::to_text(&flight.sensor).map_err(|e| e.to_string())?;
     let text = format!("# The camera of a rendered rocket flight.\npreset = \"hzn\"\n\n{config}");
     write(LAST, text.as_bytes())?;
     Ok(Done::Rendered(folder.to_owned()))

@@ -24,6 +24,17 @@ use crate::stages::fit::{self, Fit};
 use crate::stages::gates::{self, Case, Cover, Passed};
 use crate::stages::rays;
 
+/// An answer ends the search where its edge covers more than this part of the limb in view, and where more than
+/// [`CERTAIN_SHARE`] of its points are inliers.
+const CERTAIN_SUPPORT: f64 = 0.5;
+/// See [`CERTAIN_SUPPORT`]. An RMS below a quarter of the largest distance of an inlier replaces this condition.
+const CERTAIN_SHARE: f64 = 0.8;
+/// Smallest part of an edge's points that must be inliers. With one inlier in 20 points and a threshold of three
+/// pixels, a cone that is free to turn passes through clutter by chance.
+const MIN_INLIER_SHARE: f64 = 0.05;
+/// The same in a further look.
+const LATER_INLIER_SHARE: f64 = 0.5;
+
 impl<T: Real, O: Observer<T>> Search<'_, T, O> {
     /// Takes a followed edge through every stage, and keeps its answer if it is the best so far.
     pub(super) fn judge_edge<P: Pixels>(&mut self, binary: &BinaryPicture<'_, T, P, O>, edge: &Thinned<'_>) {
@@ -196,11 +207,10 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         outcome.verdict = judged.err().unwrap_or(Verdict::Passed);
         let Passed { glows } = judged.ok()?;
         let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number)?;
-        let share = T::from_i32(fit.inliers as i32)
-            > T::from_i32(points.count as i32) * T::from_f64(config.gates.certain_share);
+        let share = T::from_i32(fit.inliers as i32) > T::from_i32(points.count as i32) * T::from_f64(CERTAIN_SHARE);
         // The reflection of a Sun in the lens may look as good as the Sun, so every edge is examined.
         let certain = !expected.free
-            && case.cover.share > T::from_f64(config.gates.certain_support)
+            && case.cover.share > T::from_f64(CERTAIN_SUPPORT)
             && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
         let next = (self.needs_next_threshold && !P::STREAMED)
             .then(|| gates::middle_level(&fused.e, blocks, fit.inliers, binary, camera));
@@ -210,9 +220,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
     /// Returns the smallest part of an edge's points that must be inliers. A further look is another chance for a false
     /// answer, so it asks for more.
     fn min_inlier_share(&self) -> f64 {
-        let config = &self.sensor.config;
-        let more = if self.report.counters.looks > 0 { config.retry.min_part } else { 0.0 };
-        config.gates.min_inlier_share.max(more)
+        if self.report.counters.looks > 0 { LATER_INLIER_SHARE } else { MIN_INLIER_SHARE }
     }
 
     /// Shows the fit of a candidate to the observer, if the observer wants it.

@@ -19,6 +19,12 @@ use crate::model::verdict::Verdict;
 use crate::model::work::WorkBudget;
 use crate::stages::{covariance, gates, threshold};
 
+/// Answers farther apart than this contradict each other, in degrees.
+const AMBIGUOUS_DEG: f64 = 5.0;
+/// Of answers that contradict each other, the better one counts where its score is better by this factor. Two Suns, or
+/// two Moons, always contradict each other: the reflection of a Sun in the lens is often rounder than the Sun.
+const AMBIGUOUS_SCORE: f64 = 2.0;
+
 /// The search over the edges of one picture, which are judged one by one.
 pub(super) struct Search<'a, T, O> {
     sensor: &'a Sensor<T>,
@@ -110,7 +116,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         let limit = if self.expected.free {
             new.solution.half_angle_rad.max(old.solution.half_angle_rad)
         } else {
-            T::from_f64(self.sensor.config.gates.ambiguous_deg.to_radians())
+            T::from_f64(AMBIGUOUS_DEG.to_radians())
         };
         let apart = new.solution.axis.angle_rad(&old.solution.axis) > limit;
         let (better, other) = if new.score < old.score { (new, old) } else { (old, new) };
@@ -126,7 +132,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
         report.counters.work = work.spent();
         report.counters.looks += 1;
         if let Some(best) = self.best {
-            let factor = T::from_f64(self.sensor.config.gates.ambiguous_score);
+            let factor = T::from_f64(AMBIGUOUS_SCORE);
             let is_close = |rival: T| rival < best.score * factor || self.expected.free;
             if !best.certain && self.rival.is_some_and(is_close) {
                 report.status = Status::Ambiguous;

@@ -27,11 +27,15 @@ const MIN_SKY_SHARE: [i32; 2] = [2, 3];
 /// allows for blur and stray light.
 const SKY_PART: f64 = 0.1;
 
-/// Refuses a limb if too many of the lines inwards come back to the sky across a second edge. The step of this edge must
-/// be at least `band_step` times that of the limb. A terminator fades and is no edge.
+/// Smallest brightness step of the second edge, as a part of the brightness step of the limb. A terminator fades and is
+/// no edge.
+const STEP: f64 = 0.4;
+
+/// Refuses a limb if too many of the lines inwards come back to the sky across a second edge. The step of this edge
+/// must be at least [`STEP`] times that of the limb.
 ///
-/// Of a picture that came row by row, only lit and dark pixels are left, and a terminator is as steep as an edge. A disc
-/// that is whole in the picture may be a crescent, which is a band, too.
+/// Of a picture that came row by row, only lit and dark pixels are left, and a terminator is as steep as an edge. A
+/// disc that is whole in the picture may be a crescent, which is a band, too.
 pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
     case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,
@@ -44,7 +48,7 @@ pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
     if P::STREAMED || config.max_band >= 1.0 || !is_wide {
         return Ok(());
     }
-    let step = T::from_f64(config.band_step);
+    let step = T::from_f64(STEP);
     let (mut looks, mut bands) = (0, 0);
     for place in places {
         let Some(is_band) = comes_back(place, binary, sky, disc_px, step) else { continue };

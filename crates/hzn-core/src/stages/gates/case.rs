@@ -27,8 +27,7 @@ pub(crate) struct Case<'a, T> {
     pub(crate) blocks: &'a [Block<T>],
     /// Number of edge points.
     pub(crate) points: u32,
-    /// Smallest part of the points that must be inliers: `gates.min_inlier_share`, and `retry.min_part` in a further
-    /// look.
+    /// Smallest part of the points that must be inliers; it is larger in a further look.
     pub(crate) min_inlier_share: f64,
     /// Factor by which the noise of the edge raises the threshold of the consensus; the largest RMS grows by the same
     /// factor.

@@ -38,29 +38,11 @@ section! {
         /// Sun and Moon stand in a dark sky. A glare fades outwards and does not count. A bright spot of a cloud has
         /// the same size, but it lies among other clouds.
         @- dark_sky: f64 = 0.25, [above 0.0 to 1.0];
-        /// Smallest part of an edge's points that must be inliers.
+        /// Where at least this part of an edge's points are inliers, the edge may wind; 0 turns the check off.
         ///
-        /// With one inlier in 20 points and a threshold of three pixels, a cone that is free to turn passes through
-        /// clutter by chance.
-        @- min_inlier_share: f64 = 0.05, [0.0 to 1.0];
-        /// Largest number of points close to the fitted limb that are no inliers, as a part of the inliers.
-        ///
-        /// Close means within three times the cut-off. A limb stands alone; a curve through many edges has other points
-        /// close to it.
-        @- max_nearby: f64 = 1.0 / 3.0, [0.0 to 1e6];
-        /// Where at least this part of an edge's points are inliers, the edge is not checked with `max_path`; 0 turns
-        /// the check off.
+        /// The path along the inliers of any other edge may be three times as long as the limb that they cover. A
+        /// cloud's edge winds, and a part of it may lie on a limb by chance.
         @- whole_edge: f64 = 0.8, [0.0 to 1.0];
-        /// Longest path along the inliers, as a multiple of the limb that they cover, where less than `whole_edge` of
-        /// the points are inliers.
-        ///
-        /// A cloud's edge winds, and a part of it may lie on a limb by chance.
-        @- max_path: f64 = 3.0, [1.0 to 1e6];
-        /// For the Sun: smallest part of the fitted limb in view that edge points must cover, where `min_support` is
-        /// above 0.
-        ///
-        /// The Sun is a whole disc; a gibbous Moon shows less.
-        @- min_support_whole: f64 = 0.7, [0.0 to 1.0];
         /// Largest ratio of the cone's residual to that of a circle of the image or of four straight pieces; 1e6 turns
         /// the gate off.
         ///
@@ -73,17 +55,13 @@ section! {
         ///
         /// A value of 9 is three standard deviations. Points with correlated residuals count once.
         @- min_evidence: f64 = 9.0, [-1e6 to 1e6];
-        /// Residuals below this count as equal, px.
-        ///
-        /// Sampling and interpolation cause about this residual even for a perfect edge.
-        @- rival_floor_px: f64 = 0.03, [above 0.0 to 1e4];
         /// Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the given
         /// noise, px; with 1e4 the gate uses the told noise.
         @- residual_floor_px: f64 = 0.1, [0.0 to 1e4];
         /// Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
         /// turns the gate off.
         ///
-        /// A continuation counts where it keeps its contrast, see `departure_contrast`.
+        /// A continuation counts where it keeps 0.6 of the limb's contrast.
         @- max_departure: f64 = 0.2, [0.0 to 1e6];
         /// Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb without
         /// a loss of contrast; 0 turns the gate off.
@@ -91,14 +69,6 @@ section! {
         /// The corner of an iris and the crossing of two flares end an edge in this way. The default is 0, because 0.7
         /// also refuses half-lit discs and crescents.
         @- min_support_abrupt: f64 = 0.0, [0.0 to 1.0];
-        /// Largest turn between two lengths of 16 px of edge that counts as smooth, degrees.
-        ///
-        /// 8 degrees are a curve of 115 px radius; corners of clouds are sharper. An allowance for the noise is added.
-        @- departure_turn_deg: f64 = 8.0, [0.0 to 90.0];
-        /// Smallest contrast of a continuation that counts, as a part of the limb's contrast.
-        ///
-        /// A terminator fades; the rim of a flare does not.
-        @- departure_contrast: f64 = 0.6, [0.0 to 1e6];
         /// Largest brightness high above the limb, as a part of the brightness step at the limb; 1e6 turns the gate
         /// off.
         ///
@@ -111,8 +81,6 @@ section! {
         ///
         /// The gate is only for a body that does not fit into the picture, because a crescent is a band, too.
         @- max_band: f64 = 0.5, [0.0 to 1.0];
-        /// Smallest brightness step of a second edge, as a part of the brightness step of the limb.
-        @- band_step: f64 = 0.4, [above 0.0 to 1.0];
         /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
         /// deviations.
         @- max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];
@@ -124,38 +92,6 @@ section! {
         /// Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does
         /// `body.sunlit = false`.
         @- max_unlit: f64 = 0.5, [0.0 to 1.0];
-        /// Lowest elevation of the Sun that lights a limb, degrees; −18 is the end of twilight.
-        @- min_sun_elevation_deg: f64 = -18.0, [-90.0 to 90.0];
-        /// Smallest distance of the fitted half-angle from that of a body on the other side of the edge, in standard
-        /// deviations.
-        ///
-        /// The curvature of the edge shows on which side the body is.
-        @- min_side_sigma: f64 = 4.0, [0.0 to 1e6];
-        /// Answers farther apart than this contradict each other, degrees.
-        @- ambiguous_deg: f64 = 5.0, [0.0 to 180.0];
-        /// Of answers that contradict each other, the better one counts where its score is better by this factor.
-        ///
-        /// Two Suns, or two Moons, always contradict each other: the reflection of a Sun in the lens is often rounder
-        /// than the Sun.
-        @- ambiguous_score: f64 = 2.0, [1.0 to 1e6];
-        /// An answer ends the search where its edge covers more than this part of the limb in view; `certain_share`
-        /// must hold, too.
-        @- certain_support: f64 = 0.5, [0.0 to 1.0];
-        /// An answer ends the search where more than this part of its edge's points are inliers; `certain_support` must
-        /// hold, too.
-        ///
-        /// An RMS below a quarter of the largest distance of an inlier replaces this condition.
-        @- certain_share: f64 = 0.8, [0.0 to 1.0];
-        /// [smallest, largest] half-angle of a Sun, as multiples of its true one.
-        ///
-        /// The Sun never looks smaller than it is, and it blooms.
-        @- sun_size: [f64; 2] = [0.9, 12.0], [above 0.0 to 1e6];
-        /// [smallest, largest] half-angle of a Moon, as multiples of its mean one.
-        ///
-        /// The saturated part of the Moon is smaller than the Moon, and the Moon is sometimes nearer than on average.
-        @- moon_size: [f64; 2] = [0.5, 1.1], [above 0.0 to 1e6];
-        /// Largest blooming by which a Moon may exceed `moon_size`, px.
-        @- moon_bloom_px: f64 = 10.0, [0.0 to 1e6];
         /// Whether a part of the limb with the expected half-angle about the fitted axis must lie in the picture.
         @- limb_in_view: bool = false, ["true or false"] { needs: "dlr" };
         /// Largest mean square distance of the points from the expected conic section, focal lengths squared.
@@ -181,9 +117,6 @@ impl Config {
         self.check_keys()?;
         if let Some([low, high]) = self.altitude_limits_km {
             between("gates.altitude_limits_km", high, low, 1e9)?;
-        }
-        for (name, [smallest, largest]) in [("gates.sun_size", self.sun_size), ("gates.moon_size", self.moon_size)] {
-            between(name, largest, smallest, 1e6)?;
         }
         Ok(())
     }

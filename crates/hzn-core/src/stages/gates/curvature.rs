@@ -7,8 +7,8 @@ use crate::base::real::Real;
 use crate::model::verdict::Verdict;
 use crate::stages::covariance;
 
-/// Refuses a half-angle that differs from the expected one by more than the residuals allow. If an edge is smoother than the told noise
-/// says, its curvature is also more accurate than the told noise allows.
+/// Refuses a half-angle that differs from the expected one by more than the residuals allow. If an edge is smoother
+/// than the told noise says, its curvature is also more accurate than the told noise allows.
 ///
 /// The test is (c₀ − ĉ)² / (P₃₃ + σ_c² + other given variances). P₃₃ uses the RMS of the residuals, at least
 /// `gates.residual_floor_px`, and the correlation length from the length of the edge

@@ -3,7 +3,7 @@
 
 use super::case::{Case, refuse_if};
 use super::places::{MAX_PLACES, inliers};
-use super::shape::Residuals;
+use super::shape::{RIVAL_FLOOR_PX, Residuals};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
@@ -21,6 +21,12 @@ const BOXES: usize = 24;
 const NEAR: usize = 2;
 /// Longest gap within a run of inliers, in pixels.
 const GAP_PX: f64 = 12.0;
+/// Largest turn between two boxes that counts as smooth, in degrees. 8 degrees are a curve of 115 px radius; corners of
+/// clouds are sharper.
+const TURN_DEG: f64 = 8.0;
+/// Smallest contrast of a continuation that counts, as a part of the limb's contrast. A terminator fades; the rim of a
+/// flare does not.
+const CONTRAST: f64 = 0.6;
 /// Distance from the edge at which the contrast is read on each side, in pixels.
 const ASIDE_PX: i32 = 3;
 
@@ -127,9 +133,9 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
     /// Follows the edge beyond the end of a run of inliers, and adds its boxes that are not on the cone to `found`.
     #[inline(always)]
     fn follow_beyond(&self, end: usize, ahead: bool, found: &mut Continuation<T>) {
-        let (noise_px, config) = (self.residuals.noise_px, self.case.config);
-        let off_cone = noise_px.max(T::from_f64(config.rival_floor_px)) * T::from_f64(3.0);
-        let turn = T::from_f64(config.departure_turn_deg.to_radians());
+        let noise_px = self.residuals.noise_px;
+        let off_cone = noise_px.max(T::from_f64(RIVAL_FLOOR_PX)) * T::from_f64(3.0);
+        let turn = T::from_f64(TURN_DEG.to_radians());
         // Two boxes within the run give the direction at its end.
         let mut place = Some(end);
         let (Some(mut before), Some(further)) = (self.stretch(&mut place, !ahead), self.stretch(&mut place, !ahead))
@@ -187,7 +193,7 @@ impl<T: Real, P: Pixels, O: Observer<T>> Edge<'_, '_, T, P, O> {
 /// continuation is smooth and longer than `gates.max_departure` of the longest run of inliers. Or edge points cover
 /// less than `gates.min_support_abrupt` of the limb in view; then any continuation counts.
 ///
-/// A continuation is smooth if it turns from box to box by less than `gates.departure_turn_deg`, plus an allowance for
+/// A continuation is smooth if it turns from box to box by less than [`TURN_DEG`], plus an allowance for
 /// the noise of the boxes.
 pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
     case: &Case<'_, T>,
@@ -220,9 +226,7 @@ pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
         }
     }
     // A terminator fades, and the rim of another object does not.
-    let kept = |beside: &Mean| {
-        beside.count > 0 && beside.mean::<T>() >= on_cone.mean::<T>() * T::from_f64(config.departure_contrast)
-    };
+    let kept = |beside: &Mean| beside.count > 0 && beside.mean::<T>() >= on_cone.mean::<T>() * T::from_f64(CONTRAST);
     refuse_if((is_long && kept(&smooth)) || (is_abrupt && kept(&near)), Verdict::Departure)
 }
 

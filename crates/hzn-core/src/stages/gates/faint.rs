@@ -22,8 +22,8 @@ const LEAST: usize = 3;
 /// Refuses a limb whose step of the brightness is below the least contrast of an edge point. A picture that shows too
 /// little of both sides is no evidence.
 ///
-/// Of a picture that came row by row, only lit and dark pixels are left. Where bands are allowed, the inside of the limb
-/// may be as dark as the sky.
+/// Of a picture that came row by row, only lit and dark pixels are left. Where bands are allowed, the inside of the
+/// limb may be as dark as the sky.
 pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
     case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,

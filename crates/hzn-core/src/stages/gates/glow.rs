@@ -38,8 +38,8 @@ fn dark_angle<T: Real>(sin: T, c: T, expected: &Expected<T>) -> Option<T> {
 /// `gates.max_glow` of the step from the sky to the body. `false` if the body's air is unknown, or if the picture shows
 /// too little of the sky.
 ///
-/// This is no gate, although the verdict on an answer may be [`crate::model::verdict::Verdict::Glow`]: the edge stays in
-/// the choice, because another edge in the same glow is no better. If it wins, the picture has no answer.
+/// This is no gate, although the verdict on an answer may be [`crate::model::verdict::Verdict::Glow`]: the edge stays
+/// in the choice, because another edge in the same glow is no better. If it wins, the picture has no answer.
 pub(crate) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
     case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,

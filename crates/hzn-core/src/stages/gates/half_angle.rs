@@ -9,6 +9,6 @@ use crate::model::verdict::Verdict;
 /// half-angle, the gate refuses a size that the body never has.
 pub(super) fn refuse<T: Real>(case: &Case<'_, T>) -> Result<(), Verdict> {
     let chi = T::from_f64(case.config.max_half_angle_sigma);
-    let agrees = case.fused.chi2 <= chi * chi && is_possible_size(&case.fit.c, case.expected, case.camera, case.config);
+    let agrees = case.fused.chi2 <= chi * chi && is_possible_size(&case.fit.c, case.expected, case.camera);
     refuse_if(!agrees, Verdict::HalfAngle)
 }

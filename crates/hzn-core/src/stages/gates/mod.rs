@@ -64,8 +64,8 @@ pub(crate) struct Passed {
 
 /// Asks the gates in their order.
 ///
-/// The order decides which verdict an edge gets that several gates refuse, and what a refusal costs: first the gates that
-/// compare numbers, then those that look at the picture, then those that fit other curves to the points.
+/// The order decides which verdict an edge gets that several gates refuse, and what a refusal costs: first the gates
+/// that compare numbers, then those that look at the picture, then those that fit other curves to the points.
 ///
 /// # Errors
 /// Returns the verdict of the first gate that refuses the edge.

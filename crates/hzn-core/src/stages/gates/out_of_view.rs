@@ -1,5 +1,5 @@
-//! Gate of Braun & Barf 2022, 3.5: the limb that is expected about the axis lies in the picture. A nadir that was fitted
-//! to the edge of something else puts the limb elsewhere.
+//! Gate of Braun & Barf 2022, 3.5: the limb that is expected about the axis lies in the picture. A nadir that was
+//! fitted to the edge of something else puts the limb elsewhere.
 
 use super::case::{Case, refuse_if};
 use crate::base::linalg::{V3, basis};

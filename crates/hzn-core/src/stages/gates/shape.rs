@@ -14,6 +14,10 @@ use crate::stages::fit::Fit;
 /// Largest number of inliers that are used, evenly along the edge. It gives the ratio of two residuals to about 10 %.
 pub(super) const MOST: usize = 128;
 
+/// Residuals below this count as equal, in pixels. Sampling and interpolation cause about this residual even for a
+/// perfect edge.
+pub(super) const RIVAL_FLOOR_PX: f64 = 0.03;
+
 /// An inlier.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place<T> {
@@ -87,7 +91,7 @@ impl<'a, T: Real> Residuals<'a, T> {
             rms_px: rms(shape),
             noise_px: local_noise(shape),
             independent: independent(shape),
-            floor_px: T::from_f64(config.rival_floor_px),
+            floor_px: T::from_f64(RIVAL_FLOOR_PX),
             max_ratio: T::from_f64(config.max_rival_ratio),
             min_evidence: T::from_f64(config.min_evidence),
         }
@@ -109,8 +113,8 @@ impl<'a, T: Real> Residuals<'a, T> {
         self.exceed_noise() || self.evidence(self.rms_px, self.noise_px) > self.min_evidence
     }
 
-    /// Returns whether a curve with this RMS replaces the cone: its residuals are far smaller, or the evidence for it is
-    /// large. `more` is the number of parameters that it has more than the cone; each needs more evidence.
+    /// Returns whether a curve with this RMS replaces the cone: its residuals are far smaller, or the evidence for it
+    /// is large. `more` is the number of parameters that it has more than the cone; each needs more evidence.
     pub(super) fn prefer(&self, rival_px: T, more: T) -> bool {
         let needed = self.min_evidence + self.independent.ln() * more;
         self.rms_px > self.max_ratio * rival_px.max(self.floor_px)

@@ -6,6 +6,18 @@ use crate::geometry::camera::Camera;
 use crate::model::body::Expected;
 use crate::stages::covariance::Fused;
 
+/// Smallest part of the Sun's limb in view that edge points must cover. The Sun is a whole disc; a gibbous Moon shows
+/// less.
+const WHOLE_SUPPORT: f64 = 0.7;
+/// Smallest and largest half-angle of a Sun, as multiples of its true one. The Sun never looks smaller than it is, and
+/// it blooms.
+const SUN_SIZE: [f64; 2] = [0.9, 12.0];
+/// Smallest and largest half-angle of a Moon, as multiples of its mean one. The saturated part of the Moon is smaller
+/// than the Moon, and the Moon is sometimes nearer than on average.
+const MOON_SIZE: [f64; 2] = [0.5, 1.1];
+/// Largest blooming by which a Moon may exceed its size, in pixels.
+const MOON_BLOOM_PX: f64 = 10.0;
+
 /// Returns the diameter of the body's disc, 2 α f, in pixels.
 pub(super) fn disc_px<T: Real>(expected: &Expected<T>, camera: &Camera<T>) -> T {
     let (fx, fy) = camera.focal_px();
@@ -33,23 +45,23 @@ pub(super) fn sin_for_points<T: Real>(fused: &Fused<T>, expected: &Expected<T>) 
 /// Returns the smallest part of the limb in view that edge points must cover; 0 means no minimum for any body.
 pub(super) fn min_support<T>(config: &Config, expected: &Expected<T>) -> f64 {
     let whole = config.min_support > 0.0 && !expected.phases;
-    if whole { config.min_support.max(config.min_support_whole) } else { config.min_support }
+    if whole { config.min_support.max(WHOLE_SUPPORT) } else { config.min_support }
 }
 
 /// Returns whether a body with a free half-angle can appear with the half-angle of cosine `c`. Other bodies always
 /// pass, because another gate compares them with the expected half-angle.
-pub(super) fn is_possible_size<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>, config: &Config) -> bool {
+pub(super) fn is_possible_size<T: Real>(c: &T, expected: &Expected<T>, camera: &Camera<T>) -> bool {
     let sin = (T::one() - *c * *c).max(T::ZERO).sqrt();
     let (fx, fy) = camera.focal_px();
     let px = T::one() / fx.min(fy);
     let times = |n: f64| expected.sin * T::from_f64(n);
     let (least, most) = if expected.blooms() {
         // The lower limit is reduced by one pixel, the error of the measurement, but never below half of its value.
-        let [least, most] = config.sun_size;
+        let [least, most] = SUN_SIZE;
         ((times(least) - px).max(times(least * 0.5)), times(most))
     } else {
-        let [least, most] = config.moon_size;
-        (times(least), times(most) + px * T::from_f64(config.moon_bloom_px))
+        let [least, most] = MOON_SIZE;
+        (times(least), times(most) + px * T::from_f64(MOON_BLOOM_PX))
     };
     !expected.free || (sin >= least && sin <= most.min(T::one()) && *c > T::ZERO)
 }

@@ -23,8 +23,8 @@ pub(super) struct Sky<T> {
     pub(super) spread: T,
 }
 
-/// Reads the brightness from the limb outwards to the border of the region. Sky counts as lit from the threshold on; for
-/// a Sun or Moon, from `gates.dark_sky` of it on.
+/// Reads the brightness from the limb outwards to the border of the region. Sky counts as lit from the threshold on;
+/// for a Sun or Moon, from `gates.dark_sky` of it on.
 pub(super) fn measure_sky<T: Real, P: Pixels, O: Observer<T>>(
     case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,

@@ -7,20 +7,23 @@ use crate::geometry::block::{Block, LANES};
 use crate::model::body::Expected;
 use crate::model::verdict::Verdict;
 
+/// Lowest elevation of the Sun that lights a limb, in degrees: the end of twilight.
+const LOWEST_SUN_DEG: f64 = -18.0;
+
 /// Refuses a limb of which the Sun lights too small a part.
 pub(super) fn refuse<T: Real>(case: &Case<'_, T>) -> Result<(), Verdict> {
     let Case { fused, blocks, expected, config, .. } = *case;
-    let unlit = unlit(&fused.e, fused.c, blocks, expected, config.min_sun_elevation_deg);
+    let unlit = unlit(&fused.e, fused.c, blocks, expected);
     refuse_if(unlit > T::from_f64(config.max_unlit), Verdict::Sun)
 }
 
-/// Returns the part of the inliers where the Sun is lower than `elevation_deg`, 0 to 1. The result is 0 if the
+/// Returns the part of the inliers that the Sun does not light, 0 to 1. The result is 0 if the
 /// direction of the Sun is unknown or the body shines by itself. The surface normal where the ray s touches the limb is
 /// (s cos α − e)/sin α.
-fn unlit<T: Real>(e: &V3<T>, c: T, blocks: &[Block<T>], expected: &Expected<T>, elevation_deg: f64) -> T {
+fn unlit<T: Real>(e: &V3<T>, c: T, blocks: &[Block<T>], expected: &Expected<T>) -> T {
     let Some(sun) = &expected.sun_seen else { return T::ZERO };
     let sin = (T::one() - c * c).max(T::from_f64(1e-12)).sqrt();
-    let (lowest, _) = T::from_f64(elevation_deg.to_radians()).sin_cos();
+    let (lowest, _) = T::from_f64(LOWEST_SUN_DEG.to_radians()).sin_cos();
     let along = e.dot(sun);
     let (mut dark, mut all) = (0, 0);
     for block in blocks {
