@@ -196,8 +196,10 @@ pub(crate) fn cargo_program() -> OsString {
 /// Returns a call of the cargo that runs this program, with the committed versions and without input. Nothing is
 /// compiled incrementally: that takes longer the first time, and makes slower programs.
 pub(crate) fn cargo(args: &[&str]) -> Command {
+    // What follows `--` is for the program that cargo runs.
+    let (own, rest) = args.split_at(args.iter().position(|word| *word == "--").unwrap_or(args.len()));
     let mut command = Command::new(cargo_program());
-    command.args(args).arg("--locked").env("CARGO_INCREMENTAL", "0").stdin(Stdio::null());
+    command.args(own).arg("--locked").args(rest).env("CARGO_INCREMENTAL", "0").stdin(Stdio::null());
     command
 }
 

@@ -78,7 +78,7 @@ fn test_core_alone(steps: &mut Steps) -> Outcome {
         return steps.cargo_test(&alone);
     }
     // No feature changes what these compute, and they take longest.
-    let without = ["--lib", "--test", "core", "--", "--skip", "monte_carlo::", "--skip", "reference::"];
+    let without = ["--lib", "--", "--skip", "monte_carlo::", "--skip", "reference::"];
     steps.cargo_test(&[&alone[..], &without].concat())
 }
 

@@ -72,7 +72,10 @@ impl From<hzn_run::Error> for Stop {
         };
         let error = match error.remedy().and_then(option) {
             Some(option) => anyhow::anyhow!("{error}; {option}"),
-            None => anyhow::Error::from_boxed(error.into_cause()),
+            // A closed pipe is recognised by its type, which a boxed error hides.
+            None => {
+                error.into_cause().downcast::<std::io::Error>().map_or_else(anyhow::Error::from_boxed, |e| (*e).into())
+            }
         };
         Self::new(exit, error)
     }

@@ -109,7 +109,6 @@ fn recording(
         let known = one.frame_row(frame);
         let pose = &frame.scene.pose;
         let fixed_from_camera: Rotation<Cam, Fixed> = rotation(pose.q_fixed_from_camera_wxyz);
-        let to_camera = fixed_from_camera.inverse();
         for &kind in &one.bodies {
             if !is_in_view(one, frame, kind)? {
                 continue;
@@ -126,7 +125,7 @@ fn recording(
             if !errors.has_light(&moment) {
                 continue;
             }
-            let axis = to_camera * reference;
+            let axis = fixed_from_camera.inverse() * reference;
             // The sensor knows the position at the time of the stamp.
             let told_m = Vector::new(known.x_km, known.y_km, known.z_km) * 1e3;
             let reference = limb_axis(body, &told_m).unwrap_or(reference);

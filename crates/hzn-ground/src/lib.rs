@@ -2,7 +2,7 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`encode`] | the text of a command as packets |
+//! | [`mod@encode`] | the text of a command as packets |
 //! | [`commander`] | commands, each with its acknowledgement |
 //! | [`incoming`] | bytes that come, commands that go |
 //! | [`station`] | packets on their way from bytes to files |

@@ -38,9 +38,9 @@ def sequence(folder: str) -> list[str]:
 
 
 def keys(body: hzn.keys.Body) -> float:
-    reject: hzn.keys.Reject = {"method": "ransac", "threshold_px": 2, "seed": 3}
+    consensus: hzn.keys.Consensus = {"method": "ransac", "threshold_px": 2, "seed": 3}
     camera = hzn.Camera(width=4, height=4, fx_px=3.0, fy_px=3.0, cx_px=1.5, cy_px=1.5, k=np.zeros(4))
-    sensor = hzn.Sensor(camera=camera, preset="hzn", body=body, reject=reject, mask={"polygons_px": [[(0, 0), (1, 1)]]})
+    sensor = hzn.Sensor(camera=camera, preset="hzn", body=body, consensus=consensus, mask={"polygons_px": [[(0, 0), (1, 1)]]})
     sensor = hzn.Sensor(**sensor.parameters, flight=True)
     hzn.Sensor(camera={"file": "camchain.yaml"}, bodies=[body, {"kind": "sun", "threshold": {"method": "fixed"}}])
     parameters = sensor.parameters

@@ -93,7 +93,7 @@ int example(void) {
     /* The same picture, row by row, with a threshold that is known before. */
     int y = 0;
     HznAnswer by_rows;
-    if (hzn_set(sensor, HZN_BINARIZE_METHOD, 1) != 0 || hzn_set(sensor, HZN_BINARIZE_LEVEL, 110) != 0 ||
+    if (hzn_set(sensor, HZN_THRESHOLD_METHOD, 1) != 0 || hzn_set(sensor, HZN_THRESHOLD_LEVEL, 110) != 0 ||
         hzn_apply(sensor) != 0 || hzn_process(sensor, &frame, NULL, &answer) != HZN_OK ||
         hzn_process_rows(sensor, rows_memory, sizeof rows_memory, next_row, &y, NULL, &by_rows) != HZN_OK) {
         return 8;

@@ -91,8 +91,8 @@ typedef struct {
 typedef struct {
   // Altitude in metres: geodetic for the Earth, above the radius for other bodies.
   float altitude_m;
-  // Position of the camera in the fixed frame of the body (for the Earth ECEF), metres. If it is known, the altitude is
-  // not used.
+  // Position of the camera in the fixed frame of the body (for the Earth ECEF), metres. If it is known, the altitude
+  // is not used.
   float position_m[3];
   // Rate of rotation of the camera in the camera frame, rad/s; it has an effect only with a rolling shutter.
   float rate_rad_s[3];

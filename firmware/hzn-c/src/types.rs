@@ -25,7 +25,8 @@ pub struct HznPicture {
 pub struct HznKnown {
     /// Altitude in metres: geodetic for the Earth, above the radius for other bodies.
     pub altitude_m: f32,
-    /// Position of the camera in ECEF, metres. If it is known, the altitude is not used.
+    /// Position of the camera in the fixed frame of the body (for the Earth ECEF), metres. If it is known, the altitude
+    /// is not used.
     pub position_m: [f32; 3],
     /// Rate of rotation of the camera in the camera frame, rad/s; it has an effect only with a rolling shutter.
     pub rate_rad_s: [f32; 3],
@@ -40,7 +41,7 @@ pub struct HznAnswer {
     pub axis: [f32; 3],
     /// Covariance of `axis`: xx, xy, xz, yy, yz, zz, rad².
     pub cov_rad2: [f32; 6],
-    /// The same direction in ECEF; NaN without a position.
+    /// The same direction in the fixed frame of the body (for the Earth ECEF); NaN without a position.
     pub axis_fixed: [f32; 3],
     /// The same direction in the vehicle's frame; NaN without a mounting.
     pub axis_vehicle: [f32; 3],

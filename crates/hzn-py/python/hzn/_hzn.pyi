@@ -315,7 +315,8 @@ class Sensor:
         altitude_km
             Above WGS-84 for ``earth``, otherwise above the radius. Without it, the parameters' altitude is used.
         position_km
-            Position of the camera in the fixed frame of the body (for the Earth ECEF), km, shape (3,). It overrides the altitude.
+            Position of the camera in the fixed frame of the body (for the Earth ECEF), km, shape (3,). It overrides the
+            altitude.
         attitude
             Prior attitude: unit quaternion (w, x, y, z) from the camera frame to the fixed frame of the body.
         attitude_sigma_deg
@@ -439,7 +440,7 @@ class Report:
 
     @property
     def axis_fixed(self) -> NDArray[np.float64] | None:
-        """The same direction in the fixed frame of the body (for the Earth ECEF), shape (3,), if the position is known."""
+        """The same direction in the fixed frame (for the Earth ECEF), shape (3,), if the position is known."""
 
     @property
     def covariance(self) -> NDArray[np.float64] | None:

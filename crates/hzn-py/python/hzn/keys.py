@@ -163,7 +163,8 @@ class Consensus(TypedDict, total=False):
     method: Literal["two-point", "none", "ransac", "ransac-preverify", "mlesac"]
     """How the inliers are found. Default: "two-point"."""
     threshold_px: float
-    """Largest distance of an inlier from the limb, px. Values: above 0 to 1000 px. Default: 3.0."""
+    """Largest distance from the limb at which a point belongs to the consensus, px; the fit ``sphere`` also weights
+    points up to twice as far away. Values: above 0 to 1000 px. Default: 3.0."""
     noise_sigma: float
     """The largest distance is at least this many times the noise from point to point; 0 leaves it at
     ``threshold_px``. Values: 0 to 100. Default: 2.0."""

@@ -9,7 +9,12 @@ pub(crate) fn check_number(path: &'static str, x: f64, low: f64, above: bool, hi
     require(x.is_finite(), path, x, Limit::Finite)?;
     require(!above || x > low, path, x, Limit::Above(low))?;
     // A limit of infinity would be printed as "between 0 and inf"; "at least" says what is meant.
-    let limit = if high.is_finite() { Limit::Between(low, high) } else { Limit::AtLeast(low) };
+    let limit = match (above, high.is_finite()) {
+        // The lower limit itself is refused, so "between" would be wrong.
+        (true, true) => Limit::AtMost(high),
+        (false, true) => Limit::Between(low, high),
+        (_, false) => Limit::AtLeast(low),
+    };
     require(x >= low && x <= high, path, x, limit)
 }
 

@@ -25,7 +25,8 @@ section! {
     "consensus" pub struct Config: Copy {
         /// How the inliers are found.
         @80 method: Method = Method::TwoPoint, [choice];
-        /// Largest distance of an inlier from the limb, px.
+        /// Largest distance from the limb at which a point belongs to the consensus, px; the fit `sphere` also weights
+        /// points up to twice as far away.
         // Before most of today's gates, 1494 artefacts gave 185 false answers at 3 px and 309 to 511 at 0.5 to 1.5 px,
         // because a threshold within the noise finds inliers on any curve.
         @81 threshold_px: f64 = 3.0, [above 0.0 to 1000.0];

@@ -1,7 +1,7 @@
 //! Gates and choice: decides whether a fitted cone is the limb of the body, and which of several cones is the answer.
 //!
-//! A gate is a function of a [`Case`] in a file of its own. It returns its verdict if it refuses the edge. The function
-//! [`judge`] names all gates in their order.
+//! A gate is a function of a `Case` in a file of its own. It returns its verdict if it refuses the edge. The function
+//! `judge` names all gates in their order.
 
 mod any_cone;
 mod attitude;
