@@ -119,8 +119,7 @@ impl Default for CameraOptions {
         Self {
             mount: Rotation::identity(),
             misalignment: Block::estimated(core::f64::consts::PI / 180.0),
-            // An estimated slow error makes the filter over-confident: in 40 flights of a prototype the NEES of the
-            // attitude was 9.9 with it, and 3.5 with a considered one (3 is ideal).
+            // An estimated slow error makes the filter over-confident, so the default considers it.
             slow_error: Mode::Considered,
             slow_error_time_s: 20.0,
             bodies: 1,

@@ -1,8 +1,7 @@
 //! Updates: gates, gain with considered errors, Joseph's form.
 //!
 //! Joseph's form holds for any gain, and the gain here is not the optimal one: the rows of considered errors are 0. The
-//! shorter (I − K H) P holds for the optimal gain only. In 40 flights of a prototype it gave a NEES of the attitude of
-//! 5.1 instead of 3.5 (3 is ideal).
+//! shorter (I − K H) P holds for the optimal gain only, and with this gain the covariance would be too small.
 
 use nalgebra::{SMatrix, SVector, Vector3};
 

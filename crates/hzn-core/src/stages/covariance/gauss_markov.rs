@@ -43,7 +43,6 @@ pub(crate) fn correlated<T: Real>(
             gap[l] = T::one() - rho[l] * rho[l];
         }
         // The chain from lane to lane is kept apart from the products, so that the products become vector instructions.
-        // In a prototype the double sum over 1913 points took 15 µs this way instead of 44 µs.
         let mut before = [[[T::ZERO; LANES]; 3]; 2];
         for (before, (c, g)) in before.iter_mut().zip(c.iter_mut().zip(&g)) {
             for i in 0..3 {
