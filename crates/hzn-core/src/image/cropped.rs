@@ -4,19 +4,15 @@ use super::Pixels;
 use crate::geometry::crop::Crop;
 
 /// A picture that is read through a crop. If the scales of the picture and of the crop differ, each read interpolates
-/// between four pixels. The picture is read through a pointer, so that pictures of every kind use the same compiled
-/// pipeline: crops are rare.
-pub(crate) struct Cropped<'a> {
-    /// Returns the brightness of the picture at a column and a row.
-    // As a type parameter it was one of the reasons for 36 compiled pipelines in the command `hzn`; there are 14 now.
-    at: &'a dyn Fn(u16, u16) -> u16,
-    full_scale: u16,
+/// between four pixels.
+pub(crate) struct Cropped<'a, P> {
+    picture: &'a P,
     crop: Crop,
 }
 
-impl<'a> Cropped<'a> {
-    pub(crate) fn new(at: &'a dyn Fn(u16, u16) -> u16, full_scale: u16, crop: Crop) -> Self {
-        Self { at, full_scale, crop }
+impl<'a, P: Pixels> Cropped<'a, P> {
+    pub(crate) fn new(picture: &'a P, crop: Crop) -> Self {
+        Self { picture, crop }
     }
 
     /// Interpolates bilinearly between the four pixels around the centre of the crop's pixel (x, y), which is computed
@@ -34,7 +30,7 @@ impl<'a> Cropped<'a> {
         };
         let (x0, x1, fx) = place(x, self.crop.x0, 0);
         let (y0, y1, fy) = place(y, self.crop.y0, 1);
-        let at = |x: u16, y: u16| u64::from((self.at)(x, y));
+        let at = |x: u16, y: u16| u64::from(self.picture.at(x, y));
         let across = |y: u16| at(x0, y) * (65536 - fx) + at(x1, y) * fx;
         // Half of the unit is added, so that the result is rounded and not cut off: a copy would otherwise be half a
         // count darker.
@@ -42,7 +38,7 @@ impl<'a> Cropped<'a> {
     }
 }
 
-impl Pixels for Cropped<'_> {
+impl<P: Pixels> Pixels for Cropped<'_, P> {
     fn width(&self) -> u16 {
         self.crop.width
     }
@@ -50,7 +46,7 @@ impl Pixels for Cropped<'_> {
         self.crop.height
     }
     fn full_scale(&self) -> u16 {
-        self.full_scale
+        self.picture.full_scale()
     }
     fn index(&self, x: u16, y: u16) -> usize {
         usize::from(y) * usize::from(self.crop.width) + usize::from(x)
@@ -69,7 +65,7 @@ impl Pixels for Cropped<'_> {
         }
         // A rectangle of the picture itself needs no interpolation and keeps the same counts.
         if self.crop.copy == self.crop.full {
-            return (self.at)(self.crop.x0 + x, self.crop.y0 + y as u16);
+            return self.picture.at(self.crop.x0 + x, self.crop.y0 + y as u16);
         }
         self.between(x, y as u16)
     }
@@ -89,8 +85,7 @@ mod tests {
         let picture = Grey::try_new(&data, Layout::packed(120, 90, 1, 16)).unwrap();
         for height in [10, 30, 45, 60, 89] {
             let crop = Crop::whole([120, 90], Some(height));
-            let at = |x: u16, y: u16| picture.at(x, y);
-            let part = Cropped::new(&at, picture.full_scale(), crop);
+            let part = Cropped::new(&picture, crop);
             assert_eq!((part.height(), part.width()), (height, (120.0 * f64::from(height) / 90.0_f64).round() as u16));
             for y in 0..part.height() {
                 for x in 0..part.width() {
@@ -105,8 +100,7 @@ mod tests {
         // At half the size, each pixel is the mean of four pixels and not a copy of one.
         let four: [u8; 16] = [0, 40, 80, 120, 8, 48, 88, 128, 0, 0, 0, 0, 0, 0, 0, 0];
         let picture = Grey::try_new(&four, Layout::packed(4, 4, 1, 8)).unwrap();
-        let at = |x: u16, y: u16| picture.at(x, y);
-        let part = Cropped::new(&at, picture.full_scale(), Crop::whole([4, 4], Some(2)));
+        let part = Cropped::new(&picture, Crop::whole([4, 4], Some(2)));
         assert_eq!([part.at(0, 0), part.at(1, 0)], [24, 104]);
     }
 
@@ -124,8 +118,7 @@ mod tests {
                     parts.extend(halves);
                     continue;
                 }
-                let at = |x: u16, y: u16| picture.at(x, y);
-            let part = Cropped::new(&at, picture.full_scale(), crop);
+                let part = Cropped::new(&picture, crop);
                 for y in 0..part.height() {
                     for x in 0..part.width() {
                         let place = crop.pixel(x, y);

@@ -7,6 +7,7 @@
 mod colour;
 mod cropped;
 mod grey;
+mod indirect;
 mod layout;
 mod pixels;
 pub mod region;
@@ -18,6 +19,7 @@ mod view;
 pub use colour::{Channel, Colour};
 pub(crate) use cropped::Cropped;
 pub use grey::Grey;
+pub use indirect::Indirect;
 pub use layout::{ImageError, Layout};
 pub use pixels::{Pixels, StreamedPoint};
 pub use sample::Sample;

@@ -16,7 +16,7 @@ use crate::config::retry::{Combine, Method};
 use crate::geometry::crop::Crop;
 use crate::geometry::frames::{Cov3, UnitVec3};
 use crate::geometry::pixel::ImagePoint;
-use crate::image::{Cropped, Pixels};
+use crate::image::{Cropped, Indirect, Pixels};
 use crate::model::body::Expected;
 use crate::model::error_budget::ErrorBudget;
 use crate::model::observer::{Border, Observer};
@@ -115,8 +115,11 @@ impl<T: Real> Sensor<T> {
             region: self.region.for_crop(&crop),
             vehicle_from_camera: self.vehicle_from_camera,
         };
-        let at = |x: u16, y: u16| picture.at(x, y);
-        let picture = Cropped::new(&at, picture.full_scale(), crop);
+        // Picture and observer are behind pointers, so that crops of every kind share the pipeline of the watched
+        // pictures: crops are rare, and each pipeline is 100 KB and seconds of compiling.
+        let cropped = Cropped::new(picture, crop);
+        let read = |index| cropped.read(index);
+        let picture = Indirect::new(&cropped, &read);
         let observer: &dyn Observer<T> = &Through { observer, crop };
         part.look(Look { lists, picture: &picture, expected, taken, observer: &observer, report });
     }

@@ -6,7 +6,7 @@ use hzn_core::body::{self, PriorError};
 use hzn_core::camera::Camera;
 use hzn_core::error::ConfigError;
 use hzn_core::frames::{Fixed, UnitVec3};
-use hzn_core::image::{ImageView, Pixels};
+use hzn_core::image::{ImageView, Indirect, Pixels};
 use hzn_core::real::Real;
 use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report};
 use hzn_files::{FrameData, Frames, Problem};
@@ -165,19 +165,24 @@ impl AnySensor {
             // Kinds that few cameras of a flight computer have share the pipeline of the watched pictures.
             (Kind::Flight(h), view) => {
                 let clock = Clock::default();
-                run(h, view, data, last, now_s, &(&clock as &dyn Observer<f32>), &clock)
+                let read = |index| view.read(index);
+                let picture = Indirect::new(view, &read);
+                run(h, &picture, data, last, now_s, &(&clock as &dyn Observer<f32>), &clock)
             }
         };
         self.conclude(processed, data, now_s)
     }
 
-    /// Processes a picture with an observer behind a pointer, so that every observer uses the same compiled pipeline.
+    /// Processes a picture with picture and observer behind pointers, so that every kind of both uses the same compiled
+    /// pipeline.
     fn watch<P: Pixels>(&mut self, picture: &P, data: Option<&FrameData>, watch: &dyn Watch) -> Vec<Processed> {
         let now_s = self.take_time(data);
         let last = &self.last;
+        let read = |index| picture.read(index);
+        let picture = Indirect::new(picture, &read);
         let processed = match &mut self.kind {
-            Kind::Host(h) => run(h, picture, data, last, now_s, &(watch as &dyn Observer<f64>), watch),
-            Kind::Flight(h) => run(h, picture, data, last, now_s, &(watch as &dyn Observer<f32>), watch),
+            Kind::Host(h) => run(h, &picture, data, last, now_s, &(watch as &dyn Observer<f64>), watch),
+            Kind::Flight(h) => run(h, &picture, data, last, now_s, &(watch as &dyn Observer<f32>), watch),
         };
         self.conclude(processed, data, now_s)
     }
