@@ -1,10 +1,13 @@
 """Tests of an archive on a real cluster of two processes."""
 
+import csv
 import math
 import os
+import shutil
 import signal
 import threading
 import time
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -15,12 +18,15 @@ from conftest import CAMERA, limb, pgm
 dask = pytest.importorskip("dask")
 import distributed  # noqa: E402
 import fsspec  # noqa: E402
+import fsspec.implementations.local  # noqa: E402
 import pyarrow.parquet as parquet  # noqa: E402
+from moto.moto_server.werkzeug_app import DomainDispatcherApplication  # noqa: E402
 from moto.server import ThreadedMotoServer  # noqa: E402
 
 from hzn.dask import process_archive  # noqa: E402
 
-FRAMES = 2000
+# A multiple of 50, of at least 100.
+FRAMES = int(os.environ.get("HZN_ARCHIVE_PICTURES", "2000"))
 SMALL = dict(CAMERA, width=80, height=60, fx_px=75.0, fy_px=75.0, cx_px=39.5, cy_px=29.5)
 
 
@@ -39,8 +45,8 @@ def archive(tmp_path_factory):
     folder = tmp_path_factory.mktemp("archive")
     kinds = [pgm(np.ascontiguousarray(limb(i)[::4, ::4])) for i in range(50)]
     for i in range(FRAMES):
-        (folder / f"{i:04}.pgm").write_bytes(kinds[i % 50] if i != 77 else b"P5 cut")
-    return [str(folder / f"{i:04}.pgm") for i in range(FRAMES)][:-1] + [str(folder / "lost.pgm")]
+        (folder / f"{i:06}.pgm").write_bytes(kinds[i % 50] if i != 77 else b"P5 cut")
+    return [str(folder / f"{i:06}.pgm") for i in range(FRAMES)][:-1] + [str(folder / "lost.pgm")]
 
 
 @pytest.fixture
@@ -70,8 +76,8 @@ def test_two_thousand_frames_and_a_worker_that_dies(client, archive, small, tmp_
     killer.join()
     client.wait_for_workers(2, timeout=60)
     assert victim not in client.run(os.getpid).values()
-    assert (result.frames, len(result.shards), result.skipped) == (FRAMES, 40, 0)
-    assert [os.path.basename(f["file"]) for f in result.failed] == ["0077.pgm", "lost.pgm"]
+    assert (result.frames, len(result.shards), result.skipped) == (FRAMES, FRAMES // 50, 0)
+    assert [os.path.basename(f["file"]) for f in result.failed] == ["000077.pgm", "lost.pgm"]
     assert "no such file" in result.failed[1]["detail"].lower()
     assert sorted(p.name for p in out.iterdir()) == sorted(os.path.basename(s) for s in result.shards)
     found = columns(result)
@@ -86,7 +92,7 @@ def test_two_thousand_frames_and_a_worker_that_dies(client, archive, small, tmp_
     lost = sorted(out.iterdir())[3]
     lost.rename(f"{lost}.77.part")  # as left by a worker that died before the renaming
     again = process_archive(archive, small, client=client, out=str(out), shard_frames=50)
-    assert again.skipped == 39 and columns(again)["axis_y"] == found["axis_y"]
+    assert again.skipped == FRAMES // 50 - 1 and columns(again)["axis_y"] == found["axis_y"]
     assert {p for p in out.iterdir() if p.stat().st_mtime_ns != times[p]} == {lost}
     # With another sensor these shards do not count.
     other = hzn.Sensor(**{**small.parameters, "consensus": {"seed": 5}})
@@ -153,7 +159,25 @@ def bucket(client, monkeypatch):
     server.stop()
 
 
-def test_an_archive_in_an_object_store(client, archive, small, bucket):
+@pytest.fixture
+def slow_down(monkeypatch):
+    """Let every sixth request for a picture fail, as a store does that is asked too often."""
+    answer = DomainDispatcherApplication.__call__
+    refused = []
+
+    def call(self, environ, start_response):
+        if environ["REQUEST_METHOD"] == "GET" and environ["PATH_INFO"].endswith(".pgm"):
+            refused.append(len(refused) % 6 == 0)
+            if refused[-1]:
+                start_response("503 Slow Down", [("Content-Type", "application/xml")])
+                return [b"<Error><Code>SlowDown</Code><Message>Please reduce your request rate.</Message></Error>"]
+        return answer(self, environ, start_response)
+
+    monkeypatch.setattr(DomainDispatcherApplication, "__call__", call)
+    return refused
+
+
+def test_an_archive_in_an_object_store(client, archive, small, bucket, slow_down):
     files = fsspec.filesystem("s3")
     for path in archive[:30]:
         files.put_file(path, f"flights/pictures/{os.path.basename(path)}")
@@ -166,6 +190,7 @@ def test_an_archive_in_an_object_store(client, archive, small, bucket):
     tables = [parquet.read_table(files.open(shard)).to_pydict() for shard in result.shards]
     found = [axis for table in tables for axis in table["axis_y"]]
     assert found[:-1] == [small.process(np.ascontiguousarray(limb(i)[::4, ::4])).to_dict()["axis_y"] for i in range(30)]
+    assert sum(slow_down) >= 5
     # Another program removes a shard and leaves the unfinished file of a worker; the next run makes what is missing.
     store = fsspec.filesystem("s3", skip_instance_cache=True)
     lost = result.shards[1].removeprefix("s3://")
@@ -183,7 +208,7 @@ def test_what_an_archive_refuses(client, archive, small, tmp_path):
     out = str(tmp_path)
     for urls, sensor, more, what in [
         ([], small, {}, "urls"),
-        (archive, small, {"format": "csv"}, "format"),
+        (archive, small, {"format": "xml"}, "format: 'xml' .* parquet, csv or mcap"),
         (archive, small, {"shard_frames": 0}, "shard_frames"),
         (archive, hzn.Sensor(camera=SMALL, threshold={"method": "track"}), {}, "track"),
     ]:
@@ -199,3 +224,122 @@ def test_what_an_archive_refuses(client, archive, small, tmp_path):
         with pytest.raises(hzn.ConfigError, match=f"{archive[1]}: .*{what}"):
             process_archive([archive[0], (archive[1], known)], small, client=client, out=out)
     assert list(tmp_path.iterdir()) == []
+
+
+class Unsteady(fsspec.implementations.local.LocalFileSystem):
+    """A file system that fails: ``unsteady://N/PATH`` is read after N failures."""
+
+    protocol = "unsteady"
+    cachable = False
+    failures: ClassVar[dict[str, int]] = {}
+
+    @classmethod
+    def _strip_protocol(cls, path):
+        return path.removeprefix("unsteady://")
+
+    def info(self, path, **kwargs):
+        return super().info(path.partition("/")[2])
+
+    def _open(self, path, mode="rb", **kwargs):
+        count, _, file = path.partition("/")
+        self.failures[path] = self.failures.get(path, 0) + 1
+        if self.failures[path] <= int(count):
+            raise RuntimeError("SlowDown: please reduce your request rate")
+        return super()._open(f"/{file}", mode, **kwargs)
+
+
+def test_a_reading_that_fails_for_a_while_costs_nothing(client, archive, small, tmp_path):
+    def register():
+        fsspec.register_implementation("unsteady", Unsteady, clobber=True)
+        Unsteady.failures.clear()
+
+    def run(**more):
+        return process_archive(urls, small, client=client, out=str(tmp_path), shard_frames=2, retries=0, **more)
+
+    client.run(register)
+    urls = [f"unsteady://{count}/{path}" for count, path in zip([0, 2, 0, 4], archive, strict=False)]
+    result = run()
+    # The second picture was tried three times. The fourth needs more, and is a row of its shard.
+    assert (result.skipped, [f["file"] for f in result.failed]) == (0, urls[3:])
+    assert result.failed[0]["detail"] == "cannot be read: SlowDown: please reduce your request rate"
+    assert columns(result)["status"] == ["ok", "ok", "ok", "unreadable"]
+    # A later run tries its shard again, unless it is told not to.
+    again = run(retry_failed=False)
+    assert (again.skipped, again.failed, again.shards) == (2, result.failed, result.shards)
+    again = run()
+    assert (again.skipped, again.failed, again.shards) == (1, [], result.shards)
+    assert columns(again)["status"] == ["ok"] * 4
+    assert run().skipped == 2
+
+
+@pytest.mark.parametrize("format", ["parquet", "csv", "mcap"])
+def test_a_replaced_picture_is_noticed(client, archive, small, tmp_path, format):
+    folder, out = tmp_path / "pictures", tmp_path / "out"
+    folder.mkdir()
+    urls = [str(folder / f"{i}.pgm") for i in range(4)]
+    for url, path in zip(urls[:3], archive, strict=False):
+        shutil.copy(path, url)
+
+    def run():
+        return process_archive(urls, small, client=client, out=str(out), shard_frames=2, retries=0, format=format)
+
+    first = run()
+    assert [f["file"] for f in first.failed] == urls[3:] and run().skipped == 2
+    # One picture is replaced by another of the same size, and the absent one appears.
+    shutil.copy(archive[3], urls[0])
+    second = run()
+    assert second.skipped == 1 and second.shards[0] != first.shards[0] and second.shards[1] == first.shards[1]
+    shutil.copy(archive[4], urls[3])
+    third = run()
+    assert (third.skipped, third.failed) == (1, [])
+    assert sorted(path.name for path in out.iterdir()) == sorted(os.path.basename(shard) for shard in third.shards)
+
+
+def test_csv_shards_are_those_of_parquet(client, archive, small, tmp_path):
+    both = [
+        process_archive(archive[60:90], small, client=client, out=f"{tmp_path}/{kind}", shard_frames=20, format=kind)
+        for kind in ("parquet", "csv")
+    ]
+    table = columns(both[0])
+    rows = []
+    for shard in both[1].shards:
+        with open(shard.removeprefix("file://"), newline="", encoding="utf-8") as file:
+            rows += csv.DictReader(file)
+    assert [list(row) for row in rows] == [list(table)] * 30 and both[0].failed == both[1].failed != []
+    for name in set(table) - {"elapsed_us"}:
+        cells = [row[name] for row in rows]
+        for cell, known in zip(cells, table[name], strict=True):
+            assert cell == "" if known is None else type(known)(cell) == known, name
+
+
+def test_a_generator_is_read_only_as_far_as_the_workers_need_it(client, archive, small, tmp_path):
+    out, ahead = tmp_path / "out", []
+
+    def urls():
+        for i, path in enumerate(archive):
+            finished = len(list(out.glob("*.parquet"))) if out.exists() else 0
+            ahead.append(i - 10 * finished)
+            yield path
+
+    result = process_archive(urls(), small, client=client, out=str(out), shard_frames=10)
+    # Four shards wait for each of two threads. Each may be finished and not yet be counted when the next is read.
+    assert (result.frames, len(result.shards)) == (FRAMES, FRAMES // 10) and max(ahead) <= 10 * (4 * 2 + 2)
+    shards = [os.path.basename(shard) for shard in result.shards]
+    assert shards == sorted(shards)
+
+    def broken():
+        yield from archive[:25]
+        yield archive[25], {"altitude_km": "high"}
+        yield from archive[26:]
+
+    with pytest.raises(hzn.ConfigError, match=f"{archive[25]}: "):
+        process_archive(broken(), small, client=client, out=str(tmp_path / "broken"), shard_frames=10)
+    assert len(list((tmp_path / "broken").iterdir())) == 2
+    with pytest.raises(hzn.ConfigError, match="urls: is empty"):
+        process_archive(iter(()), small, client=client, out=str(tmp_path / "empty"))
+
+
+def test_a_progress_bar_says_how_long_it_takes(client, archive, small, tmp_path, capsys):
+    process_archive(archive[:80], small, client=client, out=str(tmp_path), shard_frames=40, progress=True)
+    shown = capsys.readouterr().err
+    assert "80/80" in shown and "pictures/s" in shown and "failed=1" in shown

@@ -6,41 +6,31 @@ so a file with the name of a shard is always complete. A second run skips the sh
 
 from __future__ import annotations
 
-import hashlib
-import json
+import importlib.util
 import os
-import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from ._hzn import (
-    ConfigError,
-    Report,
-    Sensor,
-    __version__,
-    _check_prior,
-    _Prior,
-    _process_encoded,
-    _write_mcap,
-)
+from ._hzn import ConfigError, Sensor, _check_prior, _Prior
 
 try:
     import fsspec  # type: ignore[import-untyped]
-    import pyarrow  # type: ignore[import-untyped]
-    import pyarrow.parquet  # type: ignore[import-untyped]
     from distributed import as_completed, get_client
 except ImportError as _missing:
     raise ImportError(f"hzn.dask needs the package {_missing.name}: pip install \"hzn-sensor[dask]\"") from None
+
+from ._shards import FORMATS, Done, Task, digest, make
 
 if TYPE_CHECKING:
     from distributed import Client
 
 Url: TypeAlias = str | tuple[str, Mapping[str, Any]]
 
-_TEXTS = ("file", "body", "status", "detail")
-_UNPROCESSED = ("unreadable", "no-altitude")
-_COUNTS = ("index", "edge_points", "inliers", "candidates", "dropped", "level")
+# Shards that wait for each thread of the cluster. With fewer, a thread may wait for the client; more fill its memory.
+_WAITING = 4
 
 
 @dataclass
@@ -64,9 +54,11 @@ def process_archive(
     *,
     client: Client | None = None,
     out: str,
-    format: Literal["parquet", "mcap"] = "parquet",
+    format: Literal["parquet", "csv", "mcap"] = "parquet",
     shard_frames: int = 500,
     retries: int = 2,
+    retry_failed: bool = True,
+    progress: bool = False,
 ) -> Archive:
     """Process pictures from any place that fsspec can read, into shards of results.
 
@@ -75,7 +67,8 @@ def process_archive(
     urls
         URLs or paths of picture files; or pairs of a URL or path and a dictionary of what is known of the picture: the
         keyword arguments of `hzn.Sensor.process` from ``altitude_km`` to ``time_s``. A picture without a usable
-        altitude gets a row with the status ``no-altitude``.
+        altitude gets a row with the status ``no-altitude``. A generator is read only as far as the cluster needs it,
+        so an archive of any size fits into memory.
     sensor
         The sensor. ``threshold.method = "track"`` is refused, because its threshold depends on the picture before.
     client
@@ -83,12 +76,17 @@ def process_archive(
     out
         URL or path of a folder for the shards.
     format
-        Format of the shards: Parquet with the columns of book/reference/files.md, or MCAP without pictures.
+        Format of the shards: Parquet or CSV with the columns of book/reference/files.md, or MCAP without pictures.
     shard_frames
         Number of pictures per shard. Another number makes other shards.
     retries
         Number of times that a shard is tried again if its task fails. The death of a worker does not count: Dask gives
-        its tasks to others.
+        its tasks to others. A picture whose reading fails is tried three times in any case.
+    retry_failed
+        Whether a shard that exists is made again if one of its pictures could not be read although it exists.
+    progress
+        Whether a progress bar is shown, with the rate, the pictures that failed, and the time left
+        (``pip install tqdm``).
 
     Returns
     -------
@@ -99,48 +97,124 @@ def process_archive(
     ------
     ConfigError
         There are no pictures; the sensor or an option is invalid; or an altitude, position or attitude is impossible.
+        The pictures of a list are checked before anything is processed, those of a generator when they are read.
     Exception
         A shard failed after all retries. The other shards are written, and the next run makes the missing ones.
     """
-    pictures = [(url, {}) if isinstance(url, str) else (url[0], dict(url[1])) for url in urls]
-    if not pictures:
+    _check_options(sensor, format, shard_frames)
+    total = len(urls) if isinstance(urls, Sequence) else None
+    if total is not None:
+        if total == 0:
+            raise ConfigError("urls: is empty")
+        for url in urls:
+            _check(sensor, url)
+    bar = _bar(total) if progress else None
+    client = client or get_client()
+    filesystem, folder = fsspec.core.url_to_fs(out)
+    filesystem.makedirs(folder, exist_ok=True)
+    existing = _existing(filesystem, folder)
+
+    def tasks() -> Iterator[Task]:
+        pictures = (_check(sensor, url) for url in urls)
+        first = 0
+        while shard := list(islice(pictures, shard_frames)):
+            stem = f"{folder}/part-{first // shard_frames:06}-{digest(sensor, first, shard)}"
+            older = existing.get(f"{os.path.basename(stem)}.{format}", [])
+            yield Task(sensor, first, shard, out, stem, format, older, retry_failed)
+            first += len(shard)
+
+    with client.as_current():
+        shards, error = _run(client, tasks(), retries, bar)
+    if bar is not None:
+        bar.close()
+    done = [shards[first] for first in sorted(shards)]
+    _sweep(filesystem, folder, [shard.done.name for shard in done])
+    if error is not None:
+        raise error
+    if not done:
         raise ConfigError("urls: is empty")
+    return Archive(
+        shards=[filesystem.unstrip_protocol(shard.done.name) for shard in done],
+        frames=sum(shard.frames for shard in done),
+        skipped=sum(shard.done.existed for shard in done),
+        failed=[row for shard in done for row in shard.done.failed],
+    )
+
+
+def _check_options(sensor: Sensor, format: str, shard_frames: int) -> None:
     if shard_frames < 1:
         raise ConfigError(f"shard_frames: {shard_frames} is refused: must be 1 or more")
-    if format not in ("parquet", "mcap"):
-        raise ConfigError(f"format: {format!r} is refused: must be parquet or mcap")
+    if format not in FORMATS:
+        raise ConfigError(f"format: {format!r} is refused: must be {', '.join(FORMATS[:-1])} or {FORMATS[-1]}")
+    if format == "parquet" and importlib.util.find_spec("pyarrow") is None:
+        raise ImportError('format: parquet needs the package pyarrow: pip install "hzn-sensor[dask]", or choose csv')
     if sensor.parameters["threshold"]["method"] == "track":
         raise ConfigError(
             "threshold.method: track takes its threshold from the previous picture, which another worker may have"
         )
-    for url, known in pictures:
-        try:
-            _check_prior(sensor, _Prior(**known))
-        except (ConfigError, TypeError) as error:
-            raise ConfigError(f"{url}: {error}") from None
-    client = client or get_client()
-    filesystem, folder = fsspec.core.url_to_fs(out)
-    filesystem.makedirs(folder, exist_ok=True)
-    existing = set(_list(filesystem, folder))
-    names: list[str] = []
-    tasks = []
-    for first in range(0, len(pictures), shard_frames):
-        shard = pictures[first : first + shard_frames]
-        name = f"{folder}/part-{first // shard_frames:06}-{_digest(sensor, first, shard)}.{format}"
-        names.append(name)
-        if not any(path.endswith(name.lstrip("/")) for path in existing):
+
+
+def _check(sensor: Sensor, url: Url) -> tuple[str, dict[str, Any]]:
+    """Return a picture and what is known of it; refuse what is impossible."""
+    url, known = (url, {}) if isinstance(url, str) else (url[0], dict(url[1]))
+    try:
+        _check_prior(sensor, _Prior(**known))
+    except (ConfigError, TypeError) as error:
+        raise ConfigError(f"{url}: {error}") from None
+    return url, known
+
+
+@dataclass
+class _Finished:
+    done: Done
+    frames: int
+
+
+def _run(
+    client: Client, tasks: Iterator[Task], retries: int, bar: Any
+) -> tuple[dict[int, _Finished], BaseException | None]:
+    """Run the tasks, with only a few of them on the way. Return what became of each shard by its first picture, and the
+    first error. After an error of a task the others go on; after an error of the pictures no further task begins."""
+    shards: dict[int, _Finished] = {}
+    error: BaseException | None = None
+    running: dict[Any, Task] = {}
+    failed = 0
+    finished = as_completed()
+    while True:
+        room = _WAITING * max(1, sum(client.nthreads().values()))
+        while len(running) < room:
+            try:
+                task = next(tasks, None)
+            except Exception as why:  # noqa: BLE001 (of the caller's generator)
+                error = error or why
+                task = None
+            if task is None:
+                break
             # The task is not pure: its result is the file on the disk, not its return value.
-            tasks.append(client.submit(_shard, sensor, first, shard, out, name, retries=retries, pure=False))
-    for _ in as_completed(tasks):
-        pass
-    client.gather(tasks)
-    _sweep(filesystem, folder, names)
-    return Archive(
-        shards=[filesystem.unstrip_protocol(name) for name in names],
-        frames=len(pictures),
-        skipped=len(names) - len(tasks),
-        failed=[row for name in names for row in _unprocessed(filesystem, name)],
-    )
+            future = client.submit(make, task, retries=retries, pure=False)
+            running[future] = task
+            finished.add(future)
+        if not running:
+            return shards, error
+        future = next(finished)
+        task = running.pop(future)
+        try:
+            done = future.result()
+            shards[task.first] = _Finished(done, len(task.shard))
+            failed += len(done.failed)
+        except Exception as why:  # noqa: BLE001 (of the worker)
+            error = error or why
+        if bar is not None:
+            bar.update(len(task.shard))
+            bar.set_postfix(failed=failed, refresh=False)
+
+
+def _bar(total: int | None) -> Any:
+    try:
+        from tqdm import tqdm  # type: ignore[import-untyped]
+    except ImportError:
+        raise ImportError("progress: the progress bar needs the package tqdm: pip install tqdm") from None
+    return tqdm(total=total, unit=" pictures")
 
 
 def _list(filesystem: Any, folder: str) -> list[str]:
@@ -154,6 +228,16 @@ def _list(filesystem: Any, folder: str) -> list[str]:
         return []
 
 
+def _existing(filesystem: Any, folder: str) -> dict[str, list[str]]:
+    """Return the shards of a folder by their name without the digest of their pictures."""
+    found: defaultdict[str, list[str]] = defaultdict(list)
+    for path in _list(filesystem, folder):
+        stem, _, rest = os.path.basename(path).rpartition("-")
+        if stem.startswith("part-") and not path.endswith(".part"):
+            found[f"{stem}.{rest.rpartition('.')[2]}"].append(path)
+    return found
+
+
 def _sweep(filesystem: Any, folder: str, names: Sequence[str]) -> None:
     """Remove the files of workers that died between writing a shard and renaming it."""
     own = {os.path.basename(name) for name in names}
@@ -163,57 +247,4 @@ def _sweep(filesystem: Any, folder: str, names: Sequence[str]) -> None:
             filesystem.rm(path)
 
 
-def _digest(sensor: Sensor, first: int, shard: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
-    """Return a digest of everything that a shard depends on, so that the same name means the same result."""
-    inputs = json.dumps([__version__, sensor.parameters, sensor.flight, first, shard], default=list, sort_keys=True)
-    return hashlib.sha256(inputs.encode()).hexdigest()[:12]
-
-
-def _shard(sensor: Sensor, first: int, shard: Sequence[tuple[str, Mapping[str, Any]]], out: str, name: str) -> None:
-    """Process a shard; this is the task of a worker."""
-    filesystem, _ = fsspec.core.url_to_fs(out)
-    if filesystem.exists(name):
-        # A worker wrote it and then died, or a second worker got the same task.
-        return
-    reports = [_picture(sensor, first + i, url, known) for i, (url, known) in enumerate(shard)]
-    part = f"{name}.{os.getpid()}.part"
-    with tempfile.TemporaryDirectory() as scratch:
-        local = os.path.join(scratch, "shard")
-        if name.endswith(".mcap"):
-            _write_mcap(local, sensor, reports)
-        else:
-            pyarrow.parquet.write_table(_table(reports), local)
-        filesystem.put_file(local, part)
-    filesystem.mv(part, name)
-
-
-def _picture(sensor: Sensor, index: int, url: str, known: Mapping[str, Any]) -> Report:
-    try:
-        with fsspec.open(url, "rb") as file:
-            data, why = file.read(), ""
-    except OSError as error:
-        data, why = None, f"cannot be read: {error}"
-    return _process_encoded(sensor, index, url, data, why, _Prior(**known))
-
-
-def _table(reports: Sequence[Report]) -> Any:
-    rows = [r.to_dict() for report in reports for r in (report, *report.others)]
-    kinds = {name: pyarrow.string() for name in _TEXTS} | {name: pyarrow.int64() for name in _COUNTS}
-    schema = pyarrow.schema([(name, kinds.get(name, pyarrow.float64())) for name in rows[0]])
-    return pyarrow.Table.from_pylist(rows, schema=schema)
-
-
-def _unprocessed(filesystem: Any, name: str) -> list[dict[str, Any]]:
-    if name.endswith(".mcap"):
-        from ._hzn import read_mcap
-
-        with tempfile.TemporaryDirectory() as scratch:
-            local = os.path.join(scratch, "shard.mcap")
-            filesystem.get_file(name, local)
-            table = read_mcap(local)
-        rows = zip(table["status"].tolist(), table["file"].tolist(), table["detail"].tolist(), strict=True)
-    else:
-        with filesystem.open(name, "rb") as file:
-            columns = pyarrow.parquet.read_table(file, columns=["status", "file", "detail"])
-        rows = zip(*(columns[c].to_pylist() for c in ("status", "file", "detail")), strict=True)
-    return [{"file": file, "detail": detail} for status, file, detail in rows if status in _UNPROCESSED]
+__all__ = ["Archive", "Url", "process_archive"]
