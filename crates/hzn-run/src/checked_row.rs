@@ -34,8 +34,16 @@ fn to_csv(row: &Row) -> Result<Vec<u8>, Error> {
 /// # Errors
 /// The row cannot be written as CSV.
 pub fn checksum(row: &Row) -> Result<String, Error> {
+    sum(row).map(|sum| format!("{sum:08x}"))
+}
+
+/// Returns the checksum of a row as a number.
+///
+/// # Errors
+/// The row cannot be written as CSV.
+pub fn sum(row: &Row) -> Result<u32, Error> {
     let line = to_csv(&Row { elapsed_us: None, ..row.clone() })?;
-    Ok(format!("{:08x}", crc32fast::hash(&line)))
+    Ok(crc32fast::hash(&line))
 }
 
 /// Returns one row as a line of CSV.

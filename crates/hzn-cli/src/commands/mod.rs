@@ -16,6 +16,7 @@ mod init;
 mod lens_model;
 mod migrate;
 mod recover;
+mod resume;
 mod run;
 mod sensitivity;
 mod simulate;

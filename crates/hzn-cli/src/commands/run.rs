@@ -7,13 +7,13 @@ use hzn_core::body::PriorError;
 use hzn_core::config::Orient;
 use hzn_core::status::Status;
 use hzn_files::{Frames, Sensor};
-use hzn_mcap::Row;
-use hzn_run::engine::{self, AnySensor, BodyOutcome, End, Finished, Plan};
+use hzn_run::engine::{self, BodyOutcome, End, Finished, Plan};
 use hzn_run::open::Opened;
-use hzn_run::sink::{self, Existing, Output, StoredResults};
+use hzn_run::sink::{self, Existing, Output};
 use hzn_run::source::{self, Source, ending};
 use hzn_run::{disk, explain};
 
+use super::resume;
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
@@ -114,7 +114,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line(format_args!("note: the {} pictures of the earlier run are not drawn again", stored.frames));
     }
     let total = source.total();
-    if let Err(stop) = skip_stored(source.as_mut(), &stored, &plan, path) {
+    if let Err(stop) = resume::skip_stored(source.as_mut(), &stored, &plan, path) {
         output.put_back()?;
         return Err(stop);
     }
@@ -310,44 +310,6 @@ fn explain_command(args: &Args, source: &dyn Source, frame: u64) -> String {
 
 pub(super) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, Into::into)
-}
-
-/// Skips the pictures that the output contains already, and checks that this run would give the same results. The last
-/// skipped picture is processed again and must give the row in the output.
-fn skip_stored(source: &mut dyn Source, stored: &StoredResults, plan: &Plan, path: Option<&Path>) -> Result<(), Stop> {
-    let name = path.map(|p| p.display().to_string()).unwrap_or_default();
-    let other = |what: String| Err(usage(format!("{name}: {what}, or start over with --force")));
-    let mut last = None;
-    for n in 0..stored.frames {
-        match source.next() {
-            Some(item) => last = Some(item?),
-            None => {
-                let what = format!("contains {} pictures, but the input has only {n}", stored.frames);
-                return other(format!("{what}; give the input that it was begun with"));
-            }
-        }
-    }
-    let (Some(item), Some(stored_row)) = (last, &stored.last) else { return Ok(()) };
-    if item.name != stored_row.file {
-        let what = format!("its last picture is {}, but the input has {} in this place", stored_row.file, item.name);
-        return other(format!("{what}; give the input that it was begun with"));
-    }
-    if plan.config.tracks() {
-        // Without the pictures before it, the last picture would give another result.
-        return Ok(());
-    }
-    let mut sensor = AnySensor::new(&plan.config, plan.flight).map_err(usage)?;
-    let processed = engine::process_one(&Plan { overlay: None, ..plan.clone() }, &mut sensor, stored_row.index, item)?;
-    let Some(row) = sink::rows(&processed, &plan.config).pop() else { return Ok(()) };
-    let row = Row { elapsed_us: stored_row.elapsed_us, ..row };
-    if row != *stored_row {
-        let what = format!("its last picture, {}, now gives another result", stored_row.file);
-        return other(format!(
-            "{what}; give the sensor.toml, frames.csv and options (--altitude-km, --fps, --flight) that it was begun \
-             with"
-        ));
-    }
-    Ok(())
 }
 
 fn warn_of_missing_pictures(frames: &Frames, folder: &Path) {

@@ -150,3 +150,38 @@ fn another_sensor_is_not_appended() {
         place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("2 pictures: 2 ok");
     }
 }
+
+/// A picture in the middle is replaced between two runs, and the table of the pictures is edited.
+#[test]
+fn changed_pictures_are_not_mixed_with_their_old_results() {
+    let place = Place::with_pictures(5);
+    let table = |altitudes: [u32; 5]| {
+        let rows = altitudes.iter().enumerate().map(|(i, km)| format!("{i:04}.png,{i},{km}\n")).collect::<String>();
+        place.write("in/frames.csv", format!("file,time_s,altitude_km\n{rows}").as_bytes());
+    };
+    table([400; 5]);
+    for out in ["a.csv", "a.jsonl", "a.mcap"] {
+        place.run(&["run", "in/0000.png", "in/0001.png", "in/0002.png", "-o", out]).expect(0);
+        let before = std::fs::read(place.path(out)).unwrap();
+        let resume = || place.run(&["run", "in", "-o", out, "--resume"]);
+        let refuse = |what: &str| {
+            resume().expect(2).says(what).says("--force");
+            assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
+        };
+        let old = std::fs::read(place.path("in/0001.png")).unwrap();
+        let time = std::fs::metadata(place.path("in/0001.png")).unwrap().modified().unwrap();
+        std::fs::copy(place.path("in/0003.png"), place.path("in/0001.png")).unwrap();
+        // Programs that copy may keep the time of the contents.
+        let file = std::fs::File::options().write(true).open(place.path("in/0001.png")).unwrap();
+        file.set_modified(if cfg!(unix) { time } else { std::time::SystemTime::now() }).unwrap();
+        refuse("the picture 0001.png was changed since these results were written");
+        place.write("in/0001.png", &old);
+        table([410, 400, 400, 400, 400]);
+        refuse("its picture 0000.png, now gives another result");
+        // What changes no result is no obstacle.
+        table([400, 400, 400, 410, 400]);
+        let ran = resume().expect(0);
+        assert!(ran.err.contains("frames.csv was changed since these results were written"), "{}", ran.err);
+        table([400; 5]);
+    }
+}

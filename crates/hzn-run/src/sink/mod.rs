@@ -100,6 +100,8 @@ pub fn open(path: Option<&Path>, existing: Existing, settings: Settings<'_>) -> 
         Existing::Refuse => refuse(path, &part)?,
         Existing::Replace => {}
         Existing::Resume => {
+            let written = [&part, path].iter().find_map(|p| std::fs::metadata(p).and_then(|m| m.modified()).ok());
+            let output = |kind, stored, was_final| output(kind, StoredResults { written, ..stored }, was_final);
             // An interrupted run has already given its file the final name.
             if path.exists() && !part.exists() {
                 std::fs::rename(path, &part).map_err(|e| cannot_write(&part, &e))?;
@@ -201,12 +203,12 @@ fn read_stored(part: &Path) -> StoredResults {
     let mut rows: Vec<hzn_mcap::Row> = Vec::new();
     for frame in reader.filter_map(Result::ok) {
         if rows.first().is_some_and(|first| first.index != frame.row.index) {
-            stored.record_answers(&rows);
+            stored.record(&rows);
             rows.clear();
         }
         rows.push(frame.row);
     }
-    stored.record_answers(&rows);
+    stored.record(&rows);
     stored.last = rows.pop();
     stored
 }

@@ -183,7 +183,7 @@ fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<
     let damage = each_row(bytes, form, |row, to| {
         frame.push(row);
         if frame.len() == bodies {
-            stored.record_answers(&frame);
+            stored.record(&frame);
             stored.frames += 1;
             stored.rows += bodies as u64;
             stored.last = frame.pop();

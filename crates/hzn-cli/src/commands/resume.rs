@@ -1,0 +1,111 @@
+//! The pictures that an output contains already: which are skipped, and which are processed again.
+
+use std::path::{Path, PathBuf};
+
+use hzn_mcap::Row;
+use hzn_run::checked_row;
+use hzn_run::engine::{self, AnySensor, Plan};
+use hzn_run::sink::{self, StoredResults};
+use hzn_run::source::{Item, Payload, Source};
+
+use crate::exit::{Stop, usage};
+use crate::tell;
+
+/// Skips the pictures that the output contains already, and checks that this run would give the same results. The last
+/// of them is processed again, and so is each picture file that was changed since the results were written; each must
+/// give the row in the output. If the table of the pictures was changed, this holds for all pictures.
+pub(super) fn skip_stored(
+    source: &mut dyn Source,
+    stored: &StoredResults,
+    plan: &Plan,
+    output: Option<&Path>,
+) -> Result<(), Stop> {
+    let name = output.map(|p| p.display().to_string()).unwrap_or_default();
+    let other = |what: String| Err(usage(format!("{name}: {what}, or start over with --force")));
+    let table = plan.frames.as_ref().map(|frames| &frames.path);
+    let changed_table = table.filter(|table| stored.frames > 0 && stored.is_older_than(table));
+    if let Some(table) = changed_table {
+        tell::line(format_args!(
+            "note: {} was changed since these results were written, so that all pictures are compared with it",
+            table.display()
+        ));
+    }
+    let mut again = Again { sensor: None, plan: Plan { overlay: None, ..plan.clone() }, stored };
+    for n in 0..stored.frames {
+        let Some(item) = source.next() else {
+            let what = format!("contains {} pictures, but the input has only {n}", stored.frames);
+            return other(format!("{what}; give the input that it was begun with"));
+        };
+        let item = item?;
+        let is_last = n + 1 == stored.frames;
+        if let (true, Some(row)) = (is_last, &stored.last)
+            && item.name != row.file
+        {
+            let what = format!("its last picture is {}, but the input has {} in this place", row.file, item.name);
+            return other(format!("{what}; give the input that it was begun with"));
+        }
+        let changed = file_of(&item).is_some_and(|file| stored.is_older_than(file));
+        if !(is_last || changed || changed_table.is_some()) {
+            continue;
+        }
+        let picture = item.name.clone();
+        match again.gives_the_same(n, item)? {
+            Some(true) => {}
+            // Without the pictures before it, a picture would give another result.
+            None if !changed && changed_table.is_none() => {}
+            None => {
+                let what = "was changed since these results were written, and with threshold.method = track its result \
+                            cannot be compared alone";
+                let file = if changed { picture } else { table.map(|p| p.display().to_string()).unwrap_or_default() };
+                return other(format!("{file} {what}"));
+            }
+            Some(false) if changed => {
+                let what = format!("the picture {picture} was changed since these results were written, and now gives");
+                return other(format!("{what} another result; give the pictures that it was begun with"));
+            }
+            Some(false) => {
+                let which = if is_last { "its last picture, " } else { "its picture " };
+                return other(format!(
+                    "{which}{picture}, now gives another result; give the sensor.toml, frames.csv and options \
+                     (--altitude-km, --fps, --flight) that it was begun with"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Returns the file of a picture that has a file of its own.
+fn file_of(item: &Item) -> Option<&PathBuf> {
+    match &item.payload {
+        Payload::File(path) | Payload::RawFile(path, _) => Some(path),
+        Payload::Encoded(_) | Payload::Decoded(_) | Payload::Broken(_) => None,
+    }
+}
+
+/// Processes pictures again and compares them with what is stored.
+struct Again<'a> {
+    sensor: Option<AnySensor>,
+    plan: Plan,
+    stored: &'a StoredResults,
+}
+
+impl Again<'_> {
+    /// Returns whether a picture gives its stored rows again; `None` if that depends on the pictures before it.
+    fn gives_the_same(&mut self, n: u64, item: Item) -> Result<Option<bool>, Stop> {
+        if self.plan.config.tracks() {
+            return Ok(None);
+        }
+        let sensor = match &mut self.sensor {
+            Some(sensor) => sensor,
+            none => none.insert(AnySensor::new(&self.plan.config, self.plan.flight).map_err(usage)?),
+        };
+        // In a run with several threads, an answer does not depend on those before it.
+        sensor.remember(&vec![None; self.plan.config.each_body().len()]);
+        let processed = engine::process_one(&self.plan, sensor, n, item)?;
+        let rows: Vec<Row> = sink::rows(&processed, &self.plan.config);
+        let sums = rows.iter().map(checked_row::sum).collect::<Result<Vec<u32>, _>>()?;
+        let first = n as usize * rows.len();
+        Ok(Some(self.stored.sums.get(first..first + rows.len()) == Some(sums.as_slice())))
+    }
+}
