@@ -87,19 +87,20 @@ section! {
 section! {
     /// `[input]` of sensor.toml: conversion of a pixel to one brightness.
     "input" pub struct Input: Copy {
-        /// The brightness of a colour pixel.
+        /// Channel that gives the brightness of a colour pixel, or their mean.
         @- channel: Channel = Channel::Mean, [choice];
         /// Significant bits of a sample, if the file's words have room for more.
         ///
-        /// It is 12 for a 12-bit camera whose values are in the lower bits of 16-bit words. Programs that read files
-        /// copy it to the picture's [`Layout`](crate::image::Layout).
+        /// It is 12 for a 12-bit camera whose values are in the lower bits of 16-bit words. A wrong value makes full
+        /// scale wrong, and every limit that is a fraction of full scale. Programs that read files copy it to the
+        /// picture's [`Layout`](crate::image::Layout).
         @- bits: Option<u8> = None, [8.0 to 16.0]
             { unset: "from the file; for 16-bit words, determined from the pictures", example: "12" };
         /// Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
         /// picture.
         @- orient: Orient = Orient::AsStored, [choice];
-        /// Number of rows of a smaller copy of the picture, which is processed instead; lengths are then in pixels of
-        /// the copy.
+        /// Number of rows of a smaller copy of the picture, which is processed instead of the picture; lengths in
+        /// pixels are then those of the copy.
         @- scale_to_height: Option<u16> = None, ["16 to `height`"] { needs: "horace", unset: "none", example: "540" };
     }
 }

@@ -32,11 +32,13 @@ section! {
         /// (1); `[]` allows only one look.
         ///
         /// Up to 4 looks follow one after the other, until there is an answer. Otsu's threshold follows the brightest
-        /// clouds, and most of the limb of a half-lit disc may lie below it. Every look can give a false answer, so
-        /// there are only a few; all looks share one `limits.max_work`. With a `fixed` threshold there is one look
-        /// only.
+        /// clouds, and most of the limb of a half-lit disc may lie below it. More looks answer more pictures, but every
+        /// look can give a false answer; all looks share one `limits.max_work`. With a `fixed` threshold there is only
+        /// one look.
         @- levels: heapless::Vec<f64, MAX_LEVELS> = levels(), [0.05 to 4.0];
         /// Lowest threshold of a further look, in standard deviations of the dark pixels' noise above their mean.
+        ///
+        /// A smaller value finds fainter limbs; below 3, the threshold follows the noise of the sky.
         // Below three deviations a threshold follows the noise of the sky: there the limb was found 25 km too high.
         @- min_sigma: f64 = 3.0, [0.0 to 100.0];
         /// Widest dark frame around the picture that is detected and left out, px; 0 turns the detection off.
@@ -48,7 +50,8 @@ section! {
         @- frame_px: u16 = 8, [0.0 to 64.0];
         /// The step that follows when no edge of the whole picture gives an answer.
         @- method: Method = Method::None, [choice];
-        /// For `division`: parts below this fraction of the picture's area are not cut again.
+        /// For `division`: parts below this fraction of the picture's area are not cut again; a smaller value costs
+        /// more time.
         @- least_part: f64 = 0.1, [0.015625 to 1.0] { needs: "horace" };
         /// For `division`: method that combines the answers of several parts.
         @- combine: Combine = Combine::Median, [choice] { needs: "horace" };

@@ -26,10 +26,11 @@ choices! {
 choices! {
     /// Method that computes the covariance.
     pub enum Method {
-        /// N⁻¹ X N⁻¹ of the fit, where X holds the correlated errors of the edge; the expected half-angle is fused.
+        /// The correlated errors of the edge points are propagated through the fit, N⁻¹ X N⁻¹ with their covariance
+        /// in X; the expected half-angle is fused.
         @- Sandwich = "sandwich";
-        /// The covariance of the direct nadir, whichever fit is used; the expected half-angle is not fused, and the
-        /// residuals do not raise it (Braun & Barf 2022, (33)).
+        /// The covariance is that of the direct nadir, whichever fit is used; the expected half-angle is not fused, and
+        /// the residuals do not raise the covariance (Braun & Barf 2022, (33)).
         @- BraunBarf = "braun-barf" needs "dlr";
     }
 }
@@ -39,30 +40,38 @@ section! {
     "covariance" pub struct Config: Copy {
         /// Method that computes the covariance.
         @- method: Method = Method::Sandwich, [choice];
-        /// Whether the values below are used as they are, or are the floor of values that are measured in each picture.
+        /// Source of the noise: the residuals of each picture, with the values below as their floor (`rms`, `reml`), or
+        /// the values below (`told`).
+        ///
+        /// Keep `rms` unless the values were measured with the same camera in the same kind of scene: a noise that is
+        /// told too small makes sigma too small.
         @102 noise: Noise = Noise::Rms, [choice];
         /// 1σ of an edge point, px; raised to the RMS of the residuals if that is larger.
+        ///
+        /// A larger value widens the covariance of clean edges and gives the expected half-angle more weight.
         // 0.1 px is what sub-pixel points reach on a clean edge. It was 1 px before, which was too large: the mean NEES
         // of infrared pictures was 0.02 instead of about 0.5.
         @100 sigma_px: f64 = 0.1, [above 0.0 to 1e4];
-        /// Correlation length of edge point errors along the edge, px; 0 for white errors.
+        /// Correlation length of the errors of edge points along the edge, px; 0 for white errors.
+        ///
+        /// A larger value leaves fewer independent points, so that the covariance widens.
         // No fixed length held on fresh flights (60 to 300 px were tried), which is why it is only the floor of the
         // measured one.
         @101 correlation_px: f64 = 60.0, [0.0 to 1e6];
         /// 1σ of a shift that all points of an edge have in common, px.
         ///
-        /// Its causes are the threshold, blur, and the profile of a limb that is no wider than a pixel. The shift
+        /// Its causes are the threshold, blur, and the profile of a limb that is no wider than a pixel. A larger value
         /// widens the variance of the fitted half-angle, which then has less weight against the expected one.
         // 0.3 px is the shift of an edge by threshold and blur.
         @103 bias_px: f64 = 0.3, [0.0 to 1e4];
         /// 1σ of a tilt that the whole edge has in common, px: an error that goes from −1 to 1 times this value along
         /// the edge.
         ///
-        /// Its cause is light that fades along the limb. The tilt widens the covariance of the axis.
+        /// Its cause is light that fades along the limb. A larger value widens the covariance of the axis.
         @104 tilt_px: f64 = 0.1, [0.0 to 1e4];
         /// For `braun-barf`: whether the largest variance is used in every direction.
         ///
-        /// Braun & Barf 2022, (37); it is about twenty times too large.
+        /// This is the overbound of Braun & Barf 2022, (37), which is about twenty times too large.
         @- overbound: bool = false, ["true or false"] { needs: "dlr" };
     }
 }

@@ -25,10 +25,14 @@ section! {
         @50 method: Method = Method::Otsu, [choice];
         /// For `fixed`: a pixel is lit at this value or above, in the picture's own counts; a value below 1 is a
         /// fraction of full scale.
+        ///
+        /// A level above the brightness of the limb finds no limb. A level within the noise of the sky finds edges in
+        /// the sky, which cost time.
         @51 level: f64 = 64.0, [above 0.0 to 65535.0];
-        /// For `dynamic`: the threshold is this factor times the mean of the sample.
+        /// For `dynamic`: the threshold is this factor times the mean of the sample; a larger factor gives a higher
+        /// threshold.
         @52 factor: f64 = 1.0, [above 0.0 to 100.0];
-        /// For `otsu`: factor by which the threshold is multiplied.
+        /// For `otsu`: factor by which the threshold is multiplied; a larger factor gives a higher threshold.
         ///
         /// Use it to test how much an answer depends on the threshold.
         @53 scale: f64 = 1.0, [0.1 to 10.0];
@@ -44,9 +48,15 @@ pub(crate) static SUN: Config = Config { method: Method::Fixed, level: 0.9, fact
 section! {
     /// `[brightness]` of sensor.toml: the brightness that a picture must have to be processed.
     "brightness" pub struct Brightness: Copy {
-        /// Smallest mean brightness of the picture, as a fraction of full scale.
+        /// Smallest mean brightness of the picture, as a fraction of full scale; a darker picture has the status
+        /// `too-dark`.
+        ///
+        /// A value above 0 saves the time of pictures of the night side or of the sky alone.
         @40 min_mean: f64 = 0.0, [0.0 to 1.0];
-        /// Largest mean brightness of the picture, as a fraction of full scale; not below `min_mean`.
+        /// Largest mean brightness of the picture, as a fraction of full scale; a brighter picture has the status
+        /// `too-bright`.
+        ///
+        /// It must not be below `min_mean`. A smaller value refuses pictures that the Sun or the exposure saturates.
         @41 max_mean: f64 = 0.98, [0.0 to 1.0];
     }
 }

@@ -10,11 +10,13 @@ use crate::base::keys::section;
 section! {
     /// `[limits]` of sensor.toml: the bound on the time of the worst picture.
     "limits" pub struct Config: Copy {
-        /// Largest cost of one picture and body, in steps of the border follower; when it is used up, the best answer
-        /// so far counts.
+        /// Work budget for one picture and one body, in steps of the border follower; when it is used up, the best
+        /// answer so far counts.
         ///
-        /// An ordinary picture costs about 30 thousand. If there is no answer by then, the status is `truncated`. The
-        /// default is 120 for each border pixel that the lists hold, and 2120 with `erf`.
+        /// If there is no answer when the budget is used up, the status is `truncated`. An ordinary picture costs about
+        /// 30 thousand steps. A smaller budget shortens the longest calculation; a larger one answers more pictures
+        /// with much clutter or large masks. The default is 120 steps for each border pixel that the lists hold, and
+        /// 2120 with `erf`.
         @120 max_work: Option<u32> = None, [10000.0 to 1e9]
             { unset: "245 760 on a flight computer, 1 966 080 on the host", example: "1000000" };
     }

@@ -107,6 +107,8 @@ section! {
             { unset: "none", example: "[-0.055, 0.011, -0.0035, 0.0002]" };
         /// Radius of the image circle, degrees off the optical axis; pixels beyond it count as masked.
         ///
+        /// Set it if the corners of the picture are black, or if the calibration does not cover them.
+        ///
         /// The lens must be monotone up to 2° beyond the smaller of this angle and the farthest corner.
         @13 theta_max_deg: Option<f64>, serde(default, skip_serializing_if = "Option::is_none"), [0.1 to 175.0]
             { unset: "none", example: "54.0" };
@@ -117,6 +119,8 @@ section! {
         @17 theta_min_deg: Option<f64>, serde(default, skip_serializing_if = "Option::is_none"), [0.1 to 175.0]
             { unset: "none", example: "30.0" };
         /// 1σ of the focal length, the same for both axes, in percent; it widens the covariance.
+        ///
+        /// Take it from the calibration. Without a calibration it is the error of the field of view that was given.
         @14 focal_sigma_percent: f64, serde(default, skip_serializing_if = "is_zero"), [0.0 to 100.0]
             { unset: "0", example: "0.1" };
         /// 1σ of each coordinate of the principal point, px; it widens the covariance.

@@ -29,8 +29,10 @@ pub type Polygon = heapless::Vec<[f64; 2], MAX_CORNERS>;
 section! {
     /// `[mask]` of sensor.toml: parts of the vehicle in view.
     "mask" pub struct Config {
-        /// Areas that never count, as polygons of corners [x, y], px; no pixel in them is lit, and their outline is not
+        /// Areas that are ignored, as polygons of corners [x, y], px; no pixel in them is lit, and their outline is not
         /// an edge.
+        ///
+        /// Draw one around each part of the vehicle that is always in view. Polygons with fewer corners take less time.
         @- polygons_px: heapless::Vec<Polygon, MAX_POLYGONS> = heapless::Vec::new(),
             ["up to 8 polygons of 3 to 16 corners"]
             { unset: "none", example: "[[[1500, 0], [1919, 0], [1919, 1079], [1450, 1079]]]" };

@@ -56,7 +56,9 @@ section! {
         /// bodies, because a planet with a name has its own.
         @- radii_km: Option<[f64; 3]> = None, ["three lengths above 0, for `ellipsoid` only"]
             { needs: "position", unset: "none", example: "[71492.0, 71492.0, 66854.0]" };
-        /// 1σ of each semi-axis, km, with `fit.position`.
+        /// 1σ of each semi-axis, km; it widens the covariance of the position (`fit.position`).
+        ///
+        /// Set it for a body whose shape is known only roughly, such as an asteroid.
         @- radii_sigma_km: f64 = 0.0, [0.0 to 1e5] { needs: "position" };
         /// Distance of the camera from the body's centre for pictures without one in their prior, km, with
         /// `fit.position`; it needs `range_sigma_km`.
@@ -64,13 +66,18 @@ section! {
         /// Without any distance, the position comes from the limb alone.
         @- range_km: Option<f64> = None, [above 0.0] { needs: "position", unset: "none", example: "5986000.0" };
         /// 1σ of `range_km`, and of the column `range_km` of frames.csv if that has no `range_sigma_km`, km.
+        ///
+        /// A smaller value gives the distance more weight against the limb.
         @- range_sigma_km: Option<f64> = None, [0.0 to 1e12] { needs: "position", unset: "none", example: "1000.0" };
         /// Altitude of the camera for pictures without an altitude in their prior, km; above WGS-84 for `earth`, else
         /// above the radius, which is the mean of the three semi-axes for an ellipsoid.
         ///
         /// `sun` and `moon` do not use it. For a camera in orbit about the Moon, use a `sphere` of 1737.4 km.
         @32 altitude_km: Option<f64> = None, [above 0.0] { unset: "none", example: "400.0" };
-        /// 1σ of the altitude, km.
+        /// 1σ of the altitude, km; it widens the expected half-angle.
+        ///
+        /// Give the sigma of the navigation that the altitude comes from. A larger value gives the expected half-angle
+        /// less weight; a value that is too small makes the covariance too small, or right answers are refused.
         @33 altitude_sigma_km: f64 = 0.5, [0.0 to 1e6];
         /// For `earth`: the surface from which an altitude without a position is measured.
         @36 altitude_reference: AltitudeReference = AltitudeReference::Ellipsoid, [choice];
@@ -86,22 +93,25 @@ section! {
         /// The height is 24 km at 440 nm and 12 km at 650 nm. The range of thresholds is a quarter to three quarters of
         /// the limb's brightness. A larger sigma gives the expected half-angle less weight.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
-        /// 1σ of the part of the limb height that goes twice up and down along the limb, km. It decides how well the
-        /// rotation about the line to the body is known, see `fit.yaw_limit_deg`.
+        /// 1σ of the second harmonic of the limb height along the limb, km; it limits how well the rotation about the
+        /// line to the body is known (`fit.yaw_limit_deg`).
         ///
-        /// Nothing is known of the shape of the height along the limb, so that by default it has the sigma of the
-        /// height itself.
+        /// The second harmonic rises and falls twice along the limb, which looks like a rotation. A smaller value gives
+        /// the rotation a smaller sigma. The default is the sigma of the limb height, because the variation along the
+        /// limb is usually unknown.
         @- limb_height_harmonic_sigma_km: Option<f64> = None, [0.0 to 1e4]
             { needs: "position", unset: "`limb_height_sigma_km`", example: "0.1" };
         /// Height that overexposure adds to the limb, km; it is multiplied by the fraction of the limb that is clipped
         /// at full scale.
         ///
-        /// If the light exceeds full scale by the factor B, the limb in the picture, at half of full scale, lies h ln B
-        /// higher than the limb at half of the light, where h = 7.5 km is the scale height of the air. The default is
-        /// the mean for B from 1 to 8, with a uniform distribution of ln B.
+        /// Set it to 0 if `limb_height_km` was measured on pictures that are overexposed in the same way. If the light
+        /// exceeds full scale by the factor B, the limb in the picture, at half of full scale, lies h ln B higher than
+        /// the limb at half of the light, where h = 7.5 km is the scale height of the air. The default is the mean for
+        /// B from 1 to 8, with a uniform distribution of ln B.
         // The mean of h ln B is h ln 8/2, because ln B is evenly distributed from 0 to ln 8.
         @37 clipped_height_km: f64 = 7.8, [0.0 to 500.0];
-        /// 1σ of `clipped_height_km`, km; the height varies along the limb.
+        /// 1σ of `clipped_height_km`, km; it also stands for the variation along the limb, and a larger value widens
+        /// the covariance.
         // This is the sigma of the same even distribution: its width h ln 8 over √12.
         @38 clipped_sigma_km: f64 = 4.5, [0.0 to 1e4];
         /// Limb height by latitude instead of `limb_height_km`: rows of [geodetic latitude in degrees, height in km],
@@ -112,7 +122,7 @@ section! {
         @- limb_height_by_latitude_km: heapless::Vec<[f64; 2], MAX_LATITUDES> = heapless::Vec::new(),
             ["up to 16 rows, for `earth`"] { unset: "none", example: "[[-90, 20.5], [0, 25.0], [90, 29.5]]" };
         /// Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun. In visible
-        /// light, true is better: near the terminator the light fades, and the edge is too low there.
+        /// light, set true: near the terminator the light fades, and the edge is too low there.
         @- sunlit: Option<bool> = None, ["true or false"]
             { unset: "true for all but `earth`, `earth-sphere` and `sun`", example: "true" };
         /// Threshold for this body, as a table with the keys of `[threshold]`.

@@ -40,7 +40,9 @@ section! {
     "contour" pub struct Config: Copy {
         /// How edges are found.
         @- method: Method = Method::BorderFollowing, [choice];
-        /// Rows between two search lines for closed edges, px.
+        /// Rows between two search lines for edges that do not touch the border of the picture, px.
+        ///
+        /// A smaller spacing finds smaller bodies and takes more time.
         @60 line_spacing_px: Option<u16> = None, [1.0 or more] { unset: "from the body's expected size", example: "8" };
         /// For `erode`: side of the square neighbourhood, px.
         @- erode_size_px: u16 = 3, ["odd, 3 to 31"] { needs: "horace" };

@@ -27,14 +27,16 @@ choices! {
 section! {
     /// `[edge_points]` of sensor.toml: edges that are candidates for the limb, and their edge points.
     "edge_points" pub struct Config: Copy {
-        /// Shortest edge, border pixels; a small body or picture needs fewer.
+        /// Fewest border pixels of an edge that may be the limb; a small body or picture needs fewer.
         ///
-        /// For a small disc, half of its circumference in pixels is enough; in a picture of fewer than 80 rows or
-        /// columns, half of its shorter side.
+        /// A larger value skips more lights and small clouds, and short limbs. For a small disc, half of its
+        /// circumference in pixels is enough; in a picture of fewer than 80 rows or columns, half of its shorter side
+        /// is enough.
         @70 min_points: u16 = 40, [8.0 or more];
         /// Points kept per edge, evenly along it; 0 keeps all that fit into memory.
         ///
-        /// 200 points take half the time, but single pictures are then lost or much less accurate.
+        /// Fewer points take less time: 200 points take half the time, but single pictures are then lost or much less
+        /// accurate.
         // With 300 points a Cortex-M7 needs a third less, but `tumble` has one more false answer and one answer less in
         // 200 pictures. On real limbs more than 600 gain little, because the errors are correlated over many pixels.
         @71 keep_points: u16 = 600, ["0 (all) or 16 to 65535"];

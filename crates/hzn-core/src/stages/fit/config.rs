@@ -29,14 +29,15 @@ choices! {
         @- Conic = "conic" needs "dlr";
         /// An elliptic cone by total least squares (Wang et al. 2022, (10) to (17)).
         @- Tls = "tls" needs "zju";
-        /// An elliptic cone by total least squares; every point is weighed by the angle of a pixel at its place (Wang
-        /// et al. 2022, (18) to (21)).
+        /// An elliptic cone by total least squares, in which every point is weighted by the effect of an error of one
+        /// pixel (Wang et al. 2022, (18) to (21)).
         @- Wtls = "wtls" needs "zju";
         /// Linear least squares in scaled space (Christian & Robinson 2016), for comparison: biased on short arcs.
         @- LeastSquares = "least-squares" needs "position";
-        /// Generalised total least squares in scaled space, closed and without bias (math.md, 13.9).
+        /// Generalised total least squares in scaled space, in closed form and without bias (math.md, 13.9).
         @- GeneralisedTls = "generalised-tls" needs "position";
-        /// Centre and radius of a circle, right for a camera that points at the body (Barf 2014, 2.2.4).
+        /// The centre of a circle gives the direction and its radius the half-angle; this is right only for a camera
+        /// that points at the body (Barf 2014, 2.2.4).
         @- Circle = "circle" needs "horace";
     }
 }
@@ -48,17 +49,17 @@ section! {
         @- method: Method = Method::Sphere, [choice];
         /// Which half-angle the fitted cone has.
         @90 half_angle: HalfAngle = HalfAngle::Fused, [choice];
-        /// Whether the fit gives the position of the body's centre: the whole vector with its covariance. The limb of
-        /// an ellipsoid must then have an orientation: an attitude, or for a body of revolution its pole.
+        /// Whether the fit gives the position of the body's centre: the whole vector with its covariance. An ellipsoid
+        /// then needs its orientation in each prior: an attitude, or for a body of revolution its pole.
         ///
         /// The position and the axis of one picture hold the same information. A filter must use only one of them.
         @- position: Option<bool> = None, ["true or false"]
             { needs: "position", unset: "true for `ellipsoid` and the planets with a name", example: "true" };
-        /// The rotation about the line to the body is reported if its 1σ is below this, degrees; 0 never reports it. It
-        /// needs `fit.position` and a body that is not a sphere.
+        /// Largest 1σ at which the rotation about the line to the body is reported, degrees; 0 never reports it. The
+        /// rotation needs `fit.position` and a body that is not a sphere.
         ///
-        /// At 1 degree it is as good as a magnetometer. The second harmonic of the limb height decides: see
-        /// `body.limb_height_harmonic_sigma_km`.
+        /// A rotation with a 1σ of 1 degree is as accurate as that of a magnetometer. The 1σ follows mostly from the
+        /// second harmonic of the limb height: see `body.limb_height_harmonic_sigma_km`.
         @- yaw_limit_deg: f64 = 1.0, [0.0 to 180.0] { needs: "position" };
         /// For `wtls`: points are weighted where the axis is farther from the optical axis than this, degrees; 0 always
         /// weights them.

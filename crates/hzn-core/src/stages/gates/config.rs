@@ -8,63 +8,80 @@ section! {
     "gates" pub struct Config: Copy {
         /// Fewest inliers; a small body or picture needs fewer.
         ///
-        /// For a small disc, one third of its circumference in pixels is enough; in a picture of fewer than 80 rows or
-        /// columns, one third of its shorter side.
+        /// A larger value refuses shorter limbs; with a smaller value more edges pass by chance. For a small disc, one
+        /// third of its circumference in pixels is enough; in a picture of fewer than 80 rows or columns, one third of
+        /// its shorter side is enough.
         @110 min_inliers: u16 = 24, [8.0 or more];
         /// Shortest length of edge that inliers must cover, px.
         ///
-        /// Many curves fit a shorter edge.
+        /// A smaller value answers pictures with less limb in view, but many curves fit a short edge.
         @111 min_arc_px: Option<f64> = None, [0.0 to 1e6] {
             unset: "a tenth of the diagonal, or a third of the body's circumference if less",
             example: "60.0",
         };
-        /// Largest weighted RMS distance of the inliers from the limb, px; it grows as `consensus.noise_sigma` raises
-        /// the largest distance of an inlier.
+        /// Largest weighted RMS distance of the inliers from the limb, px; where `consensus.noise_sigma` raises the
+        /// largest distance of an inlier, this limit is raised by the same factor.
+        ///
+        /// A larger value answers pictures with a poor calibration or a rough limb, and may let edges pass that are no
+        /// limb.
         @112 max_rms_px: f64 = 2.0, [above 0.0];
         /// Largest difference between the fitted and the expected half-angle, in standard deviations.
+        ///
+        /// A smaller value refuses more edges that are no limb, and also limbs whose altitude or limb height is worse
+        /// than its sigma says.
         @113 max_half_angle_sigma: f64 = 3.0, [above 0.0];
-        /// Largest standard deviation of an answer, degrees.
+        /// Largest standard deviation of an answer in its worst direction, degrees.
+        ///
+        /// Set a smaller value if your filter has no use for rough answers.
         @114 max_sigma_deg: f64 = 10.0, [above 0.0 to 180.0];
         /// Smallest part of the fitted limb in view that edge points must cover.
         ///
-        /// A limb goes on where the edge of a mast or of a cloud ends.
+        /// A limb goes on where the edge of a mast or of a cloud ends. A larger value refuses more of these edges, and
+        /// also limbs that are lit only in part.
         @115 min_support: f64 = 0.4, [0.0 to 1.0];
         /// Largest part of the sky beyond the fitted limb that may be lit.
         ///
-        /// Beyond the edge of a cloud are other clouds. Ghosts in the sky next to a limb light up to a quarter of it.
+        /// Beyond the edge of a cloud are other clouds, so a smaller value refuses more clouds. Ghosts in the sky next
+        /// to a limb light up to a quarter of this sky, so a smaller value also refuses limbs next to ghosts.
         @116 max_lit_sky: f64 = 0.3, [0.0 to 1.0];
-        /// For Sun and Moon: a place in the sky counts as lit from this part of the threshold on.
+        /// For Sun and Moon: brightness from which a place in the sky counts as lit, as a fraction of the threshold.
         ///
-        /// Sun and Moon stand in a dark sky. A glare fades outwards and does not count. A bright spot of a cloud has
-        /// the same size, but it lies among other clouds.
+        /// Sun and Moon stand in a dark sky. A glare fades outwards and does not count. A bright spot of a cloud may
+        /// have the size of the Sun, but it lies among other clouds; a smaller value refuses more of these spots, and
+        /// discs in stray light.
         @- dark_sky: f64 = 0.25, [above 0.0 to 1.0];
-        /// Where at least this part of an edge's points are inliers, the edge may wind; 0 turns the check off.
+        /// Smallest part of an edge's points that must be inliers if the edge winds; 0 turns the check off.
         ///
-        /// The path along the inliers of any other edge may be three times as long as the limb that they cover. A
+        /// An edge winds if the path along its inliers is more than three times as long as the limb that they cover. A
         /// cloud's edge winds, and a part of it may lie on a limb by chance.
         @- whole_edge: f64 = 0.8, [0.0 to 1.0];
-        /// Largest ratio of the cone's residual to that of a circle of the image or of four straight pieces; 1e6 turns
-        /// the gate off.
+        /// Largest ratio of the cone's RMS residual to that of a circle of the image or of up to four straight pieces;
+        /// 1e6 turns this test off.
         ///
-        /// Lens flares are circles of the image; an iris and a vehicle have straight edges. Where residuals are noise
-        /// the ratio is about 1. A ratio of 2 is a likelihood ratio of 4 to the power of half the number of independent
-        /// points.
+        /// Lens flares are circles of the image; an iris and a vehicle have straight edges. A smaller value refuses
+        /// more of them, and limbs that clouds make rough. If the residuals are noise, the ratio is about 1. A ratio of
+        /// 2 is a likelihood ratio of 4 to the power of half the number of independent points.
         @- max_rival_ratio: f64 = 2.0, [1.0 to 1e6];
         /// Smallest evidence for the limb over a straight line, and largest evidence for a rival shape over the limb:
         /// twice the logarithm of the likelihood ratio; −1e6 turns the gate off.
         ///
-        /// A value of 9 is three standard deviations. Points with correlated residuals count once.
+        /// A value of 9 is three standard deviations. A larger value refuses more edges that are nearly straight, but
+        /// fewer circles and polygons. Points with correlated residuals count once.
         @- min_evidence: f64 = 9.0, [-1e6 to 1e6];
-        /// Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the given
-        /// noise, px; with 1e4 the gate uses the told noise.
+        /// Floor of the noise in the second test of the half-angle, px; this test takes the noise from the residuals,
+        /// even if the told noise is larger. With 1e4 it uses the told noise.
+        ///
+        /// The limit is `max_half_angle_sigma`. A larger value refuses fewer edges.
         @- residual_floor_px: f64 = 0.1, [0.0 to 1e4];
         /// Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
         /// turns the gate off.
         ///
-        /// A continuation counts where it keeps 0.6 of the limb's contrast.
+        /// The edge of a panel or of an iris goes on smoothly where it leaves the fitted limb. A continuation counts
+        /// where it keeps 0.6 of the limb's contrast. A smaller value refuses more of these edges, and limbs that touch
+        /// another bright edge.
         @- max_departure: f64 = 0.2, [0.0 to 1e6];
-        /// Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb without
-        /// a loss of contrast; 0 turns the gate off.
+        /// Smallest part of the fitted limb in view that edge points must cover if the edge leaves the limb without a
+        /// loss of contrast; 0 turns the gate off.
         ///
         /// The corner of an iris and the crossing of two flares end an edge in this way. The default is 0, because 0.7
         /// also refuses half-lit discs and crescents.
@@ -72,27 +89,35 @@ section! {
         /// Largest brightness high above the limb, as a part of the brightness step at the limb; 1e6 turns the gate
         /// off.
         ///
-        /// It is read three standard deviations of the limb height, 4.8 scale heights of the air and four pixels above
-        /// the limb. Sunlit air leaves a fifteenth there in an sRGB picture. Airglow and aurora reach higher, and their
-        /// edge is not the limb. Bodies without known air are not checked.
+        /// The brightness is read three standard deviations of the limb height, 4.8 scale heights of the air and four
+        /// pixels above the limb. Sunlit air leaves a fifteenth there in an sRGB picture. Airglow and aurora reach
+        /// higher, and their edge is not the limb. A larger value answers pictures with more light above the limb, and
+        /// takes the risk that their edge is airglow. Bodies without known air are not checked.
         @- max_glow: f64 = 0.125, [0.0 to 1e6];
         /// Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky;
         /// 1 turns the gate off.
         ///
-        /// The gate is only for a body that does not fit into the picture, because a crescent is a band, too.
+        /// A smaller value refuses more bands, such as rings and streaks of light. The gate is only for a body that
+        /// does not fit into the picture, because a crescent is a band, too.
         @- max_band: f64 = 0.5, [0.0 to 1.0];
         /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
         /// deviations.
+        ///
+        /// A smaller value refuses more false answers, and right answers whose attitude is worse than its sigma says.
         @- max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];
         /// Largest rate of rotation of the vehicle, degrees per second; an axis that is farther from the previous
         /// answer is refused.
         ///
-        /// Pictures are then processed in order.
+        /// Set it to the largest rate that the vehicle can reach: a smaller value refuses right answers. Pictures are
+        /// then processed in order.
         @- max_rate_deg_s: Option<f64> = None, [above 0.0 to 1e6] { unset: "any", example: "100.0" };
         /// Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does
         /// `body.sunlit = false`.
+        ///
+        /// A Sun more than 18° below the horizon does not light a point.
         @- max_unlit: f64 = 0.5, [0.0 to 1.0];
-        /// Whether a part of the limb with the expected half-angle about the fitted axis must lie in the picture.
+        /// Whether a part of the expected limb must lie in the picture: the limb with the expected half-angle about the
+        /// fitted axis.
         @- limb_in_view: bool = false, ["true or false"] { needs: "dlr" };
         /// Largest mean square distance of the points from the expected conic section, focal lengths squared.
         ///
@@ -100,10 +125,10 @@ section! {
         @- max_section_residual: Option<f64> = None, [above 0.0] { needs: "dlr", unset: "any", example: "0.025" };
         /// [lowest, highest] altitude, km: the radius of the fitted circle must be that of a limb between them.
         ///
-        /// At altitude 0 the limb is infinitely wide.
+        /// Wider limits refuse fewer circles; at altitude 0 the radius has no upper limit.
         @- altitude_limits_km: Option<[f64; 2]> = None, [0.0 to 1e9]
             { needs: "horace", unset: "any", example: "[0.0, 1000.0]" };
-        /// With `altitude_limits_km`: the radius may lie beyond its limits by this fraction of the limits.
+        /// With `altitude_limits_km`: the radius may lie beyond its limits by this fraction of each limit.
         @- radius_margin: f64 = 0.1, [0.0 to 1000.0] { needs: "horace" };
         /// With `altitude_limits_km`: the radius may lie beyond its limits by this length, px.
         ///
