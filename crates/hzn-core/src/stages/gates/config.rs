@@ -89,16 +89,17 @@ section! {
         /// Largest brightness high above the limb, as a part of the brightness step at the limb; 1e6 turns the gate
         /// off.
         ///
-        /// The brightness is read three standard deviations of the limb height, 4.8 scale heights of the air and four
-        /// pixels above the limb. Sunlit air leaves a fifteenth there in an sRGB picture. Airglow and aurora reach
-        /// higher, and their edge is not the limb. A larger value answers pictures with more light above the limb, and
-        /// takes the risk that their edge is airglow. Bodies without known air are not checked.
+        /// The brightness is read at a height above the limb that is the sum of three standard deviations of the limb
+        /// height, 4.8 scale heights of the air and four pixels. Sunlit air leaves a fifteenth there in an sRGB
+        /// picture. Airglow and aurora reach higher, and their edge is not the limb. A larger value answers pictures
+        /// with more light above the limb, and takes the risk that their edge is airglow. Bodies without known air are
+        /// not checked.
         @- max_glow: f64 = 0.125, [0.0 to 1e6];
         /// Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky;
-        /// 1 turns the gate off.
+        /// 1 turns the gates `band` and `faint` off.
         ///
-        /// A smaller value refuses more bands, such as rings and streaks of light. The gate is only for a body that
-        /// does not fit into the picture, because a crescent is a band, too.
+        /// A smaller value refuses more bands, such as rings and streaks of light. The gate `band` is only for a body
+        /// that does not fit into the picture, because a crescent is a band, too.
         @- max_band: f64 = 0.5, [0.0 to 1.0];
         /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
         /// deviations.
