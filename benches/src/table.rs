@@ -38,7 +38,7 @@ pub(crate) fn markdown(results: &Results) -> String {
             s,
             "\n## Growth\n\nThe time in µs against the size of the picture, with everything flushed; 3 frames of each \
              size. `hostile` is a pattern of dots in which every dot is an edge and none is a limb: the work budget \
-             ends it, so its time does not grow. The recipe takes the longest edge and does not notice.\n\n\
+             ends it, so its time does not grow. The recipe takes the longest edge, whether it is a limb or not.\n\n\
              ![Time of a picture, everything flushed](figures/growth.svg)\n\n{}",
             growth::table(&results.growth)
         );

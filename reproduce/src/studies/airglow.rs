@@ -122,11 +122,10 @@ pub(super) fn night_side(effort: &Effort) -> anyhow::Result<Section> {
     section.text(format!(
         "The night side from {ALTITUDE_KM} km: airglow (a Chapman layer at 95 km), a red aurora (a layer at 250 km) of \
          three brightnesses, and ground in moonlight; {} cameras of 500 and 2000 px focal length, with linear and with \
-         sRGB counts; {pictures} pictures each. The sensor has default settings and is told camera and position. An \
-         answer is false if it is more than {FALSE_DEG}° and {FALSE_SIGMAS} sigmas wrong. The ground's brightness is \
-         given as a multiple of the brightest airglow. The gate was designed on one photograph and on an early form \
-         of this scene with other pictures (**in-sample** for the decision that the edge that wins is the one that is \
-         checked).",
+         sRGB counts; {pictures} pictures each. The sensor has default settings; it knows the camera and the position. \
+         An answer is false if it is more than {FALSE_DEG}° and {FALSE_SIGMAS} sigmas wrong. The ground's brightness \
+         is given as a multiple of the brightest airglow. The gate was designed on one photograph and on an early form \
+         of this scene with other pictures (**in-sample** for the decision to check only the edge that wins).",
         CAMERAS.len()
     ));
     let names = ["default", "without the gate", "attitude to 5°"];

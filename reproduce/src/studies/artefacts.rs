@@ -89,8 +89,8 @@ pub(super) fn campaign(effort: &Effort) -> anyhow::Result<Section> {
     s.text(format!(
         "{} pictures without a limb, {count} of each kind, of 480×360 to 1280×960 pixels through pinholes (27° to 110° \
          wide), equidistant lenses (to 140°) and lenses of Kannala and Brandt (60° to 150°), from 60 to 600 km, 8 \
-         bits, with noise of 0.2 to 2.5 % of full scale; `hzn_tests::artefact` has the ranges of each kind. Known to \
-         the sensor: the camera and the position, for the lower half of the table also an attitude that is wrong by \
+         bits, with noise of 0.2 to 2.5 % of full scale; `hzn_tests::artefact` has the ranges of each kind. The sensor \
+         knows the camera and the position; for the second table it also has an attitude that is wrong by \
          {ATTITUDE_DEG}° (1σ about each axis). Every setting but `consensus.threshold_px` has its default. The table \
          counts the pictures that are answered. If the half-angle of a disc is within three sigmas of the expected \
          one, its shape cannot distinguish it from a limb; these discs have a row of their own.",

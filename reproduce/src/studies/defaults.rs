@@ -281,10 +281,10 @@ pub(super) fn default_settings(effort: &Effort) -> anyhow::Result<Section> {
          2 % beyond 3σ, none beyond 5σ, a mean NEES of 0.4 to 3, no false answer, and with the altitude alone at most \
          1.3 times the RMS with the position. *calibrated on another flight*: limb height and noise as `hzn calibrate \
          noise` finds them without truth on another seed; the goals are a mean NEES of 0.3 to 3 and at most 1.7 times \
-         the RMS with the truth. The prior has rates of rotation in `{ROLLING_SHUTTER_SCENE}` alone, whose rolling \
-         shutter needs them, and not in its last row. *lens*: as the first row, with a focal length whose error is the \
-         sigma in `camera.focal_sigma_percent`; the goal is at most 1 % beyond 3σ. All rows are out of sample: nothing \
-         was fitted to the flight that is answered.",
+         the RMS with the truth. Only in `{ROLLING_SHUTTER_SCENE}` the prior has rates of rotation, because its \
+         rolling shutter needs them; the last row has none. *lens*: as the first row, with a focal length whose error \
+         is the sigma in `camera.focal_sigma_percent`; the goal is at most 1 % beyond 3σ. All rows are out of sample: \
+         nothing was fitted to the flight that is answered.",
         SEEDS.len()
     ));
     let mut tables = Tables::default();
@@ -296,11 +296,12 @@ pub(super) fn default_settings(effort: &Effort) -> anyhow::Result<Section> {
     }
     s.table(HEADS, tables.outcomes);
     s.text(
-        "The table compares what `hzn calibrate noise` finds on each flight without its truth with the truth of the \
-         same pictures. The parts of sigma in brackets come from edge noise over all pictures, scatter between \
-         pictures, a shift of all edges by their RMS (at least 0.1 px), and a bend that the pictures share. Goals: at \
-         most 2σ off; a sigma of at most 1.5 km in `rocket-clean` and `horace` and 3 km in `leo-infrared`; latitudes \
-         within 1 km; an alarm (χ² above 2) or a refusal in `tumble` without rates, and in no other flight.",
+        "The table compares the values that `hzn calibrate noise` finds on each flight, without the truth, with the \
+         truth of the same pictures. The parts of sigma in brackets come from edge noise over all pictures, scatter \
+         between pictures, a shift of all edges by their RMS (at least 0.1 px), and a bend that the pictures share. \
+         Goals: at most 2σ off; a sigma of at most 1.5 km in `rocket-clean` and `horace` and 3 km in `leo-infrared`; \
+         latitudes within 1 km; an alarm (χ² above 2) or a refusal in `tumble` without rates, and in no other \
+         flight.",
     );
     s.table(CALIBRATION_HEADS, tables.calibrations);
     if !tables.wrong.is_empty() {

@@ -123,15 +123,14 @@ pub(super) fn switched_off_effects(effort: &Effort) -> anyhow::Result<Section> {
     }
     s.text(
         "`rocket`: *found* equals *curvature* in every row, so fit and calibration are right; the height of the limb \
-         itself varies. The light of the limb changes along the limb with the angle from the Sun, the edge is at \
-         half of the local brightness, and a tone curve moves this place up by 5 km and increases its variation. A \
-         fit with a free half-angle mistakes the variation for curvature, so the calibrated height follows \
-         *curvature* and not *points*. The Sun's stray light is in none of the answered pictures of this flight, so \
-         it is not the cause; JPEG and shutter change less than the calibration's sigma. `tumble`: the shutter is \
-         the smaller part of the excess. The exposure controller saturates the bright limb; where the band is \
-         clipped, half of the clipped value is kilometres farther out, and not equally everywhere. With an exposure \
-         that does not clip, the errors are a third. A camera for this sensor should be exposed so that the limb is \
-         not saturated.",
+         itself varies. The light of the limb changes along the limb with the angle from the Sun, the edge is at half \
+         of the local brightness, and a tone curve moves this place up by 5 km and increases its variation. A fit with \
+         a free half-angle mistakes the variation for curvature, so the calibrated height follows *curvature* and not \
+         *points*. The Sun's stray light is in none of the answered pictures of this flight, so it is not the cause; \
+         JPEG and shutter change less than the calibration's sigma. `tumble`: the shutter is the smaller part of the \
+         excess. The exposure controller saturates the bright limb; where the band is clipped, half of the clipped \
+         value is kilometres farther out, and not equally everywhere. With an exposure that does not clip, the errors \
+         are a third as large. A camera for this sensor should be exposed so that the limb is not saturated.",
     );
     Ok(s)
 }

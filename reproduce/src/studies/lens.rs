@@ -107,13 +107,13 @@ pub(super) fn from_the_limb(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(PICTURES);
     let mut section = Section::default();
     section.text(format!(
-        "Rendered flights of {count} pictures with a lens that is told {:.0} % too long. Its principal point is told \
-         with an error of (0.3, −0.2) px and a sigma of 0.5 px, or with an error of (4, −3) px and no sigma. The limb \
-         height is told as 17 ± 7 km (default) or as the true mean ± 1 km. Errors are \
-         those of the estimate after `hzn calibrate sky`. RMS is that of the directions of **another** flight (next \
-         seed) with the wrong, the estimated and the true lens, and otherwise default settings. The attitude is not \
-         used. **In-sample in two rules**: the floor of 0.1 px and the limit for the principal point were added \
-         after a first run with these seeds.",
+        "Rendered flights of {count} pictures with a focal length that is {:.0} % too long in sensor.toml. The \
+         principal point there has an error of (0.3, −0.2) px and a sigma of 0.5 px, or an error of (4, −3) px and no \
+         sigma. The limb height there is 17 ± 7 km (default) or the true mean ± 1 km. Errors are those of the estimate \
+         after `hzn calibrate sky`. RMS is that of the directions of **another** flight (next seed) with the wrong, \
+         the estimated and the true lens, and otherwise default settings. The attitude is not used. **In-sample in two \
+         rules**: the floor of 0.1 px and the limit for the principal point were added after a first run with these \
+         seeds.",
         100.0 * (FOCAL_PART - 1.0)
     ));
     let (mut rows, mut checks) = (Vec::new(), Vec::new());

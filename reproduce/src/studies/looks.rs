@@ -134,8 +134,8 @@ pub(super) fn real_pictures(_: &Effort) -> anyhow::Result<Section> {
         "Photographs of tests/data/real, reduced, at fixed brightness thresholds (levels, as parts of full scale) and \
          consensus thresholds (px). `iss073e0293986-aurora`: night limb, airglow, aurora; its camera is not recorded, \
          so lenses of 24 to 50 mm on a sensor 36 mm wide are assumed. `iss030e102170-night`: airglow and aurora, with \
-         the direction to the Earth from the stars. The sensor should answer none of the 40 settings of the first, and \
-         of the second only within 3σ of the truth. It has a limb height of 17 ± 7 km.",
+         the direction to the Earth from the stars. The sensor should not answer the first at any of the 40 settings, \
+         and should answer the second only within 3σ of the truth. Its limb height is 17 ± 7 km.",
     );
     let mut rows = Vec::new();
     let mut answers = Vec::new();

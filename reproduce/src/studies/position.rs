@@ -115,9 +115,9 @@ pub(super) fn rendered(effort: &Effort) -> anyhow::Result<Section> {
         "{pictures} pictures of each body, 640×640 pixels with 1 % noise: discs from 9 px across to wider than the \
          picture, phase angles from 0° to 150°, every direction. The sensor is told the camera, the body by its name, \
          the attitude within {ATTITUDE_SIGMA_DEG}° and the direction to the Sun; it has no distance. The surface of \
-         each picture lies higher or lower than told, by the default sigma of the limb height. NEES has three degrees \
-         of freedom (3 is ideal). The term for light that changes along the limb was added after a look at other \
-         seeds of the same bodies; the seeds here were not used before."
+         each picture lies higher or lower than the sensor assumes; the default sigma of the limb height is the 1σ of \
+         this error. NEES has three degrees of freedom (3 is ideal). The term for light that changes along the limb \
+         was added after a look at other seeds of the same bodies; the seeds here were not used before."
     ));
     let mut rows = Vec::new();
     for (name, first_seed, focal_px) in BODIES {

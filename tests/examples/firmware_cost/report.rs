@@ -14,8 +14,8 @@ const HEAD: &str = "# What the firmware costs
 RAM, stack) grows by more than 5 %; `cargo xtask test` looks at flash and static RAM only, of the sensor alone on the
 Cortex-M4F and of the flight image on the Cortex-M7. Instructions are exact (QEMU 7.2, `-icount`); they are not cycles.
 The sensor computes in f32 and keeps 600 points, unless a row names another number. A row is the worst of its pictures.
-Every answer had the bits of the same sensor on the host. The bound of the stack comes from the disassembly: it is the
-deepest path of calls, with an exception on top, so no picture can need more.
+Every answer has the same bits as on the host. The bound of the stack comes from the disassembly: it is the deepest path
+of calls, with an exception on top, so no picture can need more.
 
 The goals are for a Cortex-M7: 96 KiB (98304 bytes) of flash for the sensor alone, 96 KiB of RAM in addition to the
 picture, 0.6 million instructions for a clean picture of 1920×1080, 2 million for a cloudy one, 20 million for the

@@ -113,8 +113,9 @@ fn head(options: &Options) -> String {
     let load = load.split_whitespace().next().unwrap_or("unknown");
     format!(
         "# Batches\n\n`cargo xtask bench run` writes this page. It compares `hzn run` with a program that only decodes \
-         the same files with the same decoder. Both use all {cores} cores. The ways take turns in {} rounds, and a \
-         time is the least of its way. The ratio is to decoding alone. Load of the machine at the start: {load}.\n\n\
+         the same files with the same decoder. Both use all {cores} cores. The programs take turns in {} rounds, and \
+         each time is the shortest of all rounds. The ratio is the time divided by that of decoding alone. Load of the \
+         machine at the start: {load}.\n\n\
          A headerless picture is ready as soon as it is read, so its ratios show what hzn and the writing of results \
          cost, and have no goal. `out.mcap` keeps the pictures: PNG and JPEG as they are, headerless pictures as PNG, \
          which must be encoded first. [Where the time goes](speed.md#batches) says why goals are missed.\n",

@@ -92,13 +92,13 @@ pub(super) fn navigation(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(PICTURES);
     let mut section = Section::default();
     section.text(format!(
-        "Scene `atek`: two cameras whose mounts are told with errors of 1° and whose clocks are 0.05 s to 0.15 s \
-         wrong, an inertial unit of 20 Hz, a receiver. The horizon sensor has its default settings; limb height \
-         (true: 25 km) and noise are not told. Mounts, clocks and biases are different in every flight. *defaults*: \
-         every setting of the filter is the default, that is table 3 of [BB]. *scene*: the shares for what is not \
-         modelled are smaller (gyros 0.6°/√h, accelerometers 0.5 mg/√Hz, directions 0.0005 rad); chosen on seed 1, \
-         which is in no table. The filter begins with the first picture of limb and Sun. The Sun is not in view in \
-         every flight; the flights are the first seeds from {} and {FIRST_SEED} on whose geometry shows it before \
+        "Scene `atek`: two cameras whose stated mounts have errors of 1° and whose clocks are 0.05 s to 0.15 s wrong, \
+         an inertial unit of 20 Hz, a receiver. The horizon sensor has its default settings; it knows neither the limb \
+         height (true: 25 km) nor the noise. Mounts, clocks and biases are different in every flight. *defaults*: \
+         every setting of the filter is the default, that is table 3 of [BB]. *scene*: the shares for unmodelled \
+         errors are smaller (gyros 0.6°/√h, accelerometers 0.5 mg/√Hz, directions 0.0005 rad); chosen on seed 1, which \
+         is in no table. The filter begins with the first picture of limb and Sun. The Sun is not in view in every \
+         flight; the flights are the first seeds from {} and {FIRST_SEED} on whose geometry shows it before \
          T+{LATEST_START_S:.0} s.",
         PICTURE_FLIGHTS.0
     ));
