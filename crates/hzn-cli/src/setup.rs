@@ -19,7 +19,8 @@ pub(crate) struct SensorArgs {
     /// The sensor.toml; without it, the one in the recording or next to the pictures
     #[arg(short, long, value_name = "FILE")]
     pub(crate) sensor: Option<PathBuf>,
-    /// Altitude of the camera for pictures without one in frames.csv or the recording; replaces body.altitude_km
+    /// Altitude of the camera in kilometres, for pictures without one in frames.csv or the recording; replaces
+    /// body.altitude_km
     #[arg(long, value_name = "KM", allow_negative_numbers = true)]
     pub(crate) altitude_km: Option<f64>,
     /// Use single precision and 2048 points, as on the flight computer
@@ -34,7 +35,7 @@ pub(crate) struct InputArgs {
     /// earlier run, or frames.csv next to the pictures
     #[arg(long, value_name = "FILE")]
     pub(crate) frames: Option<PathBuf>,
-    /// Frames a second, for pictures without a time in frames.csv, the container or EXIF
+    /// Frames per second, for pictures without a time in frames.csv, the container or EXIF
     #[arg(long, value_name = "RATE", default_value_t = 1.0, allow_negative_numbers = true)]
     pub(crate) fps: f64,
     /// Size and format of headerless pictures (mono8, mono10, mono12, mono16: little-endian words; mono10p, mono12p:

@@ -28,7 +28,7 @@ pub(super) struct Args {
     /// The sensor.toml whose parameters are stored, if none are stored yet
     #[arg(short, long, value_name = "FILE")]
     sensor: Option<PathBuf>,
-    /// Store the parameters of --sensor also if there are others
+    /// Store the parameters of --sensor even if other parameters are stored already
     #[arg(long, requires = "sensor")]
     load: bool,
     /// Size and format of the pictures on standard input (formats as for `hzn run`); without it, those of the
@@ -42,7 +42,7 @@ pub(super) struct Args {
     /// The folder for parameters and log; without it, $STATE_DIRECTORY (of systemd), or ./hzn-fly
     #[arg(long, value_name = "DIR")]
     state: Option<PathBuf>,
-    /// Most megabytes of the log; its oldest files are removed
+    /// Largest size of the log in megabytes; beyond it, the oldest files are removed
     #[arg(long, value_name = "MB", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(2..1_000_000))]
     log_mb: u64,
 }

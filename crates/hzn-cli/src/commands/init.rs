@@ -19,8 +19,9 @@ Examples:
 /// Write a sensor.toml to start from
 ///
 /// With pictures: the file is for the camera that took them. The focal length comes from a field of view (--fov) or
-/// from their EXIF. Its sigmas are large, because these values are rough; with an altitude the file works at once.
-/// Without pictures: the file has every key with its default and a comment, and only the camera must be filled in.
+/// from the EXIF data of the pictures. The sigmas of the lens are large, because these values are rough; with an
+/// altitude the file works at once. Without pictures: the file has every key with its default and a comment, and only
+/// the camera must be filled in.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {

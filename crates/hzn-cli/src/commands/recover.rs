@@ -17,7 +17,8 @@ use crate::tell;
 pub(super) struct Args {
     /// The unfinished file, such as out.mcap.part
     file: PathBuf,
-    /// Name of the result; without it, the file's name without .part (or with .recovered, if it does not end in .part)
+    /// Name of the result; if not given, the file's name without .part (or with .recovered, if it does not end in
+    /// .part)
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Replace an output that exists

@@ -46,7 +46,7 @@ pub(super) struct Args {
     /// Continue an output after its last finished picture
     #[arg(long, conflicts_with = "force", requires = "output")]
     resume: bool,
-    /// Wait for the disk at each flush (every 0.2 s), so that also a power cut loses no finished picture
+    /// Wait for the disk at each flush (every 0.2 s), so that even a power cut loses no finished picture
     #[arg(long, requires = "output")]
     durable: bool,
     /// Leave the pictures out of an MCAP

@@ -18,8 +18,8 @@ use crate::tell::{self, one_line};
 /// Render a sequence of pictures with truth, and write a sensor.toml that fits it
 ///
 /// Writes pictures, frames.csv (the prior of each picture), truth.csv, scene.toml and sensor.toml, and imu.csv and
-/// gnss.csv if the scene has such instruments; vehicle.csv has the true state of the vehicle then. A scene with several
-/// cameras has a folder for each of them. The limb height and noise model in sensor.toml are measured on other
+/// gnss.csv if the scene has these instruments; vehicle.csv then has the true state of the vehicle. A scene with
+/// several cameras has a folder for each of them. The limb height and noise model in sensor.toml are measured on other
 /// pictures of the scene; for a planet or moon (`[world.ellipsoid]`) the limb height is the scene's own.
 ///
 /// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble, atek,

@@ -11,7 +11,7 @@ use crate::exit::{Exit, Outcome};
 use crate::files;
 use crate::tell;
 
-/// Write commands for a flight computer
+/// Write telecommands for a flight computer, or send them over a line
 ///
 /// Each command is one argument:
 ///   "mode standby|flight|safe|shut-down"

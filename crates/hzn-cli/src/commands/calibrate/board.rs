@@ -17,9 +17,9 @@ use crate::tell;
 
 /// Calibrate a camera from pictures of a chessboard
 ///
-/// Print a chessboard, fix it to something flat, and take 10 to 20 pictures: the board tilted by 30 to 45 degrees in
-/// different directions, and near each corner of the picture in some of them. No first guess is needed. A board that
-/// the border of the picture cuts counts as well.
+/// Print a chessboard, fix it to something flat, and take 10 to 20 pictures. Tilt the board by 30 to 45 degrees in
+/// different directions, and hold it near each corner of the picture in some of them. No first guess is needed. A board
+/// that the border of the picture cuts counts as well.
 ///
 /// The report goes to stdout. `-o camera.toml` writes the section [camera] with the covariance of its parameters, ready
 /// for a sensor.toml; `-o report.html` writes plots; `-o residuals.csv` writes the residual of every corner.

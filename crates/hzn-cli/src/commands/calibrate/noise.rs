@@ -21,9 +21,9 @@ use crate::tell;
 /// The flight needs an altitude or a position for each picture (frames.csv, --altitude-km, body.altitude_km), but no
 /// truth. The altitude gives the expected size of the limb, so the measured size gives the limb height. The residuals
 /// along the limb give the edge noise. The report goes to stdout. `-o sensor.toml` writes the keys, with comments, into
-/// a copy of the sensor.toml; `-o report.html` writes plots of both. No sensor.toml is written if the flight is not
-/// sufficient (fewer than 12 answered pictures, too small a field of view), or if its pictures contradict each other.
-/// Then the exit code is 1 and the message has the measured number.
+/// a copy of the sensor.toml; `-o report.html` writes plots of both. No sensor.toml is written if the flight does not
+/// determine the limb height (fewer than 12 answered pictures, too small a field of view), or if its pictures
+/// contradict each other. Then the exit code is 1, and the message gives the measured number.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A folder, a pattern in quotes, pictures, a video, or an MCAP

@@ -18,7 +18,7 @@ use crate::tell;
 /// range of altitudes and directions separates the two; the report says how well. The sigmas of the calibration in
 /// [camera] are the prior of the lens; without them, the focal length is free within 10 %. The report goes to stdout.
 /// `-o sensor.toml` writes the determined parameters with their covariance into a copy of the sensor.toml; `-o
-/// report.html` writes plots. A parameter is written only if the flight halves its sigma at least. If it halves none,
+/// report.html` writes plots. A parameter is written only if the flight at least halves its sigma. If it halves none,
 /// nothing is written and the exit code is 1; the report still has the measured numbers.
 ///
 /// A sensor that looks for the Sun or the Moon measures the lens on the track of the disc instead. frames.csv must give

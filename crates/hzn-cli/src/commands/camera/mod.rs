@@ -32,7 +32,7 @@ enum Command {
     Show {
         /// A sensor.toml, or a camera file of Kalibr, OpenCV, EuRoC, ROS or Foxglove (YAML, XML, JSON)
         file: PathBuf,
-        /// Also draw a map of the picture: degrees a pixel, angles off axis, image circle, monotone limit
+        /// Also draw a map of the picture: degrees per pixel, angles off axis, image circle, limit of the monotone lens
         #[arg(long, value_name = "PNG")]
         picture: Option<PathBuf>,
         /// Replace a map that exists

@@ -21,7 +21,7 @@ pub(crate) struct Args {
     /// Fixes of the receiver: time_s, x_m, y_m, z_m, vx_mps, vy_mps, vz_mps, position_sigma_m, velocity_sigma_mps
     #[arg(long, value_name = "CSV", required_unless_present = "show_config")]
     pub(super) gnss: Option<PathBuf>,
-    /// Attitudes of a star tracker: time_s, qw, qx, qy, qz (body to ECEF), sigma_deg
+    /// Attitudes of a star tracker: time_s, qw, qx, qy, qz (vehicle to ECEF), sigma_deg
     #[arg(long, value_name = "CSV")]
     pub(super) attitude: Option<PathBuf>,
     /// The mount of a camera, instead of that in its recording: a TOML file with the table [mount]
@@ -57,10 +57,10 @@ pub(crate) struct Args {
     /// A frames.csv with the attitude of a camera, for a second `hzn run --frames`
     #[arg(long, value_name = "CAMERA=FILE", value_parser = pair)]
     pub(super) write_frames: Vec<(String, String)>,
-    /// Also smooth: the solution at every measurement from all measurements, also later ones
+    /// Also smooth: at every measurement, write the solution from all measurements, later ones included
     #[arg(long)]
     pub(super) smooth: bool,
-    /// Most solutions a second in the results
+    /// Largest number of solutions per second in the results
     #[arg(long, value_name = "HZ", default_value_t = 10.0)]
     pub(super) rate: f64,
     /// Compare with the truth of `hzn simulate`: its vehicle.csv

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use super::body::Body;
 use super::sweep::Values;
 
-/// Compute how accurate a camera would be, without rendering: sigma of the direction by field of view, altitude,
-/// resolution
+/// Predict the accuracy of a camera without pictures: sigma of the direction by field of view, altitude, resolution
 ///
 /// A value may be a number (94.4), a list (60,90,120) or a range (60:150 or 60:150:10); the table has a row for every
 /// combination. The limb is that of a sphere. Its points are a pixel apart, with errors that are correlated along the
@@ -53,10 +52,10 @@ pub(crate) struct Args {
     /// Angle of the optical axis below the horizontal, degrees; 90 looks straight down
     #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true)]
     pub(super) depression: Values,
-    /// Turn of the camera about its optical axis, degrees
+    /// Rotation of the camera about its optical axis, degrees
     #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true)]
     pub(super) roll: Values,
-    /// For `yaw` and `--sensor`: latitude of the camera, degrees; for `yaw` as seen from the centre of the body
+    /// For `yaw` and `--sensor`: latitude of the camera, degrees; for `yaw` it is the angle at the centre of the body
     #[arg(long, value_name = "DEG", default_value = "0", allow_hyphen_values = true)]
     pub(super) latitude: Values,
     /// For `yaw`: direction of view from north over east, degrees
@@ -66,8 +65,8 @@ pub(crate) struct Args {
     /// the limb height]
     #[arg(long, value_name = "KM")]
     pub(super) second_harmonic: Option<f64>,
-    /// 1-sigma of an edge point, pixels [default: 1]. With `--sensor` and `noise = "rms"` it is the RMS of the
-    /// residuals [default: that of the simulated scene next to the sensor.toml]
+    /// 1-sigma of an edge point, pixels [default: 1]; with `--sensor` and `noise = "rms"` the RMS of the residuals
+    /// [default: that of the simulated scene next to the sensor.toml]
     #[arg(long, value_name = "PX")]
     pub(super) sigma_px: Option<f64>,
     /// Correlation length of the errors along the edge, pixels [default: 300; with `--sensor` that of the sensor]
