@@ -68,9 +68,9 @@ pub struct Imu {
     pub gyro_scale_ppm: ErrorSetting,
     /// Rotation of the gyros' axes, mrad.
     pub gyro_misalignment_mrad: ErrorSetting,
-    /// White noise of the accelerometers, and the share for what is not modelled, mg/√Hz.
+    /// White noise of the accelerometers, and the noise that stands for unmodelled errors, mg/√Hz.
     pub accel_noise_mg_rthz: [f64; 2],
-    /// White noise of the gyros, and the share for what is not modelled, °/√h.
+    /// White noise of the gyros, and the noise that stands for unmodelled errors, °/√h.
     pub gyro_noise_deg_rth: [f64; 2],
     /// Longest time between two samples, s. A longer one is a gap.
     pub max_step_s: f64,
@@ -112,11 +112,11 @@ pub struct Camera {
     pub white_rad: f64,
     /// Time that the camera's clock differs from that of the inertial unit, s.
     pub clock_s: ErrorSetting,
-    /// What is taken of a row that has both: the limb's axis, or the position.
+    /// Which measurement the filter takes from a row that has both: the limb's axis, or the position.
     pub limb: Limb,
 }
 
-/// What is taken of a row with a limb.
+/// The measurement that the filter takes from a row with a limb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Limb {

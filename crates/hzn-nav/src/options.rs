@@ -63,9 +63,9 @@ pub struct ImuOptions {
     pub gyro_scale: Block,
     /// Rotation of the gyros' axes, rad.
     pub gyro_misalignment: Block,
-    /// White noise of the accelerometers and its share for what is not modelled, m/s²/√Hz.
+    /// White noise of the accelerometers, and the noise that stands for unmodelled errors, m/s²/√Hz.
     pub accel_noise: [f64; 2],
-    /// White noise of the gyros and its share for what is not modelled, rad/√s.
+    /// White noise of the gyros, and the noise that stands for unmodelled errors, rad/√s.
     pub gyro_noise: [f64; 2],
     /// Longest time between two samples, s. A longer one is a gap.
     pub max_step_s: f64,

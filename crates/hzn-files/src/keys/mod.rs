@@ -15,7 +15,7 @@ pub use hzn_core::keys::{Choice, Form, Key, Limits, Table, Value};
 /// The key for the starting values, which is above all sections.
 const PRESET: Key = Key {
     path: "preset",
-    doc: "Starting values; keys in the file override them.\n",
+    doc: "Named starting values of the whole sensor; keys in the file replace them.\n",
     form: Form::Word,
     limits: Limits::Choice,
     choices: Preset::CHOICES,
@@ -29,9 +29,9 @@ const PRESET: Key = Key {
 const CAMERA_FILE: [Key; 2] = [
     Key {
         path: "camera.file",
-        doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file with the calibration; its path is relative to this \
-              file, and only `camera`, `theta_max_deg`, `theta_min_deg`, `readout_s`, the sigmas and `covariance` may \
-              be next to it.\n",
+        doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file with the calibration. Its path is relative to this \
+              sensor.toml. Of the other keys of `[camera]`, only `camera`, `theta_max_deg`, `theta_min_deg`, \
+              `readout_s`, the sigmas and `covariance` are allowed with it.\n",
         form: Form::Word,
         limits: Limits::Rule("a path"),
         choices: &[],

@@ -12,8 +12,8 @@ pub struct Truth {
     pub time_s: f64,
     /// The body's kind as in sensor.toml.
     pub body: String,
-    /// 1 when lit limb is in view that nothing hides, of at least the smallest of 50 px, a quarter of the outline, and
-    /// half of the picture's shorter side (`Scene::has_limb` of hzn-sim); else 0.
+    /// 1 if enough of the lit limb is in view and nothing hides it, else 0. Enough is the smallest of 50 px, a quarter
+    /// of the outline, and half of the picture's shorter side (`Scene::has_limb` of hzn-sim).
     pub limb: u8,
     /// Limb axis in the camera frame, first component of the unit vector. For spheres it is the direction to the
     /// centre.
