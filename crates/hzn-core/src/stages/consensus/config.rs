@@ -38,7 +38,8 @@ section! {
         /// point to point; 0 keeps it at `threshold_px`.
         ///
         /// Two sigmas include 95 % of a limb's points. With a distance below the noise, the inliers are points that lie
-        /// near some limb by chance. The distance rises at most to the sigma of the limb height.
+        /// near some limb by chance. The distance rises at most to the sigma of the limb height; it does not rise for a
+        /// body whose half-angle is free, such as the Sun.
         // Without it HORACE's camera lost every seventh limb: the edge was spread over 60 px, so that only points that
         // lay near some limb by chance stayed.
         @84 noise_sigma: f64 = 2.0, [0.0 to 100.0];

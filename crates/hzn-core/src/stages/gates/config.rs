@@ -63,13 +63,13 @@ section! {
         /// 2 is a likelihood ratio of 4 to the power of half the number of independent points.
         @- max_rival_ratio: f64 = 2.0, [1.0 to 1e6];
         /// Smallest evidence for the limb over a straight line, and largest evidence for a rival shape over the limb:
-        /// twice the logarithm of the likelihood ratio; −1e6 turns the gate off.
+        /// twice the logarithm of the likelihood ratio; −1e6 turns these tests off.
         ///
         /// A value of 9 is three standard deviations. A larger value refuses more edges that are nearly straight, but
         /// fewer circles and polygons. Points with correlated residuals count once.
         @- min_evidence: f64 = 9.0, [-1e6 to 1e6];
         /// Floor of the noise in the second test of the half-angle, px; this test takes the noise from the residuals,
-        /// even if the told noise is larger. With 1e4 it uses the told noise.
+        /// even if the told noise is larger. With 0 the test is off, and with 1e4 it uses the told noise.
         ///
         /// The limit is `max_half_angle_sigma`. A larger value refuses fewer edges.
         @- residual_floor_px: f64 = 0.1, [0.0 to 1e4];
