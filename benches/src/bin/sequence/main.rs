@@ -123,7 +123,7 @@ fn head(options: &Options) -> String {
     )
 }
 
-const TABLE_HEAD: &str = "| files | way | wall, s | frames per second | ratio | goal | processor time, s | ratio |
+const TABLE_HEAD: &str = "| files | way | wall, s | pictures per second | ratio | goal | processor time, s | ratio |
 |---|---|---|---|---|---|---|---|
 ";
 
