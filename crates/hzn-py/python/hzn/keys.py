@@ -66,9 +66,9 @@ class Camera(TypedDict, total=False):
     """Rolling shutter: time from the exposure of the first row to that of the last row, s; 0 for a global shutter,
     negative if the last row comes first. Values: −10 to 10 s. Default: 0."""
     file: str | None
-    """A Kalibr, OpenCV, EuRoC or ROS camera_info file with the calibration; its path is relative to this file, and
-    only ``camera``, ``theta_max_deg``, ``theta_min_deg``, ``readout_s``, the sigmas and ``covariance`` may be next
-    to it. Values: a path."""
+    """A Kalibr, OpenCV, EuRoC or ROS camera_info file with the calibration. Its path is relative to this
+    sensor.toml. Of the other keys of ``[camera]``, only ``camera``, ``theta_max_deg``, ``theta_min_deg``,
+    ``readout_s``, the sigmas and ``covariance`` are allowed with it. Values: a path."""
     camera: str | None
     """Name of the camera in ``file``. Values: a name in the file. Default: the first one."""
 
@@ -85,7 +85,7 @@ class Input(TypedDict, total=False):
     """Conversion of a pixel to one brightness."""
 
     channel: Literal["mean", "red", "green", "blue"]
-    """The brightness of a colour pixel. Default: "mean"."""
+    """Channel that gives the brightness of a colour pixel, or their mean. Default: "mean"."""
     bits: int | None
     """Significant bits of a sample, if the file's words have room for more. Values: 8 to 16. Default: from the file;
     for 16-bit words, determined from the pictures."""
@@ -93,18 +93,19 @@ class Input(TypedDict, total=False):
     """Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
     picture. Default: "as-stored"."""
     scale_to_height: int | None
-    """Number of rows of a smaller copy of the picture, which is processed instead; lengths are then in pixels of the
-    copy. Values: 16 to ``height``."""
+    """Number of rows of a smaller copy of the picture, which is processed instead of the picture; lengths in pixels
+    are then those of the copy. Values: 16 to ``height``."""
 
 
 class Brightness(TypedDict, total=False):
     """The brightness that a picture must have to be processed."""
 
     min_mean: float
-    """Smallest mean brightness of the picture, as a fraction of full scale. Values: 0 to 1. Default: 0.0."""
+    """Smallest mean brightness of the picture, as a fraction of full scale; a darker picture has the status
+    ``too-dark``. Values: 0 to 1. Default: 0.0."""
     max_mean: float
-    """Largest mean brightness of the picture, as a fraction of full scale; not below ``min_mean``. Values: 0 to 1.
-    Default: 0.98."""
+    """Largest mean brightness of the picture, as a fraction of full scale; a brighter picture has the status
+    ``too-bright``. Values: 0 to 1. Default: 0.98."""
 
 
 class Threshold(TypedDict, total=False):
@@ -116,17 +117,18 @@ class Threshold(TypedDict, total=False):
     """For ``fixed``: a pixel is lit at this value or above, in the picture's own counts; a value below 1 is a
     fraction of full scale. Values: above 0 to 65535. Default: 64.0."""
     factor: float
-    """For ``dynamic``: the threshold is this factor times the mean of the sample. Values: above 0 to 100. Default:
-    1.0."""
+    """For ``dynamic``: the threshold is this factor times the mean of the sample; a larger factor gives a higher
+    threshold. Values: above 0 to 100. Default: 1.0."""
     scale: float
-    """For ``otsu``: factor by which the threshold is multiplied. Values: 0.1 to 10. Default: 1.0."""
+    """For ``otsu``: factor by which the threshold is multiplied; a larger factor gives a higher threshold. Values:
+    0.1 to 10. Default: 1.0."""
 
 
 class Mask(TypedDict, total=False):
     """Parts of the vehicle in view."""
 
     polygons_px: _Polygons
-    """Areas that never count, as polygons of corners [x, y], px; no pixel in them is lit, and their outline is not
+    """Areas that are ignored, as polygons of corners [x, y], px; no pixel in them is lit, and their outline is not
     an edge. Values: up to 8 polygons of 3 to 16 corners."""
 
 
@@ -136,8 +138,8 @@ class Contour(TypedDict, total=False):
     method: Literal["border-following", "raster", "erode", "sobel"]
     """How edges are found. Default: "border-following"."""
     line_spacing_px: int | None
-    """Rows between two search lines for closed edges, px. Values: 1 or more px. Default: from the body's expected
-    size."""
+    """Rows between two search lines for edges that do not touch the border of the picture, px. Values: 1 or more px.
+    Default: from the body's expected size."""
     erode_size_px: int
     """For ``erode``: side of the square neighbourhood, px. Values: odd, 3 to 31. Default: 3."""
     erode_threshold: int
@@ -149,7 +151,8 @@ class Edge_points(TypedDict, total=False):
     """Edges that are candidates for the limb, and their edge points."""
 
     min_points: int
-    """Shortest edge, border pixels; a small body or picture needs fewer. Values: 8 or more. Default: 40."""
+    """Fewest border pixels of an edge that may be the limb; a small body or picture needs fewer. Values: 8 or more.
+    Default: 40."""
     keep_points: int
     """Points kept per edge, evenly along it; 0 keeps all that fit into memory. Values: 0 (all) or 16 to 65535.
     Default: 600."""
@@ -166,8 +169,8 @@ class Consensus(TypedDict, total=False):
     """Largest distance from the limb at which a point belongs to the consensus, px; the fit ``sphere`` also weights
     points up to twice as far away. Values: above 0 to 1000 px. Default: 3.0."""
     noise_sigma: float
-    """The largest distance is at least this many times the noise from point to point; 0 leaves it at
-    ``threshold_px``. Values: 0 to 100. Default: 2.0."""
+    """Where an edge is noisy, the largest distance rises from ``threshold_px`` to this many times the noise from
+    point to point; 0 keeps it at ``threshold_px``. Values: 0 to 100. Default: 2.0."""
     seed: int
     """Seed of the random draws; the same seed gives the same answer. Values: 0 to 4294967295. Default: 1."""
     max_draws: int
@@ -182,12 +185,12 @@ class Fit(TypedDict, total=False):
     half_angle: Literal["fused", "known", "free"]
     """Which half-angle the fitted cone has. Default: "fused"."""
     position: bool | None
-    """Whether the fit gives the position of the body's centre: the whole vector with its covariance. The limb of an
-    ellipsoid must then have an orientation: an attitude, or for a body of revolution its pole. Values: true or
+    """Whether the fit gives the position of the body's centre: the whole vector with its covariance. An ellipsoid
+    then needs its orientation in each prior: an attitude, or for a body of revolution its pole. Values: true or
     false. Default: true for ``ellipsoid`` and the planets with a name."""
     yaw_limit_deg: float
-    """The rotation about the line to the body is reported if its 1σ is below this, degrees; 0 never reports it. It
-    needs ``fit.position`` and a body that is not a sphere. Values: 0 to 180 deg. Default: 1.0."""
+    """Largest 1σ at which the rotation about the line to the body is reported, degrees; 0 never reports it. The
+    rotation needs ``fit.position`` and a body that is not a sphere. Values: 0 to 180 deg. Default: 1.0."""
     weigh_above_deg: float
     """For ``wtls``: points are weighted where the axis is farther from the optical axis than this, degrees; 0 always
     weights them. Values: 0 to 180 deg. Default: 0.0."""
@@ -199,14 +202,14 @@ class Covariance(TypedDict, total=False):
     method: Literal["sandwich", "braun-barf"]
     """Method that computes the covariance. Default: "sandwich"."""
     noise: Literal["rms", "told", "reml"]
-    """Whether the values below are used as they are, or are the floor of values that are measured in each picture.
-    Default: "rms"."""
+    """Source of the noise: the residuals of each picture, with the values below as their floor (``rms``, ``reml``),
+    or the values below (``told``). Default: "rms"."""
     sigma_px: float
     """1σ of an edge point, px; raised to the RMS of the residuals if that is larger. Values: above 0 to 10000 px.
     Default: 0.1."""
     correlation_px: float
-    """Correlation length of edge point errors along the edge, px; 0 for white errors. Values: 0 to 1e6 px. Default:
-    60.0."""
+    """Correlation length of the errors of edge points along the edge, px; 0 for white errors. Values: 0 to 1e6 px.
+    Default: 60.0."""
     bias_px: float
     """1σ of a shift that all points of an edge have in common, px. Values: 0 to 10000 px. Default: 0.3."""
     tilt_px: float
@@ -226,44 +229,46 @@ class Gates(TypedDict, total=False):
     """Shortest length of edge that inliers must cover, px. Values: 0 to 1e6 px. Default: a tenth of the diagonal, or
     a third of the body's circumference if less."""
     max_rms_px: float
-    """Largest weighted RMS distance of the inliers from the limb, px; it grows as ``consensus.noise_sigma`` raises
-    the largest distance of an inlier. Values: above 0 px. Default: 2.0."""
+    """Largest weighted RMS distance of the inliers from the limb, px; where ``consensus.noise_sigma`` raises the
+    largest distance of an inlier, this limit is raised by the same factor. Values: above 0 px. Default: 2.0."""
     max_half_angle_sigma: float
     """Largest difference between the fitted and the expected half-angle, in standard deviations. Values: above 0.
     Default: 3.0."""
     max_sigma_deg: float
-    """Largest standard deviation of an answer, degrees. Values: above 0 to 180 deg. Default: 10.0."""
+    """Largest standard deviation of an answer in its worst direction, degrees. Values: above 0 to 180 deg. Default:
+    10.0."""
     min_support: float
     """Smallest part of the fitted limb in view that edge points must cover. Values: 0 to 1. Default: 0.4."""
     max_lit_sky: float
     """Largest part of the sky beyond the fitted limb that may be lit. Values: 0 to 1. Default: 0.3."""
     dark_sky: float
-    """For Sun and Moon: a place in the sky counts as lit from this part of the threshold on. Values: above 0 to 1.
-    Default: 0.25."""
+    """For Sun and Moon: brightness from which a place in the sky counts as lit, as a fraction of the threshold.
+    Values: above 0 to 1. Default: 0.25."""
     whole_edge: float
-    """Where at least this part of an edge's points are inliers, the edge may wind; 0 turns the check off. Values: 0
-    to 1. Default: 0.8."""
+    """Smallest part of an edge's points that must be inliers if the edge winds; 0 turns the check off. Values: 0 to
+    1. Default: 0.8."""
     max_rival_ratio: float
-    """Largest ratio of the cone's residual to that of a circle of the image or of four straight pieces; 1e6 turns
-    the gate off. Values: 1 to 1e6. Default: 2.0."""
+    """Largest ratio of the cone's RMS residual to that of a circle of the image or of up to four straight pieces;
+    1e6 turns this test off. Values: 1 to 1e6. Default: 2.0."""
     min_evidence: float
     """Smallest evidence for the limb over a straight line, and largest evidence for a rival shape over the limb:
-    twice the logarithm of the likelihood ratio; −1e6 turns the gate off. Values: −1e6 to 1e6. Default: 9.0."""
+    twice the logarithm of the likelihood ratio; −1e6 turns these tests off. Values: −1e6 to 1e6. Default: 9.0."""
     residual_floor_px: float
-    """Floor of an edge's noise in the gate of the half-angle, where the residuals are smaller than the given noise,
-    px; with 1e4 the gate uses the told noise. Values: 0 to 10000 px. Default: 0.1."""
+    """Floor of the noise in the second test of the half-angle, px; this test takes the noise from the residuals,
+    even if the told noise is larger. With 0 the test is off, and with 1e4 it uses the told noise. Values: 0 to 10000
+    px. Default: 0.1."""
     max_departure: float
     """Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
     turns the gate off. Values: 0 to 1e6. Default: 0.2."""
     min_support_abrupt: float
-    """Smallest part of the fitted limb in view that edge points must cover, where the edge leaves the limb without a
+    """Smallest part of the fitted limb in view that edge points must cover if the edge leaves the limb without a
     loss of contrast; 0 turns the gate off. Values: 0 to 1. Default: 0.0."""
     max_glow: float
     """Largest brightness high above the limb, as a part of the brightness step at the limb; 1e6 turns the gate off.
     Values: 0 to 1e6. Default: 0.125."""
     max_band: float
     """Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky; 1
-    turns the gate off. Values: 0 to 1. Default: 0.5."""
+    turns the gates ``band`` and ``faint`` off. Values: 0 to 1. Default: 0.5."""
     max_attitude_sigma: float
     """Largest angle between the axis and the axis that a given attitude and position predict, in standard
     deviations. Values: above 0 to 1e6. Default: 4.0."""
@@ -274,8 +279,8 @@ class Gates(TypedDict, total=False):
     """Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does ``body.sunlit
     = false``. Values: 0 to 1. Default: 0.5."""
     limb_in_view: bool
-    """Whether a part of the limb with the expected half-angle about the fitted axis must lie in the picture. Values:
-    true or false. Default: false."""
+    """Whether a part of the expected limb must lie in the picture: the limb with the expected half-angle about the
+    fitted axis. Values: true or false. Default: false."""
     max_section_residual: float | None
     """Largest mean square distance of the points from the expected conic section, focal lengths squared. Values:
     above 0. Default: any."""
@@ -283,7 +288,7 @@ class Gates(TypedDict, total=False):
     """[lowest, highest] altitude, km: the radius of the fitted circle must be that of a limb between them. Values: 0
     to 1e9 km. Default: any."""
     radius_margin: float
-    """With ``altitude_limits_km``: the radius may lie beyond its limits by this fraction of the limits. Values: 0 to
+    """With ``altitude_limits_km``: the radius may lie beyond its limits by this fraction of each limit. Values: 0 to
     1000. Default: 0.1."""
     radius_margin_px: float
     """With ``altitude_limits_km``: the radius may lie beyond its limits by this length, px. Values: 0 to 1e6 px.
@@ -305,8 +310,8 @@ class Retry(TypedDict, total=False):
     method: Literal["none", "division"]
     """The step that follows when no edge of the whole picture gives an answer. Default: "none"."""
     least_part: float
-    """For ``division``: parts below this fraction of the picture's area are not cut again. Values: 0.015625 to 1.
-    Default: 0.1."""
+    """For ``division``: parts below this fraction of the picture's area are not cut again; a smaller value costs
+    more time. Values: 0.015625 to 1. Default: 0.1."""
     combine: Literal["median", "mean"]
     """For ``division``: method that combines the answers of several parts. Default: "median"."""
 
@@ -315,8 +320,8 @@ class Limits(TypedDict, total=False):
     """The bound on the time of the worst picture."""
 
     max_work: int | None
-    """Largest cost of one picture and body, in steps of the border follower; when it is used up, the best answer so
-    far counts. Values: 10000 to 1e9. Default: 245 760 on a flight computer, 1 966 080 on the host."""
+    """Work budget for one picture and one body, in steps of the border follower; when it is used up, the best answer
+    so far counts. Values: 10000 to 1e9. Default: 245 760 on a flight computer, 1 966 080 on the host."""
 
 
 class Body(TypedDict, total=False):
@@ -330,7 +335,8 @@ class Body(TypedDict, total=False):
     """Semi-axes of an ``ellipsoid`` along its own x, y and z axes (z to the north pole), km; not allowed for other
     bodies, because a planet with a name has its own. Values: three lengths above 0, for ``ellipsoid`` only."""
     radii_sigma_km: float
-    """1σ of each semi-axis, km, with ``fit.position``. Values: 0 to 100000 km. Default: 0.0."""
+    """1σ of each semi-axis, km; it widens the covariance of the position (``fit.position``). Values: 0 to 100000 km.
+    Default: 0.0."""
     range_km: float | None
     """Distance of the camera from the body's centre for pictures without one in their prior, km, with
     ``fit.position``; it needs ``range_sigma_km``. Values: above 0 km."""
@@ -341,7 +347,7 @@ class Body(TypedDict, total=False):
     """Altitude of the camera for pictures without an altitude in their prior, km; above WGS-84 for ``earth``, else
     above the radius, which is the mean of the three semi-axes for an ellipsoid. Values: above 0 km."""
     altitude_sigma_km: float
-    """1σ of the altitude, km. Values: 0 to 1e6 km. Default: 0.5."""
+    """1σ of the altitude, km; it widens the expected half-angle. Values: 0 to 1e6 km. Default: 0.5."""
     altitude_reference: Literal["ellipsoid", "sphere"]
     """For ``earth``: the surface from which an altitude without a position is measured. Default: "ellipsoid"."""
     limb_height_km: float
@@ -351,20 +357,20 @@ class Body(TypedDict, total=False):
     """1σ of the limb height, km; 7 km spans the visible wavelengths and usual thresholds. Values: 0 to 10000 km.
     Default: 7.0."""
     limb_height_harmonic_sigma_km: float | None
-    """1σ of the part of the limb height that goes twice up and down along the limb, km. It decides how well the
-    rotation about the line to the body is known, see ``fit.yaw_limit_deg``. Values: 0 to 10000 km. Default:
-    ``limb_height_sigma_km``."""
+    """1σ of the second harmonic of the limb height along the limb, km; it limits how well the rotation about the
+    line to the body is known (``fit.yaw_limit_deg``). Values: 0 to 10000 km. Default: ``limb_height_sigma_km``."""
     clipped_height_km: float
     """Height that overexposure adds to the limb, km; it is multiplied by the fraction of the limb that is clipped at
     full scale. Values: 0 to 500 km. Default: 7.8."""
     clipped_sigma_km: float
-    """1σ of ``clipped_height_km``, km; the height varies along the limb. Values: 0 to 10000 km. Default: 4.5."""
+    """1σ of ``clipped_height_km``, km; it also stands for the variation along the limb, and a larger value widens
+    the covariance. Values: 0 to 10000 km. Default: 4.5."""
     limb_height_by_latitude_km: _Rows | None
     """Limb height by latitude instead of ``limb_height_km``: rows of [geodetic latitude in degrees, height in km],
     with rising latitudes. Values: up to 16 rows, for ``earth``."""
     sunlit: bool | None
     """Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun. In visible
-    light, true is better: near the terminator the light fades, and the edge is too low there. Values: true or false.
+    light, set true: near the terminator the light fades, and the edge is too low there. Values: true or false.
     Default: true for all but ``earth``, ``earth-sphere`` and ``sun``."""
     threshold: Threshold | None
     """Threshold for this body, as a table with the keys of ``[threshold]``. Values: the keys of ``[threshold]``.
@@ -378,7 +384,7 @@ class _Optional(TypedDict, total=False):
     """The sections that may be left out."""
 
     preset: Literal["hzn", "sun", "moon", "dlr-2022", "zju-2022", "horace-2015"] | None
-    """Starting values; keys in the file override them. Default: ``hzn``."""
+    """Named starting values of the whole sensor; keys in the file replace them. Default: ``hzn``."""
     mount: Mount
     """How the camera is mounted in the vehicle."""
     body: Body
