@@ -23,7 +23,7 @@ pub(crate) struct SensorArgs {
     /// body.altitude_km
     #[arg(long, value_name = "KM", allow_negative_numbers = true)]
     pub(crate) altitude_km: Option<f64>,
-    /// Use single precision and 2048 points, as on the flight computer
+    /// Use single precision and at most 2048 points, as `FlightHorizon` has
     #[arg(long)]
     pub(crate) flight: bool,
 }

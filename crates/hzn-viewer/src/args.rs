@@ -34,7 +34,7 @@ pub struct Args {
     /// Size and format of headerless pictures, as for `hzn run`
     #[arg(long, value_name = "WIDTHxHEIGHT:FORMAT")]
     pub raw: Option<Raw>,
-    /// Compute with single precision and 2048 points, as on the flight computer
+    /// Compute with single precision and at most 2048 points, as `FlightHorizon` has
     #[arg(long)]
     pub flight: bool,
     /// Index of the first picture to show, from 0

@@ -10,7 +10,7 @@ use super::sensor::LastAnswer;
 pub struct Plan {
     /// The sensor.
     pub config: Config,
-    /// Use single precision and 2048 points, as on the flight computer.
+    /// Use single precision and at most 2048 points, as `FlightHorizon` has.
     pub flight: bool,
     /// Number of threads.
     pub threads: usize,

@@ -37,7 +37,7 @@ pub struct Task {
     pub slots: Vec<Slot>,
     /// Picture to begin with.
     pub from: usize,
-    /// Single precision and 2048 points, as on the flight computer.
+    /// Single precision and at most 2048 points, as `FlightHorizon` has.
     pub flight: bool,
 }
 

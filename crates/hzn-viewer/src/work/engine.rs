@@ -39,7 +39,7 @@ pub struct FrameRequest {
     pub entry: Entry,
     /// Configuration of the session, and the one that it is compared with.
     pub setups: Vec<Setup>,
-    /// Single precision and 2048 points, as on the flight computer.
+    /// Single precision and at most 2048 points, as `FlightHorizon` has.
     pub flight: bool,
     /// Display of the picture.
     pub look: Look,

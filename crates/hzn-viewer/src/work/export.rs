@@ -149,7 +149,7 @@ pub struct Video {
     pub sequence: Sequence,
     /// Configuration that the pictures are processed with.
     pub config: Arc<Config>,
-    /// Single precision and 2048 points, as on the flight computer.
+    /// Single precision and at most 2048 points, as `FlightHorizon` has.
     pub flight: bool,
     /// Layers that are drawn.
     pub layers: Vec<Layer>,

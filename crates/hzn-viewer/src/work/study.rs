@@ -33,7 +33,7 @@ pub struct Task {
     pub truth: Axes,
     /// Body whose results count.
     pub body: usize,
-    /// Single precision and 2048 points, as on the flight computer.
+    /// Single precision and at most 2048 points, as `FlightHorizon` has.
     pub flight: bool,
 }
 

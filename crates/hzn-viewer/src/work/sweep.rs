@@ -26,7 +26,7 @@ pub struct Task {
     pub version: u64,
     /// The text of the sensor.toml.
     pub sensor_toml: String,
-    /// Single precision and 2048 points, as on the flight computer.
+    /// Single precision and at most 2048 points, as `FlightHorizon` has.
     pub flight: bool,
     /// File for the results; an existing file is replaced. Without it, the results go to the plots only.
     pub output: Option<PathBuf>,

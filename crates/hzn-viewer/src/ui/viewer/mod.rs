@@ -229,7 +229,7 @@ impl Viewer {
         self.leave(Leave::Sequence(Box::new(request)), None);
     }
 
-    /// Switches to single precision and 2048 points, as on the flight computer.
+    /// Switches to single precision and at most 2048 points, as `FlightHorizon` has.
     pub fn set_flight(&mut self, flight: bool) {
         self.flight = flight;
     }
