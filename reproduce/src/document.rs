@@ -7,8 +7,8 @@ use crate::section::{begin_mark, end_mark};
 const HEAD: &str = "# Reproduction
 
 This page compares our numbers with the published ones. `cargo xtask reproduce` writes it; the command in a section
-writes that section alone. Every picture follows from its seed and every answer from its picture, so every machine finds
-the same numbers.
+writes that section alone. [The papers](papers.md) has each printed number next to ours. Every picture follows from its
+seed and every answer from its picture, so every machine finds the same numbers.
 
 Sources: **[BB]** Braun & Barf 2022, **[W]** Wang, Wang & Jin 2022, **[B14]** Barf 2014, **[H15]** Barf et al. 2015.
 NEES is the squared error over the covariance, with two degrees of freedom: its mean is 2 for an honest covariance and
@@ -20,6 +20,25 @@ other scenes. Values that were measured on other seeds of the same scene are bet
 air and detector are the same. Sections without these words are calculations.
 ";
 
+const PAPERS_HEAD: &str = "# The papers, number by number
+
+hzn was built from four documents. This page has the numbers that they print, as a reading line by line noted them, each
+with its statistic and with our number in the same statistic. `cargo xtask reproduce papers` writes the page from the
+tables in `reproduce/papers`. Each number of ours is on the page that is linked in its row; a test compares the two. The
+command of a row measures our number, or works with our setting.
+
+| verdict | meaning |
+|---|---|
+| better, worse | the same statistic of the same quantity, with a smaller or a larger error |
+| same | the same value, or a difference that is within the scatter of our own figures |
+| different | another value: a misprint, or a choice; the reason is in the row |
+| open | nobody has measured our number in this statistic; the row says what has to be run |
+
+Numbers of figures are read off. Where the reading did not note the figure, the place names the range. \"No value is read
+off\" means that a curve still has to be read. The pictures of the papers are not public, so ours are rendered, and a
+verdict holds for the scenes of its page.
+";
+
 /// Document that contains sections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Document {
@@ -27,6 +46,8 @@ pub(crate) enum Document {
     Reproduction,
     /// The file book/theory/methods.md, which has marked places for some sections.
     Methods,
+    /// The file book/results/papers.md, with one section.
+    Papers,
 }
 
 impl Document {
@@ -35,13 +56,15 @@ impl Document {
         match self {
             Self::Reproduction => "results/reproduction.md",
             Self::Methods => "theory/methods.md",
+            Self::Papers => "results/papers.md",
         }
     }
     /// Returns the text of the document with the section `name` in its place. `names` are the sections of the document
     /// in their order. In `Methods`, the marks of the section must exist.
     pub(crate) fn put(self, text: &str, names: &[&str], name: &str, section: &str) -> anyhow::Result<String> {
         match self {
-            Self::Reproduction => Ok(join_sections(text, names, name, section)),
+            Self::Reproduction => Ok(join_sections(HEAD, text, names, name, section)),
+            Self::Papers => Ok(join_sections(PAPERS_HEAD, text, names, name, section)),
             Self::Methods => {
                 let old = find_section(text, name).ok_or_else(|| {
                     anyhow!("{}: the marks {} and {} are missing", self.file(), begin_mark(name), end_mark(name))
@@ -60,10 +83,10 @@ pub(crate) fn find_section<'a>(document: &'a str, name: &str) -> Option<&'a str>
     Some(&rest[..to])
 }
 
-/// Returns book/results/reproduction.md with this section in its place. The other sections stay, in the order of
+/// Returns a document of sections only, with this section in its place. The other sections stay, in the order of
 /// `names`.
-fn join_sections(document: &str, names: &[&str], name: &str, section: &str) -> String {
-    let mut out = HEAD.to_owned();
+fn join_sections(head: &str, document: &str, names: &[&str], name: &str, section: &str) -> String {
+    let mut out = head.to_owned();
     for &other in names {
         let text = if other == name { Some(section) } else { find_section(document, other) };
         if let Some(text) = text {

@@ -18,7 +18,8 @@ use clap::Parser;
 
 use studies::{ALL, Effort, names_in};
 
-/// Measures the numbers of book/results/reproduction.md and of parts of book/theory/methods.md again, and writes them
+/// Measures the numbers of book/results/reproduction.md and of parts of book/theory/methods.md again, and writes them;
+/// writes book/results/papers.md from the tables in reproduce/papers
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask reproduce")]
 struct Args {

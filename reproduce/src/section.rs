@@ -14,7 +14,7 @@ pub(crate) struct Section {
 #[derive(Debug)]
 enum Part {
     Text(String),
-    Table { head: Vec<String>, rows: Vec<Vec<String>> },
+    Table { align: &'static str, head: Vec<String>, rows: Vec<Vec<String>> },
     Figure { file: String, alt: String, svg: String },
 }
 
@@ -29,8 +29,24 @@ impl Section {
         head: impl IntoIterator<Item = H>,
         rows: impl IntoIterator<Item = Vec<String>>,
     ) {
+        self.add_table("---:|", head, rows);
+    }
+    /// Adds a table of words; all columns are left-aligned.
+    pub(crate) fn prose_table<H: Into<String>>(
+        &mut self,
+        head: impl IntoIterator<Item = H>,
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) {
+        self.add_table("---|", head, rows);
+    }
+    fn add_table<H: Into<String>>(
+        &mut self,
+        align: &'static str,
+        head: impl IntoIterator<Item = H>,
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) {
         let head = head.into_iter().map(Into::into).collect();
-        self.parts.push(Part::Table { head, rows: rows.into_iter().collect() });
+        self.parts.push(Part::Table { align, head, rows: rows.into_iter().collect() });
     }
     /// Adds a chart, which becomes `figures/NAME.svg`.
     pub(crate) fn figure(&mut self, name: &str, chart: &Chart) -> anyhow::Result<()> {
@@ -46,8 +62,8 @@ impl Section {
             out.push('\n');
             match part {
                 Part::Text(text) => out.push_str(&format!("{text}\n")),
-                Part::Table { head, rows } => {
-                    out.push_str(&format!("| {} |\n|---|{}\n", head.join(" | "), "---:|".repeat(head.len() - 1)));
+                Part::Table { align, head, rows } => {
+                    out.push_str(&format!("| {} |\n|---|{}\n", head.join(" | "), align.repeat(head.len() - 1)));
                     rows.iter().for_each(|row| out.push_str(&format!("| {} |\n", row.join(" | "))));
                 }
                 Part::Figure { file, alt, .. } => out.push_str(&format!("![{alt}]({file})\n")),

@@ -301,7 +301,8 @@ pub(super) fn default_settings(effort: &Effort) -> anyhow::Result<Section> {
          between pictures, a shift of all edges by their RMS (at least 0.1 px), and a bend that the pictures share. \
          Goals: at most 2σ off; a sigma of at most 1.5 km in `rocket-clean` and `horace` and 3 km in `leo-infrared`; \
          latitudes within 1 km; an alarm (χ² above 2) or a refusal in `tumble` without rates, and in no other \
-         flight.",
+         flight. [BB] (36) has edge errors of 1 px over 300 px; the edge noise of `rocket-clean` is that of the same \
+         kind of flight.",
     );
     s.table(CALIBRATION_HEADS, tables.calibrations);
     if !tables.wrong.is_empty() {

@@ -51,9 +51,9 @@ pub(super) fn sensitivity(_: &Effort) -> anyhow::Result<Section> {
     s.text(
         "Level pinhole camera 1920×1080 at 200 km; edge errors of 1 px over 300 px; points one pixel apart; 3 sigma, \
          ours / reference. [BB] print curves; the reference is an independent evaluation of their equations with the \
-         errata corrected (book/theory/math.md), and we agree with it within 2 %. Roll is about the optical axis, \
-         pitch about the horizontal of the picture. The same by hand: `hzn sensitivity --altitude 200 --limb-height 0 \
-         --fov 66:146:16 -o table.csv`.",
+         errata corrected (book/theory/math.md), and we agree with it within 2 %. Figure 37 of [BB] stays below 0.9°, \
+         which the overbound as printed does not. Roll is about the optical axis, pitch about the horizontal of the \
+         picture. The same by hand: `hzn sensitivity --altitude 200 --limb-height 0 --fov 66:146:16 -o table.csv`.",
     );
     add_altitudes_and_fields(&mut s)?;
     add_rows_and_limb_heights(&mut s)?;

@@ -79,8 +79,9 @@ pub(super) fn off_nadir(effort: &Effort) -> anyhow::Result<Section> {
          [W] do not print their radiance curves; ours are analytic. The prior has the position. The sensor knows a \
          limb height of 25 km ± {COMMON_HEIGHT_SIGMA_KM} km, or the height by latitude ± {HEIGHT_SIGMA_BY_LATITUDE_KM} \
          km, and a possible common shift of all edge points by {BIAS_PX} px. The cells have the RMS error of the axis, \
-         the number of errors above 2° (wrong), the number of pictures without an answer by status, and the NEES; [W] \
-         is as printed there.",
+         the number of errors above 2° (wrong), the number of pictures without an answer by status, and the NEES. [W] \
+         is as printed there: RMS errors against the direction to the centre of the Earth. The truth here is the limb \
+         axis.",
     ));
     s.text("**In-sample**: limb height, its sigma, the common shift and the edge noise are those of the scene.");
     let mut rows = Vec::new();

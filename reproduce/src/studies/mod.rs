@@ -11,6 +11,7 @@ mod infrared;
 mod lens;
 mod looks;
 mod orbit;
+mod papers;
 mod position;
 mod presets;
 mod real;
@@ -63,6 +64,8 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("real-pictures", "Photographs at many settings", looks::real_pictures),
     reproduced("real", "Photographs with truth", real::suite),
     Study { name: "presets", title: "Presets compared", document: Document::Methods, run: presets::compare_presets },
+    // The last one, because it compares its numbers with those of the other sections.
+    Study { name: "papers", title: "Printed and measured", document: Document::Papers, run: papers::compare },
 ];
 
 const fn reproduced(name: &'static str, title: &'static str, run: fn(&Effort) -> anyhow::Result<Section>) -> Study {
@@ -94,5 +97,19 @@ mod tests {
             let file = figure.split(')').next().unwrap();
             assert!(docs.join("results/figures").join(file).is_file(), "{file}");
         }
+    }
+
+    /// The page is made from tables, so it can be compared as a whole. Every row of the tables is checked on the way.
+    #[test]
+    fn the_page_of_the_papers_is_that_of_the_tables() {
+        let papers = ALL.iter().find(|study| study.document == Document::Papers).unwrap();
+        let section = (papers.run)(&Effort { frames: None, recordings: None }).unwrap();
+        let section = section.markdown(papers.name, papers.title);
+        let page = Document::Papers.put("", &names_in(Document::Papers), papers.name, &section).unwrap();
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../book").join(Document::Papers.file());
+        let committed = std::fs::read_to_string(path).unwrap();
+        let different = page.lines().zip(committed.lines()).find(|(new, old)| new != old);
+        assert_eq!(different, None, "`cargo xtask reproduce papers` writes the page");
+        assert_eq!(page.len(), committed.len());
     }
 }

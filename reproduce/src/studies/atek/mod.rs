@@ -120,9 +120,15 @@ pub(super) fn navigation(effort: &Effort) -> anyhow::Result<Section> {
     section.text(
         "**Flights through pictures.** 3σ is the largest of three axes. The angles are medians over the flight: \
          between the directions and the solution, with and without aid after the first attitude, and between the \
-         attitude of two directions alone (TRIAD) and the filter. The last row is the flight of the paper.",
+         attitude of two directions alone (TRIAD) and the filter. The last row is the flight of the paper: its angles \
+         are the largest of the flight, and its last column has 3σ, where ours has 1σ.",
     );
     section.table(score::PICTURE_HEAD, rows);
+    section.text(
+        "Before the vehicle turns, an attitude with a prior of 2° and two cameras with mounts of 1° cannot be better \
+         than 3/√(1/2² + 2/1²) = 2.0° (3σ). The 1.1° of [BB] needs rotation against the directions, or it is too small \
+         because of (48) with (50) as printed (book/theory/navigation.md).",
+    );
     let residuals = Donors::new(donors);
     section.text(residuals.describe());
     let flights: Vec<(Scenario, Inputs)> = with_sun(FIRST_SEED, FLIGHTS.min(effort.frames(FLIGHTS)), count)?

@@ -29,7 +29,9 @@ pub(super) const PICTURE_HEAD: [&str; 11] = [
 ];
 
 pub(super) fn paper_row() -> Vec<String> {
-    ["[BB]", "table 3", "", "6°", "1.1°", "", "1.8°", "", "4.2° / 0.6°", "3.4° / 0.6°", "0.9°"].map(String::from).into()
+    let sigmas = ["[BB]", "table 3", "", "6°", "1.1°", "", "1.8°", ""];
+    let angles = ["4.2° / 0.6° (largest)", "3.4° / 0.6° (largest)", "0.9° (3σ)"];
+    sigmas.into_iter().chain(angles).map(String::from).collect()
 }
 
 fn misses(scene: &Scenario, fused: &Fused) -> anyhow::Result<Vec<Miss>> {
