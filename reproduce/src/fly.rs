@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::Context;
 use hzn_core::body::Kind;
 use hzn_core::{Config, HostHorizon, Report};
-use hzn_evaluate::{Answer, Case, Evaluation, MeasuredDirection, pair};
+use hzn_evaluate::{Answer, Case, Evaluation, pair};
 use hzn_files::truth::Truth;
 use hzn_sim::{Flight, FlightFrame, Picture};
 use rayon::prelude::*;
@@ -143,11 +143,7 @@ fn process_picture(
         file: frame.file.clone(),
         body: truth.body.clone(),
         status: report.status,
-        found: report.solution.as_ref().map(|s| MeasuredDirection {
-            axis: s.axis.xyz(),
-            covariance_rad2: s.covariance.upper_rad2,
-            half_angle_deg: Some(s.half_angle_rad.to_degrees()),
-        }),
+        found: report.solution.as_ref().map(Into::into),
         position: None,
     };
     Ok((reports.iter().zip(truths).map(answer).collect(), elapsed_us))

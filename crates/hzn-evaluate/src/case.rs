@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use hzn_core::Solution;
 use hzn_core::body::Kind;
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
@@ -30,13 +31,11 @@ pub struct Answer {
 
 impl From<&Row> for Answer {
     fn from(row: &Row) -> Self {
-        let covariance = || -> Option<[f64; 6]> {
-            Some([row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?])
-        };
         let found = row.axis().filter(|_| row.status == Status::Ok).map(|axis| MeasuredDirection {
             axis,
             // Without a covariance the error still counts, but its covariance is not evaluated.
-            covariance_rad2: covariance().unwrap_or_default(),
+            covariance_rad2: row.covariance().unwrap_or_default(),
+            common_rad2: row.common_covariance(),
             half_angle_deg: row.half_angle_deg,
         });
         let position = || {
@@ -55,8 +54,21 @@ pub struct MeasuredDirection {
     pub axis: [f64; 3],
     /// Covariance of the axis: xx, xy, xz, yy, yz, zz in rad².
     pub covariance_rad2: [f64; 6],
+    /// The part of the covariance that the next picture shares; `None` if the result does not have it.
+    pub common_rad2: Option<[f64; 6]>,
     /// Half-angle of the half-angle-free fit in degrees.
     pub half_angle_deg: Option<f64>,
+}
+
+impl From<&Solution<f64>> for MeasuredDirection {
+    fn from(s: &Solution<f64>) -> Self {
+        Self {
+            axis: s.axis.xyz(),
+            covariance_rad2: s.covariance.upper_rad2,
+            common_rad2: s.common.map(|c| c.upper_rad2),
+            half_angle_deg: Some(s.half_angle_rad.to_degrees()),
+        }
+    }
 }
 
 /// Returns true for Sun and Moon, which have no nadir.
@@ -114,6 +126,9 @@ pub struct Miss {
     pub half_angle_ratio: Option<f64>,
     /// Error of the direction divided by the true half-angle.
     pub half_angles: f64,
+    /// The answer itself.
+    #[serde(skip)]
+    pub found: MeasuredDirection,
 }
 
 impl Miss {
@@ -141,6 +156,7 @@ impl Miss {
             nees,
             half_angle_ratio: found.half_angle_deg.map(|a| a / truth_half_angle_deg),
             half_angles: angle_deg / truth_half_angle_deg,
+            found: *found,
         })
     }
 }

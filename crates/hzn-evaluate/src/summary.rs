@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::case::Case;
 use crate::classes::ErrorClasses;
 use crate::honesty::Honesty;
+use crate::means::Means;
 use crate::position::PositionErrors;
 use crate::quantile::quantile;
 
@@ -34,6 +35,9 @@ pub struct Evaluation {
     pub errors: Option<Errors>,
     /// Comparison of these errors with their covariances; `None` if there are no answers.
     pub honesty: Option<Honesty>,
+    /// Means over consecutive answers compared with their covariances, for each of [`LENGTHS`](crate::LENGTHS) that has
+    /// a group.
+    pub means: Vec<Means>,
     /// Errors of the positions; `None` if there are none.
     pub position: Option<PositionErrors>,
     /// The error classes of ECSS-E-ST-60-20C about the camera's x and y axes; `None` for a short sequence.
@@ -137,6 +141,7 @@ impl Evaluation {
             false_answers,
             errors: Errors::new(&with_limb),
             honesty: honesty(&with_limb),
+            means: Means::of(cases),
             position: PositionErrors::new(&with_limb.iter().filter_map(|c| c.position_miss).collect::<Vec<_>>()),
             classes: classes(&with_limb),
             horace: Horace {

@@ -30,7 +30,7 @@ fn answer(file: &str, x_deg: f64, z_deg: f64) -> Answer {
     let (a, b) = (0.1f64.to_radians(), 0.2f64.to_radians());
     // A turn about z moves the x component, and a turn about x moves the z component.
     let covariance_rad2 = [b * b, 0.0, 0.0, 0.0, 0.0, a * a];
-    let found = MeasuredDirection { axis, covariance_rad2, half_angle_deg: Some(60.0) };
+    let found = MeasuredDirection { axis, covariance_rad2, common_rad2: None, half_angle_deg: Some(60.0) };
     Answer { file: file.into(), body: "earth".into(), status: Status::Ok, found: Some(found), position: None }
 }
 
@@ -52,12 +52,14 @@ fn errors_by_axis_and_their_sigmas() {
 #[test]
 fn a_singular_covariance_has_no_nees_and_a_large_error_is_an_arc() {
     let mut opposite = answer("a", 0.0, 0.0);
-    opposite.found = Some(MeasuredDirection { axis: [0.0, 0.0, 1.0], covariance_rad2: [0.0; 6], half_angle_deg: None });
+    let (axis, covariance_rad2) = ([0.0, 0.0, 1.0], [0.0; 6]);
+    opposite.found = Some(MeasuredDirection { axis, covariance_rad2, common_rad2: None, half_angle_deg: None });
     let m = pair(&[opposite], &[truth("a", 1)], None).unwrap()[0].miss.unwrap();
     assert!((m.angle_deg - 90.0).abs() < 1e-9 && m.nees.is_none());
     let found = MeasuredDirection {
         axis: [0.0, 0.0, 1.0],
         covariance_rad2: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        common_rad2: None,
         half_angle_deg: None,
     };
     let m = Miss::new(&found, [0.0, 1.0, 0.0], 60.0).unwrap();
@@ -215,4 +217,42 @@ fn the_classes_are_those_that_were_put_in() {
     let classes = ErrorClasses::new(&noise).unwrap();
     assert!((classes.temporal_deg - 0.2).abs() < 0.02 && classes.field_of_view_deg < 0.05, "{classes:?}");
     assert!(ErrorClasses::new(&noise[..20]).is_none());
+}
+
+/// Answers with the same error of one sigma about x, of which three quarters of the variance are common.
+fn alike(frames: usize) -> Vec<Answer> {
+    let one = |i: usize| {
+        let mut answer = answer(&format!("{i:03}"), 0.1, 0.0);
+        let found = answer.found.as_mut().unwrap();
+        found.common_rad2 = Some(found.covariance_rad2.map(|v| 0.75 * v));
+        answer
+    };
+    (0..frames).map(one).collect()
+}
+
+fn means(answers: &[Answer]) -> Vec<Means> {
+    let truths: Vec<Truth> = answers.iter().map(|a| truth(&a.file, 1)).collect();
+    Evaluation::by_body(&pair(answers, &truths, None).unwrap())[0].means.clone()
+}
+
+#[test]
+fn what_is_common_stays_in_a_mean() {
+    let means = means(&alike(200));
+    assert_eq!(means.iter().map(|m| (m.answers, m.groups)).collect::<Vec<_>>(), [(3, 66), (10, 20), (100, 2)]);
+    for m in means {
+        let n = m.answers as f64;
+        assert!((m.nees * (0.75 + 0.25 / n) - 1.0).abs() < 1e-4, "{m:?}");
+        assert!((m.nees_if_independent / n - 1.0).abs() < 1e-4, "{m:?}");
+        assert_eq!(m.beyond_3_sigma, 0.0);
+    }
+}
+
+#[test]
+fn a_mean_is_of_consecutive_answers() {
+    let mut answers = alike(103);
+    answers[50] = none("050", Status::NoLimb);
+    assert_eq!(means(&answers).iter().map(|m| (m.answers, m.groups)).collect::<Vec<_>>(), [(3, 33), (10, 10)]);
+    // Results without the columns say nothing about means.
+    answers.iter_mut().filter_map(|a| a.found.as_mut()).for_each(|f| f.common_rad2 = None);
+    assert!(means(&answers).is_empty());
 }

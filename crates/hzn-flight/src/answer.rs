@@ -279,6 +279,7 @@ impl PictureAnswer {
             Some(d) => Some(Solution {
                 axis: UnitVec3::try_new(widen(d.axis))?,
                 covariance: Cov3::from_upper(d.cov.map(f64::from)),
+                common: None,
                 axis_fixed: UnitVec3::try_new(widen(d.axis_fixed)),
                 axis_vehicle: UnitVec3::try_new(widen(d.axis_vehicle)),
                 half_angle_rad: d.half_angle_rad.into(),

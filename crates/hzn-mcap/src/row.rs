@@ -223,6 +223,19 @@ columns! {
         yaw_deg: Option<f64>,
         /// 1σ of that rotation, degrees.
         yaw_sigma_deg: Option<f64>,
+        /// The part of the axis's covariance whose error is the same in the next picture while the geometry stays, xx,
+        /// rad². The mean of n such answers has the covariance common + (cov − common)/n.
+        cov_common_xx: Option<f64>,
+        /// The common part of the axis's covariance, xy, rad².
+        cov_common_xy: Option<f64>,
+        /// The common part of the axis's covariance, xz, rad².
+        cov_common_xz: Option<f64>,
+        /// The common part of the axis's covariance, yy, rad².
+        cov_common_yy: Option<f64>,
+        /// The common part of the axis's covariance, yz, rad².
+        cov_common_yz: Option<f64>,
+        /// The common part of the axis's covariance, zz, rad².
+        cov_common_zz: Option<f64>,
     }
 }
 
@@ -270,6 +283,16 @@ impl Row {
         [self.axis_x, self.axis_y, self.axis_z] = s.axis.xyz().map(number);
         [self.cov_xx, self.cov_xy, self.cov_xz, self.cov_yy, self.cov_yz, self.cov_zz] =
             s.covariance.upper_rad2.map(number);
+        if let Some(common) = &s.common {
+            [
+                self.cov_common_xx,
+                self.cov_common_xy,
+                self.cov_common_xz,
+                self.cov_common_yy,
+                self.cov_common_yz,
+                self.cov_common_zz,
+            ] = common.upper_rad2.map(number);
+        }
         self.sigma_max_deg = deg(s.covariance.sigma_max_rad());
         if let Some(e) = &s.axis_fixed {
             [self.axis_e_x, self.axis_e_y, self.axis_e_z] = e.xyz().map(number);
@@ -334,6 +357,24 @@ impl Row {
     /// Returns the axis (camera frame); `None` if there is no answer.
     pub fn axis(&self) -> Option<[f64; 3]> {
         Some([self.axis_x?, self.axis_y?, self.axis_z?])
+    }
+
+    /// Returns the covariance of [`Self::axis`] in rad² (camera frame): xx, xy, xz, yy, yz, zz; `None` if there is none.
+    pub fn covariance(&self) -> Option<[f64; 6]> {
+        Some([self.cov_xx?, self.cov_xy?, self.cov_xz?, self.cov_yy?, self.cov_yz?, self.cov_zz?])
+    }
+
+    /// Returns the part of the covariance that the next picture shares, in rad² (camera frame): xx, xy, xz, yy, yz, zz;
+    /// `None` if it is not known.
+    pub fn common_covariance(&self) -> Option<[f64; 6]> {
+        Some([
+            self.cov_common_xx?,
+            self.cov_common_xy?,
+            self.cov_common_xz?,
+            self.cov_common_yy?,
+            self.cov_common_yz?,
+            self.cov_common_zz?,
+        ])
     }
 
     /// Returns the position of the body's centre from the camera, in km (camera frame); `None` if there is none.

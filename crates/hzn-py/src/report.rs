@@ -8,8 +8,7 @@ use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, Row};
 use hzn_run::engine::Trace;
-use numpy::ndarray::Array2;
-use numpy::{PyArray1, PyArray2, ToPyArray};
+use numpy::{PyArray1, PyArray2, ToPyArray, ndarray::Array2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyWeakrefMethods, PyWeakrefReference};
 
@@ -217,8 +216,7 @@ impl Report {
     #[doc = doc!("Report.covariance")]
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
-        let r = &self.row;
-        symmetric(py, [r.cov_xx, r.cov_xy, r.cov_xz, r.cov_yy, r.cov_yz, r.cov_zz])
+        symmetric(py, self.row.covariance()?.map(Some))
     }
     #[doc = doc!("Report.sigma_max_deg")]
     #[getter]
@@ -239,8 +237,12 @@ impl Report {
     #[getter]
     fn covariance_free<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         let r = &self.row;
-        let upper = [r.cov_free_xx, r.cov_free_xy, r.cov_free_xz, r.cov_free_yy, r.cov_free_yz, r.cov_free_zz];
-        symmetric(py, upper)
+        symmetric(py, [r.cov_free_xx, r.cov_free_xy, r.cov_free_xz, r.cov_free_yy, r.cov_free_yz, r.cov_free_zz])
+    }
+    #[doc = doc!("Report.covariance_common")]
+    #[getter]
+    fn covariance_common<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        symmetric(py, self.row.common_covariance()?.map(Some))
     }
     #[doc = doc!("Report.axis_by_cos")]
     #[getter]

@@ -25,13 +25,16 @@ def test_an_answer_and_its_covariance(sensor):
     assert np.isclose(np.linalg.norm(report.axis), 1.0)
     assert np.allclose(report.covariance @ report.axis, 0.0, atol=1e-12)
     assert np.isclose(np.degrees(np.sqrt(np.linalg.eigvalsh(report.covariance)[-1])), report.sigma_max_deg)
+    # What is common is a part of the covariance: neither it nor the rest is negative in any direction.
+    for part in (report.covariance_common, report.covariance - report.covariance_common):
+        assert np.linalg.eigvalsh(part)[0] > -1e-9 * np.trace(report.covariance) and np.trace(part) > 0.0
     assert "sigma" in repr(report) and report.altitude_km == 400.0
     assert report.to_dict()["axis_y"] == report.axis[1]
 
 
 def test_no_limb_is_an_answer_too(sensor):
     report = sensor.process(np.full((240, 320), 9, np.uint8))
-    assert not report.ok and report.axis is None and report.covariance is None
+    assert not report.ok and report.axis is None and report.covariance is None and report.covariance_common is None
     assert report.status in repr(report)
 
 

@@ -80,6 +80,7 @@ pub fn term_text(term: Term) -> &'static str {
         Term::EdgeNoise => "edge noise",
         Term::CommonShift => "a shift that the whole edge shares",
         Term::CommonTilt => "a tilt that the whole edge shares",
+        Term::CommonBend => "a bend that the whole edge shares",
         Term::UnknownAzimuth => "the limb's unknown azimuth",
         Term::Lens => "the calibration of the lens",
         Term::Clipping => "the limb height where the picture is clipped at full scale",

@@ -2,7 +2,7 @@
 
 use hzn_core::camera::{Config as CameraConfig, Model};
 use hzn_core::{Config, HostHorizon, Prior, body};
-use hzn_evaluate::{Answer, Case, Evaluation, MeasuredDirection, MeasuredPosition, pair};
+use hzn_evaluate::{Answer, Case, Evaluation, MeasuredPosition, pair};
 use hzn_sim::{Detector, Ellipsoid, Reflection, Scene, Surface, Trials};
 
 use super::setup::{Effort, halton};
@@ -91,11 +91,7 @@ fn fly(name: &str, first_seed: u64, focal_px: f64, pictures: usize) -> anyhow::R
             file: file.clone(),
             body: name.to_owned(),
             status: report.status,
-            found: solution.map(|s| MeasuredDirection {
-                axis: s.axis.xyz(),
-                covariance_rad2: s.covariance.upper_rad2,
-                half_angle_deg: Some(s.half_angle_rad.to_degrees()),
-            }),
+            found: solution.map(Into::into),
             position: solution.and_then(|s| s.position.as_ref()).map(|p| MeasuredPosition {
                 centre_km: p.centre_m.map(|x| x / 1e3),
                 covariance_km2: p.covariance_m2.map(|x| x / 1e6),

@@ -4,7 +4,7 @@ use hzn_core::body::Expected;
 use hzn_core::status::Status;
 use hzn_core::{Config, HostHorizon};
 use hzn_core::{observer::Observer, report::Candidate};
-use hzn_evaluate::{MeasuredDirection, Miss};
+use hzn_evaluate::Miss;
 use hzn_sim::error::SceneError;
 use hzn_sim::globe::Globe;
 use hzn_sim::picture::Picture;
@@ -89,13 +89,8 @@ pub fn process_trial(
     let report = horizon.process_observed(&picture.view(), &expected, observer);
     let truth = &trial.truth;
     let found = report.solution.as_ref().and_then(|s| {
-        let found = MeasuredDirection {
-            axis: s.axis.xyz(),
-            covariance_rad2: s.covariance.upper_rad2,
-            half_angle_deg: Some(s.half_angle_rad.to_degrees()),
-        };
         Some(Detection {
-            miss: Miss::new(&found, [truth.axis_x, truth.axis_y, truth.axis_z], truth.half_angle_deg)?,
+            miss: Miss::new(&s.into(), [truth.axis_x, truth.axis_y, truth.axis_z], truth.half_angle_deg)?,
             axis: s.axis.xyz(),
             half_angle_rad: s.fused_half_angle_rad,
             rms_px: s.rms_px,

@@ -71,14 +71,17 @@ pub struct Height {
 pub struct Edge {
     /// 1-sigma of an edge point, in pixels: the RMS of the residuals.
     pub sigma_px: f64,
-    /// Correlation length of the errors, in pixels. An exponential process with this sigma and this length gives a fit
-    /// the same variance as the noise models of the pictures.
+    /// Correlation length of the errors, in pixels, if all of them were correlated. An exponential process with this
+    /// sigma and this length gives a fit the same variance as the noise models of the pictures.
     pub correlation_px: f64,
     /// Length L of the most likely model of all pictures together, in pixels.
     pub length_px: f64,
     /// White part ν of the variance in that model.
     pub white: f64,
-    /// 1-sigma of a common shift of all points of an edge, in pixels: the RMS of the residuals, at least 0.1.
+    /// 1-sigma of that white part, in pixels.
+    pub white_px: f64,
+    /// 1-sigma of a common shift of all points of an edge, in pixels: the RMS of the correlated part of the residuals,
+    /// at least 0.1.
     pub bias_px: f64,
 }
 
@@ -145,7 +148,8 @@ impl Calibration {
         }
         let vague = |sigma_km: f64| Refusal::TooVague { sigma_km, max_km: MAX_SIGMA_KM, pictures: consistent.len() };
         let profile = fit_profile(&consistent).ok_or(vague(f64::INFINITY))?;
-        let height = combine_heights(&profile, &consistent);
+        let edge = combine_edges(&consistent);
+        let height = combine_heights(&profile, &consistent, &edge);
         if height.statistical_km > MAX_SIGMA_KM {
             return Err(vague(height.statistical_km));
         }
@@ -160,7 +164,7 @@ impl Calibration {
         Ok(Self {
             body: body.kind,
             height,
-            edge: combine_edges(&consistent),
+            edge,
             chi2: profile.solved.chi2,
             focal: fit_focal(&profile, &consistent),
             pictures: sightings.iter().map(picture).collect(),
@@ -178,7 +182,8 @@ impl Calibration {
         let several = !sensor.bodies.is_empty();
         let noise = hzn_core::covariance::Config {
             sigma_px: round_to_written_digits(self.edge.sigma_px),
-            correlation_px: round_to_written_digits(self.edge.correlation_px),
+            correlation_px: round_to_written_digits(self.edge.length_px),
+            white_px: round_to_written_digits(self.edge.white_px),
             bias_px: round_to_written_digits(self.edge.bias_px),
             ..sensor.covariance
         };
@@ -212,7 +217,7 @@ fn find_consistent(all: &[Sighting]) -> Vec<&Sighting> {
     all.iter().filter(is_near).collect()
 }
 
-fn combine_heights(profile: &Profile, sightings: &[&Sighting]) -> Height {
+fn combine_heights(profile: &Profile, sightings: &[&Sighting], edge: &Edge) -> Height {
     let Solved { h, covariance, scatter2, .. } = &profile.solved;
     let (n, parameters) = (sightings.len() as f64, h.len());
     // The mean weights of the parameters over all pictures.
@@ -228,7 +233,9 @@ fn combine_heights(profile: &Profile, sightings: &[&Sighting]) -> Height {
         .sum();
     let mean_square = |value: &dyn Fn(&Sighting) -> f64| sightings.iter().map(|s| value(s).powi(2)).sum::<f64>() / n;
     let (statistical_km, scatter_km) = (mean_variance.sqrt(), scatter2.sqrt());
-    let shift_km = mean_square(&|s| s.rms_px.max(MIN_SHIFT_PX) * s.km_per_px).sqrt();
+    // Noise that is new at every point averages out along an edge; only the rest can be a shift.
+    let correlated = (1.0 - edge.white).sqrt();
+    let shift_km = mean_square(&|s| (s.rms_px * correlated).max(MIN_SHIFT_PX) * s.km_per_px).sqrt();
     let bend_km =
         bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px)) * mean_square(&|s| s.km_per_bend_px).sqrt();
     let radius_km = mean_square(&|s| s.radius_sigma_km).sqrt();
@@ -259,7 +266,8 @@ fn combine_edges(sightings: &[&Sighting]) -> Edge {
         correlation_px: median(sightings.iter().map(|s| s.correlation_px)),
         length_px: LENGTHS_PX[i],
         white: WHITE[j],
-        bias_px: rms_px.max(MIN_SHIFT_PX),
+        white_px: rms_px * WHITE[j].sqrt(),
+        bias_px: (rms_px * (1.0 - WHITE[j]).sqrt()).max(MIN_SHIFT_PX),
     }
 }
 

@@ -65,6 +65,7 @@ pub(crate) fn solution(axis: Vector3<f64>, half_angle_rad: f64) -> Solution<f64>
     Solution {
         axis: UnitVec3::try_new([axis.x, axis.y, axis.z]).unwrap(),
         covariance: Cov3::from_upper([1e-8, 0.0, 0.0, 1e-8, 0.0, 1e-8]),
+        common: None,
         axis_fixed: None,
         axis_vehicle: None,
         half_angle_rad,

@@ -92,7 +92,7 @@ fn limb_lines(calibration: &Calibration, source: &str) -> Vec<Line> {
     let mut parts = vec![
         format!("{:.2} km from edge noise over all pictures", h.statistical_km),
         format!("{:.2} km from the scatter between them", h.scatter_km),
-        format!("{:.2} km from a shift of all edges by their RMS, at least 0.1 px", h.shift_km),
+        format!("{:.2} km from a shift of all edges by their correlated RMS, at least 0.1 px", h.shift_km),
         format!("{:.2} km from a bend that all edges have in common", h.bend_km),
     ];
     if h.radius_km > 0.0 {
@@ -126,19 +126,24 @@ fn limb_lines(calibration: &Calibration, source: &str) -> Vec<Line> {
 
 fn noise_lines(calibration: &Calibration) -> Vec<Line> {
     let e = &calibration.edge;
-    let length = "correlation length that gives the fit the same variance as the residuals of each picture".to_owned();
+    let length = "correlation length of the residuals without their white part".to_owned();
     vec![
         Line {
             key: "sigma_px",
             value: round_to_written_digits(e.sigma_px).into(),
             why: "RMS of the residuals along the limb".into(),
         },
-        Line { key: "correlation_px", value: round_to_written_digits(e.correlation_px).into(), why: length },
+        Line { key: "correlation_px", value: round_to_written_digits(e.length_px).into(), why: length },
+        Line {
+            key: "white_px",
+            value: round_to_written_digits(e.white_px).into(),
+            why: "the part of the residuals that is new at every point".into(),
+        },
         Line {
             key: "bias_px",
             value: round_to_written_digits(e.bias_px).into(),
-            why: "residuals do not show a common shift of all points; it is assumed to be equal to their RMS, and at \
-                  least 0.1 px"
+            why: "residuals do not show a common shift of all points; it is assumed to be equal to the RMS of their \
+                  correlated part, and at least 0.1 px"
                 .into(),
         },
     ]

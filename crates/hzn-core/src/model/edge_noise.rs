@@ -6,9 +6,9 @@ use crate::base::keys::{Form, Section, Value, choices, section};
 choices! {
     /// Source of the noise model of an edge.
     pub enum Noise {
-        /// The sigma, the common shift and the RMS of the common tilt each equal the RMS of the edge's residuals. The
-        /// correlation length is a twelfth of the edge's length. The values of `[covariance]` are the floors of these
-        /// four numbers.
+        /// The sigma, the common shift, the common bend and the RMS of the common tilt each equal the RMS of the edge's
+        /// residuals. The correlation length is a twelfth of the edge's length. The values of `[covariance]` are the
+        /// floors of these five numbers.
         // The default measures in each picture, because no fixed set of values held on flights with other seeds:
         // between 0 and 38 % of the answers were beyond 3 sigma.
         @1 Rms = "rms";
@@ -69,6 +69,17 @@ section! {
         ///
         /// Its cause is light that fades along the limb. A larger value widens the covariance of the axis.
         @104 tilt_px: f64 = 0.1, [0.0 to 1e4];
+        /// 1σ of a bend that the whole edge has in common, px: an error that is this value at both ends of the edge,
+        /// and minus half of it in the middle.
+        ///
+        /// Its cause is light that changes along the limb, most of all with a low Sun. The bend widens the covariance
+        /// of the answer, and changes no weight in the fusion with the expected half-angle.
+        @- bend_px: f64 = 0.0, [0.0 to 1e4];
+        /// 1σ of the part of an edge point's error that is new at every point, px. `hzn calibrate noise` measures it.
+        ///
+        /// With `rms`, only the rest of the residuals counts as correlated, as common shift, tilt and bend.
+        // Without a calibration it is 0, because one picture cannot separate the two parts well enough.
+        @- white_px: f64 = 0.0, [0.0 to 1e4];
         /// For `braun-barf`: whether the largest variance is used in every direction.
         ///
         /// This is the overbound of Braun & Barf 2022, (37), which is about twenty times too large.
@@ -91,7 +102,7 @@ impl Config {
     /// the correlation length is that of `rms`.
     pub fn measured(&self, rms_px: f64, edge_px: f64) -> Self {
         let (length_px, common) = match self.noise {
-            Noise::Rms => (edge_px / LENGTHS_PER_EDGE, rms_px),
+            Noise::Rms => (edge_px / LENGTHS_PER_EDGE, self.correlated_px(rms_px)),
             Noise::Reml => (edge_px / LENGTHS_PER_EDGE, 0.0),
             Noise::Given => (0.0, 0.0),
         };
@@ -103,8 +114,14 @@ impl Config {
             correlation_px: self.correlation_px.max(length_px),
             bias_px: self.bias_px.max(common),
             tilt_px: self.tilt_px.max(common * END_PER_RMS),
+            bend_px: self.bend_px.max(common),
             ..*self
         }
+    }
+
+    /// Returns the RMS of residuals without the part that is new at every point.
+    pub(crate) fn correlated_px(&self, rms_px: f64) -> f64 {
+        libm::sqrt((rms_px * rms_px - self.white_px * self.white_px).max(0.0))
     }
 
     /// Makes a known noise model from these values, without a common shift or tilt.

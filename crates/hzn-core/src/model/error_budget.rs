@@ -17,26 +17,29 @@ pub enum Term {
     CommonShift = 1,
     /// A tilt of the whole edge.
     CommonTilt = 2,
+    /// A bend of the whole edge, which the weights of the fusion leave out.
+    CommonBend = 3,
     /// The limb's azimuthal harmonics, whose direction or size is unknown.
-    UnknownAzimuth = 3,
+    UnknownAzimuth = 4,
     /// The calibration of the lens.
-    Lens = 4,
+    Lens = 5,
     /// The height of the limb, through the expected half-angle.
-    LimbHeight = 5,
+    LimbHeight = 6,
     /// The altitude, through the expected half-angle.
-    Altitude = 6,
+    Altitude = 7,
     /// The local radius of the body, through the expected half-angle.
-    Radius = 7,
+    Radius = 8,
     /// The height of a limb that is clipped at full scale, through the expected half-angle.
-    Clipping = 8,
+    Clipping = 9,
 }
 
 impl Term {
     /// All terms in the order of their numbers.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::EdgeNoise,
         Self::CommonShift,
         Self::CommonTilt,
+        Self::CommonBend,
         Self::UnknownAzimuth,
         Self::Lens,
         Self::LimbHeight,
@@ -47,7 +50,7 @@ impl Term {
 }
 
 /// Number of terms that are known before the expected half-angle is fused. The other terms come from the fusion.
-const FIT_TERMS: usize = 5;
+const FIT_TERMS: usize = 6;
 
 /// The covariance of an answer's axis, term by term. The sum of the terms is the whole covariance.
 #[derive(Debug, Clone, Copy)]

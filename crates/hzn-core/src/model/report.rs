@@ -237,6 +237,13 @@ pub struct Solution<T> {
     pub axis: UnitVec3<Cam, T>,
     /// Covariance of `axis`, rad², rank 2.
     pub covariance: Cov3<Cam, T>,
+    /// The part of `covariance` whose error is the same in the next picture while the geometry stays, rad², rank 2. A
+    /// mean of n such answers has the covariance common + (covariance − common)/n. `None` if the method does not know
+    /// the part (`braun-barf`), or when the answer came by telemetry.
+    ///
+    /// All terms of the [`ErrorBudget`](crate::covariance::ErrorBudget) are common except the errors of the edge
+    /// points. The part includes the gain of the fusion with the expected half-angle.
+    pub common: Option<Cov3<Cam, T>>,
     /// The same direction in the fixed frame, computed from the position; only for `earth` with a position. A filter
     /// needs both directions.
     pub axis_fixed: Option<UnitVec3<Fixed, T>>,

@@ -14,7 +14,7 @@ use crate::base::real::Real;
 use crate::base::sort;
 use crate::config::retry::{Combine, Method};
 use crate::geometry::crop::Crop;
-use crate::geometry::frames::{Cov3, UnitVec3};
+use crate::geometry::frames::{Cam, Cov3, UnitVec3};
 use crate::geometry::pixel::ImagePoint;
 use crate::image::{Cropped, Indirect, Pixels};
 use crate::model::body::Expected;
@@ -148,23 +148,14 @@ fn combine_answers<T: Real>(answers: &mut Answers<T>, combine: Combine) -> Optio
     };
     let axis = unit(&axis)?;
     let (b1, b2) = basis(&axis);
-    let mut p = [T::ZERO; 3];
+    let (mut p, mut common) = ([T::ZERO; 3], Some([T::ZERO; 3]));
     for a in answers.iter() {
-        let rows = a.covariance.rows();
-        let form = |x: &V3<T>, y: &V3<T>| {
-            let mut sum = T::ZERO;
-            for i in 0..3 {
-                for j in 0..3 {
-                    sum += x[i] * rows[i][j] * y[j];
-                }
-            }
-            sum
-        };
         let off = a.axis.v() - axis;
         let (x, y) = (off.dot(&b1), off.dot(&b2));
-        p[0] += form(&b1, &b1) + x * x;
-        p[1] += form(&b1, &b2) + x * y;
-        p[2] += form(&b2, &b2) + y * y;
+        let [p11, p12, p22] = across(&a.covariance, &b1, &b2);
+        p = [p[0] + (p11 + x * x), p[1] + (p12 + x * y), p[2] + (p22 + y * y)];
+        // The scatter of the parts is new in every picture.
+        common = common.zip(a.common.map(|c| across(&c, &b1, &b2))).map(|(sum, c)| [0, 1, 2].map(|i| sum[i] + c[i]));
     }
     let nearest = answers.iter().max_by(|a, b| {
         let along = |s: &Solution<T>| s.axis.v().dot(&axis);
@@ -173,8 +164,24 @@ fn combine_answers<T: Real>(answers: &mut Answers<T>, combine: Combine) -> Optio
     Some(Solution {
         axis: UnitVec3::assume_unit(axis),
         covariance: Cov3::from_tangent(&b1, &b2, p.map(|x| x / count)),
+        common: common.map(|c| Cov3::from_tangent(&b1, &b2, c.map(|x| x / count))),
         ..*nearest
     })
+}
+
+/// Returns a covariance (11, 12, 22) on a tangent basis.
+fn across<T: Real>(covariance: &Cov3<Cam, T>, b1: &V3<T>, b2: &V3<T>) -> [T; 3] {
+    let rows = covariance.rows();
+    let form = |x: &V3<T>, y: &V3<T>| {
+        let mut sum = T::ZERO;
+        for i in 0..3 {
+            for j in 0..3 {
+                sum += x[i] * rows[i][j] * y[j];
+            }
+        }
+        sum
+    };
+    [form(b1, b1), form(b1, b2), form(b2, b2)]
 }
 
 /// Passes on what is observed in a part, in the coordinates of the whole picture.

@@ -177,13 +177,12 @@ fn is_earth(name: &str) -> bool {
 fn seen(row: &Row, index: usize, time_s: f64, body: Body, limb_sigma_km: Option<f64>) -> Option<Seen> {
     let axis = Vector::from(row.axis()?);
     let symmetric = |[xx, xy, xz, yy, yz, zz]: [f64; 6]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    let cov = [row.cov_xx?, row.cov_xy?, row.cov_xz?, row.cov_yy?, row.cov_yz?, row.cov_zz?];
     let three = |x: [Option<f64>; 3]| Some(Vector::new(x[0]?, x[1]?, x[2]?));
     let mut seen = Seen {
         time_s,
         body,
         axis,
-        covariance_rad2: symmetric(cov).into(),
+        covariance_rad2: symmetric(row.covariance()?).into(),
         reference: three([row.axis_e_x, row.axis_e_y, row.axis_e_z]),
         by_limb_height: Vector::zeros(),
         centre: None,

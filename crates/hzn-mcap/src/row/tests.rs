@@ -12,6 +12,7 @@ fn report<T: Real>(status: Status) -> Report<T> {
     let solution = Solution {
         axis: UnitVec3::try_new([number(0.0), number(0.6), number(0.8)]).unwrap(),
         covariance: Cov3::from_upper([number(4e-8), number(0.0), number(0.0), number(1e-8), number(0.0), number(0.0)]),
+        common: Some(Cov3::from_upper([number(3e-8), number(0.0), number(0.0), number(0.0), number(0.0), number(0.0)])),
         axis_fixed: None,
         axis_vehicle: UnitVec3::try_new([number(-0.5), number(0.0), number(0.75f64.sqrt())]),
         half_angle_rad: number(1.3),
@@ -40,6 +41,7 @@ fn converts<T: Real>(tolerance: f64) {
     let row = Row::from_report::<T>(&meta(), &report(Status::Ok), Some(45.0));
     let near = |x: Option<f64>, y: f64| assert!((x.unwrap() / y - 1.0).abs() < tolerance, "{x:?} {y}");
     near(row.axis_z, 0.8);
+    near(row.cov_common_xx, 3e-8);
     near(row.sigma_max_deg, 2e-4f64.to_degrees());
     near(row.half_angle_deg, 1.3f64.to_degrees());
     near(row.altitude_est_km, 240.0);

@@ -447,6 +447,14 @@ class Report:
         """Covariance of the axis on its tangent plane in the camera frame, shape (3, 3) of rank 2, rad²."""
 
     @property
+    def covariance_common(self) -> NDArray[np.float64] | None:
+        """Part of `covariance` whose error is the same in the next picture while the geometry stays, shape (3, 3), rad².
+
+        The mean of n such answers has the covariance ``common + (covariance - common) / n``. It is None if the method
+        does not know it.
+        """
+
+    @property
     def sigma_max_deg(self) -> float | None:
         """The larger of the axis' two standard deviations, degrees."""
 

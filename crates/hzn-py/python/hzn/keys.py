@@ -215,6 +215,12 @@ class Covariance(TypedDict, total=False):
     tilt_px: float
     """1σ of a tilt that the whole edge has in common, px: an error that goes from −1 to 1 times this value along the
     edge. Values: 0 to 10000 px. Default: 0.1."""
+    bend_px: float
+    """1σ of a bend that the whole edge has in common, px: an error that is this value at both ends of the edge, and
+    minus half of it in the middle. Values: 0 to 10000 px. Default: 0.0."""
+    white_px: float
+    """1σ of the part of an edge point's error that is new at every point, px. ``hzn calibrate noise`` measures it.
+    Values: 0 to 10000 px. Default: 0.0."""
     overbound: bool
     """For ``braun-barf``: whether the largest variance is used in every direction. Values: true or false. Default:
     false."""

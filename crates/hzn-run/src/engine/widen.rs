@@ -33,6 +33,7 @@ pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Sol
     Some(Solution {
         axis: UnitVec3::try_new(s.axis.xyz().map(Into::into))?,
         covariance: Cov3::from_upper(s.covariance.upper_rad2.map(Into::into)),
+        common: s.common.map(|c| Cov3::from_upper(c.upper_rad2.map(Into::into))),
         axis_fixed: s.axis_fixed.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
         axis_vehicle: s.axis_vehicle.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
         half_angle_rad: s.half_angle_rad.into(),

@@ -1,6 +1,6 @@
 //! The report as text.
 
-use hzn_evaluate::{Case, Evaluation, Group, Honesty};
+use hzn_evaluate::{Case, Evaluation, Group, Honesty, Means};
 
 use super::report::Report;
 use crate::tell::one_line;
@@ -71,6 +71,7 @@ pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
         let ideal = h.within.map(|w| format!("{:.1}", 100.0 * w.expected)).join(", ");
         line("sigma", format!("{} ({ideal} % when right)", parts.join(", ")));
     }
+    out.extend(means_line(e));
     out.extend(position_lines(e));
     let mut line = |name, value| out.push((name, value));
     if e.with_limb > 0 {
@@ -86,6 +87,19 @@ pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
         );
     }
     out
+}
+
+/// Returns the NEES of means over consecutive answers; `None` if no answer can tell.
+fn means_line(e: &Evaluation) -> Option<(&'static str, String)> {
+    e.honesty.as_ref()?;
+    let part = |m: &Means| {
+        let groups = if m.groups == 1 { "group" } else { "groups" };
+        let (n, independent) = (m.answers, m.nees_if_independent);
+        format!("{:.2} of {n} answers ({} {groups}; {independent:.2} if independent)", m.nees, m.groups)
+    };
+    let parts: Vec<String> = e.means.iter().map(part).collect();
+    let none = "not tested: no three consecutive answers have the columns cov_common_*";
+    Some(("means (NEES)", if parts.is_empty() { none.into() } else { parts.join(", ") + "; 2 is ideal" }))
 }
 
 /// Returns the numbers about the position and the error classes of star sensors with their names.

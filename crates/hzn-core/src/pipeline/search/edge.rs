@@ -250,6 +250,10 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let solution = Solution {
             axis,
             covariance,
+            common: fused.common.map(|p| {
+                let (n1, n2) = basis(&fused.e);
+                Cov3::from_tangent(&n1, &n2, p)
+            }),
             axis_fixed: expected.axis_fixed(),
             axis_vehicle: self.sensor.vehicle_from_camera.as_ref().map(|r| r.apply(&axis)),
             half_angle_rad: half_angle(fit.k),
@@ -290,6 +294,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         Some(Solution {
             axis,
             covariance: Cov3::from_tangent(&b1, &b2, placed.p),
+            common: placed.common.map(|p| Cov3::from_tangent(&b1, &b2, p)),
             axis_vehicle: self.sensor.vehicle_from_camera.as_ref().map(|r| r.apply(&axis)),
             half_angle_rad,
             fused_half_angle_rad,

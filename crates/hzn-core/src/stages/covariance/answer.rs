@@ -3,6 +3,16 @@
 use crate::base::linalg::M3;
 use crate::base::linalg::V3;
 
+/// Covariance of the fitted (δ₁₂, δc).
+pub(super) struct ConeCovariance<T> {
+    /// All terms.
+    pub(super) whole: M3<T>,
+    /// The terms that the next picture shares: see [`Solution::common`](crate::model::report::Solution::common).
+    pub(super) common: M3<T>,
+    /// A term that is added after the fusion, so that it changes no weight. It is common, too.
+    pub(super) late: M3<T>,
+}
+
 /// The answer of a fit with its covariance.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fused<T> {
@@ -12,6 +22,8 @@ pub(crate) struct Fused<T> {
     pub(crate) c: T,
     /// Covariance (11, 12, 22) on the tangent basis of `e`, rad².
     pub(crate) p: [T; 3],
+    /// The part of `p` that the next picture shares; `None` if the method does not know it.
+    pub(crate) common: Option<[T; 3]>,
     /// Covariance (11, 12, 22) of the freely fitted axis on its own tangent basis, rad².
     // It is kept for a filter that treats the limb height as one error of all pictures: fused covariances hide it.
     pub(crate) free_p: [T; 3],
@@ -34,6 +46,8 @@ pub(crate) struct Located<T> {
     pub(crate) r: V3<T>,
     /// Covariance of `r` in the same units.
     pub(crate) p: M3<T>,
+    /// The part of `p` that the next picture shares.
+    pub(crate) common: M3<T>,
     /// The same before the known distance was fused.
     pub(crate) free_r: V3<T>,
     pub(crate) free_p: M3<T>,

@@ -34,6 +34,8 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
         e: fit.e,
         c: fit.c,
         p: across,
+        // The paper has errors of the edge points only. Nothing says that no error is common, so that there is no zero.
+        common: None,
         free_p: across,
         // The expected half-angle is not fused in the paper, so that its terms are 0.
         by_cos: [T::ZERO; 2],

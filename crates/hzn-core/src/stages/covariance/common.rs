@@ -7,6 +7,7 @@
 //! |---|---|
 //! | common shift | g: every point one pixel across the limb |
 //! | common tilt | g τ, τ from −1 to 1 along the edge |
+//! | common bend | g (3τ² − 1)/2, the second Legendre polynomial |
 //! | unknown azimuth | cos kφ and sin kφ of the azimuth φ about the axis, k = 1, 2 |
 //! | lens | g·∂u/∂p, the pixel's move for an intrinsic parameter p |
 //!
@@ -51,7 +52,9 @@ pub(super) fn add_terms<T: Real>(
     let error = |sum: &V3<T>| response * sum;
     let outer = |v: &V3<T>, variance: T| v * v.transpose() * variance;
     add(Term::CommonShift, &outer(&error(&sums.shift), noise.shift_px * noise.shift_px));
-    add(Term::CommonTilt, &outer(&error(&sums.tilt()), noise.tilt_px * noise.tilt_px));
+    let [tilt, bend] = sums.along();
+    add(Term::CommonTilt, &outer(&error(&tilt), noise.tilt_px * noise.tilt_px));
+    add(Term::CommonBend, &outer(&error(&bend), noise.bend_px * noise.bend_px));
     let mut uneven = M3::zeros();
     for (amplitude, pair) in expected.unknown_harmonics_cos.iter().zip(&sums.harmonics) {
         for sum in pair {
@@ -123,10 +126,11 @@ struct Sums<T> {
     /// Upper triangle of Σ w h hᵀ.
     normal: [T; 6],
     shift: V3<T>,
-    /// Σ w h g i, where i is the number of the point. `numbers` are Σ, Σ i and Σ i² of the robust weights, from which τ
-    /// is computed.
-    // The mean of the numbers is known only after the pass. With these sums the tilt needs no second one.
+    /// Σ w h g i and Σ w h g i², where i is the number of the point. `numbers` are Σ, Σ i and Σ i² of the robust
+    /// weights, from which τ is computed.
+    // The mean of the numbers is known only after the pass. With these sums tilt and bend need no second one.
     by_number: V3<T>,
+    by_square: V3<T>,
     numbers: [T; 3],
     /// Sums of the harmonics: for each harmonic, cosine and sine.
     harmonics: [[V3<T>; 2]; 2],
@@ -141,6 +145,7 @@ impl<T: Real> Sums<T> {
             normal: [T::ZERO; 6],
             shift: zero,
             by_number: zero,
+            by_square: zero,
             numbers: [T::ZERO; 3],
             harmonics: [[zero; 2]; 2],
             lens: [zero; INTRINSICS],
@@ -153,6 +158,7 @@ impl<T: Real> Sums<T> {
             sums.shift += shift;
             let i = T::from_i32(place as i32);
             sums.by_number += shift * i;
+            sums.by_square += shift * (i * i);
             sums.numbers[0] += weight;
             sums.numbers[1] += weight * i;
             sums.numbers[2] += weight * i * i;
@@ -172,11 +178,17 @@ impl<T: Real> Sums<T> {
         sums
     }
 
-    /// Returns the sum for the tilt, with τ = (i − ī)/(√3 σ_i). For evenly distributed points τ goes from −1 to 1.
-    fn tilt(&self) -> V3<T> {
+    /// Returns the sums for tilt and bend, with τ = (i − ī)/(√3 σ_i). For evenly distributed points τ goes from −1 to
+    /// 1.
+    fn along(&self) -> [V3<T>; 2] {
         let [n, sum, squares] = self.numbers;
         let mean = sum / n.max(T::one());
         let spread = (squares / n.max(T::one()) - mean * mean).max(T::one()).sqrt();
-        (self.by_number - self.shift * mean) * (T::from_f64(SPREAD) / spread)
+        let per_number = T::from_f64(SPREAD) / spread;
+        let tilt = (self.by_number - self.shift * mean) * per_number;
+        // Σ g τ², from τ² = (i² − 2 ī i + ī²)/(3 σ_i²).
+        let square =
+            (self.by_square - self.by_number * (mean + mean) + self.shift * (mean * mean)) * (per_number * per_number);
+        [tilt, square * T::from_f64(1.5) - self.shift * T::from_f64(0.5)]
     }
 }

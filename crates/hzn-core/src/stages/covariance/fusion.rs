@@ -1,6 +1,6 @@
 //! Fuses the fitted half-angle with the expected one.
 
-use super::answer::{EdgeNoise, Fused};
+use super::answer::{ConeCovariance, EdgeNoise, Fused};
 use crate::base::linalg::{M3, V3, basis, invert_spd2, unit};
 use crate::base::real::Real;
 use crate::model::body::Expected;
@@ -12,7 +12,7 @@ use crate::stages::fit::Fit;
 /// half-angle was not fitted, or if the configuration or the body leaves the half-angle free.
 pub(super) fn fused<T: Real>(
     fit: &Fit<T>,
-    p: &M3<T>,
+    covariance: &ConeCovariance<T>,
     edge: EdgeNoise<T>,
     expected: &Expected<T>,
     config: &fit::Config,
@@ -20,11 +20,12 @@ pub(super) fn fused<T: Real>(
 ) -> Option<Fused<T>> {
     let (b1, b2) = basis(&fit.e);
     let var_c = expected.sigma_cos * expected.sigma_cos;
+    let p = &covariance.whole;
     let var_free = fit.free.then_some(p.m33);
     let free_p = [p.m11, p.m12, p.m22];
     // A half-angle that was not fitted cannot be fused: its variance and its correlation with the axis do not exist.
     if !fit.free || config.half_angle == fit::HalfAngle::Free || expected.free {
-        return Some(unfused(fit, p, edge, expected, config, budget));
+        return Some(unfused(fit, covariance, edge, expected, config, budget));
     }
     let total = p.m33 + var_c;
     let difference = expected.cos - fit.c;
@@ -41,12 +42,17 @@ pub(super) fn fused<T: Real>(
     let (n1, n2) = basis(&e);
     let turn = |n: &V3<T>| [n.dot(&b1), n.dot(&b2)];
     let (r1, r2) = (turn(&n1), turn(&n2));
-    let form =
-        |a: [T; 2], b: [T; 2]| a[0] * (fused[0] * b[0] + fused[1] * b[1]) + a[1] * (fused[1] * b[0] + fused[2] * b[1]);
+    let late = projected([k.x, k.y], &covariance.late, T::ZERO);
+    let sum = |a: [T; 3], b: [T; 3]| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+    let turned = |[p11, p12, p22]: [T; 3]| {
+        let form = |a: [T; 2], b: [T; 2]| a[0] * (p11 * b[0] + p12 * b[1]) + a[1] * (p12 * b[0] + p22 * b[1]);
+        [form(r1, r1), form(r1, r2), form(r2, r2)]
+    };
     Some(Fused {
         e,
         c: fit.c + k.z * difference,
-        p: [form(r1, r1), form(r1, r2), form(r2, r2)],
+        p: turned(sum(fused, late)),
+        common: Some(turned(sum(projected([k.x, k.y], &covariance.common, var_c), late))),
         free_p,
         by_cos: [k.x, k.y],
         var_free_cos: var_free,
@@ -60,7 +66,7 @@ pub(super) fn fused<T: Real>(
 /// Returns the answer of a fit whose half-angle is not fused with the expected one.
 fn unfused<T: Real>(
     fit: &Fit<T>,
-    p: &M3<T>,
+    covariance: &ConeCovariance<T>,
     edge: EdgeNoise<T>,
     expected: &Expected<T>,
     config: &fit::Config,
@@ -68,6 +74,7 @@ fn unfused<T: Real>(
 ) -> Fused<T> {
     let (b1, b2) = basis(&fit.e);
     let var_c = expected.sigma_cos * expected.sigma_cos;
+    let p = &covariance.whole;
     let (var_free, free_p) = (fit.free.then_some(p.m33), [p.m11, p.m12, p.m22]);
     // If the half-angle is fixed at the expected one, its error causes a proportional error of the axis.
     let k = fixed_half_angle_gain(fit);
@@ -77,8 +84,32 @@ fn unfused<T: Real>(
     if let Some(budget) = budget {
         budget.project(&b1, &b2, [T::ZERO; 2], k.map(|k| k * var_c.sqrt()), expected);
     }
-    let p = [p.m11 + k[0] * k[0] * var_c, p.m12 + k[0] * k[1] * var_c, p.m22 + k[1] * k[1] * var_c];
-    Fused { e: fit.e, c: fit.c, p, free_p, by_cos: k, var_free_cos: var_free, chi2: T::ZERO, edge, located: None }
+    let with_prior =
+        |p: &M3<T>| [p.m11 + k[0] * k[0] * var_c, p.m12 + k[0] * k[1] * var_c, p.m22 + k[1] * k[1] * var_c];
+    Fused {
+        e: fit.e,
+        c: fit.c,
+        p: with_prior(&(p + covariance.late)),
+        common: Some(with_prior(&(covariance.common + covariance.late))),
+        free_p,
+        by_cos: k,
+        var_free_cos: var_free,
+        chi2: T::ZERO,
+        edge,
+        located: None,
+    }
+}
+
+/// Returns what a covariance C of (δ₁₂, δc) becomes by the fusion with an expected cosine of the variance σ_c², on the
+/// tangent basis of the fitted axis: (I, −k) C (I, −k)ᵀ + k kᵀ σ_c².
+///
+/// The gain k weighs all errors of the fit and of the expected half-angle. While the geometry stays, it is the same in
+/// the next picture, so that it carries the common part of both sides over. The expected half-angle is common as a
+/// whole: the next picture is told the same limb height and radius, and an altitude with nearly the same error.
+fn projected<T: Real>([k1, k2]: [T; 2], c: &M3<T>, var_c: T) -> [T; 3] {
+    let both = c.m33 + var_c;
+    let (c13, c23) = (c.m13 - k1 * both, c.m23 - k2 * both);
+    [c.m11 - k1 * (c.m13 + c13), c.m12 - k2 * c.m13 - k1 * c23, c.m22 - k2 * (c.m23 + c23)]
 }
 
 /// Returns the change of the axis for δc = 1 with a fixed half-angle: the solution of the normal equations for the

@@ -31,6 +31,7 @@ use crate::stages::fit::{self, Fit};
 
 pub use crate::model::edge_noise::{Config, Method, Noise};
 pub use crate::model::error_budget::{ErrorBudget, Term};
+use answer::ConeCovariance;
 pub(crate) use answer::Fused;
 #[cfg(all(test, feature = "position"))]
 pub(crate) use answer::Located;
@@ -57,10 +58,13 @@ pub(crate) fn fuse<T: Real>(
     let noise = noise::EdgeNoiseModel::new(fit, config);
     if let Some(quadric) = fit.quadric() {
         let p = elliptic::covariance(blocks, quadric, noise.length_px) * noise.variance;
-        return fused(fit, &p, noise.edge(p.m33), expected, fit_config, budget);
+        let edge = noise.edge(p.m33);
+        // Only the errors of the edge points are known here.
+        let covariance = ConeCovariance { whole: p, common: M3::zeros(), late: M3::zeros() };
+        return fused(fit, &covariance, edge, expected, fit_config, budget);
     }
     let response = response(&fit.sums, fit.mean, fit.free)?;
-    let mut p = sandwich(&response, &noise.correlated(blocks, fit, expected));
+    let p = sandwich(&response, &noise.correlated(blocks, fit, expected));
     let mut add = |term: Term, more: &M3<T>| {
         if let Some(budget) = budget.as_deref_mut() {
             budget.record(term, more);
@@ -69,8 +73,16 @@ pub(crate) fn fuse<T: Real>(
     add(Term::EdgeNoise, &p);
     // The part of the edge noise is taken before the other terms are added, because a gate replaces this part alone.
     let edge = noise.edge(p.m33);
+    let mut p = ConeCovariance { whole: p, common: M3::zeros(), late: M3::zeros() };
     common::add_terms(blocks, fit, expected, &noise, camera, |term, more| {
-        p += more;
+        if term == Term::CommonBend {
+            // Half of the bend looks like another half-angle. If it were added before the fusion, the expected
+            // half-angle would get more weight in every picture.
+            p.late = *more;
+        } else {
+            p.whole += more;
+            p.common += more;
+        }
         add(term, more);
     })?;
     if let Some(target) = expected.target().filter(|_| fit.free) {

@@ -19,12 +19,16 @@ pub(crate) fn measured_length_px<T: Real>(fit: &Fit<T>) -> T {
 pub(super) struct EdgeNoiseModel<T> {
     /// Variance of an edge point, px².
     pub(super) variance: T,
-    /// Correlation length, px.
+    /// The part of `variance` that is new at every point, px².
+    white: T,
+    /// Correlation length of the rest, px.
     pub(super) length_px: T,
     /// 1-sigma of the common shift, px.
     pub(super) shift_px: T,
     /// 1-sigma of the common tilt, px.
     pub(super) tilt_px: T,
+    /// 1-sigma of the common bend, px.
+    pub(super) bend_px: T,
     /// Sigma of the configuration in pixels, if the likelihood of the residuals gives the noise.
     reml: Option<f64>,
 }
@@ -38,18 +42,24 @@ impl<T: Real> EdgeNoiseModel<T> {
     /// Does the same for another RMS of the residuals.
     pub(super) fn with_residuals(fit: &Fit<T>, rms_px: T, config: &Config) -> Self {
         let told = T::from_f64(config.sigma_px);
+        let white = T::from_f64(config.white_px * config.white_px);
         let (length_px, common) = match config.noise {
+            // Without a told white part, the square root of the square would change the last bit.
+            Noise::Rms if white > T::ZERO => (measured_length_px(fit), (rms_px * rms_px - white).max(T::ZERO).sqrt()),
             Noise::Rms => (measured_length_px(fit), rms_px),
             // The likelihood includes the errors that the fit absorbs, at every length.
             Noise::Given | Noise::Reml => (T::ZERO, T::ZERO),
         };
+        // Residuals only raise the variance: the fit absorbs the longest waves of the errors, so that it does not see
+        // them.
+        let variance = (told * told).max(rms_px * rms_px);
         Self {
-            // Residuals only raise the variance: the fit absorbs the longest waves of the errors, so that it does not
-            // see them.
-            variance: (told * told).max(rms_px * rms_px),
+            variance,
+            white: white.min(variance),
             length_px: T::from_f64(config.correlation_px).max(length_px),
             shift_px: T::from_f64(config.bias_px).max(common),
             tilt_px: T::from_f64(config.tilt_px).max(common * T::from_f64(END_PER_RMS)),
+            bend_px: T::from_f64(config.bend_px).max(common),
             reml: (config.noise == Noise::Reml).then_some(config.sigma_px),
         }
     }
@@ -67,6 +77,11 @@ impl<T: Real> EdgeNoiseModel<T> {
             return x;
         }
         let (b1, b2) = basis(&fit.e);
-        correlated(blocks, &fit.e, &b1, &b2, fit.mean, self.length_px).map(|x| x * self.variance)
+        let sum = |length_px: T| correlated(blocks, &fit.e, &b1, &b2, fit.mean, length_px);
+        if self.white > T::ZERO {
+            let (rest, white) = (sum(self.length_px), sum(T::ZERO));
+            return core::array::from_fn(|i| rest[i] * (self.variance - self.white) + white[i] * self.white);
+        }
+        sum(self.length_px).map(|x| x * self.variance)
     }
 }

@@ -7,7 +7,7 @@
 //!
 //! Lengths are in units of the mean semi-axis, so that single precision suffices at any distance.
 
-use super::answer::{EdgeNoise, Fused, Located};
+use super::answer::{ConeCovariance, EdgeNoise, Fused, Located};
 use super::consider::Sensitivity;
 use super::fusion;
 use crate::base::linalg::{M3, V3, basis, unit};
@@ -31,7 +31,7 @@ const ITERATIONS: usize = 3;
 pub(super) fn fused<T: Real>(
     blocks: &[Block<T>],
     fit: &Fit<T>,
-    p: &M3<T>,
+    p: &ConeCovariance<T>,
     edge: EdgeNoise<T>,
     expected: &Expected<T>,
     target: &Target<T>,
@@ -40,7 +40,7 @@ pub(super) fn fused<T: Real>(
 ) -> Option<Fused<T>> {
     let by_direction = fusion::fused(fit, p, edge, expected, config, budget)?;
     let sin = (fit.k * (T::one() + fit.c)).max(T::ZERO).sqrt();
-    if !is_determined(fit, sin, p.m33) || !is_lit_inside(blocks, fit) {
+    if !is_determined(fit, sin, p.whole.m33) || !is_lit_inside(blocks, fit) {
         // With a known distance the half-angle is the expected one, so that the direction needs no fitted half-angle.
         return target.range.map(|_| by_direction);
     }
@@ -85,7 +85,7 @@ fn is_lit_inside<T: Real>(blocks: &[Block<T>], fit: &Fit<T>) -> bool {
 fn located<T: Real>(
     fit: &Fit<T>,
     sin: T,
-    p: &M3<T>,
+    p: &ConeCovariance<T>,
     target: &Target<T>,
     given: &Sensitivity<T>,
     lights: &[V3<T>; 2],
@@ -95,8 +95,12 @@ fn located<T: Real>(
     let grown = T::one() + target.raised_m / target.unit_m;
     let r = from * fit.e * (grown / sin);
     let g = by_cone(target, &fit.e, sin, fit.c) * grown;
-    let mut errors = *p;
-    let mut add = |v: &V3<T>, sigma: T| errors += v * v.transpose() * (sigma * sigma);
+    let (mut errors, mut common) = (p.whole + p.late, p.common + p.late);
+    let mut add = |v: &V3<T>, sigma: T| {
+        let more = v * v.transpose() * (sigma * sigma);
+        errors += more;
+        common += more;
+    };
     // The errors are added before the distance is fused, because they are common to direction and distance: 1 km of
     // limb height moves the position by r/a km and is often the largest term.
     add(&given.by_limb, target.limb_sigma_m / target.unit_m);
@@ -104,7 +108,8 @@ fn located<T: Real>(
     given.by_axis.iter().for_each(|v| add(v, target.radii_sigma_m / target.unit_m));
     lights.iter().for_each(|v| add(v, T::one()));
     let covariance = g * errors * g.transpose();
-    Located { r, p: covariance, free_r: r, free_p: covariance, turn: None }
+    let common = g * common * g.transpose();
+    Located { r, p: covariance, common, free_r: r, free_p: covariance, turn: None }
 }
 
 /// Returns the errors by light that changes along the limb, for a shift of one pixel. Without the direction to the Sun,
@@ -132,7 +137,7 @@ pub(crate) fn by_cone<T: Real>(target: &Target<T>, e: &V3<T>, sin: T, cos: T) ->
 pub(crate) fn with_range<T: Real>(free: &Located<T>, target: &Target<T>, sigma: T) -> Option<(Located<T>, T)> {
     let Located { r: start, p, .. } = *free;
     let (mut x, mut chi2) = (start, T::ZERO);
-    let mut covariance = p;
+    let (mut covariance, mut common) = (p, free.common);
     for _ in 0..ITERATIONS {
         let u = unit(&x)?;
         let distance = target.range_m(&u)? / target.unit_m;
@@ -143,9 +148,18 @@ pub(crate) fn with_range<T: Real>(free: &Located<T>, target: &Target<T>, sigma: 
         let innovation = distance - x.dot(&u) - u.dot(&(start - x));
         x = start + pu * (innovation / total);
         covariance = p - pu * pu.transpose() * (T::one() / total);
+        common = common_with_range(&free.common, &u, &(pu * (T::one() / total)), sigma);
         chi2 = innovation * innovation / total;
     }
-    Some((Located { r: x, p: covariance, ..*free }, chi2))
+    Some((Located { r: x, p: covariance, common, ..*free }, chi2))
+}
+
+/// Returns the common part after the fusion of the known distance: (I − k uᵀ) C (I − k uᵀ)ᵀ + k kᵀ σ². The error of the
+/// distance is common as the altitude of which it comes.
+fn common_with_range<T: Real>(common: &M3<T>, u: &V3<T>, gain: &V3<T>, sigma: T) -> M3<T> {
+    let along = common * u;
+    let crossed = gain * along.transpose();
+    common - crossed - crossed.transpose() + gain * gain.transpose() * (u.dot(&along) + sigma * sigma)
 }
 
 /// Returns the answer in scaled space for the gates: axis, half-angle and covariance that belong to a position.
@@ -163,11 +177,12 @@ fn answer<T: Real>(fitted: &Fused<T>, found: Located<T>, chi2: T, target: &Targe
     let (b1, b2) = basis(&e);
     // δe = (I − e eᵀ) U δr/‖U r‖.
     let (g1, g2) = (target.scaling.to * b1 * per_length, target.scaling.to * b2 * per_length);
-    let form = |a: &V3<T>, b: &V3<T>| a.dot(&(found.p * b));
+    let across = |p: &M3<T>| [g1.dot(&(p * g1)), g1.dot(&(p * g2)), g2.dot(&(p * g2))];
     Some(Fused {
         e,
         c,
-        p: [form(&g1, &g1), form(&g1, &g2), form(&g2, &g2)],
+        p: across(&found.p),
+        common: Some(across(&found.common)),
         // The fused distance is no half-angle; its derivative by the expected cosine does not exist.
         by_cos: [T::ZERO; 2],
         chi2,
@@ -181,6 +196,8 @@ pub(crate) struct Placed<T> {
     /// Axis in the camera frame with its covariance on the tangent basis.
     pub(crate) axis: V3<T>,
     pub(crate) p: [T; 3],
+    /// The part of `p` that the next picture shares.
+    pub(crate) common: Option<[T; 3]>,
     /// Half-angles of the limb in the camera frame: before and after the known distance was fused; radians.
     pub(crate) half_angles_rad: [T; 2],
     /// Altitude before the known distance was fused, and its 1-sigma, metres; `None` if there is only a direction.
@@ -198,14 +215,18 @@ pub(crate) fn place<T: Real>(fused: &Fused<T>, target: &Target<T>, mean_radius_m
     let length = |v: &V3<T>| v.dot(v).sqrt();
     let per = T::one() / length(&found.r);
     let (b1, b2) = basis(&axis);
-    let form = |a: &V3<T>, b: &V3<T>| a.dot(&(found.p * b)) * per * per;
+    let across = |p: &M3<T>| {
+        let form = |a: &V3<T>, b: &V3<T>| a.dot(&(p * b)) * per * per;
+        [form(&b1, &b1), form(&b1, &b2), form(&b2, &b2)]
+    };
     let free_u = unit(&free_r)?;
     let sigma_m = free_u.dot(&(found.free_p * free_u)).max(T::ZERO).sqrt() * unit_m;
     let p = found.p * (unit_m * unit_m);
     let body_fixed = target.body_fixed(&r);
     Some(Placed {
         axis,
-        p: [form(&b1, &b1), form(&b1, &b2), form(&b2, &b2)],
+        p: across(&found.p),
+        common: Some(across(&found.common)),
         half_angles_rad: [free_half_angle, half_angle],
         altitude_m: Some((target.altitude_m(&free_r, mean_radius_m), sigma_m)),
         position: Some(Position {
@@ -231,11 +252,14 @@ fn direction<T: Real>(fused: &Fused<T>, target: &Target<T>) -> Option<Placed<T>>
     // du = (I − u uᵀ) U⁻¹ de/‖U⁻¹ e‖; the small angle between u and the limb axis does not matter.
     let by = |b: &V3<T>| [&e1, &e2].map(|e| b.dot(&(target.scaling.from * e)) * per_length);
     let (g1, g2) = (by(&b1), by(&b2));
-    let [p11, p12, p22] = fused.p;
-    let form = |a: [T; 2], b: [T; 2]| a[0] * (p11 * b[0] + p12 * b[1]) + a[1] * (p12 * b[0] + p22 * b[1]);
+    let across = |[p11, p12, p22]: [T; 3]| {
+        let form = |a: [T; 2], b: [T; 2]| a[0] * (p11 * b[0] + p12 * b[1]) + a[1] * (p12 * b[0] + p22 * b[1]);
+        [form(g1, g1), form(g1, g2), form(g2, g2)]
+    };
     Some(Placed {
         axis,
-        p: [form(g1, g1), form(g1, g2), form(g2, g2)],
+        p: across(fused.p),
+        common: fused.common.map(across),
         half_angles_rad: [half_angle; 2],
         altitude_m: None,
         position: None,
