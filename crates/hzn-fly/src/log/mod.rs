@@ -283,7 +283,7 @@ mod tests {
             thread::sleep(FLUSH_INTERVAL / 50);
         }
         (0..4).for_each(|k| assert!(!log.add(record(answers + k)), "the flight software is told"));
-        assert_eq!(log.finish(), (0, answers as usize + 4));
+        assert_eq!(log.finish(), (0, answers + 4));
         let told = told.lock().unwrap();
         assert_eq!(told.len(), 1, "{told:?}");
         assert!(told[0].contains("the flight goes on without it"), "{told:?}");
