@@ -9,6 +9,7 @@
 
 mod apid;
 pub mod commands;
+mod doubts;
 pub mod exit;
 mod files;
 mod html;
@@ -17,7 +18,10 @@ mod refusals;
 mod setup;
 mod tell;
 
-use clap::Parser;
+use std::ffi::OsString;
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, FromArgMatches};
 
 use exit::Exit;
 
@@ -39,11 +43,39 @@ pub fn main() -> Exit {
 
 /// Parses the command line. clap itself prints help and usage errors, and exits with 0 or 2.
 fn parse() -> commands::Cli {
-    commands::Cli::try_parse().unwrap_or_else(|error| {
+    read(std::env::args_os()).unwrap_or_else(|error| {
         // clap prints refused arguments as they are, so it gets them once more without control characters.
-        let shown = std::env::args_os().map(|word| tell::one_line(word.to_string_lossy()));
-        commands::Cli::try_parse_from(shown).err().unwrap_or(error).exit()
+        let shown = std::env::args_os().map(|word| tell::one_line(word.to_string_lossy()).into());
+        let mut error = read(shown).err().unwrap_or(error);
+        name_commands(&mut error);
+        error.exit()
     })
+}
+
+/// Reads the words of a command line.
+fn read(words: impl Iterator<Item = OsString>) -> Result<commands::Cli, clap::Error> {
+    let mut command = with_negative_numbers(commands::Cli::command());
+    let matches = command.try_get_matches_from_mut(words)?;
+    commands::Cli::from_arg_matches(&matches).map_err(|e| e.format(&mut command))
+}
+
+/// Returns a command whose options take a negative number as their value. Without this, clap takes `-1` after `--jobs`
+/// for another option, and the message does not name the number as the fault.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let takes_value = |arg: &clap::Arg| !arg.is_positional() && arg.get_action().takes_values();
+    let command = command.mut_args(|arg| if takes_value(&arg) { arg.allow_negative_numbers(true) } else { arg });
+    command.mut_subcommands(with_negative_numbers)
+}
+
+/// Adds the list of commands to the error about an unknown one, unless the error has a suggestion.
+fn name_commands(error: &mut clap::Error) {
+    if error.kind() != ErrorKind::InvalidSubcommand || error.get(ContextKind::SuggestedSubcommand).is_some() {
+        return;
+    }
+    let command = commands::Cli::command();
+    let names: Vec<String> = command.get_subcommands().map(|c| c.get_name().to_owned()).collect();
+    let tip = format!("the commands are {}", names.join(", "));
+    error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
 }
 
 /// Makes a write beyond the limit of the file size (`ulimit -f`) an error with a message. Without this, a signal ends

@@ -66,7 +66,7 @@ impl Progress {
             self.last_line = Instant::now();
             let done = self.before + self.frames;
             let of = self.total.map(|n| format!(" of {n}")).unwrap_or_default();
-            tell::line(format_args!("{done}{of} pictures, {:.1} a second", self.rate()));
+            tell::line(format_args!("{done}{of} pictures, {}{}", self.speed(), self.time_left(done)));
         }
     }
 
@@ -89,6 +89,17 @@ impl Progress {
     pub(crate) fn any_unprocessed(&self) -> bool {
         let unprocessed = [Status::Unreadable, Status::NoAltitude];
         self.bodies.iter().any(|counts| unprocessed.iter().any(|s| counts[*s as usize] > 0))
+    }
+    /// Returns the speed: pictures a second, or seconds a picture if they take longer than one.
+    fn speed(&self) -> String {
+        let rate = self.rate();
+        if rate >= 1.0 { format!("{rate:.1} a second") } else { format!("{:.1} s each", 1.0 / rate.max(1e-9)) }
+    }
+    /// Returns the time that is left, if the number of pictures is known.
+    fn time_left(&self, done: u64) -> String {
+        let Some(left) = self.total.and_then(|n| n.checked_sub(done)) else { return String::new() };
+        let left_s = left as f64 / self.rate().max(1e-9);
+        if left_s < 90.0 { format!(", {left_s:.0} s left") } else { format!(", {:.0} min left", left_s / 60.0) }
     }
     fn rate(&self) -> f64 {
         self.frames as f64 / self.start.elapsed().as_secs_f64().max(1e-9)

@@ -8,8 +8,7 @@ use hzn_core::{Report, gates};
 use hzn_run::engine::Finished;
 use hzn_run::explain;
 
-/// The reason why a body was not found in a picture: the verdict on the fitted edge with the most inliers, or the
-/// status if no edge was fitted.
+/// The reason why a body was not found in a picture: the verdict on the best candidate, or the status if there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Why {
     Verdict(Verdict),
@@ -22,9 +21,7 @@ impl Why {
         if report.status == Status::Ok {
             return None;
         }
-        // Among edges with equally many inliers the first is used. It begins next to the longest dark stretch of the
-        // border.
-        let best = report.candidates.iter().rev().max_by_key(|c| c.inliers);
+        let best = explain::best_candidate(report);
         Some(best.map_or(Self::Status(report.status), |c| Self::Verdict(c.verdict)))
     }
 

@@ -114,11 +114,24 @@ fn find_place(places: &[KeyPlace], offset: usize) -> Option<&KeyPlace> {
 
 /// Converts an error of the TOML syntax.
 pub(crate) fn translate_syntax_error(error: &toml::de::Error, text: &str, path: &Path) -> Problem {
-    let problem = Problem::new(path, format!("not valid TOML: {}", error.message().replace('\n', "; ")));
+    let is_comma = error.span().is_some_and(|span| has_decimal_comma(text, span.start));
+    let why = if is_comma {
+        "a number has a decimal comma; write a point".to_owned()
+    } else {
+        error.message().replace('\n', "; ")
+    };
+    let problem = Problem::new(path, format!("not valid TOML: {why}"));
     match error.span() {
         Some(span) => problem.at_exactly(text, span.start),
         None => problem,
     }
+}
+
+/// Returns whether there is a comma between two digits at this byte or next to it.
+fn has_decimal_comma(text: &str, offset: usize) -> bool {
+    let bytes = text.as_bytes().get(offset.saturating_sub(2)..).unwrap_or_default();
+    let is_comma = |w: &[u8]| matches!(w, [a, b',', c] if a.is_ascii_digit() && c.is_ascii_digit());
+    bytes.get(..4.min(bytes.len())).unwrap_or_default().windows(3).any(is_comma)
 }
 
 /// Translates serde's error into the terms of the file. `extra_keys` are top-level keys that serde does not know.

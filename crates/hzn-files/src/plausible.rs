@@ -6,6 +6,7 @@
 use hzn_core::Config;
 use hzn_core::body;
 use hzn_core::camera::{self, Camera, Model};
+use hzn_core::image::region::{self, Region};
 use hzn_core::pixel::ImagePoint;
 
 /// A value that looks wrong.
@@ -31,7 +32,7 @@ const MAX_OFF_CENTRE: f64 = 0.2;
 /// Largest usual relative difference between the focal lengths along x and y, because pixels are square.
 const MAX_FOCAL_DIFFERENCE: f64 = 0.2;
 /// Largest usual field of view of a pinhole lens from side to side, in degrees.
-const MAX_PINHOLE_FOV_DEG: f64 = 150.0;
+pub(crate) const MAX_PINHOLE_FOV_DEG: f64 = 150.0;
 /// Largest usual field of view of a fisheye lens, in degrees.
 const MAX_FISHEYE_FOV_DEG: f64 = 250.0;
 /// Smallest usual field of view, in degrees. Telescopes have a smaller one, and no limb in view.
@@ -43,6 +44,13 @@ const MAX_TANGENTIAL: f64 = 0.05;
 const MAX_ALTITUDE_RADII: f64 = 40.0;
 /// Largest usual altitude above the Earth, in kilometres: just beyond geostationary orbit.
 pub(crate) const MAX_ALTITUDE_KM: f64 = 40_000.0;
+/// Altitudes of the Moon and of its orbiters above the Earth, in kilometres.
+const MOON_ALTITUDES_KM: std::ops::Range<f64> = 340_000.0..420_000.0;
+/// Largest relative difference of a radius from the Earth's for a sphere that stands for the Earth. Its semi-axes
+/// differ by 0.3 %.
+const MAX_EARTH_DIFFERENCE: f64 = 0.02;
+/// Number of pixels in a row and in a column of the picture that the check of the mask looks at.
+const MASK_SAMPLES: u16 = 32;
 
 /// Returns every value of a sensor that looks wrong.
 pub fn find_implausible(config: &Config) -> Vec<Implausible> {
@@ -53,6 +61,7 @@ pub fn find_implausible(config: &Config) -> Vec<Implausible> {
         let what = "is half a turn about the optical axis, because the scalar comes first; no rotation is [1, 0, 0, 0]";
         found.push(Implausible::new("mount.q_vehicle_from_camera_wxyz", what));
     }
+    found.extend(check_mask(config));
     let several = !config.bodies.is_empty();
     for (which, body) in (0u8..).zip(config.each_body()) {
         found.extend(check_body(body).map(|implausible| Implausible { body: several.then_some(which), ..implausible }));
@@ -71,12 +80,48 @@ pub(crate) fn max_altitude_km(body: body::Kind, radius_km: f64) -> f64 {
 }
 
 fn check_body(body: &body::Config) -> Option<Implausible> {
+    check_altitude(body).or_else(|| check_air(body))
+}
+
+fn check_altitude(body: &body::Config) -> Option<Implausible> {
     let km = body.altitude_km?;
     if let Some(what) = explain_unused_altitude(body.kind) {
         return Some(Implausible::new("body.altitude_km", what));
     }
     let is_far = km > max_altitude_km(body.kind, body.mean_radius_km());
-    is_far.then(|| Implausible::new("body.altitude_km", format!("{km} km is implausibly large: is it in metres?")))
+    is_far.then(|| Implausible::new("body.altitude_km", format!("{km} km {}", suspect_metres(body.kind, km))))
+}
+
+/// Returns the doubt about an altitude above [`max_altitude_km`].
+pub(crate) fn suspect_metres(body: body::Kind, km: f64) -> String {
+    let is_moon = matches!(body, body::Kind::Earth | body::Kind::EarthSphere) && MOON_ALTITUDES_KM.contains(&km);
+    let moon = if is_moon { " (for a camera as far away as the Moon it is right)" } else { "" };
+    format!("is implausibly large: is it in metres?{moon}")
+}
+
+/// Finds a sphere other than the Earth that has the limb height of the Earth's air.
+fn check_air(body: &body::Config) -> Option<Implausible> {
+    let earth = body::Config::default();
+    let radius_km = body.radius_km.filter(|r| (r / earth.mean_radius_km() - 1.0).abs() > MAX_EARTH_DIFFERENCE)?;
+    if body.kind != body::Kind::Sphere || body.limb_height_km != earth.limb_height_km {
+        return None;
+    }
+    let what = format!(
+        "{} km is the default, for the Earth's air: a body without air has {}",
+        earth.limb_height_km,
+        airless_limb(radius_km).replace('\n', ", ").trim_end_matches(", ")
+    );
+    Some(Implausible::new("body.limb_height_km", what))
+}
+
+/// Returns the keys of `[body]` for the limb of a body without air, with this radius in kilometres: the height of its
+/// relief is uncertain, and overexposure does not raise the limb.
+pub(crate) fn airless_limb(radius_km: f64) -> String {
+    let body = body::Config::of_kind(body::Kind::Ellipsoid, Some([radius_km; 3]));
+    format!(
+        "limb_height_km = {:.1}\nlimb_height_sigma_km = {:.1}\nclipped_height_km = {:.1}\nclipped_sigma_km = {:.1}\n",
+        body.limb_height_km, body.limb_height_sigma_km, body.clipped_height_km, body.clipped_sigma_km
+    )
 }
 
 /// Returns the warning for an altitude of the Sun or the Moon, whose half-angle does not depend on it. The result is
@@ -85,12 +130,37 @@ pub fn explain_unused_altitude(body: body::Kind) -> Option<String> {
     match body {
         body::Kind::Moon => Some(format!(
             "is not used: kind = \"moon\" is the Moon as a disc of half a degree, as seen from near the Earth; for a \
-             camera in orbit around the Moon write kind = \"sphere\" and radius_km = {}",
-            body::MOON_RADIUS_KM
+             camera in orbit around the Moon write kind = \"sphere\", radius_km = {}, {} (`hzn init --body moon` does)",
+            body::MOON_RADIUS_KM,
+            airless_limb(body::MOON_RADIUS_KM).replace('\n', ", ").trim_end_matches(", ")
         )),
         body::Kind::Sun => Some("is not used: kind = \"sun\" is the Sun as a disc of half a degree".to_owned()),
         _ => None,
     }
+}
+
+/// Finds a mask that covers everything, and polygons that cover nothing.
+fn check_mask(config: &Config) -> Option<Implausible> {
+    let (w, h) = (config.camera.width, config.camera.height);
+    let is_outside = |polygon: &region::Polygon| {
+        let all = |f: &dyn Fn(&[f64; 2]) -> bool| polygon.iter().all(f);
+        all(&|c| c[0] < 0.0) || all(&|c| c[1] < 0.0) || all(&|c| c[0] > f64::from(w)) || all(&|c| c[1] > f64::from(h))
+    };
+    let polygons = &config.mask.polygons_px;
+    if let Some(which) = polygons.iter().position(is_outside) {
+        let what = format!("polygon {} lies outside of the picture of {w} x {h} px and masks nothing", which + 1);
+        return Some(Implausible::new("mask.polygons_px", what));
+    }
+    if polygons.is_empty() {
+        return None;
+    }
+    let camera = Camera::<f64>::try_new(&config.camera).ok()?;
+    let region = Region::new(&config.mask, &camera);
+    let place = |i: u16, side: u16| (u32::from(i) * u32::from(side.saturating_sub(1)) / u32::from(MASK_SAMPLES)) as u16;
+    let sampled = (0..=MASK_SAMPLES).flat_map(|i| (0..=MASK_SAMPLES).map(move |j| (place(i, w), place(j, h))));
+    let covers = sampled.filter(|(x, y)| region.contains(*x, *y)).all(|(x, y)| region.masked(x, y));
+    let what = "covers the whole picture, so that nothing can be found; a polygon covers the parts to leave out";
+    covers.then(|| Implausible::new("mask.polygons_px", what))
 }
 
 fn check_camera(c: &camera::Config) -> Vec<Implausible> {
@@ -299,16 +369,44 @@ mod tests {
     }
 
     #[test]
+    fn the_air_of_the_earth_around_another_sphere_is_reported() {
+        let sphere = |radius_km, limb_height_km| {
+            let kind = body::Kind::Sphere;
+            let body = body::Config { kind, radius_km: Some(radius_km), limb_height_km, ..body::Config::default() };
+            check_body(&body).map(|d| d.what).unwrap_or_default()
+        };
+        let moon = sphere(1737.4, 17.0);
+        assert!(moon.contains("a body without air has limb_height_km = 0.0, limb_height_sigma_km = 5.2, "), "{moon}");
+        assert_eq!(sphere(1737.4, 0.0) + &sphere(6371.0, 17.0), "");
+    }
+
+    #[test]
+    fn a_mask_of_everything_or_nothing_is_reported() {
+        let mut config = Config::new(camera(Model::Pinhole, [640, 480], [600.0; 2], [319.5, 239.5], &[]));
+        let mut with = |corners: &[[f64; 2]]| {
+            config.mask.polygons_px = [corners.iter().copied().collect()].into_iter().collect();
+            find_implausible(&config).first().map(|d| d.what.clone()).unwrap_or_default()
+        };
+        let box_of = |x: f64, y: f64, w: f64, h: f64| [[x, y], [x + w, y], [x + w, y + h], [x, y + h]];
+        assert!(with(&box_of(-1.0, -1.0, 642.0, 482.0)).starts_with("covers the whole picture"));
+        assert!(with(&box_of(700.0, 0.0, 100.0, 100.0)).starts_with("polygon 1 lies outside of the picture"));
+        assert_eq!(with(&box_of(0.0, 0.0, 640.0, 400.0)) + &with(&box_of(600.0, 0.0, 100.0, 100.0)), "");
+    }
+
+    #[test]
     fn altitudes_in_metres_and_of_the_moon_are_reported() {
         let with = |kind, km| {
             let radius_km = (kind == body::Kind::Sphere).then_some(1737.4);
             let body = body::Config { kind, radius_km, altitude_km: Some(km), ..body::Config::default() };
-            check_body(&body).map(|d| d.what).unwrap_or_default()
+            check_altitude(&body).map(|d| d.what).unwrap_or_default()
         };
         assert_eq!(with(body::Kind::Earth, 35_786.0) + &with(body::Kind::Sphere, 100.0), "");
-        assert!(with(body::Kind::Earth, 230_000.0).contains("is it in metres?"));
+        assert!(with(body::Kind::Earth, 230_000.0).ends_with("is it in metres?"));
+        assert!(with(body::Kind::Earth, 378_000.0).ends_with("as far away as the Moon it is right)"));
         assert!(with(body::Kind::Sphere, 100_000.0).contains("is it in metres?"));
-        assert!(with(body::Kind::Moon, 100.0).contains("write kind = \"sphere\" and radius_km = 1737.4"));
+        assert!(
+            with(body::Kind::Moon, 100.0).contains("write kind = \"sphere\", radius_km = 1737.4, limb_height_km = 0.0")
+        );
         assert!(with(body::Kind::Sun, 400.0).contains("is not used"));
     }
 }

@@ -20,40 +20,21 @@
 
 use core::fmt::Write as _;
 
+use hzn_core::body::MOON_RADIUS_KM;
 use hzn_core::camera::Model;
+
+pub use crate::exif_lens::Exif;
+use crate::exif_lens::{EXIF_PERCENT, Focal, SQRT_3};
+use crate::plausible::{MAX_PINHOLE_FOV_DEG, airless_limb};
 
 /// 1-sigma of a series lens's focal length, in percent: uniform within ± 5 %.
 const STATED_PERCENT: f64 = 5.0 / SQRT_3;
-/// 1-sigma of the focal length in EXIF, in percent: uniform within ± 10 %.
-const EXIF_PERCENT: f64 = 10.0 / SQRT_3;
-const SQRT_3: f64 = 1.732_050_807_568_877_2;
 /// 1-sigma of the principal point, as a fraction of the width.
 const CENTRE_FRACTION: f64 = 0.015;
 /// 1-sigma of an altitude that is given once for all pictures, as a fraction of it. Orbits are not circular.
 const ALTITUDE_FRACTION: f64 = 0.02;
-/// Sides of the 35 mm film, in millimetres.
-const FILM_MM: [f64; 2] = [36.0, 24.0];
 /// Largest stated field of view, in degrees, for which a pinhole is assumed if the lens is not given.
 const MAX_PINHOLE_DEFAULT_DEG: f64 = 90.0;
-
-/// EXIF data of a picture about the lens; every field may be missing.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Exif {
-    /// Maker's name of the camera.
-    pub camera: Option<String>,
-    /// `FocalLength`, in millimetres.
-    pub focal_mm: Option<f64>,
-    /// `FocalLengthIn35mmFilm`, in millimetres.
-    pub focal_35mm_mm: Option<f64>,
-    /// `FocalPlaneXResolution`, converted to pixels per millimetre on the sensor.
-    pub plane_px_per_mm: Option<f64>,
-    /// `PixelXDimension`: columns of the picture as the camera wrote it. A picture with another width was scaled later.
-    pub columns: Option<f64>,
-    /// `DigitalZoomRatio`, if the camera enlarged its picture.
-    pub digital_zoom: Option<f64>,
-    /// Whether a viewer turns the picture by 90 degrees (`Orientation` 5 to 8).
-    pub turned: bool,
-}
 
 /// Known properties of a camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,6 +50,18 @@ pub struct CameraFacts {
     pub exif: Exif,
     /// Altitude of all pictures, in kilometres.
     pub altitude_km: Option<f64>,
+    /// The body in the pictures.
+    pub body: Body,
+}
+
+/// The body in the pictures of a camera without a calibration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Body {
+    /// The Earth.
+    #[default]
+    Earth,
+    /// The Moon as an orbiter or a lander sees it.
+    Moon,
 }
 
 /// A sensor.toml to start from, with its main values.
@@ -109,50 +102,6 @@ fn fov_deg(lens: Model, width: f64, focal_px: f64) -> f64 {
     2.0 * half.to_degrees()
 }
 
-/// A focal length in pixels with its 1-sigma in percent and its source.
-#[derive(Debug, Clone, PartialEq)]
-struct Focal {
-    px: f64,
-    percent: f64,
-    from: String,
-}
-
-impl Exif {
-    /// Returns the focal length from EXIF for a picture of this size (pixels).
-    fn focal(&self, [width, height]: [f64; 2]) -> Option<Focal> {
-        let sound = |x: Option<f64>| x.filter(|x| x.is_finite() && *x > 0.0);
-        if let (Some(mm), Some(px_per_mm)) = (sound(self.focal_mm), sound(self.plane_px_per_mm)) {
-            let scale =
-                sound(self.columns).map_or(1.0, |columns| width / columns) * sound(self.digital_zoom).unwrap_or(1.0);
-            let px = mm * px_per_mm * scale;
-            let pitch_um = 1e3 / (px_per_mm * scale);
-            // Some programs write wrong values there. No sensor has pixels below half a micrometre or above 0.1 mm.
-            if (0.5..100.0).contains(&pitch_um) {
-                return Some(Focal {
-                    px,
-                    percent: EXIF_PERCENT,
-                    from: format!("EXIF: {mm} mm, pixels of {pitch_um:.2} um"),
-                });
-            }
-        }
-        let mm = sound(self.focal_35mm_mm)?;
-        // The 35 mm equivalent compares diagonals. A picture wider than the film is cropped in height and keeps its
-        // width.
-        let [film_width, film_height] = FILM_MM;
-        let px = if width * film_height > height * film_width {
-            mm * width / film_width
-        } else {
-            mm * width.hypot(height) / film_width.hypot(film_height)
-        };
-        let rounded = 100.0 * 0.5 / mm / SQRT_3;
-        Some(Focal {
-            px,
-            percent: EXIF_PERCENT.hypot(rounded),
-            from: format!("EXIF: equivalent to {mm} mm on 35 mm film"),
-        })
-    }
-}
-
 /// Writes a sensor.toml that works at once. Values that are not measured have a sigma.
 ///
 /// # Errors
@@ -160,18 +109,7 @@ impl Exif {
 /// be given.
 pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
     let [width, height] = facts.size_px.map(f64::from);
-    if let Some(fov) = facts.fov_deg.filter(|f| !(*f > 0.1 && *f <= 300.0)) {
-        return Err(format!("--fov {fov}: must lie between 0.1 and 300 degrees"));
-    }
-    let lens = match (facts.lens, facts.fov_deg) {
-        (Some(lens), _) => lens,
-        (None, Some(fov)) if fov > MAX_PINHOLE_DEFAULT_DEG => {
-            return Err(format!(
-                "--fov {fov}: a lens of this width may be a fisheye or a pinhole; add --lens fisheye or --lens pinhole"
-            ));
-        }
-        (None, _) => Model::Pinhole,
-    };
+    let lens = choose_lens(facts.lens, facts.fov_deg)?;
     let exif = facts.exif.focal([width, height]);
     let stated = facts.fov_deg.map(|fov| {
         let px = focal_px(lens, width, fov)
@@ -197,13 +135,39 @@ pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
     Ok(StartConfig { text, ..start })
 }
 
+/// Chooses the lens: a pinhole, unless it is given.
+fn choose_lens(given: Option<Model>, fov_deg: Option<f64>) -> Result<Model, String> {
+    let Some(fov) = fov_deg else { return Ok(given.unwrap_or(Model::Pinhole)) };
+    if !(fov > 0.1 && fov <= 300.0) {
+        return Err(format!("--fov {fov}: must lie between 0.1 and 300 degrees"));
+    }
+    match given {
+        Some(Model::Pinhole) if fov > MAX_PINHOLE_FOV_DEG => Err(format!(
+            "--fov {fov}: a pinhole lens sees at most {MAX_PINHOLE_FOV_DEG} degrees; a lens of this width is a \
+             fisheye: --lens fisheye"
+        )),
+        None if fov > MAX_PINHOLE_FOV_DEG => {
+            Err(format!("--fov {fov}: a lens of this width is a fisheye; add --lens fisheye"))
+        }
+        None if fov > MAX_PINHOLE_DEFAULT_DEG => Err(format!(
+            "--fov {fov}: a lens of this width may be a fisheye or a pinhole; add --lens fisheye or --lens pinhole"
+        )),
+        given => Ok(given.unwrap_or(Model::Pinhole)),
+    }
+}
+
 /// The chosen focal length, warnings, and a note about the other focal length.
 type Chosen = (Focal, Vec<String>, Option<String>);
 
 /// Chooses the focal length: a stated field of view overrides EXIF, which is only compared with it.
-fn choose_focal(stated: Option<Focal>, exif: Option<Focal>, lens: Model, width: f64) -> Result<Chosen, String> {
+fn choose_focal(
+    stated: Option<Focal>,
+    exif: Result<Focal, Option<String>>,
+    lens: Model,
+    width: f64,
+) -> Result<Chosen, String> {
     match (stated, exif) {
-        (Some(stated), Some(exif)) => {
+        (Some(stated), Ok(exif)) => {
             let off_percent = 100.0 * (exif.px / stated.px - 1.0);
             let other = fov_deg(lens, width, exif.px);
             let comparison = format!("{}: {:.1} px, {other:.1} degrees wide ({off_percent:+.1} %)", exif.from, exif.px);
@@ -217,12 +181,14 @@ fn choose_focal(stated: Option<Focal>, exif: Option<Focal>, lens: Model, width: 
             };
             Ok((stated, warnings, Some(comparison)))
         }
-        (Some(stated), None) => Ok((stated, Vec::new(), None)),
-        (None, Some(exif)) => Ok((exif, Vec::new(), None)),
-        (None, None) => {
-            Err("the picture has no focal length (EXIF); add the field of view over the whole width, for example \
-                 --fov 60, and --lens fisheye or --lens pinhole"
-                .into())
+        (Some(stated), Err(_)) => Ok((stated, Vec::new(), None)),
+        (None, Ok(exif)) => Ok((exif, Vec::new(), None)),
+        (None, Err(why)) => {
+            let why = why.unwrap_or_else(|| "the picture has no focal length (EXIF)".to_owned());
+            Err(format!(
+                "{why}; add the field of view over the whole width, for example --fov 60, and --lens fisheye or \
+                 --lens pinhole"
+            ))
         }
     }
 }
@@ -249,7 +215,7 @@ fn write_text(
     text += &write_camera_model(facts, start);
     text += &write_focal_and_centre(facts, start, focal, comparison);
     text += &write_camera_sigmas(start, focal, shape_percent);
-    text += &write_body(facts.altitude_km);
+    text += &write_body(facts.body, facts.altitude_km);
     text
 }
 
@@ -315,10 +281,19 @@ fn write_camera_sigmas(start: &StartConfig, focal: &Focal, shape_percent: f64) -
 }
 
 /// Writes `[body]` with the altitude, or with a comment that says where altitudes belong.
-fn write_body(altitude_km: Option<f64>) -> String {
-    let mut t = String::from(
-        "\n[body]\nkind = \"earth\"                 # earth (WGS-84) | earth-sphere | sun | moon | sphere\n",
-    );
+fn write_body(body: Body, altitude_km: Option<f64>) -> String {
+    let mut t = match body {
+        Body::Earth => {
+            "\n[body]\nkind = \"earth\"                 # earth (WGS-84) | earth-sphere | sun | moon | sphere\n"
+                .to_owned()
+        }
+        // `kind = "moon"` is the disc in the sky of the Earth.
+        Body::Moon => format!(
+            "\n[body]\nkind = \"sphere\"                # the Moon, from near it\nradius_km = {MOON_RADIUS_KM}\n\
+             # There is no air: the limb is as high as its hills, and overexposure does not raise it.\n{}",
+            airless_limb(MOON_RADIUS_KM)
+        ),
+    };
     let _ = match altitude_km {
         Some(km) => write!(
             t,
@@ -343,7 +318,7 @@ mod tests {
     use super::*;
 
     fn known(fov_deg: Option<f64>, lens: Option<Model>, exif: Exif) -> CameraFacts {
-        CameraFacts { size_px: [4928, 2768], fov_deg, lens, exif, altitude_km: Some(418.0) }
+        CameraFacts { size_px: [4928, 2768], fov_deg, lens, exif, altitude_km: Some(418.0), body: Body::Earth }
     }
 
     /// The Nikon D4 on the ISS, 20 November 2020.
@@ -375,6 +350,16 @@ mod tests {
     }
 
     #[test]
+    fn the_moon_has_no_air() {
+        let moon = CameraFacts { body: Body::Moon, ..known(Some(40.0), None, Exif::default()) };
+        let start = write_sensor_toml(&moon).unwrap();
+        let sensor = crate::sensor::parse(&start.text, Path::new("s.toml")).unwrap();
+        let body = &sensor.config.body;
+        assert_eq!((body.mean_radius_km(), body.limb_height_km, body.clipped_height_km), (1737.4, 0.0, 0.0));
+        assert!(sensor.warnings.is_empty(), "{:?}", sensor.warnings);
+    }
+
+    #[test]
     fn exif_gives_the_nominal_focal_length_by_either_way() {
         let start = write_sensor_toml(&known(None, None, d4())).unwrap();
         assert!((start.focal_px - 7666.0).abs() < 1.0, "{}", start.focal_px);
@@ -396,6 +381,21 @@ mod tests {
     }
 
     #[test]
+    fn the_pitch_of_a_picture_that_was_made_smaller_is_refused() {
+        // 5.8 mm and pixels of 1.55 um, over 960 px instead of 4608.
+        let small = Exif { focal_mm: Some(5.8), plane_px_per_mm: Some(645.0), columns: Some(960.0), ..Exif::default() };
+        let start = |exif| write_sensor_toml(&CameraFacts { size_px: [960, 720], ..known(None, None, exif) });
+        let refused = start(small.clone()).unwrap_err();
+        assert!(refused.contains("would be a sensor of 1.5 mm") && refused.contains("--fov 60"), "{refused}");
+        // The equivalent on film contradicts the pitch, and does not depend on the size of the picture.
+        let film = start(Exif { focal_35mm_mm: Some(28.0), ..small.clone() }).unwrap();
+        assert!((film.focal_px - 28.0 * 1200.0 / 43.267).abs() < 1.0, "{}", film.focal_px);
+        // A small sensor that is confirmed.
+        let confirmed = start(Exif { focal_35mm_mm: Some(135.0), ..small }).unwrap();
+        assert!((confirmed.focal_px - 5.8 * 645.0).abs() < 1.0, "{}", confirmed.focal_px);
+    }
+
+    #[test]
     fn a_contradiction_is_reported_and_agreement_is_not() {
         let both = |fov| write_sensor_toml(&known(Some(fov), None, d4())).unwrap();
         // EXIF: 35.6 degrees over the width.
@@ -412,7 +412,8 @@ mod tests {
         let refused = |fov, lens, exif| write_sensor_toml(&known(fov, lens, exif)).unwrap_err();
         assert!(refused(None, None, Exif::default()).contains("--fov"));
         assert!(refused(Some(92.0), None, Exif::default()).contains("--lens"));
-        assert!(refused(Some(180.0), Some(Model::Pinhole), Exif::default()).contains("below 180"));
+        assert!(refused(Some(179.9), Some(Model::Pinhole), Exif::default()).contains("at most 150 degrees"));
+        assert!(refused(Some(190.0), None, Exif::default()).ends_with("is a fisheye; add --lens fisheye"));
         assert!(refused(Some(f64::NAN), None, Exif::default()).contains("between"));
         assert!(refused(Some(0.0), None, Exif::default()).contains("between"));
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use hzn_core::camera::{self, Config, Model, Ray};
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
-use hzn_files::{camera_file, sensor};
+use hzn_files::{camera_file, plausible, sensor};
 use numpy::ndarray::{Array2, Array3, ArrayView2, Axis};
 use numpy::{AllowTypeChange, PyArray2, PyArray3, PyArrayLike2, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;
@@ -27,6 +27,19 @@ impl Camera {
         Ok(Self { config, lens })
     }
 
+    fn from_keys(py: Python<'_>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let sections = PyDict::new(py);
+        sections.set_item("camera", keys.map_or_else(|| PyDict::new(py), Clone::clone))?;
+        Self::from_config(parameters::config(&sections)?.camera)
+    }
+
+    /// Returns the camera after a warning for each value that looks wrong, for example if width and height are swapped.
+    fn warned(self, py: Python<'_>) -> PyResult<Self> {
+        let doubts = plausible::find_implausible(&hzn_core::Config::new(self.config.clone()));
+        doubts.iter().try_for_each(|doubt| errors::warn(py, format_args!("{}: {}", doubt.key, doubt.what)))?;
+        Ok(self)
+    }
+
     /// Returns `then` of the ray of each of n points. A row is NaN outside the field of view of the lens or if `then`
     /// is `None`.
     fn each_ray<'py, const N: usize>(
@@ -46,22 +59,20 @@ impl Camera {
     #[new]
     #[pyo3(signature = (**keys))]
     fn new(py: Python<'_>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let sections = PyDict::new(py);
-        sections.set_item("camera", keys.map_or_else(|| PyDict::new(py), Clone::clone))?;
-        Self::from_config(parameters::config(&sections)?.camera)
+        Self::from_keys(py, keys)?.warned(py)
     }
 
     #[doc = doc!("Camera.from_toml")]
     #[staticmethod]
-    fn from_toml(path: PathBuf) -> PyResult<Self> {
-        Self::from_config(sensor::load(&path).map_err(errors::config)?.config.camera)
+    fn from_toml(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        Self::from_config(sensor::load(&path).map_err(errors::config)?.config.camera)?.warned(py)
     }
 
     #[doc = doc!("Camera.from_kalibr")]
     #[staticmethod]
     #[pyo3(signature = (path, *, camera = None))]
-    fn from_kalibr(path: PathBuf, camera: Option<&str>) -> PyResult<Self> {
-        Self::from_config(camera_file::load(&path, camera).map_err(errors::config)?)
+    fn from_kalibr(py: Python<'_>, path: PathBuf, camera: Option<&str>) -> PyResult<Self> {
+        Self::from_config(camera_file::load(&path, camera).map_err(errors::config)?)?.warned(py)
     }
 
     #[doc = doc!("Camera.from_opencv")]
@@ -74,7 +85,7 @@ impl Camera {
         fisheye: bool,
     ) -> PyResult<Self> {
         if let Ok(path) = source.extract::<PathBuf>() {
-            return Self::from_config(camera_file::load(&path, None).map_err(errors::config)?);
+            return Self::from_config(camera_file::load(&path, None).map_err(errors::config)?)?.warned(source.py());
         }
         let matrix = rows(source, 3, "camera matrix")?;
         let m = matrix.as_array();
@@ -104,7 +115,7 @@ impl Camera {
         }
         let ideal = Config::ideal(model, width, height, fx_px);
         let k = k.into_iter().collect();
-        Self::from_config(Config { fx_px, fy_px, cx_px, cy_px, k, ..ideal })
+        Self::from_config(Config { fx_px, fy_px, cx_px, cy_px, k, ..ideal })?.warned(source.py())
     }
 
     #[doc = doc!("Camera.parameters")]
@@ -190,7 +201,7 @@ impl Camera {
     }
     #[staticmethod]
     fn _of(keys: &Bound<'_, PyDict>) -> PyResult<Self> {
-        Self::new(keys.py(), Some(keys))
+        Self::from_keys(keys.py(), Some(keys))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Cells of a row as arrays; `None` if a cell is empty.
 
-use numpy::ndarray::{arr1, arr2};
+use numpy::ndarray::{Array2, arr1, arr2};
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 
@@ -15,4 +15,9 @@ pub(crate) fn symmetric(py: Python<'_>, upper: [Option<f64>; 6]) -> Option<Bound
 pub(crate) fn vector<'py>(py: Python<'py>, xyz: [Option<f64>; 3]) -> Option<Bound<'py, PyArray1<f64>>> {
     let [Some(x), Some(y), Some(z)] = xyz else { return None };
     Some(arr1(&[x, y, z]).to_pyarray(py))
+}
+
+/// Returns rows of numbers as an array of shape (n, N).
+pub(crate) fn table<'py, const N: usize>(py: Python<'py>, rows: &[[f64; N]]) -> Bound<'py, PyArray2<f64>> {
+    Array2::from_shape_fn((rows.len(), N), |(i, j)| rows[i][j]).to_pyarray(py)
 }

@@ -5,6 +5,7 @@ use hzn_core::image::{Channel, ImageView, Layout, Pixels};
 use hzn_run::source::picture;
 use numpy::ndarray::{Array3, ArrayView3, ArrayViewD, Axis, Ix2, Ix3};
 use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::intern;
 use pyo3::prelude::*;
 
 use crate::errors;
@@ -21,9 +22,19 @@ impl<'py> Array<'py> {
     /// Takes an array of uint8 or uint16 with the shape (height, width) or (height, width, 1 to 4).
     pub(crate) fn from_object(object: &Bound<'py, PyAny>) -> PyResult<Self> {
         let Ok(untyped) = object.cast::<PyUntypedArray>() else {
+            if object.is_none() {
+                let what = "the picture is None: cv2.imread returns None for a file that it cannot read";
+                return Err(errors::image(what));
+            }
             let name = object.get_type().name().map(|n| n.to_string()).unwrap_or_default();
             return Err(errors::image(format!("a numpy array is expected, not {name}: numpy.asarray(...) makes one")));
         };
+        if object.hasattr(intern!(object.py(), "mask"))? {
+            return Err(errors::image(
+                "the array is masked, and its mask would be ignored: leave areas out with mask.polygons_px of the \
+                 sensor, and pass image.data",
+            ));
+        }
         let shape = untyped.shape().to_vec();
         if !matches!(shape[..], [_, _] | [_, _, 1..=4]) {
             return Err(errors::image(format!(

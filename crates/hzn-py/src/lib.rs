@@ -21,6 +21,7 @@ mod image;
 mod locate;
 mod nav;
 mod notebook;
+mod numbered;
 mod overlay;
 mod parameters;
 mod pickled;
@@ -48,6 +49,8 @@ mod _hzn {
     use crate::locate::locate;
     #[pymodule_export]
     use crate::nav::{Filter, celestial, fuse, triad_of, wahba_of};
+    #[pymodule_export]
+    use crate::numbered::number;
     #[pymodule_export]
     use crate::overlay::overlay;
     #[pymodule_export]

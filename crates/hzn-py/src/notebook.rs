@@ -9,12 +9,14 @@ use crate::errors;
 
 /// Longest side of a picture in a notebook, in pixels.
 const MAX_SIDE_PX: u32 = 960;
+/// Quality of its JPEG, of 100. A notebook keeps every output, and a PNG of a noisy picture has a megabyte.
+const QUALITY: u8 = 80;
 
 /// Returns the table of these rows, next to the picture if there is one.
-pub(crate) fn to_html<'a>(png: Option<Vec<u8>>, rows: impl Iterator<Item = &'a Row>) -> String {
+pub(crate) fn to_html<'a>(jpeg: Option<Vec<u8>>, rows: impl Iterator<Item = &'a Row>) -> String {
     let mut html = String::from("<div style=\"display:flex;gap:1em;align-items:start\">");
-    if let Some(png) = png {
-        html += &format!("<img style=\"max-width:60%\" src=\"data:image/png;base64,{}\">", STANDARD.encode(png));
+    if let Some(jpeg) = jpeg {
+        html += &format!("<img style=\"max-width:60%\" src=\"data:image/jpeg;base64,{}\">", STANDARD.encode(jpeg));
     }
     html += "<table>";
     for row in rows {
@@ -49,8 +51,8 @@ fn cells(r: &Row) -> Vec<(&'static str, String)> {
     rows
 }
 
-/// Encodes a picture as PNG; a large one is made smaller.
-pub(crate) fn to_png(picture: &image::RgbImage) -> PyResult<Vec<u8>> {
+/// Encodes a picture as JPEG; a large one is made smaller.
+pub(crate) fn to_jpeg(picture: &image::RgbImage) -> PyResult<Vec<u8>> {
     let (w, h) = picture.dimensions();
     let small = (w.max(h) > MAX_SIDE_PX).then(|| {
         let scale = f64::from(MAX_SIDE_PX) / f64::from(w.max(h));
@@ -59,7 +61,8 @@ pub(crate) fn to_png(picture: &image::RgbImage) -> PyResult<Vec<u8>> {
     });
     let mut bytes = std::io::Cursor::new(Vec::new());
     let shown = small.as_ref().unwrap_or(picture);
-    shown.write_to(&mut bytes, image::ImageFormat::Png).map_err(errors::other)?;
+    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, QUALITY);
+    shown.write_with_encoder(encoder).map_err(errors::other)?;
     Ok(bytes.into_inner())
 }
 

@@ -16,7 +16,7 @@ pub(crate) fn overlay<'py>(
     report: &Report,
     bits: Option<u8>,
 ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-    let drawn = drawing::draw(py, image, &report.drawing_of_all(), &report.title(), bits)?;
+    let drawn = drawing::draw(py, image, &report.drawing_of_all(), &report.title(), bits, report.camera.as_deref())?;
     let (width, height) = (drawn.width() as usize, drawn.height() as usize);
     Ok(Array3::from_shape_vec((height, width, 3), drawn.into_raw()).map_err(errors::image)?.into_pyarray(py))
 }

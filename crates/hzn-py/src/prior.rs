@@ -52,6 +52,18 @@ impl Prior {
     }
 }
 
+impl Prior {
+    /// Issues a warning for each value that is possible but looks wrong, as `hzn run` does for a frames.csv. The texts
+    /// name arguments instead of columns.
+    pub(crate) fn tell_doubts(&self, py: Python<'_>, config: &hzn_core::Config) -> PyResult<()> {
+        for doubt in self.data.check_sensor(config) {
+            let named = doubt.replace("x_km, y_km, z_km", "position_km").replace("qw, qx, qy, qz", "attitude");
+            errors::warn(py, named)?;
+        }
+        Ok(())
+    }
+}
+
 fn number(x: Option<f64>) -> Option<f64> {
     x.filter(|x| !x.is_nan())
 }

@@ -8,12 +8,12 @@ use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, Row};
 use hzn_run::engine::Trace;
-use numpy::{PyArray1, PyArray2, ToPyArray, ndarray::Array2};
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyWeakrefMethods, PyWeakrefReference};
 
 use crate::camera::Camera;
-use crate::cells::{symmetric, vector};
+use crate::cells::{symmetric, table, vector};
 use crate::pickled::{Detail, Pickled};
 use crate::{drawing, errors, notebook, parameters};
 
@@ -24,21 +24,21 @@ type Reduced = (Py<PyAny>, (Py<PyBytes>, Vec<Py<Report>>));
 #[pyclass(frozen, module = "hzn", weakref)]
 pub(crate) struct Report {
     pub(crate) row: Row,
-    candidates: Vec<CandidateEdge>,
-    camera: Option<Arc<Camera>>,
+    pub(crate) candidates: Vec<CandidateEdge>,
+    pub(crate) camera: Option<Arc<Camera>>,
     /// Half-angle of the limb that was fitted, in radians.
-    half_angle_rad: Option<f64>,
+    pub(crate) half_angle_rad: Option<f64>,
     /// The answer, if it has a position: its limb is not that of a cone.
-    placed: Option<Box<hzn_core::Solution<f64>>>,
+    pub(crate) placed: Option<Box<hzn_core::Solution<f64>>>,
     /// Edges and points, if they were requested or recorded.
-    detail: Option<Detail>,
+    pub(crate) detail: Option<Detail>,
     /// Annotations, computed on first use, because tracing the limb takes longer than processing the picture.
-    drawing: OnceLock<Annotations>,
-    stage: Cow<'static, str>,
-    others: Vec<Py<Self>>,
+    pub(crate) drawing: OnceLock<Annotations>,
+    pub(crate) stage: Cow<'static, str>,
+    pub(crate) others: Vec<Py<Self>>,
     /// The picture, while another object keeps it alive.
-    image: Option<Py<PyWeakrefReference>>,
-    bits: Option<u8>,
+    pub(crate) image: Option<Py<PyWeakrefReference>>,
+    pub(crate) bits: Option<u8>,
 }
 
 impl Report {
@@ -152,13 +152,10 @@ impl Report {
     }
 
     fn require_detail(&self, what: &str) -> PyResult<&Detail> {
-        let missing = || errors::other(format!("{what} are kept only by process(image, detail=True)"));
-        self.detail.as_ref().ok_or_else(missing)
+        self.detail
+            .as_ref()
+            .ok_or_else(|| errors::other(format!("{what} are kept only by process(image, detail=True)")))
     }
-}
-
-fn table<'py, const N: usize>(py: Python<'py>, rows: &[[f64; N]]) -> Bound<'py, PyArray2<f64>> {
-    Array2::from_shape_fn((rows.len(), N), |(i, j)| rows[i][j]).to_pyarray(py)
 }
 
 #[pymethods]
@@ -418,6 +415,9 @@ impl Report {
             ..Self::from_row(pickled.row)
         })
     }
+    fn __bool__(&self) -> bool {
+        self.ok()
+    }
     /// Returns the report itself, because it never changes.
     fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
         slf
@@ -441,10 +441,11 @@ impl Report {
     /// Shows the numbers in a notebook, next to the picture with all annotations.
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
         let image = self.image.as_ref().and_then(|w| w.bind(py).upgrade());
-        let png = image.map(|image| {
-            let rgb = drawing::draw(py, &image, &self.drawing_of_all(), &self.title(), self.bits)?;
-            errors::detached(py, || notebook::to_png(&rgb))?
+        let jpeg = image.map(|image| {
+            let rgb =
+                drawing::draw(py, &image, &self.drawing_of_all(), &self.title(), self.bits, self.camera.as_deref())?;
+            errors::detached(py, || notebook::to_jpeg(&rgb))?
         });
-        Ok(notebook::to_html(png.transpose()?, self.each().map(|report| &report.row)))
+        Ok(notebook::to_html(jpeg.transpose()?, self.each().map(|report| &report.row)))
     }
 }

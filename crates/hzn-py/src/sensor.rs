@@ -8,12 +8,14 @@ use hzn_core::body::PriorError;
 use hzn_files::{FrameData, plausible, sensor};
 use hzn_mcap::{Row, RowMeta};
 use hzn_run::engine::{Traces, Unprocessed};
+use hzn_run::source::Payload;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 
 use crate::camera::Camera;
 use crate::expected::Expected;
-use crate::image::{Array, View};
+use crate::image::{Array, View, to_array};
 use crate::prior::Prior;
 use crate::report::Report;
 use crate::state::State;
@@ -42,8 +44,18 @@ impl Sensor {
 #[pymethods]
 impl Sensor {
     #[new]
-    #[pyo3(signature = (*, flight = false, **sections))]
-    fn new(py: Python<'_>, flight: bool, sections: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    #[pyo3(signature = (*wrong, flight = false, **sections), text_signature = "(*, flight=False, **sections)")]
+    fn new(
+        py: Python<'_>,
+        wrong: &Bound<'_, PyTuple>,
+        flight: bool,
+        sections: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        if !wrong.is_empty() {
+            let what =
+                "Sensor takes sections by name: Sensor(camera=..., body=...); Sensor.from_toml(path) reads a file";
+            return Err(PyTypeError::new_err(what));
+        }
         let none = PyDict::new(py);
         let config = read_sections(sections.unwrap_or(&none))?;
         let doubts = plausible::find_implausible(&config);
@@ -131,7 +143,7 @@ impl Sensor {
         bits: Option<u8>,
         detail: bool,
     ) -> PyResult<Report> {
-        let Prior { data } = Prior::new(
+        let known = Prior::new(
             altitude_km,
             position_km,
             attitude,
@@ -144,35 +156,15 @@ impl Sensor {
             time_s,
         )?;
         let state = self.state();
-        let array = Array::from_object(image)?;
-        state.check_size(&array)?;
-        let bits = array.bits(bits, &state.config.input);
-        let view = array.view(bits, state.config.input.channel)?;
-        let bodies = state.config.each_body();
-        let (processed, traces) = errors::detached(py, || {
-            let traces = detail.then(|| Traces::new(bodies.len()));
-            let processed = state.lend(|sensor| match &view {
-                View::Packed(view) => sensor.process(view, Some(&data), traces.as_ref()),
-                View::Strided(view) => sensor.process_pixels(view, Some(&data), traces.as_ref()),
-            });
-            processed.map(|p| (p, traces))
-        })??;
-        let traces = traces.map(|t| t.each).unwrap_or_default();
-        let report = |(which, (processed, body)): (usize, (hzn_run::engine::Processed, &hzn_core::body::Config))| {
-            let meta = row_meta(&data, body);
-            let found = match processed.report {
-                Ok(found) => found,
-                Err(why) => return report_without_limb(&meta, why),
-            };
-            let elapsed_us = processed.elapsed.as_nanos() as f64 / 1e3;
-            let row = Row::from_report(&meta, &found, Some(elapsed_us));
-            Ok(Report::new(row, &found, traces.get(which), &state.camera))
+        known.tell_doubts(py, &state.config)?;
+        let Prior { data } = known;
+        let read = match image.extract::<PathBuf>() {
+            Ok(path) => Read::from_file(py, &state, path)?,
+            Err(_) => Read { image: image.clone(), file: String::new(), bits: None, time_s: None },
         };
-        let reports = processed.into_iter().zip(bodies).enumerate().map(report).collect::<PyResult<Vec<_>>>()?;
-        if reports.iter().all(|report| !report.is_answer()) {
-            warn_of_unused_bits(py, &array, bits)?;
-        }
-        Ok(Report::from_bodies(py, reports)?.with_image(image, bits))
+        let time_s = data.time_s.or(read.time_s);
+        let data = FrameData { time_s, utc_s: time_s, ..data };
+        read.process(py, &state, &data, bits, detail)
     }
 
     #[doc = doc!("Sensor.process_many")]
@@ -239,6 +231,68 @@ fn report_without_limb(meta: &RowMeta, why: PriorError) -> PyResult<Report> {
 /// Warns of unused bits in a picture in which nothing was found.
 fn warn_of_unused_bits(py: Python<'_>, array: &Array<'_>, bits: Option<u8>) -> PyResult<()> {
     array.unused_bits(bits).map_or(Ok(()), |tip| errors::warn(py, format_args!("nothing found: {tip}")))
+}
+
+/// A picture as an array, and what its file says.
+struct Read<'py> {
+    image: Bound<'py, PyAny>,
+    /// Name of the file; empty for an array.
+    file: String,
+    bits: Option<u8>,
+    time_s: Option<f64>,
+}
+
+impl<'py> Read<'py> {
+    /// Reads a picture file as `hzn run` does.
+    fn from_file(py: Python<'py>, state: &State, path: PathBuf) -> PyResult<Self> {
+        let (shown, file) = (path.display().to_string(), path.file_name().unwrap_or_default().to_string_lossy().into());
+        let decoded = errors::detached(py, || Payload::File(path).decode(Some(&state.config)))?;
+        let (picture, _) = decoded.map_err(|why| errors::image(format!("{shown}: {why}")))?;
+        let bits = Some(picture.layout.bits).filter(|bits| (9..16).contains(bits));
+        let time_s = picture.exif_time_s;
+        Ok(Self { image: to_array(py, picture)?, file, bits, time_s })
+    }
+
+    /// Finds the limb of each body.
+    fn process(
+        &self,
+        py: Python<'py>,
+        state: &Arc<State>,
+        data: &FrameData,
+        bits: Option<u8>,
+        detail: bool,
+    ) -> PyResult<Report> {
+        let bits = bits.or(self.bits);
+        let array = Array::from_object(&self.image)?;
+        state.check_size(&array)?;
+        let bits = array.bits(bits, &state.config.input);
+        let view = array.view(bits, state.config.input.channel)?;
+        let bodies = state.config.each_body();
+        let (processed, traces) = errors::detached(py, || {
+            let traces = detail.then(|| Traces::new(bodies.len()));
+            let processed = state.lend(|sensor| match &view {
+                View::Packed(view) => sensor.process(view, Some(data), traces.as_ref()),
+                View::Strided(view) => sensor.process_pixels(view, Some(data), traces.as_ref()),
+            });
+            processed.map(|p| (p, traces))
+        })??;
+        let traces = traces.map(|t| t.each).unwrap_or_default();
+        let report = |(which, (processed, body)): (usize, (hzn_run::engine::Processed, &hzn_core::body::Config))| {
+            let meta = RowMeta { file: self.file.clone(), ..row_meta(data, body) };
+            let found = match processed.report {
+                Ok(found) => found,
+                Err(why) => return report_without_limb(&meta, why),
+            };
+            let elapsed_us = processed.elapsed.as_nanos() as f64 / 1e3;
+            let row = Row::from_report(&meta, &found, Some(elapsed_us));
+            Ok(Report::new(row, &found, traces.get(which), &state.camera))
+        };
+        let reports = processed.into_iter().zip(bodies).enumerate().map(report).collect::<PyResult<Vec<_>>>()?;
+        if reports.iter().all(|report| !report.is_answer()) {
+            warn_of_unused_bits(py, &array, bits)?;
+        }
+        Ok(Report::from_bodies(py, reports)?.with_image(&self.image, bits))
+    }
 }
 
 /// Returns the data of a picture for its row.

@@ -96,11 +96,13 @@ impl Sequence {
     }
 }
 
-/// Raises a `ConfigError` if the sensor refuses these data, as `hzn run` refuses a frames.csv before it begins.
+/// Raises a `ConfigError` if the sensor refuses these data, as `hzn run` refuses a frames.csv before it begins, and
+/// warns of values that look wrong.
 #[pyfunction]
 #[pyo3(name = "_check_prior")]
-pub(crate) fn check_prior(sensor: &Sensor, known: &Prior) -> PyResult<()> {
+pub(crate) fn check_prior(py: Python<'_>, sensor: &Sensor, known: &Prior) -> PyResult<()> {
     let state = sensor.state();
+    known.tell_doubts(py, &state.config)?;
     match state.lend(|sensor| engine::find_refused(&state.config, sensor, &known.data))? {
         Some(why) => Err(errors::config(why)),
         None => Ok(()),

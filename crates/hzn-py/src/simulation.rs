@@ -220,7 +220,13 @@ pub(crate) fn evaluate<'py>(
             files.dedup();
             let mut rows = Vec::new();
             for (i, report) in results.try_iter()?.enumerate() {
-                let report: Py<Report> = report?.extract()?;
+                let report = report?;
+                let name = report.get_type().name()?;
+                let report: Py<Report> = report.extract().map_err(|_| {
+                    errors::config(format!(
+                        "results: item {i} is a {name}, not a Report; give the reports, or the file that `hzn run` wrote"
+                    ))
+                })?;
                 let file_of_truth = files.get(i).copied().unwrap_or_default();
                 rows.extend(report.get().each().map(|r| {
                     let mut row = r.row.clone();

@@ -180,7 +180,7 @@ def test_detail_and_overlay(sensor):
     assert len(plain.limb) == 1
     assert np.array_equal(report.rays, sensor.camera.unproject(report.inliers))
     html = report._repr_html_()
-    assert "data:image/png;base64," in html and "sigma" in html
+    assert "data:image/jpeg;base64," in html and "sigma" in html
     del image
     assert "base64" not in report._repr_html_()
 

@@ -19,6 +19,18 @@ def directions(images: list[NDArray[np.uint8]]) -> NDArray[np.float64]:
     return np.vstack([*found, rays])
 
 
+def narrowed(sensor: hzn.Sensor, image: NDArray[np.uint8]) -> NDArray[np.float64]:
+    report = sensor.process(image)
+    if report.ok:
+        return report.covariance @ report.axis
+    if other := sensor.process("next.png"):
+        return other.covariance * other.sigma_max_deg
+    nothing: None = other.axis
+    reports: list[hzn.Report] = [report, other]
+    assert nothing is None and reports
+    return np.zeros((3, 3))
+
+
 def statuses(path: str) -> dict[str, int]:
     table = hzn.read_mcap(path)
     names, counts = np.unique(table["status"], return_counts=True)

@@ -1,6 +1,7 @@
 //! Explains in words and numbers what happened to a picture.
 
 use hzn_core::covariance::Term;
+use hzn_core::report::Candidate;
 use hzn_core::status::{Stage, Status};
 use hzn_core::verdict::Verdict;
 use hzn_core::{Report, Solution, gates};
@@ -66,6 +67,45 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
     }
 }
 
+/// The verdicts of candidates, from the one that says least about the body in view to the one that says most: first
+/// those of edges that were not fitted or belong to another body, then the gates in the order in which an edge passes
+/// them (`judge` in `hzn_core`). A verdict of several gates has the place of its first one.
+const ORDER: &[Verdict] = &[
+    Verdict::NoFit,
+    Verdict::Taken,
+    Verdict::NoConsensus,
+    Verdict::FewInliers,
+    Verdict::ShortArc,
+    Verdict::Residuals,
+    Verdict::HalfAngle,
+    Verdict::Uncertain,
+    Verdict::Unsupported,
+    Verdict::Indistinct,
+    Verdict::NoSky,
+    Verdict::Sun,
+    Verdict::Faint,
+    Verdict::Band,
+    Verdict::Attitude,
+    Verdict::Rate,
+    Verdict::Straight,
+    Verdict::Circle,
+    Verdict::Polyline,
+    Verdict::Departure,
+    Verdict::OutOfView,
+    Verdict::Radius,
+    Verdict::Glow,
+    Verdict::Passed,
+    Verdict::Chosen,
+];
+
+/// Returns the candidate that most probably is the body: the one that reached the furthest gate, and among several the
+/// one with the most inliers. Structure in view can have more inliers than the limb, but it fails an early gate.
+pub fn best_candidate(r: &Report<f64>) -> Option<&Candidate<f64>> {
+    let reached = |c: &Candidate<f64>| ORDER.iter().position(|verdict| *verdict == c.verdict);
+    // Among equals the first is used. It begins next to the longest dark stretch of the border.
+    r.candidates.iter().rev().max_by_key(|c| (reached(c), c.inliers))
+}
+
 /// Returns the meaning of [`Verdict::ShortArc`]; without a limit in pixels, it is a part of the picture's diagonal.
 fn short_arc_text(min_arc_px: Option<f64>) -> String {
     match min_arc_px {
@@ -124,12 +164,13 @@ pub fn principal_sigmas(s: &Solution<f64>) -> ([f64; 2], f64) {
     ([(half + root).max(0.0).sqrt(), (half - root).max(0.0).sqrt()], angle)
 }
 
-/// Returns advice for a picture without an answer. Advice for a longer candidate comes first, because the longest edge
-/// is most likely the limb.
+/// Returns advice for a picture without an answer. Advice for the best candidate comes first, then advice for longer
+/// ones, because the longest edge is most likely the limb.
 pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
     let mut candidates: Vec<_> = r.candidates.iter().collect();
     candidates.sort_by_key(|c| std::cmp::Reverse(c.length_px));
-    let by_verdict = candidates.iter().flat_map(|c| VERDICT_TIPS.iter().filter(|(of, _)| of.contains(&c.verdict)));
+    let candidates = best_candidate(r).into_iter().chain(candidates);
+    let by_verdict = candidates.flat_map(|c| VERDICT_TIPS.iter().filter(|(of, _)| of.contains(&c.verdict)));
     let mut tips: Vec<&'static str> = status_tip(r).into_iter().collect();
     for (_, tip) in by_verdict {
         if !tips.contains(tip) {
@@ -204,4 +245,43 @@ const VERDICT_TIPS: &[(&[Verdict], &str)] = &[
 /// Returns a number with its noun: `1 picture`, `2 pictures`.
 pub fn counted(n: u64, what: &str) -> String {
     if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(edges: &[(Verdict, u32)]) -> Report<f64> {
+        let mut report = Report {
+            status: Status::Rejected,
+            stage: Stage::Gates,
+            level: 9,
+            next_level: None,
+            counters: Default::default(),
+            candidates: Default::default(),
+            solution: None,
+        };
+        for (number, &(verdict, inliers)) in (0..).zip(edges) {
+            let edge = Candidate { number, length_px: 9, points: 9, inliers, rms_px: 0.5, verdict };
+            report.candidates.push(edge).unwrap();
+        }
+        report
+    }
+
+    /// The limb contradicts a wrong attitude. A longer edge of the vehicle does not even have the size of the body.
+    #[test]
+    fn the_edge_that_came_furthest_is_the_best() {
+        let best = |edges: &[(Verdict, u32)]| best_candidate(&report(edges)).map(|c| c.number);
+        assert_eq!(best(&[(Verdict::HalfAngle, 900), (Verdict::Attitude, 300), (Verdict::Taken, 2000)]), Some(1));
+        assert_eq!(best(&[(Verdict::Residuals, 100), (Verdict::Residuals, 300), (Verdict::Residuals, 300)]), Some(1));
+        assert_eq!(best(&[]), None);
+        let tips = tips(&report(&[(Verdict::HalfAngle, 900), (Verdict::Attitude, 300)]));
+        assert!(tips[0].contains("contradicts the given attitude"), "{tips:?}");
+    }
+
+    #[test]
+    fn every_verdict_has_one_place() {
+        assert_eq!(ORDER.len(), Verdict::ALL.len());
+        assert!(Verdict::ALL.iter().all(|verdict| ORDER.contains(verdict)));
+    }
 }

@@ -84,8 +84,9 @@ impl fmt::Display for Refusal {
                 if *with_known_limb_percent < 0.5 * focal_percent {
                     write!(
                         f,
-                        "With the limb height known exactly, it would be ± {with_known_limb_percent:.2} %: state the \
-                         limb height with a smaller sigma, or take pictures from a wider range of altitudes and \
+                        "With the limb height known exactly, it would be ± {with_known_limb_percent:.2} %: reduce \
+                         limb_height_sigma_km or altitude_sigma_km of [body], whichever is larger, by a better limb \
+                         height or better altitudes; or take pictures from a wider range of altitudes and \
                          directions"
                     )
                 } else {

@@ -102,6 +102,9 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
     if kind == "csv" {
         let header = csv::Reader::from_path(file).and_then(|mut r| r.headers().cloned()).map_err(failed)?;
         let has = |name: &str| header.iter().any(|column| column == name);
+        if header.is_empty() {
+            return Err(failed(format!("{}: the table is empty", file.display())));
+        }
         if !header.iter().take(FIRST_COLUMNS.len()).eq(FIRST_COLUMNS.iter().copied()) {
             return match () {
                 () if has("limb") => truth(file),

@@ -14,7 +14,9 @@ const EXAMPLES: &str = "\
 Examples:
   hzn init                                          every key, into sensor.toml
   hzn init flight/ --fov 92 --lens fisheye          a fisheye that sees 92 degrees over the width
-  hzn init IMG_0001.JPG --altitude 418 -o iss.toml  the lens as EXIF has it, pictures from 418 km";
+  hzn init IMG_0001.JPG --altitude 418 -o iss.toml  the lens as EXIF has it, pictures from 418 km
+  hzn init moon/ --fov 40 --body moon --altitude 100
+                                                    a camera in orbit around the Moon";
 
 /// Write a sensor.toml to start from
 ///
@@ -34,7 +36,10 @@ pub(super) struct Args {
     /// Kind of lens [default: pinhole, up to a field of view of 90 degrees]
     #[arg(long, requires = "pictures")]
     lens: Option<Lens>,
-    /// Altitude of all pictures above WGS-84, kilometres, if no frames.csv gives one
+    /// The body in the pictures
+    #[arg(long, default_value = "earth", requires = "pictures")]
+    body: Body,
+    /// Altitude of all pictures above WGS-84, or above the Moon, kilometres, if no frames.csv gives one
     #[arg(long, value_name = "KM", requires = "pictures")]
     altitude: Option<f64>,
     /// The file to write
@@ -43,6 +48,24 @@ pub(super) struct Args {
     /// Replace a file that exists
     #[arg(long)]
     force: bool,
+}
+
+/// The body in the pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Body {
+    /// The Earth
+    Earth,
+    /// The Moon, seen from an orbit or a flight around it
+    Moon,
+}
+
+impl From<Body> for start::Body {
+    fn from(body: Body) -> Self {
+        match body {
+            Body::Earth => Self::Earth,
+            Body::Moon => Self::Moon,
+        }
+    }
 }
 
 /// The projection of the lens.
@@ -85,6 +108,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let start = start::write_sensor_toml(&known).map_err(usage)?;
     write(&start.text)?;
     start.warnings.iter().for_each(tell::warning);
+    // The commands that read the file say the same, but then it is not clear which option was wrong.
+    hzn_files::sensor::parse(&start.text, &args.output)?.warnings.iter().for_each(tell::warning);
     if known.exif.turned {
         tell::warning(
             "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
@@ -120,7 +145,9 @@ fn known(args: &Args, source: &mut dyn Source) -> Result<CameraFacts, Stop> {
         _ => start::Exif::default(),
     };
     let size_px = [size_px.0, size_px.1];
-    Ok(CameraFacts { size_px, fov_deg: args.fov, lens: args.lens.map(Model::from), exif, altitude_km: args.altitude })
+    let lens = args.lens.map(Model::from);
+    let (fov_deg, altitude_km) = (args.fov, args.altitude);
+    Ok(CameraFacts { size_px, fov_deg, lens, exif, altitude_km, body: args.body.into() })
 }
 
 /// Returns the size of the pictures. Refuses pictures of different sizes.

@@ -3,17 +3,16 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use hzn_core::body::PriorError;
 use hzn_core::config::Orient;
-use hzn_core::status::Status;
 use hzn_files::{Frames, Sensor};
-use hzn_run::engine::{self, BodyOutcome, End, Finished, Plan};
+use hzn_run::engine::{self, End, Finished, Plan};
 use hzn_run::open::Opened;
 use hzn_run::sink::{self, Existing, Output};
 use hzn_run::source::{self, Source, ending};
 use hzn_run::{disk, explain};
 
 use super::resume;
+use crate::doubts::{MissingPriors, MultiPageFiles, Times};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
@@ -128,6 +127,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let lost = source.describe_loss().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
     watch.missing.tell(plan.frames.as_ref());
+    watch.times.tell();
     watch.multi_page.tell();
     if !args.quiet {
         watch.sum_up(args, &plan, source.as_ref(), &summary, stored.frames);
@@ -205,6 +205,7 @@ struct Watch {
     quiet: bool,
     tipped: bool,
     missing: MissingPriors,
+    times: Times,
     refusals: Refusals,
     multi_page: MultiPageFiles,
     /// Number of pictures that could not be read.
@@ -221,6 +222,7 @@ impl Watch {
             quiet,
             tipped: quiet,
             missing: MissingPriors::default(),
+            times: Times::default(),
             refusals: Refusals::default(),
             multi_page: MultiPageFiles::default(),
             unreadable: 0,
@@ -229,6 +231,7 @@ impl Watch {
 
     fn see(&mut self, frame: &Finished) {
         self.missing.count(frame);
+        self.times.count(frame);
         self.refusals.count(frame);
         self.multi_page.count(frame);
         if let Some(tip) = frame.tip.as_ref().filter(|_| !self.tipped) {
@@ -325,85 +328,3 @@ fn warn_of_missing_pictures(frames: &Frames, folder: &Path) {
 
 /// Number of rows without a picture that are reported one by one.
 const MAX_MISSING_LISTED: usize = 3;
-
-/// Counts files that contain more pictures than the one that was processed.
-#[derive(Default)]
-struct MultiPageFiles {
-    files: u64,
-    first: Option<(String, u32)>,
-}
-
-impl MultiPageFiles {
-    fn count(&mut self, frame: &Finished) {
-        if frame.pages > 1 {
-            self.files += 1;
-            self.first.get_or_insert_with(|| (frame.name.clone(), frame.pages));
-        }
-    }
-
-    fn tell(&self) {
-        let Some((name, pages)) = &self.first else { return };
-        let files = explain::counted(self.files, "file");
-        tell::warning(format_args!(
-            "only the first picture of {files} with several pages or frames was processed (the first file is {name} \
-             with {pages} pictures); write each picture into its own file, or give a video"
-        ));
-    }
-}
-
-/// Counts pictures with missing priors, so that each kind is reported once.
-#[derive(Default)]
-struct MissingPriors {
-    frames: u64,
-    no_row: u64,
-    no_time: u64,
-    no_altitude: u64,
-    below_limb: u64,
-    /// Pictures with other values that contradict each other, and the first of them with the reason.
-    impossible: u64,
-    first_impossible: Option<String>,
-}
-
-impl MissingPriors {
-    fn count(&mut self, frame: &Finished) {
-        self.frames += 1;
-        self.no_row += u64::from(frame.data.is_none());
-        self.no_time += u64::from(frame.time_s.is_none());
-        let unprocessed = |f: &&BodyOutcome| f.status() == Status::NoAltitude;
-        let Some(why) = frame.outcomes.iter().find(unprocessed) else { return };
-        match why.refused_prior() {
-            Some(PriorError::BelowLimb { .. }) => self.below_limb += 1,
-            Some(PriorError::NoAltitude) | None => self.no_altitude += 1,
-            Some(other) => {
-                self.impossible += 1;
-                self.first_impossible.get_or_insert_with(|| format!("{}: {other}", frame.name));
-            }
-        }
-    }
-
-    fn tell(&self, frames: Option<&Frames>) {
-        let mut parts = Vec::new();
-        if let Some(frames) = frames.filter(|_| self.no_row > 0) {
-            parts.push(format!("{} without a row in {}", self.no_row, frames.path.display()));
-        }
-        if self.no_time > 0 {
-            parts.push(format!("{} without a time", self.no_time));
-        }
-        if self.no_altitude > 0 {
-            let what = "without an altitude, not processed (status no-altitude): give it in frames.csv, as \
-                        body.altitude_km, or by --altitude-km";
-            parts.push(format!("{} {what}", self.no_altitude));
-        }
-        if self.below_limb > 0 {
-            let what = "below the limb height, where no limb can be seen, not processed (status no-altitude)";
-            parts.push(format!("{} {what}", self.below_limb));
-        }
-        if let Some(first) = &self.first_impossible {
-            let what = "with values that allow no search, not processed (status no-altitude); the first is";
-            parts.push(format!("{} {what} {first}", self.impossible));
-        }
-        if !parts.is_empty() {
-            tell::warning(format_args!("of {}: {}", explain::counted(self.frames, "picture"), parts.join("; ")));
-        }
-    }
-}

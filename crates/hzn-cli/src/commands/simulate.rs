@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::progress::Progress;
+use crate::refusals::quoted_path;
 use crate::setup::{clear_rendered, rendered, stop_flag};
 use crate::tell::{self, one_line};
 
@@ -27,10 +28,10 @@ use crate::tell::{self, one_line};
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A built-in scene, or a scene.toml
-    #[arg(value_name = "SCENE", required_unless_present = "list")]
+    #[arg(value_name = "SCENE")]
     scene: Option<String>,
     /// The folder to create
-    #[arg(short, long, value_name = "DIR", required_unless_present_any = ["show", "list"])]
+    #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Number of pictures; replaces the scene's number
     #[arg(long, value_name = "N")]
@@ -44,6 +45,9 @@ pub(super) struct Args {
     /// Render only the pictures that are missing in the folder
     #[arg(long, conflicts_with = "force")]
     resume: bool,
+    /// Do not measure limb height and noise, which takes 32 more pictures; sensor.toml has the defaults
+    #[arg(long)]
+    no_noise: bool,
     /// Print no progress on stderr
     #[arg(short, long)]
     quiet: bool,
@@ -62,17 +66,23 @@ pub(super) fn run(args: &Args) -> Outcome {
         }
         return Ok(Exit::Done);
     }
-    let name = args.scene.as_deref().unwrap_or_default();
+    let Some(name) = args.scene.as_deref() else {
+        let what = "name a scene and a folder for its pictures, for example:  hzn simulate rocket -o flight";
+        return Err(usage(format!("{what}  (`hzn simulate --list` describes the scenes)")));
+    };
     if args.show {
         tell::file(format_args!("{}\n", scenario::source(name)?.1.trim_end()))?;
         return Ok(Exit::Done);
     }
+    let Some(folder) = args.output.clone() else {
+        let scene = quoted_path(Path::new(name));
+        return Err(usage(format!("name a folder for the pictures with -o:  hzn simulate {scene} -o flight")));
+    };
     let mut scenario = scenario::load(name, args.frames, args.seed)?;
     let from = Path::new(name).parent().unwrap_or(Path::new(""));
     let mut read = hzn_files::files_of_sensor(Path::new(name));
     read.extend(scenario.files_mut().into_iter().map(|(_, file)| from.join(file)));
     let files = files(&mut scenario, from)?;
-    let folder = args.output.clone().unwrap_or_default();
     let text = scenario.to_text().map_err(failed)?;
     let scene_toml = folder.join("scene.toml");
     check_folder(args, &folder, &text, &files)?;
@@ -181,10 +191,10 @@ fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Stop> {
 /// Writes the sensor.toml of every camera. All have the same lens and world, so that the noise is measured once.
 fn sensors(cameras: &[Sequence], name: &str, args: &Args) -> Result<(), Stop> {
     let Some(first) = cameras.first() else { return Ok(()) };
-    if first.scenario.ellipsoid().is_some() {
+    if first.scenario.ellipsoid().is_some() || args.no_noise {
         return cameras
             .iter()
-            .try_for_each(|one| write(&one.folder.join("sensor.toml"), sensor(&one.scenario, &one.flight, &[])?));
+            .try_for_each(|one| write(&one.folder.join("sensor.toml"), sensor(&one.scenario, &one.flight, None)?));
     }
     if !args.quiet {
         tell::line(format_args!("measuring limb height and noise on other pictures of the scene ..."));
@@ -196,19 +206,22 @@ fn sensors(cameras: &[Sequence], name: &str, args: &Args) -> Result<(), Stop> {
         p.finish();
     }
     for one in cameras {
-        write(&one.folder.join("sensor.toml"), &sensor(&one.scenario, &one.flight, &fits)?)?;
+        write(&one.folder.join("sensor.toml"), &sensor(&one.scenario, &one.flight, Some(&fits))?)?;
     }
     Ok(())
 }
 
-/// Returns the text of a sensor.toml: the values that differ from the defaults, with a measured noise model.
-fn sensor(scenario: &Scenario, flight: &Flight, fits: &[Fit]) -> Result<String, Stop> {
+/// Returns the text of a sensor.toml: the values that differ from the defaults, with the noise model if it is measured.
+fn sensor(scenario: &Scenario, flight: &Flight, fits: Option<&[Fit]>) -> Result<String, Stop> {
     let mut sensor = flight.sensor.clone();
     let mut how = String::new();
     if scenario.ellipsoid().is_some() {
         how += "# The limb height is that of the scene; the noise comes from the residuals of each picture.\n";
+    } else if fits.is_none() {
+        how += "# Limb height and noise are the defaults; without --no-noise they are measured on other pictures.\n";
     }
     for &body in scenario.bodies.iter().filter(|_| scenario.ellipsoid().is_none()) {
+        let Some(fits) = fits else { continue };
         let name = body.name();
         let Some(fit) = fits.iter().find(|fit| fit.body == body) else {
             let why = "too few pictures were answered to measure limb height and noise";

@@ -233,7 +233,7 @@ fn what_looks_wrong_is_a_warning_and_the_run_goes_on() {
     let metres = told("altitude_km = 400.0", "altitude_km = 400000.0");
     assert!(metres.contains("[body] altitude_km: 400000 km is implausibly large: is it in metres?"), "{metres}");
     let moon = told("earth-sphere", "moon");
-    insta::assert_snapshot!(moon.lines().next().unwrap(), @r#"warning: in/sensor.toml:14: [body] altitude_km: is not used: kind = "moon" is the Moon as a disc of half a degree, as seen from near the Earth; for a camera in orbit around the Moon write kind = "sphere" and radius_km = 1737.4"#);
+    insta::assert_snapshot!(moon.lines().next().unwrap(), @r#"warning: in/sensor.toml:14: [body] altitude_km: is not used: kind = "moon" is the Moon as a disc of half a degree, as seen from near the Earth; for a camera in orbit around the Moon write kind = "sphere", radius_km = 1737.4, limb_height_km = 0.0, limb_height_sigma_km = 5.2, clipped_height_km = 0.0, clipped_sigma_km = 0.0 (`hzn init --body moon` does)"#);
     // With the Moon as a second body, the altitude is still the altitude above the Earth.
     let two = crate::common::SENSOR.replace("[body]", "[[bodies]]") + "[[bodies]]\nkind = \"moon\"\n";
     place.write("in/sensor.toml", two.as_bytes());

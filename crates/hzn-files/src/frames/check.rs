@@ -1,5 +1,7 @@
 //! Finds altitudes and positions in a frames.csv that are possible but look wrong.
 
+use std::path::Path;
+
 use hzn_core::Config;
 use hzn_core::body::Kind;
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
@@ -12,6 +14,16 @@ const MAX_DISTANCE_RADII: f64 = 120.0;
 /// Largest plausible rate of the altitude, in km/s. Objects that fly by the Earth reach 11 to 20 km/s.
 const MAX_CLIMB_KM_S: f64 = 30.0;
 
+/// Largest plausible time, in seconds: the year 5138 as seconds since 1970. The milliseconds since 1970 are above it
+/// from 1973 on.
+const MAX_TIME_S: f64 = 1e11;
+/// Altitudes above the equator at which a vehicle is ballistic or in orbit, and moves against the ground, in
+/// kilometres. A geostationary satellite does not move against the ground.
+const SLOW_ALTITUDES_KM: std::ops::Range<f64> = 150.0..10_000.0;
+/// Smallest plausible speed over ground at these altitudes, in km/s. An orbit has at least 1.5 km/s there. A sounding
+/// rocket is slower only around its highest point, while all rows must be this slow.
+const MIN_SPEED_KM_S: f64 = 0.02;
+
 /// Number of warnings of a kind that are listed one by one; the others are only counted.
 const MAX_LISTED: usize = 3;
 
@@ -23,6 +35,15 @@ pub fn altitude_at_km(position_km: [f64; 3], kind: Kind, radius_km: f64) -> Opti
         Kind::Earth => Some(geodetic(position_km.map(|km| km * 1e3), WGS84_A_M, WGS84_B_M).0 / 1e3),
         Kind::Sun | Kind::Moon => None,
         _ => Some(position_km.iter().map(|x| x * x).sum::<f64>().sqrt() - radius_km),
+    }
+}
+
+impl FrameData {
+    /// Returns what looks wrong in the data of a single picture, as [`Frames::check_sensor`] finds it in a file.
+    pub fn check_sensor(&self, config: &Config) -> Vec<String> {
+        let mut one = Frames::new(Path::new(""));
+        one.push(self.clone());
+        one.check_sensor(config).into_iter().map(|problem| problem.what).collect()
     }
 }
 
@@ -41,7 +62,57 @@ impl Frames {
             }
         }
         warnings.extend(self.explain_unused_columns(config));
+        warnings.extend(self.explain_unused_attitude(config));
+        warnings.extend(self.suspect_milliseconds());
         warnings
+    }
+
+    /// Returns one warning if the rows have an attitude, but neither a position nor an ellipsoid whose position is
+    /// fitted. Only with one of them the attitude predicts a direction.
+    fn explain_unused_attitude(&self, config: &Config) -> Option<Problem> {
+        let has_position = self.rows.iter().any(|row| row.position_km.is_some());
+        if has_position || config.each_body().iter().any(|body| config.fits_position(body)) {
+            return None;
+        }
+        let row = self.rows.iter().find(|row| row.q_fixed_from_camera_wxyz.is_some())?;
+        let what = "without a position, nothing uses qw, qx, qy, qz: add x_km, y_km, z_km";
+        Some(self.problem(row, what))
+    }
+
+    /// Returns one warning if times are probably not in seconds: if they are far in the future as seconds since 1970,
+    /// or if the positions are those of a spacecraft that hardly moves.
+    fn suspect_milliseconds(&self) -> Option<Problem> {
+        if let Some(row) = self.rows.iter().find(|row| row.time_s.is_some_and(|t| t.abs() > MAX_TIME_S)) {
+            let t = row.time_s.unwrap_or_default();
+            let what =
+                format!("time_s is {t}, which as seconds since 1970 is no time of a flight; is it in milliseconds?");
+            return Some(self.problem(row, what));
+        }
+        let known: Vec<_> = self.rows.iter().filter_map(|r| Some((r, r.time_s?, r.position_km?))).collect();
+        let is_in_space = |[x, y, z]: [f64; 3]| {
+            let above_km = (x * x + y * y + z * z).sqrt() - WGS84_A_M / 1e3;
+            SLOW_ALTITUDES_KM.contains(&above_km)
+        };
+        if known.len() < 3 || !known.iter().all(|(.., position)| is_in_space(*position)) {
+            return None;
+        }
+        let speed = |a: &(_, f64, [f64; 3]), b: &(_, f64, [f64; 3])| {
+            let moved: f64 = a.2.iter().zip(b.2).map(|(a, b)| (b - a) * (b - a)).sum();
+            moved.sqrt() / (b.1 - a.1)
+        };
+        let steps = known.iter().zip(known.iter().skip(1)).filter(|(a, b)| b.1 > a.1 && a.2 != b.2);
+        let speeds: Vec<f64> = steps.map(|(a, b)| speed(a, b)).collect();
+        let fastest = speeds.iter().copied().fold(0.0, f64::max);
+        if speeds.is_empty() || fastest > MIN_SPEED_KM_S {
+            return None;
+        }
+        let (row, ..) = known.first()?;
+        let what = format!(
+            "with time_s in seconds the positions move by at most {:.1} m/s, which is too slow in space; is time_s in \
+             milliseconds?",
+            fastest * 1e3
+        );
+        Some(self.problem(row, what))
     }
 
     /// Returns one warning if the rows have columns that only the fit of a position uses, and no position is fitted.
@@ -95,7 +166,7 @@ impl Frames {
             |row: &&FrameData| row.altitude_km.is_some_and(|h| h > plausible::max_altitude_km(kind, radius_km));
         if let Some(row) = self.rows.iter().find(is_far) {
             let h = row.altitude_km.unwrap_or_default();
-            let what = format!("altitude_km is {h}, which is implausibly large; is it in metres?");
+            let what = format!("altitude_km is {h}, which {}", plausible::suspect_metres(kind, h));
             return Some(self.problem(row, what));
         }
         let known: Vec<_> = self.rows.iter().filter_map(|r| Some((r, r.time_s?, r.altitude_km?))).collect();
@@ -109,8 +180,6 @@ impl Frames {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::frames::parse;
 
@@ -138,10 +207,47 @@ mod tests {
         assert_eq!(found.len(), 1);
         assert!(found[0].starts_with("frames.csv:4: c: altitude_km changes by 55 km/s"), "{found:?}");
         let orbit = warnings("file,altitude_km\na,517500\nb,517600\n", Kind::Earth);
-        assert_eq!(orbit, ["frames.csv:2: a: altitude_km is 517500, which is implausibly large; is it in metres?"]);
+        assert_eq!(orbit, ["frames.csv:2: a: altitude_km is 517500, which is implausibly large: is it in metres?"]);
         assert!(warnings("file,time_s,altitude_km\na,0,60\nb,1,61.5\nc,1,90\n", Kind::Earth).is_empty());
         let moon = warnings("file,altitude_km\na,100\nb,100\n", Kind::Moon);
         assert!(moon.len() == 1 && moon[0].contains("altitude_km is not used: kind = \"moon\""), "{moon:?}");
+    }
+
+    #[test]
+    fn milliseconds_are_suspected() {
+        let told = |text: &str| read(text).unwrap().suspect_milliseconds().map(|w| w.to_string());
+        let unix = told("file,time_s\na,1605861000250\nb,1605861000750\n").unwrap();
+        assert!(
+            unix.starts_with("frames.csv:2: a: time_s is 1605861000250") && unix.ends_with("milliseconds?"),
+            "{unix}"
+        );
+        // 7.6 km/s, once with seconds and once with milliseconds.
+        let orbit = |unit: f64| {
+            let row = |i: u32| {
+                let angle = 0.00112 * f64::from(i);
+                format!("{i},{},{},{},0\n", f64::from(i) * unit, 6778.0 * angle.cos(), 6778.0 * angle.sin())
+            };
+            told(&("file,time_s,x_km,y_km,z_km\n".to_owned() + &(0..4).map(row).collect::<String>()))
+        };
+        assert_eq!(orbit(1.0), None);
+        let slow = orbit(1000.0).unwrap();
+        assert!(slow.contains("at most 7.6 m/s") && slow.ends_with("is time_s in milliseconds?"), "{slow}");
+        // A balloon is as slow, and a geostationary satellite slower.
+        for radius_km in [6400.0, 42_164.0] {
+            let rows = format!(
+                "file,time_s,x_km,y_km,z_km\na,0,{radius_km},0,0\nb,1,{radius_km},0.005,0\nc,2,{radius_km},0.01,0\n"
+            );
+            assert_eq!(told(&rows), None);
+        }
+    }
+
+    #[test]
+    fn an_attitude_without_a_position_is_reported() {
+        let camera = hzn_core::camera::Config::ideal(hzn_core::camera::Model::Pinhole, 64, 48, 60.0);
+        let told = |text: &str| read(text).unwrap().check_sensor(&Config::new(camera.clone()));
+        let alone = told("file,altitude_km,qw,qx,qy,qz\na,400,1,0,0,0\n");
+        assert!(alone.len() == 1 && alone[0].what.contains("nothing uses qw, qx, qy, qz"), "{alone:?}");
+        assert!(told("file,x_km,y_km,z_km,qw,qx,qy,qz\na,6778,0,0,1,0,0,0\nb,,,,1,0,0,0\n").is_empty());
     }
 
     #[test]

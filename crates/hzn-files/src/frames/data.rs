@@ -142,6 +142,14 @@ pub struct Frames {
     by_file: HashMap<String, usize>,
 }
 
+/// Returns the name of a picture without `./`, which `find . -name '*.png'` puts before it.
+fn plain_name(mut file: &str) -> &str {
+    while let Some(rest) = file.strip_prefix("./") {
+        file = rest;
+    }
+    file
+}
+
 impl Frames {
     /// Creates a file without rows.
     pub(super) fn new(path: &Path) -> Self {
@@ -150,13 +158,13 @@ impl Frames {
 
     /// Appends a row. Its picture must not have a row yet.
     pub(super) fn push(&mut self, row: FrameData) {
-        self.by_file.insert(row.file.clone(), self.rows.len());
+        self.by_file.insert(plain_name(&row.file).to_owned(), self.rows.len());
         self.rows.push(row);
     }
 
     /// Returns the row of the picture with this name.
     pub fn get(&self, file: &str) -> Option<&FrameData> {
-        self.by_file.get(file).and_then(|&i| self.rows.get(i))
+        self.by_file.get(plain_name(file)).and_then(|&i| self.rows.get(i))
     }
 
     /// Returns whether any picture has a time. The file is then the only clock of the sequence.

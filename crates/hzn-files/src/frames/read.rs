@@ -140,6 +140,10 @@ impl Columns {
 
 /// Returns the problem of a header without the column `file`. A header in one cell has another separator.
 fn without_file_column(header: &StringRecord, path: &Path) -> Problem {
+    if header.iter().all(str::is_empty) {
+        let what = "is empty; its first line names the columns, for example file,time_s,altitude_km";
+        return Problem::new(path, what);
+    }
     let found: Vec<&str> = header.iter().collect();
     let other = [(';', "semicolons"), ('\t', "tabs")].iter().find(|(c, _)| header.iter().any(|name| name.contains(*c)));
     let hint =
@@ -327,6 +331,7 @@ mod tests {
             read("name,altitude\na,1\n").unwrap_err(),
             "frames.csv:1: the column `file` is missing (found: name, altitude); it names the picture of each row"
         );
+        assert!(read("").unwrap_err().starts_with("frames.csv: is empty; its first line names the columns"));
         assert_eq!(
             read("file,time_s\na\n").unwrap_err(),
             "frames.csv:2: this row has 1 cells, but the header has 2 columns"

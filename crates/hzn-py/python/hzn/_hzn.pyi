@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from types import TracebackType
-from typing import Any, Literal, TypeAlias, final
+from typing import Any, Literal, TypeAlias, final, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -288,7 +288,7 @@ class Sensor:
 
     def process(
         self,
-        image: _Image,
+        image: _Image | _Path,
         *,
         altitude_km: float | None = None,
         position_km: Sequence[float] | None = None,
@@ -302,7 +302,7 @@ class Sensor:
         time_s: float | None = None,
         bits: int | None = None,
         detail: bool = False,
-    ) -> Report:
+    ) -> _Result:
         """Find the limb in a picture.
 
         NaN, or an array of NaN, is an unknown value, as in a table of pandas with gaps.
@@ -311,7 +311,7 @@ class Sensor:
         ----------
         image
             Shape (height, width) or (height, width, channels), uint8 or uint16, with any strides. It is not copied; C
-            order is fastest.
+            order is fastest. Or the path of a picture file, which is read as by ``hzn run``.
         altitude_km
             Above WGS-84 for ``earth``, otherwise above the radius. Without it, the parameters' altitude is used.
         position_km
@@ -352,25 +352,30 @@ class Sensor:
         Raises
         ------
         ImageError
-            The array has another dtype, shape or size than the camera's picture.
+            The array has another dtype, shape or size than the camera's picture, or the file cannot be read.
         ConfigError
             An altitude, position or attitude is impossible.
+
+        Warns
+        -----
+        UserWarning
+            A value is possible but looks wrong, for example an altitude in metres.
         """
 
     def process_many(
         self,
-        images: _Path | Iterable[_Image | _Path | tuple[_Image, Mapping[str, Any]]],
+        images: _Path | Iterable[_Image | _Path | tuple[_Image | _Path, Mapping[str, Any]]],
         *,
         jobs: int | None = None,
         progress: bool = False,
-    ) -> Iterator[Report]:
+    ) -> Iterator[_Result]:
         """Process a sequence on all cores. Reports come in order while it runs; memory does not grow with the length.
 
         Parameters
         ----------
         images
             A folder, a pattern, a video or an MCAP, as for ``hzn run``, with the frames.csv next to it; or paths of
-            pictures; or arrays; or pairs of an array and a dictionary of keyword arguments of `process`
+            pictures; or arrays; or pairs of an array or a path and a dictionary of keyword arguments of `process`
             (``altitude_km`` and so on). An iterable is read only as fast as it is processed: each thread takes some
             milliseconds' work or 8 MB at a time, and at least one picture.
         jobs
@@ -396,7 +401,7 @@ class Sensor:
 
 @final
 class Report:
-    """Result of one picture. Without an answer, the properties of the answer are None.
+    """Result of one picture. Without an answer, the properties of the answer are None, and ``bool(report)`` is False.
 
     A notebook shows it with the picture and all annotations; the picture is the processed array with its present
     contents. A report can be pickled, but without the picture.
@@ -578,8 +583,41 @@ class Report:
     def to_dict(self) -> dict[str, Any]:
         """Return the row that ``hzn run`` would write, by column; None for an empty cell."""
 
+    def __bool__(self) -> bool: ...
     def __copy__(self) -> Report: ...
     def __deepcopy__(self, _memo: Any, /) -> Report: ...
+
+# At run time there is only `Report`. These two let a type checker know after `if report.ok:` or `if report:` that the
+# answer is not None.
+@type_check_only
+class _Answer(Report):  # type: ignore[misc]  # pyright: ignore[reportGeneralTypeIssues]
+    @property
+    def ok(self) -> Literal[True]: ...
+    @property
+    def status(self) -> Literal["ok"]: ...
+    @property
+    def axis(self) -> NDArray[np.float64]: ...
+    @property
+    def covariance(self) -> NDArray[np.float64]: ...
+    @property
+    def sigma_max_deg(self) -> float: ...
+    @property
+    def half_angle_deg(self) -> float: ...
+    @property
+    def rms_px(self) -> float: ...
+    def __bool__(self) -> Literal[True]: ...
+
+@type_check_only
+class _NoAnswer(Report):  # type: ignore[misc]  # pyright: ignore[reportGeneralTypeIssues]
+    @property
+    def ok(self) -> Literal[False]: ...
+    @property
+    def axis(self) -> None: ...
+    @property
+    def covariance(self) -> None: ...
+    def __bool__(self) -> Literal[False]: ...
+
+_Result: TypeAlias = _Answer | _NoAnswer
 
 @final
 class Calibration:
@@ -985,6 +1023,7 @@ def _fit(sensor: Sensor, rays: Rays, start: Cone, expected: Expected) -> Fit | N
 def _fuse(
     sensor: Sensor, rays: Rays, fit: Cone, expected: Expected
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float] | None: ...
+def _number(report: Report, index: int) -> Report: ...
 @final
 class _Sequence:
     def __new__(cls, sensor: Sensor, inputs: Sequence[_Path]) -> _Sequence: ...

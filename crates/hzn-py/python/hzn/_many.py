@@ -15,11 +15,12 @@ from queue import SimpleQueue
 from time import perf_counter
 from typing import Any
 
-from ._hzn import ConfigError, Report, Sensor, _Sequence
+from ._hzn import ConfigError, Report, Sensor, _number, _Sequence
 
 _TASK_S = 2e-3
 _TASK_BYTES = 8 << 20
 _TASK_ITEMS = 32
+_NOTHING = object()
 
 
 def process_many(sensor: Sensor, images: Any, jobs: int | None, progress: bool) -> Iterator[Report]:
@@ -37,16 +38,27 @@ def _work(sensor: Sensor, images: Any) -> tuple[Callable[[Any], Report], Iterabl
     if isinstance(images, str | os.PathLike):
         return _files(sensor, [images])
     iterator = iter(images)
-    first = next(iterator, None)
+    first = next(iterator, _NOTHING)
     if isinstance(first, str | os.PathLike):
         return _files(sensor, [first, *iterator])
 
-    def process(item: Any) -> Report:
+    def process(numbered: _Numbered) -> Report:
+        item = numbered.item
         image, known = item if isinstance(item, tuple) else (item, {})
-        return sensor.process(image, **known)
+        return _number(sensor.process(image, **known), numbered.index)
 
     total = len(images) if hasattr(images, "__len__") else None
-    return process, chain([] if first is None else [first], iterator), total
+    items = chain([] if first is _NOTHING else [first], iterator)
+    return process, (_Numbered(index, item) for index, item in enumerate(items)), total
+
+
+class _Numbered:
+    """An item with its number."""
+
+    def __init__(self, index: int, item: Any) -> None:
+        self.index = index
+        self.item = item
+        self.nbytes: int = getattr(item[0] if isinstance(item, tuple) else item, "nbytes", 0)
 
 
 def _files(
@@ -117,7 +129,7 @@ def _tasks(items: Iterable[Any], shared: _Shared) -> Iterator[_Task]:
             while True:
                 item = next(iterator)
                 task.items.append(item)
-                held_bytes += getattr(item[0] if isinstance(item, tuple) else item, "nbytes", 0)
+                held_bytes += getattr(item, "nbytes", 0)
                 next_s = max(perf_counter() - begun, (len(task.items) + 1) * shared.item_s)
                 if held_bytes >= _TASK_BYTES or next_s > _TASK_S or len(task.items) == _TASK_ITEMS:
                     break

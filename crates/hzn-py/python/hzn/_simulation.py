@@ -69,7 +69,7 @@ def evaluate(
         A file that ``hzn run`` wrote (.mcap, .csv, .jsonl), or reports. Reports of arrays have no name, so they must be
         in the order of the truth.
     truth
-        A truth.csv or its folder, a `Simulation`, or rows of truth (`SimulatedFrame.truth`).
+        A truth.csv or its folder, a `Simulation`, rows of truth (`SimulatedFrame.truth`), or a data frame of them.
     camera
         Camera for the length of limb in view; not needed with an MCAP or a `Simulation`, which contain it.
 
@@ -84,11 +84,16 @@ def evaluate(
     HznError
         Results and truth do not belong together, or a file cannot be read.
     """
+    if hasattr(results, "columns"):
+        raise ConfigError("results: a table is refused; give the reports, or the file that `hzn run` wrote")
+    if hasattr(truth, "to_dict"):
+        # A data frame of truth.csv. Its empty cells are NaN.
+        rows = truth.to_dict("records")
+        truth = [{name: None if value != value else value for name, value in row.items()} for row in rows]
     if isinstance(truth, Simulation):
         camera = camera or Camera(**truth.parameters["camera"])
         truth = [row for frame in truth for row in frame.truth]
-    rows = truth if isinstance(truth, str | PathLike) else list(truth)
-    return _evaluate(results, rows, camera)
+    return _evaluate(results, truth if isinstance(truth, str | PathLike) else list(truth), camera)
 
 
 def sensitivity(

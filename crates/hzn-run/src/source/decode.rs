@@ -17,6 +17,9 @@ pub const MAX_SIDE_PX: u32 = 20_000;
 /// Largest decoded picture, in bytes.
 pub const MAX_BYTES: u64 = 512 << 20;
 
+/// What helps against samples of a kind that is not supported, for example numbers with 32 bits in a TIFF.
+const SAMPLES: &str = "scale its samples to whole numbers of 8 or 16 bits";
+
 /// Returns the format of picture data, from their first bytes.
 pub fn guess_format(bytes: &[u8]) -> Option<ImageFormat> {
     image::guess_format(bytes).ok()
@@ -57,7 +60,10 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
     let mut limits = image::Limits::no_limits();
     limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
-    let format = reader.format().ok_or("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP)")?;
+    let format = reader.format().ok_or_else(|| {
+        let found = name_foreign(bytes).map(|name| format!("; it is {name}: convert it")).unwrap_or_default();
+        format!("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP){found}")
+    })?;
     let mut decoder = reader.into_decoder().map_err(|e| explain(&e, format))?;
     let (width, height) = decoder.dimensions();
     check_size(width, height, expected)?;
@@ -71,7 +77,7 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
     if format == ImageFormat::Jpeg && jpeg_is_truncated(bytes) {
         return Err("JPEG data end before the picture is complete: the file is truncated".into());
     }
-    let exif_time_s = decoder.exif_metadata().ok().flatten().and_then(exif::time_s);
+    let exif_time_s = decoder.exif_metadata().ok().flatten().and_then(|block| exif::time_s(block).ok().flatten());
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let image = DynamicImage::from_decoder(decoder).map_err(|e| explain(&e, format))?;
     let (samples, channels, bits) = match image {
@@ -84,11 +90,28 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
         DynamicImage::ImageRgb16(i) => (Samples::Words(i.into_raw()), 3, 16),
         DynamicImage::ImageRgba16(i) => (Samples::Words(i.into_raw()), 4, 16),
         other => {
-            return Err(format!("samples of kind {:?} are not supported; use integers of 8 or 16 bits", other.color()));
+            return Err(format!("samples of kind {:?} are not supported; {SAMPLES}", other.color()));
         }
     };
     let layout = Layout::packed(width, height, channels, bits);
     Ok(Picture { exif_time_s, orientation, pages: pages::count(bytes, format), ..Picture::new(samples, layout) })
+}
+
+/// Returns the name of a format that is not supported, from the first bytes.
+fn name_foreign(bytes: &[u8]) -> Option<&'static str> {
+    const FORMATS: &[(usize, &[u8], &str)] = &[
+        (0, b"SIMPLE  =", "FITS"),
+        (4, b"jP  ", "JPEG 2000"),
+        (0, b"\xff\x4f\xff\x51", "JPEG 2000"),
+        (8, b"WEBP", "WebP"),
+        (0, b"GIF8", "GIF"),
+        (4, b"ftypavif", "AVIF"),
+        (4, b"ftyphei", "HEIC"),
+        (0, b"\x93NUMPY", "a NumPy array"),
+        (0, b"\x89HDF", "HDF5"),
+        (0, b"%PDF", "PDF"),
+    ];
+    FORMATS.iter().find(|(at, magic, _)| bytes.get(*at..).is_some_and(|b| b.starts_with(magic))).map(|(.., name)| *name)
 }
 
 /// Refuses sizes that are zero, above the limit, or not the camera's size.
@@ -124,7 +147,9 @@ fn explain(error: &image::ImageError, format: ImageFormat) -> String {
     let text = error.to_string().replace('\n', " ");
     match error {
         image::ImageError::Limits(_) => format!("{name} needs more memory than the limit of {} MB", MAX_BYTES >> 20),
-        image::ImageError::Unsupported(_) => format!("{name} of a kind that is not supported: {text}"),
+        image::ImageError::Unsupported(_) => {
+            format!("{name} of a kind that is not supported: {text}; {SAMPLES}")
+        }
         image::ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
             format!("{name} data end before the picture is complete: the file is truncated")
         }

@@ -25,6 +25,8 @@ pub(super) struct Files {
     folder: PathBuf,
     raw: Option<Raw>,
     time: TimeSource,
+    /// A picture whose EXIF exists but has no readable time, and the reason.
+    unread_exif: Option<String>,
     /// Names include the folder, because the files lie in several folders.
     with_folder: bool,
     left_out: LeftOut,
@@ -41,10 +43,12 @@ impl Files {
         let first = paths.first().map(parent).unwrap_or_default();
         let with_folder = paths.iter().any(|p| parent(p) != first);
         let folder = folder.unwrap_or(first);
-        let time = if raw.is_none() && have_exif_time(&paths) { TimeSource::Exif } else { TimeSource::Count };
+        let timed = if raw.is_none() { have_exif_time(&paths) } else { Ok(false) };
+        let time = if timed == Ok(true) { TimeSource::Exif } else { TimeSource::Count };
         let out_of_order = out_of_order(&paths);
         let is_pattern = matches!(inputs, [one] if !one.exists());
-        Ok(Self { paths, next: 0, folder, raw, time, with_folder, left_out, out_of_order, is_pattern })
+        let unread_exif = timed.err();
+        Ok(Self { paths, next: 0, folder, raw, time, unread_exif, with_folder, left_out, out_of_order, is_pattern })
     }
 }
 
@@ -60,8 +64,15 @@ fn out_of_order(paths: &[PathBuf]) -> Option<[String; 2]> {
 }
 
 /// Returns whether the camera wrote the time into the pictures. The first readable picture decides for all.
-fn have_exif_time(paths: &[PathBuf]) -> bool {
-    paths.iter().take(MAX_SIZES_READ).find_map(|p| header::read_exif_time(p)).flatten().is_some()
+///
+/// # Errors
+/// The picture has EXIF that cannot be read: its name and the reason.
+fn have_exif_time(paths: &[PathBuf]) -> Result<bool, String> {
+    match paths.iter().take(MAX_SIZES_READ).find_map(|path| Some((path, header::read_exif_time(path)?))) {
+        Some((path, Err(why))) => Err(format!("{}: {why}", path.display())),
+        Some((_, Ok(time))) => Ok(time.is_some()),
+        None => Ok(false),
+    }
 }
 
 impl Files {
@@ -161,12 +172,22 @@ impl Source for Files {
             let what = match kind {
                 Kind::File => "file",
                 Kind::Folder => "folder",
+                Kind::Again => {
+                    let paths = explain::counted(*n as u64, "path");
+                    return format!("{paths} through links to pictures that are in the list already were left out");
+                }
             };
             let name = if ending.is_empty() { "without an ending".to_owned() } else { format!("ending in .{ending}") };
             let were = if *n == 1 { "was" } else { "were" };
             format!("{} {name} {were} left out", explain::counted(*n as u64, what))
         };
         let mut notes: Vec<String> = self.left_out.iter().map(note).collect();
+        notes.extend(self.unread_exif.as_ref().map(|why| {
+            format!(
+                "the EXIF of the pictures gives no time of exposure ({why}); without frames.csv, times are numbers of \
+                 pictures divided by --fps"
+            )
+        }));
         notes.extend(self.out_of_order.as_ref().map(|[a, b]| {
             format!(
                 "pictures are processed in the given order, {a} before {b}; give the folder, or the pattern in quotes, \

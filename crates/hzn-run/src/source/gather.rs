@@ -1,6 +1,6 @@
 //! Gathers the picture files of the inputs: of a folder, of a pattern, or of a list.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::paths::ending;
@@ -19,6 +19,8 @@ pub(super) type LeftOut = BTreeMap<(Kind, String), usize>;
 pub(super) enum Kind {
     File,
     Folder,
+    /// A file that was found before, because a link leads to its folder.
+    Again,
 }
 
 impl Kind {
@@ -37,6 +39,18 @@ fn retain_files(paths: &mut Vec<PathBuf>, left_out: &mut LeftOut) {
             *left_out.entry((kind, ending(p))).or_default() += 1;
         }
         kind == Kind::File
+    });
+}
+
+/// Keeps one path to each name in each folder, the shortest. A link to a folder above it leads to the same pictures on
+/// ever longer paths. Links to single pictures stay: whoever gave a picture two names wants two rows.
+fn retain_places(paths: &mut Vec<PathBuf>) {
+    paths.sort_by_cached_key(|path| (path.components().count(), path.clone()));
+    let mut places = HashSet::new();
+    paths.retain(|path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        places.insert(folder.join(path.file_name().unwrap_or_default()))
     });
 }
 
@@ -108,6 +122,11 @@ impl Gathered {
             _ => PICTURES.contains(&ending(p).as_str()),
         });
         retain_files(&mut found, &mut self.left_out);
+        let paths = found.len();
+        retain_places(&mut found);
+        if let Some(again) = paths.checked_sub(found.len()).filter(|n| *n > 0) {
+            *self.left_out.entry((Kind::Again, String::new())).or_default() += again;
+        }
         if found.is_empty() {
             return Err(unusable(format!("{text}: no picture matches")));
         }

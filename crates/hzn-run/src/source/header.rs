@@ -20,10 +20,12 @@ pub(super) fn read_size(path: &Path) -> Option<(u32, u32)> {
     read_size_from(open_file(path).ok()?)
 }
 
-/// Returns the time of exposure, if the camera wrote it into the file. `None` if the header cannot be read.
-pub(super) fn read_exif_time(path: &Path) -> Option<Option<f64>> {
+/// Returns the time of exposure, if the camera wrote it into the file, or why its EXIF cannot be read. `None` if the
+/// header cannot be read.
+pub(super) fn read_exif_time(path: &Path) -> Option<Result<Option<f64>, String>> {
     let mut decoder = open(path)?;
-    Some(decoder.exif_metadata().ok().flatten().and_then(exif::time_s))
+    let block = decoder.exif_metadata().map_err(|e| e.to_string());
+    Some(block.and_then(|block| block.map_or(Ok(None), exif::time_s)))
 }
 
 /// Returns the lens data from the file's EXIF. `None` if the header cannot be read or there is no EXIF.

@@ -81,7 +81,7 @@ fn open_recording(path: &Path, topic: Option<&str>) -> Result<Box<dyn Source>, E
 
 /// Returns the EXIF time of exposure of a picture file, in seconds since 1970.
 pub fn exif_time_s(path: &Path) -> Option<f64> {
-    header::read_exif_time(path).flatten()
+    header::read_exif_time(path)?.ok().flatten()
 }
 
 /// Returns the lens data from a picture file's EXIF.

@@ -10,10 +10,14 @@ use crate::error::{Error, unusable};
 /// unfinished file has the ending of its kind before `.part`.
 ///
 /// # Errors
-/// The file does not exist, or is a folder.
+/// The file does not exist, or is not a regular file.
 pub fn check_exists(file: &Path) -> Result<(String, bool), Error> {
     if !file.is_file() {
-        let what = if file.is_dir() { "is a folder; a file is expected here" } else { "no such file" };
+        let what = match (file.is_dir(), file.exists()) {
+            (true, _) => "is a folder; a file is expected here",
+            (_, true) => "is a device, a pipe or a socket; a file is expected here",
+            _ => "no such file",
+        };
         return Err(unusable(format!("{}: {what}", file.display())));
     }
     let unfinished = ending(file) == "part";

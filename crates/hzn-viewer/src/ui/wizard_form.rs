@@ -43,6 +43,7 @@ impl Wizard {
             lens: Some(if self.fisheye { Model::Equidistant } else { Model::Pinhole }),
             exif: self.exif.clone(),
             altitude_km: self.one_altitude.then_some(self.altitude_km),
+            body: start::Body::Earth,
         };
         let start = start::write_sensor_toml(&facts).map_err(|e| e.to_string())?;
         Ok((start.text, start.warnings))

@@ -250,7 +250,10 @@ fn remedy(check: &Check) -> String {
         "the calibration itself is not better known (focal_sigma_percent, covariance)".to_owned()
     } else if o.known_limb_percent < needed {
         let km = (needed * needed - o.known_limb_percent.powi(2)).sqrt() / o.percent_per_km.abs().max(1e-12);
-        format!("state the limb height to ± {km:.1} km, or use a wider range of altitudes and directions")
+        format!(
+            "state limb height and altitude together to ± {km:.1} km (limb_height_sigma_km and altitude_sigma_km of \
+             [body]), or use a wider range of altitudes and directions"
+        )
     } else {
         "use more pictures, or pictures with a longer limb".to_owned()
     };
