@@ -34,7 +34,7 @@ command of a row measures our number, or works with our setting.
 | different | another value: a misprint, or a choice; the reason is in the row |
 | open | nobody has measured our number in this statistic; the row says what has to be run |
 
-Numbers of figures are read off. Where the reading did not note the figure, the place names the range. \"No value is read
+Numbers of figures are read off. Where the reading did not note the figure, the place has the range. \"No value is read
 off\" means that a curve still has to be read. The pictures of the papers are not public, so ours are rendered, and a
 verdict holds for the scenes of its page.
 ";

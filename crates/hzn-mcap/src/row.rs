@@ -359,7 +359,7 @@ impl Row {
         Some([self.axis_x?, self.axis_y?, self.axis_z?])
     }
 
-    /// Returns the covariance of [`Self::axis`] in rad² (camera frame): xx, xy, xz, yy, yz, zz; `None` if there is none.
+    /// Returns the covariance of [`Self::axis`] in rad² (camera frame): xx, xy, xz, yy, yz, zz; `None` without an axis.
     pub fn covariance(&self) -> Option<[f64; 6]> {
         Some([self.cov_xx?, self.cov_xy?, self.cov_xz?, self.cov_yy?, self.cov_yz?, self.cov_zz?])
     }

@@ -437,7 +437,6 @@ impl Report {
             _ => format!("Report({}: {})", self.title(), r.detail),
         }
     }
-
     /// Shows the numbers in a notebook, next to the picture with all annotations.
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
         let image = self.image.as_ref().and_then(|w| w.bind(py).upgrade());

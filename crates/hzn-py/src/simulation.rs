@@ -224,7 +224,7 @@ pub(crate) fn evaluate<'py>(
                 let name = report.get_type().name()?;
                 let report: Py<Report> = report.extract().map_err(|_| {
                     errors::config(format!(
-                        "results: item {i} is a {name}, not a Report; give the reports, or the file that `hzn run` wrote"
+                        "results: item {i} is a {name}, not a Report; give the reports, or the file that hzn run wrote"
                     ))
                 })?;
                 let file_of_truth = files.get(i).copied().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The papers, number by number: every number that they print next to ours, from the tables in `reproduce/papers`. A row
+//! The papers, number by number: each that they print next to ours, from the tables in `reproduce/papers`. A row
 //! that is incomplete, or quotes a number that its page no longer has, is an error.
 
 use std::path::{Path, PathBuf};
@@ -114,7 +114,7 @@ fn check(row: &Row, root: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Fails if the command is neither a study, nor a chore of `cargo xtask`, nor a command of `hzn`. The sources list them.
+/// Fails if the command is no study, no chore of `cargo xtask` and no command of `hzn`. The sources list them.
 fn check_command(command: &str, root: &Path) -> anyhow::Result<()> {
     let lists = |file: &str, entry: String| -> anyhow::Result<bool> {
         Ok(std::fs::read_to_string(root.join(file)).with_context(|| file.to_owned())?.contains(&entry))

@@ -88,6 +88,11 @@ fn score_all(flights: &[(Scenario, Inputs)]) -> Table {
     table
 }
 
+/// What no filter can do better before the vehicle turns.
+const BEFORE_THE_TURN: &str = "Before the vehicle turns, an attitude with a prior of 2° and two cameras with mounts of 1° \
+    cannot be better than 3/√(1/2² + 2/1²) = 2.0° (3σ). The 1.1° of [BB] needs rotation against the directions, or it is \
+    too small because of (48) with (50) as printed (book/theory/navigation.md).";
+
 pub(super) fn navigation(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(PICTURES);
     let mut section = Section::default();
@@ -124,11 +129,7 @@ pub(super) fn navigation(effort: &Effort) -> anyhow::Result<Section> {
          are the largest of the flight, and its last column has 3σ, where ours has 1σ.",
     );
     section.table(score::PICTURE_HEAD, rows);
-    section.text(
-        "Before the vehicle turns, an attitude with a prior of 2° and two cameras with mounts of 1° cannot be better \
-         than 3/√(1/2² + 2/1²) = 2.0° (3σ). The 1.1° of [BB] needs rotation against the directions, or it is too small \
-         because of (48) with (50) as printed (book/theory/navigation.md).",
-    );
+    section.text(BEFORE_THE_TURN);
     let residuals = Donors::new(donors);
     section.text(residuals.describe());
     let flights: Vec<(Scenario, Inputs)> = with_sun(FIRST_SEED, FLIGHTS.min(effort.frames(FLIGHTS)), count)?

@@ -156,6 +156,30 @@ fn a_full_covariance_beats_the_scalars_and_says_the_same_where_it_is_the_same() 
     assert_eq!(refused(&|c| c.order[0] = Intrinsic::P1), "camera.covariance.order");
 }
 
+/// Fails if the parts of a budget do not add up to the covariance, or all but the errors of the edge points not to its
+/// common part.
+fn assert_parts_add_up(name: &str, budget: &ErrorBudget<f64>, fused: &covariance::Fused<f64>) {
+    let (mut sum, mut shared) = ([0.0; 6], [0.0; 6]);
+    for term in Term::ALL {
+        let part = budget.covariance(term).upper_rad2;
+        sum.iter_mut().zip(part).for_each(|(s, x)| *s += x);
+        // Only the errors of the edge points are new in the next picture.
+        let shared = shared.iter_mut().filter(|_| term != Term::EdgeNoise);
+        shared.zip(part).for_each(|(s, x)| *s += x);
+    }
+    let (n1, n2) = basis(&fused.e);
+    let whole = Cov3::<Cam, f64>::from_tangent(&n1, &n2, fused.p).upper_rad2;
+    let scale = whole[0] + whole[3] + whole[5];
+    let common = Cov3::<Cam, f64>::from_tangent(&n1, &n2, fused.common.unwrap()).upper_rad2;
+    for (parts, fused) in [(sum, whole), (shared, common)] {
+        for (s, w) in parts.iter().zip(fused) {
+            // The tangent planes before and after the fusion are some hundredths of a degree apart.
+            assert!((s - w).abs() < 0.01 * scale, "{name}: {parts:?} {fused:?}");
+        }
+    }
+    assert!(common[0] + common[3] + common[5] < scale, "{name}: {common:?} {whole:?}");
+}
+
 /// The parts of all sources add up to the whole covariance. Measured noise never gives a smaller covariance than the
 /// told noise.
 #[test]
@@ -197,25 +221,7 @@ fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
             let mut budget = ErrorBudget::new();
             let fused =
                 covariance::fuse(&blocks, &fit, &expected, &noise, &estimate, &camera, Some(&mut budget)).unwrap();
-            let (mut sum, mut shared) = ([0.0; 6], [0.0; 6]);
-            for term in Term::ALL {
-                let part = budget.covariance(term).upper_rad2;
-                sum.iter_mut().zip(part).for_each(|(s, x)| *s += x);
-                // Only the errors of the edge points are new in the next picture.
-                let shared = shared.iter_mut().filter(|_| term != Term::EdgeNoise);
-                shared.zip(part).for_each(|(s, x)| *s += x);
-            }
-            let (n1, n2) = basis(&fused.e);
-            let whole = Cov3::<Cam, f64>::from_tangent(&n1, &n2, fused.p).upper_rad2;
-            let scale = whole[0] + whole[3] + whole[5];
-            let common = Cov3::<Cam, f64>::from_tangent(&n1, &n2, fused.common.unwrap()).upper_rad2;
-            for (parts, fused) in [(sum, whole), (shared, common)] {
-                for (s, w) in parts.iter().zip(fused) {
-                    // The tangent planes before and after the fusion are some hundredths of a degree apart.
-                    assert!((s - w).abs() < 0.01 * scale, "{name}: {parts:?} {fused:?}");
-                }
-            }
-            assert!(common[0] + common[3] + common[5] < scale, "{name}: {common:?} {whole:?}");
+            assert_parts_add_up(name, &budget, &fused);
             let floor: [f64; 3] = *told.get_or_insert(fused.p);
             let more = [fused.p[0] - floor[0], fused.p[1] - floor[1], fused.p[2] - floor[2]];
             let slack = 1e-3 * (floor[0] + floor[2]);
