@@ -2,6 +2,7 @@
 
 use hzn_core::Config;
 use hzn_core::body::{self, Kind};
+use hzn_core::covariance::{self, Noise};
 
 use super::bend;
 use super::edge::{LENGTHS_PX, MIN_SIGMA_PX, WHITE};
@@ -78,8 +79,12 @@ pub struct Edge {
     pub length_px: f64,
     /// White part ν of the variance in that model.
     pub white: f64,
-    /// 1-sigma of that white part, in pixels.
+    /// 1-sigma of the part of the errors that averages out over [`Self::slow_px`], in pixels: the white part, and most of
+    /// errors whose length is much shorter.
     pub white_px: f64,
+    /// Correlation length of the rest, in pixels: L, and at least the length that the sensor assumes without a
+    /// calibration.
+    pub slow_px: f64,
     /// 1-sigma of a common shift of all points of an edge, in pixels: the RMS of the correlated part of the residuals,
     /// at least 0.1.
     pub bias_px: f64,
@@ -180,9 +185,9 @@ impl Calibration {
     /// Writes the values into a sensor that looks for the body, as [`super::into_sensor_toml`] does for the file.
     pub fn apply(&self, sensor: &mut Config) {
         let several = !sensor.bodies.is_empty();
-        let noise = hzn_core::covariance::Config {
+        let noise = covariance::Config {
             sigma_px: round_to_written_digits(self.edge.sigma_px),
-            correlation_px: round_to_written_digits(self.edge.length_px),
+            correlation_px: round_to_written_digits(self.edge.slow_px),
             white_px: round_to_written_digits(self.edge.white_px),
             bias_px: round_to_written_digits(self.edge.bias_px),
             ..sensor.covariance
@@ -234,7 +239,7 @@ fn combine_heights(profile: &Profile, sightings: &[&Sighting], edge: &Edge) -> H
     let mean_square = |value: &dyn Fn(&Sighting) -> f64| sightings.iter().map(|s| value(s).powi(2)).sum::<f64>() / n;
     let (statistical_km, scatter_km) = (mean_variance.sqrt(), scatter2.sqrt());
     // Noise that is new at every point averages out along an edge; only the rest can be a shift.
-    let correlated = (1.0 - edge.white).sqrt();
+    let correlated = (1.0 - (edge.white_px / edge.sigma_px).powi(2)).max(0.0).sqrt();
     let shift_km = mean_square(&|s| (s.rms_px * correlated).max(MIN_SHIFT_PX) * s.km_per_px).sqrt();
     let bend_km =
         bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px)) * mean_square(&|s| s.km_per_bend_px).sqrt();
@@ -261,14 +266,25 @@ fn combine_edges(sightings: &[&Sighting]) -> Edge {
     let models = (0..LENGTHS_PX.len()).flat_map(|i| (0..WHITE.len()).map(move |j| (i, j)));
     let (i, j) = models.min_by(|a, b| cost(a.0, a.1).total_cmp(&cost(b.0, b.1))).unwrap_or_default();
     let rms_px = (sightings.iter().map(|s| s.rms_px * s.rms_px).sum::<f64>() / n).sqrt();
+    // The length that the sensor assumes for correlated errors. Errors with a much shorter length are as good as white.
+    let arc_px = sightings.iter().map(|s| s.arc_px).sum::<f64>() / n;
+    let measured = covariance::Config { noise: Noise::Rms, correlation_px: 0.0, ..covariance::Config::default() };
+    let window_px = measured.measured(rms_px, arc_px).correlation_px;
+    let correlated = (1.0 - WHITE[j]) * share_of_mean(window_px / LENGTHS_PX[i]);
     Edge {
         sigma_px: rms_px.max(MIN_SIGMA_PX),
         correlation_px: median(sightings.iter().map(|s| s.correlation_px)),
         length_px: LENGTHS_PX[i],
         white: WHITE[j],
-        white_px: rms_px * WHITE[j].sqrt(),
-        bias_px: (rms_px * (1.0 - WHITE[j]).sqrt()).max(MIN_SHIFT_PX),
+        slow_px: LENGTHS_PX[i].max(window_px),
+        white_px: rms_px * (1.0 - correlated).sqrt(),
+        bias_px: (rms_px * correlated.sqrt()).max(MIN_SHIFT_PX),
     }
+}
+
+/// Returns the variance of the mean over a window of x correlation lengths, for a Gauss-Markov process of variance 1.
+fn share_of_mean(x: f64) -> f64 {
+    if x < 1e-3 { 1.0 } else { 2.0 * (x - 1.0 + (-x).exp()) / (x * x) }
 }
 
 /// Fits d_i = A_i h − D_i ε: the relative focal length error ε together with the heights and the scatter.

@@ -122,6 +122,10 @@ fn height_scatter_and_noise_are_found_within_their_errors() {
     // (1 − ν) L or more, because one picture does not determine the length.
     assert!((15.0..=200.0).contains(&c.edge.correlation_px), "{:?}", c.edge);
     assert!(c.correlation.first().is_some_and(|p| (p.1 - 1.0).abs() < 1e-9));
+    // What averages out, and the rest, are the whole variance; the rest is the smaller part of such errors.
+    let (whole, slow) = (c.edge.sigma_px.powi(2), c.edge.sigma_px.powi(2) - c.edge.white_px.powi(2));
+    assert!((0.05..0.5).contains(&(slow / whole)) && c.edge.bias_px >= slow.sqrt() - 1e-12, "{:?}", c.edge);
+    assert!(c.edge.slow_px >= c.edge.length_px, "{:?}", c.edge);
 }
 
 #[test]

@@ -133,11 +133,11 @@ fn noise_lines(calibration: &Calibration) -> Vec<Line> {
             value: round_to_written_digits(e.sigma_px).into(),
             why: "RMS of the residuals along the limb".into(),
         },
-        Line { key: "correlation_px", value: round_to_written_digits(e.length_px).into(), why: length },
+        Line { key: "correlation_px", value: round_to_written_digits(e.slow_px).into(), why: length },
         Line {
             key: "white_px",
             value: round_to_written_digits(e.white_px).into(),
-            why: "the part of the residuals that is new at every point".into(),
+            why: "the part of the residuals that averages out over this length".into(),
         },
         Line {
             key: "bias_px",

@@ -6,9 +6,9 @@ use crate::base::keys::{Form, Section, Value, choices, section};
 choices! {
     /// Source of the noise model of an edge.
     pub enum Noise {
-        /// The sigma, the common shift, the common bend and the RMS of the common tilt each equal the RMS of the edge's
-        /// residuals. The correlation length is a twelfth of the edge's length. The values of `[covariance]` are the
-        /// floors of these five numbers.
+        /// The sigma, the common shift and the RMS of the common tilt each equal the RMS of the edge's residuals. The
+        /// correlation length is a twelfth of the edge's length. The common bend is as strong as the strongest slow wave
+        /// of the residuals. The values of `[covariance]` are the floors of these five numbers.
         // The default measures in each picture, because no fixed set of values held on flights with other seeds:
         // between 0 and 38 % of the answers were beyond 3 sigma.
         @1 Rms = "rms";
@@ -77,7 +77,7 @@ section! {
         @- bend_px: f64 = 0.0, [0.0 to 1e4];
         /// 1σ of the part of an edge point's error that is new at every point, px. `hzn calibrate noise` measures it.
         ///
-        /// With `rms`, only the rest of the residuals counts as correlated, as common shift, tilt and bend.
+        /// With `rms`, only the rest of the residuals counts as correlated, as common shift and as common tilt.
         // Without a calibration it is 0, because one picture cannot separate the two parts well enough.
         @- white_px: f64 = 0.0, [0.0 to 1e4];
         /// For `braun-barf`: whether the largest variance is used in every direction.
@@ -114,7 +114,6 @@ impl Config {
             correlation_px: self.correlation_px.max(length_px),
             bias_px: self.bias_px.max(common),
             tilt_px: self.tilt_px.max(common * END_PER_RMS),
-            bend_px: self.bend_px.max(common),
             ..*self
         }
     }

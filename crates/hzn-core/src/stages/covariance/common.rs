@@ -17,6 +17,10 @@
 //! counts with a²/2. Around the whole limb, the second harmonic causes no error. On a short arc, nearly all of it is
 //! fitted as a tilt or as another half-angle; the visible arc decides which.
 //!
+//! The fit absorbs a bend as another half-angle, so that the residuals do not show it. They show the next shapes along
+//! the edge, the Legendre polynomials of the degrees 3 to 5. The bend is assumed to be as strong as the strongest of
+//! them, as in `hzn calibrate noise`. Noise that is new at every point has little of these shapes.
+//!
 //! The signals vary slowly along the limb, so that a part of the points is used instead of all. This part has its own
 //! normal equations; a signal that the cone can follow is then fitted completely.
 
@@ -38,6 +42,26 @@ const PART: usize = 64;
 /// Standard deviation of the position along the edge, for positions from −1 to 1: 1/√3.
 const SPREAD: f64 = 0.577_350_269_189_625_8;
 
+/// Value of a bend at the ends of the edge if its RMS along the edge is 1: √5.
+const BEND_END_PER_RMS: f64 = 2.236_067_977_499_79;
+
+/// Returns the Legendre polynomials of the degrees 3 to 5 at t from −1 to 1, with an RMS of 1.
+fn shapes<T: Real>(t: T) -> [T; 3] {
+    // √7/2, √9/8 and √11/8.
+    const SCALES: [f64; 3] = [1.322_875_655_532_295_4, 0.375, 0.414_578_098_794_425];
+    let (n, t2) = (T::from_f64, t * t);
+    [
+        t * (t2 * n(5.0) - n(3.0)) * n(SCALES[0]),
+        (t2 * (t2 * n(35.0) - n(30.0)) + n(3.0)) * n(SCALES[1]),
+        t * (t2 * (t2 * n(63.0) - n(70.0)) + n(15.0)) * n(SCALES[2]),
+    ]
+}
+
+/// Returns the distance between the points of the part, counted in inliers.
+fn step<T: Real>(fit: &Fit<T>) -> usize {
+    (fit.inliers as usize).div_ceil(PART).max(1)
+}
+
 /// Calls `add` with each term and its covariance of (δ₁₂, δc).
 pub(super) fn add_terms<T: Real>(
     blocks: &[Block<T>],
@@ -54,7 +78,8 @@ pub(super) fn add_terms<T: Real>(
     add(Term::CommonShift, &outer(&error(&sums.shift), noise.shift_px * noise.shift_px));
     let [tilt, bend] = sums.along();
     add(Term::CommonTilt, &outer(&error(&tilt), noise.tilt_px * noise.tilt_px));
-    add(Term::CommonBend, &outer(&error(&bend), noise.bend_px * noise.bend_px));
+    let bend_px = if noise.measures_bend { noise.bend_px.max(sums.strongest_shape_px()) } else { noise.bend_px };
+    add(Term::CommonBend, &outer(&error(&bend), bend_px * bend_px));
     let mut uneven = M3::zeros();
     for (amplitude, pair) in expected.unknown_harmonics_cos.iter().zip(&sums.harmonics) {
         for sum in pair {
@@ -109,7 +134,7 @@ impl<T: Real> Row<T> {
 pub(super) fn part<'a, T: Real>(blocks: &'a [Block<T>], fit: &'a Fit<T>) -> impl Iterator<Item = Row<T>> + 'a {
     let (b1, b2) = basis(&fit.e);
     let [m1, m2] = fit.mean;
-    every_weighted(blocks, (fit.inliers as usize).div_ceil(PART)).map(move |(place, block, l)| {
+    every_weighted(blocks, step(fit)).map(move |(place, block, l)| {
         let s = block.ray(l);
         let [gu, gv] = block.gradient_at(l, &fit.e);
         let g2 = (gu * gu + gv * gv).max(T::from_f64(1e-20));
@@ -132,6 +157,8 @@ struct Sums<T> {
     by_number: V3<T>,
     by_square: V3<T>,
     numbers: [T; 3],
+    /// Σ of the robust weight times the distance from the fitted limb, px, times each of the shapes of [`shapes`].
+    residuals: [T; 3],
     /// Sums of the harmonics: for each harmonic, cosine and sine.
     harmonics: [[V3<T>; 2]; 2],
     /// Sums for each intrinsic parameter.
@@ -147,9 +174,14 @@ impl<T: Real> Sums<T> {
             by_number: zero,
             by_square: zero,
             numbers: [T::ZERO; 3],
+            residuals: [T::ZERO; 3],
             harmonics: [[zero; 2]; 2],
             lens: [zero; INTRINSICS],
         };
+        let every = step(fit);
+        let per_point = T::from_f64(2.0 * every as f64) / T::from_f64(f64::from(fit.inliers.max(1)));
+        // The middle of each stretch of points, from −1 to 1.
+        let mut along = per_point * T::from_f64(0.5) - T::one();
         let is_uncertain = camera.intrinsic_modes().is_some();
         part(blocks, fit).for_each(|row| {
             let Row { s, gradient: [gu, gv], h, weight, place, x, y, .. } = row;
@@ -159,6 +191,12 @@ impl<T: Real> Sums<T> {
             let i = T::from_i32(place as i32);
             sums.by_number += shift * i;
             sums.by_square += shift * (i * i);
+            let d = s - fit.e;
+            // 1 − s·e is half of the squared distance of two unit vectors; the difference of cosines would lose the
+            // digits of a small disc.
+            let off_px = (d.dot(&d) * T::from_f64(0.5) - fit.k) / row.g2.sqrt();
+            sums.residuals.iter_mut().zip(shapes(along)).for_each(|(sum, shape)| *sum += weight * off_px * shape);
+            along += per_point;
             sums.numbers[0] += weight;
             sums.numbers[1] += weight * i;
             sums.numbers[2] += weight * i * i;
@@ -176,6 +214,12 @@ impl<T: Real> Sums<T> {
             }
         });
         sums
+    }
+
+    /// Returns the value at the ends of a bend that is as strong as the strongest of the next shapes, in pixels.
+    fn strongest_shape_px(&self) -> T {
+        let strongest = self.residuals.iter().fold(T::ZERO, |largest, sum| largest.max(sum.abs()));
+        strongest * T::from_f64(BEND_END_PER_RMS) / self.numbers[0].max(T::one())
     }
 
     /// Returns the sums for tilt and bend, with τ = (i − ī)/(√3 σ_i). For evenly distributed points τ goes from −1 to

@@ -27,8 +27,9 @@ pub(super) struct EdgeNoiseModel<T> {
     pub(super) shift_px: T,
     /// 1-sigma of the common tilt, px.
     pub(super) tilt_px: T,
-    /// 1-sigma of the common bend, px.
+    /// 1-sigma of the common bend that is told, px, and whether the residuals may raise it.
     pub(super) bend_px: T,
+    pub(super) measures_bend: bool,
     /// Sigma of the configuration in pixels, if the likelihood of the residuals gives the noise.
     reml: Option<f64>,
 }
@@ -59,7 +60,8 @@ impl<T: Real> EdgeNoiseModel<T> {
             length_px: T::from_f64(config.correlation_px).max(length_px),
             shift_px: T::from_f64(config.bias_px).max(common),
             tilt_px: T::from_f64(config.tilt_px).max(common * T::from_f64(END_PER_RMS)),
-            bend_px: T::from_f64(config.bend_px).max(common),
+            bend_px: T::from_f64(config.bend_px),
+            measures_bend: config.noise == Noise::Rms,
             reml: (config.noise == Noise::Reml).then_some(config.sigma_px),
         }
     }
