@@ -24,6 +24,7 @@ const MAX_INPUT_BYTES: u32 = 8192;
 const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TARGET]...
        cargo xtask campaign kill [RUNS]
        cargo xtask campaign cuts [PICTURES]
+       cargo xtask campaign flights [FLIGHTS]
        cargo xtask campaign long [PICTURES]
        cargo xtask campaign flips [TRIALS]
        cargo xtask campaign packets [COUNT]
@@ -36,6 +37,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
         new coverage to fuzz/corpus
   kill  kills RUNS (1000) runs of hzn at random moments and continues them
   cuts  cuts the power after each step of runs of PICTURES (12) pictures
+  flights
+        fuses FLIGHTS (200) right flights, and every wrong input on a twentieth of them
   long  processes PICTURES (100000) with hzn run, and ten times as many in one process
   flips flips TRIALS (20000) bits of pictures and of stored parameters, sticks as many pictures, and flips every bit
         of a sensor in memory
@@ -59,6 +62,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("fuzz") => Request::parse(&args[1..]).and_then(|request| request.run().map_err(Trouble::into_message)),
         Some("kill") => kill(number(1000)?).map_err(Trouble::into_message),
         Some("cuts") => cuts(number(12)?).map_err(Trouble::into_message),
+        Some("flights") => flights(number(200)?).map_err(Trouble::into_message),
         Some("long") => long(number(100_000)?).map_err(Trouble::into_message),
         Some("flips") => flips(number(20_000)?).map_err(Trouble::into_message),
         Some("packets") => packets(number(1_000_000)?).map_err(Trouble::into_message),
@@ -96,6 +100,11 @@ pub(crate) fn flips(trials: u64) -> Outcome {
 /// Processes pictures with artefacts, with and without a limb: `pictures` of each kind.
 pub(crate) fn artefacts(pictures: u64) -> Outcome {
     steps::run(test("chain", "artefacts::").env("HZN_ARTEFACTS", pictures.to_string()))
+}
+
+/// Fuses right flights, and wrong inputs on a twentieth of them.
+pub(crate) fn flights(count: u64) -> Outcome {
+    steps::run(test("fuse", "verdict::").env("HZN_FLIGHTS", count.to_string()))
 }
 
 /// Cuts the power after each step of runs of so many pictures.

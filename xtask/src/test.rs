@@ -54,6 +54,7 @@ const STEPS: &[Step] = &[
     long("killed runs", |_| campaign::kill(1000)),
     long("flipped bits", |_| campaign::flips(20_000)),
     long("power cuts", |_| campaign::cuts(12)),
+    long("verdicts over flights", |_| campaign::flights(200)),
     long("artefacts", |_| campaign::artefacts(15)),
 ];
 

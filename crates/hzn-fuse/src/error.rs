@@ -1,11 +1,21 @@
 //! The reasons why a flight cannot be fused.
 
+use crate::finding::Finding;
+
 /// An error, in words that name the file, the line or the key.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// An input cannot be used. Nothing was written.
     #[error("{0}")]
     Unusable(String),
+    /// No solution is possible, and the inputs contradict each other. Nothing was written.
+    #[error("{why}. The likeliest cause: {}", .finding.what)]
+    Contradicts {
+        /// Why there is no solution.
+        why: String,
+        /// The likeliest cause.
+        finding: Box<Finding>,
+    },
     /// Something failed, for example a disk.
     #[error("{0}")]
     Failed(String),

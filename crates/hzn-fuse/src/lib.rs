@@ -8,6 +8,7 @@
 //! | [`truth`] | errors against the truth of a simulated flight |
 //! | [`start`] | the first attitude from directions in a window of time |
 //! | [`smooth`] | the smoothed solution |
+//! | [`finding`] | the verdict: whether the inputs agree with each other, and the likeliest cause if not |
 //! | [`results`] | what comes out |
 //! | `simulated` | recordings of simulated flights without pictures, with the feature of this name |
 //! | [`sink`] | results as files: CSV, MCAP, AEM, CK, frames.csv |
@@ -16,9 +17,11 @@
 #![forbid(unsafe_code)]
 
 mod error;
+pub mod finding;
 pub mod flight;
 pub mod input;
 pub mod read_back;
+mod reference;
 pub mod results;
 pub mod settings;
 #[cfg(feature = "simulated")]
@@ -27,6 +30,7 @@ pub mod sink;
 pub mod smooth;
 pub mod start;
 pub mod truth;
+mod verdict;
 
 pub use error::Error;
 pub use flight::fuse;

@@ -9,6 +9,7 @@ use hzn_nav::layout::{Layout, Place};
 use hzn_nav::strapdown::Nominal;
 use nalgebra::Vector3;
 
+use crate::finding::Verdict;
 use crate::input::Body;
 
 /// The estimated errors of a camera.
@@ -35,10 +36,10 @@ pub struct Epoch {
     pub state: Nominal,
     /// Covariance of the attitude: of a rotation vector, rad².
     pub attitude_covariance_rad2: Covariance<Vehicle>,
-    /// 1-sigma of the velocity (ECEF), m/s.
-    pub velocity_sigma_m_s: Vector3<f64>,
-    /// 1-sigma of the position (ECEF), m.
-    pub position_sigma_m: Vector3<f64>,
+    /// Covariance of the velocity, m²/s².
+    pub velocity_covariance_m2_s2: Covariance<Fixed>,
+    /// Covariance of the position, m².
+    pub position_covariance_m2: Covariance<Fixed>,
     /// Estimated errors of the instruments.
     pub corrections: Corrections,
     /// 1-sigma of the gyros' biases, rad/s; 0 if they do not exist.
@@ -64,7 +65,8 @@ impl Epoch {
         let sigmas = |place: Option<Place>| place.map_or_else(Vector3::zeros, |p| filter.sigmas(p.first));
         let one = |place: Option<Place>| place.map_or(0.0, |p| filter.sigmas(p.first).x);
         let to_vehicle = filter.nominal().attitude.inverse();
-        let covariance = filter.covariance().fixed_view::<3, 3>(Layout::ATTITUDE, Layout::ATTITUDE).into_owned();
+        let covariance =
+            |first: usize| Covariance::<Fixed>::from(filter.covariance().fixed_view::<3, 3>(first, first).into_owned());
         let inertial = filter.last_imu().map(|imu| filter.corrections().correct(&imu).gyro_rad_s);
         let rate = inertial.unwrap_or_default() - to_vehicle * earth_rate();
         let camera = |which: usize| {
@@ -80,9 +82,9 @@ impl Epoch {
         };
         Self {
             state: *filter.nominal(),
-            attitude_covariance_rad2: Covariance::<Fixed>::from(covariance).rotated(&to_vehicle),
-            velocity_sigma_m_s: filter.sigmas(Layout::VELOCITY),
-            position_sigma_m: filter.sigmas(Layout::POSITION),
+            attitude_covariance_rad2: covariance(Layout::ATTITUDE).rotated(&to_vehicle),
+            velocity_covariance_m2_s2: covariance(Layout::VELOCITY),
+            position_covariance_m2: covariance(Layout::POSITION),
             corrections: *filter.corrections(),
             gyro_bias_sigma_rad_s: sigmas(layout.gyro_bias),
             accel_bias_sigma_m_s2: sigmas(layout.accel_bias),
@@ -245,8 +247,9 @@ pub struct Fused {
     pub begin: Option<Begin>,
     /// The solution from the start on.
     pub epochs: Vec<Epoch>,
-    /// The solution from the first sample to the start: the strapdown solution, integrated back.
-    pub back: Vec<Nominal>,
+    /// The solution before the start, integrated back from there as far as the inertial unit measured everything: to
+    /// the first sample, or to a gap or a saturated channel.
+    pub back: Vec<Epoch>,
     /// The smoothed solution at the measurements; empty without a smoother.
     pub smoothed: Vec<Epoch>,
     /// Every innovation, in the order of time.
@@ -255,6 +258,8 @@ pub struct Fused {
     pub triads: Vec<Triad>,
     /// What happened to the data.
     pub counts: Counts,
+    /// Whether the inputs agree with each other.
+    pub verdict: Verdict,
     /// What the reader of the results should know.
     pub notes: Vec<String>,
 }

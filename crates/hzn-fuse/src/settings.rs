@@ -9,6 +9,7 @@ use hzn_nav::options::{Block, CameraOptions, ImuOptions, Mode, Options, StartSig
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
+use crate::input::Fix;
 
 /// How the filter treats an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -334,6 +335,12 @@ impl Settings {
             },
             gate_probability: self.gate_probability,
         }
+    }
+
+    /// Returns the sigmas of a fix, m and m/s: its own, else those of the settings.
+    pub fn fix_sigmas(&self, fix: &Fix) -> [f64; 2] {
+        let or = |own: f64, default: f64| if own > 0.0 && own.is_finite() { own } else { default };
+        [or(fix.position_sigma_m, self.gnss.position_sigma_m), or(fix.velocity_sigma_m_s, self.gnss.velocity_sigma_mps)]
     }
 
     /// Returns the options of a camera with its mount, that sees a number of bodies.

@@ -13,8 +13,8 @@ use hzn_sim::{FlightFrame, Scenario, ScenarioError};
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use crate::error::Error;
-use crate::flight::reference::limb_axis;
 use crate::input::{Body, Fix, Inputs, Recording, Sample, Seen};
+use crate::reference::limb_axis;
 
 /// Half-angle of the discs of Sun and Moon, rad.
 const DISC_RAD: f64 = 0.00465;
@@ -108,12 +108,10 @@ fn recording(
     for (row, frame) in one.flight()?.frames.iter().enumerate() {
         let known = one.frame_row(frame);
         let pose = &frame.scene.pose;
-        let fixed_from_camera: Rotation<Cam, Fixed> = rotation(pose.q_fixed_from_camera_wxyz);
+        let fixed_from_camera = rotation(pose.q_fixed_from_camera_wxyz);
         for &kind in &one.bodies {
-            if !is_in_view(one, frame, kind)? {
-                continue;
-            }
-            let Some((body, reference)) = true_direction(one, frame, kind) else { continue };
+            let seen_from_here = is_in_view(one, frame, kind)?.then(|| true_direction(one, frame, kind));
+            let Some((body, reference)) = seen_from_here.flatten() else { continue };
             let moment = Moment {
                 camera: number,
                 body,
@@ -128,7 +126,7 @@ fn recording(
             let axis = fixed_from_camera.inverse() * reference;
             // The sensor knows the position at the time of the stamp.
             let told_m = Vector::new(known.x_km, known.y_km, known.z_km) * 1e3;
-            let reference = limb_axis(body, &told_m).unwrap_or(reference);
+            let told = limb_axis(body, &told_m).unwrap_or(reference);
             let (error, covariance_rad2) = errors.draw(&moment, &axis);
             let by_limb_height =
                 if body == Body::Limb { errors.by_limb_height(&moment, &axis) } else { Vector::zeros() };
@@ -137,7 +135,8 @@ fn recording(
                 body,
                 axis: (axis + error + by_limb_height * limb_height_km).normalize(),
                 covariance_rad2,
-                reference: Some(reference),
+                reference: Some(told),
+                altitude_km: Some(known.altitude_km),
                 by_limb_height,
                 centre: None,
                 row,
@@ -228,7 +227,7 @@ fn row(seen: &Seen) -> Row {
         file: format!("{:05}.png", seen.row),
         time_s: Some(seen.time_s),
         body: if seen.body == Body::Limb { "earth" } else { seen.body.name() }.into(),
-        altitude_km: None,
+        altitude_km: seen.altitude_km,
     };
     let mut row = Row::unprocessed(&meta, Status::Ok, "");
     let p = seen.covariance_rad2.as_inner();

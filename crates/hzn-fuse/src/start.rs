@@ -5,6 +5,7 @@
 
 use hzn_nav::frames::{Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::gravity::EARTH_RATE_RAD_S;
+use hzn_nav::strapdown::turn;
 use hzn_nav::vectors::{Direction, Wahba, davenport};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -46,8 +47,7 @@ impl DeadReckoning {
         for sample in samples {
             if let Some(last) = last {
                 let dt = sample.imu.time_s - last.imu.time_s;
-                let rate_rad_s = last.imu.gyro_rad_s + sample.imu.gyro_rad_s;
-                q = q * Rotation::from_scaled_axis(rate_rad_s * (0.5 * dt));
+                q = (q * turn(&last.imu.gyro_rad_s, &sample.imu.gyro_rad_s, dt)).renormalized();
             }
             steps.push((sample.imu.time_s, q));
             last = Some(sample);

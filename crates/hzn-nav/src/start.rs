@@ -1,6 +1,6 @@
 //! The start of a filter: an attitude from two directions, and the way back to an earlier time.
 
-use crate::filter::Filter;
+use crate::filter::{Corrections, Filter};
 use crate::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use crate::layout::Layout;
 use crate::options::CameraOptions;
@@ -66,6 +66,11 @@ pub fn propagate_back(state: &Nominal, samples: &[Imu]) -> Nominal {
 }
 
 impl<const N: usize> Filter<N> {
+    /// Sets the estimated errors of the instruments, for a way back with what was found out later.
+    pub fn set_corrections(&mut self, corrections: &Corrections) {
+        *self.corrections_mut() = *corrections;
+    }
+
     /// Sets the attitude and the covariance of its error, a rotation vector (rad²). It becomes independent of all other
     /// errors.
     pub fn set_attitude(&mut self, attitude: &Rotation<Vehicle, Fixed>, covariance_rad2: &Covariance<Fixed>) {

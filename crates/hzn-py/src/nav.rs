@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use hzn_fuse::finding::Finding;
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{self, Inputs};
 use hzn_fuse::{Settings, sink};
@@ -29,6 +30,7 @@ type Rows = [[f64; 3]; 3];
 fn to_exception(error: hzn_fuse::Error) -> PyErr {
     match error {
         hzn_fuse::Error::Unusable(what) => errors::config(what),
+        contradiction @ hzn_fuse::Error::Contradicts { .. } => errors::config(contradiction),
         hzn_fuse::Error::Failed(what) => errors::other(what),
     }
 }
@@ -97,7 +99,7 @@ pub(crate) fn fuse<'py>(
     py: Python<'py>,
     recordings: Vec<PathBuf>,
     imu: PathBuf,
-    gnss: PathBuf,
+    gnss: Option<PathBuf>,
     attitude: Option<PathBuf>,
     mounts: BTreeMap<String, Rows>,
     clocks: BTreeMap<String, f64>,
@@ -123,7 +125,9 @@ pub(crate) fn fuse<'py>(
         recording.clock_offset_s = *offset_s;
     }
     inputs.imu = input::imu(&imu).map_err(to_exception)?;
-    inputs.gnss = input::gnss(&gnss).map_err(to_exception)?;
+    if let Some(path) = &gnss {
+        inputs.gnss = input::gnss(path).map_err(to_exception)?;
+    }
     if let Some(path) = &attitude {
         inputs.attitudes = input::attitudes(path).map_err(to_exception)?;
     }
@@ -131,7 +135,11 @@ pub(crate) fn fuse<'py>(
     let fused = errors::detached(py, || hzn_fuse::fuse(&inputs, &settings, wanted))?.map_err(to_exception)?;
     let states: Vec<Value> = sink::states(&fused).map(|s| to_json(&s)).collect();
     let innovations: Vec<Value> = sink::innovations(&fused).map(|i| to_json(&i)).collect();
+    let finding = |f: &Finding| json!({ "level": f.level.name(), "source": f.source.name(), "what": f.what });
+    let findings: Vec<Value> = fused.verdict.findings.iter().map(finding).collect();
     let result = json!({
+        "verdict": fused.verdict.level().name(),
+        "findings": findings,
         "cameras": fused.cameras,
         "states": states,
         "innovations": innovations,

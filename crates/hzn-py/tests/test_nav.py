@@ -106,6 +106,9 @@ def test_fuse_gives_attitudes(tmp_path):
     files = {"imu": tmp_path / "imu.csv", "gnss": tmp_path / "gnss.csv"}
     result = hzn.nav.fuse([tmp_path / "cam.csv"], mounts={"cam": np.eye(3)}, smooth=True, **files)
     assert result["cameras"] == ["cam"] and result["start_s"] == 1.0 and result["restarts"] == 0
+    assert result["verdict"] in ("consistent", "doubtful", "contradicts")
+    assert len(result["states"][0]["position_cov_m2"]) == 6
+    assert all({"level", "source", "what"} == set(finding) for finding in result["findings"])
     last = [state for state in result["states"] if state["phase"] == "filter"][-1]
     w, x, y, z = (last[name] for name in ("qw", "qx", "qy", "qz"))
     column = [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)]

@@ -27,11 +27,15 @@ fn flight(folder: &Path) {
 /// Runs `hzn fuse` in a folder with these arguments after the two cameras.
 fn fuse(folder: &Path, args: &[&str]) -> (i32, String, String) {
     let cameras = ["--nadir", "left.csv", "--nadir", "right.csv", "--imu", "imu.csv", "--gnss", "gnss.csv"];
+    bare(folder, &[&cameras[..], args].concat())
+}
+
+/// Runs `hzn fuse` in a folder with these arguments.
+fn bare(folder: &Path, args: &[&str]) -> (i32, String, String) {
     let out = assert_cmd::Command::cargo_bin("hzn")
         .expect("the binary is built")
         .current_dir(folder)
         .arg("fuse")
-        .args(cameras)
         .args(args)
         .output()
         .expect("hzn starts");
@@ -105,6 +109,63 @@ fn wrong_inputs_are_refused_in_words() {
     std::fs::write(at.join("gnss.csv"), "time_s,x_m,y_m,z_m\n0,1,2,three\n").unwrap();
     let (_, _, text) = fuse(at, &[&MOUNTS[..], &["-o", "nav.csv"]].concat());
     assert!(text.contains("imu.csv"), "{text}");
+}
+
+/// A mount that is 40° off: the command names it with its file, and keeps the attitude from other programs.
+#[test]
+fn a_contradiction_is_named_and_its_attitudes_are_held_back() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    flight(at);
+    let mount = std::fs::read_to_string(at.join("right.toml")).unwrap();
+    let numbers = mount.split_once('[').unwrap().1.split_once('[').unwrap().1.trim_end().trim_end_matches(']');
+    let q: Vec<f64> = numbers.split(", ").map(|n| n.parse().unwrap()).collect();
+    // The product with a turn of 40° about the camera's x axis.
+    let (s, c) = 20f64.to_radians().sin_cos();
+    let q = [c * q[0] - s * q[1], c * q[1] + s * q[0], c * q[2] + s * q[3], c * q[3] - s * q[2]];
+    std::fs::write(at.join("turned.toml"), format!("[mount]\nq_vehicle_from_camera_wxyz = {q:?}\n")).unwrap();
+    let mounts = ["--mount", "left=left.toml", "--mount", "right=turned.toml", "--utc", "2019-06-13T04:00:00Z"];
+    let files = ["-o", "nav.csv", "--aem", "nav.aem", "--ck", "nav.bc"];
+    let (code, stdout, stderr) = fuse(at, &[&mounts[..], &files].concat());
+    assert_eq!(code, 1, "{stdout}{stderr}");
+    assert!(stdout.contains("verdict                contradicts") && stdout.contains("nav.csv"), "{stdout}");
+    assert!(!stdout.contains("nav.aem") && !stdout.contains("nav.bc"), "{stdout}");
+    let likeliest = stderr.lines().find(|line| line.contains("likeliest cause, contradicts")).unwrap();
+    assert!(likeliest.contains("the mount of right") && likeliest.contains("[turned.toml]"), "{stderr}");
+    assert!(stderr.contains("not written: nav.aem, nav.bc, nav.tsc, nav.tf"), "{stderr}");
+    assert!(at.join("nav.csv").is_file() && !at.join("nav.aem").exists() && !at.join("nav.bc").exists());
+    let (code, _, stderr) = fuse(at, &[&mounts[..], &files, &["--force"]].concat());
+    assert!(code == 1 && at.join("nav.aem").is_file() && at.join("nav.bc").is_file(), "{stderr}");
+}
+
+/// A star tracker replaces cameras and receiver.
+#[test]
+fn a_star_tracker_needs_neither_cameras_nor_a_receiver() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    flight(at);
+    let vehicle = std::fs::read_to_string(at.join("vehicle.csv")).unwrap();
+    let names: Vec<&str> = vehicle.lines().next().unwrap().split(',').collect();
+    let column = |name: &str| names.iter().position(|n| *n == name).unwrap();
+    let columns = ["time_s", "qw", "qx", "qy", "qz"].map(column);
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        columns.map(|i| cells[i]).join(",") + ",0.05\n"
+    };
+    let rows: String = vehicle.lines().skip(1 + 20 * 100).step_by(200).map(row).collect();
+    std::fs::write(at.join("attitude.csv"), "time_s,qw,qx,qy,qz,sigma_deg\n".to_owned() + &rows).unwrap();
+    let only = ["--imu", "imu.csv", "--attitude", "attitude.csv", "--truth", "vehicle.csv", "-o", "nav.csv"];
+    let (code, stdout, stderr) = bare(at, &only);
+    assert_eq!(code, 0, "{stdout}{stderr}");
+    assert!(
+        stdout.contains("an attitude of the star tracker") && stderr.contains("the position is not known"),
+        "{stderr}"
+    );
+    let solution = hzn_fuse::read_back::read_solution(&at.join("nav.csv")).unwrap();
+    let last = solution.states.last().unwrap();
+    assert!(last.sigma_x_deg.unwrap() < 2.0 && last.position_sigma_m.unwrap() > 1e6, "{last:?}");
+    let (code, _, stderr) = bare(at, &["--imu", "imu.csv", "-o", "nav2.csv"]);
+    assert!(code == 2 && stderr.contains("--nadir"), "{stderr}");
 }
 
 #[test]

@@ -1,11 +1,11 @@
 //! A flight with its data in the order of time.
 
 use hzn_nav::frames::{Cam, Rotation, Vehicle};
-use hzn_nav::strapdown::Nominal;
+use hzn_nav::options::{CameraOptions, Options, StartSigmas};
 
 use super::events::Event;
 use crate::input::{Inputs, Sample};
-use crate::results::Fused;
+use crate::settings::Settings;
 
 /// A flight with its data in order.
 #[derive(Clone, Copy)]
@@ -17,21 +17,15 @@ pub(super) struct Flight<'a> {
 }
 
 impl Flight<'_> {
-    /// Returns the strapdown solution from the first sample to the start, integrated back from the start with the
-    /// instruments' errors as they are estimated at the end.
-    pub(super) fn back(&self, fused: &Fused) -> Vec<Nominal> {
-        let (Some(begin), Some(last)) = (fused.epochs.first(), fused.epochs.last()) else { return Vec::new() };
-        let mut state = begin.state;
-        let mut out = vec![state];
-        let before = self.samples.partition_point(|s| s.imu.time_s < state.time_s);
-        let mut later = None;
-        for sample in self.samples.iter().take(before).rev() {
-            let earlier = last.corrections.correct(&sample.imu);
-            state = state.step(&later.unwrap_or(earlier), &earlier);
-            later = Some(earlier);
-            out.push(state);
-        }
-        out.reverse();
-        out
+    /// Returns the options of all cameras.
+    pub(super) fn cameras(&self, settings: &Settings) -> Vec<CameraOptions> {
+        let recordings = self.inputs.recordings.iter().zip(self.mounts);
+        recordings.map(|(r, mount)| settings.camera_options(&r.name, *mount, r.bodies().len())).collect()
+    }
+
+    /// Returns the options of the filter.
+    pub(super) fn options(&self, settings: &Settings, start: StartSigmas) -> Options {
+        let limb_sigma_km = self.inputs.recordings.iter().filter_map(|r| r.limb_sigma_km).reduce(f64::max);
+        settings.options(limb_sigma_km, start)
     }
 }

@@ -1,18 +1,21 @@
 //! The state at the start: an attitude from directions or a star tracker, position and velocity from the receiver.
 
+use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
 use hzn_nav::frames::{Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::options::CameraOptions;
 use hzn_nav::strapdown::Nominal;
 
 use super::data::Flight;
 use super::events::Source;
-use super::reference::limb_axis;
 use crate::error::Error;
-use crate::input::{Body, Fix, Seen};
+use crate::input::{Body, Fix, Inputs, Seen};
+use crate::reference::limb_axis;
 use crate::results::Begin;
 use crate::settings::Settings;
 use crate::start::{DeadReckoning, Sight, Sighted, attitude};
 
+/// Speed in a low orbit: the sigma of a velocity that nobody measures, m/s.
+const ORBIT_M_S: f64 = 7.8e3;
 /// Longest time from a fix to the start, s.
 const FIX_S: f64 = 5.0;
 
@@ -36,7 +39,7 @@ pub(super) fn first_attitude(
     let mut bodies: Vec<Body> = Vec::new();
     let mut contradicts = false;
     for event in flight.events {
-        let Some(fix) = fix_near(&flight.inputs.gnss, event.time_s) else { continue };
+        let Some(fix) = place_near(flight.inputs, event.time_s) else { continue };
         let found = match event.source {
             Source::Gnss(_) => None,
             Source::Attitude(index) => {
@@ -47,7 +50,8 @@ pub(super) fn first_attitude(
                 let seen = flight.inputs.recordings.get(camera).and_then(|r| r.seen.get(index));
                 let sight = seen.and_then(|seen| {
                     let options = cameras.get(camera)?;
-                    let reference = seen.reference.or_else(|| limb_axis(seen.body, &fix.position_m))?;
+                    let receiver = || limb_axis(seen.body, &fix.position_m).filter(|_| flight.inputs.has_receiver());
+                    let reference = seen.reference.or_else(receiver)?;
                     let sigma_rad = sight_sigma(seen, Some(options));
                     let on_vehicle = options.mount * seen.axis;
                     Some(Sight { time_s: event.time_s, camera, body: seen.body, on_vehicle, reference, sigma_rad })
@@ -103,7 +107,7 @@ fn found_at(
     settings: &Settings,
 ) -> Found {
     let dt = begin.time_s - fix.time_s;
-    let [position, velocity] = sigmas(fix, settings);
+    let [position, velocity] = settings.fix_sigmas(fix);
     let moved = if fix.velocity_m_s.is_finite() { fix.velocity_m_s } else { Vector::zeros() };
     let state =
         Nominal { time_s: begin.time_s, attitude, velocity_m_s: moved, position_m: fix.position_m + moved * dt };
@@ -134,6 +138,21 @@ fn without_one_camera(sights: &[Sight], reckoning: &DeadReckoning) -> Sighted {
     all
 }
 
+/// Returns the place of the vehicle near a time. Without a receiver it is somewhere around the Earth: the attitude does
+/// not need it.
+fn place_near(inputs: &Inputs, time_s: f64) -> Option<Fix> {
+    if inputs.has_receiver() {
+        return fix_near(&inputs.gnss, time_s);
+    }
+    Some(Fix {
+        time_s,
+        position_m: Vector::new(EARTH_MEAN_RADIUS_M, 0.0, 0.0),
+        velocity_m_s: Vector::zeros(),
+        position_sigma_m: EARTH_MEAN_RADIUS_M,
+        velocity_sigma_m_s: ORBIT_M_S,
+    })
+}
+
 /// Returns the fix that is nearest to a time and agrees with a neighbour.
 fn fix_near(fixes: &[Fix], time_s: f64) -> Option<Fix> {
     let agrees = |a: &Fix, b: &Fix| {
@@ -149,15 +168,6 @@ fn fix_near(fixes: &[Fix], time_s: f64) -> Option<Fix> {
     let near = fixes.iter().enumerate().filter(|(_, fix)| (fix.time_s - time_s).abs() <= FIX_S);
     let usable = near.filter(|(i, fix)| is_usable(*i, fix)).map(|(_, fix)| *fix);
     usable.min_by(|a, b| (a.time_s - time_s).abs().total_cmp(&(b.time_s - time_s).abs()))
-}
-
-/// Returns the sigmas of a fix: its own, else those of the settings.
-pub(super) fn sigmas(fix: &Fix, settings: &Settings) -> [f64; 2] {
-    let or = |own: f64, default: f64| if own > 0.0 && own.is_finite() { own } else { default };
-    [
-        or(fix.position_sigma_m, settings.gnss.position_sigma_m),
-        or(fix.velocity_sigma_m_s, settings.gnss.velocity_sigma_mps),
-    ]
 }
 
 /// Returns the 1-sigma of a direction on the vehicle, with the errors of mount and limb height.

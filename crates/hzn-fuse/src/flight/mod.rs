@@ -3,17 +3,19 @@
 mod data;
 mod events;
 mod first;
-pub(crate) mod reference;
 mod runner;
 
 use hzn_nav::frames::{Cam, Rotation, Vehicle};
 use hzn_nav::layout::MAX_CAMERAS;
+use hzn_nav::options::StartSigmas;
 
 use crate::error::Error;
+use crate::finding::{Finding, Level, Verdict};
 use crate::input::{Inputs, Recording};
-use crate::results::{Counts, Fused, Kind};
-use crate::settings::{ErrorSetting, Settings, Treatment};
+use crate::results::{Counts, Fused};
+use crate::settings::{ErrorSetting, Limb, Settings, Treatment};
 use crate::smooth::{MAX_EPOCHS, smooth};
+use crate::verdict::{self, Given};
 use data::Flight;
 use events::{clean, events};
 use runner::Runner;
@@ -56,8 +58,18 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
         return Err(Error::unusable("the inertial unit has no finite sample"));
     };
+    if !inputs.has_receiver() {
+        without_receiver(inputs, settings)?;
+    }
     let span_s = [first.imu.time_s, last.imu.time_s];
     let mut notes = Vec::new();
+    if !inputs.has_receiver() {
+        notes.push(
+            "without a receiver the position is not known: the attitude against ECEF (qw to qz) holds, but yaw, pitch \
+             and roll do not"
+                .to_owned(),
+        );
+    }
     let events = events(inputs, span_s, &mut counts, &mut notes)?;
     let flight = Flight { inputs, mounts: &mounts, samples: &samples, events: &events };
     // The time of a step grows with the square of the memory for states, so that few bodies get a small filter.
@@ -70,8 +82,11 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     } else {
         replay::<MANY>
     };
-    let mut fused = replay(&flight, settings, wanted)?;
-    fused.back = flight.back(&fused);
+    let (cameras, start) = (flight.cameras(settings), StartSigmas::default());
+    let options = flight.options(settings, start);
+    let given = Given { inputs, samples: &samples, settings, cameras: &cameras, options: &options };
+    let findings = verdict::of_inputs(&given);
+    let mut fused = replay(&flight, settings, wanted).map_err(|error| explained(error, &findings))?;
     fused.cameras = inputs.recordings.iter().map(|r| r.name.clone()).collect();
     counts.before_start = fused.counts.before_start;
     counts.restarts = fused.counts.restarts;
@@ -83,8 +98,30 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     fused.counts = counts;
     notes.append(&mut fused.notes);
     fused.notes = notes;
-    fused.notes.extend(doubts(&fused));
+    fused.verdict = verdict::verdict(findings, &fused, &given);
     Ok(fused)
+}
+
+/// Refuses settings that need a receiver.
+fn without_receiver(inputs: &Inputs, settings: &Settings) -> Result<(), Error> {
+    match inputs.recordings.iter().find(|r| settings.camera(&r.name).limb == Limb::Position) {
+        Some(one) => {
+            let what = "limb = \"position\" in fuse.toml corrects the position of a receiver, and there is none";
+            Err(Error::unusable(format!("{}: {what}; give --gnss FILE, or leave the key out", one.name)))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Adds what the inputs show to the reason why a flight cannot be fused.
+fn explained(error: Error, findings: &[Finding]) -> Error {
+    let verdict = Verdict::new(findings.to_vec());
+    match (error, verdict.likeliest()) {
+        (Error::Unusable(why), Some(first)) if first.level == Level::Contradicts => {
+            Error::Contradicts { why, finding: Box::new(first.clone()) }
+        }
+        (error, _) => error,
+    }
 }
 
 /// Runs the filter, with memory for N states, and the smoother if it is wanted.
@@ -174,29 +211,4 @@ fn estimate_all(settings: &Settings) -> Settings {
         all.limb_height.mode = Treatment::Estimated;
     }
     all
-}
-
-/// Returns notes about sources that the filter refuses almost always.
-fn doubts(fused: &Fused) -> Vec<String> {
-    let mut notes = Vec::new();
-    let share = |of: &dyn Fn(&crate::results::Innovation) -> bool| {
-        let all = fused.innovations.iter().filter(|i| of(i)).count();
-        let refused = fused.innovations.iter().filter(|i| of(i) && !i.taken).count();
-        (refused * 2 > all && all >= 5).then_some((refused, all))
-    };
-    for (camera, name) in fused.cameras.iter().enumerate() {
-        if let Some((refused, all)) = share(&|i| i.camera == Some(camera)) {
-            notes.push(format!(
-                "{refused} of {all} directions of {name} were refused: are its mount (also its sign), its clock and \
-                 its lens right?"
-            ));
-        }
-    }
-    if let Some((refused, all)) = share(&|i| matches!(i.kind, Kind::Position | Kind::Velocity)) {
-        notes.push(format!(
-            "{refused} of {all} positions and velocities were refused: is their clock that of the inertial unit? GPS \
-             time is ahead of UTC by whole leap seconds"
-        ));
-    }
-    notes
 }

@@ -1,7 +1,8 @@
 //! The filter over the samples and measurements of a flight.
 
 use hzn_nav::filter::{DirectionMeasurement, Filter, Unusable};
-use hzn_nav::frames::{Cam, Covariance, Rotation, Vector, Vehicle};
+use hzn_nav::frames::{Covariance, Rotation, Vector, Vehicle};
+use hzn_nav::gravity::gravity;
 use hzn_nav::layout::Layout;
 use hzn_nav::options::{CameraOptions, StartSigmas};
 use hzn_nav::strapdown::{Imu, Nominal};
@@ -10,10 +11,10 @@ use nalgebra::SMatrix;
 
 use super::data::Flight;
 use super::events::{Event, Source};
-use super::first::{first_attitude, sight_sigma, sigmas};
-use super::reference::limb_axis;
+use super::first::{first_attitude, sight_sigma};
 use crate::error::Error;
 use crate::input::{Body, Recording, Sample, Seen};
+use crate::reference::limb_axis;
 use crate::results::{Begin, Epoch, Fused, Innovation, Kind, Triad};
 use crate::settings::{Limb, Settings};
 use crate::smooth::Recorded;
@@ -50,28 +51,24 @@ pub(super) struct Runner<'a, const N: usize> {
     recorded: Vec<Recorded<N>>,
     transition: SMatrix<f64, N, N>,
     begins: bool,
+    max_step_s: f64,
     out: Fused,
 }
 
 impl<'a, const N: usize> Runner<'a, N> {
     /// Finds the first attitude and makes a filter there.
     pub(super) fn new(flight: &Flight<'a>, settings: &'a Settings, record: bool) -> Result<Self, Error> {
-        let recordings = &flight.inputs.recordings;
-        let bodies: Vec<Vec<Body>> = recordings.iter().map(Recording::bodies).collect();
-        let options = |((r, mount), bodies): ((&Recording, &Rotation<Cam, Vehicle>), &Vec<Body>)| {
-            settings.camera_options(&r.name, *mount, bodies.len())
-        };
-        let cameras: Vec<CameraOptions> = recordings.iter().zip(flight.mounts).zip(&bodies).map(options).collect();
+        let bodies: Vec<Vec<Body>> = flight.inputs.recordings.iter().map(Recording::bodies).collect();
+        let cameras = flight.cameras(settings);
         let reckoning = DeadReckoning::new(flight.samples);
         let found = first_attitude(flight, settings, &cameras, &reckoning)?;
-        let limb_sigma_km = recordings.iter().filter_map(|r| r.limb_sigma_km).reduce(f64::max);
         let sigmas = StartSigmas {
             attitude_rad: settings.start.attitude_deg.to_radians(),
             velocity_m_s: found.velocity_sigma_m_s,
             position_m: found.position_sigma_m,
         };
-        let mut filter = Filter::<N>::new(found.state, &settings.options(limb_sigma_km, sigmas), &cameras)
-            .map_err(Error::unusable)?;
+        let mut filter =
+            Filter::<N>::new(found.state, &flight.options(settings, sigmas), &cameras).map_err(Error::unusable)?;
         let least = Covariance::isotropic(sigmas.attitude_rad.powi(2));
         filter.set_attitude(&found.state.attitude, &(found.covariance_rad2 + least));
         Ok(Self {
@@ -90,6 +87,7 @@ impl<'a, const N: usize> Runner<'a, N> {
             recorded: Vec::new(),
             transition: SMatrix::identity(),
             begins: true,
+            max_step_s: settings.imu.max_step_s,
             out: Fused::default(),
         })
     }
@@ -108,6 +106,7 @@ impl<'a, const N: usize> Runner<'a, N> {
             self.predict(&Imu { time_s: begin_s, ..at }, before.saturated);
         }
         self.push_epoch();
+        let begin = self.filter.clone();
         let mut due_s = begin_s;
         for sample in samples.iter().skip(first) {
             while let Some(event) = pending.next_if(|e| e.time_s <= sample.imu.time_s) {
@@ -121,6 +120,7 @@ impl<'a, const N: usize> Runner<'a, N> {
             }
         }
         self.out.begin = Some(self.begin);
+        self.go_back(begin, rate_hz);
         Ok((self.out, self.recorded))
     }
 
@@ -135,6 +135,7 @@ impl<'a, const N: usize> Runner<'a, N> {
     }
 
     fn predict(&mut self, imu: &Imu, saturated: bool) {
+        let imu = &self.usable(imu, &self.filter);
         if self.record {
             self.filter.predict_recorded(imu, saturated, &mut self.transition);
         } else {
@@ -144,6 +145,46 @@ impl<'a, const N: usize> Runner<'a, N> {
             self.unaided = self.unaided.step(&last, imu);
         }
         self.last = Some(*imu);
+    }
+
+    /// Goes back from the start, with the instruments' errors as they are known at the end. Their sigmas stay those of
+    /// the start, because nobody knows how the errors of the first attitude and of the last estimates are correlated. A
+    /// saturated unit and a gap do not say how the vehicle turned, so the way back ends there.
+    fn go_back(&mut self, mut filter: Filter<N>, rate_hz: Option<f64>) {
+        filter.set_corrections(self.filter.corrections());
+        let begin_s = self.begin.time_s;
+        let earlier = self.flight.samples.partition_point(|s| s.imu.time_s < begin_s);
+        let mut back = vec![Epoch::of(&filter, None)];
+        let mut due_s = begin_s;
+        for sample in self.flight.samples.iter().take(earlier).rev() {
+            let now_s = filter.nominal().time_s;
+            let is_gap = now_s - sample.imu.time_s > self.max_step_s;
+            if sample.saturated || is_gap {
+                let why =
+                    if is_gap { "samples of the inertial unit are missing" } else { "the inertial unit is saturated" };
+                let what = "the solution before the start ends at";
+                self.out.notes.push(format!("{what} {now_s:.1} s: {why} before it"));
+                break;
+            }
+            filter.predict_back(&self.usable(&sample.imu, &filter), false);
+            if rate_hz.is_none_or(|hz| sample.imu.time_s <= due_s - 1.0 / hz + 1e-6) {
+                due_s = sample.imu.time_s;
+                back.push(Epoch::of(&filter, None));
+            }
+        }
+        back.reverse();
+        self.out.back = back;
+    }
+
+    /// Returns a sample as the filter takes it. Without a receiver the position is not known, and a fall from a wrong
+    /// place would end in the Earth: a force then holds the vehicle where it is. The attitude does not depend on the
+    /// force.
+    fn usable(&self, imu: &Imu, filter: &Filter<N>) -> Imu {
+        if self.flight.inputs.has_receiver() {
+            return *imu;
+        }
+        let state = filter.nominal();
+        Imu { accel_m_s2: state.attitude.inverse() * -gravity(&state.position_m), ..*imu }
     }
 
     fn push_epoch(&mut self) {
@@ -199,12 +240,13 @@ impl<'a, const N: usize> Runner<'a, N> {
         if seen.centre.is_some() && self.settings.camera(&recording.name).limb == Limb::Position {
             return None;
         }
-        let nominal = self.filter.nominal();
+        let position_m = self.filter.nominal().position_m;
+        let by_position = || limb_axis(seen.body, &position_m).filter(|_| self.flight.inputs.has_receiver());
         let measurement = DirectionMeasurement {
             camera,
             body: self.bodies.get(camera)?.iter().position(|body| *body == seen.body)?,
             measured: seen.axis,
-            reference: seen.reference.or_else(|| limb_axis(seen.body, &nominal.position_m))?,
+            reference: seen.reference.or_else(by_position)?,
             covariance_rad2: seen.covariance_rad2,
             by_limb_height: seen.by_limb_height,
             is_limb: seen.body == Body::Limb,
@@ -315,7 +357,7 @@ impl<'a, const N: usize> Runner<'a, N> {
 
     fn measure_fix(&mut self, time_s: f64, index: usize) -> Used {
         let Some(fix) = self.flight.inputs.gnss.get(index) else { return Ok(()) };
-        let [position_sigma, velocity_sigma] = sigmas(fix, self.settings);
+        let [position_sigma, velocity_sigma] = self.settings.fix_sigmas(fix);
         let done = self.filter.update_position(&fix.position_m, position_sigma).map_err(Unusable::as_str)?;
         self.keep(time_s, None, Kind::Position, &done);
         if fix.velocity_m_s.is_finite() {

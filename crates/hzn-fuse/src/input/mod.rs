@@ -36,3 +36,11 @@ pub struct Inputs {
     /// Results of `hzn run`, one of each camera.
     pub recordings: Vec<Recording>,
 }
+
+impl Inputs {
+    /// Returns whether there is a receiver. Without one nobody knows the position, and the attitude needs a star
+    /// tracker or recordings that know where their directions point.
+    pub fn has_receiver(&self) -> bool {
+        !self.gnss.is_empty()
+    }
+}

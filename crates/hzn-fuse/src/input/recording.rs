@@ -56,6 +56,8 @@ pub struct Seen {
     pub covariance_rad2: Covariance<Cam>,
     /// The same direction from outside, if the recording has it.
     pub reference: Option<Vector<Fixed>>,
+    /// Altitude of the vehicle above the ellipsoid that the sensor was told, km.
+    pub altitude_km: Option<f64>,
     /// Derivative of the axis by the error of the limb height, 1/km.
     pub by_limb_height: Vector<Cam>,
     /// The position of the body's centre, if the recording has it.
@@ -184,6 +186,7 @@ fn seen(row: &Row, index: usize, time_s: f64, body: Body, limb_sigma_km: Option<
         axis,
         covariance_rad2: symmetric(row.covariance()?).into(),
         reference: three([row.axis_e_x, row.axis_e_y, row.axis_e_z]),
+        altitude_km: row.altitude_km,
         by_limb_height: Vector::zeros(),
         centre: None,
         row: index,

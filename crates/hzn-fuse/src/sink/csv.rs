@@ -14,7 +14,7 @@ pub fn write_states(fused: &Fused, out: impl Write) -> Result<(), Error> {
     let mut out = csv::Writer::from_writer(out);
     out.write_record(header(fused)).map_err(Error::failed)?;
     for state in states(fused) {
-        out.write_record(cells(fused, &state)).map_err(Error::failed)?;
+        out.write_record(cells(&state)).map_err(Error::failed)?;
     }
     out.flush().map_err(Error::failed)
 }
@@ -55,6 +55,9 @@ const SINGLE: [&str; 20] = [
 
 fn header(fused: &Fused) -> Vec<String> {
     let mut names: Vec<String> = SINGLE.map(str::to_owned).into();
+    for (begin, unit) in [("attitude_cov", "deg2"), ("velocity_cov", "m2ps2"), ("position_cov", "m2")] {
+        names.extend(["xx", "xy", "xz", "yy", "yz", "zz"].map(|axes| format!("{begin}_{axes}_{unit}")));
+    }
     let mut three =
         |begin: &str, unit: &str| names.extend(["x", "y", "z"].map(|axis| format!("{begin}_{axis}_{unit}")));
     three("gyro_bias", "deg_h");
@@ -73,27 +76,18 @@ fn header(fused: &Fused) -> Vec<String> {
     names
 }
 
-fn cells(fused: &Fused, s: &StateRecord) -> Vec<String> {
+fn cells(s: &StateRecord) -> Vec<String> {
     let phase = serde_json::to_value(s.phase).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
-    let number = |x: f64| x.to_string();
-    let maybe = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
-    let mut out = vec![number(s.time_s), phase];
-    out.extend([s.qw, s.qx, s.qy, s.qz].map(number));
-    out.extend([s.sigma_x_deg, s.sigma_y_deg, s.sigma_z_deg].map(maybe));
-    out.extend([s.yaw_deg, s.pitch_deg, s.roll_deg, s.x_m, s.y_m, s.z_m, s.vx_mps, s.vy_mps, s.vz_mps].map(number));
-    out.extend([s.position_sigma_m, s.velocity_sigma_mps].map(maybe));
-    for three in [s.gyro_bias_deg_h, s.gyro_bias_sigma_deg_h, s.accel_bias_mps2, s.accel_bias_sigma_mps2] {
-        out.extend([0, 1, 2].map(|i| maybe(three.map(|x| x[i]))));
+    let mut numbers = vec![s.qw, s.qx, s.qy, s.qz, s.sigma_x_deg, s.sigma_y_deg, s.sigma_z_deg];
+    numbers.extend([s.yaw_deg, s.pitch_deg, s.roll_deg, s.x_m, s.y_m, s.z_m, s.vx_mps, s.vy_mps, s.vz_mps]);
+    numbers.extend([s.position_sigma_m, s.velocity_sigma_mps]);
+    numbers.extend([s.attitude_cov_deg2, s.velocity_cov_m2ps2, s.position_cov_m2].concat());
+    numbers.extend([s.gyro_bias_deg_h, s.gyro_bias_sigma_deg_h, s.accel_bias_mps2, s.accel_bias_sigma_mps2].concat());
+    numbers.extend([s.limb_height_km, s.limb_height_sigma_km]);
+    numbers.extend([s.limb_latitude_km, s.limb_latitude_sigma_km].concat());
+    for camera in &s.cameras {
+        numbers.extend([camera.misalignment_deg, camera.misalignment_sigma_deg].concat());
+        numbers.extend([camera.clock_s, camera.clock_sigma_s]);
     }
-    out.extend([s.limb_height_km, s.limb_height_sigma_km].map(maybe));
-    for two in [s.limb_latitude_km, s.limb_latitude_sigma_km] {
-        out.extend([0, 1].map(|i| maybe(two.map(|x| x[i]))));
-    }
-    for camera in 0..fused.cameras.len() {
-        let camera = s.cameras.get(camera);
-        out.extend([0, 1, 2].map(|i| maybe(camera.map(|c| c.misalignment_deg[i]))));
-        out.extend([0, 1, 2].map(|i| maybe(camera.map(|c| c.misalignment_sigma_deg[i]))));
-        out.extend([maybe(camera.map(|c| c.clock_s)), maybe(camera.map(|c| c.clock_sigma_s))]);
-    }
-    out
+    [s.time_s.to_string(), phase].into_iter().chain(numbers.iter().map(f64::to_string)).collect()
 }

@@ -1,8 +1,7 @@
 //! One record for each solution and each innovation, the same in every kind of file.
 
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
-use hzn_nav::frames::{Fixed, Rotation, Vector, Vehicle};
-use hzn_nav::strapdown::Nominal;
+use hzn_nav::frames::{Covariance, Fixed, Rotation, Vector, Vehicle};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -36,11 +35,11 @@ pub struct StateRecord {
     /// Third vector component of the attitude.
     pub qz: f64,
     /// 1-sigma of the attitude about the vehicle's x axis, degrees.
-    pub sigma_x_deg: Option<f64>,
+    pub sigma_x_deg: f64,
     /// 1-sigma about the y axis.
-    pub sigma_y_deg: Option<f64>,
+    pub sigma_y_deg: f64,
     /// 1-sigma about the z axis.
-    pub sigma_z_deg: Option<f64>,
+    pub sigma_z_deg: f64,
     /// Yaw, pitch and roll of the vehicle against north, east and down at its position, degrees.
     pub yaw_deg: f64,
     /// Pitch, degrees.
@@ -60,25 +59,31 @@ pub struct StateRecord {
     /// Third component of the velocity.
     pub vz_mps: f64,
     /// Largest 1-sigma of a component of the position, m.
-    pub position_sigma_m: Option<f64>,
+    pub position_sigma_m: f64,
     /// Largest 1-sigma of a component of the velocity, m/s.
-    pub velocity_sigma_mps: Option<f64>,
+    pub velocity_sigma_mps: f64,
+    /// Covariance of the attitude, a rotation vector in the vehicle's axes: xx, xy, xz, yy, yz, zz, deg².
+    pub attitude_cov_deg2: [f64; 6],
+    /// Covariance of the velocity in ECEF: xx, xy, xz, yy, yz, zz, m²/s².
+    pub velocity_cov_m2ps2: [f64; 6],
+    /// Covariance of the position in ECEF: xx, xy, xz, yy, yz, zz, m².
+    pub position_cov_m2: [f64; 6],
     /// Bias of the gyros, degrees per hour: x, y, z.
-    pub gyro_bias_deg_h: Option<[f64; 3]>,
+    pub gyro_bias_deg_h: [f64; 3],
     /// Its 1-sigma.
-    pub gyro_bias_sigma_deg_h: Option<[f64; 3]>,
+    pub gyro_bias_sigma_deg_h: [f64; 3],
     /// Bias of the accelerometers, m/s²: x, y, z.
-    pub accel_bias_mps2: Option<[f64; 3]>,
+    pub accel_bias_mps2: [f64; 3],
     /// Its 1-sigma.
-    pub accel_bias_sigma_mps2: Option<[f64; 3]>,
+    pub accel_bias_sigma_mps2: [f64; 3],
     /// Error of the limb height, km.
-    pub limb_height_km: Option<f64>,
+    pub limb_height_km: f64,
     /// Its 1-sigma.
-    pub limb_height_sigma_km: Option<f64>,
+    pub limb_height_sigma_km: f64,
     /// Coefficients of its change with the latitude φ of the limb, km: of sin φ, and of (3 sin² φ − 1)/2.
-    pub limb_latitude_km: Option<[f64; 2]>,
+    pub limb_latitude_km: [f64; 2],
     /// Their 1-sigma.
-    pub limb_latitude_sigma_km: Option<[f64; 2]>,
+    pub limb_latitude_sigma_km: [f64; 2],
     /// The cameras, in the order of the recordings.
     pub cameras: Vec<CameraRecord>,
 }
@@ -135,9 +140,11 @@ pub struct InnovationRecord {
 
 /// Returns all solutions: back to the first sample, the filter's, the smoother's.
 pub fn states(fused: &Fused) -> impl Iterator<Item = StateRecord> + '_ {
-    let back = fused.back.iter().take(fused.back.len().saturating_sub(1)).map(bare);
-    let record = |phase| move |epoch: &Epoch| full(fused, epoch, phase);
-    back.chain(fused.epochs.iter().map(record(Phase::Filter))).chain(fused.smoothed.iter().map(record(Phase::Smoothed)))
+    // The last solution of the way back is the first one of the filter.
+    let back = fused.back.iter().take(fused.back.len().saturating_sub(1));
+    let record = |phase| move |epoch: &Epoch| state(fused, epoch, phase);
+    let filter = fused.epochs.iter().map(record(Phase::Filter));
+    back.map(record(Phase::Back)).chain(filter).chain(fused.smoothed.iter().map(record(Phase::Smoothed)))
 }
 
 /// Returns all innovations.
@@ -145,20 +152,38 @@ pub fn innovations(fused: &Fused) -> impl Iterator<Item = InnovationRecord> + '_
     fused.innovations.iter().map(|i| innovation(fused, i))
 }
 
-fn bare(state: &Nominal) -> StateRecord {
-    let [[x_m, y_m, z_m], [vx_mps, vy_mps, vz_mps]] = [state.position_m, state.velocity_m_s].map(|v| v.xyz());
-    let [qw, qx, qy, qz] = state.attitude.wxyz();
-    let [yaw_deg, pitch_deg, roll_deg] = yaw_pitch_roll_deg(&state.attitude, &state.position_m);
+/// Returns the upper triangle of a covariance.
+fn triangle<F>(covariance: &Covariance<F>) -> [f64; 6] {
+    let p = covariance.as_inner();
+    [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33]
+}
+
+fn state(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
+    let now = &epoch.state;
+    let [[x_m, y_m, z_m], [vx_mps, vy_mps, vz_mps]] = [now.position_m, now.velocity_m_s].map(|v| v.xyz());
+    let [qw, qx, qy, qz] = now.attitude.wxyz();
+    let [yaw_deg, pitch_deg, roll_deg] = yaw_pitch_roll_deg(&now.attitude, &now.position_m);
+    let deg = |v: Vector3<f64>| -> [f64; 3] { v.map(f64::to_degrees).into() };
+    let per_hour = |v: Vector3<f64>| deg(v * 3600.0);
+    let [sigma_x_deg, sigma_y_deg, sigma_z_deg] = deg(epoch.attitude_sigma_rad());
+    let largest = |p: &Covariance<Fixed>| p.as_inner().diagonal().max().max(0.0).sqrt();
+    let camera = |(name, state): (&String, &CameraState)| CameraRecord {
+        name: name.clone(),
+        misalignment_deg: deg(state.misalignment_rad.into_inner()),
+        misalignment_sigma_deg: deg(state.misalignment_sigma_rad),
+        clock_s: state.clock_s,
+        clock_sigma_s: state.clock_sigma_s,
+    };
     StateRecord {
-        time_s: state.time_s,
-        phase: Phase::Back,
+        time_s: now.time_s,
+        phase,
         qw,
         qx,
         qy,
         qz,
-        sigma_x_deg: None,
-        sigma_y_deg: None,
-        sigma_z_deg: None,
+        sigma_x_deg,
+        sigma_y_deg,
+        sigma_z_deg,
         yaw_deg,
         pitch_deg,
         roll_deg,
@@ -168,48 +193,20 @@ fn bare(state: &Nominal) -> StateRecord {
         vx_mps,
         vy_mps,
         vz_mps,
-        position_sigma_m: None,
-        velocity_sigma_mps: None,
-        gyro_bias_deg_h: None,
-        gyro_bias_sigma_deg_h: None,
-        accel_bias_mps2: None,
-        accel_bias_sigma_mps2: None,
-        limb_height_km: None,
-        limb_height_sigma_km: None,
-        limb_latitude_km: None,
-        limb_latitude_sigma_km: None,
-        cameras: Vec::new(),
-    }
-}
-
-fn full(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
-    let deg = |v: Vector3<f64>| -> [f64; 3] { v.map(f64::to_degrees).into() };
-    let per_hour = |v: Vector3<f64>| deg(v * 3600.0);
-    let sigma = deg(epoch.attitude_sigma_rad());
-    let camera = |(name, state): (&String, &CameraState)| CameraRecord {
-        name: name.clone(),
-        misalignment_deg: deg(state.misalignment_rad.into_inner()),
-        misalignment_sigma_deg: deg(state.misalignment_sigma_rad),
-        clock_s: state.clock_s,
-        clock_sigma_s: state.clock_sigma_s,
-    };
-    StateRecord {
-        phase,
-        sigma_x_deg: Some(sigma[0]),
-        sigma_y_deg: Some(sigma[1]),
-        sigma_z_deg: Some(sigma[2]),
-        position_sigma_m: Some(epoch.position_sigma_m.max()),
-        velocity_sigma_mps: Some(epoch.velocity_sigma_m_s.max()),
-        gyro_bias_deg_h: Some(per_hour(epoch.corrections.gyro_bias.into_inner())),
-        gyro_bias_sigma_deg_h: Some(per_hour(epoch.gyro_bias_sigma_rad_s)),
-        accel_bias_mps2: Some(epoch.corrections.accel_bias.xyz()),
-        accel_bias_sigma_mps2: Some(epoch.accel_bias_sigma_m_s2.into()),
-        limb_height_km: Some(epoch.corrections.limb_height_km),
-        limb_height_sigma_km: Some(epoch.limb_height_sigma_km),
-        limb_latitude_km: Some(epoch.corrections.limb_latitude_km),
-        limb_latitude_sigma_km: Some(epoch.limb_latitude_sigma_km),
+        position_sigma_m: largest(&epoch.position_covariance_m2),
+        velocity_sigma_mps: largest(&epoch.velocity_covariance_m2_s2),
+        attitude_cov_deg2: triangle(&epoch.attitude_covariance_rad2).map(|v| v * 1f64.to_degrees().powi(2)),
+        velocity_cov_m2ps2: triangle(&epoch.velocity_covariance_m2_s2),
+        position_cov_m2: triangle(&epoch.position_covariance_m2),
+        gyro_bias_deg_h: per_hour(epoch.corrections.gyro_bias.into_inner()),
+        gyro_bias_sigma_deg_h: per_hour(epoch.gyro_bias_sigma_rad_s),
+        accel_bias_mps2: epoch.corrections.accel_bias.xyz(),
+        accel_bias_sigma_mps2: epoch.accel_bias_sigma_m_s2.into(),
+        limb_height_km: epoch.corrections.limb_height_km,
+        limb_height_sigma_km: epoch.limb_height_sigma_km,
+        limb_latitude_km: epoch.corrections.limb_latitude_km,
+        limb_latitude_sigma_km: epoch.limb_latitude_sigma_km,
         cameras: fused.cameras.iter().zip(&epoch.cameras).map(camera).collect(),
-        ..bare(&epoch.state)
     }
 }
 

@@ -2,4 +2,6 @@
 
 mod common;
 mod flight;
+mod tracker;
 mod two_bodies;
+mod verdict;

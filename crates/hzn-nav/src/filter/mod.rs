@@ -245,6 +245,11 @@ impl<const N: usize> Filter<N> {
         (&mut self.nominal, &mut self.covariance)
     }
 
+    /// Returns the estimated errors of the instruments to be changed.
+    pub(crate) fn corrections_mut(&mut self) -> &mut Corrections {
+        &mut self.corrections
+    }
+
     /// Returns the estimated errors of the instruments.
     pub fn corrections(&self) -> &Corrections {
         &self.corrections

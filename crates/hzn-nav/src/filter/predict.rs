@@ -57,6 +57,19 @@ impl<const N: usize> Filter<N> {
         self.predict_into(imu, saturated, None)
     }
 
+    /// Moves the state back to the time of an earlier sample, for the time before a filter began. The covariance grows
+    /// as it does on the way forwards. A sample that is not older than the state is [`Step::OutOfOrder`].
+    pub fn predict_back(&mut self, imu: &Imu, saturated: bool) -> Step {
+        if !imu.is_finite() {
+            return Step::NotFinite;
+        }
+        let Some(last) = self.last_imu else { return self.predict(imu, saturated) };
+        if !(imu.time_s < self.nominal.time_s) {
+            return if imu.time_s == last.time_s { Step::Duplicate } else { Step::OutOfOrder };
+        }
+        self.move_to(imu, &last, saturated, None)
+    }
+
     pub(super) fn predict_into(
         &mut self,
         imu: &Imu,
@@ -75,9 +88,15 @@ impl<const N: usize> Filter<N> {
         if !(dt > 0.0) {
             return if imu.time_s == last.time_s { Step::Duplicate } else { Step::OutOfOrder };
         }
-        let gap = saturated || dt > self.options.imu.max_step_s;
-        self.propagate_covariance(&last, imu, dt, gap, transition);
-        let (from, to) = (self.corrections.correct(&last), self.corrections.correct(imu));
+        self.move_to(imu, &last, saturated, transition)
+    }
+
+    /// Moves the state to the time of a sample, in either direction.
+    fn move_to(&mut self, imu: &Imu, last: &Imu, saturated: bool, transition: Option<&mut SMatrix<f64, N, N>>) -> Step {
+        let dt = imu.time_s - self.nominal.time_s;
+        let gap = saturated || libm::fabs(dt) > self.options.imu.max_step_s;
+        self.propagate_covariance(last, imu, dt, gap, transition);
+        let (from, to) = (self.corrections.correct(last), self.corrections.correct(imu));
         self.nominal = self.nominal.step(&from, &to);
         self.last_imu = Some(*imu);
         if gap { Step::TakenWithGap } else { Step::Taken }
@@ -104,7 +123,8 @@ impl<const N: usize> Filter<N> {
             let vehicle: SMatrix<f64, V, N> = rows * **recorded;
             recorded.fixed_view_mut::<V, N>(0, 0).copy_from(&vehicle);
         }
-        let noise = self.process_noise(dt, gap);
+        // The errors grow in both directions of time.
+        let noise = self.process_noise(libm::fabs(dt), gap);
         // The noise enters during the step: half before it, half after it.
         let noise = (transition * noise * transition.transpose() + noise) * 0.5;
         let vehicle = moved * rows.transpose() + noise;
@@ -117,7 +137,7 @@ impl<const N: usize> Filter<N> {
                 self.covariance[(i, j)] = 0.5 * (vehicle[(i, j)] + vehicle[(j, i)]);
             }
         }
-        self.fade_slow_errors(dt, recorded);
+        self.fade_slow_errors(libm::fabs(dt), recorded);
     }
 
     /// Returns the derivatives of the vehicle's errors by themselves and by all others.

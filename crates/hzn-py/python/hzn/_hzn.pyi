@@ -1089,7 +1089,7 @@ def _celestial(moon: bool, unix_s: float) -> _Three: ...
 def _fuse_flight(
     recordings: list[str],
     imu: str,
-    gnss: str,
+    gnss: str | None,
     attitude: str | None,
     mounts: dict[str, _Rows],
     clocks: dict[str, float],

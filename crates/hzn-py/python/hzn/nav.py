@@ -256,7 +256,7 @@ def fuse(
     recordings: Sequence[str | PathLike[str]],
     *,
     imu: str | PathLike[str],
-    gnss: str | PathLike[str],
+    gnss: str | PathLike[str] | None = None,
     attitude: str | PathLike[str] | None = None,
     mounts: Mapping[str, ArrayLike] | None = None,
     clocks: Mapping[str, float] | None = None,
@@ -271,7 +271,8 @@ def fuse(
     recordings
         Results of ``hzn run``, one file for each camera (.mcap, .csv, .jsonl); the name of a camera is that of its file.
     imu, gnss, attitude
-        Tables of the inertial unit, the receiver and a star tracker, with the columns of ``hzn fuse``.
+        Tables of the inertial unit, the receiver and a star tracker, with the columns of ``hzn fuse``. With a star tracker,
+        the attitude needs neither a receiver nor recordings; without a receiver the position is not known.
     mounts
         Mounts by the name of the camera, shape (3, 3), instead of those of the recordings.
     clocks
@@ -287,7 +288,9 @@ def fuse(
     -------
     dict
         ``states`` and ``innovations`` are lists of dictionaries with the names of the results of ``hzn fuse``, for
-        ``pandas.DataFrame`` for example; ``cameras``, ``notes``, ``restarts``, ``start_s``.
+        ``pandas.DataFrame`` for example; ``cameras``, ``notes``, ``restarts``, ``start_s``. ``verdict`` is
+        ``"consistent"``, ``"doubtful"`` or ``"contradicts"``, and ``findings`` is a list of dictionaries with ``level``,
+        ``source`` and ``what``: what contradicts what, the likeliest cause first.
 
     Raises
     ------
@@ -297,7 +300,7 @@ def fuse(
     result: dict[str, Any] = _hzn._fuse_flight(
         [str(path) for path in recordings],
         str(imu),
-        str(gnss),
+        None if gnss is None else str(gnss),
         None if attitude is None else str(attitude),
         {name: _list(mount, (3, 3), f"mounts[{name!r}]") for name, mount in (mounts or {}).items()},
         dict(clocks or {}),

@@ -1,7 +1,8 @@
 //! The arguments of `hzn fuse`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use hzn_fuse::finding::{Cause, Finding, Source};
 use hzn_fuse::input::Inputs;
 
 /// Fuse the results of `hzn run` with inertial unit and receiver: attitude and position with covariance
@@ -12,14 +13,15 @@ use hzn_fuse::input::Inputs;
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Results of `hzn run` of one camera (.mcap, .csv, .jsonl); once for each camera. The name of a camera is that of
-    /// its file without the ending
-    #[arg(long, value_name = "FILE", required_unless_present = "show_config")]
+    /// its file without the ending. A star tracker can replace them
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["show_config", "attitude"])]
     pub(super) nadir: Vec<PathBuf>,
     /// Samples of the inertial unit: time_s, gyro_{x,y,z}_radps, accel_{x,y,z}_mps2, saturated
     #[arg(long, value_name = "CSV", required_unless_present = "show_config")]
     pub(super) imu: Option<PathBuf>,
-    /// Fixes of the receiver: time_s, x_m, y_m, z_m, vx_mps, vy_mps, vz_mps, position_sigma_m, velocity_sigma_mps
-    #[arg(long, value_name = "CSV", required_unless_present = "show_config")]
+    /// Fixes of the receiver: time_s, x_m, y_m, z_m, vx_mps, vy_mps, vz_mps, position_sigma_m, velocity_sigma_mps.
+    /// With a star tracker the attitude needs none; the position is then not known
+    #[arg(long, value_name = "CSV", required_unless_present_any = ["show_config", "attitude"])]
     pub(super) gnss: Option<PathBuf>,
     /// Attitudes of a star tracker: time_s, qw, qx, qy, qz (vehicle to ECEF), sigma_deg
     #[arg(long, value_name = "CSV")]
@@ -66,7 +68,7 @@ pub(crate) struct Args {
     /// Compare with the truth of `hzn simulate`: its vehicle.csv
     #[arg(long, value_name = "CSV")]
     pub(super) truth: Option<PathBuf>,
-    /// Replace outputs that exist
+    /// Replace outputs that exist, and write --aem and --ck although the inputs contradict each other
     #[arg(long)]
     pub(super) force: bool,
     /// Print a fuse.toml with all defaults and do nothing else
@@ -80,6 +82,25 @@ impl Args {
         let tables = [&self.imu, &self.gnss, &self.attitude, &self.config, &self.truth];
         let mounts = self.mount.iter().map(|(_, file)| PathBuf::from(file));
         self.nadir.iter().chain(tables.into_iter().flatten()).cloned().chain(mounts).collect()
+    }
+}
+
+impl Args {
+    /// Returns the file that a finding is about: for a mount, the file with the mount if there is one.
+    pub(super) fn file_of(&self, finding: &Finding) -> Option<&Path> {
+        match &finding.source {
+            Source::Imu => self.imu.as_deref(),
+            Source::Receiver => self.gnss.as_deref(),
+            Source::StarTracker => self.attitude.as_deref(),
+            Source::Camera(name) => {
+                let mount =
+                    self.mount.iter().filter(|_| finding.cause == Cause::Mount).find(|(camera, _)| camera == name);
+                let recording =
+                    self.nadir.iter().find(|path| path.file_stem().is_some_and(|stem| stem == name.as_str()));
+                mount.map(|(_, file)| Path::new(file)).or(recording.map(PathBuf::as_path))
+            }
+            Source::Cameras | Source::All => None,
+        }
     }
 }
 

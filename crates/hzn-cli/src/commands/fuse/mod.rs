@@ -7,9 +7,10 @@ mod summary;
 
 use std::path::Path;
 
+use hzn_fuse::finding::Level;
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{self, Inputs};
-use hzn_fuse::{Settings, truth};
+use hzn_fuse::{Fused, Settings, truth};
 
 use crate::exit::{Exit, Outcome, Stop, unreadable, usage};
 use crate::tell::{self, one_line};
@@ -21,7 +22,7 @@ impl From<hzn_fuse::Error> for Stop {
     fn from(error: hzn_fuse::Error) -> Self {
         let exit = match error {
             hzn_fuse::Error::Unusable(_) => Exit::Usage,
-            hzn_fuse::Error::Failed(_) => Exit::Failed,
+            hzn_fuse::Error::Failed(_) | hzn_fuse::Error::Contradicts { .. } => Exit::Failed,
         };
         Self::new(exit, error.into())
     }
@@ -50,11 +51,31 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let written = outputs.write(&fused, &inputs, &settings)?;
     summary::print(&fused, truth.as_deref())?;
+    verdict(args, &fused, &outputs);
     let written: Vec<String> = written.iter().map(one_line).collect();
     tell::result(format_args!("\n{}\n", written.join("\n")))?;
     let lost: Vec<_> = inputs.recordings.iter().filter_map(|recording| recording.lost.as_ref()).collect();
     lost.iter().for_each(tell::warning);
-    Ok(if lost.is_empty() { Exit::Done } else { Exit::SomeUnreadable })
+    Ok(match (fused.verdict.level(), lost.is_empty()) {
+        (Level::Contradicts, _) => Exit::Failed,
+        (_, false) => Exit::SomeUnreadable,
+        (_, true) => Exit::Done,
+    })
+}
+
+/// Says what is probably wrong with which file, and what was not written.
+fn verdict(args: &Args, fused: &Fused, outputs: &Outputs<'_>) {
+    let level = fused.verdict.level();
+    for (i, finding) in fused.verdict.findings.iter().enumerate() {
+        let head = if i == 0 { "likeliest cause" } else { "also" };
+        let file = args.file_of(finding).map(|file| format!(" [{}]", file.display())).unwrap_or_default();
+        tell::line(format_args!("{head}, {}: {}{file}", finding.level.name(), one_line(&finding.what)));
+    }
+    let held: Vec<String> = outputs.attitudes().iter().map(|path| path.display().to_string()).collect();
+    if level == Level::Contradicts && !args.force && !held.is_empty() {
+        let why = "the inputs contradict each other; --force writes them all the same";
+        tell::line(format_args!("not written: {}: {why}", held.join(", ")));
+    }
 }
 
 /// Reads all inputs.

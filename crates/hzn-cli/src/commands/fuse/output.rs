@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
+use hzn_fuse::finding::Level;
 use hzn_fuse::input::Inputs;
 use hzn_fuse::sink::{self, AemOptions, CkOptions, Utc};
 use hzn_fuse::{Fused, Settings};
@@ -50,12 +51,16 @@ impl<'a> Outputs<'a> {
         if self.ending() == "csv" {
             all.push(self.innovations());
         }
-        all.extend([&args.report, &args.aem].into_iter().flatten().cloned());
-        if let Some(ck) = &args.ck {
-            all.extend([ck.clone(), ck.with_extension("tsc"), ck.with_extension("tf")]);
-        }
+        all.extend(args.report.iter().cloned());
+        all.extend(self.attitudes());
         all.extend(args.write_frames.iter().map(|(_, file)| PathBuf::from(file)));
         all
+    }
+
+    /// Returns the files that carry the attitude to other programs.
+    pub(super) fn attitudes(&self) -> Vec<PathBuf> {
+        let ck = self.args.ck.iter().flat_map(|ck| [ck.clone(), ck.with_extension("tsc"), ck.with_extension("tf")]);
+        self.args.aem.iter().cloned().chain(ck).collect()
     }
 
     /// Returns a warning if the UTC of the flight is later than the list of leap seconds.
@@ -83,6 +88,17 @@ impl<'a> Outputs<'a> {
             let page = page::html(fused, &self.results.display().to_string())?;
             std::fs::write(path, page).map_err(|e| Stop::from(disk::cannot_write(path, &e)))?;
         }
+        for (camera, file) in &args.write_frames {
+            let found = inputs.recordings.iter().find(|r| r.name == *camera);
+            let recording =
+                found.ok_or_else(|| usage(format!("--write-frames {camera}: no such camera; {}", names(inputs))))?;
+            sink::write_frames(fused, recording, self.utc, create(Path::new(file))?)?;
+        }
+        let contradicts = fused.verdict.level() == Level::Contradicts;
+        if contradicts && !args.force {
+            // Others take an attitude without its verdict.
+            return Ok(self.all().iter().filter(|path| !self.attitudes().contains(path)).map(shown).collect());
+        }
         if let (Some(path), Some(utc)) = (&args.aem, self.utc) {
             let created = Utc::now().iso(0.0);
             let object_name = args.object.clone();
@@ -92,14 +108,12 @@ impl<'a> Outputs<'a> {
         if let (Some(path), Some(utc)) = (&args.ck, self.utc) {
             sink::write_ck(fused, &CkOptions { utc, spacecraft: args.spacecraft }, path)?;
         }
-        for (camera, file) in &args.write_frames {
-            let found = inputs.recordings.iter().find(|r| r.name == *camera);
-            let recording =
-                found.ok_or_else(|| usage(format!("--write-frames {camera}: no such camera; {}", names(inputs))))?;
-            sink::write_frames(fused, recording, self.utc, create(Path::new(file))?)?;
-        }
-        Ok(self.all().iter().map(|path| path.display().to_string()).collect())
+        Ok(self.all().iter().map(shown).collect())
     }
+}
+
+fn shown(path: impl AsRef<Path>) -> String {
+    path.as_ref().display().to_string()
 }
 
 fn create(path: &Path) -> Result<BufWriter<File>, Stop> {

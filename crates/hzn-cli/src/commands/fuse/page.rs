@@ -21,7 +21,8 @@ pub(super) fn html(fused: &Fused, results: &str) -> anyhow::Result<String> {
     let row =
         |(name, value): (String, String)| format!("<tr><td>{}</td><td>{}</td></tr>", escape(&name), escape(&value));
     let table: String = summary::lines(fused, None).into_iter().map(row).collect();
-    let notes: String = fused.notes.iter().map(|note| format!("<p>{}</p>", escape(note))).collect();
+    let findings = fused.verdict.findings.iter().map(|f| &f.what);
+    let notes: String = findings.chain(&fused.notes).map(|note| format!("<p>{}</p>", escape(note))).collect();
     let mut plots = String::new();
     // A chart without a point is left out: a flight without Sun has no TRIAD.
     for chart in charts(fused).iter().filter(|c| c.series.iter().any(|s| !s.points.is_empty())) {

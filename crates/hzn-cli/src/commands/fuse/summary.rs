@@ -25,6 +25,7 @@ pub(super) fn print(fused: &Fused, truth: Option<&[VehicleRow]>) -> Result<(), S
 pub(super) fn lines(fused: &Fused, truth: Option<&[VehicleRow]>) -> Vec<(String, String)> {
     let mut out = Vec::new();
     let mut line = |name: &str, value: String| out.push((name.to_owned(), value));
+    line("verdict", fused.verdict.level().name().to_owned());
     if let (Some(begin), Some(last)) = (fused.begin, fused.epochs.last()) {
         let from = match begin.directions {
             0 => "an attitude of the star tracker".to_owned(),
@@ -57,11 +58,12 @@ pub(super) fn lines(fused: &Fused, truth: Option<&[VehicleRow]>) -> Vec<(String,
         }
     }
     for (name, Tally { taken, refused, nis, freedom }) in tallies(fused) {
-        let mean = nis / taken.max(1) as f64;
+        let mean = nis / (taken + refused).max(1) as f64;
         line(
             &name,
             format!(
-                "{taken} taken, {refused} refused; squared innovation over its covariance {mean:.2} (ideal {freedom})"
+                "{taken} taken, {refused} refused; squared innovation of all over its covariance {mean:.2} (ideal \
+                 {freedom})"
             ),
         );
     }
@@ -89,7 +91,7 @@ fn three(epoch: &Epoch) -> String {
 struct Tally {
     taken: usize,
     refused: usize,
-    /// Sum of the squares of the innovations over their covariance, of the taken ones.
+    /// Sum of the squares of the innovations over their covariance, taken or not.
     nis: f64,
     /// Numbers in an innovation: the ideal mean of those squares.
     freedom: usize,
@@ -102,7 +104,7 @@ fn tallies(fused: &Fused) -> Vec<(String, Tally)> {
         let tally = all.entry((i.camera, i.kind)).or_default();
         tally.taken += usize::from(i.taken);
         tally.refused += usize::from(!i.taken);
-        tally.nis += if i.taken { i.nis } else { 0.0 };
+        tally.nis += i.nis;
         tally.freedom = i.value.len();
     }
     let name = |camera: Option<usize>, kind: Kind| match camera.and_then(|c| fused.cameras.get(c)) {

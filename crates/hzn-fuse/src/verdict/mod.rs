@@ -1,0 +1,75 @@
+//! The verdict over a flight: do its inputs agree with each other?
+//!
+//! A filter weighs measurements; it does not doubt its inputs. A turned mount or a shifted clock becomes an attitude
+//! with a small sigma. The tests here compare inputs that must agree before any filter runs, and the filter's solution
+//! with what was known before it:
+//!
+//! | test | compares |
+//! |---|---|
+//! | `samples` | intervals of the inertial unit |
+//! | `receiver` | positions and velocities of the receiver with each other |
+//! | `force` | specific forces with the changes of the receiver's velocities |
+//! | `clocks`, `place` | the receiver with the positions that the recordings were made with |
+//! | `suspects` | all directions, attitudes and rates, adjusted at once for each suspicion |
+//! | `solution` | the filter's estimates with what was known before, refusals, innovations |
+
+mod adjust;
+mod clocks;
+mod force;
+mod motion;
+mod place;
+mod problem;
+mod receiver;
+mod samples;
+mod solution;
+mod state;
+mod suspects;
+
+use hzn_nav::options::{CameraOptions, Options};
+use nalgebra::Matrix3;
+
+use crate::finding::{Cause, Finding, Verdict};
+use crate::input::{Inputs, Sample};
+use crate::results::Fused;
+use crate::settings::Settings;
+use force::Force;
+use motion::Reckoning;
+use problem::Problem;
+
+/// What the tests of the inputs need.
+pub(crate) struct Given<'a> {
+    pub(crate) inputs: &'a Inputs,
+    pub(crate) samples: &'a [Sample],
+    pub(crate) settings: &'a Settings,
+    pub(crate) cameras: &'a [CameraOptions],
+    pub(crate) options: &'a Options,
+}
+
+/// Tests the inputs.
+pub(crate) fn of_inputs(given: &Given<'_>) -> Vec<Finding> {
+    let Given { inputs, samples, settings, .. } = given;
+    let max_step_s = settings.imu.max_step_s;
+    if let Some(finding) = samples::test(samples, max_step_s) {
+        // Without the right times nothing else can be compared.
+        return vec![finding];
+    }
+    let mut findings: Vec<Finding> = receiver::test(&inputs.gnss, settings).into_iter().collect();
+    let reckoning = Reckoning::new(samples, max_step_s, &Matrix3::identity());
+    let force = if findings.is_empty() { force::test(&reckoning, &inputs.gnss, settings) } else { Force::default() };
+    findings.extend(force.finding);
+    let names: Vec<String> = inputs.recordings.iter().map(|r| r.name.clone()).collect();
+    let of_directions = Problem::new(inputs, given.cameras, given.options, reckoning)
+        .and_then(|problem| suspects::test(&problem, samples, max_step_s, &names));
+    if findings.is_empty() {
+        let of_cameras = of_directions.as_ref().is_some_and(|d| d.cause == Cause::CameraClock);
+        findings.extend(clocks::test(inputs, settings, force.lag_s, of_cameras));
+    }
+    findings.extend(of_directions);
+    findings
+}
+
+/// Returns the verdict, with what the inputs already showed.
+pub(crate) fn verdict(mut of_inputs: Vec<Finding>, fused: &Fused, given: &Given<'_>) -> Verdict {
+    of_inputs.extend(solution::test(fused, given.cameras, given.options));
+    Verdict::new(of_inputs)
+}

@@ -1,0 +1,92 @@
+//! Flights with a star tracker: it replaces receiver and cameras, and one fix of it can begin a flight.
+
+use crate::common::{Draws, Slow, scene};
+use hzn_fuse::finding::{Cause, Level};
+use hzn_fuse::flight::Wanted;
+use hzn_fuse::input::{Attitude, Inputs};
+use hzn_fuse::settings::{ErrorSetting, Treatment};
+use hzn_fuse::simulated::inputs;
+use hzn_fuse::{Fused, Settings, fuse, truth};
+use hzn_nav::frames::{Fixed, Rotation, Vector};
+use hzn_sim::Scenario;
+
+const SIGMA_DEG: f64 = 0.05;
+
+/// Attitudes of a star tracker at these times.
+fn tracked(scene: &Scenario, times_s: impl Iterator<Item = f64>) -> Vec<Attitude> {
+    let (path, mut draws, sigma_rad) = (scene.path().unwrap(), Draws(77), SIGMA_DEG.to_radians());
+    let attitude = |time_s: f64| {
+        let truth: Rotation<_, Fixed> = path.state(time_s).fixed_from_vehicle.into();
+        let error = Rotation::from_scaled_axis(Vector::from([0, 1, 2].map(|_| sigma_rad * draws.normal())));
+        Attitude { time_s, fixed_from_vehicle: Some(truth * error), sigma_rad }
+    };
+    times_s.map(attitude).collect()
+}
+
+fn fly(inputs: &Inputs, settings: &Settings) -> Fused {
+    fuse(inputs, settings, Wanted { rate_hz: Some(2.0), ..Wanted::default() }).unwrap()
+}
+
+/// Returns the mean NEES of the attitude, and its largest error in degrees.
+fn scored(fused: &Fused, scene: &Scenario) -> (f64, f64) {
+    let rows: Vec<_> = scene.path().unwrap().vehicle_rows([0.0, 430.0], 10.0).collect();
+    let misses = truth::compare(&fused.epochs, &rows);
+    assert!(misses.len() > 20);
+    let nees = misses.iter().map(|m| m.nees).sum::<f64>() / misses.len() as f64;
+    (nees, misses.iter().map(|m| m.attitude_rad.norm().to_degrees()).fold(0.0, f64::max))
+}
+
+#[test]
+fn a_star_tracker_replaces_receiver_and_cameras() {
+    let scene = scene(3);
+    let mut all = inputs(&scene, &mut Slow::new(3, 0.1), 0.0).unwrap();
+    all.attitudes = tracked(&scene, (0..30).map(|k| 110.0 + 10.0 * f64::from(k)));
+    all.gnss.clear();
+    let with_cameras = fly(&all, &Settings::default());
+    all.recordings.clear();
+    for fused in [with_cameras, fly(&all, &Settings::default())] {
+        let (nees, worst_deg) = scored(&fused, &scene);
+        println!("NEES {nees:.2}, worst {worst_deg:.3} deg");
+        assert!((0.02..6.0).contains(&nees) && worst_deg < 2.0, "{nees} {worst_deg}");
+        assert_eq!(fused.verdict.level(), Level::Consistent, "{:?}", fused.verdict);
+        assert!(fused.notes.iter().any(|n| n.contains("without a receiver")), "{:?}", fused.notes);
+        let sigma_m = fused.epochs.last().unwrap().position_covariance_m2.as_inner().trace().sqrt();
+        assert!(sigma_m > 6e6, "the position is not known: {sigma_m} m");
+    }
+}
+
+/// The inertial unit of the scene `rocket` is 30 times worse than that of the paper, whose table the defaults are: its
+/// gyros have a bias of 0.05°/s. The default settings consider 6°/h and know no better than the gyros, so they refuse
+/// the limbs. The verdict says so; with the settings of this unit all limbs are taken.
+#[test]
+fn one_fix_at_the_start_of_the_default_rocket_flight() {
+    for frames in [75, 12] {
+        one_fix_at_the_start(frames);
+    }
+}
+
+fn one_fix_at_the_start(frames: u32) {
+    let mut scene = Scenario::builtin("rocket").unwrap();
+    scene.capture.frames = frames;
+    let mut all = inputs(&scene, &mut Slow::new(scene.seed, 0.1), 0.0).unwrap();
+    all.attitudes = tracked(&scene, [60.0].into_iter());
+    let refused = |fused: &Fused| {
+        let limbs = || fused.innovations.iter().filter(|i| i.camera.is_some());
+        (limbs().filter(|i| !i.taken).count(), limbs().count())
+    };
+    let defaults = fly(&all, &Settings::default());
+    println!(
+        "{frames} pictures, defaults: refused {:?}, {:?}, {:#?}",
+        refused(&defaults),
+        scored(&defaults, &scene),
+        defaults.verdict
+    );
+    let mut settings = Settings::default();
+    settings.imu.gyro_bias_deg_h = ErrorSetting { mode: Treatment::Estimated, sigma: 180.0 };
+    let own = fly(&all, &settings);
+    println!("own: refused {:?}, {:?}, {:#?}", refused(&own), scored(&own, &scene), own.verdict);
+    let found = defaults.verdict.likeliest().unwrap();
+    assert_eq!((found.level, found.cause), (Level::Contradicts, Cause::GyroBias), "{:?}", defaults.verdict);
+    let ((out, of), (nees, _)) = (refused(&own), scored(&own, &scene));
+    assert!(out * 20 < of && (0.05..6.0).contains(&nees) && own.verdict.level() == Level::Consistent, "{out} {nees}");
+}
