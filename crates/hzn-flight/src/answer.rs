@@ -312,6 +312,8 @@ impl PictureAnswer {
                 work: o.work,
                 // Telemetry does not have it, so the number is missing for a picture that came row by row.
                 cut_points: 0,
+                // Telemetry does not have it either.
+                sampled: 0,
                 looks: o.looks.into(),
             },
             candidates,

@@ -233,9 +233,10 @@ fn open_camera(settings: &Settings, config: &Config, tell: &Tell) -> Result<Box<
 /// Refuses what the flight software does not do to a picture.
 fn check_input(sensor: Option<&Config>) -> Result<(), Error> {
     let Some(input) = sensor.map(|config| config.input) else { return Ok(()) };
-    let key = match (input.orient, input.scale_to_height) {
-        (Orient::AsStored, None) => return Ok(()),
-        (Orient::AsStored, Some(_)) => "input.scale_to_height",
+    let key = match (input.orient, input.invert, input.scale_to_height) {
+        (Orient::AsStored, false, None) => return Ok(()),
+        (Orient::AsStored, false, Some(_)) => "input.scale_to_height",
+        (Orient::AsStored, true, _) => "input.invert",
         _ => "input.orient",
     };
     Err(Error::usage(format!("{key}: the flight software takes pictures as they are; leave it at its default")))

@@ -1,5 +1,7 @@
 //! Explains in words and numbers what happened to a picture.
 
+use std::borrow::Cow;
+
 use hzn_core::covariance::Term;
 use hzn_core::report::Candidate;
 use hzn_core::status::{Stage, Status};
@@ -52,6 +54,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Band => {
             "behind the edge there is a narrow band and then the sky again, not the body (gates.max_band)".into()
         }
+        Verdict::Night => "it is night at this time and position (gates.max_unlit, body.sunlit)".into(),
         Verdict::Faint => "the brightness hardly changes across the edge, as in twilight".into(),
         Verdict::Glow => "light reaches high above the edge: it is airglow or aurora (gates.max_glow)".into(),
         Verdict::Attitude => format!(
@@ -166,23 +169,33 @@ pub fn principal_sigmas(s: &Solution<f64>) -> ([f64; 2], f64) {
 
 /// Returns advice for a picture without an answer. Advice for the best candidate comes first, then advice for longer
 /// ones, because the longest edge is most likely the limb.
-pub fn tips(r: &Report<f64>) -> Vec<&'static str> {
+pub fn tips(r: &Report<f64>) -> Vec<Cow<'static, str>> {
     let mut candidates: Vec<_> = r.candidates.iter().collect();
     candidates.sort_by_key(|c| std::cmp::Reverse(c.length_px));
     let candidates = best_candidate(r).into_iter().chain(candidates);
     let by_verdict = candidates.flat_map(|c| VERDICT_TIPS.iter().filter(|(of, _)| of.contains(&c.verdict)));
-    let mut tips: Vec<&'static str> = status_tip(r).into_iter().collect();
+    let mut tips: Vec<Cow<'static, str>> = status_tip(r).into_iter().collect();
     for (_, tip) in by_verdict {
-        if !tips.contains(tip) {
-            tips.push(tip);
+        if !tips.iter().any(|known| known == tip) {
+            tips.push((*tip).into());
         }
     }
     tips
 }
 
 /// Returns advice that follows from the status of a picture.
-fn status_tip(r: &Report<f64>) -> Option<&'static str> {
-    Some(match r.status {
+fn status_tip(r: &Report<f64>) -> Option<Cow<'static, str>> {
+    if r.status == Status::NoLimb && r.stage == Stage::Threshold {
+        let size = match r.counters.sampled {
+            0 => String::new(),
+            places => format!(" of {places} places"),
+        };
+        return Some(Cow::Owned(format!(
+            "no bright pixel in the sample{size}: nothing is in view, the exposure does not show it, or the body is \
+             smaller than the distance between two places (then set threshold.method = \"fixed\")"
+        )));
+    }
+    Some(Cow::Borrowed(match r.status {
         Status::TooDark => "the picture is darker than brightness.min_mean allows: lower it, or expose longer",
         Status::TooBright => "the picture is brighter than brightness.max_mean allows: raise it, or expose shorter",
         Status::TooFewPoints => {
@@ -194,15 +207,12 @@ fn status_tip(r: &Report<f64>) -> Option<&'static str> {
              or set a threshold above the clouds (threshold.method = \"fixed\")"
         }
         Status::Ambiguous => "two directions fit about equally well: mask structure in view (mask.polygons_px)",
-        Status::NoLimb if r.stage == Stage::Threshold => {
-            "the whole picture has one brightness: nothing is in view, or the exposure does not show it"
-        }
         Status::NoLimb if r.candidates.is_empty() => {
             "no edge is long enough. Is the limb in view? If it is, try another threshold (threshold.scale, or \
              threshold.level if threshold.method is \"fixed\")"
         }
         _ => return None,
-    })
+    }))
 }
 
 /// Advice for a picture that has a candidate with one of these verdicts.
@@ -234,6 +244,11 @@ const VERDICT_TIPS: &[(&[Verdict], &str)] = &[
         &[Verdict::Attitude],
         "the picture contradicts the given attitude: check the order of the quaternion (qw, qx, qy, qz: camera to \
          ECEF), its time, and attitude_sigma_deg",
+    ),
+    (
+        &[Verdict::Night],
+        "it is night below the camera: check utc and x_km, y_km, z_km; for a thermal camera set body.sunlit = false; \
+         gates.max_unlit = 1 takes the risk that the edge is airglow",
     ),
     (
         &[Verdict::Sun],

@@ -27,5 +27,6 @@
 #define HZN_VERDICT_RATE 22
 #define HZN_VERDICT_GLOW 23
 #define HZN_VERDICT_FAINT 24
+#define HZN_VERDICT_NIGHT 25
 
 #endif

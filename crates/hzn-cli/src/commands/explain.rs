@@ -1,5 +1,6 @@
 //! `hzn explain`: explains the processing of one picture, stage by stage.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -131,8 +132,19 @@ impl PictureWithPrior<'_> {
                 }
             };
             let levels = config.threshold_of(which as u8);
-            let explained =
-                Explained { name: file, config, body, levels, data, picture, trace, report: &report, half_angle };
+            let is_dark = report.solution.is_none() && self.is_answered_inverted(&mut sensor, which)?;
+            let explained = Explained {
+                name: file,
+                config,
+                body,
+                levels,
+                data,
+                picture,
+                trace,
+                report: &report,
+                half_angle,
+                is_dark,
+            };
             tell::result(format_args!("{between}{}", explained.text(decoding, time.elapsed)))?;
             // The camera includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
             let camera = sensor.camera().with_rate(data.and_then(|d| d.rate_rad_s));
@@ -148,6 +160,20 @@ impl PictureWithPrior<'_> {
     }
 }
 
+impl PictureWithPrior<'_> {
+    /// Returns whether the picture has an answer for a body if dark and bright are exchanged: the border of a dark hole
+    /// then fits the limb.
+    fn is_answered_inverted(&self, sensor: &mut AnySensor, which: usize) -> Result<bool, Stop> {
+        if self.config.input.invert {
+            return Ok(false);
+        }
+        let inverted = self.picture.clone().inverted();
+        let view = inverted.view(self.config.input.channel).map_err(|e| usage(format!("input.channel: {e}")))?;
+        let processed = sensor.process(&view, self.data, None);
+        Ok(processed.get(which).is_some_and(|one| one.report.as_ref().is_ok_and(|report| report.solution.is_some())))
+    }
+}
+
 /// Everything that is known about the picture and one body in it. The half-angle is in radians.
 struct Explained<'a> {
     name: &'a str,
@@ -159,6 +185,8 @@ struct Explained<'a> {
     trace: &'a Trace,
     report: &'a Report<f64>,
     half_angle: f64,
+    /// Whether the inverted picture has an answer.
+    is_dark: bool,
 }
 
 impl Explained<'_> {
@@ -179,7 +207,7 @@ impl Explained<'_> {
         line("status", self.report.status.name().to_owned());
         match &self.report.solution {
             Some(s) => self.answer(s, &mut line),
-            None => advice(self.report, self.picture, &mut line),
+            None => self.advice(&mut line),
         }
         self.times(decoding, elapsed, &mut line);
         out
@@ -304,7 +332,8 @@ impl Explained<'_> {
                 format!("threshold {level} of {full} ({method}), mean {mean:.1} over a sample of {n} pixels")
             }
             (None, Status::NoLimb) if self.report.level == 0 => {
-                format!("one brightness everywhere: no threshold ({method})")
+                let places = self.report.counters.sampled;
+                format!("no bright pixel in the sample of {places}: no threshold ({method})")
             }
             (None, _) => format!("threshold {} of {full} ({method})", self.report.level),
         }
@@ -383,16 +412,19 @@ impl Explained<'_> {
             line("altitude", format!("{:.2} +- {:.2} km from the free fit", h / 1e3, sigma / 1e3));
         }
     }
-}
 
-/// Prints advice for a picture without an answer.
-fn advice(r: &Report<f64>, picture: &Picture, line: &mut impl FnMut(&str, String)) {
-    let mut tips: Vec<String> = explain::tips(r).into_iter().map(str::to_owned).collect();
-    tips.extend(picture.unused_bits());
-    if tips.is_empty() {
-        tips.push("look at the edges that were found, with --overlay out.png".to_owned());
-    }
-    for (i, tip) in tips.into_iter().enumerate() {
-        line(if i == 0 { "try" } else { "" }, tip);
+    /// Prints advice for a picture without an answer.
+    fn advice(&self, line: &mut impl FnMut(&str, String)) {
+        let dark = "the border of a dark hole fits the limb: if the body is darker than the sky, as in an infrared \
+                    picture with white cold or before a corona, set invert = true in [input] of sensor.toml";
+        let mut tips: Vec<String> = self.is_dark.then(|| dark.to_owned()).into_iter().collect();
+        tips.extend(explain::tips(self.report).into_iter().map(Cow::into_owned));
+        tips.extend(self.picture.unused_bits());
+        if tips.is_empty() {
+            tips.push("look at the edges that were found, with --overlay out.png".to_owned());
+        }
+        for (i, tip) in tips.into_iter().enumerate() {
+            line(if i == 0 { "try" } else { "" }, tip);
+        }
     }
 }

@@ -97,11 +97,12 @@ pub(super) fn run(args: &Args) -> Outcome {
         prepare_overlays(drawn, args.force || args.resume)?;
     }
     let path = args.output.as_deref();
-    // A recording stores the pictures as they were processed, that is, already turned.
+    // A recording stores the pictures as they were processed, that is, already turned and inverted.
     let recorded = match sensor.config.input.orient {
         Orient::AsStored => sensor.text.clone(),
         _ => source::with_key(&sensor.text, "orient", "as-stored"),
     };
+    let recorded = if sensor.config.input.invert { source::with_key(&recorded, "invert", false) } else { recorded };
     let plan = plan(args, sensor, frames);
     let settings = sink::Settings { config: &plan.config, sensor_toml: &recorded, durable: args.durable };
     let (mut output, stored) = sink::open(path, existing(args), settings)?;

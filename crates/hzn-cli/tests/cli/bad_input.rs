@@ -194,7 +194,7 @@ fn pictures_of_nothing_come_with_advice() {
     (0..60u32).for_each(|i| stars.put_pixel(i * 97 % 320, i * 53 % 240, image::Luma([200])));
     stars.save(place.path("in/stars.png")).unwrap();
     let told = |name: &str| place.run(&["explain", name]).expect(0).out;
-    assert!(told("in/black.png").contains("one brightness: nothing is in view"));
+    assert!(told("in/black.png").contains("no bright pixel in the sample of 4352 places: nothing is in view"));
     assert!(told("in/stars.png").contains("for example of stars, noise or hot pixels"), "{}", told("in/stars.png"));
     place.run(&["run", "in"]).expect(0).says("nothing was found in any picture").says("hzn explain in/black.png\n");
     limb(320, 240, 0.0).save(place.path("in/z.png")).unwrap();

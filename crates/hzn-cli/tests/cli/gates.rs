@@ -82,6 +82,53 @@ fn a_given_attitude_and_a_given_sun_are_gates() {
     assert_eq!(frames(&to_ecef(0.0), "0,0.9,0.4358898943540674").0, "ok");
 }
 
+/// The time and the position say whether it is night. The Sun is above 0° N, 0° E at noon of an equinox.
+#[test]
+fn at_night_no_limb_counts() {
+    let place = Place::with_pictures(1);
+    let at = |utc: &str, more: [&str; 2]| {
+        let [columns, values] = more;
+        place.write(
+            "in/frames.csv",
+            format!("file,utc,x_km,y_km,z_km{columns}\n0000.png,{utc},6771.0088,0,0{values}\n").as_bytes(),
+        );
+        statuses(&place.run(&["run", "in"]).expect(0).out).remove(0)
+    };
+    let none = ["", ""];
+    assert_eq!(at("2025-03-20T12:00:00Z", none).0, "ok");
+    // From 400 km the limb is 20° away: twilight ends where the Sun is 38° below the horizon, 2.5 hours after sunset.
+    assert_eq!(at("2025-03-20T20:25:00Z", none).0, "ok");
+    let (status, why) = at("2025-03-20T20:55:00Z", none);
+    assert!(status == "rejected" && why.contains("night"), "{status}: {why}");
+    // With an attitude, the Sun is known in the camera, too: at noon it lights the limb.
+    let (s, c) = 68.0f64.to_radians().sin_cos();
+    let q = quaternion_of([[0.0, -s, -c], [1.0, 0.0, 0.0], [0.0, -c, s]]);
+    let values = format!(",{},{},{},{},1", q[0], q[1], q[2], q[3]);
+    let attitude = [",qw,qx,qy,qz,attitude_sigma_deg", &values];
+    assert_eq!(at("2025-03-20T12:00:00Z", attitude).0, "ok");
+    // A camera that sees thermal radiation does not need the Sun.
+    place.write("in/sensor.toml", SENSOR.replace("[body]\n", "[body]\nsunlit = false\n").as_bytes());
+    assert_eq!(at("2025-03-20T23:59:00Z", none).0, "ok");
+}
+
+/// A dark body before a bright sky: `hzn explain` says which key helps.
+#[test]
+fn a_dark_body_before_a_bright_sky_is_found_inverted() {
+    let place = Place::new();
+    let mut picture = limb(320, 240, 0.0);
+    picture.pixels_mut().for_each(|p| p.0[0] = 255 - p.0[0]);
+    picture.save(place.path("in/0000.png")).unwrap();
+    assert_ne!(statuses(&place.run(&["run", "in"]).expect(0).out)[0].0, "ok");
+    let told = place.run(&["explain", "in/0000.png"]).expect(0).out;
+    assert!(told.contains("set invert = true in [input]"), "{told}");
+    place.write("in/sensor.toml", format!("{SENSOR}\n[input]\ninvert = true\n").as_bytes());
+    assert_eq!(statuses(&place.run(&["run", "in"]).expect(0).out)[0].0, "ok");
+    assert!(!place.run(&["explain", "in/0000.png"]).expect(0).out.contains("invert = true"));
+    // A recording has the inverted picture, so that it is not inverted again.
+    place.run(&["run", "in", "-o", "out.mcap"]).expect(0);
+    assert_eq!(statuses(&place.run(&["run", "out.mcap"]).expect(0).out)[0].0, "ok");
+}
+
 /// Returns the quaternion, scalar first, of a rotation matrix given by rows.
 fn quaternion_of(m: [[f64; 3]; 3]) -> [f64; 4] {
     let trace = m[0][0] + m[1][1] + m[2][2];

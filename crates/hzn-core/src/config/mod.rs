@@ -99,6 +99,12 @@ section! {
         /// Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
         /// picture.
         @- orient: Orient = Orient::AsStored, [choice];
+        /// Whether the brightness is inverted, so that dark becomes bright: for a dark body before a bright sky.
+        ///
+        /// Examples are an infrared camera that shows cold as white, and a body in front of the Sun's corona. The
+        /// programs that read pictures invert them, up to full scale. `hzn explain` says if an inverted picture has an
+        /// answer.
+        @- invert: bool = false, ["true or false"];
         /// Number of rows of a smaller copy of the picture, which is processed instead of the picture; lengths in
         /// pixels are then those of the copy.
         @- scale_to_height: Option<u16> = None, ["16 to `height`"] { needs: "horace", unset: "none", example: "540" };

@@ -36,7 +36,8 @@ section! {
         /// look can give a false answer; all looks share one `limits.max_work`. With a `fixed` threshold there is only
         /// one look.
         @- levels: heapless::Vec<f64, MAX_LEVELS> = levels(), [0.05 to 4.0];
-        /// Lowest threshold of a further look, in standard deviations of the dark pixels' noise above their mean.
+        /// Lowest threshold of every look, in standard deviations of the dark pixels' noise above their mean; a `fixed`
+        /// threshold is kept.
         ///
         /// A smaller value finds fainter limbs; below 3, the threshold follows the noise of the sky.
         // Below three deviations a threshold follows the noise of the sky: there the limb was found 25 km too high.

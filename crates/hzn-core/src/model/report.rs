@@ -115,6 +115,8 @@ pub struct Counters {
     pub fallback_points: u32,
     /// Sub-pixel points of the chosen candidate (of all candidates, when none was chosen).
     pub edge_points: u32,
+    /// Places of the picture that were read for the threshold, where none of them is bright; otherwise 0.
+    pub sampled: u32,
     /// For a picture that arrives row by row: edge points of the candidates with a plateau that is not within the rows
     /// in memory.
     pub cut_points: u32,

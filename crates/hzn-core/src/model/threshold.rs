@@ -62,6 +62,9 @@ section! {
 }
 
 impl Brightness {
+    /// The limits that no picture exceeds.
+    pub(crate) const ANY: Self = Self { min_mean: 0.0, max_mean: 1.0 };
+
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         self.check_keys()?;
         let limit = Limit::Between(self.min_mean, 1.0);

@@ -80,4 +80,6 @@ verdicts! {
     Glow = 23, "glow";
     /// The brightness hardly changes across the fitted limb: the edge is a contour line of light that fades slowly.
     Faint = 24, "faint";
+    /// The time and the position of the prior say that it is night: the Sun lights no part of the limb.
+    Night = 25, "night";
 }

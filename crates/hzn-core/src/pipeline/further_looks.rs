@@ -14,8 +14,13 @@ use crate::model::observer::Observer;
 use crate::model::report::Report;
 use crate::model::status::Status;
 use crate::model::work;
+use crate::model::work::WorkBudget;
 use crate::stages::contour::BinaryPicture;
 use crate::stages::threshold::{self, Level};
+
+/// Largest number of times that the noise is measured for the first threshold. The second measurement includes the noise
+/// that the first one cut off.
+const NOISE_PASSES: usize = 2;
 
 /// Returns whether the look gave no answer and a further look may give one. In a glow, every threshold has an edge.
 fn goes_on<T>(report: &Report<T>) -> bool {
@@ -44,9 +49,10 @@ impl<T: Real> Sensor<T> {
         let mut others = if fixed { [].iter() } else { config.retry.levels.iter() };
         let (mut work, read) = (budget::new(config, look.lists.border.len()), work::READ + self.region.mask_cost());
         work.charge(first.drawn * read);
-        let mut within = None;
-        let mut status = None;
-        let mut lowest = None;
+        let (mut within, mut status, mut lowest) = (None, None, None);
+        let (mut first, mut is_cleared) = (*first, P::STREAMED);
+        self.raise_above_noise(&look, &mut first, &mut work);
+        let set_level = first.level;
         look.report.level = first.level;
         loop {
             let level = look.report.level;
@@ -73,6 +79,11 @@ impl<T: Real> Sensor<T> {
             if others.len() == 0 || !work.try_spend(work::LOOK) {
                 break;
             }
+            if !core::mem::replace(&mut is_cleared, true) && self.leave_out_lost_blocks(&look, &mut first, &mut work) {
+                look.report.level = first.level;
+                observer.look(look.report.counters.looks, first.level);
+                continue;
+            }
             let lowest = *lowest.get_or_insert_with(|| {
                 work.charge(threshold::NOISE_READS * read);
                 let noise = threshold::dark_noise(picture, &self.region, first.level, config.consensus.seed, observer);
@@ -86,7 +97,63 @@ impl<T: Real> Sensor<T> {
         if let Some(status) = status
             && look.report.solution.is_none()
         {
-            (look.report.status, look.report.level) = (status, first.level);
+            (look.report.status, look.report.level) = (status, set_level);
+        }
+    }
+
+    /// Raises a threshold within the noise of the dark pixels to `retry.min_sigma` above their mean: there an edge would
+    /// follow the noise. The noise is measured only if the spread of the dark pixels, which includes it, allows that the
+    /// threshold is too low.
+    fn raise_above_noise<P: Pixels, O: Observer<T>>(
+        &self,
+        look: &Look<'_, T, P, O>,
+        first: &mut Level<T>,
+        work: &mut WorkBudget,
+    ) {
+        let Look { picture, observer, expected, .. } = *look;
+        if P::STREAMED || self.config.threshold_of(expected.which).method == threshold::Method::Fixed {
+            return;
+        }
+        let least = T::from_f64(self.config.retry.min_sigma);
+        let above = |level: u16| T::from_i32(level.into()) - first.dark;
+        // Noise that is clipped at 0 counts spreads half as far.
+        if above(first.level) >= (first.spread + first.spread) * least {
+            return;
+        }
+        let mut level = first.level;
+        for _ in 0..NOISE_PASSES {
+            work.charge(threshold::NOISE_READS * (work::READ + self.region.mask_cost()));
+            // Within the noise, the pixels below the threshold are only a part of it; twice as far are nearly all.
+            let twice = Level { level, ..*first }.at_fraction(2.0);
+            let noise = threshold::dark_noise(picture, &self.region, twice, self.config.consensus.seed, observer);
+            if above(level) >= noise * least {
+                break;
+            }
+            level = first.at_noise(noise * least);
+        }
+        if level != first.level {
+            first.level = level;
+            observer.level(level, first.mean, first.samples);
+        }
+    }
+
+    /// Replaces the threshold by that of the picture without lost blocks. Returns false if there are none, or if they
+    /// change nothing.
+    fn leave_out_lost_blocks<P: Pixels, O: Observer<T>>(
+        &self,
+        look: &Look<'_, T, P, O>,
+        first: &mut Level<T>,
+        work: &mut WorkBudget,
+    ) -> bool {
+        work.charge(threshold::LOST_READS * (work::READ + self.region.mask_cost()));
+        let levels = self.config.threshold_of(look.expected.which);
+        let seed = self.config.consensus.seed;
+        match threshold::without_lost_blocks(look.picture, &self.region, levels, seed, look.observer) {
+            Some(found) if found.level != first.level => {
+                *first = found;
+                true
+            }
+            _ => false,
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::model::body::Expected;
 use crate::model::found_limb::FoundLimb;
 use crate::model::observer::Observer;
 use crate::model::report::{MAX_BODIES, Report, Reports};
-use crate::model::status::Stage;
+use crate::model::status::{Stage, Status};
 use crate::model::work::WorkBudget;
 use crate::stages::contour;
 use crate::stages::contour::BinaryPicture;
@@ -86,7 +86,22 @@ impl<T: Real> Sensor<T> {
         let (last, seed) = (look.expected.level, config.consensus.seed);
         match threshold::split(look.picture, &self.region, &config.brightness, levels, last, seed, look.observer) {
             Ok(level) => self.look_at_levels(look, &level),
+            Err(Status::NoLimb) => self.look_for_small_body(look),
             Err(status) => look.report.status = status,
+        }
+    }
+
+    /// Looks at a picture in whose sample nothing is bright: the body may be smaller than the cells of the sample.
+    #[cold]
+    fn look_for_small_body<P: Pixels, O: Observer<T>>(&self, look: Look<'_, T, P, O>) {
+        let (fx, fy) = self.camera.focal_px();
+        let radius_px = look.expected.half_angle_rad() * (fx + fy) * T::from_f64(0.5);
+        let levels = self.config.threshold_of(look.expected.which);
+        let (drawn, level) = threshold::split_small_body(look.picture, &self.region, levels, radius_px, look.observer);
+        look.report.counters.sampled = threshold::SAMPLED + drawn;
+        match level {
+            Some(level) => self.look_at_levels(look, &level),
+            None => look.report.status = Status::NoLimb,
         }
     }
 

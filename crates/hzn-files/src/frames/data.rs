@@ -90,6 +90,8 @@ impl FrameData {
                 .and_then(|q| Rotation::assume_from_quaternion(q.map(T::from_f64))),
             attitude_sigma_rad: self.attitude_sigma_deg.map(|deg| T::from_f64(deg.to_radians())),
             level: None,
+            // The engine adds it, because the ephemeris is not part of this crate.
+            sun_elevation_rad: None,
             sun: self.sun_camera.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))),
             last: None,
             rate_rad_s: self.rate_rad_s.map(|rate| rate.map(T::from_f64)),

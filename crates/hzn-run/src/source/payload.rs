@@ -50,7 +50,7 @@ impl Payload {
     }
 
     /// Decodes the picture. With a sensor, the picture must have the sensor's size, and gets the sensor's number of
-    /// bits and turn. Also returns the file's own bytes, if they are PNG or JPEG and can be kept unchanged.
+    /// bits, turn and inversion. Also returns the file's own bytes, if they are PNG or JPEG and can be kept unchanged.
     ///
     /// # Errors
     /// The reason why the picture cannot be read, for its result.
@@ -64,10 +64,10 @@ impl Payload {
             _ => Some(own),
         };
         let (picture, original) = self.decode_as_stored(stored)?;
-        let turned = picture.is_turned(&sensor.input);
+        let is_changed = picture.is_changed(&sensor.input);
         let picture = picture.with_input(&sensor.input)?;
         decode::check_size(picture.layout.width, picture.layout.height, Some(own))?;
-        Ok((picture, original.filter(|_| !turned)))
+        Ok((picture, original.filter(|_| !is_changed)))
     }
 
     /// Returns the largest sample of a picture of 16-bit words. Returns `None` for any other or unreadable picture.

@@ -382,7 +382,10 @@ impl Scenario {
             _ => Vec::new(),
         };
         let limb_height_by_latitude_km = by_latitude.into_iter().collect();
-        body::Config { kind, limb_height_km, limb_height_by_latitude_km, ..body::Config::default() }
+        // Only a visible world is lit by the Sun; the others shine by themselves, at night, too.
+        let shines = kind == Kind::Earth && !matches!(self.world, World::Visible(_));
+        let sunlit = shines.then_some(false);
+        body::Config { kind, limb_height_km, limb_height_by_latitude_km, sunlit, ..body::Config::default() }
     }
 }
 

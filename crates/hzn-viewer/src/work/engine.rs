@@ -148,7 +148,7 @@ pub(super) fn with_input(picture: Arc<Picture>, input: &Input) -> Result<Arc<Pic
         (Samples::Words(_), Some(bits)) if bits != picture.layout.bits => {
             Picture::clone(&picture).with_input(input).map(Arc::new)
         }
-        _ if picture.is_turned(input) => Picture::clone(&picture).with_input(input).map(Arc::new),
+        _ if picture.is_changed(input) => Picture::clone(&picture).with_input(input).map(Arc::new),
         _ => Ok(picture),
     }
 }
@@ -323,7 +323,8 @@ impl Worker {
             Tone { low, high: high.max(low.saturating_add(1)), gamma: request.contrast.1 }
         };
         let orient = config.map_or(Orient::AsStored, |config| config.input.orient);
-        let recipe = Recipe { look: request.look, level, tone, channel, orient, plane };
+        let invert = config.is_some_and(|config| config.input.invert);
+        let recipe = Recipe { look: request.look, level, tone, channel, orient, invert, plane };
         let key = (request.index, recipe);
         if let Some(shown) = self.shown.as_ref().filter(|s| s.key == key) {
             return Arc::clone(shown);

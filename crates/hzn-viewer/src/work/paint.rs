@@ -27,6 +27,8 @@ pub struct Recipe {
     pub channel: Channel,
     /// Orientation in which the picture is read.
     pub orient: Orient,
+    /// Whether dark and bright are exchanged.
+    pub invert: bool,
     /// The plane that the picture is shown in.
     pub plane: Plane,
 }
@@ -226,6 +228,7 @@ mod tests {
             tone: Tone::plain(255),
             channel: Channel::Mean,
             orient: Orient::AsStored,
+            invert: false,
             plane: Plane::Camera,
         }
     }

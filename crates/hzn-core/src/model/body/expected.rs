@@ -45,6 +45,8 @@ pub struct Expected<T> {
     /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; without the altitude when the half-angle is
     /// free.
     pub(crate) sigma_cos: T,
+    /// Whether cos α bends so much within a sigma that `sigma_cos` must not be fused, see [`Self::update`].
+    pub(crate) is_curved: bool,
     /// Contributions to `sigma_cos` as 1-sigmas of the limb height: limb, altitude, unknown radius, clipping; metres.
     pub(crate) limb_sigma_parts_m: [T; 4],
     /// Height that clipping adds to a limb that is clipped everywhere, and its 1-sigma; metres.
@@ -65,6 +67,8 @@ pub struct Expected<T> {
     pub(crate) sun: Option<V3<T>>,
     /// Direction to the Sun in the camera frame for the gate on unlit limbs, if the body is seen in sunlight.
     pub(crate) sun_seen: Option<V3<T>>,
+    /// Elevation of the Sun at the point below the camera, if the body is seen in sunlight, radians.
+    pub(crate) sun_elevation_rad: Option<T>,
     /// The axis in the camera frame that the prior attitude and position predict, and its 1-sigma in radians.
     pub(crate) predicted: Option<(V3<T>, T)>,
     /// The last answer before this picture.
@@ -195,10 +199,11 @@ impl<T: Real> Expected<T> {
         let limb_sigma_parts_m = [limb_sigma, sin * altitude_sigma, seen.unknown_m, T::zero()];
         let variance = limb_sigma_parts_m.iter().fold(T::zero(), |sum, s| sum + *s * *s);
         let predicted = prior.fixed_from_camera.zip(seen.axis_fixed(body, prior));
-        Ok(Self {
+        let mut expected = Self {
             cos,
             sin,
             sigma_cos: scale * variance.sqrt(),
+            is_curved: false,
             limb_sigma_parts_m,
             clipped_m: [body.clipped_height_km, body.clipped_sigma_km].map(|h| T::from_f64(h) * km),
             ellipsoid: seen.ellipsoid,
@@ -208,6 +213,7 @@ impl<T: Real> Expected<T> {
             level: prior.level,
             sun: prior.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
             sun_seen: prior.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),
+            sun_elevation_rad: prior.sun_elevation_rad.filter(|_| body.is_seen_in_sunlight()),
             predicted: predicted.map(|(r, a)| (*r.inverse().apply(&a).v(), attitude_sigma)),
             last: prior.last,
             rate_rad_s: prior.rate_rad_s,
@@ -219,7 +225,9 @@ impl<T: Real> Expected<T> {
             phases: body.kind != Kind::Sun,
             which: 0,
             target: None,
-        })
+        };
+        expected.is_curved = expected.bends();
+        Ok(expected)
     }
 
     /// Returns the 1-sigma of the half-angle from the limb height alone, radians: its sigma over the distance to the
@@ -258,7 +266,7 @@ impl<T: Real> Expected<T> {
         if target.is_some_and(|target| target.range.is_none()) {
             return Self { target, ..*self };
         }
-        Self {
+        let mut clipped = Self {
             target,
             cos,
             sin,
@@ -271,7 +279,9 @@ impl<T: Real> Expected<T> {
             limb_m: self.limb_m + height,
             limb_sigma_m: root(&[self.limb_sigma_m, sigma]),
             ..*self
-        }
+        };
+        clipped.is_curved = clipped.bends();
+        clipped
     }
 
     /// Returns the altitude in metres and its sigma from a measured cos α and its variance; `None` when the half-angle

@@ -1,6 +1,7 @@
 //! The body whose limb the sensor searches for, and its cone for a given position and altitude.
 
 mod apparent;
+mod bounds;
 mod expected;
 mod kind;
 mod lit;
@@ -123,6 +124,8 @@ section! {
             ["up to 16 rows, for `earth`"] { unset: "none", example: "[[-90, 20.5], [0, 25.0], [90, 29.5]]" };
         /// Whether only the sunlit part of the limb counts as limb; this needs the direction to the Sun. In visible
         /// light, set true: near the terminator the light fades, and the edge is too low there.
+        ///
+        /// False says that the body shines by itself, as for a thermal camera: no gate then asks for the Sun.
         @- sunlit: Option<bool> = None, ["true or false"]
             { unset: "true for all but `earth`, `earth-sphere` and `sun`", example: "true" };
         /// Threshold for this body, as a table with the keys of `[threshold]`.

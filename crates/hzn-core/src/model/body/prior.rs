@@ -44,6 +44,9 @@ pub struct Prior<T> {
     pub level: Option<u16>,
     /// Direction to the Sun in the camera frame. It is used by a gate, see `gates.max_unlit`.
     pub sun: Option<UnitVec3<Cam, T>>,
+    /// Elevation of the Sun above the horizon at the point below the camera, radians; it follows from the time and the
+    /// position. At night no limb is seen in sunlight, see `gates.max_unlit`.
+    pub sun_elevation_rad: Option<T>,
     /// 1-sigma of the prior attitude about the axis in radians, 0 or more; 5 degrees if it is left out. It widens the
     /// covariance by the part of the ellipsoid's shape that then remains uncertain. From 30 degrees on, the attitude
     /// does not correct the shape at all.

@@ -34,6 +34,7 @@ impl<T: Real> Expected<T> {
             cos: (T::one() - sin * sin).max(T::EPSILON).sqrt(),
             sin,
             sigma_cos: T::from_f64(UNKNOWN_COS),
+            is_curved: false,
             limb_sigma_parts_m: [target.limb_sigma_m, sin * range_sigma, unknown_m, T::ZERO],
             clipped_m: [body.clipped_height_km, body.clipped_sigma_km].map(|h| T::from_f64(h) * km),
             ellipsoid: None,
@@ -43,6 +44,7 @@ impl<T: Real> Expected<T> {
             level: prior.level,
             sun: sun.filter(|_| body.is_sunlit()),
             sun_seen: sun.filter(|_| body.is_seen_in_sunlight()),
+            sun_elevation_rad: prior.sun_elevation_rad.filter(|_| body.is_seen_in_sunlight()),
             predicted: to_direction.and_then(|u| scaled(&u)).map(|e| (e, attitude_sigma)),
             last: prior.last,
             rate_rad_s: prior.rate_rad_s,
@@ -60,6 +62,7 @@ impl<T: Real> Expected<T> {
         if size.is_some() {
             expected.sigma_cos = expected.sigma_cos_of_parts();
             expected.set_uneven_limb(body);
+            expected.is_curved = expected.bends();
         }
         Ok(expected)
     }
@@ -97,6 +100,7 @@ impl<T: Real> Expected<T> {
         let [limb, _, _, clipped] = self.limb_sigma_parts_m;
         let mut seen = Self { sin, cos, limb_sigma_parts_m: [limb, sin * range_sigma_m, T::ZERO, clipped], ..*self };
         seen.sigma_cos = seen.sigma_cos_of_parts();
+        seen.is_curved = seen.bends();
         seen
     }
 }

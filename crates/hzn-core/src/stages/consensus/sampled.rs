@@ -5,7 +5,7 @@ use super::two_point::MIN_DRAWS;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::base::rng::Rng;
-use crate::geometry::block::{Block, LANES, sum};
+use crate::geometry::block::{Block, LANES, LEAST_GRADIENT2, sum};
 use crate::geometry::cone::through_three;
 
 /// Largest value of `max_draws`.
@@ -46,7 +46,7 @@ pub(super) fn distances2<T: Real>(b: &Block<T>, e: &V3<T>, c: T) -> [T; LANES] {
     core::array::from_fn(|l| {
         let r = c - (b.s[0][l] * e.x + b.s[1][l] * e.y + b.s[2][l] * e.z);
         // A cleared point has no gradient; the floor turns it into a very large distance instead of NaN.
-        r * r / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(1e-20))
+        r * r / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(LEAST_GRADIENT2))
     })
 }
 

@@ -5,7 +5,7 @@ use super::inliers::{Consensus, Threshold};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::base::rng::Rng;
-use crate::geometry::block::{Block, LANES, sum};
+use crate::geometry::block::{Block, LANES, LEAST_GRADIENT2, sum};
 use crate::geometry::cone::{through_three, through_two};
 use crate::model::body::Expected;
 use crate::model::work::{DRAW, SCORE, WorkBudget};
@@ -134,7 +134,7 @@ fn distance2<T: Real>(blocks: &[Block<T>], i: u32, e: &V3<T>, c: T) -> T {
     let lane = i as usize % LANES;
     let r = c - block.ray(lane).dot(e);
     let [gu, gv] = block.gradient_at(lane, e);
-    r * r / (gu * gu + gv * gv).max(T::from_f64(1e-20))
+    r * r / (gu * gu + gv * gv).max(T::from_f64(LEAST_GRADIENT2))
 }
 
 /// Returns the sum of the squared distances, each at most `limit2`, over every `scored`-th block, in px². Empty lanes
@@ -145,7 +145,7 @@ fn score<T: Real>(blocks: &[Block<T>], scored: usize, e: &V3<T>, c: T, limit2: T
         let g = b.gradient(e);
         for l in 0..LANES {
             let r = c - (b.s[0][l] * e.x + b.s[1][l] * e.y + b.s[2][l] * e.z);
-            let d2 = r * r / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(1e-20));
+            let d2 = r * r / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(LEAST_GRADIENT2));
             // Truncated squares prefer the better of two cones with the same inliers, which a count of inliers cannot.
             total[l] += d2.min(limit2);
         }

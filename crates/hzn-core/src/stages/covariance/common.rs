@@ -28,7 +28,7 @@ use super::noise::EdgeNoiseModel;
 use super::sandwich::response;
 use crate::base::linalg::{M3, V3, basis};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, every_weighted};
+use crate::geometry::block::{Block, LEAST_GRADIENT2, every_weighted};
 use crate::geometry::camera::{Camera, INTRINSICS};
 use crate::model::body::Expected;
 use crate::model::error_budget::Term;
@@ -137,7 +137,7 @@ pub(super) fn part<'a, T: Real>(blocks: &'a [Block<T>], fit: &'a Fit<T>) -> impl
     every_weighted(blocks, step(fit)).map(move |(place, block, l)| {
         let s = block.ray(l);
         let [gu, gv] = block.gradient_at(l, &fit.e);
-        let g2 = (gu * gu + gv * gv).max(T::from_f64(1e-20));
+        let g2 = (gu * gu + gv * gv).max(T::from_f64(LEAST_GRADIENT2));
         let w = block.weight[l & 7] / g2;
         let (x, y) = (s.dot(&b1), s.dot(&b2));
         let (h1, h2) = (x - m1, y - m2);

@@ -31,10 +31,20 @@ pub(super) fn fused<T: Real>(
     let difference = expected.cos - fit.c;
     // The axis moves with the half-angle, because on an arc both are known only together: on a short arc the fusion
     // makes sigma three to six times smaller.
-    let k = V3::new(p.m13, p.m23, p.m33) * (T::one() / total);
-    let e = unit(&(fit.e + b1 * (k.x * difference) + b2 * (k.y * difference)))?;
+    let with_half_angle = V3::new(p.m13, p.m23, p.m33);
+    let (k, moved, prior) = match expected.update(fit.c, p.m33) {
+        None => {
+            let k = with_half_angle * (T::one() / total);
+            (k, k * difference, k * expected.sigma_cos)
+        }
+        Some(exact) => {
+            let by = |x: T| with_half_angle * x;
+            (by(exact.weight), by(exact.moved), by(exact.sigma_weight))
+        }
+    };
+    let e = unit(&(fit.e + b1 * moved.x + b2 * moved.y))?;
     if let Some(budget) = budget {
-        budget.project(&b1, &b2, [k.x, k.y], [k.x * expected.sigma_cos, k.y * expected.sigma_cos], expected);
+        budget.project(&b1, &b2, [k.x, k.y], [prior.x, prior.y], expected);
     }
     // The tangent basis at the fused axis differs only by a small rotation. The covariance is therefore transformed
     // through the camera frame without other changes.
@@ -42,7 +52,8 @@ pub(super) fn fused<T: Real>(
     let (n1, n2) = basis(&e);
     let turn = |n: &V3<T>| [n.dot(&b1), n.dot(&b2)];
     let (r1, r2) = (turn(&n1), turn(&n2));
-    let late = projected([k.x, k.y], &covariance.late, T::ZERO);
+    let late = projected([k.x, k.y], &covariance.late);
+    let common = projected([k.x, k.y], &covariance.common);
     let sum = |a: [T; 3], b: [T; 3]| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
     let turned = |[p11, p12, p22]: [T; 3]| {
         let form = |a: [T; 2], b: [T; 2]| a[0] * (p11 * b[0] + p12 * b[1]) + a[1] * (p12 * b[0] + p22 * b[1]);
@@ -50,9 +61,9 @@ pub(super) fn fused<T: Real>(
     };
     Some(Fused {
         e,
-        c: fit.c + k.z * difference,
+        c: fit.c + moved.z,
         p: turned(sum(fused, late)),
-        common: Some(turned(sum(projected([k.x, k.y], &covariance.common, var_c), late))),
+        common: Some(turned(sum(sum(common, late), [prior.x * prior.x, prior.x * prior.y, prior.y * prior.y]))),
         free_p,
         by_cos: [k.x, k.y],
         var_free_cos: var_free,
@@ -73,7 +84,7 @@ fn unfused<T: Real>(
     budget: Option<&mut ErrorBudget<T>>,
 ) -> Fused<T> {
     let (b1, b2) = basis(&fit.e);
-    let var_c = expected.sigma_cos * expected.sigma_cos;
+    let var_c = expected.fixed_variance();
     let p = &covariance.whole;
     let (var_free, free_p) = (fit.free.then_some(p.m33), [p.m11, p.m12, p.m22]);
     // If the half-angle is fixed at the expected one, its error causes a proportional error of the axis.
@@ -100,15 +111,14 @@ fn unfused<T: Real>(
     }
 }
 
-/// Returns what a covariance C of (δ₁₂, δc) becomes by the fusion with an expected cosine of the variance σ_c², on the
-/// tangent basis of the fitted axis: (I, −k) C (I, −k)ᵀ + k kᵀ σ_c².
+/// Returns what a covariance C of (δ₁₂, δc) becomes by the fusion, on the tangent basis of the fitted axis:
+/// (I, −k) C (I, −k)ᵀ. The expected cosine of the variance σ_c² adds k kᵀ σ_c².
 ///
 /// The gain k weighs all errors of the fit and of the expected half-angle. While the geometry stays, it is the same in
 /// the next picture, so that it carries the common part of both sides over. The expected half-angle is common as a
 /// whole: the next picture is told the same limb height and radius, and an altitude with nearly the same error.
-fn projected<T: Real>([k1, k2]: [T; 2], c: &M3<T>, var_c: T) -> [T; 3] {
-    let both = c.m33 + var_c;
-    let (c13, c23) = (c.m13 - k1 * both, c.m23 - k2 * both);
+fn projected<T: Real>([k1, k2]: [T; 2], c: &M3<T>) -> [T; 3] {
+    let (c13, c23) = (c.m13 - k1 * c.m33, c.m23 - k2 * c.m33);
     [c.m11 - k1 * (c.m13 + c13), c.m12 - k2 * c.m13 - k1 * c23, c.m22 - k2 * (c.m23 + c23)]
 }
 

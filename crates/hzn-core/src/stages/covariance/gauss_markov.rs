@@ -2,7 +2,7 @@
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
-use crate::geometry::block::{Block, HALF_LANES, LANES, exp_neg};
+use crate::geometry::block::{Block, HALF_LANES, LANES, LEAST_GRADIENT2, exp_neg};
 
 /// Returns the upper triangle of Σ (1 − ρ²) c cᵀ about `mean`.
 pub(crate) fn correlated<T: Real>(
@@ -23,7 +23,7 @@ pub(crate) fn correlated<T: Real>(
         let mut q = [[T::ZERO; LANES]; 3];
         for l in 0..LANES {
             let (sx, sy, sz) = (block.s[0][l], block.s[1][l], block.s[2][l]);
-            let w = block.weight[l] / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(1e-20));
+            let w = block.weight[l] / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(LEAST_GRADIENT2));
             q[0][l] = w * (sx * b1.x + sy * b1.y + sz * b1.z - mean[0]);
             q[1][l] = w * (sx * b2.x + sy * b2.y + sz * b2.z - mean[1]);
             q[2][l] = -w;

@@ -15,7 +15,7 @@ use super::answer::Turn;
 use super::noise::EdgeNoiseModel;
 use crate::base::linalg::{M3, V3, basis, invert_spd3, unit};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, LANES};
+use crate::geometry::block::{Block, LANES, LEAST_GRADIENT2};
 use crate::geometry::camera::{Camera, INTRINSICS};
 use crate::model::body::{Expected, Target};
 use crate::model::edge_noise::Config;
@@ -175,7 +175,7 @@ impl Limb {
         let radial = self.b1 * azimuth[0] + self.b2 * azimuth[1];
         let outward = radial * self.cos - self.e * self.sin;
         let gradient = block.gradient_at(lane, &self.e.map(T::from_f64)).map(|g| g.to_f64());
-        let g2 = (gradient[0] * gradient[0] + gradient[1] * gradient[1]).max(1e-20);
+        let g2 = (gradient[0] * gradient[0] + gradient[1] * gradient[1]).max(LEAST_GRADIENT2);
         let mut row = Row {
             h: V3::new(self.sin * azimuth[0], self.sin * azimuth[1], -1.0),
             x: 0.0,

@@ -13,7 +13,7 @@ use super::cone::{Cone, State};
 use super::sums::{self, Weights, pass};
 use crate::base::linalg::{V3, basis, invert_spd3, unit};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, HALF_LANES, LANES};
+use crate::geometry::block::{Block, HALF_LANES, LANES, LEAST_GRADIENT2};
 use crate::geometry::scaling::Scaling;
 
 /// Largest number of steps. From the robust fit, three are enough (math.md, 13.3).
@@ -122,7 +122,7 @@ impl<T: Real> Sums<T> {
                 let terms = |l: usize| {
                     let (weight, rho) = (block.weight[l], rho[l]);
                     let g2 = gradient[0][l] * gradient[0][l] + gradient[1][l] * gradient[1][l];
-                    let w = weight / g2.max(T::from_f64(1e-20));
+                    let w = weight / g2.max(T::from_f64(LEAST_GRADIENT2));
                     let (h1, h2) = (x[l] - mean[0], y[l] - mean[1]);
                     let (w1, w2, wr) = (w * h1, w * h2, w * rho);
                     [w1 * h1, w1 * h2, w1, w2 * h2, w2, w, wr * h1, wr * h2, wr, wr * rho, weight]

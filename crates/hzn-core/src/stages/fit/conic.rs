@@ -15,7 +15,7 @@
 use super::direct::LEAST_Z;
 use crate::base::linalg::{M3, Triangle, V3, symmetric_eigen, unit};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, LANES};
+use crate::geometry::block::{Block, LANES, LEAST_GRADIENT2};
 
 /// Returns the axis and cos α of the conic closest to the points with a weight. The result is `None` if the points do
 /// not determine a cone: if there are fewer than five, if all are on a line, or if the conic is no picture of a cone
@@ -42,7 +42,7 @@ fn distance2<T: Real>(blocks: &[Block<T>], e: &V3<T>, c: T) -> T {
         let g = b.gradient(e);
         for l in 0..LANES {
             let r = c - b.ray(l).dot(e);
-            total += b.weight[l] * r * r / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(1e-20));
+            total += b.weight[l] * r * r / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(LEAST_GRADIENT2));
             count += b.weight[l];
         }
     }

@@ -156,6 +156,8 @@ fn settle<T: Real>(
 }
 
 /// Limits 1 − cos to its valid range.
+// The lower limit only keeps a step beyond the point of no size from becoming negative. It is the half-angle of 1e-12
+// rad, far below a pixel of every lens: a limit that a body can reach, such as 1e-9 (9 arc seconds), spoils its fit.
 fn clamp<T: Real>(k: T) -> T {
-    k.max(T::from_f64(1e-9)).min(T::from_f64(2.0 - 1e-6))
+    k.max(T::from_f64(5e-25)).min(T::from_f64(2.0 - 1e-6))
 }

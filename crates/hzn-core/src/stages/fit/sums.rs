@@ -3,22 +3,24 @@
 use super::config::{Config, HalfAngle};
 use crate::base::linalg::{M3, V3, invert_spd2, invert_spd3};
 use crate::base::real::Real;
-use crate::geometry::block::{Block, HALF_LANES, LANES, sum};
+use crate::geometry::block::{Block, HALF_LANES, LANES, LEAST_GRADIENT2, sum};
 use crate::geometry::cone::Azimuth;
 use crate::model::body::Expected;
 use crate::model::edge_noise;
 
 /// The expected half-angle as a row of the normal equations.
-pub(super) struct HalfAngleRow<T> {
-    cos: T,
+pub(super) struct HalfAngleRow<'a, T> {
+    expected: &'a Expected<T>,
+    /// Weight for a half-angle of unit variance, and for the expected variance.
+    unit: T,
     weight: T,
 }
 
-impl<T: Real> HalfAngleRow<T> {
+impl<'a, T: Real> HalfAngleRow<'a, T> {
     /// Weighs the row by the number of independent errors of the edge: one error per two correlation lengths.
     pub(super) fn new(
         blocks: &[Block<T>],
-        expected: &Expected<T>,
+        expected: &'a Expected<T>,
         config: &Config,
         noise: &edge_noise::Config,
     ) -> Option<Self> {
@@ -37,7 +39,18 @@ impl<T: Real> HalfAngleRow<T> {
         // An expected half-angle without any sigma would have an infinite weight.
         let floor = expected.sin * T::from_f64(1e-6);
         let sigma_c = expected.sigma_cos.max(floor);
-        Some(Self { cos: expected.cos, weight: sigma * sigma * each / (sigma_c * sigma_c) })
+        let unit = sigma * sigma * each;
+        Some(Self { expected, unit, weight: unit / (sigma_c * sigma_c) })
+    }
+
+    /// Returns the weight of the row and the difference of the expected cos α from `c`. A curved prior is made linear
+    /// there.
+    fn at(&self, c: T) -> (T, T) {
+        if self.expected.is_curved {
+            let (difference, weight) = self.expected.linear_near(c);
+            return (self.unit * weight, difference);
+        }
+        (self.weight, self.expected.cos - c)
     }
 }
 
@@ -62,12 +75,12 @@ impl<T: Real> Sums<T> {
     }
 
     /// Returns the step (δ₁₂, δc) with a free half-angle, or with its prior.
-    pub(super) fn step(&self, mean: [T; 2], prior: Option<&HalfAngleRow<T>>, c: T) -> Option<([T; 2], T)> {
+    pub(super) fn step(&self, mean: [T; 2], prior: Option<&HalfAngleRow<'_, T>>, c: T) -> Option<([T; 2], T)> {
         let [mut n11, mut n12, mut n13, mut n22, mut n23, mut n33] = self.n;
         let [mut g1, mut g2, mut g3] = self.g;
         if let Some(p) = prior {
             // The prior adds the row [m, 1] for (δ₁₂, δc'), with the value c₀ − c.
-            let (w, [m1, m2], v) = (p.weight, mean, p.cos - c);
+            let ((w, v), [m1, m2]) = (p.at(c), mean);
             n11 += w * m1 * m1;
             n12 += w * m1 * m2;
             n13 += w * m1;
@@ -182,7 +195,7 @@ pub(crate) fn pass<T: Real>(
                 // them.
                 let (x, y, z) = (b.s[0][l] - e.x, b.s[1][l] - e.y, b.s[2][l] - e.z);
                 let r = target[l] + (x * x + y * y + z * z) * half;
-                let g2 = (grad[0][l] * grad[0][l] + grad[1][l] * grad[1][l]).max(T::from_f64(1e-20));
+                let g2 = (grad[0][l] * grad[0][l] + grad[1][l] * grad[1][l]).max(T::from_f64(LEAST_GRADIENT2));
                 let per = T::one() / g2;
                 let d2 = r * r * per;
                 parts[l] = d2 * inverse;

@@ -27,8 +27,10 @@ section! {
         @112 max_rms_px: f64 = 2.0, [above 0.0];
         /// Largest difference between the fitted and the expected half-angle, in standard deviations.
         ///
-        /// A smaller value refuses more edges that are no limb, and also limbs whose altitude or limb height is worse
-        /// than its sigma says.
+        /// The bounds are the exact half-angles at this many standard deviations of altitude and limb height, widened
+        /// by the standard deviation of the fitted half-angle. If the lower altitude is below the limb, any wider limb
+        /// passes. A smaller value refuses more edges that are no limb, and also limbs whose altitude or limb height is
+        /// worse than its sigma says.
         @113 max_half_angle_sigma: f64 = 3.0, [above 0.0];
         /// Largest standard deviation of an answer in its worst direction, degrees.
         ///
@@ -93,7 +95,7 @@ section! {
         /// height, 4.8 scale heights of the air and four pixels. Sunlit air leaves a fifteenth there in an sRGB
         /// picture. Airglow and aurora reach higher, and their edge is not the limb. A larger value answers pictures
         /// with more light above the limb, and takes the risk that their edge is airglow. Bodies without known air are
-        /// not checked.
+        /// not checked, and nor is a camera that is below the airglow: 3σ of its altitude below 85 km.
         @- max_glow: f64 = 0.125, [0.0 to 1e6];
         /// Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky;
         /// 1 turns the gates `band` and `faint` off.
@@ -113,9 +115,12 @@ section! {
         /// then processed in order.
         @- max_rate_deg_s: Option<f64> = None, [above 0.0 to 1e6] { unset: "any", example: "100.0" };
         /// Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does
-        /// `body.sunlit = false`.
+        /// `body.sunlit = false`, which is for a thermal camera.
         ///
-        /// A Sun more than 18° below the horizon does not light a point.
+        /// A Sun more than 18° below the horizon does not light a point. With the column `utc` and a position the Sun is
+        /// known, too: at night no limb of the Earth counts. It is night where the Sun is 18° plus the dip of the
+        /// horizon below the horizon of the point below the camera. An attitude then gives the direction of the Sun, if
+        /// the columns `sun_x` to `sun_z` are empty.
         @- max_unlit: f64 = 0.5, [0.0 to 1.0];
         /// Whether a part of the expected limb must lie in the picture: the limb with the expected half-angle about the
         /// fitted axis.

@@ -19,9 +19,11 @@ pub(super) fn refuse<T: Real>(case: &Case<'_, T>) -> Result<(), Verdict> {
     let Some(var_free) = fused.var_free_cos.filter(|_| config.residual_floor_px > 0.0 && !expected.free) else {
         return Ok(());
     };
-    let (edge, rest) = (fused.edge.var_cos, var_free - fused.edge.var_cos + expected.sigma_cos * expected.sigma_cos);
     let difference = expected.cos - fit.c;
     let chi = T::from_f64(config.max_half_angle_sigma);
+    // Without a limit on this side no half-angle contradicts the expected one.
+    let Some(prior) = expected.variance_towards(fit.c, chi) else { return Ok(()) };
+    let (edge, rest) = (fused.edge.var_cos, var_free - fused.edge.var_cos + prior);
     // The half-angles disagree unless the variance from the edge is at least this value.
     let needed = difference * difference / (chi * chi) - rest;
     let sigma = fit.rms_px.max(T::from_f64(config.residual_floor_px));

@@ -24,6 +24,19 @@ const FARTHEST: f64 = 8.0;
 const NEAREST: f64 = 2.0;
 /// Fewest places from which the sky must be visible.
 const LEAST: usize = 3;
+/// Height of the lowest glow in scale heights of the air.
+// The airglow of the Earth is a layer from 85 to 105 km, with the scale height of 7.5 km. A layer that the camera is
+// below has no limb, because every line of sight leaves through it. Other bodies glow at about the same pressure.
+const LOWEST_SCALE_HEIGHTS: f64 = 85.0 / 7.5;
+/// Number of standard deviations of the altitude by which a camera must be below the lowest glow.
+const BELOW_SIGMAS: f64 = 3.0;
+
+/// Returns whether the camera is below every glow, so that light above the limb can only be that of the air.
+fn is_below<T: Real>(expected: &Expected<T>) -> bool {
+    let (altitude_m, sigma_m) = expected.altitude_and_sigma_m();
+    let lowest_m = expected.scale_height_m * T::from_f64(LOWEST_SCALE_HEIGHTS);
+    altitude_m + sigma_m * T::from_f64(BELOW_SIGMAS) < lowest_m
+}
 
 /// Returns the angle above the limb at which the air is dark, in radians; `None` for a body without known air.
 fn dark_angle<T: Real>(sin: T, c: T, expected: &Expected<T>) -> Option<T> {
@@ -35,8 +48,8 @@ fn dark_angle<T: Real>(sin: T, c: T, expected: &Expected<T>) -> Option<T> {
 }
 
 /// Returns whether a limb may belong to a glow: if the light above it, above the sky farther out, is more than
-/// `gates.max_glow` of the step from the sky to the body. `false` if the body's air is unknown, or if the picture shows
-/// too little of the sky.
+/// `gates.max_glow` of the step from the sky to the body. `false` if the body's air is unknown, if the camera is below
+/// every glow, or if the picture shows too little of the sky.
 ///
 /// This is no gate, although the verdict on an answer may be [`crate::model::verdict::Verdict::Glow`]: the edge stays
 /// in the choice, because another edge in the same glow is no better. If it wins, the picture has no answer.
@@ -46,7 +59,7 @@ pub(crate) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
     places: &Places<T>,
 ) -> bool {
     // Of a picture that came row by row, only lit and dark pixels are left.
-    if P::STREAMED {
+    if P::STREAMED || is_below(case.expected) {
         return false;
     }
     let (c, most) = (case.fused.c, T::from_f64(case.config.max_glow));

@@ -18,6 +18,7 @@ mod half_angle;
 mod hidden;
 mod indistinct;
 mod line;
+mod night;
 mod no_consensus;
 mod no_sky;
 mod out_of_view;
@@ -85,6 +86,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     let places = along_limb(&case.fused.e, case.blocks, case.fit.inliers, case.camera);
     let sky = measure_sky(case, binary, &places);
     no_sky::refuse(case, &sky)?;
+    night::refuse(case)?;
     sun::refuse(case)?;
     faint::refuse(case, binary, &places)?;
     band::refuse(case, binary, &places, &sky)?;

@@ -5,7 +5,7 @@ use super::config::Config;
 use crate::base::linalg::V3;
 use crate::base::median;
 use crate::base::real::Real;
-use crate::geometry::block::{Block, LANES};
+use crate::geometry::block::{Block, LANES, LEAST_GRADIENT2};
 use crate::geometry::camera::Camera;
 use crate::geometry::cone::Azimuth;
 use crate::geometry::frames::UnitVec3;
@@ -63,7 +63,7 @@ impl<T: Real> Curve<T> {
             r += a.offset([s.x, s.y, s.z], s.dot(&self.e), self.east_along);
         }
         let [gu, gv] = block.gradient_at(lane, &self.e);
-        r / (gu * gu + gv * gv).max(T::from_f64(1e-20)).sqrt()
+        r / (gu * gu + gv * gv).max(T::from_f64(LEAST_GRADIENT2)).sqrt()
     }
 }
 

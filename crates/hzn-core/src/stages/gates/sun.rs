@@ -8,7 +8,7 @@ use crate::model::body::Expected;
 use crate::model::verdict::Verdict;
 
 /// Lowest elevation of the Sun that lights a limb, in degrees: the end of twilight.
-const LOWEST_SUN_DEG: f64 = -18.0;
+pub(super) const LOWEST_SUN_DEG: f64 = -18.0;
 
 /// Refuses a limb of which the Sun lights too small a part.
 pub(super) fn refuse<T: Real>(case: &Case<'_, T>) -> Result<(), Verdict> {

@@ -30,6 +30,10 @@ pub(super) struct Histogram {
 }
 
 impl Histogram {
+    pub(super) fn new() -> Self {
+        Self { bins: [0; BINS], sum: 0, count: 0, shift: 0, first: 0 }
+    }
+
     pub(super) fn count(&mut self, v: u16) {
         let v = u32::from(v);
         if self.count == 0 {
@@ -139,6 +143,15 @@ impl Histogram {
         // crosses neither.
         let level = T::from_f64(f64::from(first + last)) * T::from_f64(0.5) + T::one() + self.offset();
         (apart && contrast >= T::from_f64(2.0)).then_some(level * scale)
+    }
+
+    /// Returns the standard deviation of the pixels below the threshold about their mean `dark`, in counts.
+    pub(super) fn dark_spread<T: Real>(&self, level: u16, dark: T) -> T {
+        let width = self.width::<T>();
+        let Some(last) = (u32::from(level) >> self.shift).saturating_sub(self.first).checked_sub(1) else {
+            return T::ZERO;
+        };
+        self.spread(last, dark / width - self.offset()) * width
     }
 
     /// Returns the standard deviation of the bins up to number `last` about `mean`, in bins. It includes the rounding

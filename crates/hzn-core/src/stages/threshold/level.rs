@@ -1,5 +1,6 @@
 //! The threshold between dark and lit, in counts.
 
+use super::histogram::Histogram;
 use crate::base::real::Real;
 use crate::model::threshold::{Config, Method};
 
@@ -22,6 +23,8 @@ pub struct Level<T> {
     pub dark: T,
     /// Mean of the lit pixels of the sample minus the mean of the dark ones, in counts; 0 if one class is empty.
     pub contrast: T,
+    /// Standard deviation of the dark pixels of the sample, in counts: their noise and the slope of their brightness.
+    pub(crate) spread: T,
     /// Number of places that were drawn, in all samples: those that the region leaves out, too.
     pub(crate) drawn: u32,
 }
@@ -33,6 +36,19 @@ impl<T: Real> Level<T> {
     pub(crate) fn at_fraction(&self, part: f64) -> u16 {
         let level = T::from_i32(i32::from(self.level));
         counts(self.dark + (level - self.dark) * T::from_f64(part))
+    }
+}
+
+impl<T: Real> Level<T> {
+    /// Makes the threshold `level` of a sample.
+    pub(super) fn new(sample: &Histogram, level: u16, mean: T, samples: u32, drawn: u32) -> Self {
+        let (dark, contrast) = sample.classes(level, mean);
+        Self { level, mean, samples, dark, contrast, spread: sample.dark_spread(level, dark), drawn }
+    }
+
+    /// Returns the threshold that is `noise` counts above the mean of the dark pixels, rounded upwards.
+    pub(crate) fn at_noise(&self, noise: T) -> u16 {
+        counts((self.dark + noise).floor() + T::one())
     }
 }
 

@@ -1,6 +1,6 @@
 //! The sparse sample of a picture that is in memory or arrives row by row.
 
-use super::histogram::{BINS, Histogram};
+use super::histogram::Histogram;
 use super::level::{Level, counts, fixed_level};
 use crate::base::real::Real;
 use crate::base::rng::Rng;
@@ -67,7 +67,7 @@ pub(super) struct Sample {
 
 impl Sample {
     pub(super) fn new<T: Real>(seed: u32, side_log2: u32, full_scale: u16, region: &Region<T>) -> Self {
-        let histogram = Histogram { bins: [0; BINS], sum: 0, count: 0, shift: 0, first: 0 };
+        let histogram = Histogram::new();
         let mut sample = Self { histogram, rng: Rng::new(seed), side_log2, full_scale, cells: 0, y: 0 };
         sample.y = sample.draw(0, region.height());
         sample
@@ -134,9 +134,8 @@ impl Sample {
         };
         let level = level?;
         observer.level(level, mean, sample.count);
-        let (dark, contrast) = sample.classes(level, mean);
         let sides = SIDES_LOG2.iter().take_while(|&&side| side <= self.side_log2);
         let drawn = sides.map(|side| 1 << (2 * side)).sum();
-        Some(Ok(Level { level, mean, samples: sample.count, dark, contrast, drawn }))
+        Some(Ok(Level::new(sample, level, mean, sample.count, drawn)))
     }
 }

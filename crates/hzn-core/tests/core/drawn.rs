@@ -1,0 +1,202 @@
+//! Drawn discs whose place is known: uncertain altitudes, small bodies, lost blocks, glow, and noise.
+
+use hzn_core::body::Kind;
+use hzn_core::camera::{self, Model};
+use hzn_core::image::{Grey, Layout};
+use hzn_core::status::Status;
+use hzn_core::{Config, HostHorizon, Prior, Report};
+
+/// A disc with its axis, half-angle in degrees, and brightness above the sky.
+struct Disc {
+    axis: [f64; 3],
+    half_angle_deg: f64,
+    brightness: f64,
+}
+
+/// Random numbers for noise.
+struct Noise(u64);
+
+impl Noise {
+    /// Returns a number that is nearly normal, with a sigma of 1.
+    fn normal(&mut self) -> f64 {
+        let mut uniform = || {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 40) as f64 / f64::from(1u32 << 24)
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+}
+
+fn unit([x, y, z]: [f64; 3]) -> [f64; 3] {
+    let n = (x * x + y * y + z * z).sqrt();
+    [x / n, y / n, z / n]
+}
+
+/// Returns the angle between two directions in degrees, also a small one.
+fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let (a, b) = (unit(a), unit(b));
+    let chord = (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
+    2.0 * (chord / 2.0).asin().to_degrees()
+}
+
+fn sensor(width: u16, height: u16, focal_px: f64) -> Config {
+    let mut config = Config::new(camera::Config::ideal(Model::Pinhole, width, height, focal_px));
+    config.body.kind = Kind::Sphere;
+    config.body.radius_km = Some(1737.4);
+    (config.body.limb_height_km, config.body.limb_height_sigma_km) = (0.0, 2.0);
+    config
+}
+
+/// Draws discs with a soft edge of one pixel over a sky of `sky` counts with noise of `sigma` counts.
+fn draw(config: &Config, discs: &[Disc], sky: f64, sigma: f64) -> Vec<u8> {
+    let camera = &config.camera;
+    let (w, h) = (u32::from(camera.width), u32::from(camera.height));
+    let mut noise = Noise(7);
+    (0..w * h)
+        .map(|i| {
+            let ray = unit([
+                (f64::from(i % w) - camera.cx_px) / camera.fx_px,
+                (f64::from(i / w) - camera.cy_px) / camera.fy_px,
+                1.0,
+            ]);
+            let light: f64 = discs
+                .iter()
+                .map(|d| {
+                    let inside_deg = d.half_angle_deg - angle_deg(ray, d.axis);
+                    d.brightness * (0.5 + inside_deg.to_radians() * camera.fx_px).clamp(0.0, 1.0)
+                })
+                .sum();
+            (sky + light + sigma * noise.normal()).round().clamp(0.0, 255.0) as u8
+        })
+        .collect()
+}
+
+fn process(config: &Config, data: &[u8]) -> Report<f64> {
+    let mut horizon = HostHorizon::boxed(config).unwrap();
+    let expected = horizon.expect(&Prior::default()).unwrap();
+    let layout = Layout::packed(config.camera.width.into(), config.camera.height.into(), 1, 8);
+    horizon.process(&Grey::try_new(data, layout).unwrap(), &expected)
+}
+
+/// Asserts that the answer is within three sigmas of the truth.
+fn assert_answer(report: &Report<f64>, axis: [f64; 3]) {
+    let Some(found) = &report.solution else { panic!("{}: {:?}", report.status, report.candidates) };
+    let (error, sigma) = (angle_deg(found.axis.xyz(), axis), found.covariance.sigma_max_rad().to_degrees());
+    assert!(error <= 3.0 * sigma, "{error}° with a sigma of {sigma}°");
+}
+
+#[test]
+fn an_uncertain_altitude_allows_the_half_angles_of_its_bounds() {
+    let mut config = sensor(640, 480, 946.5);
+    (config.body.altitude_km, config.body.altitude_sigma_km) = (Some(6000.0), 5000.0);
+    let moon = || Disc { axis: unit([0.05, -0.66, 0.75]), half_angle_deg: 33.34, brightness: 90.0 };
+    let earth = || Disc { axis: unit([0.117, 0.032, 0.993]), half_angle_deg: 0.95, brightness: 150.0 };
+    // The altitude of the limb is 1424 km, 0.9 sigmas from the given one. That of the disc is 103 000 km.
+    let both = process(&config, &draw(&config, &[moon(), earth()], 6.0, 1.5));
+    assert_answer(&both, moon().axis);
+    let disc = process(&config, &draw(&config, &[earth()], 6.0, 1.5));
+    assert!(disc.solution.is_none() && disc.status == Status::Rejected, "{:?}", disc.solution);
+    // With a smaller sigma, the limb contradicts the altitude.
+    config.body.altitude_sigma_km = 1000.0;
+    let limb = process(&config, &draw(&config, &[moon()], 6.0, 1.5));
+    assert!(limb.solution.is_none(), "{:?}", limb.solution);
+}
+
+#[test]
+fn a_body_of_any_size_is_fitted_as_well() {
+    // A radius of 40 px at every focal length: the half-angle is 4e-3 to 4e-6 rad.
+    for focal_px in [1e4, 6e5, 1.2e6, 1e7] {
+        let half_angle_deg = (40.0 / focal_px as f64).to_degrees();
+        let mut config = sensor(320, 240, focal_px);
+        config.body.radius_km = Some(100.0);
+        config.body.altitude_km = Some(100.0 * (1.0 / half_angle_deg.to_radians().sin() - 1.0));
+        config.body.altitude_sigma_km = config.body.altitude_km.unwrap_or_default() * 0.01;
+        let axis = unit([21.3 / focal_px, -17.7 / focal_px, 1.0]);
+        let report = process(&config, &draw(&config, &[Disc { axis, half_angle_deg, brightness: 150.0 }], 6.0, 1.5));
+        assert_answer(&report, axis);
+        let found = report.solution.unwrap();
+        let off_px = angle_deg(found.axis.xyz(), axis).to_radians() * focal_px;
+        assert!(off_px < 0.1 && found.rms_px < 0.3, "{focal_px} px: {off_px} px, RMS {} px", found.rms_px);
+        assert!((found.half_angle_rad.to_degrees() / half_angle_deg - 1.0).abs() < 0.01);
+    }
+}
+
+#[test]
+fn a_disc_between_the_places_of_both_samples_is_found() {
+    let mut config = sensor(3280, 2464, 2716.33);
+    (config.body.altitude_km, config.body.altitude_sigma_km) = (Some(527_887.0), 5300.0);
+    for (u, v) in [(1137.3, 1789.6), (2920.8, 207.1)] {
+        let axis = unit([(u - 1639.5) / 2716.33, (v - 1231.5) / 2716.33, 1.0]);
+        let half_angle_deg = (8.9f64 / 2716.33).atan().to_degrees();
+        let mut data = draw(&config, &[Disc { axis, half_angle_deg, brightness: 128.0 }], 1.0, 0.0);
+        // Hot pixels are no body.
+        (0..40).for_each(|k| data[k * 201_811 % (3280 * 2464)] = 255);
+        let report = process(&config, &data);
+        assert_answer(&report, axis);
+        assert!(report.level > 40 && report.level < 90, "{}", report.level);
+    }
+    // In a black picture, the report says how many places were read.
+    let black = process(&config, &vec![0; 3280 * 2464]);
+    assert_eq!(black.status, Status::NoLimb);
+    assert!(black.counters.sampled > 50_000, "{}", black.counters.sampled);
+}
+
+#[test]
+fn grey_blocks_of_lost_packets_do_not_set_the_threshold() {
+    let mut config = sensor(640, 480, 946.5);
+    (config.body.altitude_km, config.body.altitude_sigma_km) = (Some(7000.0), 3000.0);
+    let moon = || Disc { axis: unit([-0.05, 0.02, 1.0]), half_angle_deg: 11.0, brightness: 16.0 };
+    let mut data = draw(&config, &[moon()], 3.0, 1.0);
+    for y in 0..16 {
+        data[y * 640..y * 640 + 544].fill(128);
+    }
+    let report = process(&config, &data);
+    assert_answer(&report, moon().axis);
+    // Without noise every body has one grey: its pixels are no lost blocks.
+    let mut clean = sensor(640, 480, 946.5);
+    (clean.body.altitude_km, clean.body.altitude_sigma_km) = (Some(7000.0), 3000.0);
+    assert_answer(&process(&clean, &draw(&clean, &[moon()], 0.0, 0.0)), moon().axis);
+}
+
+#[test]
+fn the_first_threshold_is_above_the_noise_of_the_sky() {
+    // A limb in a corner of a dark picture: most pixels are noise, and Otsu's threshold separates it.
+    let mut config = sensor(640, 480, 946.5);
+    (config.body.altitude_km, config.body.altitude_sigma_km) = (Some(7000.0), 100.0);
+    let half_angle_deg = (1737.4f64 / 8737.4).asin().to_degrees();
+    let disc = || Disc { axis: unit([0.475, -0.32, 1.0]), half_angle_deg, brightness: 8.0 };
+    // The noise is cut off at 0 counts. Its sigma is 2.5 counts, and the mean of the sky is 1 count.
+    let report = process(&config, &draw(&config, &[disc()], 0.0, 2.5));
+    assert!((7..=10).contains(&report.level), "threshold {}: {}", report.level, report.status);
+    // A fixed threshold is the user's.
+    config.threshold.method = hzn_core::threshold::Method::Fixed;
+    config.threshold.level = 4.0;
+    assert_eq!(process(&config, &draw(&config, &[disc()], 0.0, 2.5)).level, 4);
+}
+
+#[test]
+fn a_camera_below_the_airglow_sees_no_glow() {
+    // The light of the sky falls to a fifth over 80 px, much more slowly than the air of the standard atmosphere.
+    let limb = |altitude_km: f64| {
+        let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 518.0));
+        config.body.kind = Kind::EarthSphere;
+        config.body.altitude_km = Some(altitude_km);
+        let half_angle_deg = ((6371.0088 + 17.0) / (6371.0088 + altitude_km)).asin().to_degrees();
+        let axis = unit([0.41, 0.895, 0.173]);
+        let mut noise = Noise(3);
+        let data: Vec<u8> = (0..640 * 480u32)
+            .map(|i| {
+                let ray = [(f64::from(i % 640) - 319.5) / 518.0, (f64::from(i / 640) - 239.5) / 518.0, 1.0];
+                let above_px = (angle_deg(ray, axis) - half_angle_deg).to_radians() * 518.0;
+                let sky = 12.0 + 60.0 * (-above_px.max(0.0) / 50.0).exp();
+                let step = 80.0 * (0.5 - above_px / 3.0).clamp(0.0, 1.0);
+                (sky + step + noise.normal()) as u8
+            })
+            .collect();
+        (process(&config, &data), axis)
+    };
+    let (below, axis) = limb(60.0);
+    assert_answer(&below, axis);
+    let (above, _) = limb(400.0);
+    assert!(above.solution.is_none(), "{:?}", above.solution);
+}
