@@ -92,6 +92,9 @@ class Input(TypedDict, total=False):
     orient: Literal["as-stored", "exif", "rotate-90", "rotate-180", "rotate-270"]
     """Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
     picture. Default: "as-stored"."""
+    invert: bool
+    """Whether the brightness is inverted, so that dark becomes bright: for a dark body before a bright sky. Values:
+    true or false. Default: false."""
     scale_to_height: int | None
     """Number of rows of a smaller copy of the picture, which is processed instead of the picture; lengths in pixels
     are then those of the copy. Values: 16 to ``height``."""
@@ -283,7 +286,7 @@ class Gates(TypedDict, total=False):
     is refused. Values: above 0 to 1e6 deg/s. Default: any."""
     max_unlit: float
     """Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does ``body.sunlit
-    = false``. Values: 0 to 1. Default: 0.5."""
+    = false``, which is for a thermal camera. Values: 0 to 1. Default: 0.5."""
     limb_in_view: bool
     """Whether a part of the expected limb must lie in the picture: the limb with the expected half-angle about the
     fitted axis. Values: true or false. Default: false."""
@@ -308,8 +311,8 @@ class Retry(TypedDict, total=False):
     """Thresholds of further looks, on a scale from the mean of the dark pixels (0) to the first look's threshold
     (1); ``[]`` allows only one look. Values: 0.05 to 4. Default: [0.5, 0.25, 2.0]."""
     min_sigma: float
-    """Lowest threshold of a further look, in standard deviations of the dark pixels' noise above their mean. Values:
-    0 to 100. Default: 3.0."""
+    """Lowest threshold of every look, in standard deviations of the dark pixels' noise above their mean; a ``fixed``
+    threshold is kept. Values: 0 to 100. Default: 3.0."""
     frame_px: int
     """Widest dark frame around the picture that is detected and left out, px; 0 turns the detection off. Values: 0
     to 64 px. Default: 8."""
