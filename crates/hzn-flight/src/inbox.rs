@@ -8,9 +8,10 @@
 //! | bytes that make much work | [`Inbox::effort`] counts the work, and the loop limits it |
 //!
 //! A damaged packet does not say where it ends. For [`MAX_BYTES`] bytes after its marker, a packet is therefore taken
-//! only if its end is confirmed: by the marker of the next packet, or by a pause of the line. A packet inside the
-//! damaged one has neither, because the rest of the damaged packet follows it without a pause. A marker with a few
-//! wrong bits, or without one of its bytes, also begins a damaged packet.
+//! only if whole packets alone follow it, one after the other, up to a pause of the line or up to the end of these
+//! bytes. A packet inside the damaged one is refused, also if others lie beside it there: the rest of the damaged packet,
+//! at least its checksum, follows them without a pause. A marker with a few wrong bits, or without one of its bytes,
+//! also begins a damaged packet.
 
 use crate::packet::{self, HEADER, MAX_BYTES, Packet, SYNC};
 
@@ -27,7 +28,7 @@ const TICK_LOG2: u32 = 14;
 const PAUSE_TICKS: u8 = (PAUSE_US >> TICK_LOG2) as u8;
 const COMPLETE_TICKS: u8 = (COMPLETE_US >> TICK_LOG2) as u8;
 
-/// The longest packet, and the bytes after it that may confirm its end.
+/// The longest packet, and the bytes after it that show a pause or another packet.
 const CAPACITY: usize = MAX_BYTES + SYNC.len() + 1;
 
 /// Most wrong bits of a marker that counts as damaged. Of random bytes, one in 800 000 is the end of such a marker.
@@ -49,9 +50,9 @@ pub struct Inbox {
     window: u32,
     /// Number of bytes since the marker of the last damaged packet, up to [`MAX_BYTES`]; fewer bytes may belong to it.
     since_damage: usize,
-    /// Whether the checksum of the packet at the start is known to be right.
-    // The checksum is computed once, because `step` runs again for every byte that may confirm the end.
-    intact: bool,
+    /// Number of bytes from the start that are whole packets with right checksums, one after the other.
+    // A checksum is computed once, because `step` runs again for every byte that may confirm the packet.
+    checked: usize,
     last_us: u64,
     effort: usize,
 }
@@ -76,8 +77,20 @@ pub enum Filled {
 /// The state of the packet at the start.
 enum Step {
     More,
-    Broken,
+    /// The number of bytes to leave out.
+    Broken(usize),
+    /// The number of bytes of the packet.
     Packet(usize),
+}
+
+/// What follows the packets whose checksums are right.
+enum After {
+    Pause,
+    /// The marker of a packet at this place.
+    Marker(usize),
+    /// Too few bytes to tell.
+    Open,
+    Other,
 }
 
 impl Inbox {
@@ -92,7 +105,7 @@ impl Inbox {
             need: 0,
             window: 0,
             since_damage: 0,
-            intact: false,
+            checked: 0,
             last_us: 0,
             effort: 0,
         }
@@ -188,10 +201,9 @@ impl Inbox {
     pub fn next<R>(&mut self, now_us: u64, handle: impl FnOnce(Option<Packet<'_>>) -> R) -> Option<R> {
         match self.step(now_us) {
             Step::More => None,
-            Step::Broken => {
-                // A damaged length may have hidden another packet: it is searched for after the marker.
+            Step::Broken(count) => {
                 self.since_damage = 0;
-                self.leave_out(SYNC.len());
+                self.leave_out(count);
                 Some(handle(None))
             }
             Step::Packet(length) => {
@@ -216,56 +228,94 @@ impl Inbox {
             }
             return Step::More;
         };
+        // A damaged length may have hidden another packet: it is searched for after the marker.
+        const BROKEN: Step = Step::Broken(SYNC.len());
         let is_late = tick(now_us).wrapping_sub(began) >= COMPLETE_TICKS;
         let Some(header) = held.first_chunk() else {
             self.need = SYNC.len() + HEADER;
-            return if is_late { Step::Broken } else { Step::More };
+            return if is_late { BROKEN } else { Step::More };
         };
         // The header is judged before the rest has come, because a damaged length would hold back what follows.
-        let Some(length) = packet::length(header) else { return Step::Broken };
+        let Some(length) = packet::length(header) else { return BROKEN };
         let Some(whole) = held.get(..length) else {
             self.need = length;
-            return if is_late { Step::Broken } else { Step::More };
+            return if is_late { BROKEN } else { Step::More };
         };
-        if !self.intact {
+        if self.checked == 0 {
             // The checksum counts as work, because packets inside packets would make it again for every marker.
             self.effort += length;
             if packet::read(whole).is_none() {
-                return Step::Broken;
+                return BROKEN;
             }
-            self.intact = true;
+            self.checked = length;
         }
-        if self.since_damage < MAX_BYTES { self.confirm(length, is_quiet) } else { Step::Packet(length) }
+        if self.since_damage < MAX_BYTES { self.confirm(length, is_quiet, is_late) } else { Step::Packet(length) }
     }
 
-    /// Finds out whether the packet at the start ends after `length` bytes, from what follows it. One byte between the
-    /// packet and the pause or the next marker does not matter: some drivers of a line add it when they switch off.
-    fn confirm(&mut self, length: usize, is_quiet: bool) -> Step {
+    /// Finds out whether the packet at the start, of `length` bytes, is no part of the damaged packet, from what follows
+    /// it.
+    fn confirm(&mut self, length: usize, is_quiet: bool, is_late: bool) -> Step {
+        // The damaged packet has ended before these bytes do.
+        while self.since_damage + self.checked < MAX_BYTES {
+            // All that was checked is left out, because what follows it refuses each of these packets.
+            let refused = Step::Broken(self.checked);
+            let held = self.bytes.get(self.start..self.end).unwrap_or_default();
+            let (next, need) = match self.after_checked(is_quiet) {
+                After::Pause => return Step::Packet(length),
+                After::Other => return refused,
+                After::Open => (None, held.len() + 1),
+                After::Marker(at) => {
+                    let rest = held.get(at..).unwrap_or_default();
+                    match rest.first_chunk().map(packet::length) {
+                        None => (None, at + SYNC.len() + HEADER),
+                        Some(None) => return refused,
+                        Some(Some(bytes)) => (rest.get(..bytes), at + bytes),
+                    }
+                }
+            };
+            let Some(next) = next else {
+                // A packet that is cut off by a pause shows nothing. Without a pause, no more bytes than these are kept.
+                if is_quiet || is_late || need > CAPACITY {
+                    return refused;
+                }
+                self.need = need;
+                return Step::More;
+            };
+            self.effort += next.len();
+            if packet::read(next).is_none() {
+                return refused;
+            }
+            self.checked = need;
+        }
+        Step::Packet(length)
+    }
+
+    /// Returns what follows the packets whose checksums are right. One byte before the pause or the next marker does not
+    /// matter: some drivers of a line add it when they switch off.
+    fn after_checked(&self, is_quiet: bool) -> After {
         let held = self.bytes.get(self.start..self.end).unwrap_or_default();
         let times = self.arrived.get(self.start..self.end).unwrap_or_default();
-        for more in 0..=1 {
-            let end = length + more;
-            let is_pause = match (times.get(end - 1), times.get(end)) {
+        for at in self.checked..=self.checked + 1 {
+            let is_pause = match (times.get(at - 1), times.get(at)) {
                 (Some(last), Some(next)) => next.wrapping_sub(*last) >= PAUSE_TICKS,
                 (Some(_), None) => is_quiet,
                 _ => false,
             };
-            if is_pause || held.get(end..).is_some_and(|after| after.starts_with(&SYNC)) {
-                return Step::Packet(length);
+            if is_pause {
+                return After::Pause;
+            }
+            if held.get(at..).is_some_and(|after| after.starts_with(&SYNC)) {
+                return After::Marker(at);
             }
         }
-        // Bytes followed without a pause, so this packet may be in the data of the damaged one.
-        if held.len() > length + SYNC.len() || is_quiet {
-            return Step::Broken;
-        }
-        self.need = held.len() + 1;
-        Step::More
+        // Other bytes followed without a pause, so the packet may be in the data of the damaged one.
+        if held.len() > self.checked + SYNC.len() || is_quiet { After::Other } else { After::Open }
     }
 
     /// Removes bytes from the start, and everything up to the next marker.
     fn leave_out(&mut self, count: usize) {
         let from = (self.start + count).min(self.end);
-        (self.intact, self.window, self.need) = (false, 0, 0);
+        (self.checked, self.window, self.need) = (0, 0, 0);
         for at in from..self.end {
             self.effort += 1;
             if self.bytes.get(at).copied().is_some_and(|byte| self.is_marker(byte)) {
@@ -296,7 +346,7 @@ impl Inbox {
 
     fn begin(&mut self, now_us: u64) {
         // The marker is stored again, because the functions of `packet` read a packet from its marker on.
-        (self.start, self.end, self.need, self.intact) = (0, SYNC.len(), SYNC.len() + HEADER, false);
+        (self.start, self.end, self.need, self.checked) = (0, SYNC.len(), SYNC.len() + HEADER, 0);
         for (place, byte) in self.bytes.iter_mut().zip(SYNC) {
             *place = byte;
         }

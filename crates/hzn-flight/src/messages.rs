@@ -208,7 +208,8 @@ record! {
         answers: u32,
         /// Pictures lost by overrun.
         lost: u32,
-        /// Pictures refused for their size or for an impossible prior.
+        /// Pictures without an answer, which `pictures` does not count: of wrong size or incomplete, refused row by row,
+        /// with an impossible prior, or lost to a memory error. `stuck` counts other pictures.
         refused: u32,
         /// Telecommands that were carried out.
         commands: u16,
@@ -283,7 +284,7 @@ record! {
         /// [`Code`] as a number.
         code: u8,
         /// What was refused: the number of a parameter, or, after `known` and `navigate`, the place of a number in
-        /// [`Navigation`], from 1; 0: not said.
+        /// [`Navigation`], from 1; 0: not said. After code 9, the sequence count of the last telecommand that was taken.
         detail: u16,
     }
 }
@@ -372,6 +373,10 @@ record! {
         value: f64,
     }
 }
+
+/// Most parameters that are read by one telecommand.
+// Their packets take a quarter of a second of a line with 115 200 baud, and the loop waits for them.
+pub const MAX_READ: u8 = 96;
 
 /// Number of pixels in a packet with a part of an edge. Those after [`EdgePart::count`] are 0.
 // The number is fixed, because ground systems decode packets by tables without counts.

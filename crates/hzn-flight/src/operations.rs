@@ -79,6 +79,8 @@ operations! {
     /// at all.
     // At most 1e9, because the bit budget multiplies it by up to an hour in microseconds, in 64 bits.
     @306 "telemetry.science_bits_s" science_bits_s: Option<f64> = None, [1.0, 1e9];
+    /// Whether six resets by the watchdog in a row lead to safe mode: 0 never, 1 before lift-off, 2 always.
+    @307 "boot.safe_after_resets" safe_after_resets: u16 = 1, [0.0, 2.0];
 }
 
 impl Operations {

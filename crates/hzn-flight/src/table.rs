@@ -91,6 +91,16 @@ pub fn read(bytes: &[u8]) -> Result<(Parameters, u32), TableError> {
     Ok((parameters, generation))
 }
 
+/// Returns a checksum of all parameters, which differs if one of them does.
+pub(crate) fn digest(parameters: &Parameters) -> u32 {
+    let mut digest = CRC32.digest();
+    for id in parameters.numbers() {
+        digest.update(&id.to_le_bytes());
+        digest.update(&parameters.get(id).unwrap_or(f64::NAN).to_le_bytes());
+    }
+    digest.finalize()
+}
+
 /// Returns the generation of the table at the start of `bytes`; `None` if it is not complete or its checksum is wrong.
 pub fn generation(bytes: &[u8]) -> Option<u32> {
     split(bytes).ok().map(|(_, generation)| generation)

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crossbeam_channel::{Receiver, never, select};
-use hzn_core::Report;
 use hzn_core::status::Status;
+use hzn_core::{Config, Report};
 use hzn_flight::Parameters;
 use hzn_flight::board::{BUILD, Board, Image, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::Reader;
@@ -120,9 +120,9 @@ impl Linux {
         let _ = self.parts.capture.spare.try_send(shot.pixels);
     }
 
-    /// Returns why no more pictures will come, once the last one was taken.
-    pub(crate) fn ended(&self) -> Option<&Ended> {
-        self.ended.as_ref().filter(|_| self.next.is_none())
+    /// Returns why no more pictures will come. If the loop takes every picture, the last one must have been taken.
+    pub(crate) fn ended(&self, takes_pictures: bool) -> Option<&Ended> {
+        self.ended.as_ref().filter(|_| !takes_pictures || self.next.is_none())
     }
     pub(crate) fn counts(&self) -> Counts {
         self.counts
@@ -224,9 +224,10 @@ impl Board for Linux {
             let folder = self.parts.flash.folder().display();
             self.not_stored.line(&format!("{folder}: the parameters cannot be stored: {e}"));
         }
-        let Ok((parameters, _)) = hzn_flight::table::read(bytes) else { return written.is_ok() };
-        self.parts.log.set_config(&parameters.sensor);
         written.is_ok()
+    }
+    fn note_sensor(&mut self, config: &Config) {
+        self.parts.log.set_config(config);
     }
     fn stack_bytes(&mut self) -> u32 {
         0

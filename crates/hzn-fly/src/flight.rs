@@ -110,10 +110,10 @@ fn run(board: Linux) -> Result<Summary, Error> {
             flight.board().parts().notify.status(&format!("{} mode", now.name()));
             (flight.board().parts().tell)(&format!("{} mode", now.name()));
         }
-        if flight.mode() == Mode::ShutDown || flight.board().ended().is_some() {
+        let takes_pictures = flight.mode() == Mode::Flight;
+        if flight.mode() == Mode::ShutDown || flight.board().ended(takes_pictures).is_some() {
             break;
         }
-        let takes_pictures = flight.mode() == Mode::Flight;
         flight.board().wait(takes_pictures);
         flight.turn();
     }
@@ -144,7 +144,7 @@ fn end(board: &mut Linux, is_shut_down: bool) -> Summary {
         dropped_packets,
         latency: parts.latency.summary(),
         counts: board.counts(),
-        ended: board.ended().cloned(),
+        ended: board.ended(false).cloned(),
     }
 }
 
@@ -240,4 +240,56 @@ fn check_input(sensor: Option<&Config>) -> Result<(), Error> {
         _ => "input.orient",
     };
     Err(Error::usage(format!("{key}: the flight software takes pictures as they are; leave it at its default")))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use hzn_core::camera::{self, Model};
+
+    use super::*;
+
+    #[test]
+    fn the_end_of_the_pipe_ends_every_mode() {
+        let camera = camera::Config::ideal(Model::Pinhole, 64, 48, 60.0);
+        let (done, ends) = mpsc::channel();
+        for boot_mode in [Some(0), Some(1), None] {
+            let done = done.clone();
+            let camera = camera.clone();
+            thread::spawn(move || {
+                let dir = tempfile::tempdir().unwrap();
+                let flash = Flash::open(dir.path()).unwrap();
+                let mut parameters = Parameters::new(Config::new(camera));
+                parameters.sensor.body.altitude_km = Some(230.0);
+                // Without stored parameters the computer starts in safe mode.
+                if let Some(mode) = boot_mode {
+                    parameters.operations.boot_mode = mode;
+                    let mut bytes = vec![0; table::MAX_BYTES];
+                    let n = table::write(&parameters, 1, &mut bytes).unwrap();
+                    flash.write_copy(1, &bytes[..n]).unwrap();
+                }
+                let pixels: &[u8] = &[9; 3 * 64 * 48];
+                let samples = Samples::Raw("64x48:mono8".parse().unwrap());
+                let tell: Tell = Arc::new(|_: &str| ());
+                let log = Log::open(&dir.path().join("log"), 1 << 20, &parameters.sensor, tell.clone()).unwrap();
+                let parts = Parts {
+                    capture: Capture::start(Box::new(Pipe::new(pixels, samples))).unwrap(),
+                    line: None,
+                    latency: Arc::new(Latency::default()),
+                    flash,
+                    log,
+                    lines: Arc::new(Lines::default()),
+                    notify: Notify::from_environment(),
+                    tell,
+                };
+                done.send((boot_mode, run(Linux::new(parts)).unwrap())).unwrap();
+            });
+        }
+        for _ in 0..3 {
+            let (boot_mode, summary) = ends.recv_timeout(Duration::from_secs(30)).expect("a mode does not end");
+            assert_eq!(summary.ended, Some(Ended::Whole));
+            assert_eq!(summary.counts.pictures, if boot_mode == Some(1) { 3 } else { 0 });
+        }
+    }
 }

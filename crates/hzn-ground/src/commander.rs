@@ -10,6 +10,7 @@ use hzn_fly::tell::Tell;
 
 use crate::encode::{encode, write_packet};
 use crate::error::Error;
+use crate::outcome;
 
 /// Longest wait for an acknowledgement. A flight computer carries out a command at the latest 1.1 s after its end.
 const LONGEST: Duration = Duration::from_secs(3);
@@ -20,6 +21,8 @@ pub struct Commander {
     base: ApidBase,
     sequence: u16,
     has_sent: bool,
+    /// Whether a packet was acknowledged, or refused for its sequence count.
+    knows_sequence: bool,
     waiting: VecDeque<Pending>,
 }
 
@@ -38,29 +41,26 @@ struct Sent {
 }
 
 /// What became of a command.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Answered {
     text: String,
-    /// The code of the acknowledgement; `None` if none came.
-    code: Option<u8>,
+    /// The acknowledgement; `None` if none came.
+    acknowledge: Option<Acknowledge>,
     after: Duration,
 }
 
 impl Answered {
     /// Returns whether the command was carried out.
     pub fn is_done(&self) -> bool {
-        self.code == Some(Code::Done as u8)
+        self.acknowledge.is_some_and(|a| a.code == Code::Done as u8)
     }
 }
 
 impl fmt::Display for Answered {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { text, code, after } = self;
-        match code {
-            Some(code) => {
-                let name = Code::from_number(*code).map_or("unknown code", Code::name);
-                write!(f, "{text}: {name} ({} ms)", after.as_millis())
-            }
+        let Self { text, acknowledge, after } = self;
+        match acknowledge {
+            Some(a) => write!(f, "{text}: {} ({} ms)", outcome::describe(a), after.as_millis()),
             None => write!(f, "{text}: no acknowledgement within {} s", LONGEST.as_secs()),
         }
     }
@@ -72,7 +72,7 @@ impl Commander {
     /// # Errors
     /// A command is refused, see [`encode`].
     pub fn new(base: ApidBase, sequence: u16, commands: &[String], tell: Tell) -> Result<Self, Error> {
-        let mut new = Self { tell, base, sequence, has_sent: false, waiting: VecDeque::new() };
+        let mut new = Self { tell, base, sequence, has_sent: false, knows_sequence: false, waiting: VecDeque::new() };
         commands.iter().try_for_each(|text| new.add(text))?;
         Ok(new)
     }
@@ -123,14 +123,21 @@ impl Commander {
     /// Takes an acknowledgement. Returns what became of a command, if this decides it. Other acknowledgements belong to
     /// the commands of somebody else.
     pub fn take(&mut self, a: &Acknowledge, now: Instant) -> Option<Answered> {
-        let first = self.waiting.front()?;
+        let first = self.waiting.front_mut()?;
         let sent = first.sent.filter(|sent| sent.sequence == a.sequence && first.user.first() == Some(&a.function))?;
+        // The first packet begins anywhere in the count. If the computer expects another place, its refusal says which.
+        // Later packets follow one that was taken, so that their refusal has another cause: a second ground station.
+        if a.code == Code::Sequence as u8 && !self.knows_sequence {
+            (first.sent, self.sequence, self.knows_sequence) = (None, (a.detail + 1) & 0x3FFF, true);
+            return None;
+        }
+        self.knows_sequence = true;
         let (is_last, is_done) = (first.is_last, a.code == Code::Done as u8);
         if is_done && !is_last {
             self.waiting.pop_front();
             return None;
         }
-        Some(self.end_first(Some(a.code), now - sent.at))
+        Some(self.end_first(Some(*a), now - sent.at))
     }
 
     /// Returns the command whose acknowledgement did not come.
@@ -140,7 +147,7 @@ impl Commander {
     }
 
     /// Removes the first command with all of its packets.
-    fn end_first(&mut self, code: Option<u8>, after: Duration) -> Answered {
+    fn end_first(&mut self, acknowledge: Option<Acknowledge>, after: Duration) -> Answered {
         let mut text = String::new();
         while let Some(packet) = self.waiting.pop_front() {
             text = packet.text;
@@ -148,7 +155,7 @@ impl Commander {
                 break;
             }
         }
-        Answered { text, code, after }
+        Answered { text, acknowledge, after }
     }
 }
 
@@ -188,6 +195,41 @@ mod tests {
         let mode = commander.expired(ms(3009)).unwrap();
         assert_eq!((mode.to_string().as_str(), mode.is_done()), ("mode flight: no acknowledgement within 3 s", false));
         assert!(commander.is_idle() && commander.add("mode fly").is_err());
+    }
+
+    #[test]
+    fn a_refusal_says_what_was_refused() {
+        let texts = ["set consensus.threshold_px 900".to_owned()];
+        let mut commander = Commander::new(ApidBase::DEFAULT, 0, &texts, silent()).unwrap();
+        let now = Instant::now();
+        commander.next(now).unwrap().unwrap();
+        let refused = Acknowledge { detail: 81, ..ack(Function::SetParameters, 0, Code::Refused as u8) };
+        let answer = commander.take(&refused, now).unwrap().to_string();
+        assert!(
+            answer.ends_with(": value refused; nothing changed: parameter 81 consensus.threshold_px (0 ms)"),
+            "{answer}"
+        );
+    }
+
+    #[test]
+    fn a_sequence_window_does_not_lock_the_ground_out() {
+        let mut commander = Commander::new(ApidBase::DEFAULT, 0, &["ping".into(), "ping".into()], silent()).unwrap();
+        let now = Instant::now();
+        let sequence = |commander: &mut Commander| {
+            let bytes = commander.next(now).unwrap().unwrap();
+            let Scan::Packet { packet, .. } = packet::scan(&bytes) else { panic!() };
+            packet.sequence
+        };
+        let outside = |sequence| Acknowledge { detail: 16383, ..ack(Function::Ping, sequence, Code::Sequence as u8) };
+        assert_eq!(sequence(&mut commander), 0);
+        assert_eq!(commander.take(&outside(0), now), None);
+        // The last count was 16383, so that 0 is the next one.
+        assert_eq!(sequence(&mut commander), 0);
+        assert!(commander.take(&ack(Function::Ping, 0, 0), now).unwrap().is_done());
+        assert_eq!(sequence(&mut commander), 1);
+        // A second refusal is told: somebody else sends, too.
+        let told = commander.take(&outside(1), now).unwrap();
+        assert!(!told.is_done() && told.to_string().contains("the last one taken has 16383"), "{told}");
     }
 
     #[test]

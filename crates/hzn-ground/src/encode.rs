@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use hzn_files::keys::Limits;
 use hzn_flight::bytes::Writer;
 use hzn_flight::cuc::Cuc;
-use hzn_flight::messages::{Function, Mode, Navigation};
+use hzn_flight::messages::{Function, MAX_READ, Mode, Navigation};
 use hzn_flight::operations::Operations;
 use hzn_flight::packet::{self, Apid, ApidBase};
 use hzn_flight::{Parameters, parameters};
@@ -120,8 +120,8 @@ impl Command<'_> {
 
     fn read_parameters(&self) -> Result<Vec<u8>, Error> {
         let words = self.arguments;
-        if words.is_empty() || words.len() > 90 {
-            return Err(self.refuse("read takes the names of parameters, up to 90"));
+        if words.is_empty() || words.len() > usize::from(MAX_READ) {
+            return Err(self.refuse(&format!("read takes the names of parameters, up to {MAX_READ}")));
         }
         let ids =
             words.iter().map(|w| parameter_number(w).map_err(|e| self.refuse(&e))).collect::<Result<Vec<_>, _>>()?;

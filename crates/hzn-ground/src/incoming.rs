@@ -165,10 +165,8 @@ impl Incoming {
             }
             self.take_notices().iter().for_each(|notice| tell(notice));
             // The values that a command has read.
-            for note in &seen {
-                if let Seen::Note(_, text) = note
-                    && text.contains("  parameter ")
-                {
+            for seen in &seen {
+                if let Seen::Value(text) = seen {
                     tell(text);
                 }
             }

@@ -7,6 +7,7 @@
 //! | [`incoming`] | bytes that come, commands that go |
 //! | [`station`] | packets on their way from bytes to files |
 //! | [`stream`] | packets in words, and as rows |
+//! | `outcome` | the outcome of a telecommand in words |
 //! | `outputs` | the files that telemetry becomes |
 //! | [`tai`] | the time of the packets, and UTC |
 //! | [`xtce`] | the dictionary of the packets, for other ground systems |
@@ -20,6 +21,7 @@ pub mod commander;
 pub mod encode;
 mod error;
 pub mod incoming;
+mod outcome;
 mod outputs;
 pub mod station;
 pub mod stream;

@@ -8,8 +8,8 @@ use hzn_flight::assembly::{Assembled, Assembly};
 use hzn_flight::bytes::Reader;
 use hzn_flight::cuc::{Cuc, Epoch};
 use hzn_flight::messages::{
-    Acknowledge, Code, EdgePart, EdgePixel, Event, EventRecord, Function, Housekeeping, Mode, Navigation,
-    NavigationState, ParameterValue, Severity,
+    Acknowledge, Code, EdgePart, EdgePixel, Event, EventRecord, Function, Housekeeping, Mode, NavigationState,
+    ParameterValue, Severity,
 };
 use hzn_flight::packet::{Apid, ApidBase, Packet};
 use hzn_flight::{Parameters, parameters};
@@ -17,6 +17,7 @@ use hzn_fly::tell::Tell;
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, RowMeta};
 
 use crate::error::Error;
+use crate::outcome;
 use crate::outputs::{Sink, write_housekeeping};
 use crate::tai;
 
@@ -28,7 +29,9 @@ pub enum Seen {
     Housekeeping(Box<Housekeeping>),
     /// The outcome of a telecommand.
     Acknowledge(Acknowledge),
-    /// A message, with the time of its packet.
+    /// The value of a parameter that a telecommand has read, in words, with the time of its packet.
+    Value(String),
+    /// Another message, with the time of its packet.
     Note(LogLevel, String),
 }
 
@@ -147,22 +150,14 @@ impl StreamCounts {
     fn acknowledge(&mut self, time: Cuc, a: &Acknowledge) {
         self.seen.push(Seen::Acknowledge(*a));
         let function = Function::from_number(a.function).map_or("?", Function::name);
-        let code = Code::from_number(a.code).map_or("?", Code::name);
         let level = if a.code == 0 { LogLevel::Info } else { LogLevel::Warning };
-        let detail = match (Function::from_number(a.function), a.detail) {
-            (_, 0) => String::new(),
-            (Some(Function::SetKnown | Function::Navigate), place) => {
-                let name = Navigation::FIELDS.get(usize::from(place) - 1).unwrap_or(&"?");
-                format!(": {name}")
-            }
-            (_, number) => format!(": parameter {number} {}", parameters::name(number).unwrap_or("?")),
-        };
-        self.note(time, level, &format!("command {} ({function}): {code}{detail}", a.sequence));
+        self.note(time, level, &format!("command {} ({function}): {}", a.sequence, outcome::describe(a)));
     }
 
     fn parameter(&mut self, time: Cuc, ParameterValue { number, value }: ParameterValue) {
         let name = parameters::name(number).unwrap_or("?");
-        self.note(time, LogLevel::Info, &format!("parameter {number} {name} = {value}"));
+        let line = self.log(time, LogLevel::Info, &format!("parameter {number} {name} = {value}"));
+        self.seen.push(Seen::Value(line));
     }
 
     fn edge(&mut self, time: Cuc, part: &EdgePart, from: &mut Reader<'_>) {
@@ -209,14 +204,20 @@ impl StreamCounts {
     }
 
     fn note(&mut self, time: Cuc, level: LogLevel, message: &str) {
+        let line = self.log(time, level, message);
+        self.seen.push(Seen::Note(level, line));
+    }
+
+    /// Tells a message and keeps it for the next answer. Returns it with its time.
+    fn log(&mut self, time: Cuc, level: LogLevel, message: &str) -> String {
         let line = format!("{}  {message}", describe_time(time));
         if let Some(tell) = &self.tell {
             tell(&line);
         }
-        self.seen.push(Seen::Note(level, line));
         if self.log.len() < MAX_LOG {
             self.log.push(LogLine { level, message: message.to_owned() });
         }
+        line
     }
 
     /// Returns the counts in words.

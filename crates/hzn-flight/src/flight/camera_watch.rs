@@ -4,6 +4,10 @@ use crate::board::Picture;
 
 /// Longest wait for a picture while the period is not known well yet.
 const FIRST_US: u64 = 2_000_000;
+/// Shortest wait: what follows the event, housekeeping and other warnings, comes at most once a second.
+// One and a half periods alone are 25 ms at 60 pictures a second, and an operating system pauses for longer: of 36 000
+// pictures, 37 had such an event.
+const LEAST_US: u64 = 1_000_000;
 /// Number of intervals that the mean period is taken over. One early or late picture moves it little.
 // The last interval alone was used before. With pictures a fifth of a period early or late it can be 0.6 periods, and
 // one and a half times 0.6 is shorter than the wait for a picture in time.
@@ -55,11 +59,11 @@ impl CameraWatch {
         self.period_us = self.period_us - share_us(self.period_us) + share_us(interval_us);
     }
 
-    /// Returns the time since the last picture when it becomes longer than one and a half periods.
+    /// Returns the time since the last picture when it becomes longer than one and a half periods and a second.
     pub(super) fn becomes_silent(&mut self, now_us: u64) -> Option<u64> {
         let waited_us = now_us.saturating_sub(self.waiting_since_us);
-        let least_us = if self.intervals < MEAN_OF { FIRST_US } else { 0 };
-        // One and a half periods, so that a picture may be a fifth late, and the event comes within two.
+        let least_us = if self.intervals < MEAN_OF { FIRST_US } else { LEAST_US };
+        // One and a half periods, so that a picture may be a fifth late, and the event of a slow camera comes within two.
         let longest_us = least_us.max(self.period_us.saturating_add(self.period_us / 2));
         if self.is_silent || waited_us <= longest_us {
             return None;

@@ -12,6 +12,8 @@ impl<B: Board> Flight<'_, B> {
     pub(super) fn report_by_time(&mut self, now_us: u64) {
         let period_us = u64::from(self.operations.get().housekeeping_s) * 1_000_000;
         if now_us.saturating_sub(self.housekeeping_us) >= period_us {
+            // Modes without pictures have no other comparison, and a second flip in the same place would hide the first.
+            self.check_memory(None);
             self.send_housekeeping();
         }
     }
@@ -30,7 +32,7 @@ impl<B: Board> Flight<'_, B> {
             | bit(self.recovery.has_lifted_off(), LIFTED_OFF)
             | bit(self.camera.is_silent(), CAMERA_SILENT)
             | bit(self.staged > 0, STAGED);
-        state.last_sequence = self.last_sequence.unwrap_or(u16::MAX);
+        state.last_sequence = self.recovery.last_sequence().unwrap_or(u16::MAX);
         state.since_lift_off_s = self.recovery.since_lift_off_s(now_us).unwrap_or(u32::MAX);
         state.clock = self.buffers.line.clock.state(now_us);
         let state = self.state;

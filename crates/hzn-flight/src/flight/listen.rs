@@ -100,10 +100,16 @@ impl<B: Board> Flight<'_, B> {
         self.detail = 0;
         let code = match Function::from_number(number) {
             // This is asked first, so that a replay changes nothing.
-            _ if !self.is_in_sequence(sequence) => Code::Sequence,
+            _ if !self.is_in_sequence(sequence) => {
+                // The sender learns from the refusal which count comes next.
+                self.refuse(Code::Sequence, self.recovery.last_sequence().unwrap_or(0))
+            }
             Some(function) => {
                 // It counts even if it is refused below, because its replay could be allowed later, in another mode.
-                self.last_sequence = Some(sequence);
+                let now_us = self.board.now_us();
+                self.recovery.note_sequence(&mut self.board, sequence, now_us);
+                // A telecommand may copy what it does not change, into a new intact copy and into permanent memory.
+                self.check_memory(None);
                 self.carry_out(function, &mut from)
             }
             None => Code::Unknown,
@@ -116,8 +122,8 @@ impl<B: Board> Flight<'_, B> {
     /// Returns whether a sequence count is within the window after that of the last telecommand that was taken.
     fn is_in_sequence(&self, sequence: u16) -> bool {
         let window = self.operations.get().sequence_window;
-        // After the start no count is known, so that the first telecommand is taken with any count.
-        let Some(last) = self.last_sequence.filter(|_| window > 0) else { return true };
+        // After power-on no count is known, so that the first telecommand is taken with any count.
+        let Some(last) = self.recovery.last_sequence().filter(|_| window > 0) else { return true };
         let ahead = sequence.wrapping_sub(last) & 0x3FFF;
         (1..=window).contains(&ahead)
     }

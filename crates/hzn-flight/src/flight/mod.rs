@@ -28,7 +28,7 @@ use crate::inbox::Inbox;
 use crate::messages::{Event, Housekeeping, Mode};
 use crate::operations::Operations;
 use crate::store::{self, Loaded};
-use crate::table::{self, TableError};
+use crate::table;
 pub use crate::view::Lists;
 use crate::view::LongestEdge;
 
@@ -95,6 +95,8 @@ pub struct Flight<'a, B> {
     operations: KeptTwice<Operations>,
     /// Whether the parameters in use differ from the stored ones.
     is_not_stored: bool,
+    /// Checksum of the stored parameters; `None` if the defaults are in use, which are not stored.
+    stored: Option<u32>,
     /// Number of parameters that are kept for a commit; they are in the buffer of the table.
     staged: u16,
     known: KeptTwice<Known>,
@@ -111,8 +113,6 @@ pub struct Flight<'a, B> {
     /// Number of pictures since the last housekeeping packet, and its time.
     since_housekeeping: u16,
     housekeeping_us: u64,
-    /// Sequence count of the last telecommand that was taken.
-    last_sequence: Option<u16>,
     /// What the last telecommand was refused for, as in [`crate::messages::Acknowledge::detail`].
     detail: u16,
     /// Whether the board could keep the last answer.
@@ -166,19 +166,16 @@ impl<'a, B: Board> Flight<'a, B> {
             ..Housekeeping::default()
         };
         buffers.line.set_base(loaded.parameters.operations.base());
+        board.note_sensor(&loaded.parameters.sensor);
         Some(Self {
-            start: Some(loaded.broken.each_ref().map(|broken| match broken {
-                None => 0,
-                Some(TableError::Header) => 1,
-                Some(TableError::Checksum) => 2,
-                Some(TableError::Refused(_)) => 3,
-            })),
+            start: Some(loaded.broken_codes()),
             sensor: KeptTwice::new(Sensor::new(&loaded.parameters.sensor).ok()?),
             board,
             buffers,
             workspace,
             operations: KeptTwice::new(loaded.parameters.operations.clone()),
             is_not_stored: loaded.copy == 0,
+            stored: loaded.digest(),
             staged: 0,
             known: KeptTwice::new(Known::default()),
             has_expired: false,
@@ -191,7 +188,6 @@ impl<'a, B: Board> Flight<'a, B> {
             number: 0,
             since_housekeeping: 0,
             housekeeping_us: 0,
-            last_sequence: None,
             detail: 0,
             keeps_answers: true,
             process_once: false,
@@ -227,6 +223,10 @@ impl<'a, B: Board> Flight<'a, B> {
     pub fn turn(&mut self) {
         // Nothing else feeds it, so that any part of a turn that hangs ends in a reset.
         self.board.feed_watchdog();
+        // First of all, because nothing may end this mode: a repair, for example, can start safe mode.
+        if self.mode == Mode::ShutDown {
+            return;
+        }
         if let Some(broken) = self.start.take() {
             self.begin(broken);
         }
@@ -240,7 +240,7 @@ impl<'a, B: Board> Flight<'a, B> {
         // Before `listen`, so that a telecommand `time` finds the last pulse.
         self.buffers.line.clock.note_pulse(pulse_us);
         // Before `listen`, so that no telecommand writes parameters while power is being cut.
-        if self.mode == Mode::ShutDown || self.follow_vehicle(now_us) {
+        if self.follow_vehicle(now_us) {
             return;
         }
         // Before the picture, so that a prior or a mode that has just come holds for it.

@@ -12,8 +12,14 @@ impl<B: Board> Flight<'_, B> {
         if resets >= OLDER_AFTER {
             self.send_event(Event::OlderParameters, self.state.parameter_copy.into(), resets.into());
         }
+        // After lift-off nobody may be able to end safe mode: a sounding rocket often has no uplink.
+        let may_be_safe = match self.operations.get().safe_after_resets {
+            0 => false,
+            1 => !self.recovery.has_lifted_off(),
+            _ => true,
+        };
         // Neither copy of the parameters ended the resets, so the computer processes nothing and listens.
-        if resets >= SAFE_AFTER {
+        if resets >= SAFE_AFTER && may_be_safe {
             self.send_event(Event::SafeAfterResets, resets.into(), 0);
             self.enter_mode(Mode::Safe);
         } else if self.mode == Mode::Standby && (self.operations.get().boot_mode == 1 || self.recovery.has_lifted_off())

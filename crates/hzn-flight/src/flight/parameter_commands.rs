@@ -3,12 +3,14 @@
 use hzn_core::Sensor;
 
 use super::Flight;
+use super::self_check::NO_PARAMETERS;
 use crate::board::Board;
 use crate::bytes::Reader;
-use crate::messages::{Code, Event, ParameterValue};
+use crate::messages::{Code, Event, MAX_READ, ParameterValue};
 use crate::packet::Apid;
 use crate::parameters::{Parameters, Refused};
 use crate::store;
+use crate::table;
 
 /// How long new parameters are kept.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -19,9 +21,6 @@ pub(super) enum Keep {
 
 /// Bytes of a parameter that waits for the commit: its number and its value.
 const ENTRY: usize = 10;
-/// Most parameters that are read by one telecommand.
-// Their packets take a quarter of a second of a line with 115 200 baud, and the loop waits for them.
-const MAX_READ: u8 = 96;
 
 impl<B: Board> Flight<'_, B> {
     fn parameters(&self) -> Parameters {
@@ -94,7 +93,8 @@ impl<B: Board> Flight<'_, B> {
             self.sensor.complete();
             self.operations.set(parameters.operations.clone());
             self.operations.complete();
-            self.is_not_stored = true;
+            // Parameters that were tried may be the stored ones again.
+            self.is_not_stored = self.stored != Some(table::digest(parameters));
         }
         // Memory wears out: it is written only if this changes something.
         if keep == Keep::UntilReset || !self.is_not_stored { Code::Done } else { self.store(parameters) }
@@ -108,6 +108,7 @@ impl<B: Board> Flight<'_, B> {
         let is_accepted = sensor.is_ok();
         if let Ok(sensor) = sensor {
             self.sensor.set(sensor);
+            self.board.note_sensor(&parameters.sensor);
         }
         is_accepted
     }
@@ -126,8 +127,8 @@ impl<B: Board> Flight<'_, B> {
             Ok((copy, generation)) => {
                 (self.state.parameter_copy, self.state.parameter_generation) = (copy, generation);
                 // The self-check failed because nothing was stored, which is no longer so.
-                self.state.self_check &= !4;
-                self.is_not_stored = false;
+                self.state.self_check &= !NO_PARAMETERS;
+                (self.stored, self.is_not_stored) = (Some(table::digest(parameters)), false);
                 self.send_event(Event::Stored, u32::from(copy), generation);
                 Code::Done
             }

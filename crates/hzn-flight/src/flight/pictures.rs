@@ -31,6 +31,11 @@ impl<B: Board> Flight<'_, B> {
         }
         // What changed since the last picture is made anew in time for this one.
         self.check_memory(None);
+        if self.mode == Mode::Safe {
+            // There are no stored parameters any more, so that the sensor is that of another camera.
+            self.state.refused = self.state.refused.saturating_add(1);
+            return;
+        }
         if !self.check_size(picture.bytes) {
             return;
         }
@@ -38,7 +43,8 @@ impl<B: Board> Flight<'_, B> {
         let mut expected = KeptTwice::new(expected);
         expected.complete();
         let start = self.board.now_us();
-        let wanted = core::mem::take(&mut self.dump_edges);
+        // The request stays until it is met, because this picture may be incomplete or stuck.
+        let wanted = self.dump_edges;
         let edge = &mut self.buffers.edge;
         let mut viewer = Viewer::new(self.sensor.get(), expected.get(), self.workspace, edge, wanted);
         self.board.show(&mut viewer);
@@ -63,6 +69,7 @@ impl<B: Board> Flight<'_, B> {
         self.count_picture(report.status, calculation_us);
         self.send_answer(&report, picture.exposure_us, done_us);
         if wanted {
+            self.dump_edges = false;
             let Buffers { line, edge, .. } = &mut *self.buffers;
             let time = line.clock.at(picture.exposure_us);
             longest_edge::send(edge, line, &mut self.board, time, self.number);

@@ -1,10 +1,11 @@
-//! What survives a reset: how often the watchdog reset the computer, and when it lifted off.
+//! What survives a reset: how often the watchdog reset the computer, when it lifted off, and the count of the last
+//! telecommand.
 //!
 //! | resets by the watchdog in a row | what the computer does |
 //! |---|---|
 //! | 1, 2 | it starts as usual |
 //! | 3 to 5 | it uses the older parameters, because the newer ones may be the cause |
-//! | 6 and more | it stays in safe mode |
+//! | 6 and more | it stays in safe mode, as `boot.safe_after_resets` says |
 //!
 //! After a minute without a reset the count starts again.
 
@@ -20,6 +21,8 @@ pub(super) const SAFE_AFTER: u8 = 6;
 const STABLE_US: u64 = 60_000_000;
 /// Time for which the shut-down is armed.
 const ARMED_US: u64 = 10_000_000;
+/// A bit of the word with the sequence count of the last telecommand: there was one.
+const HAS_SEQUENCE: u32 = 1 << 16;
 /// The value of "since lift-off" before lift-off.
 const ON_THE_GROUND: u32 = u32::MAX;
 
@@ -34,6 +37,8 @@ pub(super) struct Recovery {
     /// Whether the lift-off line showed lift-off at the last turn.
     line_was_off: bool,
     armed_until_us: u64,
+    /// Sequence count of the last telecommand that was taken.
+    last_sequence: Option<u16>,
     /// Seconds since lift-off that are kept for a reset.
     kept_s: Option<u32>,
     is_stable: bool,
@@ -43,9 +48,9 @@ impl Recovery {
     /// Reads what the last run left, and counts this start.
     pub(super) fn begin(board: &mut impl Board) -> Self {
         let now_us = board.now_us();
-        let [counts, since_ms, spare, check] = board.read_retained();
+        let [counts, since_ms, sequence, check] = board.read_retained();
         // A start was counted before words were kept, so that zeros are memory without any.
-        let is_kept = counts != 0 && check == checksum([counts, since_ms, spare]);
+        let is_kept = counts != 0 && check == checksum([counts, since_ms, sequence]);
         let (starts, resets) = if is_kept { ((counts >> 16) as u16, counts as u8) } else { (0, 0) };
         let lift_off_us = (is_kept && since_ms != ON_THE_GROUND)
             .then(|| now_us.cast_signed().saturating_sub(i64::from(since_ms) * 1000));
@@ -56,6 +61,7 @@ impl Recovery {
             lift_off_us,
             line_was_off: false,
             armed_until_us: 0,
+            last_sequence: (is_kept && sequence & HAS_SEQUENCE != 0).then_some(sequence as u16),
             kept_s: None,
             is_stable: false,
         };
@@ -75,11 +81,21 @@ impl Recovery {
         let since_ms = since_us.map_or(ON_THE_GROUND, |us| u32::try_from(us / 1000).unwrap_or(ON_THE_GROUND - 1));
         // Only the kept count starts again, so that housekeeping still says why this run began.
         let resets = if self.is_stable { 0 } else { self.watchdog_resets };
-        let words = [u32::from(self.starts) << 16 | u32::from(resets), since_ms, 0];
-        let [counts, since_ms, spare] = words;
-        let kept: [u32; RETAINED_WORDS] = [counts, since_ms, spare, checksum(words)];
+        let sequence = self.last_sequence.map_or(0, |sequence| HAS_SEQUENCE | u32::from(sequence));
+        let words = [u32::from(self.starts) << 16 | u32::from(resets), since_ms, sequence];
+        let [counts, since_ms, sequence] = words;
+        let kept: [u32; RETAINED_WORDS] = [counts, since_ms, sequence, checksum(words)];
         board.write_retained(kept);
         self.kept_s = self.since_lift_off_s(now_us);
+    }
+
+    /// Takes note of a telecommand, before it is carried out: after a reset in the middle its replay is refused, too.
+    pub(super) fn note_sequence(&mut self, board: &mut impl Board, sequence: u16, now_us: u64) {
+        self.last_sequence = Some(sequence);
+        self.keep(board, now_us);
+    }
+    pub(super) fn last_sequence(&self) -> Option<u16> {
+        self.last_sequence
     }
 
     /// Writes what has changed since the last turn.

@@ -4,6 +4,9 @@ use super::Flight;
 use crate::board::Board;
 use crate::messages::{Event, Mode};
 
+/// The bit of `self_check` in housekeeping that says that no stored parameters can be used.
+pub(super) const NO_PARAMETERS: u8 = 4;
+
 impl<B: Board> Flight<'_, B> {
     /// Runs the self-checks of camera, memory and parameters. Default parameters fail the check: a sensor that was not
     /// configured is of no use, so the computer enters safe mode.
@@ -11,7 +14,7 @@ impl<B: Board> Flight<'_, B> {
         let camera = self.board.camera_answers();
         // The memory of the packets, because nothing in it must survive.
         let memory = memory_works(&mut self.buffers.line.out, |_| ());
-        let failed = u8::from(!camera) | u8::from(!memory) << 1 | u8::from(!parameters) << 2;
+        let failed = u8::from(!camera) | u8::from(!memory) << 1 | if parameters { 0 } else { NO_PARAMETERS };
         self.state.self_check = failed;
         if failed != 0 {
             self.send_event(Event::SelfCheck, u32::from(failed), 0);

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use hzn_core::{Report, pixel};
+use hzn_core::{Config, Report, pixel};
 use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::cuc::Cuc;
@@ -44,6 +44,8 @@ pub(crate) struct Bench {
     pub(crate) fed: u32,
     pub(crate) watchdog_reset: bool,
     pub(crate) retained: [u32; RETAINED_WORDS],
+    /// The parameters of the sensor that is in use.
+    pub(crate) noted: Option<Config>,
     /// Number of writes of a copy of the parameters.
     pub(crate) writes: u32,
 }
@@ -99,6 +101,9 @@ impl Board for Bench {
         // The memory is erased before it is written.
         self.copies[usize::from(copy) - 1] = bytes[..n].to_vec();
         n == bytes.len()
+    }
+    fn note_sensor(&mut self, config: &Config) {
+        self.noted = Some(config.clone());
     }
     fn stack_bytes(&mut self) -> u32 {
         1234

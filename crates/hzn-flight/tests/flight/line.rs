@@ -117,20 +117,43 @@ fn a_command_inside_a_damaged_packet_is_not_carried_out() {
         take_sent(f);
         assert_eq!(send(f, &[&outer[..], &after].concat()).answers, [(11, 8, Code::Done)]);
     });
-    for bit in 0..8 * outer.len() {
+    // One, two or three telecommands side by side: the marker of the next one is in the damaged packet, too.
+    let ours = |sequence| command(sequence, Function::SetMode, |w| w.u8(2));
+    let several: [Vec<u8>; 3] = [inside, [ours(7), ours(9)].concat(), [ours(7), ours(9), ours(10)].concat()];
+    for inside in &several {
+        let outer = with_command_inside(0x123, inside);
+        for bit in 0..8 * outer.len() {
+            fly(ready(), |f| {
+                take_sent(f);
+                let mut damaged = outer.clone();
+                damaged[bit / 8] ^= 0x80 >> (bit % 8);
+                // The embedded packets are whole also if the bit is behind them.
+                f.board().line.extend(damaged.iter().chain(&after));
+                let mut answers = Vec::new();
+                for _ in 0..20 {
+                    answers.extend(pause(f, 60_000).answers);
+                }
+                // The packet behind the damaged one counts, within 1.2 seconds. The embedded ones do not.
+                assert_eq!(answers, [(11, 8, Code::Done)], "bit {bit} of {}", outer.len());
+            });
+        }
+    }
+}
+
+#[test]
+fn telecommands_after_a_damaged_packet_are_taken_without_a_pause_between_them() {
+    // Many telecommands one after the other, without a pause: those that begin more than 1024 bytes after the damaged
+    // packet end the wait for a pause.
+    let commands: Vec<u8> = (0..100).flat_map(|n| command(n, Function::Ping, |_| ())).collect();
+    let mut damaged = with_command_inside(0x123, &[7; 9]);
+    damaged[20] ^= 1;
+    for count in [1, 2, 30, 60, 100] {
         fly(ready(), |f| {
             take_sent(f);
-            let mut damaged = outer.clone();
-            damaged[bit / 8] ^= 0x80 >> (bit % 8);
-            // The embedded packet is whole also if the bit is behind it.
-            f.board().line.extend(damaged.iter().chain(&after));
-            let mut answers = Vec::new();
-            for _ in 0..20 {
-                answers.extend(pause(f, 60_000).answers);
-            }
-            // The packet behind the damaged one counts, within 1.2 seconds. The embedded one does not.
-            let inside_is_damaged = (12..12 + inside.len()).contains(&(bit / 8).wrapping_sub(19));
-            assert_eq!(answers, [(11, 8, Code::Done)], "bit {bit}, {inside_is_damaged}");
+            let one = commands.len() / 100;
+            f.board().line.extend(damaged.iter().chain(&commands[..count * one]));
+            let answers: Vec<_> = (0..150).flat_map(|_| pause(f, 10_000).answers).collect();
+            assert_eq!(answers.len(), count);
         });
     }
 }
@@ -193,8 +216,35 @@ fn a_replay_is_refused_if_the_window_is_set() {
         // The count wraps after 16 383; lost telecommands are no error.
         assert_eq!([code(f, 16_382), code(f, 16_382), code(f, 3)], [Code::Done, Code::Sequence, Code::Done]);
         assert_eq!([code(f, 14), code(f, 3), code(f, 13)], [Code::Sequence, Code::Sequence, Code::Done]);
+        assert_eq!(send(f, &ping(3)).details, [13], "a refusal says the last count");
         assert_eq!(send(f, &command(14, Function::Report, |_| ())).housekeeping[0].last_sequence, 14);
     });
+}
+
+#[test]
+fn a_replay_is_refused_also_after_a_reset() {
+    let mut with_window = Parameters::defaults();
+    with_window.set(303, 10.0).unwrap();
+    let mut table = vec![0; table::MAX_BYTES];
+    let n = table::write(&with_window, 1, &mut table).unwrap();
+    table.truncate(n);
+    let bench = |retained| Bench { copies: [table.clone(), Vec::new()], retained, ..Bench::default() };
+    for watchdog_reset in [false, true] {
+        let retained = fly(bench([0; 4]), |f| {
+            assert_eq!(send(f, &command(0, Function::Ping, |_| ())).answers, [(11, 0, Code::Done)]);
+            assert_eq!(send(f, &command(7, Function::Ping, |_| ())).answers, [(11, 7, Code::Done)]);
+            f.board().retained
+        });
+        fly(Bench { watchdog_reset, ..bench(retained) }, |f| {
+            assert_eq!(take_sent(f).housekeeping[0].last_sequence, 7);
+            assert_eq!(send(f, &command(7, Function::Ping, |_| ())).answers, [(11, 7, Code::Sequence)]);
+            assert_eq!(send(f, &command(8, Function::Ping, |_| ())).answers, [(11, 8, Code::Done)]);
+        });
+        // After power-on, the words are random or zeros.
+        fly(bench([0; 4]), |f| {
+            assert_eq!(send(f, &command(7, Function::Ping, |_| ())).answers, [(11, 7, Code::Done)]);
+        });
+    }
 }
 
 #[test]

@@ -46,6 +46,27 @@ fn memory_is_written_only_for_a_change() {
 }
 
 #[test]
+fn the_only_valid_copy_is_not_written() {
+    // The copy in use is damaged while the computer runs, so that the other one holds the only parameters.
+    for used in [1usize, 2] {
+        let mut copies = [stored(1), stored(1)];
+        copies[used - 1] = stored(2);
+        let copies = fly(Bench { copies, ..Bench::default() }, |f| {
+            take_sent(f);
+            f.board().copies[used - 1][40] ^= 1;
+            let set = command(1, Function::SetParameters, pairs(&[(81, 2.0)]));
+            assert_eq!(send(f, &set).events, [(Event::Stored, used as u32, 3)]);
+            f.board().copies.clone()
+        });
+        assert_eq!(copies[2 - used], stored(1));
+        fly(Bench { copies, ..Bench::default() }, |f| {
+            assert_eq!(take_sent(f).events[0], (Event::Started, used as u32, 3));
+            assert_eq!(read(f, 81), 2.0);
+        });
+    }
+}
+
+#[test]
 fn a_stored_limit_that_is_too_high_is_refused_at_the_start() {
     let mut free = Parameters::defaults();
     free.sensor.limits.max_work = Some(1_000_000_000);
@@ -75,6 +96,16 @@ fn a_tried_parameter_is_gone_after_a_reset() {
         let h = send(f, &command(1, Function::SetParameters, pairs(&[(81, 2.0)])));
         assert_eq!((h.answers[0].2, h.events[0].0), (Code::Done, Event::Stored));
         assert_eq!(send(f, &command(1, Function::Report, |_| ())).housekeeping[0].flags, 0);
+        // A try back to the stored value is no difference any more, so that a set of this value writes nothing.
+        let writes = f.board().writes;
+        for (value, flags) in [(2.5, 1), (2.0, 0)] {
+            assert_eq!(do_it(f, Function::TryParameters, pairs(&[(81, value)])), Code::Done);
+            assert_eq!(send(f, &command(1, Function::Report, |_| ())).housekeeping[0].flags, flags);
+        }
+        assert_eq!(do_it(f, Function::SetParameters, pairs(&[(81, 2.0)])), Code::Done);
+        assert_eq!(f.board().writes, writes);
+        // The board knows the sensor that is in use.
+        assert_eq!(f.board().noted.as_ref().map(|sensor| sensor.consensus.threshold_px), Some(2.0));
     });
 }
 

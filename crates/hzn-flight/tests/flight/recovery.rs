@@ -46,6 +46,27 @@ fn a_loop_of_resets_leads_to_the_older_parameters_and_then_to_safe_mode() {
 }
 
 #[test]
+fn resets_after_lift_off_do_not_silence_a_rocket() {
+    // 307 is `boot.safe_after_resets`: never, before lift-off, always.
+    for (safe, lift_off, last) in [
+        (0.0, false, Mode::Flight),
+        (0.0, true, Mode::Flight),
+        (1.0, false, Mode::Safe),
+        (1.0, true, Mode::Flight),
+        (2.0, true, Mode::Safe),
+    ] {
+        let copy = |generation| stored_with(generation, &[(304, 1.0), (307, safe)]);
+        let starts = starts(Bench { copies: [copy(1), copy(2)], lift_off, ..Bench::default() }, 7);
+        let modes: Vec<_> = starts.iter().map(|(mode, ..)| *mode).collect();
+        assert_eq!(modes[..6], [Mode::Flight; 6]);
+        assert_eq!(modes[6..], [last; 2], "{safe}, {lift_off}");
+        // The older parameters are kept, because the newer ones may be the cause.
+        assert_eq!(starts[7].1, 1);
+        assert_eq!(starts[6].2.contains(&Event::SafeAfterResets), last == Mode::Safe);
+    }
+}
+
+#[test]
 fn a_minute_without_a_reset_ends_the_count() {
     let retained = fly(Bench { watchdog_reset: true, ..ready() }, |f| {
         f.board().now_us += 61_000_000;

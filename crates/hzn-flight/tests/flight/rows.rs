@@ -109,6 +109,23 @@ fn a_camera_that_stops_in_a_picture_is_reported() {
 }
 
 #[test]
+fn the_longest_edge_that_was_asked_for_waits_for_an_answer() {
+    let stuck = {
+        let mut picture = noisy_limb(5);
+        for x in 0..WIDTH {
+            let limb = (0..HEIGHT).find(|y| picture[y * WIDTH + x] >= 100).unwrap();
+            (limb..HEIGHT.min(limb + 12)).for_each(|y| picture[y * WIDTH + x] = 180);
+        }
+        picture
+    };
+    for bad in [vec![9; 100], stuck] {
+        let (answers, events, edge) = fly_over(ready(), &FIXED_AT_100, &[bad, noisy_limb(5)]);
+        assert!(answers.len() == 1 && events.len() > 1, "{events:?}");
+        assert!(edge > 300, "{edge}");
+    }
+}
+
+#[test]
 fn a_picture_that_the_memory_for_rows_does_not_hold_is_refused() {
     // This camera has more rows than the memory.
     let (answers, events, _) = fly_over(by_rows(), &[(2, 481.0), (50, 1.0)], &[vec![9; WIDTH * 481]]);

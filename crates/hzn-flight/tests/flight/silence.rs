@@ -36,7 +36,7 @@ fn housekeeping_says_which_program_runs() {
 }
 
 #[test]
-fn a_camera_that_stops_is_told_within_two_periods() {
+fn a_camera_that_stops_is_told_after_a_second() {
     fly(ready(), |f| {
         send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
         let mut told = Vec::new();
@@ -54,7 +54,7 @@ fn a_camera_that_stops_is_told_within_two_periods() {
             told.extend(silent.map(|(_, _, picture)| (tick, picture)));
         }
         // The last picture has number 9 and came at tick 90; it is told once.
-        assert!(matches!(told[..], [(101..=110, 9)]), "{told:?}");
+        assert!(matches!(told[..], [(190..=192, 9)]), "{told:?}");
         assert_eq!(send(f, &command(2, Function::Report, |_| ())).housekeeping[0].flags, 8);
         f.board().pictures.push_back((limb(), 0));
         f.turn();
@@ -79,12 +79,18 @@ fn a_camera_with_jitter_is_not_silent() {
     fly(ready(), |f| {
         send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
         take_sent(f);
-        // Pictures come every 40 ms, each up to 8 ms early or late, for 80 s; then every 100 ms.
+        // Pictures come every 40 ms, each up to 8 ms early or late, for 80 s; every hundredth is 0.9 s late, because the
+        // operating system pauses. Then they come every 100 ms, and every 2 s.
         let mut random = 1u32;
         let mut told = Vec::new();
-        for picture in 0..2100u64 {
+        for picture in 0..2106u64 {
             random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let due_us = if picture < 2000 { 40_000 * picture } else { 80_000_000 + 100_000 * (picture - 2000) };
+            let due_us = match picture {
+                0..2000 if picture % 100 == 99 => 40_000 * picture + 900_000,
+                0..2000 => 40_000 * picture,
+                2000..2100 => 80_000_000 + 100_000 * (picture - 2000),
+                _ => 90_000_000 + 2_000_000 * (picture - 2100),
+            };
             let at_us = 1_000_000 + due_us + u64::from(random >> 16) * 16_000 / 65_536;
             while f.board().now_us + 1000 < at_us {
                 f.board().now_us += 1000;
@@ -95,8 +101,8 @@ fn a_camera_with_jitter_is_not_silent() {
             f.turn();
             told.extend(take_sent(f).events.into_iter().filter(|e| e.0 == Event::CameraSilent).map(|_| picture));
         }
-        // The slower rate is told once, until its period is known.
-        assert_eq!(told, [2001]);
+        // The slowest rate is told once, until its period is known.
+        assert_eq!(told, [2101]);
     });
 }
 

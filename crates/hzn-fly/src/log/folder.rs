@@ -85,6 +85,15 @@ impl Folder {
         }
     }
 
+    /// Removes the oldest finished recording. Returns its name; `None` if there is none but the newest recording.
+    pub(super) fn remove_oldest(&self) -> Option<String> {
+        let entries = self.entries();
+        let (_, older) = entries.split_last()?;
+        let oldest = older.iter().find(|entry| entry.is_finished)?;
+        fs::remove_file(&oldest.path).ok()?;
+        Some(oldest.path.display().to_string())
+    }
+
     /// Closes the recordings that are not finished. Nobody may be writing them.
     pub(super) fn recover(&mut self, tell: &Tell) {
         for entry in self.entries().into_iter().filter(|entry| !entry.is_finished) {

@@ -160,16 +160,23 @@ impl Writing {
 
     /// Takes note of an error. The file that failed stays as it is; the next one is tried later.
     fn take_outcome(&mut self, outcome: Result<(), hzn_mcap::Error>) {
-        if let Err(e) = outcome {
+        let Err(e) = outcome else { return };
+        self.file = None;
+        let is_full = matches!(e, hzn_mcap::Error::DiskFull { .. });
+        // Others may fill the disk, too. The newest answers are worth more than the oldest.
+        if let Some(oldest) = Some(()).filter(|()| is_full).and_then(|()| self.folder.remove_oldest()) {
+            (self.tell)(&format!("the disk is full: the oldest recording {oldest} was removed"));
+        } else {
             if self.failed.is_none() {
-                (self.tell)(&format!("the log cannot be written: {e}; the flight goes on without it"));
+                // The error speaks of a run that can be continued, which a flight cannot.
+                let why = if is_full { "the disk is full".to_owned() } else { e.to_string() };
+                (self.tell)(&format!("the log cannot be written: {why}; the flight goes on without it"));
             }
             self.failed = Some(Instant::now());
             self.fails.store(true, Ordering::Relaxed);
-            self.file = None;
-            // The part with the finished answers becomes a file, if the disk has room for it.
-            self.folder.recover(&self.tell);
         }
+        // The part with the finished answers becomes a file, if the disk has room for it.
+        self.folder.recover(&self.tell);
     }
 }
 
@@ -263,6 +270,39 @@ mod tests {
         assert_eq!(indexes(after.path()), (0..=40).collect::<Vec<_>>());
         assert!(told.lock().unwrap()[0].contains("answers were recovered"), "{told:?}");
         assert!(after.path().join("fly-000010.mcap").exists());
+    }
+
+    #[test]
+    fn a_full_disk_costs_the_oldest_recordings_first() {
+        let dir = tempfile::tempdir().unwrap();
+        for start in [0, 10, 20] {
+            let mut log = Log::open(dir.path(), MIN_LIMIT_BYTES, &config(), quiet()).unwrap();
+            (start..start + 10).for_each(|index| assert!(log.add(record(index))));
+            log.finish();
+        }
+        let told = Arc::new(Mutex::new(Vec::<String>::new()));
+        let list = Arc::clone(&told);
+        let mut writing = Writing {
+            folder: Folder::open(dir.path(), MIN_LIMIT_BYTES).unwrap(),
+            file: None,
+            failed: None,
+            lost: Arc::default(),
+            written: Arc::default(),
+            fails: Arc::default(),
+            config: Arc::new(Mutex::new(config())),
+            tell: Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned())),
+        };
+        let full = || Err(hzn_mcap::Error::DiskFull { folder: dir.path().into(), part: dir.path().join("x") });
+        for (first, count, fails) in [(10, 20, false), (20, 10, false), (20, 10, true)] {
+            writing.take_outcome(full());
+            let kept = indexes(dir.path());
+            assert_eq!((kept[0], kept.len(), writing.fails.load(Ordering::Relaxed)), (first, count, fails));
+        }
+        let told = told.lock().unwrap();
+        assert!(
+            told[0].contains("the oldest recording") && told[2].contains("the disk is full; the flight"),
+            "{told:?}"
+        );
     }
 
     #[test]

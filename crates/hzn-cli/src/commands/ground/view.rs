@@ -61,6 +61,7 @@ impl View {
                 Seen::Answer(picture) => self.take_answer(picture),
                 Seen::Housekeeping(record) => self.housekeeping = Some(record),
                 Seen::Acknowledge(_) => {}
+                Seen::Value(text) => self.tell(LogLevel::Info, text),
                 Seen::Note(level, text) => self.tell(level, text),
             }
         }
