@@ -36,6 +36,11 @@ use force::Force;
 use motion::Reckoning;
 use problem::Problem;
 
+/// Most samples that are integrated again for each suspicion: an hour at 50 Hz, in three seconds for all.
+const MOST_SAMPLES: usize = 200_000;
+/// Time before the first direction that belongs to them, s: the thrust of a rocket.
+const BEFORE_S: f64 = 600.0;
+
 /// What the tests of the inputs need.
 pub(crate) struct Given<'a> {
     pub(crate) inputs: &'a Inputs,
@@ -53,6 +58,7 @@ pub(crate) fn of_inputs(given: &Given<'_>) -> Vec<Finding> {
         // Without the right times nothing else can be compared.
         return vec![finding];
     }
+    let samples = part(samples, inputs);
     let mut findings: Vec<Finding> = receiver::test(&inputs.gnss, settings).into_iter().collect();
     let reckoning = Reckoning::new(samples, max_step_s, &Matrix3::identity());
     let force = if findings.is_empty() { force::test(&reckoning, &inputs.gnss, settings) } else { Force::default() };
@@ -66,6 +72,17 @@ pub(crate) fn of_inputs(given: &Given<'_>) -> Vec<Finding> {
     }
     findings.extend(of_directions);
     findings
+}
+
+/// Returns the samples that the tests integrate again for each suspicion: those of a long flight from before the first
+/// direction on. A wrong input is wrong there, too, and the filter's solution is tested over the whole flight.
+fn part<'a>(samples: &'a [Sample], inputs: &Inputs) -> &'a [Sample] {
+    let directions = inputs.recordings.iter().flat_map(|r| r.seen.iter().map(|seen| seen.time_s + r.clock_offset_s));
+    let times = directions.chain(inputs.attitudes.iter().map(|a| a.time_s)).filter(|t| t.is_finite());
+    let from_s = times.fold(f64::INFINITY, f64::min) - BEFORE_S;
+    let latest = samples.len().saturating_sub(MOST_SAMPLES);
+    let first = samples.partition_point(|s| s.imu.time_s < from_s).min(latest);
+    samples.get(first..samples.len().min(first + MOST_SAMPLES)).unwrap_or(samples)
 }
 
 /// Returns the verdict, with what the inputs already showed.

@@ -1,5 +1,7 @@
 //! What inertial unit and receiver say about the motion, at any time.
 
+use std::sync::Arc;
+
 use hzn_nav::frames::{Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::gravity::{earth_rate, gravity};
 use hzn_nav::strapdown::turn;
@@ -33,10 +35,10 @@ pub(super) struct Integrals {
     pub(super) rate_rad_s: Vector<Vehicle>,
 }
 
-/// The integrals at all samples.
+/// The integrals at all samples. Copies share them, because each suspicion has one.
 #[derive(Debug, Clone)]
 pub(super) struct Reckoning {
-    steps: Vec<Integrals>,
+    steps: Arc<[Integrals]>,
 }
 
 impl Reckoning {
@@ -78,7 +80,7 @@ impl Reckoning {
                 rate_rad_s: rate,
             });
         }
-        Self { steps }
+        Self { steps: steps.into() }
     }
 
     /// Returns the integrals at a time between two samples; outside those of the nearest sample.

@@ -294,3 +294,21 @@ fn boastful_directions_are_in_doubt() {
     let (level, _, all) = judged(&inputs);
     assert!(level > Level::Consistent, "{all}");
 }
+
+/// The unit ran for four hours before lift-off, of which the cameras saw nothing: the verdict looks at the samples
+/// of the flight.
+#[test]
+fn a_long_wait_before_the_flight_hides_nothing() {
+    let mut inputs = drawn(FIRST_SEED + 3000);
+    turn_mount(&mut inputs.recordings[1], [40.0, 0.0, 0.0]);
+    let first = inputs.imu[0];
+    let waiting = (1..300_000).rev().map(|k| {
+        let mut sample = first;
+        sample.imu.time_s -= 0.05 * f64::from(k);
+        sample
+    });
+    inputs.imu = waiting.chain(inputs.imu.iter().copied()).collect();
+    let (level, finding, all) = judged(&inputs);
+    let finding = finding.expect(&all);
+    assert!(level == Level::Contradicts && finding.cause == Cause::Mount && right(&finding.source), "{all}");
+}
