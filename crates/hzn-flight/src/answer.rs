@@ -310,9 +310,8 @@ impl PictureAnswer {
                 edge_points: o.edge_points,
                 draws: o.draws,
                 work: o.work,
-                // Telemetry does not have it, so the number is missing for a picture that came row by row.
+                // Telemetry has neither; the first is missing for a picture that came row by row.
                 cut_points: 0,
-                // Telemetry does not have it either.
                 sampled: 0,
                 looks: o.looks.into(),
             },

@@ -81,8 +81,8 @@ pub trait Board {
     fn read_copy(&mut self, copy: u8, into: &mut [u8]);
     /// Writes copy 1 or 2 of the parameters. Returns false if the memory refuses.
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool;
-    /// Takes note of the parameters of the sensor that is in use from now on, for a log, for example: at the start, after
-    /// a telecommand, and after the repair of a memory error.
+    /// Takes note of the parameters of the sensor that is in use from now on, for a log, for example: at the start,
+    /// after a telecommand, and after the repair of a memory error.
     fn note_sensor(&mut self, _config: &Config) {}
     /// Returns the largest use of the stack since the start in bytes; 0 if unknown.
     fn stack_bytes(&mut self) -> u32;

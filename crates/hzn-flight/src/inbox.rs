@@ -9,9 +9,9 @@
 //!
 //! A damaged packet does not say where it ends. For [`MAX_BYTES`] bytes after its marker, a packet is therefore taken
 //! only if whole packets alone follow it, one after the other, up to a pause of the line or up to the end of these
-//! bytes. A packet inside the damaged one is refused, also if others lie beside it there: the rest of the damaged packet,
-//! at least its checksum, follows them without a pause. A marker with a few wrong bits, or without one of its bytes,
-//! also begins a damaged packet.
+//! bytes. A packet inside the damaged one is refused, also if others lie beside it there: the rest of the damaged
+//! packet, at least its checksum, follows them without a pause. A marker with a few wrong bits, or without one of its
+//! bytes, also begins a damaged packet.
 
 use crate::packet::{self, HEADER, MAX_BYTES, Packet, SYNC};
 
@@ -252,8 +252,8 @@ impl Inbox {
         if self.since_damage < MAX_BYTES { self.confirm(length, is_quiet, is_late) } else { Step::Packet(length) }
     }
 
-    /// Finds out whether the packet at the start, of `length` bytes, is no part of the damaged packet, from what follows
-    /// it.
+    /// Finds out whether the packet at the start, of `length` bytes, is no part of the damaged packet, from what
+    /// follows it.
     fn confirm(&mut self, length: usize, is_quiet: bool, is_late: bool) -> Step {
         // The damaged packet has ended before these bytes do.
         while self.since_damage + self.checked < MAX_BYTES {
@@ -274,7 +274,8 @@ impl Inbox {
                 }
             };
             let Some(next) = next else {
-                // A packet that is cut off by a pause shows nothing. Without a pause, no more bytes than these are kept.
+                // A packet that is cut off by a pause shows nothing. Without a pause, no more bytes than these are
+                // kept.
                 if is_quiet || is_late || need > CAPACITY {
                     return refused;
                 }
@@ -290,8 +291,8 @@ impl Inbox {
         Step::Packet(length)
     }
 
-    /// Returns what follows the packets whose checksums are right. One byte before the pause or the next marker does not
-    /// matter: some drivers of a line add it when they switch off.
+    /// Returns what follows the packets whose checksums are right. One byte before the pause or the next marker does
+    /// not matter: some drivers of a line add it when they switch off.
     fn after_checked(&self, is_quiet: bool) -> After {
         let held = self.bytes.get(self.start..self.end).unwrap_or_default();
         let times = self.arrived.get(self.start..self.end).unwrap_or_default();

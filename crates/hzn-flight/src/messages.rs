@@ -208,8 +208,8 @@ record! {
         answers: u32,
         /// Pictures lost by overrun.
         lost: u32,
-        /// Pictures without an answer, which `pictures` does not count: of wrong size or incomplete, refused row by row,
-        /// with an impossible prior, or lost to a memory error. `stuck` counts other pictures.
+        /// Pictures without an answer, which `pictures` does not count: of wrong size or incomplete, refused row by
+        /// row, with an impossible prior, or lost to a memory error. `stuck` counts other pictures.
         refused: u32,
         /// Telecommands that were carried out.
         commands: u16,
@@ -284,7 +284,8 @@ record! {
         /// [`Code`] as a number.
         code: u8,
         /// What was refused: the number of a parameter, or, after `known` and `navigate`, the place of a number in
-        /// [`Navigation`], from 1; 0: not said. After code 9, the sequence count of the last telecommand that was taken.
+        /// [`Navigation`], from 1; 0: not said. After code 9, the sequence count of the last telecommand that was
+        /// taken.
         detail: u16,
     }
 }

@@ -72,8 +72,8 @@ pub fn load(board: &mut impl Board, buffer: &mut [u8], choice: Choice) -> Loaded
     out
 }
 
-/// Writes the next generation over a copy, and reads it back. Returns the copy and the generation. The other copy stays:
-/// the one in use, or the only valid one.
+/// Writes the next generation over a copy, and reads it back. Returns the copy and the generation. The other copy
+/// stays: the one in use, or the only valid one.
 ///
 /// # Errors
 /// Returns the copy that the memory did not keep.
@@ -85,15 +85,15 @@ pub fn save(
     generation: u32,
     buffer: &mut [u8],
 ) -> Result<(u8, u32), u8> {
-    // The copy that stays is not touched, so that a power cut at any byte leaves it whole. The copy in use may have been
-    // damaged since the start; writing the other one would then put the only parameters at risk.
+    // The copy that stays is not touched, so that a power cut at any byte leaves it whole. The copy in use may have
+    // been damaged since the start; writing the other one would then put the only parameters at risk.
     let (first, second) = if current == 1 { (1, 2) } else { (2, 1) };
     let (staying, copy) = match (generation_of(board, first, buffer), generation_of(board, second, buffer)) {
         (None, Some(kept)) => (Some(kept), first),
         (kept, _) => (kept, second),
     };
-    // Above that of the copy that stays, so that the new copy is the newer one. Wrapping, because no flash lives through
-    // 2^32 writes.
+    // Above that of the copy that stays, so that the new copy is the newer one. Wrapping, because no flash lives
+    // through 2^32 writes.
     let generation = staying.map_or(generation, |kept| kept.max(generation)).wrapping_add(1);
     let written = table::write(parameters, generation, buffer)
         .and_then(|n| buffer.get(..n))

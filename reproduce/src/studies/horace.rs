@@ -93,8 +93,8 @@ pub(super) fn criteria(effort: &Effort) -> anyhow::Result<Section> {
     );
     s.text(
         "The 0.6° of [B14] is |mean| + standard deviation of the error of the unit vector in the picture (2.37). It \
-         has two dimensions, and the centre of a circle gives it also in a tilted picture. The errors of the other rows \
-         are angles between axes in space. The two quantities must not be compared.",
+         has two dimensions, and the centre of a circle gives it also in a tilted picture. The errors of the other \
+         rows are angles between axes in space. The two quantities must not be compared.",
     );
     add_own_camera(&mut s, effort)?;
     Ok(s)

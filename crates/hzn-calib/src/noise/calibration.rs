@@ -79,8 +79,8 @@ pub struct Edge {
     pub length_px: f64,
     /// White part ν of the variance in that model.
     pub white: f64,
-    /// 1-sigma of the part of the errors that averages out over [`Self::slow_px`], in pixels: the white part, and most of
-    /// errors whose length is much shorter.
+    /// 1-sigma of the part of the errors that averages out over [`Self::slow_px`], in pixels: the white part, and most
+    /// of errors whose length is much shorter.
     pub white_px: f64,
     /// Correlation length of the rest, in pixels: L, and at least the length that the sensor assumes without a
     /// calibration.

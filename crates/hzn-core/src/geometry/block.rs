@@ -17,8 +17,8 @@ pub(crate) const LANES: usize = 8;
 pub(crate) const HALF_LANES: usize = LANES / 2;
 
 /// Smallest squared derivative of s·e by (u, v), per square pixel, for a division by it. Only empty lanes are smaller.
-// The derivative at the limb of a disc of the radius r in pixels is r/f²: 4e-14 for 4 px and a focal length of 1e7 px. Its
-// square is 2e-27. The reciprocal of the limit is a number in single precision, too.
+// The derivative at the limb of a disc of the radius r in pixels is r/f²: 4e-14 for 4 px and a focal length of 1e7 px.
+// Its square is 2e-27. The reciprocal of the limit is a number in single precision, too.
 pub(crate) const LEAST_GRADIENT2: f64 = 1e-36;
 
 /// The side of an edge point that is lit: the direction of the brightness gradient along the axis (u or v) on which the

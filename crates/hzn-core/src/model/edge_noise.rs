@@ -7,8 +7,8 @@ choices! {
     /// Source of the noise model of an edge.
     pub enum Noise {
         /// The sigma, the common shift and the RMS of the common tilt each equal the RMS of the edge's residuals. The
-        /// correlation length is a twelfth of the edge's length. The common bend is as strong as the strongest slow wave
-        /// of the residuals. The values of `[covariance]` are the floors of these five numbers.
+        /// correlation length is a twelfth of the edge's length. The common bend is as strong as the strongest slow
+        /// wave of the residuals. The values of `[covariance]` are the floors of these five numbers.
         // The default measures in each picture, because no fixed set of values held on flights with other seeds:
         // between 0 and 38 % of the answers were beyond 3 sigma.
         @1 Rms = "rms";

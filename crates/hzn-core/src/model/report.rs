@@ -244,7 +244,8 @@ pub struct Solution<T> {
     /// the part (`braun-barf`), or when the answer came by telemetry.
     ///
     /// All terms of the [`ErrorBudget`](crate::covariance::ErrorBudget) are common except the errors of the edge
-    /// points: the noise of the detector is new in every picture, and the vehicle moves past clouds. The part includes the gain of the fusion with the expected half-angle.
+    /// points: the noise of the detector is new in every picture, and the vehicle moves past clouds. The part includes
+    /// the gain of the fusion with the expected half-angle.
     pub common: Option<Cov3<Cam, T>>,
     /// The same direction in the fixed frame, computed from the position; only for `earth` with a position. A filter
     /// needs both directions.

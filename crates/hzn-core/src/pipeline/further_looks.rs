@@ -18,8 +18,8 @@ use crate::model::work::WorkBudget;
 use crate::stages::contour::BinaryPicture;
 use crate::stages::threshold::{self, Level};
 
-/// Largest number of times that the noise is measured for the first threshold. The second measurement includes the noise
-/// that the first one cut off.
+/// Largest number of times that the noise is measured for the first threshold. The second measurement includes the
+/// noise that the first one cut off.
 const NOISE_PASSES: usize = 2;
 
 /// Returns whether the look gave no answer and a further look may give one. In a glow, every threshold has an edge.
@@ -101,9 +101,9 @@ impl<T: Real> Sensor<T> {
         }
     }
 
-    /// Raises a threshold within the noise of the dark pixels to `retry.min_sigma` above their mean: there an edge would
-    /// follow the noise. The noise is measured only if the spread of the dark pixels, which includes it, allows that the
-    /// threshold is too low.
+    /// Raises a threshold within the noise of the dark pixels to `retry.min_sigma` above their mean: there an edge
+    /// would follow the noise. The noise is measured only if the spread of the dark pixels, which includes it, allows
+    /// that the threshold is too low.
     fn raise_above_noise<P: Pixels, O: Observer<T>>(
         &self,
         look: &Look<'_, T, P, O>,

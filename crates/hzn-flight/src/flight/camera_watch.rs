@@ -63,7 +63,8 @@ impl CameraWatch {
     pub(super) fn becomes_silent(&mut self, now_us: u64) -> Option<u64> {
         let waited_us = now_us.saturating_sub(self.waiting_since_us);
         let least_us = if self.intervals < MEAN_OF { FIRST_US } else { LEAST_US };
-        // One and a half periods, so that a picture may be a fifth late, and the event of a slow camera comes within two.
+        // One and a half periods, so that a picture may be a fifth late, and the event of a slow camera comes within
+        // two.
         let longest_us = least_us.max(self.period_us.saturating_add(self.period_us / 2));
         if self.is_silent || waited_us <= longest_us {
             return None;

@@ -12,7 +12,8 @@ impl<B: Board> Flight<'_, B> {
     pub(super) fn report_by_time(&mut self, now_us: u64) {
         let period_us = u64::from(self.operations.get().housekeeping_s) * 1_000_000;
         if now_us.saturating_sub(self.housekeeping_us) >= period_us {
-            // Modes without pictures have no other comparison, and a second flip in the same place would hide the first.
+            // Modes without pictures have no other comparison, and a second flip in the same place would hide the
+            // first.
             self.check_memory(None);
             self.send_housekeeping();
         }

@@ -79,8 +79,8 @@ fn a_camera_with_jitter_is_not_silent() {
     fly(ready(), |f| {
         send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
         take_sent(f);
-        // Pictures come every 40 ms, each up to 8 ms early or late, for 80 s; every hundredth is 0.9 s late, because the
-        // operating system pauses. Then they come every 100 ms, and every 2 s.
+        // Pictures come every 40 ms, each up to 8 ms early or late, for 80 s; every hundredth is 0.9 s late, because
+        // the operating system pauses. Then they come every 100 ms, and every 2 s.
         let mut random = 1u32;
         let mut told = Vec::new();
         for picture in 0..2106u64 {

@@ -248,8 +248,8 @@ fn prior<T: Real>(data: Option<&FrameData>, which: usize, body: &body::Config) -
     data.map_or(Ok(Prior::default()), |d| Ok(with_sun(d.for_body(which, body)?.to_prior(None), d, body)))
 }
 
-/// Largest 1σ of an attitude that gives the direction of the Sun, degrees: three of them are the 18° between the horizon
-/// and the end of twilight, from which on the gates refuse an unlit limb.
+/// Largest 1σ of an attitude that gives the direction of the Sun, degrees: three of them are the 18° between the
+/// horizon and the end of twilight, from which on the gates refuse an unlit limb.
 const SUN_ATTITUDE_DEG: f64 = 6.0;
 
 /// Adds the Sun to the prior of the Earth: its elevation at the point below the camera, and with an attitude its

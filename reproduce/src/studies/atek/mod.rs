@@ -89,9 +89,9 @@ fn score_all(flights: &[(Scenario, Inputs)]) -> Table {
 }
 
 /// What no filter can do better before the vehicle turns.
-const BEFORE_THE_TURN: &str = "Before the vehicle turns, an attitude with a prior of 2° and two cameras with mounts of 1° \
-    cannot be better than 3/√(1/2² + 2/1²) = 2.0° (3σ). The 1.1° of [BB] needs rotation against the directions, or it is \
-    too small because of (48) with (50) as printed (book/theory/navigation.md).";
+const BEFORE_THE_TURN: &str = "Before the vehicle turns, an attitude with a prior of 2° and two cameras with mounts of \
+    1° cannot be better than 3/√(1/2² + 2/1²) = 2.0° (3σ). The 1.1° of [BB] needs rotation against the directions, or \
+    it is too small because of (48) with (50) as printed (book/theory/navigation.md).";
 
 pub(super) fn navigation(effort: &Effort) -> anyhow::Result<Section> {
     let count = effort.frames(PICTURES);

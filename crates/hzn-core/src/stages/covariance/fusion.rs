@@ -29,19 +29,7 @@ pub(super) fn fused<T: Real>(
     }
     let total = p.m33 + var_c;
     let difference = expected.cos - fit.c;
-    // The axis moves with the half-angle, because on an arc both are known only together: on a short arc the fusion
-    // makes sigma three to six times smaller.
-    let with_half_angle = V3::new(p.m13, p.m23, p.m33);
-    let (k, moved, prior) = match expected.update(fit.c, p.m33) {
-        None => {
-            let k = with_half_angle * (T::one() / total);
-            (k, k * difference, k * expected.sigma_cos)
-        }
-        Some(exact) => {
-            let by = |x: T| with_half_angle * x;
-            (by(exact.weight), by(exact.moved), by(exact.sigma_weight))
-        }
-    };
+    let [k, moved, prior] = gain(fit, p, expected, total);
     let e = unit(&(fit.e + b1 * moved.x + b2 * moved.y))?;
     if let Some(budget) = budget {
         budget.project(&b1, &b2, [k.x, k.y], [prior.x, prior.y], expected);
@@ -72,6 +60,21 @@ pub(super) fn fused<T: Real>(
         edge,
         located: None,
     })
+}
+
+/// Returns the gain of the fusion, the change of (δ₁₂, δc), and its change for one sigma of the expected half-angle.
+///
+/// The axis moves with the half-angle, because on an arc both are known only together: on a short arc the fusion makes
+/// sigma three to six times smaller.
+fn gain<T: Real>(fit: &Fit<T>, p: &M3<T>, expected: &Expected<T>, total: T) -> [V3<T>; 3] {
+    let with_half_angle = V3::new(p.m13, p.m23, p.m33);
+    match expected.update(fit.c, p.m33) {
+        None => {
+            let k = with_half_angle * (T::one() / total);
+            [k, k * (expected.cos - fit.c), k * expected.sigma_cos]
+        }
+        Some(exact) => [exact.weight, exact.moved, exact.sigma_weight].map(|x| with_half_angle * x),
+    }
 }
 
 /// Returns the answer of a fit whose half-angle is not fused with the expected one.

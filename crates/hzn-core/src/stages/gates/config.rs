@@ -117,8 +117,8 @@ section! {
         /// Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does
         /// `body.sunlit = false`, which is for a thermal camera.
         ///
-        /// A Sun more than 18° below the horizon does not light a point. With the column `utc` and a position the Sun is
-        /// known, too: at night no limb of the Earth counts. It is night where the Sun is 18° plus the dip of the
+        /// A Sun more than 18° below the horizon does not light a point. With the column `utc` and a position the Sun
+        /// is known, too: at night no limb of the Earth counts. It is night where the Sun is 18° plus the dip of the
         /// horizon below the horizon of the point below the camera. An attitude then gives the direction of the Sun, if
         /// the columns `sun_x` to `sun_z` are empty.
         @- max_unlit: f64 = 0.5, [0.0 to 1.0];

@@ -5,8 +5,8 @@ use super::sun::LOWEST_SUN_DEG;
 use crate::base::real::Real;
 use crate::model::verdict::Verdict;
 
-/// Refuses every limb if the Sun lights none of it: if it is more than dip + 18° below the horizon of the point below the
-/// camera.
+/// Refuses every limb if the Sun lights none of it: if it is more than dip + 18° below the horizon of the point below
+/// the camera.
 ///
 /// The limb is as far from this point as the dip of the horizon, 90° − α, along the surface. At the limb's part that is
 /// nearest to the Sun, the Sun stands higher by the dip. At 18° below the horizon there, twilight ends.

@@ -1,7 +1,7 @@
 //! Blocks of one grey that a decoder puts where the data of a picture are lost.
 //!
-//! A lost packet leaves blocks in which every pixel has exactly the same value, the same in every block. Otsu's threshold
-//! of a dim picture then separates the blocks from everything else.
+//! A lost packet leaves blocks in which every pixel has exactly the same value, the same in every block. Otsu's
+//! threshold of a dim picture then separates the blocks from everything else.
 
 use super::sample::{SIDES_LOG2, Sample};
 use super::{Brightness, Config, Level};
@@ -21,10 +21,10 @@ pub(crate) const READS: u32 = 16 << (2 * SIDES_LOG2[0]);
 
 /// Returns the threshold of the picture without the pixels of lost blocks; `None` without lost blocks.
 ///
-/// A pixel counts as one of a block if it lies in a run of equal pixels as long as a block. With a noise of one count, that
-/// happens to one pixel in a thousand. All pixels of blocks must have
-/// one value, which is neither black nor full scale. Most other pixels that are not black must lie in no such run,
-/// because in a picture without noise every pixel lies in such a run.
+/// A pixel counts as one of a block if it lies in a run of equal pixels as long as a block. With a noise of one count,
+/// that happens to one pixel in a thousand. All pixels of blocks must have one value, which is neither black nor full
+/// scale. Most other pixels that are not black must lie in no such run, because in a picture without noise every pixel
+/// lies in such a run.
 #[cold]
 pub(crate) fn without_lost_blocks<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,

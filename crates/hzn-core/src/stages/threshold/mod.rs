@@ -66,9 +66,9 @@ pub(crate) const NOISE_READS: u32 = 2 << (2 * SIDES_LOG2[0]);
 /// Returns the 1-sigma noise of the dark pixels in counts, from the differences of neighbours below the threshold
 /// `level`. The result is 0 if there are no dark neighbours.
 ///
-/// If the noise is clipped at 0 counts, its differences are smaller: by half if half of the noise is clipped, and nearly
-/// in proportion to the part that is not. The part of the dark pixels that are 0 corrects this, up to a half. Black
-/// corners of an image circle, which have no noise, are corrected in the same way.
+/// If the noise is clipped at 0 counts, its differences are smaller: by half if half of the noise is clipped, and
+/// nearly in proportion to the part that is not. The part of the dark pixels that are 0 corrects this, up to a half.
+/// Black corners of an image circle, which have no noise, are corrected in the same way.
 #[cold]
 pub(crate) fn dark_noise<T: Real, P: Pixels, O: Observer<T>>(
     picture: &P,
