@@ -106,7 +106,7 @@ fn an_uncertain_altitude_allows_the_half_angles_of_its_bounds() {
 fn a_body_of_any_size_is_fitted_as_well() {
     // A radius of 40 px at every focal length: the half-angle is 4e-3 to 4e-6 rad.
     for focal_px in [1e4, 6e5, 1.2e6, 1e7] {
-        let half_angle_deg = (40.0 / focal_px as f64).to_degrees();
+        let half_angle_deg = (40.0f64 / focal_px).to_degrees();
         let mut config = sensor(320, 240, focal_px);
         config.body.radius_km = Some(100.0);
         config.body.altitude_km = Some(100.0 * (1.0 / half_angle_deg.to_radians().sin() - 1.0));

@@ -58,7 +58,8 @@ fn lost_value<T: Real, P: Pixels, O: Observer<T>>(
             if value > 0 && value < picture.full_scale() {
                 if is_flat(picture, region, x, y) {
                     flat.set(flat.get() + 1);
-                    (least.set(least.get().min(value)), most.set(most.get().max(value)));
+                    least.set(least.get().min(value));
+                    most.set(most.get().max(value));
                 } else {
                     other.set(other.get() + 1);
                 }
