@@ -21,6 +21,7 @@ use crate::flash::Flash;
 use crate::latency::Latency;
 use crate::link::Link;
 use crate::log::Log;
+use crate::log_clock::LogClock;
 use crate::notify::Notify;
 use crate::signals::Lines;
 use crate::tell::{Rarely, Tell};
@@ -56,8 +57,7 @@ pub(crate) struct Parts {
 /// The board.
 pub(crate) struct Linux {
     start: Instant,
-    /// Time of the start, s since 1970.
-    start_s: f64,
+    clock: LogClock,
     parts: Parts,
     arrived: VecDeque<u8>,
     next: Option<Shot>,
@@ -70,10 +70,9 @@ pub(crate) struct Linux {
 
 impl Linux {
     pub(crate) fn new(parts: Parts) -> Self {
-        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self {
             start: Instant::now(),
-            start_s: since_1970.as_secs_f64(),
+            clock: LogClock::new(system_s(), 0),
             not_stored: Rarely::new(parts.tell.clone()),
             parts,
             arrived: VecDeque::new(),
@@ -131,6 +130,16 @@ impl Linux {
         &mut self.parts
     }
 
+    /// Keeps a step of the log's clock for the log.
+    fn note_step(&mut self, by: &str, step_s: Option<f64>) {
+        let Some(step_s) = step_s else { return };
+        let message = format!("{by} has set the clock of the log by {step_s:+.3} s");
+        (self.parts.tell)(&message);
+        if self.events.len() < EVENTS {
+            self.events.push(LogLine { level: LogLevel::Warning, message });
+        }
+    }
+
     /// Keeps an event for the log.
     fn note_event(&mut self, record: &EventRecord) {
         let level = match Severity::from_number(record.severity) {
@@ -147,6 +156,11 @@ impl Linux {
             self.events.push(LogLine { level, message });
         }
     }
+}
+
+/// Returns the clock of the system, s since 1970.
+fn system_s() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64()
 }
 
 impl Board for Linux {
@@ -174,6 +188,12 @@ impl Board for Linux {
             && let Some(record) = EventRecord::read(&mut Reader::new(packet.user))
         {
             self.note_event(&record);
+            // The packet has the time of now.
+            if let Some(time) = packet.time.filter(|_| record.number == Event::ClockSet as u16) {
+                let now_us = self.now_us();
+                let step_s = self.clock.correlate(time.us, now_us);
+                self.note_step("the telecommand time", step_s);
+            }
         }
     }
     fn lift_off(&mut self) -> bool {
@@ -246,11 +266,14 @@ impl Board for Linux {
         self.counts.pictures += 1;
         self.counts.answers += u64::from(report.status == Status::Ok);
         let number = self.current.as_ref().map_or(0, |shot| shot.number);
+        let now_us = self.now_us();
+        let step_s = self.clock.follow_system(system_s(), now_us);
+        self.note_step("the system", step_s);
         let altitude_m = f64::from(exposure.altitude_m);
         let meta = RowMeta {
             index: u64::from(exposure.picture).saturating_sub(1),
             file: format!("frame-{number:06}"),
-            time_s: Some(self.start_s + exposure.exposure_us as f64 * 1e-6),
+            time_s: Some(self.clock.utc_s(exposure.exposure_us)),
             body: Parameters::body(exposure.body).map_or("?", |body| body.name()).to_owned(),
             altitude_km: (!altitude_m.is_nan()).then_some(altitude_m * 1e-3),
         };

@@ -8,6 +8,7 @@
 //! | [`camera`] | pictures from a pipe or a camera of Video4Linux 2 |
 //! | [`flash`] | the files that hold parameters and survive a crash |
 //! | [`log`] | the answers as recordings, within a share of the disk |
+//! | `log_clock` | the time of the log |
 //! | `notify` | messages to systemd |
 //! | `signals` | the lines of the vehicle, and the wish to stop |
 //! | [`latency`] | the time from the last byte of a picture to its packet |
@@ -30,6 +31,8 @@ pub mod latency;
 pub mod link;
 #[cfg(target_os = "linux")]
 pub mod log;
+#[cfg(target_os = "linux")]
+mod log_clock;
 #[cfg(target_os = "linux")]
 mod notify;
 #[cfg(target_os = "linux")]

@@ -1,17 +1,14 @@
 //! TAI, the time of a flight computer's packets, and UTC, the time of people.
 
 use hzn_fly::tell::Tell;
-use hzn_nav::time::{are_leap_seconds_known, tai_minus_utc_s};
+use hzn_nav::time::{are_leap_seconds_known, tai_minus_utc_s, unix_from_tai_s};
 
 /// Seconds from 1958-01-01 to 1970-01-01.
 const UNIX_EPOCH_S: f64 = 4383.0 * 86_400.0;
 
 /// Returns a time in TAI, in microseconds since 1958, as a text in UTC.
 pub fn utc_text(tai_us: u64) -> String {
-    let tai_s = tai_us as f64 * 1e-6 - UNIX_EPOCH_S;
-    // The difference changes only at the end of a month; near it the text may be one second off.
-    let unix_s = tai_s - tai_minus_utc_s(tai_s - tai_minus_utc_s(tai_s));
-    hzn_files::utc::iso8601(unix_s)
+    hzn_files::utc::iso8601(unix_from_tai_s(tai_us as f64 * 1e-6 - UNIX_EPOCH_S))
 }
 
 /// Returns a time in UTC, such as `2026-11-24T12:00:00.5Z`, as microseconds of TAI since 1958. `tell` gets a

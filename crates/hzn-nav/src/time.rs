@@ -18,6 +18,12 @@ pub fn tai_minus_utc_s(unix_s: f64) -> f64 {
     32.0 + since.iter().filter(|&&from| unix_s >= from).count() as f64
 }
 
+/// Returns a time in UTC, in seconds since 1970, from TAI in seconds since 1970-01-01T00:00 TAI.
+// The difference changes only at the end of a month; near it the result may be one second off.
+pub fn unix_from_tai_s(tai_s: f64) -> f64 {
+    tai_s - tai_minus_utc_s(tai_s - tai_minus_utc_s(tai_s))
+}
+
 /// Returns the days of terrestrial time since J2000 (2000-01-01T12:00 TT), from UTC in seconds since 1970.
 pub fn tt_days_since_j2000(unix_s: f64) -> f64 {
     ut_days_since_j2000(unix_s) + (tai_minus_utc_s(unix_s) + 32.184) / 86_400.0
