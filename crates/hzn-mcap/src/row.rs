@@ -364,8 +364,8 @@ impl Row {
         Some([self.cov_xx?, self.cov_xy?, self.cov_xz?, self.cov_yy?, self.cov_yz?, self.cov_zz?])
     }
 
-    /// Returns the part of the covariance that the next picture shares, in rad² (camera frame): xx, xy, xz, yy, yz, zz;
-    /// `None` if it is not known.
+    /// Returns the part of the covariance that the next picture shares, as [`Self::covariance`]; `None` if it is not
+    /// known.
     pub fn common_covariance(&self) -> Option<[f64; 6]> {
         Some([
             self.cov_common_xx?,

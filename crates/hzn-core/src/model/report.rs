@@ -243,7 +243,7 @@ pub struct Solution<T> {
     /// mean of n such answers has the covariance common + (covariance − common)/n. `None` if the method does not know
     /// the part (`braun-barf`), or when the answer came by telemetry.
     ///
-    /// All terms of the [`ErrorBudget`](crate::covariance::ErrorBudget) are common except the errors of the edge
+    /// All terms of the [`ErrorBudget`](crate::error_budget::ErrorBudget) are common except the errors of the edge
     /// points: the noise of the detector is new in every picture, and the vehicle moves past clouds. The part includes
     /// the gain of the fusion with the expected half-angle.
     pub common: Option<Cov3<Cam, T>>,

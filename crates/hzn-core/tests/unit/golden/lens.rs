@@ -206,16 +206,8 @@ fn the_budget_adds_up_and_measured_noise_has_the_told_as_floor() {
         for noise in [Noise::Given, Noise::Rms] {
             let mut blocks = blocks(&camera, &points, &e);
             let mut work = WorkBudget::unlimited();
-            let start = consensus::find(
-                &mut blocks,
-                points.len() as u32,
-                &expected,
-                fx,
-                consensus::Threshold::from_config(&config),
-                &config,
-                &mut work,
-            )
-            .unwrap();
+            let (threshold, count) = (consensus::Threshold::from_config(&config), points.len() as u32);
+            let start = consensus::find(&mut blocks, count, &expected, fx, threshold, &config, &mut work).unwrap();
             let noise = covariance::Config { noise, ..Default::default() };
             let fit = fit::fit(&mut blocks, &start, &expected, &camera, 3.0, &estimate, &noise).unwrap();
             let mut budget = ErrorBudget::new();
