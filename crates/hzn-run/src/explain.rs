@@ -85,6 +85,7 @@ const ORDER: &[Verdict] = &[
     Verdict::Unsupported,
     Verdict::Indistinct,
     Verdict::NoSky,
+    Verdict::Night,
     Verdict::Sun,
     Verdict::Faint,
     Verdict::Band,

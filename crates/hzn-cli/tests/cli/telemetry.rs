@@ -77,13 +77,15 @@ fn exposure(picture: u32) -> Exposure {
     }
 }
 
-/// Returns the cells of the first row by their names, without those that name the picture and its times.
+/// Returns the cells of the first row by their names, without those that name the picture and its times, and without the
+/// common part of the covariance, which is not sent.
 fn cells(place: &Place, file: &str) -> Vec<(String, String)> {
     let text = std::fs::read_to_string(place.path(file)).unwrap();
     let mut lines = text.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
     let (columns, row) = (lines.next().unwrap(), lines.next().unwrap());
     let other = ["index", "file", "time_s", "elapsed_us", "altitude_km", "crc32"];
-    columns.into_iter().zip(row).filter(|(c, _)| !other.contains(&c.as_str())).collect()
+    let is_sent = |column: &str| !other.contains(&column) && !column.starts_with("cov_common");
+    columns.into_iter().zip(row).filter(|(column, _)| is_sent(column)).collect()
 }
 
 #[test]
