@@ -192,5 +192,5 @@ def test_implausible_values_warn(tmp_path):
     camera = PARAMETERS["camera"] | {"cx_px": 119.5, "cy_px": 159.5, "width": 480}
     with pytest.warns(UserWarning, match="camera.cx_px: the centre"):
         hzn.Sensor(camera=camera)
-    with pytest.warns(UserWarning, match='write kind = "sphere" and radius_km = 1737.4'):
+    with pytest.warns(UserWarning, match='write kind = "sphere", radius_km = 1737.4, limb_height_km'):
         hzn.Sensor(camera=PARAMETERS["camera"], body={"kind": "moon", "altitude_km": 100.0})

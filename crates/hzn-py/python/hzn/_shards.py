@@ -70,11 +70,13 @@ def make(task: Task) -> Done:
     filesystem, _ = fsspec.core.url_to_fs(task.out)
     marks = [_attempt(_mark, url)[0] for url, _ in task.shard]
     name = _name(task, marks)
-    # A worker may have written it and then died, or a second worker may have got the same task.
-    if filesystem.exists(name):
+    existed = any(os.path.basename(older) == os.path.basename(name) for older in task.older)
+    # A shard that is new may be there, too: its worker wrote it and then died, or two workers got the same task.
+    if existed or filesystem.exists(name):
         failed = _unprocessed(filesystem, name)
-        if not (task.retry_failed and any(row["detail"].startswith(_NOT_READ) for row in failed)):
-            return Done(name, True, failed)
+        again = existed and task.retry_failed and any(row["detail"].startswith(_NOT_READ) for row in failed)
+        if not again:
+            return Done(name, existed, failed)
     reports = []
     for i, (url, known) in enumerate(task.shard):
         data, why = _attempt(_read, url)
