@@ -25,7 +25,7 @@ const STAGES: [&str; 11] = [
 ];
 /// Functions that convert values of the configuration to single precision, once per picture or per candidate. Each has
 /// the number of places that may do so, the larger one of the images `chain` and `measure`.
-const ALLOWED_CONVERSIONS: [(&str, usize); 14] = [
+const ALLOWED_CONVERSIONS: [(&str, usize); 16] = [
     ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::candidate::{{closure}}", 35),
     ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::judge_edge", 40),
     ("hzn_core::stages::consensus::inliers::Threshold<T>::new", 3),
@@ -40,6 +40,8 @@ const ALLOWED_CONVERSIONS: [(&str, usize); 14] = [
     ("hzn_core::stages::threshold::histogram::Histogram::mean", 2),
     ("hzn_core::stages::threshold::histogram::Histogram::otsu", 3),
     ("hzn_core::stages::threshold::level::fixed_level", 4),
+    ("hzn_core::stages::threshold::sample::Sample::decide", 8),
+    ("hzn_core::stages::threshold::small_body::split_small_body", 1),
 ];
 /// Number of places of a gate that may do so. A gate converts its limits, once per candidate.
 const CONVERSIONS_OF_A_GATE: usize = 8;

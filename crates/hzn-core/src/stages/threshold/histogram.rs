@@ -94,7 +94,7 @@ impl Histogram {
     }
     /// Returns the number of the first bin.
     fn offset<T: Real>(&self) -> T {
-        T::from_f64(f64::from(self.first))
+        T::from_i32(self.first as i32)
     }
 
     pub(super) fn mean<T: Real>(&self) -> Option<T> {
@@ -160,10 +160,11 @@ impl Histogram {
     fn spread<T: Real>(&self, last: u32, mean: T) -> T {
         let (mut count, mut sum) = (0u32, T::from_f64(0.0));
         for (&n, k) in self.bins.iter().zip(0..=last) {
-            let off = T::from_f64(f64::from(k)) - mean;
-            sum += T::from_f64(f64::from(n)) * off * off;
+            // Whole numbers below 2²⁴ are exact in both precisions, and need no double on a core without them.
+            let off = T::from_i32(k as i32) - mean;
+            sum += T::from_i32(n.into()) * off * off;
             count += u32::from(n);
         }
-        (sum / T::from_f64(f64::from(count.max(1))) + T::from_f64(1.0 / 12.0)).sqrt()
+        (sum / T::from_i32(count.max(1) as i32) + T::from_f64(1.0 / 12.0)).sqrt()
     }
 }
