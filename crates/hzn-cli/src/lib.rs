@@ -13,10 +13,12 @@ mod doubts;
 pub mod exit;
 mod files;
 mod html;
+mod limb_fov;
 mod progress;
 mod refusals;
 mod setup;
 mod tell;
+mod what_fits;
 
 use std::ffi::OsString;
 

@@ -38,10 +38,31 @@ impl Why {
 pub(crate) struct Refusals {
     /// Number of answers that a further look at another threshold gave.
     further: u64,
-    /// For each reason: the reason, its count, and the number of the first picture with it that was processed for every
-    /// body.
-    each: Vec<(Why, u64, Option<u64>)>,
+    each: Vec<Reason>,
     total: u64,
+}
+
+/// Most pictures with one reason that are kept to look at again.
+const MAX_KEPT: usize = 5;
+
+/// A reason with its count.
+#[derive(Debug)]
+struct Reason {
+    why: Why,
+    count: u64,
+    /// Numbers of the first pictures with it that were processed for every body.
+    first: Vec<u64>,
+}
+
+/// The commonest reason.
+#[derive(Debug)]
+pub(crate) struct Commonest<'a> {
+    /// The reason in words, with its count.
+    pub(crate) text: String,
+    /// Numbers of the first pictures with it.
+    pub(crate) pictures: &'a [u64],
+    /// Whether the body may have another size than expected.
+    pub(crate) is_size: bool,
 }
 
 impl Refusals {
@@ -51,9 +72,12 @@ impl Refusals {
         self.further += frame.outcomes.iter().filter(|f| f.report.as_ref().is_ok_and(is_further)).count() as u64;
         for why in frame.outcomes.iter().filter_map(|f| Why::from_report(f.report.as_ref().ok()?)) {
             self.total += 1;
-            match self.each.iter_mut().find(|(known, ..)| *known == why) {
-                Some((_, n, first)) => (*n, *first) = (*n + 1, first.or(first_here)),
-                None => self.each.push((why, 1, first_here)),
+            match self.each.iter_mut().find(|known| known.why == why) {
+                Some(known) => {
+                    known.count += 1;
+                    known.first.extend(first_here.filter(|_| known.first.len() < MAX_KEPT));
+                }
+                None => self.each.push(Reason { why, count: 1, first: first_here.into_iter().collect() }),
             }
         }
     }
@@ -67,12 +91,15 @@ impl Refusals {
         }
     }
 
-    /// Returns the commonest reason in words, and the number of the first picture with it. Among equally common reasons
-    /// the first is used.
-    pub(crate) fn commonest(&self, limits: &gates::Config) -> Option<(String, Option<u64>)> {
-        let (why, n, first) = self.each.iter().rev().max_by_key(|(_, n, _)| *n)?;
-        let share = if *n == self.total { "all".to_owned() } else { format!("{n}") };
-        Some((format!("{} refused, {share} as {}", self.total, why.text(limits)), *first))
+    /// Returns the commonest reason. Among equally common reasons the first is used.
+    pub(crate) fn commonest(&self, limits: &gates::Config) -> Option<Commonest<'_>> {
+        let Reason { why, count, first } = self.each.iter().rev().max_by_key(|reason| reason.count)?;
+        let share = if *count == self.total { "all".to_owned() } else { format!("{count}") };
+        Some(Commonest {
+            text: format!("{} refused, {share} as {}", self.total, why.text(limits)),
+            pictures: first,
+            is_size: matches!(why, Why::Verdict(Verdict::HalfAngle | Verdict::NoConsensus | Verdict::FewInliers)),
+        })
     }
 }
 

@@ -19,7 +19,6 @@ mod body_defaults;
 pub mod camera_file;
 mod camera_section;
 pub mod document;
-mod exif_lens;
 pub mod frames;
 pub mod keys;
 pub mod limited;

@@ -7,6 +7,7 @@ use hzn_core::Config;
 use hzn_core::body::PriorError;
 use hzn_files::{FrameData, plausible, sensor};
 use hzn_mcap::{Row, RowMeta};
+use hzn_run::diagnosis::{self, AnyCone};
 use hzn_run::engine::{Traces, Unprocessed};
 use hzn_run::source::Payload;
 use pyo3::exceptions::PyTypeError;
@@ -165,6 +166,30 @@ impl Sensor {
         let time_s = data.time_s.or(read.time_s);
         let data = FrameData { time_s, utc_s: time_s, ..data };
         read.process(py, &state, &data, bits, detail)
+    }
+
+    #[doc = doc!("Sensor.what_fits")]
+    #[pyo3(signature = (image, *, altitude_km = None, position_km = None, bits = None))]
+    fn what_fits(
+        &self,
+        py: Python<'_>,
+        image: &Bound<'_, PyAny>,
+        altitude_km: Option<f64>,
+        position_km: Option<[f64; 3]>,
+        bits: Option<u8>,
+    ) -> PyResult<Option<String>> {
+        let Prior { data } = Prior::new(altitude_km, position_km, None, None, None, None, None, None, None, None)?;
+        let state = self.state();
+        let array = Array::from_object(image)?;
+        state.check_size(&array)?;
+        let view = array.view(array.bits(bits, &state.config.input), state.config.input.channel)?;
+        let (config, lens) = (&state.config, &state.camera.lens);
+        let mut trial = AnyCone::new(config, state.flight).map_err(errors::config)?;
+        let fit = errors::detached(py, || match &view {
+            View::Packed(view) => diagnosis::find_misfit(&mut trial, config, view, Some(&data)),
+            View::Strided(view) => diagnosis::find_misfit(&mut trial, config, view, Some(&data)),
+        })?;
+        Ok(fit.map(|fit| diagnosis::what_fits(&fit, lens, config.camera.width)))
     }
 
     #[doc = doc!("Sensor.process_many")]

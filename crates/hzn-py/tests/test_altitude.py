@@ -99,3 +99,15 @@ def test_a_body_that_has_no_limb_in_view():
     far = sensor.process(limb(), attitude=[1, 0, 0, 0], range_km=1e9, range_sigma_km=1.0)
     assert (inside.status, far.status) == ("no-altitude", "no-altitude")
     assert "inside the body" in inside.detail and "px wide at this distance" in far.detail
+
+
+def test_a_wrong_altitude_is_told(sensor):
+    picture = limb()
+    assert sensor.what_fits(picture) is None, "the limb has the expected size"
+    assert not sensor.process(picture, altitude_km=1500.0).ok
+    words = sensor.what_fits(picture, altitude_km=1500.0)
+    assert words.startswith("the limb fits 70.") and "a field of view of" in words and "at 1500 km" in words
+    altitude, sigma = words.split("altitude ")[1].split(" km")[0].split(" +- ")
+    assert abs(float(altitude) - 400.0) < 3.0 * float(sigma)
+    with pytest.raises(hzn.ImageError):
+        sensor.what_fits(picture[:10])

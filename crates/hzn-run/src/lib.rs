@@ -4,8 +4,9 @@
 //! [`open`] opens a sequence with its sensor, by the same rules for every program. A [`source`] hands out pictures in
 //! order. The [`engine`] processes them with the sensor on all cores. A [`sink`] takes the results in order.
 //! [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of their rows. [`overlay`] draws
-//! the result over a picture, and [`explain`] describes in words what happened to it. [`disk`] has the errors of files
-//! that cannot be written. [`terminal`] makes text from files safe for a terminal.
+//! the result over a picture, and [`explain`] describes in words what happened to it. [`diagnosis`] says what would
+//! make a refused limb the expected one. [`disk`] has the errors of files that cannot be written. [`terminal`] makes
+//! text from files safe for a terminal.
 //!
 //! The command line, the Python package and the viewer are built on this crate. It prints nothing, and its [`Error`]
 //! contains no exit code and no name of an option.
@@ -13,6 +14,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "a library prints nothing; the caller does")]
 
 pub mod checked_row;
+pub mod diagnosis;
 pub mod disk;
 pub mod engine;
 mod error;

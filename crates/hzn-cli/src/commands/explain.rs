@@ -4,10 +4,12 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use hzn_core::camera::Camera;
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Report, Solution, body, threshold};
 use hzn_files::FrameData;
 use hzn_mcap::Annotations;
+use hzn_run::diagnosis::{self, AnyCone};
 use hzn_run::engine::{AnySensor, Trace, Traces, Unprocessed};
 use hzn_run::open::Opened;
 use hzn_run::source::{self, Item, Picture, Source};
@@ -132,6 +134,7 @@ impl PictureWithPrior<'_> {
                 }
             };
             let levels = config.threshold_of(which as u8);
+            let fits = self.what_fits(&report, sensor.camera(), args.sensor.flight);
             let is_dark = report.solution.is_none() && self.is_answered_inverted(&mut sensor, which)?;
             let explained = Explained {
                 name: file,
@@ -143,6 +146,7 @@ impl PictureWithPrior<'_> {
                 trace,
                 report: &report,
                 half_angle,
+                fits,
                 is_dark,
             };
             tell::result(format_args!("{between}{}", explained.text(decoding, time.elapsed)))?;
@@ -158,9 +162,19 @@ impl PictureWithPrior<'_> {
         }
         Ok(exit)
     }
-}
 
-impl PictureWithPrior<'_> {
+    /// Says what would fit a limb of another size than the expected one, if the picture has no answer but such a limb.
+    fn what_fits(&self, report: &Report<f64>, camera: &Camera<f64>, flight: bool) -> Option<String> {
+        let Self { config, data, picture, .. } = *self;
+        if report.solution.is_some() {
+            return None;
+        }
+        let view = picture.view(config.input.channel).ok()?;
+        let mut trial = AnyCone::new(config, flight).ok()?;
+        let fit = diagnosis::find_misfit(&mut trial, config, &view, data)?;
+        Some(diagnosis::what_fits(&fit, camera, config.camera.width))
+    }
+
     /// Returns whether the picture has an answer for a body if dark and bright are exchanged: the border of a dark hole
     /// then fits the limb.
     fn is_answered_inverted(&self, sensor: &mut AnySensor, which: usize) -> Result<bool, Stop> {
@@ -185,6 +199,8 @@ struct Explained<'a> {
     trace: &'a Trace,
     report: &'a Report<f64>,
     half_angle: f64,
+    /// What would fit a limb of another size.
+    fits: Option<String>,
     /// Whether the inverted picture has an answer.
     is_dark: bool,
 }
@@ -207,7 +223,10 @@ impl Explained<'_> {
         line("status", self.report.status.name().to_owned());
         match &self.report.solution {
             Some(s) => self.answer(s, &mut line),
-            None => self.advice(&mut line),
+            None => {
+                self.fits.iter().for_each(|fits| line("fits", fits.clone()));
+                self.advice(&mut line);
+            }
         }
         self.times(decoding, elapsed, &mut line);
         out

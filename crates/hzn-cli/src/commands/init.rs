@@ -3,27 +3,30 @@
 use std::path::PathBuf;
 
 use hzn_core::camera::Model;
-use hzn_files::start::{self, CameraFacts};
+use hzn_files::start::{self, CameraFacts, MeasuredFov};
+use hzn_run::diagnosis::FieldOfView;
 use hzn_run::disk;
+use hzn_run::open::Request;
 use hzn_run::source::{self, Payload, Source};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::tell;
+use crate::{limb_fov, tell};
 
 const EXAMPLES: &str = "\
 Examples:
   hzn init                                          every key, into sensor.toml
   hzn init flight/ --fov 92 --lens fisheye          a fisheye that sees 92 degrees over the width
   hzn init IMG_0001.JPG --altitude 418 -o iss.toml  the lens as EXIF has it, pictures from 418 km
+  hzn init flight/ --altitude 418                   without EXIF: the field of view from the limb itself
   hzn init moon/ --fov 40 --body moon --altitude 100
                                                     a camera in orbit around the Moon";
 
 /// Write a sensor.toml to start from
 ///
-/// With pictures: the file is for the camera that took them. The focal length comes from a field of view (--fov) or
-/// from the EXIF data of the pictures. The sigmas of the lens are large, because these values are rough; with an
-/// altitude the file works at once. Without pictures: the file has every key with its default and a comment, and only
-/// the camera must be filled in.
+/// With pictures: the file is for the camera that took them. The focal length comes from a field of view (--fov), from
+/// their EXIF, or else from the curvature of the limb in them, for which an altitude must be known. Its sigmas are
+/// large, because these values are rough; with an altitude the file works at once.
+/// Without pictures: the file has every key with its default and a comment, and only the camera must be filled in.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
@@ -104,7 +107,11 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));
         return Ok(Exit::Done);
     };
-    let known = known(args, source.as_mut())?;
+    let mut known = known(args, source.as_mut())?;
+    let found = if known.has_focal() { None } else { limb_fov(args, &known)? };
+    if let Some(found) = &found {
+        (known.lens, known.measured) = (Some(found.lens), Some(found.measured));
+    }
     let start = start::write_sensor_toml(&known).map_err(usage)?;
     write(&start.text)?;
     start.warnings.iter().for_each(tell::warning);
@@ -115,22 +122,48 @@ pub(super) fn run(args: &Args) -> Outcome {
             "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
         );
     }
+    if let Some(FieldOfView { lens, measured, pictures: [kept, seen] }) = &found {
+        let sigma_deg = fov_sigma_deg(&known, *lens, measured);
+        tell::line(format_args!(
+            "the limb in {kept} of {seen} pictures says: {:.1} +- {sigma_deg:.1} degrees wide, as a {}",
+            measured.fov_deg,
+            if *lens == Model::Pinhole { "pinhole" } else { "fisheye" },
+        ));
+    }
     tell::line(format_args!(
-        "{name} written: {} x {} px, {}, {:.1} degrees wide, f = {:.0} px +- {:.1} %",
+        "{name} written: {} x {} px, {}, {:.1} degrees wide, f = {:.0} px +- {:.1} %, k1 = 0 +- {:.2}",
         known.size_px[0],
         known.size_px[1],
         start.lens.name(),
         start.fov_deg,
         start.focal_px,
-        start.focal_sigma_percent
+        start.focal_sigma_percent,
+        start.k1_sigma,
     ));
-    if known.altitude_km.is_none() {
+    // A field of view from the limb shows that a table gives the altitudes.
+    if known.altitude_km.is_none() && found.is_none() {
         tell::line(
             "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or \
              --altitude KM",
         );
     }
     Ok(Exit::Done)
+}
+
+/// Finds the field of view from the limb, if an altitude is known.
+fn limb_fov(args: &Args, known: &CameraFacts) -> Result<Option<FieldOfView>, Stop> {
+    let request = Request { inputs: args.pictures.clone(), ..Request::default() };
+    limb_fov::find(&request, known)
+}
+
+/// Returns the 1-sigma of a measured field of view in degrees.
+fn fov_sigma_deg(known: &CameraFacts, lens: Model, measured: &MeasuredFov) -> f64 {
+    let width = f64::from(known.size_px[0]);
+    let at = |factor: f64| {
+        start::focal_px(lens, width, measured.fov_deg).map_or(f64::NAN, |f| start::fov_deg(lens, width, f * factor))
+    };
+    let part = 0.01 * measured.focal_sigma_percent;
+    0.5 * (at(1.0 - part) - at(1.0 + part))
 }
 
 /// Collects what the pictures and the command line say about the camera.
@@ -146,8 +179,15 @@ fn known(args: &Args, source: &mut dyn Source) -> Result<CameraFacts, Stop> {
     };
     let size_px = [size_px.0, size_px.1];
     let lens = args.lens.map(Model::from);
-    let (fov_deg, altitude_km) = (args.fov, args.altitude);
-    Ok(CameraFacts { size_px, fov_deg, lens, exif, altitude_km, body: args.body.into() })
+    Ok(CameraFacts {
+        size_px,
+        fov_deg: args.fov,
+        lens,
+        exif,
+        altitude_km: args.altitude,
+        body: args.body.into(),
+        measured: None,
+    })
 }
 
 /// Returns the size of the pictures. Refuses pictures of different sizes.

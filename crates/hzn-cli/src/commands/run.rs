@@ -18,7 +18,7 @@ use crate::files;
 use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
 use crate::setup::{self, InputArgs, SensorArgs, stop_flag};
-use crate::tell;
+use crate::{tell, what_fits};
 
 /// Process a sequence of pictures
 ///
@@ -264,14 +264,17 @@ impl Watch {
         if let Some(further) = self.refusals.further() {
             tell::line(format_args!("note: {further}"));
         }
-        if let Some((why, frame)) = self.refusals.commonest(&plan.config.gates) {
+        if let Some(commonest) = self.refusals.commonest(&plan.config.gates) {
             let nothing = !self.progress.any_answered() && stored == 0;
             let found = if nothing { "nothing was found in any picture; " } else { "" };
-            let more = frame.map(|frame| {
-                let command = explain_command(args, source, frame);
+            let more = commonest.pictures.first().map(|frame| {
+                let command = explain_command(args, source, *frame);
                 format!("; for an explanation and advice: {command}")
             });
-            tell::line(format_args!("note: {found}{why}{}", more.unwrap_or_default()));
+            tell::line(format_args!("note: {found}{}{}", commonest.text, more.unwrap_or_default()));
+            let request = setup::request(&args.input, &args.sensor, &args.source).ok().filter(|_| commonest.is_size);
+            let fits = request.and_then(|r| what_fits::in_pictures(&r, &plan.config, commonest.pictures));
+            fits.iter().for_each(|fits| tell::line(format_args!("note: {fits}")));
         }
     }
 }

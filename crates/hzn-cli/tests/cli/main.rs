@@ -29,6 +29,7 @@ mod run;
 mod sensitivity;
 mod simulate;
 mod small_limbs;
+mod start;
 mod telemetry;
 mod terminal;
 mod told;

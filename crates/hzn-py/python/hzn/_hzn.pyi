@@ -362,6 +362,38 @@ class Sensor:
             A value is possible but looks wrong, for example an altitude in metres.
         """
 
+    def what_fits(
+        self,
+        image: _Image,
+        *,
+        altitude_km: float | None = None,
+        position_km: Sequence[float] | None = None,
+        bits: int | None = None,
+    ) -> str | None:
+        """Say what would make the limb in a refused picture the expected one.
+
+        The picture is searched for a limb of any half-angle. The sentence names its half-angle, and the altitude or the
+        field of view with which it would be the expected one: ``the limb fits 59.8 +- 1.4 deg, expected 68.3 deg:
+        altitude 1023 +- 107 km, or a field of view of 92.8 deg at 505 km``.
+
+        Parameters
+        ----------
+        image, altitude_km, position_km, bits
+            As for `process`.
+
+        Returns
+        -------
+        str or None
+            None if there is no such limb, if its half-angle is the expected one, or if the sensor has several bodies.
+
+        Raises
+        ------
+        ImageError
+            The array has another dtype, shape or size than the camera's picture.
+        ConfigError
+            An altitude or position is impossible.
+        """
+
     def process_many(
         self,
         images: _Path | Iterable[_Image | _Path | tuple[_Image | _Path, Mapping[str, Any]]],

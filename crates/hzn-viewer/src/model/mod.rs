@@ -3,7 +3,6 @@
 pub mod atomic_file;
 pub mod autosave;
 pub mod cause;
-pub mod diagnosis;
 pub mod fingerprint;
 pub mod histogram;
 pub mod image_circle;
@@ -20,6 +19,8 @@ pub mod settings;
 pub mod sheet;
 pub mod slider_range;
 pub mod view;
+
+pub use hzn_run::diagnosis;
 
 pub use autosave::{Autosave, Unsaved};
 pub use fingerprint::Fingerprint;

@@ -44,6 +44,7 @@ impl Wizard {
             exif: self.exif.clone(),
             altitude_km: self.one_altitude.then_some(self.altitude_km),
             body: start::Body::Earth,
+            measured: None,
         };
         let start = start::write_sensor_toml(&facts).map_err(|e| e.to_string())?;
         Ok((start.text, start.warnings))

@@ -22,12 +22,11 @@ use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Trace, Traces, Watch};
 use hzn_run::source::Picture;
 use hzn_run::{overlay, sink};
 
-use super::implied::fit_facts;
 use super::paint::Recipe;
 use super::residuals::{Residual, ellipse, residuals};
-use super::trials::{self, OtsuTrial, Trials};
+use super::trials::{OtsuTrial, Trials};
 use crate::model::cause::Cause;
-use crate::model::diagnosis::FitFacts;
+use crate::model::diagnosis::{FitFacts, find_fit};
 use crate::model::view::Point;
 use crate::model::{Entry, Histogram, Processed};
 
@@ -375,26 +374,6 @@ fn add_causes(
 /// Returns the limb of a fit with its own half-angle, in coarse steps.
 fn free_limb(solution: &Solution<f64>, camera: &Camera<f64>) -> Vec<Vec<Point>> {
     overlay::limb::lines_with_steps(solution.axis.xyz(), solution.half_angle_rad, camera, CANDIDATE_STEPS)
-}
-
-/// Returns what the edge of the answer says, with its fit. Without an answer, `trial` returns an edge with a cone of
-/// any half-angle: the sensor's own fit uses only points near a limb with the expected half-angle, so that it misses
-/// most of the limb if the expected one is wrong. Its longest edge counts only if the trial finds nothing.
-pub(super) fn find_fit(
-    edges: &[Edge],
-    report: &Report<f64>,
-    altitude_km: Option<f64>,
-    camera: &Camera<f64>,
-    trial: impl FnOnce() -> Option<Edge>,
-) -> Option<(FitFacts, Solution<f64>)> {
-    let facts = |edge: &Edge, is_trial: bool| {
-        let fitted = edge.fitted.as_ref()?;
-        Some((fit_facts(edge, fitted, camera, altitude_km, is_trial)?, fitted.solution))
-    };
-    if let Some(solution) = &report.solution {
-        return facts(edges.iter().find(|e| e.candidate == solution.candidate)?, false);
-    }
-    trial().and_then(|edge| facts(&edge, true)).or_else(|| facts(trials::longest(edges)?, false))
 }
 
 /// Returns the results of a picture that cannot be processed: one row for each body.

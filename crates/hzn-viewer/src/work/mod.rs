@@ -9,7 +9,6 @@ pub mod demo;
 pub mod engine;
 pub mod export;
 pub mod frame_view;
-mod implied;
 pub mod job;
 pub mod open;
 pub mod paint;

@@ -6,10 +6,11 @@ use hzn_core::status::Status;
 use hzn_run::engine::{AnySensor, BodyOutcome, Traces};
 use hzn_run::sink;
 
-use super::frame_view::{FrameInput, find_fit};
+use super::frame_view::FrameInput;
 use super::trials::Trials;
 use crate::model::Processed;
 use crate::model::cause::Cause;
+use crate::model::diagnosis::find_fit;
 
 /// Processes a picture and returns its results with their causes and fits. Without `trials` there are only results.
 pub(super) fn summarise(

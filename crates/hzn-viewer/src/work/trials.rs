@@ -3,20 +3,18 @@
 use hzn_core::error::ConfigError;
 use hzn_core::image::ImageView;
 use hzn_core::status::Status;
-use hzn_core::verdict::Verdict;
-use hzn_core::{Config, consensus, fit, threshold};
+use hzn_core::{Config, threshold};
 use hzn_files::FrameData;
+use hzn_run::diagnosis::AnyCone;
+use hzn_run::engine::AnySensor;
 use hzn_run::engine::trace::Edge;
-use hzn_run::engine::{AnySensor, Traces};
 
 /// Sensors for the trials with one configuration.
 pub struct Trials {
     /// The sensor with Otsu's threshold; `None` if the sensor itself uses it.
     otsu: Option<AnySensor>,
     /// A sensor that finds a cone of any half-angle.
-    any_cone: AnySensor,
-    /// One body; further bodies have thresholds of their own, and their sizes are known.
-    single: bool,
+    any_cone: AnyCone,
 }
 
 /// Result of the trial with Otsu's threshold.
@@ -40,23 +38,11 @@ fn with_otsu(config: &Config) -> Config {
     config
 }
 
-/// Returns the configuration of a sensor that fits a cone of any half-angle to each edge.
-fn with_any_cone(config: &Config) -> Config {
-    let mut config = config.clone();
-    config.consensus.method = consensus::Method::Ransac;
-    config.fit.half_angle = fit::HalfAngle::Free;
-    config.gates.max_half_angle_sigma = 1e6;
-    // The first look finds the limb of most pictures. Further looks would cost several times as much.
-    config.retry.levels.clear();
-    config
-}
-
 impl Trials {
     /// Makes the sensors. It returns `None` if one of them cannot be made; then there are no trials.
     pub fn new(config: &Config, flight: bool) -> Option<Self> {
         let otsu = if uses_otsu(config) { None } else { Some(AnySensor::new(&with_otsu(config), flight).ok()?) };
-        let any_cone = AnySensor::new(&with_any_cone(config), flight).ok()?;
-        Some(Self { otsu, any_cone, single: config.each_body().len() == 1 })
+        Some(Self { otsu, any_cone: AnyCone::new(config, flight).ok()? })
     }
 
     /// Takes another configuration.
@@ -64,8 +50,7 @@ impl Trials {
     /// # Errors
     /// The sensors cannot be made.
     pub fn reconfigure(&mut self, config: &Config, flight: bool) -> Result<(), ConfigError> {
-        self.any_cone.reconfigure(&with_any_cone(config))?;
-        self.single = config.each_body().len() == 1;
+        self.any_cone.reconfigure(config)?;
         match (&mut self.otsu, uses_otsu(config)) {
             (otsu, true) => *otsu = None,
             (Some(otsu), false) => otsu.reconfigure(&with_otsu(config))?,
@@ -89,24 +74,6 @@ impl Trials {
 
     /// Returns the longest edge that a cone of any half-angle fits.
     pub fn try_any_cone(&mut self, view: &ImageView<'_>, data: Option<&FrameData>) -> Option<Edge> {
-        if !self.single {
-            return None;
-        }
-        let traces = Traces::new(1);
-        self.any_cone.process(view, data, Some(&traces));
-        let edges = traces.each.first()?.edges();
-        // A cone of any half-angle goes through many edges; only one that passes every other gate says something.
-        longest_fitted(&edges).filter(|e| e.outcome.is_some_and(|o| o.verdict == Verdict::Passed)).cloned()
+        self.any_cone.find(view, data)
     }
-}
-
-/// Returns the longest edge with a fit.
-pub fn longest_fitted(edges: &[Edge]) -> Option<&Edge> {
-    let fitted = edges.iter().filter(|e| e.fitted.is_some_and(|f| f.solution.free.is_some()));
-    fitted.max_by_key(|e| e.outcome.map_or(0, |o| o.length_px))
-}
-
-/// Returns the longest edge.
-pub fn longest(edges: &[Edge]) -> Option<&Edge> {
-    edges.iter().max_by_key(|e| e.outcome.map_or(0, |o| o.length_px))
 }

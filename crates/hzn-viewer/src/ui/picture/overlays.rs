@@ -98,7 +98,7 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Pla
     }
     if on(Layer::Limb) {
         // Many short edges have a fit; only the longest one, and the one under the pointer, are drawn strongly.
-        let longest = crate::work::trials::longest(&answer.edges).map(|e| e.candidate);
+        let longest = crate::model::diagnosis::longest_edge(&answer.edges).map(|e| e.candidate);
         let pointed = |c: u32| viewer.pointed == Some(c) || viewer.chosen_candidate == Some(c);
         for (candidate, limb) in &answer.candidate_limbs {
             let strong = pointed(*candidate) || longest == Some(*candidate);

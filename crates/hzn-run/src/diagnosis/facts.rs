@@ -44,6 +44,8 @@ pub struct FitFacts {
     pub expected_deg: f64,
     /// Fitted half-angle in degrees.
     pub fitted_deg: f64,
+    /// Its 1-sigma in degrees, with all terms except that of the expected half-angle.
+    pub fitted_sigma_deg: f64,
     /// Difference of the cosines of the half-angles in standard deviations; positive if the fitted half-angle is the
     /// larger one.
     pub sigmas: f64,
@@ -129,6 +131,7 @@ mod tests {
         FitFacts {
             expected_deg: 80.0,
             fitted_deg: 78.0,
+            fitted_sigma_deg: 0.2,
             sigmas: -9.0,
             is_trial: false,
             given_altitude_km: Some(altitude),

@@ -3,19 +3,43 @@
 use hzn_core::camera::Camera;
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
-use hzn_run::engine::trace::{Edge, Fitted};
+use hzn_core::{Report, Solution};
 
-use crate::model::diagnosis::{FitFacts, Implied};
-use crate::model::view::Point;
+use super::any_cone::longest_edge;
+use super::facts::{FitFacts, Implied};
+use crate::engine::trace::{Edge, Fitted};
+
+/// A point of the picture (u, v), in pixels.
+type Point = [f64; 2];
 
 /// Largest number of points that a cone is fitted to here; more change the factor by less than its sigma.
 const MOST_POINTS: usize = 300;
 /// Factors of the focal length that are searched.
 const FACTORS: [f64; 2] = [0.3, 3.0];
 
+/// Returns what the edge of the answer says, with its fit. Without an answer, `trial` returns an edge with a cone of
+/// any half-angle: the sensor's own fit uses only points near a limb with the expected half-angle, so that it misses
+/// most of the limb if the expected one is wrong. Its longest edge counts only if the trial finds nothing.
+pub fn find_fit(
+    edges: &[Edge],
+    report: &Report<f64>,
+    altitude_km: Option<f64>,
+    camera: &Camera<f64>,
+    trial: impl FnOnce() -> Option<Edge>,
+) -> Option<(FitFacts, Solution<f64>)> {
+    let facts = |edge: &Edge, is_trial: bool| {
+        let fitted = edge.fitted.as_ref()?;
+        Some((fit_facts(edge, fitted, camera, altitude_km, is_trial)?, fitted.solution))
+    };
+    if let Some(solution) = &report.solution {
+        return facts(edges.iter().find(|e| e.candidate == solution.candidate)?, false);
+    }
+    trial().and_then(|edge| facts(&edge, true)).or_else(|| facts(longest_edge(edges)?, false))
+}
+
 /// Returns what a fit says. `given_altitude_km` is the altitude that the picture was processed with. `is_trial` is true
 /// for a fit without the expected half-angle.
-pub(super) fn fit_facts(
+pub fn fit_facts(
     edge: &Edge,
     fitted: &Fitted,
     camera: &Camera<f64>,
@@ -37,6 +61,7 @@ pub(super) fn fit_facts(
     Some(FitFacts {
         expected_deg: fitted.expected_cos.clamp(-1.0, 1.0).acos().to_degrees(),
         fitted_deg: free.cos.clamp(-1.0, 1.0).acos().to_degrees(),
+        fitted_sigma_deg: (edge_sigma / sin_fitted).to_degrees(),
         // A smaller cosine is a larger half-angle.
         sigmas: -difference / sigma.max(f64::MIN_POSITIVE),
         is_trial,
@@ -45,6 +70,20 @@ pub(super) fn fit_facts(
         focal_factor: focal_factor(edge, free.axis.xyz(), fitted.expected_cos, free.cos, edge_sigma, camera),
         limb_height_km: limb.map(|(metres, slope)| implied(metres / 1e3, slope.abs())),
     })
+}
+
+/// Returns the change of the cosine of the half-angle of a cone through the inliers if `other` replaces the camera.
+pub(super) fn cos_change(edge: &Edge, axis: [f64; 3], camera: &Camera<f64>, other: &Camera<f64>) -> Option<f64> {
+    let points = thinned_inliers(edge);
+    Some(cone_cos(&points, axis, 1.0, other)? - cone_cos(&points, axis, 1.0, camera)?)
+}
+
+/// Returns at most [`MOST_POINTS`] inliers, evenly spread over the edge.
+fn thinned_inliers(edge: &Edge) -> Vec<Point> {
+    let inliers: Vec<Point> =
+        edge.points.iter().zip(&edge.weights).filter(|(_, w)| **w > 0.0).map(|(p, _)| *p).collect();
+    let step = inliers.len().div_ceil(MOST_POINTS).max(1);
+    inliers.into_iter().step_by(step).collect()
 }
 
 /// Returns the factor of both focal lengths with which a cone through the inliers has the expected half-angle.
@@ -56,10 +95,7 @@ fn focal_factor(
     sigma_cos: f64,
     camera: &Camera<f64>,
 ) -> Option<Implied> {
-    let inliers: Vec<Point> =
-        edge.points.iter().zip(&edge.weights).filter(|(_, w)| **w > 0.0).map(|(p, _)| *p).collect();
-    let step = inliers.len().div_ceil(MOST_POINTS).max(1);
-    let points: Vec<Point> = inliers.into_iter().step_by(step).collect();
+    let points = thinned_inliers(edge);
     // The sensor weights its points differently, so only the change of this fit with the factor is used.
     let offset = fitted_cos - cone_cos(&points, axis, 1.0, camera)?;
     let miss = |factor: f64| Some(cone_cos(&points, axis, factor, camera)? + offset - expected_cos);
@@ -98,7 +134,7 @@ fn cone_cos(points: &[Point], axis: [f64; 3], factor: f64, camera: &Camera<f64>)
     let mut e = axis;
     let mut cos = 0.0;
     for _ in 0..6 {
-        let [b1, b2] = super::residuals::tangent_basis(e);
+        let [b1, b2] = tangent_basis(e);
         // Normal equations of x b1·r + y b2·r − c = −e·r.
         let mut n = [[0.0; 4]; 3];
         for r in &rays {
@@ -117,6 +153,12 @@ fn cone_cos(points: &[Point], axis: [f64; 3], factor: f64, camera: &Camera<f64>)
         e = turned.xyz();
     }
     (cos.abs() < 1.0).then_some(cos)
+}
+
+/// Returns two unit vectors perpendicular to an axis.
+fn tangent_basis([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
+    let q = 1.0 / (1.0 + z).max(1e-9);
+    [[1.0 - x * x * q, -x * y * q, -x], [-x * y * q, 1.0 - y * y * q, -y]]
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -155,7 +197,7 @@ mod tests {
         let [taken, told] = configs.map(|c| Camera::<f64>::try_new(&c).unwrap());
         let half_angle = 1.2f64;
         let axis = [0.0, (1.25f64).sin(), (1.25f64).cos()];
-        let limb = hzn_run::overlay::limb::lines(axis, half_angle, &taken).concat();
+        let limb = crate::overlay::limb::lines(axis, half_angle, &taken).concat();
         let edge = Edge { weights: vec![1.0; limb.len()], points: limb, ..Edge::default() };
         let seen = cone_cos(&edge.points, axis, 1.0, &told).unwrap();
         assert!((seen - half_angle.cos()).abs() > 0.01, "with the wrong focal length the half-angle is another one");

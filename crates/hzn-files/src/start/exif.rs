@@ -1,8 +1,10 @@
 //! The focal length of a camera by the EXIF of its pictures.
 
+use super::focal::{Focal, SQRT_3};
+
 /// 1-sigma of the focal length in EXIF, in percent: uniform within ± 10 %.
-pub(crate) const EXIF_PERCENT: f64 = 10.0 / SQRT_3;
-pub(crate) const SQRT_3: f64 = 1.732_050_807_568_877_2;
+const EXIF_PERCENT: f64 = 10.0 / SQRT_3;
+const SIGMA_FROM: &str = "EXIF (10 % at most)";
 /// Sides of the 35 mm film, in millimetres.
 const FILM_MM: [f64; 2] = [36.0, 24.0];
 /// Smallest longer side of a sensor whose pitch is used without another value that confirms it, in millimetres. The
@@ -29,14 +31,6 @@ pub struct Exif {
     pub turned: bool,
 }
 
-/// A focal length in pixels with its 1-sigma in percent and its source.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Focal {
-    pub(crate) px: f64,
-    pub(crate) percent: f64,
-    pub(crate) from: String,
-}
-
 /// Returns a number that can be a length or a ratio.
 fn sound(x: Option<f64>) -> Option<f64> {
     x.filter(|x| x.is_finite() && *x > 0.0)
@@ -47,7 +41,7 @@ impl Exif {
     ///
     /// # Errors
     /// There is none; the text says why, if EXIF has one that is not used.
-    pub(crate) fn focal(&self, size: [f64; 2]) -> Result<Focal, Option<String>> {
+    pub(super) fn focal(&self, size: [f64; 2]) -> Result<Focal, Option<String>> {
         let (pitch, film) = (self.focal_by_pitch(size), self.focal_on_film(size));
         let Some((pitch, sensor_mm)) = pitch else { return film.ok_or(None) };
         if sensor_mm >= MIN_SENSOR_MM {
@@ -75,7 +69,13 @@ impl Exif {
             return None;
         }
         let from = format!("EXIF: {mm} mm, pixels of {pitch_um:.2} um");
-        let focal = Focal { px: mm * px_per_mm * scale, percent: EXIF_PERCENT, from };
+        let focal = Focal {
+            px: mm * px_per_mm * scale,
+            percent: EXIF_PERCENT,
+            from,
+            sigma_from: SIGMA_FROM,
+            is_at_edge: false,
+        };
         Some((focal, width.max(height) * sound(self.digital_zoom).unwrap_or(1.0) * pitch_um * 1e-3))
     }
 
@@ -95,6 +95,8 @@ impl Exif {
             px,
             percent: EXIF_PERCENT.hypot(rounded),
             from: format!("EXIF: equivalent to {mm} mm on 35 mm film"),
+            sigma_from: SIGMA_FROM,
+            is_at_edge: false,
         })
     }
 }

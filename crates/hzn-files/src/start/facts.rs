@@ -1,0 +1,74 @@
+//! What is known about a camera, and the file that follows from it.
+
+use hzn_core::camera::Model;
+
+use super::exif::Exif;
+
+/// Known properties of a camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraFacts {
+    /// Columns and rows of its pictures.
+    pub size_px: [u32; 2],
+    /// Stated field of view over the whole width, in degrees.
+    pub fov_deg: Option<f64>,
+    /// [`Model::Pinhole`] or [`Model::Equidistant`]. If it is missing, a pinhole is assumed. A stated field of view
+    /// above 90 degrees requires it.
+    pub lens: Option<Model>,
+    /// EXIF data of a picture.
+    pub exif: Exif,
+    /// Altitude of all pictures, in kilometres.
+    pub altitude_km: Option<f64>,
+    /// The body in the pictures.
+    pub body: Body,
+    /// Field of view that the limb in the pictures says. It is used if neither a field of view nor EXIF is known.
+    pub measured: Option<MeasuredFov>,
+}
+
+impl CameraFacts {
+    /// Returns whether a stated field of view or EXIF gives the focal length.
+    pub fn has_focal(&self) -> bool {
+        self.fov_deg.is_some() || self.exif.focal(self.size_px.map(f64::from)).is_ok()
+    }
+}
+
+/// The body in the pictures of a camera without a calibration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Body {
+    /// The Earth.
+    #[default]
+    Earth,
+    /// The Moon as an orbiter or a lander sees it.
+    Moon,
+}
+
+/// A field of view that was measured on the limb in pictures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredFov {
+    /// Field of view over the whole width, in degrees.
+    pub fov_deg: f64,
+    /// 1-sigma of the focal length of a lens with this angle at the edge, in percent.
+    pub focal_sigma_percent: f64,
+    /// Number of pictures.
+    pub pictures: usize,
+}
+
+/// A sensor.toml to start from, with its main values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartConfig {
+    /// Text of the file.
+    pub text: String,
+    /// Ideal lens that is closest to the guess: [`Model::Pinhole`] or [`Model::Equidistant`].
+    pub lens: Model,
+    /// Focal length, in pixels.
+    pub focal_px: f64,
+    /// Field of view over the whole width, in degrees.
+    pub fov_deg: f64,
+    /// 1-sigma of the focal length, in percent, with the part that the shape of the lens explains.
+    pub focal_sigma_percent: f64,
+    /// 1-sigma of the coefficient k1, which is the shape of the lens.
+    pub k1_sigma: f64,
+    /// 1-sigma of the principal point, in pixels.
+    pub centre_sigma_px: f64,
+    /// Warnings for the user.
+    pub warnings: Vec<String>,
+}

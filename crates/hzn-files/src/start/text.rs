@@ -1,0 +1,159 @@
+//! The text of the sensor.toml.
+
+use core::fmt::Write as _;
+
+use hzn_core::body::MOON_RADIUS_KM;
+use hzn_core::camera::{Config, Model};
+
+use super::facts::{Body, CameraFacts};
+use super::focal::Focal;
+use super::guess::Guess;
+use crate::plausible::airless_limb;
+
+/// 1-sigma of an altitude that is given once for all pictures, as a fraction of it. Orbits are not circular.
+const ALTITUDE_FRACTION: f64 = 0.02;
+
+/// Beginning of the comment before a section `[gates]` whose keys `max_rival_ratio` and `min_evidence` leave room for a
+/// lens of unknown shape. A calibration of the shape removes these keys.
+pub const LENIENT_GATES: &str = "# A lens of unknown shape bends the limb";
+
+/// Writes the text of the file; `comparison` is the note about the focal length that is not used.
+pub(super) fn write_text(
+    facts: &CameraFacts,
+    guess: &Guess,
+    focal: &Focal,
+    fov_deg: f64,
+    comparison: Option<&str>,
+) -> String {
+    let mut text = String::from(
+        "# A sensor.toml for a camera without a calibration, by `hzn init`. Unknown properties of the lens are\n\
+         # sigmas, which the covariance of the answers includes. A calibration reduces them: `hzn calibrate sky` with\n\
+         # pictures of a flight, `hzn calibrate lens` with pictures of a board, `hzn camera convert` with a file.\n\
+         # Try it on one picture:  hzn explain PICTURE --sensor sensor.toml --overlay out.png\n\
+         # Every other key with its default:  hzn init -o all.toml\n\
+         \n\
+         preset = \"hzn\"\n\
+         \n\
+         [camera]\n",
+    );
+    text += &write_camera(facts, &guess.camera, focal, fov_deg, comparison);
+    text += &write_covariance(guess, focal);
+    text += &write_body(facts.body, facts.altitude_km);
+    text += &write_gates(guess);
+    text
+}
+
+/// Writes the size of the pictures, the lens, the focal length with its source, and the picture's centre as the
+/// principal point.
+fn write_camera(facts: &CameraFacts, camera: &Config, focal: &Focal, fov_deg: f64, comparison: Option<&str>) -> String {
+    let mut t = String::new();
+    if let Some(camera) = &facts.exif.camera {
+        let _ = writeln!(t, "# {}", camera.replace(['\n', '\r'], " "));
+    }
+    let _ = write!(t, "width = {}\nheight = {}\nmodel = \"{}\"\n", camera.width, camera.height, camera.model.name());
+    let is_planar = camera.model.is_planar();
+    let _ = writeln!(
+        t,
+        "# k1 = 0 is {}.\nk = [0.0]",
+        if is_planar {
+            "an ideal pinhole without distortion"
+        } else {
+            "an equidistant fisheye: the angle off axis is proportional to the radius"
+        }
+    );
+    let _ = match comparison {
+        Some(comparison) => writeln!(t, "# From {}; for comparison, {comparison}.", focal.from),
+        None => writeln!(t, "# From {}; {fov_deg:.1} degrees wide.", focal.from),
+    };
+    let _ = write!(
+        t,
+        "fx_px = {:.1}\nfy_px = {:.1}\ncx_px = {:.1}                 # the picture's centre\ncy_px = {:.1}\n",
+        camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px
+    );
+    if !is_planar {
+        let _ = writeln!(
+            t,
+            "# theta_max_deg = {:.0}            # radius of the image circle in degrees off axis, if its rim is in the \
+             picture",
+            0.5 * fov_deg
+        );
+    }
+    t
+}
+
+/// Writes the covariance of the guess, with a comment for each sigma.
+fn write_covariance(guess: &Guess, focal: &Focal) -> String {
+    let together = if focal.is_at_edge {
+        ". A lens with another k1 and the\n# same field of view has another focal length, so that both change together"
+    } else {
+        ""
+    };
+    let family = match guess.camera.model {
+        Model::BrownConrady => "distortion between none and that of a fisheye",
+        _ => "equidistant, equisolid or stereographic",
+    };
+    let mut t = format!(
+        "\n# 1 sigma of what is not known. Focal length: {:.1} % for {}.\n\
+         # Shape of the lens, k1: {:.3} ({family}){together}.\n\
+         # Principal point: {:.0} px on each axis, 1.5 % of the width. It turns all answers by the same angle. Its\n\
+         # variance {:.0} px² is larger for cropped pictures.\n\
+         [camera.covariance]\n",
+        focal.percent,
+        focal.sigma_from,
+        guess.k1_sigma,
+        guess.centre_sigma_px,
+        guess.centre_sigma_px.powi(2),
+    );
+    if let Some(covariance) = &guess.camera.covariance {
+        let names: Vec<String> = covariance.order.iter().map(|i| format!("\"{}\"", i.name())).collect();
+        let _ = writeln!(t, "order = [{}]\nrows = [", names.join(", "));
+        for row in &covariance.rows {
+            let numbers: Vec<String> = row.iter().map(|x| format!("{x:.4e}")).collect();
+            let _ = writeln!(t, "    [{}],", numbers.join(", "));
+        }
+        t.push_str("]\n");
+    }
+    t
+}
+
+/// Writes `[body]` with the altitude, or with a comment that says where altitudes belong.
+fn write_body(body: Body, altitude_km: Option<f64>) -> String {
+    let mut t = match body {
+        Body::Earth => {
+            "\n[body]\nkind = \"earth\"                 # earth (WGS-84) | earth-sphere | sun | moon | sphere\n"
+                .to_owned()
+        }
+        // `kind = "moon"` is the disc in the sky of the Earth.
+        Body::Moon => format!(
+            "\n[body]\nkind = \"sphere\"                # the Moon, from near it\nradius_km = {MOON_RADIUS_KM}\n\
+             # There is no air: the limb is as high as its hills, and overexposure does not raise it.\n{}",
+            airless_limb(MOON_RADIUS_KM)
+        ),
+    };
+    let _ = match altitude_km {
+        Some(km) => write!(
+            t,
+            "altitude_km = {km}\naltitude_sigma_km = {:.1}        # 1-sigma: 2 % of the altitude, for all pictures; \
+             frames.csv can give each picture its altitude\n",
+            (ALTITUDE_FRACTION * km).max(0.5)
+        ),
+        None => write!(
+            t,
+            "# Every picture needs an altitude in kilometres. Write it into the columns file, altitude_km (or x_km, \
+             y_km, z_km)\n\
+             # of a frames.csv next to the pictures, or here for all pictures:\n# altitude_km = 400.0\n"
+        ),
+    };
+    t
+}
+
+/// Writes the gates that compare the limb with other shapes.
+fn write_gates(guess: &Guess) -> String {
+    format!(
+        "\n{LENIENT_GATES}, so that a circle of the picture may fit better than a cone.\n\
+         # These keys leave room for two sigmas of k1. Remove both with a calibration, as `hzn calibrate sky` does:\n\
+         # their defaults also find flares of the lens.\n\
+         [gates]\nmax_rival_ratio = {:.0}\nmin_evidence = 0.0\n",
+        guess.max_rival_ratio
+    )
+}

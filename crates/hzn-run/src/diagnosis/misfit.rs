@@ -1,0 +1,26 @@
+//! A limb of another size than the expected one, in one picture.
+
+use hzn_core::Config;
+use hzn_core::camera::Camera;
+use hzn_core::image::Pixels;
+use hzn_files::FrameData;
+
+use super::any_cone::AnyCone;
+use super::facts::FitFacts;
+use super::implied::fit_facts;
+use crate::sink;
+
+/// Looks for a limb of any size, and returns what it says if its half-angle differs from the expected one by more than
+/// `gates.max_half_angle_sigma`. `trial` is made from `config`.
+pub fn find_misfit<P: Pixels>(
+    trial: &mut AnyCone,
+    config: &Config,
+    picture: &P,
+    data: Option<&FrameData>,
+) -> Option<FitFacts> {
+    let edge = trial.find(picture, data)?;
+    let altitude_km = sink::altitude_km(data, config.each_body().first()?);
+    let camera = Camera::<f64>::try_new(&config.camera).ok()?;
+    let fit = fit_facts(&edge, edge.fitted.as_ref()?, &camera, altitude_km, true)?;
+    (fit.sigmas.abs() > config.gates.max_half_angle_sigma).then_some(fit)
+}

@@ -1,0 +1,22 @@
+//! What would make a fitted limb the expected one: an altitude, a focal length (that is a field of view), or a limb
+//! height.
+//!
+//! The sensor's own fit uses only points near a limb of the expected half-angle. If the expected half-angle is wrong,
+//! it misses most of the limb. [`AnyCone`] therefore fits a cone of any half-angle to the edges of a refused picture;
+//! [`find_misfit`] returns what this limb says, as [`FitFacts`], and [`what_fits`] says it in words. [`summarise`]
+//! compares the pictures of a sequence. [`find_field_of_view`] finds the field of view of a camera of which nothing is
+//! known.
+
+mod any_cone;
+mod facts;
+mod field_of_view;
+mod implied;
+mod misfit;
+mod words;
+
+pub use any_cone::{AnyCone, longest_edge};
+pub use facts::{Consensus, FitFacts, Implied, Suspect, summarise, typical_sigmas};
+pub use field_of_view::{FieldOfView, find_field_of_view};
+pub use implied::{find_fit, fit_facts};
+pub use misfit::find_misfit;
+pub use words::what_fits;

@@ -1,0 +1,44 @@
+//! What would fit, in words.
+
+use hzn_core::camera::Camera;
+use hzn_core::pixel::ImagePoint;
+
+use super::facts::{FitFacts, Implied};
+
+/// Says which half-angle the limb has, and which altitude or field of view would make it the expected one: `the limb
+/// fits 78.6 +- 0.8 deg, expected 75.1 deg: altitude 146 +- 25 km, or a field of view of 91.0 deg at 240 km`. `width`
+/// and `camera` are those of the picture.
+pub fn what_fits(fit: &FitFacts, camera: &Camera<f64>, width: u16) -> String {
+    let limb = format!(
+        "the limb fits {:.1} +- {:.1} deg, expected {:.1} deg",
+        fit.fitted_deg, fit.fitted_sigma_deg, fit.expected_deg
+    );
+    let altitude = fit
+        .altitude_km
+        .filter(|i| i.value > 0.0)
+        .map(|Implied { value, sigma }| format!("altitude {value:.0} +- {sigma:.0} km"));
+    let at = fit.given_altitude_km.map(|km| format!(" at {km:.0} km")).unwrap_or_default();
+    let field_of_view = fit
+        .focal_factor
+        .and_then(|factor| field_of_view_deg(camera, width, factor.value))
+        .map(|deg| format!("a field of view of {deg:.1} deg{at}"));
+    match (altitude, field_of_view) {
+        (Some(altitude), Some(field_of_view)) => format!("{limb}: {altitude}, or {field_of_view}"),
+        (Some(one), None) | (None, Some(one)) => format!("{limb}: {one}"),
+        (None, None) => limb,
+    }
+}
+
+/// Returns the field of view over the width of the picture in degrees if both focal lengths are multiplied by `factor`;
+/// `None` if the lens does not reach to the edges of the picture.
+fn field_of_view_deg(camera: &Camera<f64>, width: u16, factor: f64) -> Option<f64> {
+    let centre = camera.principal_point();
+    // The edge of a picture is half a pixel beyond the centre of its last column.
+    let edges = [-0.5, f64::from(width) - 0.5];
+    let [left, right] = edges.map(|u| {
+        let at = ImagePoint { u: centre.u + (u - centre.u) / factor, v: centre.v };
+        let [x, _, z] = camera.unproject(at)?.xyz();
+        Some(x.atan2(z).to_degrees())
+    });
+    Some(right? - left?)
+}
