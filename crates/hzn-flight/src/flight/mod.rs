@@ -167,15 +167,17 @@ impl<'a, B: Board> Flight<'a, B> {
         };
         buffers.line.set_base(loaded.parameters.operations.base());
         board.note_sensor(&loaded.parameters.sensor);
+        // Before the sensor is made, whose two copies would otherwise wait on the stack.
+        let (start, stored) = (Some(loaded.broken_codes()), loaded.digest());
         Some(Self {
-            start: Some(loaded.broken_codes()),
+            start,
             sensor: KeptTwice::new(Sensor::new(&loaded.parameters.sensor).ok()?),
             board,
             buffers,
             workspace,
             operations: KeptTwice::new(loaded.parameters.operations.clone()),
             is_not_stored: loaded.copy == 0,
-            stored: loaded.digest(),
+            stored,
             staged: 0,
             known: KeptTwice::new(Known::default()),
             has_expired: false,
