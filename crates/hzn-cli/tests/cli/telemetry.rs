@@ -77,8 +77,8 @@ fn exposure(picture: u32) -> Exposure {
     }
 }
 
-/// Returns the cells of the first row by their names, without those that name the picture and its times. The common part
-/// of the covariance is left out, too, because it is not sent.
+/// Returns the cells of the first row by their names, without those that name the picture and its times, and without
+/// the common part of the covariance, which is not sent.
 fn cells(place: &Place, file: &str) -> Vec<(String, String)> {
     let text = std::fs::read_to_string(place.path(file)).unwrap();
     let mut lines = text.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
