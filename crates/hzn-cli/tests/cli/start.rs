@@ -236,7 +236,7 @@ fn the_limb_gives_the_field_of_view() {
 }
 
 #[test]
-#[ignore = "takes minutes; it measures the figures of book/guide/first-steps.md"]
+#[ignore = "takes half a minute; it measures the figures of book/guide/first-steps.md"]
 fn the_limb_gives_the_field_of_view_of_twenty_flights() {
     let mut within = 0;
     for i in 0..20u32 {

@@ -9,9 +9,8 @@ use crate::stages::{consensus, contour, edge_points, fit, threshold};
 /// circle through each, the radius check, and halves of the picture if there is no answer.
 ///
 /// HORACE's own numbers are: a threshold of 0.75 times the mean; the limb's radius for altitudes from 100 to 20 km,
-/// ± 5000 px in its picture of 768 rows; γ = 5, where a pixel is edge if at most γ of its eight neighbours are lit. γ
-/// applies only to `contour.method = "erode"`. There the pixel itself counts too and the limit is exclusive, so the key
-/// is 7. The copy's height, the brightness gate and the shortest edge are numbers of `hzn`.
+/// ± 5000 px in its picture of 768 rows. Its γ = 5 is the least number of horizon points (Barf 2014, (2.6)); `hzn` asks
+/// for 100. The copy's height, the brightness gate and the shortest edge are numbers of `hzn`, too.
 pub(super) fn preset(config: &mut Config) {
     set_given_noise(config);
     config.brightness.min_mean = 0.02;
@@ -22,6 +21,8 @@ pub(super) fn preset(config: &mut Config) {
     let rows = config.camera.height.min(HORACE_ROWS);
     config.input.scale_to_height = (rows < config.camera.height).then_some(rows);
     config.contour.method = contour::Method::Raster;
+    // Only for `contour.method = "erode"`, which a user may choose instead: a pixel is edge if at most five of its
+    // eight neighbours are lit. The pixel itself counts, too, and the limit is exclusive.
     config.contour.erode_threshold = 7;
     config.edge_points.sub_pixel = edge_points::SubPixel::None;
     config.edge_points.min_points = 100;

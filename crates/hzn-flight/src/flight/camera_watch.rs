@@ -5,8 +5,7 @@ use crate::board::Picture;
 /// Longest wait for a picture while the period is not known well yet.
 const FIRST_US: u64 = 2_000_000;
 /// Shortest wait: what follows the event, housekeeping and other warnings, comes at most once a second.
-// One and a half periods alone are 25 ms at 60 pictures a second, and an operating system pauses for longer: of 36 000
-// pictures, 37 had such an event.
+// One and a half periods alone are 25 ms at 60 pictures a second, and an operating system may pause for longer.
 const LEAST_US: u64 = 1_000_000;
 /// Number of intervals that the mean period is taken over. One early or late picture moves it little.
 // The last interval alone was used before. With pictures a fifth of a period early or late it can be 0.6 periods, and
