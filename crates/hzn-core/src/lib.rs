@@ -86,6 +86,7 @@ pub mod image;
 mod model;
 mod papers;
 pub mod pipeline;
+pub mod rig;
 mod stages;
 
 pub use base::{error, keys, real};

@@ -198,6 +198,7 @@ impl Position {
             covariance: Cov3::from_upper(self.cov_free.map(f64::from)),
             cos: self.cos_free.into(),
             var_cos: self.cos_free_variance.into(),
+            axis_with_cos: None,
             cos_per_px: self.cos_free_per_px.into(),
         })
     }

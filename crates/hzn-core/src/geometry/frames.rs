@@ -79,6 +79,11 @@ impl<F, T: Real> UnitVec3<F, T> {
     pub fn xyz(&self) -> [T; 3] {
         [self.v.x, self.v.y, self.v.z]
     }
+    /// Converts the direction to double precision. The components keep their values, so the length of a direction in
+    /// single precision differs from one by up to 1e-7.
+    pub fn to_f64(&self) -> UnitVec3<F, f64> {
+        UnitVec3::assume_unit(self.v.map(Real::to_f64))
+    }
     /// Returns the cosine of the angle between two directions of the same frame.
     pub fn dot(&self, other: &Self) -> T {
         self.v.dot(&other.v)

@@ -156,6 +156,9 @@ pub struct Free<T> {
     pub cos: T,
     /// Variance of `cos`: all terms of the covariance except that of the expected half-angle.
     pub var_cos: T,
+    /// Covariance of `axis` with `cos` in the camera frame, rad. On a short arc both are known only together. `None`
+    /// when the answer came by telemetry.
+    pub axis_with_cos: Option<[T; 3]>,
     /// Change of `cos` when every edge point moves by one pixel across the limb, 1/px: the weighted RMS of
     /// |∂(s·e)/∂(u, v)| over the points with a weight in the fit.
     pub cos_per_px: T,

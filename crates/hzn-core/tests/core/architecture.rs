@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const FOLDERS: &[&str] = &["base", "geometry", "model", "image", "stages", "config", "papers", "pipeline"];
+const FOLDERS: &[&str] = &["base", "geometry", "model", "image", "stages", "config", "papers", "pipeline", "rig"];
 const STAGES: &[&str] = &["threshold", "contour", "edge_points", "rays", "consensus", "fit", "covariance", "gates"];
 
 fn files(dir: &Path, out: &mut Vec<PathBuf>) {

@@ -6,5 +6,6 @@ mod drawn;
 mod precision;
 #[cfg(all(feature = "dlr", feature = "erf", feature = "horace", feature = "zju"))]
 mod published;
+mod rig;
 mod rows;
 mod total;

@@ -273,8 +273,8 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
         let limb =
             fit.free.and_then(|free| expected.limb_height_m(free.cos)).map(|(h, slope)| (h.into(), slope.into()));
         self.change_edge(candidate, |e| {
-            e.fitted = widen_solution(fit).map(|solution| Fitted {
-                solution,
+            e.fitted = Some(Fitted {
+                solution: widen_solution(fit),
                 expected_cos: cos.into(),
                 expected_sigma_cos: sigma.into(),
                 limb_height_m: limb,
@@ -284,7 +284,7 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
         self.change_edge(candidate, |e| {
             e.outcome = Some(widen_candidate(outcome));
-            e.solution = solution.and_then(widen_solution);
+            e.solution = solution.map(widen_solution);
         });
     }
 }

@@ -14,7 +14,7 @@ pub fn widen_report<T: Real + Into<f64>>(r: &Report<T>) -> Report<f64> {
         next_level: r.next_level,
         counters: r.counters,
         candidates: r.candidates.iter().map(widen_candidate).collect(),
-        solution: r.solution.as_ref().and_then(widen_solution),
+        solution: r.solution.as_ref().map(widen_solution),
     }
 }
 
@@ -29,32 +29,33 @@ pub(super) fn widen_candidate<T: Real + Into<f64>>(c: &Candidate<T>) -> Candidat
     }
 }
 
-pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Option<Solution<f64>> {
-    Some(Solution {
-        axis: UnitVec3::try_new(s.axis.xyz().map(Into::into))?,
+pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Solution<f64> {
+    Solution {
+        axis: s.axis.to_f64(),
         covariance: Cov3::from_upper(s.covariance.upper_rad2.map(Into::into)),
         common: s.common.map(|c| Cov3::from_upper(c.upper_rad2.map(Into::into))),
-        axis_fixed: s.axis_fixed.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
-        axis_vehicle: s.axis_vehicle.and_then(|a| UnitVec3::try_new(a.xyz().map(Into::into))),
+        axis_fixed: s.axis_fixed.as_ref().map(UnitVec3::to_f64),
+        axis_vehicle: s.axis_vehicle.as_ref().map(UnitVec3::to_f64),
         half_angle_rad: s.half_angle_rad.into(),
         fused_half_angle_rad: s.fused_half_angle_rad.into(),
         altitude_m: s.altitude_m.map(|(h, sigma)| (h.into(), sigma.into())),
-        free: s.free.as_ref().and_then(widen_free),
+        free: s.free.as_ref().map(widen_free),
         axis_by_cos: s.axis_by_cos.map(|by| by.map(Into::into)),
         position: s.position.as_ref().map(Position::to_f64),
         rms_px: s.rms_px.into(),
         inliers: s.inliers,
         arc_px: s.arc_px.into(),
         candidate: s.candidate,
-    })
+    }
 }
 
-fn widen_free<T: Real + Into<f64>>(f: &Free<T>) -> Option<Free<f64>> {
-    Some(Free {
-        axis: UnitVec3::try_new(f.axis.xyz().map(Into::into))?,
+fn widen_free<T: Real + Into<f64>>(f: &Free<T>) -> Free<f64> {
+    Free {
+        axis: f.axis.to_f64(),
         covariance: Cov3::from_upper(f.covariance.upper_rad2.map(Into::into)),
         cos: f.cos.into(),
         var_cos: f.var_cos.into(),
+        axis_with_cos: f.axis_with_cos.map(|p| p.map(Into::into)),
         cos_per_px: f.cos_per_px.into(),
-    })
+    }
 }

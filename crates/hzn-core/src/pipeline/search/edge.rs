@@ -264,6 +264,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
                 covariance: Cov3::from_tangent(&b1, &b2, fused.free_p),
                 cos: fit.c,
                 var_cos,
+                axis_with_cos: Some((b1 * fused.free_with_cos[0] + b2 * fused.free_with_cos[1]).into()),
                 cos_per_px: fit.sums.cos_per_px(),
             }),
             axis_by_cos: Some((b1 * by_1 + b2 * by_2).into()),

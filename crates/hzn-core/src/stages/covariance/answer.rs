@@ -27,6 +27,8 @@ pub(crate) struct Fused<T> {
     /// Covariance (11, 12, 22) of the freely fitted axis on its own tangent basis, rad².
     // It is kept for a filter that treats the limb height as one error of all pictures: fused covariances hide it.
     pub(crate) free_p: [T; 3],
+    /// Covariance of the freely fitted axis with its cosine, on the same basis.
+    pub(crate) free_with_cos: [T; 2],
     /// Derivative of the axis by the cosine of the expected half-angle, on the tangent basis of the fitted axis.
     pub(crate) by_cos: [T; 2],
     /// Variance of the freely fitted cos α; `None` when it was not fitted.

@@ -1,0 +1,176 @@
+//! Each head against the solution of the others.
+
+use super::head::Head;
+use super::joint::{Cone, Joint, NoJoint, axis_sigma, chosen, invert};
+use crate::base::error::{ConfigError, Limit};
+use crate::base::real::Real;
+use crate::geometry::frames::{Cov3, UnitVec3};
+
+/// Largest number of heads.
+pub const MOST_HEADS: usize = 4;
+
+/// Smallest and largest probability of the configuration.
+const LEAST: f64 = 1e-12;
+const MOST: f64 = 0.5;
+
+/// Probabilities of the check.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Config {
+    /// Probability of a false alarm: good heads that the check takes as contradicting, for each epoch.
+    pub false_alarm: f64,
+    /// Probability that the error exceeds the protection level, if one head is wrong.
+    pub misleading: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { false_alarm: 1e-3, misleading: 1e-4 }
+    }
+}
+
+/// One to four heads that are one sensor.
+#[derive(Debug, Clone, Copy)]
+pub struct Rig<T> {
+    /// Limit of χ² with three degrees of freedom for 2, 3 and 4 heads, in this order.
+    limits: [T; MOST_HEADS - 1],
+    /// Sigmas of a Gaussian direction (two dimensions, its worse one) that are exceeded with the probability.
+    sigmas: T,
+}
+
+impl<T: Real> Rig<T> {
+    /// Checks the probabilities: both lie between 1e-12 and 0.5.
+    pub fn new(config: &Config) -> Result<Self, ConfigError> {
+        for (name, value) in [("rig.false_alarm", config.false_alarm), ("rig.misleading", config.misleading)] {
+            // A smaller probability needs more of the distribution's tail than anybody has measured.
+            if !(LEAST..=MOST).contains(&value) {
+                return Err(ConfigError { field: name, value, limit: Limit::Between(LEAST, MOST), body: None });
+            }
+        }
+        let limit = |heads: f64| T::from_f64(quantile(config.false_alarm / heads, survival_of_three));
+        Ok(Self {
+            limits: [limit(2.0), limit(3.0), limit(4.0)],
+            sigmas: T::from_f64(quantile(config.misleading, survival_of_two).sqrt()),
+        })
+    }
+
+    /// Joins the cones of the heads, at most four, `None` for a head without an answer.
+    ///
+    /// `tilt_rad` is the 1-sigma of a tilt of the limb that all heads share: the axis then has this error, and nothing
+    /// shows it. With one cone the answer is that of the head.
+    pub fn join(&self, heads: &[Option<Head<T>>], tilt_rad: T) -> Result<Joint<T>, NoJoint> {
+        let heads = &heads[..heads.len().min(MOST_HEADS)];
+        let all = heads.iter().enumerate().fold(0, |set, (k, head)| set | u8::from(head.is_some()) << k);
+        if all == 0 {
+            return Err(NoJoint::NoHead);
+        }
+        let (set, cone) = self.consistent_set(heads, all)?;
+        let separated = self.separate(heads, set, &cone);
+        let var_tilt = tilt_rad * tilt_rad;
+        let p = &cone.covariance;
+        let excluded = all & !set;
+        Ok(Joint {
+            axis: UnitVec3::assume_unit(cone.e),
+            covariance: Cov3::from_tangent(&cone.b[0], &cone.b[1], [p.m11 + var_tilt, p.m12, p.m22 + var_tilt]),
+            cos: (cone.c, p.m33.max(T::ZERO).sqrt()),
+            heads_used: set,
+            heads_excluded: excluded,
+            separation_rad: separated.as_ref().map(|s| s.worst),
+            protection_rad: separated.map(|s| s.protection(self.sigmas, axis_sigma(p), var_tilt)),
+        })
+    }
+
+    /// Returns the heads that agree, with their cone: all, or all but the only one whose exclusion makes them agree.
+    fn consistent_set(&self, heads: &[Option<Head<T>>], all: u8) -> Result<(u8, Cone<T>), NoJoint> {
+        let cone = Cone::fit(heads, all).ok_or(NoJoint::Undetermined)?;
+        if self.separate(heads, all, &cone).is_none_or(|s| s.agrees) {
+            return Ok((all, cone));
+        }
+        let mut found = None;
+        if all.count_ones() > 2 {
+            for (k, _) in chosen(heads, all) {
+                let set = all & !(1 << k);
+                let Some(cone) = Cone::fit(heads, set) else { continue };
+                if self.separate(heads, set, &cone).is_some_and(|s| s.agrees) {
+                    if found.is_some() {
+                        return Err(NoJoint::Inconsistent);
+                    }
+                    found = Some((set, cone));
+                }
+            }
+        }
+        found.ok_or(NoJoint::Inconsistent)
+    }
+
+    /// Compares each head of a set with the solution of the others. `None` with one head, or if the others of a head do
+    /// not determine a cone.
+    fn separate(&self, heads: &[Option<Head<T>>], set: u8, cone: &Cone<T>) -> Option<Separation<T>> {
+        let count = set.count_ones() as usize;
+        let limit = *self.limits.get(count.checked_sub(2)?)?;
+        let mut out = Separation { agrees: true, worst: (T::ZERO, T::ZERO), bound: [(T::ZERO, T::ZERO); MOST_HEADS] };
+        let mut largest = -T::one();
+        for (k, head) in chosen(heads, set) {
+            let (j, r) = cone.seen_by(head);
+            let weighted = j.transpose() * head.information;
+            let others = invert(&(cone.normal - weighted * j))?;
+            // The solution of the others relative to that of all: the gradient of the sum is zero at the cone of all.
+            let moved = -(others * (weighted * r));
+            let innovation = r - j * moved;
+            let spread = head.covariance + j * others * j.transpose();
+            let q = innovation.dot(&(invert(&spread)? * innovation));
+            let allowed = limit.sqrt() * axis_sigma(&(others - cone.covariance));
+            if q > largest {
+                largest = q;
+                out.worst = ((moved.x * moved.x + moved.y * moved.y).sqrt(), allowed);
+            }
+            out.agrees &= q <= limit;
+            if let Some(bound) = out.bound.get_mut(k) {
+                *bound = (allowed, axis_sigma(&others));
+            }
+        }
+        Some(out)
+    }
+}
+
+/// What the comparison of a set's heads says.
+struct Separation<T> {
+    /// Whether every head lies within the limit.
+    agrees: bool,
+    /// Angle and allowed angle of the head that agrees least, in radians.
+    worst: (T, T),
+    /// For each head: the angle by which its fault can move the axis unnoticed, and sigma without the head, in radians.
+    bound: [(T, T); MOST_HEADS],
+}
+
+impl<T: Real> Separation<T> {
+    /// Returns the maximum over the hypotheses "no head is wrong" and "head k is wrong".
+    fn protection(&self, sigmas: T, sigma: T, var_tilt: T) -> T {
+        let with_tilt = |sigma: T| sigmas * (sigma * sigma + var_tilt).sqrt();
+        let good = with_tilt(sigma);
+        self.bound.iter().fold(good, |most, &(allowed, sigma)| most.max(allowed + with_tilt(sigma)))
+    }
+}
+
+/// Probability that χ² with two degrees of freedom exceeds x.
+fn survival_of_two(x: f64) -> f64 {
+    libm::exp(-0.5 * x)
+}
+
+/// Probability that χ² with three degrees of freedom exceeds x.
+fn survival_of_three(x: f64) -> f64 {
+    libm::erfc(libm::sqrt(0.5 * x)) + libm::sqrt(x * core::f64::consts::FRAC_2_PI) * libm::exp(-0.5 * x)
+}
+
+/// Returns the value that is exceeded with a probability.
+fn quantile(probability: f64, survival: fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1500.0);
+    // Each step halves the interval; after 60 of them it is as narrow as the rounding.
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if survival(middle) > probability {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
