@@ -6,9 +6,7 @@ use hzn_core::camera::{Camera, Config, Intrinsic, Model};
 use hzn_core::frames::Rotation;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
-use super::{
-    Determined, Found, LimbPrior, Picture, Refusal, Unknowns, Verdict, View, check, estimate, into_sensor_toml, mount,
-};
+use super::{Found, LimbPrior, Picture, Refusal, Unknowns, Verdict, View, check, estimate, into_sensor_toml, mount};
 use crate::draws::Draws;
 use crate::noise::tests::{Noise, earth, limb, solution};
 
@@ -208,51 +206,6 @@ fn the_written_file_is_read_back() {
     let covariance = read.covariance.unwrap();
     assert_eq!(covariance.order.len(), 4);
     assert!((covariance.rows[0][0].sqrt() / found.parameters[0].sigma - 1.0).abs() < 1e-5);
-}
-
-/// A measured k1 ends the need for the gates that `hzn init` writes; a user's own gates stay.
-#[test]
-fn a_measured_shape_removes_the_lenient_gates_of_a_guess() {
-    use hzn_files::start::{Body, CameraFacts, Exif, write_sensor_toml};
-    let (size_px, lens, body) = ([640, 480], Some(Model::Equidistant), Body::Earth);
-    let facts = CameraFacts {
-        size_px,
-        fov_deg: Some(92.0),
-        lens,
-        exif: Exif::default(),
-        altitude_km: None,
-        body,
-        measured: None,
-    };
-    let guess = write_sensor_toml(&facts).unwrap().text;
-    let camera = hzn_files::sensor::parse(&guess, std::path::Path::new("s.toml")).unwrap().config.camera;
-    let written = |text: &str, which| {
-        let value = camera.intrinsic(which).unwrap();
-        let (before, sigma) = (value, 0.001);
-        let parameter = Determined {
-            which,
-            before,
-            sigma_before: 0.05,
-            stated: true,
-            value,
-            sigma,
-            corner_px: 0.1,
-            determined: true,
-        };
-        into_sensor_toml(text, Found { camera: &camera, parameters: &[parameter], source: "a flight" }).unwrap()
-    };
-    let gates = |text: &str| hzn_files::sensor::parse(text, std::path::Path::new("s.toml")).unwrap().config.gates;
-    let default = hzn_core::gates::Config::default();
-    assert!(gates(&guess) != default, "{guess}");
-    let removed = written(&guess, Intrinsic::K1);
-    assert!(gates(&removed.text) == default && !removed.text.contains("rival"), "{}", removed.text);
-    assert!(removed.keys.iter().any(|key| key.contains("max_rival_ratio")), "{:?}", removed.keys);
-    // The focal length alone says nothing about the shape.
-    assert!(gates(&written(&guess, Intrinsic::FyPx).text) == gates(&guess));
-    let more = written(&format!("{guess}min_arc_px = 99.0\n"), Intrinsic::K1).text;
-    assert!(gates(&more).min_arc_px == Some(99.0) && gates(&more).min_evidence == default.min_evidence, "{more}");
-    let own = written(&guess.replace("# A lens of", "# Mine, for a lens of"), Intrinsic::K1).text;
-    assert!(own.contains("\nmin_evidence = 0.0"), "{own}");
 }
 
 /// A flight whose pictures have a position and an attitude that was computed with a nominal mount; the real camera is

@@ -1,7 +1,6 @@
 //! Writes an estimated lens into the text of a sensor.toml: only `[camera]` changes, and each key gets a comment.
 
 use hzn_core::camera::{Config, Covariance, Intrinsic};
-use hzn_files::start::LENIENT_GATES;
 use nalgebra::{Quaternion, UnitQuaternion};
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
@@ -15,7 +14,7 @@ const MARK: &str = "# calibrated:";
 pub struct Written {
     /// The whole text.
     pub text: String,
-    /// Keys that were written, in the form `[camera] fx_px = 1234.5`, and what was removed.
+    /// Keys that were written, in the form `[camera] fx_px = 1234.5`.
     pub keys: Vec<String>,
 }
 
@@ -84,33 +83,7 @@ pub fn into_sensor_toml(text: &str, found: Found<'_>) -> Result<Written, String>
         let why = "covariance of the parameters above, by `hzn calibrate sky`";
         set(camera, "[camera]", "covariance", covariance_value(covariance), why, &mut keys);
     }
-    if found.parameters.iter().any(|p| p.determined && p.which == Intrinsic::K1) && remove_lenient_gates(&mut document)
-    {
-        keys.push("[gates] max_rival_ratio and min_evidence are removed: the shape of the lens is measured".to_owned());
-    }
     Ok(Written { text: document.to_string(), keys })
-}
-
-/// Removes the gates that leave room for a lens of unknown shape, if their comment says that `hzn init` wrote them.
-/// Returns whether it did. Other keys of the section stay.
-fn remove_lenient_gates(document: &mut DocumentMut) -> bool {
-    let Some(gates) = document.get_mut("gates").and_then(Item::as_table_mut) else { return false };
-    let decor = gates.decor_mut();
-    let before = decor.prefix().and_then(|p| p.as_str()).unwrap_or_default().to_owned();
-    if !before.lines().any(|line| line.starts_with(LENIENT_GATES)) {
-        return false;
-    }
-    // The comment of `hzn init` is the last one before the section, up to its end.
-    let kept: String = before.lines().take_while(|l| !l.starts_with(LENIENT_GATES)).map(|l| format!("{l}\n")).collect();
-    let is_bare = kept.trim().is_empty();
-    decor.set_prefix(kept);
-    for key in ["max_rival_ratio", "min_evidence"] {
-        gates.remove(key);
-    }
-    if gates.is_empty() && is_bare {
-        document.remove("gates");
-    }
-    true
 }
 
 impl Written {

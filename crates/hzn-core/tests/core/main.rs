@@ -9,3 +9,4 @@ mod published;
 mod rig;
 mod rows;
 mod total;
+mod uncertain_lens;

@@ -1,7 +1,6 @@
 //! The guessed lens: an ideal projection, and a covariance that has the lenses which the camera may really have.
 
 use hzn_core::camera::{Config, Covariance, Intrinsic, Model};
-use hzn_core::gates;
 
 use super::focal::{Focal, SQRT_3};
 
@@ -19,13 +18,7 @@ pub(super) struct Guess {
     pub(super) focal_sigma_percent: f64,
     /// 1-sigma of each coordinate of the principal point, in pixels.
     pub(super) centre_sigma_px: f64,
-    /// Value of `gates.max_rival_ratio`.
-    pub(super) max_rival_ratio: f64,
 }
-
-/// Part of k1 ρ³ at the edge of the picture that a limb leaves as RMS: a cone has three parameters, and the best
-/// parabola leaves a quarter of a cubic curve, of which the RMS is 1/√2.
-const CUBIC_LEFT: f64 = 0.25 * core::f64::consts::FRAC_1_SQRT_2;
 
 impl Guess {
     /// Makes the guess for an ideal lens ([`Model::Pinhole`] or [`Model::Equidistant`]) and its focal length.
@@ -57,11 +50,7 @@ impl Guess {
                 .collect(),
             rows: rows.iter().map(|row| row.iter().copied().collect()).collect(),
         });
-        // Two sigmas of the shape bend the limb by this much more than an edge that counts as perfect.
-        let gates = gates::Config::default();
-        let bend_px = 2.0 * CUBIC_LEFT * f * k1_sigma * edge.powi(3);
-        let max_rival_ratio = (bend_px / gates.residual_floor_px).max(gates.max_rival_ratio).ceil();
-        Self { camera, k1_sigma, focal_sigma_percent: 100.0 * focal_sigma, centre_sigma_px, max_rival_ratio }
+        Self { camera, k1_sigma, focal_sigma_percent: 100.0 * focal_sigma, centre_sigma_px }
     }
 }
 

@@ -30,7 +30,6 @@ use hzn_core::camera::Model;
 pub use exif::Exif;
 pub use facts::{Body, CameraFacts, MeasuredFov, StartConfig};
 pub use focal::{focal_px, fov_deg};
-pub use text::LENIENT_GATES;
 
 use focal::Focal;
 use guess::Guess;

@@ -39,6 +39,8 @@ fn what_is_written_loads_and_is_the_camera_of_the_facts() {
         let off_axis = edge.xyz()[0].atan2(edge.xyz()[2]).to_degrees();
         assert!((off_axis - 0.5 * fov).abs() < 0.01, "{} {off_axis}", start.text);
         assert_eq!(config.body.altitude_km, Some(418.0));
+        // The gates know what an uncertain lens bends, so that they are those of any other sensor.
+        assert!(config.gates == hzn_core::gates::Config::default() && !start.text.contains("[gates]"));
         let covariance = config.camera.covariance.unwrap();
         let sigma = |i: usize| covariance.rows[i][i].sqrt();
         assert!((100.0 * sigma(0) / start.focal_px / start.focal_sigma_percent - 1.0).abs() < 1e-3);

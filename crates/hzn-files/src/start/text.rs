@@ -13,10 +13,6 @@ use crate::plausible::airless_limb;
 /// 1-sigma of an altitude that is given once for all pictures, as a fraction of it. Orbits are not circular.
 const ALTITUDE_FRACTION: f64 = 0.02;
 
-/// Beginning of the comment before a section `[gates]` whose keys `max_rival_ratio` and `min_evidence` leave room for a
-/// lens of unknown shape. A calibration of the shape removes these keys.
-pub const LENIENT_GATES: &str = "# A lens of unknown shape bends the limb";
-
 /// Writes the text of the file; `comparison` is the note about the focal length that is not used.
 pub(super) fn write_text(
     facts: &CameraFacts,
@@ -39,7 +35,6 @@ pub(super) fn write_text(
     text += &write_camera(facts, &guess.camera, focal, fov_deg, comparison);
     text += &write_covariance(guess, focal);
     text += &write_body(facts.body, facts.altitude_km);
-    text += &write_gates(guess);
     text
 }
 
@@ -145,15 +140,4 @@ fn write_body(body: Body, altitude_km: Option<f64>) -> String {
         ),
     };
     t
-}
-
-/// Writes the gates that compare the limb with other shapes.
-fn write_gates(guess: &Guess) -> String {
-    format!(
-        "\n{LENIENT_GATES}, so that a circle of the picture may fit better than a cone.\n\
-         # These keys leave room for two sigmas of k1. Remove both with a calibration, as `hzn calibrate sky` does:\n\
-         # their defaults also find flares of the lens.\n\
-         [gates]\nmax_rival_ratio = {:.0}\nmin_evidence = 0.0\n",
-        guess.max_rival_ratio
-    )
 }

@@ -71,6 +71,8 @@ pub(crate) struct Turn<T> {
 pub(crate) struct EdgeNoise<T> {
     /// Contribution to the variance of the freely fitted cos α; 0 if it was not fitted.
     pub(crate) var_cos: T,
+    /// Contribution of the lens to the same variance.
+    pub(crate) lens_var_cos: T,
     /// 1-sigma of an edge point in pixels. `length_px` is the correlation length, in pixels.
     pub(crate) sigma_px: T,
     pub(crate) length_px: T,

@@ -44,6 +44,7 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
         chi2: T::ZERO,
         edge: EdgeNoise {
             var_cos: var_c,
+            lens_var_cos: T::ZERO,
             sigma_px: T::from_f64(config.sigma_px),
             length_px: T::from_f64(config.correlation_px),
             shift_px: T::ZERO,

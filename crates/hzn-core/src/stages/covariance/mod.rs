@@ -72,7 +72,7 @@ pub(crate) fn fuse<T: Real>(
     };
     add(Term::EdgeNoise, &p);
     // The part of the edge noise is taken before the other terms are added, because a gate replaces this part alone.
-    let edge = noise.edge(p.m33);
+    let mut edge = noise.edge(p.m33);
     let mut p = ConeCovariance { whole: p, common: M3::zeros(), late: M3::zeros() };
     common::add_terms(blocks, fit, expected, &noise, camera, |term, more| {
         if term == Term::CommonBend {
@@ -82,6 +82,9 @@ pub(crate) fn fuse<T: Real>(
         } else {
             p.whole += more;
             p.common += more;
+        }
+        if term == Term::Lens {
+            edge.lens_var_cos = more.m33;
         }
         add(term, more);
     })?;

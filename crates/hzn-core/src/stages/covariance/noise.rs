@@ -68,7 +68,13 @@ impl<T: Real> EdgeNoiseModel<T> {
 
     /// Returns the errors of the edge points, with their contribution to the variance of the freely fitted cos α.
     pub(super) fn edge(&self, var_cos: T) -> EdgeNoise<T> {
-        EdgeNoise { var_cos, sigma_px: self.variance.sqrt(), length_px: self.length_px, shift_px: self.shift_px }
+        EdgeNoise {
+            var_cos,
+            lens_var_cos: T::ZERO,
+            sigma_px: self.variance.sqrt(),
+            length_px: self.length_px,
+            shift_px: self.shift_px,
+        }
     }
 
     /// Returns the upper triangle of the covariance of the right-hand side Σ w r h of the normal equations.

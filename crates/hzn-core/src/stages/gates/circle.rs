@@ -111,7 +111,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn shape<T: Real>(points: impl Iterator<Item = [f64; 2]>) -> Shape<T> {
-        let place = |p: [f64; 2]| Place { at: p.map(T::from_f64), r: T::ZERO, w: T::one() };
+        let place = |p: [f64; 2]| Place { at: p.map(T::from_f64), r: T::ZERO, w: T::one(), number: 0 };
         points.map(place).collect()
     }
 

@@ -83,7 +83,12 @@ mod tests {
     use super::*;
 
     fn shape<T: Real>(at: impl Fn(f64) -> [f64; 2]) -> Shape<T> {
-        let place = |i: usize| Place { at: at(i as f64 / (MOST - 1) as f64).map(T::from_f64), r: T::ZERO, w: T::one() };
+        let place = |i: usize| Place {
+            at: at(i as f64 / (MOST - 1) as f64).map(T::from_f64),
+            r: T::ZERO,
+            w: T::one(),
+            number: 0,
+        };
         (0..MOST).map(place).collect()
     }
 

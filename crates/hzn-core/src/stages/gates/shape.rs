@@ -27,6 +27,8 @@ pub(super) struct Place<T> {
     pub(super) r: T,
     /// Weight of the point in the fit.
     pub(super) w: T,
+    /// Number of the edge point: its lane, and its block times [`LANES`].
+    pub(super) number: u16,
 }
 
 /// Inliers in the order of the edge.
@@ -81,6 +83,8 @@ pub(super) struct Residuals<'a, T> {
     floor_px: T,
     max_ratio: T,
     min_evidence: T,
+    /// Evidence against the cone that the residuals do not show: the lens must have an error for it.
+    bend: T,
 }
 
 impl<'a, T: Real> Residuals<'a, T> {
@@ -94,12 +98,20 @@ impl<'a, T: Real> Residuals<'a, T> {
             floor_px: T::from_f64(RIVAL_FLOOR_PX),
             max_ratio: T::from_f64(config.max_rival_ratio),
             min_evidence: T::from_f64(config.min_evidence),
+            bend: T::ZERO,
         }
+    }
+
+    /// Makes the residuals of a cone that was fitted together with uncertain parameters of the lens, from the χ² of the
+    /// values that this fit needs, and its noise: the sigma of a point and the number of independent errors.
+    pub(super) fn with_bend(self, chi2: T, noise_px: T, independent: T) -> Self {
+        let (floor_px, independent) = (self.floor_px.max(noise_px), self.independent.min(independent));
+        Self { bend: chi2, floor_px, independent, ..self }
     }
 
     /// Returns whether the points prove that they are on the cone and not on a curve with this RMS.
     pub(super) fn prove_cone_over(&self, rival_px: T) -> bool {
-        self.evidence(rival_px, self.rms_px) > self.min_evidence
+        self.evidence(rival_px, self.rms_px) - self.bend > self.min_evidence
     }
 
     /// Returns whether the residuals are larger than noise.
@@ -110,7 +122,7 @@ impl<'a, T: Real> Residuals<'a, T> {
     /// Returns whether some other curve may fit better. No smooth curve can fit better than the noise from point to
     /// point.
     pub(super) fn allow_rival(&self) -> bool {
-        self.exceed_noise() || self.evidence(self.rms_px, self.noise_px) > self.min_evidence
+        self.exceed_noise() || self.evidence(self.rms_px, self.noise_px) + self.bend > self.min_evidence
     }
 
     /// Returns whether a curve with this RMS replaces the cone: its residuals are far smaller, or the evidence for it
@@ -118,7 +130,7 @@ impl<'a, T: Real> Residuals<'a, T> {
     pub(super) fn prefer(&self, rival_px: T, more: T) -> bool {
         let needed = self.min_evidence + self.independent.ln() * more;
         self.rms_px > self.max_ratio * rival_px.max(self.floor_px)
-            || (self.evidence(self.rms_px, rival_px) > needed && self.min_evidence > T::ZERO)
+            || (self.evidence(self.rms_px, rival_px) + self.bend > needed && self.min_evidence > T::ZERO)
     }
 
     /// Returns the evidence against a curve with the first RMS, for one with the second: twice the logarithm of the
@@ -139,7 +151,7 @@ pub(super) fn collect_inliers<T: Real>(
 ) {
     let every = fit.inliers.div_ceil(MOST as u32).max(1);
     let mut passed = every / 2;
-    for block in blocks {
+    for (number, block) in blocks.iter().enumerate() {
         for lane in 0..LANES {
             let w = block.weight[lane];
             if !(w > T::ZERO) {
@@ -151,7 +163,9 @@ pub(super) fn collect_inliers<T: Real>(
             }
             passed = 0;
             let Some(at) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { continue };
-            if shape.push(Place { at: [at.u, at.v], r: curve.distance(block, lane), w }).is_err() {
+            // No workspace has more than 65 535 points.
+            let number = (number * LANES + lane) as u16;
+            if shape.push(Place { at: [at.u, at.v], r: curve.distance(block, lane), w, number }).is_err() {
                 return;
             }
         }

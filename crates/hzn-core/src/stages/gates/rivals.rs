@@ -1,0 +1,34 @@
+//! The gates that fit other shapes to the inliers, and the second chance of a limb that an uncertain lens bends.
+
+use super::case::{Case, refuse_if};
+use super::shape::Residuals;
+use super::{any_cone, circle, lens, polyline, straight};
+use crate::base::real::Real;
+use crate::model::verdict::Verdict;
+
+/// Refuses an edge whose points fit another shape better than the cone. If the lens is uncertain, the cone is first
+/// fitted together with the parameters of the lens; the half-angle must then be the expected one, too.
+// The second fit is done only if its result matters, so that other edges do not pay for it.
+pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> Result<(), Verdict> {
+    let exact = compare(case, residuals);
+    if exact.is_ok() && !lens::explains_half_angle(case) {
+        return Ok(());
+    }
+    let mut shape = residuals.shape.clone();
+    let Some(bend) = lens::unbend(case, residuals, &mut shape) else { return exact };
+    if exact.is_err() {
+        let floor_px = T::from_f64(case.config.residual_floor_px);
+        let independent = T::from_f64(lens::INDEPENDENT);
+        let bent = Residuals::new(residuals.curve, &shape, case.config).with_bend(bend.chi2, floor_px, independent);
+        compare(case, &bent)?;
+    }
+    let chi = T::from_f64(case.config.max_half_angle_sigma);
+    refuse_if(bend.half_angle_chi2 > chi * chi, Verdict::HalfAngle)
+}
+
+fn compare<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> Result<(), Verdict> {
+    straight::refuse(residuals)?;
+    any_cone::refuse(case, residuals)?;
+    circle::refuse(residuals)?;
+    polyline::refuse(residuals)
+}
