@@ -44,7 +44,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
         of a sensor in memory
   packets sends COUNT (1000000) telecommands to the flight software, most of them damaged
   pictures
-        renders FLIGHTS (30) flights of three kinds with a program in Python, and counts hzn's errors against sigma
+        renders FLIGHTS (30) flights of three kinds with a program in Python, and counts hzn's errors against sigma;
+        then FLIGHTS flights of each of 16 kinds with an edge that is no limb, which continue after a stop
   paths builds the images of the flight computer and the wheel in another folder; their bytes must be the same
   processors
         compares the answers to PICTURES (2000) on aarch64 and big-endian powerpc64, in QEMU, with those of this machine
@@ -128,14 +129,25 @@ pub(crate) fn packets(count: u64) -> Outcome {
 fn pictures(flights: u64) -> Outcome {
     steps::run(&mut cargo(&["build", "--release", "--bin", "hzn"]))?;
     let mut campaign = limb_campaign(&target().join("release/hzn"))?;
-    steps::run(campaign.args(["--list", "--flights", &flights.to_string()]))
+    steps::run(campaign.args(["--list", "--flights", &flights.to_string()]))?;
+    let mut decoys = decoy_campaign(&target().join("release/hzn"))?;
+    steps::run(decoys.arg("--keep").arg(target().join("xtask/decoys")).args(["--flights", &flights.to_string()]))
 }
 
 /// Returns the call of the campaign on pictures of another program.
 pub(crate) fn limb_campaign(hzn: &Path) -> Result<Command, Trouble> {
+    python_campaign("tests/python/limb_campaign.py", hzn)
+}
+
+/// Returns the call of the campaign on edges that are no limb.
+pub(crate) fn decoy_campaign(hzn: &Path) -> Result<Command, Trouble> {
+    python_campaign("tests/python/decoy_campaign.py", hzn)
+}
+
+fn python_campaign(script: &str, hzn: &Path) -> Result<Command, Trouble> {
     let python = python::prepare_environment("benches", Path::new("benches/requirements.txt"))?;
     let mut campaign = Command::new(python);
-    campaign.arg("tests/python/limb_campaign.py").arg("--hzn").arg(hzn);
+    campaign.arg(script).arg("--hzn").arg(hzn);
     Ok(campaign)
 }
 

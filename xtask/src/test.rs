@@ -125,7 +125,9 @@ fn check_limbs_of_another_program(steps: &mut Steps) -> Outcome {
     build_tests()?;
     let mut campaign = campaign::limb_campaign(&target().join("debug/hzn"))?;
     let flights = if steps.all { "10" } else { "1" };
-    steps::run(campaign.args(["--check", "--list", "--flights", flights, "--first-seed", "1"]))
+    steps::run(campaign.args(["--check", "--list", "--flights", flights, "--first-seed", "1"]))?;
+    let mut decoys = campaign::decoy_campaign(&target().join("debug/hzn"))?;
+    steps::run(decoys.args(["--check", "--flights", flights, "--first-seed", "1"]))
 }
 
 /// Runs a script of tests/python. Its arguments are one of our programs and a folder that the script makes.

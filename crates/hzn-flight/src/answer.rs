@@ -122,6 +122,11 @@ record! {
 const NAN: f32 = f32::NAN;
 
 impl Direction {
+    /// Returns the estimated altitude and its 1-sigma in metres, if they are known.
+    fn altitude_est_and_sigma_m(&self) -> Option<(f64, f64)> {
+        (!self.altitude_est_m.is_nan()).then(|| (self.altitude_est_m.into(), self.altitude_est_sigma_m.into()))
+    }
+
     /// What a picture without a direction has.
     // NaN, because the packet has a fixed size and 0 could be taken for a value.
     pub const NONE: Self = Self {
@@ -285,11 +290,11 @@ impl PictureAnswer {
                 axis_vehicle: UnitVec3::try_new(widen(d.axis_vehicle)),
                 half_angle_rad: d.half_angle_rad.into(),
                 fused_half_angle_rad: d.fused_half_angle_rad.into(),
-                altitude_m: (!d.altitude_est_m.is_nan())
-                    .then(|| (d.altitude_est_m.into(), d.altitude_est_sigma_m.into())),
+                altitude_m: d.altitude_est_and_sigma_m(),
                 free: self.position.and_then(|p| p.free()),
                 axis_by_cos: self.position.map(|p| widen(p.axis_by_cos)).filter(|v| !v.iter().any(|x| x.is_nan())),
                 position: None,
+                p_limb: None,
                 rms_px: d.rms_px.into(),
                 inliers: d.inliers,
                 arc_px: d.arc_px.into(),

@@ -223,6 +223,8 @@ columns! {
         yaw_deg: Option<f64>,
         /// 1σ of that rotation, degrees.
         yaw_sigma_deg: Option<f64>,
+        /// Probability that the edge of the answer is the limb; only for bodies with air.
+        p_limb: Option<f64>,
         /// The part of the axis's covariance whose error is the same in the next picture while the geometry stays, xx,
         /// rad². The mean of n such answers has the covariance common + (cov − common)/n.
         cov_common_xx: Option<f64>,
@@ -320,6 +322,7 @@ impl Row {
             self.set_position(position);
         }
         self.rms_px = number(s.rms_px);
+        self.p_limb = s.p_limb.and_then(number);
         self.inliers = Some(s.inliers);
         if let Some(body) = &s.axis_vehicle {
             let [roll, pitch] = roll_pitch_deg(body);

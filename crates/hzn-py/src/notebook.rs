@@ -27,6 +27,17 @@ pub(crate) fn to_html<'a>(jpeg: Option<Vec<u8>>, rows: impl Iterator<Item = &'a 
     html + "</table></div>"
 }
 
+/// Returns the text of a report, with its status or those of several bodies.
+pub(crate) fn to_text(title: &str, r: &Row) -> String {
+    match (r.axis(), r.sigma_max_deg, r.inliers) {
+        (Some([x, y, z]), Some(sigma), Some(inliers)) => format!(
+            "Report({title}, axis [{x:.6}, {y:.6}, {z:.6}], sigma {sigma:.4} deg, {inliers} inliers, rms {:.2} px)",
+            r.rms_px.unwrap_or(f64::NAN)
+        ),
+        _ => format!("Report({title}: {})", r.detail),
+    }
+}
+
 /// Returns names and values of the numbers of a row.
 fn cells(r: &Row) -> Vec<(&'static str, String)> {
     let mut rows =

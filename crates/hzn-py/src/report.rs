@@ -291,6 +291,11 @@ impl Report {
     fn rms_px(&self) -> Option<f64> {
         self.row.rms_px
     }
+    #[doc = doc!("Report.p_limb")]
+    #[getter]
+    fn p_limb(&self) -> Option<f64> {
+        self.row.p_limb
+    }
     #[doc = doc!("Report.roll_deg")]
     #[getter]
     fn roll_deg(&self) -> Option<f64> {
@@ -427,15 +432,7 @@ impl Report {
         slf
     }
     fn __repr__(&self) -> String {
-        let r = &self.row;
-        match (r.axis(), r.sigma_max_deg, r.inliers) {
-            (Some([x, y, z]), Some(sigma), Some(inliers)) => format!(
-                "Report({}, axis [{x:.6}, {y:.6}, {z:.6}], sigma {sigma:.4} deg, {inliers} inliers, rms {:.2} px)",
-                self.title(),
-                r.rms_px.unwrap_or(f64::NAN)
-            ),
-            _ => format!("Report({}: {})", self.title(), r.detail),
-        }
+        notebook::to_text(&self.title(), &self.row)
     }
     /// Shows the numbers in a notebook, next to the picture with all annotations.
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {

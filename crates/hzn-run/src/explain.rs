@@ -6,7 +6,9 @@ use hzn_core::covariance::Term;
 use hzn_core::report::Candidate;
 use hzn_core::status::{Stage, Status};
 use hzn_core::verdict::Verdict;
-use hzn_core::{Report, Solution, gates};
+use hzn_core::{Report, Solution, evidence, gates};
+
+use crate::engine::Trace;
 
 /// Returns the meaning of a verdict, with the limit that was not met.
 pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
@@ -51,11 +53,10 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
             s.max_rival_ratio
         ),
         Verdict::Departure => "the edge leaves the fitted limb smoothly (gates.max_departure)".into(),
-        Verdict::Band => {
-            "behind the edge there is a narrow band and then the sky again, not the body (gates.max_band)".into()
-        }
+        Verdict::Band => "behind the edge there is a narrow band, and then the sky again (gates.max_band)".into(),
         Verdict::Night => "it is night at this time and position (gates.max_unlit, body.sunlit)".into(),
         Verdict::Faint => "the brightness hardly changes across the edge, as in twilight".into(),
+        Verdict::Unlikely => format!("its probability to be the limb is below {} (gates.min_p_limb)", s.min_p_limb),
         Verdict::Glow => "light reaches high above the edge: it is airglow or aurora (gates.max_glow)".into(),
         Verdict::Attitude => format!(
             "the axis is more than {} sigma from the given attitude (gates.max_attitude_sigma)",
@@ -97,6 +98,7 @@ const ORDER: &[Verdict] = &[
     Verdict::Departure,
     Verdict::OutOfView,
     Verdict::Radius,
+    Verdict::Unlikely,
     Verdict::Glow,
     Verdict::Passed,
     Verdict::Chosen,
@@ -247,6 +249,11 @@ const VERDICT_TIPS: &[(&[Verdict], &str)] = &[
          ECEF), its time, and attitude_sigma_deg",
     ),
     (
+        &[Verdict::Unlikely],
+        "the edge has few signs of a limb (see evidence): an attitude (qw, qx, qy, qz) or the Sun (sun_x, sun_y, \
+         sun_z) is evidence, too; gates.min_p_limb = 0 takes the risk",
+    ),
+    (
         &[Verdict::Night],
         "it is night below the camera: check utc and x_km, y_km, z_km; for a thermal camera set body.sunlit = false; \
          gates.max_unlit = 1 takes the risk that the edge is airglow",
@@ -257,6 +264,53 @@ const VERDICT_TIPS: &[(&[Verdict], &str)] = &[
          camera set body.sunlit = false",
     ),
 ];
+
+/// Returns the evidence that the answer, or else the last edge with evidence, is the limb: the names and texts of
+/// lines.
+pub fn evidence(
+    trace: &Trace,
+    report: &Report<f64>,
+    gates: &gates::Config,
+) -> impl Iterator<Item = (&'static str, String)> + use<> {
+    let edges = trace.edges();
+    let answer = report.solution.as_ref().map(|s| s.candidate);
+    let shown = edges.iter().rev().find(|e| e.evidence.is_some() && answer.is_none_or(|n| n == e.candidate));
+    let mut lines = Vec::new();
+    if let Some((edge, evidence)) = shown.and_then(|edge| Some((edge.candidate, edge.evidence?))) {
+        let odds = gates.prior_odds;
+        let (p_limb, ratio) = (evidence.p_limb(odds), evidence.ln_ratio_of_all());
+        lines.push((
+            "evidence",
+            format!(
+                "edge {edge} is the limb with probability {p_limb:.4}: odds {odds}, log likelihood ratio {ratio:+.2}"
+            ),
+        ));
+        for term in evidence::Term::ALL {
+            if let Some(value) = evidence.value(term) {
+                let (name, ratio, text) = (term.name(), evidence.ln_ratio(term), evidence_text(term));
+                lines.push(("", format!("{ratio:+6.2} {name:<15} {value:.4}  {text}")));
+            }
+        }
+    }
+    lines.into_iter()
+}
+
+/// Returns the meaning of a piece of evidence.
+fn evidence_text(term: evidence::Term) -> &'static str {
+    match term {
+        evidence::Term::Curvature => "log of the curvature over its sigma",
+        evidence::Term::HalfAngle => "squared difference from the expected half-angle, in sigmas",
+        evidence::Term::Gaps => "parts of the limb without edge, and of the edge without limb",
+        evidence::Term::Misfit => "log of the residuals over their noise",
+        evidence::Term::Sky => "brightness of the sky over that of the body",
+        evidence::Term::FaintAir => "log of the light 1.5 scale heights up, if too faint for air",
+        evidence::Term::BrightAir => "log of the light 1.5 scale heights up, if too bright for air",
+        evidence::Term::FaintHighAir => "log of the light three scale heights up, if too faint for air",
+        evidence::Term::Layer => "a second edge below, as the ground has below airglow",
+        evidence::Term::Attitude => "agreement with the given attitude",
+        evidence::Term::Sun => "the given Sun lights the edge",
+    }
+}
 
 /// Returns a number with its noun: `1 picture`, `2 pictures`.
 pub fn counted(n: u64, what: &str) -> String {

@@ -219,6 +219,7 @@ impl Explained<'_> {
         self.edges(&mut line);
         self.candidates(&mut line);
         self.points(&mut line);
+        explain::evidence(self.trace, self.report, &self.config.gates).for_each(|(name, text)| line(name, text));
         line("work", format!("{} (limits.max_work bounds it)", self.report.counters.work));
         line("status", self.report.status.name().to_owned());
         match &self.report.solution {

@@ -136,3 +136,26 @@ fn quaternion_of(m: [[f64; 3]; 3]) -> [f64; 4] {
     let axis = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]].map(|v| v / (4.0 * w));
     [w, axis[0], axis[1], axis[2]]
 }
+
+/// The probability of the limb is a column, a gate, and a list of evidence.
+#[test]
+fn a_limb_has_a_probability_and_its_evidence() {
+    let place = Place::with_pictures(1);
+    let p_limb = |gates: &str| -> Result<f64, String> {
+        place.write("in/sensor.toml", format!("{SENSOR}\n[gates]\n{gates}\n").as_bytes());
+        let rows = without_time(&place.run(&["run", "in"]).expect(0).out);
+        cell(&rows[0], "p_limb").parse().map_err(|_| cell(&rows[0], "detail").to_owned())
+    };
+    let likely = p_limb("min_p_limb = 0.0").unwrap();
+    assert!((0.5..1.0).contains(&likely), "{likely}");
+    let rarer = p_limb("min_p_limb = 0.0\nprior_odds = 0.5").unwrap();
+    // The odds are in proportion to the prior odds.
+    let odds = |p: f64| p / (1.0 - p);
+    assert!((odds(likely) / odds(rarer) / 100.0 - 1.0).abs() < 1e-6, "{likely} {rarer}");
+    let why = p_limb(&format!("min_p_limb = {}", 0.5 * (1.0 + likely))).unwrap_err();
+    assert!(why.contains("unlikely"), "{why}");
+    let explained = place.run(&["explain", "in/0000.png"]).expect(0);
+    for text in ["is the limb with probability", "curvature", "gates.min_p_limb"] {
+        assert!(explained.out.contains(text), "{text}: {}", explained.out);
+    }
+}

@@ -4,6 +4,7 @@ pub mod body;
 mod border;
 pub mod edge_noise;
 pub mod error_budget;
+pub mod evidence;
 pub(crate) mod found_limb;
 pub mod observer;
 pub mod report;

@@ -5,6 +5,7 @@ use crate::geometry::pixel::ImagePoint;
 use crate::model::body::Expected;
 pub use crate::model::border::Border;
 use crate::model::error_budget::ErrorBudget;
+use crate::model::evidence::Evidence;
 use crate::model::report::{Candidate, Solution};
 use crate::model::status::Stage;
 
@@ -100,6 +101,9 @@ pub trait Observer<T> {
     /// the cone that is expected. It comes before the gates, so a candidate that a gate refuses has a fit, too.
     #[inline(always)]
     fn fit(&self, _candidate: u32, _fit: &Solution<T>, _expected: &Expected<T>) {}
+    /// The evidence that a candidate is the limb is weighed. Only candidates that pass all gates before have evidence.
+    #[inline(always)]
+    fn evidence(&self, _candidate: u32, _evidence: &Evidence<T>) {}
     /// A candidate has its verdict, and a solution if there is one.
     fn verdict(&self, _candidate: u32, _outcome: &Candidate<T>, _solution: Option<&Solution<T>>) {}
 }
@@ -154,6 +158,9 @@ impl<T> Observer<T> for &dyn Observer<T> {
     }
     fn fit(&self, candidate: u32, fit: &Solution<T>, expected: &Expected<T>) {
         (**self).fit(candidate, fit, expected);
+    }
+    fn evidence(&self, candidate: u32, evidence: &Evidence<T>) {
+        (**self).evidence(candidate, evidence);
     }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
         (**self).verdict(candidate, outcome, solution);

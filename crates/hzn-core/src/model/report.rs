@@ -270,6 +270,9 @@ pub struct Solution<T> {
     pub axis_by_cos: Option<[T; 3]>,
     /// The position of the body's centre, with `fit.position`; `None` if the arc is too short for a position.
     pub position: Option<Position<T>>,
+    /// Probability that the edge of the answer is the limb, from all [evidence](crate::evidence). It is only known for
+    /// bodies with air. `None` when the half-angle was not fitted, or when the answer came by telemetry.
+    pub p_limb: Option<T>,
     /// Weighted RMS distance of the inliers from the limb in pixels.
     pub rms_px: T,
     /// Number of inliers: edge points with a weight above 0 in the fit.

@@ -82,4 +82,6 @@ verdicts! {
     Faint = 24, "faint";
     /// The time and the position of the prior say that it is night: the Sun lights no part of the limb.
     Night = 25, "night";
+    /// All evidence together makes it too improbable that the edge is the limb.
+    Unlikely = 26, "unlikely";
 }

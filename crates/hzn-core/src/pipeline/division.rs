@@ -19,6 +19,7 @@ use crate::geometry::pixel::ImagePoint;
 use crate::image::{Cropped, Indirect, Pixels};
 use crate::model::body::Expected;
 use crate::model::error_budget::ErrorBudget;
+use crate::model::evidence::Evidence;
 use crate::model::observer::{Border, Observer};
 use crate::model::report::{Candidate, Report, Solution};
 use crate::model::status::{Stage, Status};
@@ -230,6 +231,9 @@ impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
     }
     fn fit(&self, candidate: u32, fit: &Solution<T>, expected: &Expected<T>) {
         self.observer.fit(candidate, fit, expected);
+    }
+    fn evidence(&self, candidate: u32, evidence: &Evidence<T>) {
+        self.observer.evidence(candidate, evidence);
     }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
         self.observer.verdict(candidate, outcome, solution);

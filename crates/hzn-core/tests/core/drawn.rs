@@ -4,6 +4,7 @@ use hzn_core::body::Kind;
 use hzn_core::camera::{self, Model};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
+use hzn_core::verdict::Verdict;
 use hzn_core::{Config, HostHorizon, Prior, Report};
 
 /// A disc with its axis, half-angle in degrees, and brightness above the sky.
@@ -199,4 +200,52 @@ fn a_camera_below_the_airglow_sees_no_glow() {
     assert_answer(&below, axis);
     let (above, _) = limb(400.0);
     assert!(above.solution.is_none(), "{:?}", above.solution);
+}
+
+/// Draws the Earth's limb from 400 km with air: the brightness falls by e over `scale_height_px` above the limb, or
+/// within the pixel of [`draw`] if this is 0.
+fn earth_limb(config: &Config, scale_height_px: f64) -> Vec<u8> {
+    let (half_angle_deg, per_px) = ((6388.0 / 6771.0f64).asin().to_degrees(), 1.0 / 1200f64);
+    let disc = Disc { axis: unit([0.1, 0.94, 0.33]), half_angle_deg, brightness: 180.0 };
+    if scale_height_px == 0.0 {
+        return draw(config, &[disc], 5.0, 1.5);
+    }
+    let mut noise = Noise(9);
+    (0..640 * 480)
+        .map(|i| {
+            let ray = unit([(f64::from(i % 640) - 319.5) * per_px, (f64::from(i / 640) - 239.5) * per_px, 1.0]);
+            let above_px = (angle_deg(ray, disc.axis) - half_angle_deg).to_radians() / per_px;
+            let depth = core::f64::consts::LN_2 * (-above_px / scale_height_px).exp();
+            (5.0 + disc.brightness * -(-depth).exp_m1() + 1.5 * noise.normal()).round().clamp(0.0, 255.0) as u8
+        })
+        .collect()
+}
+
+#[test]
+fn an_edge_without_air_is_an_unlikely_limb() {
+    let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 1200.0));
+    config.body.kind = Kind::EarthSphere;
+    config.body.altitude_km = Some(400.0);
+    // The scale height of 7.5 km at a distance of 2244 km has 4 px.
+    let p_limb = |config: &Config, scale_height_px: f64| {
+        process(config, &earth_limb(config, scale_height_px)).solution.and_then(|s| s.p_limb)
+    };
+    let [limb, ghost] = [4.0, 0.0].map(|scale_height_px| p_limb(&config, scale_height_px).unwrap());
+    assert!(limb > 0.98 && ghost < 0.9 && ghost > 0.75, "{limb} {ghost}");
+    config.gates.min_p_limb = 0.9;
+    assert_eq!(p_limb(&config, 4.0), Some(limb));
+    let refused = process(&config, &earth_limb(&config, 0.0));
+    assert!(refused.solution.is_none(), "{:?}", refused.solution);
+    assert!(refused.candidates.iter().any(|c| c.verdict == Verdict::Unlikely), "{:?}", refused.candidates);
+    config.gates.min_p_limb = 0.0;
+    // Rarer limbs make every edge less probable.
+    config.gates.prior_odds = 0.01;
+    assert!(p_limb(&config, 4.0).unwrap() < 0.5 * limb);
+    // The weights are those of the Earth.
+    let moon = sensor(640, 480, 600.0);
+    let config = Config { body: hzn_core::body::Config { altitude_km: Some(500.0), ..moon.body.clone() }, ..moon };
+    let half_angle_deg = (1737.4f64 / 2237.4).asin().to_degrees();
+    let disc = Disc { axis: unit([0.1, 0.8, 0.6]), half_angle_deg, brightness: 180.0 };
+    let moon = process(&config, &draw(&config, &[disc], 5.0, 1.5));
+    assert!(moon.solution.is_some_and(|s| s.p_limb.is_none()));
 }

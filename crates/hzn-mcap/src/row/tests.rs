@@ -21,6 +21,7 @@ fn report<T: Real>(status: Status) -> Report<T> {
         free: None,
         axis_by_cos: None,
         position: None,
+        p_limb: Some(number(0.875)),
         rms_px: number(f64::NAN),
         inliers: 500,
         arc_px: number(900.0),
@@ -42,6 +43,7 @@ fn converts<T: Real>(tolerance: f64) {
     let near = |x: Option<f64>, y: f64| assert!((x.unwrap() / y - 1.0).abs() < tolerance, "{x:?} {y}");
     near(row.axis_z, 0.8);
     near(row.cov_common_xx, 3e-8);
+    near(row.p_limb, 0.875);
     near(row.sigma_max_deg, 2e-4f64.to_degrees());
     near(row.half_angle_deg, 1.3f64.to_degrees());
     near(row.altitude_est_km, 240.0);

@@ -557,6 +557,10 @@ class Report:
         """Weighted RMS distance of the inliers from the fitted limb, pixels."""
 
     @property
+    def p_limb(self) -> float | None:
+        """Probability that the edge of the answer is the limb; None for bodies without air."""
+
+    @property
     def roll_deg(self) -> float | None:
         """Roll of the vehicle, degrees; needs a mounting."""
 

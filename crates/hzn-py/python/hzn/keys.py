@@ -278,6 +278,12 @@ class Gates(TypedDict, total=False):
     max_band: float
     """Largest part of the inliers at which a second edge inside the limb leads back to the brightness of the sky; 1
     turns the gates ``band`` and ``faint`` off. Values: 0 to 1. Default: 0.5."""
+    min_p_limb: float
+    """Smallest probability that the edge of an answer is the limb (column ``p_limb``); 0 turns the gate off. Values:
+    0 to 1. Default: 0.75."""
+    prior_odds: float
+    """Odds that an edge that passes all other gates is the limb, before its evidence is weighed. Values: above 0 to
+    1e9. Default: 50.0."""
     max_attitude_sigma: float
     """Largest angle between the axis and the axis that a given attitude and position predict, in standard
     deviations. Values: above 0 to 1e6. Default: 4.0."""

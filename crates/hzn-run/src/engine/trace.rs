@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use hzn_core::body::Expected;
 use hzn_core::covariance::{ErrorBudget, Term};
+use hzn_core::evidence::Evidence;
 use hzn_core::observer::Border;
 use hzn_core::pixel::{ImagePoint, Pixel};
 use hzn_core::real::Real;
@@ -32,6 +33,8 @@ pub struct Edge {
     /// The larger standard deviation (1 sigma) of the axis from each source of error, in radians. Empty if there was no
     /// fit.
     pub budget_rad: Vec<(Term, f64)>,
+    /// The evidence that this candidate is the limb, if it passed every gate but `unlikely`.
+    pub evidence: Option<Evidence<f64>>,
     /// The fit of this candidate, if it passed every gate.
     pub solution: Option<Solution<f64>>,
     /// The fit of this candidate and the cone that was expected, also if a gate refused the candidate.
@@ -219,6 +222,9 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
     fn fit(&self, candidate: u32, fit: &Solution<T>, expected: &Expected<T>) {
         self.now().into_iter().for_each(|t| t.fit(candidate, fit, expected));
     }
+    fn evidence(&self, candidate: u32, evidence: &Evidence<T>) {
+        self.now().into_iter().for_each(|t| t.evidence(candidate, evidence));
+    }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
         self.now().into_iter().for_each(|t| t.verdict(candidate, outcome, solution));
     }
@@ -280,6 +286,9 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
                 limb_height_m: limb,
             });
         });
+    }
+    fn evidence(&self, candidate: u32, evidence: &Evidence<T>) {
+        self.change_edge(candidate, |e| e.evidence = Some(evidence.to_f64()));
     }
     fn verdict(&self, candidate: u32, outcome: &Candidate<T>, solution: Option<&Solution<T>>) {
         self.change_edge(candidate, |e| {

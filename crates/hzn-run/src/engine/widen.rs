@@ -42,6 +42,7 @@ pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Solution<f
         free: s.free.as_ref().map(widen_free),
         axis_by_cos: s.axis_by_cos.map(|by| by.map(Into::into)),
         position: s.position.as_ref().map(Position::to_f64),
+        p_limb: s.p_limb.map(Into::into),
         rms_px: s.rms_px.into(),
         inliers: s.inliers,
         arc_px: s.arc_px.into(),

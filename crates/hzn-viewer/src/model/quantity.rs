@@ -34,6 +34,7 @@ pub const QUANTITIES: &[Quantity] = &[
     always("3 sigma", "°", &[("3σ", |r, _| Some(3.0 * r.sigma_max_deg?))]),
     optional("Error (truth)", "°", &[("error", error_deg), ("3σ", |r, t| t.and(Some(3.0 * r.sigma_max_deg?)))]),
     always("RMS", "px", &[("rms", |r, _| r.rms_px)]),
+    optional("Probability of the limb", "", &[("p", |r, _| r.p_limb)]),
     always(
         "Points",
         "",

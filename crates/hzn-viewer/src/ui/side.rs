@@ -117,6 +117,9 @@ fn answer(viewer: &mut Viewer, ui: &mut Ui) {
             }
             row("RMS", format!("{:.3} px", s.rms_px));
             row("inliers", s.inliers.to_string());
+            if let Some(p_limb) = s.p_limb {
+                row("p (limb)", format!("{p_limb:.4}"));
+            }
             if let Some(body) = &s.axis_vehicle {
                 let [roll, pitch] = hzn_mcap::roll_pitch_deg(body);
                 row("roll", format!("{roll:.3}°"));

@@ -188,6 +188,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let covariance = Cov3::from_tangent(&b1, &b2, fused.p);
         self.show_fit(fit, &fused, covariance, expected, outcome.number);
         let case = Case {
+            number: outcome.number,
             fit,
             fused: &fused,
             sigma_max_rad: covariance.sigma_max_rad(),
@@ -205,8 +206,9 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         };
         let judged = gates::judge(&case, binary);
         outcome.verdict = judged.err().unwrap_or(Verdict::Passed);
-        let Passed { glows } = judged.ok()?;
-        let solution = self.make_solution(fit, &fused, covariance, expected, outcome.number)?;
+        let Passed { glows, p_limb } = judged.ok()?;
+        let mut solution = self.make_solution(fit, &fused, covariance, expected, outcome.number)?;
+        solution.p_limb = p_limb;
         let share = T::from_i32(fit.inliers as i32) > T::from_i32(points.count as i32) * T::from_f64(CERTAIN_SHARE);
         // The reflection of a Sun in the lens may look as good as the Sun, so every edge is examined.
         let certain = !expected.free
@@ -269,6 +271,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             }),
             axis_by_cos: Some((b1 * by_1 + b2 * by_2).into()),
             position: None,
+            p_limb: None,
             rms_px: fit.rms_px,
             inliers: fit.inliers,
             arc_px: fit.arc_px,

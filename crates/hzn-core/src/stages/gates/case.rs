@@ -14,6 +14,8 @@ use crate::stages::fit::{self, Fit};
 
 /// A fitted edge, which the gates judge.
 pub(crate) struct Case<'a, T> {
+    /// Number of the candidate.
+    pub(crate) number: u32,
     /// The cone that was fitted to the edge with a free half-angle.
     pub(crate) fit: &'a Fit<T>,
     /// The same cone after the expected half-angle was fused.

@@ -103,6 +103,17 @@ section! {
         /// A smaller value refuses more bands, such as rings and streaks of light. The gate `band` is only for a body
         /// that does not fit into the picture, because a crescent is a band, too.
         @- max_band: f64 = 0.5, [0.0 to 1.0];
+        /// Smallest probability that the edge of an answer is the limb (column `p_limb`); 0 turns the gate off.
+        ///
+        /// The default is for a false answer that costs as much as three right answers. With a larger value fewer false
+        /// answers pass, and more limbs are refused. Bodies without known air, Sun and Moon have no such probability.
+        // An answer is worth giving if (1 − p) C < p, so p > C/(1 + C) with the cost C of a false answer: 3 gives 0.75.
+        @- min_p_limb: f64 = 0.75, [0.0 to 1.0];
+        /// Odds that an edge that passes all other gates is the limb, before its evidence is weighed.
+        ///
+        /// The default is for a camera that sees a limb in half of its pictures: the other gates let about one in fifty
+        /// pictures without a limb pass. Set a smaller value if limbs are rarer, for example 5 for one picture in ten.
+        @- prior_odds: f64 = 50.0, [above 0.0 to 1e9];
         /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
         /// deviations.
         ///
@@ -158,7 +169,7 @@ impl Config {
         (self.max_rival_ratio, self.min_evidence, self.residual_floor_px) = (1e6, -1e6, 1e4);
         (self.min_support_abrupt, self.whole_edge) = (0.0, 0.0);
         (self.max_departure, self.max_band, self.max_unlit) = (1e6, 1.0, 1.0);
-        self.max_glow = 1e6;
+        (self.max_glow, self.min_p_limb) = (1e6, 0.0);
         self.max_attitude_sigma = 1e6;
     }
 }

@@ -11,6 +11,7 @@ mod circle;
 mod config;
 mod curvature;
 mod departure;
+mod evidence;
 mod faint;
 mod few_inliers;
 mod glow;
@@ -39,6 +40,7 @@ mod straight;
 mod sun;
 mod turn;
 mod uncertain;
+mod unlikely;
 mod unsupported;
 mod view;
 
@@ -60,9 +62,11 @@ pub(crate) use view::Cover;
 
 /// An edge that passed every gate.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Passed {
+pub(crate) struct Passed<T> {
     /// Whether light reaches higher above the limb than air does, see [`Verdict::Glow`].
     pub(crate) glows: bool,
+    /// Probability that the edge is the limb; `None` if it is unknown.
+    pub(crate) p_limb: Option<T>,
 }
 
 /// Asks the gates in their order.
@@ -75,7 +79,7 @@ pub(crate) struct Passed {
 pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,
-) -> Result<Passed, Verdict> {
+) -> Result<Passed<T>, Verdict> {
     no_consensus::refuse(case)?;
     few_inliers::refuse(case)?;
     short_arc::refuse(case)?;
@@ -111,5 +115,8 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
 
     hidden::refuse(case)?;
     side::refuse(case)?;
-    Ok(Passed { glows })
+    let evidence = evidence::weigh(case, binary, &places, &sky, &residuals);
+    evidence.iter().for_each(|evidence| binary.observer.evidence(case.number, evidence));
+    let p_limb = unlikely::refuse(case, evidence.as_ref())?;
+    Ok(Passed { glows, p_limb })
 }

@@ -1,0 +1,158 @@
+//! The evidence that an edge is the limb, and the probability that follows from it.
+//!
+//! The logarithm of the odds is ln(prior odds) + b + Σ w x, where x are the values of the terms. A term that the
+//! picture does not show adds nothing. The weights come from a logistic regression (`tests/python/fit_evidence.py`).
+
+use crate::base::real::Real;
+
+/// What is known about an edge that passes all gates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+// The numbers are fixed because they are the indices of the values.
+#[repr(u8)]
+pub enum Term {
+    /// How clearly the edge is curved: the logarithm of the cosine of its half-angle over the sigma of this cosine, 0
+    /// to 5. A straight edge has the cosine 0.
+    Curvature = 0,
+    /// Squared difference between the fitted and the expected half-angle over its variance, at most 9.
+    HalfAngle = 1,
+    /// Part of the limb in view without edge points, plus the part of the edge's points that are no inliers.
+    Gaps = 2,
+    /// Logarithm of the RMS residual over the noise from point to point.
+    Misfit = 3,
+    /// Brightness of the sky over that of the body, 0 to 1.
+    Sky = 4,
+    /// Where the light 1.5 scale heights above the edge is fainter than that of air: the logarithm of this light over
+    /// that of air, −2.5 to 0.
+    FaintAir = 5,
+    /// Where this light is brighter than that of air: the logarithm, 0 to 1.1.
+    BrightAir = 6,
+    /// Where the light three scale heights above the edge is fainter than that of air: the logarithm, −1.9 to 0.
+    FaintHighAir = 7,
+    /// How abruptly the brightness changes between 40 and 140 km below the edge, alike everywhere along the edge: 0 to
+    /// 3. The ground below a layer of airglow has such a second edge.
+    Layer = 8,
+    /// A given attitude: the logarithm of the likelihood ratio.
+    Attitude = 9,
+    /// A given Sun that lights the edge: the logarithm of the likelihood ratio.
+    Sun = 10,
+}
+
+/// Number of terms.
+const TERMS: usize = 11;
+
+impl Term {
+    /// All terms in the order of their numbers.
+    pub const ALL: [Self; TERMS] = [
+        Self::Curvature,
+        Self::HalfAngle,
+        Self::Gaps,
+        Self::Misfit,
+        Self::Sky,
+        Self::FaintAir,
+        Self::BrightAir,
+        Self::FaintHighAir,
+        Self::Layer,
+        Self::Attitude,
+        Self::Sun,
+    ];
+
+    /// Returns the name of the term.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Curvature => "curvature",
+            Self::HalfAngle => "half-angle",
+            Self::Gaps => "gaps",
+            Self::Misfit => "misfit",
+            Self::Sky => "sky",
+            Self::FaintAir => "faint-air",
+            Self::BrightAir => "bright-air",
+            Self::FaintHighAir => "faint-high-air",
+            Self::Layer => "layer",
+            Self::Attitude => "attitude",
+            Self::Sun => "sun",
+        }
+    }
+}
+
+/// Weights of the terms in their order. The values of attitude and Sun are likelihood ratios already.
+const WEIGHTS: [f64; TERMS] = [1.39, -0.43, -1.93, -0.85, -1.47, 2.13, -1.69, 1.21, -2.45, 1.0, 1.0];
+/// The constant b.
+const CONSTANT: f64 = -1.43;
+
+/// The evidence that an edge is the limb.
+#[derive(Debug, Clone, Copy)]
+pub struct Evidence<T> {
+    values: [Option<T>; TERMS],
+}
+
+impl<T: Real> Evidence<T> {
+    pub(crate) fn new() -> Self {
+        Self { values: [None; TERMS] }
+    }
+
+    pub(crate) fn set(&mut self, term: Term, value: T) {
+        if let Some(slot) = self.values.get_mut(term as usize) {
+            *slot = Some(value);
+        }
+    }
+
+    /// Returns the value of a term; `None` if the picture or the prior does not show it.
+    pub fn value(&self, term: Term) -> Option<T> {
+        self.values.get(term as usize).copied().flatten()
+    }
+
+    /// Returns the logarithm of a term's likelihood ratio, except for a constant; 0 without a value.
+    pub fn ln_ratio(&self, term: Term) -> T {
+        let weight = WEIGHTS.get(term as usize).copied().unwrap_or(0.0);
+        self.value(term).map_or(T::ZERO, |value| value * T::from_f64(weight))
+    }
+
+    /// Returns the logarithm of the likelihood ratio of all terms.
+    pub fn ln_ratio_of_all(&self) -> T {
+        self.values
+            .iter()
+            .zip(WEIGHTS)
+            .filter_map(|(value, weight)| value.map(|x| x * T::from_f64(weight)))
+            .fold(T::from_f64(CONSTANT), |sum, x| sum + x)
+    }
+
+    /// Returns the probability that the edge is the limb. `prior_odds` are the odds before the evidence is weighed.
+    pub fn p_limb(&self, prior_odds: T) -> T {
+        // Beyond this number the probability is 0 or 1 in single precision.
+        let most = T::from_f64(80.0);
+        let ln_ratio = self.ln_ratio_of_all().max(-most).min(most);
+        let against = (-ln_ratio).exp();
+        prior_odds / (prior_odds + against)
+    }
+
+    /// Converts the evidence to double precision.
+    pub fn to_f64(&self) -> Evidence<f64> {
+        Evidence { values: self.values.map(|value| value.map(T::to_f64)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_terms_have_the_order_of_their_numbers() {
+        for (i, term) in Term::ALL.into_iter().enumerate() {
+            assert_eq!(term as usize, i, "{}", term.name());
+        }
+    }
+
+    #[test]
+    fn probabilities_follow_odds_and_evidence() {
+        let mut evidence = Evidence::<f64>::new();
+        evidence.set(Term::Attitude, -CONSTANT);
+        assert!((evidence.p_limb(9.0) - 0.9).abs() < 1e-12, "no evidence leaves the odds");
+        evidence.set(Term::Attitude, 9f64.ln() - CONSTANT);
+        assert!((evidence.p_limb(1.0) - 0.9).abs() < 1e-12);
+        let (mut far, mut single) = (evidence, Evidence::<f32>::new());
+        far.set(Term::Attitude, -1e6);
+        single.set(Term::Attitude, 1e6);
+        assert!(far.p_limb(50.0) >= 0.0 && far.p_limb(50.0) < 1e-30);
+        assert_eq!(single.p_limb(50.0), 1.0);
+    }
+}
