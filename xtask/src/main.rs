@@ -59,7 +59,7 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|
                      --by-feature prints only how much flash the methods of published systems take
   first-command      clones the committed state, runs the README's first command there, and prints its wall time and
                      processor time; what cargo downloads is downloaded before and not counted
-  keys               writes the table of book/reference/sensor-toml.md, the template, the JSON schema and the
+  keys               writes the tables of book/reference/sensor-toml.md, the template, the JSON schema and the
                      Python types (hzn.keys) from the keys in hzn-core
   viewer             makes book/images/viewer.png again; needs `cargo xtask test demo` first
   viewer situations  makes pictures of the window into target/xtask/situations, in four sizes and two themes";

@@ -14,7 +14,8 @@ const CRATE: &str = "crates/hzn-py";
 const AS_IN_THE_TESTS: &[&str] = &["--profile", "dev", "--features", "as-in-the-tests"];
 const RELEASE: &[&str] = &["--profile", "release"];
 
-/// Builds the wheel, installs it into a separate environment, and checks stubs, behaviour, notebooks and documents.
+/// Builds the wheel, installs it into a separate environment, and checks stubs, behaviour, notebooks, documents and the
+/// search in them.
 /// `hzn` is the program of the same build. The build of the site executes one notebook, or with `every_notebook` all.
 pub(crate) fn run_step(hzn: &Path, every_notebook: bool) -> Outcome {
     let folder = Path::new(CRATE);
@@ -38,7 +39,9 @@ pub(crate) fn run_step(hzn: &Path, every_notebook: bool) -> Outcome {
     if !every_notebook {
         site.env("HZN_UNEXECUTED", "methods.ipynb");
     }
-    steps::run(site.arg(config).arg("--site-dir").arg(scratch.join("python-site")))
+    let built = scratch.join("python-site");
+    steps::run(site.arg(config).arg("--site-dir").arg(&built))?;
+    steps::run(Command::new(&python).arg("tests/python/check_search.py").arg(built))
 }
 
 /// Compares positions with those of Basilisk. It has an environment of its own, because it needs older packages.

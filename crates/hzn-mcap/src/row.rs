@@ -238,6 +238,12 @@ columns! {
         cov_common_yz: Option<f64>,
         /// The common part of the axis's covariance, zz, rad².
         cov_common_zz: Option<f64>,
+        /// The axis in the vehicle's frame, x; only with a mounting. Roll and pitch belong to this direction.
+        axis_v_x: Option<f64>,
+        /// The axis in the vehicle's frame, y.
+        axis_v_y: Option<f64>,
+        /// The axis in the vehicle's frame, z.
+        axis_v_z: Option<f64>,
     }
 }
 
@@ -325,6 +331,7 @@ impl Row {
         self.p_limb = s.p_limb.and_then(number);
         self.inliers = Some(s.inliers);
         if let Some(body) = &s.axis_vehicle {
+            [self.axis_v_x, self.axis_v_y, self.axis_v_z] = body.xyz().map(number);
             let [roll, pitch] = roll_pitch_deg(body);
             (self.roll_deg, self.pitch_deg) = (finite(roll), finite(pitch));
         }

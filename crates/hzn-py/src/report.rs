@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyWeakrefMethods, PyWeakrefReference};
 
 use crate::camera::Camera;
-use crate::cells::{symmetric, table, vector};
+use crate::cells::{candidate, symmetric, table, vector};
 use crate::pickled::{Detail, Pickled};
 use crate::{drawing, errors, notebook, parameters};
 
@@ -210,6 +210,11 @@ impl Report {
     fn axis_fixed<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         vector(py, [self.row.axis_e_x, self.row.axis_e_y, self.row.axis_e_z])
     }
+    #[doc = doc!("Report.axis_vehicle")]
+    #[getter]
+    fn axis_vehicle<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        vector(py, [self.row.axis_v_x, self.row.axis_v_y, self.row.axis_v_z])
+    }
     #[doc = doc!("Report.covariance")]
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
@@ -334,16 +339,7 @@ impl Report {
     #[doc = doc!("Report.candidates")]
     #[getter]
     fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let edge = |c: &CandidateEdge| {
-            let dict = PyDict::new(py);
-            dict.set_item("length_px", c.length_px)?;
-            dict.set_item("points", c.points)?;
-            dict.set_item("inliers", c.inliers)?;
-            dict.set_item("rms_px", c.rms_px)?;
-            dict.set_item("verdict", &c.verdict)?;
-            Ok(dict)
-        };
-        self.candidates.iter().map(edge).collect()
+        self.candidates.iter().map(|edge| candidate(py, edge)).collect()
     }
     #[doc = doc!("Report.limb")]
     #[getter]

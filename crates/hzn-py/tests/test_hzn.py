@@ -28,8 +28,16 @@ def test_an_answer_and_its_covariance(sensor):
     # What is common is a part of the covariance: neither it nor the rest is negative in any direction.
     for part in (report.covariance_common, report.covariance - report.covariance_common):
         assert np.linalg.eigvalsh(part)[0] > -1e-9 * np.trace(report.covariance) and np.trace(part) > 0.0
-    assert "sigma" in repr(report) and report.altitude_km == 400.0
+    assert "sigma" in repr(report) and report.altitude_km == 400.0 and report.axis_vehicle is None
     assert report.to_dict()["axis_y"] == report.axis[1]
+
+
+def test_the_axis_in_the_vehicle():
+    # A camera that looks forward: the vehicle's x, y, z are the camera's z, x, y.
+    mounted = hzn.Sensor(**PARAMETERS, mount={"q_vehicle_from_camera_wxyz": [0.5, 0.5, 0.5, 0.5]}).process(limb())
+    assert np.allclose(mounted.axis_vehicle, np.roll(mounted.axis, 1), atol=1e-12)
+    row = mounted.to_dict()
+    assert [row["axis_v_x"], row["axis_v_y"], row["axis_v_z"]] == list(mounted.axis_vehicle)
 
 
 def test_no_limb_is_an_answer_too(sensor):

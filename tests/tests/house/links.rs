@@ -56,6 +56,48 @@ fn every_link_leads_somewhere() {
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
+/// Returns the anchors of the headings of a page, as GitHub and mkdocs make them.
+fn find_anchors(text: &str) -> Vec<String> {
+    let mut fenced = false;
+    let headings = text.lines().filter(|line| {
+        fenced ^= line.trim_start().starts_with("```");
+        !fenced && line.starts_with('#')
+    });
+    let words = |line: &str| line.trim_start_matches('#').trim().to_lowercase();
+    let is_kept = |c: &char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_');
+    headings.map(|line| words(line).chars().filter(is_kept).collect::<String>().replace(' ', "-")).collect()
+}
+
+#[test]
+fn every_anchor_of_the_book_exists() {
+    let mut pages = Vec::new();
+    collect_pages(&root().join("book"), &mut pages);
+    pages.push(root().join("README.md"));
+    let (mut checked, mut broken) = (0, Vec::new());
+    for page in pages {
+        for target in find_targets(&fs::read_to_string(&page).unwrap()) {
+            let Some((path, anchor)) = target.split_once('#') else { continue };
+            let text = fs::read_to_string(page.parent().unwrap().join(path)).unwrap_or_default();
+            checked += 1;
+            if !find_anchors(&text).iter().any(|have| have.replace("--", "-") == anchor.replace("--", "-")) {
+                broken.push(format!("{}: {target}", page.display()));
+            }
+        }
+    }
+    assert!(checked > 30, "{checked}");
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
+/// Tests that each code cell of a notebook was executed, because GitHub shows only the outputs that the file has.
+#[test]
+fn every_notebook_has_its_outputs() {
+    for name in ["photograph.ipynb", "methods.ipynb"] {
+        let text = fs::read_to_string(root().join("book/guide/python/notebooks").join(name)).unwrap();
+        assert!(text.contains("\"image/png\""), "{name} has no picture");
+        assert!(!text.contains("\"execution_count\": null"), "{name} has cells that were not executed");
+    }
+}
+
 /// Tests that the lines which the documents show are those of the image `example`, which runs on a board with 192 KiB
 /// of RAM (`firmware.rs`). Only the picture has another source there.
 #[test]

@@ -246,6 +246,15 @@ fn demo_compares_with_the_truth() {
         assert!(place.path("d").join(file).exists(), "{file}");
     }
     place.run(&["demo", "d"]).expect(2).says("exists already");
+    // The documents show what the demo prints of the photograph, which does not depend on the number of pictures.
+    for document in ["README.md", "book/guide/first-steps.md"] {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(document);
+        let text = std::fs::read_to_string(path).unwrap();
+        let is_printed =
+            |line: &&str| line.starts_with("axis in the camera ") || line.starts_with("altitude from the ");
+        let shown: Vec<&str> = text.lines().map(str::trim).filter(is_printed).collect();
+        assert!(shown.len() == 2 && shown.iter().all(|line| out.contains(line)), "{document}: {shown:#?}\n{out}");
+    }
 }
 
 #[test]

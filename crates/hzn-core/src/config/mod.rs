@@ -78,7 +78,7 @@ section! {
     /// `[mount]` of sensor.toml: how the camera is mounted in the vehicle.
     "mount" pub struct Mount: Copy without defaults {
         /// Quaternion that converts camera coordinates to vehicle coordinates, scalar first; with it the results have
-        /// roll and pitch.
+        /// roll, pitch, and the axis in the vehicle's frame.
         @20 q_vehicle_from_camera_wxyz: [f64; 4], serde(), ["unit quaternion"]
             { unset: "no mounting", example: "[1.0, 0.0, 0.0, 0.0]" };
     }

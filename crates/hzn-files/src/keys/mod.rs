@@ -1,6 +1,6 @@
 //! The keys of sensor.toml: those of hzn-core, and those that exist only in the file.
 //!
-//! Four files are generated from the keys: the [table](table::markdown) of the documentation, the commented
+//! Four files are generated from the keys: the [tables](table::markdown) of the documentation, the commented
 //! [template](template::text), the [JSON schema](schema::json) for editors, and the [types](python::module) of the
 //! Python package. `cargo xtask keys` writes all four.
 

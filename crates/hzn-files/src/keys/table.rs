@@ -1,11 +1,11 @@
-//! The table of keys in the documentation.
+//! The tables of keys in the documentation.
 
 use super::{Key, Table, default_of, defaults, keys_of_file, limits_in_words, sections};
 
-/// The lines that enclose the table on its page.
-const MARKS: [&str; 2] = ["<!-- keys: `cargo xtask keys` writes this table -->\n", "<!-- end of keys -->\n"];
+/// The lines that enclose the tables on their page.
+const MARKS: [&str; 2] = ["<!-- keys: `cargo xtask keys` writes these tables -->\n", "<!-- end of keys -->\n"];
 
-/// Returns a page with the current table between its marks; `None` if the page has no marks.
+/// Returns a page with the current tables between its marks; `None` if the page has no marks.
 pub fn insert_table(page: &str) -> Option<String> {
     let [begin, end] = MARKS;
     let (before, rest) = page.split_once(begin)?;
@@ -13,13 +13,13 @@ pub fn insert_table(page: &str) -> Option<String> {
     Some(format!("{before}{begin}\n{}\n{end}{after}", markdown()))
 }
 
-/// Writes the table as Markdown.
+/// Writes the tables as Markdown: each section has a heading, and therefore an anchor of its own, such as `#camera`.
 pub fn markdown() -> String {
     let defaults = defaults();
-    let mut out = String::from("| key | meaning | values | default | in flight |\n|---|---|---|---|---|\n");
-    out += &row(&super::PRESET, &defaults);
+    let head = "| key | meaning | values | default | in flight |\n|---|---|---|---|---|\n";
+    let mut out = format!("### Above the sections\n\n{head}{}", row(&super::PRESET, &defaults));
     for table in sections() {
-        out += &format!("| **[{}]** | {} | | | |\n", table.name, about(table));
+        out += &format!("\n### [{}]\n\n{}\n\n{head}", table.name, about(table));
         for key in table.keys.iter().chain(keys_of_file(table.name)) {
             out += &row(key, &defaults);
         }

@@ -109,6 +109,18 @@ fn entries_say_unit_method_and_limits() {
 }
 
 #[test]
+fn every_section_has_a_heading_and_its_keys() {
+    let text = table::markdown();
+    let parts: Vec<(&str, &str)> = text.split("\n### [").skip(1).filter_map(|part| part.split_once("]\n")).collect();
+    let names: Vec<&str> = parts.iter().map(|(name, _)| *name).collect();
+    assert_eq!(names, sections().map(|table| table.name).collect::<Vec<_>>());
+    for (name, part) in parts {
+        let rows = part.lines().filter(|line| line.starts_with("| `")).count();
+        assert_eq!(rows, in_section(name).count(), "{name}");
+    }
+}
+
+#[test]
 fn documents_are_as_the_keys_say() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let say = "run `cargo xtask keys` and look at the difference";

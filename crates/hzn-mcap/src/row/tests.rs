@@ -48,6 +48,9 @@ fn converts<T: Real>(tolerance: f64) {
     near(row.half_angle_deg, 1.3f64.to_degrees());
     near(row.altitude_est_km, 240.0);
     near(row.pitch_deg, 30.0);
+    near(row.axis_v_x, -0.5);
+    near(row.axis_v_z, 0.75f64.sqrt());
+    assert_eq!(row.axis_v_y, Some(0.0));
     assert_eq!((row.roll_deg, row.rms_px, row.axis_e_x), (Some(0.0), None, None));
     assert_eq!((row.level, row.inliers, row.detail.as_str()), (Some(80), Some(500), ""));
 }

@@ -480,6 +480,10 @@ class Report:
         """The same direction in the fixed frame (for the Earth ECEF), shape (3,), if the position is known."""
 
     @property
+    def axis_vehicle(self) -> NDArray[np.float64] | None:
+        """The same direction in the vehicle's frame, shape (3,), with ``[mount]`` in sensor.toml."""
+
+    @property
     def covariance(self) -> NDArray[np.float64] | None:
         """Covariance of the axis on its tangent plane in the camera frame, shape (3, 3) of rank 2, rad²."""
 

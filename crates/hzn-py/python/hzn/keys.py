@@ -78,7 +78,7 @@ class Mount(TypedDict):
 
     q_vehicle_from_camera_wxyz: _Numbers
     """Quaternion that converts camera coordinates to vehicle coordinates, scalar first; with it the results have
-    roll and pitch. Values: unit quaternion. Default: no mounting."""
+    roll, pitch, and the axis in the vehicle's frame. Values: unit quaternion. Default: no mounting."""
 
 
 class Input(TypedDict, total=False):
