@@ -8,6 +8,8 @@
 //! | [`truth`] | errors against the truth of a simulated flight |
 //! | [`start`] | the first attitude from directions in a window of time |
 //! | [`smooth`] | the smoothed solution |
+//! | [`solve`] | the whole flight at once, instead of the smoother |
+//! | [`sparse`] | sparse least squares with covariances |
 //! | [`finding`] | the verdict: whether the inputs agree with each other, and the likeliest cause if not |
 //! | [`results`] | what comes out |
 //! | `simulated` | recordings of simulated flights without pictures, with the feature of this name |
@@ -16,7 +18,9 @@
 
 #![forbid(unsafe_code)]
 
+mod data;
 mod error;
+mod events;
 pub mod finding;
 pub mod flight;
 pub mod input;
@@ -28,7 +32,10 @@ pub mod settings;
 pub mod simulated;
 pub mod sink;
 pub mod smooth;
+pub mod solve;
+pub mod sparse;
 pub mod start;
+mod track;
 pub mod truth;
 mod verdict;
 

@@ -238,6 +238,59 @@ impl Counts {
     }
 }
 
+/// What a solve of the whole flight found out about an error that lasts the whole flight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Determined {
+    /// The error in words.
+    pub name: String,
+    /// The unit of the numbers.
+    pub unit: &'static str,
+    /// The estimate of each component.
+    pub estimate: Vec<f64>,
+    /// Its 1-sigma.
+    pub sigma: Vec<f64>,
+    /// 1-sigma of what was known before.
+    pub before: Vec<f64>,
+}
+
+/// A measurement that a solve of the whole flight counts less, because it differs by more than its sigma explains.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lowered {
+    /// Time, s.
+    pub time_s: f64,
+    /// Number of the camera; `None` for receiver and star tracker.
+    pub camera: Option<usize>,
+    /// The kind of the measurement.
+    pub kind: Kind,
+    /// Its difference over its sigma.
+    pub sigmas: f64,
+    /// Its weight; that of others is 1.
+    pub weight: f64,
+}
+
+/// How the whole flight was solved at once.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Solved {
+    /// Number of unknowns.
+    pub unknowns: usize,
+    /// Number of states.
+    pub knots: usize,
+    /// Number of numbers in the factor of the normal equations: time and memory grow with it.
+    pub factor_numbers: usize,
+    /// Number of steps.
+    pub steps: usize,
+    /// Whether the last step changed less than a thousandth of what a sigma does.
+    pub is_converged: bool,
+    /// The sum of the squares of all errors over their sigmas, at the filter's solution and at the end.
+    pub cost: [f64; 2],
+    /// What was found out about the errors that last the whole flight.
+    pub determined: Vec<Determined>,
+    /// Measurements that count less.
+    pub lowered: Vec<Lowered>,
+    /// Number of measurements of each source.
+    pub sources: BTreeMap<(Option<usize>, Kind), usize>,
+}
+
 /// The results of a flight.
 #[derive(Debug, Clone, Default)]
 pub struct Fused {
@@ -256,6 +309,8 @@ pub struct Fused {
     pub innovations: Vec<Innovation>,
     /// Attitudes from pairs of directions.
     pub triads: Vec<Triad>,
+    /// How the whole flight was solved at once, if it was; its solutions are those of `smoothed`.
+    pub solved: Option<Solved>,
     /// What happened to the data.
     pub counts: Counts,
     /// Whether the inputs agree with each other.

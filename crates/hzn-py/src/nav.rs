@@ -131,7 +131,7 @@ pub(crate) fn fuse<'py>(
     if let Some(path) = &attitude {
         inputs.attitudes = input::attitudes(path).map_err(to_exception)?;
     }
-    let wanted = Wanted { smoothed: smooth, rate_hz: Some(rate_hz) };
+    let wanted = Wanted { smoothed: smooth, rate_hz: Some(rate_hz), ..Wanted::default() };
     let fused = errors::detached(py, || hzn_fuse::fuse(&inputs, &settings, wanted))?.map_err(to_exception)?;
     let states: Vec<Value> = sink::states(&fused).map(|s| to_json(&s)).collect();
     let innovations: Vec<Value> = sink::innovations(&fused).map(|i| to_json(&i)).collect();

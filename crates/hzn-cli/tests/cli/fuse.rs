@@ -73,6 +73,53 @@ fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
     assert!(code == 0 && at.join("nav.mcap").is_file() && !at.join("nav.mcap.part").exists(), "{stderr}");
 }
 
+/// Returns the three errors of an attitude that the summary tells, and the position's.
+fn told_errors(stdout: &str, who: &str) -> ([f64; 3], f64) {
+    let name = format!("error of the {who}");
+    let line = stdout.lines().find(|line| line.starts_with(&name)).unwrap_or_else(|| panic!("{name} in {stdout}"));
+    let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    let position = line.rsplit_once("position ").unwrap().1.trim_end_matches(" m").parse().unwrap();
+    (numbers[..3].try_into().unwrap(), position)
+}
+
+/// `--solve` writes what `--smooth` writes, is nearer to the truth than the filter, and says what it found.
+#[test]
+fn the_whole_flight_is_solved_at_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    flight(at);
+    let args = [&MOUNTS[..], &["--truth", "vehicle.csv", "--solve", "-o", "nav.csv", "--report", "nav.html"]].concat();
+    let (code, stdout, stderr) = fuse(at, &args);
+    assert_eq!(code, 0, "{stdout}{stderr}");
+    for text in ["unknowns", "deg before (filter)", "mount of left", "determined", "limb height", "consistent"] {
+        assert!(stdout.contains(text), "{text} in {stdout}");
+    }
+    assert!(!stderr.contains("did not converge"), "{stderr}");
+    let ((filter, filter_m), (solve, solve_m)) = (told_errors(&stdout, "filter"), told_errors(&stdout, "solve"));
+    let norm = |e: [f64; 3]| e.iter().map(|x| x * x).sum::<f64>().sqrt();
+    assert!(norm(solve) < 0.8 * norm(filter) && solve_m < filter_m, "{solve:?} {filter:?} {solve_m} {filter_m}");
+    let states = hzn_fuse::read_back::read_solution(&at.join("nav.csv")).unwrap().states;
+    let smoothed: Vec<_> = states.iter().filter(|s| s.phase == hzn_fuse::sink::Phase::Smoothed).collect();
+    assert!(smoothed.len() > 300 && smoothed.windows(2).all(|pair| pair[0].time_s < pair[1].time_s));
+    let (code, _, stderr) = fuse(at, &[&MOUNTS[..], &["--solve", "--smooth", "-o", "other.csv"]].concat());
+    assert!(code == 2 && stderr.contains("--smooth"), "{stderr}");
+}
+
+/// A mount that is 40° off is told with `--solve`, too.
+#[test]
+fn a_solve_of_wrong_inputs_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    flight(at);
+    turn_right_mount(at);
+    let mounts = ["--mount", "left=left.toml", "--mount", "right=turned.toml", "--solve", "-o", "nav.csv"];
+    let (code, stdout, stderr) = fuse(at, &mounts);
+    assert!(code == 1 && stdout.contains("verdict                contradicts"), "{stdout}{stderr}");
+    let likeliest = stderr.lines().find(|line| line.contains("likeliest cause, contradicts")).unwrap();
+    assert!(likeliest.contains("the mount of right") && likeliest.contains("[turned.toml]"), "{stderr}");
+    assert!(stdout.contains("count less, they are too far off"), "{stdout}");
+}
+
 #[test]
 fn wrong_inputs_are_refused_in_words() {
     let dir = tempfile::tempdir().unwrap();
@@ -111,12 +158,8 @@ fn wrong_inputs_are_refused_in_words() {
     assert!(text.contains("imu.csv"), "{text}");
 }
 
-/// A mount that is 40° off: the command names it with its file, and keeps the attitude from other programs.
-#[test]
-fn a_contradiction_is_named_and_its_attitudes_are_held_back() {
-    let dir = tempfile::tempdir().unwrap();
-    let at = dir.path();
-    flight(at);
+/// Writes turned.toml: the mount of the right camera, 40° off.
+fn turn_right_mount(at: &Path) {
     let mount = std::fs::read_to_string(at.join("right.toml")).unwrap();
     let numbers = mount.split_once('[').unwrap().1.split_once('[').unwrap().1.trim_end().trim_end_matches(']');
     let q: Vec<f64> = numbers.split(", ").map(|n| n.parse().unwrap()).collect();
@@ -124,6 +167,15 @@ fn a_contradiction_is_named_and_its_attitudes_are_held_back() {
     let (s, c) = 20f64.to_radians().sin_cos();
     let q = [c * q[0] - s * q[1], c * q[1] + s * q[0], c * q[2] + s * q[3], c * q[3] - s * q[2]];
     std::fs::write(at.join("turned.toml"), format!("[mount]\nq_vehicle_from_camera_wxyz = {q:?}\n")).unwrap();
+}
+
+/// A mount that is 40° off: the command names it with its file, and keeps the attitude from other programs.
+#[test]
+fn a_contradiction_is_named_and_its_attitudes_are_held_back() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    flight(at);
+    turn_right_mount(at);
     let mounts = ["--mount", "left=left.toml", "--mount", "right=turned.toml", "--utc", "2019-06-13T04:00:00Z"];
     let files = ["-o", "nav.csv", "--aem", "nav.aem", "--ck", "nav.bc"];
     let (code, stdout, stderr) = fuse(at, &[&mounts[..], &files].concat());
@@ -263,6 +315,14 @@ fn every_answer_of_the_flight_program_is_used() {
         hzn_fuse::read_back::read_solution(&at.join("nav.csv")).unwrap().states
     };
     let (host, flight) = (fused(&[]), fused(&["--flight"]));
+    // The whole chain from pictures to a solve, against the truth. The gyros of this scene are worse than the defaults.
+    let worse = "[imu]\ngyro_bias_deg_h = { mode = \"estimated\", sigma = 180.0 }\n";
+    std::fs::write(at.join("fuse.toml"), worse).unwrap();
+    let files = ["--imu", "out/imu.csv", "--gnss", "out/gnss.csv", "--attitude", "attitude.csv"];
+    let camera = ["fuse", "--nadir", "cam.csv", "--mount", "cam=mount.toml", "-o", "solve.csv", "--solve"];
+    let said = hzn(&[&camera[..], &files, &["--config", "fuse.toml", "--truth", "out/vehicle.csv"]].concat());
+    let ((_, filter_m), (errors, solve_m)) = (told_errors(&said, "filter"), told_errors(&said, "solve"));
+    assert!(errors.iter().all(|deg| *deg < 1.0) && solve_m < filter_m, "{said}");
     assert_eq!(host.len(), flight.len());
     for (a, b) in host.iter().zip(&flight) {
         let apart = [a.yaw_deg - b.yaw_deg, a.pitch_deg - b.pitch_deg, a.roll_deg - b.roll_deg];

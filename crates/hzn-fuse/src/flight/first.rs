@@ -5,9 +5,9 @@ use hzn_nav::frames::{Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::options::CameraOptions;
 use hzn_nav::strapdown::Nominal;
 
-use super::data::Flight;
-use super::events::Source;
+use crate::data::Flight;
 use crate::error::Error;
+use crate::events::Source;
 use crate::input::{Body, Fix, Inputs, Seen};
 use crate::reference::limb_axis;
 use crate::results::Begin;

@@ -1,7 +1,5 @@
 //! The replay of a flight.
 
-mod data;
-mod events;
 mod first;
 mod runner;
 
@@ -9,16 +7,17 @@ use hzn_nav::frames::{Cam, Rotation, Vehicle};
 use hzn_nav::layout::MAX_CAMERAS;
 use hzn_nav::options::StartSigmas;
 
+use crate::data::Flight;
 use crate::error::Error;
+use crate::events::{clean, events};
 use crate::finding::{Finding, Level, Verdict};
 use crate::input::{Inputs, Recording};
 use crate::results::{Counts, Fused};
 use crate::settings::{ErrorSetting, Limb, Settings, Treatment};
 use crate::smooth::{MAX_EPOCHS, smooth};
+use crate::solve::{Estimates, Problem, solve};
 use crate::verdict::{self, Given};
-use data::Flight;
-use events::{clean, events};
-use runner::Runner;
+use runner::{Ran, Runner};
 
 /// Most components of the error without the cameras.
 const VEHICLE_STATES: usize = 30;
@@ -42,6 +41,8 @@ const SAME_MOUNT_RAD: f64 = 1e-4;
 pub struct Wanted {
     /// The smoothed solution.
     pub smoothed: bool,
+    /// The solution of the whole flight at once, instead of the smoothed one.
+    pub solved: bool,
     /// Most solutions a second; `None` for one at each sample.
     pub rate_hz: Option<f64>,
 }
@@ -71,7 +72,8 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
         );
     }
     let events = events(inputs, span_s, &mut counts, &mut notes)?;
-    let flight = Flight { inputs, mounts: &mounts, samples: &samples, events: &events };
+    let names: Vec<String> = inputs.recordings.iter().map(|r| r.name.clone()).collect();
+    let flight = Flight { inputs, names: &names, mounts: &mounts, samples: &samples, events: &events };
     // The time of a step grows with the square of the memory for states, so that few bodies get a small filter.
     let slow_errors = |r: &Recording| CAMERA_STATES + 3 * r.bodies().len();
     let needed = VEHICLE_STATES + inputs.recordings.iter().map(slow_errors).sum::<usize>();
@@ -87,7 +89,7 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     let given = Given { inputs, samples: &samples, settings, cameras: &cameras, options: &options };
     let findings = verdict::of_inputs(&given);
     let mut fused = replay(&flight, settings, wanted).map_err(|error| explained(error, &findings))?;
-    fused.cameras = inputs.recordings.iter().map(|r| r.name.clone()).collect();
+    fused.cameras = names.clone();
     counts.before_start = fused.counts.before_start;
     counts.restarts = fused.counts.restarts;
     counts.waiting = fused.counts.waiting;
@@ -100,6 +102,31 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     fused.notes = notes;
     fused.verdict = verdict::verdict(findings, &fused, &given);
     Ok(fused)
+}
+
+/// Calls a function with the whole flight as a sum of squares and with its first estimates, which are the filter's:
+/// what [`Wanted::solved`] solves.
+///
+/// # Errors
+/// See [`fuse`].
+pub fn with_problem<R>(
+    inputs: &Inputs,
+    settings: &Settings,
+    call: impl FnOnce(&Problem<'_>, &Estimates) -> R,
+) -> Result<R, Error> {
+    let mounts = mounts(&inputs.recordings)?;
+    let mut counts = Counts::default();
+    let samples = clean(&inputs.imu, settings.imu.max_step_s, &mut counts);
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
+        return Err(Error::unusable("the inertial unit has no finite sample"));
+    };
+    let events = events(inputs, [first.imu.time_s, last.imu.time_s], &mut counts, &mut Vec::new())?;
+    let names: Vec<String> = inputs.recordings.iter().map(|r| r.name.clone()).collect();
+    let flight = Flight { inputs, names: &names, mounts: &mounts, samples: &samples, events: &events };
+    let all = estimate_all(settings);
+    let ran = Runner::<MANY>::new(&flight, settings, false)?.run(Some(1.0))?;
+    let (problem, first) = Problem::new(&flight, &all, &ran.track)?;
+    Ok(call(&problem, &first))
 }
 
 /// Refuses settings that need a receiver.
@@ -126,8 +153,16 @@ fn explained(error: Error, findings: &[Finding]) -> Error {
 
 /// Runs the filter, with memory for N states, and the smoother if it is wanted.
 fn replay<const N: usize>(flight: &Flight<'_>, settings: &Settings, wanted: Wanted) -> Result<Fused, Error> {
-    let mut fused = Runner::<N>::new(flight, settings, false)?.run(wanted.rate_hz)?.0;
-    if wanted.smoothed {
+    let Ran { mut fused, track, .. } = Runner::<N>::new(flight, settings, false)?.run(wanted.rate_hz)?;
+    if wanted.solved {
+        let all = estimate_all(settings);
+        let (problem, first) = Problem::new(flight, &all, &track)?;
+        let (epochs, solved) = solve(&problem, first)?;
+        if !solved.is_converged {
+            fused.notes.push(format!("--solve did not converge in {} steps", solved.steps));
+        }
+        (fused.smoothed, fused.solved) = (epochs, Some(solved));
+    } else if wanted.smoothed {
         if flight.events.len() > MAX_EPOCHS {
             let what = "measurements, more than a smoother can keep";
             return Err(Error::unusable(format!(
@@ -136,8 +171,8 @@ fn replay<const N: usize>(flight: &Flight<'_>, settings: &Settings, wanted: Want
             )));
         }
         let all = estimate_all(settings);
-        let (_, recorded) = Runner::<N>::new(flight, &all, true)?.run(wanted.rate_hz)?;
-        fused.smoothed = smooth(&recorded);
+        let ran = Runner::<N>::new(flight, &all, true)?.run(wanted.rate_hz)?;
+        fused.smoothed = smooth(&ran.recorded);
     }
     Ok(fused)
 }

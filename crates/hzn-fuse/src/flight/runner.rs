@@ -9,16 +9,17 @@ use hzn_nav::strapdown::{Imu, Nominal};
 use hzn_nav::vectors::{Direction, triad};
 use nalgebra::SMatrix;
 
-use super::data::Flight;
-use super::events::{Event, Source};
 use super::first::{first_attitude, sight_sigma};
+use crate::data::Flight;
 use crate::error::Error;
+use crate::events::{Event, Source, mix};
 use crate::input::{Body, Recording, Sample, Seen};
 use crate::reference::limb_axis;
 use crate::results::{Begin, Epoch, Fused, Innovation, Kind, Triad};
 use crate::settings::{Limb, Settings};
 use crate::smooth::Recorded;
 use crate::start::{DeadReckoning, Sight, Sighted, attitude};
+use crate::track::Track;
 
 /// Longest time between limb and Sun for a pair without the filter, s.
 const PAIR_S: f64 = 0.6;
@@ -29,6 +30,13 @@ const LARGE_RAD: f64 = 0.26;
 
 /// Whether the filter could use a measurement, or why not.
 type Used = Result<(), &'static str>;
+
+/// What a run leaves.
+pub(super) struct Ran<const N: usize> {
+    pub(super) fused: Fused,
+    pub(super) recorded: Vec<Recorded<N>>,
+    pub(super) track: Track,
+}
 
 /// A filter on its way through a flight.
 pub(super) struct Runner<'a, const N: usize> {
@@ -49,6 +57,7 @@ pub(super) struct Runner<'a, const N: usize> {
     verdicts: Vec<(Body, bool)>,
     record: bool,
     recorded: Vec<Recorded<N>>,
+    track: Track,
     transition: SMatrix<f64, N, N>,
     begins: bool,
     max_step_s: f64,
@@ -85,6 +94,7 @@ impl<'a, const N: usize> Runner<'a, N> {
             verdicts: Vec::new(),
             record,
             recorded: Vec::new(),
+            track: Track::default(),
             transition: SMatrix::identity(),
             begins: true,
             max_step_s: settings.imu.max_step_s,
@@ -93,7 +103,7 @@ impl<'a, const N: usize> Runner<'a, N> {
     }
 
     /// Runs to the end.
-    pub(super) fn run(mut self, rate_hz: Option<f64>) -> Result<(Fused, Vec<Recorded<N>>), Error> {
+    pub(super) fn run(mut self, rate_hz: Option<f64>) -> Result<Ran<N>, Error> {
         let (samples, events) = (self.flight.samples, self.flight.events);
         let begin_s = self.begin.time_s;
         let first = samples.partition_point(|s| s.imu.time_s <= begin_s);
@@ -106,12 +116,14 @@ impl<'a, const N: usize> Runner<'a, N> {
             self.predict(&Imu { time_s: begin_s, ..at }, before.saturated);
         }
         self.push_epoch();
+        self.track.states.push(*self.filter.nominal());
         let begin = self.filter.clone();
         let mut due_s = begin_s;
         for sample in samples.iter().skip(first) {
             while let Some(event) = pending.next_if(|e| e.time_s <= sample.imu.time_s) {
                 self.advance(sample, event.time_s);
                 self.measure(event);
+                self.track.states.push(*self.filter.nominal());
             }
             self.advance(sample, sample.imu.time_s);
             if rate_hz.is_none_or(|hz| sample.imu.time_s >= due_s + 1.0 / hz - 1e-6) {
@@ -120,8 +132,9 @@ impl<'a, const N: usize> Runner<'a, N> {
             }
         }
         self.out.begin = Some(self.begin);
+        self.track.finish(&self.filter);
         self.go_back(begin, rate_hz);
-        Ok((self.out, self.recorded))
+        Ok(Ran { fused: self.out, recorded: self.recorded, track: self.track })
     }
 
     /// Moves the filter to a time up to that of the next sample.
@@ -275,7 +288,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         if self.is_attitude_unknown() {
             // The equations of the update hold for small angles; they would spoil the mounts.
             self.out.counts.waiting += 1;
-            self.begin_again(time_s, "the attitude was not known any more");
+            self.begin_again(time_s, "the attitude was not known any more", false);
             return Ok(());
         }
         let done = self.filter.update_direction(&measurement).map_err(Unusable::as_str)?;
@@ -332,7 +345,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         if let Some(recent) = self.verdicts.len().checked_sub(many).and_then(|from| self.verdicts.get(from..)) {
             let refused = recent.iter().filter(|(_, taken)| !*taken).count();
             if refused * 5 >= many * 4 {
-                return self.begin_again(time_s, &format!("{refused} of {many} directions were refused"));
+                return self.begin_again(time_s, &format!("{refused} of {many} directions were refused"), true);
             }
         }
         let own = || self.verdicts.iter().rev().filter(|(b, _)| *b == body);
@@ -340,17 +353,20 @@ impl<'a, const N: usize> Runner<'a, N> {
         // The more often this body confirmed the attitude, the more it takes to give the attitude up.
         let confirmed = own().filter(|(_, taken)| *taken).count();
         if in_a_row >= confirmed.clamp(FEWEST_REFUSED, many.max(FEWEST_REFUSED)) {
-            self.begin_again(time_s, &format!("{in_a_row} directions in a row to the {} were refused", body.name()));
+            let why = format!("{in_a_row} directions in a row to the {} were refused", body.name());
+            self.begin_again(time_s, &why, true);
         }
     }
 
-    /// Begins again with the attitude of the last directions, if they determine one and agree on it.
-    fn begin_again(&mut self, time_s: f64, why: &str) {
+    /// Begins again with the attitude of the last directions, if they determine one and agree on it. `was_wrong` says
+    /// that the attitude before was refused, and not only unknown.
+    fn begin_again(&mut self, time_s: f64, why: &str, was_wrong: bool) {
         let Sighted::Attitude(wahba, _) = attitude(&self.sights, &self.reckoning) else { return };
         let least = Covariance::isotropic(self.settings.start.attitude_deg.to_radians().powi(2));
         self.filter.set_attitude(&wahba.attitude, &(wahba.covariance_rad2 + least));
         self.verdicts.clear();
         self.begins = true;
+        self.track.restarts.push((self.track.states.len(), was_wrong));
         self.out.counts.restarts += 1;
         self.out.notes.push(format!("at {time_s:.1} s the filter began again: {why}"));
     }
@@ -394,15 +410,5 @@ impl<'a, const N: usize> Runner<'a, N> {
             unaided_rad: None,
             sensor_sigma_rad: None,
         });
-    }
-}
-
-/// Returns the sample at a time between two samples.
-fn mix(from: &Imu, to: &Imu, time_s: f64) -> Imu {
-    let part = (time_s - from.time_s) / (to.time_s - from.time_s);
-    Imu {
-        time_s,
-        gyro_rad_s: from.gyro_rad_s + (to.gyro_rad_s - from.gyro_rad_s) * part,
-        accel_m_s2: from.accel_m_s2 + (to.accel_m_s2 - from.accel_m_s2) * part,
     }
 }

@@ -8,7 +8,7 @@ use hzn_nav::options::{Block, CameraOptions, Mode, Options};
 
 use super::receiver::median;
 use crate::finding::{Cause, Finding, Level, Source};
-use crate::results::{Epoch, Fused, Innovation, Kind};
+use crate::results::{Epoch, Fused, Innovation, Kind, Solved};
 
 /// Sigmas of an estimate above which it contradicts what was known before.
 const FAR: f64 = 4.0;
@@ -25,7 +25,11 @@ const BLOCK_S: f64 = 20.0;
 pub(super) fn test(fused: &Fused, cameras: &[CameraOptions], options: &Options) -> Vec<Finding> {
     let mut all = Vec::new();
     if let Some(last) = fused.epochs.last() {
-        estimates(fused, last, cameras, options, &mut all);
+        estimates("the filter", fused, last, cameras, options, &mut all);
+    }
+    if let (Some(solved), Some(last)) = (&fused.solved, fused.smoothed.last()) {
+        estimates("the solve", fused, last, cameras, options, &mut all);
+        all.extend(solved.sources.iter().filter_map(|(source, count)| lowered(fused, solved, *source, *count)));
     }
     for ((camera, kind), innovations) in &by_source(fused) {
         all.extend(source(fused, *camera, *kind, innovations));
@@ -39,11 +43,18 @@ pub(super) fn test(fused: &Fused, cameras: &[CameraOptions], options: &Options) 
 }
 
 /// Compares the estimates at the end with what was known before.
-fn estimates(fused: &Fused, last: &Epoch, cameras: &[CameraOptions], options: &Options, all: &mut Vec<Finding>) {
+fn estimates(
+    who: &str,
+    fused: &Fused,
+    last: &Epoch,
+    cameras: &[CameraOptions],
+    options: &Options,
+    all: &mut Vec<Finding>,
+) {
     let is_estimated = |block: &Block| block.mode == Mode::Estimated && block.sigma > 0.0;
     let mut far = |cause: Cause, source: Source, name: &str, sigmas: f64| {
         if sigmas > FAR {
-            let what = format!("the filter estimates {name} {sigmas:.1} sigma from what was known before");
+            let what = format!("{who} estimates {name} {sigmas:.1} sigma from what was known before");
             all.push(Finding { level: Level::Contradicts, cause, source, what });
         }
     };
@@ -72,7 +83,8 @@ fn estimates(fused: &Fused, last: &Epoch, cameras: &[CameraOptions], options: &O
     let [mean_s, sigmas] = [clocks.iter().map(|c| c.0).sum::<f64>() / n, clocks.iter().map(|c| c.1).sum::<f64>() / n];
     if clocks.len() > 1 && sigmas.abs() > CLOCKS {
         let what = format!(
-            "all cameras' clocks together are {mean_s:+.2} s off, {sigmas:+.1} of their sigma: is their latency known?"
+            "{who}: all cameras' clocks together are {mean_s:+.2} s off, {sigmas:+.1} of their sigma: is their latency \
+             known?"
         );
         all.push(Finding { level: Level::Doubtful, cause: Cause::CameraClock, source: Source::Cameras, what });
     }
@@ -88,15 +100,45 @@ fn by_source(fused: &Fused) -> Sources<'_> {
     all
 }
 
+/// Tests how many measurements of a source the solve counts less: as the filter's refusals.
+fn lowered(fused: &Fused, solved: &Solved, (camera, kind): (Option<usize>, Kind), count: usize) -> Option<Finding> {
+    let lowered = solved.lowered.iter().filter(|l| (l.camera, l.kind) == (camera, kind)).count();
+    if lowered < REFUSED.1 || lowered as f64 <= REFUSED.0 * count as f64 {
+        return None;
+    }
+    let About { source, cause, ask, name } = About::new(fused, camera, kind);
+    let what = format!("{name}: {lowered} of {count} differ from the solve by more than their sigmas explain: {ask}");
+    Some(Finding { level: Level::Contradicts, cause, source, what })
+}
+
+/// What a finding about a source says.
+struct About {
+    source: Source,
+    cause: Cause,
+    ask: &'static str,
+    name: String,
+}
+
+impl About {
+    fn new(fused: &Fused, camera: Option<usize>, kind: Kind) -> Self {
+        let camera = camera.and_then(|c| fused.cameras.get(c));
+        let (source, cause, ask) = match (camera, kind) {
+            (Some(name), _) => {
+                (Source::Camera(name.clone()), Cause::Mount, "are its mount, its clock and its lens right?")
+            }
+            (None, Kind::Attitude) => {
+                (Source::StarTracker, Cause::TrackerFrame, "is the frame of its attitudes right?")
+            }
+            (None, _) => (Source::Receiver, Cause::Receiver, "are its clock and its frame right?"),
+        };
+        let name = camera.map_or_else(String::new, |name| format!("{name}, ")) + kind.name();
+        Self { source, cause, ask, name }
+    }
+}
+
 /// Tests the innovations of one source, taken or not.
 fn source(fused: &Fused, camera: Option<usize>, kind: Kind, all: &[&Innovation]) -> Option<Finding> {
-    let camera = camera.and_then(|c| fused.cameras.get(c));
-    let (source, cause, ask) = match (camera, kind) {
-        (Some(name), _) => (Source::Camera(name.clone()), Cause::Mount, "are its mount, its clock and its lens right?"),
-        (None, Kind::Attitude) => (Source::StarTracker, Cause::TrackerFrame, "is the frame of its attitudes right?"),
-        (None, _) => (Source::Receiver, Cause::Receiver, "are its clock and its frame right?"),
-    };
-    let name = camera.map_or_else(String::new, |name| format!("{name}, ")) + kind.name();
+    let About { source, cause, ask, name } = About::new(fused, camera, kind);
     let refused = all.iter().filter(|i| !i.taken).count();
     let finding = |level, what| Some(Finding { level, cause, source: source.clone(), what });
     if refused >= REFUSED.1 && refused as f64 > REFUSED.0 * all.len() as f64 {

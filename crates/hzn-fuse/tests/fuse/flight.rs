@@ -49,7 +49,8 @@ fn worst_deg(fused: &Fused, scene: &Scenario, from_s: f64) -> f64 {
 #[test]
 fn a_flight_gives_attitude_mounts_clocks_and_the_way_back() {
     let scene = scene(SEED);
-    let fused = fuse(&flight(&scene), &settings(), Wanted { smoothed: true, rate_hz: Some(5.0) }).unwrap();
+    let fused =
+        fuse(&flight(&scene), &settings(), Wanted { smoothed: true, rate_hz: Some(5.0), ..Wanted::default() }).unwrap();
     let begin = fused.begin.unwrap();
     assert!((100.0..130.0).contains(&begin.time_s) && begin.directions >= 2, "{begin:?}");
     assert!(worst_deg(&fused, &scene, 200.0) < 1.0);

@@ -2,6 +2,7 @@
 
 mod common;
 mod flight;
+mod solve;
 mod tracker;
 mod two_bodies;
 mod verdict;

@@ -60,6 +60,16 @@ impl DirectionMeasurement {
             && self.by_limb_height.is_finite()
     }
 
+    /// Returns the measured direction as a unit vector, and the symmetric root of its covariance without the effects of
+    /// rounding, rad.
+    ///
+    /// # Errors
+    /// See [`Unusable`].
+    pub fn with_root(&self) -> Result<(Vector<Cam>, Matrix3<f64>), Unusable> {
+        let (measured, covariance) = self.checked()?;
+        Ok((measured, covariance.root()))
+    }
+
     /// Returns the measured direction as a unit vector, and its covariance without the effects of rounding.
     pub(super) fn checked(&self) -> Result<(Vector<Cam>, Spectrum), Unusable> {
         if !self.is_finite() {
@@ -178,7 +188,7 @@ impl<const N: usize> Filter<N> {
 }
 
 /// Returns two unit vectors across a direction, as rows.
-fn basis(direction: &Vector3<f64>) -> SMatrix<f64, 2, 3> {
+pub fn basis(direction: &Vector3<f64>) -> SMatrix<f64, 2, 3> {
     let helper = if libm::fabs(direction.x) < 0.6 { Vector3::x() } else { Vector3::y() };
     let first = direction.cross(&helper).normalize();
     let second = direction.cross(&first);

@@ -11,19 +11,20 @@ use crate::frames::{Fixed, Vector};
 
 /// Mean radius of the Earth, km. A sphere is enough here: the flattening moves the latitude of the limb by less than
 /// 0.2°, and the height changes by kilometres between equator and pole.
-pub(super) const RADIUS_KM: f64 = 6371.0;
+pub const RADIUS_KM: f64 = 6371.0;
 
-/// The effect of one coefficient.
-pub(super) struct LatitudeTerm {
+/// The effect of one coefficient of [`Options::limb_latitude`](crate::options::Options::limb_latitude).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LatitudeTerm {
     /// Mean height along the limb by the coefficient.
-    pub(super) height: f64,
+    pub height: f64,
     /// Tilt of the axis by the coefficient, rad/km.
-    pub(super) tilt: Vector<Fixed>,
+    pub tilt: Vector<Fixed>,
 }
 
 impl LatitudeTerm {
     /// Returns the effects of the coefficients of degree 1 and 2 from a position, m; `None` within the Earth.
-    pub(super) fn both(position_m: &Vector<Fixed>) -> Option<[Self; 2]> {
+    pub fn both(position_m: &Vector<Fixed>) -> Option<[Self; 2]> {
         let distance_m = position_m.norm();
         let up = position_m.try_normalize(1.0)?;
         let s = RADIUS_KM * 1e3 / distance_m;

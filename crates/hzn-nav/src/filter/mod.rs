@@ -24,10 +24,10 @@ use crate::options::{CameraOptions, Options};
 use crate::strapdown::{Imu, Nominal};
 
 use blocks::{set, three};
-use limb_latitude::LatitudeTerm;
 
 pub use chi2::chi2_limit;
-pub use direction::{DirectionMeasurement, predict_direction};
+pub use direction::{DirectionMeasurement, basis, predict_direction};
+pub use limb_latitude::{LatitudeTerm, RADIUS_KM};
 pub use predict::Step;
 pub use unusable::Unusable;
 pub use update::Innovation;

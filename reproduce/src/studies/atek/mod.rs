@@ -64,7 +64,7 @@ fn settings() -> [(&'static str, Settings); 2] {
 }
 
 fn fly(inputs: &Inputs, settings: &Settings) -> Option<Fused> {
-    fuse(inputs, settings, Wanted { smoothed: false, rate_hz: Some(2.0) }).ok()
+    fuse(inputs, settings, Wanted { rate_hz: Some(2.0), ..Wanted::default() }).ok()
 }
 
 /// Flies all flights with both settings, with and without false answers.

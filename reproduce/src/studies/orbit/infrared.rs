@@ -173,7 +173,7 @@ fn second_run(scene: &Scenario, inputs: &Inputs, fused: &Fused, alone: &Nadir) -
     let both = pictures(scene, &heights)?;
     let mut inputs = inputs.clone();
     inputs.recordings = vec![Recording::new(scene.name.clone(), heights, Some(&sensor))?];
-    let wanted = Wanted { smoothed: false, rate_hz: Some(0.1) };
+    let wanted = Wanted { rate_hz: Some(0.1), ..Wanted::default() };
     let fused = fuse(&inputs, &settings(Treatment::Estimated, 1.0), wanted)?;
     let last = filtered(scene, &fused, [scene.capture.to_s - ORBIT_S, scene.capture.to_s])?;
     let is_met = last.rms_rad().to_degrees() <= GOAL_DEG;
@@ -224,7 +224,7 @@ pub(super) fn study(effort: &Effort, section: &mut Section) -> anyhow::Result<()
         ("estimated", settings(Treatment::Estimated, 0.0)),
         ("estimated by latitude", settings(Treatment::Estimated, 4.0)),
     ] {
-        let fused = fuse(&inputs, &settings, Wanted { smoothed: false, rate_hz: Some(0.1) })?;
+        let fused = fuse(&inputs, &settings, Wanted { rate_hz: Some(0.1), ..Wanted::default() })?;
         let orbit =
             |k: f64| Ok::<_, anyhow::Error>(filtered(&scene, &fused, [(k - 1.0) * ORBIT_S, k * ORBIT_S])?.cell());
         let sigma = fused.epochs.last().map_or(f64::NAN, |e| 3.0 * e.attitude_sigma_rad().max().to_degrees());

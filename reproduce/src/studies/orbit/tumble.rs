@@ -141,7 +141,7 @@ fn fly(scene: &Scenario, donors: &Donors, settings: &Settings, with_false: bool)
     if with_false {
         residuals::replace_one_in_fifty(&mut inputs);
     }
-    let fused = fuse(&inputs, settings, Wanted { smoothed: false, rate_hz: Some(0.1) })?;
+    let fused = fuse(&inputs, settings, Wanted { rate_hz: Some(0.1), ..Wanted::default() })?;
     let path = scene.path()?;
     let truth: Vec<_> = path.vehicle_rows([0.0, scene.capture.to_s], 5.0).collect();
     let misses = compare(&fused.epochs, &truth);

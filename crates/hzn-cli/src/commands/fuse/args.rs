@@ -62,6 +62,10 @@ pub(crate) struct Args {
     /// Also smooth: at every measurement, write the solution from all measurements, later ones included
     #[arg(long)]
     pub(super) smooth: bool,
+    /// Also solve the whole flight at once: the most probable states, mounts, clocks and biases from all measurements.
+    /// It replaces --smooth, says what was determined, and counts wrong measurements less instead of refusing them
+    #[arg(long, conflicts_with = "smooth")]
+    pub(super) solve: bool,
     /// Largest number of solutions per second in the results
     #[arg(long, value_name = "HZ", default_value_t = 10.0)]
     pub(super) rate: f64,

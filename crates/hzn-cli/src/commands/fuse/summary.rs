@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hzn_files::vehicle::VehicleRow;
 use hzn_fuse::Fused;
-use hzn_fuse::results::{Counts, Epoch, Kind};
+use hzn_fuse::results::{Counts, Determined, Epoch, Kind, Solved};
 use hzn_fuse::truth::{self, Miss};
 
 use crate::exit::Stop;
@@ -67,18 +67,23 @@ pub(super) fn lines(fused: &Fused, truth: Option<&[VehicleRow]>) -> Vec<(String,
             ),
         );
     }
+    for (name, value) in fused.solved.iter().flat_map(|solved| solve(fused, solved)) {
+        line(&name, value);
+    }
     for (name, value) in counts(&fused.counts) {
         line(&name, value);
     }
-    if let Some(truth) = truth {
-        for (name, epochs) in [("filter", &fused.epochs), ("smoother", &fused.smoothed)] {
-            let misses = truth::compare(epochs, truth);
-            if let Some(text) = errors(&misses) {
-                line(&format!("error of the {name}"), text);
-            }
-        }
-    }
+    out.extend(truth.into_iter().flat_map(|truth| against(fused, truth)));
     out
+}
+
+/// Returns the errors of the solutions against the truth: names and values.
+fn against(fused: &Fused, truth: &[VehicleRow]) -> Vec<(String, String)> {
+    let later = if fused.solved.is_some() { "solve" } else { "smoother" };
+    let all = [("filter", &fused.epochs), (later, &fused.smoothed)].into_iter();
+    let named = all
+        .filter_map(|(name, epochs)| Some((format!("error of the {name}"), errors(&truth::compare(epochs, truth))?)));
+    named.collect()
 }
 
 fn three(epoch: &Epoch) -> String {
@@ -97,6 +102,68 @@ struct Tally {
     freedom: usize,
 }
 
+/// Most measurements that are named one by one.
+const MOST_NAMED: usize = 5;
+
+/// Returns what the solve of the whole flight found: names and values.
+fn solve(fused: &Fused, solved: &Solved) -> Vec<(String, String)> {
+    let [before, after] = solved.cost;
+    let mut out = vec![(
+        "solve".to_owned(),
+        format!(
+            "{} unknowns, {} states, {} steps; squared errors over their sigmas {before:.0} at the filter's solution, \
+             {after:.0} at the end",
+            solved.unknowns, solved.knots, solved.steps
+        ),
+    )];
+    if let (Some(filter), Some(last)) = (fused.epochs.last(), fused.smoothed.last()) {
+        let text = format!("{} deg before (filter), {} after (solve)", three(filter), three(last));
+        out.push(("  3 sigma at the end".to_owned(), text));
+    }
+    out.extend(solved.determined.iter().map(determined));
+    for ((camera, kind), count) in &solved.sources {
+        let lowered: Vec<_> = solved.lowered.iter().filter(|l| (l.camera, l.kind) == (*camera, *kind)).collect();
+        if lowered.is_empty() {
+            continue;
+        }
+        let mut worst = lowered.clone();
+        worst.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+        let named: Vec<String> =
+            worst.iter().take(MOST_NAMED).map(|l| format!("{:.1} s: {:.0} sigma", l.time_s, l.sigmas)).collect();
+        let text = format!("{} of {count} count less, they are too far off: {}", lowered.len(), named.join(", "));
+        out.push((format!("  {}", source_name(fused, *camera, *kind)), text));
+    }
+    out
+}
+
+/// Says how much better an error is known than before.
+fn determined(one: &Determined) -> (String, String) {
+    let largest = |all: &[f64]| all.iter().copied().fold(0.0, f64::max);
+    let list = |all: &[f64]| all.iter().map(|x| format!("{x:+.3}")).collect::<Vec<_>>().join(" ");
+    let share = one.sigma.iter().zip(&one.before).map(|(after, before)| after / before).fold(0.0, f64::max);
+    let word = match share {
+        s if s < 0.5 => "determined",
+        s if s < 0.9 => "partly determined",
+        _ => "as before",
+    };
+    let text = format!(
+        "{word}: {} {}, sigma {:.3} (before {:.3})",
+        list(&one.estimate),
+        one.unit,
+        largest(&one.sigma),
+        largest(&one.before)
+    );
+    (format!("  {}", one.name), text)
+}
+
+/// Returns the name of a source.
+fn source_name(fused: &Fused, camera: Option<usize>, kind: Kind) -> String {
+    match camera.and_then(|c| fused.cameras.get(c)) {
+        Some(camera) => format!("{camera}, {}", kind.name()),
+        None => kind.name().to_owned(),
+    }
+}
+
 /// Returns the name and the tally of each source.
 fn tallies(fused: &Fused) -> Vec<(String, Tally)> {
     let mut all: BTreeMap<(Option<usize>, Kind), Tally> = BTreeMap::new();
@@ -107,11 +174,7 @@ fn tallies(fused: &Fused) -> Vec<(String, Tally)> {
         tally.nis += i.nis;
         tally.freedom = i.value.len();
     }
-    let name = |camera: Option<usize>, kind: Kind| match camera.and_then(|c| fused.cameras.get(c)) {
-        Some(camera) => format!("{camera}, {}", kind.name()),
-        None => kind.name().to_owned(),
-    };
-    all.into_iter().map(|((camera, kind), tally)| (name(camera, kind), tally)).collect()
+    all.into_iter().map(|((camera, kind), tally)| (source_name(fused, camera, kind), tally)).collect()
 }
 
 fn counts(counts: &Counts) -> Vec<(String, String)> {

@@ -1,20 +1,22 @@
 //! Samples and measurements in the order of time.
 
+use hzn_nav::strapdown::Imu;
+
 use crate::error::Error;
 use crate::input::{Inputs, Sample};
 use crate::results::Counts;
 
 /// A measurement, by its place in the inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Event {
+pub(crate) struct Event {
     /// Time by the clock of the inertial unit, s.
-    pub(super) time_s: f64,
-    pub(super) source: Source,
+    pub(crate) time_s: f64,
+    pub(crate) source: Source,
 }
 
 /// The source of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Source {
+pub(crate) enum Source {
     /// A direction: the number of the recording, and its place there.
     Camera(usize, usize),
     /// A fix of the receiver.
@@ -24,7 +26,7 @@ pub(super) enum Source {
 }
 
 /// Returns the samples whose numbers are finite and whose times rise, and counts the others.
-pub(super) fn clean(samples: &[Sample], max_step_s: f64, counts: &mut Counts) -> Vec<Sample> {
+pub(crate) fn clean(samples: &[Sample], max_step_s: f64, counts: &mut Counts) -> Vec<Sample> {
     let mut out: Vec<Sample> = Vec::with_capacity(samples.len());
     counts.samples = samples.len();
     for sample in samples {
@@ -47,7 +49,7 @@ pub(super) fn clean(samples: &[Sample], max_step_s: f64, counts: &mut Counts) ->
 }
 
 /// Returns all measurements in the order of time.
-pub(super) fn events(
+pub(crate) fn events(
     inputs: &Inputs,
     [from_s, to_s]: [f64; 2],
     counts: &mut Counts,
@@ -95,4 +97,14 @@ pub(super) fn events(
     }
     all.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     Ok(all)
+}
+
+/// Returns the sample at a time between two samples.
+pub(crate) fn mix(from: &Imu, to: &Imu, time_s: f64) -> Imu {
+    let part = (time_s - from.time_s) / (to.time_s - from.time_s);
+    Imu {
+        time_s,
+        gyro_rad_s: from.gyro_rad_s + (to.gyro_rad_s - from.gyro_rad_s) * part,
+        accel_m_s2: from.accel_m_s2 + (to.accel_m_s2 - from.accel_m_s2) * part,
+    }
 }
