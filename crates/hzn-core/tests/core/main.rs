@@ -2,6 +2,7 @@
 
 mod architecture;
 mod common;
+mod dice;
 mod drawn;
 mod precision;
 #[cfg(all(feature = "dlr", feature = "erf", feature = "horace", feature = "zju"))]

@@ -5,7 +5,7 @@ use hzn_core::report::Free;
 use hzn_core::rig::{Config, Head, Joint, NoJoint, Rig};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use crate::common::Dice;
+use crate::dice::Dice;
 
 /// Half-angle of the Earth's limb from 500 km.
 const HALF_ANGLE_RAD: f64 = 1.19;
