@@ -20,6 +20,13 @@ pub struct Calibrated {
     /// 1-sigma of the lens within the angles off axis that the observations cover, px: RMS over the picture, with a
     /// rotation of the camera left out.
     pub lens_sigma_px: f64,
+    /// The same from the corners alone, as if the errors of all corners were independent, px.
+    pub alone_sigma_px: f64,
+    /// The same from the scatter between pictures, px: it also holds errors that the corners of a picture share. `None`
+    /// with fewer than three pictures.
+    pub between_sigma_px: Option<f64>,
+    /// The bow of the board; `None` if the board counts as flat.
+    pub bow: Option<Bow>,
     /// 1-sigma of the lens in the worst corner of the picture (or on the image circle), px.
     pub corner_sigma_px: f64,
     /// Largest angle off axis of an observation, degrees.
@@ -30,6 +37,15 @@ pub struct Calibrated {
     pub views: Vec<ViewResult>,
     /// Doubts about the result.
     pub warnings: Vec<Warning>,
+}
+
+/// The bow of a board, which was estimated together with the lens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bow {
+    /// Depth of the ends of a row and of a column behind their middle, mm. Above 0, it bulges towards the camera.
+    pub depth_mm: [f64; 2],
+    /// 1-sigma of both, mm.
+    pub sigma_mm: [f64; 2],
 }
 
 /// A picture in a calibration.
@@ -56,6 +72,8 @@ pub struct Residual {
     pub error_px: [f64; 2],
     /// Whether the observation counts; an outlier does not.
     pub counts: bool,
+    /// Column and row of the corner on a chessboard, from 0; `None` for other points.
+    pub corner: Option<[u16; 2]>,
 }
 
 /// The reason why a picture does not count.
@@ -123,6 +141,13 @@ pub enum Warning {
         /// 1-sigma of an observation, px.
         sigma_px: f64,
     },
+    /// The pictures disagree about the lens by more than the noise of their corners explains.
+    Between {
+        /// 1-sigma of the lens between pictures, px.
+        between_px: f64,
+        /// 1-sigma of the lens from the corners alone, px.
+        alone_px: f64,
+    },
     /// Pictures that were left out predict worse than those that were fitted: the lens model does not fit the lens, or
     /// the board is not flat.
     Overfitted {
@@ -156,6 +181,12 @@ impl fmt::Display for Warning {
                 f,
                 "the points determine the lens to {lens_sigma_px:.2} px, worse than a point is measured \
                  ({sigma_px:.2} px): add pictures, or choose a model with fewer coefficients"
+            ),
+            Self::Between { between_px, alone_px } => write!(
+                f,
+                "the pictures disagree about the lens: 1 sigma is {between_px:.3} px between pictures, but \
+                 {alone_px:.3} px from the noise of the corners; the camera has the larger one. Usual causes: a board \
+                 that is not flat, a lens that focuses or zooms, cut or stabilised pictures, another lens model"
             ),
             Self::Overfitted { held_out_rms_px, rms_px } => write!(
                 f,

@@ -4,6 +4,7 @@ use hzn_core::camera::{Camera, Config, Covariance};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::adjust::{Adjusted, Block};
+use crate::between::between_pictures;
 use crate::calibrated::{Calibrated, Dropped, Refusal, Residual, ViewResult, Warning};
 use crate::lens_error::{places, sigmas_px};
 
@@ -21,6 +22,9 @@ const MAX_HELD_OUT: f64 = 1.5;
 /// Ratio of the 1-sigma of the lens to that of a single observation above which there is a warning. A calibration
 /// averages hundreds of observations, so that a larger ratio means that they do not determine some parameter.
 const MAX_LENS_SIGMA: f64 = 3.0;
+/// Ratio of the 1-sigma of the lens between pictures to that from the corners alone above which there is a warning: the
+/// pictures then disagree by more than half of their told error on account of something that is not the corners' noise.
+const MAX_BETWEEN: f64 = 2.0;
 /// Angle between `theta_max_deg` and the end of monotony that a camera demands, and a little more, in degrees.
 const MONOTONE_MARGIN_DEG: f64 = 2.1;
 
@@ -36,12 +40,10 @@ pub(crate) fn finish(adjusted: &Adjusted, views: &[Named]) -> Result<Calibrated,
     let counted =
         || blocks.iter().flat_map(|b| b.observations.iter().map(move |o| (b, o))).filter(|(_, o)| o.weight > 0.0);
     let observations = counted().count();
-    let pose_unknowns: usize = blocks.iter().map(|b| if b.translation.is_some() { 6 } else { 3 }).sum();
-    let unknowns = pose_unknowns + adjusted.information.nrows();
     let not_determined = Refusal::NotDetermined { focal_sigma_percent: f64::INFINITY };
-    let freedom = (2 * observations).checked_sub(unknowns).filter(|n| *n > 0).ok_or(not_determined.clone())?;
-    let sigma_px = (adjusted.cost / freedom as f64).sqrt();
-    let covariance = invert(&adjusted.information).ok_or(not_determined)? * (sigma_px * sigma_px);
+    let (sigma_px, alone) = least_squares(adjusted).ok_or(not_determined)?;
+    let between = between_pictures(adjusted, &alone, sigma_px * sigma_px);
+    let covariance = between.as_ref().map_or_else(|| alone.clone(), |b| b.covariance.clone());
     let focal_sigma_percent = 100.0 * (covariance[(0, 0)].sqrt() / adjusted.config.fx_px);
     if !(focal_sigma_percent <= MAX_FOCAL_SIGMA_PERCENT) {
         return Err(Refusal::NotDetermined { focal_sigma_percent });
@@ -53,15 +55,22 @@ pub(crate) fn finish(adjusted: &Adjusted, views: &[Named]) -> Result<Calibrated,
     let config = Config { covariance: Some(to_covariance(&adjusted.config, &covariance)), ..adjusted.config.clone() };
     let (config, camera) = with_limits(config, covered_deg, &mut warnings)?;
     let places = places(&camera);
-    let sigmas_px = sigmas_px(&config, &covariance, &places);
-    let each = || places.iter().zip(&sigmas_px);
-    let within: Vec<f64> = each().filter(|(p, _)| p.off_axis_deg <= covered_deg).map(|(_, s)| s * s).collect();
+    let rms_sigma_px = |covariance: &DMatrix<f64>| {
+        let each = sigmas_px(&config, &lens_part(&config, covariance), &places);
+        let covered = places.iter().zip(each).filter(|(p, _)| p.off_axis_deg <= covered_deg);
+        let squares: Vec<f64> = covered.map(|(_, s)| s * s).collect();
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    };
+    let sigmas_px = sigmas_px(&config, &lens_part(&config, &covariance), &places);
     let results = views.iter().map(|(name, place)| view_result(name, place, &config, blocks)).collect();
     let mut calibrated = Calibrated {
         rms_px: (adjusted.cost / observations as f64).sqrt(),
         sigma_px,
         held_out_rms_px: None,
-        lens_sigma_px: (within.iter().sum::<f64>() / within.len() as f64).sqrt(),
+        lens_sigma_px: rms_sigma_px(&covariance),
+        alone_sigma_px: rms_sigma_px(&alone),
+        between_sigma_px: between.map(|b| rms_sigma_px(&b.scatter)),
+        bow: None,
         corner_sigma_px: sigmas_px.iter().copied().fold(0.0, f64::max),
         covered_deg,
         corner_deg: places.iter().map(|p| p.off_axis_deg).fold(0.0, f64::max),
@@ -71,6 +80,18 @@ pub(crate) fn finish(adjusted: &Adjusted, views: &[Named]) -> Result<Calibrated,
     };
     calibrated.warnings.extend(find_doubts(&calibrated));
     Ok(calibrated)
+}
+
+/// Returns the 1-sigma of a coordinate from the residuals and their degrees of freedom, px, and the covariance of least
+/// squares of the shared unknowns. `None` if the observations do not determine them.
+pub(crate) fn least_squares(adjusted: &Adjusted) -> Option<(f64, DMatrix<f64>)> {
+    let blocks = &adjusted.blocks;
+    let observations = blocks.iter().flat_map(|b| &b.observations).filter(|o| o.weight > 0.0).count();
+    let pose_unknowns: usize = blocks.iter().map(|b| if b.translation.is_some() { 6 } else { 3 }).sum();
+    let unknowns = pose_unknowns + adjusted.information.nrows();
+    let freedom = (2 * observations).checked_sub(unknowns).filter(|n| *n > 0)?;
+    let variance = adjusted.cost / freedom as f64;
+    Some((variance.sqrt(), invert(&adjusted.information)? * variance))
 }
 
 /// Adds the RMS of pictures that were left out of the fit, with a warning if it is far above that of the fit.
@@ -93,10 +114,16 @@ fn invert(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     is_regular.then(|| scaled.cholesky().map(|c| &scale * c.inverse() * &scale)).flatten()
 }
 
+/// Returns the part of a covariance that belongs to the lens. The bow of the board comes after it.
+fn lens_part(config: &Config, covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = config.model.intrinsics().len();
+    covariance.view((0, 0), (n, n)).into()
+}
+
 fn to_covariance(config: &Config, covariance: &DMatrix<f64>) -> Covariance {
     Covariance {
         order: config.model.intrinsics().iter().copied().collect(),
-        rows: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        rows: lens_part(config, covariance).row_iter().map(|row| row.iter().copied().collect()).collect(),
     }
 }
 
@@ -140,6 +167,7 @@ fn view_result(name: &str, place: &Result<usize, Dropped>, config: &Config, bloc
         at_px: o.at_px,
         error_px: *error_px,
         counts: o.weight > 0.0,
+        corner: None,
     };
     let residuals: Vec<Residual> = block.observations.iter().zip(&errors).map(residual).collect();
     let counting = || residuals.iter().filter(|r| r.counts);
@@ -165,6 +193,11 @@ fn find_doubts(c: &Calibrated) -> Vec<Warning> {
     let max_tilt_deg = c.views.iter().filter_map(|v| v.tilt_deg).fold(f64::NAN, f64::max);
     if max_tilt_deg < FRONTAL_DEG {
         doubts.push(Warning::Frontal { max_tilt_deg });
+    }
+    if let Some(between_px) = c.between_sigma_px
+        && between_px > MAX_BETWEEN * c.alone_sigma_px
+    {
+        doubts.push(Warning::Between { between_px, alone_px: c.alone_sigma_px });
     }
     if c.lens_sigma_px > MAX_LENS_SIGMA * c.sigma_px {
         doubts.push(Warning::Uncertain { lens_sigma_px: c.lens_sigma_px, sigma_px: c.sigma_px });

@@ -11,6 +11,7 @@
 //! reads and writes residuals.csv, the residuals of a lens calibration.
 
 mod adjust;
+mod between;
 pub mod board;
 mod calibrated;
 pub mod conversion;

@@ -6,6 +6,7 @@
 //! | `u_px`, `v_px` | px | measured place; pixel centres are at integers |
 //! | `error_u_px`, `error_v_px` | px | measured minus projected place |
 //! | `counts` | | 0 for an outlier, else 1 |
+//! | `column`, `row` | | corner on the chessboard, from 0; empty for other points |
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +17,7 @@ use crate::calibrated::{Calibrated, Residual};
 
 /// Name of the table next to pictures.
 const NAME: &str = "residuals.csv";
-/// The columns, which are the first line of the file.
+/// The columns with which the first line of the file begins. Column and row of the corner are missing in older tables.
 const HEADER: &str = "file,u_px,v_px,error_u_px,error_v_px,counts";
 
 #[derive(Serialize, Deserialize)]
@@ -27,6 +28,10 @@ struct Line {
     error_u_px: f64,
     error_v_px: f64,
     counts: u8,
+    #[serde(default)]
+    column: Option<u16>,
+    #[serde(default)]
+    row: Option<u16>,
 }
 
 /// Returns the table of all pictures that count.
@@ -39,7 +44,9 @@ pub fn write(calibrated: &Calibrated) -> Result<String, csv::Error> {
         for r in &view.residuals {
             let ([u_px, v_px], [error_u_px, error_v_px]) = (r.at_px, r.error_px);
             let counts = u8::from(r.counts);
-            out.serialize(Line { file: view.name.clone(), u_px, v_px, error_u_px, error_v_px, counts })?;
+            let [column, row] = [0, 1].map(|side| r.corner.map(|corner| corner[side]));
+            let file = view.name.clone();
+            out.serialize(Line { file, u_px, v_px, error_u_px, error_v_px, counts, column, row })?;
         }
     }
     let bytes = out.into_inner().map_err(|e| csv::Error::from(e.into_error()))?;
@@ -72,8 +79,12 @@ pub fn read(path: &Path) -> Result<Vec<(String, Residual)>, Problem> {
             let problem = refuse(format!("{e}; write the table again with `hzn calibrate … -o residuals.csv`"));
             at.map_or_else(|| problem.clone(), |n| problem.clone().at_line(n as usize))
         })?;
-        let residual =
-            Residual { at_px: [l.u_px, l.v_px], error_px: [l.error_u_px, l.error_v_px], counts: l.counts != 0 };
+        let residual = Residual {
+            at_px: [l.u_px, l.v_px],
+            error_px: [l.error_u_px, l.error_v_px],
+            counts: l.counts != 0,
+            corner: l.column.zip(l.row).map(<[u16; 2]>::from),
+        };
         if residual.at_px.iter().chain(&residual.error_px).any(|x| !x.is_finite()) {
             return Err(refuse("has a number that is not finite".into()).at_line(out.len() + 2));
         }
@@ -96,8 +107,12 @@ mod tests {
         let path = file(&format!("{HEADER}\na.png,1,2,0.5,-0.25,1\n\"b, c.png\",3,4,9,9,0\n"));
         assert_eq!(find(dir.path()), Some(path.clone()));
         let rows = read(&path).unwrap();
-        assert_eq!(rows[0], ("a.png".into(), Residual { at_px: [1.0, 2.0], error_px: [0.5, -0.25], counts: true }));
+        let first = Residual { at_px: [1.0, 2.0], error_px: [0.5, -0.25], counts: true, corner: None };
+        assert_eq!(rows[0], ("a.png".into(), first));
         assert_eq!((rows[1].0.as_str(), rows[1].1.counts), ("b, c.png", false));
+        let path = file(&format!("{HEADER},column,row\na.png,1,2,0.5,-0.25,1,8,5\na.png,1,2,0.5,-0.25,1,,\n"));
+        assert_eq!(find(dir.path()), Some(path.clone()));
+        assert_eq!(read(&path).unwrap().iter().map(|(_, r)| r.corner).collect::<Vec<_>>(), [Some([8, 5]), None]);
         let why = read(&file(&format!("{HEADER}\na.png,1,2,0,0,1\na.png,1,x,0,0,1\n"))).unwrap_err();
         assert_eq!(why.line, Some(3), "{why}");
         let why = read(&file(&format!("{HEADER}\na.png,1,inf,0,0,1\n"))).unwrap_err();

@@ -5,6 +5,8 @@ use nalgebra::{Rotation3, SMatrix, Vector3};
 
 /// Number of unknowns of a pose.
 pub(super) const POSE: usize = 6;
+/// Number of unknowns of the bow of a board.
+pub(crate) const BOW: usize = 2;
 
 /// Derivatives of a direction in the camera frame by rotation (3) and translation (3).
 type ByPose = SMatrix<f64, 3, POSE>;
@@ -18,6 +20,8 @@ pub(crate) struct Observation {
     pub(crate) at_px: [f64; 2],
     /// Weight from 0 to 1; an observation with weight 0 does not count.
     pub(crate) weight: f64,
+    /// Depth of the place behind a flat board for each unknown of the bow, mm per mm; 0 for directions.
+    pub(crate) by_bow: [f64; BOW],
 }
 
 /// The observations of a picture with the pose that projects them.
@@ -53,6 +57,20 @@ impl Block {
             by.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
         }
         by
+    }
+
+    /// Returns the derivatives of [`Self::direction`] by the unknowns of the bow, mm per mm.
+    pub(super) fn by_bow(&self, o: &Observation) -> [Vector3<f64>; BOW] {
+        o.by_bow.map(|depth| self.rotation * Vector3::z() * depth)
+    }
+
+    /// Returns the block with a board that is bent by so many millimetres more.
+    pub(crate) fn bent(&self, bow_mm: [f64; BOW]) -> Self {
+        let mut bent = self.clone();
+        for o in &mut bent.observations {
+            o.place.z += o.by_bow[0] * bow_mm[0] + o.by_bow[1] * bow_mm[1];
+        }
+        bent
     }
 
     /// Returns the block after a step of its pose.

@@ -12,6 +12,8 @@ type Pose = SMatrix<f64, POSE, POSE>;
 
 /// The parts of the normal equations that belong to one block: Jᵀ W J and Jᵀ W r.
 struct Part {
+    lens: Lens,
+    lens_right: SVector<f64, MAX_FREE>,
     cross: Cross,
     pose: Pose,
     right: SVector<f64, POSE>,
@@ -57,6 +59,8 @@ impl Normal {
             Self { lens: Lens::zeros(), right: SVector::zeros(), parts: Vec::with_capacity(blocks.len()), cost: 0.0 };
         for block in blocks {
             let part = normal.add(block, &lens, free)?;
+            normal.lens += part.lens;
+            normal.right += part.lens_right;
             normal.parts.push(part);
         }
         for unused in free.len()..MAX_FREE {
@@ -65,18 +69,27 @@ impl Normal {
         Some(normal)
     }
 
-    /// Adds the observations of a block and returns the parts of its pose.
+    /// Adds the cost of a block and returns its part of the equations.
     fn add(&mut self, block: &Block, lens: &Equation, free: &Free) -> Option<Part> {
-        let mut part = Part { cross: Cross::zeros(), pose: Pose::zeros(), right: SVector::zeros() };
+        let mut part = Part {
+            lens: Lens::zeros(),
+            lens_right: SVector::zeros(),
+            cross: Cross::zeros(),
+            pose: Pose::zeros(),
+            right: SVector::zeros(),
+        };
         for o in block.observations.iter().filter(|o| o.weight > 0.0) {
             let projected = block.project(lens, &o.place)?;
             let by_pose = block.by_pose(&o.place);
+            let by_bow = block.by_bow(o);
             let residual = [o.at_px[0] - projected.point.u, o.at_px[1] - projected.point.v];
             for axis in 0..2 {
-                let by_lens = SVector::from(free.gather(&projected.by_intrinsics[axis]));
-                let pose_row = (SMatrix::<f64, 1, 3>::from(projected.by_direction[axis]) * by_pose).transpose();
-                self.lens += by_lens * by_lens.transpose() * o.weight;
-                self.right += by_lens * (o.weight * residual[axis]);
+                let by_direction = SMatrix::<f64, 1, 3>::from(projected.by_direction[axis]);
+                let by_bow = by_bow.map(|by| (by_direction * by)[0]);
+                let by_lens = SVector::from(free.gather(&projected.by_intrinsics[axis], by_bow));
+                let pose_row = (by_direction * by_pose).transpose();
+                part.lens += by_lens * by_lens.transpose() * o.weight;
+                part.lens_right += by_lens * (o.weight * residual[axis]);
                 part.cross += by_lens * pose_row.transpose() * o.weight;
                 part.pose += pose_row * pose_row.transpose() * o.weight;
                 part.right += pose_row * (o.weight * residual[axis]);
@@ -112,12 +125,13 @@ impl Normal {
         Some(Step { lens: lens_step, poses, predicted: along })
     }
 
-    /// Returns the information matrix of the free lens parameters with unknown poses, for observations of 1 px.
-    pub(super) fn information(&self) -> Option<Lens> {
-        let mut lens = self.lens;
-        for part in &self.parts {
-            lens -= part.cross * part.pose.cholesky()?.inverse() * part.cross.transpose();
-        }
-        Some(lens)
+    /// Returns for each block the information matrix of the shared unknowns with an unknown pose, for observations of
+    /// 1 px, and the gradient of the block's cost with the pose eliminated.
+    pub(super) fn reduced(&self) -> Option<Vec<(Lens, SVector<f64, MAX_FREE>)>> {
+        let each = self.parts.iter().map(|part| {
+            let by_pose = part.cross * part.pose.cholesky()?.inverse();
+            Some((part.lens - by_pose * part.cross.transpose(), part.lens_right - by_pose * part.right))
+        });
+        each.collect()
     }
 }

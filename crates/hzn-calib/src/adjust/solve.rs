@@ -1,9 +1,9 @@
 //! The Levenberg-Marquardt iteration.
 
 use hzn_core::camera::Config;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
-use super::block::Block;
+use super::block::{BOW, Block};
 use super::free::Free;
 use super::normal::{Normal, cost};
 
@@ -29,6 +29,10 @@ pub(crate) struct Adjusted {
     /// Information matrix of the free parameters with the poses unknown, for residuals of 1 px in u and v. It is
     /// singular if the observations do not determine the parameters.
     pub(crate) information: DMatrix<f64>,
+    /// The same for each block, and the gradient of its cost with the pose eliminated. The gradients add up to 0.
+    pub(crate) reduced: Vec<(DMatrix<f64>, DVector<f64>)>,
+    /// Change of the bow of the board against the start, mm; see [`Block::bent`].
+    pub(crate) bow_mm: [f64; BOW],
 }
 
 /// Adjusts the free parameters and all poses. The result is `None` if the start is impossible: an observation has no
@@ -36,6 +40,7 @@ pub(crate) struct Adjusted {
 pub(crate) fn adjust(config: &Config, blocks: &[Block], free: &Free) -> Option<Adjusted> {
     let (mut config, mut blocks) = (config.clone(), blocks.to_vec());
     let mut normal = Normal::new(&config, &blocks, free)?;
+    let mut bow_mm = [0.0; BOW];
     let mut damping = FIRST_DAMPING;
     for _ in 0..MAX_STEPS {
         let Some(step) = normal.step(damping) else {
@@ -49,9 +54,12 @@ pub(crate) fn adjust(config: &Config, blocks: &[Block], free: &Free) -> Option<A
             break;
         }
         let moved = free.moved(&config, step.lens.as_slice());
-        let moved_blocks: Vec<Block> = blocks.iter().zip(&step.poses).map(|(b, pose)| b.moved(pose)).collect();
+        let bow_step = free.bow_step(step.lens.as_slice());
+        let moved_blocks: Vec<Block> =
+            blocks.iter().zip(&step.poses).map(|(b, pose)| b.moved(pose).bent(bow_step)).collect();
         if is_usable(&moved) && cost(&moved, &moved_blocks) < normal.cost {
             (config, blocks) = (moved, moved_blocks);
+            bow_mm = core::array::from_fn(|k| bow_mm[k] + bow_step[k]);
             normal = Normal::new(&config, &blocks, free)?;
             damping = (damping * 0.1).max(1e-12);
         } else {
@@ -62,8 +70,11 @@ pub(crate) fn adjust(config: &Config, blocks: &[Block], free: &Free) -> Option<A
         }
     }
     let n = free.len();
-    let information = normal.information().map_or(DMatrix::zeros(n, n), |full| full.view((0, 0), (n, n)).into());
-    Some(Adjusted { config, blocks, cost: normal.cost, information })
+    let reduced = normal.reduced().unwrap_or_default().into_iter();
+    let reduced: Vec<(DMatrix<f64>, DVector<f64>)> =
+        reduced.map(|(all, gradient)| (all.view((0, 0), (n, n)).into(), gradient.rows(0, n).into())).collect();
+    let information = reduced.iter().fold(DMatrix::zeros(n, n), |sum, (of_block, _)| sum + of_block);
+    Some(Adjusted { config, blocks, cost: normal.cost, information, reduced, bow_mm })
 }
 
 /// Adjusts the pose of one block with a fixed lens.

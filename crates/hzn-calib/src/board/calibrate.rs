@@ -15,8 +15,8 @@ const FOLDS: usize = 5;
 ///
 /// All pictures have `size_px` (width, height). The corners of a picture may be a part of those of the board. The
 /// residuals are minimised in the picture, with a robust loss at first; then observations that are no longer plausible
-/// are removed and all others count alike. The covariance is that of least squares: the inverse of the information
-/// matrix with unknown poses, times the variance of the residuals over their degrees of freedom.
+/// are removed and all others count alike. If the corners show a bow of the target, it is estimated as well. The
+/// covariance is that of least squares, or that between the pictures where this is larger.
 ///
 /// # Errors
 /// The pictures do not determine the lens: see [`Refusal`].
@@ -42,7 +42,15 @@ pub fn calibrate(model: Model, size_px: [u16; 2], board: &Board, views: &[View])
             });
         }
     }
-    calibrate_planar(model, size_px, &views.iter().map(|view| view.to_planar(board)).collect::<Vec<_>>())
+    let planar: Vec<_> = views.iter().map(|view| view.to_planar(board)).collect();
+    let mut calibrated = calibrate_planar(model, size_px, &planar)?;
+    for (result, view) in calibrated.views.iter_mut().zip(views) {
+        // A picture with a pose has the residuals in the order of its corners.
+        for (residual, corner) in result.residuals.iter_mut().zip(&view.corners) {
+            residual.corner = Some([corner.column, corner.row]);
+        }
+    }
+    Ok(calibrated)
 }
 
 /// Does the same as [`calibrate`] for any flat target: chessboards, circles, tags.
@@ -50,18 +58,21 @@ pub fn calibrate(model: Model, size_px: [u16; 2], board: &Board, views: &[View])
 /// # Errors
 /// The pictures do not determine the lens: see [`Refusal`].
 pub fn calibrate_planar(model: Model, size_px: [u16; 2], views: &[PlanarView]) -> Result<Calibrated, Refusal> {
-    let fitted = fit(model, size_px, views)?;
+    let mut fitted = fit(model, size_px, views)?;
+    let bow = super::bow::bend(&mut fitted.adjusted);
     let names = views.iter().map(|v| v.name.clone()).zip(fitted.places.iter().copied()).collect::<Vec<_>>();
     let mut calibrated = finish(&fitted.adjusted, &names)?;
-    add_held_out(&mut calibrated, held_out_rms_px(&fitted));
+    calibrated.bow = bow;
+    add_held_out(&mut calibrated, held_out_rms_px(&fitted, bow.is_some()));
     Ok(calibrated)
 }
 
 /// Returns the RMS distance in pictures that did not take part in the fit of the lens. Each of them has its pose fitted
 /// to the lens of the others.
-fn held_out_rms_px(fitted: &Fitted) -> Option<f64> {
+fn held_out_rms_px(fitted: &Fitted, is_bent: bool) -> Option<f64> {
     let adjusted = &fitted.adjusted;
     let free = Free::all(adjusted.config.model);
+    let free = if is_bent { free.with_bow() } else { free };
     let folds = FOLDS.min(adjusted.blocks.len());
     let (mut squares, mut count) = (0.0, 0);
     for fold in 0..folds {
@@ -73,9 +84,10 @@ fn held_out_rms_px(fitted: &Fitted) -> Option<f64> {
         if others.len() < MIN_VIEWS {
             return None;
         }
-        let lens = adjust(&adjusted.config, &others, &free)?.config;
+        let others = adjust(&adjusted.config, &others, &free)?;
+        let lens = others.config;
         for block in part(true) {
-            let block = adjust_pose(&lens, &block)?;
+            let block = adjust_pose(&lens, &block.bent(others.bow_mm))?;
             let (_, rms) = residuals_px(&lens, &block);
             let counting = block.observations.iter().filter(|o| o.weight > 0.0).count();
             squares += rms * rms * counting as f64;

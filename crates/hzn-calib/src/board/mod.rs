@@ -4,6 +4,7 @@
 //! corners ─► guess: one focal length, poses ─► robust adjustment, stage by stage ─► without outliers ─► Calibrated
 //! ```
 
+mod bow;
 mod calibrate;
 mod fit;
 mod layout;
@@ -11,6 +12,6 @@ mod pose;
 #[cfg(test)]
 mod tests;
 
-pub use crate::calibrated::{Calibrated, Dropped, Refusal, Residual, ViewResult, Warning};
+pub use crate::calibrated::{Bow, Calibrated, Dropped, Refusal, Residual, ViewResult, Warning};
 pub use calibrate::{calibrate, calibrate_planar};
 pub use layout::{Board, Corner, PlanarPoint, PlanarView, View};

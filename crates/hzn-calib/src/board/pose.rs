@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, SymmetricEigen, Vector3};
 
-use crate::adjust::{Block, Observation};
+use crate::adjust::{BOW, Block, Observation};
 
 /// Smallest number of corners of a pose. A homography has eight unknowns, so four corners determine it; six leave
 /// residuals that show whether it fits.
@@ -61,6 +61,7 @@ pub(super) fn pose_from_rays(corners: &[([f64; 2], [f64; 2], [f64; 3])]) -> Opti
         place: Vector3::new(place[0], place[1], 0.0),
         at_px: *at_px,
         weight: 1.0,
+        by_bow: [0.0; BOW],
     };
     let observations = corners.iter().map(observation).collect();
     Some(Ok(Block { rotation, translation: Some(translation), observations }))

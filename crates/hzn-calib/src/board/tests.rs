@@ -30,12 +30,27 @@ fn lenses() -> Vec<Config> {
     ]
 }
 
-/// Returns views of the board all over the picture. A corner outside the picture is not seen.
+/// What is wrong with a set of pictures.
+#[derive(Clone, Copy, Default)]
+struct Faults {
+    /// Depth of the ends of a row and of a column behind their middle, mm.
+    bow_mm: [f64; 2],
+    /// 1-sigma of the focal length from picture to picture, as a part of it: a lens that focuses again.
+    focus: f64,
+}
+
+/// Returns views of a flat board all over the picture. A corner outside the picture is not seen.
 fn views(lens: &Config, count: usize, noise_px: f64, draws: &mut Draws) -> Vec<View> {
+    faulty_views(lens, count, noise_px, Faults::default(), draws)
+}
+
+/// Returns the same views with faults.
+fn faulty_views(lens: &Config, count: usize, noise_px: f64, faults: Faults, draws: &mut Draws) -> Vec<View> {
     let camera = Camera::<f64>::try_new(lens).unwrap();
-    let equation = Equation::new(lens);
     let mut views = Vec::new();
     while views.len() < count {
+        let focus = if faults.focus > 0.0 { 1.0 + faults.focus * draws.normal() } else { 1.0 };
+        let equation = Equation::new(&Config { fx_px: lens.fx_px * focus, fy_px: lens.fy_px * focus, ..lens.clone() });
         // The middle of the board projects to a place in the picture; its size is about a third of the picture.
         let place = [0, 1].map(|axis| f64::from(SIZE[axis]) * (0.05 + 0.9 * draws.uniform()));
         let Some(ray) = camera.unproject(hzn_core::pixel::ImagePoint { u: place[0], v: place[1] }) else { continue };
@@ -47,7 +62,8 @@ fn views(lens: &Config, count: usize, noise_px: f64, draws: &mut Draws) -> Vec<V
         let corner = |n: u16| {
             let (column, row) = (n % BOARD.columns, n / BOARD.columns);
             let [x, y] = BOARD.place_mm(column, row);
-            let point = rotation * Vector3::new(x - 120.0, y - 75.0, 0.0) + ray * distance_mm;
+            let depth_mm = faults.bow_mm[0] * (x / 120.0 - 1.0).powi(2) + faults.bow_mm[1] * (y / 75.0 - 1.0).powi(2);
+            let point = rotation * Vector3::new(x - 120.0, y - 75.0, depth_mm) + ray * distance_mm;
             let p = equation.project(point.into())?.point;
             camera.project(&UnitVec3::try_new(point.into())?)?;
             let inside = p.u > 0.0 && p.v > 0.0 && p.u < f64::from(SIZE[0]) - 1.0 && p.v < f64::from(SIZE[1]) - 1.0;
@@ -106,6 +122,47 @@ fn errors_agree_with_their_sigmas() {
         println!("{}: {:.1} % within 3 sigma, RMS {rms:.2} sigma", lens.model.name(), 100.0 * within);
         assert!(within >= 0.97 && (0.8..1.25).contains(&rms), "{lens:?}: {within} {rms}");
     }
+}
+
+/// Returns the RMS of the errors over their sigmas in sets of pictures with faults, and all calibrations.
+fn errors_with_faults(lens: &Config, sets: u64, faults: Faults) -> (f64, Vec<Calibrated>) {
+    let calibrate = |set| {
+        let views = faulty_views(lens, 16, 0.1, faults, &mut Draws(5000 + set));
+        calibrate(lens.model, SIZE, &BOARD, &views).unwrap()
+    };
+    let found: Vec<Calibrated> = (0..sets).map(calibrate).collect();
+    let errors: Vec<f64> = found.iter().flat_map(|c| normalised_errors(c, lens)).collect();
+    ((errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt(), found)
+}
+
+/// Tests a lens whose focal length changes from picture to picture: the corners alone promise too much.
+#[test]
+fn pictures_that_disagree_make_the_lens_uncertain() {
+    for lens in [&lenses()[0], &lenses()[4]] {
+        let (rms, found) = errors_with_faults(lens, 30, Faults { focus: 0.01, ..Faults::default() });
+        let ratio = found.iter().map(|c| c.between_sigma_px.unwrap() / c.alone_sigma_px).sum::<f64>() / 30.0;
+        let warned = |c: &&Calibrated| c.warnings.iter().any(|w| matches!(w, Warning::Between { .. }));
+        let warned = found.iter().filter(warned).count();
+        println!("{}: RMS {rms:.2} sigma, ratio {ratio:.2}, {warned} of 30 warn", lens.model.name());
+        assert!((0.6..1.4).contains(&rms) && ratio > 2.0 && warned > 20, "{rms} {ratio} {warned}");
+    }
+}
+
+#[test]
+fn a_bent_board_is_found() {
+    let lens = &lenses()[0];
+    let bow_mm = [0.6, -0.3];
+    let (rms, found) = errors_with_faults(lens, 20, Faults { bow_mm, ..Faults::default() });
+    assert!((0.7..1.3).contains(&rms), "{rms}");
+    for found in found {
+        let bow = found.bow.unwrap();
+        let off = |k: usize| (bow.depth_mm[k] - bow_mm[k]) / bow.sigma_mm[k];
+        assert!(off(0).abs() < 4.0 && off(1).abs() < 4.0, "{bow:?}");
+        assert!((found.sigma_px / 0.1 - 1.0).abs() < 0.1, "{}", found.sigma_px);
+    }
+    // A flat board stays flat: the limit lets one of a thousand through.
+    let (_, flat) = errors_with_faults(lens, 20, Faults::default());
+    assert!(flat.iter().filter(|c| c.bow.is_some()).count() <= 1);
 }
 
 #[test]

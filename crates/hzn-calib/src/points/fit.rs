@@ -6,7 +6,7 @@ use hzn_core::camera::{Config, Model};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::table::{Point, Points};
-use crate::adjust::{Block, Observation};
+use crate::adjust::{BOW, Block, Observation};
 use crate::calibrated::{Calibrated, Dropped, Refusal};
 use crate::finish::finish;
 use crate::ideal;
@@ -198,7 +198,8 @@ fn rotate(config: &Config, picture: &Points) -> Block {
         }
         _ => Matrix3::identity(),
     };
-    let observation = |p: &Point| Observation { place: Vector3::from(p.direction), at_px: p.at_px, weight: 1.0 };
+    let observation =
+        |p: &Point| Observation { place: Vector3::from(p.direction), at_px: p.at_px, weight: 1.0, by_bow: [0.0; BOW] };
     Block {
         rotation: Rotation3::from_matrix_unchecked(rotation),
         translation: None,

@@ -51,7 +51,7 @@ fn parse_yaml(text: &str, path: &Path) -> Result<Value, Problem> {
     })
 }
 
-/// Reads the XML of OpenCV's FileStorage: an element is a value, or a mapping of its child elements.
+/// Reads the XML of OpenCV's FileStorage or of Metashape: an element is a value, or a mapping of its child elements.
 fn parse_xml(text: &str, path: &Path) -> Result<Value, Problem> {
     let document = Document::parse(text).map_err(|e| {
         let at = e.pos();
@@ -59,7 +59,7 @@ fn parse_xml(text: &str, path: &Path) -> Result<Value, Problem> {
         Problem { line: place.0, column: place.1, ..Problem::new(path, format!("not valid XML: {e}")) }
     })?;
     let root = document.root_element();
-    if root.has_tag_name("opencv_storage") {
+    if root.has_tag_name("opencv_storage") || root.has_tag_name("calibration") {
         return Ok(element(root, 0));
     }
     let what = format!("is XML with the root <{}>; OpenCV's XML has the root <opencv_storage>", root.tag_name().name());

@@ -1,5 +1,5 @@
 //! Camera calibrations of other tools: Kalibr camchains, OpenCV's YAML, XML and JSON, EuRoC `sensor.yaml`, ROS's
-//! camera_info, Foxglove's CameraCalibration.
+//! camera_info, Foxglove's CameraCalibration; camodocal (VINS), ORB-SLAM3, Basalt, COLMAP, Metashape.
 //!
 //! | file | lens there | in hzn |
 //! |---|---|---|
@@ -14,12 +14,19 @@
 //! | ROS, Foxglove | `distortion_model`: `plumb_bob`, or `rational_polynomial` with k4 to k6 = 0 | `brown-conrady` |
 //! | ROS, Foxglove | the same with `distortion_model`: `equidistant`, `fisheye`, `kannala_brandt` | `kannala-brandt` |
 //!
+//! | camodocal (VINS) | `KANNALA_BRANDT`; `PINHOLE`; `MEI` | `kannala-brandt`; `brown-conrady`; as Kalibr's `omni` |
+//! | ORB-SLAM3 | `KannalaBrandt8`; `PinHole`; `Rectified` | `kannala-brandt`; `brown-conrady`; `pinhole` |
+//! | Basalt | `kb4`; `ds`; `eucm`; `pinhole`; `pinhole-radtan8` with k4 to k6 = 0 | the lens of this name |
+//! | COLMAP, `cameras.txt` | all but `FOV` and thin prisms; `FULL_OPENCV` with k4 to k6 = 0 | the lens of this name |
+//! | Metashape | `frame` with k4 = b2 = 0; `fisheye` with p1 = p2 = b2 = 0 | `brown-conrady`; `kannala-brandt` |
+//!
 //! Four coefficients in a row or in a plain list, without either word, are ambiguous. Such a file is refused. The text
 //! tells the format, and the name of the file tells nothing.
 //!
 //! [`load`] reads a file, [`load_any`] one whose lens hzn may not have, [`write()`] writes one; [`from_braun_barf`]
 //! converts the five coefficients of that paper.
 
+mod camchain;
 mod camera_matrix;
 mod document;
 mod format;

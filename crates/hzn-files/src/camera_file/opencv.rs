@@ -37,7 +37,31 @@ pub(super) fn read(reader: &Reader<'_>, top: &Map<String, Value>) -> Result<Conf
         (None, None) => lens_of_shape(reader, value, &coefficients)?,
     };
     let model = reader.model(lens, &coefficients)?;
+    let (size, intrinsics) = read_window(reader, top, size, intrinsics)?;
     reader.config(model, size, intrinsics, coefficients.values.as_deref().unwrap_or_default())
+}
+
+/// Returns size and intrinsic parameters of the pictures that a ROS camera sends: `roi` cuts a window out of the full
+/// picture, and `binning_x` and `binning_y` reduce it. The formula is that of ROS's image_geometry.
+fn read_window(
+    reader: &Reader<'_>,
+    top: &Map<String, Value>,
+    size: [f64; 2],
+    [fx, fy, cx, cy]: [f64; 4],
+) -> Result<([f64; 2], [f64; 4]), Problem> {
+    let whole = |value: Option<&Value>, field: &str| {
+        let number = value.map_or(Some(0.0), number).filter(|x| *x >= 0.0 && x.fract() == 0.0);
+        number.ok_or_else(|| reader.problem(field, "a whole number of pixels is expected"))
+    };
+    let roi = |key: &str| whole(top.get("roi").and_then(|roi| roi.get(key)), &format!("roi.{key}"));
+    let offset = [roi("x_offset")?, roi("y_offset")?];
+    let window = [roi("width")?, roi("height")?];
+    // A window of 0 pixels is the full picture, and a binning of 0 is none.
+    let binning =
+        [whole(top.get("binning_x"), "binning_x")?.max(1.0), whole(top.get("binning_y"), "binning_y")?.max(1.0)];
+    let side = |k: usize| ((if window[k] > 0.0 { window[k] } else { size[k] }) / binning[k]).floor();
+    let centre = |k: usize, c: f64| (c - offset[k]) / binning[k];
+    Ok(([side(0), side(1)], [fx / binning[0], fy / binning[1], centre(0, cx), centre(1, cy)]))
 }
 
 /// Returns the lens that the shape of the coefficients tells. `cv2.fisheye.calibrate` returns a column of four.

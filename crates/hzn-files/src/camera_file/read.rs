@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::loaded::Loaded;
 use super::reader::Reader;
-use super::{document, kalibr, opencv};
+use super::{camchain, document, kalibr, opencv};
 use crate::nearest::suggestion;
 use crate::{Problem, limited};
 
@@ -41,7 +41,13 @@ pub fn load_any(path: &Path, name: Option<&str>) -> Result<Loaded, Problem> {
 
 /// Reads a camera file as [`load_any`] does, but from text.
 fn parse_any(text: &str, path: &Path, name: Option<&str>) -> Result<Loaded, Problem> {
-    let value = document::parse(text, path)?;
+    let mut value = match camchain::of_colmap(text, path) {
+        Some(chain) => chain?,
+        None => document::parse(text, path)?,
+    };
+    if let Some(chain) = value.as_object().and_then(|top| camchain::of_document(top, path)) {
+        value = chain?;
+    }
     let reader = Reader { path };
     let Value::Object(top) = &value else { return Err(unknown_format(path)) };
     let numbered =
@@ -78,7 +84,8 @@ fn unknown_format(path: &Path) -> Problem {
         path,
         "is not a known camera file; expected is a Kalibr camchain (cam0: ...), a EuRoC sensor.yaml (intrinsics, \
          resolution), an OpenCV calibration (camera_matrix or K, image_width, image_height; YAML, XML or JSON), ROS's \
-         camera_info, or Foxglove's CameraCalibration (JSON)",
+         camera_info, Foxglove's CameraCalibration (JSON), or a file of camodocal (model_type), ORB-SLAM3 \
+         (Camera.type), Basalt, COLMAP (cameras.txt) or Metashape (XML)",
     )
 }
 

@@ -1,4 +1,5 @@
 //! Tests of camera files and of sensor.toml.
 
 mod camera_files;
+mod further_tools;
 mod presets;

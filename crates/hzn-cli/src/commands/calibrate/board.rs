@@ -34,7 +34,7 @@ pub(super) struct Args {
     /// Inner corners of the board, along its rows and its columns: one less than its squares
     #[arg(long, value_name = "COLUMNSxROWS")]
     board: BoardSize,
-    /// Side of a square of the board; it sets the scale of the poses and has no effect on the lens
+    /// Side of a square of the board; it sets the scale of the board's bow and has no effect on the lens
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     square_mm: f64,
     /// Model of the lens: kannala-brandt, brown-conrady, equidistant, pinhole, double-sphere, eucm

@@ -28,7 +28,7 @@ struct Searched {
 
 /// All pictures after the search.
 pub(super) struct Pictures {
-    /// Width and height of all pictures, px.
+    /// Width and height of the pictures, px. Pictures of another size are left out.
     pub(super) size_px: [u16; 2],
     /// One view for each picture, in the order of the source. It has no corners if no board was found.
     pub(super) views: Vec<View>,
@@ -43,7 +43,7 @@ pub(super) struct Pictures {
 /// Searches all pictures of a source; `None` if the user has interrupted.
 ///
 /// # Errors
-/// The source fails, the pictures have different sizes, no picture shows the board, or the board has another size.
+/// The source fails, most pictures are too large, no picture shows the board, or the board has another size.
 pub(super) fn search(
     source: &mut dyn Source,
     board: &Board,
@@ -90,7 +90,7 @@ fn search_one(name: String, payload: Payload, board: &Board) -> Searched {
 }
 
 fn sort_out(searched: &[Searched], board: &Board) -> Result<Pictures, Stop> {
-    let size = check_sizes(searched)?;
+    let size = usual_size(searched)?;
     check_board(searched, board)?;
     let too_large = |_| usage(format!("pictures of {}x{} px are too large; scale them down", size[0], size[1]));
     let size_px = [u16::try_from(size[0]).map_err(too_large)?, u16::try_from(size[1]).map_err(too_large)?];
@@ -101,6 +101,10 @@ fn sort_out(searched: &[Searched], board: &Board) -> Result<Pictures, Stop> {
             Vec::new()
         };
         let corners = match result {
+            Ok((other, _)) if *other != size => leave_out(format!(
+                "it has {}x{} px, but most pictures have {}x{} px; a scaled or cut picture shows another lens",
+                other[0], other[1], size[0], size[1]
+            )),
             Ok((_, Ok(found))) => found.corners.clone(),
             Ok((_, Err(why))) => leave_out(why.to_string()),
             Err(why) => {
@@ -113,27 +117,19 @@ fn sort_out(searched: &[Searched], board: &Board) -> Result<Pictures, Stop> {
     Ok(Pictures { size_px, views, reasons, unreadable, notes: note_of_parts(searched, board).into_iter().collect() })
 }
 
-/// Returns the size of the pictures that can be read, and refuses different sizes.
-fn check_sizes(searched: &[Searched]) -> Result<[usize; 2], Stop> {
-    let mut sizes: BTreeMap<[usize; 2], Vec<&str>> = BTreeMap::new();
+/// Returns the size that most pictures have; of two sizes with equally many pictures, the larger one.
+fn usual_size(searched: &[Searched]) -> Result<[usize; 2], Stop> {
+    let mut sizes: BTreeMap<[usize; 2], usize> = BTreeMap::new();
     for s in searched {
         if let Ok((size, _)) = &s.result {
-            sizes.entry(*size).or_default().push(&s.name);
+            *sizes.entry(*size).or_default() += 1;
         }
     }
-    let usual = sizes.iter().max_by_key(|(_, names)| names.len()).map(|(size, names)| (*size, names.len()));
-    let Some((usual, pictures)) = usual else {
+    let usual = sizes.into_iter().max_by_key(|(_, pictures)| *pictures).map(|(size, _)| size);
+    usual.ok_or_else(|| {
         let why = |s: &Searched| format!("  {}: {}", s.name, s.result.as_ref().err().map_or("", String::as_str));
-        return Err(failed("no picture can be read:").with_details(searched.iter().map(why)));
-    };
-    if sizes.len() == 1 {
-        return Ok(usual);
-    }
-    let others = sizes.iter().filter(|(size, _)| **size != usual);
-    let lines = others.flat_map(|(s, names)| names.iter().map(move |n| format!("  {n}: {}x{} px", s[0], s[1])));
-    let [w, h] = usual;
-    let what = format!("the pictures have different sizes: {pictures} have {w}x{h} px, but");
-    Err(usage(what).with_details(lines.chain(["give pictures of one size, as the camera takes them".to_owned()])))
+        failed("no picture can be read:").with_details(searched.iter().map(why))
+    })
 }
 
 /// Refuses pictures that agree on a board of another size, and pictures without any board.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hzn_calib::board::{Calibrated, ViewResult};
+use hzn_calib::board::{Bow, Calibrated, ViewResult};
 use hzn_core::camera::Intrinsic;
 
 use crate::tell::one_line;
@@ -55,6 +55,18 @@ pub(super) fn lines(c: &Calibrated) -> Vec<(String, String)> {
     lines.push(("RMS".to_owned(), format!("{:.4} px, 1 sigma of a coordinate {:.4} px", c.rms_px, c.sigma_px)));
     if let Some(rms) = c.held_out_rms_px {
         lines.push(("held out".to_owned(), format!("{rms:.4} px RMS in pictures that are not in the fit")));
+    }
+    if let Some(Bow { depth_mm: [row, column], sigma_mm: [row_sigma, column_sigma] }) = c.bow {
+        let [row, column] = [with_sigma(row, Some(row_sigma)), with_sigma(column, Some(column_sigma))];
+        let what = format!("the ends lie behind the middle by {row} mm along a row, {column} mm along a column");
+        lines.push(("bow of board".to_owned(), what));
+    }
+    if let Some(between_px) = c.between_sigma_px {
+        let what = "1 sigma of the lens from the corners alone";
+        lines.push((
+            "agreement".to_owned(),
+            format!("{what} {:.4} px, between pictures {between_px:.4} px", c.alone_sigma_px),
+        ));
     }
     lines.push((
         "lens".to_owned(),

@@ -15,6 +15,9 @@ use crate::tell;
 
 /// Convert a calibration: sensor.toml, Kalibr, OpenCV, EuRoC, ROS, Foxglove, or the coefficients of Braun & Barf
 ///
+/// Files of camodocal (VINS), ORB-SLAM3, Basalt, COLMAP (cameras.txt) and Metashape (XML) are read as well, but not
+/// written. --camera chooses one of several cameras: cam0 is the first, and in COLMAP cam1 is the camera with number 1.
+///
 /// The form of the input is detected from its text; numbers keep their last bit. --model fits another lens over the
 /// picture and prints the error. Examples:
 ///
