@@ -7,6 +7,7 @@ mod faint;
 mod firmware;
 mod free_axis;
 mod hard;
+mod heads;
 mod jupiter;
 mod line_cost;
 mod looks;
