@@ -100,5 +100,7 @@ pub use body::{Expected, Prior};
 pub use config::Config;
 pub use observer::{Observer, Unobserved};
 pub use papers::Preset;
-pub use pipeline::{FlightHorizon, FlightWorkspace, Horizon, HostHorizon, HostWorkspace, Sensor, Workspace};
+pub use pipeline::{
+    FlightHorizon, FlightWorkspace, Horizon, HostHorizon, HostWorkspace, Sensor, Sequence, Step, Workspace,
+};
 pub use report::{Report, Solution};

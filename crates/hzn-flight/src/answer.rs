@@ -323,6 +323,8 @@ impl PictureAnswer {
             },
             candidates,
             solution,
+            // The computer sends an event instead.
+            is_suspect: false,
         })
     }
 

@@ -157,6 +157,8 @@ numbered_enum! {
         /// The computer can no longer keep the answers that it sends: the disk of the log is full or fails. Sent again
         /// only when it could be written meanwhile. a: number of the picture. b: 0.
         AnswersNotKept = 21 => "the answers are no longer kept",
+        /// The edge of an answer stays in the picture while the vehicle turns. a: picture. b: 1 if the answer was sent.
+        FixedEdge = 22 => "fixed in the picture while the vehicle turns",
     }
 }
 
@@ -175,6 +177,7 @@ impl Event {
             | Self::CameraSilent
             | Self::KnownExpired
             | Self::StuckPixels
+            | Self::FixedEdge
             | Self::RowsRefused
             | Self::Repaired => Severity::Warning,
             Self::Defaults

@@ -1,10 +1,14 @@
 //! The flat result: one row per picture and body, the same in CSV, JSON Lines and MCAP.
 
-use hzn_core::frames::{UnitVec3, Vehicle};
+mod detail;
+
+use hzn_core::frames::{Cam, Cov3, UnitVec3, Vehicle};
 use hzn_core::real::Real;
 use hzn_core::report::Position;
-use hzn_core::status::{Stage, Status};
+use hzn_core::status::Status;
 use hzn_core::{Report, Solution};
+
+use detail::{SUSPECT, describe};
 use serde::{Deserialize, Serialize};
 
 use crate::status_name;
@@ -164,7 +168,8 @@ columns! {
         pitch_deg: Option<f64>,
         /// Processing time, microseconds, without decoding.
         elapsed_us: Option<f64>,
-        /// Why there is no answer, in words; empty with the status `ok`.
+        /// Why there is no answer, in words; with the status `ok` empty, or why the answer is suspect
+        /// (`gates.fixed_edge`).
         detail: String,
         /// Axis of the fit with a free half-angle (camera frame, unit vector), x; only if the half-angle was fitted.
         axis_free_x: Option<f64>,
@@ -261,7 +266,10 @@ impl Row {
             ..Self::without_answer(meta, report.status)
         };
         match (&report.solution, report.status) {
-            (Some(solution), Status::Ok) => row.set_answer(solution),
+            (Some(solution), Status::Ok) => {
+                row.set_answer(solution);
+                row.detail = if report.is_suspect { SUSPECT } else { "" }.to_owned();
+            }
             _ => row.detail = describe(report),
         }
         row
@@ -387,6 +395,15 @@ impl Row {
         ])
     }
 
+    /// Returns the larger standard deviation of the errors that the next picture does not share, in radians, see
+    /// [`Solution::noise_rad`]; `None` without an axis.
+    pub fn noise_rad(&self) -> Option<f64> {
+        let common = self.common_covariance().unwrap_or_default();
+        let all = self.covariance()?;
+        let noise = std::array::from_fn(|i| all[i] - common[i]);
+        Some(Cov3::<Cam, f64>::from_upper(noise).sigma_max_rad())
+    }
+
     /// Returns the position of the body's centre from the camera, in km (camera frame); `None` if there is none.
     pub fn position_km(&self) -> Option<[f64; 3]> {
         Some([self.position_x_km?, self.position_y_km?, self.position_z_km?])
@@ -418,24 +435,6 @@ pub fn roll_pitch_deg<T: Real>(to_body: &UnitVec3<Vehicle, T>) -> [f64; 2] {
 /// Returns the number if it is finite, because a table has no other numbers.
 fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
-}
-
-/// Describes the last stage, the verdict of each candidate, and the number of looks if there was more than one.
-fn describe<T: Real>(report: &Report<T>) -> String {
-    let mut text = format!("ended at {}", report.stage.name());
-    if report.status == Status::NoLimb && report.stage == Stage::Threshold {
-        text.push_str(
-            ": dark and lit differ by less than 3 % of full scale; the body fills the picture or is not in it",
-        );
-    }
-    if report.counters.looks > 1 {
-        text.push_str(&format!(" in {} looks", report.counters.looks));
-    }
-    for (i, c) in report.candidates.iter().enumerate() {
-        text.push_str(if i == 0 { ": " } else { ", " });
-        text.push_str(c.verdict.name());
-    }
-    text
 }
 
 #[cfg(test)]

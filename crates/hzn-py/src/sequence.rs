@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use hzn_files::FrameData;
-use hzn_run::engine::{self, Finished, Plan};
+use hzn_run::engine::{self, Finished, Plan, Turns};
 use hzn_run::open::{Opened, Request, SensorChoice, open};
 use hzn_run::source::{self, Payload, Source};
 use hzn_run::{Error, Kind};
@@ -148,6 +148,7 @@ fn default_plan(state: &State, frames: Option<hzn_files::Frames>) -> Plan {
         keep_picture: false,
         overlay: None,
         last: Vec::new(),
+        turns: Turns::default(),
     }
 }
 

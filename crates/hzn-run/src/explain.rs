@@ -65,6 +65,11 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Sun => {
             "the given Sun does not light this limb (gates.max_unlit); a thermal camera sets body.sunlit = false".into()
         }
+        Verdict::Fixed => {
+            "suspect: fixed in the picture, while the vehicle turns (gates.fixed_edge); the edge belongs to the window, \
+             the lens or the vehicle"
+                .into()
+        }
         Verdict::Rate => {
             "the axis is farther from the last answer than the vehicle can turn (gates.max_rate_deg_s)".into()
         }
@@ -100,6 +105,7 @@ const ORDER: &[Verdict] = &[
     Verdict::Radius,
     Verdict::Unlikely,
     Verdict::Glow,
+    Verdict::Fixed,
     Verdict::Passed,
     Verdict::Chosen,
 ];
@@ -330,6 +336,7 @@ mod tests {
             counters: Default::default(),
             candidates: Default::default(),
             solution: None,
+            is_suspect: false,
         };
         for (number, &(verdict, inliers)) in (0..).zip(edges) {
             let edge = Candidate { number, length_px: 9, points: 9, inliers, rms_px: 0.5, verdict };

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_mcap::Row;
 use hzn_run::checked_row;
-use hzn_run::engine::{self, AnySensor, Plan};
+use hzn_run::engine::{self, AnySensor, Plan, Turns};
 use hzn_run::sink::{self, StoredResults};
 use hzn_run::source::{Item, Payload, Source};
 
@@ -13,13 +13,14 @@ use crate::tell;
 
 /// Skips the pictures that the output contains already, and checks that this run would give the same results. The last
 /// of them is processed again, and so is each picture file that was changed since the results were written; each must
-/// give the row in the output. If the table of the pictures was changed, this holds for all pictures.
+/// give the row in the output. If the table of the pictures was changed, this holds for all pictures. Returns the
+/// answers and turns up to the last of them.
 pub(super) fn skip_stored(
     source: &mut dyn Source,
     stored: &StoredResults,
     plan: &Plan,
     output: Option<&Path>,
-) -> Result<(), Stop> {
+) -> Result<Turns, Stop> {
     let name = output.map(|p| p.display().to_string()).unwrap_or_default();
     let other = |what: String| Err(usage(format!("{name}: {what}, or start over with --force")));
     let table = plan.frames.as_ref().map(|frames| &frames.path);
@@ -31,6 +32,7 @@ pub(super) fn skip_stored(
         ));
     }
     let mut again = Again { sensor: None, plan: Plan { overlay: None, ..plan.clone() }, stored };
+    let mut turns = Turns::default();
     for n in 0..stored.frames {
         let Some(item) = source.next() else {
             let what = format!("contains {} pictures, but the input has only {n}", stored.frames);
@@ -45,11 +47,13 @@ pub(super) fn skip_stored(
             return other(format!("{what}; give the input that it was begun with"));
         }
         let changed = file_of(&item).is_some_and(|file| stored.is_older_than(file));
+        let before = turns.clone();
+        again.replay(n, &item, &mut turns);
         if !(is_last || changed || changed_table.is_some()) {
             continue;
         }
         let picture = item.name.clone();
-        match again.gives_the_same(n, item)? {
+        match again.gives_the_same(n, item, before)? {
             Some(true) => {}
             // Without the pictures before it, a picture would give another result.
             None if !changed && changed_table.is_none() => {}
@@ -72,7 +76,7 @@ pub(super) fn skip_stored(
             }
         }
     }
-    Ok(())
+    Ok(turns)
 }
 
 /// Returns the file of a picture that has a file of its own.
@@ -91,8 +95,21 @@ struct Again<'a> {
 }
 
 impl Again<'_> {
-    /// Returns whether a picture gives its stored rows again; `None` if that depends on the pictures before it.
-    fn gives_the_same(&mut self, n: u64, item: Item) -> Result<Option<bool>, Stop> {
+    /// Takes the stored answers of a picture into the comparison with the turn of the vehicle.
+    fn replay(&self, n: u64, item: &Item, turns: &mut Turns) {
+        let (config, bodies) = (&self.plan.config, self.plan.config.each_body().len());
+        let first = n as usize * bodies;
+        let answers = self.stored.answers.get(first..first + bodies).unwrap_or_default();
+        let time_s = self.stored.times_s.get(n as usize).copied().flatten();
+        match &self.plan.frames {
+            Some(frames) => turns.replay(frames.get(&item.name), time_s, answers, config),
+            None => turns.replay(item.data.as_ref(), time_s, answers, config),
+        }
+    }
+
+    /// Returns whether a picture gives its stored rows again, after the answers and turns before it; `None` if that
+    /// also depends on the threshold of the pictures before it.
+    fn gives_the_same(&mut self, n: u64, item: Item, mut before: Turns) -> Result<Option<bool>, Stop> {
         if self.plan.config.tracks() {
             return Ok(None);
         }
@@ -102,7 +119,8 @@ impl Again<'_> {
         };
         // In a run with several threads, an answer does not depend on those before it.
         sensor.remember(&vec![None; self.plan.config.each_body().len()]);
-        let processed = engine::process_one(&self.plan, sensor, n, item)?;
+        let mut processed = engine::process_one(&self.plan, sensor, n, item)?;
+        before.judge(&mut processed, &self.plan.config);
         let rows: Vec<Row> = sink::rows(&processed, &self.plan.config);
         let sums = rows.iter().map(checked_row::sum).collect::<Result<Vec<u32>, _>>()?;
         let first = n as usize * rows.len();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::config::Orient;
 use hzn_files::{Frames, Sensor};
-use hzn_run::engine::{self, End, Finished, Plan};
+use hzn_run::engine::{self, End, Finished, Plan, Turns};
 use hzn_run::open::Opened;
 use hzn_run::sink::{self, Existing, Output};
 use hzn_run::source::{self, Source, ending};
@@ -114,10 +114,13 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line(format_args!("note: the {} pictures of the earlier run are not drawn again", stored.frames));
     }
     let total = source.total();
-    if let Err(stop) = resume::skip_stored(source.as_mut(), &stored, &plan, path) {
-        output.put_back()?;
-        return Err(stop);
-    }
+    let plan = match resume::skip_stored(source.as_mut(), &stored, &plan, path) {
+        Ok(turns) => Plan { turns, ..plan },
+        Err(stop) => {
+            output.put_back()?;
+            return Err(stop);
+        }
+    };
     let mut watch = Watch::new(Progress::new(total, stored.frames, args.quiet), args.quiet);
     let stop = stop_flag();
     let end = engine::run(&plan, source.as_mut(), stored.frames, &stop, &mut output, &mut |frame| watch.see(frame));
@@ -197,6 +200,7 @@ fn plan(args: &Args, sensor: Sensor, frames: Option<Frames>) -> Plan {
         keep_picture: trace && !args.no_images,
         overlay: args.overlay.clone(),
         last: Vec::new(),
+        turns: Turns::default(),
     }
 }
 

@@ -159,3 +159,52 @@ fn a_limb_has_a_probability_and_its_evidence() {
         assert!(explained.out.contains(text), "{text}: {}", explained.out);
     }
 }
+
+/// A folder whose pictures have a rate of 2.5 degrees a second about the camera's x axis. The limb moves with it only
+/// in the first two pictures and in the last one: in the other three, it stays where it is.
+fn stuck(gates: &str) -> Place {
+    let place = Place::new();
+    place.write("in/sensor.toml", format!("{SENSOR}\n[gates]\n{gates}\n").as_bytes());
+    let mut table = "file,rate_x,rate_y,rate_z\n".to_owned();
+    for (i, shift) in [0.0, 50.0, 50.0, 50.0, 50.0, 10.0].into_iter().enumerate() {
+        limb(320, 240, shift).save(place.path(&format!("in/{i:04}.png"))).unwrap();
+        table += &format!("{i:04}.png,{},0,0\n", 2.5f64.to_radians());
+    }
+    place.write("in/frames.csv", table.as_bytes());
+    place
+}
+
+#[test]
+fn an_edge_that_stays_in_the_picture_of_a_vehicle_that_turns_is_refused() {
+    let place = stuck("");
+    place.run(&["run", "in", "-j", "1", "-o", "one.csv"]).expect(0);
+    place.run(&["run", "in", "-j", "8", "-o", "eight.csv"]).expect(0);
+    assert_eq!(without_time(&place.read("one.csv")), without_time(&place.read("eight.csv")));
+    let judged = statuses(&place.read("one.csv"));
+    let refused = ("rejected".to_owned(), "ended at gates: fixed".to_owned());
+    let right = ("ok".to_owned(), String::new());
+    assert_eq!(judged[..2], [right.clone(), right.clone()]);
+    assert_eq!(judged[2..], [refused.clone(), refused.clone(), refused, right]);
+    // A run that is continued has the same rows, wherever it stopped. A recording is continued from its last rows.
+    let text = place.read("one.csv");
+    for stored in 1..6 {
+        let begun: String = text.split_inclusive('\n').take(1 + stored).collect();
+        place.write("part.csv.part", begun.as_bytes());
+        place.run(&["run", "in", "-o", "part.csv", "--resume"]).expect(0);
+        assert_eq!(without_time(&place.read("part.csv")), without_time(&text), "after {stored}");
+        std::fs::remove_file(place.path("part.csv")).unwrap();
+    }
+    place.run(&["run", "in", "-o", "one.mcap"]).expect(0);
+    place.run(&["run", "one.mcap", "-o", "again.csv"]).expect(0);
+    assert_eq!(without_time(&place.read("again.csv")), without_time(&text));
+}
+
+#[test]
+fn an_edge_that_stays_in_the_picture_may_be_a_warning() {
+    let ok = |detail: &str| ("ok".to_owned(), detail.to_owned());
+    let judged = statuses(&stuck("fixed_edge = \"warn\"").run(&["run", "in"]).expect(0).out);
+    let suspect = ok("suspect: fixed in the picture");
+    assert_eq!(judged, [ok(""), ok(""), suspect.clone(), suspect.clone(), suspect, ok("")]);
+    let off = statuses(&stuck("fixed_edge = \"off\"").run(&["run", "in"]).expect(0).out);
+    assert_eq!(off, vec![ok(""); 6]);
+}

@@ -68,6 +68,9 @@ pub struct Report<T> {
     pub candidates: heapless::Vec<Candidate<T>, MAX_LISTED>,
     /// The direction. It is present if and only if the status is `ok`.
     pub solution: Option<Solution<T>>,
+    /// Whether the edge of the answer stays in the picture while the vehicle turns, with `gates.fixed_edge = "warn"`.
+    /// Only a sequence shows it, see [`Sequence`](crate::Sequence).
+    pub is_suspect: bool,
 }
 
 impl<T> Report<T> {
@@ -82,11 +85,20 @@ impl<T> Report<T> {
             counters: Counters::default(),
             candidates: heapless::Vec::new(),
             solution: None,
+            is_suspect: false,
         }
     }
     /// Returns whether a candidate won that is an edge in a glow, see [`Verdict::Glow`].
     pub(crate) fn glows(&self) -> bool {
         self.candidates.iter().any(|c| c.verdict == Verdict::Glow)
+    }
+    /// Takes the answer back: the candidate that won gets this verdict.
+    pub(crate) fn reject(&mut self, verdict: Verdict) {
+        self.solution = None;
+        self.status = Status::Rejected;
+        if let Some(chosen) = self.candidates.iter_mut().find(|c| c.verdict == Verdict::Chosen) {
+            chosen.verdict = verdict;
+        }
     }
     /// Lists the candidate that won, in the last place if the list has no room for it. Its verdict is `Chosen`, or the
     /// reason why the picture has no answer all the same.
@@ -213,6 +225,17 @@ impl<T: Real> Position<T> {
         let (sin, cos) = angle_rad.sin_cos();
         let ray = e * *c + (b1 * cos + b2 * sin) * sin_half_angle;
         UnitVec3::assume_unit(scaling.as_ref().map_or(ray, |scaling| scaling.unscale(&ray)))
+    }
+}
+
+impl<T: Real> Solution<T> {
+    /// Returns the larger standard deviation of the errors that the next picture does not share, radians; that of the
+    /// whole error if the common part is not known.
+    pub fn noise_rad(&self) -> T {
+        let common = self.common.map_or([T::zero(); 6], |common| common.upper_rad2);
+        let mut noise = self.covariance;
+        noise.upper_rad2.iter_mut().zip(common).for_each(|(all, common)| *all -= common);
+        noise.sigma_max_rad()
     }
 }
 

@@ -84,4 +84,7 @@ verdicts! {
     Night = 25, "night";
     /// All evidence together makes it too improbable that the edge is the limb.
     Unlikely = 26, "unlikely";
+    /// The candidate won, but its edge stays in the picture while the vehicle turns: it belongs to the window, the lens
+    /// or the vehicle.
+    Fixed = 27, "fixed";
 }

@@ -20,6 +20,7 @@ mod process;
 mod row_stream;
 mod search;
 mod sensor;
+mod sequence;
 mod workspace;
 
 #[cfg(test)]
@@ -29,4 +30,5 @@ mod golden;
 pub use horizon::{FlightHorizon, Horizon, HostHorizon};
 pub use row_stream::{ROWS_HELD, RowBuffers, RowStream, RowStreamError};
 pub use sensor::Sensor;
+pub use sequence::{Sequence, Step};
 pub use workspace::{FlightWorkspace, HostWorkspace, Workspace};

@@ -5,9 +5,9 @@
 //! term of the series is the change of the acceleration; in low orbit it moves the position by 1.5 m in ten seconds and
 //! by 0.3 km in a minute.
 
-use hzn_core::Prior;
 use hzn_core::body::Last;
 use hzn_core::real::Real;
+use hzn_core::{Prior, Sequence};
 
 use super::clock::Clock;
 use crate::bytes::Reader;
@@ -30,6 +30,10 @@ pub(super) struct Known {
     pub(super) motion: Option<Motion>,
     /// The last answer, and the time when its picture was exposed, µs since the start.
     pub(super) last: Option<(Last<f32>, u64)>,
+    /// The earlier answer that answers are compared with, with the turn since then.
+    pub(super) turns: Sequence<f32>,
+    /// The time when the newest picture was exposed, µs since the start.
+    pub(super) seen_us: Option<u64>,
     /// The threshold that the last picture proposes for the next one, in counts.
     pub(super) level: Option<u16>,
 }

@@ -2,7 +2,7 @@
 
 use hzn_core::body::{Expected, Last};
 use hzn_core::status::Status;
-use hzn_core::{Prior, Report};
+use hzn_core::{Prior, Report, Sequence, Step};
 use hzn_twice::KeptTwice;
 
 use super::{Buffers, Flight, longest_edge};
@@ -39,7 +39,8 @@ impl<B: Board> Flight<'_, B> {
         if !self.check_size(picture.bytes) {
             return;
         }
-        let Some(expected) = self.expect_limb(picture.exposure_us) else { return };
+        let prior = self.prior_at(picture.exposure_us);
+        let Some(expected) = self.expect_limb(&prior) else { return };
         let mut expected = KeptTwice::new(expected);
         expected.complete();
         let start = self.board.now_us();
@@ -49,14 +50,15 @@ impl<B: Board> Flight<'_, B> {
         let mut viewer = Viewer::new(self.sensor.get(), expected.get(), self.workspace, edge, wanted);
         self.board.show(&mut viewer);
         let seen = viewer.into_seen();
-        let Some((report, stuck)) = self.accept(seen) else { return };
+        let Some((mut report, stuck)) = self.accept(seen) else { return };
         // A bit may have changed during the calculation.
         if !self.check_memory(Some(&mut expected)) {
             self.state.refused = self.state.refused.saturating_add(1);
             return;
         }
         // After the check, because a new copy of a changed value would hide the change.
-        self.remember(&report, picture.exposure_us, stuck.is_none());
+        let turns = self.compare_with_turn(&prior, &mut report, picture.exposure_us, stuck.is_none());
+        self.remember(&report, picture.exposure_us, stuck.is_none(), turns);
         // Without this, 3 of 5643 answers to such pictures were false, where the altitude is known to 100 km.
         if let Some(stuck) = stuck {
             self.state.stuck = self.state.stuck.saturating_add(1);
@@ -108,12 +110,13 @@ impl<B: Board> Flight<'_, B> {
     }
 
     /// Remembers what a picture says about the next one: its threshold, and its direction if that may be believed.
-    fn remember(&mut self, report: &Report<f32>, exposure_us: u64, is_believed: bool) {
+    fn remember(&mut self, report: &Report<f32>, exposure_us: u64, is_believed: bool, turns: Sequence<f32>) {
         let mut known = self.known.get().clone();
+        (known.turns, known.seen_us) = (turns, Some(exposure_us));
         // The threshold is kept in any case, because it comes from the whole picture. A stuck direction would let the
         // gate of the rate refuse the next, right one.
         known.level = report.next_level;
-        if let Some(s) = report.solution.as_ref().filter(|_| is_believed) {
+        if let Some(s) = report.solution.as_ref().filter(|_| is_believed && !report.is_suspect) {
             let last = Last { axis: s.axis, sigma_rad: s.covariance.sigma_max_rad(), age_s: 0.0 };
             known.last = Some((last, exposure_us));
         }
@@ -121,11 +124,33 @@ impl<B: Board> Flight<'_, B> {
         self.known.complete();
     }
 
+    /// Compares the answer with the turn of the vehicle, see `gates.fixed_edge`. An event says if its edge stays in the
+    /// picture. Returns what the next picture is compared with.
+    fn compare_with_turn(
+        &mut self,
+        prior: &Prior<f32>,
+        report: &mut Report<f32>,
+        exposure_us: u64,
+        is_believed: bool,
+    ) -> Sequence<f32> {
+        let known = self.known.get();
+        let mut turns = known.turns.clone();
+        let after_s = known.seen_us.map(|before| exposure_us.wrapping_sub(before).cast_signed() as f32 * 1e-6);
+        let (step, gates) = (Step::from_prior(prior, after_s), self.sensor.get().config().gates);
+        if !is_believed {
+            turns.see(&step, None, &gates);
+        } else if turns.judge(&step, report, &gates) {
+            // The number that this picture will have.
+            self.send_event(Event::FixedEdge, self.number.wrapping_add(1), u32::from(report.is_suspect));
+        }
+        turns
+    }
+
     /// Returns the expected limb of a picture, from the values of navigation and the last answer. Refuses the picture
     /// if these are impossible.
-    fn expect_limb(&mut self, exposure_us: u64) -> Option<Expected<f32>> {
+    fn expect_limb(&mut self, prior: &Prior<f32>) -> Option<Expected<f32>> {
         // A picture that comes row by row has no other threshold, unless the parameters fix it.
-        let prior = Prior { level: self.known.get().level, ..self.prior_at(exposure_us) };
+        let prior = Prior { level: self.known.get().level, ..*prior };
         let expected = self.sensor.get().expect(&prior).ok();
         if expected.is_none() {
             self.state.refused = self.state.refused.saturating_add(1);

@@ -22,9 +22,10 @@ impl<B: Board> Flight<'_, B> {
         if sensor.expect(&known.prior).is_err() || moves && !is_earth {
             return Code::Refused;
         }
-        // The last answer and the threshold come from pictures, so that new values from navigation do not replace them.
-        let Known { last, level, .. } = *self.known.get();
-        self.known.set(Known { last, level, ..known });
+        // The last answers and the threshold come from pictures, so that new values from navigation do not replace
+        // them.
+        let Known { last, level, turns, seen_us, .. } = self.known.get().clone();
+        self.known.set(Known { last, level, turns, seen_us, ..known });
         self.known.complete();
         self.has_expired = false;
         Code::Done

@@ -133,3 +133,40 @@ fn a_number_that_is_missing_or_impossible_is_named() {
         }
     });
 }
+
+/// The picture shows the same limb again and again, while navigation says that the camera turns.
+#[test]
+fn an_edge_that_stays_while_the_vehicle_turns_is_refused_and_told() {
+    fly(ready(), |f| {
+        send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
+        let mut see = |rate: f32| {
+            let still = Navigation { epoch: f.board().now_us, altitude_m: 230e3, ..unknown() };
+            let values = Navigation { rate_x_rad_s: rate, rate_y_rad_s: 0.0, rate_z_rad_s: 0.0, ..still };
+            assert_eq!(navigate(f, values), Code::Done);
+            f.board().now_us += 1_000_000;
+            f.board().pictures.push_back((limb(), 0));
+            f.turn();
+            let sent = take_sent(f);
+            (sent.science[0].1.outcome.status, sent.events)
+        };
+        let rejected = hzn_core::status::Status::Rejected as u8;
+        assert_eq!(see(0.1), (0, vec![]));
+        // New values from navigation do not make the computer forget the picture before.
+        let (status, events) = see(0.1);
+        assert_eq!(status, rejected);
+        assert!(events.contains(&(Event::FixedEdge, 2, 0)), "{events:?}");
+        assert_eq!(see(0.1).0, rejected);
+    });
+    fly(ready(), |f| {
+        send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
+        let values = Navigation { rate_x_rad_s: 0.0, rate_y_rad_s: 0.0, rate_z_rad_s: 0.0, ..unknown() };
+        let values = Navigation { epoch: f.board().now_us, altitude_m: 230e3, ..values };
+        assert_eq!(navigate(f, values), Code::Done);
+        for _ in 0..3 {
+            f.board().now_us += 1_000_000;
+            f.board().pictures.push_back((limb(), 0));
+            f.turn();
+            assert_eq!(take_sent(f).science[0].1.outcome.status, 0);
+        }
+    });
+}

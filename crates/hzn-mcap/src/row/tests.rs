@@ -35,6 +35,7 @@ fn report<T: Real>(status: Status) -> Report<T> {
         counters: Counters { edge_points: 600, candidates: 2, ..Counters::default() },
         candidates: Default::default(),
         solution: Some(solution),
+        is_suspect: false,
     }
 }
 

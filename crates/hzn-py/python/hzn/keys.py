@@ -290,6 +290,12 @@ class Gates(TypedDict, total=False):
     max_rate_deg_s: float | None
     """Largest rate of rotation of the vehicle, degrees per second; an axis that is farther from the previous answer
     is refused. Values: above 0 to 1e6 deg/s. Default: any."""
+    fixed_edge: Literal["refuse", "warn", "off"]
+    """Treatment of an answer whose edge stays in the picture while the vehicle turns: the edge belongs to the
+    window, the lens or the vehicle. Default: "refuse"."""
+    fixed_edge_sigma: float
+    """Evidence for an edge that is fixed in the picture from which ``fixed_edge`` acts, in standard deviations.
+    Values: above 0 to 1000. Default: 3.0."""
     max_unlit: float
     """Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does ``body.sunlit
     = false``, which is for a thermal camera. Values: 0 to 1. Default: 0.5."""

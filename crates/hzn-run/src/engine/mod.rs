@@ -19,6 +19,7 @@ mod sequence;
 #[cfg(test)]
 mod tests;
 pub mod trace;
+mod turns;
 mod widen;
 
 pub use annotate::annotate;
@@ -28,4 +29,5 @@ pub use process::process_one;
 pub use sensor::{AnySensor, LastAnswer, Processed, check_frames, find_refused};
 pub use sequence::{End, Sink, run};
 pub use trace::{Trace, Traces, Watch};
+pub use turns::{StoredAnswer, Turns};
 pub use widen::widen_report;

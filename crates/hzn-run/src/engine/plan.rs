@@ -4,6 +4,7 @@ use hzn_core::Config;
 use hzn_files::Frames;
 
 use super::sensor::LastAnswer;
+use super::turns::Turns;
 
 /// The settings of a run, for every picture.
 #[derive(Debug, Clone)]
@@ -28,4 +29,6 @@ pub struct Plan {
     pub overlay: Option<std::path::PathBuf>,
     /// The last answers of the run that this one continues, one for each body.
     pub last: Vec<Option<LastAnswer>>,
+    /// The answers and turns of the run that this one continues.
+    pub turns: Turns,
 }

@@ -67,6 +67,7 @@ pub fn run(
     }
     // Set when the writer stops with an error, so that the source ends too.
     let give_up = AtomicBool::new(false);
+    let mut turns = plan.turns.clone();
     std::thread::scope(|scope| {
         let stopped = || stop.load(Ordering::Relaxed) || give_up.load(Ordering::Relaxed);
         let source_end = scope.spawn(move || read_source(source, first, &ticket_out, &job_in, stopped));
@@ -75,7 +76,8 @@ pub fn run(
             scope.spawn(move || process_jobs(plan, &jobs, &results));
         }
         drop((job_out, result_in));
-        let written = write_in_order(first, &result_out, &ticket_in, sink, seen);
+        let mut judged = |frame: &mut Finished| turns.judge(frame, &plan.config);
+        let written = write_in_order(first, &result_out, &ticket_in, &mut judged, sink, seen);
         if written.is_err() {
             give_up.store(true, Ordering::Relaxed);
         }
@@ -131,11 +133,12 @@ fn process_jobs(plan: &Plan, jobs: &Receiver<Job>, results: &Sender<Result<Finis
     }
 }
 
-/// Writes the results in the order of the pictures, and returns a ticket for each. Flushes the sink regularly.
+/// Judges and writes the results in the order of the pictures, and returns a ticket for each. Flushes the sink regularly.
 fn write_in_order(
     first: u64,
     results: &Receiver<Result<Finished, Error>>,
     tickets: &Sender<()>,
+    judge: &mut dyn FnMut(&mut Finished),
     sink: &mut dyn Sink,
     seen: &mut dyn FnMut(&Finished),
 ) -> Result<(), Error> {
@@ -155,6 +158,7 @@ fn write_in_order(
                 })?;
                 waiting.insert(frame.index, frame);
                 while let Some(mut frame) = waiting.remove(&next) {
+                    judge(&mut frame);
                     sink.write(&mut frame)?;
                     seen(&frame);
                     next += 1;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use hzn_core::image::Layout;
 use hzn_core::{Config, camera};
 
-use super::{End, Finished, Plan, Sink, run};
+use super::{End, Finished, Plan, Sink, Turns, run};
 use crate::error::Error;
 use crate::source::{Item, Payload, Picture, Source, TimeSource, picture::Samples};
 
@@ -70,6 +70,7 @@ fn a_slow_disk_does_not_fill_the_memory() {
         keep_picture: false,
         overlay: None,
         last: Vec::new(),
+        turns: Turns::default(),
     };
     let (pending, largest) = (AtomicU64::new(0), AtomicU64::new(0));
     let mut source = Counted { left: 200, pending: &pending, largest: &largest };

@@ -15,6 +15,7 @@ pub fn widen_report<T: Real + Into<f64>>(r: &Report<T>) -> Report<f64> {
         counters: r.counters,
         candidates: r.candidates.iter().map(widen_candidate).collect(),
         solution: r.solution.as_ref().map(widen_solution),
+        is_suspect: r.is_suspect,
     }
 }
 

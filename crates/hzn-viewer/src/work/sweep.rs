@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use hzn_core::Config;
 use hzn_mcap::Row;
-use hzn_run::engine::{self, End, Finished, Plan, Sink};
+use hzn_run::engine::{self, End, Finished, Plan, Sink, Turns};
 use hzn_run::sink::{self, Existing};
 
 use super::Wake;
@@ -127,6 +127,7 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
         keep_picture: output.is_some(),
         overlay: None,
         last: Vec::new(),
+        turns: Turns::default(),
     };
     let mut source = SequenceSource::new(sequence)?;
     let settings = sink::Settings { config: &config, sensor_toml: &sensor_toml, durable: false };

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use hzn_calib::noise::{self, WeightedPoints};
 use hzn_core::{Prior, Solution};
 use hzn_files::{FrameData, Frames, Sensor};
-use hzn_run::engine::{self, End, Finished, Plan, Sink};
+use hzn_run::engine::{self, End, Finished, Plan, Sink, Turns};
 use hzn_run::open::{self, Opened, Request, SensorChoice};
 use hzn_run::source::{Source, ending};
 
@@ -68,6 +68,7 @@ pub(super) fn plan(input: &InputArgs, flight: bool, jobs: Option<u16>, frames: O
         keep_picture: false,
         overlay: None,
         last: Vec::new(),
+        turns: Turns::default(),
     }
 }
 

@@ -1,7 +1,20 @@
 //! `[gates]` of sensor.toml: the gates that an answer must pass, and the choice among answers.
 
 use crate::base::error::{ConfigError, between};
-use crate::base::keys::{Section, section};
+use crate::base::keys::{Section, choices, section};
+
+choices! {
+    /// Treatment of an answer whose edge stays in the picture while the vehicle turns.
+    pub enum FixedEdge {
+        /// The answer is refused with the verdict `fixed`.
+        @- Refuse = "refuse";
+        /// The answer stays; the column `detail` says `suspect: fixed in the picture`, and the flight software sends an
+        /// event.
+        @- Warn = "warn";
+        /// Answers are not compared with the turn.
+        @- Off = "off";
+    }
+}
 
 section! {
     /// `[gates]` of sensor.toml: the gates that an answer must pass, and the choice among answers.
@@ -125,6 +138,18 @@ section! {
         /// Set it to the largest rate that the vehicle can reach: a smaller value refuses right answers. Pictures are
         /// then processed in order.
         @- max_rate_deg_s: Option<f64> = None, [above 0.0 to 1e6] { unset: "any", example: "100.0" };
+        /// Treatment of an answer whose edge stays in the picture while the vehicle turns: the edge belongs to the
+        /// window, the lens or the vehicle.
+        ///
+        /// The turn comes from the columns `rate_x` to `rate_z` of frames.csv, or from an attitude; without both,
+        /// nothing is compared. The first picture of a sequence has nothing to be compared with, and nor has a vehicle
+        /// that turns more slowly than an orbit turns the direction to the body, 0.07° per second.
+        @- fixed_edge: FixedEdge = FixedEdge::Refuse, [choice];
+        /// Evidence for an edge that is fixed in the picture from which `fixed_edge` acts, in standard deviations.
+        ///
+        /// A larger value refuses fewer right answers by chance, and needs a larger turn. With 3, at most 0.14 % of
+        /// right answers are refused if the covariance is right.
+        @- fixed_edge_sigma: f64 = 3.0, [above 0.0 to 1e3];
         /// Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does
         /// `body.sunlit = false`, which is for a thermal camera.
         ///
@@ -171,5 +196,6 @@ impl Config {
         (self.max_departure, self.max_band, self.max_unlit) = (1e6, 1.0, 1.0);
         (self.max_glow, self.min_p_limb) = (1e6, 0.0);
         self.max_attitude_sigma = 1e6;
+        self.fixed_edge = FixedEdge::Off;
     }
 }

@@ -52,7 +52,7 @@ use crate::stages::contour::BinaryPicture;
 use crate::stages::fit::azimuth;
 
 pub(crate) use case::Case;
-pub use config::Config;
+pub use config::{Config, FixedEdge};
 use places::along_limb;
 pub(crate) use places::middle_level;
 use shape::{Curve, Residuals, Shape, collect_inliers};

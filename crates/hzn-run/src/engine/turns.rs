@@ -1,0 +1,85 @@
+//! The comparison of answers with the turn of the vehicle, for every body of a sequence, in the order of the pictures.
+//!
+//! It comes after the threads, where results are in order again: the rows are then the same for any number of threads.
+
+use hzn_core::frames::{Cam, UnitVec3};
+use hzn_core::gates::FixedEdge;
+use hzn_core::{Config, Prior, Sequence, Step};
+use hzn_files::FrameData;
+use hzn_mcap::Row;
+
+use super::outcome::{BodyOutcome, Finished};
+
+/// The answers of earlier pictures, one for each body, with the turn of the vehicle since then.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Turns {
+    each: Vec<Sequence<f64>>,
+    time_s: Option<f64>,
+}
+
+/// An answer in the results of an earlier run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StoredAnswer {
+    axis: [f64; 3],
+    noise_rad: f64,
+}
+
+impl StoredAnswer {
+    /// Returns the answer of a row; `None` if the row has none.
+    pub fn from_row(row: &Row) -> Option<Self> {
+        Some(Self { axis: row.axis()?, noise_rad: row.noise_rad()? })
+    }
+
+    fn to_answer(self) -> Option<(UnitVec3<Cam, f64>, f64)> {
+        Some((UnitVec3::try_new(self.axis)?, self.noise_rad))
+    }
+}
+
+impl Turns {
+    /// Judges the answers of the next picture, see `gates.fixed_edge`.
+    pub fn judge(&mut self, frame: &mut Finished, config: &Config) {
+        let Some(steps) = self.take_steps(frame.data.as_ref(), frame.time_s, config) else { return };
+        for ((sequence, step), outcome) in self.each.iter_mut().zip(steps).zip(&mut frame.outcomes) {
+            match outcome {
+                BodyOutcome { report: Ok(report), .. } => {
+                    sequence.judge(&step, report, &config.gates);
+                }
+                BodyOutcome { report: Err(_), .. } => {
+                    sequence.see(&step, None, &config.gates);
+                }
+            }
+        }
+    }
+
+    /// Takes the next picture from the results of an earlier run. An answer that this run refused is not in them, and
+    /// it would not change what follows.
+    pub fn replay(
+        &mut self,
+        data: Option<&FrameData>,
+        time_s: Option<f64>,
+        answers: &[Option<StoredAnswer>],
+        config: &Config,
+    ) {
+        let Some(steps) = self.take_steps(data, time_s, config) else { return };
+        for ((sequence, step), answer) in self.each.iter_mut().zip(steps).zip(answers) {
+            sequence.see(&step, answer.and_then(StoredAnswer::to_answer), &config.gates);
+        }
+    }
+
+    /// Returns the step to the next picture for each body; `None` if nothing is compared.
+    fn take_steps(&mut self, data: Option<&FrameData>, time_s: Option<f64>, config: &Config) -> Option<Vec<Step<f64>>> {
+        if config.gates.fixed_edge == FixedEdge::Off {
+            return None;
+        }
+        let bodies = config.each_body();
+        self.each.resize(bodies.len(), Sequence::default());
+        let after_s = time_s.zip(self.time_s).map(|(now, before)| now - before);
+        self.time_s = time_s;
+        let step = |(which, body)| {
+            let prior: Prior<f64> =
+                data.and_then(|d| d.for_body(which, body).ok()).map(|d| d.to_prior(None)).unwrap_or_default();
+            Step::from_prior(&prior, after_s)
+        };
+        Some(bodies.iter().enumerate().map(step).collect())
+    }
+}
