@@ -65,11 +65,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Sun => {
             "the given Sun does not light this limb (gates.max_unlit); a thermal camera sets body.sunlit = false".into()
         }
-        Verdict::Fixed => {
-            "suspect: fixed in the picture, while the vehicle turns (gates.fixed_edge); the edge belongs to the window, \
-             the lens or the vehicle"
-                .into()
-        }
+        Verdict::Fixed => "suspect: fixed in the picture, while the vehicle turns (gates.fixed_edge)".into(),
         Verdict::Rate => {
             "the axis is farther from the last answer than the vehicle can turn (gates.max_rate_deg_s)".into()
         }

@@ -25,12 +25,7 @@ pub(super) fn skip_stored(
     let other = |what: String| Err(usage(format!("{name}: {what}, or start over with --force")));
     let table = plan.frames.as_ref().map(|frames| &frames.path);
     let changed_table = table.filter(|table| stored.frames > 0 && stored.is_older_than(table));
-    if let Some(table) = changed_table {
-        tell::line(format_args!(
-            "note: {} was changed since these results were written, so that all pictures are compared with it",
-            table.display()
-        ));
-    }
+    changed_table.iter().for_each(|table| tell_changed(table));
     let mut again = Again { sensor: None, plan: Plan { overlay: None, ..plan.clone() }, stored };
     let mut turns = Turns::default();
     for n in 0..stored.frames {
@@ -77,6 +72,11 @@ pub(super) fn skip_stored(
         }
     }
     Ok(turns)
+}
+
+fn tell_changed(table: &Path) {
+    let what = "was changed since these results were written, so that all pictures are compared with it";
+    tell::line(format_args!("note: {} {what}", table.display()));
 }
 
 /// Returns the file of a picture that has a file of its own.

@@ -108,10 +108,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let (mut output, stored) = sink::open(path, existing(args), settings)?;
     let plan = Plan { last: stored.last_answers.clone(), ..plan };
     if !args.quiet {
-        notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
-    }
-    if stored.frames > 0 && plan.overlay.is_some() && !args.quiet {
-        tell::line(format_args!("note: the {} pictures of the earlier run are not drawn again", stored.frames));
+        tell_notes(&notes, stored.frames, plan.overlay.is_some());
     }
     let total = source.total();
     let plan = match resume::skip_stored(source.as_mut(), &stored, &plan, path) {
@@ -143,6 +140,14 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let missed = watch.progress.any_unprocessed() || lost.is_some() || watch.multi_page.files > 0;
     Ok(if missed { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// Prints the notes of the pictures, and that a continued run does not draw the pictures of the earlier one.
+fn tell_notes(notes: &[String], stored: u64, is_drawn: bool) {
+    notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
+    if stored > 0 && is_drawn {
+        tell::line(format_args!("note: the {stored} pictures of the earlier run are not drawn again"));
+    }
 }
 
 /// Refuses arguments that contradict each other, before anything is opened.

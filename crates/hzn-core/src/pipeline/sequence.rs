@@ -1,8 +1,8 @@
 //! The comparison of answers with the turn of the vehicle: an edge that stays in the picture while the vehicle turns is
 //! no limb.
 //!
-//! An earlier answer a₀ is kept, the reference. The turn says where its direction is in a later picture, a₀'. The answer
-//! to that picture, a₁, is compared with both:
+//! An earlier answer a₀ is kept, the reference. The turn says where its direction is in a later picture, a₀'. The
+//! answer to that picture, a₁, is compared with both:
 //!
 //! ```text
 //!   limb   χ²_limb  = |a₁ − a₀'|² / (σ₀² + σ₁² + σ_turn²)
@@ -10,9 +10,10 @@
 //! ```
 //!
 //! σ₀ and σ₁ are the larger standard deviations of the errors that pictures do not share. With the whole covariance, a
-//! turn of many degrees would not be noticed: nearly all of it is the same error in both pictures, and cancels. The edge
-//! is fixed if χ²_limb − χ²_fixed > k² and χ²_fixed ≤ k². For a limb, the difference is distributed as N(−Δ², 4Δ²) with
-//! the turn Δ in standard deviations. It is above k² with a probability of at most Φ(−k), which it reaches at Δ = k.
+//! turn of many degrees would not be noticed: nearly all of it is the same error in both pictures, and cancels. The
+//! edge is fixed if χ²_limb − χ²_fixed > k² and χ²_fixed ≤ k². For a limb, the difference is distributed as N(−Δ², 4Δ²)
+//! with the turn Δ in standard deviations. It is above k² with a probability of at most Φ(−k), which it reaches at Δ =
+//! k.
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;

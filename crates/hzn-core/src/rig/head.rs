@@ -23,8 +23,8 @@ impl<T: Real> Head<T> {
     ///
     /// `mount_rad2` is the upper triangle (xx, xy, xz, yy, yz, zz) of the covariance of the mount: a small rotation of
     /// the camera about the axes of the vehicle, rad². `own_sigma_cos` is the 1-sigma of the part of the cosine that
-    /// this head does not share with the others, such as the weather of its part of the limb. `None` if the cone came by
-    /// telemetry, without its correlation, or if its covariance is not positive definite.
+    /// this head does not share with the others, such as the weather of its part of the limb. `None` if the cone came
+    /// by telemetry, without its correlation, or if its covariance is not positive definite.
     pub fn new(
         free: &Free<T>,
         vehicle_from_camera: &Rotation<Cam, Vehicle, T>,

@@ -7,8 +7,8 @@ use crate::base::linalg::{M3, V3, basis, invert_spd3, unit};
 use crate::base::real::Real;
 use crate::geometry::frames::{Cov3, UnitVec3, Vehicle};
 
-/// Number of Gauss-Newton steps. The cones of heads on one body lie within degrees of each other, and the error of a step
-/// is of the second order in this angle.
+/// Number of Gauss-Newton steps. The cones of heads on one body lie within degrees of each other, and the error of a
+/// step is of the second order in this angle.
 const STEPS: usize = 3;
 
 /// The answer of several heads.

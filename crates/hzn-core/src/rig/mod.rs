@@ -7,9 +7,9 @@
 //! # Equations
 //!
 //! Head k gives the freely fitted cone (e_k, c_k) with its covariance C_k on (δ₁, δ₂, δc), turned into the axes of the
-//! vehicle. C_k also has the error of the mount and the part of the limb height that is the head's own. The unknowns are
-//! the common axis e and the common cosine c. With the tangent bases B of e and B_k of e_k, the residual r_k and the
-//! derivative J_k of what head k sees are
+//! vehicle. C_k also has the error of the mount and the part of the limb height that is the head's own. The unknowns
+//! are the common axis e and the common cosine c. With the tangent bases B of e and B_k of e_k, the residual r_k and
+//! the derivative J_k of what head k sees are
 //!
 //! ```text
 //! r_k = (−B_kᵀ e, c_k − c),   J_k = [[B_kᵀ B, 0], [0, 1]],   A = Σ J_kᵀ C_k⁻¹ J_k,   δ = A⁻¹ Σ J_kᵀ C_k⁻¹ r_k

@@ -7,7 +7,6 @@ use hzn_core::body::PriorError;
 use hzn_core::status::Status;
 use hzn_files::FrameData;
 
-use super::plan::Plan;
 use super::sensor::Processed;
 use super::trace::Traces;
 
@@ -96,9 +95,9 @@ impl Finished {
         errors.filter(|e| e.status == Status::Unreadable).map(|e| e.why.as_str()).next()
     }
     /// Returns the result of a picture that could not be read. It is unreadable for every body.
-    pub(super) fn into_unreadable(self, plan: &Plan, why: &str) -> Self {
+    pub(super) fn into_unreadable(self, bodies: usize, why: &str) -> Self {
         let why = Unprocessed { status: Status::Unreadable, why: why.to_owned(), prior: None };
         let none = || BodyOutcome { report: Err(why.clone()), elapsed: Duration::ZERO };
-        Self { outcomes: plan.config.each_body().iter().map(|_| none()).collect(), ..self }
+        Self { outcomes: (0..bodies).map(|_| none()).collect(), ..self }
     }
 }

@@ -35,15 +35,15 @@ pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: It
         tip: None,
         pages: decoded.as_ref().map_or(1, |(p, _)| p.pages),
     };
+    let bodies = plan.config.each_body().len();
     let (picture, original) = match decoded {
         Ok(decoded) => decoded,
-        Err(why) => return Ok(finished.into_unreadable(plan, &why)),
+        Err(why) => return Ok(finished.into_unreadable(bodies, &why)),
     };
-    let traces =
-        (plan.trace || plan.keep_traces || plan.overlay.is_some()).then(|| Traces::new(plan.config.each_body().len()));
+    let traces = (plan.trace || plan.keep_traces || plan.overlay.is_some()).then(|| Traces::new(bodies));
     let view = match picture.view(plan.config.input.channel) {
         Ok(view) => view,
-        Err(why) => return Ok(finished.into_unreadable(plan, &format!("{why} (input.channel in sensor.toml)"))),
+        Err(why) => return Ok(finished.into_unreadable(bodies, &format!("{why} (input.channel in sensor.toml)"))),
     };
     let data = finished.data.as_ref();
     sensor.set_time(finished.time_s);

@@ -133,7 +133,8 @@ fn process_jobs(plan: &Plan, jobs: &Receiver<Job>, results: &Sender<Result<Finis
     }
 }
 
-/// Judges and writes the results in the order of the pictures, and returns a ticket for each. Flushes the sink regularly.
+/// Judges and writes the results in the order of the pictures, and returns a ticket for each. Flushes the sink
+/// regularly.
 fn write_in_order(
     first: u64,
     results: &Receiver<Result<Finished, Error>>,

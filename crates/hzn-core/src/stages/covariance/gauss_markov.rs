@@ -1,8 +1,8 @@
 //! Sum over all pairs of points whose errors are a Gauss-Markov process along the edge.
 //!
 //! Points that are much closer together than the correlation length L have nearly the same error, so that one of them
-//! stands for all. With the distance Δ between the points of the sum, the sum replaces the integral of exp(−|s|/L), 2 L,
-//! by Δ coth(Δ/2L) ≈ 2 L (1 + Δ²/12L²). At Δ = L/2 sigma grows by 1 %.
+//! stands for all. With the distance Δ between the points of the sum, the sum replaces the integral of exp(−|s|/L), 2
+//! L, by Δ coth(Δ/2L) ≈ 2 L (1 + Δ²/12L²). At Δ = L/2 sigma grows by 1 %.
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
@@ -77,6 +77,20 @@ fn by_stretch<T: Real>(
     x
 }
 
+/// Returns w h of each point of a block.
+#[inline(always)]
+fn weighted<T: Real>(block: &Block<T>, g: &[[T; LANES]; 2], b1: &V3<T>, b2: &V3<T>, mean: [T; 2]) -> [[T; LANES]; 3] {
+    let mut q = [[T::ZERO; LANES]; 3];
+    for l in 0..LANES {
+        let (sx, sy, sz) = (block.s[0][l], block.s[1][l], block.s[2][l]);
+        let w = block.weight[l] / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(LEAST_GRADIENT2));
+        q[0][l] = w * (sx * b1.x + sy * b1.y + sz * b1.z - mean[0]);
+        q[1][l] = w * (sx * b2.x + sy * b2.y + sz * b2.z - mean[1]);
+        q[2][l] = -w;
+    }
+    q
+}
+
 /// Adds `factor` times c cᵀ of both directions to the upper triangle `x`.
 fn add_outer<T: Real>(x: &mut [T; 6], c: &[[T; 3]; 2], factor: T) {
     for [c1, c2, c3] in c {
@@ -95,14 +109,7 @@ fn by_point<T: Real>(blocks: &[Block<T>], e: &V3<T>, b1: &V3<T>, b2: &V3<T>, mea
     let per_length = if length_px > T::ZERO { T::one() / length_px } else { T::ZERO };
     for block in blocks {
         let g = block.gradient(e);
-        let mut q = [[T::ZERO; LANES]; 3];
-        for l in 0..LANES {
-            let (sx, sy, sz) = (block.s[0][l], block.s[1][l], block.s[2][l]);
-            let w = block.weight[l] / (g[0][l] * g[0][l] + g[1][l] * g[1][l]).max(T::from_f64(LEAST_GRADIENT2));
-            q[0][l] = w * (sx * b1.x + sy * b1.y + sz * b1.z - mean[0]);
-            q[1][l] = w * (sx * b2.x + sy * b2.y + sz * b2.z - mean[1]);
-            q[2][l] = -w;
-        }
+        let q = weighted(block, &g, b1, b2, mean);
         let mut rho = [T::ZERO; LANES];
         // White noise has no correlation, and exp(−∞) need not be computed.
         if per_length > T::ZERO {
