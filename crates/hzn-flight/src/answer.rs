@@ -199,7 +199,7 @@ impl Position {
 
     fn free(&self) -> Option<Free<f64>> {
         Some(Free {
-            axis: UnitVec3::try_new(self.axis_free.map(f64::from))?,
+            axis: unit(self.axis_free.map(f64::from))?,
             covariance: Cov3::from_upper(self.cov_free.map(f64::from)),
             cos: self.cos_free.into(),
             var_cos: self.cos_free_variance.into(),
@@ -207,6 +207,11 @@ impl Position {
             cos_per_px: self.cos_free_per_px.into(),
         })
     }
+}
+
+/// Returns a direction as it was sent. Only if another program sent it with another length, it is normalised.
+fn unit<F>(xyz: [f64; 3]) -> Option<UnitVec3<F, f64>> {
+    UnitVec3::from_unit(xyz).or_else(|| UnitVec3::try_new(xyz))
 }
 
 /// The answer to one picture.
@@ -283,11 +288,11 @@ impl PictureAnswer {
         let solution = match &self.direction {
             None => None,
             Some(d) => Some(Solution {
-                axis: UnitVec3::try_new(widen(d.axis))?,
+                axis: unit(widen(d.axis))?,
                 covariance: Cov3::from_upper(d.cov.map(f64::from)),
                 common: None,
-                axis_fixed: UnitVec3::try_new(widen(d.axis_fixed)),
-                axis_vehicle: UnitVec3::try_new(widen(d.axis_vehicle)),
+                axis_fixed: unit(widen(d.axis_fixed)),
+                axis_vehicle: unit(widen(d.axis_vehicle)),
                 half_angle_rad: d.half_angle_rad.into(),
                 fused_half_angle_rad: d.fused_half_angle_rad.into(),
                 altitude_m: d.altitude_est_and_sigma_m(),

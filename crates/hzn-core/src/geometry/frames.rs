@@ -68,6 +68,12 @@ impl<F, T: Real> UnitVec3<F, T> {
         let n2 = v.dot(&v);
         (n2 > T::from_f64(1e-30) && n2.is_finite()).then(|| Self::assume_unit(v * (T::one() / n2.sqrt())))
     }
+    /// Takes components of unit length as they are, for example those of a packet. `None` if the length differs from
+    /// one by more than the rounding of single precision.
+    pub fn from_unit(xyz: [T; 3]) -> Option<Self> {
+        let v = V3::from(xyz);
+        ((v.dot(&v) - T::one()).abs() < T::from_f64(1e-6)).then(|| Self::assume_unit(v))
+    }
     /// Wraps `v` without a check: the caller guarantees that it has unit length.
     pub(crate) fn assume_unit(v: V3<T>) -> Self {
         Self { v, frame: PhantomData }

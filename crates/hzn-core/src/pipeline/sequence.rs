@@ -311,7 +311,7 @@ mod tests {
         };
         let mut normal = || {
             let (radius, (sin, _)) =
-                (libm::sqrt(-2.0 * libm::log(1.0 - uniform())), libm::sincos(6.283_185 * uniform()));
+                (libm::sqrt(-2.0 * libm::log(1.0 - uniform())), libm::sincos(core::f64::consts::TAU * uniform()));
             radius * sin
         };
         let mut alarms = 0;
