@@ -209,6 +209,18 @@ impl Position {
     }
 }
 
+/// Returns a candidate in double precision; `None` if its verdict has no meaning.
+fn to_candidate(e: &Edge) -> Option<Candidate<f64>> {
+    Some(Candidate {
+        number: e.number,
+        length_px: e.length_px,
+        points: e.points,
+        inliers: e.inliers,
+        rms_px: f64::from(e.rms_px),
+        verdict: *Verdict::ALL.get(usize::from(e.verdict))?,
+    })
+}
+
 /// Returns a direction as it was sent. Only if another program sent it with another length, it is normalised.
 fn unit<F>(xyz: [f64; 3]) -> Option<UnitVec3<F, f64>> {
     UnitVec3::from_unit(xyz).or_else(|| UnitVec3::try_new(xyz))
@@ -273,15 +285,7 @@ impl PictureAnswer {
     pub fn to_report(&self) -> Option<Report<f64>> {
         let mut candidates = Candidates::default();
         for e in self.edges.iter().flatten() {
-            let candidate = Candidate {
-                number: e.number,
-                length_px: e.length_px,
-                points: e.points,
-                inliers: e.inliers,
-                rms_px: f64::from(e.rms_px),
-                verdict: *Verdict::ALL.get(usize::from(e.verdict))?,
-            };
-            candidates.push(candidate).ok()?;
+            candidates.push(to_candidate(e)?).ok()?;
         }
         // Double precision, so that the rows of `hzn telemetry` have the columns and the type of those of `hzn run`.
         let widen = |v: [f32; 3]| v.map(f64::from);
