@@ -43,7 +43,8 @@ TERMS = ["curvature", "half-angle", "gaps", "misfit", "sky", "faint-air", "brigh
 SHARES = {"other": 0.6, "ghost": 0.2, "airglow": 0.2}
 SENSORS = {"default": limb_campaign.POSITION, "with an attitude": limb_campaign.POSITION + limb_campaign.ATTITUDE}
 # Expectation of the figures: share of the pictures without a limb that have an answer, and of lost true answers. The
-# limits of --check are those of a few flights, twice as wide.
+# limits of --check are those of a few flights, twice as wide, and one flight of three pictures more: they show the
+# same edge, so that they are answered together.
 LARGEST_FALSE, LARGEST_LOST = 0.02, 0.04
 
 
@@ -169,7 +170,8 @@ def table(records, limit):
         lost = sum(p < limit for p in right)
         print(f"{sensor}, right answers lost: {share(lost, len(right))}")
         false = sum(r["answered"] and r["p"] >= limit for r in plain)
-        shares[sensor] = (false / max(len(plain), 1), lost / max(len(right), 1))
+        flight = 3 / max(len(plain), 1)
+        shares[sensor] = (false / max(len(plain), 1), lost / max(len(right), 1), flight)
     return shares
 
 
@@ -216,8 +218,8 @@ def main():
     shares = table(records, options.limit)
     reliability(records, options.odds)
     if options.check:
-        for sensor, (false, lost) in shares.items():
-            if not (false <= LARGEST_FALSE and lost <= LARGEST_LOST) or math.isnan(false + lost):
+        for sensor, (false, lost, flight) in shares.items():
+            if not (false <= LARGEST_FALSE + flight and lost <= LARGEST_LOST) or math.isnan(false + lost):
                 sys.exit(f"{sensor}: {false:.2%} of the pictures without a limb are answered, {lost:.2%} of the limbs lost")
 
 
