@@ -25,7 +25,7 @@ const STAGES: [&str; 11] = [
 ];
 /// Functions that convert values of the configuration to single precision, once per picture or per candidate. Each has
 /// the number of places that may do so, the larger one of the images `chain` and `measure`.
-const ALLOWED_CONVERSIONS: [(&str, usize); 17] = [
+const ALLOWED_CONVERSIONS: [(&str, usize); 19] = [
     ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::candidate::{{closure}}", 35),
     ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::judge_edge", 40),
     ("hzn_core::stages::consensus::inliers::Threshold<T>::new", 3),
@@ -34,6 +34,8 @@ const ALLOWED_CONVERSIONS: [(&str, usize); 17] = [
     ("hzn_core::stages::fit::fit", 4),
     ("hzn_core::stages::gates::evidence::weigh", 1),
     ("hzn_core::stages::gates::glow::is_likely", 1),
+    ("hzn_core::stages::gates::lens::Rows<T>::fit", 1),
+    ("hzn_core::stages::gates::lens::unbend", 1),
     ("hzn_core::stages::gates::shape::Residuals<T>::new", 3),
     ("hzn_core::stages::gates::size::is_possible_size", 7),
     ("hzn_core::stages::gates::size::min_arc", 1),
