@@ -16,7 +16,6 @@ air are left out, because nothing tells them from a limb.
 
 import argparse
 import concurrent.futures
-import csv
 import json
 import math
 import pathlib
@@ -48,25 +47,6 @@ SENSORS = {"default": limb_campaign.POSITION, "with an attitude": limb_campaign.
 LARGEST_FALSE, LARGEST_LOST = 0.02, 0.04
 
 
-def run(hzn, folder, sensor, gates):
-    """Runs hzn on a flight. Returns the rows of its results."""
-    with (folder / "frames.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    with (folder / "used.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, SENSORS[sensor], extrasaction="ignore")
-        writer.writeheader()
-        writer.writerows(rows)
-    (folder / "used.toml").write_text((folder / "sensor.toml").read_text() + f"[gates]\nmin_p_limb = {gates}\n")
-    out = folder / "out.csv"
-    command = [hzn, "run", *sorted(str(folder / row["file"]) for row in rows), "--sensor", str(folder / "used.toml"),
-               "--frames", str(folder / "used.csv"), "-o", str(out), "--force", "-q"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode != 0:
-        raise RuntimeError(f"{folder}: {done.stderr.strip()}")
-    with out.open() as file:
-        return list(csv.DictReader(file))
-
-
 def evidence(hzn, folder, name):
     """Returns the values of the terms of a picture's answer."""
     command = [hzn, "explain", str(folder / name), "--sensor", str(folder / "used.toml"), "--frames",
@@ -93,7 +73,7 @@ def fly(hzn, root, kind, seed, fit):
     records = []
     for sensor in ["default"] if fit else SENSORS:
         # All answers without the gate, so that p_limb is seen; the gate refuses those below its limit.
-        for row in run(hzn, folder, sensor, 0):
+        for row in limb_campaign.process(hzn, folder, SENSORS[sensor], "[gates]\nmin_p_limb = 0\n"):
             name = pathlib.Path(row["file"]).name
             axis, *rest = truth[name]
             axis = np.array(axis)

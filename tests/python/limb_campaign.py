@@ -40,7 +40,11 @@ SENSORS = {
 
 def answers(hzn, folder, sensor):
     """Runs hzn on a flight. Returns the rows of its results."""
-    columns, lines = SENSORS[sensor]
+    return process(hzn, folder, *SENSORS[sensor])
+
+
+def process(hzn, folder, columns, lines):
+    """Runs hzn with these columns of frames.csv and these further lines of sensor.toml. Returns the rows of its results."""
     (folder / "used.toml").write_text((folder / "sensor.toml").read_text() + lines)
     with (folder / "frames.csv").open() as file:
         rows = list(csv.DictReader(file))

@@ -30,7 +30,7 @@ fn lenses() -> Vec<Config> {
     ]
 }
 
-/// What is wrong with a set of pictures.
+/// A fault that a test draws into a set of pictures.
 #[derive(Clone, Copy, Default)]
 struct Faults {
     /// Depth of the ends of a row and of a column behind their middle, mm.

@@ -5,7 +5,7 @@
 
 use crate::base::real::Real;
 
-/// What is known about an edge that passes all gates.
+/// The evidence for and against an edge that has passed all other gates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 // The numbers are fixed because they are the indices of the values.
 #[repr(u8)]

@@ -34,20 +34,16 @@ impl<T: Real> Head<T> {
         let turn = |v: V3<T>| vehicle_from_camera.to_matrix() * v;
         let (c1, c2) = basis(free.axis.v());
         let with_cos = V3::from(free.axis_with_cos?);
-        let form = |a: &V3<T>, rows: &[[T; 3]; 3], b: &V3<T>| {
-            let along = V3::new(dot(&rows[0], b), dot(&rows[1], b), dot(&rows[2], b));
-            a.dot(&along)
-        };
-        let rows = free.covariance.rows();
+        let form = |a: &V3<T>, p: &M3<T>, b: &V3<T>| a.dot(&(p * b));
+        let axis = symmetric(&free.covariance.upper_rad2);
         let e = *vehicle_from_camera.apply(&free.axis).v();
         let b = [turn(c1), turn(c2)];
         // A rotation θ of the mount moves the axis by θ × e, so that the components are (e × b)·θ.
-        let [xx, xy, xz, yy, yz, zz] = *mount_rad2;
-        let mount = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+        let mount = symmetric(mount_rad2);
         let lever = b.map(|b| e.cross(&b));
-        let p11 = form(&c1, &rows, &c1) + form(&lever[0], &mount, &lever[0]);
-        let p12 = form(&c1, &rows, &c2) + form(&lever[0], &mount, &lever[1]);
-        let p22 = form(&c2, &rows, &c2) + form(&lever[1], &mount, &lever[1]);
+        let p11 = form(&c1, &axis, &c1) + form(&lever[0], &mount, &lever[0]);
+        let p12 = form(&c1, &axis, &c2) + form(&lever[0], &mount, &lever[1]);
+        let p22 = form(&c2, &axis, &c2) + form(&lever[1], &mount, &lever[1]);
         let (p13, p23) = (c1.dot(&with_cos), c2.dot(&with_cos));
         let p33 = free.var_cos + own_sigma_cos * own_sigma_cos;
         Some(Self {
@@ -65,6 +61,6 @@ impl<T: Real> Head<T> {
     }
 }
 
-fn dot<T: Real>(row: &[T; 3], v: &V3<T>) -> T {
-    row[0] * v.x + row[1] * v.y + row[2] * v.z
+fn symmetric<T: Real>([xx, xy, xz, yy, yz, zz]: &[T; 6]) -> M3<T> {
+    M3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz)
 }

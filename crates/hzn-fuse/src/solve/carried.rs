@@ -39,22 +39,27 @@ fn exact(block: Block) -> Block {
     Block { sigma: 0.0, ..block }
 }
 
+/// Returns the errors of the inertial unit that the filter estimates or considers.
+pub(super) fn errors_of_unit(options: &mut Options) -> [&mut Block; 6] {
+    let imu = &mut options.imu;
+    [
+        &mut imu.accel_bias,
+        &mut imu.accel_scale,
+        &mut imu.accel_misalignment,
+        &mut imu.gyro_bias,
+        &mut imu.gyro_scale,
+        &mut imu.gyro_misalignment,
+    ]
+}
+
 impl Carrier {
     pub(super) fn new(options: &Options, samples: &[Sample], has_receiver: bool) -> Self {
         let mut options = *options;
-        let imu = &mut options.imu;
-        for block in [
-            &mut imu.accel_bias,
-            &mut imu.accel_scale,
-            &mut imu.accel_misalignment,
-            &mut imu.gyro_bias,
-            &mut imu.gyro_scale,
-            &mut imu.gyro_misalignment,
-        ] {
+        for block in errors_of_unit(&mut options) {
             *block = exact(*block);
         }
         if !has_receiver {
-            imu.accel_noise = [0.0, ANY_FORCE];
+            options.imu.accel_noise = [0.0, ANY_FORCE];
         }
         (options.limb_height, options.limb_latitude) = (Block::OFF, Block::OFF);
         options.start = StartSigmas { attitude_rad: 0.0, velocity_m_s: 0.0, position_m: 0.0 };

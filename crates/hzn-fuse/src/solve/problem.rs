@@ -11,7 +11,7 @@ use hzn_nav::strapdown::Nominal;
 use nalgebra::{DVector, Matrix3};
 
 use super::begin::{first_estimates, shared};
-use super::carried::Carrier;
+use super::carried::{Carrier, errors_of_unit};
 use super::directions::{At, CentreSeen, Direction};
 use super::estimates::{Estimates, column};
 use super::knots::Knot;
@@ -273,19 +273,8 @@ fn without_fixed(options: &mut Options, cameras: &mut [CameraOptions]) -> (Optio
             *block = Block::OFF;
         }
     };
-    let imu = &mut options.imu;
-    [
-        &mut imu.accel_bias,
-        &mut imu.accel_scale,
-        &mut imu.accel_misalignment,
-        &mut imu.gyro_bias,
-        &mut imu.gyro_scale,
-        &mut imu.gyro_misalignment,
-        &mut options.limb_height,
-        &mut options.limb_latitude,
-    ]
-    .into_iter()
-    .for_each(fixed);
+    errors_of_unit(options).into_iter().for_each(fixed);
+    [&mut options.limb_height, &mut options.limb_latitude].into_iter().for_each(fixed);
     for camera in cameras.iter_mut() {
         fixed(&mut camera.misalignment);
         fixed(&mut camera.clock);

@@ -63,7 +63,8 @@ pub(crate) struct Args {
     #[arg(long)]
     pub(super) smooth: bool,
     /// Also solve the whole flight at once: the most probable states, mounts, clocks and biases from all measurements.
-    /// It replaces --smooth, says what was determined, and counts wrong measurements less instead of refusing them
+    /// It replaces --smooth. It says which values the flight determined, and gives wrong measurements less weight
+    /// instead of refusing them
     #[arg(long, conflicts_with = "smooth")]
     pub(super) solve: bool,
     /// Largest number of solutions per second in the results
