@@ -12,9 +12,45 @@ pub(super) fn refuse<T: Real>(residuals: &Residuals<'_, T>) -> Result<(), Verdic
     // proves nothing.
     let (points, turns) = (T::from_i32(residuals.shape.len() as i32), T::from_f64(PARAMETERS));
     let left = points - T::from_f64(3.0) - turns;
-    let rival_px = || rms(residuals.shape, residuals.rms_px) * ((left + turns) / left).sqrt();
-    let is_polyline = residuals.allow_rival() && left > T::ZERO && residuals.prefer(rival_px(), turns);
+    let prefers = |rms_px: T| residuals.prefer(rms_px * ((left + turns) / left).sqrt(), turns);
+    // The bound costs a tenth of the best polyline, and is enough for most limbs.
+    let is_polyline = residuals.allow_rival()
+        && left > T::ZERO
+        && prefers(residuals.rms_px.min(least_rms(residuals.shape) * T::from_f64(1.0 - ROUNDING)))
+        && prefers(rms(residuals.shape, residuals.rms_px));
     refuse_if(is_polyline, Verdict::Polyline)
+}
+
+/// Allowance for the rounding of two sums of the same points, as a part.
+const ROUNDING: f64 = 1e-3;
+/// Number of equal parts of the shape for [`least_rms`]. At least three of them contain no end of a piece.
+const PARTS: usize = 2 * (PIECES - 1);
+
+/// Returns a lower bound of [`rms`] for any polyline: three ends of pieces lie in at most three parts of the shape, and
+/// each of the other parts fits its own best line at least as well as the polyline.
+fn least_rms<T: Real>(shape: &Shape<T>) -> T {
+    let mut costs = [T::ZERO; PARTS];
+    let (mut whole, mut weight) = (T::ZERO, T::ZERO);
+    for (part, cost) in costs.iter_mut().enumerate() {
+        let [from, to] = [part, part + 1].map(|k| k * shape.len() / PARTS);
+        let Some(points) = shape.get(from..to) else { return T::ZERO };
+        let (Some(first), Some(last)) = (points.first(), points.last()) else { return T::ZERO };
+        let mut line = Line::new(first.at, last.at);
+        for p in points {
+            line.add(p);
+            weight += p.w;
+        }
+        *cost = line.cost();
+        whole += *cost;
+    }
+    for _ in 1..PIECES {
+        let mut most = T::ZERO;
+        costs.iter().for_each(|c| most = most.max(*c));
+        let Some(largest) = costs.iter_mut().find(|c| **c >= most) else { break };
+        whole -= *largest;
+        *largest = T::ZERO;
+    }
+    (whole.max(T::ZERO) / weight.max(T::from_f64(1e-20))).sqrt()
 }
 
 /// Largest number of straight pieces. A polygon of many corners touches a cone only near a few of its sides.
@@ -116,6 +152,23 @@ mod tests {
         assert!(found > 3.0, "{found}");
         let (one, other) = (rms::<f32>(&shape(circle), 50.0), rms::<f64>(&shape(circle), 50.0));
         assert!((f64::from(one) - other).abs() < 0.01 * other, "{one} {other}");
+    }
+
+    #[test]
+    fn the_bound_is_below_the_best_polyline() {
+        let wave = |t: f64| [400.0 * t, 20.0 * libm::sin(9.0 * t) + 3.0 * libm::sin(61.0 * t)];
+        let corners = [[100.0, 300.0], [180.0, 120.0], [400.0, 60.0], [620.0, 150.0], [700.0, 340.0]];
+        let circle = |t: f64| {
+            let (s, c) = libm::sincos(t * 3.0);
+            [400.0 + 300.0 * c, 400.0 - 300.0 * s]
+        };
+        let shapes = [shape::<f32>(wave), shape(|t| along(&corners, t)), shape(circle), shape(|t| [300.0 * t, 0.0])];
+        for shape in &shapes {
+            let (least, best) = (least_rms(shape), rms(shape, 1e3));
+            assert!(least <= best * 1.001 + 1e-3, "{least} {best}");
+        }
+        // A bound that is always zero would save nothing.
+        assert!(least_rms(&shapes[2]) > 0.25 * rms(&shapes[2], 1e3));
     }
 
     #[test]
