@@ -106,6 +106,14 @@ def main():
         for low, high in ((0.0, NOTICED_DEG), (NOTICED_DEG, 180.0)):
             pairs = [fixed for both in flown for turn, fixed in both[which] if low <= turn < high]
             print(f"| {name}, axis turned by {low:g}° to {high:g}° | {len(pairs)} | {sum(pairs)} |")
+    # Flights whose axis turns far enough; a flight without an alert has none at the largest turn.
+    alerts = sorted(next((turn for turn, fixed in both[1] if fixed), math.inf) for both in flown
+                    if any(turn >= NOTICED_DEG for turn, _ in both[1]))
+    if alerts:
+        median, late = (alerts[math.ceil(share * len(alerts)) - 1] for share in (0.5, 0.9))
+        print(f"\nedge of the window: {len(alerts)} flights turn by {NOTICED_DEG:g}° or more, "
+              f"{sum(map(math.isfinite, alerts))} have an alert; turn at the first alert: {median:.2f}° (median), "
+              f"{late:.2f}° (nine of ten)")
 
 
 if __name__ == "__main__":

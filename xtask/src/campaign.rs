@@ -29,6 +29,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign flips [TRIALS]
        cargo xtask campaign packets [COUNT]
        cargo xtask campaign pictures [FLIGHTS]
+       cargo xtask campaign integrity [PICTURES [SEED [STATE]...]]
        cargo xtask campaign paths
        cargo xtask campaign processors [PICTURES]
        cargo xtask campaign parts [FOLDER]
@@ -46,6 +47,9 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   pictures
         renders FLIGHTS (30) flights of three kinds with a program in Python, and counts hzn's errors against sigma;
         then FLIGHTS flights of each of 16 kinds with an edge that is no limb, which continue after a stop
+  integrity
+        renders PICTURES (200) pictures of each state (day, low Sun, no limb, matching ghost, night), each of a flight
+        of its own, from SEED (700000) on, and counts errors above protection_deg
   paths builds the images of the flight computer and the wheel in another folder; their bytes must be the same
   processors
         compares the answers to PICTURES (2000) on aarch64 and big-endian powerpc64, in QEMU, with those of this machine
@@ -55,10 +59,11 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
 /// Runs one campaign.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
     std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
-    let number = |default: u64| match args.get(1).map(|text| text.parse::<u64>()) {
+    let number_at = |place: usize, default: u64| match args.get(place).map(|text| text.parse::<u64>()) {
         None => Ok(default),
-        Some(number) => number.map_err(|_| format!("{}: a number is expected\n{USAGE}", args[1])),
+        Some(number) => number.map_err(|_| format!("{}: a number is expected\n{USAGE}", args[place])),
     };
+    let number = |default: u64| number_at(1, default);
     let done = match args.first().map(String::as_str) {
         Some("fuzz") => Request::parse(&args[1..]).and_then(|request| request.run().map_err(Trouble::into_message)),
         Some("kill") => kill(number(1000)?).map_err(Trouble::into_message),
@@ -68,6 +73,10 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("flips") => flips(number(20_000)?).map_err(Trouble::into_message),
         Some("packets") => packets(number(1_000_000)?).map_err(Trouble::into_message),
         Some("pictures") => pictures(number(30)?).map_err(Trouble::into_message),
+        Some("integrity") => {
+            let states = args.get(3..).unwrap_or_default();
+            integrity(number(200)?, number_at(2, 700_000)?, states).map_err(Trouble::into_message)
+        }
         Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
         Some("paths") => paths().map_err(Trouble::into_message),
         Some("parts") => parts(args.get(1).map_or("target/sbom", String::as_str)).map_err(Trouble::into_message),
@@ -132,6 +141,17 @@ fn pictures(flights: u64) -> Outcome {
     steps::run(campaign.args(["--list", "--flights", &flights.to_string()]))?;
     let mut decoys = decoy_campaign(&target().join("release/hzn"))?;
     steps::run(decoys.arg("--keep").arg(target().join("xtask/decoys")).args(["--flights", &flights.to_string()]))
+}
+
+/// Compares errors with protection levels on pictures that programs in Python render, one of each flight.
+fn integrity(pictures: u64, first_seed: u64, states: &[String]) -> Outcome {
+    steps::run(&mut cargo(&["build", "--release", "--bin", "hzn"]))?;
+    let mut campaign = python_campaign("tests/python/integrity_campaign.py", &target().join("release/hzn"))?;
+    campaign.args(["--pictures", &pictures.to_string(), "--first-seed", &first_seed.to_string()]);
+    if !states.is_empty() {
+        campaign.arg("--states").args(states);
+    }
+    steps::run(&mut campaign)
 }
 
 /// Returns the call of the campaign on pictures of another program.

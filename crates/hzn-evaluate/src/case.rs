@@ -37,6 +37,7 @@ impl From<&Row> for Answer {
             covariance_rad2: row.covariance().unwrap_or_default(),
             common_rad2: row.common_covariance(),
             half_angle_deg: row.half_angle_deg,
+            protection_deg: row.protection_deg,
         });
         let position = || {
             let (centre_km, covariance_km2) = (row.position_km()?, row.position_covariance_km2()?);
@@ -58,6 +59,8 @@ pub struct MeasuredDirection {
     pub common_rad2: Option<[f64; 6]>,
     /// Half-angle of the half-angle-free fit in degrees.
     pub half_angle_deg: Option<f64>,
+    /// Protection level in degrees; `None` if the result does not have it.
+    pub protection_deg: Option<f64>,
 }
 
 impl From<&Solution<f64>> for MeasuredDirection {
@@ -67,6 +70,8 @@ impl From<&Solution<f64>> for MeasuredDirection {
             covariance_rad2: s.covariance.upper_rad2,
             common_rad2: s.common.map(|c| c.upper_rad2),
             half_angle_deg: Some(s.half_angle_rad.to_degrees()),
+            // Only rows have it, because it depends on the configuration.
+            protection_deg: None,
         }
     }
 }

@@ -14,6 +14,7 @@
 mod case;
 mod classes;
 mod honesty;
+mod integrity;
 mod means;
 mod position;
 mod quantile;
@@ -22,6 +23,7 @@ mod summary;
 pub use case::{Answer, Case, MeasuredDirection, Mismatch, Miss, limb_in_view_px, pair};
 pub use classes::{ErrorClasses, WINDOW};
 pub use honesty::{Honesty, Within};
+pub use integrity::{Integrity, IntegrityRange, share_interval};
 pub use means::{LENGTHS, Means};
 pub use position::{MeasuredPosition, PositionErrors, PositionMiss};
 pub use summary::{Errors, Evaluation, Group, GroupRow, Horace};

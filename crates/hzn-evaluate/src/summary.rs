@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::case::Case;
 use crate::classes::ErrorClasses;
 use crate::honesty::Honesty;
+use crate::integrity::Integrity;
 use crate::means::Means;
 use crate::position::PositionErrors;
 use crate::quantile::quantile;
@@ -38,6 +39,8 @@ pub struct Evaluation {
     /// Means over consecutive answers compared with their covariances, for each of [`LENGTHS`](crate::LENGTHS) that has
     /// a group.
     pub means: Vec<Means>,
+    /// Protection levels compared with the errors; `None` if no answer has a level.
+    pub integrity: Option<Integrity>,
     /// Errors of the positions; `None` if there are none.
     pub position: Option<PositionErrors>,
     /// The error classes of ECSS-E-ST-60-20C about the camera's x and y axes; `None` for a short sequence.
@@ -142,6 +145,7 @@ impl Evaluation {
             errors: Errors::new(&with_limb),
             honesty: honesty(&with_limb),
             means: Means::of(cases),
+            integrity: Integrity::of(cases),
             position: PositionErrors::new(&with_limb.iter().filter_map(|c| c.position_miss).collect::<Vec<_>>()),
             classes: classes(&with_limb),
             horace: Horace {

@@ -30,7 +30,13 @@ fn answer(file: &str, x_deg: f64, z_deg: f64) -> Answer {
     let (a, b) = (0.1f64.to_radians(), 0.2f64.to_radians());
     // A turn about z moves the x component, and a turn about x moves the z component.
     let covariance_rad2 = [b * b, 0.0, 0.0, 0.0, 0.0, a * a];
-    let found = MeasuredDirection { axis, covariance_rad2, common_rad2: None, half_angle_deg: Some(60.0) };
+    let found = MeasuredDirection {
+        axis,
+        covariance_rad2,
+        common_rad2: None,
+        half_angle_deg: Some(60.0),
+        protection_deg: None,
+    };
     Answer { file: file.into(), body: "earth".into(), status: Status::Ok, found: Some(found), position: None }
 }
 
@@ -53,7 +59,13 @@ fn errors_by_axis_and_their_sigmas() {
 fn a_singular_covariance_has_no_nees_and_a_large_error_is_an_arc() {
     let mut opposite = answer("a", 0.0, 0.0);
     let (axis, covariance_rad2) = ([0.0, 0.0, 1.0], [0.0; 6]);
-    opposite.found = Some(MeasuredDirection { axis, covariance_rad2, common_rad2: None, half_angle_deg: None });
+    opposite.found = Some(MeasuredDirection {
+        axis,
+        covariance_rad2,
+        common_rad2: None,
+        half_angle_deg: None,
+        protection_deg: None,
+    });
     let m = pair(&[opposite], &[truth("a", 1)], None).unwrap()[0].miss.unwrap();
     assert!((m.angle_deg - 90.0).abs() < 1e-9 && m.nees.is_none());
     let found = MeasuredDirection {
@@ -61,6 +73,7 @@ fn a_singular_covariance_has_no_nees_and_a_large_error_is_an_arc() {
         covariance_rad2: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         common_rad2: None,
         half_angle_deg: None,
+        protection_deg: None,
     };
     let m = Miss::new(&found, [0.0, 1.0, 0.0], 60.0).unwrap();
     assert!((m.nees.unwrap() - core::f64::consts::FRAC_PI_2.powi(2)).abs() < 1e-9);
@@ -255,4 +268,32 @@ fn a_mean_is_of_consecutive_answers() {
     // Results without the columns say nothing about means.
     answers.iter_mut().filter_map(|a| a.found.as_mut()).for_each(|f| f.common_rad2 = None);
     assert!(means(&answers).is_empty());
+}
+
+#[test]
+fn an_error_above_the_protection_level_is_misleading() {
+    let with_level = |file: &str, error_deg: f64, level_deg: Option<f64>| {
+        let mut answer = answer(file, error_deg, 0.0);
+        answer.found.as_mut().unwrap().protection_deg = level_deg;
+        answer
+    };
+    let answers = [
+        with_level("a", 0.3, Some(0.5)),
+        with_level("b", 0.6, Some(0.5)),
+        with_level("c", 0.0, Some(0.7)),
+        with_level("d", 9.0, Some(0.5)),
+        with_level("e", 9.0, None),
+    ];
+    let truths: Vec<Truth> = answers.iter().map(|a| truth(&a.file, u8::from(a.file != "d"))).collect();
+    let evaluate = |answers: &[Answer]| Evaluation::by_body(&pair(answers, &truths, None).unwrap())[0].clone();
+    let found = evaluate(&answers).integrity.unwrap();
+    assert_eq!((found.answers, found.misleading, found.interval), (3, 1, share_interval(1, 3)));
+    assert!((found.share - 1.0 / 3.0).abs() < 1e-12 && (found.median_deg - 0.5).abs() < 1e-12);
+    // The larger sigma of every answer is 0.2 degrees.
+    assert!((found.median_sigmas - 2.5).abs() < 1e-9, "{}", found.median_sigmas);
+    let counts: Vec<_> = found.ranges.iter().map(|r| (r.up_to, r.with_limb, r.without_limb)).collect();
+    assert_eq!(counts[..3], [(Some(0.25), 1, 0), (Some(0.5), 0, 0), (Some(0.75), 1, 0)]);
+    assert_eq!(counts[3..], [(Some(1.0), 0, 0), (None, 1, 1)]);
+    let without_level = answers.map(|a| with_level(&a.file, 0.1, None));
+    assert!(evaluate(&without_level).integrity.is_none());
 }

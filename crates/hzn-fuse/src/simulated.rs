@@ -23,6 +23,11 @@ const DISC_RAD: f64 = 0.00465;
 pub trait Errors {
     /// Returns the error of a direction and the covariance that the sensor would tell. `axis` is the true direction.
     fn draw(&mut self, at: &Moment, axis: &Vector<Cam>) -> (Vector<Cam>, Covariance<Cam>);
+    /// Returns the part of this covariance whose error is the same in the next picture; `None` if the sensor would not
+    /// tell it.
+    fn common(&mut self, _at: &Moment, _axis: &Vector<Cam>) -> Option<Covariance<Cam>> {
+        None
+    }
     /// Returns the derivative of the measured axis by the limb height, 1/km.
     fn by_limb_height(&mut self, at: &Moment, axis: &Vector<Cam>) -> Vector<Cam>;
     /// Returns whether there is enough light for the body that is in view.
@@ -135,6 +140,7 @@ fn recording(
                 body,
                 axis: (axis + error + by_limb_height * limb_height_km).normalize(),
                 covariance_rad2,
+                common_rad2: errors.common(&moment, &axis),
                 reference: Some(told),
                 altitude_km: Some(known.altitude_km),
                 by_limb_height,
@@ -234,6 +240,10 @@ fn row(seen: &Seen) -> Row {
     [row.axis_x, row.axis_y, row.axis_z] = seen.axis.xyz().map(Some);
     [row.cov_xx, row.cov_xy, row.cov_xz] = [p.m11, p.m12, p.m13].map(Some);
     [row.cov_yy, row.cov_yz, row.cov_zz] = [p.m22, p.m23, p.m33].map(Some);
+    if let Some(c) = seen.common_rad2.map(Covariance::into_inner) {
+        [row.cov_common_xx, row.cov_common_xy, row.cov_common_xz] = [c.m11, c.m12, c.m13].map(Some);
+        [row.cov_common_yy, row.cov_common_yz, row.cov_common_zz] = [c.m22, c.m23, c.m33].map(Some);
+    }
     if let Some(e) = seen.reference {
         [row.axis_e_x, row.axis_e_y, row.axis_e_z] = e.xyz().map(Some);
     }

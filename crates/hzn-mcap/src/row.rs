@@ -230,6 +230,9 @@ columns! {
         yaw_sigma_deg: Option<f64>,
         /// Probability that the edge of the answer is the limb; only for bodies with air.
         p_limb: Option<f64>,
+        /// Protection level: the angle that the error of the axis exceeds with the probability
+        /// `covariance.protection_probability` if the edge is the limb, degrees; only with `p_limb`.
+        protection_deg: Option<f64>,
         /// The part of the axis's covariance whose error is the same in the next picture while the geometry stays, xx,
         /// rad². The mean of n such answers has the covariance common + (cov − common)/n.
         cov_common_xx: Option<f64>,
@@ -291,6 +294,12 @@ impl Row {
             altitude_km: meta.altitude_km.and_then(finite),
             ..Self::empty_cells()
         }
+    }
+
+    /// Sets the protection level of an answer with `p_limb`, from its multiple of `sigma_max_deg`.
+    #[must_use]
+    pub fn with_protection(self, factor: f64) -> Self {
+        Self { protection_deg: self.p_limb.and(self.sigma_max_deg).and_then(|sigma| finite(sigma * factor)), ..self }
     }
 
     fn set_answer<T: Real>(&mut self, s: &Solution<T>) {

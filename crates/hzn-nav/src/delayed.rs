@@ -10,6 +10,7 @@ use crate::strapdown::{Imu, Nominal};
 
 /// A measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "there is no heap for the large one")]
 pub enum Measurement {
     /// A direction of a camera.
     Direction(DirectionMeasurement),

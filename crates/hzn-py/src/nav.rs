@@ -216,14 +216,16 @@ impl Filter {
         covariance: Rows,
         by_limb_height: Three,
         is_limb: bool,
+        common: Option<Rows>,
     ) -> Option<Taken> {
-        let covariance_rad2 = Matrix3::from_fn(|i, j| covariance[i][j]);
+        let matrix = |rows: Rows| Matrix3::from_fn(|i, j| rows[i][j]);
         let measurement = DirectionMeasurement {
             camera,
             body: 0,
             measured: measured.into(),
             reference: reference.into(),
-            covariance_rad2: covariance_rad2.into(),
+            covariance_rad2: matrix(covariance).into(),
+            common_rad2: common.map(|rows| matrix(rows).into()),
             by_limb_height: by_limb_height.into(),
             is_limb,
         };

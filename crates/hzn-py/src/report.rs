@@ -301,6 +301,11 @@ impl Report {
     fn p_limb(&self) -> Option<f64> {
         self.row.p_limb
     }
+    #[doc = doc!("Report.protection_deg")]
+    #[getter]
+    fn protection_deg(&self) -> Option<f64> {
+        self.row.protection_deg
+    }
     #[doc = doc!("Report.roll_deg")]
     #[getter]
     fn roll_deg(&self) -> Option<f64> {

@@ -309,7 +309,8 @@ impl<'py> Read<'py> {
                 Err(why) => return report_without_limb(&meta, why),
             };
             let elapsed_us = processed.elapsed.as_nanos() as f64 / 1e3;
-            let row = Row::from_report(&meta, &found, Some(elapsed_us));
+            let row = Row::from_report(&meta, &found, Some(elapsed_us))
+                .with_protection(state.config.protection_factor(which as u8));
             Ok(Report::new(row, &found, traces.get(which), &state.camera))
         };
         let reports = processed.into_iter().zip(bodies).enumerate().map(report).collect::<PyResult<Vec<_>>>()?;

@@ -28,6 +28,8 @@ def test_an_answer_and_its_covariance(sensor):
     # What is common is a part of the covariance: neither it nor the rest is negative in any direction.
     for part in (report.covariance_common, report.covariance - report.covariance_common):
         assert np.linalg.eigvalsh(part)[0] > -1e-9 * np.trace(report.covariance) and np.trace(part) > 0.0
+    # The default probability is 1e-4.
+    assert report.p_limb > 0.0 and np.isclose(report.protection_deg, 6.15 * report.sigma_max_deg)
     assert "sigma" in repr(report) and report.altitude_km == 400.0 and report.axis_vehicle is None
     assert report.to_dict()["axis_y"] == report.axis[1]
 
@@ -43,7 +45,7 @@ def test_the_axis_in_the_vehicle():
 def test_no_limb_is_an_answer_too(sensor):
     report = sensor.process(np.full((240, 320), 9, np.uint8))
     assert not report.ok and report.axis is None and report.covariance is None and report.covariance_common is None
-    assert report.status in repr(report)
+    assert report.status in repr(report) and report.protection_deg is None
 
 
 def test_kinds_of_arrays_give_one_answer(sensor):

@@ -61,7 +61,9 @@ def test_a_filter_at_rest_learns_its_attitude():
         time_s = 0.1 * step
         assert nav.predict(time_s, truth.T @ rate, truth.T @ (-9.8 * down)) == ("taken" if step else "first")
         for camera, reference in enumerate((down, sun)):
-            innovation = nav.update_direction(camera, truth.T @ reference, reference, covariance)
+            # Half of the covariance of the limb is common; the Sun does not tell it.
+            common = 0.5 * covariance if camera == 0 else None
+            innovation = nav.update_direction(camera, truth.T @ reference, reference, covariance, common=common)
             assert innovation.taken and innovation.value.shape == (2,)
         assert nav.update_position(position, 5.0).taken
         nav.update_velocity(np.zeros(3), 0.1)
@@ -69,6 +71,8 @@ def test_a_filter_at_rest_learns_its_attitude():
     assert angle < 3e-3, angle
     assert nav.covariance.shape[0] >= 9 and np.allclose(nav.covariance, nav.covariance.T)
     assert nav.update_direction(7, down, down, covariance) is None
+    with pytest.raises(hzn.ConfigError, match="common"):
+        nav.update_direction(0, truth.T @ down, down, covariance, common=np.zeros(3))
     assert nav.predict(5.0, np.zeros(3), np.zeros(3)) == "out-of-order"
     with pytest.raises(hzn.ConfigError, match="a rotation matrix is expected"):
         hzn.nav.Filter(0.0, -truth, np.zeros(3), position)

@@ -21,6 +21,7 @@ struct Residual {
     altitude_km: f64,
     error: Vector3<f64>,
     covariance: Matrix3<f64>,
+    common: Option<Matrix3<f64>>,
     by_limb_height: Vector3<f64>,
 }
 
@@ -63,6 +64,7 @@ impl Residuals {
                     altitude_km: row.altitude_km.unwrap_or(0.0),
                     error: to_frame * (seen.axis - axis).as_inner(),
                     covariance: to_frame * seen.covariance_rad2.as_inner() * to_frame.transpose(),
+                    common: seen.common_rad2.map(|c| to_frame * c.as_inner() * to_frame.transpose()),
                     by_limb_height: to_frame * seen.by_limb_height.as_inner(),
                 });
             }
@@ -140,6 +142,11 @@ impl Errors for Drawn<'_> {
         }
     }
 
+    fn common(&mut self, at: &Moment, axis: &Vector<Cam>) -> Option<Covariance<Cam>> {
+        let to_camera = frame(axis).transpose();
+        Some((to_camera * self.find(at, axis)?.common? * to_camera.transpose()).into())
+    }
+
     fn by_limb_height(&mut self, at: &Moment, axis: &Vector<Cam>) -> Vector<Cam> {
         self.find(at, axis).map_or_else(Vector::zeros, |r| (frame(axis).transpose() * r.by_limb_height).into())
     }
@@ -162,6 +169,7 @@ pub(super) fn replace_one_in_fifty(inputs: &mut Inputs) {
             let across = frame(&seen.axis).transpose() * Vector3::new((k as f64).cos(), (k as f64).sin(), 0.0);
             seen.axis = Rotation::from_scaled_axis((across * 52f64.to_radians()).into()) * seen.axis;
             seen.covariance_rad2 = Covariance::across(&seen.axis, sigma.powi(2));
+            seen.common_rad2 = None;
         }
     }
 }

@@ -99,6 +99,7 @@ impl Recorded {
                         measured: three(r, 3),
                         reference: three(r, 6),
                         covariance_rad2: Matrix3::from_rows(&rows).into(),
+                        common_rad2: None,
                         by_limb_height: three(r, 18),
                         is_limb: true,
                     };

@@ -395,17 +395,16 @@ impl Explained<'_> {
             ),
         );
         let (sigma, angle_rad) = explain::principal_sigmas(s);
-        line(
-            "sigma",
-            format!(
-                "{:.5} deg along {:.0} deg from image x towards y, {:.5} deg across",
-                sigma[0].to_degrees(),
-                angle_rad.to_degrees(),
-                sigma[1].to_degrees()
-            ),
-        );
+        let ([along, across], angle_deg) = (sigma.map(f64::to_degrees), angle_rad.to_degrees());
+        let from_x = format!("{angle_deg:.0} deg from image x towards y");
+        line("sigma", format!("{along:.5} deg along {from_x}, {across:.5} deg across"));
         for (name, sigma) in self.budget(s.candidate) {
             line("", format!("{sigma:.5} deg from {name}"));
+        }
+        if s.p_limb.is_some() {
+            let noise = self.body.covariance.as_ref().unwrap_or(&self.config.covariance);
+            let (level_deg, probability) = (along * noise.protection_factor(), noise.protection_probability);
+            line("protection", format!("the error exceeds {level_deg:.5} deg with probability {probability}"));
         }
         if let Some(what) = self.shutter() {
             line("shutter", what);

@@ -27,7 +27,13 @@ fn a_run_against_its_truth_as_text_json_and_page() {
     let place = place();
     let args = ["evaluate", "out.mcap", "--truth", "in/truth.csv", "-o", "r.json", "-o", "r.html"];
     let ran = place.run(&args).expect(0);
-    for text in ["answered           5 of 5 pictures", "false answers      0 of 1 pictures", "HORACE criteria"] {
+    for text in [
+        "answered           5 of 5 pictures",
+        "false answers      0 of 1 pictures",
+        "HORACE criteria",
+        "6.15 sigma; 0 of 5 errors are above it (0.00 % to 52.18 %, 95 %)",
+        "above 1: misleading                     0         0",
+    ] {
         assert!(ran.out.contains(text), "{text} in {}", ran.out);
     }
     // The folder of the truth is sufficient, and a table gives the same report as the recording.
@@ -40,9 +46,15 @@ fn a_run_against_its_truth_as_text_json_and_page() {
     let rms = e["errors"]["rms_deg"].as_f64().unwrap();
     assert!(rms > 0.0 && rms < 0.2, "{rms}");
     assert_eq!(json["frames"].as_array().unwrap().len(), 6);
+    let ranges = e["integrity"]["ranges"].as_array().unwrap();
+    assert_eq!(ranges.iter().map(|r| r["with_limb"].as_u64().unwrap()).sum::<u64>(), 5);
 
     let page = place.read("r.html");
     assert!(page.matches("<svg").count() >= 4 && page.contains("data:image/jpeg;base64,"));
+    // The Stanford diagram as picture and table.
+    for text in ["below the line: misleading", "<td>above 1: misleading</td><td>0</td><td>0</td>"] {
+        assert!(page.contains(text), "{text}");
+    }
     // The page loads nothing from elsewhere.
     assert!(!page.contains("src=\"http") && !page.contains("href") && !page.contains("@import"));
     place.run(&args).expect(2).says("r.json: exists already; --force replaces it");

@@ -160,6 +160,36 @@ fn a_limb_has_a_probability_and_its_evidence() {
     }
 }
 
+/// The protection level is a multiple of sigma that grows when its probability falls. An answer without `p_limb` has no
+/// level.
+#[test]
+fn an_answer_with_a_probability_has_a_protection_level() {
+    let place = Place::with_pictures(1);
+    let run = |lines: &str| {
+        place.write("in/sensor.toml", format!("{SENSOR}\n{lines}\n").as_bytes());
+        without_time(&place.run(&["run", "in"]).expect(0).out)
+    };
+    let sigmas = |rows: &[Vec<(String, String)>]| -> f64 {
+        let number = |name| cell(&rows[0], name).parse::<f64>().unwrap();
+        number("protection_deg") / number("sigma_max_deg")
+    };
+    for (probability, expected) in [("1e-4", 6.15), ("1e-3", 4.55), ("0.01", 2.95)] {
+        let rows = run(&format!("[covariance]\nprotection_probability = {probability}"));
+        assert!((sigmas(&rows) - expected).abs() < 1e-9, "{probability}: {}", sigmas(&rows));
+        let explained = place.run(&["explain", "in/0000.png"]).expect(0);
+        assert!(explained.out.contains("deg with probability"), "{}", explained.out);
+    }
+    assert!((sigmas(&run("")) - 6.15).abs() < 1e-9);
+    let known = run("[fit]\nhalf_angle = \"known\"");
+    assert_eq!(["status", "p_limb", "protection_deg"].map(|name| cell(&known[0], name)), ["ok", "", ""]);
+    for probability in ["1e-5", "0.02"] {
+        let lines = format!("{SENSOR}\n[covariance]\nprotection_probability = {probability}\n");
+        place.write("in/sensor.toml", lines.as_bytes());
+        let refused = place.run(&["run", "in"]).expect(2);
+        assert!(refused.err.contains("protection_probability"), "{}", refused.err);
+    }
+}
+
 /// A folder whose pictures have a rate of 2.5 degrees a second about the camera's x axis. The limb moves with it only
 /// in the first two pictures and in the last one: in the other three, it stays where it is.
 fn stuck(gates: &str) -> Place {

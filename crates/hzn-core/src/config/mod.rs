@@ -170,6 +170,11 @@ impl Config {
         let own = self.each_body().get(usize::from(which)).and_then(|b| b.covariance.as_ref());
         own.unwrap_or(&self.covariance)
     }
+    /// Returns the protection level of answers about body number `which`, as a multiple of `sigma_max_deg`, see
+    /// [`protection_probability`](covariance::Config::protection_probability).
+    pub fn protection_factor(&self, which: u8) -> f64 {
+        self.noise_model_of(which).protection_factor()
+    }
     /// Returns whether the threshold of a body, or a gate, depends on the previous picture. Pictures must then come in
     /// order.
     pub fn tracks(&self) -> bool {

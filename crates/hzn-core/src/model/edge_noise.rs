@@ -80,6 +80,12 @@ section! {
         /// With `rms`, only the rest of the residuals counts as correlated, as common shift and as common tilt.
         // Without a calibration it is 0, because one picture cannot separate the two parts well enough.
         @- white_px: f64 = 0.0, [0.0 to 1e4];
+        /// Probability with which the error of an answer exceeds its protection level (the column `protection_deg`).
+        ///
+        /// A smaller value makes the level larger: 2.95 `sigma_max_deg` for 10⁻², 4.55 for 10⁻³, 6.15 for 10⁻⁴. The
+        /// probability holds for an edge that is the limb, by day, with the defaults of `[covariance]`.
+        // The range is that of the factor in `protection.rs`.
+        @- protection_probability: f64 = 1e-4, [1e-4 to 1e-2];
         /// For `braun-barf`: whether the largest variance is used in every direction.
         ///
         /// This is the overbound of Braun & Barf 2022, (37), which is about twenty times too large.

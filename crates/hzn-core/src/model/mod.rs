@@ -7,6 +7,7 @@ pub mod error_budget;
 pub mod evidence;
 pub(crate) mod found_limb;
 pub mod observer;
+mod protection;
 pub mod report;
 pub mod status;
 pub(crate) mod threshold;

@@ -54,6 +54,9 @@ pub struct Seen {
     pub axis: Vector<Cam>,
     /// Its covariance without the error of the limb height, rad².
     pub covariance_rad2: Covariance<Cam>,
+    /// The part of this covariance whose error is the same in the next picture, rad²; `None` if the recording does not
+    /// have it.
+    pub common_rad2: Option<Covariance<Cam>>,
     /// The same direction from outside, if the recording has it.
     pub reference: Option<Vector<Fixed>>,
     /// Altitude of the vehicle above the ellipsoid that the sensor was told, km.
@@ -185,6 +188,7 @@ fn seen(row: &Row, index: usize, time_s: f64, body: Body, limb_sigma_km: Option<
         body,
         axis,
         covariance_rad2: symmetric(row.covariance()?).into(),
+        common_rad2: row.common_covariance().map(|common| symmetric(common).into()),
         reference: three([row.axis_e_x, row.axis_e_y, row.axis_e_z]),
         altitude_km: row.altitude_km,
         by_limb_height: Vector::zeros(),
@@ -202,6 +206,14 @@ fn seen(row: &Row, index: usize, time_s: f64, body: Body, limb_sigma_km: Option<
 }
 
 impl Seen {
+    /// Returns the largest variance of the slow error and that of the white noise, rad².
+    pub fn largest_variances_rad2(&self) -> [f64; 2] {
+        let largest = |c: Matrix3<f64>| c.symmetric_eigenvalues().max().max(0.0);
+        let whole = self.covariance_rad2.into_inner();
+        let slow = self.common_rad2.map_or(whole, Covariance::into_inner);
+        [largest(slow), largest(whole - slow)]
+    }
+
     /// Takes the error of the limb height out of the covariance, because the filter holds it as one error that all
     /// pictures share. With the derivative k of the axis by the expected cos α, a limb that is higher by δ than the
     /// told one moves the axis by k tan α / (R + H) δ.
@@ -227,11 +239,17 @@ impl Seen {
         let by_limb_height = k * (tan / (hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M / 1e3 + altitude_km));
         let height = by_limb_height.as_inner();
         let own = height * height.transpose() * limb_sigma_km.unwrap_or(0.0).powi(2);
-        let mut rest = (self.covariance_rad2.into_inner() - own).symmetric_eigen();
-        // A sensor that was told less would make the rest negative; its covariance then stays whole.
-        if rest.eigenvalues.min() > -1e-3 * own.trace() {
+        let without_own = |covariance: Covariance<Cam>| -> Option<Covariance<Cam>> {
+            let mut rest = (covariance.into_inner() - own).symmetric_eigen();
+            let is_covariance = rest.eigenvalues.min() > -1e-3 * own.trace();
             rest.eigenvalues.apply(|v| *v = v.max(0.0));
-            self.covariance_rad2 = rest.recompose().into();
+            is_covariance.then(|| rest.recompose().into())
+        };
+        // A sensor that was told less would make the rest negative; its covariance then stays whole.
+        if let Some(rest) = without_own(self.covariance_rad2) {
+            self.covariance_rad2 = rest;
+            // The limb height is common, too. If the common part is smaller, it is of another sensor.
+            self.common_rad2 = self.common_rad2.and_then(without_own);
         }
         self.by_limb_height = by_limb_height;
     }

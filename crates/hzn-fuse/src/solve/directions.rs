@@ -3,7 +3,9 @@
 //! The derivatives are those of the filter (`hzn_nav::filter`). The axes across a direction are those of the measured
 //! one, which does not move with the estimates.
 
-use hzn_nav::filter::{DirectionMeasurement, LatitudeTerm, RADIUS_KM, Unusable, basis, predict_direction};
+use hzn_nav::filter::{
+    DirectionMeasurement, LatitudeTerm, RADIUS_KM, Unusable, UsableDirection, basis, predict_direction,
+};
 use hzn_nav::frames::{Cam, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::layout::Layout;
 use hzn_nav::strapdown::Nominal;
@@ -49,12 +51,12 @@ impl Direction {
         white_rad: f64,
         slow: Option<usize>,
     ) -> Result<Self, Unusable> {
-        let (measured, root) = m.with_root()?;
+        let UsableDirection { measured, slow_root_rad: root, white_rad2: rest } = m.usable()?;
         let reference = m.reference.try_normalize(1e-6).ok_or(Unusable::NoDirection)?;
         let covariance = root * root;
         let white = white_rad.max(LEAST_WHITE * covariance.trace().sqrt());
         let axes = basis(measured.as_inner());
-        let mut noise = Matrix2::identity() * (white * white);
+        let mut noise = Matrix2::identity() * (white * white) + axes * rest * axes.transpose();
         if slow.is_none() {
             noise += axes * covariance * axes.transpose();
         }

@@ -171,6 +171,7 @@ impl<'a> Problem<'a> {
             measured: seen.axis,
             reference: seen.reference.or_else(by_position)?,
             covariance_rad2: seen.covariance_rad2,
+            common_rad2: seen.common_rad2,
             by_limb_height: seen.by_limb_height,
             is_limb: seen.body == Body::Limb,
         };

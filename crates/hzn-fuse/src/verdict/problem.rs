@@ -234,8 +234,8 @@ fn of_body(
         let receiver = || limb_axis(seen.body, &receiver_at(&inputs.gnss, time_s)?.0);
         let reference = seen.reference.or_else(receiver)?.try_normalize(1e-6)?;
         let measured = seen.axis.try_normalize(1e-6)?;
-        let slow = seen.covariance_rad2.as_inner().symmetric_eigenvalues().max().max(0.0);
-        let own_sigma = (slow * in_common + camera.white_rad.powi(2)).sqrt().max(1e-6);
+        let [slow, white] = seen.largest_variances_rad2();
+        let own_sigma = (slow * in_common + white + camera.white_rad.powi(2)).sqrt().max(1e-6);
         let is_finite = seen.by_limb_height.is_finite() && own_sigma.is_finite() && time_s.is_finite();
         let integrals = reckoning.at(time_s)?;
         is_finite.then(|| Look {

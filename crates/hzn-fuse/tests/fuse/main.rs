@@ -1,6 +1,7 @@
 //! Tests of the replay of whole flights.
 
 mod common;
+mod common_part;
 mod flight;
 mod solve;
 mod tracker;

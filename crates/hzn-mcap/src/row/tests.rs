@@ -45,6 +45,11 @@ fn converts<T: Real>(tolerance: f64) {
     near(row.axis_z, 0.8);
     near(row.cov_common_xx, 3e-8);
     near(row.p_limb, 0.875);
+    assert_eq!(row.protection_deg, None);
+    near(row.clone().with_protection(6.0).protection_deg, 6.0 * 2e-4f64.to_degrees());
+    // Without an edge that can be the limb there is no level, and without an answer neither.
+    assert_eq!(Row { p_limb: None, ..row.clone() }.with_protection(6.0).protection_deg, None);
+    assert_eq!(Row::unprocessed(&meta(), Status::Unreadable, "").with_protection(6.0).protection_deg, None);
     near(row.sigma_max_deg, 2e-4f64.to_degrees());
     near(row.half_angle_deg, 1.3f64.to_degrees());
     near(row.altitude_est_km, 240.0);

@@ -1,10 +1,10 @@
 //! Directions: the limb axis, the Sun, the Moon.
 //!
 //! With the reference direction d in ECEF the camera sees ê = R_bcᵀ R_ebᵀ d. Its derivatives are R_bcᵀ R_ebᵀ [d×] by
-//! the attitude error, [ê×] by the misalignment, and 1 by the slow error. The covariance of the direction belongs to
-//! the slow error alone, or it would count twice. The innovation has the two components across ê, because the
-//! covariance of three is singular along ê when there is no white noise. The derivative by the position is left out:
-//! the 30 m of a receiver turn nadir by 4·10⁻⁶ rad.
+//! the attitude error, [ê×] by the misalignment, and 1 by the slow error. The common part of the direction's covariance
+//! belongs to the slow error, and the rest to the white noise, or a part would count twice. The innovation has the two
+//! components across ê, because the covariance of three is singular along ê when there is no white noise. The
+//! derivative by the position is left out: the 30 m of a receiver turn nadir by 4·10⁻⁶ rad.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
@@ -29,14 +29,27 @@ pub struct DirectionMeasurement {
     pub measured: Vector<Cam>,
     /// The same direction from outside, a unit vector.
     pub reference: Vector<Fixed>,
-    /// Covariance of the measured direction, rad², of rank 2. It belongs to the slow error. Rounding to single
-    /// precision does no harm.
+    /// Covariance of the measured direction, rad², of rank 2. Rounding to single precision does no harm.
     pub covariance_rad2: Covariance<Cam>,
+    /// The part of the covariance whose error is the same in the next picture, rad². It belongs to the slow error, and
+    /// the rest is white noise. `None` if it is not known: the whole covariance then belongs to the slow error.
+    pub common_rad2: Option<Covariance<Cam>>,
     /// Derivative of the measured direction by the limb height, per km; zero for the Sun.
     pub by_limb_height: Vector<Cam>,
     /// Whether it is the axis of the Earth's limb. A limb height that changes with the latitude
     /// ([`Options::limb_latitude`](crate::options::Options::limb_latitude)) moves such a direction alone.
     pub is_limb: bool,
+}
+
+/// A direction whose covariance is repaired and divided.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UsableDirection {
+    /// Unit vector.
+    pub measured: Vector<Cam>,
+    /// Symmetric root of the covariance of the slow error, rad.
+    pub slow_root_rad: Matrix3<f64>,
+    /// Covariance of the white noise that the direction brings, rad².
+    pub white_rad2: Matrix3<f64>,
 }
 
 /// Returns the predicted direction with its derivatives by the attitude error (columns in ECEF) and by the misalignment
@@ -57,26 +70,33 @@ impl DirectionMeasurement {
         self.measured.is_finite()
             && self.reference.is_finite()
             && self.covariance_rad2.is_finite()
+            && self.common_rad2.is_none_or(|common| common.is_finite())
             && self.by_limb_height.is_finite()
     }
 
-    /// Returns the measured direction as a unit vector, and the symmetric root of its covariance without the effects of
-    /// rounding, rad.
+    /// Returns the direction without the effects of rounding.
     ///
     /// # Errors
     /// See [`Unusable`].
-    pub fn with_root(&self) -> Result<(Vector<Cam>, Matrix3<f64>), Unusable> {
-        let (measured, covariance) = self.checked()?;
-        Ok((measured, covariance.root()))
+    pub fn usable(&self) -> Result<UsableDirection, Unusable> {
+        let (measured, slow, white_rad2) = self.checked()?;
+        Ok(UsableDirection { measured, slow_root_rad: slow.root(), white_rad2 })
     }
 
-    /// Returns the measured direction as a unit vector, and its covariance without the effects of rounding.
-    pub(super) fn checked(&self) -> Result<(Vector<Cam>, Spectrum), Unusable> {
+    /// Returns the measured direction as a unit vector, the covariance of its slow error without the effects of
+    /// rounding, and that of its white noise.
+    pub(super) fn checked(&self) -> Result<(Vector<Cam>, Spectrum, Matrix3<f64>), Unusable> {
         if !self.is_finite() {
             return Err(Unusable::NotFinite);
         }
         let measured = self.measured.try_normalize(1e-6).ok_or(Unusable::NoDirection)?;
-        Ok((measured, Spectrum::of_direction(self.covariance_rad2.as_inner(), measured.as_inner())?))
+        let spectrum =
+            |covariance: &Covariance<Cam>| Spectrum::of_direction(covariance.as_inner(), measured.as_inner());
+        let whole = spectrum(&self.covariance_rad2)?;
+        let Some(common) = &self.common_rad2 else { return Ok((measured, whole, Matrix3::zeros())) };
+        let slow = spectrum(common)?;
+        let white = Spectrum::positive_part(&(whole.matrix() - slow.matrix()));
+        Ok((measured, slow, white))
     }
 }
 
@@ -86,7 +106,7 @@ impl<const N: usize> Filter<N> {
     /// # Errors
     /// See [`Unusable`].
     pub fn update_direction(&mut self, m: &DirectionMeasurement) -> Result<Innovation<2>, Unusable> {
-        let (measured, covariance) = m.checked()?;
+        let (measured, covariance, rest) = m.checked()?;
         let reference = m.reference.try_normalize(1e-6).ok_or(Unusable::NoDirection)?;
         self.set_slow_covariance((m.camera, m.body), &covariance, None)?;
         let (camera, places) = self.camera_places(m.camera)?;
@@ -124,9 +144,9 @@ impl<const N: usize> Filter<N> {
         let across = basis(predicted.as_inner());
         let value = across * (measured - predicted - slow - height).into_inner();
         let white = camera.options.white_rad;
-        let mut noise = SMatrix::<f64, 2, 2>::identity() * (white * white);
+        let mut noise = SMatrix::<f64, 2, 2>::identity() * (white * white) + across * rest * across.transpose();
         if slow_place.is_none() {
-            // Without a slow error, the covariance is noise of each direction.
+            // Without a slow error, the whole covariance is noise of each direction.
             noise += across * covariance.matrix() * across.transpose();
         }
         self.update(value, &(across * by_errors), &noise)
@@ -193,4 +213,41 @@ pub fn basis(direction: &Vector3<f64>) -> SMatrix<f64, 2, 3> {
     let first = direction.cross(&helper).normalize();
     let second = direction.cross(&first);
     SMatrix::<f64, 2, 3>::from_rows(&[first.transpose(), second.transpose()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slow_error_and_white_noise_are_the_whole_covariance() {
+        let measured = Vector::new(0.0, 0.6, 0.8);
+        let across = |variance: f64| Covariance::across(&measured, variance);
+        let parts = |common_rad2: Option<Covariance<Cam>>| {
+            let direction = DirectionMeasurement {
+                camera: 0,
+                body: 0,
+                measured,
+                reference: Vector::new(0.0, 0.0, 1.0),
+                covariance_rad2: across(4e-6),
+                common_rad2,
+                by_limb_height: Vector::zeros(),
+                is_limb: true,
+            };
+            direction.usable().map(|usable| (usable.slow_root_rad * usable.slow_root_rad, usable.white_rad2))
+        };
+        let is = |found: &Matrix3<f64>, variance: f64| (found - across(variance).as_inner()).norm() < 1e-13;
+        for (common, slow, white) in [
+            (None, 4e-6, 0.0),
+            (Some(4e-6), 4e-6, 0.0),
+            (Some(3e-6), 3e-6, 1e-6),
+            // A common part that is too large leaves no noise that is negative.
+            (Some(5e-6), 5e-6, 0.0),
+        ] {
+            let found = parts(common.map(across)).unwrap();
+            assert!(is(&found.0, slow) && is(&found.1, white), "{common:?}: {found:?}");
+        }
+        assert_eq!(parts(Some(Covariance::isotropic(f64::NAN))).err(), Some(Unusable::NotFinite));
+        assert_eq!(parts(Some(across(-1e-6))).err(), Some(Unusable::NegativeVariance));
+    }
 }

@@ -26,7 +26,7 @@ use crate::strapdown::{Imu, Nominal};
 use blocks::{set, three};
 
 pub use chi2::chi2_limit;
-pub use direction::{DirectionMeasurement, basis, predict_direction};
+pub use direction::{DirectionMeasurement, UsableDirection, basis, predict_direction};
 pub use limb_latitude::{LatitudeTerm, RADIUS_KM};
 pub use predict::Step;
 pub use unusable::Unusable;
@@ -133,6 +133,7 @@ impl core::error::Error for FilterError {}
 ///     measured: Vector::new(-1.0, 0.0, 0.0),
 ///     reference: Vector::new(-1.0, 0.0, 0.0),
 ///     covariance_rad2: Covariance::across(&Vector::new(-1.0, 0.0, 0.0), 1e-6),
+///     common_rad2: None,
 ///     by_limb_height: Vector::zeros(),
 ///     is_limb: true,
 /// };

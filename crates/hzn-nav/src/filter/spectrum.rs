@@ -56,6 +56,13 @@ impl Spectrum {
         Ok(Self::of(&checked(covariance)?).lifted())
     }
 
+    /// Returns a symmetric matrix without its negative eigenvalues. The difference of two covariances has them if the
+    /// second one is larger in some direction, by rounding or because a sensor tells it so.
+    pub(super) fn positive_part(matrix: &Matrix3<f64>) -> Matrix3<f64> {
+        let spectrum = Self::of(matrix);
+        spectrum.with(&spectrum.values.map(|value| value.max(0.0)))
+    }
+
     fn lifted(self) -> Self {
         let least = self.values.max().max(SMALLEST_VARIANCE) * (SMALLEST_SHARE * SMALLEST_SHARE);
         Self { values: self.values.map(|value| value.max(least)), ..self }

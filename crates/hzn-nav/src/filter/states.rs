@@ -77,7 +77,7 @@ impl<const N: usize> Filter<N> {
         m: &DirectionMeasurement,
         transition: &mut SMatrix<f64, N, N>,
     ) -> Result<(), Unusable> {
-        let (_, covariance) = m.checked()?;
+        let (_, covariance, _) = m.checked()?;
         self.set_slow_covariance((m.camera, m.body), &covariance, Some(transition))
     }
 }

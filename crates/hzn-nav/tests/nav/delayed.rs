@@ -49,6 +49,7 @@ fn direction(truth: &Nominal, sun: bool) -> Measurement {
         measured,
         reference,
         covariance_rad2,
+        common_rad2: None,
         by_limb_height: Vector::zeros(),
         is_limb: true,
     })

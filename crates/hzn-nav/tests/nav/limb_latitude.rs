@@ -113,6 +113,7 @@ fn watch(filter: &mut Filter<20>, seed: u64, limbs: usize) {
             measured: (seen + error + noise).normalize(),
             reference,
             covariance_rad2: Covariance::isotropic(0.0),
+            common_rad2: None,
             by_limb_height: by_half_angle * fit(&position_m, |_| 1.0).half_angle_rad,
             is_limb: true,
         };

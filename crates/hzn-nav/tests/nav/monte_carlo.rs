@@ -38,6 +38,10 @@ struct Flight {
     sun: Vector<Fixed>,
     mounts: [Rotation<Cam, Vehicle>; 2],
     slow: [Vector<Cam>; 2],
+    /// 1-sigma of white noise that the covariance of a direction contains, rad.
+    rest: f64,
+    /// Whether a direction tells the part of its covariance that is common.
+    tells_common: bool,
     height_km: f64,
     /// Time that the cameras' clocks are late, s.
     clock_s: [f64; 2],
@@ -78,7 +82,22 @@ impl Flight {
         let sun = Vector::new(0.3, -0.8, 0.5).normalize();
         let height_km = options.limb_height.sigma * draws.normal();
         let clock_s = [0.0; 2];
-        Self { draws, truth, told, sun, mounts, slow, height_km, clock_s, errors, options, last: None }
+        let (rest, tells_common) = (0.0, false);
+        Self {
+            draws,
+            truth,
+            told,
+            sun,
+            mounts,
+            slow,
+            rest,
+            tells_common,
+            height_km,
+            clock_s,
+            errors,
+            options,
+            last: None,
+        }
     }
 
     /// Moves the truth by a step, and returns the measured sample.
@@ -118,10 +137,20 @@ impl Flight {
         let seen = (self.truth.attitude * later * self.mounts[camera]).inverse() * reference;
         // The limb height tilts the axis about a fixed direction of the camera.
         let by_limb_height = if camera == 0 { seen.cross(&Vector::new(1.0, 0.0, 0.0)) * 3e-4 } else { Vector::zeros() };
-        let white = self.draws.vector(WHITE);
+        let white = self.draws.vector(WHITE.hypot(self.rest));
         let measured = (seen + self.slow[camera] + by_limb_height * self.height_km + white).normalize();
-        let covariance_rad2 = Covariance::across(&measured, SLOW[camera].powi(2));
-        DirectionMeasurement { camera, body: 0, measured, reference, covariance_rad2, by_limb_height, is_limb: true }
+        let covariance_rad2 = Covariance::across(&measured, SLOW[camera].powi(2) + self.rest.powi(2));
+        let common_rad2 = self.tells_common.then(|| Covariance::across(&measured, SLOW[camera].powi(2)));
+        DirectionMeasurement {
+            camera,
+            body: 0,
+            measured,
+            reference,
+            covariance_rad2,
+            common_rad2,
+            by_limb_height,
+            is_limb: true,
+        }
     }
 }
 
@@ -227,6 +256,26 @@ fn white_errors_instead_of_slow_ones_are_over_confident() {
     let runs: Vec<Flown> = (0..20).map(|k| fly(&mut Flight::new(9100 + k), &options(), &white, None)).collect();
     let nees = mean(runs.iter().map(|r| r.nees));
     assert!(nees > 4.5, "{nees}");
+}
+
+/// Directions whose covariance is half slow and half white. If they tell which part is common, the covariance of the
+/// filter is right; otherwise the slow error has all of it.
+#[test]
+fn the_rest_of_the_covariance_is_white_noise() {
+    let run = |k: u64, tells_common: bool| {
+        let mut flight = Flight::new(9700 + k);
+        (flight.rest, flight.tells_common) = (0.12 * DEG, tells_common);
+        fly(&mut flight, &options(), &cameras(), None)
+    };
+    let [told, untold] = [true, false].map(|tells_common| {
+        let runs: Vec<Flown> = (0..60).map(|k| run(k, tells_common)).collect();
+        let rmse = mean(runs.iter().map(|r| r.error_rad.powi(2))).sqrt() / DEG;
+        let directions = mean(runs.iter().flat_map(|r| r.directions.iter().copied()));
+        println!("NEES {:.2}, RMSE {rmse:.3}°, NIS {directions:.2}", mean(runs.iter().map(|r| r.nees)));
+        (mean(runs.iter().map(|r| r.nees)), rmse, directions)
+    });
+    assert!((2.2..3.9).contains(&told.0) && (1.6..2.4).contains(&told.2), "{told:?}");
+    assert!(told.1 < 1.02 * untold.1 && (told.2 - 2.0).abs() < (untold.2 - 2.0).abs(), "{told:?} {untold:?}");
 }
 
 /// Limb and Sun in one camera do not share their slow errors. A filter that takes one for both is over-confident.

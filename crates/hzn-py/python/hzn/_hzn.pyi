@@ -565,6 +565,11 @@ class Report:
         """Probability that the edge of the answer is the limb; None for bodies without air."""
 
     @property
+    def protection_deg(self) -> float | None:
+        """Protection level: the angle that the error of the axis exceeds with the probability
+        `covariance.protection_probability` if the edge is the limb, degrees; None without `p_limb`."""
+
+    @property
     def roll_deg(self) -> float | None:
         """Roll of the vehicle, degrees; needs a mounting."""
 
@@ -1159,6 +1164,7 @@ class _Filter:
         covariance: _Rows,
         by_limb_height: _Three,
         is_limb: bool,
+        common: _Rows | None,
     ) -> _Taken | None: ...
     def update_position(self, position: _Three, sigma: float) -> _Taken | None: ...
     def update_velocity(self, velocity: _Three, sigma: float) -> _Taken | None: ...

@@ -224,6 +224,9 @@ class Covariance(TypedDict, total=False):
     white_px: float
     """1σ of the part of an edge point's error that is new at every point, px. ``hzn calibrate noise`` measures it.
     Values: 0 to 10000 px. Default: 0.0."""
+    protection_probability: float
+    """Probability with which the error of an answer exceeds its protection level (the column ``protection_deg``).
+    Values: 0.0001 to 0.01. Default: 0.0001."""
     overbound: bool
     """For ``braun-barf``: whether the largest variance is used in every direction. Values: true or false. Default:
     false."""

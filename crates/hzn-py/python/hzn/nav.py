@@ -163,6 +163,7 @@ class Filter:
         covariance: ArrayLike,
         by_limb_height: ArrayLike = (0.0, 0.0, 0.0),
         is_limb: bool = False,
+        common: ArrayLike | None = None,
     ) -> Innovation | None:
         """Take a direction of a camera at the time of the state.
 
@@ -181,6 +182,10 @@ class Filter:
         is_limb
             Whether it is the axis of the Earth's limb; it matters only if the settings have
             ``limb_height.latitude_sigma_km``.
+        common
+            The part of the covariance whose error is the same in the next picture, shape (3, 3), rad²: the columns
+            ``cov_common_*``. The filter takes it as the slow error and the rest as white noise. Without it, the
+            whole covariance is the slow error.
 
         Returns
         -------
@@ -196,6 +201,7 @@ class Filter:
                 _list(covariance, (3, 3), "covariance"),
                 _list(by_limb_height, (3,), "by_limb_height"),
                 is_limb,
+                None if common is None else _list(common, (3, 3), "common"),
             )
         )
 

@@ -21,7 +21,7 @@ pub fn altitude_km(data: Option<&FrameData>, body: &body::Config) -> Option<f64>
 
 /// Returns the rows of a picture, one for each body.
 pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
-    let row = |(body, found): (&body::Config, &BodyOutcome)| {
+    let row = |(which, (body, found)): (u8, (&body::Config, &BodyOutcome))| {
         let meta = RowMeta {
             index: frame.index,
             file: frame.name.clone(),
@@ -30,11 +30,12 @@ pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
             altitude_km: altitude_km(frame.data.as_ref(), body),
         };
         match &found.report {
-            Ok(report) => Row::from_report(&meta, report, Some(found.elapsed.as_nanos() as f64 / 1e3)),
+            Ok(report) => Row::from_report(&meta, report, Some(found.elapsed.as_nanos() as f64 / 1e3))
+                .with_protection(config.protection_factor(which)),
             Err(e) => Row::unprocessed(&meta, e.status, e.why.clone()),
         }
     };
-    config.each_body().iter().zip(&frame.outcomes).map(row).collect()
+    (0..).zip(config.each_body().iter().zip(&frame.outcomes)).map(row).collect()
 }
 
 /// Returns the records of a picture, one for each body. The pixels and the drawing are moved out of the picture, into

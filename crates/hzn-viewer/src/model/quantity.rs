@@ -35,6 +35,11 @@ pub const QUANTITIES: &[Quantity] = &[
     optional("Error (truth)", "°", &[("error", error_deg), ("3σ", |r, t| t.and(Some(3.0 * r.sigma_max_deg?)))]),
     always("RMS", "px", &[("rms", |r, _| r.rms_px)]),
     optional("Probability of the limb", "", &[("p", |r, _| r.p_limb)]),
+    optional(
+        "Protection level",
+        "°",
+        &[("level", |r, _| r.protection_deg), ("error", |r, t| r.protection_deg.and(error_deg(r, t)))],
+    ),
     always(
         "Points",
         "",

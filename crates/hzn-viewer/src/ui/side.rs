@@ -117,8 +117,9 @@ fn answer(viewer: &mut Viewer, ui: &mut Ui) {
             }
             row("RMS", format!("{:.3} px", s.rms_px));
             row("inliers", s.inliers.to_string());
-            if let Some(p_limb) = s.p_limb {
+            if let (Some(p_limb), Some(level_deg)) = (s.p_limb, answer.row.protection_deg) {
                 row("p (limb)", format!("{p_limb:.4}"));
+                row("protection", format!("{level_deg:.4}°"));
             }
             if let Some(body) = &s.axis_vehicle {
                 let [roll, pitch] = hzn_mcap::roll_pitch_deg(body);

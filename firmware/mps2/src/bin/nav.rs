@@ -92,6 +92,7 @@ fn push(flight: &mut Flight, record: &Record) {
             measured: three(record, 3),
             reference: three(record, 6),
             covariance_rad2: Matrix3::from_rows(&rows).into(),
+            common_rad2: None,
             by_limb_height: three(record, 18),
             is_limb: three::<Cam>(record, 18) != Vector::zeros(),
         };

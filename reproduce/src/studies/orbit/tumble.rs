@@ -61,6 +61,9 @@ impl Errors for Lit<'_> {
     fn draw(&mut self, at: &Moment, axis: &Vector<Cam>) -> (Vector<Cam>, Covariance<Cam>) {
         self.drawn.draw(at, axis)
     }
+    fn common(&mut self, at: &Moment, axis: &Vector<Cam>) -> Option<Covariance<Cam>> {
+        self.drawn.common(at, axis)
+    }
     fn by_limb_height(&mut self, at: &Moment, axis: &Vector<Cam>) -> Vector<Cam> {
         self.drawn.by_limb_height(at, axis)
     }

@@ -1,7 +1,7 @@
 //! The report as one page of HTML that needs no other file and no network.
 
 use base64::Engine;
-use hzn_evaluate::{Case, Evaluation, Miss};
+use hzn_evaluate::{Case, Evaluation, Integrity, Miss};
 use hzn_plot::{Chart, Series, Style};
 
 use super::report::Report;
@@ -41,6 +41,9 @@ pub(super) fn html(report: &Report, worst: &[Drawn]) -> anyhow::Result<String> {
                 body.push_str(&format!("<tr><td>{}</td>{cells}</tr>", escape(&range)));
             }
             body.push_str("</table>");
+        }
+        if let Some(integrity) = &e.integrity {
+            body.push_str(&stanford_table(integrity));
         }
     }
     if !worst.is_empty() {
@@ -82,6 +85,7 @@ fn charts(e: &Evaluation, frames: &[Case]) -> Vec<Chart> {
         distribution(&cases),
     ];
     out.extend(calibration(&cases));
+    out.extend(stanford(e, frames));
     for group in &e.groups {
         let x: &dyn Fn(&Case) -> Option<f64> = match group.name {
             "altitude" => &|c| c.altitude_km,
@@ -124,6 +128,39 @@ fn calibration(cases: &[(&Case, Miss)]) -> Option<Chart> {
         Chart::new("Calibration of sigma (above the line: too small)", "expected distance [sigma]", "distance [sigma]")
             .with_series(Series::new("right", Style::Ideal, [(0.0, 0.0), (far, far)]))
             .with_series(Series::new("answers", Style::Dots, points)),
+    )
+}
+
+/// Returns the numbers of the Stanford diagram.
+fn stanford_table(integrity: &Integrity) -> String {
+    let row = |tag: &str, cells: [&str; 3]| {
+        let cells: String = cells.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect();
+        format!("<tr>{cells}</tr>")
+    };
+    let rows: String =
+        text::stanford(integrity).iter().map(|cells| row("td", cells.each_ref().map(String::as_str))).collect();
+    format!("<table>{}{rows}</table>", row("th", text::STANFORD))
+}
+
+/// Plots the protection level against the error, as the integrity of satellite navigation is drawn (the Stanford
+/// diagram). Answers below the line are misleading. An answer without a limb in view has an error, too.
+fn stanford(e: &Evaluation, frames: &[Case]) -> Option<Chart> {
+    let answers: Vec<(bool, f64, f64)> = frames
+        .iter()
+        .filter(|c| c.body == e.body)
+        .filter_map(|c| c.miss.and_then(|m| Some((c.limb, m.angle_deg, m.found.protection_deg?))))
+        .collect();
+    let far = answers.iter().map(|(_, error, level)| error.max(*level)).reduce(f64::max)?;
+    let dots = |name: &str, of: &dyn Fn(bool, f64, f64) -> bool| {
+        let shown = answers.iter().filter(|(limb, error, level)| of(*limb, *error, *level));
+        Series::new(name, Style::Dots, shown.map(|(_, error, level)| (*error, *level)).collect::<Vec<_>>())
+    };
+    Some(
+        Chart::new("Protection level against error (below the line: misleading)", "error [deg]", "level [deg]")
+            .with_series(Series::new("error = level", Style::Ideal, [(0.0, 0.0), (far, far)]))
+            .with_series(dots("limb in view", &|limb, error, level| limb && error <= level))
+            .with_series(dots("misleading", &|limb, error, level| limb && error > level))
+            .with_series(dots("no limb in view", &|limb, _, _| !limb)),
     )
 }
 

@@ -1,6 +1,6 @@
 //! The report as text.
 
-use hzn_evaluate::{Case, Evaluation, Group, Honesty, Means};
+use hzn_evaluate::{Case, Evaluation, Group, Honesty, Integrity, IntegrityRange, Means};
 
 use super::report::Report;
 use crate::tell::one_line;
@@ -15,6 +15,10 @@ pub(super) fn report(report: &Report, worst: &[&Case]) -> String {
         for group in &e.groups {
             out.push('\n');
             out.push_str(&table(group));
+        }
+        if let Some(integrity) = &e.integrity {
+            out.push('\n');
+            out.push_str(&stanford_table(integrity));
         }
         out.push('\n');
     }
@@ -71,8 +75,7 @@ pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
         let ideal = h.within.map(|w| format!("{:.1}", 100.0 * w.expected)).join(", ");
         line("sigma", format!("{} ({ideal} % when right)", parts.join(", ")));
     }
-    out.extend(means_line(e));
-    out.extend(position_lines(e));
+    out.extend(means_line(e).into_iter().chain(integrity_line(e)).chain(position_lines(e)));
     let mut line = |name, value| out.push((name, value));
     if e.with_limb > 0 {
         let positives = e.horace.false_positives.map(|p| format!(", false positives {}", percent(p)));
@@ -100,6 +103,37 @@ fn means_line(e: &Evaluation) -> Option<(&'static str, String)> {
     let parts: Vec<String> = e.means.iter().map(part).collect();
     let none = "not tested: no three consecutive answers have the columns cov_common_*";
     Some(("means (NEES)", if parts.is_empty() { none.into() } else { parts.join(", ") + "; 2 is ideal" }))
+}
+
+/// Returns the protection level against the errors; `None` if no answer has one.
+fn integrity_line(e: &Evaluation) -> Option<(&'static str, String)> {
+    let i = e.integrity.as_ref()?;
+    let [low, high] = i.interval.map(|share| format!("{:.2} %", 100.0 * share));
+    let level = format!("{} deg median, {:.2} sigma", deg(i.median_deg), i.median_sigmas);
+    let above = format!("{} of {} errors are above it ({low} to {high}, 95 %)", i.misleading, i.answers);
+    Some(("protection level", format!("{level}; {above}")))
+}
+
+/// Columns of the table of errors against protection levels.
+pub(super) const STANFORD: [&str; 3] = ["error over protection level", "with a limb", "without"];
+
+/// Returns the rows of the table of errors against protection levels: the cells of [`STANFORD`].
+pub(super) fn stanford(i: &Integrity) -> Vec<[String; 3]> {
+    let row = |r: &IntegrityRange| {
+        let name = match r.up_to {
+            Some(most) => format!("{} to {most}", r.above),
+            None => format!("above {}: misleading", r.above),
+        };
+        [name, r.with_limb.to_string(), r.without_limb.to_string()]
+    };
+    i.ranges.iter().map(row).collect()
+}
+
+fn stanford_table(i: &Integrity) -> String {
+    let line = |[range, with, without]: [&str; 3]| format!("  {range:<28} {with:>12} {without:>9}\n");
+    let rows = stanford(i);
+    let cells = rows.iter().map(|cells| line(cells.each_ref().map(String::as_str)));
+    [line(STANFORD)].into_iter().chain(cells).collect()
 }
 
 /// Returns the numbers about the position and the error classes of star sensors with their names.

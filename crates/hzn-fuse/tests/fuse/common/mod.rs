@@ -9,17 +9,19 @@ use hzn_fuse::simulated::{Errors, Moment, inputs};
 use hzn_nav::frames::{Cam, Covariance, Vector};
 use hzn_sim::Scenario;
 
-/// Slow errors of limb and Sun with a time constant of 20 s, and a small white part.
+/// Slow errors of limb and Sun with a time constant of 20 s, and a small white part that the sensor does not tell.
 pub(crate) struct Slow {
     pub(crate) draws: Draws,
-    /// 1-sigma, rad.
+    /// 1-sigma of the slow error, rad.
     pub(crate) sigma_rad: f64,
+    /// 1-sigma of white noise that the sensor tells, rad. With 0 it does not tell what is common.
+    pub(crate) white_rad: f64,
     last: Vec<(Moment, Vector<Cam>)>,
 }
 
 impl Slow {
     pub(crate) fn new(seed: u64, sigma_deg: f64) -> Self {
-        Self { draws: Draws(seed), sigma_rad: sigma_deg.to_radians(), last: Vec::new() }
+        Self { draws: Draws(seed), sigma_rad: sigma_deg.to_radians(), white_rad: 0.0, last: Vec::new() }
     }
 
     fn three(&mut self, sigma: f64) -> Vector<Cam> {
@@ -39,8 +41,13 @@ impl Errors for Slow {
             None => self.three(sigma),
         };
         self.last.push((*at, error));
-        let covariance = Covariance::across(axis, sigma.powi(2));
-        (error + self.three(2e-4), covariance)
+        let white = self.white_rad;
+        let covariance = Covariance::across(axis, sigma.powi(2) + white.powi(2));
+        (error + self.three(white.hypot(2e-4)), covariance)
+    }
+
+    fn common(&mut self, _: &Moment, axis: &Vector<Cam>) -> Option<Covariance<Cam>> {
+        (self.white_rad > 0.0).then(|| Covariance::across(axis, self.sigma_rad.powi(2)))
     }
 
     fn by_limb_height(&mut self, _: &Moment, axis: &Vector<Cam>) -> Vector<Cam> {
