@@ -12,7 +12,7 @@ use crate::tell;
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
 /// Number of pictures for each status.
-type Counts = [u64; Status::ALL.len()];
+pub(crate) type Counts = [u64; Status::ALL.len()];
 
 /// Counts pictures and shows the progress of the run.
 pub(crate) struct Progress {
@@ -134,7 +134,8 @@ impl Progress {
     }
 }
 
-fn count_text(counts: &Counts) -> String {
+/// Returns the counts in words, for example `120 ok, 2 no-limb`.
+pub(crate) fn count_text(counts: &Counts) -> String {
     let present = Status::ALL.iter().zip(counts).filter(|(_, n)| **n > 0);
     let parts: Vec<String> = present.map(|(status, n)| format!("{n} {}", status.name())).collect();
     parts.join(", ")

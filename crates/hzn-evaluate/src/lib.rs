@@ -13,6 +13,7 @@
 
 mod case;
 mod classes;
+pub mod heads;
 mod honesty;
 mod integrity;
 mod means;

@@ -13,7 +13,8 @@ use crate::merge::merge_missing;
 use crate::migrate::refuse_old_names;
 
 /// Reads `text` as a `T`. `path` is used in messages, and the path of a camera `file` is relative to its folder.
-/// `check` tests the value after it has been read. It returns the key, as `[section] key`, and the rule that is broken.
+/// `check` tests the value after it has been read. It returns the key, as `[section] key` or `[[tables]] 2 key`, and
+/// the rule that is broken.
 ///
 /// # Errors
 /// The first error in the text.
@@ -41,7 +42,11 @@ pub fn parse<T: DeserializeOwned>(
         .map_err(|e| translate_serde_error(&e, text, path, &places, &[]))?;
     check(&value).map_err(|(field, what)| {
         let problem = Problem::new(path, what).in_field(field.clone());
-        let parts: Vec<&str> = field.split(|c: char| "[]. ".contains(c)).filter(|part| !part.is_empty()).collect();
+        let parts = field.split(|c: char| "[]. ".contains(c)).filter(|part| !part.is_empty());
+        // The tables of a list are counted from 1 in messages.
+        let place =
+            |part: &str| part.parse().map_or_else(|_| part.to_owned(), |n: usize| n.saturating_sub(1).to_string());
+        let parts: Vec<String> = parts.map(place).collect();
         // The place of the key, or of the section that lacks it.
         let place = (1..=parts.len()).rev().find_map(|n| places.iter().find(|p| p.path == parts[..n]));
         match place {

@@ -3,6 +3,7 @@
 //! | file | read by | gives |
 //! |---|---|---|
 //! | `sensor.toml` | [`sensor::load`] | [`hzn_core::Config`], checked |
+//! | `rig.toml` | [`rig::load`] | the heads of a rig, checked |
 //! | Kalibr camchain, OpenCV YAML, EuRoC `sensor.yaml` | [`camera_file::load`] | [`hzn_core::camera::Config`] |
 //! | `frames.csv` | [`frames::load`] | time, altitude, position, attitude of every picture |
 //! | `truth.csv` | [`truth::load`] | the truth about every picture of a simulation |
@@ -28,6 +29,7 @@ pub mod migrate;
 mod nearest;
 pub mod plausible;
 mod problem;
+pub mod rig;
 pub mod sensor;
 pub mod start;
 pub mod template;

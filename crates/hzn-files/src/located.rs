@@ -89,6 +89,10 @@ pub(crate) fn check_list_lengths(text: &str, path: &Path, places: &[KeyPlace]) -
             // The limit is that of `brown-conrady`.
             ["camera", "k"] => (5, "numbers"),
             ["mount" | "attitude_mount", QUATERNION] | ["cameras", _, "mount", QUATERNION] => (4, "numbers"),
+            ["rig", "mount", "q_vehicle_from_rig_wxyz"] | ["head", _, "mount", "q_rig_from_camera_wxyz"] => {
+                (4, "numbers")
+            }
+            ["head", _, "mount", "covariance_deg2"] => (6, "numbers"),
             ["mask", "polygons_px"] => (MAX_POLYGONS, "polygons"),
             ["mask", "polygons_px", _] => (MAX_CORNERS, "corners"),
             ["body", ROWS] | ["bodies", _, ROWS] => (MAX_LATITUDES, "rows"),

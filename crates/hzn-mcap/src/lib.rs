@@ -49,6 +49,7 @@ mod frame;
 mod images;
 mod index;
 mod messages;
+mod origin;
 pub mod palette;
 mod part;
 mod pictures;

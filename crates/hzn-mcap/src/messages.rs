@@ -14,8 +14,10 @@ use crate::frame::{Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageForm
 use crate::row::Row;
 use crate::topics::Topic;
 
-/// Name of the camera frame.
-const CAMERA: &str = "camera";
+/// Name of the camera frame of a recording with one camera; with several, the frames have the names of the heads.
+pub(crate) const CAMERA: &str = "camera";
+/// Name of the vehicle's frame, for the joint axis of several heads.
+pub(crate) const VEHICLE: &str = "vehicle";
 /// Name of the frame that is fixed in the body, for the camera's attitude.
 const FIXED: &str = "fixed";
 
@@ -63,7 +65,7 @@ pub(crate) fn parse_report(data: &[u8]) -> Result<(Row, Vec<CandidateEdge>, Fram
 
 /// Appends a picture as a message. The bytes are copied only once, directly into the buffer, because pictures are
 /// almost all of a recording.
-pub(crate) fn image(image: &EncodedImage, ns: u64, buffer: &mut Vec<u8>) {
+pub(crate) fn image(image: &EncodedImage, frame_id: &str, ns: u64, buffer: &mut Vec<u8>) {
     /// Field numbers of `data` in `foxglove.CompressedImage` and `foxglove.RawImage`.
     const COMPRESSED_DATA: u32 = 2;
     const RAW_DATA: u32 = 6;
@@ -71,7 +73,7 @@ pub(crate) fn image(image: &EncodedImage, ns: u64, buffer: &mut Vec<u8>) {
     let raw = |buffer: &mut Vec<u8>, width: u32, height: u32, encoding: &str, bytes_per_pixel: u32| {
         let message = RawImage {
             timestamp: stamp(ns),
-            frame_id: CAMERA.into(),
+            frame_id: frame_id.into(),
             width,
             height,
             encoding: encoding.into(),
@@ -84,7 +86,7 @@ pub(crate) fn image(image: &EncodedImage, ns: u64, buffer: &mut Vec<u8>) {
     let compressed = |buffer: &mut Vec<u8>, format: &str| {
         let message = CompressedImage {
             timestamp: stamp(ns),
-            frame_id: CAMERA.into(),
+            frame_id: frame_id.into(),
             format: format.into(),
             ..CompressedImage::default()
         };
@@ -178,8 +180,8 @@ pub(crate) fn parse_image(schema: &str, data: &[u8]) -> Result<EncodedImage, Str
     }
 }
 
-/// Returns the axis (camera frame) as a pose at the camera whose x axis points along it.
-pub(crate) fn axis([x, y, z]: [f64; 3], ns: u64) -> PoseInFrame {
+/// Returns the axis in a frame as a pose at the origin of the frame whose x axis points along it.
+pub(crate) fn axis([x, y, z]: [f64; 3], frame_id: &str, ns: u64) -> PoseInFrame {
     // The shortest rotation from +x to the axis is (1 + x, +x × axis), normalised; half a turn about z if they are
     // opposite.
     let n = ((1.0 + x).powi(2) + y * y + z * z).sqrt();
@@ -189,16 +191,16 @@ pub(crate) fn axis([x, y, z]: [f64; 3], ns: u64) -> PoseInFrame {
         Quaternion { w: 0.0, x: 0.0, y: 0.0, z: 1.0 }
     };
     let pose = Pose { position: Some(Vector3 { x: 0.0, y: 0.0, z: 0.0 }), orientation: Some(orientation) };
-    PoseInFrame { timestamp: stamp(ns), frame_id: CAMERA.into(), pose: Some(pose) }
+    PoseInFrame { timestamp: stamp(ns), frame_id: frame_id.into(), pose: Some(pose) }
 }
 
-pub(crate) fn transform(attitude: &Attitude, ns: u64) -> FrameTransform {
+pub(crate) fn transform(attitude: &Attitude, frame_id: &str, ns: u64) -> FrameTransform {
     let [w, x, y, z] = attitude.q_fixed_from_camera_wxyz;
     let [px, py, pz] = attitude.position_m;
     FrameTransform {
         timestamp: stamp(ns),
         parent_frame_id: FIXED.into(),
-        child_frame_id: CAMERA.into(),
+        child_frame_id: frame_id.into(),
         translation: Some(Vector3 { x: px, y: py, z: pz }),
         rotation: Some(Quaternion { x, y, z, w }),
     }
@@ -240,7 +242,7 @@ pub(crate) fn parse_log(data: &[u8]) -> Result<LogLine, prost::DecodeError> {
 }
 
 /// Returns the calibration. Its principal point uses hzn's convention, which ROS also has: pixel centres at integers.
-pub(crate) fn calibration(c: &camera::Config, ns: u64) -> CameraCalibration {
+pub(crate) fn calibration(c: &camera::Config, frame_id: &str, ns: u64) -> CameraCalibration {
     let (model, coefficients) = match c.model.projection() {
         camera::Projection::Angle => ("kannala_brandt", 4),
         camera::Projection::Plane => ("plumb_bob", 5),
@@ -250,7 +252,7 @@ pub(crate) fn calibration(c: &camera::Config, ns: u64) -> CameraCalibration {
     let (fx, fy, cx, cy) = (c.fx_px, c.fy_px, c.cx_px, c.cy_px);
     CameraCalibration {
         timestamp: stamp(ns),
-        frame_id: CAMERA.into(),
+        frame_id: frame_id.into(),
         width: c.width.into(),
         height: c.height.into(),
         distortion_model: model.into(),
@@ -268,7 +270,7 @@ mod tests {
     #[test]
     fn the_pose_turns_x_to_the_axis() {
         for axis_xyz in [[0.0, 0.6, 0.8], [0.48, -0.6, 0.64], [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]] {
-            let q = axis(axis_xyz, 0).pose.unwrap().orientation.unwrap();
+            let q = axis(axis_xyz, CAMERA, 0).pose.unwrap().orientation.unwrap();
             let (w, x, y, z) = (q.w, q.x, q.y, q.z);
             let turned = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)];
             for (a, b) in turned.iter().zip(axis_xyz) {

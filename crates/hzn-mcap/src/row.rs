@@ -1,8 +1,9 @@
 //! The flat result: one row per picture and body, the same in CSV, JSON Lines and MCAP.
 
 mod detail;
+mod values;
 
-use hzn_core::frames::{Cam, Cov3, UnitVec3, Vehicle};
+use hzn_core::frames::{UnitVec3, Vehicle};
 use hzn_core::real::Real;
 use hzn_core::report::Position;
 use hzn_core::status::Status;
@@ -230,8 +231,9 @@ columns! {
         yaw_sigma_deg: Option<f64>,
         /// Probability that the edge of the answer is the limb; only for bodies with air.
         p_limb: Option<f64>,
-        /// Protection level: the angle that the error of the axis exceeds with the probability
-        /// `covariance.protection_probability` if the edge is the limb, degrees; only with `p_limb`.
+        /// Protection level, degrees: the angle that the error of the axis exceeds with the probability
+        /// `covariance.protection_probability` if the edge is the limb; only with `p_limb`. Of a rig: with its
+        /// probability `misleading`, if at most one head is wrong.
         protection_deg: Option<f64>,
         /// The part of the axis's covariance whose error is the same in the next picture while the geometry stays, xx,
         /// rad². The mean of n such answers has the covariance common + (cov − common)/n.
@@ -252,6 +254,16 @@ columns! {
         axis_v_y: Option<f64>,
         /// The axis in the vehicle's frame, z.
         axis_v_z: Option<f64>,
+        /// With a rig: the name of the head, or `rig` for the joint answer, whose axis is in the vehicle's frame.
+        head: Option<String>,
+        /// Names of the heads that the joint answer uses, with spaces between them.
+        heads_used: Option<String>,
+        /// Names of the heads that the rig's own check excluded.
+        heads_excluded: Option<String>,
+        /// Angle by which the joint axis moves without the head that agrees least, degrees.
+        separation_deg: Option<f64>,
+        /// The largest such angle that the covariances allow, degrees.
+        separation_limit_deg: Option<f64>,
     }
 }
 
@@ -379,55 +391,6 @@ impl Row {
         if let Some(body_fixed) = body_fixed_m {
             [self.body_fixed_x_km, self.body_fixed_y_km, self.body_fixed_z_km] = body_fixed.map(km);
         }
-    }
-
-    /// Returns the axis (camera frame); `None` if there is no answer.
-    pub fn axis(&self) -> Option<[f64; 3]> {
-        Some([self.axis_x?, self.axis_y?, self.axis_z?])
-    }
-
-    /// Returns the covariance of [`Self::axis`] in rad² (camera frame): xx, xy, xz, yy, yz, zz; `None` without an axis.
-    pub fn covariance(&self) -> Option<[f64; 6]> {
-        Some([self.cov_xx?, self.cov_xy?, self.cov_xz?, self.cov_yy?, self.cov_yz?, self.cov_zz?])
-    }
-
-    /// Returns the part of the covariance that the next picture shares, as [`Self::covariance`]; `None` if it is not
-    /// known.
-    pub fn common_covariance(&self) -> Option<[f64; 6]> {
-        Some([
-            self.cov_common_xx?,
-            self.cov_common_xy?,
-            self.cov_common_xz?,
-            self.cov_common_yy?,
-            self.cov_common_yz?,
-            self.cov_common_zz?,
-        ])
-    }
-
-    /// Returns the larger standard deviation of the errors that the next picture does not share, in radians, see
-    /// [`Solution::noise_rad`]; `None` without an axis.
-    pub fn noise_rad(&self) -> Option<f64> {
-        let common = self.common_covariance().unwrap_or_default();
-        let all = self.covariance()?;
-        let noise = std::array::from_fn(|i| all[i] - common[i]);
-        Some(Cov3::<Cam, f64>::from_upper(noise).sigma_max_rad())
-    }
-
-    /// Returns the position of the body's centre from the camera, in km (camera frame); `None` if there is none.
-    pub fn position_km(&self) -> Option<[f64; 3]> {
-        Some([self.position_x_km?, self.position_y_km?, self.position_z_km?])
-    }
-
-    /// Returns the covariance of [`Self::position_km`] in km² (camera frame): xx, xy, xz, yy, yz, zz.
-    pub fn position_covariance_km2(&self) -> Option<[f64; 6]> {
-        Some([
-            self.pos_cov_xx_km2?,
-            self.pos_cov_xy_km2?,
-            self.pos_cov_xz_km2?,
-            self.pos_cov_yy_km2?,
-            self.pos_cov_yz_km2?,
-            self.pos_cov_zz_km2?,
-        ])
     }
 }
 

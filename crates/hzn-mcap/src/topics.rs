@@ -38,6 +38,9 @@ pub fn report_schema() -> serde_json::Value {
 /// The topic of the pictures in recordings of hzn.
 pub const IMAGE_TOPIC: &str = "/camera/image";
 
+/// Step from the channels of a head to those of the next one.
+const HEAD_STEP: u16 = 16;
+
 /// A topic; its number is the id of its channel and of its schema.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u16)]
@@ -72,6 +75,14 @@ impl Topic {
 
     pub(crate) fn id(self) -> u16 {
         self as u16
+    }
+    /// Returns the id and the name of this topic's channel for a head of a rig. The reports of all heads are on one
+    /// topic, so that a reader finds them; the column `head` tells them apart.
+    pub(crate) fn of_head(self, number: usize, name: &str) -> (u16, String) {
+        match self {
+            Self::Report => (self.id(), self.name().to_owned()),
+            _ => ((number as u16 + 1) * HEAD_STEP + self.id(), format!("/{name}{}", self.name())),
+        }
     }
     pub(crate) fn name(self) -> &'static str {
         match self {

@@ -15,6 +15,7 @@ use crate::early_sync::EarlySync;
 use crate::error::{Error, while_writing};
 use crate::frame::FrameRecord;
 use crate::messages;
+use crate::origin::Origin;
 use crate::part::{create_part, part_path, publish, sync, sync_name};
 use crate::topics::Topic;
 
@@ -28,7 +29,7 @@ const BATCH_DATA_BYTES: usize = 1 << 20;
 const CALIBRATION_EVERY_NS: u64 = 1_000_000_000;
 
 /// Largest size in bytes of what surrounds the messages of a chunk: its head, the heads of its indexes (at most seven
-/// topics), its entry in the summary.
+/// topics of a camera), its entry in the summary.
 const CHUNK_BYTES: u64 = 1024;
 
 /// Settings of a recording.
@@ -40,6 +41,11 @@ pub struct Options {
     pub metadata: BTreeMap<String, String>,
     /// The calibration for `/camera/calibration`.
     pub camera: Option<camera::Config>,
+    /// With a rig, names and calibrations of its heads. A record whose row names a head goes to the topics of this
+    /// head, for example `/left/camera/image`.
+    pub heads: Vec<(String, camera::Config)>,
+    /// Further files, attached by name.
+    pub files: Vec<(String, String)>,
     /// Whether an existing output, or the remains of a run, may be replaced.
     pub force: bool,
     /// Whether a finished frame is on the disk, so that also a power cut cannot lose it. Otherwise the operating system
@@ -72,10 +78,12 @@ pub struct Writer {
     path: PathBuf,
     part: PathBuf,
     camera: Option<camera::Config>,
+    heads: Vec<(String, camera::Config)>,
     images: ChunkBuilder,
     data: ChunkBuilder,
     waiting_since: Option<Instant>,
-    last_calibration_ns: Option<u64>,
+    /// Log time of the last calibration of each head; of the only camera, the first entry.
+    last_calibration_ns: Vec<Option<u64>>,
     /// Log time of the last frame.
     last_ns: u64,
     frames: u64,
@@ -113,10 +121,11 @@ impl Writer {
             path: path.to_path_buf(),
             part: part.to_path_buf(),
             camera: options.camera.clone(),
+            heads: options.heads.clone(),
             images: ChunkBuilder::default(),
             data: ChunkBuilder::default(),
             waiting_since: None,
-            last_calibration_ns: None,
+            last_calibration_ns: vec![None; options.heads.len().max(1)],
             last_ns: 0,
             frames: 0,
             durable: options.durable,
@@ -136,9 +145,10 @@ impl Writer {
 
     /// Returns the size in bytes that the recording has at most if it is finished now; 0 after a failure.
     pub fn finished_bytes(&self) -> u64 {
+        let heads = self.heads.len().max(1) as u64;
         // Pictures are stored as they are; what cannot be compressed becomes a little longer.
         let waiting =
-            [&self.images, &self.data].map(|chunk| chunk.len() as u64 + chunk.len() as u64 / 64 + CHUNK_BYTES);
+            [&self.images, &self.data].map(|chunk| chunk.len() as u64 + chunk.len() as u64 / 64 + CHUNK_BYTES * heads);
         let messages = self.images.messages() + self.data.messages();
         let indexes = messages * 16;
         self.container.as_ref().map_or(0, |c| c.finished_bytes() + waiting.iter().sum::<u64>() + indexes)
@@ -160,6 +170,24 @@ impl Writer {
     /// # Errors
     /// The errors are those of [`Self::write`].
     pub fn write_bodies(&mut self, records: &[FrameRecord]) -> Result<(), Error> {
+        self.write_heads(&[records])
+    }
+
+    /// Appends an epoch of a rig: the records of the joint answer and of each head, as [`Self::write_bodies`] does for
+    /// one camera. Either all of them are finished or none.
+    ///
+    /// # Errors
+    /// The errors are those of [`Self::write`].
+    pub fn write_heads(&mut self, heads: &[&[FrameRecord]]) -> Result<(), Error> {
+        heads.iter().try_for_each(|records| self.push_bodies(records))?;
+        self.waiting_since.get_or_insert_with(Instant::now);
+        if self.images.len() >= BATCH_IMAGE_BYTES || self.data.len() >= BATCH_DATA_BYTES {
+            return self.flush();
+        }
+        self.flush_if_due()
+    }
+
+    fn push_bodies(&mut self, records: &[FrameRecord]) -> Result<(), Error> {
         let several = records.len() > 1;
         let caption = |record: &FrameRecord| {
             let text = drawing::caption(&record.row);
@@ -170,11 +198,7 @@ impl Writer {
             // Only the first record has the picture and the drawing.
             self.push(record, if i == 0 { &captions } else { &[] })?;
         }
-        self.waiting_since.get_or_insert_with(Instant::now);
-        if self.images.len() >= BATCH_IMAGE_BYTES || self.data.len() >= BATCH_DATA_BYTES {
-            return self.flush();
-        }
-        self.flush_if_due()
+        Ok(())
     }
 
     fn push(&mut self, frame: &FrameRecord, captions: &[String]) -> Result<(), Error> {
@@ -183,37 +207,29 @@ impl Writer {
         if bytes + (BATCH_IMAGE_BYTES as u64) >= MAX_RECORD_BYTES {
             return Err(Error::TooLarge { bytes, limit: MAX_RECORD_BYTES - BATCH_IMAGE_BYTES as u64 });
         }
-        let pen_px = drawing::pen_px(self.camera.as_ref());
+        let origin = Origin::find(&frame.row, &self.heads, self.camera.as_ref());
+        let frame_id = origin.frame_id;
+        let pen_px = drawing::pen_px(origin.camera);
         // A frame without a time gets the time of the frame before it.
         let ns = frame.row.time_s.map_or(self.last_ns, messages::time_ns);
         self.last_ns = ns;
         let sequence = frame.row.index as u32;
-        let declare = |topic: Topic, container: &mut Container<_>| -> std::io::Result<u16> {
-            let id = topic.id();
-            if !container.has_channel(id) {
-                let (name, encoding, data, message_encoding) = topic.schema();
-                container.schema(id, &name, &encoding, &data)?;
-                container.channel(id, id, topic.name(), message_encoding)?;
-            }
-            Ok(id)
-        };
         let failed = |e| while_writing(&self.part, e);
         if let Some(image) = &frame.image {
-            let id = declare(messages::image_topic(&image.format), container).map_err(failed)?;
-            self.images.push(id, sequence, ns, |buffer| messages::image(image, ns, buffer));
+            let id = origin.declare(messages::image_topic(&image.format), container).map_err(failed)?;
+            self.images.push(id, sequence, ns, |buffer| messages::image(image, frame_id, ns, buffer));
         }
         let data = &mut self.data;
         let mut push = |topic: Topic, fill: &mut dyn FnMut(&mut Vec<u8>)| -> Result<(), Error> {
-            let id = declare(topic, container).map_err(failed)?;
+            let id = origin.declare(topic, container).map_err(failed)?;
             data.push(id, sequence, ns, fill);
             Ok(())
         };
-        if let Some(camera) = &self.camera {
-            let due = self.last_calibration_ns.is_none_or(|last| ns.abs_diff(last) >= CALIBRATION_EVERY_NS);
-            if due {
-                self.last_calibration_ns = Some(ns);
-                push(Topic::Calibration, &mut |b| messages::append(&messages::calibration(camera, ns), b))?;
-            }
+        if let Some((camera, last)) = origin.camera.zip(self.last_calibration_ns.get_mut(origin.number()))
+            && last.is_none_or(|last| ns.abs_diff(last) >= CALIBRATION_EVERY_NS)
+        {
+            *last = Some(ns);
+            push(Topic::Calibration, &mut |b| messages::append(&messages::calibration(camera, frame_id, ns), b))?;
         }
         let unprocessed = matches!(frame.row.status, Status::Unreadable | Status::NoAltitude);
         if frame.image.is_some() || !frame.annotations.is_empty() || (unprocessed && !captions.is_empty()) {
@@ -223,10 +239,10 @@ impl Writer {
             push(Topic::Annotations, &mut |b| messages::append(&drawing, b))?;
         }
         if let Some(axis) = frame.row.axis() {
-            push(Topic::Axis, &mut |b| messages::append(&messages::axis(axis, ns), b))?;
+            push(Topic::Axis, &mut |b| messages::append(&messages::axis(axis, frame_id, ns), b))?;
         }
         if let Some(attitude) = &frame.attitude {
-            push(Topic::Transform, &mut |b| messages::append(&messages::transform(attitude, ns), b))?;
+            push(Topic::Transform, &mut |b| messages::append(&messages::transform(attitude, frame_id, ns), b))?;
         }
         for line in &frame.log {
             push(Topic::Log, &mut |b| messages::append(&messages::log(line, &frame.row.file, ns), b))?;
@@ -327,7 +343,11 @@ pub(crate) fn open_container(part: &Path) -> std::io::Result<Container<BufWriter
 /// Opens a file and writes what comes before its first message.
 fn begin_recording(part: &Path, options: &Options) -> std::io::Result<Container<BufWriter<File>>> {
     let mut container = open_container(part)?;
-    container.attach(SENSOR_TOML, "application/toml", options.sensor_toml.as_bytes())?;
+    // The sensors of a rig are further files.
+    let own = (options.heads.is_empty()).then(|| (SENSOR_TOML.to_owned(), options.sensor_toml.clone()));
+    for (name, text) in own.iter().chain(&options.files) {
+        container.attach(name, "application/toml", text.as_bytes())?;
+    }
     let mut metadata = options.metadata.clone();
     metadata.insert("hzn_mcap_version".into(), env!("CARGO_PKG_VERSION").into());
     container.metadata("hzn", &metadata)?;

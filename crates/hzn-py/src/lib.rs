@@ -28,6 +28,7 @@ mod pickled;
 mod prior;
 mod recording;
 mod report;
+mod rig;
 mod sensor;
 mod sequence;
 mod simulation;
@@ -59,6 +60,8 @@ mod _hzn {
     use crate::recording::{Frame, Recording, open_mcap, read_mcap, write_mcap};
     #[pymodule_export]
     use crate::report::Report;
+    #[pymodule_export]
+    use crate::rig::Rig;
     #[pymodule_export]
     use crate::sensor::Sensor;
     #[pymodule_export]

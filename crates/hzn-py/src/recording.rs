@@ -185,7 +185,7 @@ pub(crate) fn write_mcap(py: Python<'_>, path: PathBuf, sensor: &Sensor, reports
         let sensor_toml = hzn_files::sensor::to_text(&config).map_err(errors::other)?;
         let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
         let camera = Some(config.camera);
-        let options = hzn_mcap::Options { sensor_toml, metadata, camera, force: true, durable: false };
+        let options = hzn_mcap::Options { sensor_toml, metadata, camera, force: true, ..hzn_mcap::Options::default() };
         let mut writer = hzn_mcap::Writer::create(&path, &options).map_err(errors::other)?;
         frames.iter().try_for_each(|bodies| writer.write_bodies(bodies)).map_err(errors::other)?;
         writer.finish().map(drop).map_err(errors::other)

@@ -8,7 +8,7 @@ use hzn_core::body::PriorError;
 use hzn_files::{FrameData, plausible, sensor};
 use hzn_mcap::{Row, RowMeta};
 use hzn_run::diagnosis::{self, AnyCone};
-use hzn_run::engine::{Traces, Unprocessed};
+use hzn_run::engine::{Processed, Traces, Unprocessed};
 use hzn_run::source::Payload;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -159,13 +159,10 @@ impl Sensor {
         let state = self.state();
         known.tell_doubts(py, &state.config)?;
         let Prior { data } = known;
-        let read = match image.extract::<PathBuf>() {
-            Ok(path) => Read::from_file(py, &state, path)?,
-            Err(_) => Read { image: image.clone(), file: String::new(), bits: None, time_s: None },
-        };
+        let read = Read::from_object(py, &state, image)?;
         let time_s = data.time_s.or(read.time_s);
         let data = FrameData { time_s, utc_s: time_s, ..data };
-        read.process(py, &state, &data, bits, detail)
+        Ok(read.process(py, &state, &data, bits, detail)?.0)
     }
 
     #[doc = doc!("Sensor.what_fits")]
@@ -259,15 +256,23 @@ fn warn_of_unused_bits(py: Python<'_>, array: &Array<'_>, bits: Option<u8>) -> P
 }
 
 /// A picture as an array, and what its file says.
-struct Read<'py> {
+pub(crate) struct Read<'py> {
     image: Bound<'py, PyAny>,
     /// Name of the file; empty for an array.
-    file: String,
+    pub(crate) file: String,
     bits: Option<u8>,
-    time_s: Option<f64>,
+    pub(crate) time_s: Option<f64>,
 }
 
 impl<'py> Read<'py> {
+    /// Takes an array, or reads a picture file.
+    pub(crate) fn from_object(py: Python<'py>, state: &State, image: &Bound<'py, PyAny>) -> PyResult<Self> {
+        match image.extract::<PathBuf>() {
+            Ok(path) => Self::from_file(py, state, path),
+            Err(_) => Ok(Self { image: image.clone(), file: String::new(), bits: None, time_s: None }),
+        }
+    }
+
     /// Reads a picture file as `hzn run` does.
     fn from_file(py: Python<'py>, state: &State, path: PathBuf) -> PyResult<Self> {
         let (shown, file) = (path.display().to_string(), path.file_name().unwrap_or_default().to_string_lossy().into());
@@ -278,15 +283,16 @@ impl<'py> Read<'py> {
         Ok(Self { image: to_array(py, picture)?, file, bits, time_s })
     }
 
-    /// Finds the limb of each body.
-    fn process(
+    /// Finds the limb of each body. Returns the report of the first body, which has those of the others, and what the
+    /// sensor found.
+    pub(crate) fn process(
         &self,
         py: Python<'py>,
         state: &Arc<State>,
         data: &FrameData,
         bits: Option<u8>,
         detail: bool,
-    ) -> PyResult<Report> {
+    ) -> PyResult<(Report, Vec<Processed>)> {
         let bits = bits.or(self.bits);
         let array = Array::from_object(&self.image)?;
         state.check_size(&array)?;
@@ -302,22 +308,22 @@ impl<'py> Read<'py> {
             processed.map(|p| (p, traces))
         })??;
         let traces = traces.map(|t| t.each).unwrap_or_default();
-        let report = |(which, (processed, body)): (usize, (hzn_run::engine::Processed, &hzn_core::body::Config))| {
+        let report = |(which, (processed, body)): (usize, (&Processed, &hzn_core::body::Config))| {
             let meta = RowMeta { file: self.file.clone(), ..row_meta(data, body) };
-            let found = match processed.report {
+            let found = match &processed.report {
                 Ok(found) => found,
-                Err(why) => return report_without_limb(&meta, why),
+                Err(why) => return report_without_limb(&meta, *why),
             };
             let elapsed_us = processed.elapsed.as_nanos() as f64 / 1e3;
-            let row = Row::from_report(&meta, &found, Some(elapsed_us))
+            let row = Row::from_report(&meta, found, Some(elapsed_us))
                 .with_protection(state.config.protection_factor(which as u8));
-            Ok(Report::new(row, &found, traces.get(which), &state.camera))
+            Ok(Report::new(row, found, traces.get(which), &state.camera))
         };
-        let reports = processed.into_iter().zip(bodies).enumerate().map(report).collect::<PyResult<Vec<_>>>()?;
+        let reports = processed.iter().zip(bodies).enumerate().map(report).collect::<PyResult<Vec<_>>>()?;
         if reports.iter().all(|report| !report.is_answer()) {
             warn_of_unused_bits(py, &array, bits)?;
         }
-        Ok(Report::from_bodies(py, reports)?.with_image(&self.image, bits))
+        Ok((Report::from_bodies(py, reports)?.with_image(&self.image, bits), processed))
     }
 }
 

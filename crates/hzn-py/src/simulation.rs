@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera as Lens;
 use hzn_core::image::Layout;
-use hzn_evaluate::{Answer, Evaluation, pair};
+use hzn_evaluate::{Answer, Evaluation, heads, pair};
 use hzn_files::truth::Truth;
 use hzn_run::results::Results;
 use hzn_run::source::picture::{Picture, Samples};
@@ -213,6 +213,10 @@ pub(crate) fn evaluate<'py>(
             lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
             let recorded = sensor_toml.and_then(|t| hzn_files::sensor::parse(&t, Path::new("sensor.toml")).ok());
             camera = camera.or(recorded.map(|s| s.config.camera));
+            let mut rows = heads::select(rows, None).map_err(errors::config)?;
+            if heads::are_joint(&rows) {
+                heads::name_by_time(&mut rows, &truth);
+            }
             rows
         }
         Err(_) => {

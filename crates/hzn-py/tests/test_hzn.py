@@ -414,3 +414,31 @@ def test_unused_bits_of_an_array_warn(sensor):
     assert sensor.process(words).ok and sensor.process(words, bits=8).ok
     with pytest.warns(UserWarning, match="the largest sample is 200 of 65535"):
         assert not sensor.process(np.full_like(words, 200)).ok
+
+
+def test_a_rig_joins_its_heads(sensor):
+    # The cameras look 22 degrees down on opposite sides, so that the body is along y of the vehicle in both.
+    c, s = np.cos(np.radians(11)), np.sin(np.radians(11))
+    mounts = [[c, -s, 0.0, 0.0], [0.0, 0.0, c, s]]
+    rig = hzn.Rig([sensor, sensor], mounts=mounts, names=["left", "right"])
+    answers = rig.process({"left": limb(), "right": limb()}, altitude_km=400.0)
+    assert list(answers) == ["rig", "left", "right"] and rig.names == ["left", "right"]
+    assert np.array_equal(answers["left"].axis, sensor.process(limb(), altitude_km=400.0).axis)
+    joint = answers["rig"]
+    row = joint.to_dict()
+    assert joint.ok and row["head"] == "rig" and row["heads_used"] == "left right" and row["heads_excluded"] is None
+    # The limb is 7 km lower than the sensor assumes; the two heads see this with opposite signs.
+    assert np.allclose(joint.axis, [0.0, 1.0, 0.0], atol=2e-4) and row["protection_deg"] > 0.0
+
+    alone = rig.process({"right": limb(), "left": None}, altitude_km=400.0)
+    assert alone["rig"].to_dict()["detail"] == "left: no picture" and "left" not in alone
+    _, y, z = alone["right"].axis
+    cos, sin = np.cos(np.radians(22)), np.sin(np.radians(22))
+    assert np.allclose(alone["rig"].axis[1:], [y * cos + z * sin, y * sin - z * cos], atol=1e-12)
+
+    with pytest.raises(hzn.ConfigError, match="no head 'lft'|no head \"lft\"; did you mean left"):
+        rig.process({"lft": limb()})
+    with pytest.raises(hzn.ConfigError, match="mounts: 1 for 2 sensors"):
+        hzn.Rig([sensor, sensor], mounts=mounts[:1])
+    with pytest.raises(hzn.ConfigError, match=r"\[\[head\]\] 2 mount.q_rig_from_camera_wxyz"):
+        hzn.Rig([sensor, sensor], mounts=[mounts[0], [1.0, 1.0, 0.0, 0.0]])

@@ -3,6 +3,7 @@
 //!
 //! [`open`] opens a sequence with its sensor, by the same rules for every program. A [`source`] hands out pictures in
 //! order. The [`engine`] processes them with the sensor on all cores. A [`sink`] takes the results in order.
+//! [`rig`] does the same for several cameras that are one sensor.
 //! [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of their rows. [`overlay`] draws
 //! the result over a picture, and [`explain`] describes in words what happened to it. [`diagnosis`] says what would
 //! make a refused limb the expected one. [`disk`] has the errors of files that cannot be written. [`terminal`] makes
@@ -22,6 +23,7 @@ pub mod explain;
 pub mod open;
 pub mod overlay;
 pub mod results;
+pub mod rig;
 pub mod sink;
 pub mod source;
 pub mod terminal;

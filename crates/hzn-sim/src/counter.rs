@@ -43,6 +43,8 @@ pub enum Stream {
     Trials,
     /// Random part of an encounter with a body, and the error of its range.
     Encounter,
+    /// Weather of the limb.
+    Weather,
 }
 
 /// A sequence of random numbers, read by index.

@@ -12,6 +12,7 @@ use crate::globe::{Globe, RayHit, View};
 use crate::pose::Pose;
 use crate::radiance::{Grid, Radiance, mean_over_globe};
 use crate::texture::{CellCache, CloudField, Clouds};
+use crate::weather::{Weather, WeatherField};
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
 use hzn_files::limited;
@@ -41,6 +42,9 @@ pub struct Infrared {
     /// Cold clouds. Their `brightness` is the brightness of a thick cloud as a fraction of the disc's brightness.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clouds: Option<Clouds>,
+    /// Weather: the height of the limb varies from place to place. Without it, the height depends on the latitude only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weather: Option<Weather>,
     /// Brightness of space.
     pub space: f64,
     /// CSV file with a table of radiances, see [`Radiance::parse`]. The table replaces the curves that the five keys
@@ -62,6 +66,7 @@ impl Default for Infrared {
             half_level_season_km: 4.5,
             scale_km: 4.0,
             clouds: None,
+            weather: None,
             space: 0.03,
             table: None,
             radiance: None,
@@ -181,6 +186,7 @@ pub(crate) struct InfraredPainter {
     view: View,
     table: Arc<Grid>,
     clouds: Option<Arc<CloudField>>,
+    weather: Option<Arc<WeatherField>>,
     space: f32,
     disc: f32,
     pixel_rad: f64,
@@ -201,6 +207,7 @@ impl InfraredPainter {
         Some(Self {
             near: 2.0 * (1.3e5 + 3.0 * limb_m * pixel_rad) / globe.b_m,
             clouds: world.clouds.map(|c| Arc::new(CloudField::new(&c, globe.a_m))),
+            weather: world.weather.map(|weather| Arc::new(WeatherField::new(&weather))),
             space: world.space as f32,
             disc: if world.radiance.is_some() { table.lowest_mean() } else { world.brightness as f32 },
             table: Arc::new(table),
@@ -239,7 +246,7 @@ impl InfraredPainter {
         }
     }
 
-    /// Returns latitude and cloud where a ray meets or passes the globe.
+    /// Returns latitude, weather and cloud where a ray meets or passes the globe.
     fn locate_ground(&self, hit: &RayHit, cache: &mut CellCache) -> GroundPoint<'_> {
         let point = self.view.point(hit);
         let latitude_deg = libm::asin(self.view.normal(&point).z.clamp(-1.0, 1.0)).to_degrees();
@@ -254,14 +261,19 @@ impl InfraredPainter {
             cloud =
                 clouds.sample(&point, footprint_km, cache).map(|(cover, bright)| (cover * visible, bright * self.disc));
         }
-        GroundPoint { painter: self, latitude_deg, cloud }
+        // The disc has the same brightness at any height below the limb.
+        let weather = self.weather.as_ref().filter(|_| hit.miss >= -self.near);
+        let weather_m = weather.map_or(0.0, |field| field.height_m(&(point * self.globe.a_m)));
+        GroundPoint { painter: self, latitude_deg, weather_m, cloud }
     }
 }
 
-/// Latitude and cloud under a ray.
+/// Latitude, weather and cloud under a ray.
 struct GroundPoint<'a> {
     painter: &'a InfraredPainter,
     latitude_deg: f64,
+    /// Height of the limb above that of its latitude, metres.
+    weather_m: f64,
     /// Weight and light of a cloud; `None` under a clear sky.
     cloud: Option<(f32, f32)>,
 }
@@ -269,7 +281,7 @@ struct GroundPoint<'a> {
 impl GroundPoint<'_> {
     /// Returns the brightness of a ray with this tangent height in metres.
     fn brightness(&self, height_m: f64) -> f32 {
-        let clear = self.painter.table.interpolate(height_m * 1e-3, self.latitude_deg);
+        let clear = self.painter.table.interpolate((height_m - self.weather_m) * 1e-3, self.latitude_deg);
         let light = self.cloud.map_or(clear, |(weight, cloud)| clear + weight * (cloud - clear));
         self.painter.space + light * (1.0 - self.painter.space)
     }

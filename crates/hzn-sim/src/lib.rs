@@ -58,6 +58,7 @@ pub mod texture;
 pub mod trajectory;
 pub mod truth;
 pub mod visible;
+mod weather;
 
 pub use detector::{Detector, Tone};
 pub use ellipsoid::{Ellipsoid, EllipsoidLimb, Haze, LimbArc, Reflection, Ring, Surface, Trials};
@@ -75,3 +76,4 @@ pub use scenario::{Scenario, ScenarioError};
 pub use scene::{Band, Disc, Light, Profile, Scene, Sky, World};
 pub use texture::Clouds;
 pub use visible::Visible;
+pub use weather::Weather;

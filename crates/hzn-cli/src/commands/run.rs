@@ -1,15 +1,20 @@
 //! `hzn run`: processes a sequence of pictures and writes the results.
 
+mod args;
+mod rig;
+
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 use hzn_core::config::Orient;
 use hzn_files::{Frames, Sensor};
-use hzn_run::engine::{self, End, Finished, Plan, Turns};
+use hzn_run::engine::{self, End, Finished, Plan};
 use hzn_run::open::Opened;
-use hzn_run::sink::{self, Existing, Output};
+use hzn_run::sink;
 use hzn_run::source::{self, Source, ending};
 use hzn_run::{disk, explain};
+
+pub(super) use args::{Args, cores};
 
 use super::resume;
 use crate::doubts::{MissingPriors, MultiPageFiles, Times};
@@ -17,73 +22,16 @@ use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
-use crate::setup::{self, InputArgs, SensorArgs, stop_flag};
+use crate::setup::{self, stop_flag};
 use crate::{tell, what_fits};
-
-/// Process a sequence of pictures
-///
-/// Pictures are PNG, JPEG, TIFF, PNM or BMP, in a folder, as a pattern, or one by one; or headerless (--raw); or a
-/// video (through ffmpeg on PATH); or an MCAP with an image topic. The pictures of a folder or pattern are sorted by
-/// name, and numbers in names are compared by value (img2 before img10). An MCAP of an earlier run is processed again
-/// with its own sensor, names, times and positions. A picture that cannot be read becomes a row with status
-/// `unreadable`; the run goes on.
-#[derive(Debug, clap::Args)]
-pub(super) struct Args {
-    /// A folder, a pattern in quotes, pictures, a video, or an MCAP
-    #[arg(required = true, value_name = "INPUT")]
-    input: Vec<PathBuf>,
-    #[command(flatten)]
-    sensor: SensorArgs,
-    #[command(flatten)]
-    source: InputArgs,
-    /// Results: .mcap, .csv or .jsonl; without it, CSV on stdout
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
-    /// Replace an output that exists
-    #[arg(long)]
-    force: bool,
-    /// Continue an output after its last finished picture
-    #[arg(long, conflicts_with = "force", requires = "output")]
-    resume: bool,
-    /// Wait for the disk at each flush (every 0.2 s), so that even a power cut loses no finished picture
-    #[arg(long, requires = "output")]
-    durable: bool,
-    /// Leave the pictures out of an MCAP
-    #[arg(long)]
-    no_images: bool,
-    /// Draw the result over every picture, as PNG into this folder
-    #[arg(long, value_name = "DIR")]
-    overlay: Option<PathBuf>,
-    /// Number of threads; without it, all cores
-    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
-    /// Print no progress and no summary
-    #[arg(short, long)]
-    quiet: bool,
-}
-
-impl Args {
-    /// Returns the arguments to process a folder with its own sensor.toml into `output`. An existing output is
-    /// replaced, and no progress is printed.
-    pub(super) fn quiet_run(folder: &Path, output: &Path) -> Self {
-        Self {
-            input: vec![folder.to_owned()],
-            sensor: SensorArgs { sensor: None, altitude_km: None, flight: false },
-            source: InputArgs { frames: None, fps: 1.0, raw: None, topic: None },
-            output: Some(output.to_owned()),
-            force: true,
-            resume: false,
-            durable: false,
-            no_images: false,
-            overlay: None,
-            jobs: None,
-            quiet: true,
-        }
-    }
-}
 
 pub(super) fn run(args: &Args) -> Outcome {
     check_arguments(args)?;
+    if let [one] = args.input.as_slice()
+        && ending(one) == "toml"
+    {
+        return rig::run(args, one);
+    }
     let opened = setup::open(&args.input, &args.sensor, &args.source)?;
     opened.check_size()?;
     opened.check_altitude()?;
@@ -97,15 +45,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         prepare_overlays(drawn, args.force || args.resume)?;
     }
     let path = args.output.as_deref();
-    // A recording stores the pictures as they were processed, that is, already turned and inverted.
-    let recorded = match sensor.config.input.orient {
-        Orient::AsStored => sensor.text.clone(),
-        _ => source::with_key(&sensor.text, "orient", "as-stored"),
-    };
-    let recorded = if sensor.config.input.invert { source::with_key(&recorded, "invert", false) } else { recorded };
-    let plan = plan(args, sensor, frames);
-    let settings = sink::Settings { config: &plan.config, sensor_toml: &recorded, durable: args.durable };
-    let (mut output, stored) = sink::open(path, existing(args), settings)?;
+    let recorded = recorded(&sensor);
+    let plan = args.plan(sensor, frames);
+    let settings = sink::Settings { config: &plan.config, sensor_toml: &recorded, durable: args.durable, heads: &[] };
+    let (mut output, stored) = sink::open(path, args.existing(), settings)?;
     let plan = Plan { last: stored.last_answers.clone(), ..plan };
     if !args.quiet {
         tell_notes(&notes, stored.frames, plan.overlay.is_some());
@@ -140,6 +83,16 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let missed = watch.progress.any_unprocessed() || lost.is_some() || watch.multi_page.files > 0;
     Ok(if missed { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// Returns the sensor.toml that a recording stores. Its pictures are stored as they were processed, that is, already
+/// turned and inverted.
+fn recorded(sensor: &Sensor) -> String {
+    let text = match sensor.config.input.orient {
+        Orient::AsStored => sensor.text.clone(),
+        _ => source::with_key(&sensor.text, "orient", "as-stored"),
+    };
+    if sensor.config.input.invert { source::with_key(&text, "invert", false) } else { text }
 }
 
 /// Prints the notes of the pictures, and that a continued run does not draw the pictures of the earlier one.
@@ -180,33 +133,6 @@ fn prepare_overlays(drawn: &Path, may_have_files: bool) -> Result<(), Stop> {
         return Err(usage(format!("--overlay {}: {what}", drawn.display())));
     }
     Ok(())
-}
-
-fn existing(args: &Args) -> Existing {
-    match (args.force, args.resume) {
-        (true, _) => Existing::Replace,
-        (_, true) => Existing::Resume,
-        _ => Existing::Refuse,
-    }
-}
-
-fn plan(args: &Args, sensor: Sensor, frames: Option<Frames>) -> Plan {
-    let trace = Output::wants_trace(args.output.as_deref());
-    // If the threshold or a gate comes from the previous picture, pictures are processed one after another.
-    let threads = if sensor.config.tracks() { 1 } else { args.jobs.map_or_else(cores, usize::from) };
-    Plan {
-        config: sensor.config,
-        flight: args.sensor.flight,
-        threads,
-        frames,
-        fps: args.source.fps,
-        trace,
-        keep_traces: false,
-        keep_picture: trace && !args.no_images,
-        overlay: args.overlay.clone(),
-        last: Vec::new(),
-        turns: Turns::default(),
-    }
 }
 
 /// Counts and messages while the run goes on.
@@ -322,10 +248,6 @@ fn explain_command(args: &Args, source: &dyn Source, frame: u64) -> String {
         words.push("--flight".to_owned());
     }
     words.join(" ")
-}
-
-pub(super) fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, Into::into)
 }
 
 fn warn_of_missing_pictures(frames: &Frames, folder: &Path) {

@@ -20,11 +20,12 @@ use crate::tell::{self, one_line};
 ///
 /// Writes pictures, frames.csv (the prior of each picture), truth.csv, scene.toml and sensor.toml, and imu.csv and
 /// gnss.csv if the scene has these instruments; vehicle.csv then has the true state of the vehicle. A scene with
-/// several cameras has a folder for each of them. The limb height and noise model in sensor.toml are measured on other
-/// pictures of the scene; for a planet or moon (`[world.ellipsoid]`) the limb height is the scene's own.
+/// several cameras has a folder for each of them; if they are a rig, rig.toml, frames.csv and truth.csv of the vehicle
+/// are next to the folders. The limb height and noise model in sensor.toml are measured on other pictures of the scene;
+/// for a planet or moon (`[world.ellipsoid]`) the limb height is the scene's own.
 ///
-/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble, atek,
-/// jupiter, enceladus, saturn, geo. `hzn simulate SCENE --show` prints one; change it and give it as a file.
+/// Built-in scenes: rocket, rocket-clean, leo-infrared, horace, horace-wide, full-disc, sun-moon, tumble, atek, ring,
+/// pair, jupiter, enceladus, saturn, geo. `hzn simulate SCENE --show` prints one; change it and give it as a file.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A built-in scene, or a scene.toml
@@ -84,7 +85,6 @@ pub(super) fn run(args: &Args) -> Outcome {
     read.extend(scenario.files_mut().into_iter().map(|(_, file)| from.join(file)));
     let files = files(&mut scenario, from)?;
     let text = scenario.to_text().map_err(failed)?;
-    let scene_toml = folder.join("scene.toml");
     check_folder(args, &folder, &text, &files)?;
     // All errors of the scene are reported before anything is written.
     let mut cameras = Vec::new();
@@ -95,7 +95,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     disk::refuse_inputs(&read, &written(args, &folder, &cameras, &files))?;
     std::fs::create_dir_all(&folder).map_err(|e| disk::cannot_write(&folder, &e))?;
-    write(&scene_toml, &text)?;
+    write(&folder.join("scene.toml"), &text)?;
     for folder in cameras.iter().map(|one| &one.folder).chain([&folder]) {
         std::fs::create_dir_all(folder).map_err(|e| disk::cannot_write(folder, &e))?;
         files.iter().try_for_each(|(file, bytes)| write(&folder.join(file), bytes))?;
@@ -105,6 +105,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if !(args.resume && sensors_exist) {
         sensors(&cameras, name, args)?;
     }
+    rig(&scenario, &cameras, &folder)?;
     let stop = stop_flag();
     for one in &cameras {
         if !args.resume {
@@ -116,14 +117,15 @@ pub(super) fn run(args: &Args) -> Outcome {
         }
     }
     cameras.iter().try_for_each(Sequence::summary)?;
-    next(&cameras)?;
+    next(&cameras, scenario.rig.map(|_| folder.as_path()))?;
     Ok(Exit::Done)
 }
 
 /// Returns every file that is written or removed.
 fn written(args: &Args, folder: &Path, cameras: &[Sequence], files: &[(String, Vec<u8>)]) -> Vec<PathBuf> {
     let copies = || ["scene.toml"].into_iter().chain(files.iter().map(|(name, _)| name.as_str()));
-    let mut all: Vec<PathBuf> = ["imu.csv", "gnss.csv", "vehicle.csv"].map(|name| folder.join(name)).into();
+    let of_vehicle = ["imu.csv", "gnss.csv", "vehicle.csv", "rig.toml", "frames.csv", "truth.csv"];
+    let mut all: Vec<PathBuf> = of_vehicle.map(|name| folder.join(name)).into();
     for one in cameras.iter().map(|one| &one.folder).map(PathBuf::as_path).chain([folder]) {
         // To resume, these must be the files of the scene already.
         if !(args.resume && one == folder) {
@@ -263,6 +265,22 @@ fn sensor(scenario: &Scenario, flight: &Flight, fits: Option<&[Fit]>) -> Result<
     Ok(format!("# The sensor of the simulated scene {}.\n{how}preset = \"hzn\"\n\n{table}", scenario.name))
 }
 
+/// Writes rig.toml, and frames.csv and truth.csv of the vehicle, if the cameras are a rig.
+fn rig(scenario: &Scenario, cameras: &[Sequence], folder: &Path) -> Result<(), Stop> {
+    let Some(rig) = scenario.rig_file() else { return Ok(()) };
+    let text =
+        format!("# The rig of the simulated scene {}.\n{}", scenario.name, toml::to_string(&rig).map_err(failed)?);
+    write(&folder.join("rig.toml"), text)?;
+    let flights: Vec<Flight> = cameras.iter().map(|one| one.flight.clone()).collect();
+    let (known, truth) = scenario.vehicle_tables(&flights).map_err(failed)?;
+    let mut rows = table(folder, "frames.csv")?;
+    known.iter().try_for_each(|row| rows.serialize(row)).map_err(failed)?;
+    rows.flush()?;
+    let mut rows = table(folder, "truth.csv")?;
+    truth.iter().try_for_each(|row| rows.serialize(row)).map_err(failed)?;
+    Ok(rows.flush()?)
+}
+
 /// Makes a table in a folder.
 fn table(folder: &Path, name: &str) -> Result<csv::Writer<std::fs::File>, Stop> {
     csv::Writer::from_path(folder.join(name)).map_err(failed)
@@ -362,14 +380,26 @@ impl Sequence {
     }
 }
 
-/// Prints the commands that come next.
-fn next(cameras: &[Sequence]) -> Result<(), Stop> {
+/// Prints the commands that come next; for a rig, those for its folder.
+fn next(cameras: &[Sequence], rig: Option<&Path>) -> Result<(), Stop> {
+    if let Some(folder) = rig {
+        return next_of_rig(folder);
+    }
     tell::result("\n")?;
     for (i, one) in cameras.iter().enumerate() {
         let shown = one_line(one.folder.display());
         let begin = if i == 0 { "Next:  " } else { "       " };
         tell::result(format_args!("{begin}hzn run {shown} -o {shown}.csv\n"))?;
     }
+    Ok(())
+}
+
+/// Prints the commands that come next for a rig.
+fn next_of_rig(folder: &Path) -> Result<(), Stop> {
+    let shown = one_line(folder.display());
+    tell::result(format_args!(
+        "\nNext:  hzn run {shown}/rig.toml -o {shown}.csv\n       hzn evaluate {shown}.csv --truth {shown}\n"
+    ))?;
     Ok(())
 }
 

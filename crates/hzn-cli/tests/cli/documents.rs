@@ -22,6 +22,9 @@ const ONLY_PARSED: &[(&str, &str)] = &[
     ("hzn run some", "needs a part of the same"),
     ("hzn run atek", "needs the flight of minutes before it"),
     ("hzn simulate atek", "takes minutes"),
+    ("hzn simulate ring", "takes a minute; rig.rs runs a smaller one"),
+    ("hzn run ring", "needs the flight before it; rig.rs runs one"),
+    ("hzn evaluate ring", "needs the same"),
     ("hzn sensitivity visibility", "sensitivity.rs runs it"),
     ("hzn sensitivity spherical-earth", "sensitivity.rs runs it"),
 ];

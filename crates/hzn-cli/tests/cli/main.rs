@@ -25,6 +25,7 @@ mod power_cut;
 mod rerun;
 mod resume;
 mod rewritten;
+mod rig;
 mod run;
 mod sensitivity;
 mod simulate;

@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::Prior;
 use hzn_core::body::{self, PriorError};
-use hzn_core::frames::{Rotation, UnitVec3};
+use hzn_core::frames::{Cam, Rotation, UnitVec3, Vehicle};
 use hzn_core::real::Real;
 use serde::{Deserialize, Serialize};
 
 use crate::Problem;
+use crate::rig::turn_after;
 
 /// One row: the prior of one picture. Recordings store it as JSON, without what their rows have already: name, line and
 /// time.
@@ -123,6 +124,33 @@ impl FrameData {
         row.check_attitude().map(|()| Cow::Owned(row))
     }
 
+    /// Returns the row of a vehicle, whose attitude and directions are in the axes of the vehicle, as the row of a
+    /// camera on it.
+    #[must_use]
+    pub fn seen_by_camera(&self, q_vehicle_from_camera_wxyz: [f64; 4]) -> Self {
+        let mount = Rotation::<Cam, Vehicle, f64>::assume_from_quaternion(q_vehicle_from_camera_wxyz);
+        // The length of a vector is kept: a rate has one.
+        let into_camera = |v: [f64; 3]| {
+            let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let turned = mount.as_ref().zip(UnitVec3::try_new(v)).map(|(mount, v)| mount.inverse().apply(&v).xyz());
+            turned.map_or([0.0; 3], |v| v.map(|x| x * length))
+        };
+        let attitude = |q: Option<[f64; 4]>| q.map(|q| turn_after(q, q_vehicle_from_camera_wxyz));
+        let body = |other: &Orientation| Orientation {
+            body: other.body.clone(),
+            q_fixed_from_camera_wxyz: attitude(other.q_fixed_from_camera_wxyz),
+            pole_camera: other.pole_camera.map(into_camera),
+        };
+        Self {
+            q_fixed_from_camera_wxyz: attitude(self.q_fixed_from_camera_wxyz),
+            sun_camera: self.sun_camera.map(into_camera),
+            rate_rad_s: self.rate_rad_s.map(into_camera),
+            pole_camera: self.pole_camera.map(into_camera),
+            other_bodies: self.other_bodies.iter().map(body).collect(),
+            ..self.clone()
+        }
+    }
+
     fn check_attitude(&self) -> Result<(), PriorError> {
         let length = |q: [f64; 4]| q.iter().map(|x| x * x).sum::<f64>().sqrt();
         match self.q_fixed_from_camera_wxyz {
@@ -167,6 +195,35 @@ impl Frames {
     /// Returns the row of the picture with this name.
     pub fn get(&self, file: &str) -> Option<&FrameData> {
         self.by_file.get(plain_name(file)).and_then(|&i| self.rows.get(i))
+    }
+
+    /// Returns the row whose time is nearest to this one, if it is at most `within_s` away. The rows are in the order
+    /// of time, as [`load_vehicle`](super::load_vehicle) requires it.
+    pub fn nearest(&self, time_s: f64, within_s: f64) -> Option<&FrameData> {
+        let at = |i: usize| self.rows.get(i).and_then(|row| Some((row, (row.time_s? - time_s).abs())));
+        let after = self.rows.partition_point(|row| row.time_s.is_some_and(|t| t < time_s));
+        let both = after.checked_sub(1).and_then(at).into_iter().chain(at(after));
+        both.filter(|(_, away_s)| *away_s <= within_s).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(row, _)| row)
+    }
+
+    /// Returns the table of a vehicle as the table of a camera on it, see [`FrameData::seen_by_camera`]. The warnings
+    /// are left out, because they are those of the file.
+    #[must_use]
+    pub fn seen_by_camera(&self, q_vehicle_from_camera_wxyz: [f64; 4]) -> Self {
+        let rows = self.rows.iter().map(|row| row.seen_by_camera(q_vehicle_from_camera_wxyz)).collect();
+        Self { rows, warnings: Vec::new(), path: self.path.clone(), by_file: self.by_file.clone() }
+    }
+
+    /// Returns whether any row has more than the name and the time of a picture.
+    pub fn has_priors(&self) -> bool {
+        let bare = |row: &FrameData| FrameData {
+            file: row.file.clone(),
+            line: row.line,
+            time_s: row.time_s,
+            utc_s: row.utc_s,
+            ..FrameData::default()
+        };
+        self.rows.iter().any(|row| *row != bare(row))
     }
 
     /// Returns whether any picture has a time. The file is then the only clock of the sequence.
@@ -220,5 +277,22 @@ mod tests {
         let read: FrameData = serde_json::from_str(&text).unwrap();
         assert_eq!(read, FrameData { file: String::new(), line: 0, time_s: None, ..row });
         assert_eq!(serde_json::to_string(&FrameData::default()).unwrap(), "{}");
+    }
+
+    #[test]
+    fn a_camera_sees_the_vehicles_directions_in_its_own_axes() {
+        let half = 0.5f64.sqrt();
+        let row = FrameData {
+            altitude_km: Some(500.0),
+            q_fixed_from_camera_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
+            sun_camera: Some([0.0, 1.0, 0.0]),
+            rate_rad_s: Some([0.0, 0.02, 0.0]),
+            ..FrameData::default()
+        };
+        // The camera's x axis is the vehicle's y axis.
+        let seen = row.seen_by_camera([half, 0.0, 0.0, half]);
+        let close = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-15);
+        assert!(close(seen.sun_camera.unwrap(), [1.0, 0.0, 0.0]) && close(seen.rate_rad_s.unwrap(), [0.02, 0.0, 0.0]));
+        assert_eq!((seen.q_fixed_from_camera_wxyz, seen.altitude_km), (Some([half, 0.0, 0.0, half]), Some(500.0)));
     }
 }

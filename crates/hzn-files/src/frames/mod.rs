@@ -20,4 +20,4 @@ mod read;
 
 pub use check::altitude_at_km;
 pub use data::{FrameData, Frames, Orientation};
-pub use read::{COLUMNS, load, parse};
+pub use read::{COLUMNS, load, load_vehicle, parse, parse_vehicle};

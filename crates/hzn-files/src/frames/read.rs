@@ -57,11 +57,23 @@ const MAX_ROWS: usize = 2_000_000;
 /// The file cannot be read, the column `file` is missing, a cell is not a finite number, a vector is incomplete, or a
 /// picture has two rows.
 pub fn load(path: &Path) -> Result<Frames, Problem> {
-    let text = limited::read_text(path, limited::TABLE_BYTES).map_err(|e| match e.kind() {
+    parse(&read_text(path)?, path)
+}
+
+/// Reads the frames.csv of a vehicle with several cameras, as [`load`] does. Its rows belong to times and not to
+/// pictures: attitude and directions are in the axes of the vehicle, and the column `file` is not needed.
+///
+/// # Errors
+/// The errors are those of [`load`]; also a row without a time, or one that is not later than the row before it.
+pub fn load_vehicle(path: &Path) -> Result<Frames, Problem> {
+    parse_vehicle(&read_text(path)?, path)
+}
+
+fn read_text(path: &Path) -> Result<String, Problem> {
+    limited::read_text(path, limited::TABLE_BYTES).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Problem::new(path, "no such file"),
         _ => Problem::new(path, format!("cannot be read: {e}")),
-    })?;
-    parse(&text, path)
+    })
 }
 
 /// Reads a frames.csv as [`load`] does, but from text; `path` is only used in messages.
@@ -69,12 +81,45 @@ pub fn load(path: &Path) -> Result<Frames, Problem> {
 /// # Errors
 /// The errors are those of [`load`].
 pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
+    parse_rows(text, path, Belongs::ToPicture)
+}
+
+/// Reads the frames.csv of a vehicle as [`load_vehicle`] does, but from text; `path` is only used in messages.
+///
+/// # Errors
+/// The errors are those of [`load_vehicle`].
+pub fn parse_vehicle(text: &str, path: &Path) -> Result<Frames, Problem> {
+    let frames = parse_rows(text, path, Belongs::ToTime)?;
+    let mut before: Option<f64> = None;
+    for row in &frames.rows {
+        match (row.time_s, before) {
+            (None, _) => return Err(frames.problem(row, "time_s, utc: empty; a row of a vehicle needs its time")),
+            (Some(time_s), Some(last)) if time_s <= last => {
+                let what = format!("time_s: {time_s} is not later than the row before it; sort the rows by time");
+                return Err(frames.problem(row, what));
+            }
+            (time_s, _) => before = time_s,
+        }
+    }
+    Ok(frames)
+}
+
+/// What a row belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Belongs {
+    /// The picture that `file` names.
+    ToPicture,
+    /// A time of the vehicle. `file` is only used in messages.
+    ToTime,
+}
+
+fn parse_rows(text: &str, path: &Path, belongs: Belongs) -> Result<Frames, Problem> {
     // Spreadsheet programs write a byte-order mark first.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
     let header = reader.headers().map_err(|e| translate_csv_error(&e, path))?.clone();
     let mut frames = Frames::new(path);
-    let columns = Columns::find(&header, path, &mut frames.warnings)?;
+    let columns = Columns::find(&header, path, belongs, &mut frames.warnings)?;
     for record in reader.records() {
         if frames.rows.len() == MAX_ROWS {
             return Err(Problem::new(
@@ -83,9 +128,9 @@ pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
             ));
         }
         let record = record.map_err(|e| translate_csv_error(&e, path))?;
-        let row = Row::new(&record, &columns, path)?;
+        let row = Row::new(&record, &columns, path, belongs)?;
         let data = row.read()?;
-        if let Some(before) = frames.get(&row.file) {
+        if let Some(before) = frames.get(&row.file).filter(|_| belongs == Belongs::ToPicture) {
             return Err(row.problem("file", &format!("is also in line {}; each picture has only one row", before.line)));
         }
         let time_s = data.time_s.or(data.utc_s);
@@ -115,7 +160,12 @@ struct Columns(HashMap<String, usize>);
 
 impl Columns {
     /// Finds the columns by the header. Unknown columns give warnings.
-    fn find(header: &StringRecord, path: &Path, warnings: &mut Vec<Problem>) -> Result<Self, Problem> {
+    fn find(
+        header: &StringRecord,
+        path: &Path,
+        belongs: Belongs,
+        warnings: &mut Vec<Problem>,
+    ) -> Result<Self, Problem> {
         let mut columns = HashMap::new();
         for (i, name) in header.iter().enumerate() {
             let Some(known) = known_column(name) else {
@@ -129,7 +179,14 @@ impl Columns {
                 return Err(Problem::new(path, "this column exists twice").at_line(1).in_field(name));
             }
         }
-        if columns.contains_key("file") { Ok(Self(columns)) } else { Err(without_file_column(header, path)) }
+        match belongs {
+            Belongs::ToPicture if !columns.contains_key("file") => Err(without_file_column(header, path)),
+            Belongs::ToTime if !["time_s", "utc"].iter().any(|name| columns.contains_key(*name)) => {
+                let what = "has neither time_s nor utc; the rows of a vehicle belong to times";
+                Err(Problem::new(path, what).at_line(1))
+            }
+            _ => Ok(Self(columns)),
+        }
     }
 
     /// Returns the cell of a column; `None` if it is empty or the column is missing.
@@ -163,11 +220,11 @@ struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    fn new(record: &'a StringRecord, columns: &'a Columns, path: &'a Path) -> Result<Self, Problem> {
+    fn new(record: &'a StringRecord, columns: &'a Columns, path: &'a Path, belongs: Belongs) -> Result<Self, Problem> {
         let line = record.position().map_or(0, |p| p.line() as usize);
         let file = columns.cell(record, "file").unwrap_or_default().to_owned();
         let row = Self { record, columns, path, line, file };
-        if row.file.is_empty() {
+        if row.file.is_empty() && belongs == Belongs::ToPicture {
             return Err(row.problem("file", "is empty; it must name the picture"));
         }
         Ok(row)
@@ -349,6 +406,22 @@ mod tests {
                 .unwrap_err()
                 .contains("\"400,5\" has a decimal comma; write a point")
         );
+    }
+
+    #[test]
+    fn the_rows_of_a_vehicle_belong_to_times() {
+        let read = |text: &str| parse_vehicle(text, Path::new("frames.csv")).map_err(|e| e.to_string());
+        let f = read("time_s,altitude_km\n1,500\n2,501\n4,503\n").unwrap();
+        let nearest = |time_s: f64| f.nearest(time_s, 0.4).and_then(|row| row.altitude_km);
+        let got = [0.7, 1.4, 1.5, 1.7, 3.0, 4.3, 9.0].map(nearest);
+        assert_eq!(got, [Some(500.0), Some(500.0), None, Some(501.0), None, Some(503.0), None]);
+        assert!(f.has_priors() && !read("file,utc\na,1970-01-01T00:00:02Z\n").unwrap().has_priors());
+        // Pictures of two heads may have the same name.
+        assert_eq!(read("file,time_s\na,1\na,2\n").unwrap().rows.len(), 2);
+        let later = "time_s: 2 is not later than the row before it; sort the rows by time";
+        assert_eq!(read("file,time_s\na,2\nb,2\n").unwrap_err(), format!("frames.csv:3: b: {later}"));
+        assert!(read("file,time_s\na,\n").unwrap_err().ends_with("a row of a vehicle needs its time"));
+        assert!(read("altitude_km\n1\n").unwrap_err().ends_with("the rows of a vehicle belong to times"));
     }
 
     #[test]

@@ -148,7 +148,10 @@ impl Writing {
                 let sensor_toml = toml::to_string(&config).unwrap_or_default();
                 let metadata = [("program".to_owned(), format!("hzn fly {}", env!("CARGO_PKG_VERSION")))].into();
                 let camera = Some(config.camera);
-                Writer::create(path, &Options { sensor_toml, metadata, camera, force: true, durable: true })?
+                Writer::create(
+                    path,
+                    &Options { sensor_toml, metadata, camera, force: true, durable: true, ..Options::default() },
+                )?
             }
         };
         Ok(self.file.insert(file))

@@ -122,8 +122,12 @@ impl Recording {
     /// Makes a recording from the rows of a camera, with the sensor.toml that they were made with, if it is known.
     ///
     /// # Errors
-    /// The mount is not a rotation.
+    /// The mount is not a rotation, or the rows are those of a rig.
     pub fn new(name: String, rows: Vec<Row>, config: Option<&Config>) -> Result<Self, Error> {
+        if rows.iter().any(|row| row.head.is_some()) {
+            let what = "these are results of a rig, whose axes are in several frames; give results of single cameras";
+            return Err(Error::unusable(what));
+        }
         let told = config.and_then(|c| c.mount).map(mount::of_config).transpose();
         let mount = told.map_err(|e| Error::unusable(format!("sensor.toml: [mount] {e}")))?;
         let limb_sigma_km = config.map(|c| {

@@ -25,6 +25,7 @@ from ._hzn import HznError as HznError
 from ._hzn import ImageError as ImageError
 from ._hzn import Recording as Recording
 from ._hzn import Report as Report
+from ._hzn import Rig as Rig
 from ._hzn import Sensor as Sensor
 from ._hzn import SimulatedFrame as SimulatedFrame
 from ._hzn import Simulation as Simulation

@@ -208,6 +208,99 @@ class Camera:
     def __eq__(self, other: object, /) -> bool: ...
 
 @final
+class Rig:
+    """Several cameras (heads) on one vehicle that are one sensor.
+
+    The joint answer needs no altitude and no limb height, because heads that look at different parts of the limb see a
+    wrong height with different signs. Each head is checked by the others.
+
+    Parameters
+    ----------
+    sensors
+        The sensor of each head, one to four.
+    mounts
+        For each head, the rotation from the camera to the vehicle as a unit quaternion (w, x, y, z).
+    names
+        Name of each head, with letters, digits, ``_`` and ``-``; without it, ``head0``, ``head1`` and so on.
+    mount_sigma_deg
+        1-sigma of each mount about each axis, degrees.
+    rig_sigma_deg
+        1-sigma of the attitude of all heads together on the vehicle, degrees.
+    limb_tilt_sigma_km, limb_own_sigma_km, false_alarm, misleading
+        As in ``[rig]`` of rig.toml; without them, its defaults.
+
+    Raises
+    ------
+    ConfigError
+        A mount, a name or another value is refused; the message names the head as in a rig.toml.
+
+    Examples
+    --------
+    >>> rig = hzn.Rig([left, right], mounts=[q_vehicle_from_left, q_vehicle_from_right], names=["left", "right"])
+    >>> answers = rig.process({"left": image_l, "right": image_r}, altitude_km=500.0)
+    >>> answers["rig"].axis_vehicle
+    """
+
+    def __new__(
+        cls,
+        sensors: Sequence[Sensor],
+        *,
+        mounts: Sequence[Sequence[float]],
+        names: Sequence[str] | None = None,
+        mount_sigma_deg: float = 0.0,
+        rig_sigma_deg: float = 0.0,
+        limb_tilt_sigma_km: float | None = None,
+        limb_own_sigma_km: float | None = None,
+        false_alarm: float | None = None,
+        misleading: float | None = None,
+    ) -> Rig: ...
+    @property
+    def names(self) -> list[str]:
+        """Names of the heads."""
+
+    def process(
+        self,
+        images: dict[str, _Image | _Path | None],
+        *,
+        altitude_km: float | None = None,
+        position_km: Sequence[float] | None = None,
+        attitude: Sequence[float] | None = None,
+        attitude_sigma_deg: float | None = None,
+        rate_rad_s: Sequence[float] | None = None,
+        sun: Sequence[float] | None = None,
+        time_s: float | None = None,
+        bits: int | None = None,
+    ) -> dict[str, Report]:
+        """Find the limb in the pictures of one epoch, and join the answers.
+
+        Parameters
+        ----------
+        images
+            The pictures by the name of their head, as for `Sensor.process`. A head without a picture, or with None,
+            costs only itself.
+        altitude_km, position_km, attitude_sigma_deg, time_s, bits
+            As for `Sensor.process`, for all heads.
+        attitude
+            Prior attitude of the vehicle: unit quaternion (w, x, y, z) from the vehicle to the fixed frame of the body.
+        rate_rad_s, sun
+            As for `Sensor.process`, in the axes of the vehicle.
+
+        Returns
+        -------
+        dict
+            The joint answer as ``"rig"``, whose axis and covariance are in the axes of the vehicle, and the report of
+            each head with a picture. `Report.to_dict` has the columns of the check: ``heads_used``,
+            ``heads_excluded``, ``separation_deg``, ``protection_deg``. If the heads contradict each other, the status
+            is ``rejected`` and `Report.detail` begins with ``inconsistent``.
+
+        Raises
+        ------
+        ImageError
+            A picture has another dtype, shape or size than that of its head's camera, or cannot be read.
+        ConfigError
+            The rig has no head of this name, or an altitude, position or attitude is impossible.
+        """
+
 class Sensor:
     """A horizon sensor.
 

@@ -10,7 +10,7 @@ mod text;
 use std::path::{Path, PathBuf};
 
 use hzn_core::Config;
-use hzn_mcap::{Contents, Options, Reader, part_path};
+use hzn_mcap::{Contents, FrameRecord, Options, Reader, part_path};
 
 pub use record::{altitude_km, records, rows};
 pub use stored::StoredResults;
@@ -79,6 +79,8 @@ pub struct Settings<'a> {
     pub sensor_toml: &'a str,
     /// Whether every flush waits until the results are on the disk, so that a power cut cannot lose them.
     pub durable: bool,
+    /// With a rig, its heads: name, configuration and sensor.toml of each. `sensor_toml` is then the text of rig.toml.
+    pub heads: &'a [(String, &'a Config, String)],
 }
 
 /// Opens an output; without a path, CSV on stdout. Also returns the results that it contains already.
@@ -160,9 +162,17 @@ fn text_form(target: Target) -> Option<Form> {
 }
 
 fn options(settings: Settings<'_>, force: bool) -> Options {
-    let Settings { config, sensor_toml, durable } = settings;
+    let Settings { config, sensor_toml, durable, heads } = settings;
     let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
-    Options { sensor_toml: sensor_toml.to_owned(), metadata, camera: Some(config.camera.clone()), force, durable }
+    let mut options = Options { metadata, force, durable, ..Options::default() };
+    if heads.is_empty() {
+        (options.sensor_toml, options.camera) = (sensor_toml.to_owned(), Some(config.camera.clone()));
+    } else {
+        options.files.push(("rig.toml".to_owned(), sensor_toml.to_owned()));
+        options.files.extend(heads.iter().map(|(name, _, text)| (format!("{name}/sensor.toml"), text.clone())));
+        options.heads = heads.iter().map(|(name, config, _)| (name.clone(), config.camera.clone())).collect();
+    }
+    options
 }
 
 fn resume(path: &Path, part: &Path, target: Target, settings: Settings<'_>) -> Result<(Kind, StoredResults), Error> {
@@ -244,6 +254,23 @@ impl Output {
         drop(self.kind);
         if let Some(path) = self.path {
             let _ = std::fs::remove_file(part_path(&path));
+        }
+    }
+
+    /// Appends the records of an epoch of a rig: those of the joint answer, and those of each head.
+    ///
+    /// # Errors
+    /// The disk fails.
+    pub fn write_heads(&mut self, heads: &[Vec<FrameRecord>]) -> Result<(), Error> {
+        match &mut self.kind {
+            Kind::Mcap(writer) => {
+                let heads: Vec<&[FrameRecord]> = heads.iter().map(Vec::as_slice).collect();
+                writer.write_heads(&heads).map_err(Error::failed)
+            }
+            Kind::Text(text) => {
+                let written = heads.iter().flatten().try_for_each(|record| text.write(&record.row));
+                written.map_err(|e| text.write_error(e))
+            }
         }
     }
 

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{Part, Scenario, ScenarioError};
 use crate::counter::{Counter, Stream};
 use crate::flight::Stamp;
+use crate::pose::Pose;
 use crate::trajectory::Path;
 
 /// `[clock]`: the clock of a camera. A picture that is taken at t gets the time stamp t + offset + latency + jitter.
@@ -29,6 +30,35 @@ impl Clock {
     }
 }
 
+/// `[fault]`: what goes wrong with a camera in flight. sensor.toml and rig.toml do not know of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Fault {
+    /// Time from which the camera repeats its last picture before it, seconds; the truth of such a picture is that of
+    /// the repeated one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frozen_from_s: Option<f64>,
+    /// Rotation of the mount about the camera's axes, degrees.
+    pub turn_deg: [f64; 3],
+    /// Time from which the mount is turned, seconds.
+    pub turn_from_s: f64,
+    /// Time by which the pictures are taken later than those of the other cameras, seconds; the time stamps say so.
+    pub late_s: f64,
+}
+
+impl Fault {
+    /// Returns whether the camera has no fault.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Returns the pose of the camera at a time, with its turned mount.
+    pub(super) fn turn(&self, pose: &Pose, time_s: f64) -> Pose {
+        let is_turned = time_s >= self.turn_from_s && self.turn_deg != [0.0; 3];
+        if is_turned { pose.disturbed(self.turn_deg.map(f64::to_radians)) } else { *pose }
+    }
+}
+
 /// `[[cameras]]`: one of several cameras on a vehicle. Lens, bodies and times are those of the scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -43,6 +73,9 @@ pub struct CameraOnVehicle {
     /// The clock of the camera.
     #[serde(default, skip_serializing_if = "Clock::is_right")]
     pub clock: Clock,
+    /// Faults of the camera.
+    #[serde(default, skip_serializing_if = "Fault::is_none")]
+    pub fault: Fault,
     /// Parts of the vehicle in the pictures of the camera.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub vehicle: Vec<Part>,
@@ -60,6 +93,8 @@ impl Scenario {
             attitude_mount: self.pointed_mount(),
             mount_error_deg: camera.mount_error_deg,
             clock: camera.clock,
+            fault: camera.fault,
+            rig: None,
             vehicle: camera.vehicle.clone(),
             camera_number: number,
             cameras: Vec::new(),
@@ -124,8 +159,11 @@ impl Scenario {
         if self.cameras.is_empty() {
             return Ok(());
         }
-        if self.mount.is_some() || self.mount_error_deg != 0.0 || !self.clock.is_right() || !self.vehicle.is_empty() {
-            let what = "replaces mount, mount_error_deg, clock and vehicle of the scene: give them for each camera";
+        let own =
+            self.mount.is_some() || self.mount_error_deg != 0.0 || !self.clock.is_right() || !self.fault.is_none();
+        if own || !self.vehicle.is_empty() {
+            let what =
+                "replaces mount, mount_error_deg, clock, fault and vehicle of the scene: give them for each camera";
             return Err(ScenarioError::new("[[cameras]]", what));
         }
         for (i, camera) in self.cameras.iter().enumerate() {

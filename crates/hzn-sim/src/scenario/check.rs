@@ -73,6 +73,7 @@ impl Scenario {
         }
         self.check_ellipsoid()?;
         self.check_cameras()?;
+        self.check_rig()?;
         self.limits().into_iter().try_for_each(Limit::check)?;
         if c.format == Format::Jpeg && self.detector.bits != 8 {
             return refuse(
@@ -124,6 +125,14 @@ impl Scenario {
             Limit::new("mount_error_deg", self.mount_error_deg, [0.0, 45.0]),
             Limit::new("[clock] offset_s", self.clock.offset_s, [-1e6, 1e6]),
             Limit::new("[clock] latency_s", self.clock.latency_s, [0.0, 1e3]),
+            Limit::new(
+                "[fault] turn_deg",
+                self.fault.turn_deg.iter().fold(0.0, |most, x| x.abs().max(most)),
+                [0.0, 180.0],
+            ),
+            Limit::new("[fault] turn_from_s", self.fault.turn_from_s, [-1e7, 1e7]),
+            Limit::new("[fault] frozen_from_s", self.fault.frozen_from_s.unwrap_or_default(), [-1e7, 1e7]),
+            Limit::new("[fault] late_s", self.fault.late_s, [-1e3, 1e3]),
             Limit::new("[clock] jitter_s", self.clock.jitter_s, [0.0, 1e3]),
             Limit::new("[known] position_sigma_km", known.position_sigma_km, [0.0, UNLIMITED]),
             Limit::new("[known] range_sigma_km", known.range_sigma_km.unwrap_or(1.0), [ABOVE_ZERO, UNLIMITED]),
@@ -171,6 +180,10 @@ fn infrared_limits(world: &Infrared) -> Vec<Limit> {
         limit("space", world.space, [0.0, 0.99]),
     ];
     all.extend(world.clouds.iter().flat_map(|clouds| cloud_limits("[world] infrared.clouds", clouds)));
+    if let Some(weather) = &world.weather {
+        all.push(limit("weather.sigma_km", weather.sigma_km, [0.0, 50.0]));
+        all.push(limit("weather.length_km", weather.length_km, [10.0, 1e5]));
+    }
     all
 }
 

@@ -74,7 +74,20 @@ impl Scenario {
     /// # Errors
     /// Fails if a value is out of its limits, if the camera is inside the Earth, or if no picture shows the body.
     pub fn flight(&self) -> Result<Flight, ScenarioError> {
-        self.flight_with_times(&self.times_s())
+        let times_s: Vec<f64> = self.times_s().iter().map(|time_s| time_s + self.fault.late_s).collect();
+        let flight = self.flight_with_times(&times_s)?;
+        Ok(self.freeze(flight))
+    }
+
+    /// Returns the flight of a camera that repeats a picture, see [`Fault`](super::Fault).
+    fn freeze(&self, mut flight: Flight) -> Flight {
+        let Some(from_s) = self.fault.frozen_from_s else { return flight };
+        let first = flight.frames.partition_point(|frame| frame.time_s < from_s);
+        let (before, after) = flight.frames.split_at_mut(first);
+        if let Some(last) = before.last() {
+            after.iter_mut().for_each(|frame| frame.scene = last.scene.clone());
+        }
+        flight
     }
 
     /// Returns [`Scenario::flight`] with pictures at these times instead of the times of the capture. Trajectory and
@@ -131,7 +144,7 @@ impl Scenario {
     }
 
     fn scene(&self, path: &Path, index: usize, time_s: f64) -> Result<Scene, ScenarioError> {
-        let pose = path.camera(time_s);
+        let pose = self.fault.turn(&path.camera(time_s), time_s);
         let unix_s = path.unix_s(time_s);
         let mut scene = Scene::new(self.camera.clone(), pose);
         // The camera flies around the Earth for every body that it looks for.
@@ -148,6 +161,9 @@ impl Scenario {
             World::Infrared(world) => {
                 if let Some(clouds) = &mut world.clouds {
                     clouds.seed = clouds.seed.wrapping_add(self.seed);
+                }
+                if let Some(weather) = &mut world.weather {
+                    weather.seed = weather.seed.wrapping_add(self.seed);
                 }
                 *world = world.with_season(unix_s);
                 scene.limb_height_by_latitude_km = world.half_level_by_latitude_km();

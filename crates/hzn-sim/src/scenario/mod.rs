@@ -11,8 +11,9 @@ mod file;
 mod fly;
 mod noise;
 mod planet;
+mod rig;
 
-pub use cameras::{CameraOnVehicle, Clock};
+pub use cameras::{CameraOnVehicle, Clock, Fault};
 pub use exposure::Exposure;
 pub use file::{load, parse, refused, source};
 pub use noise::{FIT_PICTURES, Fit, median_rms_px};
@@ -24,6 +25,7 @@ use hzn_core::body::{self, Kind};
 use hzn_core::camera;
 use hzn_core::config::Mount;
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
+use hzn_files::rig::Common;
 use hzn_files::utc;
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +36,7 @@ use crate::trajectory::instruments::{Gnss, Imu};
 use crate::trajectory::{Attitude, Path, Trajectory};
 
 /// Scenes that come with hzn: name, description, text of the scene.toml.
-pub const BUILTIN: [(&str, &str, &str); 13] = [
+pub const BUILTIN: [(&str, &str, &str); 15] = [
     (
         "rocket",
         "sounding rocket with the Sun, lens ghosts and payload in view, colour JPEG 1920x1080",
@@ -71,6 +73,16 @@ pub const BUILTIN: [(&str, &str, &str); 13] = [
         "atek",
         "the rocket with two cameras that nobody synchronised, inertial unit and receiver, 1920x1080",
         include_str!("builtin/atek.toml"),
+    ),
+    (
+        "ring",
+        "four infrared Earth sensors around one satellite, with a rig.toml, 640x480",
+        include_str!("builtin/ring.toml"),
+    ),
+    (
+        "pair",
+        "two cameras on both sides of the rocket, synchronised, with a rig.toml, 960x540",
+        include_str!("builtin/pair.toml"),
     ),
     (
         "jupiter",
@@ -125,10 +137,16 @@ pub struct Scenario {
     /// Number of the camera on a vehicle with several: random numbers of the picture depend on it.
     #[serde(default, skip_serializing_if = "is_first")]
     pub camera_number: u32,
-    /// The cameras of a vehicle with several; empty for one. Each replaces `name`, `mount`, `mount_error_deg`, `clock`
-    /// and `vehicle`.
+    /// The cameras of a vehicle with several; empty for one. Each replaces `name`, `mount`, `mount_error_deg`,
+    /// `clock`, `fault` and `vehicle`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cameras: Vec<CameraOnVehicle>,
+    /// Faults of the camera.
+    #[serde(default, skip_serializing_if = "Fault::is_none")]
+    pub fault: Fault,
+    /// The cameras are the heads of a rig: `hzn simulate` writes a rig.toml with these keys of its `[rig]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rig: Option<Common>,
     /// Trajectory of the vehicle.
     pub trajectory: Trajectory,
     /// Attitude of the vehicle.

@@ -107,6 +107,10 @@ impl Path {
     }
 
     /// Returns the rate of the vehicle relative to ECEF, in vehicle axes, rad/s.
+    pub fn vehicle_rate_radps(&self, time_s: f64) -> [f64; 3] {
+        self.rate_against_earth_radps(time_s).into()
+    }
+
     fn rate_against_earth_radps(&self, time_s: f64) -> Vector3<f64> {
         let [before, after] = [-RATE_STEP_S, RATE_STEP_S].map(|d| self.fixed_from_vehicle(time_s + d));
         (before.inverse() * after).scaled_axis() / (2.0 * RATE_STEP_S)

@@ -2,7 +2,7 @@
 
 use hzn_core::body::Kind;
 use hzn_core::config::Mount;
-use hzn_sim::scenario::CameraOnVehicle;
+use hzn_sim::scenario::{CameraOnVehicle, Fault};
 use hzn_sim::trajectory::{Attitude, Orbit, Path, Pointing, Table, Towards, Trajectory};
 use hzn_sim::{Look, Pose, Scenario, World, pose::position_m};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -19,6 +19,7 @@ fn camera(name: &str, mount: [f64; 3], mount_error_deg: f64) -> CameraOnVehicle 
         mount: Mount { q_vehicle_from_camera_wxyz: [q.w, q.i, q.j, q.k] },
         mount_error_deg,
         clock: hzn_sim::scenario::Clock::default(),
+        fault: Fault::default(),
         vehicle: Vec::new(),
     }
 }
@@ -148,4 +149,42 @@ fn a_vehicle_with_an_attitude_of_its_own_carries_both_cameras() {
     let mut rocket = Scenario::builtin("atek").unwrap();
     rocket.capture.frames = 5;
     check(&rocket);
+}
+
+#[test]
+fn a_rig_has_tables_of_its_vehicle_and_faults_of_one_camera() {
+    let mut scene = Scenario::builtin("ring").unwrap();
+    scene.capture.frames = 4;
+    let file = scene.rig_file().unwrap();
+    let names: Vec<&str> = file.heads.iter().map(|head| head.name.as_str()).collect();
+    assert_eq!(names, ["front", "right", "back", "left"]);
+    let flights = |scene: &Scenario| scene.by_camera().iter().map(|one| one.flight().unwrap()).collect::<Vec<_>>();
+    let good = flights(&scene);
+    let (known, truth) = scene.vehicle_tables(&good).unwrap();
+    assert_eq!((known.len(), truth.len()), (4, 4));
+    for (row, flight) in truth.iter().zip(&good[0].frames) {
+        // The vehicle's z axis points down, but for its tilt of at most 2 and 3 degrees.
+        assert!(row.axis_z > 0.995 && row.has_limb(), "{row:?}");
+        // A direction in the vehicle is the one in the camera, turned by the mount.
+        let seen = flight.scene.truth("", 0.0).unwrap();
+        let mount = rotation(file.heads[0].mount.unwrap().q_rig_from_camera_wxyz);
+        let turned = mount * Vector3::new(seen.axis_x, seen.axis_y, seen.axis_z);
+        assert!((turned - Vector3::new(row.axis_x, row.axis_y, row.axis_z)).norm() < 1e-7);
+    }
+    scene.cameras[1].fault = Fault { frozen_from_s: Some(2000.0), ..Fault::default() };
+    scene.cameras[2].fault = Fault { turn_deg: [0.5, 0.0, 0.0], turn_from_s: 2000.0, ..Fault::default() };
+    scene.cameras[3].fault = Fault { late_s: 0.5, ..Fault::default() };
+    let wrong = flights(&scene);
+    // Pictures are taken at 0, 1890, 3780 and 5670 s.
+    assert_eq!(wrong[0], good[0]);
+    assert_eq!(wrong[1].frames[1].scene, good[1].frames[1].scene);
+    assert!(wrong[1].frames[2..].iter().all(|frame| frame.scene == good[1].frames[1].scene));
+    let turn_deg = |n: usize| {
+        let q = |flights: &[hzn_sim::Flight]| rotation(flights[2].frames[n].scene.pose.q_fixed_from_camera_wxyz);
+        q(&wrong).angle_to(&q(&good)).to_degrees()
+    };
+    assert!(turn_deg(1) < 1e-9 && (turn_deg(2) - 0.5).abs() < 1e-9);
+    assert_eq!(wrong[3].frames[1].time_s, good[3].frames[1].time_s + 0.5);
+    scene.cameras.clear();
+    assert!(scene.check().unwrap_err().to_string().starts_with("[rig]: [[cameras]]: the file has 0 of them"));
 }

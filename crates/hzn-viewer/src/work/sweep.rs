@@ -130,7 +130,7 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
         turns: Turns::default(),
     };
     let mut source = SequenceSource::new(sequence)?;
-    let settings = sink::Settings { config: &config, sensor_toml: &sensor_toml, durable: false };
+    let settings = sink::Settings { config: &config, sensor_toml: &sensor_toml, durable: false, heads: &[] };
     let mut file = match &output {
         Some(path) => {
             let opened = sink::open(Some(path), Existing::Replace, settings);

@@ -8,7 +8,7 @@ mod worst;
 use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera;
-use hzn_evaluate::{Answer, Evaluation, pair};
+use hzn_evaluate::{Answer, Evaluation, heads, pair};
 use hzn_files::truth::Truth;
 use hzn_mcap::Row;
 use hzn_run::disk;
@@ -25,6 +25,9 @@ use report::Report;
 /// Every picture counts. A picture with a limb in view but without an answer is missed; an answer without a limb in
 /// view is false. The report goes to stdout; -o writes it as JSON with every picture, or as one HTML page with plots
 /// and the worst pictures. Angles are in degrees.
+///
+/// Of the results of a rig, the joint answers are compared with the truth of the vehicle; --head compares the rows of
+/// one head with the truth in its folder.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The output of `hzn run`: .mcap, .csv or .jsonl
@@ -35,6 +38,9 @@ pub(super) struct Args {
     /// The sensor.toml, for the length of limb in view; without it, the one in the MCAP or next to the truth
     #[arg(short, long, value_name = "FILE")]
     sensor: Option<PathBuf>,
+    /// Of the results of a rig, the head that is compared; without it, the joint answer
+    #[arg(long, value_name = "NAME")]
+    head: Option<String>,
     /// Also write the report: .json or .html; may be given twice
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
@@ -65,15 +71,22 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(lost) = lost.as_ref().filter(|_| rows.is_empty()) {
         return Err(unreadable(lost));
     }
+    let mut rows = heads::select(rows, args.head.as_deref()).map_err(usage)?;
+    let are_joint = heads::are_joint(&rows);
+    if are_joint {
+        heads::name_by_time(&mut rows, &truth);
+    }
     let sensor = sensor(args.sensor.as_deref(), sensor_toml.as_deref(), folder)?;
-    let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok());
-    if camera.is_none() {
+    let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok()).filter(|_| !are_joint);
+    if camera.is_none() && !are_joint {
         tell::line("note: no sensor.toml is available (--sensor): the length of limb in view is left out");
     }
     let answers: Vec<Answer> = rows.iter().map(Answer::from).collect();
     let cases = pair(&answers, &truth, camera.as_ref())
         .map_err(|e| usage(format!("{} does not match {}: {e}", truth_path.display(), args.results.display())))?;
-    warn_of_other_times(&rows, &truth);
+    if !are_joint {
+        warn_of_other_times(&rows, &truth);
+    }
     let report = Report {
         results: args.results.display().to_string(),
         truth: truth_path.display().to_string(),

@@ -20,8 +20,7 @@ pub fn options() -> Options {
         sensor_toml: SENSOR.into(),
         metadata: BTreeMap::from([("hzn_version".to_owned(), "0.0.0".to_owned())]),
         camera: Some(camera::Config::ideal(camera::Model::Pinhole, 640, 480, 400.0)),
-        force: false,
-        durable: false,
+        ..Options::default()
     }
 }
 

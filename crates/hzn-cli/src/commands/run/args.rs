@@ -1,0 +1,108 @@
+//! The arguments of `hzn run`.
+
+use std::path::{Path, PathBuf};
+
+use hzn_files::{Frames, Sensor};
+use hzn_run::engine::{Plan, Turns};
+use hzn_run::sink::{Existing, Output};
+
+use crate::setup::{InputArgs, SensorArgs};
+
+/// Process a sequence of pictures
+///
+/// Pictures are PNG, JPEG, TIFF, PNM or BMP, in a folder, as a pattern, or one by one; or headerless (--raw); or a
+/// video (through ffmpeg on PATH); or an MCAP with an image topic. The pictures of a folder or pattern are sorted by
+/// name, and numbers in names are compared by value (img2 before img10). An MCAP of an earlier run is processed again
+/// with its own sensor, names, times and positions. A picture that cannot be read becomes a row with status
+/// `unreadable`; the run goes on.
+///
+/// A rig.toml names several cameras that are one sensor: each picture has the row of its camera, and each epoch a row
+/// with the joint answer.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// A folder, a pattern in quotes, pictures, a video, an MCAP, or a rig.toml
+    #[arg(required = true, value_name = "INPUT")]
+    pub(super) input: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) sensor: SensorArgs,
+    #[command(flatten)]
+    pub(super) source: InputArgs,
+    /// Results: .mcap, .csv or .jsonl; without it, CSV on stdout
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
+    /// Replace an output that exists
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Continue an output after its last finished picture
+    #[arg(long, conflicts_with = "force", requires = "output")]
+    pub(super) resume: bool,
+    /// Wait for the disk at each flush (every 0.2 s), so that even a power cut loses no finished picture
+    #[arg(long, requires = "output")]
+    pub(super) durable: bool,
+    /// Leave the pictures out of an MCAP
+    #[arg(long)]
+    pub(super) no_images: bool,
+    /// Draw the result over every picture, as PNG into this folder
+    #[arg(long, value_name = "DIR")]
+    pub(super) overlay: Option<PathBuf>,
+    /// Number of threads; without it, all cores
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(super) jobs: Option<u16>,
+    /// Print no progress and no summary
+    #[arg(short, long)]
+    pub(super) quiet: bool,
+}
+
+impl Args {
+    /// Returns the arguments to process a folder with its own sensor.toml into `output`. An existing output is
+    /// replaced, and no progress is printed.
+    pub(crate) fn quiet_run(folder: &Path, output: &Path) -> Self {
+        Self {
+            input: vec![folder.to_owned()],
+            sensor: SensorArgs { sensor: None, altitude_km: None, flight: false },
+            source: InputArgs { frames: None, fps: 1.0, raw: None, topic: None },
+            output: Some(output.to_owned()),
+            force: true,
+            resume: false,
+            durable: false,
+            no_images: false,
+            overlay: None,
+            jobs: None,
+            quiet: true,
+        }
+    }
+
+    /// Returns the treatment of an output that exists.
+    pub(super) fn existing(&self) -> Existing {
+        match (self.force, self.resume) {
+            (true, _) => Existing::Replace,
+            (_, true) => Existing::Resume,
+            _ => Existing::Refuse,
+        }
+    }
+
+    /// Returns the settings of the pictures of one camera.
+    pub(super) fn plan(&self, sensor: Sensor, frames: Option<Frames>) -> Plan {
+        let trace = Output::wants_trace(self.output.as_deref());
+        // If the threshold or a gate comes from the previous picture, pictures are processed one after another.
+        let threads = if sensor.config.tracks() { 1 } else { self.jobs.map_or_else(cores, usize::from) };
+        Plan {
+            config: sensor.config,
+            flight: self.sensor.flight,
+            threads,
+            frames,
+            fps: self.source.fps,
+            trace,
+            keep_traces: false,
+            keep_picture: trace && !self.no_images,
+            overlay: self.overlay.clone(),
+            last: Vec::new(),
+            turns: Turns::default(),
+        }
+    }
+}
+
+/// Returns the number of threads without `--jobs`.
+pub(crate) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, Into::into)
+}

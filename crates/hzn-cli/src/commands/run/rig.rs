@@ -1,0 +1,135 @@
+//! `hzn run rig.toml`: processes the pictures of several cameras that are one sensor.
+
+use std::path::Path;
+
+use hzn_run::engine::End;
+use hzn_run::rig::{self, Epochs, FinishedEpoch, HeadPlan, Opened, Plan, Request};
+use hzn_run::sink::{self, Output};
+use hzn_run::{disk, explain};
+
+use super::args::Args;
+use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::progress::{Counts, Progress, count_text};
+use crate::setup::stop_flag;
+use crate::tell;
+
+pub(super) fn run(args: &Args, path: &Path) -> Outcome {
+    check(args)?;
+    let opened = rig::open(&Request {
+        rig: path.to_owned(),
+        frames: args.source.frames.clone(),
+        raw: args.source.raw,
+        altitude_km: args.sensor.altitude_km,
+        flight: args.sensor.flight,
+    })?;
+    opened.warnings.iter().for_each(tell::warning);
+    disk::refuse_inputs(&opened.files, args.output.as_slice())?;
+    if !args.quiet {
+        opened.notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
+    }
+    let plan = plan(args, &opened)?;
+    let texts: Vec<_> = opened.heads.iter().map(|head| head.sensor.text.clone()).collect();
+    let heads: Vec<_> =
+        plan.heads.iter().zip(texts).map(|(head, text)| (head.name.clone(), &head.plan.config, text)).collect();
+    let Some((_, config, _)) = heads.first() else { return Err(usage(format!("{}: has no head", path.display()))) };
+    let settings = sink::Settings { config, sensor_toml: &opened.text, durable: args.durable, heads: &heads };
+    let (mut output, _) = sink::open(args.output.as_deref(), args.existing(), settings)?;
+    let total = opened.pictures();
+    let mut epochs = Epochs::new(opened.heads, opened.rig.rig.sync_s, args.source.fps);
+    let mut watch = Watch::new(args.quiet, total);
+    let end = rig::run(&plan, &mut epochs, &stop_flag(), &mut output, &mut |epoch| watch.see(epoch, &plan));
+    let summary = watch.progress.summary(&[]);
+    let end = end?;
+    output.finish()?;
+    let lost = epochs.describe_loss().filter(|_| end == End::Complete);
+    lost.iter().for_each(tell::warning);
+    if !args.quiet {
+        watch.sum_up(&summary);
+    }
+    if end == End::Interrupted {
+        tell::line(format_args!("interrupted after {}", explain::counted(watch.epochs, "epoch")));
+        return Ok(Exit::Interrupted);
+    }
+    let is_unread = watch.progress.any_unprocessed() || watch.unreadable > 0 || lost.is_some();
+    Ok(if is_unread { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// Refuses the options that have no meaning for several cameras, or that are not built for them.
+fn check(args: &Args) -> Result<(), Stop> {
+    let refused = [
+        ("--sensor", args.sensor.sensor.is_some(), "each head has a sensor of its own: write it into rig.toml"),
+        ("--topic", args.source.topic.is_some(), "name the pictures of each head in rig.toml"),
+        ("--overlay", args.overlay.is_some(), "draw the pictures of one head: hzn run FOLDER --overlay DIR"),
+        ("--resume", args.resume, "the run of a rig cannot be continued; --force starts again"),
+    ];
+    match refused.into_iter().find(|(_, is_given, _)| *is_given) {
+        Some((option, _, what)) => Err(usage(format!("{option} is not possible with a rig.toml: {what}"))),
+        None => Ok(()),
+    }
+}
+
+fn plan(args: &Args, opened: &Opened) -> Result<Plan, Stop> {
+    let is_mcap = Output::wants_trace(args.output.as_deref());
+    let heads: Vec<HeadPlan> = opened
+        .heads
+        .iter()
+        .map(|head| {
+            let mut plan = args.plan(head.sensor.clone(), None);
+            // A picture that repeats the one before it is found by its bytes.
+            plan.keep_picture = true;
+            HeadPlan { name: head.name.clone(), plan }
+        })
+        .collect();
+    let threads = heads.iter().map(|head| head.plan.threads).min().unwrap_or(1);
+    Ok(Plan { heads, joiner: opened.joiner()?, threads, keep_pictures: is_mcap && !args.no_images })
+}
+
+/// Number of pictures that are reported one by one.
+const MAX_LISTED: u64 = 20;
+
+/// Counts and messages while the run goes on.
+struct Watch {
+    progress: Progress,
+    quiet: bool,
+    unreadable: u64,
+    epochs: u64,
+    /// The statuses of the joint answers.
+    joint: Counts,
+    /// Number of epochs with an excluded head.
+    excluded: u64,
+}
+
+impl Watch {
+    fn new(quiet: bool, pictures: Option<u64>) -> Self {
+        let progress = Progress::new(pictures, 0, quiet);
+        Self { progress, quiet, unreadable: 0, epochs: 0, joint: Counts::default(), excluded: 0 }
+    }
+
+    fn see(&mut self, epoch: &FinishedEpoch, plan: &Plan) {
+        self.epochs += 1;
+        if let Some(count) = self.joint.get_mut(epoch.joint.status as usize) {
+            *count += 1;
+        }
+        self.excluded += u64::from(epoch.joint.heads_excluded.is_some());
+        for (frame, head) in epoch.heads.iter().zip(&plan.heads) {
+            let Some(frame) = frame else { continue };
+            if let Some(why) = frame.unreadable() {
+                self.unreadable += 1;
+                if !self.quiet && self.unreadable <= MAX_LISTED {
+                    self.progress.say(&format!("unreadable: {}: {}: {why}", head.name, frame.name));
+                }
+            }
+            // The joint answer is about the first body.
+            self.progress.count(frame.outcomes.iter().map(|outcome| outcome.status()).take(1));
+        }
+    }
+
+    fn sum_up(&self, summary: &str) {
+        tell::line(summary);
+        tell::line(format_args!("{}: {}", explain::counted(self.epochs, "epoch"), count_text(&self.joint)));
+        if self.excluded > 0 {
+            let epochs = explain::counted(self.excluded, "epoch");
+            tell::line(format_args!("note: a head was excluded in {epochs} (column heads_excluded)"));
+        }
+    }
+}

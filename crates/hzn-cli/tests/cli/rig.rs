@@ -1,0 +1,171 @@
+//! `hzn run rig.toml`: several cameras that are one sensor.
+
+use std::fs;
+
+use crate::common::{Place, cell, without_time};
+
+type Rows = Vec<Vec<(String, String)>>;
+
+const HEADS: [&str; 4] = ["front", "right", "back", "left"];
+
+/// Simulates four epochs of the scene `ring` with small pictures.
+fn ring() -> Place {
+    let place = Place::new();
+    let scene = place.run(&["simulate", "ring", "--show"]).expect(0).out;
+    let scene = scene.replace("width = 640\nheight = 480", "width = 320\nheight = 240").replace("554.0", "277.0");
+    place.write("ring.toml", scene.replace("319.5", "159.5").replace("239.5", "119.5").as_bytes());
+    place.run(&["simulate", "ring.toml", "-o", "ring", "--frames", "4", "--no-noise", "-q"]).expect(0);
+    place
+}
+
+/// Runs the rig. Returns the rows of the joint answers, and those of the heads.
+fn run(place: &Place, args: &[&str], code: i32) -> (Rows, Rows) {
+    let out = place.run(&[&["run", "ring/rig.toml", "-q"], args].concat()).expect(code).out;
+    without_time(&out).into_iter().partition(|row| cell(row, "head") == "rig")
+}
+
+/// Returns the rows of a head, without the columns that only a rig or its order gives.
+fn of_head(rows: &[Vec<(String, String)>], head: &str) -> Rows {
+    let own = rows.iter().filter(|row| cell(row, "head") == head || head.is_empty()).cloned();
+    own.map(|row| row.into_iter().filter(|(name, _)| name != "head" && name != "crc32").collect()).collect()
+}
+
+#[test]
+fn a_simulated_rig_runs_at_once_and_its_answers_fit_the_truth() {
+    let place = ring();
+    let (joint, heads) = run(&place, &["-j", "1"], 0);
+    assert_eq!((joint.len(), heads.len()), (4, 16));
+    for row in &joint {
+        assert_eq!((cell(row, "status"), cell(row, "heads_used")), ("ok", "front right back left"), "{row:?}");
+        let number = |name: &str| cell(row, name).parse::<f64>().unwrap();
+        assert!(number("separation_deg") < number("separation_limit_deg") && number("protection_deg") < 1.0);
+        // The body is below the vehicle, but for its tilt of 2 to 3 degrees.
+        assert!(number("axis_z") > 0.99 && cell(row, "axis_v_z") == cell(row, "axis_z"));
+    }
+    assert_eq!(run(&place, &["-j", "3"], 0), (joint, heads));
+    place.run(&["run", "ring/rig.toml", "-o", "out.csv", "-q"]).expect(0);
+    place.run(&["run", "ring/rig.toml", "-o", "out.mcap", "-q"]).expect(0);
+    let from_table = place.run(&["evaluate", "out.csv", "--truth", "ring", "-o", "r.json"]).expect(0).out;
+    let json: serde_json::Value = serde_json::from_str(&place.read("r.json")).unwrap();
+    let rms = json["evaluations"][0]["errors"]["rms_deg"].as_f64().unwrap();
+    assert!(json["evaluations"][0]["answered"] == 4 && rms < 0.02, "{rms}");
+    assert_eq!(
+        place.run(&["evaluate", "out.mcap", "--truth", "ring"]).expect(0).out.lines().skip(1).collect::<Vec<_>>(),
+        from_table.lines().skip(1).collect::<Vec<_>>()
+    );
+    // The recording has the pictures, the calibration and the axis of each head on topics of its own.
+    let recording = fs::read(place.path("out.mcap")).unwrap();
+    let has = |text: &str| recording.windows(text.len()).any(|bytes| bytes == text.as_bytes());
+    for topic in ["/left/camera/image", "/front/camera/calibration", "/back/hzn/axis", "/hzn/report", "rig.toml"] {
+        assert!(has(topic), "{topic}");
+    }
+    let left = place.run(&["evaluate", "out.csv", "--truth", "ring/left", "--head", "left"]).expect(0).out;
+    assert!(left.contains("4 of 4 pictures"), "{left}");
+    place
+        .run(&["evaluate", "out.csv", "--truth", "ring", "--head", "lft"])
+        .expect(2)
+        .says("back, front, left, rig, right");
+}
+
+#[test]
+fn a_heads_row_is_that_of_its_sensor_and_one_head_alone_is_turned_by_the_mount() {
+    let place = ring();
+    fs::remove_file(place.path("ring/frames.csv")).unwrap();
+    let (_, heads) = run(&place, &[], 0);
+    for head in HEADS {
+        let alone = without_time(&place.run(&["run", &format!("ring/{head}"), "-q"]).expect(0).out);
+        assert_eq!(of_head(&heads, head), of_head(&alone, ""), "{head}");
+    }
+    let text = place.read("ring/rig.toml");
+    let [start, first, ..] = text.split("[[head]]").collect::<Vec<_>>()[..] else { panic!("{text}") };
+    place.write("ring/rig.toml", format!("{start}[[head]]{first}").as_bytes());
+    let (joint, alone) = run(&place, &[], 0);
+    assert_eq!(of_head(&alone, "front"), of_head(&heads, "front"));
+    for (joint, own) in joint.iter().zip(&alone) {
+        assert_eq!((cell(joint, "heads_used"), cell(joint, "protection_deg")), ("front", ""));
+        for column in ["axis_v_x", "axis_v_y", "axis_v_z"] {
+            let [a, b] = [joint, own].map(|row| cell(row, column).parse::<f64>().unwrap());
+            assert!((a - b).abs() < 1e-12, "{column} {a} {b}");
+        }
+        let [a, b] = [joint, own].map(|row| cell(row, "sigma_max_deg").parse::<f64>().unwrap());
+        assert!((a - b).abs() < 1e-9 * a, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_lost_head_costs_only_itself_and_a_frozen_one_is_excluded() {
+    let place = ring();
+    let (_, good) = run(&place, &[], 0);
+    let file = |head: &str, n: usize| place.path(&format!("ring/{head}/{head}-{n:05}.png"));
+    fs::remove_file(file("front", 0)).unwrap();
+    fs::write(file("right", 1), "no picture").unwrap();
+    image::ImageBuffer::<image::Luma<u16>, _>::new(320, 240).save(file("back", 2)).unwrap();
+    fs::copy(file("left", 2), file("left", 3)).unwrap();
+    let (joint, heads) = run(&place, &[], 3);
+    let used: Vec<&str> = joint.iter().map(|row| cell(row, "heads_used")).collect();
+    assert_eq!(used, ["right back left", "front back left", "front right left", "front right back"]);
+    assert!(joint.iter().all(|row| cell(row, "status") == "ok"));
+    let details: Vec<&str> = joint.iter().map(|row| cell(row, "detail")).collect();
+    let dark = details[2].strip_prefix("back: ").unwrap();
+    assert!(["no-limb", "too-dark"].contains(&dark), "{dark}");
+    assert_eq!(
+        [details[0], details[1], details[3]],
+        ["front: no picture", "right: unreadable", "left: the picture of the epoch before"]
+    );
+    assert_eq!(cell(&joint[3], "heads_excluded"), "left");
+    // All other rows are the same.
+    let same = |head: &str, n: &str| {
+        let own = |rows: &Rows| of_head(rows, head).into_iter().find(|row| cell(row, "index") == n);
+        own(&heads) == own(&good) && own(&good).is_some()
+    };
+    assert!(same("right", "0") && same("back", "0") && same("front", "1") && same("left", "2") && same("right", "3"));
+    assert_eq!(heads.len(), 15);
+}
+
+#[test]
+fn a_turned_mount_is_named_and_two_heads_only_notice_it() {
+    let place = ring();
+    let text = place.read("ring/rig.toml");
+    let mount = text.split("q_rig_from_camera_wxyz = [").nth(2).unwrap().split(']').next().unwrap().to_owned();
+    let q: Vec<f64> = mount.split(',').filter_map(|x| x.trim().parse().ok()).collect();
+    // A turn of one degree about the camera's x axis moves the limb in the picture of the second head.
+    let (sin, cos) = 0.5f64.to_radians().sin_cos();
+    let turned = [q[0] * cos - q[1] * sin, q[1] * cos + q[0] * sin, q[2] * cos + q[3] * sin, q[3] * cos - q[2] * sin];
+    let wrong = text.replace(&mount, &turned.map(|x| format!("{x}")).join(", "));
+    place.write("ring/rig.toml", wrong.as_bytes());
+    let (joint, _) = run(&place, &[], 0);
+    assert!(joint.iter().all(|row| cell(row, "status") == "ok" && cell(row, "heads_excluded") == "right"), "{joint:?}");
+    let [start, first, second, ..] = wrong.split("[[head]]").collect::<Vec<_>>()[..] else { panic!("{wrong}") };
+    place.write("ring/rig.toml", format!("{start}[[head]]{first}[[head]]{second}").as_bytes());
+    let (joint, _) = run(&place, &[], 0);
+    let refused = |row: &Vec<(String, String)>| {
+        cell(row, "status") == "rejected"
+            && cell(row, "detail").starts_with("inconsistent")
+            && cell(row, "axis_x").is_empty()
+    };
+    assert!(joint.iter().all(refused), "{joint:?}");
+}
+
+#[test]
+fn errors_name_the_head_and_no_input_is_an_output() {
+    let place = ring();
+    place
+        .run(&["run", "ring/rig.toml", "--overlay", "drawn"])
+        .expect(2)
+        .says("--overlay is not possible with a rig.toml");
+    for read in ["ring/rig.toml", "ring/frames.csv", "ring/left/frames.csv", "ring/left/sensor.toml"] {
+        fs::hard_link(place.path(read), place.path("same.csv")).unwrap();
+        place.run(&["run", "ring/rig.toml", "-o", "same.csv", "--force"]).expect(2).says("is the input");
+        fs::remove_file(place.path("same.csv")).unwrap();
+    }
+    let text = place.read("ring/rig.toml");
+    place.write("ring/rig.toml", text.replace("sync_s", "sinc_s").as_bytes());
+    place.run(&["run", "ring/rig.toml"]).expect(2).says("[rig] sinc_s: unknown key; did you mean sync_s?");
+    place.write("ring/rig.toml", text.as_bytes());
+    let sensor = place.read("ring/back/sensor.toml");
+    place.write("ring/back/sensor.toml", sensor.replace("kind = \"earth\"", "kind = \"eart\"").as_bytes());
+    place.run(&["run", "ring/rig.toml"]).expect(2).says("head back: ring/back/sensor.toml");
+    place.write("ring/back/sensor.toml", sensor.as_bytes());
+    fs::remove_dir_all(place.path("ring/right")).unwrap();
+    place.run(&["run", "ring/rig.toml"]).expect(2).says("head right: ");
+}

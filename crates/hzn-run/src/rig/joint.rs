@@ -1,0 +1,302 @@
+//! The joint answer of one epoch, as a row.
+
+use hzn_core::body;
+use hzn_core::camera::Camera;
+use hzn_core::frames::{Cam, Cov3, Rotation, UnitVec3, Vehicle};
+use hzn_core::rig::{Head, Joint, MOST_HEADS, NoJoint, Rig};
+use hzn_core::status::Status;
+use hzn_core::{Config, Solution};
+use hzn_files::Frames;
+use hzn_files::rig::{self, Common, JOINT};
+use hzn_mcap::{Row, RowMeta, roll_pitch_deg};
+
+use super::mounts::{Mount, form};
+use super::weather::with_weather;
+use crate::engine::Finished;
+use crate::error::{Error, unusable};
+use crate::sink::altitude_km;
+
+/// Joins the answers of the heads about their first body.
+pub struct Joiner {
+    rig: Rig<f64>,
+    common: Common,
+    names: Vec<String>,
+    mounts: Vec<Mount>,
+    cameras: Vec<Camera<f64>>,
+    body: body::Config,
+    vehicle: Option<Frames>,
+}
+
+/// The picture of a head in an epoch, as the joint answer needs it.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a> {
+    frame: Option<&'a Finished>,
+    is_frozen: bool,
+}
+
+impl<'a> Seen<'a> {
+    /// Takes a processed picture; `None` if the head has none in this epoch. `is_frozen` says that it is the picture of
+    /// the epoch before.
+    pub fn new(frame: Option<&'a Finished>, is_frozen: bool) -> Self {
+        Self { frame, is_frozen }
+    }
+
+    fn solution(&self) -> Option<&'a Solution<f64>> {
+        let report = self.frame?.outcomes.first()?.report.as_ref().ok()?;
+        report.solution.as_ref().filter(|_| report.status == Status::Ok)
+    }
+
+    /// Returns the head as number `k` of the joint answer, if it has an answer.
+    fn answer(&self, k: usize) -> Option<Answered<'a>> {
+        let solution = self.solution().filter(|_| !self.is_frozen)?;
+        Some(Answered { k, solution, frame: self.frame? })
+    }
+
+    /// Returns why the head has no part in the joint answer; `None` if it has an answer.
+    fn absence(&self) -> Option<String> {
+        let Some(frame) = self.frame else { return Some("no picture".into()) };
+        if self.is_frozen {
+            return Some("the picture of the epoch before".into());
+        }
+        match frame.outcomes.first() {
+            Some(outcome) if self.solution().is_none() => Some(outcome.status().name().into()),
+            Some(_) => None,
+            None => Some(Status::NoLimb.name().into()),
+        }
+    }
+}
+
+/// A head that has an answer.
+struct Answered<'a> {
+    k: usize,
+    solution: &'a Solution<f64>,
+    frame: &'a Finished,
+}
+
+impl Joiner {
+    /// Prepares the joint answers of a rig about the first body of its sensors, in the order of the heads. `vehicle` is
+    /// the table of the vehicle, for its rates.
+    ///
+    /// # Errors
+    /// A value of the rig is out of its limits, see [`hzn_files::rig::check`], or a sensor has no lens.
+    pub fn new<'a>(
+        file: &rig::Rig,
+        sensors: impl IntoIterator<Item = &'a Config>,
+        vehicle: Option<Frames>,
+    ) -> Result<Self, Error> {
+        rig::check(file).map_err(|(key, what)| unusable(format!("{key}: {what}")))?;
+        let (mut cameras, mut bodies) = (Vec::new(), Vec::new());
+        for sensor in sensors {
+            cameras.push(Camera::try_new(&sensor.camera).map_err(Error::failed)?);
+            bodies.extend(sensor.each_body().first().cloned());
+        }
+        let mount = |head: &rig::Head| head.mount.map(|mount| Mount::new(&file.rig.mount, &mount));
+        Ok(Self {
+            rig: Rig::new(&file.rig.check()).map_err(Error::failed)?,
+            common: file.rig,
+            names: file.heads.iter().map(|head| head.name.clone()).collect(),
+            mounts: file.heads.iter().filter_map(mount).collect(),
+            cameras,
+            body: bodies.into_iter().next().unwrap_or_default(),
+            vehicle,
+        })
+    }
+
+    /// Returns the rotation from each camera to the vehicle as a quaternion, scalar first.
+    pub fn q_vehicle_from_camera_wxyz(&self) -> impl Iterator<Item = [f64; 4]> + '_ {
+        self.mounts.iter().map(|mount| mount.q_vehicle_from_camera_wxyz)
+    }
+
+    /// Returns the row of an epoch. The axis is in the frame of the vehicle.
+    pub fn join(&self, index: u64, heads: &[Seen<'_>]) -> Row {
+        let answered: Vec<_> = heads.iter().enumerate().filter_map(|(k, head)| head.answer(k)).collect();
+        let time_s = middle_s(&answered).or_else(|| heads.iter().find_map(|head| head.frame?.time_s));
+        let mut row = match answered.as_slice() {
+            [] => self.nothing(index, heads, time_s),
+            [one] => self.single(index, heads, time_s, one),
+            several => self.joint(index, heads, time_s, several),
+        };
+        row.detail = [row.detail, self.absences(heads)]
+            .into_iter()
+            .filter(|text| !text.is_empty())
+            .collect::<Vec<_>>()
+            .join("; ");
+        let frozen = heads.iter().enumerate().filter(|(_, head)| head.is_frozen).fold(0, |set, (k, _)| set | 1 << k);
+        row.heads_excluded = self.listed(frozen | self.bits(row.heads_excluded.as_deref()));
+        row
+    }
+
+    fn row(&self, index: u64, heads: &[Seen<'_>], time_s: Option<f64>, status: Status, detail: &str) -> Row {
+        let first = heads.iter().find_map(|head| head.frame);
+        let meta = RowMeta {
+            index,
+            file: first.map(|frame| frame.name.clone()).unwrap_or_default(),
+            time_s,
+            body: self.body.kind.name().to_owned(),
+            altitude_km: altitude_km(first.and_then(|frame| frame.data.as_ref()), &self.body),
+        };
+        Row { head: Some(JOINT.to_owned()), ..Row::unprocessed(&meta, status, detail) }
+    }
+
+    /// Returns the row of an epoch in which no head answers. Its status is that of the heads if they agree.
+    fn nothing(&self, index: u64, heads: &[Seen<'_>], time_s: Option<f64>) -> Row {
+        let mut statuses = heads.iter().filter_map(|head| Some(head.frame?.outcomes.first()?.status()));
+        let first = statuses.next().filter(|status| *status != Status::Ok);
+        let status = first.filter(|first| statuses.all(|other| other == *first)).unwrap_or(Status::NoLimb);
+        self.row(index, heads, time_s, status, &NoJoint::NoHead.to_string())
+    }
+
+    /// Returns the rotation from a head to the axes that the vehicle has at the time of the epoch.
+    fn mount(&self, head: &Answered<'_>, time_s: Option<f64>) -> Option<Rotation<Cam, Vehicle, f64>> {
+        let after_s = time_s.zip(head.frame.time_s).map_or(0.0, |(epoch_s, own_s)| epoch_s - own_s);
+        let row = self.vehicle.as_ref().zip(time_s).and_then(|(frames, t)| frames.nearest(t, self.common.sync_s));
+        self.mounts.get(head.k)?.after(after_s, row.and_then(|row| row.rate_rad_s))
+    }
+
+    /// Returns the answer of the only head, in the axes of the vehicle. It keeps the expected half-angle, which several
+    /// heads do not need.
+    fn single(&self, index: u64, heads: &[Seen<'_>], time_s: Option<f64>, head: &Answered<'_>) -> Row {
+        let (Some(mount), Some(own)) = (self.mount(head, time_s), self.mounts.get(head.k)) else {
+            return self.row(index, heads, time_s, Status::Rejected, &NoJoint::Undetermined.to_string());
+        };
+        let mut row = self.row(index, heads, time_s, Status::Ok, "");
+        let axis = mount.apply(&head.solution.axis);
+        let turned = turn(&mount, &head.solution.covariance);
+        let var = self.common.mount.sigma_deg.to_radians().powi(2);
+        let levers = across(&axis, &own.covariance_rad2);
+        let rig = across(&axis, &[var, 0.0, 0.0, var, 0.0, var]);
+        let sum = |i: usize| turned[i] + levers[i] + rig[i];
+        self.set_direction(&mut row, &axis, std::array::from_fn(sum));
+        if let Some(common) = &head.solution.common {
+            let turned = turn(&mount, common);
+            let sum: [f64; 6] = std::array::from_fn(|i| turned[i] + levers[i] + rig[i]);
+            [
+                row.cov_common_xx,
+                row.cov_common_xy,
+                row.cov_common_xz,
+                row.cov_common_yy,
+                row.cov_common_yz,
+                row.cov_common_zz,
+            ] = sum.map(Some);
+        }
+        row.half_angle_deg = Some(head.solution.half_angle_rad.to_degrees());
+        set_fixed(&mut row, head.solution);
+        row.heads_used = self.listed(1 << head.k);
+        row
+    }
+
+    fn joint(&self, index: u64, heads: &[Seen<'_>], time_s: Option<f64>, answered: &[Answered<'_>]) -> Row {
+        let mut cones = [None; MOST_HEADS];
+        for head in answered {
+            let cone = self.cone(head, time_s);
+            if let Some(place) = cones.get_mut(head.k) {
+                *place = cone;
+            }
+        }
+        // The largest limb counts: its tilt moves the axis most.
+        let cos = answered.iter().filter_map(|head| Some(head.solution.free?.cos)).fold(1.0, f64::min);
+        let rig_rad = self.common.mount.sigma_deg.to_radians();
+        match self.rig.join(&cones, self.tilt_rad(cos).hypot(rig_rad)) {
+            Ok(joint) => {
+                let mut row = self.row(index, heads, time_s, Status::Ok, "");
+                self.set_joint(&mut row, &joint);
+                if let Some(used) = answered.iter().find(|head| joint.heads_used >> head.k & 1 == 1) {
+                    set_fixed(&mut row, used.solution);
+                }
+                row
+            }
+            Err(why) => {
+                let detail = match why {
+                    NoJoint::Inconsistent => format!("inconsistent: {why}"),
+                    _ => why.to_string(),
+                };
+                self.row(index, heads, time_s, Status::Rejected, &detail)
+            }
+        }
+    }
+
+    /// Returns the free cone of a head in the axes of the vehicle.
+    fn cone(&self, head: &Answered<'_>, time_s: Option<f64>) -> Option<Head<f64>> {
+        let limb_km = self.body.mean_radius_km() + self.body.limb_height_km;
+        let free = with_weather(&head.solution.free?, self.cameras.get(head.k)?, limb_km, &self.common);
+        let mount = self.mount(head, time_s)?;
+        Head::new(&free, &mount, &self.mounts.get(head.k)?.covariance_rad2, 0.0)
+    }
+
+    /// Returns the 1σ of the axis that a tilt of the limb causes, in radians: the tilt times the derivative of the
+    /// half-angle by the height, tan α/(R + d).
+    fn tilt_rad(&self, cos: f64) -> f64 {
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let limb_km = self.body.mean_radius_km() + self.body.limb_height_km;
+        let km = self.common.limb_tilt_km(sin.atan2(cos).to_degrees());
+        if cos > 0.0 && limb_km > 0.0 { km * sin / (cos * limb_km) } else { 0.0 }
+    }
+
+    fn set_joint(&self, row: &mut Row, joint: &Joint<f64>) {
+        self.set_direction(row, &joint.axis, joint.covariance.upper_rad2);
+        let (cos, _) = joint.cos;
+        row.half_angle_deg = Some((1.0 - cos * cos).max(0.0).sqrt().atan2(cos).to_degrees());
+        row.protection_deg = joint.protection_rad.map(f64::to_degrees);
+        row.heads_used = self.listed(joint.heads_used);
+        row.heads_excluded = self.listed(joint.heads_excluded);
+        let separation = joint.separation_rad.map(|(moved, allowed)| (moved.to_degrees(), allowed.to_degrees()));
+        row.separation_deg = separation.map(|(moved, _)| moved);
+        row.separation_limit_deg = separation.map(|(_, allowed)| allowed);
+    }
+
+    fn set_direction(&self, row: &mut Row, axis: &UnitVec3<Vehicle, f64>, upper_rad2: [f64; 6]) {
+        [row.axis_x, row.axis_y, row.axis_z] = axis.xyz().map(Some);
+        [row.axis_v_x, row.axis_v_y, row.axis_v_z] = axis.xyz().map(Some);
+        [row.cov_xx, row.cov_xy, row.cov_xz, row.cov_yy, row.cov_yz, row.cov_zz] = upper_rad2.map(Some);
+        let sigma_rad = Cov3::<Vehicle, f64>::from_upper(upper_rad2).sigma_max_rad();
+        row.sigma_max_deg = Some(sigma_rad.to_degrees());
+        let [roll, pitch] = roll_pitch_deg(axis);
+        (row.roll_deg, row.pitch_deg) = (Some(roll), Some(pitch));
+    }
+
+    /// Returns which heads have no part in the answer, with the reasons.
+    fn absences(&self, heads: &[Seen<'_>]) -> String {
+        let absent = |(name, head): (&String, &Seen<'_>)| Some(format!("{name}: {}", head.absence()?));
+        self.names.iter().zip(heads).filter_map(absent).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Returns the names of a set of heads; `None` if it is empty.
+    fn listed(&self, set: u8) -> Option<String> {
+        let named = self.names.iter().enumerate().filter(|(k, _)| set >> k & 1 == 1).map(|(_, name)| name.as_str());
+        Some(named.collect::<Vec<_>>().join(" ")).filter(|names| !names.is_empty())
+    }
+
+    fn bits(&self, listed: Option<&str>) -> u8 {
+        let place = |name: &str| self.names.iter().position(|own| own == name);
+        listed.unwrap_or_default().split(' ').filter_map(place).fold(0, |set, k| set | 1 << k)
+    }
+}
+
+/// Returns the middle of the exposures that are used.
+fn middle_s(answered: &[Answered<'_>]) -> Option<f64> {
+    let times = || answered.iter().filter_map(|head| head.frame.time_s);
+    let (first, last) = (times().reduce(f64::min)?, times().reduce(f64::max)?);
+    Some(0.5 * (first + last))
+}
+
+/// Copies the direction in the fixed frame, which is the same for all heads.
+fn set_fixed(row: &mut Row, solution: &Solution<f64>) {
+    if let Some(fixed) = &solution.axis_fixed {
+        [row.axis_e_x, row.axis_e_y, row.axis_e_z] = fixed.xyz().map(Some);
+    }
+}
+
+/// Returns a covariance in the axes of the vehicle.
+fn turn(mount: &Rotation<Cam, Vehicle, f64>, covariance: &Cov3<Cam, f64>) -> [f64; 6] {
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let in_camera = axes.map(|axis| UnitVec3::try_new(axis).map_or(axis, |axis| mount.inverse().apply(&axis).xyz()));
+    form(covariance.upper_rad2, in_camera)
+}
+
+/// Returns the covariance of a direction whose axes are turned by a small rotation with this covariance: the direction
+/// moves by θ × e.
+fn across(axis: &UnitVec3<Vehicle, f64>, rotation_rad2: &[f64; 6]) -> [f64; 6] {
+    let [x, y, z] = axis.xyz();
+    // The components of θ × e along x, y and z are (e × x)·θ, (e × y)·θ and (e × z)·θ.
+    form(*rotation_rad2, [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+}

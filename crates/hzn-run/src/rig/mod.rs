@@ -1,0 +1,18 @@
+//! The run over several cameras (heads) that are one sensor, as rig.toml describes them.
+//!
+//! Each head has its own pictures, sensor and thread of answers, as in [`engine::run`](crate::engine::run): its row is
+//! that of its sensor. [`open`] opens all of them. [`Epochs`] pairs their pictures by time. [`run`] processes the
+//! epochs on all cores, and joins the answers of the heads in the order of time, so that the rows are the same for any
+//! number of threads.
+
+mod epochs;
+mod joint;
+mod mounts;
+mod open;
+mod plan;
+mod weather;
+
+pub use epochs::{Epoch, Epochs};
+pub use joint::{Joiner, Seen};
+pub use open::{OpenHead, Opened, Request, open};
+pub use plan::{FinishedEpoch, HeadPlan, Plan, run};

@@ -1,0 +1,174 @@
+//! Opens the heads of a rig with their sensors and tables.
+
+use std::path::{Path, PathBuf};
+
+use hzn_files::rig::{self, Head, JOINT};
+use hzn_files::{Frames, Problem, Sensor, files_of_sensor};
+
+use super::joint::Joiner;
+use super::mounts::Mount;
+use crate::engine;
+use crate::error::{Error, Remedy, unusable};
+use crate::open::{self, SensorChoice};
+use crate::source::{Raw, Source};
+
+/// The rig.toml to open, and the values that replace those of its files.
+#[derive(Debug, Clone, Default)]
+pub struct Request {
+    /// The rig.toml.
+    pub rig: PathBuf,
+    /// The frames.csv of the vehicle; without it, the one next to rig.toml.
+    pub frames: Option<PathBuf>,
+    /// Size and format of headerless pictures, of all heads.
+    pub raw: Option<Raw>,
+    /// Altitude of the vehicle, km, which replaces `body.altitude_km` of each sensor.
+    pub altitude_km: Option<f64>,
+    /// Whether the sensors are those of the flight computer.
+    pub flight: bool,
+}
+
+/// An open rig.
+pub struct Opened {
+    /// The content of rig.toml.
+    pub rig: rig::Rig,
+    /// The heads, in the order of rig.toml.
+    pub heads: Vec<OpenHead>,
+    /// The frames.csv of the vehicle.
+    pub frames: Option<Frames>,
+    /// The text of rig.toml.
+    pub text: String,
+    /// Values that are possible but look wrong.
+    pub warnings: Vec<String>,
+    /// What the user should know about the pictures.
+    pub notes: Vec<String>,
+    /// Every file that is read, so that no output replaces one of them.
+    pub files: Vec<PathBuf>,
+}
+
+/// An open head.
+pub struct OpenHead {
+    /// Its name.
+    pub name: String,
+    /// Its pictures.
+    pub source: Box<dyn Source>,
+    /// Its sensor.
+    pub sensor: Sensor,
+    /// The frames.csv next to its pictures.
+    pub frames: Option<Frames>,
+    /// The frames.csv of the vehicle, as this head sees it.
+    pub(super) vehicle: Option<Frames>,
+}
+
+/// Opens a rig, and checks every file that it names.
+///
+/// # Errors
+/// rig.toml, a sensor, a table or the pictures of a head cannot be used. The message names the head.
+pub fn open(request: &Request) -> Result<Opened, Error> {
+    let file = hzn_files::rig::load(&request.rig)?;
+    let text = hzn_files::limited::read_text(&request.rig, hzn_files::limited::SETTINGS_BYTES)?;
+    let folder = request.rig.parent().unwrap_or(Path::new("")).to_owned();
+    let beside = || Some(folder.join("frames.csv")).filter(|path| path.exists());
+    let path = request.frames.clone().or_else(beside);
+    let frames = path.as_ref().map(|path| hzn_files::frames::load_vehicle(path)).transpose()?;
+    let mut opened = Opened {
+        rig: file.clone(),
+        heads: Vec::new(),
+        text,
+        warnings: frames.iter().flat_map(|f| &f.warnings).map(Problem::to_string).collect(),
+        notes: Vec::new(),
+        files: std::iter::once(request.rig.clone()).chain(path).collect(),
+        frames,
+    };
+    for head in &file.heads {
+        opened.add(head, &folder, request)?;
+    }
+    opened.check_bodies()?;
+    Ok(opened)
+}
+
+impl Opened {
+    fn add(&mut self, head: &Head, folder: &Path, request: &Request) -> Result<(), Error> {
+        let sensor = head.sensor.as_ref().map(|path| folder.join(path));
+        let own = open::Request {
+            inputs: vec![folder.join(&head.pictures)],
+            raw: request.raw,
+            sensor: sensor.map_or(SensorChoice::Neighbour, SensorChoice::File),
+            altitude_km: request.altitude_km,
+            flight: request.flight,
+            ..open::Request::default()
+        };
+        let named = |e: Error| e.in_head(&head.name);
+        let opened = open::open(&own).map_err(named)?;
+        let source = opened.source.as_ref();
+        self.files.extend(source.files());
+        self.files.extend(open::sensor_path(&own, source).iter().flat_map(|path| files_of_sensor(path)));
+        self.files.extend(open::frames_path(&own, source));
+        let name = |text: &String| format!("{}: {text}", head.name);
+        self.warnings.extend(opened.warnings.iter().map(name));
+        self.notes.extend(opened.notes.iter().map(name));
+        let Some(mount) = &head.mount else { return Err(unusable(format!("{}: [head.mount] is missing", head.name))) };
+        let mount = Mount::new(&self.rig.rig.mount, mount);
+        let vehicle = self.frames.as_ref().map(|frames| frames.seen_by_camera(mount.q_vehicle_from_camera_wxyz));
+        if let Some(vehicle) = &vehicle {
+            let config = &opened.sensor.config;
+            engine::check_frames(config, request.flight, Some(vehicle)).map_err(|e| named(e.into()))?;
+            self.warnings.extend(vehicle.check_sensor(config).iter().map(|w| name(&w.to_string())));
+            if let Some(unused) = opened.frames.as_ref().filter(|frames| frames.has_priors()) {
+                self.notes.push(format!(
+                    "{}: {}: only its names and times are used, because {} has the data of the vehicle",
+                    head.name,
+                    unused.path.display(),
+                    vehicle.path.display()
+                ));
+            }
+        }
+        open::check_size(source, &opened.sensor.config).map_err(named)?;
+        let known = vehicle.as_ref().or(opened.frames.as_ref());
+        open::check_altitude(source, &opened.sensor.config, known).map_err(named)?;
+        let (name, open::Opened { source, sensor, frames, .. }) = (head.name.clone(), opened);
+        self.heads.push(OpenHead { name, source, sensor, frames, vehicle });
+        Ok(())
+    }
+
+    /// Refuses heads that look for different bodies: the joint answer is about the first body of each.
+    fn check_bodies(&self) -> Result<(), Error> {
+        let body = |head: &OpenHead| head.sensor.config.each_body().first().map(|body| body.kind);
+        let Some((first, rest)) = self.heads.split_first() else { return Ok(()) };
+        match rest.iter().find(|head| body(head) != body(first)) {
+            Some(other) => {
+                let kind = |head| body(head).map_or("none", |kind| kind.name());
+                Err(unusable(format!(
+                    "{} looks for {} and {} for {}: the heads of a {JOINT} must look for the same first body",
+                    first.name,
+                    kind(first),
+                    other.name,
+                    kind(other)
+                )))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Prepares the joint answers.
+    ///
+    /// # Errors
+    /// A value of rig.toml is out of its limits; [`open`] has refused it already.
+    pub fn joiner(&self) -> Result<Joiner, Error> {
+        Joiner::new(&self.rig, self.heads.iter().map(|head| &head.sensor.config), self.frames.clone())
+    }
+
+    /// Returns the number of pictures of all heads, if it is known before.
+    pub fn pictures(&self) -> Option<u64> {
+        self.heads.iter().map(|head| head.source.total()).sum()
+    }
+}
+
+impl Error {
+    /// Returns the same error with the name of the head.
+    fn in_head(self, name: &str) -> Self {
+        // An option for the sensor or the altitude of one head would be that of all.
+        let remedy = self.remedy().filter(|remedy| !matches!(remedy, Remedy::Sensor | Remedy::Altitude));
+        let error = unusable(format!("head {name}: {self}"));
+        remedy.map_or_else(|| unusable(&error), |remedy| unusable(&error).with_remedy(remedy))
+    }
+}

@@ -1,0 +1,143 @@
+//! The run over the epochs of a rig.
+
+use std::sync::atomic::AtomicBool;
+
+use hzn_mcap::{FrameRecord, Row};
+
+use super::epochs::{Epoch, Epochs};
+use super::joint::{Joiner, Seen};
+use crate::engine::{self, AnySensor, End, Finished, InOrder, Sink, Turns, Work, run_in_order};
+use crate::error::Error;
+use crate::sink::{self, Output};
+
+/// The settings of a run over a rig.
+pub struct Plan {
+    /// The settings of each head, in order.
+    pub heads: Vec<HeadPlan>,
+    /// Joins the answers.
+    pub joiner: Joiner,
+    /// Number of threads.
+    pub threads: usize,
+    /// Whether the output stores the pictures of the heads.
+    pub keep_pictures: bool,
+}
+
+/// The settings of a head.
+pub struct HeadPlan {
+    /// Its name.
+    pub name: String,
+    /// The settings of its pictures. The times and the data come with the epochs.
+    pub plan: engine::Plan,
+}
+
+/// A processed epoch.
+pub struct FinishedEpoch {
+    /// The joint answer.
+    pub joint: Row,
+    /// The pictures of the heads; `None` for a head without one.
+    pub heads: Vec<Option<Finished>>,
+}
+
+/// Runs all epochs. `seen` is called for each in order, after it is written.
+///
+/// # Errors
+/// The output cannot be written, or a source breaks off. Epochs that were written before remain.
+pub fn run(
+    plan: &Plan,
+    epochs: &mut Epochs,
+    stop: &AtomicBool,
+    output: &mut Output,
+    seen: &mut dyn FnMut(&FinishedEpoch),
+) -> Result<End, Error> {
+    let mut order = Order {
+        plan,
+        turns: plan.heads.iter().map(|head| head.plan.turns.clone()).collect(),
+        frozen: Frozen { last: vec![None; plan.heads.len()] },
+    };
+    let write = |(index, mut heads): (u64, Vec<Option<Finished>>), output: &mut &mut Output| {
+        let joint = order.join(index, &mut heads);
+        output.write_heads(&records(plan, &joint, &mut heads))?;
+        seen(&FinishedEpoch { joint, heads });
+        Ok(())
+    };
+    let mut out = InOrder { sink: output, write, flush: |output: &mut &mut Output| output.flush() };
+    run_in_order(plan, plan.threads, || epochs.next(), 0, stop, &mut out)
+}
+
+/// What depends on the order of the epochs.
+struct Order<'a> {
+    plan: &'a Plan,
+    /// The turns of each head.
+    turns: Vec<Turns>,
+    frozen: Frozen,
+}
+
+impl Order<'_> {
+    /// Judges the pictures of the heads, and joins their answers.
+    fn join(&mut self, index: u64, heads: &mut [Option<Finished>]) -> Row {
+        let mut are_frozen = Vec::with_capacity(heads.len());
+        for ((k, frame), (turns, head)) in heads.iter_mut().enumerate().zip(self.turns.iter_mut().zip(&self.plan.heads))
+        {
+            let is_frozen = frame.as_ref().is_some_and(|frame| self.frozen.see(k, frame));
+            are_frozen.push(is_frozen);
+            if let Some(frame) = frame {
+                turns.judge(frame, &head.plan.config);
+                frame.picture = frame.picture.take().filter(|_| self.plan.keep_pictures);
+            }
+        }
+        let views: Vec<Seen<'_>> =
+            heads.iter().zip(are_frozen).map(|(frame, is)| Seen::new(frame.as_ref(), is)).collect();
+        self.plan.joiner.join(index, &views)
+    }
+}
+
+/// Returns the records of an epoch: those of the joint answer, and those of each head.
+fn records(plan: &Plan, joint: &Row, heads: &mut [Option<Finished>]) -> Vec<Vec<FrameRecord>> {
+    let mut records = vec![vec![FrameRecord::new(joint.clone())]];
+    for (frame, head) in heads.iter_mut().zip(&plan.heads) {
+        let own = frame.as_mut().map(|frame| sink::records(frame, &head.plan.config));
+        let named = |record: FrameRecord| {
+            let row = Row { head: Some(head.name.clone()), ..record.row };
+            FrameRecord { row, ..record }
+        };
+        records.push(own.into_iter().flatten().map(named).collect());
+    }
+    records
+}
+
+impl Work for Plan {
+    type Job = Epoch;
+    type Done = (u64, Vec<Option<Finished>>);
+    type Worker = Vec<AnySensor>;
+
+    fn worker(&self) -> Result<Vec<AnySensor>, Error> {
+        self.heads.iter().map(|head| head.plan.worker()).collect()
+    }
+
+    fn process(&self, sensors: &mut Vec<AnySensor>, index: u64, epoch: Epoch) -> Result<Self::Done, Error> {
+        let heads = self.heads.iter().zip(sensors).zip(epoch.pictures);
+        let one = |((head, sensor), picture): ((&HeadPlan, &mut AnySensor), Option<_>)| {
+            let Some((number, item)) = picture else { return Ok(None) };
+            // The row has the number of the epoch, so that it stands with the rows of the other heads.
+            head.plan.process(sensor, number, item).map(|frame| Some(Finished { index, ..frame }))
+        };
+        Ok((index, heads.map(one).collect::<Result<_, Error>>()?))
+    }
+}
+
+/// Finds heads that repeat a picture.
+struct Frozen {
+    /// Time and checksum of the last picture of each head.
+    last: Vec<Option<(Option<f64>, u32)>>,
+}
+
+impl Frozen {
+    /// Returns whether the picture of a head has the bytes of the picture before it. The noise of a camera never
+    /// repeats.
+    fn see(&mut self, k: usize, frame: &Finished) -> bool {
+        let Some(last) = self.last.get_mut(k) else { return false };
+        let now = frame.picture.as_ref().map(|bytes| (frame.time_s, crc32fast::hash(bytes)));
+        let before = std::mem::replace(last, now);
+        now.zip(before).is_some_and(|((now_s, now), (before_s, before))| now == before && now_s != before_s)
+    }
+}

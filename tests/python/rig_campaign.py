@@ -1,0 +1,297 @@
+"""Flies the built-in scenes of several heads, and compares the joint answers with the truth.
+
+    python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 accuracy
+    python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 faults
+    python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 pair
+
+The sensors of the scene `ring` are told a limb height of 15 +- 10 km while the limb is at 25 km. Its change with
+latitude is told or not. The mounts are exact, unless a fault turns one of them.
+"""
+
+import argparse
+import concurrent.futures
+import csv
+import math
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+
+import numpy as np
+
+HEADS = ["front", "right", "back", "left"]
+# The half level of the scene is at 25 km, and 4.5 km higher or lower at the poles. The sensors are told 10 km less.
+TOLD = "limb_height_by_latitude_km = [[-90.0, 10.5], [0.0, 15.0], [90.0, 19.5]]\n"
+WEATHER = "\n[world.infrared.weather]\nsigma_km = 1.5\nlength_km = 1000.0\n"
+
+
+def hzn(program, *args):
+    done = subprocess.run([program, *map(str, args)], capture_output=True, text=True)
+    if done.returncode not in (0, 3):
+        raise RuntimeError(f"hzn {' '.join(map(str, args))}: {done.stderr.strip()}")
+    return done.stdout
+
+
+def simulate(program, folder, scene, seed, frames, change=lambda text: text):
+    """Renders a flight whose scene is changed by a function of its text."""
+    text = change(hzn(program, "simulate", scene, "--show"))
+    path = folder.parent / f"{folder.name}.toml"
+    path.write_text(text)
+    hzn(program, "simulate", path, "-o", folder, "--frames", frames, "--seed", seed, "--no-noise", "-q", "--force")
+
+
+def tell_limb(folder, latitudes):
+    """Writes the limb height into the sensors, 10 km too low, with or without its change with latitude."""
+    for head in HEADS:
+        path = folder / head / "sensor.toml"
+        text = re.sub(r"(?m)^limb_height\w*km = (\[[^\n]*\]|[^\n]*)\n", "", path.read_text())
+        assert "[body]" in text, text
+        lines = "limb_height_km = 15.0\nlimb_height_sigma_km = 10.0\n" + (TOLD if latitudes else "")
+        path.write_text(text.replace("[body]\n", "[body]\n" + lines))
+
+
+def write_rig(folder, heads, name="used.toml", keys="", mounts=None):
+    """Writes a rig.toml with some heads of the scene's own, and with other told mounts of some of them."""
+    blocks = (folder / "rig.toml").read_text().split("[[head]]")[1:]
+    named = {re.search(r'name = "(\w+)"', block)[1]: block for block in blocks}
+    text = "[rig]\n" + keys
+    for head in heads:
+        block = named[head]
+        if mounts and head in mounts:
+            numbers = ", ".join(repr(float(x)) for x in mounts[head])
+            block = re.sub(r"q_rig_from_camera_wxyz = \[[^\]]*\]", f"q_rig_from_camera_wxyz = [{numbers}]", block)
+        text += "\n[[head]]" + block
+    (folder / name).write_text(text)
+    return folder / name
+
+
+def told_mount(folder, head):
+    block = next(b for b in (folder / "rig.toml").read_text().split("[[head]]") if f'name = "{head}"' in b)
+    inner = re.search(r"q_rig_from_camera_wxyz = \[([^\]]*)\]", block)[1]
+    return np.array([float(x) for x in inner.split(",") if x.strip()])
+
+
+def turned(q, axis, angle_deg):
+    """Returns the mount that is turned about an axis of the camera."""
+    half = math.radians(angle_deg) / 2
+    w, v = math.cos(half), math.sin(half) * np.asarray(axis, float) / np.linalg.norm(axis)
+    scalar, vector = q[0], q[1:]
+    return np.concatenate([[scalar * w - vector @ v], scalar * v + w * vector + np.cross(vector, v)])
+
+
+def run(program, folder, rig):
+    """Runs a rig. Returns the rows of the joint answers and those of each head."""
+    out = folder / f"{rig.stem}.csv"
+    hzn(program, "run", rig, "-o", out, "--force", "-q", "-j", 1)
+    with out.open() as file:
+        rows = list(csv.DictReader(file))
+    out.unlink()
+    return [row for row in rows if row["head"] == "rig"], [row for row in rows if row["head"] != "rig"]
+
+
+def truths(folder):
+    with (folder / "truth.csv").open() as file:
+        return {row["file"]: row for row in csv.DictReader(file)}
+
+
+def miss(row, truth):
+    """Returns the error in degrees and the squared error over the covariance."""
+    answer = np.array([float(row[f"axis_{k}"]) for k in "xyz"])
+    axis = np.array([float(truth[f"axis_{k}"]) for k in "xyz"])
+    covariance = np.array([[float(row["cov_" + "".join(sorted(a + b))]) for b in "xyz"] for a in "xyz"])
+    values, vectors = np.linalg.eigh(covariance)
+    squared = ((vectors[:, 1:].T @ (axis - answer)) ** 2 / values[1:]).sum()
+    return math.degrees(math.atan2(np.linalg.norm(np.cross(axis, answer)), axis @ answer)), squared
+
+
+def by_time(truth, row):
+    return min(truth.values(), key=lambda t: abs(float(t["time_s"]) - float(row["time_s"])))
+
+
+class Count:
+    """Errors and verdicts of joint answers."""
+
+    def __init__(self):
+        self.errors, self.squared, self.protection, self.beyond = [], [], [], 0
+        self.epochs = self.inconsistent = self.excluded = self.silent = 0
+
+    def add(self, row, truth):
+        self.epochs += 1
+        self.excluded += bool(row["heads_excluded"])
+        if row["status"] != "ok":
+            is_inconsistent = row["detail"].startswith("inconsistent")
+            self.inconsistent += is_inconsistent
+            self.silent += not is_inconsistent
+            return
+        error, squared = miss(row, truth)
+        self.errors.append(error)
+        self.squared.append(squared)
+        if row["protection_deg"]:
+            self.protection.append(float(row["protection_deg"]))
+            self.beyond += error > self.protection[-1]
+
+    def merge(self, other):
+        for key, value in vars(other).items():
+            setattr(self, key, getattr(self, key) + value)
+        return self
+
+    def line(self, name):
+        errors = np.array(self.errors or [math.nan])
+        protection = np.median(self.protection) if self.protection else math.nan
+        alarms = self.inconsistent + self.excluded
+        rms = np.sqrt((errors**2).mean())
+        return (f"| {name} | {self.epochs} | {len(self.errors)} | {rms:.4f} | {errors.max():.3f} "
+                f"| {np.mean(self.squared or [math.nan]):.2f} | {protection:.3f} | {self.beyond} | {alarms} |")
+
+
+HEAD = ("| rig | epochs | answers | RMS, deg | worst | NEES | protection, median | beyond | alarms |\n"
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|")
+
+
+def accuracy_of(program, root, seed, frames):
+    """Flies one scene with each set of heads. Returns the counts by name."""
+    counts = {}
+    for weather in (False, True):
+        folder = root / f"ring-{seed}-{weather}"
+        change = (lambda text: text.replace("[world.infrared]\n", "[world.infrared]\n", 1) + WEATHER) if weather else (
+            lambda text: text)
+        simulate(program, folder, "ring", seed, frames, change)
+        truth = truths(folder)
+        for told in (False, True):
+            tell_limb(folder, told)
+            sets = {"four": HEADS, "two opposite": ["front", "back"], "two adjacent": ["front", "right"],
+                    "one": ["front"]}
+            for name, heads in sets.items():
+                for keys, how in (("", ""), ("limb_tilt_sigma_km = 0.0\n", ", tilt told")):
+                    if how and not told:
+                        continue
+                    joint, _ = run(program, folder, write_rig(folder, heads, keys=keys))
+                    count = counts.setdefault((weather, told, f"{name}{how}"), Count())
+                    for row in joint:
+                        count.add(row, by_time(truth, row))
+        shutil.rmtree(folder)
+    return counts
+
+
+# A fault of one head: the axis of the camera that its mount turns about, or what is done with its pictures.
+TURNS = {"across its limb": [1, 0, 0], "about its axis": [0, 0, 1], "sideways": [0, 1, 0]}
+SIZES_DEG = [0.1, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0]
+
+
+def faults_of(program, root, seed, frames):
+    folder = root / f"ring-{seed}"
+    simulate(program, folder, "ring", seed, frames)
+    truth = truths(folder)
+    counts = {}
+    sets = {"four": HEADS, "three": HEADS[:3], "two opposite": ["front", "back"], "two adjacent": ["front", "right"]}
+    told = (seed % 2) == 0
+    tell_limb(folder, told)
+
+    def tally(name, size, set_name, joint, wrong, epochs=None):
+        count = counts.setdefault((name, size, set_name), [Count(), 0, 0, 0])
+        for number, row in enumerate(joint):
+            if epochs is not None and number not in epochs:
+                continue
+            count[0].add(row, by_time(truth, row))
+            excluded = row["heads_excluded"].split()
+            noticed = bool(excluded) or row["detail"].startswith("inconsistent")
+            count[1] += noticed
+            count[2] += excluded == [wrong]
+            count[3] += bool(excluded) and excluded != [wrong]
+
+    for set_name, heads in sets.items():
+        wrong = heads[seed % len(heads)]
+        joint, _ = run(program, folder, write_rig(folder, heads))
+        tally("none", 0.0, set_name, joint, "")
+        for turn, axis in TURNS.items():
+            for size in SIZES_DEG:
+                mount = turned(told_mount(folder, wrong), axis, size if seed % 4 < 2 else -size)
+                joint, _ = run(program, folder, write_rig(folder, heads, mounts={wrong: mount}))
+                tally(turn, size, set_name, joint, wrong)
+    # The other faults are in the pictures of one head.
+    wrong = HEADS[seed % 4]
+    pictures = sorted((folder / wrong).glob("*.png"))
+    kept = [path.read_bytes() for path in pictures]
+    for number in range(1, len(pictures), 2):
+        pictures[number].write_bytes(kept[number - 1])
+    joint, _ = run(program, folder, write_rig(folder, HEADS))
+    tally("frozen", 0.0, "four", joint, wrong, set(range(1, len(pictures), 2)))
+    for number in range(0, len(pictures) - 1, 2):
+        pictures[number].write_bytes(kept[number + 1])
+        pictures[number + 1].write_bytes(kept[number])
+    joint, _ = run(program, folder, write_rig(folder, HEADS))
+    tally("picture of another epoch", 0.0, "four", joint, wrong)
+    shutil.rmtree(folder)
+    return counts
+
+
+def pair_of(program, root, seed, frames):
+    folder = root / f"pair-{seed}"
+    simulate(program, folder, "pair", seed, frames)
+    truth = truths(folder)
+    joint, heads = run(program, folder, write_rig(folder, ["left", "right"]))
+    counts = {}
+    for row in joint:
+        name = "both heads" if " " in row["heads_used"] else "one head or none"
+        counts.setdefault(name, Count()).add(row, by_time(truth, row))
+    both = {row["index"] for row in joint if " " in row["heads_used"]}
+    for head in ("left", "right"):
+        own = truths(folder / head)
+        for row in heads:
+            if row["head"] == head and row["index"] in both:
+                counts.setdefault(f"{head} alone, in epochs with both", Count()).add(row, own[row["file"]])
+    shutil.rmtree(folder)
+    return counts
+
+
+def fly(args, work):
+    """Flies all seeds. Returns the results, one for each."""
+    seeds = range(args.first_seed, args.first_seed + args.flights)
+    with tempfile.TemporaryDirectory() as root, concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
+        return list(pool.map(lambda seed: work(args.hzn, pathlib.Path(root), seed, args.frames), seeds))
+
+
+def merge(results):
+    total = {}
+    for counts in results:
+        for key, count in counts.items():
+            if isinstance(count, Count):
+                total.setdefault(key, Count()).merge(count)
+            else:
+                sums = total.setdefault(key, [Count(), 0, 0, 0])
+                total[key] = [sums[0].merge(count[0])] + [a + b for a, b in zip(sums[1:], count[1:])]
+    return total
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=["accuracy", "faults", "pair"])
+    parser.add_argument("--hzn", default="target/release/hzn")
+    parser.add_argument("--flights", type=int, default=10)
+    parser.add_argument("--first-seed", type=int, default=100)
+    parser.add_argument("--frames", type=int, default=8)
+    parser.add_argument("--jobs", type=int, default=1)
+    args = parser.parse_args()
+    total = merge(fly(args, {"accuracy": accuracy_of, "faults": faults_of, "pair": pair_of}[args.what]))
+    print(f"{args.flights} flights of {args.frames} epochs, seeds from {args.first_seed}\n")
+    if args.what == "faults":
+        print("| fault of one head | size, deg | heads | epochs | noticed | right head excluded | wrong head excluded "
+              "| protection, median | beyond |\n|---|---:|---|---:|---:|---:|---:|---:|---:|")
+        for (name, size, heads), (count, noticed, right, wrong) in sorted(total.items(), key=lambda t: (t[0][2], t[0])):
+            share = [f"{100 * n / count.epochs:.1f} %" for n in (noticed, right, wrong)]
+            protection = f"{np.median(count.protection):.3f}" if count.protection else "-"
+            cells = [name, size, heads, count.epochs, *share, protection, count.beyond]
+            print(f"| {' | '.join(map(str, cells))} |")
+        return
+    print(HEAD)
+    for key, count in total.items():
+        name = key
+        if args.what == "accuracy":
+            weather, told, heads = key
+            name = f"{heads}; {'latitude told' if told else 'not told'}{'; weather' if weather else ''}"
+        print(count.line(name))
+
+
+if __name__ == "__main__":
+    main()
