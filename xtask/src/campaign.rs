@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use crate::firmware;
-use crate::machine::{has, root, target};
+use crate::machine::{root, target};
 use crate::steps::{self, Outcome, Trouble, cargo};
-use crate::{processors, python, wheel};
+use crate::{miri, parts, processors, python, wheel};
 
 /// The triple that the fuzzing program is built for. With a named target, build scripts are not instrumented.
 const HOST: &str = "x86_64-unknown-linux-gnu";
@@ -30,9 +30,10 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign packets [COUNT]
        cargo xtask campaign pictures [FLIGHTS]
        cargo xtask campaign integrity [PICTURES [SEED [STATE]...]]
+       cargo xtask campaign miri
        cargo xtask campaign paths
        cargo xtask campaign processors [PICTURES]
-       cargo xtask campaign parts [FOLDER]
+       cargo xtask campaign parts [FOLDER] [--advisories FOLDER]
 
   fuzz  runs every target (or those that are named) under libFuzzer for N seconds (60); --keep adds the inputs with
         new coverage to fuzz/corpus
@@ -50,11 +51,13 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   integrity
         renders PICTURES (200) pictures of each state (day, low Sun, no limb, matching ghost, night), each of a flight
         of its own, from SEED (700000) on, and counts errors above protection_deg
+  miri  runs the tests of the flight software and of the C interface in Miri
   paths builds the images of the flight computer and the wheel in another folder; their bytes must be the same
   processors
         compares the answers to PICTURES (2000) on aarch64 and big-endian powerpc64, in QEMU, with those of this machine
   parts writes the CycloneDX lists of parts (SBOM) of command, wheel and firmware into FOLDER (target/sbom), and runs
-        cargo-deny if it is installed";
+        cargo-deny if it is installed; --advisories looks the parts up in a copy of the RustSec database (the folder
+        that contains crates/), and lists parts that are yanked or older than the newest version";
 
 /// Runs one campaign.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
@@ -78,8 +81,9 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
             integrity(number(200)?, number_at(2, 700_000)?, states).map_err(Trouble::into_message)
         }
         Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
+        Some("miri") => miri::campaign().map_err(Trouble::into_message),
         Some("paths") => paths().map_err(Trouble::into_message),
-        Some("parts") => parts(args.get(1).map_or("target/sbom", String::as_str)).map_err(Trouble::into_message),
+        Some("parts") => parts::run(&args[1..]).map_err(Trouble::into_message),
         _ => Err(USAGE.to_owned()),
     };
     done.map_err(|e| format!("campaign: {e}"))
@@ -180,16 +184,6 @@ fn paths() -> Outcome {
     steps::run(Command::new("git").args(["clone", "--quiet"]).arg(root()).arg(&clone))?;
     firmware::is_the_same_elsewhere(&clone)?;
     wheel::is_the_same_elsewhere(&clone)
-}
-
-fn parts(folder: &str) -> Outcome {
-    let sbom = ["run", "--quiet", "--package", "hzn-fuzz", "--example", "sbom"];
-    steps::run(cargo(&sbom).args(["--", folder]))?;
-    if has("cargo-deny") {
-        return steps::run(Command::new(steps::cargo_program()).args(["deny", "check", "licenses", "bans", "sources"]));
-    }
-    println!("cargo-deny is not installed; the test `supply` checks licences and sources");
-    Ok(())
 }
 
 /// A campaign of libFuzzer.

@@ -25,6 +25,7 @@ mod first_command;
 mod flight_build;
 mod machine;
 mod miri;
+mod parts;
 mod processors;
 mod python;
 mod reproduce;

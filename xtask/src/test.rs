@@ -29,7 +29,7 @@ const STEPS: &[Step] = &[
     every("ffmpeg", |_| if has("ffmpeg") { Ok(()) } else { apt_install(&["ffmpeg"]) }),
     every("tests", |steps| steps.cargo_test(&[])),
     every("tests of hzn-core alone", test_core_alone),
-    every("undefined behaviour", |_| miri::test()),
+    every("undefined behaviour", |steps| miri::test(steps.all)),
     every("feature sets of hzn-core", |_| {
         // The tests above build it without features. A feature chooses by `cfg!`, so most code is always compiled.
         ["std,_edges", "serde", "dlr,zju,horace,erf,kalibr,position,reml"].into_iter().try_for_each(check_core_with)

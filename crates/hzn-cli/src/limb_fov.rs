@@ -3,7 +3,7 @@
 use hzn_files::FrameData;
 use hzn_files::start::CameraFacts;
 use hzn_run::diagnosis::{FieldOfView, find_field_of_view};
-use hzn_run::open::{Request, frames_path};
+use hzn_run::open::{Request, frames_path, load_frames};
 use hzn_run::source::{self, Picture};
 
 use crate::exit::{Stop, usage};
@@ -18,7 +18,7 @@ const PICTURES: u64 = 8;
 /// A file cannot be read, or no picture shows a limb that says the field of view.
 pub(crate) fn find(request: &Request, known: &CameraFacts) -> Result<Option<FieldOfView>, Stop> {
     let mut source = source::open(&request.inputs, None, None)?;
-    let frames = frames_path(request, source.as_ref()).map(|path| hzn_files::frames::load(&path)).transpose()?;
+    let frames = frames_path(request, source.as_ref()).map(|path| load_frames(&path, source.as_ref())).transpose()?;
     let knows = |data: &FrameData| data.position_km.is_some() || data.altitude_km.is_some();
     // The pictures of a folder are spread over it. A sequence of unknown length gives its first ones.
     let step = source.total().map_or(1, |total| (total / PICTURES).max(1));

@@ -9,6 +9,8 @@
 //! | `truth.csv` | [`truth::load`] | the truth about every picture of a simulation |
 //! | `vehicle.csv` | serde, row by row | the truth about the vehicle of a simulation ([`vehicle`]) |
 //!
+//! [`png`] leaves colour profiles and texts out of PNG files.
+//!
 //! [`document`] reads TOML files of other crates with the same checks, for example scene.toml.
 //!
 //! [`start`] writes a sensor.toml for a camera without a calibration; [`migrate`] rewrites a file with old names.
@@ -28,6 +30,7 @@ mod merge;
 pub mod migrate;
 mod nearest;
 pub mod plausible;
+pub mod png;
 mod problem;
 pub mod rig;
 pub mod sensor;

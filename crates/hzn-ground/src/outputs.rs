@@ -5,14 +5,14 @@ use std::path::Path;
 use hzn_flight::cuc::Cuc;
 use hzn_flight::messages::Housekeeping;
 use hzn_mcap::FrameRecord;
-use hzn_run::disk;
+use hzn_run::disk::{self, Checked};
 use hzn_run::sink::{self, Existing, RowFile, Target};
 
 use crate::error::Error;
 
-pub(crate) fn table(path: &Path, force: bool) -> Result<csv::Writer<std::fs::File>, Error> {
+pub(crate) fn table(path: &Path, force: bool) -> Result<csv::Writer<Checked>, Error> {
     disk::refuse_existing(path, force)?;
-    let mut table = csv::Writer::from_path(path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+    let mut table = csv::Writer::from_writer(Checked::create(path).map_err(|e| disk::cannot_write(path, &e))?);
     let columns = ["time_s"].into_iter().chain(Housekeeping::FIELDS.iter().copied());
     table.write_record(columns).map_err(Error::failed)?;
     Ok(table)
@@ -52,7 +52,7 @@ impl Sink {
 pub(crate) fn write_housekeeping(
     time: Cuc,
     record: &Housekeeping,
-    table: &mut Option<csv::Writer<std::fs::File>>,
+    table: &mut Option<csv::Writer<Checked>>,
 ) -> Result<(), Error> {
     if let Some(table) = table {
         // The time of a correlated clock counts from 1958; the column `clock` says which time it is.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use hzn_flight::packet::{self, ApidBase, OVERHEAD, Scan};
 use hzn_fly::tell::Tell;
+use hzn_run::disk::Checked;
 use hzn_run::sink::Existing;
 
 use crate::error::Error;
@@ -16,7 +17,7 @@ pub struct Station {
     counts: StreamCounts,
     tell: Tell,
     sink: Option<Sink>,
-    housekeeping: Option<csv::Writer<std::fs::File>>,
+    housekeeping: Option<csv::Writer<Checked>>,
 }
 
 impl Station {

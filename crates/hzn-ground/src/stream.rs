@@ -15,6 +15,7 @@ use hzn_flight::packet::{Apid, ApidBase, Packet};
 use hzn_flight::{Parameters, parameters};
 use hzn_fly::tell::Tell;
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, RowMeta};
+use hzn_run::disk::Checked;
 
 use crate::error::Error;
 use crate::outcome;
@@ -76,7 +77,7 @@ impl StreamCounts {
         &mut self,
         packet: &Packet<'_>,
         sink: &mut Option<Sink>,
-        housekeeping: &mut Option<csv::Writer<std::fs::File>>,
+        housekeeping: &mut Option<csv::Writer<Checked>>,
     ) -> Result<(), Error> {
         self.packets += 1;
         self.count_lost(packet);

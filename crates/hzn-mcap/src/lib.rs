@@ -67,7 +67,7 @@ pub use error::Error;
 pub use frame::{Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
 pub use images::{ImageReader, InputImage};
 pub use index::{Index, IndexEntry};
-pub use part::{create_part, is_being_written, open_part, part_path, publish, rename, sync, sync_name};
+pub use part::{check_close, create_part, is_being_written, open_part, part_path, publish, rename, sync, sync_name};
 pub use pictures::{Pictures, Place};
 pub use reader::{Contents, Reader};
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};

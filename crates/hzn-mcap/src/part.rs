@@ -58,6 +58,20 @@ pub fn sync(file: &File) -> io::Result<()> {
     ignore_impossible(file.sync_data())
 }
 
+/// Returns the error that the system would otherwise tell only when the file is closed, where nothing reads it. A
+/// network file system reports a full disk or a lost server this late. The file stays open, because a second
+/// descriptor of it is closed. On other systems than Unix this does nothing.
+///
+/// # Errors
+/// The file is not completely written.
+pub fn check_close(file: &File) -> io::Result<()> {
+    #[cfg(unix)]
+    nix::unistd::close(file.try_clone()?)?;
+    #[cfg(not(unix))]
+    let _ = file;
+    Ok(())
+}
+
 /// Gives a finished file its final name. After a power cut, either the earlier file of that name is there, or this file
 /// with all of its content.
 ///
@@ -66,6 +80,7 @@ pub fn sync(file: &File) -> io::Result<()> {
 pub fn publish(file: &File, part: &Path, path: &Path) -> io::Result<()> {
     // Without this order the disk may have the new name before it has the content.
     sync(file)?;
+    check_close(file)?;
     rename(part, path)
 }
 

@@ -23,6 +23,7 @@ import pyarrow.parquet as parquet  # noqa: E402
 from moto.moto_server.werkzeug_app import DomainDispatcherApplication  # noqa: E402
 from moto.server import ThreadedMotoServer  # noqa: E402
 
+from hzn import _shards  # noqa: E402
 from hzn.dask import process_archive  # noqa: E402
 
 # A multiple of 50, of at least 100.
@@ -310,6 +311,27 @@ def test_csv_shards_are_those_of_parquet(client, archive, small, tmp_path):
         cells = [row[name] for row in rows]
         for cell, known in zip(cells, table[name], strict=True):
             assert cell == "" if known is None else type(known)(cell) == known, name
+
+
+def test_texts_of_csv_are_no_formulas(tmp_path, small):
+    texts = ["=1+1", "-2.png", "+a", "@b", "'=c", "'", "'d", "plain", ""]
+    written = ["'=1+1", "'-2.png", "'+a", "'@b", "''=c", "'", "'d", "plain", ""]
+    assert [_shards._guarded(text) for text in texts] == written
+    assert [_shards._unguarded(cell) for cell in written] == texts
+    report = _shards._process_encoded(small, 0, "=lost.png", None, "-why", hzn._hzn._Prior())
+    path = str(tmp_path / "a.csv")
+    _shards._write_csv(path, small, [report])
+    with open(path, newline="", encoding="utf-8") as file:
+        assert next(csv.DictReader(file))["file"] == "'=lost.png"
+    failed = _shards._unprocessed(fsspec.filesystem("file"), path)
+    assert [row["file"] for row in failed] == ["=lost.png"] and failed[0]["detail"].startswith("-why")
+
+
+def test_what_is_known_may_be_of_numpy(client, archive, small, tmp_path):
+    known = {"altitude_km": np.float32(400), "time_s": np.int64(3), "position_km": None}
+    urls = [(archive[0], known), (archive[1], {"rate_rad_s": np.zeros(3), "time_s": np.float64(4)})]
+    result = process_archive(urls, small, client=client, out=str(tmp_path / "numpy"))
+    assert result.failed == [] and columns(result)["time_s"] == [3.0, 4.0]
 
 
 def test_a_generator_is_read_only_as_far_as_the_workers_need_it(client, archive, small, tmp_path):

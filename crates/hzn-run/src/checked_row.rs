@@ -20,10 +20,37 @@ pub(crate) fn header() -> String {
     format!("{},{COLUMN}\n", Row::COLUMNS.join(","))
 }
 
-/// Returns a row as a line of CSV without its checksum and line end.
+/// Characters with which a spreadsheet begins a formula.
+const FORMULA: [char; 4] = ['=', '+', '-', '@'];
+
+/// Returns whether a spreadsheet would compute a text, or whether it looks like a [`guarded`] one.
+fn needs_guard(text: &str) -> bool {
+    text.trim_start_matches('\'').starts_with(FORMULA)
+}
+
+/// Returns a text as a cell of CSV. The apostrophe at its beginning makes a spreadsheet take it as a text.
+fn guarded(text: &str) -> String {
+    if needs_guard(text) { format!("'{text}") } else { text.to_owned() }
+}
+
+/// Returns the text of a [`guarded`] cell.
+fn unguarded(cell: String) -> String {
+    match cell.strip_prefix('\'') {
+        Some(text) if needs_guard(text) => text.to_owned(),
+        _ => cell,
+    }
+}
+
+/// Returns a row as a line of CSV without its checksum and line end. Of its texts, only the name and the detail can
+/// contain what others wrote.
 fn to_csv(row: &Row) -> Result<Vec<u8>, Error> {
     let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
-    writer.serialize(row).map_err(Error::failed)?;
+    let written = if needs_guard(&row.file) || needs_guard(&row.detail) {
+        writer.serialize(Row { file: guarded(&row.file), detail: guarded(&row.detail), ..row.clone() })
+    } else {
+        writer.serialize(row)
+    };
+    written.map_err(Error::failed)?;
     let mut line = writer.into_inner().map_err(failed)?;
     line.truncate(line.trim_ascii_end().len());
     Ok(line)
@@ -89,6 +116,7 @@ pub(crate) fn from_csv(record: &csv::StringRecord, header: &csv::StringRecord) -
         _ => e.to_string(),
     };
     let row = record.deserialize::<Row>(Some(header)).map_err(why)?;
+    let row = Row { file: unguarded(row.file), detail: unguarded(row.detail), ..row };
     let place = header.iter().position(|name| name == COLUMN);
     check(row, place.and_then(|i| record.get(i)))
 }
@@ -148,6 +176,24 @@ mod tests {
                     assert_eq!(read, row, "{at}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_spreadsheet_computes_no_text() {
+        let begins = ["=1+1", "+1", "-1", "@sum", "'=1", "''-", "'", "'a", "", "-", "a=1", "''"];
+        for (file, detail) in begins.iter().flat_map(|file| begins.iter().map(move |detail| (file, detail))) {
+            let row = Row { file: (*file).to_owned(), detail: (*detail).to_owned(), axis_x: Some(-0.5), ..row() };
+            let line = csv_line(&row).unwrap();
+            assert_eq!(read_csv(&line).as_ref(), Ok(&row));
+            let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(line.as_slice());
+            let record = reader.records().next().unwrap().unwrap();
+            let cell = |name: &str| record.get(Row::COLUMNS.iter().position(|c| *c == name).unwrap()).unwrap();
+            assert!(![cell("file"), cell("detail")].iter().any(|cell| cell.starts_with(FORMULA)), "{record:?}");
+            // Numbers stay numbers, and JSON is read by no spreadsheet.
+            assert_eq!(cell("axis_x"), "-0.5");
+            assert_eq!(from_json(&json_line(&row).unwrap()).as_ref(), Ok(&row));
+            assert!(String::from_utf8(json_line(&row).unwrap()).unwrap().contains(&format!("\"file\":\"{file}\"")));
         }
     }
 

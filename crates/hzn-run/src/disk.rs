@@ -1,7 +1,8 @@
 //! Paths and errors of files that are written, with advice for the user.
 
 use std::collections::HashMap;
-use std::io::Write;
+use std::fs::File;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use hzn_mcap::part_path;
@@ -71,6 +72,39 @@ pub fn refuse_existing(path: &Path, force: bool) -> Result<(), Error> {
     Ok(())
 }
 
+/// Writes a file and checks that all of it arrived.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Error> {
+    let written = Checked::create(path).and_then(|mut file| file.write_all(bytes.as_ref()).and_then(|()| file.flush()));
+    written.map_err(|e| cannot_write(path, &e))
+}
+
+/// A file whose [`flush`](Write::flush) also returns the errors that the system tells only when a file is closed.
+/// The last step of a writer must therefore be a flush.
+#[derive(Debug)]
+pub struct Checked(File);
+
+impl Checked {
+    /// Creates a file, or empties it.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        File::create(path).map(Self)
+    }
+}
+
+impl Write for Checked {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        hzn_mcap::check_close(&self.0)
+    }
+}
+
 /// Writes a text file completely or not at all: into `NAME.part`, which is then renamed.
 ///
 /// # Errors
@@ -89,18 +123,6 @@ pub fn write_whole(path: &Path, text: &str) -> Result<(), Error> {
 /// Returns the error for a file that cannot be written, with advice.
 pub fn cannot_write(path: &Path, error: &std::io::Error) -> Error {
     failed(advice(path, error))
-}
-
-/// Returns the error for a picture that cannot be written, with advice.
-pub fn cannot_save(path: &Path, error: &image::ImageError) -> Error {
-    let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
-    while let Some(e) = cause {
-        if let Some(e) = e.downcast_ref::<std::io::Error>() {
-            return cannot_write(path, e);
-        }
-        cause = e.source();
-    }
-    failed(format!("{}: {error}", path.display()))
 }
 
 /// Returns the meaning of a write error, with advice.

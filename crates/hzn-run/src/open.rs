@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Config;
 use hzn_core::body::{self, PriorError};
 use hzn_core::config::Orient;
-use hzn_files::{FrameData, Frames, Problem, Sensor, plausible};
+use hzn_files::{Frames, Problem, Sensor, plausible};
 
 use crate::engine::{self, AnySensor};
 use crate::error::{Error, Remedy, unusable};
@@ -84,13 +84,24 @@ pub fn open(request: &Request) -> Result<Opened, Error> {
     warnings.extend(request.altitude_km.map(|km| set_altitude(&mut sensor, km)).transpose()?.flatten());
     let mut notes = source.notes();
     notes.extend(complete(source.as_mut(), &mut sensor)?);
-    let frames = frames_path(request, source.as_ref()).map(|path| hzn_files::frames::load(&path)).transpose()?;
+    let frames = frames_path(request, source.as_ref()).map(|path| load_frames(&path, source.as_ref())).transpose()?;
     if let Some(frames) = &frames {
         warnings.extend(frames.warnings.iter().map(Problem::to_string));
         warnings.extend(frames.check_sensor(&sensor.config).iter().map(Problem::to_string));
     }
     engine::check_frames(&sensor.config, request.flight, frames.as_ref())?;
     Ok(Opened { source, sensor, frames, warnings, notes })
+}
+
+/// Reads a frames.csv. If the names of all pictures are known, only their rows are kept.
+///
+/// # Errors
+/// The errors are those of [`hzn_files::frames::load`].
+pub fn load_frames(path: &Path, source: &dyn Source) -> Result<Frames, Problem> {
+    match source.names() {
+        Some(names) => hzn_files::frames::load_for(path, names),
+        None => hzn_files::frames::load(path),
+    }
 }
 
 impl Opened {
@@ -193,7 +204,7 @@ pub fn complete(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<Stri
     let mut notes = Vec::new();
     source.want_channel(sensor.config.input.channel)?;
     if sensor.config.input.bits.is_none() {
-        let found = source::find_bits(source);
+        let found = source::find_bits(source, &sensor.config);
         // Recorded pictures are PNG, which has room for more bits. Therefore the recorded sensor states the number of
         // bits.
         let bits = source.bits().filter(|bits| *bits > 8).or(found.map(|f| f.bits));
@@ -247,9 +258,7 @@ pub fn check_size(source: &dyn Source, config: &Config) -> Result<(), Error> {
 pub fn check_altitude(source: &dyn Source, config: &Config, frames: Option<&Frames>) -> Result<(), Error> {
     // A position can come from the limb alone.
     let known = |b: &body::Config| b.half_angle_is_free() || b.altitude_km.is_some() || config.fits_position(b);
-    let has_altitude =
-        |row: &FrameData| row.altitude_km.is_some() || row.position_km.is_some() || row.range_km.is_some();
-    if frames.map_or(source.sensor_toml().is_some(), |f| f.rows.iter().any(has_altitude)) {
+    if frames.map_or(source.sensor_toml().is_some(), Frames::has_distances) {
         return Ok(());
     }
     if config.each_body().iter().any(known) {

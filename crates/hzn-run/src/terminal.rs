@@ -19,7 +19,7 @@ pub fn lines(text: impl Display) -> String {
 
 /// Returns whether a terminal obeys a character instead of showing it: the control characters, and those that change
 /// the direction of writing.
-fn is_obeyed(c: char) -> bool {
+pub(crate) fn is_obeyed(c: char) -> bool {
     c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 

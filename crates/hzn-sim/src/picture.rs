@@ -79,12 +79,23 @@ impl Picture {
     /// # Errors
     /// Fails if the file cannot be written, or if the format of the ending does not have this many bits.
     pub fn save(&self, path: &Path) -> Result<(), image::ImageError> {
+        Ok(std::fs::write(path, self.encode(path)?)?)
+    }
+
+    /// Encodes the picture as [`Self::save`] does; the ending of the name sets the format.
+    ///
+    /// # Errors
+    /// Fails if the format of the ending does not have this many bits.
+    pub fn encode(&self, name: &Path) -> Result<Vec<u8>, image::ImageError> {
         let (w, h) = (self.width.into(), self.height.into());
         let grey = self.channels == 1;
+        let format = image::ImageFormat::from_path(name)?;
+        let mut file = std::io::Cursor::new(Vec::new());
+        let mut write = |data: &[u8], colour| image::write_buffer_with_format(&mut file, data, w, h, colour, format);
         match &self.samples {
             Samples::Bytes(data) => {
                 let colour = if grey { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
-                image::save_buffer(path, data, w, h, colour)
+                write(data, colour)
             }
             Samples::Words(data) => {
                 // The upper bits are repeated below, so full scale stays full scale.
@@ -92,9 +103,10 @@ impl Picture {
                     |v: u16| ((u32::from(v) << (16 - self.bits)) | (u32::from(v) >> (2 * self.bits - 16))) as u16;
                 let bytes: Vec<u8> = data.iter().flat_map(|&v| spread(v).to_ne_bytes()).collect();
                 let colour = if grey { ExtendedColorType::L16 } else { ExtendedColorType::Rgb16 };
-                image::save_buffer(path, &bytes, w, h, colour)
+                write(&bytes, colour)
             }
-        }
+        }?;
+        Ok(file.into_inner())
     }
 
     /// Encodes the picture as a JPEG file of this quality, 1 to 100. Samples with more than 8 bits are cut to 8.

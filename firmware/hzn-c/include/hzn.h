@@ -34,6 +34,9 @@
 // The parameters need the whole picture in memory, or the camera has more than 1920 columns or 1080 rows.
 #define HZN_NO_ROWS -9
 
+// `next_row` ended the picture.
+#define HZN_ROWS_ENDED -10
+
 // Status: a direction was found.
 #define HZN_OK 0
 
@@ -214,8 +217,8 @@ int32_t hzn_process(HznSensor *sensor,
                     HznAnswer *out);
 
 // Finds the limb in a picture that comes row by row. `next_row` writes the next row, `width` bytes, and returns 0; any
-// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or that of the
-// picture before.
+// other number ends the picture, and `hzn_process_rows` returns `HZN_ROWS_ENDED`. `context` can take the number, which
+// would look like a status here. The threshold must be `fixed`, or that of the picture before.
 //
 // # Safety
 // `sensor` is null or from `hzn_open`. `memory` is null or has `bytes` writable bytes, which have no other use during

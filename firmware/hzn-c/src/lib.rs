@@ -56,6 +56,8 @@ pub const HZN_NOT_OPEN: i32 = -7;
 pub const HZN_OTHER_INTERFACE: i32 = -8;
 /// The parameters need the whole picture in memory, or the camera has more than 1920 columns or 1080 rows.
 pub const HZN_NO_ROWS: i32 = -9;
+/// `next_row` ended the picture.
+pub const HZN_ROWS_ENDED: i32 = -10;
 
 /// Status: a direction was found.
 pub const HZN_OK: i32 = 0;

@@ -9,7 +9,7 @@ use hzn_core::pipeline::{ROWS_HELD, RowBuffers};
 use hzn_flight::answer::PictureAnswer;
 
 use crate::types::{HznAnswer, HznKnown, NO_ANSWER, to_answer};
-use crate::{HZN_KNOWN, HZN_MEMORY, HZN_NO_ROWS, HZN_NULL, HznSensor, expect, open_sensor};
+use crate::{HZN_KNOWN, HZN_MEMORY, HZN_NO_ROWS, HZN_NULL, HZN_ROWS_ENDED, HznSensor, expect, open_sensor};
 
 const WIDTH: usize = 1920;
 const HEIGHT: usize = 1080;
@@ -25,8 +25,8 @@ pub const HZN_ROWS_SIZE: usize = 147456;
 const _: () = assert!(size_of::<Rows>() <= HZN_ROWS_SIZE);
 
 /// Finds the limb in a picture that comes row by row. `next_row` writes the next row, `width` bytes, and returns 0; any
-/// other number ends the picture, and `hzn_process_rows` returns it. The threshold must be `fixed`, or that of the
-/// picture before.
+/// other number ends the picture, and `hzn_process_rows` returns `HZN_ROWS_ENDED`. `context` can take the number, which
+/// would look like a status here. The threshold must be `fixed`, or that of the picture before.
 ///
 /// # Safety
 /// `sensor` is null or from `hzn_open`. `memory` is null or has `bytes` writable bytes, which have no other use during
@@ -72,7 +72,7 @@ pub unsafe extern "C" fn hzn_process_rows(
         // SAFETY: the caller guarantees it.
         let ended = unsafe { next_row(context, row.as_mut_ptr(), width) };
         if ended != 0 {
-            return ended;
+            return HZN_ROWS_ENDED;
         }
         if stream.push_row(row).is_err() {
             return HZN_NO_ROWS;

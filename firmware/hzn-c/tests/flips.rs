@@ -9,7 +9,7 @@ use std::ptr;
 
 use hzn::rows::{HZN_ROWS_SIZE, hzn_process_rows};
 use hzn::types::{HznAnswer, HznPicture};
-use hzn::{HZN_INTERFACE, HZN_NOT_OPEN, HZN_OK, HZN_REFUSED, HZN_WORKSPACE_SIZE, HznSensor};
+use hzn::{HZN_INTERFACE, HZN_NOT_OPEN, HZN_OK, HZN_REFUSED, HZN_ROWS_ENDED, HZN_WORKSPACE_SIZE, HznSensor};
 use hzn::{hzn_apply, hzn_get, hzn_open, hzn_process, hzn_refused, hzn_set, hzn_workspace_size};
 
 const WIDTH: usize = 96;
@@ -168,4 +168,24 @@ fn a_flipped_bit_is_refused_or_has_no_effect() {
     println!("{} flips: {refused} are refused, the others have no effect", trials());
     // More than a tenth of the memory outlives a call.
     assert!(refused > trials() / 10);
+}
+
+/// A camera that fails returns the numbers of statuses and of errors. All of them end the picture in the same way.
+#[test]
+fn an_error_of_the_camera_is_no_status() {
+    unsafe extern "C" fn fail(context: *mut c_void, _: *mut u8, _: usize) -> i32 {
+        // SAFETY: the context is the number that the camera returns.
+        unsafe { *context.cast::<i32>() }
+    }
+    let mut program = Program::new();
+    let (sensor, rows) = (program.sensor.start().cast::<HznSensor>(), program.rows.start());
+    for mut number in [1, 2, 6, 99, -1, -7, i32::MIN, i32::MAX] {
+        // SAFETY: an answer consists of numbers.
+        let mut answer: HznAnswer = unsafe { std::mem::zeroed() };
+        let context = (&raw mut number).cast();
+        // SAFETY: a sensor was opened in this memory, and the rows have the stated size.
+        let code =
+            unsafe { hzn_process_rows(sensor, rows, HZN_ROWS_SIZE, Some(fail), context, ptr::null(), &raw mut answer) };
+        assert_eq!((code, answer.status), (HZN_ROWS_ENDED, 255), "{number}");
+    }
 }

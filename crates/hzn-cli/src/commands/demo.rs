@@ -56,7 +56,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     tell::line(format_args!("looking for the limb ..."));
     let rows = process_flight(&places)?;
     let iss = process_photograph(&places)?;
-    std::fs::write(&places.layout, hzn_mcap::LAYOUT).map_err(|e| disk::cannot_write(&places.layout, &e))?;
+    disk::write(&places.layout, hzn_mcap::LAYOUT)?;
     std::fs::create_dir_all(&places.overlays).map_err(|e| disk::cannot_write(&places.overlays, &e))?;
     let drawn = draw(&places.flight_mcap, &places.overlays, 5)? + draw(&places.iss_mcap, &places.overlays, 1)?;
 
@@ -131,10 +131,7 @@ fn process_flight(places: &Places) -> Result<Vec<Row>, Stop> {
 
 /// Writes the photograph with its sensor, processes it, and returns its result.
 fn process_photograph(places: &Places) -> Result<Vec<Row>, Stop> {
-    let write = |name: &str, bytes: &[u8]| {
-        let path = places.iss.join(name);
-        std::fs::write(&path, bytes).map_err(|e| disk::cannot_write(&path, &e))
-    };
+    let write = |name: &str, bytes: &[u8]| disk::write(&places.iss.join(name), bytes);
     write("iss-limb-2020-11-20.jpg", ISS_PICTURE)?;
     write("sensor.toml", ISS_SENSOR.as_bytes())?;
     write("CREDITS.md", ISS_CREDITS.as_bytes())?;
@@ -145,22 +142,20 @@ fn process_photograph(places: &Places) -> Result<Vec<Row>, Stop> {
 /// Writes pictures, sensor.toml, frames.csv and truth.csv of the flight. Returns the truth.
 fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
     let config = hzn_files::sensor::to_text(&flight.sensor).map_err(failed)?;
-    let path = folder.join("sensor.toml");
     let text = format!("# The camera of a rendered rocket flight.\npreset = \"hzn\"\n\n{config}");
-    std::fs::write(&path, text).map_err(|e| disk::cannot_write(&path, &e))?;
+    disk::write(&folder.join("sensor.toml"), text)?;
 
     // The pictures are rendered one after the other, because each already uses all cores.
     for frame in &flight.frames {
         let path = folder.join(&frame.file);
-        frame.render().map_err(failed)?.save(&path).map_err(|e| disk::cannot_save(&path, &e))?;
+        disk::write(&path, frame.render().map_err(failed)?.encode(&path).map_err(failed)?)?;
     }
     let mut known = String::from("file,time_s,x_km,y_km,z_km\n");
     for frame in &flight.frames {
         let [x, y, z] = frame.prior().position_m.unwrap_or_default().map(|m| m / 1e3);
         known.push_str(&format!("{},{},{x},{y},{z}\n", frame.file, frame.time_s));
     }
-    let path = folder.join("frames.csv");
-    std::fs::write(&path, known).map_err(|e| disk::cannot_write(&path, &e))?;
+    disk::write(&folder.join("frames.csv"), known)?;
 
     let truth: Vec<Truth> = flight.frames.iter().map(|f| f.truth()).collect::<Result<_, _>>().map_err(failed)?;
     let path = folder.join("truth.csv");
@@ -168,7 +163,7 @@ fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
         csv::ErrorKind::Io(e) => disk::cannot_write(&path, &e).into(),
         other => failed(format!("{}: {other:?}", path.display())),
     };
-    let mut table = csv::Writer::from_path(&path).map_err(written)?;
+    let mut table = csv::Writer::from_writer(disk::Checked::create(&path).map_err(|e| disk::cannot_write(&path, &e))?);
     for row in &truth {
         table.serialize(row).map_err(written)?;
     }

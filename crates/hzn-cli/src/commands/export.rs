@@ -102,7 +102,7 @@ fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {
         };
         let path = folder.join(picture_name(&name, ending));
         disk::refuse_existing(&path, args.force)?;
-        std::fs::write(&path, bytes).map_err(|e| disk::cannot_write(&path, &e))?;
+        disk::write(&path, bytes)?;
     }
     if let Some(folder) = &args.overlay {
         let path = folder.join(overlay::file_name(&name));

@@ -101,7 +101,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.output.exists() && !args.force {
         return Err(usage(format!("{name}: exists already; choose another name with -o, or --force replaces it")));
     }
-    let write = |text: &str| std::fs::write(&args.output, text).map_err(|e| disk::cannot_write(&args.output, &e));
+    let write = |text: &str| disk::write(&args.output, text);
     let Some(mut source) = source else {
         write(hzn_files::template::SENSOR_TOML)?;
         tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));

@@ -7,6 +7,7 @@ use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 use hzn_core::config::Orient;
+use hzn_files::frames::Unused;
 use hzn_files::{Frames, Sensor};
 use hzn_run::engine::{self, End, Finished, Plan};
 use hzn_run::open::Opened;
@@ -38,7 +39,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let Opened { mut source, sensor, frames, notes, .. } = opened;
     // The check is made only for folders, because the table next to a single picture also lists all others.
     if let Some(frames) = frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
-        warn_of_missing_pictures(frames, &source.folder());
+        warn_of_missing_pictures(frames);
     }
     refuse_inputs(args, source.as_ref())?;
     if let Some(drawn) = &args.overlay {
@@ -250,16 +251,13 @@ fn explain_command(args: &Args, source: &dyn Source, frame: u64) -> String {
     words.join(" ")
 }
 
-fn warn_of_missing_pictures(frames: &Frames, folder: &Path) {
-    let missing: Vec<_> = frames.rows.iter().filter(|r| !folder.join(&r.file).exists()).collect();
-    for row in missing.iter().take(MAX_MISSING_LISTED) {
+fn warn_of_missing_pictures(frames: &Frames) {
+    let Unused { rows, first } = &frames.unused;
+    for row in first {
         tell::warning(frames.problem(row, "no such picture in the folder; the row is not used"));
     }
-    if let Some(more) = missing.len().checked_sub(MAX_MISSING_LISTED).filter(|n| *n > 0) {
+    if let Some(more) = rows.checked_sub(first.len()).filter(|n| *n > 0) {
         let rows = explain::counted(more as u64, "further row");
         tell::warning(format_args!("{}: {rows} without a picture in the folder", frames.path.display()));
     }
 }
-
-/// Number of rows without a picture that are reported one by one.
-const MAX_MISSING_LISTED: usize = 3;

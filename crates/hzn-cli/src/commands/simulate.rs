@@ -187,7 +187,7 @@ fn files(scenario: &mut Scenario, from: &Path) -> Result<Vec<(String, Vec<u8>)>,
 }
 
 fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Stop> {
-    std::fs::write(path, text).map_err(|e| disk::cannot_write(path, &e).into())
+    Ok(disk::write(path, text)?)
 }
 
 /// Writes the sensor.toml of every camera. All have the same lens and world, so that the noise is measured once.
@@ -282,8 +282,9 @@ fn rig(scenario: &Scenario, cameras: &[Sequence], folder: &Path) -> Result<(), S
 }
 
 /// Makes a table in a folder.
-fn table(folder: &Path, name: &str) -> Result<csv::Writer<std::fs::File>, Stop> {
-    csv::Writer::from_path(folder.join(name)).map_err(failed)
+fn table(folder: &Path, name: &str) -> Result<csv::Writer<disk::Checked>, Stop> {
+    let path = folder.join(name);
+    Ok(csv::Writer::from_writer(disk::Checked::create(&path).map_err(|e| disk::cannot_write(&path, &e))?))
 }
 
 /// Writes imu.csv, gnss.csv and vehicle.csv.
@@ -413,10 +414,10 @@ fn render(frame: &FlightFrame, folder: &Path) -> Result<(), Stop> {
     let path = folder.join(&frame.file);
     let part = folder.join(part_name(&frame.file));
     let picture = frame.scene.render().map_err(failed)?;
-    let saved = match frame.jpeg_quality {
-        Some(quality) => picture.encode_jpeg(quality).and_then(|file| Ok(std::fs::write(&part, file)?)),
-        None => picture.save(&part),
+    let file = match frame.jpeg_quality {
+        Some(quality) => picture.encode_jpeg(quality),
+        None => picture.encode(&part),
     };
-    saved.map_err(|e| disk::cannot_save(&path, &e))?;
+    disk::write(&part, file.map_err(failed)?)?;
     std::fs::rename(&part, &path).map_err(|e| disk::cannot_write(&path, &e).into())
 }

@@ -69,7 +69,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     match &args.output {
         Some(path) => {
             files::check_outputs(&loaded_files(&args.commands), std::slice::from_ref(path), args.force)?;
-            std::fs::write(path, out).map_err(|e| disk::cannot_write(path, &e))?;
+            disk::write(path, out)?;
             Ok(Exit::Done)
         }
         None => {

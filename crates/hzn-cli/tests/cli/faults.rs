@@ -88,9 +88,11 @@ fn warnings_are_counted_and_not_repeated() {
     place.write("in/frames.csv", format!("file,altitude_km\n{rows}").as_bytes());
     let ran = place.run(&["run", "in", "-q"]).expect(0).says("99997 further rows without a picture");
     assert!(ran.err.len() < 2000, "{} bytes", ran.err.len());
+    // Values are looked at only in the rows of the pictures.
+    let place = Place::with_pictures(8);
     let rows: String = (0..50_000).map(|i| format!("{i:04}.png,300,6778.137,0,0\n")).collect();
     place.write("in/frames.csv", format!("file,altitude_km,x_km,y_km,z_km\n{rows}").as_bytes());
-    let ran = place.run(&["run", "in", "-q"]).expect(0).says("49997 further rows with a warning of this kind");
+    let ran = place.run(&["run", "in", "-q"]).expect(0).says("5 further rows with a warning of this kind");
     assert!(ran.err.len() < 2000, "{} bytes: {}", ran.err.len(), ran.err);
     let place = Place::with_pictures(1);
     (0..200).for_each(|i| place.write(&format!("in/z{i:03}.png"), b"no picture"));

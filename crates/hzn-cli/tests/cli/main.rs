@@ -16,6 +16,7 @@ mod faults;
 mod fly;
 mod fuse;
 mod gates;
+mod hostile;
 mod kept_inputs;
 mod migrate;
 mod outputs;

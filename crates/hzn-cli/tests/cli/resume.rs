@@ -185,3 +185,34 @@ fn changed_pictures_are_not_mixed_with_their_old_results() {
         table([400; 5]);
     }
 }
+
+/// Each row is as it was written, but one is missing or at another place.
+#[test]
+fn rows_that_were_removed_or_moved_are_noticed() {
+    let place = Place::with_pictures(6);
+    place.run(&["run", "in", "-o", "a.csv"]).expect(0);
+    place.run(&["run", "in", "-o", "a.jsonl"]).expect(0);
+    for (out, head) in [("a.csv", 1), ("a.jsonl", 0)] {
+        let text = place.read(out);
+        let whole: Vec<&str> = text.split_inclusive('\n').collect();
+        std::fs::remove_file(place.path(out)).unwrap();
+        let mut removed = whole[..5].to_vec();
+        removed.remove(head + 1);
+        // As many rows as pictures, and the last one is right.
+        let mut twice = whole[..5].to_vec();
+        twice[head + 1] = whole[head];
+        let mut swapped = whole[..5].to_vec();
+        swapped.swap(head, head + 1);
+        for (rows, what) in [
+            (removed, "picture 2 is at the place of picture 1"),
+            (twice, "picture 0 is at the place of picture 1"),
+            (swapped, "picture 1 is at the place of picture 0"),
+        ] {
+            place.write(&format!("{out}.part"), rows.concat().as_bytes());
+            place.run(&["run", "in", "-o", out, "--resume"]).expect(2).says(what).says("--force starts over");
+        }
+        place.write(&format!("{out}.part"), whole[..5].concat().as_bytes());
+        place.run(&["run", "in", "-o", out, "--resume"]).expect(0).says("that were finished before");
+        std::fs::remove_file(place.path(out)).unwrap();
+    }
+}

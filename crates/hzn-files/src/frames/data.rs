@@ -169,11 +169,30 @@ pub struct Frames {
     pub rows: Vec<FrameData>,
     /// Warnings, which do not stop the run.
     pub warnings: Vec<Problem>,
+    /// The rows that are not in [`Self::rows`], because their pictures are not processed.
+    pub unused: Unused,
     by_file: HashMap<String, usize>,
+    /// Any row of the file has a time, or gives the distance from the body.
+    has_times: bool,
+    has_distances: bool,
+}
+
+/// The rows of pictures that are not processed.
+#[derive(Debug, Clone, Default)]
+pub struct Unused {
+    /// Number of these rows.
+    pub rows: usize,
+    /// The first of them, at most [`Self::LISTED`].
+    pub first: Vec<FrameData>,
+}
+
+impl Unused {
+    /// Number of rows that are kept for messages.
+    pub const LISTED: usize = 3;
 }
 
 /// Returns the name of a picture without `./`, which `find . -name '*.png'` puts before it.
-fn plain_name(mut file: &str) -> &str {
+pub(super) fn plain_name(mut file: &str) -> &str {
     while let Some(rest) = file.strip_prefix("./") {
         file = rest;
     }
@@ -189,7 +208,22 @@ impl Frames {
     /// Appends a row. Its picture must not have a row yet.
     pub(super) fn push(&mut self, row: FrameData) {
         self.by_file.insert(plain_name(&row.file).to_owned(), self.rows.len());
+        self.see(&row);
         self.rows.push(row);
+    }
+
+    /// Counts a row whose picture is not processed.
+    pub(super) fn leave_out(&mut self, row: FrameData) {
+        self.see(&row);
+        self.unused.rows += 1;
+        if self.unused.first.len() < Unused::LISTED {
+            self.unused.first.push(row);
+        }
+    }
+
+    fn see(&mut self, row: &FrameData) {
+        self.has_times |= row.time_s.is_some();
+        self.has_distances |= row.altitude_km.is_some() || row.position_km.is_some() || row.range_km.is_some();
     }
 
     /// Returns the row of the picture with this name.
@@ -211,7 +245,7 @@ impl Frames {
     #[must_use]
     pub fn seen_by_camera(&self, q_vehicle_from_camera_wxyz: [f64; 4]) -> Self {
         let rows = self.rows.iter().map(|row| row.seen_by_camera(q_vehicle_from_camera_wxyz)).collect();
-        Self { rows, warnings: Vec::new(), path: self.path.clone(), by_file: self.by_file.clone() }
+        Self { rows, warnings: Vec::new(), ..self.clone() }
     }
 
     /// Returns whether any row has more than the name and the time of a picture.
@@ -228,7 +262,12 @@ impl Frames {
 
     /// Returns whether any picture has a time. The file is then the only clock of the sequence.
     pub fn has_times(&self) -> bool {
-        self.rows.iter().any(|row| row.time_s.is_some())
+        self.has_times
+    }
+
+    /// Returns whether any picture has an altitude, a position or a distance from the body's centre.
+    pub fn has_distances(&self) -> bool {
+        self.has_distances
     }
 
     /// Returns the problem with a row that hzn-core refused, with the refused value.

@@ -19,5 +19,5 @@ mod data;
 mod read;
 
 pub use check::altitude_at_km;
-pub use data::{FrameData, Frames, Orientation};
-pub use read::{COLUMNS, load, load_vehicle, parse, parse_vehicle};
+pub use data::{FrameData, Frames, Orientation, Unused};
+pub use read::{COLUMNS, load, load_for, load_vehicle, parse, parse_vehicle};

@@ -1,12 +1,13 @@
 //! Reads a frames.csv.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::io::{self, Read};
 use std::path::Path;
 
 use csv::StringRecord;
 use hzn_core::body::Kind;
 
-use super::data::{FrameData, Frames, Orientation};
+use super::data::{FrameData, Frames, Orientation, plain_name};
 use crate::nearest::nearest;
 use crate::{Problem, limited, time};
 
@@ -57,7 +58,7 @@ const MAX_ROWS: usize = 2_000_000;
 /// The file cannot be read, the column `file` is missing, a cell is not a finite number, a vector is incomplete, or a
 /// picture has two rows.
 pub fn load(path: &Path) -> Result<Frames, Problem> {
-    parse(&read_text(path)?, path)
+    read(open(path)?, path, Belongs::ToPicture, |_| true)
 }
 
 /// Reads the frames.csv of a vehicle with several cameras, as [`load`] does. Its rows belong to times and not to
@@ -66,14 +67,29 @@ pub fn load(path: &Path) -> Result<Frames, Problem> {
 /// # Errors
 /// The errors are those of [`load`]; also a row without a time, or one that is not later than the row before it.
 pub fn load_vehicle(path: &Path) -> Result<Frames, Problem> {
-    parse_vehicle(&read_text(path)?, path)
+    in_order(read(open(path)?, path, Belongs::ToTime, |_| true)?)
 }
 
-fn read_text(path: &Path) -> Result<String, Problem> {
-    limited::read_text(path, limited::TABLE_BYTES).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => Problem::new(path, "no such file"),
-        _ => Problem::new(path, format!("cannot be read: {e}")),
+/// Reads a frames.csv as [`load`] does, but keeps only the rows of these pictures. All other rows are checked and
+/// counted ([`Frames::unused`]), so that a table of a million pictures needs no memory for the pictures that are not
+/// processed. Whether two of the other rows name the same picture is not checked.
+///
+/// # Errors
+/// The errors are those of [`load`].
+pub fn load_for(path: &Path, pictures: impl IntoIterator<Item = String>) -> Result<Frames, Problem> {
+    let pictures: HashSet<String> = pictures.into_iter().map(|name| plain_name(&name).to_owned()).collect();
+    read(open(path)?, path, Belongs::ToPicture, |file| pictures.contains(plain_name(file)))
+}
+
+fn open(path: &Path) -> Result<impl Read + use<>, Problem> {
+    limited::open(path, limited::TABLE_BYTES).map_err(|e| match e.kind() {
+        io::ErrorKind::NotFound => Problem::new(path, "no such file"),
+        _ => cannot_read(path, &e),
     })
+}
+
+fn cannot_read(path: &Path, error: &io::Error) -> Problem {
+    Problem::new(path, format!("cannot be read: {error}"))
 }
 
 /// Reads a frames.csv as [`load`] does, but from text; `path` is only used in messages.
@@ -81,7 +97,7 @@ fn read_text(path: &Path) -> Result<String, Problem> {
 /// # Errors
 /// The errors are those of [`load`].
 pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
-    parse_rows(text, path, Belongs::ToPicture)
+    read(text.as_bytes(), path, Belongs::ToPicture, |_| true)
 }
 
 /// Reads the frames.csv of a vehicle as [`load_vehicle`] does, but from text; `path` is only used in messages.
@@ -89,7 +105,11 @@ pub fn parse(text: &str, path: &Path) -> Result<Frames, Problem> {
 /// # Errors
 /// The errors are those of [`load_vehicle`].
 pub fn parse_vehicle(text: &str, path: &Path) -> Result<Frames, Problem> {
-    let frames = parse_rows(text, path, Belongs::ToTime)?;
+    in_order(read(text.as_bytes(), path, Belongs::ToTime, |_| true)?)
+}
+
+/// Refuses rows that are not in the order of their times.
+fn in_order(frames: Frames) -> Result<Frames, Problem> {
     let mut before: Option<f64> = None;
     for row in &frames.rows {
         match (row.time_s, before) {
@@ -113,28 +133,36 @@ enum Belongs {
     ToTime,
 }
 
-fn parse_rows(text: &str, path: &Path, belongs: Belongs) -> Result<Frames, Problem> {
-    // Spreadsheet programs write a byte-order mark first.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+fn read(
+    contents: impl Read,
+    path: &Path,
+    belongs: Belongs,
+    is_wanted: impl Fn(&str) -> bool,
+) -> Result<Frames, Problem> {
+    // The reader skips the byte-order mark that spreadsheet programs write first.
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(contents);
     let header = reader.headers().map_err(|e| translate_csv_error(&e, path))?.clone();
     let mut frames = Frames::new(path);
     let columns = Columns::find(&header, path, belongs, &mut frames.warnings)?;
-    for record in reader.records() {
-        if frames.rows.len() == MAX_ROWS {
+    let mut record = StringRecord::new();
+    while reader.read_record(&mut record).map_err(|e| translate_csv_error(&e, path))? {
+        if frames.rows.len() + frames.unused.rows == MAX_ROWS {
             return Err(Problem::new(
                 path,
                 format!("has more than {MAX_ROWS} rows; divide the pictures into several runs"),
             ));
         }
-        let record = record.map_err(|e| translate_csv_error(&e, path))?;
         let row = Row::new(&record, &columns, path, belongs)?;
         let data = row.read()?;
+        let data = FrameData { time_s: data.time_s.or(data.utc_s), ..data };
+        if !is_wanted(&row.file) {
+            frames.leave_out(data);
+            continue;
+        }
         if let Some(before) = frames.get(&row.file).filter(|_| belongs == Belongs::ToPicture) {
             return Err(row.problem("file", &format!("is also in line {}; each picture has only one row", before.line)));
         }
-        let time_s = data.time_s.or(data.utc_s);
-        frames.push(FrameData { time_s, ..data });
+        frames.push(data);
     }
     Ok(frames)
 }
@@ -146,6 +174,7 @@ fn translate_csv_error(error: &csv::Error, path: &Path) -> Problem {
             format!("this row has {len} cells, but the header has {expected_len} columns")
         }
         csv::ErrorKind::Utf8 { .. } => "is not UTF-8 text".to_owned(),
+        csv::ErrorKind::Io(e) => return cannot_read(path, e),
         _ => format!("not valid CSV: {error}"),
     };
     let problem = Problem::new(path, what);
@@ -156,7 +185,18 @@ fn translate_csv_error(error: &csv::Error, path: &Path) -> Problem {
 }
 
 /// The known columns of a file: their names and places.
-struct Columns(HashMap<String, usize>);
+struct Columns {
+    places: HashMap<String, usize>,
+    /// The bodies that have columns of their own.
+    bodies: Vec<BodyColumns>,
+}
+
+/// The names of the columns of a further body.
+struct BodyColumns {
+    body: &'static str,
+    q: [String; 4],
+    pole: [String; 3],
+}
 
 impl Columns {
     /// Finds the columns by the header. Unknown columns give warnings.
@@ -185,13 +225,24 @@ impl Columns {
                 let what = "has neither time_s nor utc; the rows of a vehicle belong to times";
                 Err(Problem::new(path, what).at_line(1))
             }
-            _ => Ok(Self(columns)),
+            _ => Ok(Self::new(columns)),
         }
+    }
+
+    fn new(places: HashMap<String, usize>) -> Self {
+        let names = |kind: &Kind| {
+            let body = kind.name();
+            let q = ["w", "x", "y", "z"].map(|end| format!("q_{body}_{end}"));
+            BodyColumns { body, q, pole: ["x", "y", "z"].map(|end| format!("pole_{body}_{end}")) }
+        };
+        let exist = |of: &BodyColumns| of.q.iter().chain(&of.pole).any(|name| places.contains_key(name));
+        let bodies = Kind::ALL.iter().map(names).filter(exist).collect();
+        Self { places, bodies }
     }
 
     /// Returns the cell of a column; `None` if it is empty or the column is missing.
     fn cell<'a>(&self, record: &'a StringRecord, name: &str) -> Option<&'a str> {
-        self.0.get(name).and_then(|&i| record.get(i)).filter(|c| !c.is_empty())
+        self.places.get(name).and_then(|&i| record.get(i)).filter(|c| !c.is_empty())
     }
 }
 
@@ -265,25 +316,13 @@ impl<'a> Row<'a> {
 
     /// Reads the orientations of further bodies.
     fn other_bodies(&self) -> Result<Vec<Orientation>, Problem> {
-        let mut found = Vec::new();
-        for kind in Kind::ALL {
-            let body = kind.name();
-            let names = |prefix: &str, ends: &[&str]| -> Vec<String> {
-                ends.iter().map(|end| format!("{prefix}_{body}_{end}")).collect()
-            };
-            let (q, pole) = (names("q", &["w", "x", "y", "z"]), names("pole", &["x", "y", "z"]));
-            if !q.iter().chain(&pole).any(|name| self.columns.0.contains_key(name)) {
-                continue;
-            }
-            let pole_camera = self.vector([&*pole[0], &*pole[1], &*pole[2]])?;
+        let read = |BodyColumns { body, q, pole }: &BodyColumns| {
+            let pole_camera = self.vector(pole.each_ref().map(String::as_str))?;
             self.check_direction(&pole.join(", "), pole_camera)?;
-            found.push(Orientation {
-                body: body.to_owned(),
-                q_fixed_from_camera_wxyz: self.vector([&*q[0], &*q[1], &*q[2], &*q[3]])?,
-                pole_camera,
-            });
-        }
-        Ok(found)
+            let q_fixed_from_camera_wxyz = self.vector(q.each_ref().map(String::as_str))?;
+            Ok(Orientation { body: (*body).to_owned(), q_fixed_from_camera_wxyz, pole_camera })
+        };
+        self.columns.bodies.iter().map(read).collect()
     }
 
     fn cell(&self, column: &str) -> Option<&'a str> {
@@ -336,6 +375,7 @@ mod tests {
     use hzn_core::body::{self, PriorError};
 
     use super::*;
+    use crate::frames::Unused;
 
     fn read(text: &str) -> Result<Frames, String> {
         parse(text, Path::new("frames.csv")).map_err(|e| e.to_string())
@@ -349,6 +389,30 @@ mod tests {
         assert_eq!(f.get("b.png").unwrap().altitude_km, None);
         assert!(f.get("c.png").is_none());
         assert_eq!(f.warnings[0].to_string(), "frames.csv:1: note: unknown column, not used");
+    }
+
+    #[test]
+    fn only_the_rows_of_the_pictures_are_kept() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frames.csv");
+        let load = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            load_for(&path, ["./b.png".to_owned(), "c.png".to_owned()])
+        };
+        let text = "\u{feff}file,time_s,altitude_km\na.png,0,230\nb.png,,\n./a.png,1,5\nd.png,2,\ne.png,3,\nf.png,4,\n";
+        let frames = load(text).unwrap();
+        assert_eq!(frames.rows.len(), 1);
+        assert!(frames.get("b.png").is_some() && frames.get("a.png").is_none());
+        assert_eq!((frames.unused.rows, frames.unused.first.len()), (5, Unused::LISTED));
+        assert_eq!((frames.unused.first[0].file.as_str(), frames.unused.first[0].line), ("a.png", 2));
+        // What the whole table knows does not depend on the pictures that are processed.
+        assert!(frames.has_times() && frames.has_distances());
+        // A wrong row is an error, whatever picture it is for.
+        assert!(load("file,time_s\na.png,x\n").unwrap_err().to_string().contains("not a finite number"));
+        assert!(load("file\nb.png\n./b.png\n").unwrap_err().to_string().contains("is also in line 2"));
+        assert!(parse(text, &path).unwrap_err().to_string().contains("is also in line 2"));
+        let everything = parse("file\na.png\nb.png\n", &path).unwrap();
+        assert_eq!((everything.rows.len(), everything.unused.rows), (2, 0));
     }
 
     /// An attitude that is no rotation is a problem of its row, not of the file.

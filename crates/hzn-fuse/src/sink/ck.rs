@@ -3,8 +3,6 @@
 //! Sources: NAIF, *CK Required Reading* (type 3), *DAF Required Reading*, *SCLK Required Reading*. The attitude is
 //! relative to ITRF93, SPICE's frame of the Earth with all rotations. A tick of the clock is a microsecond.
 
-use std::fs::File;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use hzn_nav::time::tt_days_since_j2000;
@@ -53,8 +51,7 @@ pub fn write_ck(fused: &Fused, options: &CkOptions, path: &Path) -> Result<[Path
     let bytes = daf(&segment(&epochs, ticks), [0.0, ticks(last)], options.spacecraft);
     let texts = [bytes, clock(options, zero_s).into_bytes(), frame(options.spacecraft).into_bytes()];
     for (path, bytes) in paths.iter().zip(texts) {
-        let written = File::create(path).and_then(|mut file| file.write_all(&bytes));
-        written.map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+        hzn_run::disk::write(path, bytes)?;
     }
     Ok(paths)
 }

@@ -376,7 +376,8 @@ class Sensor:
         Raises
         ------
         ConfigError
-            The sensor does not have this body, or an altitude, position or attitude is impossible.
+            The sensor does not have this body; an altitude, position or attitude is impossible; or the body needs an
+            altitude, and neither the arguments nor the parameters give one.
         """
 
     def process(

@@ -12,6 +12,7 @@ import csv
 import hashlib
 import json
 import os
+import re
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -25,6 +26,8 @@ from ._hzn import Report, Sensor, __version__, _Prior, _process_encoded, _write_
 Shard: TypeAlias = Sequence[tuple[str, Mapping[str, Any]]]
 
 _TEXTS = ("file", "body", "status", "detail")
+# The texts that others wrote.
+_FOREIGN = ("file", "detail")
 _COUNTS = ("index", "edge_points", "inliers", "candidates", "dropped", "level")
 _UNPROCESSED = ("unreadable", "no-altitude")
 # What file systems call the mark of a file's contents, the best first. A time is the last resort.
@@ -61,8 +64,13 @@ class Done:
 
 def digest(sensor: Sensor, first: int, shard: Shard) -> str:
     """Return a digest of everything that the caller gives for a shard."""
-    inputs = json.dumps([__version__, sensor.parameters, sensor.flight, first, shard], default=list, sort_keys=True)
+    inputs = json.dumps([__version__, sensor.parameters, sensor.flight, first, shard], default=_plain, sort_keys=True)
     return hashlib.sha256(inputs.encode()).hexdigest()[:12]
+
+
+def _plain(value: Any) -> Any:
+    """Return a number or an array of NumPy, or another sequence, as JSON can have it."""
+    return value.tolist() if hasattr(value, "tolist") else list(value)
 
 
 def make(task: Task) -> Done:
@@ -143,12 +151,21 @@ def _write_parquet(path: str, _: Sensor, reports: Sequence[Report]) -> None:
     pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows, schema=schema), path)
 
 
+def _guarded(text: str) -> str:
+    """Return a text as `hzn run` writes it into CSV: a spreadsheet must not take it for a formula."""
+    return f"'{text}" if re.match(r"'*[=+\-@]", text) else text
+
+
+def _unguarded(cell: str) -> str:
+    return cell[1:] if re.match(r"'+[=+\-@]", cell) else cell
+
+
 def _write_csv(path: str, _: Sensor, reports: Sequence[Report]) -> None:
     rows = _rows(reports)
     with open(path, "w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         table.writeheader()
-        table.writerows(rows)
+        table.writerows(row | {name: _guarded(row[name]) for name in _FOREIGN} for row in rows)
 
 
 _WRITERS: Mapping[str, Any] = {"parquet": _write_parquet, "csv": _write_csv, "mcap": _write_mcap}
@@ -166,7 +183,7 @@ def _unprocessed(filesystem: Any, name: str) -> list[dict[str, Any]]:
         columns = [table[c].tolist() for c in names]
     elif name.endswith(".csv"):
         with filesystem.open(name, "r", newline="", encoding="utf-8") as file:
-            return _failed(list(csv.DictReader(file)))
+            return _failed([row | {name: _unguarded(row[name]) for name in _FOREIGN} for row in csv.DictReader(file)])
     else:
         import pyarrow.parquet
 

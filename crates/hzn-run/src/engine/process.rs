@@ -11,7 +11,7 @@ use super::sensor::AnySensor;
 use super::trace::Traces;
 use crate::error::{Error, failed};
 use crate::overlay;
-use crate::source::Item;
+use crate::source::{Held, Item};
 
 /// Decodes and processes one picture.
 ///
@@ -20,7 +20,9 @@ use crate::source::Item;
 pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: Item) -> Result<Finished, Error> {
     let time = item.time_source(plan.frames.as_ref());
     let data = item.take_prior(plan.frames.as_ref());
-    let decoded = item.payload.decode(Some(&plan.config));
+    // It is dropped at the end of this function, after the picture.
+    let mut held = Held::default();
+    let decoded = item.payload.decode_holding(Some(&plan.config), &mut held);
     let exif = || decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
     let time_s = time.time_s(data.as_ref(), exif, index, plan.fps);
     let mut finished = Finished {

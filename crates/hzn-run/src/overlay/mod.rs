@@ -18,6 +18,7 @@ use hzn_mcap::Annotations;
 use hzn_mcap::palette::{AXIS, EDGE, INLIER, LIMB, REJECTED};
 
 use crate::error::{Error, failed};
+use crate::terminal::is_obeyed;
 
 const TRUTH: Colour = [230, 159, 0];
 
@@ -34,9 +35,35 @@ pub fn file_name(name: &str) -> String {
     }
 }
 
-/// Returns the name of a picture without separators of folders. Different names stay different.
+/// Longest name that is used as a file name, in bytes. File systems allow 255, of which an ending takes some.
+const MAX_NAME_BYTES: usize = 200;
+
+/// Returns the name of a picture as a file name: without separators of folders and without characters that a terminal
+/// obeys or a file system refuses. A long name is cut and gets a checksum. Different names stay different.
 pub fn flat_name(name: &str) -> String {
-    name.replace('%', "%25").replace('/', "%2F").replace('\\', "%5C").replace(':', "%3A")
+    let mut flat = String::with_capacity(name.len());
+    for c in name.chars() {
+        if matches!(c, '%' | '/' | '\\' | ':') || is_obeyed(c) {
+            flat.extend(c.encode_utf8(&mut [0; 4]).bytes().map(|byte| format!("%{byte:02X}")));
+        } else {
+            flat.push(c);
+        }
+    }
+    if flat.len() > MAX_NAME_BYTES {
+        let ending = flat.rsplit_once('.').map(|(_, ending)| format!(".{ending}")).filter(|e| e.len() <= 6);
+        // `%~` occurs in no other name. A cut within `%2F` is no fault, because nothing reads the name back.
+        let end = format!("%~{:016x}{}", fnv_1a(name.as_bytes()), ending.unwrap_or_default());
+        let fits = |at: &usize| at + end.len() <= MAX_NAME_BYTES;
+        flat.truncate(flat.char_indices().map(|(at, _)| at).take_while(fits).last().unwrap_or_default());
+        flat.push_str(&end);
+    }
+    flat
+}
+
+/// Returns a checksum of 64 bits. Two of a million names have the same less than once in 10⁷ runs. Source: Fowler, Noll
+/// and Vo, FNV-1a.
+fn fnv_1a(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// Draws annotations (pixel centres at integers) with a legend that begins with `title`.
@@ -150,7 +177,7 @@ fn legend(canvas: &mut Canvas, drawing: &Annotations, truth: bool, title: &str) 
 pub fn save(image: &RgbImage, path: &Path) -> Result<(), Error> {
     // The picture is encoded in memory first, because the encoder has its own words for a full disk.
     let bytes = png(image).map_err(|e| failed(format!("{}: {e}", path.display())))?;
-    std::fs::write(path, bytes).map_err(|e| failed(crate::disk::advice(path, &e)))
+    crate::disk::write(path, bytes)
 }
 
 /// Encodes a picture as PNG.
@@ -175,7 +202,11 @@ mod tests {
         assert_eq!(file_name("0001.png"), "0001.png");
         assert_eq!(file_name("0001.jpg"), "0001.jpg.png");
         assert_eq!(file_name("a/x.png"), "a%2Fx.png");
-        let parts = ["a", "a_", "a/", "a\\", "a:", "a%2F", "a%", ""];
+        assert_eq!(flat_name("日没\0\x1b[2J\u{202e}.png"), "日没%00%1B[2J%E2%80%AE.png");
+        let long = file_name(&("日".repeat(300) + "\0.jpg"));
+        assert!(long.len() <= MAX_NAME_BYTES + 4 && long.ends_with(".jpg.png"), "{long}");
+        let long = ["a", "b"].map(|c| c.repeat(300));
+        let parts = ["a", "a_", "a/", "a\\", "a:", "a%2F", "a%", "", "a\0", "a%00", "a\x1b", &long[0], &long[1]];
         let ends = ["x.png", "x.PNG", "x.jpg", "x.jpg.png", "x", "x%.png", "x..png", ".png", "_x.png"];
         let names: Vec<String> = parts.iter().flat_map(|p| ends.iter().map(move |e| format!("{p}{e}"))).collect();
         let mut given: Vec<String> = names.clone();

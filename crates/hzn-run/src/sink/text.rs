@@ -164,9 +164,11 @@ struct Complete {
     damage: Option<String>,
 }
 
-/// Finds the complete pictures of `bodies` rows each. If the number of bodies is unknown, it is the number of rows of
-/// the first picture.
+/// Finds the complete pictures of `bodies` rows each, in the results of a run. A run writes its pictures in their
+/// order, without a gap; otherwise rows were removed or moved. If the number of bodies is unknown, it is the number of
+/// rows of the first picture, and the table may be a part of the results.
 fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<Complete> {
+    let is_run = bodies.is_some();
     let bodies = match bodies {
         Some(bodies) => bodies,
         None => {
@@ -180,7 +182,13 @@ fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<
         }
     };
     let (mut stored, mut end, mut frame) = (StoredResults::default(), 0, Vec::new());
+    let mut misplaced = None;
     let damage = each_row(bytes, form, |row, to| {
+        if is_run && row.index != stored.frames {
+            let what = format!("picture {} is at the place of picture {}", row.index, stored.frames);
+            misplaced = Some(format!("{what}, so rows were removed or moved"));
+            return false;
+        }
         frame.push(row);
         if frame.len() == bodies {
             stored.record(&frame);
@@ -192,7 +200,7 @@ fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<
         }
         true
     })?;
-    Ok(Complete { stored, end, damage })
+    Ok(Complete { stored, end, damage: damage.or(misplaced) })
 }
 
 /// Calls `visit` with every complete row and the offset of its end. Stops if `visit` returns false or a row is

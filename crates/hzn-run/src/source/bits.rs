@@ -5,6 +5,8 @@
 //! Therefore pictures are sampled evenly from the whole sequence, by their place in it, and the result holds for all
 //! pictures.
 
+use hzn_core::Config;
+
 use super::sequence::Source;
 
 /// Number of pictures that are examined. If the input is one picture, it is examined in addition to those of its
@@ -38,15 +40,15 @@ impl std::fmt::Display for FoundBits {
     }
 }
 
-/// Finds the significant bits of a sequence of words. Returns `None` if the pictures have 8-bit samples, if all samples
-/// are 0, or if the source itself knows the bits.
-pub fn find_bits(source: &dyn Source) -> Option<FoundBits> {
+/// Finds the significant bits of a sequence of words. Only pictures of the sensor's size are examined. Returns `None`
+/// if the pictures have 8-bit samples, if all samples are 0, or if the source itself knows the bits.
+pub fn find_bits(source: &dyn Source, sensor: &Config) -> Option<FoundBits> {
     if source.bits().is_some() {
         return None;
     }
     let (mut largest_sample, mut pictures) = (0, 0);
     for (i, payload) in source.samples().take(MAX_EXAMINED + 1).enumerate() {
-        match payload.largest_word() {
+        match payload.largest_word(sensor) {
             Some(word) => (largest_sample, pictures) = (word.max(largest_sample), pictures + 1),
             None if pictures == 0 && i + 1 >= MAX_PICTURES_WITHOUT_WORDS => return None,
             None => {}

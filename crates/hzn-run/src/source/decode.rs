@@ -7,15 +7,21 @@ use hzn_core::image::Layout;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat};
 
+use super::memory::Held;
 use super::paths::open_file;
 use super::picture::{Picture, Samples};
 use super::picture_reader::picture_reader;
-use super::{exif, pages};
+use super::{exif, jpeg, pages};
 
 /// Longest side of a picture that is read, in pixels.
 pub const MAX_SIDE_PX: u32 = 20_000;
 /// Largest decoded picture, in bytes.
 pub const MAX_BYTES: u64 = 512 << 20;
+
+/// Memory that a decoder needs in addition to samples, in bytes. The header must fit into it.
+const SLACK: u64 = 16 << 20;
+/// Largest number of scans in a JPEG. An encoder writes about ten. Each takes as long as the whole picture.
+const MAX_SCANS: usize = 100;
 
 /// What helps against samples of a kind that is not supported, for example numbers with 32 bits in a TIFF.
 const SAMPLES: &str = "scale its samples to whole numbers of 8 or 16 bits";
@@ -30,6 +36,11 @@ pub fn guess_format(bytes: &[u8]) -> Option<ImageFormat> {
 /// # Errors
 /// The reason why it cannot be read, for the picture's result.
 pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
+    read_file_holding(path, &mut Held::default())
+}
+
+/// Reads a file as [`read_file`] does, when its memory is free.
+pub(super) fn read_file_holding(path: &Path, held: &mut Held) -> Result<Vec<u8>, String> {
     let refuse = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::NotFound => match std::fs::read_link(path) {
             Ok(there) => format!("is a link to {}, which does not exist", there.display()),
@@ -43,6 +54,9 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
     if size > 2 * MAX_BYTES {
         return Err(format!("file of {} MB is larger than the limit of {} MB", size >> 20, (2 * MAX_BYTES) >> 20));
     }
+    // Of a large file, samples and decoder are expected to take as much again, each. The decoder then need not wait
+    // while the file is in memory.
+    held.exchange(if size > SLACK { 3 * size } else { size });
     let mut bytes = Vec::with_capacity(size as usize);
     // The file may grow while it is read.
     file.take(2 * MAX_BYTES).read_to_end(&mut bytes).map_err(refuse)?;
@@ -56,15 +70,18 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, String> {
 /// # Errors
 /// The reason why it cannot be decoded, for the picture's result.
 pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, String> {
+    decode_holding(bytes, expected, &mut Held::default())
+}
+
+/// Decodes a picture as [`decode`] does, when its memory is free.
+pub(super) fn decode_holding(bytes: &[u8], expected: Option<(u32, u32)>, held: &mut Held) -> Result<Picture, String> {
     let mut reader = picture_reader(Cursor::new(bytes)).map_err(|e| e.to_string())?;
-    let mut limits = image::Limits::no_limits();
-    limits.max_alloc = Some(MAX_BYTES);
-    reader.limits(limits);
+    reader.limits(limits(SLACK));
     let format = reader.format().ok_or_else(|| {
         let found = name_foreign(bytes).map(|name| format!("; it is {name}: convert it")).unwrap_or_default();
         format!("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP){found}")
     })?;
-    let mut decoder = reader.into_decoder().map_err(|e| explain(&e, format))?;
+    let mut decoder = reader.into_decoder().map_err(|e| explain(&e, format, SLACK))?;
     let (width, height) = decoder.dimensions();
     check_size(width, height, expected)?;
     if decoder.total_bytes() > MAX_BYTES {
@@ -77,9 +94,16 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
     if format == ImageFormat::Jpeg && jpeg_is_truncated(bytes) {
         return Err("JPEG data end before the picture is complete: the file is truncated".into());
     }
+    let structure = if format == ImageFormat::Jpeg { jpeg::read(bytes) } else { jpeg::Structure::default() };
+    if structure.scans > MAX_SCANS {
+        return Err(format!("JPEG of {} scans is above the limit of {MAX_SCANS}: save it again", structure.scans));
+    }
+    let budget = budget(decoder.total_bytes(), format, structure);
+    decoder.set_limits(limits(budget)).map_err(|e| explain(&e, format, budget))?;
+    held.raise(bytes.len() as u64 + budget);
     let exif_time_s = decoder.exif_metadata().ok().flatten().and_then(|block| exif::time_s(block).ok().flatten());
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let image = DynamicImage::from_decoder(decoder).map_err(|e| explain(&e, format))?;
+    let image = DynamicImage::from_decoder(decoder).map_err(|e| explain(&e, format, budget))?;
     let (samples, channels, bits) = match image {
         DynamicImage::ImageLuma8(i) => (Samples::Bytes(i.into_raw()), 1, 8),
         DynamicImage::ImageLumaA8(i) => (Samples::Bytes(i.into_raw()), 2, 8),
@@ -95,6 +119,23 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
     };
     let layout = Layout::packed(width, height, channels, bits);
     Ok(Picture { exif_time_s, orientation, pages: pages::count(bytes, format), ..Picture::new(samples, layout) })
+}
+
+/// Returns the memory that a decoder may need for a picture of `samples` bytes. A TIFF also has a compressed strip or
+/// tile in memory. A progressive JPEG has coefficients of 16 bits for samples of 8 bits.
+fn budget(samples: u64, format: ImageFormat, structure: jpeg::Structure) -> u64 {
+    let times = match format {
+        ImageFormat::Tiff => 2,
+        _ if structure.is_progressive => 3,
+        _ => 1,
+    };
+    times * samples + SLACK
+}
+
+fn limits(bytes: u64) -> image::Limits {
+    let mut limits = image::Limits::no_limits();
+    limits.max_alloc = Some(bytes);
+    limits
 }
 
 /// Returns the name of a format that is not supported, from the first bytes.
@@ -142,11 +183,13 @@ fn jpeg_is_truncated(bytes: &[u8]) -> bool {
     }
 }
 
-fn explain(error: &image::ImageError, format: ImageFormat) -> String {
+fn explain(error: &image::ImageError, format: ImageFormat, budget: u64) -> String {
     let name = format!("{format:?}").to_uppercase();
     let text = error.to_string().replace('\n', " ");
     match error {
-        image::ImageError::Limits(_) => format!("{name} needs more memory than the limit of {} MB", MAX_BYTES >> 20),
+        image::ImageError::Limits(_) => {
+            format!("{name} needs more memory than a picture of its size should: above {} MB", budget >> 20)
+        }
         image::ImageError::Unsupported(_) => {
             format!("{name} of a kind that is not supported: {text}; {SAMPLES}")
         }

@@ -109,6 +109,9 @@ impl Source for Files {
     fn total(&self) -> Option<u64> {
         Some(self.paths.len() as u64)
     }
+    fn names(&self) -> Option<Box<dyn Iterator<Item = String> + '_>> {
+        Some(Box::new(self.paths.iter().map(|path| self.name(path))))
+    }
     fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_> {
         // The pictures are spread evenly over the whole sequence, because its beginning may be of another camera.
         let step = self.paths.len().div_ceil(MAX_SIZES_READ).max(1);
@@ -172,6 +175,10 @@ impl Source for Files {
             let what = match kind {
                 Kind::File => "file",
                 Kind::Folder => "folder",
+                Kind::Unlisted => {
+                    let folders = explain::counted(*n as u64, "folder");
+                    return format!("{folders} could not be listed and were left out; check the permissions");
+                }
                 Kind::Again => {
                     let paths = explain::counted(*n as u64, "path");
                     return format!("{paths} through links to pictures that are in the list already were left out");

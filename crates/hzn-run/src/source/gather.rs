@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::paths::ending;
-use super::{natural, video};
+use super::{natural, pattern, video};
 use crate::error::{Error, Remedy, unusable};
 
 /// Endings of the picture files that can be read.
@@ -21,6 +21,8 @@ pub(super) enum Kind {
     Folder,
     /// A file that was found before, because a link leads to its folder.
     Again,
+    /// A folder that could not be listed.
+    Unlisted,
 }
 
 impl Kind {
@@ -115,8 +117,11 @@ impl Gathered {
     }
 
     fn add_pattern(&mut self, text: &str, raw: bool) -> Result<(), Error> {
-        let matches = glob::glob(text).map_err(|e| unusable(format!("{text}: not a valid pattern: {e}")))?;
-        let mut found: Vec<PathBuf> = matches.flatten().collect();
+        let matches = pattern::find(text).map_err(|e| unusable(format!("{text}: not a valid pattern: {e}")))?;
+        if matches.unlisted > 0 {
+            *self.left_out.entry((Kind::Unlisted, String::new())).or_default() += matches.unlisted;
+        }
+        let mut found = matches.paths;
         found.retain(|p| match Kind::from_path(p) {
             Kind::File => raw || !COMPANIONS.contains(&ending(p).as_str()),
             _ => PICTURES.contains(&ending(p).as_str()),

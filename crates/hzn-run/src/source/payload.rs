@@ -7,6 +7,7 @@ use hzn_core::config::Orient;
 use hzn_core::image::Layout;
 use hzn_mcap::{EncodedImage, ImageFormat};
 
+use super::memory::Held;
 use super::paths::open_file;
 use super::picture::{Picture, Samples};
 use super::raw::Raw;
@@ -55,15 +56,22 @@ impl Payload {
     /// # Errors
     /// The reason why the picture cannot be read, for its result.
     pub fn decode(self, sensor: Option<&Config>) -> Result<(Picture, Option<Vec<u8>>), String> {
-        let Some(sensor) = sensor else { return self.decode_as_stored(None) };
+        self.decode_holding(sensor, &mut Held::default())
+    }
+
+    /// Decodes the picture as [`Self::decode`] does, when its memory is free. The memory is held until `held` is
+    /// dropped, which must not be later than the picture.
+    ///
+    /// # Errors
+    /// The errors are those of [`Self::decode`].
+    pub fn decode_holding(
+        self,
+        sensor: Option<&Config>,
+        held: &mut Held,
+    ) -> Result<(Picture, Option<Vec<u8>>), String> {
+        let Some(sensor) = sensor else { return self.decode_as_stored(None, held) };
         let own = (u32::from(sensor.camera.width), u32::from(sensor.camera.height));
-        // With EXIF, each picture has its own turn, so the stored size is known only after decoding.
-        let stored = match sensor.input.orient {
-            Orient::Exif => None,
-            Orient::Rotate90 | Orient::Rotate270 => Some((own.1, own.0)),
-            _ => Some(own),
-        };
-        let (picture, original) = self.decode_as_stored(stored)?;
+        let (picture, original) = self.decode_as_stored(stored_size(sensor), held)?;
         let is_changed = picture.is_changed(&sensor.input);
         let picture = picture.with_input(&sensor.input)?;
         decode::check_size(picture.layout.width, picture.layout.height, Some(own))?;
@@ -71,19 +79,23 @@ impl Payload {
     }
 
     /// Returns the largest sample of a picture of 16-bit words. Returns `None` for any other or unreadable picture.
-    pub(super) fn largest_word(self) -> Option<u16> {
+    pub(super) fn largest_word(self, sensor: &Config) -> Option<u16> {
         match &self {
             Self::File(path) if !header::has_words(open_file(path).ok()?) => return None,
             Self::File(path) if header::has_white_value(path) => return Some(u16::MAX),
             Self::Encoded(bytes) if !header::has_words(std::io::Cursor::new(bytes)) => return None,
             _ => {}
         }
-        self.decode_as_stored(None).ok()?.0.largest_word()
+        self.decode_as_stored(stored_size(sensor), &mut Held::default()).ok()?.0.largest_word()
     }
 
-    fn decode_as_stored(self, expected: Option<(u32, u32)>) -> Result<(Picture, Option<Vec<u8>>), String> {
-        let encoded = |bytes: Vec<u8>| {
-            let picture = decode::decode(&bytes, expected)?;
+    fn decode_as_stored(
+        self,
+        expected: Option<(u32, u32)>,
+        held: &mut Held,
+    ) -> Result<(Picture, Option<Vec<u8>>), String> {
+        let encoded = |bytes: Vec<u8>, held: &mut Held| {
+            let picture = decode::decode_holding(&bytes, expected, held)?;
             let keep = matches!(decode::guess_format(&bytes), Some(image::ImageFormat::Png | image::ImageFormat::Jpeg));
             Ok((picture, keep.then_some(bytes)))
         };
@@ -92,12 +104,28 @@ impl Payload {
             Ok((picture, None))
         };
         match self {
-            Self::File(path) => encoded(decode::read_file(&path)?),
+            Self::File(path) => encoded(decode::read_file_holding(&path, held)?, held),
             Self::Encoded(bytes) if bytes.is_empty() => Err("message without picture data".into()),
-            Self::Encoded(bytes) => encoded(bytes),
-            Self::RawFile(path, raw) => sized(raw.decode(decode::read_file(&path)?)?),
+            Self::Encoded(bytes) => encoded(bytes, held),
+            Self::RawFile(path, raw) => {
+                let bytes = decode::read_file_holding(&path, held)?;
+                // Packed samples become words, which take up to twice as much.
+                held.raise(3 * bytes.len() as u64);
+                sized(raw.decode(bytes)?)
+            }
             Self::Decoded(picture) => sized(picture),
             Self::Broken(why) => Err(why),
         }
+    }
+}
+
+/// Returns the size in pixels that the pictures of a sensor have in their files. With EXIF, each picture has its own
+/// turn, so the size is known only after decoding.
+fn stored_size(sensor: &Config) -> Option<(u32, u32)> {
+    let (width, height) = (u32::from(sensor.camera.width), u32::from(sensor.camera.height));
+    match sensor.input.orient {
+        Orient::Exif => None,
+        Orient::Rotate90 | Orient::Rotate270 => Some((height, width)),
+        _ => Some((width, height)),
     }
 }

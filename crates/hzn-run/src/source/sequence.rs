@@ -17,6 +17,10 @@ pub trait Source: Send {
     fn next(&mut self) -> Option<Result<Item, Error>>;
     /// Returns the number of pictures, if it is known before.
     fn total(&self) -> Option<u64>;
+    /// Returns the names of all pictures, if they are known before.
+    fn names(&self) -> Option<Box<dyn Iterator<Item = String> + '_>> {
+        None
+    }
     /// Returns names and sizes (width, height in pixels) of some of the pictures, from their headers alone. Pictures
     /// with unreadable headers are left out.
     fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_>;

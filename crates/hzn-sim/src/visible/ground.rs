@@ -1,8 +1,11 @@
 //! Land, sea and ice: generated, or from a map.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use hzn_files::png::WithoutProfiles;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +45,9 @@ impl Ground {
         if let Some(map) = &self.map {
             let path = folder.join(map);
             let refused = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
-            let file = std::fs::read(&path).map_err(|e| refused(&e))?;
+            let mut file = Vec::new();
+            let contents = File::open(&path).and_then(|file| WithoutProfiles::new(Box::new(file)));
+            contents.and_then(|mut contents| contents.read_to_end(&mut file)).map_err(|e| refused(&e))?;
             // The decoders of memory are compiled in `image`, those of `image::open` would be compiled here.
             let picture = image::load_from_memory(&file).map_err(|e| refused(&e))?.into_rgb8();
             self.texture = Some(Arc::new(Texture::new(&picture)));

@@ -33,8 +33,7 @@ fn render_frames(
 ) -> Result<Done, JobError> {
     let advice = |path: &Path, e: &std::io::Error| JobError::Failed(hzn_run::disk::advice(path, e));
     let write = |name: &str, bytes: &[u8]| {
-        let path = folder.join(name);
-        std::fs::write(&path, bytes).map_err(|e| advice(&path, &e))
+        hzn_run::disk::write(&folder.join(name), bytes).map_err(|e| JobError::Failed(e.to_string()))
     };
     std::fs::create_dir_all(folder).map_err(|e| advice(folder, &e))?;
     let flight = hzn_sim::flight::rocket(width, height, count, 1);
@@ -44,7 +43,7 @@ fn render_frames(
         progress.report(index as u64, count as u64)?;
         let path = folder.join(&frame.file);
         let picture = frame.render().map_err(|e| e.to_string())?;
-        picture.save(&path).map_err(|e| format!("{}: cannot be written: {e}", path.display()))?;
+        write(&frame.file, &picture.encode(&path).map_err(|e| e.to_string())?)?;
         let [x, y, z] = frame.prior().position_m.unwrap_or_default().map(|m| m / 1e3);
         let _ = writeln!(frames, "{},{},{x},{y},{z}", frame.file, frame.time_s);
         truth.serialize(frame.truth().map_err(|e| e.to_string())?).map_err(|e| format!("truth.csv: {e}"))?;

@@ -2,10 +2,13 @@
 //! (`fuzz/`), and the test `corpus` without it.
 
 use std::alloc::{Layout, alloc, dealloc};
+use std::ffi::c_void;
 use std::ptr;
 
+use hzn::rows::{HZN_ROWS_SIZE, hzn_process_rows};
 use hzn::types::{HznAnswer, HznKnown, HznPicture};
-use hzn::{HZN_INTERFACE, hzn_apply, hzn_get, hzn_open, hzn_process, hzn_refused, hzn_set};
+use hzn::{HZN_INTERFACE, HZN_ROWS_ENDED, HznSensor};
+use hzn::{hzn_apply, hzn_get, hzn_open, hzn_process, hzn_refused, hzn_set};
 use hzn::{hzn_workspace_align, hzn_workspace_size};
 
 /// Calls every function with values from the bytes.
@@ -60,7 +63,59 @@ pub(crate) fn call(data: &[u8]) {
             hzn_process(sensor, &picture, ptr::null(), &mut answer);
             hzn_process(sensor, ptr::null(), ptr::null(), &mut answer);
             hzn_process(ptr::null_mut(), &picture, ptr::null(), &mut answer);
+            // The camera ends the picture with this number in one of its first 256 rows, or not at all.
+            let number = i32::from(byte()) - 128;
+            call_by_rows(sensor, Camera { bytes: data, rows: usize::from(byte()), number, seen: 0 }, &known);
         }
+        dealloc(memory, layout);
+    }
+}
+
+/// A camera that gives rows of arbitrary bytes.
+struct Camera<'a> {
+    bytes: &'a [u8],
+    /// After this number of rows the camera returns `number`.
+    rows: usize,
+    number: i32,
+    seen: usize,
+}
+
+/// # Safety
+/// `context` is a [`Camera`], and `row` has `width` bytes.
+unsafe extern "C" fn next_row(context: *mut c_void, row: *mut u8, width: usize) -> i32 {
+    // SAFETY: the caller guarantees it.
+    let (camera, row) = unsafe { (&mut *context.cast::<Camera<'_>>(), std::slice::from_raw_parts_mut(row, width)) };
+    if camera.seen == camera.rows && camera.number != 0 {
+        return camera.number;
+    }
+    let bytes = camera.bytes.iter().cycle().skip(camera.seen % camera.bytes.len().max(1));
+    row.iter_mut().zip(bytes).for_each(|(pixel, byte)| *pixel = *byte);
+    camera.seen += 1;
+    0
+}
+
+/// Calls `hzn_process_rows` with enough memory, too little memory, and without a callback.
+///
+/// # Safety
+/// `sensor` is from `hzn_open`.
+unsafe fn call_by_rows(sensor: *mut HznSensor, mut camera: Camera<'_>, known: &HznKnown) {
+    let layout = Layout::from_size_align(HZN_ROWS_SIZE, hzn_workspace_align()).expect("a valid layout");
+    // SAFETY: the memory has the stated size, and the other pointers are valid or null.
+    unsafe {
+        let memory = alloc(layout);
+        let mut answer: HznAnswer = std::mem::zeroed();
+        let context = ptr::from_mut(&mut camera).cast();
+        let mut call = |bytes, callback: Option<unsafe extern "C" fn(*mut c_void, *mut u8, usize) -> i32>| {
+            hzn_process_rows(sensor, memory, bytes, callback, context, known, &mut answer)
+        };
+        assert!(call(0, Some(next_row)) < 0);
+        assert!(call(layout.size(), None) < 0);
+        let ended = call(layout.size(), Some(next_row));
+        // A number of the camera never looks like a status.
+        let camera = &*context.cast::<Camera<'_>>();
+        let was_ended = camera.seen == camera.rows && camera.number != 0 && camera.seen < 480;
+        assert!(!was_ended || ended < 0, "{ended}");
+        assert!(ended != HZN_ROWS_ENDED || was_ended);
         dealloc(memory, layout);
     }
 }

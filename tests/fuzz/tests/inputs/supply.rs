@@ -53,6 +53,40 @@ fn the_list_of_parts_is_complete() {
     }
 }
 
+/// A dependency that nothing uses would be kept up to date for nothing.
+#[test]
+fn every_dependency_of_the_workspace_is_used() {
+    let manifest: toml::Table = std::fs::read_to_string(supply::root().join("Cargo.toml")).unwrap().parse().unwrap();
+    let members = manifest["workspace"]["members"].as_array().unwrap().iter().map(|m| m.as_str().unwrap());
+    let folders = members.flat_map(|member| match member.strip_suffix("/*") {
+        Some(folder) => {
+            let entries = std::fs::read_dir(supply::root().join(folder)).unwrap();
+            entries.map(|entry| entry.unwrap().path()).collect()
+        }
+        None => vec![supply::root().join(member)],
+    });
+    let mut used = BTreeSet::new();
+    for text in folders.filter_map(|folder| std::fs::read_to_string(folder.join("Cargo.toml")).ok()) {
+        used.extend(text.parse::<toml::Table>().map(dependencies).unwrap());
+    }
+    let listed = manifest["workspace"]["dependencies"].as_table().unwrap();
+    let unused: Vec<_> = listed.keys().filter(|name| !used.contains(*name)).collect();
+    assert!(unused.is_empty() && used.len() > 50, "{unused:?}");
+}
+
+/// Returns the names of all dependencies of a manifest, also of those for some systems, for tests and for builds.
+fn dependencies(manifest: toml::Table) -> Vec<String> {
+    let mut found = Vec::new();
+    for (key, value) in manifest {
+        match value {
+            toml::Value::Table(table) if key.ends_with("dependencies") => found.extend(table.into_iter().map(|e| e.0)),
+            toml::Value::Table(table) => found.extend(dependencies(table)),
+            _ => {}
+        }
+    }
+    found
+}
+
 /// The binary does not know the features that its library was built with, so the text names them.
 #[test]
 fn the_version_names_the_features_that_the_manifest_turns_on() {

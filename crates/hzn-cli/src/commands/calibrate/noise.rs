@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     tell::result(text::report(&calibration, pictures))?;
     for path in args.output.iter().filter(|p| ending(p) == "html") {
         let html = page::html(&calibration, pictures, &input)?;
-        std::fs::write(path, html).map_err(|e| disk::cannot_write(path, &e))?;
+        disk::write(path, html)?;
     }
     if let Some(alarm) = calibration.alarm() {
         return Err(failed(format!("{input}: no sensor.toml is written: {alarm}")));
@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     tell::result(format_args!("\n{}\n", written.keys.join("\n")))?;
     let sensors: Vec<_> = args.output.iter().filter(|p| ending(p) == "toml").collect();
     for path in &sensors {
-        std::fs::write(path, &written.text).map_err(|e| disk::cannot_write(path, &e))?;
+        disk::write(path, &written.text)?;
     }
     if sensors.is_empty() && !args.quiet {
         tell::line("note: -o sensor.toml writes these keys into a copy of the sensor.toml");

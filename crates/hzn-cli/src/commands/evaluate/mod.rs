@@ -101,7 +101,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             let drawn = worst::draw(&worst, &args.results, folder, &truth, camera.as_ref())?;
             page::html(&report, &drawn)?.into_bytes()
         };
-        std::fs::write(path, bytes).map_err(|e| disk::cannot_write(path, &e))?;
+        disk::write(path, bytes)?;
     }
     tell::result(text::report(&report, &worst))?;
     lost.iter().for_each(tell::warning);

@@ -1,6 +1,5 @@
 //! The files that `hzn fuse` writes.
 
-use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +8,7 @@ use hzn_fuse::input::Inputs;
 use hzn_fuse::sink::{self, AemOptions, CkOptions, Utc};
 use hzn_fuse::{Fused, Settings};
 use hzn_nav::time::are_leap_seconds_known;
-use hzn_run::disk;
+use hzn_run::disk::{self, Checked};
 
 use super::args::{Args, names};
 use super::page;
@@ -86,7 +85,7 @@ impl<'a> Outputs<'a> {
         }
         if let Some(path) = &args.report {
             let page = page::html(fused, &self.results.display().to_string())?;
-            std::fs::write(path, page).map_err(|e| Stop::from(disk::cannot_write(path, &e)))?;
+            disk::write(path, page)?;
         }
         for (camera, file) in &args.write_frames {
             let found = inputs.recordings.iter().find(|r| r.name == *camera);
@@ -116,6 +115,6 @@ fn shown(path: impl AsRef<Path>) -> String {
     path.as_ref().display().to_string()
 }
 
-fn create(path: &Path) -> Result<BufWriter<File>, Stop> {
-    File::create(path).map(BufWriter::new).map_err(|e| Stop::from(disk::cannot_write(path, &e)))
+fn create(path: &Path) -> Result<BufWriter<Checked>, Stop> {
+    Checked::create(path).map(BufWriter::new).map_err(|e| Stop::from(disk::cannot_write(path, &e)))
 }

@@ -46,7 +46,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             };
             chart.svg()?.into_bytes()
         };
-        std::fs::write(path, bytes).map_err(|e| disk::cannot_write(path, &e))?;
+        disk::write(path, bytes)?;
     }
     tell::result(table.text())?;
     notes.iter().for_each(tell::line);
