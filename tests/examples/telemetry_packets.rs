@@ -10,8 +10,8 @@ use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::cuc::Cuc;
 use hzn_flight::layout::user_bytes;
 use hzn_flight::messages::{
-    Acknowledge, Code, EDGE_PIXELS, EdgePart, EdgePixel, Event, EventRecord, Exposure, Housekeeping, NavigationState,
-    ParameterValue,
+    Acknowledge, AttitudeState, Code, EDGE_PIXELS, EdgePart, EdgePixel, Event, EventRecord, Exposure, Housekeeping,
+    NavigationState, ParameterValue,
 };
 use hzn_flight::packet::{self, Apid, ApidBase};
 
@@ -58,6 +58,7 @@ fn values(apid: Apid, user: &[u8]) -> Option<Vec<f64>> {
             out.extend(Position::read(from)?.values());
         }
         Apid::Navigation => out.extend(NavigationState::read(from)?.values()),
+        Apid::Attitude => out.extend(AttitudeState::read(from)?.values()),
         Apid::Command => return None,
     }
     from.rest().is_empty().then_some(out)

@@ -1,17 +1,24 @@
 """Decodes telemetry with other libraries: space-packet-parser reads the XTCE dictionary, ccsdspy tables written here.
 
+The dictionary is checked against the schema of XTCE. Its telecommands are encoded here, from the dictionary alone, and
+compared with those of `hzn telecommand`.
+
 Usage: check_telemetry.py HZN EXAMPLE FOLDER. EXAMPLE writes packets with random contents and their numbers.
 """
 
 import json
 import math
+import struct
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import ccsdspy
 import numpy as np
 import space_packet_parser as spp
+from space_packet_parser.xtce.validation import validate_xtce
+from spacepackets.ccsds.spacepacket import PacketType, SpacePacketHeader
 
 MARKER = bytes.fromhex("1acffc1d")
 
@@ -42,7 +49,7 @@ def check_xtce(dictionary: Path, packets: Path, lines: list[dict]) -> int:
             packet = definition.parse_bytes(raw)
             names = [name for name in packet if not name.startswith(("packet_", "time_"))]
             assert int(packet["packet_apid"]) == line["apid"]
-            seconds, fraction = int(packet["time_seconds"]), int(packet["time_fraction"])
+            seconds, fraction = packet["time_seconds"].raw_value, packet["time_fraction"].raw_value
             us = seconds * 1_000_000 + round(fraction * 1_000_000 / 2**24)
             assert us == line["us"], (us, line["us"])
             values = [getattr(packet[name], "raw_value", packet[name]) for name in names]
@@ -85,6 +92,7 @@ TABLES = {
     "f4:by_cos_x f4:by_cos_y f4:by_cos_z f4:x f4:y f4:z f4:pxx f4:pxy f4:pxz f4:pyy f4:pyz f4:pzz f4:range f4:range_sigma "
     "f4:body_x f4:body_y f4:body_z",
     0x108: "u4:picture u1:state f4:age_s f4:altitude f4:x f4:y f4:z f4:vx f4:vy f4:vz f4:rate_x f4:rate_y f4:rate_z",
+    0x109: "u4:picture u1:state f4:age_s f4:qw f4:qx f4:qy f4:qz f4:sigma f4:sun_x f4:sun_y f4:sun_z",
 }
 
 
@@ -111,6 +119,80 @@ def check_ccsdspy(folder: Path, packets: bytes, lines: list[dict]) -> int:
     return compared
 
 
+XTCE = "{http://www.omg.org/spec/XTCE/20180204}"
+TIME_OF_TEST = "2026-11-24T12:00:00Z"
+# The words of `hzn telecommand`, and the same values as arguments of the dictionary, in their order. 2174212837 is the
+# time of the test in seconds since 1958, TAI.
+COMMANDS = {
+    "mode flight": ["flight"],
+    "set body.altitude_km 231.5": ["body.altitude_km", 231.5],
+    "read gates.max_attitude_sigma": ["gates.max_attitude_sigma"],
+    "process-once": [],
+    "dump-edges": [],
+    "reset-counters": [],
+    "known 231 6608 -20 3.5 0.1 -0.2 0.3": [231e3, 6608e3, -20e3, 3500.0, 0.1, -0.2, 0.3],
+    "try threshold.level 90": ["threshold.level", 90.0],
+    "ping": [],
+    "report": [],
+    "arm": [],
+    "navigate 5 60 NaN 6608 0 0 0 7300 -1": [5_000_000, 60.0, None, 6608e3, 0.0, 0.0, 0.0, 7300.0, -1.0, None, None, None],
+    f"time {TIME_OF_TEST} pulse": [2174212837, 0, "last pulse"],
+    "attitude 5 60 0.6 0 0.8 0 3 0 0 1": [5_000_000, 60.0, 0.6, 0.0, 0.8, 0.0, math.radians(3), 0.0, 0.0, 1.0],
+}
+# These two are made by `load`, which sends more than one packet.
+MADE_BY_LOAD = {"stage", "commit"}
+
+
+def encode(meta: ElementTree.Element, types: dict[str, ElementTree.Element], values: list) -> bytes:
+    """Return the bytes of a command up to its checksum, from the dictionary; a value of None takes the initial value."""
+    arguments = meta.findall(f"{XTCE}ArgumentList/{XTCE}Argument")
+    assert len(arguments) == len(values), meta.get("name")
+    given = {argument.get("name"): (argument, value) for argument, value in zip(arguments, values, strict=True)}
+    out = bytearray()
+    for entry in meta.findall(f"{XTCE}CommandContainer/{XTCE}EntryList/*"):
+        if entry.tag == f"{XTCE}FixedValueEntry":
+            piece = bytes.fromhex(entry.get("binaryValue"))
+            assert 8 * len(piece) == int(entry.get("sizeInBits"))
+        else:
+            argument, value = given.pop(entry.get("argumentRef"))
+            kind = types[argument.get("argumentTypeRef")]
+            if value is None:
+                value = float(argument.get("initialValue"))
+            encoding = next(child for child in kind if child.tag.endswith("DataEncoding"))
+            size = int(encoding.get("sizeInBits")) // 8
+            labels = {item.get("label"): int(item.get("value")) for item in kind.iter(f"{XTCE}Enumeration")}
+            if encoding.tag == f"{XTCE}FloatDataEncoding":
+                piece = struct.pack({4: ">f", 8: ">d"}[size], value)
+            else:
+                piece = int(labels[value] if labels else value).to_bytes(size, "big")
+        out += piece
+    assert not given, meta.get("name")
+    return bytes(out)
+
+
+def check_commands(hzn: str, dictionary: Path, folder: Path) -> int:
+    """Compare every telecommand of the dictionary with that of `hzn telecommand`; return how many there are."""
+    assert validate_xtce(dictionary, level="all", print_results=False, allow_schema_download=False).valid
+    root = ElementTree.parse(dictionary).getroot()
+    types = {kind.get("name"): kind for kind in root.find(f"{XTCE}CommandMetaData/{XTCE}ArgumentTypeSet")}
+    metas = {meta.get("name"): meta for meta in root.iter(f"{XTCE}MetaCommand")}
+    assert {words.split()[0] for words in COMMANDS} | MADE_BY_LOAD == set(metas)
+    for words, values in COMMANDS.items():
+        file = folder / "command.bin"
+        subprocess.run([hzn, "telecommand", words, "-o", file, "--force"], check=True, capture_output=True)
+        sent = file.read_bytes()
+        encoded = encode(metas[words.split()[0]], types, values)
+        assert sent[:4] == MARKER and sent[4:-2] == encoded, (words, sent.hex(), encoded.hex())
+        header = SpacePacketHeader.unpack(encoded)
+        assert header.packet_type == PacketType.TC and header.packet_len == len(encoded) + 2, words
+        # A command is done, or refused, when its acknowledgement says so.
+        verifiers = metas[words.split()[0]].find(f"{XTCE}VerifierSet")
+        for verifier in ("CompleteVerifier", "FailedVerifier"):
+            function = verifiers.find(f"{XTCE}{verifier}/{XTCE}ComparisonList/{XTCE}Comparison")
+            assert (function.get("parameterRef"), int(function.get("value"))) == ("acknowledgement_function", encoded[14])
+    return len(metas)
+
+
 def main() -> None:
     """Write packets and read them again."""
     hzn, example, folder = sys.argv[1], sys.argv[2], Path(sys.argv[3])
@@ -123,6 +205,7 @@ def main() -> None:
     assert apids == [line["apid"] for line in lines] and len(lines) == 10_000
     numbers = check_xtce(dictionary, folder / "packets.ccsds", lines)
     compared = check_ccsdspy(folder, packets, lines)
+    print(f"{check_commands(hzn, dictionary, folder)} telecommands of the dictionary are those of hzn")
     print(f"space-packet-parser: {len(lines)} packets, {numbers} numbers equal; ccsdspy: {compared} packets equal")
 
 

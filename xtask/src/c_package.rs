@@ -32,7 +32,25 @@ pub(crate) fn check(source: &Path, cargo_dir: &Path, out: &Path) -> Outcome {
     ]))?;
     steps::run(&mut cmake(&["--build"], &build))?;
     steps::run(&mut cmake(&["--install"], &build))?;
+    check_inline_limits(source, out)?;
     run_samples(source, &prefix, out)
+}
+
+/// Checks that flags of a user, which replace those of `.cargo/config.toml`, do not replace the limits of inlining.
+fn check_inline_limits(source: &Path, out: &Path) -> Outcome {
+    const OWN: &str = "-Ctarget-cpu=cortex-m7";
+    let build = out.join("cmake-thumb");
+    let mut configure = Command::new("cmake");
+    configure.arg("-S").arg(source).arg("-B").arg(&build).arg("-DHZN_TARGET=thumbv7em-none-eabihf");
+    steps::run(configure.env("RUSTFLAGS", OWN))?;
+    let rules = fs::read_to_string(build.join("CMakeFiles/hzn_library.dir/build.make"))?;
+    let limits = fs::read_to_string(source.join("../.cargo/config.toml"))?;
+    let limits: Vec<&str> = limits.split('"').filter(|part| part.starts_with("-C")).collect();
+    match limits.iter().chain([&OWN]).find(|flag| !rules.contains(**flag)) {
+        Some(flag) => Err(Trouble::Failed(format!("CMake builds the library without {flag}"))),
+        None if limits.is_empty() => Err(Trouble::Failed("no limits in .cargo/config.toml".into())),
+        None => Ok(()),
+    }
 }
 
 /// Builds the samples with the flags of pkg-config, and runs them.
@@ -42,16 +60,23 @@ fn run_samples(source: &Path, prefix: &Path, out: &Path) -> Outcome {
         output(Command::new("pkg-config").args(["--cflags", "--libs", "hzn"]).env("PKG_CONFIG_PATH", pkg_config))
             .ok_or_else(|| Trouble::Failed("pkg-config does not find the installed hzn".into()))?;
     let samples = source.join("samples");
-    let cfs = ["cc", "-std=c11", "cfs/hzn_app.c", "cfs/stubs/run.c", "cfs/stubs"];
-    let fprime = ["c++", "-std=c++14", "fprime/HznSensor.cpp", "fprime/stubs/run.cpp", "fprime/stubs"];
-    for [compiler, standard, sample, run, stubs] in [cfs, fprime] {
+    // The flags of the cFE: `arch_build_custom.cmake` of its sample mission.
+    const CFE: &[&str] =
+        &["-std=c99", "-pedantic", "-Wstrict-prototypes", "-Wwrite-strings", "-Wpointer-arith", "-Wcast-align"];
+    let build = |compiler: &str, standard: &[&str], sources: &[&str], includes: &[&str]| {
         let program = out.join(format!("sample-{compiler}"));
         let mut command = Command::new(compiler);
-        command.args([standard, "-O2", "-Wall", "-Wextra", "-Werror", "-I"]).arg(samples.join(stubs));
-        command.arg("-I").arg(source.join("example")).arg(samples.join(sample)).arg(samples.join(run));
+        command.args(standard).args(["-O2", "-Wall", "-Wextra", "-Werror", "-I"]).arg(source.join("example"));
+        for include in includes {
+            command.arg("-I").arg(samples.join(include));
+        }
+        command.args(sources.iter().map(|file| samples.join(file)));
         command.args(flags.split_whitespace()).arg("-lm").arg("-o").arg(&program);
         steps::run(&mut command)?;
-        steps::run(&mut Command::new(&program))?;
-    }
-    Ok(())
+        steps::run(&mut Command::new(&program))
+    };
+    build("cc", CFE, &["cfs/hzn_app.c", "cfs/stubs/run.c"], &["cfs/stubs"])?;
+    // F´ looks for headers from the root of the project on.
+    let fprime = ["fprime/Components/HznSensor/HznSensor.cpp", "fprime/stubs/run.cpp"];
+    build("c++", &["-std=c++14"], &fprime, &["fprime", "fprime/stubs"])
 }

@@ -4,7 +4,7 @@ use hzn_core::report::MAX_LISTED;
 
 use crate::answer::{Edge, PictureAnswer, Position};
 use crate::bytes::Reader;
-use crate::messages::{Exposure, NavigationState};
+use crate::messages::{AttitudeState, Exposure, NavigationState};
 use crate::packet::Apid;
 
 /// The packets that have come of a picture.
@@ -13,6 +13,7 @@ pub struct Assembly {
     picture: u32,
     position: Option<Position>,
     navigation: Option<NavigationState>,
+    attitude: Option<AttitudeState>,
     edges: heapless::Vec<Edge, MAX_LISTED>,
 }
 
@@ -25,6 +26,8 @@ pub struct Assembled {
     pub answer: PictureAnswer,
     /// The values from navigation that the picture was processed with.
     pub navigation: Option<NavigationState>,
+    /// The attitude and the Sun that the picture was processed with.
+    pub attitude: Option<AttitudeState>,
     /// Number of candidates whose packets are missing.
     pub missing_candidates: u8,
 }
@@ -53,6 +56,12 @@ impl Assembly {
                 self.navigation = Some(navigation);
                 None
             }
+            Apid::Attitude => {
+                let attitude = AttitudeState::read(from)?;
+                self.begin(attitude.picture);
+                self.attitude = Some(attitude);
+                None
+            }
             Apid::Science => Some(self.end(Exposure::read(from)?, PictureAnswer::read_science(from)?)),
             _ => return None,
         };
@@ -76,6 +85,6 @@ impl Assembly {
         }
         // The answer says how many were sent, so that a lost packet is noticed.
         let missing_candidates = answer.outcome.listed.saturating_sub(come.edges.len() as u8);
-        Assembled { exposure, answer, navigation: come.navigation, missing_candidates }
+        Assembled { exposure, answer, navigation: come.navigation, attitude: come.attitude, missing_candidates }
     }
 }

@@ -3,7 +3,8 @@
 
 use crate::answer::{Direction, Edge, Outcome, Position};
 use crate::messages::{
-    Acknowledge, EDGE_PIXELS, EdgePart, EdgePixel, EventRecord, Exposure, Housekeeping, NavigationState, ParameterValue,
+    Acknowledge, AttitudeState, EDGE_PIXELS, EdgePart, EdgePixel, EventRecord, Exposure, Housekeeping, NavigationState,
+    ParameterValue,
 };
 use crate::packet::Apid;
 use crate::record::{Field, Kind};
@@ -37,6 +38,7 @@ pub fn user_data(apid: Apid) -> Option<&'static [Part]> {
         Apid::Candidate => const { &[once(PICTURE), once(Edge::TABLE)] },
         Apid::Position => const { &[once(PICTURE), once(Position::TABLE)] },
         Apid::Navigation => const { &[once(NavigationState::TABLE)] },
+        Apid::Attitude => const { &[once(AttitudeState::TABLE)] },
         Apid::Command => return None,
     })
 }

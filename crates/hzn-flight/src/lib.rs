@@ -17,6 +17,8 @@
 //! | [`packet`] | space packets on a serial line |
 //! | [`inbox`] | whole packets from a line that is not perfect |
 //! | [`messages`] | the contents of packets |
+//! | [`navigation`] | the records of position, attitude and Sun among them |
+//! | [`attitude`] | the attitude and the Sun, moved to the exposure |
 //! | [`board`] | the functions that a board provides |
 //! | [`store`] | two copies of the parameters |
 //! | [`flight`] | the loop |
@@ -31,6 +33,7 @@ extern crate std;
 
 pub mod answer;
 pub mod assembly;
+pub mod attitude;
 pub mod board;
 pub mod bytes;
 pub mod cuc;
@@ -38,6 +41,7 @@ pub mod flight;
 pub mod inbox;
 pub mod layout;
 pub mod messages;
+pub mod navigation;
 mod numbered;
 pub mod operations;
 pub mod packet;

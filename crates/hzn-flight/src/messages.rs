@@ -1,5 +1,6 @@
 //! The contents of packets: telecommands, and telemetry other than the answers. The numbers are frozen.
 
+pub use crate::navigation::{Attitude, AttitudeState, Navigation, NavigationState};
 use crate::numbered::numbered_enum;
 use crate::record::record;
 
@@ -88,6 +89,8 @@ numbered_enum! {
         /// Correlates the clock: the time was (time code, 8 bytes, TAI) when the telecommand arrived (u8: 0) or at the
         /// last pulse (u8: 1).
         SetTime = 15 => "time",
+        /// Sets the attitude of the camera and the direction to the Sun, with their time and expiry: [`Attitude`].
+        SetAttitude = 16 => "attitude",
     }
 }
 
@@ -129,7 +132,7 @@ numbered_enum! {
         Watchdog = 10 => "reset by the watchdog",
         /// The memory did not keep the parameters. a: copy (1 or 2). b: 0.
         StoreFailed = 11 => "parameters not stored",
-        /// The sensor refused the prior: its altitude or position is missing or impossible. a: 0. b: 0.
+        /// The sensor refused the prior: its altitude, position or attitude is missing or impossible. a: 0. b: 0.
         KnownRefused = 12 => "the altitude or position is missing or impossible",
         /// The camera sends no pictures. a: time since the last one, ms. b: number of the last one.
         CameraSilent = 13 => "the camera sends no pictures",
@@ -143,7 +146,8 @@ numbered_enum! {
         /// The watchdog reset the computer also with the older parameters, so it stays in safe mode. a: number of
         /// resets. b: 0.
         SafeAfterResets = 16 => "safe mode after resets by the watchdog",
-        /// The values from navigation have expired and are not used. a: their age, ms. b: 0.
+        /// The values from navigation have expired and are not used. a: their age, ms. b: 0 position, velocity, rate;
+        /// 1 attitude and Sun.
         KnownExpired = 17 => "the values from navigation have expired",
         /// The clock was correlated. a: seconds of the time, TAI since 1958. b: change of the correlation, ms;
         /// 4294967295 at the first time and if it is larger.
@@ -287,8 +291,8 @@ record! {
         /// [`Code`] as a number.
         code: u8,
         /// What was refused: the number of a parameter, or, after `known` and `navigate`, the place of a number in
-        /// [`Navigation`], from 1; 0: not said. After code 9, the sequence count of the last telecommand that was
-        /// taken.
+        /// [`Navigation`], and after `attitude` in [`Attitude`], from 1; 0: not said. After code 9, the sequence count
+        /// of the last telecommand that was taken.
         detail: u16,
     }
 }
@@ -305,66 +309,6 @@ record! {
         /// Second number of the event.
         b: u32,
     }
-}
-
-record! {
-    /// Arguments of [`Function::Navigate`]. NaN means that a value is not known; all three numbers of a vector are
-    /// known, or none.
-    Navigation {
-        /// Time of the values: µs since the start of the computer (the first byte is then 0), or a time code
-        /// ([`crate::cuc`]).
-        epoch: u64,
-        /// The values are not used for exposures that are further from `epoch` than this, s; NaN: they do not
-        /// expire.
-        expires_s: f32,
-        /// Altitude, m.
-        altitude_m: f32,
-        /// Position in ECEF, m.
-        position_x_m: f32,
-        /// y of the position.
-        position_y_m: f32,
-        /// z of the position.
-        position_z_m: f32,
-        /// Velocity in ECEF, m/s: the position is moved to the exposure.
-        velocity_x_m_s: f32,
-        /// y of the velocity.
-        velocity_y_m_s: f32,
-        /// z of the velocity.
-        velocity_z_m_s: f32,
-        /// Rate of rotation of the camera in its own axes, rad/s.
-        rate_x_rad_s: f32,
-        /// y of the rate.
-        rate_y_rad_s: f32,
-        /// z of the rate.
-        rate_z_rad_s: f32,
-    }
-}
-
-record! {
-    /// The values from navigation that a picture was processed with. NaN means that a value is not known.
-    NavigationState {
-        /// Number of the picture.
-        picture: u32,
-        /// 1: the values were used. 2: they have expired and were not used.
-        state: u8,
-        /// Time from the values to the exposure, s; NaN: the values have no time.
-        age_s: f32,
-        /// Altitude, m.
-        altitude_m: f32,
-        /// Position of the camera at the exposure in ECEF, m.
-        position_m: [f32; 3],
-        /// Velocity of the camera in ECEF, m/s, at the time of the values.
-        velocity_m_s: [f32; 3],
-        /// Rate of rotation of the camera in its own axes, rad/s.
-        rate_rad_s: [f32; 3],
-    }
-}
-
-impl NavigationState {
-    /// [`Self::state`]: the values were used.
-    pub const USED: u8 = 1;
-    /// [`Self::state`]: the values have expired and were not used.
-    pub const EXPIRED: u8 = 2;
 }
 
 record! {

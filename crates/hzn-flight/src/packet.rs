@@ -54,6 +54,8 @@ numbered_enum! {
         Position = 0x107 => "position",
         /// The values from navigation that a picture was processed with.
         Navigation = 0x108 => "navigation",
+        /// The attitude and the Sun that a picture was processed with.
+        Attitude = 0x109 => "attitude",
         /// A telecommand.
         Command = 0x1C0 => "telecommand",
     }

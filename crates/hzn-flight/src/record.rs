@@ -91,6 +91,7 @@ macro_rules! vector_types {
 }
 vector_types! {
     3 ["_x", "_y", "_z"];
+    4 ["_w", "_x", "_y", "_z"];
     6 ["_xx", "_xy", "_xz", "_yy", "_yz", "_zz"];
 }
 

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use hzn_files::keys::Limits;
+use hzn_flight::attitude::{AttitudeAndSun, Refused};
 use hzn_flight::bytes::Writer;
 use hzn_flight::cuc::Cuc;
-use hzn_flight::messages::{Function, MAX_READ, Mode, Navigation};
+use hzn_flight::messages::{Attitude, Function, MAX_READ, Mode, Navigation};
 use hzn_flight::operations::Operations;
 use hzn_flight::packet::{self, Apid, ApidBase};
 use hzn_flight::{Parameters, parameters};
@@ -55,6 +56,7 @@ pub fn encode(text: &str, tell: &Tell) -> Result<Vec<Vec<u8>>, Error> {
         Function::ReadParameters => command.read_parameters()?,
         Function::SetKnown => command.set_known()?,
         Function::Navigate => command.navigate()?,
+        Function::SetAttitude => command.set_attitude()?,
         Function::SetTime => command.set_time()?,
         _ => command.without_arguments()?,
     };
@@ -219,6 +221,42 @@ impl Command<'_> {
             rate_y_rad_s: rate_y,
             rate_z_rad_s: rate_z,
         };
+        self.user_data(|w| values.write(w))
+    }
+
+    fn set_attitude(&self) -> Result<Vec<u8>, Error> {
+        let refuse_count = || {
+            let what = "attitude takes a time, the expiry in seconds, the quaternion from the camera to ECEF (scalar \
+                        first), its 1-sigma in degrees, and the direction to the Sun in the camera frame if it is \
+                        known: 7 or 10 numbers";
+            self.refuse(what)
+        };
+        let (epoch, numbers) = self.arguments.split_first().ok_or_else(refuse_count)?;
+        if !matches!(numbers.len(), 6 | 9) {
+            return Err(refuse_count());
+        }
+        let epoch = self.epoch(epoch)?;
+        let (values, [sun_x, sun_y, sun_z]) =
+            match self.numbers(numbers)?.iter().map(|x| *x as f32).collect::<Vec<_>>()[..] {
+                [t, w, x, y, z, sigma] => ([t, w, x, y, z, sigma], [f32::NAN; 3]),
+                [t, w, x, y, z, sigma, u, v, s] => ([t, w, x, y, z, sigma], [u, v, s]),
+                _ => return Err(refuse_count()),
+            };
+        let [expires_s, q_w, q_x, q_y, q_z, sigma_deg] = values;
+        if !(expires_s > 0.0 && expires_s.is_finite()) {
+            return Err(self.refuse(&format!("the expiry {expires_s} s is refused: must be a finite number above 0")));
+        }
+        let sigma_rad = sigma_deg.to_radians();
+        AttitudeAndSun::try_new([q_w, q_x, q_y, q_z], sigma_rad, [sun_x, sun_y, sun_z]).map_err(|refused| {
+            const NAMES: [&str; 8] = ["QW", "QX", "QY", "QZ", "SIGMA_DEG", "SUN_X", "SUN_Y", "SUN_Z"];
+            let name = |place: u16| NAMES.get(usize::from(place)).unwrap_or(&"?");
+            self.refuse(&match refused {
+                Refused::Missing(place) => format!("{} is NaN, but other numbers need it", name(place)),
+                Refused::Impossible(0) => "the length of the quaternion must be 1 within 0.01".to_owned(),
+                Refused::Impossible(place) => format!("{} is impossible", name(place)),
+            })
+        })?;
+        let values = Attitude { epoch, expires_s, q_w, q_x, q_y, q_z, sigma_rad, sun_x, sun_y, sun_z };
         self.user_data(|w| values.write(w))
     }
 

@@ -11,6 +11,7 @@
 //! | `outputs` | the files that telemetry becomes |
 //! | [`tai`] | the time of the packets, and UTC |
 //! | [`xtce`] | the dictionary of the packets, for other ground systems |
+//! | `xtce_commands`, `xtce_text` | its telecommands, and what both halves share |
 //!
 //! The crate prints nothing: whoever makes a [`Station`] or a [`Commander`] gives it a
 //! [`Tell`](hzn_fly::tell::Tell), which shows the messages.
@@ -27,6 +28,8 @@ pub mod station;
 pub mod stream;
 pub mod tai;
 pub mod xtce;
+mod xtce_commands;
+mod xtce_text;
 
 pub use commander::{Answered, Commander};
 pub use encode::{encode, loaded_files, write_packet};

@@ -8,8 +8,8 @@ use hzn_flight::assembly::{Assembled, Assembly};
 use hzn_flight::bytes::Reader;
 use hzn_flight::cuc::{Cuc, Epoch};
 use hzn_flight::messages::{
-    Acknowledge, Code, EdgePart, EdgePixel, Event, EventRecord, Function, Housekeeping, Mode, NavigationState,
-    ParameterValue, Severity,
+    Acknowledge, AttitudeState, Code, EdgePart, EdgePixel, Event, EventRecord, Function, Housekeeping, Mode,
+    NavigationState, ParameterValue, Severity,
 };
 use hzn_flight::packet::{Apid, ApidBase, Packet};
 use hzn_flight::{Parameters, parameters};
@@ -92,7 +92,7 @@ impl StreamCounts {
         };
         let from = &mut Reader::new(packet.user);
         let is_understood = match subject {
-            Some(apid @ (Apid::Science | Apid::Candidate | Apid::Position | Apid::Navigation)) => {
+            Some(apid @ (Apid::Science | Apid::Candidate | Apid::Position | Apid::Navigation | Apid::Attitude)) => {
                 match self.assembly.take(apid, packet.user) {
                     Some(Some(picture)) => {
                         self.picture(&picture, sink)?;
@@ -170,12 +170,16 @@ impl StreamCounts {
     }
 
     fn picture(&mut self, picture: &Assembled, sink: &mut Option<Sink>) -> Result<(), Error> {
-        let Assembled { exposure, answer, navigation, missing_candidates } = picture;
+        let Assembled { exposure, answer, navigation, attitude, missing_candidates } = picture;
         let (time, time_s) = (Cuc::since_start(exposure.exposure_us), exposure.exposure_us as f64 * 1e-6);
         self.incomplete += u64::from(*missing_candidates > 0);
-        if navigation.is_some_and(|n| n.state == NavigationState::EXPIRED) {
-            let what = format!("picture {}: the values from navigation have expired", exposure.picture);
-            self.log.push(LogLine { level: LogLevel::Warning, message: what });
+        let has_expired = [
+            ("values from navigation", navigation.is_some_and(|n| n.state == NavigationState::EXPIRED)),
+            ("attitude and the Sun", attitude.is_some_and(|a| a.state == AttitudeState::EXPIRED)),
+        ];
+        for (what, _) in has_expired.iter().filter(|(_, has_expired)| *has_expired) {
+            let message = format!("picture {}: the {what} have expired", exposure.picture);
+            self.log.push(LogLine { level: LogLevel::Warning, message });
         }
         let Some(report) = answer.to_report() else {
             self.note(time, LogLevel::Warning, &format!("picture {}: invalid numbers", exposure.picture));
@@ -279,6 +283,10 @@ fn describe_event(record: &EventRecord) -> String {
         }
         Some(Event::CameraSilent) => {
             format!("the camera sends no pictures: the last one, number {b}, came {:.1} s ago", f64::from(a) * 1e-3)
+        }
+        Some(Event::KnownExpired) => {
+            let what = if b == 0 { "values from navigation" } else { "attitude and the Sun" };
+            format!("the {what} have expired: they are {:.1} s from the exposure", f64::from(a) * 1e-3)
         }
         Some(Event::Repaired) => {
             let what = match a {

@@ -1,4 +1,4 @@
-//! The dictionary of telemetry as XTCE (OMG XTCE 1.2, CCSDS 660.1-G), from the tables of the records.
+//! The dictionary of telemetry and telecommands as XTCE (OMG XTCE 1.2, CCSDS 660.1-G), from the tables of the records.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -9,6 +9,9 @@ use hzn_flight::layout::user_data;
 use hzn_flight::messages::{Code, Event, Mode, Severity};
 use hzn_flight::packet::{Apid, ApidBase};
 use hzn_flight::record::{Field, Kind};
+
+use crate::xtce_commands::command_meta_data;
+use crate::xtce_text::{enumeration_list, escape, plain, type_name, unit_of, unit_set};
 
 /// The fields before the user data, with their bits.
 const HEADERS: [(&str, usize, &str); 10] = [
@@ -24,25 +27,10 @@ const HEADERS: [(&str, usize, &str); 10] = [
         8,
         "P-field of the time (CUC, CCSDS 301.0-B): 31 TAI since 1958, 47 since the start of the computer.",
     ),
-    ("time_seconds", 32, "Whole seconds of the time."),
-    ("time_fraction", 24, "Fraction of the second, in 2^-24 s."),
+    ("time_seconds", 32, "Whole seconds of the time: TAI, or with the P-field 47 since the start of the computer."),
+    ("time_fraction", 24, "The time with its fraction of a second, which is in 2^-24 s."),
 ];
 const CHECKSUM: (&str, usize, &str) = ("packet_crc", 16, "CRC-16 of the packet (CCITT: polynomial 1021, start FFFF).");
-
-/// Endings of names, with their units.
-const UNITS: [(&str, &str); 11] = [
-    ("_rad_s", "rad/s"),
-    ("_m_s", "m/s"),
-    ("_us", "us"),
-    ("_s", "s"),
-    ("_m2", "m2"),
-    ("_m", "m"),
-    ("_per_px", "1/px"),
-    ("_px", "px"),
-    ("_rad", "rad"),
-    ("cov", "rad2"),
-    ("cov_free", "rad2"),
-];
 
 /// A number of a packet.
 struct Number {
@@ -68,6 +56,47 @@ fn labels(packet: Apid, field: &str) -> Option<Vec<(u64, String)>> {
         (Apid::Event, "number") => named!(Event::ALL),
         (Apid::Event, "severity") => named!(Severity::ALL),
         (Apid::Acknowledge, "code") => named!(Code::ALL),
+        _ => None,
+    }
+}
+
+/// Severity of an alarm.
+#[derive(Clone, Copy)]
+enum Level {
+    Warning,
+    Critical,
+}
+
+impl Level {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Warning => "warning",
+            Self::Critical => "critical",
+        }
+    }
+}
+
+/// Returns the labels of a field that are alarms.
+fn alarms(packet: Apid, field: &str) -> &'static [(&'static str, Level)] {
+    match (packet, field) {
+        (Apid::Housekeeping, "mode") => const { &[(Mode::Safe.name(), Level::Critical)] },
+        (Apid::Event, "severity") => {
+            const { &[(Severity::Warning.name(), Level::Warning), (Severity::Error.name(), Level::Critical)] }
+        }
+        _ => &[],
+    }
+}
+
+/// Returns the highest value of a field that is no alarm. Counters of what a flight may have, such as lost pictures,
+/// have no limit that holds for every mission.
+fn highest(packet: Apid, field: &str) -> Option<(u32, Level)> {
+    match (packet, field) {
+        (Apid::Housekeeping, "self_check") => Some((0, Level::Critical)),
+        // From three resets in a row the older parameters are in use.
+        (Apid::Housekeeping, "watchdog_resets") => Some((2, Level::Critical)),
+        (Apid::Housekeeping, "repairs") => Some((0, Level::Warning)),
+        // 1: the values were used.
+        (Apid::Navigation | Apid::Attitude, "state") => Some((1, Level::Warning)),
         _ => None,
     }
 }
@@ -104,24 +133,62 @@ impl Dictionary {
         name
     }
 
-    fn enumeration(&mut self, name: String, bits: usize, labels: &[(u64, String)]) -> String {
-        let entry =
-            |(value, label): &(u64, String)| format!("<Enumeration value=\"{value}\" label=\"{}\"/>", escape(label));
-        let list: String = labels.iter().map(entry).collect();
+    fn enumeration(&mut self, name: String, bits: usize, labels: &[(u64, String)], alarms: &[(&str, Level)]) -> String {
+        let alarm = |(label, level): &(&str, Level)| {
+            format!("<EnumerationAlarm alarmLevel=\"{}\" enumerationLabel=\"{}\"/>", level.name(), escape(label))
+        };
+        let list: String = alarms.iter().map(alarm).collect();
+        let alarms = match list.is_empty() {
+            true => String::new(),
+            false => format!("<DefaultAlarm><EnumerationAlarmList>{list}</EnumerationAlarmList></DefaultAlarm>"),
+        };
         let text = format!(
             "<EnumeratedParameterType name=\"{name}\"><UnitSet/>\
-             <IntegerDataEncoding encoding=\"unsigned\" sizeInBits=\"{bits}\"/>\
-             <EnumerationList>{list}</EnumerationList></EnumeratedParameterType>"
+             <IntegerDataEncoding encoding=\"unsigned\" sizeInBits=\"{bits}\"/>{}{alarms}</EnumeratedParameterType>",
+            enumeration_list(labels)
         );
         self.types.insert(name.clone(), text);
         name
     }
 
+    /// Adds the type of a counter that should not be above `highest`.
+    fn watched(&mut self, name: String, bits: usize, highest: u32, level: Level) -> String {
+        let element = match level {
+            Level::Warning => "WarningRange",
+            Level::Critical => "CriticalRange",
+        };
+        let text = format!(
+            "<IntegerParameterType name=\"{name}\" signed=\"false\" sizeInBits=\"{bits}\"><UnitSet/>\
+             <IntegerDataEncoding encoding=\"unsigned\" sizeInBits=\"{bits}\"/>\
+             <DefaultAlarm><StaticAlarmRanges><{element} maxInclusive=\"{highest}\"/>\
+             </StaticAlarmRanges></DefaultAlarm>\
+             </IntegerParameterType>"
+        );
+        self.types.insert(name.clone(), text);
+        name
+    }
+
+    /// Adds the type of one of the two parts of the time, in units of `scale` seconds.
+    fn time(&mut self, name: &str, bits: usize, scale: f64, reference: &str) -> String {
+        let ty = format!("{name}_type");
+        let text = format!(
+            "<AbsoluteTimeParameterType name=\"{ty}\"><Encoding units=\"seconds\" scale=\"{scale:?}\">\
+             <IntegerDataEncoding encoding=\"unsigned\" sizeInBits=\"{bits}\"/></Encoding>\
+             <ReferenceTime>{reference}</ReferenceTime></AbsoluteTimeParameterType>"
+        );
+        self.types.insert(ty.clone(), text);
+        ty
+    }
+
     fn type_of(&mut self, packet: Apid, field: &Field) -> String {
+        let (name, bits) = (format!("{}_{}", packet.name(), field.name), 8 * field.kind.bytes());
         if let Some(labels) = labels(packet, field.name) {
-            return self.enumeration(format!("{}_{}", packet.name(), field.name), 8 * field.kind.bytes(), &labels);
+            return self.enumeration(name, bits, &labels, alarms(packet, field.name));
         }
-        let unit = UNITS.iter().find(|(end, _)| field.name.ends_with(end)).map_or("", |(_, unit)| unit);
+        if let Some((highest, level)) = highest(packet, field.name) {
+            return self.watched(name, bits, highest, level);
+        }
+        let unit = unit_of(field.name);
         match field.kind {
             Kind::Unsigned(bytes) => self.integer(8 * bytes, unit),
             Kind::Float(bytes) => self.float(8 * bytes, unit),
@@ -135,12 +202,11 @@ impl Dictionary {
             for time in 0..part.times {
                 let index = if part.times > 1 { format!("_{time:02}") } else { String::new() };
                 for field in part.table {
-                    let (ty, description) =
-                        (self.type_of(packet, field), field.description.replace(['[', ']', '`'], ""));
+                    let ty = self.type_of(packet, field);
                     numbers.extend(field.parts.iter().map(|part| Number {
                         name: format!("{}_{}{part}{index}", packet.name(), field.name),
                         ty: ty.clone(),
-                        description: description.trim().to_owned(),
+                        description: plain(field.description),
                     }));
                 }
             }
@@ -154,7 +220,7 @@ impl Dictionary {
             self.parameters,
             "      <Parameter name=\"{name}\" parameterTypeRef=\"{ty}\">\
              <LongDescription>{}</LongDescription></Parameter>",
-            escape(description)
+            description
         );
     }
 
@@ -170,25 +236,16 @@ impl Dictionary {
     }
 }
 
-fn type_name(kind: &str, unit: &str) -> String {
-    let unit = unit.replace('/', "_per_");
-    if unit.is_empty() { kind.to_owned() } else { format!("{kind}_{unit}") }
-}
-
-fn unit_set(unit: &str) -> String {
-    if unit.is_empty() { "<UnitSet/>".to_owned() } else { format!("<UnitSet><Unit>{unit}</Unit></UnitSet>") }
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 /// Returns the dictionary of a computer with these APIDs. The packets are those between the sync markers of the line.
 pub fn dictionary(base: ApidBase) -> String {
     let mut d = Dictionary::default();
     for (name, bits, description) in HEADERS.into_iter().chain([CHECKSUM]) {
-        let ty = d.integer(bits, "");
-        d.add_parameter(&Number { name: name.to_owned(), ty, description: description.to_owned() });
+        let ty = match name {
+            "time_seconds" => d.time(name, bits, 1.0, "<Epoch>1958-01-01</Epoch>"),
+            "time_fraction" => d.time(name, bits, 2f64.powi(-24), "<OffsetFrom parameterRef=\"time_seconds\"/>"),
+            _ => d.integer(bits, ""),
+        };
+        d.add_parameter(&Number { name: name.to_owned(), ty, description: plain(description) });
     }
     d.add_container("CCSDSPacket", true, &HEADERS.map(|(name, ..)| name), "");
     for &apid in Apid::ALL.iter().filter(|&&apid| apid != Apid::Command) {
@@ -207,13 +264,17 @@ pub fn dictionary(base: ApidBase) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
          <SpaceSystem name=\"hzn\" xmlns=\"http://www.omg.org/spec/XTCE/20180204\" \
-         shortDescription=\"Telemetry of the hzn horizon sensor\">\n\
+         xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" \
+         xsi:schemaLocation=\"http://www.omg.org/spec/XTCE/20180204 \
+         https://www.omg.org/spec/XTCE/20180204/SpaceSystem.xsd\" \
+         shortDescription=\"Telemetry and telecommands of the hzn horizon sensor\">\n\
          \x20 <Header version=\"{}\" validationStatus=\"Released\"/>\n\
          \x20 <TelemetryMetaData>\n    <ParameterTypeSet>\n{types}    </ParameterTypeSet>\n\
          \x20   <ParameterSet>\n{}    </ParameterSet>\n    <ContainerSet>\n{}    </ContainerSet>\n\
-         \x20 </TelemetryMetaData>\n</SpaceSystem>\n",
+         \x20 </TelemetryMetaData>\n{}</SpaceSystem>\n",
         env!("CARGO_PKG_VERSION"),
         d.parameters,
-        d.containers
+        d.containers,
+        command_meta_data(base)
     )
 }

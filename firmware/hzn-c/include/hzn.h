@@ -1,4 +1,15 @@
-/* hzn: a horizon sensor. Made by cbindgen from firmware/hzn-c; do not edit. */
+/* hzn: a horizon sensor. Made by cbindgen from firmware/hzn-c; do not edit.
+
+   Memory. The caller owns all memory; the library has no heap and no global state. The memory of a sensor begins at a multiple
+   of HZN_WORKSPACE_ALIGN, stays where it is as long as the sensor is used (it must not be copied or moved), and needs no
+   closing: it is free for other uses after the last call.
+
+   Threads and interrupts. Calls with different sensors may run at the same time, each with its own memory. Calls with one
+   sensor must not overlap: the library has no locks, so that tasks which share a sensor need one of their own, and an interrupt
+   must not use a sensor that it may have interrupted. The function that hzn_process_rows calls must not use its sensor. A
+   task that is interrupted by others needs no care.
+
+   Errors. A negative number is an error, after which nothing has changed; 0 to 7 is the status of a picture. */
 
 #ifndef HZN_H
 #define HZN_H
@@ -7,35 +18,35 @@
 #include <stdint.h>
 
 // A pointer is null.
-#define HZN_NULL -1
+#define HZN_NULL (-1)
 
 // The memory is too small or not aligned.
-#define HZN_MEMORY -2
+#define HZN_MEMORY (-2)
 
 // No parameter has this number.
-#define HZN_UNKNOWN_PARAMETER -3
+#define HZN_UNKNOWN_PARAMETER (-3)
 
 // A parameter cannot have this value, or the combination of the parameters is refused.
-#define HZN_REFUSED -4
+#define HZN_REFUSED (-4)
 
 // The picture has no pixels, another size than the camera, an impossible stride, or fewer bytes than its size needs.
-#define HZN_PICTURE -5
+#define HZN_PICTURE (-5)
 
-// The altitude or the position in `HznKnown` is impossible, or a part of a vector is NaN.
-#define HZN_KNOWN -6
+// A value in HznKnown is impossible, or a part of a vector is NaN.
+#define HZN_KNOWN (-6)
 
 // There is no sensor at this pointer: it was not opened, or bits of its memory have changed since the last call. It
 // must be opened again.
-#define HZN_NOT_OPEN -7
+#define HZN_NOT_OPEN (-7)
 
 // The program was compiled with the header of another version of this library.
-#define HZN_OTHER_INTERFACE -8
+#define HZN_OTHER_INTERFACE (-8)
 
 // The parameters need the whole picture in memory, or the camera has more than 1920 columns or 1080 rows.
-#define HZN_NO_ROWS -9
+#define HZN_NO_ROWS (-9)
 
-// `next_row` ended the picture.
-#define HZN_ROWS_ENDED -10
+// next_row ended the picture.
+#define HZN_ROWS_ENDED (-10)
 
 // Status: a direction was found.
 #define HZN_OK 0
@@ -61,8 +72,8 @@
 // Status: lists were full or the work budget was used up.
 #define HZN_TRUNCATED 7
 
-// Version of the structures and functions of this header. `hzn_open` compares it with that of the library.
-#define HZN_INTERFACE 2
+// Version of the structures and functions of this header. hzn_open compares it with that of the library.
+#define HZN_INTERFACE 3
 
 // Bytes that a sensor needs, on every machine.
 #define HZN_WORKSPACE_SIZE 114688
@@ -76,11 +87,43 @@
 // A sensor. Its content is hidden: only pointers to it are passed.
 typedef struct HznSensor HznSensor;
 
+// The prior of a picture. NaN means that a value is not known; of a vector all numbers are known, or none.
+// hzn_nothing_known fills it with NaN.
+typedef struct {
+  // Altitude in metres: geodetic for the Earth, above the radius for other bodies.
+  float altitude_m;
+  // Position of the camera in the fixed frame of the body (for the Earth ECEF), metres. If it is known, the altitude
+  // is not used.
+  float position_m[3];
+  // Rate of rotation of the camera in the camera frame, rad/s: for a rolling shutter, and to move the attitude and
+  // the Sun to the exposure.
+  float rate_rad_s[3];
+  // Attitude: unit quaternion, scalar first, from the camera frame to the fixed frame of the body (for the Earth
+  // ECEF). With a position, an answer that contradicts it is refused (parameter 130).
+  float attitude_wxyz[4];
+  // 1-sigma of the attitude about the worst axis, rad; NaN: 5 degrees.
+  float attitude_sigma_rad;
+  // Direction to the Sun in the camera frame, of any length. A limb that it does not light is refused (parameter
+  // 131).
+  float sun[3];
+  // Time from the attitude and the Sun to the exposure, s; NaN: 0. Both are moved by the rate, if it is known.
+  float attitude_age_s;
+  // The attitude and the Sun are not used if they are further from the exposure than this, s; NaN: they do not
+  // expire.
+  float attitude_expires_s;
+  // axis of the last answer. With parameter 132, an answer that is too far from it is refused.
+  float last_axis[3];
+  // cov_rad2 of that answer.
+  float last_cov_rad2[6];
+  // Time from the exposure of that answer to this one, s.
+  float last_age_s;
+} HznKnown;
+
 // A picture: one byte per pixel, row by row.
 typedef struct {
   // The first pixel of the first row.
   const uint8_t *pixels;
-  // Readable bytes from `pixels` on.
+  // Readable bytes from pixels on.
   size_t bytes;
   // Columns.
   uint32_t width;
@@ -89,17 +132,6 @@ typedef struct {
   // Bytes from the start of a row to the start of the next.
   size_t stride;
 } HznPicture;
-
-// The prior of a picture. NaN means that a value is not known.
-typedef struct {
-  // Altitude in metres: geodetic for the Earth, above the radius for other bodies.
-  float altitude_m;
-  // Position of the camera in the fixed frame of the body (for the Earth ECEF), metres. If it is known, the altitude
-  // is not used.
-  float position_m[3];
-  // Rate of rotation of the camera in the camera frame, rad/s; it has an effect only with a rolling shutter.
-  float rate_rad_s[3];
-} HznKnown;
 
 // A candidate edge.
 typedef struct {
@@ -113,16 +145,16 @@ typedef struct {
   uint32_t inliers;
   // RMS distance of the inliers from the limb, px; NaN without a fit.
   float rms_px;
-  // Verdict: a number of `hzn_verdicts.h`.
+  // Verdict: a number of hzn_verdicts.h.
   uint8_t verdict;
 } HznEdge;
 
-// The answer to a picture. Without a direction (status not 0) the values from `axis` to `rms_px` are NaN and `inliers`
-// is 0. After a call that returns an error, `status` is 255 and every other number is NaN or 0.
+// The answer to a picture. Without a direction (status not 0) the values from axis to rms_px are NaN and inliers
+// is 0. After a call that returns an error, status is 255 and every other number is NaN or 0.
 typedef struct {
   // Unit vector to the body, camera frame (x right, y down, z forward).
   float axis[3];
-  // Covariance of `axis`: xx, xy, xz, yy, yz, zz, rad².
+  // Covariance of axis: xx, xy, xz, yy, yz, zz, rad².
   float cov_rad2[6];
   // The same direction in the fixed frame of the body (for the Earth ECEF); NaN without a position.
   float axis_fixed[3];
@@ -146,12 +178,14 @@ typedef struct {
   uint32_t dropped;
   // Threshold between dark and lit, counts.
   uint16_t level;
-  // Status: the value that `hzn_process` returned.
+  // Status: the value that hzn_process returned.
   uint8_t status;
   // The last stage that was entered.
   uint8_t stage;
-  // Number of candidates in `edges`.
+  // Number of candidates in edges.
   uint8_t listed;
+  // Attitude and Sun of HznKnown: 0 not given, 1 used, 2 expired and not used.
+  uint8_t attitude;
   // The first candidates, and the chosen one.
   HznEdge edges[16];
 } HznAnswer;
@@ -169,60 +203,66 @@ size_t hzn_workspace_align(void);
 // Returns the version of the library: major, minor and patch in one byte each, from the second byte on.
 uint32_t hzn_version(void);
 
-// Makes a sensor in `memory`, with every parameter at its default, and writes a pointer to it to `out`. `interface`
-// is [`HZN_INTERFACE`].
+// Makes a sensor in memory, with every parameter at its default, and writes a pointer to it to out. interface
+// is HZN_INTERFACE.
 //
-// # Safety
-// `memory` is null or has `bytes` writable bytes that nothing else uses as long as the sensor is used. `out` is null
+// Safety:
+// memory is null or has bytes writable bytes that nothing else uses as long as the sensor is used. out is null
 // or writable.
 int32_t hzn_open(uint8_t *memory,
                  size_t bytes,
                  uint32_t interface,
                  HznSensor **out);
 
-// Sets a parameter by its number. The value is in use after the next `hzn_apply`.
+// Sets a parameter by its number. The value is in use after the next hzn_apply.
 //
-// # Safety
-// `sensor` is null or from `hzn_open`.
+// Safety:
+// sensor is null or from hzn_open.
 int32_t hzn_set(HznSensor *sensor, uint16_t number, double value);
 
-// Writes the value of a parameter, as it was set last, to `value`.
+// Writes the value of a parameter, as it was set last, to value.
 //
-// # Safety
-// `sensor` is null or from `hzn_open`. `value` is null or writable.
+// Safety:
+// sensor is null or from hzn_open. value is null or writable.
 int32_t hzn_get(const HznSensor *sensor, uint16_t number, double *value);
 
 // Puts the parameters that were set into use, all or none. If they are refused, the sensor does not change and the
 // values that were set are lost.
 //
-// # Safety
-// `sensor` is null or from `hzn_open`.
+// Safety:
+// sensor is null or from hzn_open.
 int32_t hzn_apply(HznSensor *sensor);
 
-// Returns the number of the parameter that `hzn_set` or `hzn_apply` refused last; 0: none, or the sensor is not open.
+// Returns the number of the parameter that hzn_set or hzn_apply refused last; 0: none, or the sensor is not open.
 // Of a parameter with several numbers, such as the corners of a mask, this is the first.
 //
-// # Safety
-// `sensor` is null or from `hzn_open`.
+// Safety:
+// sensor is null or from hzn_open.
 uint16_t hzn_refused(const HznSensor *sensor);
 
-// Finds the limb. Every valid picture gets a status, which is returned, and an answer in `out`.
+// Sets every value to NaN: nothing is known. Fill in what is known afterwards.
 //
-// # Safety
-// `sensor` is null or from `hzn_open`. `picture` is null, or its `pixels` have `bytes` readable bytes. `known` is null
-// (nothing is known) or readable. `out` is null or writable.
+// Safety:
+// known is null or writable.
+int32_t hzn_nothing_known(HznKnown *known);
+
+// Finds the limb. Every valid picture gets a status, which is returned, and an answer in out.
+//
+// Safety:
+// sensor is null or from hzn_open. picture is null, or its pixels have bytes readable bytes. known is null
+// (nothing is known) or readable. out is null or writable.
 int32_t hzn_process(HznSensor *sensor,
                     const HznPicture *picture,
                     const HznKnown *known,
                     HznAnswer *out);
 
-// Finds the limb in a picture that comes row by row. `next_row` writes the next row, `width` bytes, and returns 0; any
-// other number ends the picture, and `hzn_process_rows` returns `HZN_ROWS_ENDED`. `context` can take the number, which
-// would look like a status here. The threshold must be `fixed`, or that of the picture before.
+// Finds the limb in a picture that comes row by row. next_row writes the next row, width bytes, and returns 0; any
+// other number ends the picture, and hzn_process_rows returns HZN_ROWS_ENDED. context can take the number, which
+// would look like a status here. The threshold must be fixed, or that of the picture before.
 //
-// # Safety
-// `sensor` is null or from `hzn_open`. `memory` is null or has `bytes` writable bytes, which have no other use during
-// the call. `known` is null (nothing is known) or readable. `out` is null or writable. `next_row` writes `width`
+// Safety:
+// sensor is null or from hzn_open. memory is null or has bytes writable bytes, which have no other use during
+// the call. known is null (nothing is known) or readable. out is null or writable. next_row writes width
 // bytes.
 int32_t hzn_process_rows(HznSensor *sensor,
                          uint8_t *memory,

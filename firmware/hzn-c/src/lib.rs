@@ -47,7 +47,7 @@ pub const HZN_UNKNOWN_PARAMETER: i32 = -3;
 pub const HZN_REFUSED: i32 = -4;
 /// The picture has no pixels, another size than the camera, an impossible stride, or fewer bytes than its size needs.
 pub const HZN_PICTURE: i32 = -5;
-/// The altitude or the position in `HznKnown` is impossible, or a part of a vector is NaN.
+/// A value in `HznKnown` is impossible, or a part of a vector is NaN.
 pub const HZN_KNOWN: i32 = -6;
 /// There is no sensor at this pointer: it was not opened, or bits of its memory have changed since the last call. It
 /// must be opened again.
@@ -77,7 +77,7 @@ pub const HZN_REJECTED: i32 = 6;
 pub const HZN_TRUNCATED: i32 = 7;
 
 /// Version of the structures and functions of this header. `hzn_open` compares it with that of the library.
-pub const HZN_INTERFACE: u32 = 2;
+pub const HZN_INTERFACE: u32 = 3;
 /// Bytes that a sensor needs, on every machine.
 pub const HZN_WORKSPACE_SIZE: usize = 114688;
 /// Alignment that a sensor needs, bytes.
@@ -248,6 +248,23 @@ pub unsafe extern "C" fn hzn_refused(sensor: *const HznSensor) -> u16 {
     unsafe { open_sensor(sensor.cast_mut()) }.map_or(0, |sensor| sensor.kept.get().refused)
 }
 
+/// Sets every value to NaN: nothing is known. Fill in what is known afterwards.
+///
+/// # Safety
+/// `known` is null or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hzn_nothing_known(known: *mut HznKnown) -> i32 {
+    if known.is_null() {
+        return HZN_NULL;
+    }
+    if !known.is_aligned() {
+        return HZN_MEMORY;
+    }
+    // SAFETY: the pointer is neither null nor unaligned, and the caller guarantees the rest.
+    unsafe { known.write(HznKnown::NOTHING) };
+    0
+}
+
 /// Finds the limb. Every valid picture gets a status, which is returned, and an answer in `out`.
 ///
 /// # Safety
@@ -288,23 +305,23 @@ pub unsafe extern "C" fn hzn_process(
     let layout = Layout { width: picture.width, height: picture.height, stride: picture.stride, channels: 1, bits: 8 };
     let Ok(grey) = Grey::try_new(pixels, layout) else { return HZN_PICTURE };
     // SAFETY: the caller guarantees it.
-    let Some(expected) = (unsafe { expect(sensor, known) }) else { return HZN_KNOWN };
+    let Some((expected, attitude)) = (unsafe { expect(sensor, known) }) else { return HZN_KNOWN };
     let report = sensor.process(workspace, &grey, &expected, &Unobserved);
-    *out = to_answer(&PictureAnswer::from_report(&report));
+    *out = to_answer(&PictureAnswer::from_report(&report), attitude);
     i32::from(out.status)
 }
 
-/// Returns the expected limb; `None` if the values are impossible.
+/// Returns the expected limb, and what became of the attitude and the Sun; `None` if the values are impossible.
 ///
 /// # Safety
 /// `known` is null or readable and aligned.
-unsafe fn expect(sensor: &Sensor<f32>, known: *const HznKnown) -> Option<Expected<f32>> {
+unsafe fn expect(sensor: &Sensor<f32>, known: *const HznKnown) -> Option<(Expected<f32>, u8)> {
     // SAFETY: the caller guarantees it.
-    let prior = match unsafe { known.as_ref() } {
-        Some(values) => to_prior(values)?,
-        None => Prior::default(),
+    let (prior, attitude) = match unsafe { known.as_ref() } {
+        Some(values) => to_prior(values, sensor.config().body.kind)?,
+        None => (Prior::default(), types::NOT_GIVEN),
     };
-    sensor.expect(&prior).ok()
+    Some((sensor.expect(&prior).ok()?, attitude))
 }
 
 impl Kept {

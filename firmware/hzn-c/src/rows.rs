@@ -58,7 +58,7 @@ pub unsafe extern "C" fn hzn_process_rows(
     let HznSensor { kept, workspace, .. } = sensor;
     let sensor = &kept.get().sensor;
     // SAFETY: the caller guarantees it.
-    let Some(expected) = (unsafe { expect(sensor, known) }) else { return HZN_KNOWN };
+    let Some((expected, attitude)) = (unsafe { expect(sensor, known) }) else { return HZN_KNOWN };
     // SAFETY: the memory is aligned and has room. It consists of arrays of numbers, and zeros are empty ones.
     let rows = unsafe {
         ptr::write_bytes(place, 0, 1);
@@ -79,6 +79,6 @@ pub unsafe extern "C" fn hzn_process_rows(
         }
     }
     let report = stream.finish(workspace, &Unobserved);
-    *out = to_answer(&PictureAnswer::from_report(&report));
+    *out = to_answer(&PictureAnswer::from_report(&report), attitude);
     i32::from(out.status)
 }

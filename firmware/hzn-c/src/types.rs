@@ -1,7 +1,10 @@
 //! The structures of the interface.
 
 use hzn_core::Prior;
+use hzn_core::body::{Kind, Last};
+use hzn_core::frames::{Cam, Cov3, UnitVec3};
 use hzn_flight::answer::{Edge, PictureAnswer};
+use hzn_flight::attitude::AttitudeAndSun;
 
 /// A picture: one byte per pixel, row by row.
 #[repr(C)]
@@ -19,7 +22,8 @@ pub struct HznPicture {
     pub stride: usize,
 }
 
-/// The prior of a picture. NaN means that a value is not known.
+/// The prior of a picture. NaN means that a value is not known; of a vector all numbers are known, or none.
+/// `hzn_nothing_known` fills it with NaN.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct HznKnown {
@@ -28,9 +32,53 @@ pub struct HznKnown {
     /// Position of the camera in the fixed frame of the body (for the Earth ECEF), metres. If it is known, the altitude
     /// is not used.
     pub position_m: [f32; 3],
-    /// Rate of rotation of the camera in the camera frame, rad/s; it has an effect only with a rolling shutter.
+    /// Rate of rotation of the camera in the camera frame, rad/s: for a rolling shutter, and to move the attitude and
+    /// the Sun to the exposure.
     pub rate_rad_s: [f32; 3],
+    /// Attitude: unit quaternion, scalar first, from the camera frame to the fixed frame of the body (for the Earth
+    /// ECEF). With a position, an answer that contradicts it is refused (parameter 130).
+    pub attitude_wxyz: [f32; 4],
+    /// 1-sigma of the attitude about the worst axis, rad; NaN: 5 degrees.
+    pub attitude_sigma_rad: f32,
+    /// Direction to the Sun in the camera frame, of any length. A limb that it does not light is refused (parameter
+    /// 131).
+    pub sun: [f32; 3],
+    /// Time from the attitude and the Sun to the exposure, s; NaN: 0. Both are moved by the rate, if it is known.
+    pub attitude_age_s: f32,
+    /// The attitude and the Sun are not used if they are further from the exposure than this, s; NaN: they do not
+    /// expire.
+    pub attitude_expires_s: f32,
+    /// `axis` of the last answer. With parameter 132, an answer that is too far from it is refused.
+    pub last_axis: [f32; 3],
+    /// `cov_rad2` of that answer.
+    pub last_cov_rad2: [f32; 6],
+    /// Time from the exposure of that answer to this one, s.
+    pub last_age_s: f32,
 }
+
+impl HznKnown {
+    /// Nothing is known.
+    pub(crate) const NOTHING: Self = Self {
+        altitude_m: f32::NAN,
+        position_m: [f32::NAN; 3],
+        rate_rad_s: [f32::NAN; 3],
+        attitude_wxyz: [f32::NAN; 4],
+        attitude_sigma_rad: f32::NAN,
+        sun: [f32::NAN; 3],
+        attitude_age_s: f32::NAN,
+        attitude_expires_s: f32::NAN,
+        last_axis: [f32::NAN; 3],
+        last_cov_rad2: [f32::NAN; 6],
+        last_age_s: f32::NAN,
+    };
+}
+
+/// Attitude and Sun: not given.
+pub(crate) const NOT_GIVEN: u8 = 0;
+/// Attitude and Sun: used.
+const USED: u8 = 1;
+/// Attitude and Sun: expired, and not used.
+const EXPIRED: u8 = 2;
 
 /// The answer to a picture. Without a direction (status not 0) the values from `axis` to `rms_px` are NaN and `inliers`
 /// is 0. After a call that returns an error, `status` is 255 and every other number is NaN or 0.
@@ -69,6 +117,8 @@ pub struct HznAnswer {
     pub stage: u8,
     /// Number of candidates in `edges`.
     pub listed: u8,
+    /// Attitude and Sun of `HznKnown`: 0 not given, 1 used, 2 expired and not used.
+    pub attitude: u8,
     /// The first candidates, and the chosen one.
     pub edges: [HznEdge; 16],
 }
@@ -91,22 +141,51 @@ pub struct HznEdge {
     pub verdict: u8,
 }
 
-/// Returns the values as the sensor takes them; `None` if a part of a vector is NaN.
-pub(crate) fn to_prior(values: &HznKnown) -> Option<Prior<f32>> {
-    let known = |v: [f32; 3]| match v.iter().filter(|x| x.is_nan()).count() {
+/// Returns a vector; `Some(None)` if it is not known, `None` if a part of it is NaN.
+fn known<const N: usize>(v: [f32; N]) -> Option<Option<[f32; N]>> {
+    match v.iter().filter(|x| x.is_nan()).count() {
         0 => Some(Some(v)),
-        3 => Some(None),
+        unknown if unknown == N => Some(None),
         _ => None,
-    };
-    Some(Prior {
+    }
+}
+
+/// Returns the values as the sensor for this body takes them, and what became of the attitude and the Sun; `None` if a
+/// part of a vector is NaN, or if the attitude, the Sun, a time or the last answer is impossible.
+pub(crate) fn to_prior(values: &HznKnown, body: Kind) -> Option<(Prior<f32>, u8)> {
+    let prior = Prior {
         altitude_m: (!values.altitude_m.is_nan()).then_some(values.altitude_m),
         position_m: known(values.position_m)?,
         rate_rad_s: known(values.rate_rad_s)?,
+        last: to_last(values)?,
         ..Prior::default()
-    })
+    };
+    let attitude = AttitudeAndSun::try_new(values.attitude_wxyz, values.attitude_sigma_rad, values.sun).ok()?;
+    let age_s = if values.attitude_age_s.is_nan() { 0.0 } else { values.attitude_age_s };
+    if attitude.is_empty() {
+        Some((prior, NOT_GIVEN))
+    } else if !age_s.is_finite() {
+        None
+    } else if age_s.abs() > values.attitude_expires_s {
+        Some((prior, EXPIRED))
+    } else {
+        Some((attitude.moved(prior.rate_rad_s, age_s, body).added_to(prior), USED))
+    }
 }
 
-pub(crate) fn to_answer(a: &PictureAnswer) -> HznAnswer {
+/// Returns the last answer; `Some(None)` if there was none, `None` if it is impossible.
+fn to_last(values: &HznKnown) -> Option<Option<Last<f32>>> {
+    let (Some(axis), Some(covariance)) = (known(values.last_axis)?, known(values.last_cov_rad2)?) else {
+        return Some(None);
+    };
+    let sigma_rad = Cov3::<Cam, f32>::from_upper(covariance).sigma_max_rad();
+    let age_s = values.last_age_s;
+    (sigma_rad.is_finite() && age_s.is_finite() && age_s >= 0.0)
+        .then_some(Last { axis: UnitVec3::try_new(axis)?, sigma_rad, age_s })
+        .map(Some)
+}
+
+pub(crate) fn to_answer(a: &PictureAnswer, attitude: u8) -> HznAnswer {
     let nan = f32::NAN;
     let d = a.direction.as_ref();
     HznAnswer {
@@ -126,6 +205,7 @@ pub(crate) fn to_answer(a: &PictureAnswer) -> HznAnswer {
         status: a.status,
         stage: a.stage,
         listed: a.listed,
+        attitude,
         edges: a.edges.map(|edge| edge.map_or(HznEdge::default(), to_edge)),
     }
 }
@@ -159,5 +239,6 @@ pub(crate) const NO_ANSWER: HznAnswer = HznAnswer {
     status: u8::MAX,
     stage: 0,
     listed: 0,
+    attitude: NOT_GIVEN,
     edges: [HznEdge { number: 0, length_px: 0, points: 0, inliers: 0, rms_px: f32::NAN, verdict: 0 }; 16],
 };

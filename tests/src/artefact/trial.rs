@@ -173,16 +173,24 @@ impl Trial {
     /// attitude with this error (1σ) about each axis.
     pub fn prior(&self, attitude_sigma_deg: Option<f64>) -> Prior<f64> {
         let pose = &self.scene.pose;
-        let dice = &mut Part::Attitude.dice(self.kind, self.seed);
-        let sigma_rad = attitude_sigma_deg.map(f64::to_radians);
         Prior {
             altitude_m: Some(Globe::new(&self.scene.body).altitude_m(pose.position_m)),
             position_m: Some(pose.position_m),
-            fixed_from_camera: sigma_rad
-                .and_then(|s| pose.disturbed([0; 3].map(|_| s * dice.normal())).fixed_from_camera()),
-            attitude_sigma_rad: sigma_rad,
+            fixed_from_camera: attitude_sigma_deg.and_then(|deg| self.told_pose(deg).fixed_from_camera()),
+            attitude_sigma_rad: attitude_sigma_deg.map(f64::to_radians),
             ..Prior::default()
         }
+    }
+
+    /// Returns the attitude with this error (1σ) about each axis, as a navigation system would give it: a quaternion,
+    /// scalar first, from the camera to ECEF.
+    pub fn attitude_wxyz(&self, sigma_deg: f64) -> [f64; 4] {
+        self.told_pose(sigma_deg).q_fixed_from_camera_wxyz
+    }
+
+    fn told_pose(&self, sigma_deg: f64) -> Pose {
+        let dice = &mut Part::Attitude.dice(self.kind, self.seed);
+        self.scene.pose.disturbed([0; 3].map(|_| sigma_deg.to_radians() * dice.normal()))
     }
 }
 

@@ -5,6 +5,7 @@ mod artefacts;
 mod discs;
 mod faint;
 mod firmware;
+mod flight_artefacts;
 mod free_axis;
 mod hard;
 mod heads;

@@ -24,6 +24,9 @@ use crate::tell;
 ///   "navigate EPOCH EXPIRES_S ALTITUDE_KM X_KM Y_KM Z_KM VX_M_S VY_M_S VZ_M_S [RATE_X RATE_Y RATE_Z]"
 ///                                      as known, with time (UTC, or seconds since the computer's
 ///                                      start), velocity and expiry; NaN: not known
+///   "attitude EPOCH EXPIRES_S QW QX QY QZ SIGMA_DEG [SUN_X SUN_Y SUN_Z]"
+///                                      quaternion from the camera to ECEF, and the direction to the Sun in the
+///                                      camera frame; NaN: not known
 ///   "time UTC [pulse]"                 correlates the clock: UTC when the command arrives, or at the last pulse
 ///   "process-once", "dump-edges", "reset-counters", "ping", "report" (sends housekeeping)
 ///   "arm"                              allows "mode shut-down" for ten seconds

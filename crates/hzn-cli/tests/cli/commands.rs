@@ -298,6 +298,15 @@ fn a_telecommand_has_values_that_can_be() {
     // P-field of TAI, then 2174212837 seconds: `date -u -d 2026-11-24T12:00:00 +%s`, 37 s and 4383 days.
     let sent = std::fs::read(place.path("u.bin")).unwrap();
     assert_eq!(sent[19..27], [0x1F, 0x81, 0x97, 0xDA, 0xE5, 0, 0, 0], "{:x?}", &sent[19..27]);
+    place.run(&["telecommand", "attitude 5 60 1 0 0 0"]).expect(2).says("7 or 10 numbers");
+    place.run(&["telecommand", "attitude 5 NaN 1 0 0 0 3"]).expect(2).says("the expiry NaN s is refused");
+    place.run(&["telecommand", "attitude 5 60 1 1 0 0 3"]).expect(2).says("quaternion must be 1 within 0.01");
+    place.run(&["telecommand", "attitude 5 60 1 0 0 0 3 1 NaN 0"]).expect(2).says("SUN_Y is NaN");
+    place.run(&["telecommand", "attitude 5 60 1 0 0 0 3", "-o", "a.bin"]).expect(0);
+    let sent = std::fs::read(place.path("a.bin")).unwrap();
+    // The function, and after time and expiry the scalar part of the quaternion.
+    assert_eq!((sent.len(), sent[18], &sent[31..35]), (21 + 44, 16, &1f32.to_be_bytes()[..]));
+    assert_eq!(set("gates.fixed_edge warn").stdout, set("133 1").stdout);
     place.run(&["telecommand", "time 12:00"]).expect(2).says("is not a time in UTC");
     place.run(&["telecommand", "time 2026-01-01T00:00:00.5Z pulse"]).expect(2).says("a whole second");
     place.run(&["telecommand", "stage"]).expect(2).says("there is no such command");

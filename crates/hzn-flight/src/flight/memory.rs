@@ -4,7 +4,7 @@ use hzn_core::body::Expected;
 use hzn_twice::KeptTwice;
 
 use super::Flight;
-use super::navigation::Known;
+use super::known::Known;
 use super::self_check::NO_PARAMETERS;
 use crate::board::Board;
 use crate::messages::{Event, Mode};
@@ -233,7 +233,7 @@ mod tests {
         }
         assert!(flips > 400, "{flips}");
         // Wrong values from navigation are not used; the altitude of the parameters replaces them.
-        flight.known.value_mut().prior.altitude_m = Some(5e5);
+        flight.known.value_mut().navigation.prior.altitude_m = Some(5e5);
         assert_eq!(turn(&mut flight), (right, true));
         assert_eq!(turn(&mut flight), (right, false));
     }
@@ -304,22 +304,26 @@ mod tests {
                 let mut changed = small();
                 changed.set(32, 486.0).unwrap();
                 *flight.sensor.value_mut() = Sensor::new(&changed.sensor).unwrap();
-                flight.known.value_mut().prior.altitude_m = Some(5e5);
+                flight.known.value_mut().navigation.prior.altitude_m = Some(5e5);
                 send(&mut flight, function, one_pair);
                 assert_eq!(flight.state.repairs, 2, "{function:?} in {mode:?}");
                 let mut right = small();
                 right.set(81, 2.5).unwrap();
                 assert_eq!(*flight.sensor.get().config(), right.sensor, "{function:?} in {mode:?}");
-                assert_eq!(flight.known.get().prior.altitude_m, None);
+                assert_eq!(flight.known.get().navigation.prior.altitude_m, None);
                 let newest = table::read(&flight.board.copies[1]).map(|(parameters, _)| parameters);
                 assert_eq!(newest.ok(), (function == Function::SetParameters).then_some(right));
             }
             let (mut buffers, mut lists) = (Box::new(Buffers::new()), Box::new(Lists::new()));
             let mut flight = Flight::start(board(), &mut buffers, &mut lists).unwrap();
             send(&mut flight, Function::SetMode, |w| w.u8(mode as u8));
-            for function in [Function::SetKnown, Function::Navigate] {
+            for function in [Function::SetKnown, Function::Navigate, Function::SetAttitude] {
                 flight.known.value_mut().level = Some(7);
                 send(&mut flight, function, |w| {
+                    if function == Function::SetAttitude {
+                        w.u64(0);
+                        return [f32::NAN; 9].into_iter().for_each(|x| w.f32(x));
+                    }
                     if function == Function::Navigate {
                         w.u64(0);
                         w.f32(f32::NAN);
@@ -339,7 +343,7 @@ mod tests {
             let (mut buffers, mut lists) = (Box::new(Buffers::new()), Box::new(Lists::new()));
             let mut flight = Flight::start(board(), &mut buffers, &mut lists).unwrap();
             send(&mut flight, Function::SetMode, |w| w.u8(mode as u8));
-            flight.known.value_mut().prior.altitude_m = Some(5e5);
+            flight.known.value_mut().navigation.prior.altitude_m = Some(5e5);
             flight.board.now_us += 5_000_000;
             assert!(turn(&mut flight).1, "{mode:?}");
             assert_eq!((flight.state.repairs, flight.mode), (1, mode));

@@ -12,7 +12,10 @@
 //! | `memory` | bits that changed in memory |
 //! | `science` | the packets of a picture, within the bit budget |
 //! | `clock` | the time of packets, and its correlation |
-//! | `navigation` | position, velocity and rate, with their time |
+//! | `validity` | time and expiry of values from navigation |
+//! | `navigation` | position, velocity and rate |
+//! | `attitude` | attitude and Sun |
+//! | `known` | what of them is known at an exposure |
 //! | `prior` | the prior of a picture from these values, until they expire |
 //! | `camera_watch` | pictures that do not come |
 //! | `longest_edge` | the packets of the edge that a command asks for |
@@ -32,10 +35,12 @@ use crate::table;
 pub use crate::view::Lists;
 use crate::view::LongestEdge;
 
+mod attitude;
 mod budget;
 mod camera_watch;
 mod clock;
 mod housekeeping;
+mod known;
 mod line;
 mod listen;
 mod longest_edge;
@@ -50,11 +55,12 @@ mod reports;
 mod science;
 mod self_check;
 mod telecommands;
+mod validity;
 
 use budget::BitBudget;
 use camera_watch::CameraWatch;
+use known::Known;
 use line::Line;
-use navigation::Known;
 use recovery::Recovery;
 use reports::Limiter;
 
@@ -100,8 +106,8 @@ pub struct Flight<'a, B> {
     /// Number of parameters that are kept for a commit; they are in the buffer of the table.
     staged: u16,
     known: KeptTwice<Known>,
-    /// Whether an event said that the values from navigation have expired.
-    has_expired: bool,
+    /// Whether events said that the values from navigation have expired, and the attitude.
+    has_expired: (bool, bool),
     mode: Mode,
     state: Housekeeping,
     recovery: Recovery,
@@ -180,7 +186,7 @@ impl<'a, B: Board> Flight<'a, B> {
             stored,
             staged: 0,
             known: KeptTwice::new(Known::default()),
-            has_expired: false,
+            has_expired: (false, false),
             mode: Mode::Standby,
             state,
             recovery,

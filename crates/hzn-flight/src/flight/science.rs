@@ -7,7 +7,7 @@ use super::Flight;
 use crate::answer::PictureAnswer;
 use crate::board::Board;
 use crate::layout;
-use crate::messages::{Event, Exposure, NavigationState};
+use crate::messages::{AttitudeState, Event, Exposure, NavigationState};
 use crate::packet::{Apid, OVERHEAD};
 use crate::parameters::Parameters;
 
@@ -15,10 +15,12 @@ impl<B: Board> Flight<'_, B> {
     /// Sends the answer to the picture that was counted last, if the bit budget allows it. The board gets it in any
     /// case.
     pub(super) fn send_answer(&mut self, report: &Report<f32>, exposure_us: u64, done_us: u64) {
-        let navigation = self.known.get().state_at(self.number, exposure_us);
+        let (known, body) = (self.known.get(), self.body());
+        let navigation = known.navigation_at(self.number, exposure_us);
+        let attitude = known.attitude_at(self.number, exposure_us, body);
         let exposure = self.exposure(navigation.as_ref(), exposure_us, done_us);
         // Sent before it is kept, so that a slow disk does not delay the packets.
-        self.send_within_budget(report, &exposure, navigation);
+        self.send_within_budget(report, &exposure, navigation, attitude);
         let is_kept = self.board.keep_answer(&exposure, report);
         // Reported at the first one, because a full disk would otherwise send an event for each picture.
         if !is_kept && self.keeps_answers {
@@ -27,16 +29,25 @@ impl<B: Board> Flight<'_, B> {
         self.keeps_answers = is_kept;
     }
 
-    fn send_within_budget(&mut self, report: &Report<f32>, exposure: &Exposure, navigation: Option<NavigationState>) {
+    fn send_within_budget(
+        &mut self,
+        report: &Report<f32>,
+        exposure: &Exposure,
+        navigation: Option<NavigationState>,
+        attitude: Option<AttitudeState>,
+    ) {
         let answer = PictureAnswer::from_report(report);
         let exposure_us = exposure.exposure_us;
         // All packets or none, because without the science packet the others belong to no answer.
-        if !self.has_budget(&answer, navigation.is_some(), exposure.done_us) {
+        if !self.has_budget(&answer, [navigation.is_some(), attitude.is_some()], exposure.done_us) {
             self.state.decimated = self.state.decimated.saturating_add(1);
             return;
         }
         if let Some(navigation) = navigation {
             self.send_at(exposure_us, Apid::Navigation, |out| navigation.write(out));
+        }
+        if let Some(attitude) = attitude {
+            self.send_at(exposure_us, Apid::Attitude, |out| attitude.write(out));
         }
         let picture = self.number;
         if let Some(position) = answer.position {
@@ -73,13 +84,15 @@ impl<B: Board> Flight<'_, B> {
     }
 
     /// Returns whether the bit budget has room for all packets of a picture, and counts them.
-    fn has_budget(&mut self, answer: &PictureAnswer, has_navigation: bool, now_us: u64) -> bool {
+    fn has_budget(&mut self, answer: &PictureAnswer, has: [bool; 2], now_us: u64) -> bool {
+        let [has_navigation, has_attitude] = has.map(usize::from);
         let Some(rate) = self.operations.get().science_bits_s else { return true };
         let counts = [
             (Apid::Science, 1),
             (Apid::Candidate, answer.edges.iter().flatten().count()),
             (Apid::Position, usize::from(answer.position.is_some())),
-            (Apid::Navigation, usize::from(has_navigation)),
+            (Apid::Navigation, has_navigation),
+            (Apid::Attitude, has_attitude),
         ];
         let bytes = counts.map(|(apid, count)| count * (OVERHEAD + layout::user_bytes(apid).unwrap_or(0)));
         self.budget.allows(8 * bytes.iter().sum::<usize>() as u32, rate, now_us)

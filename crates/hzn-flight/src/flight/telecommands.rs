@@ -1,6 +1,7 @@
 //! The functions of telecommands. Those that read and change parameters are in `parameter_commands`.
 
 use super::Flight;
+use super::attitude::read_attitude;
 use super::navigation::{read_navigation, read_prior};
 use super::parameter_commands::Keep;
 use crate::board::Board;
@@ -22,6 +23,11 @@ impl<B: Board> Flight<'_, B> {
                 let now_us = self.board.now_us();
                 let read = read_navigation(from, &self.buffers.line.clock, now_us);
                 self.set_known(read)
+            }
+            Function::SetAttitude => {
+                let now_us = self.board.now_us();
+                let read = read_attitude(from, &self.buffers.line.clock, now_us);
+                self.set_attitude(read)
             }
             Function::SetTime => self.set_time(from),
             // The other functions have no arguments.

@@ -8,8 +8,8 @@ use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::cuc::Cuc;
 use hzn_flight::flight::{Buffers, Flight, Lists};
 use hzn_flight::messages::{
-    Acknowledge, Code, EDGE_PIXELS, EdgePart, EdgePixel, Event, EventRecord, Exposure, Function, Housekeeping,
-    NavigationState, ParameterValue,
+    Acknowledge, AttitudeState, Code, EDGE_PIXELS, EdgePart, EdgePixel, Event, EventRecord, Exposure, Function,
+    Housekeeping, NavigationState, ParameterValue,
 };
 use hzn_flight::packet::{self, Apid, ApidBase, Scan};
 use hzn_flight::view::{ROWS_HELD, RowMemory, Viewer};
@@ -176,6 +176,7 @@ pub(crate) struct Sent {
     pub(crate) housekeeping: Vec<Housekeeping>,
     pub(crate) science: Vec<(Exposure, PictureAnswer)>,
     pub(crate) navigation: Vec<NavigationState>,
+    pub(crate) attitude: Vec<AttitudeState>,
     /// The times of the packets, in their order.
     pub(crate) times: Vec<(Apid, Cuc)>,
     /// What was refused, of every acknowledgement.
@@ -200,10 +201,11 @@ pub(crate) fn take_sent(flight: &mut Flight<'_, Bench>) -> Sent {
         out.times.push((apid, packet.time.unwrap()));
         match apid {
             Apid::Housekeeping => out.housekeeping.push(Housekeeping::read(&mut r).unwrap()),
-            Apid::Science | Apid::Candidate | Apid::Position | Apid::Navigation => {
+            Apid::Science | Apid::Candidate | Apid::Position | Apid::Navigation | Apid::Attitude => {
                 if let Some(picture) = assembly.take(apid, packet.user).unwrap() {
                     assert_eq!(picture.missing_candidates, 0);
                     out.navigation.extend(picture.navigation);
+                    out.attitude.extend(picture.attitude);
                     out.science.push((picture.exposure, picture.answer));
                 }
                 continue;

@@ -1,5 +1,6 @@
 //! Tests the flight software on a board that is made of vectors.
 
+mod attitude;
 mod bench;
 mod clock;
 mod damage;

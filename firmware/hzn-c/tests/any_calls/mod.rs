@@ -7,8 +7,8 @@ use std::ptr;
 
 use hzn::rows::{HZN_ROWS_SIZE, hzn_process_rows};
 use hzn::types::{HznAnswer, HznKnown, HznPicture};
-use hzn::{HZN_INTERFACE, HZN_ROWS_ENDED, HznSensor};
-use hzn::{hzn_apply, hzn_get, hzn_open, hzn_process, hzn_refused, hzn_set};
+use hzn::{HZN_INTERFACE, HZN_NULL, HZN_ROWS_ENDED, HznSensor};
+use hzn::{hzn_apply, hzn_get, hzn_nothing_known, hzn_open, hzn_process, hzn_refused, hzn_set};
 use hzn::{hzn_workspace_align, hzn_workspace_size};
 
 /// Calls every function with values from the bytes.
@@ -53,11 +53,19 @@ pub(crate) fn call(data: &[u8]) {
                 stride: if byte() == 0 { usize::from(byte()) } else { 640 },
             };
             let mut number = || f32::from_le_bytes(std::array::from_fn(|_| byte()));
-            let known = HznKnown {
-                altitude_m: number(),
-                position_m: std::array::from_fn(|_| number()),
-                rate_rad_s: std::array::from_fn(|_| number()),
-            };
+            let mut known: HznKnown = std::mem::zeroed();
+            assert_eq!(hzn_nothing_known(&mut known) + hzn_nothing_known(ptr::null_mut()), HZN_NULL);
+            known.altitude_m = number();
+            known.position_m = std::array::from_fn(|_| number());
+            known.rate_rad_s = std::array::from_fn(|_| number());
+            known.attitude_wxyz = std::array::from_fn(|_| number());
+            known.attitude_sigma_rad = number();
+            known.sun = std::array::from_fn(|_| number());
+            known.attitude_age_s = number();
+            known.attitude_expires_s = number();
+            known.last_axis = std::array::from_fn(|_| number());
+            known.last_cov_rad2 = std::array::from_fn(|_| number());
+            known.last_age_s = number();
             let mut answer: HznAnswer = std::mem::zeroed();
             hzn_process(sensor, &picture, &known, &mut answer);
             hzn_process(sensor, &picture, ptr::null(), &mut answer);

@@ -7,12 +7,12 @@ choices! {
     /// Treatment of an answer whose edge stays in the picture while the vehicle turns.
     pub enum FixedEdge {
         /// The answer is refused with the verdict `fixed`.
-        @- Refuse = "refuse";
+        @0 Refuse = "refuse";
         /// The answer stays; the column `detail` says `suspect: fixed in the picture`, and the flight software sends an
         /// event.
-        @- Warn = "warn";
+        @1 Warn = "warn";
         /// Answers are not compared with the turn.
-        @- Off = "off";
+        @2 Off = "off";
     }
 }
 
@@ -122,35 +122,35 @@ section! {
         /// nine. With a larger value fewer false answers pass, and more limbs are refused, such as drawn ones without
         /// air. Bodies without known air, Sun and Moon have no such probability.
         // An answer is worth giving if (1 − p) C < p, so p > C/(1 + C) with the cost C of a false answer: 3 gives 0.75.
-        @- min_p_limb: f64 = 0.0, [0.0 to 1.0];
+        @135 min_p_limb: f64 = 0.0, [0.0 to 1.0];
         /// Odds that an edge that passes all other gates is the limb, before its evidence is weighed.
         ///
         /// The default is for a camera that sees a limb in half of its pictures: the other gates let about one in fifty
         /// pictures without a limb pass. Set a smaller value if limbs are rarer, for example 5 for one picture in ten.
-        @- prior_odds: f64 = 50.0, [above 0.0 to 1e9];
+        @136 prior_odds: f64 = 50.0, [above 0.0 to 1e9];
         /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
         /// deviations.
         ///
         /// A smaller value refuses more false answers, and right answers whose attitude is worse than its sigma says.
-        @- max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];
+        @130 max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];
         /// Largest rate of rotation of the vehicle, degrees per second; an axis that is farther from the previous
         /// answer is refused.
         ///
         /// Set it to the largest rate that the vehicle can reach: a smaller value refuses right answers. Pictures are
         /// then processed in order.
-        @- max_rate_deg_s: Option<f64> = None, [above 0.0 to 1e6] { unset: "any", example: "100.0" };
+        @132 max_rate_deg_s: Option<f64> = None, [above 0.0 to 1e6] { unset: "any", example: "100.0" };
         /// Treatment of an answer whose edge stays in the picture while the vehicle turns: the edge belongs to the
         /// window, the lens or the vehicle.
         ///
         /// The turn comes from the columns `rate_x` to `rate_z` of frames.csv, or from an attitude; without both,
         /// nothing is compared. The first picture of a sequence has nothing to be compared with, and nor has a vehicle
         /// that turns more slowly than an orbit turns the direction to the body, 0.07° per second.
-        @- fixed_edge: FixedEdge = FixedEdge::Refuse, [choice];
+        @133 fixed_edge: FixedEdge = FixedEdge::Refuse, [choice];
         /// Evidence for an edge that is fixed in the picture from which `fixed_edge` acts, in standard deviations.
         ///
         /// A larger value refuses fewer right answers by chance, and needs a larger turn. With 3, at most 0.14 % of
         /// right answers are refused if the covariance is right.
-        @- fixed_edge_sigma: f64 = 3.0, [above 0.0 to 1e3];
+        @134 fixed_edge_sigma: f64 = 3.0, [above 0.0 to 1e3];
         /// Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does
         /// `body.sunlit = false`, which is for a thermal camera.
         ///
@@ -158,7 +158,7 @@ section! {
         /// is known, too: at night no limb of the Earth counts. It is night where the Sun is 18° plus the dip of the
         /// horizon below the horizon of the point below the camera. An attitude then gives the direction of the Sun, if
         /// the columns `sun_x` to `sun_z` are empty.
-        @- max_unlit: f64 = 0.5, [0.0 to 1.0];
+        @131 max_unlit: f64 = 0.5, [0.0 to 1.0];
         /// Whether a part of the expected limb must lie in the picture: the limb with the expected half-angle about the
         /// fitted axis.
         @- limb_in_view: bool = false, ["true or false"] { needs: "dlr" };

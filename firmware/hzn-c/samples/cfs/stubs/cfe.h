@@ -14,7 +14,8 @@ typedef int32 CFE_Status_t;
 typedef uint32 CFE_SB_PipeId_t;
 typedef size_t CFE_MSG_Size_t;
 typedef struct { uint32 Value; } CFE_SB_MsgId_t;
-typedef struct { uint32 id; size_t size; } CFE_MSG_Message_t;
+typedef uint16 CFE_MSG_FcnCode_t;
+typedef struct { uint32 id; size_t size; uint16 code; } CFE_MSG_Message_t;
 typedef struct { CFE_MSG_Message_t Msg; } CFE_MSG_CommandHeader_t;
 typedef struct { CFE_MSG_Message_t Msg; } CFE_MSG_TelemetryHeader_t;
 typedef union { CFE_MSG_Message_t Msg; uint64_t align; } CFE_SB_Buffer_t;
@@ -41,6 +42,7 @@ CFE_Status_t CFE_SB_TransmitMsg(const CFE_MSG_Message_t *message, bool increment
 void CFE_SB_TimeStampMsg(CFE_MSG_Message_t *message);
 CFE_Status_t CFE_MSG_Init(CFE_MSG_Message_t *message, CFE_SB_MsgId_t id, CFE_MSG_Size_t size);
 CFE_Status_t CFE_MSG_GetMsgId(const CFE_MSG_Message_t *message, CFE_SB_MsgId_t *id);
+CFE_Status_t CFE_MSG_GetFcnCode(const CFE_MSG_Message_t *message, CFE_MSG_FcnCode_t *code);
 CFE_Status_t CFE_MSG_GetSize(const CFE_MSG_Message_t *message, CFE_MSG_Size_t *size);
 
 #endif

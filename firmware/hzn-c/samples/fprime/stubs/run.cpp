@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "../HznSensor.hpp"
+#include "Components/HznSensor/HznSensor.hpp"
 #include "picture.h"
 
 int main() {

@@ -2,7 +2,7 @@
 #ifndef HZN_HZNSENSOR_HPP
 #define HZN_HZNSENSOR_HPP
 
-#include "HznSensorComponentAc.hpp"
+#include "Components/HznSensor/HznSensorComponentAc.hpp"
 #include "hzn.h"
 
 namespace Hzn {

@@ -1,4 +1,5 @@
-#include "HznSensor.hpp"
+// F´ looks for headers from the root of the project on.
+#include "Components/HznSensor/HznSensor.hpp"
 
 #include "hzn_parameters.h"
 
