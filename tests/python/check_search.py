@@ -36,6 +36,7 @@ PROBES = {
     "mount": "reference/sensor-toml/",
     "opencv": "guide/python/from-opencv/",
     "gallery": "guide/gallery/",
+    "where is the limb": "theory/limb/",
 }
 FIRST = 3
 

@@ -14,6 +14,7 @@ pub mod exit;
 mod files;
 mod html;
 mod limb_fov;
+mod limb_words;
 mod progress;
 mod refusals;
 mod setup;

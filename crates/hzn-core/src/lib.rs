@@ -93,7 +93,7 @@ pub use base::{error, keys, real};
 pub use config::retry;
 pub use geometry::{camera, ellipsoid, frames, pixel, section};
 pub use image::region;
-pub use model::{body, edge_noise, error_budget, evidence, observer, report, status, verdict, work};
+pub use model::{body, edge_noise, error_budget, evidence, observer, report, status, tone, verdict, work};
 pub use stages::{consensus, contour, covariance, edge_points, fit, gates, threshold};
 
 pub use body::{Expected, Prior};

@@ -1,14 +1,15 @@
 //! The values of `[body]` that depend on the kind of body: a planet has another limb height than the Earth.
 
-use hzn_core::body::{Config, Kind};
+use hzn_core::body::{Config, Kind, Limb};
 use toml::de::{DeTable, DeValue};
 
 use crate::merge::merge_missing;
 
-/// Returns for each body of the file, in order, the limb height that fits its kind as TOML; empty for a body with the
-/// limb height of the Earth.
+/// Returns for each body of the file, in order, the limb height that fits its kind, and where it comes from, as TOML;
+/// empty for a body with the default limb height of the Earth.
 pub(crate) fn body_defaults(sensor: &DeTable<'_>) -> Vec<String> {
-    let of = |body: &DeValue<'_>| body.as_table().and_then(defaults).unwrap_or_default();
+    let of = |body: &DeValue<'_>| body.as_table().map(|body| limb(body) + &defaults(body).unwrap_or_default());
+    let of = |body: &DeValue<'_>| of(body).unwrap_or_default();
     match (sensor.get("body"), sensor.get("bodies").and_then(|bodies| bodies.get_ref().as_array())) {
         (Some(body), _) => vec![of(body.get_ref())],
         (None, Some(bodies)) => bodies.iter().map(|body| of(body.get_ref())).collect(),
@@ -28,6 +29,15 @@ pub(crate) fn merge_body_defaults<'i>(sensor: &mut DeTable<'i>, values: &'i [Str
     } else if let Some(DeValue::Array(bodies)) = sensor.get_mut("bodies").map(toml::Spanned::get_mut) {
         bodies.iter_mut().zip(values).for_each(|(body, values)| merge(body.get_mut(), values));
     }
+}
+
+/// The keys that set a limb height.
+const HEIGHT_KEYS: [&str; 3] = ["limb_height_km", "limb_height_sigma_km", "limb_height_by_latitude_km"];
+
+/// Returns `limb = "height"` for a body whose file sets a limb height; else an empty text.
+fn limb(body: &DeTable<'_>) -> String {
+    let is_set = HEIGHT_KEYS.iter().any(|key| body.contains_key(*key));
+    if is_set { format!("limb = {:?}\n", Limb::Height.name()) } else { String::new() }
 }
 
 /// Returns the values as TOML; `None` for a body with the limb height of the Earth. Wrong values are left to the reader
@@ -77,7 +87,36 @@ mod tests {
         let own = body("[[bodies]]\nkind = \"ellipsoid\"\nradii_km = [13, 11.4, 9.1]\n");
         assert_eq!((own.limb_height_km, own.clipped_height_km), (0.0, 0.0));
         assert!((own.limb_height_sigma_km - 33.5e-3).abs() < 1e-9);
+        // The told height is that of the pictures, whatever their tone.
+        let toned = body("[input]\ntone = \"srgb\"\n[body]\nkind = \"jupiter\"\n");
+        assert!((toned.limb_height_km - 102.9).abs() < 0.05, "{}", toned.limb_height_km);
+        let told = body("[input]\ntone = 2.2\n[body]\nkind = \"jupiter\"\nlimb_height_km = 80\n");
+        assert_eq!(told.limb_height_km, 80.0);
         let earth = body("[body]\nkind = \"earth\"\n");
         assert_eq!((earth.limb_height_km, earth.limb_height_sigma_km), (17.0, 7.0));
+    }
+
+    #[test]
+    fn a_tone_moves_the_default_height_only() {
+        use hzn_core::body::Limb;
+        let of = |text: &str| {
+            let body = body(text);
+            (body.limb, (body.limb_height_km * 10.0).round() / 10.0, body.limb_height_sigma_km)
+        };
+        assert_eq!(of("[input]\ntone = \"srgb\"\n"), (Limb::Visible, 23.4, 4.6));
+        assert_eq!(of("[input]\ntone = \"bt709\"\n[[bodies]]\nkind = \"earth\"\n"), (Limb::Visible, 21.9, 4.6));
+        assert_eq!(of("[input]\ntone = 2\n"), (Limb::Visible, 22.2, 4.6));
+        assert_eq!(of("[input]\ntone = \"unknown\"\n"), (Limb::Visible, 17.0, 7.0));
+        let told = "[input]\ntone = \"srgb\"\n[body]\nlimb_height_km = 17\n";
+        assert_eq!(of(told), (Limb::Height, 17.0, 7.0));
+        assert_eq!(of("[input]\ntone = \"srgb\"\n[body]\nlimb_height_sigma_km = 2\n"), (Limb::Height, 17.0, 2.0));
+        // A written configuration is read as it was, before and after the tone is known.
+        for text in ["[body]\nkind = \"earth\"\n", "[input]\ntone = \"srgb\"\n", told] {
+            let camera = "[camera]\nwidth = 64\nheight = 48\nmodel = \"pinhole\"\nfx_px = 60.0\nfy_px = 60.0\n\
+                          cx_px = 31.5\ncy_px = 23.5\n";
+            let read = |text: &str| crate::sensor::parse(text, Path::new("sensor.toml")).unwrap().config;
+            let config = read(&format!("{camera}{text}"));
+            assert_eq!(read(&crate::sensor::to_text(&config).unwrap()), config, "{text}");
+        }
     }
 }

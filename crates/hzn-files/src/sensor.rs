@@ -93,7 +93,10 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     if let Ok(values) = DeTable::parse(&starting_values) {
         merge_missing(complete.get_mut(), values.into_inner());
     }
-    let config = Config { camera, ..read(complete)? };
+    let mut config = Config { camera, ..read(complete)? };
+    if let Some(tone) = config.input.tone {
+        config.set_tone(tone);
+    }
     if let Some(what) = plausible::explain_five_coefficients(&config.camera) {
         return Err(problem_at_key("camera.k", None, what, text, path, &places));
     }

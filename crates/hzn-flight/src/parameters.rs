@@ -210,6 +210,8 @@ impl Parameters {
         // Colours and orientation of pictures are handled on the ground, so `input` does not count. The mask was set by
         // its corners.
         flown.sensor.input = self.sensor.input;
+        // The height of the limb is a parameter; where it comes from is not.
+        flown.sensor.body.limb = self.sensor.body.limb;
         match self.sensor.differing_on_ground(&flown.sensor) {
             Some(path) => Err(path),
             None => Ok(()),

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use hzn_core::Config;
 use hzn_files::FrameData;
 use hzn_run::engine::{self, Finished, Plan, Turns};
 use hzn_run::open::{Opened, Request, SensorChoice, open};
@@ -58,8 +59,14 @@ impl Sequence {
         for warning in doubts.chain(warnings).chain(notes) {
             errors::warn(py, warning)?;
         }
+        // The limb height may follow from the tone of the pictures.
+        let state = if sensor.config.each_body() == state.config.each_body() {
+            state
+        } else {
+            State::new(Config { input: state.config.input, ..sensor.config.clone() }, state.flight)?
+        };
         let mut plan = default_plan(&state, frames);
-        plan.config.input.bits = sensor.config.input.bits;
+        plan.config.input = sensor.config.input;
         Ok(Self { state, plan, source: Mutex::new(source), next: AtomicU64::new(0) })
     }
 

@@ -11,7 +11,7 @@ use hzn_files::{Frames, Problem, Sensor, plausible};
 
 use crate::engine::{self, AnySensor};
 use crate::error::{Error, Remedy, unusable};
-use crate::source::{self, Raw, Source};
+use crate::source::{self, FoundTone, Raw, Source};
 
 /// The files to open, and the values that replace those of the files.
 #[derive(Debug, Clone, Default)]
@@ -48,7 +48,7 @@ pub enum SensorChoice {
 pub struct Opened {
     /// The pictures.
     pub source: Box<dyn Source>,
-    /// The sensor, with the bits of the pictures.
+    /// The sensor, with the bits and the tone of the pictures.
     pub sensor: Sensor,
     /// The frames.csv, if one is read.
     pub frames: Option<Frames>,
@@ -195,8 +195,8 @@ fn with_altitude(text: &str, km: f64, bodies: &[usize]) -> String {
     document.to_string()
 }
 
-/// Requests the colour channel from the source. If the sensor does not state the number of bits, finds it from the
-/// pictures and sets it in the sensor and its text. Returns notes for the user.
+/// Requests the colour channel from the source. If the sensor does not state the number of bits or the tone, finds them
+/// from the pictures and sets them in the sensor and its text. Returns notes for the user.
 ///
 /// # Errors
 /// The source has no colours.
@@ -214,6 +214,7 @@ pub fn complete(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<Stri
         }
         notes.extend(found.filter(|f| f.bits < 16).map(|f| f.to_string()));
     }
+    notes.extend(complete_tone(source, sensor));
     if sensor.config.input.orient == Orient::AsStored
         && let Some((name, how)) = source.display_turn()
     {
@@ -223,6 +224,25 @@ pub fn complete(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<Stri
         ));
     }
     Ok(notes)
+}
+
+/// Takes the tone that the pictures say, if the sensor does not state it. Returns a note if the limb height follows.
+fn complete_tone(source: &dyn Source, sensor: &mut Sensor) -> Option<String> {
+    if sensor.config.input.tone.is_some() {
+        return None;
+    }
+    let FoundTone { tone, kind } = source::find_tone(source)?;
+    let before = sensor.config.clone();
+    sensor.config.set_tone(tone);
+    // A recorded sensor states the tone, because recorded pictures may be in another format.
+    let value = tone.word().map_or_else(|| tone.gamma().into(), toml_edit::Value::from);
+    sensor.text = source::with_key(&sensor.text, "tone", value);
+    let raised = before.each_body().iter().zip(sensor.config.each_body()).find(|(old, new)| old != new)?.1;
+    Some(format!(
+        "the pictures are {kind}: their tone is taken as {tone}, and the limb is expected at {:.1} +- {:.1} km; if \
+         they have another one, set tone = ... in [input] of sensor.toml",
+        raised.limb_height_km, raised.limb_height_sigma_km
+    ))
 }
 
 /// See [`Opened::check_size`].

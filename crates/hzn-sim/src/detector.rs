@@ -44,6 +44,15 @@ pub enum Tone {
     Srgb,
 }
 
+impl From<Tone> for hzn_core::tone::Tone {
+    fn from(tone: Tone) -> Self {
+        match tone {
+            Tone::Linear => Self::Linear,
+            Tone::Srgb => Self::Srgb,
+        }
+    }
+}
+
 /// Table of the sRGB curve and its slope in steps of light, because powers are slow to compute.
 struct Curve(Vec<[f32; 2]>);
 

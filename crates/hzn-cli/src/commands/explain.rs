@@ -327,9 +327,8 @@ impl Explained<'_> {
     }
 
     fn expected(&self) -> String {
-        let body = self.body;
-        let cone = format!("{}, cone of {:.4} deg half-angle", body.kind.name(), self.half_angle.to_degrees());
-        let Some(km) = sink::altitude_km(self.data, body) else {
+        let cone = format!("{}, cone of {:.4} deg half-angle", self.body.kind.name(), self.half_angle.to_degrees());
+        let Some(km) = sink::altitude_km(self.data, self.body) else {
             return format!("{cone}, as seen from near the Earth");
         };
         let from = match self.data {
@@ -337,7 +336,8 @@ impl Explained<'_> {
             Some(d) if d.altitude_km.is_some() => format!("altitude {km} km given with the picture"),
             _ => format!("altitude {km} km"),
         };
-        format!("{cone} ({from}, limb at {} +- {} km)", body.limb_height_km, body.limb_height_sigma_km)
+        let limb = crate::limb_words::limb_in_words(self.body, &self.config.input, km);
+        format!("{cone} ({from}, {limb})")
     }
 
     fn threshold(&self) -> String {

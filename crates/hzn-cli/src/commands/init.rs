@@ -173,6 +173,7 @@ fn known(args: &Args, source: &mut dyn Source) -> Result<CameraFacts, Stop> {
     if let Some(km) = args.altitude.filter(|km| !(*km > 0.0 && km.is_finite())) {
         return Err(usage(format!("--altitude {km}: must be above 0 km")));
     }
+    let tone = source::find_tone(source).map(|found| found.tone);
     let exif = match source.next().transpose()?.map(|item| item.payload) {
         Some(Payload::File(path)) => source::exif_lens(&path).unwrap_or_default(),
         _ => start::Exif::default(),
@@ -184,6 +185,7 @@ fn known(args: &Args, source: &mut dyn Source) -> Result<CameraFacts, Stop> {
         fov_deg: args.fov,
         lens,
         exif,
+        tone,
         altitude_km: args.altitude,
         body: args.body.into(),
         measured: None,

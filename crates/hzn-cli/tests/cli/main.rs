@@ -35,4 +35,5 @@ mod start;
 mod telemetry;
 mod terminal;
 mod told;
+mod tone;
 mod video;

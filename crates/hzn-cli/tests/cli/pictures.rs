@@ -1,6 +1,6 @@
 //! Kinds of pictures: the same scene gives the same direction in every coding.
 
-use crate::common::{Place, angle_deg, axes, cell, limb, without_time};
+use crate::common::{NO_TONE, Place, angle_deg, axes, cell, limb, without_time};
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, GrayImage, ImageEncoder, ImageFormat};
 
@@ -67,7 +67,7 @@ fn words(shift: f64, of: impl Fn(u16) -> u16) -> image::ImageBuffer<image::Luma<
 #[test]
 fn bits_are_found_once_for_a_sequence() {
     let bits_of = |of: &dyn Fn(u16) -> u16, first: &dyn Fn(u16) -> u16| {
-        let place = Place::new();
+        let place = Place::without_tone();
         words(0.0, first).save(place.path("in/0.png")).unwrap();
         words(0.0, of).save(place.path("in/1.png")).unwrap();
         let ran = place.run(&["run", "in"]).expect(0);
@@ -147,7 +147,7 @@ fn bits_of_headerless_words_and_of_transparent_ones() {
 fn bits_of_sensor_toml_are_used() {
     let place = Place::new();
     words(0.0, |v| v << 2).save(place.path("in/low.png")).unwrap();
-    let told = |bits: u8| format!("{}[input]\nbits = {bits}\n", crate::common::SENSOR);
+    let told = |bits: u8| format!("{}{NO_TONE}[input]\nbits = {bits}\n", crate::common::SENSOR);
     place.write("in/sensor.toml", told(10).as_bytes());
     let off = angle_deg(axes(&place, &["run", "in"])[0], plain(0.0));
     assert!(off < 1e-3, "{off}");
@@ -161,7 +161,7 @@ fn bits_of_sensor_toml_are_used() {
 
 #[test]
 fn inks_become_brightness() {
-    let place = Place::new();
+    let place = Place::without_tone();
     place.write("in/cmyk.jpg", include_bytes!("../data/cmyk.jpg"));
     // JPEG is lossy. If the inks were inverted, the picture would be bright in the sky, and the axis would point to the
     // other side.

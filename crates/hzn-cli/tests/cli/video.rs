@@ -2,7 +2,7 @@
 
 use std::process::{Command, Stdio};
 
-use crate::common::{Place, Ran, angle_deg, axes, cell, without_time};
+use crate::common::{NO_TONE, Place, Ran, SENSOR, angle_deg, axes, cell, without_time};
 
 /// Returns whether ffmpeg and ffprobe are on PATH. Without them the test `what` is skipped, but never in CI.
 fn decoder(what: &str) -> bool {
@@ -52,6 +52,7 @@ fn videos_made_and_read_by_the_real_ffmpeg() {
         return;
     }
     let place = Place::with_pictures(6);
+    place.write("in/sensor.toml", format!("{SENSOR}{NO_TONE}").as_bytes());
     let pictures = axes(&place, &["run", "in"]);
     // The videos are lossless with 10 bits of luma; lossy with 8 bits of limited range; lossless without a luma plane.
     for (name, coding, within_deg) in [
@@ -283,8 +284,7 @@ fn one_colour_of_a_video_and_its_rotation() {
         let colours = image::RgbImage::from_fn(320, 240, |x, y| image::Rgb([230, 230, grey.get_pixel(x, y).0[0]]));
         colours.save(place.path(&format!("in/{i}.png"))).unwrap();
     }
-    let sensor =
-        |more: &str| place.write("in/sensor.toml", format!("{}[input]\n{more}", crate::common::SENSOR).as_bytes());
+    let sensor = |more: &str| place.write("in/sensor.toml", format!("{SENSOR}{NO_TONE}[input]\n{more}").as_bytes());
     sensor("channel = \"blue\"\n");
     let pictures = axes(&place, &["run", "in"]);
     for (name, coding) in [

@@ -12,6 +12,7 @@ use crate::image::Channel;
 use crate::image::region;
 use crate::model::body;
 use crate::model::report::MAX_BODIES;
+use crate::model::tone::Tone;
 use crate::model::work;
 use crate::stages::consensus;
 use crate::stages::contour;
@@ -96,6 +97,14 @@ section! {
         /// picture's [`Layout`](crate::image::Layout).
         @- bits: Option<u8> = None, [8.0 to 16.0]
             { unset: "from the file; for 16-bit words, determined from the pictures", example: "12" };
+        /// Curve between light and counts, a word or a gamma; the limb height follows from it.
+        ///
+        /// Half of the counts of a photograph (sRGB) is a fifth of the light, so the limb appears 6.4 km higher than in
+        /// a linear picture. A file says its curve in most cases: JPEG (sRGB), video (BT.709), raw data and samples of
+        /// 12 to 16 bits (linear), a PNG with the chunk sRGB, gAMA or cICP. A grey PNG of 8 bits does not: those of
+        /// industrial cameras are usually linear, those of telephones are not.
+        @- tone: Option<Tone> = None, [choice]
+            { unset: "from the file, else `unknown`", example: "\"linear\"" };
         /// Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
         /// picture.
         @- orient: Orient = Orient::AsStored, [choice];
@@ -153,6 +162,12 @@ impl Config {
     /// Returns the bodies that the sensor searches for, one or several.
     pub fn each_body(&self) -> &[body::Config] {
         if self.bodies.is_empty() { core::slice::from_ref(&self.body) } else { &self.bodies }
+    }
+    /// Sets the tone of the pictures, and the height of each visible limb that follows from it
+    /// ([`body::Config::follow_tone`]).
+    pub fn set_tone(&mut self, tone: Tone) {
+        self.input.tone = Some(tone);
+        self.each_body_mut().iter_mut().for_each(|body| body.follow_tone(tone));
     }
     /// Returns the threshold parameters of body number `which`, from 0: those of the body, or else those of the sensor.
     /// If a Sun among several bodies has no threshold parameters, it uses those of the preset `sun`, because every

@@ -11,5 +11,6 @@ mod protection;
 pub mod report;
 pub mod status;
 pub(crate) mod threshold;
+pub mod tone;
 pub mod verdict;
 pub mod work;

@@ -1,11 +1,13 @@
 //! Settings that the presets of published systems have in common.
 
 use crate::config::Config;
+use crate::model::body;
 use crate::stages::covariance;
 
 /// Sets the noise model and limb height that the published systems' presets have always had: given values, for
 /// comparison.
 pub(super) fn set_given_noise(config: &mut Config) {
+    config.body.limb = body::Limb::Height;
     config.body.limb_height_km = 10.0;
     config.body.limb_height_sigma_km = 2.0;
     [config.body.clipped_height_km, config.body.clipped_sigma_km] = [0.0; 2];

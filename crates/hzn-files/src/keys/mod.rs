@@ -107,7 +107,10 @@ pub fn limits_in_words(key: &Key) -> String {
                 (false, false) => format!("{low} or more"),
             }
         }
-        Limits::Choice => key.choices.iter().map(|choice| format!("`{}`", choice.name)).collect::<Vec<_>>().join(", "),
+        Limits::Choice => {
+            let words = key.choices.iter().map(|choice| format!("`{}`", choice.name)).collect::<Vec<_>>().join(", ");
+            if key.form == Form::WordOrNumber { words + ", or a number" } else { words }
+        }
         Limits::Rule(rule) => rule.to_owned(),
         _ => String::new(),
     }

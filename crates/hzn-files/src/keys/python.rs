@@ -122,9 +122,10 @@ fn form(key: &Key) -> String {
         Form::Whole => "int".to_owned(),
         Form::Flag => "bool".to_owned(),
         Form::Word if key.choices.is_empty() => "str".to_owned(),
-        Form::Word => {
+        Form::Word | Form::WordOrNumber => {
             let words: Vec<_> = key.choices.iter().map(|choice| format!("{:?}", choice.name)).collect();
-            format!("Literal[{}]", words.join(", "))
+            let number = if key.form == Form::WordOrNumber { " | float" } else { "" };
+            format!("Literal[{}]{number}", words.join(", "))
         }
         Form::Numbers => "_Numbers".to_owned(),
         Form::Rows => "_Rows".to_owned(),

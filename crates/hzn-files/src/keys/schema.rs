@@ -61,6 +61,10 @@ fn property(key: &Key, defaults: &toml::Table) -> Value {
         Form::Flag => json!({"type": "boolean"}),
         Form::Word if key.choices.is_empty() => json!({"type": "string"}),
         Form::Word => json!({"enum": key.choices.iter().map(|choice| choice.name).collect::<Vec<_>>()}),
+        Form::WordOrNumber => {
+            let words: Vec<_> = key.choices.iter().map(|choice| choice.name).collect();
+            json!({"anyOf": [{"enum": words}, {"type": "number"}]})
+        }
         Form::Numbers => json!({"type": "array", "items": {"type": "number"}}),
         Form::Rows => json!({"type": "array", "items": {"type": "array", "items": {"type": "number"}}}),
         Form::Polygons => json!({"type": "array", "items": {"type": "array", "items": {"type": "array"}}}),

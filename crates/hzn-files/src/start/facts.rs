@@ -1,6 +1,7 @@
 //! What is known about a camera, and the file that follows from it.
 
 use hzn_core::camera::Model;
+use hzn_core::tone::Tone;
 
 use super::exif::Exif;
 
@@ -16,6 +17,8 @@ pub struct CameraFacts {
     pub lens: Option<Model>,
     /// EXIF data of a picture.
     pub exif: Exif,
+    /// Curve between light and counts that the pictures say.
+    pub tone: Option<Tone>,
     /// Altitude of all pictures, in kilometres.
     pub altitude_km: Option<f64>,
     /// The body in the pictures.

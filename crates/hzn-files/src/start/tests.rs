@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use hzn_core::tone::Tone;
+
 use super::*;
 
 fn known(fov_deg: Option<f64>, lens: Option<Model>, exif: Exif) -> CameraFacts {
@@ -10,6 +12,7 @@ fn known(fov_deg: Option<f64>, lens: Option<Model>, exif: Exif) -> CameraFacts {
         fov_deg,
         lens,
         exif,
+        tone: None,
         altitude_km: Some(418.0),
         body: Body::Earth,
         measured: None,
@@ -142,4 +145,20 @@ fn without_an_altitude_the_file_says_what_to_do() {
     assert!(start.text.contains("frames.csv") && !start.text.contains("\naltitude_km"), "{}", start.text);
     let config = crate::sensor::parse(&start.text, Path::new("s.toml")).unwrap().config;
     assert_eq!(config.body.altitude_km, None);
+}
+
+#[test]
+fn the_tone_of_the_files_is_written_or_asked_for() {
+    let body = |tone| {
+        let start = write_sensor_toml(&CameraFacts { tone, ..known(None, None, d4()) }).unwrap();
+        let sensor = crate::sensor::parse(&start.text, Path::new("sensor.toml")).unwrap();
+        (sensor.config.input.tone, sensor.config.body.limb_height_km, start.text.contains("# tone = "))
+    };
+    assert_eq!(body(None), (None, 17.0, true));
+    let (tone, height_km, is_asked) = body(Some(Tone::Srgb));
+    assert!(tone == Some(Tone::Srgb) && (height_km - 23.36).abs() < 0.01 && !is_asked);
+    assert_eq!(body(Some(Tone::Gamma(2.0))).0, Some(Tone::Gamma(2.0)));
+    // The relief of the Moon has no tone.
+    let moon = CameraFacts { body: Body::Moon, tone: Some(Tone::Srgb), ..known(Some(40.0), None, Exif::default()) };
+    assert!(!write_sensor_toml(&moon).unwrap().text.contains("[input]"));
 }

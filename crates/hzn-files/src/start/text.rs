@@ -4,6 +4,7 @@ use core::fmt::Write as _;
 
 use hzn_core::body::MOON_RADIUS_KM;
 use hzn_core::camera::{Config, Model};
+use hzn_core::tone::Tone;
 
 use super::facts::{Body, CameraFacts};
 use super::focal::Focal;
@@ -35,6 +36,9 @@ pub(super) fn write_text(
     text += &write_camera(facts, &guess.camera, focal, fov_deg, comparison);
     text += &write_covariance(guess, focal);
     text += &write_body(facts.body, facts.altitude_km);
+    if facts.body == Body::Earth {
+        text += &write_tone(facts.tone);
+    }
     text
 }
 
@@ -109,6 +113,23 @@ fn write_covariance(guess: &Guess, focal: &Focal) -> String {
         t.push_str("]\n");
     }
     t
+}
+
+/// Writes `[input]` with the tone of the pictures, or asks for it. A body without air has the same limb in any tone.
+fn write_tone(tone: Option<Tone>) -> String {
+    let head = "\n[input]\n# The curve between light and counts, from which the height of the limb follows: \"linear\" \
+                as most\n# industrial cameras write it, \"srgb\" for pictures for the eye, \"bt709\" for video, or a \
+                gamma.\n";
+    let line = match tone {
+        Some(tone) => {
+            let value = tone.word().map_or_else(|| format!("{:.3}", tone.gamma()), |word| format!("{word:?}"));
+            format!("tone = {value}                 # from the files\n")
+        }
+        None => "# The files do not say it. With a tone the limb height has a sigma of 4.6 km, without one 7 km.\n\
+                 # tone = \"linear\"\n"
+            .to_owned(),
+    };
+    format!("{head}{line}")
 }
 
 /// Writes `[body]` with the altitude, or with a comment that says where altitudes belong.

@@ -89,6 +89,9 @@ class Input(TypedDict, total=False):
     bits: int | None
     """Significant bits of a sample, if the file's words have room for more. Values: 8 to 16. Default: from the file;
     for 16-bit words, determined from the pictures."""
+    tone: Literal["linear", "srgb", "bt709", "unknown"] | float | None
+    """Curve between light and counts, a word or a gamma; the limb height follows from it. Default: from the file,
+    else ``unknown``."""
     orient: Literal["as-stored", "exif", "rotate-90", "rotate-180", "rotate-270"]
     """Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
     picture. Default: "as-stored"."""
@@ -374,12 +377,14 @@ class Body(TypedDict, total=False):
     """1σ of the altitude, km; it widens the expected half-angle. Values: 0 to 1e6 km. Default: 0.5."""
     altitude_reference: Literal["ellipsoid", "sphere"]
     """For ``earth``: the surface from which an altitude without a position is measured. Default: "ellipsoid"."""
+    limb: Literal["visible", "height"]
+    """Where the limb height comes from. Default: "visible"."""
     limb_height_km: float
-    """Height of the visible limb above the surface, km; 17 km is right for a cloudless limb in sunlight at 550 nm.
-    Values: −50 to 500 km. Default: 17.0."""
+    """Height of the visible limb above the surface, km; 17 km is right for a cloudless limb in sunlight at 550 nm,
+    and ``input.tone`` raises it. Values: −50 to 500 km. Default: 17.0."""
     limb_height_sigma_km: float
-    """1σ of the limb height, km; 7 km spans the visible wavelengths and usual thresholds. Values: 0 to 10000 km.
-    Default: 7.0."""
+    """1σ of the limb height, km; 7 km spans the visible wavelengths and usual tones. Values: 0 to 10000 km. Default:
+    7.0."""
     limb_height_harmonic_sigma_km: float | None
     """1σ of the second harmonic of the limb height along the limb, km; it limits how well the rotation about the
     line to the body is known (``fit.yaw_limit_deg``). Values: 0 to 10000 km. Default: ``limb_height_sigma_km``."""

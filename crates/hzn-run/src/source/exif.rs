@@ -36,6 +36,14 @@ pub(super) fn time_s(block: Vec<u8>) -> Result<Option<f64>, String> {
     Ok(Some(whole + fraction.unwrap_or(0.0)))
 }
 
+/// Returns whether the colours are those of sRGB.
+pub(super) fn is_srgb(block: Vec<u8>) -> bool {
+    let read = read(block);
+    read.is_ok_and(|(exif, _)| {
+        exif.get_field(Tag::ColorSpace, In::PRIMARY).is_some_and(|f| f.value.get_uint(0) == Some(1))
+    })
+}
+
 /// Returns the camera and its lens.
 pub(super) fn lens(block: Vec<u8>) -> Option<start::Exif> {
     let (exif, _) = read(block).ok()?;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hzn_core::image::Channel;
+use hzn_core::tone::Tone;
 use image::metadata::Orientation;
 
 use super::gather::{self, Gathered, Kind, LeftOut};
@@ -11,6 +12,7 @@ use super::paths::ending;
 use super::payload::Payload;
 use super::raw::{self, Raw};
 use super::sequence::{MAX_SIZES_READ, Source};
+use super::tone::FoundTone;
 use super::{bits, header, natural, turn};
 use crate::error::{Error, unusable};
 use crate::explain;
@@ -135,6 +137,10 @@ impl Source for Files {
     fn bits(&self) -> Option<u8> {
         // Words of mono16 can have any number of significant bits.
         self.raw.filter(|raw| raw.format != raw::Format::Words(16)).map(|raw| raw.bits())
+    }
+    fn tone(&self) -> Option<FoundTone> {
+        // A picture without a header comes from a detector as it is.
+        self.raw.map(|_| FoundTone { tone: Tone::Linear, kind: "raw" })
     }
     fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
         let [one] = self.paths.as_slice() else {

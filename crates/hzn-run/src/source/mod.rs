@@ -6,6 +6,7 @@ mod bits;
 pub mod decode;
 mod exif;
 mod files;
+mod find_tone;
 mod gather;
 mod header;
 mod input;
@@ -23,12 +24,14 @@ pub mod raw;
 mod recording;
 mod rerun;
 mod sequence;
+mod tone;
 mod turn;
 mod video;
 
 use std::path::{Path, PathBuf};
 
 pub use bits::{FoundBits, find_bits, with_key};
+pub use find_tone::find_tone;
 pub use item::{Item, TimeSource};
 pub use memory::Held;
 pub use paths::{check_exists, ending, open_file};
@@ -37,6 +40,7 @@ pub use picture::Picture;
 pub use raw::Raw;
 pub use rerun::{describe_loss as describe_recording_loss, recorded_prior};
 pub use sequence::Source;
+pub use tone::FoundTone;
 
 use crate::error::{Error, Remedy, unusable};
 

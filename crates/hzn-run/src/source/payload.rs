@@ -5,12 +5,14 @@ use std::path::PathBuf;
 use hzn_core::Config;
 use hzn_core::config::Orient;
 use hzn_core::image::Layout;
+use hzn_core::tone::Tone;
 use hzn_mcap::{EncodedImage, ImageFormat};
 
 use super::memory::Held;
 use super::paths::open_file;
 use super::picture::{Picture, Samples};
 use super::raw::Raw;
+use super::tone::{self, FoundTone};
 use super::{decode, header};
 
 /// A picture on its way from the source to a thread.
@@ -76,6 +78,19 @@ impl Payload {
         let picture = picture.with_input(&sensor.input)?;
         decode::check_size(picture.layout.width, picture.layout.height, Some(own))?;
         Ok((picture, original.filter(|_| !is_changed)))
+    }
+
+    /// Returns what a picture file says about its tone.
+    pub(super) fn tone(self) -> Option<FoundTone> {
+        match self {
+            Self::File(path) => tone::read(open_file(&path).ok()?),
+            Self::Encoded(bytes) => tone::read(std::io::Cursor::new(bytes)),
+            // Words of a message are the samples of a detector, as those of a file are.
+            Self::Decoded(picture) if picture.layout.bits > 8 => {
+                Some(FoundTone { tone: Tone::Linear, kind: "of more than 8 bits" })
+            }
+            Self::Decoded(_) | Self::RawFile(..) | Self::Broken(_) => None,
+        }
     }
 
     /// Returns the largest sample of a picture of 16-bit words. Returns `None` for any other or unreadable picture.

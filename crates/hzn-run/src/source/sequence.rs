@@ -6,6 +6,7 @@ use hzn_core::image::Channel;
 
 use super::item::Item;
 use super::payload::Payload;
+use super::tone::FoundTone;
 use crate::error::Error;
 
 /// Largest number of pictures whose headers [`Source::sizes`] reads.
@@ -42,6 +43,10 @@ pub trait Source: Send {
     }
     /// Returns the significant bits of a sample, if they are known before.
     fn bits(&self) -> Option<u8> {
+        None
+    }
+    /// Returns the tone, if it is known for all pictures before they are read.
+    fn tone(&self) -> Option<FoundTone> {
         None
     }
     /// Returns a few pictures from the whole sequence, for properties that only the samples show

@@ -47,8 +47,10 @@ impl Scenario {
         sensor.camera.readout_s = self.shutter.readout_s;
         let body = |kind: Kind| hzn_core::body::Config {
             altitude_sigma_km: self.known.position_sigma_km.max(0.05),
+            limb_height_km: self.limb_height_in_picture_km(kind),
             ..self.body_config(kind)
         };
+        sensor.input.tone = Some(self.detector.tone.into());
         match self.bodies.as_slice() {
             [one] => sensor.body = body(*one),
             // There are at most three bodies; `check` refuses more.

@@ -30,6 +30,11 @@ impl Air {
     /// Returns the tangent height in kilometres above the ground at which a channel mix has half the brightness of
     /// optically thick air. Ground light is not included. The `weights` of red, green and blue must sum to 1.
     pub fn half_height_km(&self, weights: [f64; 3], radius_km: f64) -> f64 {
+        self.height_km(0.5, weights, radius_km)
+    }
+
+    /// Returns the height of [`Self::half_height_km`] for the part `light` of the brightness instead of a half.
+    pub(crate) fn height_km(&self, light: f64, weights: [f64; 3], radius_km: f64) -> f64 {
         let chord = 2.0 * self.grazing(radius_km);
         let bright = |h_km: f64| -> f64 {
             let density_ratio = libm::exp(-h_km / self.scale_height_km);
@@ -38,7 +43,7 @@ impl Air {
         let (mut low, mut high) = (-100.0, 200.0);
         for _ in 0..60 {
             let mid = 0.5 * (low + high);
-            if bright(mid) > 0.5 { low = mid } else { high = mid }
+            if bright(mid) > light { low = mid } else { high = mid }
         }
         0.5 * (low + high)
     }

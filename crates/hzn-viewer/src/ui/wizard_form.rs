@@ -42,6 +42,7 @@ impl Wizard {
             fov_deg: self.states_fov.then_some(self.fov_deg),
             lens: Some(if self.fisheye { Model::Equidistant } else { Model::Pinhole }),
             exif: self.exif.clone(),
+            tone: None,
             altitude_km: self.one_altitude.then_some(self.altitude_km),
             body: start::Body::Earth,
             measured: None,

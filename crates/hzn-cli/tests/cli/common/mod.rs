@@ -22,6 +22,9 @@ pub const SENSOR: &str = "preset = \"hzn\"\n\n[camera]\nwidth = 320\nheight = 24
                           fy_px = 300.0\ncx_px = 159.5\ncy_px = 119.5\n\n[body]\nkind = \"earth-sphere\"\naltitude_km \
                           = 400.0\n";
 
+/// The line after [`SENSOR`] that makes the limb height independent of the tone.
+pub const NO_TONE: &str = "limb = \"height\"\n";
+
 /// Returns a picture of a smooth bright body below its limb; `shift` moves it by 0.05 degrees per unit.
 pub fn limb(width: u32, height: u32, shift: f64) -> image::GrayImage {
     image::GrayImage::from_fn(width, height, |x, y| {
@@ -49,6 +52,13 @@ impl Place {
         std::fs::create_dir(dir.path().join("in")).unwrap();
         let place = Self { dir };
         place.write("in/sensor.toml", SENSOR.as_bytes());
+        place
+    }
+    /// Makes a folder with a sensor.toml whose limb has the same height in pictures of any tone: the drawn limb is an
+    /// edge without air, so that its place does not depend on the format of a picture.
+    pub fn without_tone() -> Self {
+        let place = Self::new();
+        place.write("in/sensor.toml", format!("{SENSOR}{NO_TONE}").as_bytes());
         place
     }
     /// Makes a folder with pictures 0000.png to (n-1).png.

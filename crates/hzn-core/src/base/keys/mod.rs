@@ -29,6 +29,7 @@ use crate::base::error::ConfigError;
 pub(crate) use choices::choices;
 pub(crate) use notation::{check, feature_name, flight, limits, needs, option, place};
 pub(crate) use section::{section, table};
+pub(crate) use values::check_number;
 
 /// One key of sensor.toml.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,6 +113,8 @@ pub enum Form {
     Flag,
     /// One of a few words.
     Word,
+    /// One of a few words, or a number.
+    WordOrNumber,
     /// A list of numbers.
     Numbers,
     /// A list of lists of numbers.

@@ -1,9 +1,10 @@
 //! The body as it appears from the camera: its size, its limb, and the uncertainty of both.
 
 use crate::base::real::Real;
-use crate::geometry::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
+use crate::geometry::ellipsoid::{EARTH_MEAN_RADIUS_M, LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
 use crate::geometry::frames::{Fixed, UnitVec3};
 
+use super::refraction::raised_m;
 use super::{
     AU_KM, AltitudeReference, Config, Kind, LOWEST_ALTITUDE_M, MOON_DISTANCE_KM, MOON_RADIUS_KM, Prior, PriorError,
     SUN_RADIUS_KM, shape,
@@ -20,8 +21,10 @@ pub(super) struct ApparentBody<T> {
     pub(super) altitude: T,
     /// Sine of the half-angle.
     pub(super) sin: T,
-    /// Mean height of the limb, and its first and second harmonic by azimuth from north.
+    /// Mean height of the limb as the air in front of it raises it, the part of it that is from the air, and its first
+    /// and second harmonic by azimuth from north.
     pub(super) limb: T,
+    pub(super) raised_m: T,
     pub(super) harmonics: [T; 2],
     pub(super) ellipsoid: Option<LimbCone<T>>,
     /// 1-sigma of the local radius, and of the second harmonic, if the latitude is unknown.
@@ -65,6 +68,11 @@ impl<T: Real> ApparentBody<T> {
         if !(h > limb) {
             return Err(below_limb_error(h, limb));
         }
+        let raised_m = raised_m(body.kind, T::from_f64(EARTH_MEAN_RADIUS_M), limb, h);
+        if raised_m > T::zero() {
+            limb += raised_m;
+            cone = raised(limb);
+        }
         let cone = cone?;
         let (sin, _) = cone.mean_half_angle_rad().sin_cos();
         Ok(Self {
@@ -73,6 +81,7 @@ impl<T: Real> ApparentBody<T> {
             altitude: h,
             sin,
             limb,
+            raised_m,
             harmonics,
             ellipsoid: Some(cone),
             unknown_m: T::zero(),
@@ -100,6 +109,8 @@ impl<T: Real> ApparentBody<T> {
             (_, Some(h), _) => h,
             (_, None, _) => return Err(PriorError::NoAltitude),
         };
+        let raised_m = raised_m(body.kind, r, limb, altitude);
+        let limb = limb + raised_m;
         let sin = (r + limb) / (r + altitude);
         let (mut unknown_m, mut unknown_second_m) = (T::zero(), T::zero());
         if body.is_ellipsoid() {
@@ -117,7 +128,7 @@ impl<T: Real> ApparentBody<T> {
             unknown_second_m = shape::second_harmonic_m(sin, shape::EARTH_K_M);
         }
         let harmonics = [T::zero(); 2];
-        Ok(Self { radius: r, altitude, sin, limb, harmonics, ellipsoid: None, unknown_m, unknown_second_m })
+        Ok(Self { radius: r, altitude, sin, limb, raised_m, harmonics, ellipsoid: None, unknown_m, unknown_second_m })
     }
 
     /// Returns the limb axis in the fixed frame that follows from the position; `None` without a position.

@@ -79,8 +79,9 @@ pub struct Expected<T> {
     pub(crate) radius_m: T,
     /// Scale height of the air in metres; 0 if it is unknown or if there is no air.
     pub(crate) scale_height_m: T,
-    /// Limb height in metres and its sigma.
+    /// Limb height in metres as the air in front of it raises it, the part that is from this air, and its sigma.
     pub(crate) limb_m: T,
+    pub(crate) raised_m: T,
     pub(crate) limb_sigma_m: T,
     /// Whether the half-angle says nothing about the distance (Sun, Moon).
     pub(crate) free: bool,
@@ -189,11 +190,9 @@ impl<T: Real> Expected<T> {
             let (east, meridian) = cone.half_angles_rad();
             (meridian.sin_cos().1 - east.sin_cos().1) * T::from_f64(0.5)
         });
-        let uneven = |k: f64, amplitude: T| match known {
-            // An attitude error ψ leaves k ψ of the k-th harmonic.
-            Some(_) => amplitude.abs() * (attitude_sigma * T::from_f64(k)).min(T::one()),
-            None => amplitude.abs(),
-        };
+        // An attitude error ψ leaves k ψ of the k-th harmonic.
+        let left = |k: f64| known.map_or(T::one(), |_| (attitude_sigma * T::from_f64(k)).min(T::one()));
+        let uneven = |k: f64, amplitude: T| amplitude.abs() * left(k);
         let unknown_harmonics_cos =
             [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1]) + scale * seen.unknown_second_m];
         let limb_sigma_parts_m = [limb_sigma, sin * altitude_sigma, seen.unknown_m, T::zero()];
@@ -220,6 +219,7 @@ impl<T: Real> Expected<T> {
             radius_m: seen.radius,
             scale_height_m: T::from_f64(body.scale_height_km()) * km,
             limb_m: limb,
+            raised_m: seen.raised_m,
             limb_sigma_m: (limb_sigma * limb_sigma + seen.unknown_m * seen.unknown_m).sqrt(),
             free,
             phases: body.kind != Kind::Sun,
@@ -309,7 +309,7 @@ impl<T: Real> Expected<T> {
         }
         let distance = (self.radius_m + self.limb_m) / self.sin;
         // The difference of the sines is rewritten as a product, so that f32 keeps the metres.
-        let height = self.limb_m + distance * (self.cos - cos) * (self.cos + cos) / (sin + self.sin);
+        let height = self.limb_m - self.raised_m + distance * (self.cos - cos) * (self.cos + cos) / (sin + self.sin);
         Some((height, -distance * cos / sin))
     }
 

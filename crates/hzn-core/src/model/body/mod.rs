@@ -4,12 +4,15 @@ mod apparent;
 mod bounds;
 mod expected;
 mod kind;
+mod limb;
 mod lit;
 mod planets;
 mod position;
 mod prior;
+mod refraction;
 mod scaled;
 mod shape;
+mod visible;
 
 use crate::base::error::{ConfigError, Limit, above, between, require};
 use crate::base::keys::{Section, section};
@@ -20,6 +23,7 @@ use crate::model::threshold;
 
 pub use expected::Expected;
 pub use kind::{AltitudeReference, Kind};
+pub use limb::Limb;
 pub use planets::Planet;
 pub(crate) use position::Target;
 pub use prior::{Last, Prior, PriorError};
@@ -82,17 +86,22 @@ section! {
         @33 altitude_sigma_km: f64 = 0.5, [0.0 to 1e6];
         /// For `earth`: the surface from which an altitude without a position is measured.
         @36 altitude_reference: AltitudeReference = AltitudeReference::Ellipsoid, [choice];
-        /// Height of the visible limb above the surface, km; 17 km is right for a cloudless limb in sunlight at 550 nm.
+        /// Where the limb height comes from.
+        @- limb: Limb = Limb::Visible, [choice];
+        /// Height of the visible limb above the surface, km; 17 km is right for a cloudless limb in sunlight at 550 nm,
+        /// and `input.tone` raises it.
         ///
-        /// At this height the limb has half of its brightness. A value that is too high makes the expected cone too
-        /// wide.
+        /// At this height the limb has half of its counts in the picture. With the default value, and if `limb` is
+        /// `visible`, the height follows from the tone: 23.4 km for a photograph, whose half of the counts is a fifth
+        /// of the light. A value that is too high makes the expected cone too wide.
         // The default was 10 ± 2 km before, with 1 px over 300 px of edge noise: the mean NEES of `rocket-clean` was 11
         // instead of 0.55.
         @34 limb_height_km: f64 = 17.0, [-50.0 to 500.0];
-        /// 1σ of the limb height, km; 7 km spans the visible wavelengths and usual thresholds.
+        /// 1σ of the limb height, km; 7 km spans the visible wavelengths and usual tones.
         ///
-        /// The height is 24 km at 440 nm and 12 km at 650 nm. The range of thresholds is a quarter to three quarters of
-        /// the limb's brightness. A larger sigma gives the expected half-angle less weight.
+        /// The height is 24 km at 440 nm and 12 km at 650 nm. Half of the counts is a quarter to three quarters of the
+        /// limb's light. If the tone is known, the default becomes 4.6 km. A larger sigma gives the expected half-angle
+        /// less weight.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
         /// 1σ of the second harmonic of the limb height along the limb, km; it limits how well the rotation about the
         /// line to the body is known (`fit.yaw_limit_deg`).

@@ -51,6 +51,7 @@ impl<T: Real> Expected<T> {
             scale_height_m: T::from_f64(body.scale_height_km()) * km,
             radius_m: target.unit_m - T::from_f64(body.mean_limb_height_km()) * km,
             limb_m: T::from_f64(body.mean_limb_height_km()) * km,
+            raised_m: T::ZERO,
             limb_sigma_m: target.limb_sigma_m,
             free: false,
             phases: body.kind != Kind::Sun,

@@ -18,12 +18,14 @@ use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
 
 use hzn_core::image::{Channel, Layout};
+use hzn_core::tone::Tone;
 
 use super::decode::check_size;
 use super::item::Item;
 use super::payload::Payload;
 use super::picture::{Picture, Samples};
 use super::sequence::Source;
+use super::tone::FoundTone;
 use crate::error::{Error, failed, unusable};
 use crate::explain;
 use times::Times;
@@ -205,6 +207,9 @@ impl Source for Video {
     }
     fn bits(&self) -> Option<u8> {
         Some(self.bits)
+    }
+    fn tone(&self) -> Option<FoundTone> {
+        Some(FoundTone { tone: Tone::Bt709, kind: "a video" })
     }
     fn next(&mut self) -> Option<Result<Item, Error>> {
         if self.ended {

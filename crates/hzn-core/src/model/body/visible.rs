@@ -1,0 +1,78 @@
+//! The height of the visible limb, which depends on the tone of the pictures.
+
+use super::{Config, Kind, Limb};
+use crate::model::tone::Tone;
+
+/// 1-sigma of the height of the Earth's visible limb in pictures of a known tone, kilometres.
+// Two parts are independent. The wavelength: 24 km at 440 nm to 12 km at 650 nm, evenly distributed, which is 3.5 km.
+// The light next to the limb: the ground there may be half as bright as the air (a dark sea) or twice as bright
+// (cloud), evenly distributed in the logarithm, which moves the edge by 7.5 km ln 4/√12 = 3.0 km. Without a tone, the
+// height has the default sigma, 7 km.
+const SIGMA_KM: f64 = 4.6;
+
+impl Config {
+    /// Sets the height and sigma of the visible limb to those in pictures of this tone, if [`Self::limb`] is
+    /// [`Limb::Visible`] and if the height is still the default. A height that somebody measured or set already is that
+    /// of the pictures.
+    ///
+    /// The light of the air falls by a factor of e over its scale height h. If half of the counts is the fraction l of
+    /// the light, the limb lies h ln(0.5/l) higher than the limb at half of the light. Overexposure follows the same
+    /// law, and comes on top unchanged: full scale at 1/B of the light moves both limbs by h ln B.
+    pub fn follow_tone(&mut self, tone: Tone) {
+        let scale_height_km = self.scale_height_km();
+        let default = Self::of_kind(self.kind, self.radii_km);
+        let is_default = [self.limb_height_km, self.limb_height_sigma_km]
+            == [default.limb_height_km, default.limb_height_sigma_km]
+            && self.limb_height_by_latitude_km.is_empty();
+        let Some(light) = tone.light_at_half() else { return };
+        if self.limb != Limb::Visible || !is_default || !(scale_height_km > 0.0) {
+            return;
+        }
+        self.limb_height_km += scale_height_km * libm::log(0.5 / light);
+        if matches!(self.kind, Kind::Earth | Kind::EarthSphere) {
+            self.limb_height_sigma_km = SIGMA_KM;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn height(body: Config, tone: Tone) -> [f64; 2] {
+        let mut body = body;
+        body.follow_tone(tone);
+        [body.limb_height_km, body.limb_height_sigma_km]
+    }
+
+    #[test]
+    fn the_limb_of_a_photograph_is_higher() {
+        let earth = Config::default();
+        assert_eq!(height(earth.clone(), Tone::Linear), [17.0, 4.6]);
+        assert_eq!(height(earth.clone(), Tone::Unknown), [17.0, 7.0]);
+        let [srgb, sigma] = height(earth.clone(), Tone::Srgb);
+        assert!((srgb - 23.36).abs() < 0.01 && sigma == 4.6, "{srgb}");
+        // Air at half of the counts has the light of the tone: exp(−(d − 17 km)/7.5 km)/2.
+        let [bt709, _] = height(earth.clone(), Tone::Bt709);
+        assert!((0.5 * libm::exp(-(bt709 - 17.0) / 7.5) - Tone::Bt709.light_at_half().unwrap()).abs() < 1e-12);
+        let [jupiter, sigma] = height(Config::of_kind(Kind::Jupiter, None), Tone::Gamma(2.0));
+        assert!((jupiter - (80.0 + 27.0 * core::f64::consts::LN_2)).abs() < 1e-9 && sigma == 80.0, "{jupiter}");
+    }
+
+    #[test]
+    fn a_height_that_was_set_stays() {
+        let told = |limb, km| Config { limb, limb_height_km: km, ..Config::default() };
+        assert_eq!(height(told(Limb::Height, 17.0), Tone::Srgb), [17.0, 7.0]);
+        assert_eq!(height(told(Limb::Visible, 18.9), Tone::Srgb), [18.9, 7.0]);
+        let rows = Config { limb_height_by_latitude_km: [[0.0, 25.0]].into_iter().collect(), ..Config::default() };
+        assert_eq!(height(rows, Tone::Srgb), [17.0, 7.0]);
+        // There is no air whose light could fall with height.
+        let moon = Config::of_kind(Kind::Charon, None);
+        assert_eq!(height(moon.clone(), Tone::Srgb), [moon.limb_height_km, moon.limb_height_sigma_km]);
+        let mut twice = Config::default();
+        twice.follow_tone(Tone::Srgb);
+        let once = twice.clone();
+        twice.follow_tone(Tone::Srgb);
+        assert_eq!(twice, once);
+    }
+}
