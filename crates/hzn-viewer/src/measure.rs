@@ -199,6 +199,7 @@ impl Measure {
                 ctx.request_repaint_after(Duration::from_millis(200));
                 return false;
             }
+            viewer.set_speed(1.0);
             viewer.run(Command::Play, ctx);
             (self.changed, self.worked, self.passes) = (Some(Instant::now()), process_time(), 0);
         }

@@ -53,6 +53,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let measure = args.measure.map(|kind| Measure::new(kind, program_start));
     let (args, result) = (args.clone(), Arc::clone(&outcome));
     let store_is_used = store.is_some();
+    let is_unfitted = store_is_used && args.size.is_none();
     let window = eframe::run_native(
         "hzn-viewer",
         options,
@@ -72,8 +73,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             }
             let is_welcome = args.input.is_empty();
             let (begun, situation) = (Instant::now(), args.situation);
-            let window =
-                Window { viewer, shot, is_welcome, situation, measure, begun, passes: 0, is_printed: false, result };
+            let window = Window {
+                viewer,
+                shot,
+                is_welcome,
+                is_unfitted,
+                situation,
+                measure,
+                begun,
+                passes: 0,
+                is_printed: false,
+                result,
+            };
             Ok(Box::new(window))
         }),
     );
@@ -97,6 +108,12 @@ fn check_shot(shot: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Returns true if a window with its decorations does not fit on the screen. It is then maximised, because only the
+/// system knows how much of the screen its bars leave.
+fn is_too_large(outer: egui::Vec2, screen: egui::Vec2) -> bool {
+    outer.x >= screen.x || outer.y >= screen.y
+}
+
 /// Returns true if the system can show its own dialogs. On Linux they come over the session bus.
 fn native_dialogs() -> bool {
     let bus = || std::env::var_os("XDG_RUNTIME_DIR").is_some_and(|d| PathBuf::from(d).join("bus").exists());
@@ -111,6 +128,8 @@ struct Window {
     shot: Option<PathBuf>,
     /// Nothing is opened, so the welcome page is shown.
     is_welcome: bool,
+    /// The size of the window has not been compared with that of the screen yet.
+    is_unfitted: bool,
     /// Situation that the window has to be brought into before the screenshot.
     situation: Option<Situation>,
     measure: Option<Measure>,
@@ -140,6 +159,13 @@ impl eframe::App for Window {
             measure.after_pass(&self.viewer, &ctx);
         }
         if self.shot.is_none() {
+            let (outer, screen) = ctx.input(|i| (i.viewport().outer_rect, i.viewport().monitor_size));
+            if let (true, Some(outer), Some(screen)) = (self.is_unfitted, outer, screen) {
+                self.is_unfitted = false;
+                if is_too_large(outer.size(), screen) {
+                    ctx.send_viewport_cmd(ViewportCommand::Maximized(true));
+                }
+            }
             let size = ctx.input(|i| i.viewport().inner_rect.map(|r| r.size()));
             if let Some(size) = size {
                 self.viewer.settings_mut().window = size.into();
@@ -215,6 +241,15 @@ fn save(image: &ColorImage, path: &Path) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_window_as_large_as_the_screen_is_maximised() {
+        let size = egui::vec2;
+        // The title bar makes a window of 1440 x 900 points higher.
+        assert!(is_too_large(size(1442.0, 932.0), size(1440.0, 900.0)));
+        assert!(is_too_large(size(1024.0, 700.0), size(1024.0, 768.0)));
+        assert!(!is_too_large(size(1442.0, 932.0), size(1920.0, 1080.0)));
+    }
 
     #[test]
     fn a_screenshot_replaces_nothing_that_is_opened() {

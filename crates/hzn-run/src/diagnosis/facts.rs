@@ -46,6 +46,8 @@ pub struct FitFacts {
     pub fitted_deg: f64,
     /// Its 1-sigma in degrees, with all terms except that of the expected half-angle.
     pub fitted_sigma_deg: f64,
+    /// 1-sigma of the expected half-angle in degrees.
+    pub expected_sigma_deg: f64,
     /// Difference of the cosines of the half-angles in standard deviations; positive if the fitted half-angle is the
     /// larger one.
     pub sigmas: f64,
@@ -123,15 +125,63 @@ pub fn typical_sigmas<'a>(facts: impl Iterator<Item = &'a FitFacts>) -> Option<f
     median(&mut facts.map(|f| f.sigmas.abs()).filter(|s| s.is_finite()).collect::<Vec<_>>())
 }
 
+/// Part of the variance of the expected half-angle that is the same in all pictures of a flight: the limb height.
+const COMMON: f64 = 0.97;
+/// Part of the fits that agree with the expected half-angle if nothing is wrong. Of normally distributed differences,
+/// 95 % lie within two sigmas; the rest may be of clouds.
+const AGREEING: f64 = 0.6;
+
+/// Largest mean difference that counts as agreement, in sigmas of what does not average out. A right limb height stays
+/// within it in 87 % of all flights; an error of two sigmas that all pictures share lies beyond it.
+const MOST_SHARED: f64 = 1.5;
+
+/// Returns true if the pictures show that the expected half-angle is right. An edge of another half-angle is then
+/// probably not the limb. Three things have to hold, because a small error that all pictures share must not look like
+/// agreement: most fits lie within two sigmas, their mean is small against what does not average out, and at least
+/// half of the `pictures` have an answer.
+pub fn is_limb_as_expected<'a>(facts: impl Iterator<Item = &'a FitFacts>, answered: usize, pictures: usize) -> bool {
+    let all: Vec<&FitFacts> = facts.filter(|f| f.sigmas.is_finite()).collect();
+    if all.is_empty() || 2 * answered < pictures {
+        return false;
+    }
+    let n = all.len() as f64;
+    let close = all.iter().filter(|f| f.sigmas.abs() <= 2.0).count() as f64;
+    let (mut sum, mut common) = (0.0, 0.0);
+    // The fits of clouds say nothing about the mean.
+    for f in all.iter().filter(|f| f.sigmas.abs() <= 3.0) {
+        let [edge, expected] = [f.fitted_sigma_deg, f.expected_sigma_deg].map(|s| s * s);
+        sum += f.sigmas;
+        common += COMMON * expected / (edge + expected).max(f64::MIN_POSITIVE);
+    }
+    let used = all.iter().filter(|f| f.sigmas.abs() <= 3.0).count().max(1) as f64;
+    let (mean, common) = (sum / used, common / used);
+    close >= AGREEING * n && mean.abs() <= MOST_SHARED * (common + (1.0 - common) / used).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_shift_that_all_pictures_share_is_no_agreement() {
+        let with = |sigmas: f64| FitFacts { sigmas, ..facts(200.0, 0.0, 1.0) };
+        let of = |sigmas: &[f64], answered| {
+            let all: Vec<FitFacts> = sigmas.iter().map(|s| with(*s)).collect();
+            is_limb_as_expected(all.iter(), answered, all.len())
+        };
+        assert!(of(&[0.2, -0.9, 1.1, -0.3, 0.6, 9.0], 5));
+        assert!(!of(&[0.2, -0.9, 1.1, -0.3, 0.6, 9.0], 2), "most pictures have no answer");
+        assert!(!of(&[2.4, 2.6, 2.2, 2.5, 2.7, 9.0], 6), "the shift is 2 to 3 sigma in every picture");
+        assert!(!of(&[1.7, 1.6, 1.9, 1.8, 1.5, 1.7], 6), "so is a shift of 1.7 sigma");
+        assert!(!of(&[0.1, 0.2, 9.0, 8.0, -7.0, 6.0], 6) && !of(&[], 0));
+    }
 
     fn facts(altitude: f64, correction: f64, focal: f64) -> FitFacts {
         FitFacts {
             expected_deg: 80.0,
             fitted_deg: 78.0,
             fitted_sigma_deg: 0.2,
+            expected_sigma_deg: 0.1,
             sigmas: -9.0,
             is_trial: false,
             given_altitude_km: Some(altitude),

@@ -62,6 +62,7 @@ pub fn fit_facts(
         expected_deg: fitted.expected_cos.clamp(-1.0, 1.0).acos().to_degrees(),
         fitted_deg: free.cos.clamp(-1.0, 1.0).acos().to_degrees(),
         fitted_sigma_deg: (edge_sigma / sin_fitted).to_degrees(),
+        expected_sigma_deg: (fitted.expected_sigma_cos / sin(fitted.expected_cos)).to_degrees(),
         // A smaller cosine is a larger half-angle.
         sigmas: -difference / sigma.max(f64::MIN_POSITIVE),
         is_trial,

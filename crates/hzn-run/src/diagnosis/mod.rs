@@ -4,19 +4,22 @@
 //! The sensor's own fit uses only points near a limb of the expected half-angle. If the expected half-angle is wrong,
 //! it misses most of the limb. [`AnyCone`] therefore fits a cone of any half-angle to the edges of a refused picture;
 //! [`find_misfit`] returns what this limb says, as [`FitFacts`], and [`what_fits`] says it in words. [`summarise`]
-//! compares the pictures of a sequence. [`find_field_of_view`] finds the field of view of a camera of which nothing is
+//! compares the pictures of a sequence, [`find_pair`] finds two wrong values, and [`is_limb_as_expected`] says whether
+//! nothing is wrong. [`find_field_of_view`] finds the field of view of a camera of which nothing is
 //! known.
 
 mod any_cone;
 mod facts;
 mod field_of_view;
 mod implied;
+mod joint;
 mod misfit;
 mod words;
 
 pub use any_cone::{AnyCone, longest_edge};
-pub use facts::{Consensus, FitFacts, Implied, Suspect, summarise, typical_sigmas};
+pub use facts::{Consensus, FitFacts, Implied, Suspect, is_limb_as_expected, summarise, typical_sigmas};
 pub use field_of_view::{FieldOfView, find_field_of_view};
 pub use implied::{find_fit, fit_facts};
+pub use joint::{Pair, Remedy, find_pair};
 pub use misfit::find_misfit;
 pub use words::what_fits;

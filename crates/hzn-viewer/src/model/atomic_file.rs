@@ -9,6 +9,9 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// An error of `write` is returned. If the renaming fails, the message says why and what to do.
 pub fn replace<E: From<String>>(path: &Path, write: impl FnOnce(&Path) -> Result<(), E>) -> Result<(), E> {
+    // The renaming would replace a symbolic link; the user means the file that it leads to.
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let path = target.as_path();
     let part = part(path);
     let publish =
         || std::fs::OpenOptions::new().write(true).open(&part).and_then(|file| hzn_mcap::publish(&file, &part, path));
@@ -55,6 +58,22 @@ mod tests {
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
         let nowhere = write(&dir.path().join("no").join("a.png"), b"").unwrap_err();
         assert!(nowhere.contains("the folder does not exist"), "{nowhere}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_symbolic_link_stays_a_link() {
+        let (dir, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let (link, file) = (dir.path().join("sensor.toml"), other.path().join("shared.toml"));
+        std::fs::write(&file, b"first").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write(&link, b"second").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(
+            (std::fs::read(&file).unwrap(), std::fs::read(&link).unwrap()),
+            (b"second".into(), b"second".into())
+        );
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
     #[cfg(unix)]

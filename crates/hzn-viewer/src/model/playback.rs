@@ -6,6 +6,9 @@ use std::time::Duration;
 pub const SPEEDS: [f64; 9] = [0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, 1000.0];
 /// Time that a picture is shown at the speed 1 if the sequence has no times, in seconds.
 const WITHOUT_TIMES_S: f64 = 1.0;
+/// Lowest rate that a sequence begins with, in pictures per second. A recording with a picture every 16 s would
+/// otherwise seem to stand still.
+pub const LEAST_FPS: f64 = 2.0;
 /// Highest rate of playing in pictures per second; a higher rate cannot be seen.
 const FASTEST_FPS: f64 = 60.0;
 
@@ -60,6 +63,13 @@ impl Playback {
         let mut speeds = SPEEDS.iter().copied();
         let next = if faster { speeds.find(|s| *s > self.speed) } else { speeds.rfind(|s| *s < self.speed) };
         self.speed = next.unwrap_or(self.speed);
+    }
+    /// Sets the lowest speed of [`SPEEDS`], 1 or more, that shows at least [`LEAST_FPS`] pictures per second.
+    /// `interval_s` is the usual time between two pictures.
+    pub fn set_usual_speed(&mut self, interval_s: Option<f64>) {
+        let least = interval_s.unwrap_or(0.0) * LEAST_FPS;
+        let fitting = SPEEDS.into_iter().find(|speed| *speed >= least.max(1.0));
+        self.speed = fitting.unwrap_or(SPEEDS[SPEEDS.len() - 1]);
     }
     /// Sets the speed.
     pub fn set_speed(&mut self, speed: f64) {
@@ -170,6 +180,17 @@ mod tests {
         assert_eq!(p.due(half), Some(ms(125)));
         p.advance(p.due(half).unwrap(), 10, half);
         assert_eq!((p.frame(), p.due(half)), (1, Some(ms(250))));
+    }
+
+    #[test]
+    fn a_slow_recording_begins_with_a_speed_that_shows_something() {
+        let speed = |interval_s| {
+            let mut p = Playback::default();
+            p.set_usual_speed(interval_s);
+            p.speed()
+        };
+        assert_eq!([None, Some(0.04), Some(0.5), Some(1.0), Some(16.0)].map(speed), [1.0, 1.0, 1.0, 2.0, 100.0]);
+        assert_eq!(speed(Some(1e9)), 1000.0);
     }
 
     #[test]

@@ -106,6 +106,17 @@ pub fn error_deg(row: &Row, truth: Option<&Truth>) -> Option<f64> {
     Some(angle_deg(row.axis()?, truth?.axis()?.xyz()))
 }
 
+/// Returns the error of an answer over its 1-sigma in the worst direction; `None` without a truth.
+pub fn error_sigmas(row: &Row, truth: Option<&Truth>) -> Option<f64> {
+    let sigma = row.sigma_max_deg.filter(|s| *s > 0.0)?;
+    Some(error_deg(row, truth)? / sigma)
+}
+
+/// Returns true if the truth lies outside of the 3-sigma of an answer.
+pub fn misses_truth(row: &Row, truth: Option<&Truth>) -> bool {
+    error_sigmas(row, truth).is_some_and(|sigmas| sigmas > 3.0)
+}
+
 /// Returns the angle between two directions, in degrees. It is also accurate for small angles.
 pub fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
     let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

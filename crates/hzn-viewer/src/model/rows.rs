@@ -144,13 +144,11 @@ impl ResultHistory {
         (1..=n).map(nth).find(|&i| self.cause(i, body).is_some_and(wanted))
     }
 
-    /// Returns the pictures, the worst first: refused pictures, then the others in falling order of `badness`. Pictures
-    /// without a `badness` are left out.
+    /// Returns the pictures with an answer in falling order of `badness`. Pictures without a `badness` are left out.
     pub fn worst(&self, body: usize, badness: impl Fn(&Row) -> Option<f64>) -> Vec<usize> {
         let rate = |i: usize| {
-            let row = self.newest(i, body)?;
-            let bad = if row.status == Status::Ok { badness(row)? } else { f64::INFINITY };
-            Some((i, bad))
+            let row = self.newest(i, body).filter(|row| row.status == Status::Ok)?;
+            Some((i, badness(row)?))
         };
         let mut rated: Vec<(usize, f64)> = (0..self.len()).filter_map(rate).collect();
         rated.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
@@ -167,8 +165,8 @@ impl ResultHistory {
                 (false, true) => comparison.better += 1,
                 (true, false) => comparison.worse += 1,
                 (true, true) => {
-                    let apart = a.axis().zip(b.axis()).map_or(0.0, |(a, b)| angle_deg(a, b));
-                    comparison.largest_deg = comparison.largest_deg.max(apart);
+                    let apart = a.axis().zip(b.axis()).map(|(a, b)| angle_deg(a, b));
+                    comparison.largest_deg = apart.into_iter().chain(comparison.largest_deg).reduce(f64::max);
                 }
                 (false, false) => {}
             }
@@ -189,8 +187,8 @@ pub struct Comparison {
     pub better: usize,
     /// Number of pictures that only the session answers.
     pub worse: usize,
-    /// Largest angle between two answers, in degrees.
-    pub largest_deg: f64,
+    /// Largest angle between the answers of both to a picture, in degrees; `None` if both answer no picture.
+    pub largest_deg: Option<f64>,
     /// Pictures whose status differs: index, status of the session, status of the other sensor.
     pub changed: Vec<(usize, Status, Status)>,
 }
@@ -228,7 +226,7 @@ mod tests {
 
     #[test]
     fn the_worst_come_first() {
-        assert_eq!(rows().worst(0, |r| r.sigma_max_deg), [1, 4, 2, 3, 0]);
+        assert_eq!(rows().worst(0, |r| r.sigma_max_deg), [2, 3, 0], "a refused picture is not an answer");
     }
 
     #[test]

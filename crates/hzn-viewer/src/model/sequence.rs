@@ -94,6 +94,12 @@ impl Sequence {
     pub fn duration_s(&self, frame: usize) -> Option<f64> {
         Some(self.entries.get(frame + 1)?.time_s? - self.entries.get(frame)?.time_s?)
     }
+    /// Returns the mean time between two pictures in seconds, if the times of the first and the last one are known.
+    pub fn interval_s(&self) -> Option<f64> {
+        let steps = self.entries.len().checked_sub(1).filter(|steps| *steps > 0)?;
+        let time_s = |entry: Option<&Entry>| entry?.time_s;
+        Some((time_s(self.entries.last())? - time_s(self.entries.first())?) / steps as f64)
+    }
     /// Returns the index of the picture that is nearest in time.
     pub fn nearest(&self, time_s: f64) -> Option<usize> {
         let distance = |(i, e): (usize, &Entry)| Some((i, (e.time_s? - time_s).abs()));
@@ -146,6 +152,7 @@ mod tests {
         );
         assert_eq!((s.duration_s(1), s.duration_s(2)), (Some(1.5), None));
         assert_eq!(Sequence::default().nearest(0.0), None);
+        assert_eq!((s.interval_s(), Sequence::default().interval_s()), (Some(1.25), None));
         let mut s = s;
         s.entries[1].time_s = None;
         assert_eq!((s.nearest(0.4), s.duration_s(0), s.duration_s(1)), (Some(0), None, None));

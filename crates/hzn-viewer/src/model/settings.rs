@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::atomic_file;
+
 /// Number of recent files that are offered.
 const MAX_RECENT: usize = 8;
 /// Titles of plots in settings of older versions, and their titles now.
@@ -230,15 +232,16 @@ impl Settings {
         }
         settings
     }
-    /// Writes the settings.
+    /// Writes the settings, completely or not at all.
     ///
     /// # Errors
-    /// The file cannot be written.
-    pub fn store(&self, path: &Path) -> std::io::Result<()> {
+    /// The file cannot be written; the message says why and what to do.
+    pub fn store(&self, path: &Path) -> Result<(), String> {
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder)?;
+            std::fs::create_dir_all(folder).map_err(|e| hzn_run::disk::advice(folder, &e))?;
         }
-        std::fs::write(path, serde_json::to_string_pretty(self)?)
+        let text = serde_json::to_string_pretty(self).map_err(|e| e.to_string())?;
+        atomic_file::write(path, text.as_bytes())
     }
 }
 

@@ -18,7 +18,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         ui.set_width(ui.available_width());
         ui.strong("Trial of other altitudes");
         let what = format!(
-            "All altitudes are shifted by {shift_km:+.1} km in this window. No file is changed. If the frames have \
+            "All altitudes are shifted by {shift_km:+.1} km in this window. No file is changed. If the pictures have \
              answers now, correct the altitudes where they come from."
         );
         ui.add(egui::Label::new(RichText::new(what).size(12.5)).wrap());

@@ -45,7 +45,7 @@ fn status(ui: &mut Ui, one: &Counted, group: &mut Option<Group>) {
     ui.painter().rect_filled(rect, 2, theme::status(one.status));
     let mut entry = |ui: &mut Ui, text: String, own: Group| {
         let on = *group == Some(own);
-        let hint = "Show only these frames in the time line; “Next refused” then goes through them";
+        let hint = "Show only these pictures in the time line; “Next refused” then goes through them";
         if ui.selectable_label(on, RichText::new(text).size(12.5)).on_hover_text(hint).clicked() {
             *group = (!on).then_some(own);
         }

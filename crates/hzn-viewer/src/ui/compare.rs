@@ -1,9 +1,10 @@
 //! Two configurations on the same picture: a table of their answers and the differences, above their pictures.
 
 use egui::{RichText, Ui, vec2};
+use hzn_files::keys::{self, Key};
 
 use super::viewer::Viewer;
-use crate::model::quantity;
+use crate::model::{Session, quantity};
 use crate::work::frame_view::BodyResult;
 
 /// Function that returns the text of a column in one line of the table.
@@ -40,6 +41,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             });
         });
         egui::ScrollArea::horizontal().show(ui, |ui| table(ui, name, &columns));
+        keys_that_differ(viewer, ui, other);
         go = over_sequence(viewer, ui);
         ui.add_space(4.0);
     });
@@ -51,6 +53,31 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     }
 }
 
+/// Lists the keys in which the sensors differ, with both values.
+fn keys_that_differ(viewer: &Viewer, ui: &mut Ui, other: &Session) {
+    let Some(session) = &viewer.session else { return };
+    let text = |s: &Session, key: &Key| {
+        s.value(key.section(), key.name(), viewer.body).map_or_else(|| "not set".to_owned(), ToString::to_string)
+    };
+    let both = keys::all().map(|key| (key.path, text(session, key), text(other, key)));
+    let differing: Vec<_> = both.filter(|(_, ours, theirs)| ours != theirs).collect();
+    let Some((first, _, _)) = differing.first() else {
+        ui.weak(RichText::new("All keys are the same.").size(12.5));
+        return;
+    };
+    let title = match differing.len() {
+        1 => format!("1 key differs: {first}"),
+        n => format!("{n} keys differ: {first} and others"),
+    };
+    egui::CollapsingHeader::new(RichText::new(title).size(12.5)).id_salt("keys that differ").show(ui, |ui| {
+        egui::ScrollArea::vertical().id_salt("keys").max_height(110.0).show(ui, |ui| {
+            for (path, ours, theirs) in &differing {
+                ui.label(RichText::new(format!("{path}: {ours} → {theirs}")).monospace().size(11.5));
+            }
+        });
+    });
+}
+
 /// Draws the comparison over all pictures. Returns the picture that was clicked.
 fn over_sequence(viewer: &Viewer, ui: &mut Ui) -> Option<usize> {
     if viewer.sequence.len() < 2 {
@@ -58,18 +85,18 @@ fn over_sequence(viewer: &Viewer, ui: &mut Ui) -> Option<usize> {
     }
     let comparison = viewer.rows.compare(viewer.body);
     let all = viewer.sequence.len();
-    ui.label(
-        RichText::new(format!(
-            "{} of {all} frames compared: {} more answers, {} fewer; answers differ by up to {:.4}°",
-            comparison.pictures, comparison.better, comparison.worse, comparison.largest_deg
-        ))
-        .size(12.5),
-    );
+    let apart = match comparison.largest_deg {
+        Some(deg) => format!("answers differ by up to {deg:.4}°"),
+        None => "no picture is answered by both".to_owned(),
+    };
+    let (pictures, better, worse) = (comparison.pictures, comparison.better, comparison.worse);
+    let words = format!("{pictures} of {all} pictures compared: {better} more answers, {worse} fewer; {apart}");
+    ui.label(RichText::new(words).size(12.5));
     let mut go = None;
     if comparison.changed.is_empty() {
         return None;
     }
-    let title = format!("Frames whose status differs ({})", comparison.changed.len());
+    let title = format!("Pictures whose status differs ({})", comparison.changed.len());
     egui::CollapsingHeader::new(RichText::new(title).size(12.5)).show(ui, |ui| {
         egui::ScrollArea::vertical().max_height(110.0).show(ui, |ui| {
             for (index, ours, theirs) in &comparison.changed {

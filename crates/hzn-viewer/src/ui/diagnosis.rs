@@ -9,7 +9,7 @@ use super::viewer::Viewer;
 use super::{altitude_trial, links, theme};
 use crate::model::Session;
 use crate::model::cause::Reason;
-use crate::model::diagnosis::{self, Consensus, FitFacts, Implied, Suspect};
+use crate::model::diagnosis::{self, Consensus, FitFacts, Implied, Pair, Remedy, Suspect};
 use crate::work::frame_view::BodyResult;
 use crate::work::trials::OtsuTrial;
 
@@ -27,6 +27,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let refused = answer.row.status != Status::Ok;
     let fits = viewer.rows.fits(viewer.body).count();
     let typical = diagnosis::typical_sigmas(viewer.rows.fits(viewer.body));
+    let is_as_expected = fits >= ENOUGH && is_limb_as_expected(viewer);
     let conspicuous = |sigmas: Option<f64>| sigmas.is_some_and(|s| s.abs() > CONSPICUOUS);
     let differs = conspicuous(answer.fit.map(|f| f.sigmas)) || conspicuous(typical);
     if !refused && !differs {
@@ -48,10 +49,10 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         let wrong_level = answer.otsu.is_some_and(|o| o.answered);
         match answer.fit.filter(|_| differs) {
             // In the other frames the values of now are right.
-            Some(fit) if fits >= ENOUGH && !conspicuous(typical) => wrapped(ui, &only_here(&fit)),
+            Some(fit) if is_as_expected && conspicuous(Some(fit.sigmas)) => wrapped(ui, &only_here(&fit)),
             Some(fit) => half_angle_causes(viewer, ui, &fit),
-            None if answer.fit.is_none() && !wrong_level && fits >= ENOUGH && !conspicuous(typical) => {
-                let what = "No edge here fits a limb, and in most other frames the limb is as expected. The body is \
+            None if answer.fit.is_none() && !wrong_level && is_as_expected => {
+                let what = "No edge here fits a limb, and in most other pictures the limb is as expected. The body is \
                             probably out of view, or hidden.";
                 wrapped(ui, what);
             }
@@ -75,10 +76,19 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     ui.add_space(4.0);
 }
 
+/// Returns true if the pictures with an answer show that the expected half-angle is right.
+fn is_limb_as_expected(viewer: &Viewer) -> bool {
+    let causes = || (0..viewer.sequence.len()).filter_map(|i| viewer.rows.cause(i, viewer.body));
+    // A picture without an edge says nothing about the half-angle.
+    let with_edge = causes().filter(|c| c.status == Status::Ok || c.reason.is_some()).count();
+    let answered = causes().filter(|c| c.status == Status::Ok).count();
+    diagnosis::is_limb_as_expected(viewer.rows.fits(viewer.body), answered, with_edge)
+}
+
 /// Says that the half-angle of this frame alone is not the expected one.
 fn only_here(fit: &FitFacts) -> String {
     format!(
-        "An edge here fits a half-angle of {:.3}°, expected is {:.3}° ({:+.1} σ). Most other frames agree with the \
+        "An edge here fits a half-angle of {:.3}°, expected is {:.3}° ({:+.1} σ). Most other pictures agree with the \
          expected one, so this edge is probably not the limb.",
         fit.fitted_deg, fit.expected_deg, fit.sigmas
     )
@@ -95,7 +105,7 @@ fn threshold_cause(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult, otsu: 
     let same =
         (0..all).filter_map(|i| viewer.rows.cause(i, viewer.body)).filter(|c| c.reason == Some(Reason::Level)).count();
     if same > 1 {
-        wrapped(ui, &format!("The same holds for {same} of {all} frames."));
+        wrapped(ui, &format!("The same holds for {same} of {all} pictures."));
     }
     let hint = "Sets threshold.method = \"otsu\" and threshold.scale = 1";
     if otsu.answered && ui.button("Use Otsu's threshold").on_hover_text(hint).clicked() {
@@ -117,7 +127,7 @@ fn wrapped(ui: &mut Ui, text: &str) {
 
 /// Draws the fitted and the expected half-angle, and what each possible cause would have to be.
 fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
-    let how = if fit.is_trial { "The limb in this frame has the half-angle" } else { "Half-angle of the answer" };
+    let how = if fit.is_trial { "The limb in this picture has the half-angle" } else { "Half-angle of the answer" };
     wrapped(
         ui,
         &format!(
@@ -135,7 +145,7 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
     let (plausible, impossible): (Vec<_>, Vec<_>) = consensus.iter().partition(|c| is_plausible(c, &config, body));
     let (mut chosen, mut shift_km) = (None, None);
     egui::Grid::new("causes").num_columns(5).spacing(vec2(8.0, 3.0)).show(ui, |ui| {
-        for head in ["", "now", "this frame", "all frames", ""] {
+        for head in ["", "now", "this picture", "all pictures", ""] {
             ui.weak(RichText::new(head).size(11.5));
         }
         ui.end_row();
@@ -147,7 +157,7 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
             }
             let all = ui.label(RichText::new(cause.all.clone()).size(12.0));
             if suspect == Suspect::Altitude {
-                all.on_hover_text("A shift of the altitudes of all frames");
+                all.on_hover_text("A shift of the altitudes of all pictures");
             }
             match cause.shift_km.filter(|_| viewer.sequence.has_altitudes()) {
                 Some(by_km) => try_shift(ui, by_km, &mut shift_km),
@@ -160,12 +170,66 @@ fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
         return altitude_trial::shift(viewer, by_km);
     }
     let given_km = viewer.sequence.has_altitudes().then_some(viewer.sequence.altitude_shift_km);
+    let of_body = config.each_body().get(body).or(config.each_body().first());
+    let limb_km = of_body.map(|b| [b.limb_height_km, b.limb_height_sigma_km]);
+    let pair = limb_km.and_then(|limb_km| diagnosis::find_pair(viewer.rows.fits(body), limb_km));
+    if let Some(pair) = pair {
+        return two_causes(viewer, ui, &pair, &config);
+    }
     if let Some(words) = agreement(&plausible, &impossible, given_km) {
         wrapped(ui, &words);
     }
     if let (Some(cure), Some(session)) = (chosen, &mut viewer.session) {
         let values: Vec<_> = cure.iter().map(|(s, n, x)| (*s, *n, Some(Session::tidy_value(*x)))).collect();
         session.set_all(&values, body);
+    }
+}
+
+/// Says that two values are wrong, and draws the button that corrects both.
+fn two_causes(viewer: &mut Viewer, ui: &mut Ui, pair: &Pair, config: &Config) {
+    let words = |r: &Remedy| match r.suspect {
+        Suspect::Focal => {
+            let [fx, by] = [r.correction, r.sigma].map(|x| x * config.camera.fx_px);
+            format!("the focal length is {fx:.1} ± {by:.1} px")
+        }
+        other => {
+            let side = if r.correction > 0.0 { "low" } else { "high" };
+            format!("the {} is {:.1} ± {:.1} km too {side}", other.name(), r.correction.abs(), r.sigma)
+        }
+    };
+    let [a, b] = &pair.remedies;
+    let pictures = pair.pictures;
+    let what = format!("Two values are wrong. No single value explains the {pictures} pictures, but two do:");
+    wrapped(ui, &format!("{what} {}, and {}.", words(a), words(b)));
+    let hint = "Corrects both values. Altitudes of frames.csv are shifted on trial, and no file changes.";
+    if !ui.button("Apply both").on_hover_text(hint).clicked() {
+        return;
+    }
+    let (body, has_altitudes) = (viewer.body, viewer.sequence.has_altitudes());
+    let mut values: Vec<(&str, &str, Option<toml_edit::Value>)> = Vec::new();
+    let mut shift_km = None;
+    if let Some(session) = &viewer.session {
+        let mut set = |section, name, change: &dyn Fn(f64) -> f64| {
+            let now = session.number(section, name, body);
+            values.extend(now.map(|now| (section, name, Some(Session::tidy_value(change(now))))));
+        };
+        for remedy in &pair.remedies {
+            match remedy.suspect {
+                Suspect::Altitude if has_altitudes => shift_km = Some(remedy.correction),
+                Suspect::Altitude => set("body", "altitude_km", &|km| km + remedy.correction),
+                Suspect::LimbHeight => set("body", "limb_height_km", &|km| km + remedy.correction),
+                Suspect::Focal => {
+                    set("camera", "fx_px", &|px| px * remedy.correction);
+                    set("camera", "fy_px", &|px| px * remedy.correction);
+                }
+            }
+        }
+    }
+    if let Some(session) = &mut viewer.session {
+        session.set_all(&values, body);
+    }
+    if let Some(km) = shift_km {
+        altitude_trial::shift(viewer, km);
     }
 }
 
@@ -186,7 +250,7 @@ fn apply(ui: &mut Ui, cause: &Cause, chosen: &mut Option<Cure>) {
 fn try_shift(ui: &mut Ui, by_km: f64, chosen: &mut Option<f64>) {
     let response = ui.add(egui::Button::new("Try").small());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Try altitude"));
-    let hint = format!("Processes all frames with altitudes shifted by {by_km:+.1} km. No file changes.");
+    let hint = format!("Processes all pictures with altitudes shifted by {by_km:+.1} km. No file changes.");
     if response.on_hover_text(hint).clicked() {
         *chosen = Some(by_km);
     }
@@ -233,11 +297,11 @@ fn agreement(plausible: &[Consensus], impossible: &[Consensus], shift_km: Option
     } else {
         let names: Vec<&str> = plausible.iter().filter(|c| !scatters(c)).map(|c| c.suspect.name()).collect();
         format!(
-            "So the cause is one of these: {}. The frames do not tell them apart; check the one that you know least.",
+            "So the cause is one of these: {}. The pictures do not tell them apart; check the one that you know least.",
             names.join(", ")
         )
     };
-    let what = format!("The true cause has the same value in every frame. Scatter over {} frames", best.pictures);
+    let what = format!("The true cause has the same value in every picture. Scatter over {} pictures", best.pictures);
     Some(format!("{what}, divided by σ: {}; 1 is only noise. {end}", all.join(", ")))
 }
 

@@ -3,11 +3,12 @@
 use egui::{Key, RichText};
 
 use super::path_dialog::Purpose;
-use super::theme;
 use super::viewer::Viewer;
+use super::{placement, theme};
 
-pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
-    diff(viewer, ctx);
+/// Draws the dialogs. The window with the changes opens at the top left of the picture.
+pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect) {
+    diff(viewer, ctx, picture);
     let Some(path_dialog) = &mut viewer.path_dialog else { return };
     if path_dialog.replaces {
         return;
@@ -61,15 +62,22 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     }
 }
 
+/// Returns true if the key Esc closes a window: no field is being edited, and no menu and no question is open.
+pub(super) fn escape(ctx: &egui::Context) -> bool {
+    let is_covered = egui::Popup::is_any_open(ctx) || ctx.memory(|m| m.top_modal_layer().is_some());
+    !is_covered && !ctx.text_edit_focused() && ctx.input(|i| i.key_pressed(Key::Escape))
+}
+
 /// Shows the differences from the saved file, below the headings of their sections.
-fn diff(viewer: &mut Viewer, ctx: &egui::Context) {
+fn diff(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect) {
     if !viewer.showing_diff {
         return;
     }
     let Some(session) = &viewer.session else { return };
     let sections = session.sheet().diff_by_section(session.saved());
     let mut open = true;
-    egui::Window::new("Unsaved changes").open(&mut open).default_width(520.0).show(ctx, |ui| {
+    let window = egui::Window::new("Unsaved changes").open(&mut open).default_pos(placement::beside(picture));
+    window.default_width(520.0_f32.min(picture.width() - 40.0)).show(ctx, |ui| {
         if sections.is_empty() {
             ui.label("Nothing has changed.");
         }
@@ -85,5 +93,5 @@ fn diff(viewer: &mut Viewer, ctx: &egui::Context) {
             }
         });
     });
-    viewer.showing_diff = open;
+    viewer.showing_diff = open && !escape(ctx);
 }

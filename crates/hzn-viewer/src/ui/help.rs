@@ -5,6 +5,9 @@ use egui::{RichText, vec2};
 use super::command;
 use super::viewer::Viewer;
 
+/// Width in points from which the list of keys has two columns.
+const TWO_COLUMNS: f32 = 640.0;
+
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     if !viewer.showing_help {
         return;
@@ -24,7 +27,10 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
 }
 
 fn contents(ui: &mut egui::Ui) {
-    ui.horizontal_wrapped(|ui| {
+    // Both columns begin at the same height, or lie below each other if there is no room for two.
+    let across = egui::Layout::left_to_right(egui::Align::Min);
+    let layout = if ui.available_width() < TWO_COLUMNS { egui::Layout::top_down(egui::Align::Min) } else { across };
+    ui.with_layout(layout, |ui| {
         let half = command::ALL.len().div_ceil(2);
         for (n, part) in command::ALL.chunks(half).enumerate() {
             egui::Grid::new(("keys", n)).num_columns(2).spacing(vec2(14.0, 4.0)).show(ui, |ui| {
@@ -47,4 +53,7 @@ fn contents(ui: &mut egui::Ui) {
     ] {
         ui.label(line);
     }
+    ui.separator();
+    let [version, licence] = [env!("CARGO_PKG_VERSION"), env!("CARGO_PKG_LICENSE")];
+    ui.weak(format!("About: hzn viewer {version}, licence {licence}. The command hzn view starts the same window."));
 }

@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
+use super::command::Command;
 use super::panels::Panel;
 use super::viewer::Viewer;
 use super::{
-    command, compare, dialogs, help, picture, plots, questions, side, stages, study, theme, timeline, toasts, top,
-    wizard,
+    command, compare, dialogs, help, number, picture, plots, questions, side, stages, study, theme, timeline, toasts,
+    top, wizard,
 };
 
 impl Viewer {
@@ -21,11 +22,17 @@ impl Viewer {
         self.poll(&ctx);
         self.watch_close(&ctx);
         for command in command::pressed(&ctx) {
-            self.run(command, &ctx);
+            // While a question is open, only the question gets keys.
+            if self.takes(command, &ctx) {
+                self.run(command, &ctx);
+            }
         }
         let dropped: Vec<PathBuf> = ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
         if !dropped.is_empty() {
             self.open_paths(dropped);
+        }
+        if dialogs::escape(&ctx) && (self.mask.is_some() || self.circle.is_some()) {
+            (self.mask, self.circle) = (None, None);
         }
         let is_next = self.advance(&ctx);
         // The answer is computed while the panels are laid out.
@@ -49,15 +56,28 @@ impl Viewer {
             stages::show_over(self, &ctx, rect);
         }
         toasts::show(self, &ctx, rect);
-        dialogs::show(self, &ctx);
+        dialogs::show(self, &ctx, rect);
         questions::show(self, &ctx);
         wizard::show(self, &ctx);
-        study::show(self, &ctx);
+        study::show(self, &ctx, rect);
         help::show(self, &ctx);
         self.drive_background(&ctx);
         self.autosave(&ctx);
+        self.keep_settings(&ctx);
+        if let Some(text) = number::take_unread(&ctx) {
+            self.add_problem(format!("“{text}” is no number, so the value stays as it was."));
+        }
         self.close_if_due(&ctx);
+        self.focus_ring.draw(&ctx);
         self.request_frame();
+    }
+
+    /// Returns true if a key may start a command: no question, form or dialog is open. The key of the help also closes
+    /// the help.
+    fn takes(&self, command: Command, ctx: &egui::Context) -> bool {
+        let asks = self.changes.is_asking() || self.path_dialog.is_some() || self.wizard.is_some();
+        let is_covered = ctx.memory(|m| m.top_modal_layer().is_some());
+        !asks && (!is_covered || (self.showing_help && command == Command::Help))
     }
 
     /// Draws the panels around the picture.

@@ -5,7 +5,7 @@ use egui::Vec2;
 use crate::model::Settings;
 
 /// Width in points below which the stages lie over the picture.
-const NARROW: f32 = 1100.0;
+const NARROW: f32 = 1000.0;
 /// Height in points below which the plots are hidden until the user shows them.
 const LOW: f32 = 640.0;
 /// Width in points below which the column with the answer is hidden until the user shows it.

@@ -4,8 +4,8 @@ use egui::{ComboBox, Id, RichText, Slider, SliderClamping, Ui, vec2};
 use hzn_files::keys::{self, Key, Limits};
 use toml_edit::Value;
 
-use super::camera_card;
 use super::viewer::Viewer;
+use super::{camera_card, number};
 use crate::model::{Session, SliderRange};
 
 /// Width of the names of parameters.
@@ -60,7 +60,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, key: &'static Key) {
     }
     if key.path == "body.altitude_km" && viewer.sequence.has_altitudes() {
         ui.weak(
-            RichText::new("The frames have altitudes of their own (frames.csv), which are used instead.").size(12.0),
+            RichText::new("The pictures have altitudes of their own (frames.csv), which are used instead.").size(12.0),
         );
     }
     if sweep {
@@ -147,7 +147,7 @@ fn array(session: &mut Session, ui: &mut Ui, key: &Key, body: usize, values: &[t
         for (i, x) in numbers.iter_mut().enumerate() {
             let speed = (x.abs() * 0.005).max(1e-5);
             let drag = egui::DragValue::new(x).speed(speed).max_decimals(8).prefix(format!("{} ", i + 1));
-            let response = ui.add(drag).on_hover_text(hint);
+            let response = number::drag(ui, drag).on_hover_text(hint);
             let name = format!("{} {}", key.name(), i + 1);
             response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, &name));
             ended |= response.lost_focus();
@@ -200,11 +200,12 @@ fn number(
             if range.logarithmic {
                 slider = slider.smallest_positive((magnitude / 100.0).max(1e-4));
             }
-            ui.add(slider)
+            number::slide(ui, slider)
         }
         None => {
             let speed = if is_whole { 1.0 } else { (x.abs() * 0.002).max(1e-5) };
-            ui.add(egui::DragValue::new(&mut x).speed(speed).suffix(unit).max_decimals(if is_whole { 0 } else { 6 }))
+            let digits = if is_whole { 0 } else { 6 };
+            number::drag(ui, egui::DragValue::new(&mut x).speed(speed).suffix(unit).max_decimals(digits))
         }
     };
     let response = response.labelled_by(name).on_hover_text(hint);

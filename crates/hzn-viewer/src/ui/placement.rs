@@ -49,3 +49,9 @@ pub(super) fn area(rect: Rect) -> Area {
         size: [rect.width().max(1.0).into(), rect.height().max(1.0).into()],
     }
 }
+
+/// Returns where a window opens that belongs to the picture: over the picture, so that it hides neither the menus nor
+/// the answer.
+pub(super) fn beside(picture: Rect) -> Pos2 {
+    picture.left_top() + egui::Vec2::splat(12.0)
+}

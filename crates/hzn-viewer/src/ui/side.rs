@@ -5,7 +5,7 @@ use hzn_core::status::Status;
 
 use super::panels::Panel;
 use super::viewer::Viewer;
-use super::{Command, camera_card, facts, theme};
+use super::{Command, camera_card, facts, number, theme};
 use crate::model::quantity;
 use crate::model::settings::{Contrast, Layer, Look};
 use crate::work::frame_view::{BodyResult, FrameView};
@@ -15,7 +15,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let most = (ui.ctx().content_rect().width() * 0.25).clamp(160.0, 360.0);
     let width = viewer.settings.side_width.min(most);
     let shown = egui::Panel::left("side").default_size(width).size_range(160.0..=most).show(ui, |ui| {
-        egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+        viewer.scroll_area(Panel::Answer).show(ui, |ui| {
             ui.add_space(6.0);
             answer(viewer, ui);
             ui.add_space(8.0);
@@ -88,7 +88,14 @@ fn answer(viewer: &mut Viewer, ui: &mut Ui) {
         _ => None,
     };
     if let Some(status) = status {
-        badge(ui, status.name(), theme::status(status));
+        let row = answer.map(|a| &a.row).filter(|_| status == Status::Ok);
+        let truth = row.and_then(|row| viewer.truth_of(&frame_view.name, &row.body));
+        let sigmas = row.and_then(|row| quantity::error_sigmas(row, truth));
+        let misses = row.is_some_and(|row| quantity::misses_truth(row, truth));
+        badge(ui, status.name(), if misses { theme::MISSED } else { theme::status(status) });
+        if let Some(sigmas) = sigmas.filter(|_| misses) {
+            small(ui, &format!("The error is {sigmas:.1} σ: the truth lies outside of 3σ."));
+        }
         if status != Status::Ok {
             detail(&frame_view, answer).iter().for_each(|line| small(ui, line));
             let hint = "Shows the diagnosis among the stages";
@@ -182,7 +189,7 @@ fn look(viewer: &mut Viewer, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let label = ui.label("gamma");
         let drag = egui::DragValue::new(&mut viewer.settings.gamma).range(0.3..=4.0).speed(0.02).max_decimals(2);
-        ui.add(drag).labelled_by(label.id).on_hover_text("Above 1, dark parts are shown brighter");
+        number::drag(ui, drag).labelled_by(label.id).on_hover_text("Above 1, dark parts are shown brighter");
     });
     let hint = format!("As a pinhole would see it ({})", Command::Undistorted.key(ui.ctx()));
     ui.checkbox(&mut viewer.settings.undistorted, "Undistorted").on_hover_text(hint);

@@ -6,13 +6,18 @@ use hzn_core::status::Status;
 use hzn_files::keys;
 
 use super::facts::{self, CARDS, Card};
+use super::panels::Panel;
 use super::viewer::Viewer;
 use super::{Command, altitude_trial, camera_card, diagnosis, histogram, parameters, theme};
 use crate::work::frame_view::{BodyResult, Outcome};
 
+/// Smallest width of the column in points.
+const LEAST_WIDTH: f32 = 300.0;
+
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
-    let width = viewer.settings.stages_width;
-    let shown = egui::Panel::right("stages").default_size(width).size_range(300.0..=640.0).show(ui, |ui| {
+    // Most of a narrow window stays for the picture.
+    let width = viewer.settings.stages_width.min(0.31 * ui.ctx().content_rect().width()).max(LEAST_WIDTH);
+    let shown = egui::Panel::right("stages").default_size(width).size_range(LEAST_WIDTH..=640.0).show(ui, |ui| {
         contents(viewer, ui);
     });
     viewer.settings.stages_width = shown.response.rect.width();
@@ -39,7 +44,7 @@ fn contents(viewer: &mut Viewer, ui: &mut Ui) {
     if viewer.session.is_none() {
         return show_missing_sensor(viewer, ui);
     }
-    egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+    viewer.scroll_area(Panel::Stages).show(ui, |ui| {
         // The answer is shared, not copied, because it holds thousands of points.
         let outcome = viewer.frame_view.as_ref().and_then(|s| s.answers.first().cloned());
         altitude_trial::show(viewer, ui);

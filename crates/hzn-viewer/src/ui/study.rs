@@ -6,9 +6,10 @@ use egui::{DragValue, RichText, Ui};
 use egui_plot::{Line, Plot, Points, VLine};
 use hzn_files::keys::Key;
 
+use super::dialogs::escape;
 use super::study_window::StudyWindow;
-use super::theme;
 use super::viewer::Viewer;
+use super::{number, placement, theme};
 use crate::model::{Session, SliderRange};
 
 /// Opens the window for a key.
@@ -30,24 +31,25 @@ pub(super) fn open(viewer: &mut Viewer, key: &'static Key) {
     });
 }
 
-pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
+pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect) {
     let Some(mut window) = viewer.study.take() else { return };
     if let Some((done, tallies)) = window.study.as_ref().and_then(|s| s.newest()) {
         (window.done, window.tallies) = (done, tallies);
     }
     let (mut is_open, mut start, mut chosen) = (true, false, None);
     let title = format!("Sweep of {}", window.key.path);
-    let width = 440.0_f32.min(ctx.content_rect().width() - 40.0);
-    egui::Window::new(title).open(&mut is_open).default_width(width).show(ctx, |ui| {
+    let width = 440.0_f32.min(picture.width() - 40.0);
+    let frame = egui::Window::new(title).open(&mut is_open).default_pos(placement::beside(picture));
+    frame.default_width(width).show(ctx, |ui| {
         ui.horizontal(|ui| {
             for (name, x) in ["from", "to"].into_iter().zip(&mut window.range) {
                 let label = ui.label(name);
                 let speed = (x.abs() * 0.01).max(1e-4);
-                ui.add(DragValue::new(x).speed(speed)).labelled_by(label.id);
+                number::drag(ui, DragValue::new(x).speed(speed)).labelled_by(label.id);
             }
             start = ui.button("Start").clicked();
             if let Some(study) = &window.study {
-                ui.weak(format!("{} of {} frames", window.done, study.total));
+                ui.weak(format!("{} of {} pictures", window.done, study.total));
             }
         });
         chosen = plots(viewer, ui, &window);
@@ -59,7 +61,7 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
         session.set_number(window.key, viewer.body, value);
         session.end_step();
     }
-    if is_open {
+    if is_open && !escape(ctx) {
         viewer.study = Some(window);
     }
 }
@@ -80,7 +82,7 @@ fn begin(viewer: &mut Viewer, window: &mut StudyWindow) {
 /// Draws the share of answers, and error or sigma. Returns the value that the user chose.
 fn plots(viewer: &Viewer, ui: &mut Ui, window: &StudyWindow) -> Option<f64> {
     if window.tallies.is_empty() {
-        ui.weak("Each value is tried on up to 200 frames of the sequence.");
+        ui.weak("Each value is tried on up to 200 pictures of the sequence.");
         return None;
     }
     let dark = ui.visuals().dark_mode;
@@ -89,7 +91,7 @@ fn plots(viewer: &Viewer, ui: &mut Ui, window: &StudyWindow) -> Option<f64> {
     let has_truth = window.tallies.iter().any(|t| t.error_deg().is_some());
     let of = |t: &crate::work::study::Tally| if has_truth { t.error_deg() } else { t.sigma_deg() };
     let quality: Vec<[f64; 2]> = window.tallies.iter().filter_map(|t| Some([t.value, of(t)?])).collect();
-    let names = ["answered frames [%]", if has_truth { "error (truth), RMS [°]" } else { "3 sigma, RMS [°]" }];
+    let names = ["answered pictures [%]", if has_truth { "error (truth), RMS [°]" } else { "3 sigma, RMS [°]" }];
     let mut chosen = None;
     for (n, (name, line)) in names.into_iter().zip([share, quality]).enumerate() {
         ui.label(RichText::new(name).size(12.5));

@@ -1,8 +1,10 @@
 //! The time line: the status of every picture as a colour, the position in the sequence, and the player.
 
-use egui::{Align2, Color32, FontId, Rect, RichText, Sense, Shape, Stroke, Ui, pos2, vec2};
+use egui::{Align2, Color32, FontId, Rangef, Rect, RichText, Sense, Shape, Stroke, Ui, pos2, vec2};
 use hzn_core::status::Status;
 
+use super::panels::Panel;
+use super::plots::{MARGIN, TimeAxis};
 use super::viewer::Viewer;
 use super::{Command, chips, theme};
 use crate::model::playback::SPEEDS;
@@ -26,11 +28,11 @@ fn controls(viewer: &mut Viewer, ui: &mut Ui) {
         let hint = |ui: &Ui, c: Command| format!("{} ({})", c.name(), c.key(ui.ctx()));
         let play = if viewer.playback.is_playing() { (Icon::Pause, "Pause") } else { (Icon::Play, "Play") };
         for (c, icon, name) in [
-            (Command::First, Icon::First, "First frame"),
-            (Command::Back, Icon::Back, "Previous frame"),
+            (Command::First, Icon::First, "First picture"),
+            (Command::Back, Icon::Back, "Previous picture"),
             (Command::Play, play.0, play.1),
-            (Command::Next, Icon::Next, "Next frame"),
-            (Command::Last, Icon::Last, "Last frame"),
+            (Command::Next, Icon::Next, "Next picture"),
+            (Command::Last, Icon::Last, "Last picture"),
         ] {
             if icon_button(ui, icon, name).on_hover_text(hint(ui, c)).clicked() {
                 command = Some(c);
@@ -53,7 +55,7 @@ fn controls(viewer: &mut Viewer, ui: &mut Ui) {
             })
             .response
             .labelled_by(label.id)
-            .on_hover_text("1× is real time where the times of the frames are known; else one frame per second");
+            .on_hover_text("1× is real time where the times of the pictures are known; else one picture per second");
         ui.separator();
         for (c, text) in [(Command::NextRefused, "Next refused"), (Command::Worst, "Worst")] {
             if ui.button(text).on_hover_text(hint(ui, c)).clicked() {
@@ -177,8 +179,13 @@ fn strip(viewer: &mut Viewer, ui: &mut Ui) {
     if count == 0 {
         return;
     }
+    let places = Places::new(viewer, band);
     let columns = (band.width().floor() as usize).clamp(1, count);
-    let width = band.width() / columns as f32;
+    // A column of a crowded band is a pixel wide; otherwise it is a picture.
+    let crowded = columns < count;
+    let width = places.width / columns as f32;
+    let part = |column: usize| column as f32 / columns as f32;
+    let x = |column: usize| if crowded { places.left + column as f32 * width } else { places.x(column) };
     // A picture outside of the chosen group, and a result of earlier parameters, are faint.
     let strength = |i: usize| match (viewer.group, viewer.rows.cause(i, viewer.body)) {
         (Some(group), Some(cause)) if !cause.is_in(&group) => 1,
@@ -197,14 +204,13 @@ fn strip(viewer: &mut Viewer, ui: &mut Ui) {
     // Neighbours with the same colour are drawn as one rectangle.
     let flush = |first: &mut Option<(usize, (Status, u8))>, end: usize| {
         if let Some((from, look)) = first.take() {
-            let x = |c: usize| band.left() + c as f32 * width;
             let gap = if width > 4.0 && end == from + 1 { 1.0 } else { 0.0 };
             let cell = Rect::from_min_max(pos2(x(from), band.top()), pos2(x(end) - gap, band.bottom()));
             painter.rect_filled(cell, 1, shade(look));
         }
     };
     for column in 0..columns {
-        let (from, to) = (column * count / columns, ((column + 1) * count / columns).max(column * count / columns + 1));
+        let (from, to) = if crowded { places.between(part(column), part(column + 1)) } else { (column, column + 1) };
         let strongest = (from..to).map(strength).max().unwrap_or(3);
         let here = worst((from..to).filter(|i| strength(*i) == strongest).filter_map(status)).map(|s| (s, strongest));
         if width > 4.0 || here != first.map(|(_, s)| s) {
@@ -214,23 +220,72 @@ fn strip(viewer: &mut Viewer, ui: &mut Ui) {
     }
     flush(&mut first, columns);
     for index in &viewer.damaged {
-        let x = |i: usize| band.left() + i as f32 * band.width() / count as f32;
-        let mark = Rect::from_min_max(pos2(x(*index), band.top() - 3.0), pos2(x(index + 1), band.top()));
-        painter.rect_filled(mark, 0, theme::status(Status::Unreadable));
+        places.mark(&painter, band, *index, theme::status(Status::Unreadable));
     }
-    cursor(viewer, ui, &painter, &response, band);
+    for index in viewer.missed.update(&viewer.rows, &viewer.truth, viewer.body) {
+        places.mark(&painter, band, *index, theme::MISSED);
+    }
+    cursor(viewer, ui, &painter, &response, band, &places);
+}
+
+/// Where the pictures lie in the band: below the same pictures of the plots.
+struct Places {
+    left: f32,
+    width: f32,
+    /// Where each picture begins and the last one ends, from 0 to 1.
+    borders: Vec<f64>,
+}
+
+impl Places {
+    fn new(viewer: &Viewer, band: Rect) -> Self {
+        let span = viewer.plot_span.filter(|_| viewer.panels.shows(Panel::Plots, &viewer.settings));
+        let span = span.map_or(band.x_range(), |span| {
+            let margin = MARGIN / (1.0 + 2.0 * MARGIN) * span.span();
+            Rangef::new(span.min + margin, span.max - margin)
+        });
+        Self { left: span.min, width: span.span().max(1.0), borders: TimeAxis::new(viewer).borders() }
+    }
+    /// Returns where a picture begins.
+    fn x(&self, index: usize) -> f32 {
+        let border = self.borders.get(index).or(self.borders.last()).copied().unwrap_or(0.0);
+        self.left + border as f32 * self.width
+    }
+    /// Returns the picture at a place.
+    fn at(&self, x: f32) -> usize {
+        let part = f64::from((x - self.left) / self.width);
+        self.borders.partition_point(|border| *border <= part).saturating_sub(1)
+    }
+    /// Returns the pictures between two parts of the band, at least one.
+    fn between(&self, from: f32, to: f32) -> (usize, usize) {
+        let first = self.borders.partition_point(|border| *border <= f64::from(from)).saturating_sub(1);
+        let end = self.borders.partition_point(|border| *border < f64::from(to));
+        (first, end.min(self.borders.len() - 1).max(first + 1))
+    }
+    /// Marks a picture above the band.
+    fn mark(&self, painter: &egui::Painter, band: Rect, index: usize, colour: Color32) {
+        let right = self.x(index + 1).max(self.x(index) + 2.0);
+        let mark = Rect::from_min_max(pos2(self.x(index), band.top() - 3.0), pos2(right, band.top()));
+        painter.rect_filled(mark, 0, colour);
+    }
 }
 
 /// Draws the position in the sequence, and moves it with the pointer.
-fn cursor(viewer: &mut Viewer, ui: &Ui, painter: &egui::Painter, response: &egui::Response, band: Rect) {
+fn cursor(
+    viewer: &mut Viewer,
+    ui: &Ui,
+    painter: &egui::Painter,
+    response: &egui::Response,
+    band: Rect,
+    places: &Places,
+) {
     let (count, rect) = (viewer.sequence.len(), response.rect.shrink2(vec2(2.0, 0.0)));
-    let x_of = |frame: usize| band.left() + (frame as f32 + 0.5) * band.width() / count as f32;
-    let x = x_of(viewer.playback.frame());
+    let shown = viewer.playback.frame();
+    let x = (places.x(shown) + places.x(shown + 1)) / 2.0;
     let ink = if ui.visuals().dark_mode { Color32::WHITE } else { Color32::BLACK };
     painter.line_segment([pos2(x, band.top()), pos2(x, band.bottom())], Stroke::new(2.0, ink));
     let tip = [pos2(x - 5.0, rect.top()), pos2(x + 5.0, rect.top()), pos2(x, rect.top() + 7.0)];
     painter.add(Shape::convex_polygon(tip.to_vec(), ink, Stroke::NONE));
-    let frame_at = |x: f32| (((x - band.left()) / band.width() * count as f32).max(0.0) as usize).min(count - 1);
+    let frame_at = |x: f32| places.at(x).min(count - 1);
     if let Some(at) = response.interact_pointer_pos() {
         viewer.playback.go(frame_at(at.x), count);
     }

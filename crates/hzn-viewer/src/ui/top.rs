@@ -54,7 +54,9 @@ fn title(viewer: &Viewer, ui: &mut Ui) {
         add(&viewer.sequence.title, ui.visuals().strong_text_color());
         if let Some(session) = &viewer.session {
             let name = session.path().and_then(|p| p.file_name()).map(|n| n.to_string_lossy().into_owned());
-            let name = name.unwrap_or_else(|| "sensor of the recording".into());
+            let of_recording = viewer.sequence.recording.is_some();
+            let without_file = if of_recording { "sensor of the recording" } else { "new sensor.toml" };
+            let name = name.unwrap_or_else(|| without_file.into());
             let changed = if session.is_changed() { "unsaved: " } else { "" };
             add(&format!("   {changed}{name}"), ui.visuals().weak_text_color());
         }
@@ -85,11 +87,21 @@ fn menu_entry(viewer: &mut Viewer, ui: &mut Ui, command: Command, on: bool) {
 }
 
 fn menus(viewer: &mut Viewer, ui: &mut Ui) {
-    ui.menu_button("File", |ui| file_menu(viewer, ui));
-    ui.menu_button("Edit", |ui| edit_menu(viewer, ui));
-    ui.menu_button("Pictures", |ui| frames_menu(viewer, ui));
-    ui.menu_button("Compare", |ui| compare_menu(viewer, ui));
-    ui.menu_button("Export", |ui| export_menu(viewer, ui));
+    let all: [(&str, egui::Key, fn(&mut Viewer, &mut Ui)); 5] = [
+        ("File", egui::Key::F, file_menu),
+        ("Edit", egui::Key::E, edit_menu),
+        ("Pictures", egui::Key::P, frames_menu),
+        ("Compare", egui::Key::C, compare_menu),
+        ("Export", egui::Key::X, export_menu),
+    ];
+    for (name, key, contents) in all {
+        let button = ui.menu_button(name, |ui| contents(viewer, ui)).response;
+        let hint = format!("Alt+{}", key.name());
+        let button = button.on_hover_text(hint);
+        if ui.input_mut(|i| i.consume_key(egui::Modifiers::ALT, key)) {
+            egui::Popup::toggle_id(ui.ctx(), egui::Popup::default_response_id(&button));
+        }
+    }
 }
 
 fn file_menu(viewer: &mut Viewer, ui: &mut Ui) {
@@ -108,6 +120,8 @@ fn file_menu(viewer: &mut Viewer, ui: &mut Ui) {
             }
         });
     }
+    let is_open = !viewer.sequence.title.is_empty();
+    menu_entry(viewer, ui, Command::Reload, is_open);
     ui.separator();
     menu_entry(viewer, ui, Command::Save, has_sensor);
     menu_entry(viewer, ui, Command::SaveAs, has_sensor);

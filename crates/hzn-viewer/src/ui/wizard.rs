@@ -2,9 +2,9 @@
 
 use egui::{DragValue, Id, Modal, Ui};
 
-use super::theme;
 use super::viewer::Viewer;
 use super::wizard_form::Wizard;
+use super::{number, theme};
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     let Some(mut wizard) = viewer.wizard.take() else { return };
@@ -55,19 +55,19 @@ fn questions(ui: &mut Ui, wizard: &mut Wizard) {
         if wizard.states_fov {
             let label = ui.label("field of view over the width");
             let drag = DragValue::new(&mut wizard.fov_deg).range(1.0..=300.0).speed(0.5).suffix("°");
-            ui.add(drag).labelled_by(label.id);
+            number::drag(ui, drag).labelled_by(label.id);
             ui.end_row();
         }
         ui.label("altitude");
         ui.horizontal(|ui| {
-            ui.selectable_value(&mut wizard.one_altitude, true, "one for all frames");
+            ui.selectable_value(&mut wizard.one_altitude, true, "one for all pictures");
             ui.selectable_value(&mut wizard.one_altitude, false, "from frames.csv");
         });
         ui.end_row();
         if wizard.one_altitude {
             let label = ui.label("altitude above the ground");
             let drag = DragValue::new(&mut wizard.altitude_km).range(1.0..=1e6).speed(1.0).suffix(" km");
-            ui.add(drag).labelled_by(label.id);
+            number::drag(ui, drag).labelled_by(label.id);
             ui.end_row();
         }
     });

@@ -1,24 +1,35 @@
 //! Writes what the window shows to files: a picture, a video or a table. It also recovers a recording that was cut off.
 
+use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 
+use egui::Color32;
 use hzn_core::Config;
+use hzn_core::camera::Camera;
 use hzn_core::status::Status;
+use hzn_files::FrameData;
+use hzn_files::truth::Truth;
 use hzn_mcap::{Annotations, Row};
 use hzn_run::engine::AnySensor;
-use hzn_run::overlay;
+use hzn_run::overlay::{self, canvas::Canvas};
 use hzn_run::sink::{Existing, RowFile as Table};
 use hzn_run::source::{Picture, Source};
+use image::RgbImage;
 
 use super::caption::{self, Caption, Writer};
 use super::frame_view::{FrameInput, FrameView, Outcome, process_frame};
 use super::job::{Done, JobError, Progress};
 use super::sequence_source::SequenceSource;
+use super::sky;
 use crate::model::settings::Layer;
 use crate::model::{Sequence, atomic_file};
+
+/// Colours of masked parts, and of Sun and Moon.
+const MASK: [u8; 3] = [120, 120, 132];
+const SKY: [u8; 3] = [255, 236, 170];
 
 /// Returns the annotations of the layers that are switched on.
 pub fn annotations(outcome: &Outcome, layers: &[Layer]) -> Annotations {
@@ -59,6 +70,13 @@ fn describe(name: &str, time_s: Option<f64>, outcome: Option<&Outcome>, drawing:
         text += &format!("; {}: {}{reason}", row.body, row.status);
         text.extend(row.sigma_max_deg.map(|s| format!(", 3σ {:.4}°", 3.0 * s)));
         text.extend(row.rms_px.map(|rms| format!(", RMS {rms:.2} px")));
+        let ends = [outcome.config.camera.width, outcome.config.camera.height].map(|n| f64::from(n) - 0.5);
+        let is_inside = |p: [f64; 2]| p.iter().zip(ends).all(|(x, end)| (-0.5..end).contains(x));
+        if !body.axis.is_some_and(is_inside) {
+            // The picture cannot show where the axis is.
+            let z = body.solution().map(|s| s.axis.xyz()[2].clamp(-1.0, 1.0));
+            text.extend(z.map(|z| format!(", axis {:.1}° off the optical axis", z.acos().to_degrees())));
+        }
         if row.status != Status::Ok && body.cause.is_none() && !row.detail.is_empty() {
             text += &format!(" ({})", row.detail);
         }
@@ -76,30 +94,83 @@ fn describe(name: &str, time_s: Option<f64>, outcome: Option<&Outcome>, drawing:
     Caption { text, legend, scale: Some((camera.fx_px * 5f64.to_radians().tan(), "5°".to_owned())) }
 }
 
-fn draw(
-    writer: &mut Writer,
-    picture: &Picture,
-    name: &str,
+/// A picture that is drawn, and what is known about it.
+struct Drawn<'a> {
+    picture: &'a Picture,
+    name: &'a str,
     time_s: Option<f64>,
-    outcome: Option<&Outcome>,
-    layers: &[Layer],
-) -> image::RgbImage {
-    let drawing = outcome.map(|o| annotations(o, layers)).unwrap_or_default();
-    let drawn = overlay::draw_plain(picture.to_rgb(), &drawing, &[]);
-    writer.add(&drawn, &describe(name, time_s, outcome, &drawing))
+    data: Option<&'a FrameData>,
+    truth: Option<&'a Truth>,
+    outcome: Option<&'a Outcome>,
 }
 
-/// Writes the shown picture with its annotations as PNG, in the size of the picture, with a caption below it.
+impl Drawn<'_> {
+    /// Draws the layers that are switched on, with a caption below the picture.
+    fn draw(&self, writer: &mut Writer, layers: &[Layer]) -> RgbImage {
+        let drawing = self.outcome.map(|o| annotations(o, layers)).unwrap_or_default();
+        let mut caption = describe(self.name, self.time_s, self.outcome, &drawing);
+        let mut canvas = Canvas { image: overlay::draw_plain(self.picture.to_rgb(), &drawing, &[]) };
+        if let Some(outcome) = self.outcome {
+            self.draw_mask(&mut canvas, outcome, layers, &mut caption);
+            self.draw_sky(&mut canvas, writer, outcome, layers);
+        }
+        writer.add(&canvas.image, &caption)
+    }
+
+    /// Width of a thin line: it is visible if the whole picture is shown on a screen.
+    fn pen(&self) -> f64 {
+        let layout = self.picture.layout;
+        (f64::from(layout.width.max(layout.height)) / 800.0).max(1.0)
+    }
+
+    fn draw_mask(&self, canvas: &mut Canvas, outcome: &Outcome, layers: &[Layer], caption: &mut Caption) {
+        let polygons = outcome.config.mask.polygons_px.iter().filter(|p| p.len() > 2);
+        for polygon in polygons.filter(|_| layers.contains(&Layer::Mask)) {
+            let closed: Vec<[f64; 2]> = polygon.iter().chain(polygon.first()).copied().collect();
+            canvas.polyline(&closed, 1.5 * self.pen(), MASK);
+            if caption.legend.iter().all(|(name, _)| name != "mask") {
+                caption.legend.push(("mask".to_owned(), MASK));
+            }
+        }
+    }
+
+    fn draw_sky(&self, canvas: &mut Canvas, writer: &mut Writer, outcome: &Outcome, layers: &[Layer]) {
+        let camera = Camera::try_new(&outcome.config.camera).ok().filter(|_| layers.contains(&Layer::Sky));
+        let Some(camera) = camera else { return };
+        let radius = 9.0 * self.pen();
+        for place in sky::places(self.data, self.truth, &outcome.bodies, &camera) {
+            let at = |i: u32| {
+                let (s, c) = (f64::from(i) / 48.0 * std::f64::consts::TAU).sin_cos();
+                [place.at[0] + radius * c, place.at[1] + radius * s]
+            };
+            canvas.polyline(&(0..=48).map(at).collect::<Vec<_>>(), self.pen(), SKY);
+            let [r, g, b] = SKY;
+            let corner = [place.at[0] + 1.4 * radius, place.at[1] - 7.0 * self.pen()].map(|x| x as f32);
+            let size = 14.0 * self.pen() as f32;
+            writer.write(&mut canvas.image, corner, &place.name, size, f32::INFINITY, Color32::from_rgb(r, g, b));
+        }
+    }
+}
+
+/// Writes the shown picture with its annotations as PNG, in the size of the picture, with a caption below it. `truth`
+/// gives the directions of Sun and Moon where nothing else does.
 ///
 /// # Errors
 /// There is no picture, the name does not end in `.png`, or the file cannot be written.
-pub fn save_picture(frame_view: &FrameView, layers: &[Layer], path: &Path) -> Result<Done, JobError> {
+pub fn save_picture(
+    frame_view: &FrameView,
+    truth: Option<&Truth>,
+    layers: &[Layer],
+    path: &Path,
+) -> Result<Done, JobError> {
     if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
         return Err(JobError::Failed(format!("{}: the file name of a picture must end in .png", path.display())));
     }
     let picture = frame_view.picture.as_ref().map_err(Clone::clone)?;
     let outcome = frame_view.answers.first().map(|o| &**o);
-    let image = draw(&mut Writer::default(), picture, &frame_view.name, frame_view.time_s, outcome, layers);
+    let FrameView { name, time_s, data, .. } = frame_view;
+    let drawn = Drawn { picture, name, time_s: *time_s, data: data.as_ref(), truth, outcome };
+    let image = drawn.draw(&mut Writer::default(), layers);
     let bytes = overlay::png(&image).map_err(|e| format!("{}: {e:#}", path.display()))?;
     atomic_file::write(path, &bytes)?;
     Ok(Done::Written(path.to_owned()))
@@ -151,6 +222,8 @@ pub struct Video {
     pub config: Arc<Config>,
     /// Single precision and at most 2048 points, as `FlightHorizon` has.
     pub flight: bool,
+    /// Truth of the pictures by their name, for the directions of Sun and Moon.
+    pub truth: HashMap<String, Vec<Truth>>,
     /// Layers that are drawn.
     pub layers: Vec<Layer>,
     /// Pictures per second.
@@ -214,10 +287,13 @@ impl Video {
                     let (name, time_s) = (&*item.name, item.data.as_ref().and_then(|d| d.time_s));
                     let input = FrameInput { index, name, time_s, data: data.as_ref(), picture: &picture };
                     let outcome = process_frame(input, &self.config, sensor, false, None);
-                    let image = draw(&mut writer, &picture, name, time_s, Some(&outcome), &self.layers);
-                    if image.dimensions() == size { image } else { image::RgbImage::new(size.0, size.1) }
+                    let truth = self.truth.get(name).and_then(|all| all.first());
+                    let outcome = Some(&outcome);
+                    let drawn = Drawn { picture: &picture, name, time_s, data: data.as_ref(), truth, outcome };
+                    let image = drawn.draw(&mut writer, &self.layers);
+                    if image.dimensions() == size { image } else { RgbImage::new(size.0, size.1) }
                 }
-                Err(_) => image::RgbImage::new(size.0, size.1),
+                Err(_) => RgbImage::new(size.0, size.1),
             };
             let stdin = pipe.stdin.as_mut().ok_or_else(|| "ffmpeg does not take input".to_owned())?;
             if stdin.write_all(image.as_raw()).is_err() {

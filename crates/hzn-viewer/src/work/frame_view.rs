@@ -143,7 +143,22 @@ pub struct BodyResult {
 /// coarser than the limb of the answer.
 const CANDIDATE_STEPS: usize = 720;
 
+/// Number of candidates whose limbs are drawn.
+const DRAWN_CANDIDATES: usize = 3;
+
 impl BodyResult {
+    /// Returns the numbers of the candidates whose limbs are drawn: those of the longest edges, the longest first.
+    pub fn longest_candidates(&self) -> Vec<u32> {
+        let length = |c: u32| {
+            let edge = self.edges.iter().find(|e| e.candidate == c);
+            edge.and_then(|e| e.outcome).map_or(0, |o| o.length_px)
+        };
+        let mut all: Vec<u32> = self.candidate_limbs.iter().map(|(c, _)| *c).collect();
+        all.sort_by_key(|c| std::cmp::Reverse(length(*c)));
+        all.truncate(DRAWN_CANDIDATES);
+        all
+    }
+
     /// Collects the result for a body. `camera` is the camera that the limb is drawn with.
     fn new(
         kind: body::Kind,

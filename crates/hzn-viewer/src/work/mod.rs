@@ -16,6 +16,7 @@ pub mod plots;
 mod reader;
 pub mod residuals;
 mod sequence_source;
+pub mod sky;
 pub mod store;
 pub mod study;
 mod summary;

@@ -83,7 +83,7 @@ fn the_plots_are_saved_as_they_are_chosen() {
     said(&mut window, "Written");
     let text = std::fs::read_to_string(&svg).unwrap();
     assert!(text.contains("3 sigma [°]") && text.contains("RMS [px]") && !text.contains("Half-angle"), "{text}");
-    assert!(text.contains("pictures, 4 frames") && text.contains("<polyline"), "{text}");
+    assert!(text.contains("pictures, 4 pictures") && text.contains("<polyline"), "{text}");
 
     menu(&mut window, "Export", "Save plots as SVG…");
     path(&mut window, &dir.path().join("flight.pdf"), "Write");
@@ -109,7 +109,7 @@ fn the_video_shows_every_frame_or_nothing_is_left() {
     said(&mut window, "Written");
     let mut watched = self::window();
     open(&mut watched, &film);
-    until(&mut watched, "the video has frames", |v| v.sequence().complete && v.frame_view().is_some());
+    until(&mut watched, "the video has pictures", |v| v.sequence().complete && v.frame_view().is_some());
     assert_eq!(watched.state().sequence().len(), 4);
     assert_eq!(files(dir.path()), ["flight.mp4", "pictures"]);
 

@@ -8,6 +8,7 @@ use hzn_core::status::Status;
 use hzn_viewer::model::cause::Reason;
 use hzn_viewer::model::diagnosis::{self, Suspect};
 use hzn_viewer::ui::Viewer;
+use hzn_viewer::work::open::Request;
 
 use crate::window::*;
 
@@ -222,7 +223,7 @@ fn altitudes_of_frames_csv_that_are_too_high_are_named() {
     // The field of the altitude would change nothing, and says so.
     window.get_by_label("Body").click();
     window.run_steps(3);
-    let why = "The frames have altitudes of their own (frames.csv), which are used instead.";
+    let why = "The pictures have altitudes of their own (frames.csv), which are used instead.";
     assert!(window.query_by_label(why).is_some());
     // The altitudes are shifted on trial; no file changes.
     let table = std::fs::read_to_string(pictures.join("frames.csv")).unwrap();
@@ -382,7 +383,8 @@ fn a_crashed_window_gives_its_changes_back() {
     // Other pictures are open when the changes come back: their own pictures are opened.
     let (_other_dir, other) = folder();
     let mut again = stored_window(&store);
-    open(&mut again, &other);
+    // The command line opens them, because keys do nothing behind the question.
+    again.state_mut().open(Request { inputs: vec![other], ..Request::default() });
     settled(&mut again);
     again.get_by_label("Restore changes").click();
     until(&mut again, "not restored", |v: &Viewer| v.session().is_some_and(|s| s.is_changed()) && v.is_settled());

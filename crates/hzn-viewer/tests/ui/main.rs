@@ -6,6 +6,7 @@ mod exports;
 mod found;
 mod mouse;
 mod overwrite;
+mod small;
 mod tune;
 mod window;
 mod wrong;

@@ -294,13 +294,13 @@ fn a_parameter_is_swept_and_a_click_takes_a_value() {
     window.get_by_label("Start").click();
     for _ in 0..3000 {
         window.step();
-        if window.query_by_label("4 of 4 frames").is_some() {
+        if window.query_by_label("4 of 4 pictures").is_some() {
             break;
         }
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
     window.run_steps(3);
-    let title = window.get_by_label("answered frames [%]").rect();
+    let title = window.get_by_label("answered pictures [%]").rect();
     click(&mut window, title.left_bottom() + egui::vec2(330.0, 60.0));
     settled(&mut window);
     let taken = scale(&window);

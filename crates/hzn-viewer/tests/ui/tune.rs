@@ -13,7 +13,7 @@ fn open_step_tune_save_and_open_again() {
     assert_eq!(window.state().sequence().len(), 4);
     assert_eq!(answer(&window).0, Status::Ok);
 
-    window.get_by_label("Next frame").click();
+    window.get_by_label("Next picture").click();
     settled(&mut window);
     let first = answer(&window);
     assert_eq!((frame_view(&window).index, first.0), (1, Status::Ok));
@@ -42,7 +42,7 @@ fn open_step_tune_save_and_open_again() {
 
     // In another window, the answer of the saved file is the same to the last bit.
     let mut again = window_on(dir.path());
-    again.get_by_label("Next frame").click();
+    again.get_by_label("Next picture").click();
     settled(&mut again);
     assert_eq!(answer(&again), tuned);
 }

@@ -125,7 +125,7 @@ pub(crate) fn until(window: &mut Window, what: &str, ready: impl Fn(&Viewer) -> 
 pub(crate) fn settled(window: &mut Window) {
     // One step handles the click, the other one its effects.
     window.run_steps(2);
-    until(window, "the frame is not there", Viewer::is_settled);
+    until(window, "the picture is not there", Viewer::is_settled);
 }
 
 /// Types a path into the dialog, and accepts it.

@@ -94,6 +94,10 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
         let title = if pane == 0 { "session".to_owned() } else { name };
         label(&painter, rect.left_top() + vec2(10.0, 10.0), Align2::LEFT_TOP, &title);
     }
+    if !viewer.layers_hidden {
+        let percent = 100.0 * placement.scale() * f64::from(ui.ctx().pixels_per_point());
+        label(&painter, rect.right_bottom() - vec2(10.0, 10.0), Align2::RIGHT_BOTTOM, &format!("{percent:.0} %"));
+    }
     if let Some(refused) = outcome.and_then(|o| o.refused.as_deref()) {
         notice(&painter, rect, refused, ui.visuals().warn_fg_color);
     }

@@ -9,8 +9,8 @@ use crate::model::view::Point;
 use crate::ui::placement::Placement;
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
-use crate::work::FrameView;
 use crate::work::frame_view::{BodyResult, Outcome};
+use crate::work::{FrameView, sky};
 
 /// Draws all layers that are switched on.
 pub(super) fn draw(
@@ -48,40 +48,17 @@ pub(super) fn draw(
             }
         }
     }
-    if on(Layer::Sky) {
-        for (name, at) in sky(viewer, frame_view, placement) {
-            painter.circle_stroke(at, 11.0, Stroke::new(1.5, theme::SKY));
-            painter.text(at + vec2(14.0, 0.0), Align2::LEFT_CENTER, name, FontId::proportional(12.0), theme::SKY);
+    if on(Layer::Sky)
+        && let Some(camera) = placement.camera
+    {
+        let truth = viewer.truth.get(&frame_view.name).and_then(|t| t.first());
+        for place in sky::places(frame_view.data.as_ref(), truth, &outcome.bodies, camera) {
+            let Some(at) = placement.to_screen(place.at) else { continue };
+            let colour = theme::SKY.gamma_multiply(if place.is_hidden { 0.5 } else { 1.0 });
+            painter.circle_stroke(at, 11.0, Stroke::new(1.5, colour));
+            painter.text(at + vec2(14.0, 0.0), Align2::LEFT_CENTER, place.name, FontId::proportional(12.0), colour);
         }
     }
-}
-
-/// Returns the expected places of the Sun and the Moon on the screen. The Sun direction comes from frames.csv, else
-/// from the truth, else from time, position and attitude. The Moon direction comes from the truth, else from time,
-/// position and attitude.
-fn sky(viewer: &Viewer, frame_view: &FrameView, placement: &Placement<'_>) -> Vec<(&'static str, Pos2)> {
-    let Some(camera) = placement.camera else { return Vec::new() };
-    let mut out = Vec::new();
-    let mut add = |name, direction: Option<[f64; 3]>| {
-        let projected = direction.and_then(hzn_core::frames::UnitVec3::try_new).and_then(|d| camera.project(&d));
-        if let Some(at) = projected.and_then(|p| placement.to_screen([p.u, p.v])) {
-            out.push((name, at));
-        }
-    };
-    let truth = viewer.truth.get(&frame_view.name).and_then(|t| t.first());
-    let data = frame_view.data.as_ref();
-    let sun = data.and_then(|d| d.sun_camera).or_else(|| Some([truth?.sun_x?, truth?.sun_y?, truth?.sun_z?]));
-    add("Sun", sun.or_else(|| from_ephemeris(data?, hzn_nav::ephemeris::sun)));
-    let moon = truth.and_then(|t| Some([t.moon_x?, t.moon_y?, t.moon_z?]));
-    add("Moon", moon.or_else(|| from_ephemeris(data?, hzn_nav::ephemeris::moon)));
-    out
-}
-
-fn from_ephemeris(data: &hzn_files::FrameData, place: impl Fn(f64) -> hzn_nav::ephemeris::Place) -> Option<[f64; 3]> {
-    use hzn_core::frames::{Cam, Fixed, Rotation};
-    let turn = Rotation::<Cam, Fixed, f64>::assume_from_quaternion(data.q_fixed_from_camera_wxyz?)?.inverse();
-    let seen = place(data.utc_s?).seen_from(data.position_km?.map(|km| km * 1e3).into());
-    Some(turn.apply(&seen.direction.to_unit()?).xyz())
 }
 
 fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Placement<'_>) {
@@ -97,11 +74,13 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Pla
         }
     }
     if on(Layer::Limb) {
-        // Many short edges have a fit; only the longest one, and the one under the pointer, are drawn strongly.
-        let longest = crate::model::diagnosis::longest_edge(&answer.edges).map(|e| e.candidate);
+        // Many short edges have a fit. All of them would hide the picture, so only the longest ones are drawn, and the
+        // one under the pointer.
+        let longest = answer.longest_candidates();
         let pointed = |c: u32| viewer.pointed == Some(c) || viewer.chosen_candidate == Some(c);
-        for (candidate, limb) in &answer.candidate_limbs {
-            let strong = pointed(*candidate) || longest == Some(*candidate);
+        let drawn = answer.candidate_limbs.iter().filter(|(c, _)| pointed(*c) || longest.contains(c));
+        for (candidate, limb) in drawn {
+            let strong = pointed(*candidate) || longest.first() == Some(candidate);
             let colour = theme::edge(*candidate).gamma_multiply(if strong { 1.0 } else { 0.3 });
             dashed_lines(painter, placement, limb, colour, if pointed(*candidate) { 3.0 } else { 1.6 });
         }

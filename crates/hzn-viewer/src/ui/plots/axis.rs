@@ -92,9 +92,73 @@ pub(super) fn value_range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]>
     Some([low - pad.max(least), high + pad.max(least)])
 }
 
+/// Returns the ends of the y axis for values of which a few may be far from the others. Values farther from the middle
+/// eight tenths than four times their span lie outside: that is 11 sigmas of normally distributed values, so that only
+/// values of another kind are left out.
+pub(super) fn robust_range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let mut all: Vec<f64> = values.collect();
+    let tenth = all.len() / 10;
+    if tenth == 0 {
+        return value_range(all.into_iter());
+    }
+    let (_, low, _) = all.select_nth_unstable_by(tenth, f64::total_cmp);
+    let low = *low;
+    let last = all.len() - 1 - tenth;
+    let (_, high, _) = all.select_nth_unstable_by(last, f64::total_cmp);
+    let (high, room) = (*high, 4.0 * (*high - low));
+    // If most values are equal, the others are what there is to see.
+    let inside = |v: &f64| room == 0.0 || (low - room..=high + room).contains(v);
+    value_range(all.iter().copied().filter(inside))
+}
+
+/// Returns a range that is as large as both, but at most three times as large as the first one: a bad comparison does
+/// not make the curve flat that it is compared with.
+pub(super) fn widen([low, high]: [f64; 2], other: [f64; 2]) -> [f64; 2] {
+    let span = high - low;
+    [low.min(other[0]).max(low - span), high.max(other[1]).min(high + span)]
+}
+
+/// Returns angles in degrees without the jumps of 360°: a value that differs from the one before by more than half a
+/// turn has gone around.
+pub(super) fn unwrap_deg(angles_deg: impl Iterator<Item = Option<f64>>) -> Vec<Option<f64>> {
+    let mut last: Option<f64> = None;
+    let step = |angle: Option<f64>| {
+        let angle = angle?;
+        let turns = last.map_or(0.0, |last| ((last - angle) / 360.0).round());
+        last = Some(angle + 360.0 * turns);
+        last
+    };
+    angles_deg.map(step).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_few_far_values_do_not_make_the_others_flat() {
+        let near = || (0..95).map(|i| f64::from(i % 10) * 0.1);
+        let [low, high] = robust_range(near().chain([600.0, -600.0, 590.0])).unwrap();
+        assert!(low > -0.2 && low < 0.0 && high > 0.9 && high < 1.1, "{low} {high}");
+        // Two levels are no outliers, and neither is a single step.
+        assert!(robust_range((0..40).map(|i| if i < 20 { 1.0 } else { 50.0 })).unwrap()[1] > 50.0);
+        assert!(robust_range((0..100).map(|i| if i < 97 { 1.0 } else { 50.0 })).unwrap()[1] > 50.0);
+        assert_eq!(robust_range(std::iter::empty()), None);
+    }
+
+    #[test]
+    fn a_comparison_widens_a_range_within_bounds() {
+        assert_eq!(widen([0.0, 1.0], [-0.5, 1.2]), [-0.5, 1.2]);
+        assert_eq!(widen([0.0, 1.0], [-900.0, 0.5]), [-1.0, 1.0]);
+        assert_eq!(widen([0.0, 1.0], [40.0, 90.0]), [0.0, 2.0]);
+    }
+
+    #[test]
+    fn an_angle_goes_around_without_a_jump() {
+        let wrapped = [Some(170.0), Some(-175.0), None, Some(-10.0), Some(178.0), Some(160.0)];
+        let whole = [Some(170.0), Some(185.0), None, Some(350.0), Some(178.0), Some(160.0)];
+        assert_eq!(unwrap_deg(wrapped.into_iter()), whole);
+    }
 
     #[test]
     fn ticks_are_round_numbers() {

@@ -13,7 +13,7 @@ use egui::{RichText, ScrollArea, Ui};
 use super::viewer::Viewer;
 use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
 use crate::model::quantity::QUANTITIES;
-use over_time::TimeAxis;
+pub(super) use over_time::{MARGIN, TimeAxis};
 pub(super) use residuals::RESIDUALS;
 pub(super) use sheet::sheet;
 
@@ -94,9 +94,7 @@ fn rows(viewer: &mut Viewer, ui: &mut Ui, chosen: &[String]) {
     });
     // The other plots show the values of this picture with the next frame of the window.
     viewer.hovered_frame = pointed.map(|(frame, _)| frame);
-    if over_time {
-        over_time::ruler(ui, &axis, RULER);
-    }
+    viewer.plot_span = over_time.then(|| over_time::ruler(ui, &axis, RULER));
     if let Some((frame, true)) = pointed {
         viewer.playback.go(frame, viewer.sequence.len());
     }
@@ -120,7 +118,7 @@ fn quantity_choice(viewer: &mut Viewer, ui: &mut Ui, offered: &[&str]) {
         }
         // The time line below shows the times of the frames as they are.
         if viewer.sequence.entries.iter().find_map(|e| e.time_s).is_some_and(|start| start != 0.0) {
-            ui.weak(RichText::new("· time since the first frame").size(12.0));
+            ui.weak(RichText::new("· time since the first picture").size(12.0));
         }
     });
 }

@@ -4,7 +4,7 @@ use egui::{Color32, Ui};
 use egui_plot::{HLine, MarkerShape, Points};
 use hzn_fuse::sink::Phase;
 
-use super::axis::{polylines, tick_label, value_range};
+use super::axis::{polylines, tick_label, unwrap_deg, value_range};
 use super::frame::heading;
 use super::over_time::{Pointed, Style, TimeAxis, draw, frame_plot};
 use crate::model::navigation::{INNOVATIONS, InnovationSeries, NavQuantity, Navigation, StateValue};
@@ -13,8 +13,6 @@ use crate::ui::viewer::Viewer;
 
 /// Innovations beyond this many sigmas are drawn at the border of the plot.
 const MOST_SIGMAS: f64 = 8.0;
-/// An angle that jumps by more degrees than this has gone once around.
-const AROUND: f64 = 180.0;
 
 /// Plots a quantity of the solutions; returns the picture under the pointer.
 pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &NavQuantity, axis: &TimeAxis, height: f32) -> Pointed {
@@ -27,11 +25,11 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &NavQuantity, axis: &
         return None;
     }
     let within = |phase| nav.states(phase).iter().filter(|s| axis.place_of_time(s.time_s).is_some());
-    let values = [Phase::Filter, Phase::Smoothed, Phase::Back]
-        .into_iter()
-        .flat_map(within)
-        .flat_map(|s| quantity.lines.iter().filter_map(move |(_, value_of)| value_of(s)));
-    let range = value_range(values.filter(|x| x.is_finite()));
+    let values = [Phase::Filter, Phase::Smoothed, Phase::Back].into_iter().flat_map(|phase| {
+        let lines = quantity.lines.iter().map(move |(_, value_of)| line(nav, phase, quantity, *value_of, axis));
+        lines.flatten().flatten().map(|[_, y]| y)
+    });
+    let range = value_range(values);
     let Some(range) = range else {
         heading(ui, &title, &[], "");
         ui.weak(format!("{} has no value of “{}” during the pictures.", nav.file, quantity.name));
@@ -46,13 +44,15 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &NavQuantity, axis: &
     if has(Phase::Back) {
         legend.push(("faint: integrated back from the start", theme::line(0, dark).gamma_multiply(0.4)));
     }
-    heading(ui, &title, &legend, &values_text(viewer, nav, quantity));
-    frame_plot(viewer, ui, quantity.name, axis, range, height, |ui, column| {
+    let at = viewer.hovered_frame.unwrap_or(viewer.playback.frame());
+    heading(ui, &title, &legend, &values_text(viewer, nav, quantity, at));
+    let values_of = |i: usize| values_text(viewer, nav, quantity, i);
+    frame_plot(viewer, ui, quantity.name, axis, range, height, &values_of, |ui, column| {
         for (phase, style) in
             [(Phase::Back, Style::Faint), (Phase::Smoothed, Style::Dashed), (Phase::Filter, Style::Plain)]
         {
             for (n, (name, value_of)) in quantity.lines.iter().enumerate() {
-                for part in parts(nav, phase, *value_of, axis, column) {
+                for part in parts(nav, phase, quantity, *value_of, axis, column) {
                     draw(ui, name, part, theme::line(n, dark), style);
                 }
             }
@@ -64,18 +64,27 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &NavQuantity, axis: &
 pub(super) fn parts(
     nav: &Navigation,
     phase: Phase,
+    quantity: &NavQuantity,
     value_of: StateValue,
     axis: &TimeAxis,
     column: f64,
 ) -> Vec<Vec<[f64; 2]>> {
-    let states = nav.states(phase);
-    let point = |i: usize| {
-        let state = states.get(i)?;
-        Some([axis.place_of_time(state.time_s)?, value_of(state).filter(|x| x.is_finite())?])
-    };
-    let whole = polylines(states.len(), column, point);
-    let same_turn = |a: &[f64; 2], b: &[f64; 2]| (a[1] - b[1]).abs() < AROUND;
-    whole.iter().flat_map(|part| part.chunk_by(same_turn).map(<[_]>::to_vec)).collect()
+    let points = line(nav, phase, quantity, value_of, axis);
+    polylines(points.len(), column, |i| *points.get(i)?)
+}
+
+/// Returns the points of a line. Angles do not jump by 360°.
+fn line(
+    nav: &Navigation,
+    phase: Phase,
+    quantity: &NavQuantity,
+    value_of: StateValue,
+    axis: &TimeAxis,
+) -> Vec<Option<[f64; 2]>> {
+    let within = || nav.states(phase).iter().filter_map(|s| Some((axis.place_of_time(s.time_s)?, s)));
+    let values = within().map(|(_, state)| value_of(state).filter(|x| x.is_finite()));
+    let values = if quantity.unit == "°" { unwrap_deg(values) } else { values.collect() };
+    within().zip(values).map(|((x, _), y)| Some([x, y?])).collect()
 }
 
 /// Returns the innovations of a series, as taken and as refused ones. Within a column only the extremes are kept.
@@ -106,7 +115,7 @@ pub(super) fn innovations(viewer: &Viewer, ui: &mut Ui, axis: &TimeAxis, height:
     let inside = nav.innovations.iter().flat_map(|s| &s.components);
     let inside = inside.filter(|c| axis.place_of_time(c.time_s).is_some()).map(|c| c.sigmas.abs());
     let most = inside.fold(4.0, f64::max).min(MOST_SIGMAS) * 1.05;
-    frame_plot(viewer, ui, INNOVATIONS, axis, [-most, most], height, |ui, column| {
+    frame_plot(viewer, ui, INNOVATIONS, axis, [-most, most], height, &|_| String::new(), |ui, column| {
         for y in [-3.0, 3.0] {
             ui.hline(HLine::new("3σ", y).color(theme::REJECTED.gamma_multiply(0.6)).allow_hover(false));
         }
@@ -128,9 +137,8 @@ pub(super) fn title(quantity: &NavQuantity) -> String {
     format!("{} [{}]", quantity.name, quantity.unit)
 }
 
-/// Returns the values of the filter at the frame under the pointer, or else at the shown one.
-fn values_text(viewer: &Viewer, nav: &Navigation, quantity: &NavQuantity) -> String {
-    let at = viewer.hovered_frame.unwrap_or(viewer.playback.frame());
+/// Returns the values of the filter at a picture.
+fn values_text(viewer: &Viewer, nav: &Navigation, quantity: &NavQuantity, at: usize) -> String {
     let time_s = viewer.sequence.entries.get(at).and_then(|e| e.time_s);
     let Some(state) = time_s.and_then(|t| nav.nearest(t)) else { return String::new() };
     let text = |(name, value_of): &(&str, StateValue)| {
@@ -144,12 +152,12 @@ fn values_text(viewer: &Viewer, nav: &Navigation, quantity: &NavQuantity) -> Str
 /// Returns why the results of hzn fuse have no place on the time axis.
 fn why_empty(nav: &Navigation, axis: &TimeAxis) -> Option<String> {
     let Some([first, last]) = axis.span_s() else {
-        return Some(format!("The frames have no times, so {} has no place on their axis.", nav.file));
+        return Some(format!("The pictures have no times, so {} has no place on their axis.", nav.file));
     };
     let Some([from, to]) = nav.span_s() else { return Some(format!("{} has no solution.", nav.file)) };
     (to < first || from > last).then(|| {
         format!(
-            "{} covers {from:.1} to {to:.1} s, the frames {first:.1} to {last:.1} s: their clocks have other epochs.",
+            "{} covers {from:.1} to {to:.1} s, the pictures {first:.1} to {last:.1} s: their clocks have other epochs.",
             nav.file
         )
     })

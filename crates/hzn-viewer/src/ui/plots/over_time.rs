@@ -1,19 +1,24 @@
 //! Plots of a quantity over all pictures.
 
-use egui::{Color32, Id, Ui, vec2};
-use egui_plot::{Line, LineStyle, Plot, PlotUi, Points, Span, VLine};
+use egui::{Color32, Id, Rangef, Ui, vec2};
+use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotUi, Points, Span, VLine};
 use hzn_core::status::Status;
 use hzn_mcap::Row;
 
-use super::axis::{axis_labels, polylines, tick_label, value_range};
+use super::axis::{axis_labels, polylines, robust_range, tick_label, unwrap_deg, widen};
 use super::frame::{heading, set_label, shared_plot};
 use crate::model::quantity::{Quantity, RowValue};
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
 
+/// Part of the time axis that is free before the first picture and behind the last one.
+pub(in crate::ui) const MARGIN: f32 = 0.01;
+/// Width in points that a picture needs for a marker of its own.
+const MARKER_EVERY: f32 = 8.0;
+
 /// Results that a line shows.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Source {
+pub(super) enum Source {
     /// The results of the current parameters.
     Current,
     /// The results of earlier parameters, where they are not the current ones.
@@ -33,7 +38,7 @@ impl Source {
 }
 
 /// The horizontal axis: the time since the first picture, or the number of the picture if the times are not known.
-pub(super) struct TimeAxis {
+pub(in crate::ui) struct TimeAxis {
     /// Place of each picture, if it has one.
     places: Vec<Option<f64>>,
     /// The unit of the labels; empty for numbers of pictures.
@@ -43,7 +48,7 @@ pub(super) struct TimeAxis {
 }
 
 impl TimeAxis {
-    pub(super) fn new(viewer: &Viewer) -> Self {
+    pub(in crate::ui) fn new(viewer: &Viewer) -> Self {
         let entries = &viewer.sequence.entries;
         // Times may be large numbers, so the plots start at the first picture with time zero.
         let start_s = entries.iter().find_map(|e| e.time_s);
@@ -67,7 +72,7 @@ impl TimeAxis {
     }
     /// Returns the label of the axis.
     pub(super) fn label(&self) -> &'static str {
-        if self.unit.is_empty() { "frame" } else { "time since the first frame, s" }
+        if self.unit.is_empty() { "picture" } else { "time since the first picture, s" }
     }
     pub(super) fn place(&self, index: usize) -> Option<f64> {
         self.places.get(index).copied().flatten()
@@ -84,14 +89,27 @@ impl TimeAxis {
         let distance = |(i, p): (usize, &Option<f64>)| Some((i, (p.as_ref()? - x).abs()));
         self.places.iter().enumerate().filter_map(distance).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
     }
-    /// Describes a place in words.
-    fn text(&self, x: f64) -> String {
-        if self.unit.is_empty() { format!("frame {x:.0}") } else { format!("{x:.3} s") }
+    /// Describes the place of a picture in words.
+    fn text(&self, index: usize) -> String {
+        let time = self.place(index).filter(|_| !self.unit.is_empty()).map(|x| format!(", {x:.3} s"));
+        format!("picture {}{}", index + 1, time.unwrap_or_default())
+    }
+    /// Returns where each picture begins and the last one ends, as parts of the axis from its first to its last
+    /// picture: a picture reaches halfway to its neighbours. Without an order in time all pictures are equally wide.
+    pub(in crate::ui) fn borders(&self) -> Vec<f64> {
+        let count = self.places.len();
+        let places: Vec<f64> = self.places.iter().copied().flatten().collect();
+        if count < 2 || places.len() < count || !places.is_sorted() {
+            return (0..=count).map(|i| i as f64 / count.max(1) as f64).collect();
+        }
+        let [first, last] = self.ends();
+        let middles = places.windows(2).map(|pair| ((pair[0] + pair[1]) / 2.0 - first) / (last - first));
+        std::iter::once(0.0).chain(middles).chain([1.0]).collect()
     }
 }
 
-/// Draws the labels of the horizontal axis below all plots.
-pub(super) fn ruler(ui: &mut Ui, axis: &TimeAxis, height: f32) {
+/// Draws the labels of the horizontal axis below all plots, and returns where the axis begins and ends.
+pub(super) fn ruler(ui: &mut Ui, axis: &TimeAxis, height: f32) -> Rangef {
     let plot = with_axis(shared_plot("ruler", height), axis)
         .show_axes([true, true])
         .show_grid([false, false])
@@ -99,7 +117,9 @@ pub(super) fn ruler(ui: &mut Ui, axis: &TimeAxis, height: f32) {
         .include_y(0.0)
         .allow_drag([true, false])
         .x_axis_formatter(axis_labels(axis.unit));
-    set_label(&plot.show(ui, |_| ()).response, "time axis");
+    let shown = plot.show(ui, |_| ());
+    set_label(&shown.response, "time axis");
+    shown.transform.frame().x_range()
 }
 
 fn with_axis<'a>(plot: Plot<'a>, axis: &TimeAxis) -> Plot<'a> {
@@ -109,7 +129,17 @@ fn with_axis<'a>(plot: Plot<'a>, axis: &TimeAxis) -> Plot<'a> {
         .include_x(last)
         .link_cursor(Id::unique("time"), [true, false])
         .link_axis(Id::unique("time"), [true, false])
-        .set_margin_fraction(vec2(0.01, 0.0))
+        .set_margin_fraction(vec2(MARGIN, 0.0))
+}
+
+/// Returns the values of a line for all pictures. Angles do not jump by 360°.
+pub(super) fn series(viewer: &Viewer, quantity: &Quantity, value_of: RowValue, source: Source) -> Vec<Option<f64>> {
+    let value = |i: usize| {
+        let row = source.row(viewer, i)?;
+        value_of(row, viewer.truth_of(&row.file, &row.body)).filter(|x| x.is_finite())
+    };
+    let all = (0..viewer.sequence.len()).map(value);
+    if quantity.unit == "°" { unwrap_deg(all) } else { all.collect() }
 }
 
 /// The picture under the pointer, and whether it was clicked.
@@ -118,41 +148,65 @@ pub(super) type Pointed = Option<(usize, bool)>;
 /// Plots a quantity of all pictures; returns the picture under the pointer.
 pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, axis: &TimeAxis, height: f32) -> Pointed {
     let dark = ui.visuals().dark_mode;
-    let value = |i: usize, value_of: RowValue, source: Source| {
-        let row = source.row(viewer, i)?;
-        value_of(row, viewer.truth_of(&row.file, &row.body)).filter(|x| x.is_finite())
-    };
     let count = viewer.sequence.len();
-    let each = |source: Source| {
-        quantity.lines.iter().flat_map(move |(_, value_of)| (0..count).filter_map(move |i| value(i, *value_of, source)))
-    };
+    let [earlier, other, current] = [Source::Earlier, Source::Other, Source::Current]
+        .map(|source| quantity.lines.iter().map(|(_, of)| series(viewer, quantity, *of, source)).collect::<Vec<_>>());
+    let range = |lines: &[Vec<Option<f64>>]| robust_range(lines.iter().flatten().copied().flatten());
     let title = title(quantity);
-    let all = || [Source::Current, Source::Earlier, Source::Other].into_iter().flat_map(&each);
-    let Some([low, high]) = value_range(all()) else {
+    let ranges = [range(&current), range(&earlier), range(&other)];
+    let Some([low, high]) = ranges.into_iter().flatten().reduce(widen) else {
         heading(ui, &title, &[], "");
         ui.weak(why_empty(viewer, quantity));
         return None;
     };
-    let has = |source| each(source).next().is_some();
-    let (earlier, other) = (has(Source::Earlier), has(Source::Other));
+    let values_of = |i: usize| {
+        let row = Source::Current.row(viewer, i);
+        values_text(quantity, |value_of| value_of(row?, viewer.truth_of(&row?.file, &row?.body)))
+    };
     let at = viewer.hovered_frame.unwrap_or(viewer.playback.frame());
-    let values = values_text(quantity, |value_of| value(at, value_of, Source::Current));
-    heading(ui, &title, &legend(quantity, earlier, other, dark), &values);
-    frame_plot(viewer, ui, quantity.name, axis, [low, high], height, |ui, column| {
-        for (n, (name, value_of)) in quantity.lines.iter().enumerate() {
-            let colour = theme::line(n, dark);
-            for (source, style) in
-                [(Source::Earlier, Style::Faint), (Source::Other, Style::Dashed), (Source::Current, Style::Plain)]
-            {
-                let parts = polylines(count, column, |i| Some([axis.place(i)?, value(i, *value_of, source)?]));
+    let legend = legend(quantity, ranges[1].is_some(), ranges[2].is_some(), dark);
+    heading(ui, &title, &legend, &values_of(at));
+    frame_plot(viewer, ui, quantity.name, axis, [low, high], height, &values_of, |ui, column| {
+        let sources = [(&earlier, Style::Faint), (&other, Style::Dashed), (&current, Style::Plain)];
+        for (lines, style) in sources {
+            for (n, ((name, _), values)) in quantity.lines.iter().zip(lines).enumerate() {
+                let value = |i: usize| Some([axis.place(i)?, (*values.get(i)?)?]);
+                let within = |[x, y]: [f64; 2]| [x, y.clamp(low, high)];
+                let colour = theme::line(n, dark);
+                let parts = polylines(count, column, |i| value(i).map(within));
                 parts.into_iter().for_each(|part| draw(ui, name, part, colour, style));
+                outside(ui, name, (0..count).filter_map(value), [low, high], colour);
             }
         }
     })
 }
 
-/// Draws a plot over the pictures: `contents` gets the width of a column of pixels on the time axis. Returns the
-/// picture under the pointer.
+/// Draws arrows at the border of a plot for the values outside of it.
+fn outside(
+    ui: &mut PlotUi<'_>,
+    name: &str,
+    points: impl Iterator<Item = [f64; 2]>,
+    [low, high]: [f64; 2],
+    colour: Color32,
+) {
+    let (mut above, mut below) = (Vec::new(), Vec::new());
+    let inset = 0.04 * (high - low);
+    for [x, y] in points {
+        if y > high {
+            above.push([x, high - inset]);
+        } else if y < low {
+            below.push([x, low + inset]);
+        }
+    }
+    for (points, shape) in [(above, MarkerShape::Up), (below, MarkerShape::Down)] {
+        if !points.is_empty() {
+            ui.points(Points::new(name, points).color(colour).shape(shape).radius(4.0));
+        }
+    }
+}
+
+/// Draws a plot over the pictures: `contents` gets the width of a column of pixels on the time axis, and `values_of`
+/// returns the values of a picture as text. Returns the picture under the pointer.
 pub(super) fn frame_plot(
     viewer: &Viewer,
     ui: &mut Ui,
@@ -160,6 +214,7 @@ pub(super) fn frame_plot(
     axis: &TimeAxis,
     [low, high]: [f64; 2],
     height: f32,
+    values_of: &dyn Fn(usize) -> String,
     contents: impl FnOnce(&mut PlotUi<'_>, f64),
 ) -> Pointed {
     let dark = ui.visuals().dark_mode;
@@ -183,9 +238,10 @@ pub(super) fn frame_plot(
     });
     set_label(&response.response, name);
     let (at, clicked) = response.inner;
-    let p = at?;
-    response.response.on_hover_text_at_pointer(format!("{}\n{:.5}", axis.text(p.x), p.y));
-    Some((axis.nearest(p.x)?, clicked))
+    let nearest = axis.nearest(at?.x)?;
+    let text = format!("{}\n{}", axis.text(nearest), values_of(nearest));
+    response.response.on_hover_text_at_pointer(text.trim_end());
+    Some((nearest, clicked))
 }
 
 /// Style of a line.
@@ -206,6 +262,10 @@ pub(super) fn draw(ui: &mut PlotUi<'_>, name: &str, part: Vec<[f64; 2]>, colour:
     if let [one] = part.as_slice() {
         ui.points(Points::new(name, vec![*one]).color(colour).radius(2.0));
         return;
+    }
+    // A few pictures are seen one by one.
+    if style == Style::Plain && part.len() as f32 * MARKER_EVERY < ui.transform().frame().width() {
+        ui.points(Points::new(name, part.clone()).color(colour).radius(2.2));
     }
     let line = Line::new(name, part).color(colour).width(width);
     ui.line(if style == Style::Dashed { line.style(LineStyle::dashed_loose()) } else { line });
@@ -276,13 +336,13 @@ fn why_empty(viewer: &Viewer, quantity: &Quantity) -> String {
     let answered =
         (0..viewer.sequence.len()).filter_map(|i| viewer.rows.newest(i, viewer.body)).any(|r| r.status == Status::Ok);
     match quantity.name {
-        _ if viewer.rows.is_empty() => "No frame is processed yet.".into(),
+        _ if viewer.rows.is_empty() => "No picture is processed yet.".into(),
         "Roll, pitch" if session.config().is_some_and(|c| c.mount.is_none()) => {
             "Roll and pitch need the mounting of the camera: set [mount] q_vehicle_from_camera_wxyz in sensor.toml."
                 .into()
         }
         "Error (truth)" => "No answer has a truth to compare with.".into(),
-        _ if !answered => "No frame has an answer yet, so there is nothing to plot.".into(),
-        name => format!("No frame has a value of “{name}”."),
+        _ if !answered => "No picture has an answer yet, so there is nothing to plot.".into(),
+        name => format!("No picture has a value of “{name}”."),
     }
 }

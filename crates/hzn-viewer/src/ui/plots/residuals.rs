@@ -1,7 +1,7 @@
 //! The residuals along the limb of the shown picture.
 
 use egui::{Ui, vec2};
-use egui_plot::{HLine, PlotPoints, Points};
+use egui_plot::{HLine, MarkerShape, PlotPoints, Points};
 
 use super::axis::axis_labels;
 use super::frame::{heading, set_label, shared_plot};
@@ -11,6 +11,9 @@ use crate::work::residuals::{Residual, residuals};
 
 /// Name of the plot of residuals.
 pub(in crate::ui) const RESIDUALS: &str = "Residuals";
+
+/// Outliers farther away than this many thresholds are arrows at the border of the plot.
+const OUTLIER_THRESHOLDS: f64 = 4.0;
 
 /// Returns the residuals of the candidate that the user chose, or else those of the answer, with a title.
 fn chosen(viewer: &Viewer) -> (String, Vec<Residual>) {
@@ -35,20 +38,32 @@ fn chosen(viewer: &Viewer) -> (String, Vec<Residual>) {
 pub(super) fn show(viewer: &Viewer, ui: &mut Ui, height: f32) -> Option<[f64; 2]> {
     let threshold = viewer.frame_view.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.consensus.threshold_px);
     let (title, all) = chosen(viewer);
+    // Outliers may be hundreds of pixels away, so the inliers and the threshold decide the scale.
+    let largest =
+        |residuals: &mut dyn Iterator<Item = &Residual>| residuals.map(|r| r.distance_px.abs()).fold(1.0, f64::max);
+    let inliers = largest(&mut all.iter().filter(|r| r.weight > 0.0));
+    let end = largest(&mut all.iter()).min(inliers.max(OUTLIER_THRESHOLDS * threshold.unwrap_or(0.0)));
     let points = |kept: bool| -> PlotPoints<'_> {
-        all.iter().filter(|r| (r.weight > 0.0) == kept).map(|r| [r.azimuth_deg, r.distance_px]).collect()
+        let inside = all.iter().filter(|r| (r.weight > 0.0) == kept && r.distance_px.abs() <= end);
+        inside.map(|r| [r.azimuth_deg, r.distance_px]).collect()
+    };
+    let beyond = |sign: f64| -> PlotPoints<'_> {
+        let beyond = all.iter().filter(|r| sign * r.distance_px > end);
+        beyond.map(|r| [r.azimuth_deg, sign * end]).collect()
     };
     if all.is_empty() {
         heading(ui, RESIDUALS, &[], "");
         ui.weak("There are no residuals: no limb is fitted. A click on a candidate with a fit shows its residuals.");
         return None;
     }
-    heading(ui, &title, &[("inliers", theme::INLIER), ("outliers", theme::REJECTED)], "");
+    let farthest = largest(&mut all.iter());
+    let text = if farthest > end { format!("▲▼ outliers up to {farthest:.0} px") } else { String::new() };
+    heading(ui, &title, &[("inliers", theme::INLIER), ("outliers", theme::REJECTED)], &text);
     let plot = shared_plot("residuals", height)
         .set_margin_fraction(vec2(0.01, 0.1))
         .x_axis_formatter(axis_labels("°"))
-        .include_y(-1.0)
-        .include_y(1.0);
+        .include_y(-end)
+        .include_y(end);
     let shown = plot.show(ui, |ui| {
         if let Some(px) = threshold {
             for y in [px, -px] {
@@ -56,13 +71,16 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, height: f32) -> Option<[f64; 2]
             }
         }
         ui.points(Points::new("outliers", points(false)).color(theme::REJECTED).radius(1.8));
+        for (sign, shape) in [(1.0, MarkerShape::Up), (-1.0, MarkerShape::Down)] {
+            ui.points(Points::new("outliers", beyond(sign)).color(theme::REJECTED).shape(shape).radius(3.0));
+        }
         ui.points(Points::new("inliers", points(true)).color(theme::INLIER).radius(1.5));
     });
     set_label(&shown.response, RESIDUALS);
     let pointer = shown.response.interact_pointer_pos().filter(|_| shown.response.clicked())?;
     // The point that is nearest on the screen is returned.
     let distance = |r: &Residual| {
-        let p = shown.transform.position_from_point(&[r.azimuth_deg, r.distance_px].into());
+        let p = shown.transform.position_from_point(&[r.azimuth_deg, r.distance_px.clamp(-end, end)].into());
         p.distance_sq(pointer)
     };
     all.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|r| r.point)

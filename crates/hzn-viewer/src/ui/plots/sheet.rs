@@ -4,7 +4,7 @@ use hzn_fuse::sink::Phase;
 
 use super::axis::polylines;
 use super::navigation;
-use super::over_time::{TimeAxis, refused, title};
+use super::over_time::{Source, TimeAxis, refused, series, title};
 use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
 use crate::model::quantity::QUANTITIES;
 use crate::ui::viewer::Viewer;
@@ -19,16 +19,12 @@ pub(in crate::ui) fn sheet(viewer: &Viewer) -> PlotSheet {
     for quantity in QUANTITIES.iter().filter(|q| viewer.settings.plotted.iter().any(|name| name == q.name)) {
         let mut lines = Vec::new();
         for (name, value_of) in quantity.lines {
-            let parts = |is_other: bool| {
-                polylines(count, 0.0, |i| {
-                    let rows = &viewer.rows;
-                    let row = if is_other { rows.other(i, viewer.body) } else { rows.current(i, viewer.body) }?;
-                    let value = value_of(row, viewer.truth_of(&row.file, &row.body)).filter(|x| x.is_finite())?;
-                    Some([axis.place(i)?, value])
-                })
+            let parts = |source: Source| {
+                let values = series(viewer, quantity, *value_of, source);
+                polylines(count, 0.0, |i| Some([axis.place(i)?, (*values.get(i)?)?]))
             };
-            lines.push(((*name).to_owned(), parts(false)));
-            lines.push((format!("{name} (compared)"), parts(true)));
+            lines.push(((*name).to_owned(), parts(Source::Current)));
+            lines.push((format!("{name} (compared)"), parts(Source::Other)));
         }
         lines.retain(|(_, parts)| !parts.is_empty());
         if !lines.is_empty() {
@@ -36,7 +32,7 @@ pub(in crate::ui) fn sheet(viewer: &Viewer) -> PlotSheet {
         }
     }
     rows.extend(navigation(viewer, &axis));
-    let heading = format!("{}, {} frames; grey: without an answer", viewer.sequence.stem(), count);
+    let heading = format!("{}, {} pictures; grey: without an answer", viewer.sequence.stem(), count);
     let refused = refused(viewer, &axis).into_iter().map(|(_, ends)| ends).collect();
     PlotSheet { heading, axis: axis.label(), ends: axis.ends(), refused, rows }
 }
@@ -53,7 +49,7 @@ fn navigation(viewer: &Viewer, axis: &TimeAxis) -> Vec<PlotRow> {
         let mut lines = Vec::new();
         for (phase, more) in [(Phase::Filter, ""), (Phase::Smoothed, " (smoothed)"), (Phase::Back, " (back)")] {
             for (name, value_of) in quantity.lines {
-                let parts = navigation::parts(nav, phase, *value_of, axis, column);
+                let parts = navigation::parts(nav, phase, quantity, *value_of, axis, column);
                 lines.push((format!("{name}{more}"), parts));
             }
         }

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use hzn_core::Preset;
 
-use super::Viewer;
+use super::{Leave, Viewer};
 use crate::model::{CircleEdit, Look, MaskEdit, Session, autosave};
 use crate::ui::Command;
 use crate::ui::panels::Panel;
 use crate::ui::path_dialog::{PathDialog, Purpose};
+use crate::work::open::Request;
 
 impl Viewer {
     /// Executes a command.
@@ -18,6 +19,7 @@ impl Viewer {
             Command::Open => self.ask(PathDialog::new(Purpose::Open, &self.sequence.folder)),
             Command::OpenFolder => self.ask_folder(),
             Command::OpenPath => self.path_dialog = Some(PathDialog::new(Purpose::Open, &self.sequence.folder)),
+            Command::Reload => self.reload_pictures(),
             Command::Save => self.save(),
             Command::SaveAs => {
                 if let Some(session) = &self.session {
@@ -72,6 +74,14 @@ impl Viewer {
         }
     }
 
+    /// Opens the same files again, at the same picture.
+    fn reload_pictures(&mut self) {
+        if !self.sequence.title.is_empty() {
+            let request = Request { frame: self.playback.frame(), ..self.request.clone() };
+            self.leave(Leave::Sequence(Box::new(request)), None);
+        }
+    }
+
     /// Starts or stops playing.
     fn toggle_playing(&mut self) {
         // The first picture is shown for its full time.
@@ -95,19 +105,19 @@ impl Viewer {
         }
     }
 
-    /// Goes to the worst picture: by error if the truth is known, otherwise by sigma.
+    /// Goes to the worst answer: by its error over its sigma if the truth is known, otherwise by sigma.
     fn go_worst(&mut self) {
         let known = !self.truth.is_empty();
         let badness = |row: &hzn_mcap::Row| {
             if known {
-                crate::model::quantity::error_deg(row, self.truth_of(&row.file, &row.body))
+                crate::model::quantity::error_sigmas(row, self.truth_of(&row.file, &row.body))
             } else {
                 row.sigma_max_deg
             }
         };
         let worst = self.rows.worst(self.body, badness);
         if worst.is_empty() {
-            return;
+            return self.add_note("No picture has an answer yet.");
         }
         // If the shown picture is the worst one of the last call, the next worst follows.
         let position = worst.iter().position(|&i| i == self.playback.frame());

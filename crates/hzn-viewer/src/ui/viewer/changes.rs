@@ -37,6 +37,11 @@ pub(in crate::ui) struct Changes {
 }
 
 impl Changes {
+    /// Returns true while the user is asked about changes.
+    pub(in crate::ui) fn is_asking(&self) -> bool {
+        self.question.is_some() || self.of_file.is_some() || self.lost.is_some()
+    }
+
     /// Prepares the autosaving into the folder of the settings file.
     pub(in crate::ui) fn new(store: Option<&Path>) -> Self {
         let folder = store.and_then(Path::parent);

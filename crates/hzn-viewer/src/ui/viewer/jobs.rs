@@ -33,7 +33,10 @@ impl Viewer {
     pub(in crate::ui) fn export_picture(&mut self, path: PathBuf) {
         let Some(frame_view) = self.frame_view.clone() else { return };
         let layers = self.layers_drawn();
-        self.start_job("Saving the picture", move |_| export::save_picture(&frame_view, &layers, &path));
+        let truth = self.truth.get(&frame_view.name).and_then(|all| all.first()).cloned();
+        self.start_job("Saving the picture", move |_| {
+            export::save_picture(&frame_view, truth.as_ref(), &layers, &path)
+        });
     }
 
     /// Saves the newest results of all pictures.
@@ -53,7 +56,7 @@ impl Viewer {
         let Some(config) = self.session.as_ref().and_then(|s| s.config().map(Arc::clone)) else { return };
         let fps = self.sequence.duration_s(0).filter(|d| *d > 0.0).map_or(25.0, |d| (1.0 / d).clamp(1.0, 60.0));
         let (sequence, layers, flight) = (self.sequence.clone(), self.layers_drawn(), self.flight);
-        let video = Video { sequence, config, flight, layers, fps };
+        let video = Video { sequence, config, flight, truth: self.truth.clone(), layers, fps };
         self.start_job("Saving the video", move |progress| video.write(&path, progress));
     }
 

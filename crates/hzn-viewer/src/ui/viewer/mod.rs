@@ -7,6 +7,7 @@ mod begin;
 mod changes;
 mod companions;
 mod jobs;
+mod keep_settings;
 mod outputs;
 mod request_key;
 mod sequence_work;
@@ -22,11 +23,12 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::Receiver;
 use hzn_files::truth::Truth;
 
+use super::focus_ring::FocusRing;
 use super::offered::Offered;
-use super::panels::Panels;
+use super::panels::{Panel, Panels};
 use super::path_dialog::PathDialog;
 use super::study_window::StudyWindow;
-use super::summary::Summary;
+use super::summary::{Missed, Summary};
 use super::textures::Textures;
 use super::toast::Toasts;
 use super::wizard_form::Wizard;
@@ -41,6 +43,7 @@ use crate::work::{Engine, FrameView, Job, Wake};
 use changes::Changes;
 pub(super) use changes::Leave;
 use companions::Companions;
+use keep_settings::KeptSettings;
 pub(super) use outputs::replaced;
 use request_key::RequestKey;
 use sequence_work::SequenceWork;
@@ -55,6 +58,7 @@ pub struct Viewer {
     pub(super) settings: Settings,
     /// File of the settings; with `None` they are not stored.
     store: Option<PathBuf>,
+    kept: KeptSettings,
     pub(super) sequence: Sequence,
     pub(super) rows: ResultHistory,
     pub(super) truth: HashMap<String, Vec<Truth>>,
@@ -84,6 +88,7 @@ pub struct Viewer {
     pub(super) wizard: Option<Wizard>,
     pub(super) study: Option<StudyWindow>,
     pub(super) summary: Summary,
+    pub(super) missed: Missed,
     /// The plots that the sequence offers.
     pub(super) offered: Offered,
     /// Results of other commands that belong to the sequence.
@@ -97,6 +102,10 @@ pub struct Viewer {
     /// Plot that was switched on last; the plots scroll to it.
     pub(super) new_plot: Option<String>,
     pub(super) panels: Panels,
+    /// Columns that show their top when they are drawn next, because other pictures were opened.
+    unscrolled: Vec<Panel>,
+    /// Where the plots over time begin and end on the screen.
+    pub(super) plot_span: Option<egui::Rangef>,
     /// Picture under the pointer in the plots.
     pub(super) hovered_frame: Option<usize>,
     /// Group of pictures that the time line shows; `None` shows all.
@@ -109,6 +118,7 @@ pub struct Viewer {
     pub(super) mask: Option<MaskEdit>,
     pub(super) circle: Option<CircleEdit>,
     pub(super) showing_help: bool,
+    pub(super) focus_ring: FocusRing,
     pub(super) showing_diff: bool,
     pub(super) layers_hidden: bool,
     /// Position in the list of the worst pictures.
@@ -140,6 +150,7 @@ impl Viewer {
         Self {
             settings,
             store,
+            kept: KeptSettings::default(),
             sequence: Sequence::default(),
             rows: ResultHistory::default(),
             truth: HashMap::new(),
@@ -162,6 +173,7 @@ impl Viewer {
             wizard: None,
             study: None,
             summary: Summary::default(),
+            missed: Missed::default(),
             offered: Offered::default(),
             companions: Companions::default(),
             linked_focal: true,
@@ -169,6 +181,8 @@ impl Viewer {
             focus_diagnosis: false,
             new_plot: None,
             panels: Panels::default(),
+            unscrolled: Vec::new(),
+            plot_span: None,
             hovered_frame: None,
             group: None,
             chosen_candidate: None,
@@ -177,6 +191,7 @@ impl Viewer {
             mask: None,
             circle: None,
             showing_help: false,
+            focus_ring: FocusRing::default(),
             showing_diff: false,
             layers_hidden: false,
             worst: 0,
@@ -254,6 +269,14 @@ impl Viewer {
     pub fn is_playing(&self) -> bool {
         self.playback.is_playing()
     }
+    /// Sets the speed of playing, as a multiple of the speed of the sequence.
+    pub fn set_speed(&mut self, speed: f64) {
+        self.playback.set_speed(speed);
+    }
+    /// Returns the speed of playing.
+    pub fn speed(&self) -> f64 {
+        self.playback.speed()
+    }
     /// Goes to a picture.
     pub fn go(&mut self, frame: usize) {
         self.playback.go(frame, self.sequence.len());
@@ -318,6 +341,18 @@ impl Viewer {
         self.session = Some(session);
         self.requested = None;
         self.body = 0;
+    }
+
+    /// Returns the area that scrolls a column. It shows its top after other pictures were opened.
+    pub(super) fn scroll_area(&mut self, panel: Panel) -> egui::ScrollArea {
+        let area = egui::ScrollArea::vertical().auto_shrink([false, false]);
+        match self.unscrolled.iter().position(|p| *p == panel) {
+            Some(n) => {
+                self.unscrolled.swap_remove(n);
+                area.vertical_scroll_offset(0.0)
+            }
+            None => area,
+        }
     }
 
     /// Returns the result for the selected body.

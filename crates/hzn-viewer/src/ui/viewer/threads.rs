@@ -9,6 +9,7 @@ use super::request_key::RequestKey;
 use super::sequence_work::SequenceWork;
 use crate::model::settings::Layer;
 use crate::model::{Place, Processed, ResultHistory, Sequence, Session, View, autosave};
+use crate::ui::panels::Panel;
 use crate::work::check::Check;
 use crate::work::open::{self, SensorText};
 use crate::work::sweep::{self, Sweep};
@@ -139,6 +140,7 @@ impl Viewer {
         (self.mask, self.circle) = (None, None);
         (self.worst, self.body) = (0, 0);
         self.view = View::FIT;
+        self.unscrolled = vec![Panel::Answer, Panel::Stages];
         (self.group, self.chosen_candidate, self.seen_version) = (None, None, 0);
         self.work = SequenceWork::default();
         (self.checking, self.damaged) = (None, Vec::new());
@@ -160,6 +162,8 @@ impl Viewer {
         self.wizard = None;
         self.cancel_save();
         self.path_dialog.take_if(|dialog| dialog.purpose.writes());
+        // A sensor that is compared belongs to the old pictures, too.
+        self.other = None;
         let is_named = self.request.sensor.is_some();
         let found = found.map(|s| Session::new(&s.text, &s.home, s.as_read));
         let found = found.map(|s| if is_named { s.opened_by_user() } else { s });
@@ -180,15 +184,13 @@ impl Viewer {
                  “Stages”, open one, or drop it on the window.",
             );
         }
-        // A preset that is compared has the camera of the old session.
-        let has_session = self.session.is_some();
-        self.other.take_if(|(_, other)| !has_session || !other.is_opened_by_user());
     }
 
     /// Marks the sequence as complete, and tells the user what it lacks.
     fn complete_sequence(&mut self, cut_off: bool, note: Option<String>) {
         self.opening = None;
         self.sequence.complete = true;
+        self.playback.set_usual_speed(self.sequence.interval_s());
         self.playback.go(self.playback.frame(), self.sequence.len());
         if cut_off {
             let path = self.request.inputs.first().cloned();
@@ -220,8 +222,8 @@ impl Viewer {
         self.checking = None;
         if let Some(first) = damaged.first() {
             self.add_problem(format!(
-                "The recording is damaged: {} frames lie in damaged parts, the first is frame {}. Their pictures may \
-                 be wrong; the time line marks them.",
+                "The recording is damaged: {} pictures lie in damaged parts, the first is picture {}. They may be \
+                 wrong; the time line marks them.",
                 damaged.len(),
                 first + 1
             ));

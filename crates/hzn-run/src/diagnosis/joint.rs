@@ -1,0 +1,245 @@
+//! Whether two of altitude, focal length and limb height are wrong at once.
+//!
+//! One wrong value gives the same correction in every picture. With two wrong values no single correction fits, but a
+//! pair of corrections does: the difference of the half-angles of picture i is Σ s_ik x_k, where s_ik says by how much
+//! one unit of the correction x_k changes it. Weighted least squares over all pictures gives the corrections. The
+//! weights fall with the residual (least absolute deviations by iteration), because some fits may be of clouds.
+
+use super::facts::{FitFacts, Suspect};
+
+/// A value to correct.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Remedy {
+    /// The quantity.
+    pub suspect: Suspect,
+    /// The correction: a shift in km, or a factor of the focal lengths.
+    pub correction: f64,
+    /// 1-sigma of the correction, in its unit.
+    pub sigma: f64,
+}
+
+/// Two values that together explain the half-angles of all pictures, where no single one does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pair {
+    /// The corrections.
+    pub remedies: [Remedy; 2],
+    /// Correlation of the corrections, -1 to 1.
+    pub correlation: f64,
+    /// Number of pictures.
+    pub pictures: usize,
+}
+
+/// Fewest pictures for a pair: two unknowns, and as many again that agree.
+const ENOUGH: usize = 4;
+/// A pair has to lower χ² by this much: an improvement of three sigmas for the one unknown more.
+const LEAST_GAIN: f64 = 9.0;
+/// The scatter about the best single value has to be this many times that about the pair. Below, the limb itself, which
+/// is not equally high everywhere, may be the reason.
+const LEAST_RATIO: f64 = 1.5;
+/// Corrections that are more correlated than this cannot be told apart.
+const MOST_CORRELATION: f64 = 0.95;
+/// A residual counts at most as much as one of this many sigmas.
+const MOST_SIGMAS: f64 = 5.0;
+const ITERATIONS: usize = 10;
+
+/// The difference of the half-angles of one picture over its 1-sigma, and its change by one unit of each correction.
+struct Equation {
+    difference: f64,
+    slopes: [f64; 3],
+}
+
+impl Equation {
+    /// Returns the equation of a picture. `limb_height_km` is the limb height that it was processed with.
+    fn new(facts: &FitFacts, limb_height_km: f64) -> Option<Self> {
+        let sigma = facts.fitted_sigma_deg;
+        let difference = (facts.fitted_deg - facts.expected_deg) / sigma;
+        let slope = |suspect: Suspect| {
+            let implied = facts.implied(suspect)?;
+            let [correction, sigma] = match suspect {
+                Suspect::Altitude => [implied.value, implied.sigma],
+                Suspect::Focal => [implied.value.ln(), implied.sigma / implied.value],
+                Suspect::LimbHeight => [implied.value - limb_height_km, implied.sigma],
+            };
+            // The correction alone makes the difference zero. In the noise, only its sigma says something.
+            let size = if correction.abs() > 2.0 * sigma { (difference / correction).abs() } else { 1.0 / sigma };
+            let sign = match suspect {
+                // From higher up, the body is smaller.
+                Suspect::Altitude => -1.0,
+                Suspect::LimbHeight => 1.0,
+                // The sign depends on the place of the limb in the picture.
+                Suspect::Focal => (difference * correction).signum(),
+            };
+            Some(sign * size).filter(|s| s.is_finite())
+        };
+        let [altitude, focal, limb] = Suspect::ALL.map(slope);
+        let slopes = [altitude?, focal?, limb?];
+        difference.is_finite().then_some(Self { difference, slopes })
+    }
+}
+
+/// The best corrections of one or two quantities.
+struct Solved {
+    corrections: [f64; 2],
+    /// Inverse of the normal matrix: variances and covariance for a scatter of 1.
+    inverse: [[f64; 2]; 2],
+    residuals: Vec<f64>,
+}
+
+impl Solved {
+    /// Solves for the quantities `which`; two equal ones are one.
+    fn new(equations: &[Equation], which: [usize; 2]) -> Option<Self> {
+        let single = which[0] == which[1];
+        let mut weights = vec![1.0; equations.len()];
+        let (mut x, mut inverse, mut residuals) = ([0.0; 2], [[0.0; 2]; 2], Vec::new());
+        for _ in 0..ITERATIONS {
+            let (mut n, mut b) = ([[0.0; 2]; 2], [0.0; 2]);
+            for (e, w) in equations.iter().zip(&weights) {
+                let row = [e.slopes[which[0]], if single { 0.0 } else { e.slopes[which[1]] }];
+                for i in 0..2 {
+                    b[i] += w * row[i] * e.difference;
+                    for j in 0..2 {
+                        n[i][j] += w * row[i] * row[j];
+                    }
+                }
+            }
+            if single {
+                n[1][1] = 1.0;
+            }
+            let determinant = n[0][0] * n[1][1] - n[0][1] * n[1][0];
+            if !(determinant > 1e-12 * n[0][0] * n[1][1]) {
+                return None;
+            }
+            inverse =
+                [[n[1][1] / determinant, -n[0][1] / determinant], [-n[1][0] / determinant, n[0][0] / determinant]];
+            x = [0, 1].map(|i| inverse[i][0] * b[0] + inverse[i][1] * b[1]);
+            let of = |e: &Equation| {
+                let second = if single { 0.0 } else { e.slopes[which[1]] * x[1] };
+                e.difference - e.slopes[which[0]] * x[0] - second
+            };
+            residuals = equations.iter().map(of).collect();
+            weights = residuals.iter().map(|r| 1.0 / r.abs().max(1.0)).collect();
+        }
+        Some(Self { corrections: x, inverse, residuals })
+    }
+
+    /// Returns the scatter of the residuals as a 1-sigma, at least that of the edge noise.
+    fn scatter(&self) -> f64 {
+        let mut sizes: Vec<f64> = self.residuals.iter().map(|r| r.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes.get(sizes.len() / 2).map_or(1.0, |median| (1.4826 * median).max(1.0))
+    }
+
+    fn chi2(&self, scatter: f64) -> f64 {
+        self.residuals.iter().map(|r| (r / scatter).abs().min(MOST_SIGMAS).powi(2)).sum()
+    }
+
+    fn correlation(&self) -> f64 {
+        self.inverse[0][1] / (self.inverse[0][0] * self.inverse[1][1]).sqrt()
+    }
+}
+
+/// Returns the two values that are wrong, if two of them explain the half-angles of all pictures and no single one
+/// does. `limb_height_km` is the limb height that the pictures were processed with, and its 1-sigma: a limb height more
+/// than three sigmas away is no explanation.
+pub fn find_pair<'a>(facts: impl Iterator<Item = &'a FitFacts>, limb_height_km: [f64; 2]) -> Option<Pair> {
+    let [limb_height_km, limb_sigma_km] = limb_height_km;
+    let equations: Vec<Equation> = facts.filter_map(|f| Equation::new(f, limb_height_km)).collect();
+    if equations.len() < ENOUGH {
+        return None;
+    }
+    let is_limb = |k: usize| Suspect::ALL.get(k) == Some(&Suspect::LimbHeight);
+    let is_possible = |which: [usize; 2], solved: &Solved| {
+        which.into_iter().zip(solved.corrections).all(|(k, km)| !is_limb(k) || km.abs() <= 3.0 * limb_sigma_km)
+    };
+    let solve = |which: [usize; 2]| {
+        let solved = Solved::new(&equations, which).filter(|solved| is_possible(which, solved))?;
+        Some((which, solved))
+    };
+    let singles = [[0, 0], [1, 1], [2, 2]].into_iter().filter_map(solve);
+    let pairs = [[0, 1], [1, 2], [0, 2]].into_iter().filter_map(solve);
+    let apart = pairs.filter(|(_, solved)| solved.correlation().abs() <= MOST_CORRELATION);
+    let (which, pair) = apart.min_by(|a, b| a.1.scatter().total_cmp(&b.1.scatter()))?;
+    let scatter = pair.scatter();
+    let explains = |single: &Solved| {
+        single.chi2(scatter) - pair.chi2(scatter) < LEAST_GAIN || single.scatter() < LEAST_RATIO * scatter
+    };
+    if singles.into_iter().any(|(_, single)| explains(&single)) {
+        return None;
+    }
+    let remedy = |i: usize| {
+        let suspect = *Suspect::ALL.get(which[i])?;
+        let (x, sigma) = (pair.corrections[i], scatter * pair.inverse[i][i].sqrt());
+        let (correction, sigma) = if suspect == Suspect::Focal { (x.exp(), sigma * x.exp()) } else { (x, sigma) };
+        Some(Remedy { suspect, correction, sigma })
+    };
+    Some(Pair { remedies: [remedy(0)?, remedy(1)?], correlation: pair.correlation(), pictures: equations.len() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::Implied;
+
+    const NOISE_DEG: f64 = 0.02;
+    const LIMB_KM: [f64; 2] = [10.0, 7.0];
+
+    /// Returns the facts of a picture whose altitude is wrong by `km` and whose focal length by the factor `focal`.
+    /// `bend` says by how many degrees ln f = 1 changes the half-angle, which depends on the place of the limb.
+    fn facts(altitude_km: f64, bend: f64, km: f64, focal: f64, noise: f64) -> FitFacts {
+        let radius = 6371.0;
+        let half_angle = |height: f64| ((radius + 10.0) / (radius + height)).asin().to_degrees();
+        let expected = half_angle(altitude_km);
+        let by_km = half_angle(altitude_km + 0.5) - half_angle(altitude_km - 0.5);
+        let fitted = half_angle(altitude_km + km) + bend * focal.ln() + noise * NOISE_DEG;
+        let difference = fitted - expected;
+        let implied = |slope: f64| Implied { value: difference / slope, sigma: (NOISE_DEG / slope).abs() };
+        let altitude = implied(by_km);
+        let ln_focal = implied(bend);
+        let factor = ln_focal.value.exp();
+        // One km of limb is about one km of altitude less, near the ground.
+        let limb = implied(-by_km * radius / (radius + altitude_km));
+        FitFacts {
+            expected_deg: expected,
+            fitted_deg: fitted,
+            fitted_sigma_deg: NOISE_DEG,
+            expected_sigma_deg: 0.3,
+            sigmas: difference / 0.3,
+            is_trial: true,
+            given_altitude_km: Some(altitude_km),
+            altitude_km: Some(Implied { value: altitude_km + altitude.value, sigma: altitude.sigma }),
+            focal_factor: Some(Implied { value: factor, sigma: ln_focal.sigma * factor }),
+            limb_height_km: Some(Implied { value: 10.0 + limb.value, sigma: limb.sigma }),
+        }
+    }
+
+    fn flight(km: f64, focal: f64) -> Vec<FitFacts> {
+        let noise = [0.3, -0.9, 1.2, -0.4, 0.1, -1.1, 0.8, 0.5, -0.6, 1.0, -0.2, -0.7];
+        let one = |(i, noise): (usize, &f64)| {
+            let bend = [40.0, -18.0, 25.0, 9.0][i % 4];
+            facts(120.0 + 25.0 * i as f64, bend, km, focal, *noise)
+        };
+        noise.iter().enumerate().map(one).collect()
+    }
+
+    #[test]
+    fn two_wrong_values_are_found_together() {
+        let mut all = flight(-20.0, 1.06);
+        // Two fits are of clouds.
+        all[3].fitted_deg += 9.0;
+        all[8].fitted_deg -= 7.0;
+        let pair = find_pair(all.iter(), LIMB_KM).unwrap();
+        let [altitude, focal] = pair.remedies;
+        assert_eq!((altitude.suspect, focal.suspect), (Suspect::Altitude, Suspect::Focal));
+        assert!((altitude.correction + 20.0).abs() < 3.0 && altitude.sigma < 3.0, "{altitude:?}");
+        assert!((focal.correction - 1.06).abs() < 0.01, "{focal:?}");
+        assert!(pair.correlation.abs() < 0.95 && pair.pictures == 12);
+    }
+
+    #[test]
+    fn one_wrong_value_is_no_pair() {
+        for (km, focal) in [(0.0, 1.0), (-30.0, 1.0), (25.0, 1.0), (0.0, 0.9), (0.0, 1.08)] {
+            assert_eq!(find_pair(flight(km, focal).iter(), LIMB_KM), None, "{km} km, {focal}");
+        }
+        assert_eq!(find_pair(flight(-20.0, 1.06)[..3].iter(), LIMB_KM), None, "three pictures are too few");
+    }
+}
