@@ -32,11 +32,12 @@ command of a row measures our number, or works with our setting.
 | better, worse | the same statistic of the same quantity, with a smaller or a larger error |
 | same | the same value, or a difference that is within the scatter of our own figures |
 | different | another value: a misprint, or a choice; the reason is in the row |
+| not comparable | the paper prints no value; the reason and ours are in the row |
 | open | nobody has measured our number in this statistic; the row says what has to be run |
 
 Numbers of figures are read off. Where the reading did not note the figure, the place has the range. \"No value is read
-off\" means that a curve still has to be read. The pictures of the papers are not public, so ours are rendered, and a
-verdict holds for the scenes of its page.
+off\" means that the reading noted a curve or a picture without a number. The pictures of the papers are not public, so
+ours are rendered, and a verdict holds for the scenes of its page.
 ";
 
 /// Document that contains sections.

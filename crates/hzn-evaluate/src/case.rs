@@ -121,6 +121,9 @@ pub struct Miss {
     /// Rotation from the answer to the truth, about the camera's x, y and z axes, in degrees. For a camera that looks
     /// along the horizon, x is its pitch and z is its roll.
     pub about_deg: [f64; 3],
+    /// Angle from the answer to the truth in the picture, about the principal point, in degrees (positive from right to
+    /// down). It is the error of the two-dimensional direction; `None` if answer or truth is straight ahead.
+    pub picture_deg: Option<f64>,
     /// The larger of the two standard deviations of the answer's covariance, in degrees.
     pub sigma_max_deg: f64,
     /// Normalised estimation error squared (NEES) on the tangent plane, with two degrees of freedom. It is `None` if
@@ -154,9 +157,15 @@ impl Miss {
         let d = basis.transpose() * truth;
         let d = d * (angle_deg.to_radians() / d.norm().max(1e-300));
         let nees = tangent.cholesky().map(|c| d.dot(&c.solve(&d))).filter(|x| x.is_finite());
+        let (answered, true_direction) = (picture_direction(e), picture_direction(truth));
+        let picture_deg = answered.zip(true_direction).map(|(a, t)| {
+            let (right, down) = (a[0] * t[0] + a[1] * t[1], a[0] * t[1] - a[1] * t[0]);
+            down.atan2(right).to_degrees()
+        });
         Some(Self {
             angle_deg,
             about_deg,
+            picture_deg,
             sigma_max_deg: tangent.symmetric_eigenvalues().max().max(0.0).sqrt().to_degrees(),
             nees,
             half_angle_ratio: found.half_angle_deg.map(|a| a / truth_half_angle_deg),
@@ -164,6 +173,11 @@ impl Miss {
             found: *found,
         })
     }
+}
+
+/// Returns the unit vector in the picture (right, down) from the principal point towards a direction.
+fn picture_direction(direction: Vector3<f64>) -> Option<[f64; 2]> {
+    UnitVec3::<hzn_core::frames::Cam, f64>::try_new(direction.into())?.to_picture_direction()
 }
 
 /// The reason why answers and truth do not match; the message names the first picture that does not fit.

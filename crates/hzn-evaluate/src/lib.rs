@@ -27,7 +27,7 @@ pub use honesty::{Honesty, Within};
 pub use integrity::{Integrity, IntegrityRange, share_interval};
 pub use means::{LENGTHS, Means};
 pub use position::{MeasuredPosition, PositionErrors, PositionMiss};
-pub use summary::{Errors, Evaluation, Group, GroupRow, Horace};
+pub use summary::{Errors, Evaluation, Group, GroupRow, Horace, PictureError};
 
 #[cfg(test)]
 mod tests;

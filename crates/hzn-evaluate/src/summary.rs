@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::case::Case;
+use crate::case::{Case, Miss};
 use crate::classes::ErrorClasses;
 use crate::honesty::Honesty;
 use crate::integrity::Integrity;
@@ -69,6 +69,34 @@ pub struct Errors {
     pub mean_about_deg: [f64; 3],
     /// RMS rotation from answer to truth, about the camera's x, y, z axes.
     pub rms_about_deg: [f64; 3],
+    /// Error of the two-dimensional direction in the picture; `None` if no answer has one.
+    pub picture: Option<PictureError>,
+}
+
+/// Error of the unit vector in the picture towards the body (Barf 2014, (2.37)), as an angle about the principal point.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PictureError {
+    /// Number of answers whose body is not straight ahead.
+    pub answers: usize,
+    /// Mean, degrees.
+    pub mean_deg: f64,
+    /// Standard deviation about the mean, degrees.
+    pub sigma_deg: f64,
+}
+
+impl PictureError {
+    fn new(misses: &[Miss]) -> Option<Self> {
+        let errors: Vec<f64> = misses.iter().filter_map(|m| m.picture_deg).collect();
+        let mean = |of: &dyn Fn(f64) -> f64| errors.iter().map(|x| of(*x)).sum::<f64>() / errors.len() as f64;
+        let mean_deg = mean(&|x| x);
+        let sigma_deg = mean(&|x| (x - mean_deg) * (x - mean_deg)).sqrt();
+        (!errors.is_empty()).then_some(Self { answers: errors.len(), mean_deg, sigma_deg })
+    }
+
+    /// Returns the statistic of HORACE: the absolute mean plus the standard deviation, degrees.
+    pub fn mean_and_sigma_deg(&self) -> f64 {
+        self.mean_deg.abs() + self.sigma_deg
+    }
 }
 
 /// The success criteria of HORACE (Barf 2014; Barf et al. 2015), in angles instead of pixels. The radius is the
@@ -197,7 +225,7 @@ impl Errors {
         let mut sorted: Vec<f64> = misses.iter().map(|m| m.angle_deg).collect();
         sorted.sort_by(f64::total_cmp);
         let worst_deg = *sorted.last()?;
-        let mean = |f: &dyn Fn(&super::Miss) -> f64| misses.iter().map(f).sum::<f64>() / misses.len() as f64;
+        let mean = |f: &dyn Fn(&Miss) -> f64| misses.iter().map(f).sum::<f64>() / misses.len() as f64;
         Some(Self {
             answers: misses.len(),
             rms_deg: mean(&|m| m.angle_deg * m.angle_deg).sqrt(),
@@ -206,6 +234,7 @@ impl Errors {
             worst_deg,
             mean_about_deg: [0, 1, 2].map(|i| mean(&|m| m.about_deg[i])),
             rms_about_deg: [0, 1, 2].map(|i| mean(&|m| m.about_deg[i] * m.about_deg[i]).sqrt()),
+            picture: PictureError::new(&misses),
         })
     }
 }

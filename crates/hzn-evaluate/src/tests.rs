@@ -55,6 +55,31 @@ fn errors_by_axis_and_their_sigmas() {
     assert_eq!((m.half_angle_ratio, cases[0].off_axis_deg), (Some(1.0), 90.0));
 }
 
+/// The error in the picture is that of the direction from its middle: an error along this direction does not count, and
+/// near the middle an angle in space is a larger one in the picture.
+#[test]
+fn the_error_in_the_picture_has_two_dimensions() {
+    let truth = |file: &str| Truth { axis_x: 0.0, axis_y: 0.5, axis_z: 0.75f64.sqrt(), ..truth(file, 1) };
+    let turned = |file: &str, across_deg: f64, along_deg: f64| {
+        let (a, b) = (across_deg.to_radians(), (30.0 + along_deg).to_radians());
+        let axis = [b.sin() * a.sin(), b.sin() * a.cos(), b.cos()];
+        let found = MeasuredDirection { axis, ..answer(file, 0.0, 0.0).found.unwrap() };
+        Answer { found: Some(found), ..answer(file, 0.0, 0.0) }
+    };
+    let answers = [turned("a", 3.0, 0.0), turned("b", 1.0, 5.0)];
+    let cases = pair(&answers, &[truth("a"), truth("b")], None).unwrap();
+    let [e] = Evaluation::by_body(&cases).try_into().unwrap();
+    let picture = e.errors.unwrap().picture.unwrap();
+    assert!((picture.mean_deg - 2.0).abs() < 1e-9 && (picture.sigma_deg - 1.0).abs() < 1e-9, "{picture:?}");
+    assert!((picture.mean_and_sigma_deg() - 3.0).abs() < 1e-9);
+    let ahead = Answer {
+        found: Some(MeasuredDirection { axis: [0.0, 0.0, 1.0], ..answers[0].found.unwrap() }),
+        ..answers[0].clone()
+    };
+    let cases = pair(&[ahead], &[truth("a")], None).unwrap();
+    assert_eq!(Evaluation::by_body(&cases)[0].errors.unwrap().picture, None);
+}
+
 #[test]
 fn a_singular_covariance_has_no_nees_and_a_large_error_is_an_arc() {
     let mut opposite = answer("a", 0.0, 0.0);

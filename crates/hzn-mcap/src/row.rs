@@ -229,6 +229,12 @@ columns! {
         yaw_deg: Option<f64>,
         /// 1σ of that rotation, degrees.
         yaw_sigma_deg: Option<f64>,
+        /// Unit vector in the picture towards the body, to the right; empty for a body straight ahead.
+        picture_x: Option<f64>,
+        /// Unit vector in the picture towards the body, down.
+        picture_y: Option<f64>,
+        /// Standard deviation of that vector, which is its angle in the picture in radians.
+        picture_sigma: Option<f64>,
         /// Probability that the edge of the answer is the limb; only for bodies with air.
         p_limb: Option<f64>,
         /// Protection level, degrees: the angle that the error of the axis exceeds with the probability
@@ -355,6 +361,10 @@ impl Row {
         }
         if let Some(position) = &s.position {
             self.set_position(position);
+        }
+        if let Some((direction, sigma)) = s.picture_direction() {
+            [self.picture_x, self.picture_y] = direction.map(number);
+            self.picture_sigma = number(sigma);
         }
         self.rms_px = number(s.rms_px);
         self.p_limb = s.p_limb.and_then(number);

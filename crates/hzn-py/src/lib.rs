@@ -19,6 +19,7 @@ mod errors;
 mod expected;
 mod image;
 mod locate;
+mod made;
 mod nav;
 mod notebook;
 mod numbered;

@@ -31,7 +31,12 @@ def test_an_answer_and_its_covariance(sensor):
     # The default probability is 1e-4.
     assert report.p_limb > 0.0 and np.isclose(report.protection_deg, 6.15 * report.sigma_max_deg)
     assert "sigma" in repr(report) and report.altitude_km == 400.0 and report.axis_vehicle is None
-    assert report.to_dict()["axis_y"] == report.axis[1]
+    row = report.to_dict()
+    assert row["axis_y"] == report.axis[1]
+    # The limb is straight down in the picture, and only a turn about the optical axis moves this direction.
+    assert [row["picture_x"], row["picture_y"]] == list(report.picture_direction)
+    assert np.allclose(report.picture_direction, [0.0, 1.0], atol=5 * report.picture_sigma)
+    assert 0.0 < report.picture_sigma < np.radians(report.sigma_max_deg) / np.hypot(*report.axis[:2]) * 1.001
 
 
 def test_the_axis_in_the_vehicle():
@@ -44,6 +49,7 @@ def test_the_axis_in_the_vehicle():
 
 def test_no_limb_is_an_answer_too(sensor):
     report = sensor.process(np.full((240, 320), 9, np.uint8))
+    assert report.picture_direction is None and report.picture_sigma is None
     assert not report.ok and report.axis is None and report.covariance is None and report.covariance_common is None
     assert report.status in repr(report) and report.protection_deg is None
 

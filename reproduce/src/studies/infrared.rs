@@ -28,15 +28,20 @@ const ATTITUDE_SIGMA_DEG: f64 = 5.0;
 const SCENE: &str = "384×288 pixels, equidistant lens of 92 px/rad to 90° off axis, 600 km above WGS-84, limb \
                      half-level 25 km ± 4.5 km over latitude with a scale of 5 km, blur 1 px, noise 2 %, 16 bits";
 
+/// Returns the body of a sensor with one limb height for all latitudes.
+pub(super) fn one_height(flight: &Flight) -> body::Config {
+    body::Config {
+        limb_height_sigma_km: COMMON_HEIGHT_SIGMA_KM,
+        limb_height_by_latitude_km: Default::default(),
+        ..flight.sensor.body.clone()
+    }
+}
+
 /// Returns `hzn` with one limb height for all latitudes, the same with an attitude, the same with an attitude and the
 /// height by latitude, and `zju-2022`. `by_latitude_km` has rows of latitude in degrees and height in km;
 /// `height_sigma_km` is the remaining sigma of the height.
 fn sensors(flight: &Flight, by_latitude_km: &[[f64; 2]], height_sigma_km: f64) -> Vec<Sensor> {
-    let one = body::Config {
-        limb_height_sigma_km: COMMON_HEIGHT_SIGMA_KM,
-        limb_height_by_latitude_km: Default::default(),
-        ..flight.sensor.body.clone()
-    };
+    let one = one_height(flight);
     let each = body::Config {
         limb_height_sigma_km: height_sigma_km,
         limb_height_by_latitude_km: by_latitude_km.iter().copied().collect(),
@@ -53,7 +58,7 @@ fn sensors(flight: &Flight, by_latitude_km: &[[f64; 2]], height_sigma_km: f64) -
 }
 
 /// Returns `count` pictures at this angle off nadir, spread evenly over the globe, azimuth and roll.
-fn pictures_off_nadir(off_nadir_deg: f64, count: usize) -> Flight {
+pub(super) fn pictures_off_nadir(off_nadir_deg: f64, count: usize) -> Flight {
     let mut flight = leo_infrared(2, 1).with_limb_height_by_latitude_km(&LIMB_HEIGHTS_KM);
     let Some(pattern) = flight.frames.first().cloned() else { return flight };
     let frame = |i: usize| {

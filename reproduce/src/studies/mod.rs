@@ -3,9 +3,12 @@
 mod airglow;
 mod artefacts;
 mod atek;
+mod atek_largest;
+mod controller;
 mod defaults;
 mod design;
 mod effects;
+mod estimators;
 mod horace;
 mod infrared;
 mod lens;
@@ -19,6 +22,7 @@ mod recordings;
 mod residuals;
 mod scenes;
 mod setup;
+mod spin;
 mod suns;
 mod yaw;
 
@@ -45,6 +49,8 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("visibility", "Which conic is seen: [BB] figures 6 and 7", design::visibility),
     reproduced("spherical-earth", "Error of a spherical Earth: [BB] figure 8", design::spherical_earth),
     reproduced("infrared", "Infrared Earth sensor: [W] figures 5 to 8", infrared::off_nadir),
+    reproduced("estimators", "Estimators and noisy points: [W] figures 7 and 8, step 6", estimators::figures_7_and_8),
+    reproduced("thresholds", "The controller of the threshold: [B14], 6", controller::thresholds_of_a_flight),
     reproduced("horace", "Criteria of HORACE: [B14], [H15]", horace::criteria),
     reproduced("leo-infrared", "Accuracy and honesty: infrared in low orbit", infrared::flight),
     reproduced("rocket", "Accuracy and honesty: sounding rocket", scenes::rocket),
@@ -56,6 +62,8 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("defaults", "Honesty with default settings", defaults::default_settings),
     reproduced("lens-from-limb", "The lens from the limb", lens::from_the_limb),
     reproduced("atek", "Navigation: the flight of ATEK, [BB] figures 37 to 44", atek::navigation),
+    reproduced("atek-largest", "Navigation: ATEK in the paper's statistics", atek_largest::statistics),
+    reproduced("spin", "Navigation: five turns a second, the motive of [BB]", spin::navigation_through_spin),
     reproduced("orbit", "Navigation: orbits through eclipse and infrared orbits", orbit::navigation),
     reproduced("effects", "What moves the limb in the scenes", effects::switched_off_effects),
     reproduced("lost-discs", "Discs under an image circle", looks::lost_discs),

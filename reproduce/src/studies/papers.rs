@@ -16,8 +16,8 @@ const TABLES: [(&str, &str); 3] = [
     ("horace.toml", include_str!("../../papers/horace.toml")),
 ];
 
-/// Beginning of `ours` where nobody has measured the printed statistic yet.
-const UNMEASURED: &str = "not measured in this statistic";
+/// Beginning of `ours` where nobody has measured the printed statistic yet; only a row with the verdict `open` has it.
+const UNMEASURED: &str = "not measured";
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -41,7 +41,7 @@ struct Row {
     /// Our number in the same statistic; each of its digits is on `page`.
     ours: String,
     verdict: Verdict,
-    /// Reason of the difference; for an open row, what has to be run.
+    /// Reason of the difference; for a row that cannot be compared, what is missing.
     why: String,
     /// Command that measures our number, or works with our setting.
     command: String,
@@ -51,17 +51,18 @@ struct Row {
 
 /// Comparison of our number with the printed one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 enum Verdict {
     Better,
     Same,
     Different,
     Worse,
+    NotComparable,
     Open,
 }
 
 impl Verdict {
-    const ALL: [Self; 5] = [Self::Better, Self::Same, Self::Different, Self::Worse, Self::Open];
+    const ALL: [Self; 6] = [Self::Better, Self::Same, Self::Different, Self::Worse, Self::NotComparable, Self::Open];
 
     const fn name(self) -> &'static str {
         match self {
@@ -69,6 +70,7 @@ impl Verdict {
             Self::Same => "same",
             Self::Different => "different",
             Self::Worse => "worse",
+            Self::NotComparable => "not comparable",
             Self::Open => "open",
         }
     }
@@ -98,13 +100,14 @@ fn check(row: &Row, root: &Path) -> anyhow::Result<()> {
         ("page", page),
     ];
     for (name, cell) in cells {
-        ensure!(!cell.trim().is_empty(), "{name} is empty; if a number is unknown, say what has to be run");
+        ensure!(!cell.trim().is_empty(), "{name} is empty; if there is no number, say which measurement shows why");
+        let is_open = *verdict == Verdict::Open && name == "ours";
+        ensure!(
+            cell.starts_with(UNMEASURED) == is_open,
+            "{name}: every row needs a number of ours, or the reason why it has none"
+        );
         ensure!(!cell.contains(['|', '\n']), "{name}: a vertical bar or a line break would end the cell of the table");
     }
-    ensure!(
-        (*verdict == Verdict::Open) == ours.starts_with(UNMEASURED),
-        "the verdict `open` and an `ours` that begins with \"{UNMEASURED}\" belong together"
-    );
     check_command(command, root)?;
     let quoted = section_of(&root.join("book"), page)?;
     let known = numbers(&quoted);
@@ -259,8 +262,9 @@ mod tests {
             assert!(error(|r| *field(r) = " ".into()).contains(" is empty"));
             assert!(error(|r| field(r).push('|')).contains("vertical bar"));
         }
-        assert!(error(|r| r.verdict = Verdict::Open).contains("belong together"));
-        assert!(error(|r| r.ours = UNMEASURED.into()).contains("belong together"));
+        for field in fields {
+            assert!(error(|r| *field(r) = format!("{UNMEASURED} in this statistic")).contains("needs a number"));
+        }
         assert!(error(|r| r.ours = "21.5 km".into()).contains("does not have the number 21.5"));
     }
 

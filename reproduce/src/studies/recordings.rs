@@ -60,28 +60,35 @@ pub(super) fn untold(one: &Scenario) -> Config {
 
 /// Renders the pictures of a camera and runs the sensor on them. `given` replaces the rows of frames.csv.
 pub(super) fn process(one: &Scenario, config: &Config, given: Option<&Frames>) -> anyhow::Result<Vec<Row>> {
+    process_each(one, [config], given).map(|[rows]| rows)
+}
+
+/// Does the same with several sensors on the same pictures.
+pub(super) fn process_each<const N: usize>(
+    one: &Scenario,
+    configs: [&Config; N],
+    given: Option<&Frames>,
+) -> anyhow::Result<[Vec<Row>; N]> {
     let flight = one.flight()?;
-    let mut sensor = AnySensor::new(config, false)?;
-    let kinds: Vec<Kind> = match config.bodies.as_slice() {
-        [] => vec![config.body.kind],
-        several => several.iter().map(|body| body.kind).collect(),
-    };
-    let mut rows = Vec::new();
+    let mut sensors = configs.iter().map(|config| AnySensor::new(config, false)).collect::<Result<Vec<_>, _>>()?;
+    let mut rows = [const { Vec::new() }; N];
     for (batch, frames) in flight.frames.chunks(BATCH).enumerate() {
         let pictures: Vec<_> = frames.par_iter().map(FlightFrame::render).collect::<Result<_, _>>()?;
         for (k, (frame, picture)) in frames.iter().zip(&pictures).enumerate() {
             let index = (batch * BATCH + k) as u64;
             let data = given.and_then(|g| g.get(&frame.file)).cloned().unwrap_or_else(|| known(one, frame));
-            for (kind, done) in kinds.iter().zip(sensor.process(&picture.view(), Some(&data), None)) {
-                let report = done.report.map_err(|e| anyhow!("{}: {e}", frame.file))?;
-                let meta = RowMeta {
-                    index,
-                    file: frame.file.clone(),
-                    time_s: data.time_s,
-                    body: kind.name().into(),
-                    altitude_km: data.altitude_km,
-                };
-                rows.push(Row::from_report(&meta, &report, None));
+            for ((sensor, config), rows) in sensors.iter_mut().zip(configs).zip(&mut rows) {
+                for (body, done) in config.each_body().iter().zip(sensor.process(&picture.view(), Some(&data), None)) {
+                    let report = done.report.map_err(|e| anyhow!("{}: {e}", frame.file))?;
+                    let meta = RowMeta {
+                        index,
+                        file: frame.file.clone(),
+                        time_s: data.time_s,
+                        body: body.kind.name().into(),
+                        altitude_km: data.altitude_km,
+                    };
+                    rows.push(Row::from_report(&meta, &report, None));
+                }
             }
         }
     }

@@ -30,6 +30,7 @@ fn a_run_against_its_truth_as_text_json_and_page() {
     for text in [
         "answered           5 of 5 pictures",
         "false answers      0 of 1 pictures",
+        "in the picture",
         "HORACE criteria",
         "6.15 sigma; 0 of 5 errors are above it (0.00 % to 52.18 %, 95 %)",
         "above 1: misleading                     0         0",

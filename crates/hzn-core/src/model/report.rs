@@ -1,6 +1,6 @@
 //! The report that `process` returns.
 
-use crate::base::linalg::basis;
+use crate::base::linalg::{V3, basis};
 use crate::base::real::Real;
 use crate::geometry::frames::{Cam, Cov3, Fixed, UnitVec3, Vehicle};
 use crate::geometry::scaling::ScaledCone;
@@ -229,6 +229,17 @@ impl<T: Real> Position<T> {
 }
 
 impl<T: Real> Solution<T> {
+    /// Returns the unit vector (right, down) in the picture from the principal point towards the body, and the standard
+    /// deviation of its direction in radians. This is HORACE's two-dimensional answer (Barf 2014, (2.37)). `None` for a
+    /// body straight ahead or straight behind, which is in no direction.
+    pub fn picture_direction(&self) -> Option<([T; 2], T)> {
+        let [x, y, _] = self.axis.xyz();
+        let [right, down] = self.axis.to_picture_direction()?;
+        let across = UnitVec3::assume_unit(V3::new(-down, right, T::ZERO));
+        let variance = self.covariance.variance_along(&across).max(T::ZERO);
+        Some(([right, down], (variance / (x * x + y * y)).sqrt()))
+    }
+
     /// Returns the larger standard deviation of the errors that the next picture does not share, radians; that of the
     /// whole error if the common part is not known.
     pub fn noise_rad(&self) -> T {

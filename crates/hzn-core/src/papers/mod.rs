@@ -2,7 +2,7 @@
 
 mod braun_barf_2022;
 mod common;
-mod horace_2015;
+mod horace;
 mod wang_2022;
 
 use crate::base::error::ConfigError;
@@ -26,7 +26,9 @@ choices! {
         @- Dlr2022 = "dlr-2022" needs "dlr";
         /// The infrared Earth sensor of Wang et al. 2022.
         @- Zju2022 = "zju-2022" needs "zju";
-        /// HORACE on REXUS-16 (Barf 2014, Barf et al. 2015).
+        /// HORACE on REXUS-16 as in Barf 2014.
+        @- Horace2014 = "horace-2014" needs "horace";
+        /// HORACE on REXUS-16 as in Barf et al. 2015.
         @- Horace2015 = "horace-2015" needs "horace";
     }
 }
@@ -70,7 +72,8 @@ impl Config {
             }
             Preset::Dlr2022 => braun_barf_2022::preset(&mut config),
             Preset::Zju2022 => wang_2022::preset(&mut config),
-            Preset::Horace2015 => horace_2015::preset(&mut config),
+            Preset::Horace2014 => horace::preset(&mut config, &horace::IN_2014),
+            Preset::Horace2015 => horace::preset(&mut config, &horace::IN_2015),
         }
         config
     }
@@ -103,7 +106,7 @@ mod tests {
     #[test]
     #[cfg(all(feature = "dlr", feature = "horace", feature = "zju"))]
     fn published_systems_keep_their_noise_and_limb() {
-        for preset in [Preset::Dlr2022, Preset::Zju2022, Preset::Horace2015] {
+        for preset in [Preset::Dlr2022, Preset::Zju2022, Preset::Horace2014, Preset::Horace2015] {
             let config = Config::preset(preset, camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
             let covariance::Config { noise, sigma_px, correlation_px, bias_px, tilt_px, .. } = config.covariance;
             assert_eq!(noise, covariance::Noise::Given);

@@ -8,6 +8,7 @@ use hzn_core::body::{Kind, Prior};
 use hzn_core::camera::{self, Model};
 use hzn_core::edge_points::SubPixel;
 use hzn_core::error_budget::ErrorBudget;
+use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::observer::Border;
 use hzn_core::pixel::{ImagePoint, Pixel};
@@ -15,7 +16,7 @@ use hzn_core::retry::Combine;
 use hzn_core::status::Status;
 use hzn_core::verdict::Verdict;
 use hzn_core::{Config, Expected, FlightHorizon, HostHorizon, Observer, Preset, Report, Solution};
-use hzn_core::{consensus, contour, covariance, fit, retry, threshold};
+use hzn_core::{consensus, contour, covariance, fit, gates, retry, threshold};
 use proptest::prelude::*;
 
 /// Makes a configuration for a sphere of 20° angular radius and a pinhole with f = 60 px times `scale`. The radius of
@@ -101,7 +102,7 @@ const CONTOURS: [contour::Method; 4] =
 
 #[test]
 fn every_preset_and_contour_method_finds_a_disc() {
-    for preset in [Preset::Hzn, Preset::Dlr2022, Preset::Zju2022, Preset::Horace2015] {
+    for preset in [Preset::Hzn, Preset::Dlr2022, Preset::Zju2022, Preset::Horace2014, Preset::Horace2015] {
         for method in CONTOURS {
             let mut config = config(preset, 2);
             config.contour.method = method;
@@ -221,14 +222,17 @@ fn halves_answer_where_the_whole_does_not() {
     assert_eq!(watch.levels.get(), 3);
 }
 
-/// HORACE's values for its camera are altitude limits of 20 and 100 km and a margin of 5000 px at 768 rows.
+/// HORACE's values for its camera are altitude limits of 0 (2014: 20) and 100 km and a margin of 5000 px at 768 rows.
 #[test]
 fn the_radius_check_of_horace_is_in_pixels() {
     let camera = camera::Config::ideal(Model::Pinhole, 1024, 768, 2133.3);
     let own = Config::preset(Preset::Horace2015, camera);
     assert_eq!(own.threshold.factor, 0.75);
-    assert_eq!((own.gates.altitude_limits_km, own.input.scale_to_height), (Some([20.0, 100.0]), Some(240)));
-    assert!((own.gates.radius_margin_px * 768.0 / 240.0 - 5000.0).abs() < 1e-9);
+    assert_eq!((own.gates.altitude_limits_km, own.input.scale_to_height), (Some([0.0, 100.0]), Some(400)));
+    assert!((own.gates.radius_margin_px * 768.0 / 400.0 - 5000.0).abs() < 1e-9);
+    let first = Config::preset(Preset::Horace2014, own.camera.clone());
+    assert_eq!((first.gates.altitude_limits_km, first.retry.combine), (Some([20.0, 100.0]), Combine::Median));
+    assert!((first.brightness.min_mean, own.brightness.min_mean) == (5.0 / 255.0, 15.0 / 255.0));
     // The radius of the disc is 87.4 px. Limits that begin 3 px above it reject the disc, unless the margin is wider.
     let mut config = config(Preset::Horace2015, 4);
     config.retry.method = retry::Method::None;
@@ -298,6 +302,61 @@ fn limits_are_checked_by_name() {
     assert_eq!(refused(&|c| c.input.scale_to_height = Some(8)), "input.scale_to_height");
 }
 
+/// Draws two discs; the first limb is half as long as the second one.
+fn two_discs(config: &Config) -> Vec<u8> {
+    let radius = 240.0 * 20f64.to_radians().tan();
+    let small = disc(config, 60.0, 60.0, 0.5 * radius);
+    let large = disc(config, 270.0, 150.0, radius);
+    small.iter().zip(&large).map(|(a, b)| *a.max(b)).collect()
+}
+
+/// In HORACE the longest border is the limb, and the picture has no answer if this border fails. `hzn` would take the
+/// border that passes.
+#[test]
+fn only_the_longest_border_counts() {
+    let mut config = config(Preset::Horace2015, 4);
+    config.retry.method = retry::Method::None;
+    let data = two_discs(&config);
+    let altitude_of = |radius_px: f64| 1000.0 / (radius_px / 240.0).atan().sin() - 1000.0;
+    let radius = 240.0 * 20f64.to_radians().tan();
+    for (part, answers) in [(1.0, true), (0.5, false)] {
+        config.gates.radius_margin = 0.03;
+        config.gates.altitude_limits_km = Some([altitude_of(part * radius), altitude_of(part * radius)]);
+        config.gates.choice = gates::Choice::Longest;
+        let report = answer(&config, &data, &Watch::default());
+        assert_eq!(report.solution.is_some(), answers, "{part}: {:?}", report.candidates);
+        config.gates.choice = gates::Choice::Score;
+        let report = answer(&config, &data, &Watch::default());
+        assert!(report.solution.is_some(), "{part}: {:?}", report.candidates);
+    }
+}
+
+/// In Braun & Barf 2022 the edge with the smallest residual (28) is the limb. `hzn` ends its search at the first edge
+/// that is good enough, and that is the upper disc, which is a little too large.
+#[test]
+fn the_smallest_section_residual_chooses() {
+    let mut config = config(Preset::Dlr2022, 4);
+    config.gates.altitude_limits_km = None;
+    let half_angle = 8f64.to_radians();
+    config.body.altitude_km = Some(1000.0 / half_angle.sin() - 1000.0);
+    let [upper, lower] = [[100.0, 80.0], [290.0, 170.0]];
+    let axis = |[u, v]: [f64; 2]| [(u - 191.5) / 240.0, (v - 127.5) / 240.0, 1.0];
+    let unit = |place| UnitVec3::<Cam, f64>::try_new(axis(place)).unwrap();
+    let w = u32::from(config.camera.width);
+    let data: Vec<u8> = (0..w * u32::from(config.camera.height))
+        .map(|i| {
+            let ray = unit([f64::from(i % w), f64::from(i / w)]);
+            let is_within = |place, part: f64| ray.angle_rad(&unit(place)) < part * half_angle;
+            if is_within(upper, 1.05) || is_within(lower, 1.0) { 220 } else { 10 }
+        })
+        .collect();
+    for (choice, want) in [(gates::Choice::SectionResidual, lower), (gates::Choice::Score, upper)] {
+        config.gates.choice = choice;
+        let off = off_deg(&answer(&config, &data, &Watch::default()), axis(want));
+        assert!(off < 0.2, "{choice:?}: {off}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
     #[test]
@@ -311,8 +370,8 @@ proptest! {
         config.camera.theta_max_deg = circle.then_some(30.0);
         config.body.kind = [Kind::Earth, Kind::EarthSphere, Kind::Sun, Kind::Moon][body];
         config.body.radius_km = None;
-        config.edge_points.min_points = 8;
-        config.gates.min_inliers = 8;
+        config.edge_points.min_points = 3;
+        config.gates.min_inliers = 3;
         config.gates.limb_in_view = gates;
         config.gates.max_section_residual = gates.then_some(0.025);
         config.gates.altitude_limits_km = gates.then_some([0.0, 5000.0]);
@@ -340,6 +399,9 @@ proptest! {
         config.covariance.overbound = pick[5] == 0;
         config.edge_points.sub_pixel =
             [SubPixel::None, SubPixel::Linear, SubPixel::Zernike, SubPixel::Erf][methods[4] % 4];
+        use gates::Choice::{Longest, Score, SectionResidual};
+        config.gates.choice = [Score, SectionResidual, Longest][methods[5] % 3];
+        config.edge_points.blur_px = [0.0, 1.0][methods[5] / 3];
         use threshold::Method::{Dynamic, Fixed, Otsu};
         config.threshold.method = [Otsu, Dynamic, Fixed][pick[5]];
         config.input.scale_to_height = scaled.then_some(33);

@@ -1,4 +1,4 @@
-//! The values of a row as vectors and matrices.
+//! Cells of a row that belong together, as vectors and matrices.
 
 use hzn_core::frames::{Cam, Cov3};
 
@@ -29,7 +29,7 @@ impl Row {
     }
 
     /// Returns the larger standard deviation of the errors that the next picture does not share, in radians, see
-    /// [`Solution::noise_rad`]; `None` without an axis.
+    /// [`Solution::noise_rad`](hzn_core::Solution::noise_rad); `None` without an axis.
     pub fn noise_rad(&self) -> Option<f64> {
         let common = self.common_covariance().unwrap_or_default();
         let all = self.covariance()?;
@@ -52,5 +52,11 @@ impl Row {
             self.pos_cov_yz_km2?,
             self.pos_cov_zz_km2?,
         ])
+    }
+
+    /// Returns the unit vector in the picture towards the body (right, down) and its standard deviation in radians;
+    /// `None` without an answer, and for a body straight ahead.
+    pub fn picture_direction(&self) -> Option<([f64; 2], f64)> {
+        Some(([self.picture_x?, self.picture_y?], self.picture_sigma?))
     }
 }

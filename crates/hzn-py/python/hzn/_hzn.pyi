@@ -655,6 +655,17 @@ class Report:
         """Weighted RMS distance of the inliers from the fitted limb, pixels."""
 
     @property
+    def picture_direction(self) -> NDArray[np.float64] | None:
+        """Unit vector in the picture (right, down) from the principal point towards the body, shape (2,).
+
+        None for a body straight ahead, which is in no direction.
+        """
+
+    @property
+    def picture_sigma(self) -> float | None:
+        """1-sigma of the angle of `picture_direction`, radians."""
+
+    @property
     def p_limb(self) -> float | None:
         """Probability that the edge of the answer is the limb; None for bodies without air."""
 

@@ -157,13 +157,16 @@ class Edge_points(TypedDict, total=False):
     """Edges that are candidates for the limb, and their edge points."""
 
     min_points: int
-    """Fewest border pixels of an edge that may be the limb; a small body or picture needs fewer. Values: 8 or more.
+    """Fewest border pixels of an edge that may be the limb; a small body or picture needs fewer. Values: 3 or more.
     Default: 40."""
     keep_points: int
     """Points kept per edge, evenly along it; 0 keeps all that fit into memory. Values: 0 (all) or 16 to 65535.
     Default: 600."""
     sub_pixel: Literal["linear", "none", "erf", "zernike"]
     """How a border pixel becomes an edge point. Default: "linear"."""
+    blur_px: float
+    """For ``zernike``: blur of the optics, px (standard deviation); 0 takes an edge for an ideal step. Values: 0 to
+    3 px. Default: 0.0."""
 
 
 class Consensus(TypedDict, total=False):
@@ -239,7 +242,7 @@ class Gates(TypedDict, total=False):
     """The gates that an answer must pass, and the choice among answers."""
 
     min_inliers: int
-    """Fewest inliers; a small body or picture needs fewer. Values: 8 or more. Default: 24."""
+    """Fewest inliers; a small body or picture needs fewer. Values: 3 or more. Default: 24."""
     min_arc_px: float | None
     """Shortest length of edge that inliers must cover, px. Values: 0 to 1e6 px. Default: a tenth of the diagonal, or
     a third of the body's circumference if less."""
@@ -305,6 +308,8 @@ class Gates(TypedDict, total=False):
     max_unlit: float
     """Largest part of the inliers that the given Sun does not light; 1 turns the gate off, and so does ``body.sunlit
     = false``, which is for a thermal camera. Values: 0 to 1. Default: 0.5."""
+    choice: Literal["score", "section-residual", "longest"]
+    """Which of several edges that pass is the answer. Default: "score"."""
     limb_in_view: bool
     """Whether a part of the expected limb must lie in the picture: the limb with the expected half-angle about the
     fitted axis. Values: true or false. Default: false."""
@@ -412,7 +417,7 @@ class Body(TypedDict, total=False):
 class _Optional(TypedDict, total=False):
     """The sections that may be left out."""
 
-    preset: Literal["hzn", "sun", "moon", "dlr-2022", "zju-2022", "horace-2015"] | None
+    preset: Literal["hzn", "sun", "moon", "dlr-2022", "zju-2022", "horace-2014", "horace-2015"] | None
     """Named starting values of the whole sensor; keys in the file replace them. Default: ``hzn``."""
     mount: Mount
     """How the camera is mounted in the vehicle."""

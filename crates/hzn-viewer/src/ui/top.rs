@@ -86,8 +86,11 @@ fn menu_entry(viewer: &mut Viewer, ui: &mut Ui, command: Command, on: bool) {
     }
 }
 
+/// Shows the entries of a menu.
+type Menu = fn(&mut Viewer, &mut Ui);
+
 fn menus(viewer: &mut Viewer, ui: &mut Ui) {
-    let all: [(&str, egui::Key, fn(&mut Viewer, &mut Ui)); 5] = [
+    let all: [(&str, egui::Key, Menu); 5] = [
         ("File", egui::Key::F, file_menu),
         ("Edit", egui::Key::E, edit_menu),
         ("Pictures", egui::Key::P, frames_menu),

@@ -69,7 +69,7 @@ fn hides(body: &BodyResult, kind: Kind, direction: [f64; 3]) -> bool {
         _ => is_earth && body.row.altitude_km.is_some_and(|km| km < BELOW_THE_MOON_KM),
     };
     let within = |s: &hzn_core::Solution<f64>| angle_deg(direction, s.axis.xyz()) < s.fused_half_angle_rad.to_degrees();
-    is_beyond && body.solution().is_some_and(|s| within(&s))
+    is_beyond && body.solution().is_some_and(within)
 }
 
 fn from_ephemeris(data: &FrameData, place: impl Fn(f64) -> ephemeris::Place) -> Option<[f64; 3]> {

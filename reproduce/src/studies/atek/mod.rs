@@ -27,7 +27,7 @@ const PICTURES: usize = 371;
 const LOOKS: usize = 38;
 
 /// Returns the scene with a seed.
-fn scene(seed: u64, count: usize) -> anyhow::Result<Scenario> {
+pub(super) fn scene(seed: u64, count: usize) -> anyhow::Result<Scenario> {
     let mut scene = Scenario::builtin("atek").ok_or_else(|| anyhow::anyhow!("there is no scene atek"))?;
     scene.seed = seed;
     scene.capture.frames = u32::try_from(count)?;
@@ -63,7 +63,7 @@ fn settings() -> [(&'static str, Settings); 2] {
     [("defaults", Settings::default()), ("scene", own)]
 }
 
-fn fly(inputs: &Inputs, settings: &Settings) -> Option<Fused> {
+pub(super) fn fly(inputs: &Inputs, settings: &Settings) -> Option<Fused> {
     fuse(inputs, settings, Wanted { rate_hz: Some(2.0), ..Wanted::default() }).ok()
 }
 

@@ -1,6 +1,6 @@
 //! The report as text.
 
-use hzn_evaluate::{Case, Evaluation, Group, Honesty, Integrity, IntegrityRange, Means};
+use hzn_evaluate::{Case, Evaluation, Group, Honesty, Integrity, IntegrityRange, Means, PictureError};
 
 use super::report::Report;
 use crate::tell::one_line;
@@ -75,7 +75,7 @@ pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
         let ideal = h.within.map(|w| format!("{:.1}", 100.0 * w.expected)).join(", ");
         line("sigma", format!("{} ({ideal} % when right)", parts.join(", ")));
     }
-    out.extend(means_line(e).into_iter().chain(integrity_line(e)).chain(position_lines(e)));
+    out.extend(picture_line(e).into_iter().chain(means_line(e)).chain(integrity_line(e)).chain(position_lines(e)));
     let mut line = |name, value| out.push((name, value));
     if e.with_limb > 0 {
         let positives = e.horace.false_positives.map(|p| format!(", false positives {}", percent(p)));
@@ -90,6 +90,13 @@ pub(crate) fn lines(e: &Evaluation) -> Vec<(&'static str, String)> {
         );
     }
     out
+}
+
+/// Returns the error of the two-dimensional direction; `None` if no answer has one.
+fn picture_line(e: &Evaluation) -> Option<(&'static str, String)> {
+    let p: PictureError = e.errors.as_ref()?.picture?;
+    let (sum, mean, sigma) = (deg(p.mean_and_sigma_deg()), deg(p.mean_deg.abs()), deg(p.sigma_deg));
+    Some(("in the picture", format!("{sum} deg = |mean| {mean} + sigma {sigma} of the 2-D direction")))
 }
 
 /// Returns the NEES of means over consecutive answers; `None` if no answer can tell.

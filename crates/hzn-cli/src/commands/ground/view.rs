@@ -297,7 +297,7 @@ mod tests {
             position: None,
             edges: Default::default(),
         };
-        Seen::Answer(Box::new(Assembled { exposure, answer, navigation: None, missing_candidates: 0 }))
+        Seen::Answer(Box::new(Assembled { exposure, answer, navigation: None, attitude: None, missing_candidates: 0 }))
     }
 
     fn screen(view: &View, counts: &StreamCounts, width: u16, height: u16) -> String {

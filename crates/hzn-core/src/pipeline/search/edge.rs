@@ -21,7 +21,7 @@ use crate::stages::contour::{BinaryPicture, Thinned};
 use crate::stages::covariance::{self, Fused};
 use crate::stages::edge_points::{self, Points};
 use crate::stages::fit::{self, Fit};
-use crate::stages::gates::{self, Case, Cover, Passed};
+use crate::stages::gates::{self, Case, Choice, Cover, Passed};
 use crate::stages::rays;
 
 /// An answer ends the search where its edge covers more than this part of the limb in view, and where more than
@@ -38,11 +38,18 @@ const LATER_INLIER_SHARE: f64 = 0.5;
 impl<T: Real, O: Observer<T>> Search<'_, T, O> {
     /// Takes a followed edge through every stage, and keeps its answer if it is the best so far.
     pub(super) fn judge_edge<P: Pixels>(&mut self, binary: &BinaryPicture<'_, T, P, O>, edge: &Thinned<'_>) {
-        let counters = &mut self.report.counters;
         let length = edge.total();
         if length < u32::from(self.min_points) {
             self.short += 1;
             return;
+        }
+        if self.choice() == Choice::Longest {
+            if length <= self.longest {
+                return;
+            }
+            // Only the longest edge counts: an answer of a shorter one is no answer.
+            self.longest = length;
+            self.best = None;
         }
         let keep = u32::from(self.sensor.config.edge_points.keep_points);
         let points = (edge.pixels().len() as u32).min(if keep == 0 { u32::MAX } else { keep });
@@ -50,6 +57,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         if !self.work.try_spend(points.saturating_mul(point)) {
             return;
         }
+        let counters = &mut self.report.counters;
         let number = counters.candidates;
         counters.candidates += 1;
         counters.dropped += length - length.div_ceil(edge.stride().max(1));
@@ -210,13 +218,12 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let mut solution = self.make_solution(fit, &fused, covariance, expected, outcome.number)?;
         solution.p_limb = p_limb;
         let share = T::from_i32(fit.inliers as i32) > T::from_i32(points.count as i32) * T::from_f64(CERTAIN_SHARE);
-        // The reflection of a Sun in the lens may look as good as the Sun, so every edge is examined.
-        let certain = !expected.free
+        let certain = !self.examines_all()
             && case.cover.share > T::from_f64(CERTAIN_SUPPORT)
             && (share || fit.rms_px * T::from_f64(4.0) < threshold.px);
         let next = (self.needs_next_threshold && !P::STREAMED)
             .then(|| gates::middle_level(&fused.e, blocks, fit.inliers, binary, camera));
-        Some(Best { solution, outcome: *outcome, score: case.score(), glows, certain, level: next.flatten() })
+        Some(Best { solution, outcome: *outcome, score: gates::score(&case), glows, certain, level: next.flatten() })
     }
 
     /// Returns the smallest part of an edge's points that must be inliers. A further look is another chance for a false

@@ -46,6 +46,8 @@ pub(super) struct Search<'a, T, O> {
     rival: Option<T>,
     /// Number of edges with too few points.
     short: u32,
+    /// Length of the longest edge so far, border pixels, with [`gates::Choice::Longest`].
+    longest: u32,
     /// Whether any edge was fitted, whatever its verdict.
     fitted: bool,
     report: &'a mut Report<T>,
@@ -92,12 +94,26 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             best: None,
             rival: None,
             short: 0,
+            longest: 0,
             fitted: false,
             report,
             camera,
             sensor,
         };
         (search, border, marks)
+    }
+
+    /// Returns the rule that chooses among the edges.
+    fn choice(&self) -> gates::Choice {
+        // A build without these features has one rule, so that the code for the others is left out.
+        let has_others = cfg!(any(feature = "dlr", feature = "horace"));
+        if has_others { self.sensor.config.gates.choice } else { gates::Choice::Score }
+    }
+
+    /// Returns whether every edge is examined, even if one of them is certain. The reflection of a Sun in the lens may
+    /// look as good as the Sun.
+    fn examines_all(&self) -> bool {
+        self.expected.free || self.choice() != gates::Choice::Score
     }
 
     /// Returns whether the search is over: the limb is found, or the work budget is used up.
@@ -128,13 +144,14 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
 
     /// Writes the answer into the report. Returns the rest of the work budget.
     pub(super) fn conclude(self) -> WorkBudget {
+        let can_be_ambiguous = self.choice() == gates::Choice::Score;
         let (report, work) = (self.report, self.work);
         report.counters.work = work.spent();
         report.counters.looks += 1;
         if let Some(best) = self.best {
             let factor = T::from_f64(AMBIGUOUS_SCORE);
             let is_close = |rival: T| rival < best.score * factor || self.expected.free;
-            if !best.certain && self.rival.is_some_and(is_close) {
+            if can_be_ambiguous && !best.certain && self.rival.is_some_and(is_close) {
                 report.status = Status::Ambiguous;
                 return work;
             }

@@ -82,7 +82,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
                 !self.is_over()
             });
         }
-        if self.best.is_some() && !self.expected.free {
+        if self.best.is_some() && !self.examines_all() {
             return;
         }
         let mut missed = Missed::Unknown;

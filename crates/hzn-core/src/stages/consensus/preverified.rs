@@ -1,8 +1,8 @@
 //! RANSAC with pre-verification (Wang et al. 2022, 2.3).
 //!
-//! Five points are drawn, and three of them define a cone. The cone is compared with every point only if the other two
-//! are also on it. Most wrong hypotheses therefore cost only two comparisons. The search ends when more than half of
-//! the points agree, or after k_max hypotheses.
+//! Five points are drawn, and three of them define a cone. The cone is compared with every point only if the mean
+//! deviation of the five is below the threshold; that of the first three is 0. Most wrong hypotheses therefore cost
+//! only two comparisons. The search ends when more than half of the points agree, or after k_max hypotheses.
 //!
 //! Equation (25) gives k_max = ln(1 − p)/ln(1 − (1 − r)³). With p = 90 % and a share r = 80 % of outliers the paper
 //! prints 286; rounded up it is 287. This number can only count *accepted* hypotheses. A draw passes the test only if
@@ -39,13 +39,14 @@ pub(super) fn find<T: Real>(
         return None;
     }
     let limit2 = threshold.px * threshold.px;
+    let most_sum = threshold.px * T::from_f64(SAMPLE as f64);
     let mut rng = Rng::new(config.seed);
     let (mut best, mut most) = (None, T::ZERO);
     let (mut draws, mut hypotheses) = (0, 0);
     while draws < config.max_draws && hypotheses < HYPOTHESES && work.try_spend(DRAW) {
         draws += 1;
         let sample = [(); SAMPLE].map(|()| rng.below(count));
-        let Some((e, c)) = verified(blocks, sample, limit2) else { continue };
+        let Some((e, c)) = verified(blocks, sample, most_sum) else { continue };
         hypotheses += 1;
         if !work.try_spend(blocks.len() as u32 * SCORE) {
             break;
@@ -63,18 +64,20 @@ pub(super) fn find<T: Real>(
     conclude(blocks, best, limit2, draws)
 }
 
-/// Returns the cone through the first three points if the other two are on it, too.
-fn verified<T: Real>(blocks: &[Block<T>], sample: [u32; SAMPLE], limit2: T) -> Option<(V3<T>, T)> {
+/// Returns the cone through the first three points if the deviations of the other two are `most_sum` together, at most.
+fn verified<T: Real>(blocks: &[Block<T>], sample: [u32; SAMPLE], most_sum: T) -> Option<(V3<T>, T)> {
     let [i, j, k, m, n] = sample;
     // A point that is drawn twice verifies nothing.
     if m == n || [i, j, k].contains(&m) || [i, j, k].contains(&n) {
         return None;
     }
     let (e, c) = through_three(&point(blocks, i)?, &point(blocks, j)?, &point(blocks, k)?)?;
+    let mut sum = T::ZERO;
     for check in [m, n] {
         point(blocks, check)?;
         let d2 = distances2(blocks.get(check as usize / LANES)?, &e, c);
-        if !(d2[check as usize % LANES] <= limit2) {
+        sum += d2[check as usize % LANES].sqrt();
+        if !(sum <= most_sum) {
             return None;
         }
     }

@@ -47,8 +47,7 @@ section! {
         /// For `erode`: side of the square neighbourhood, px.
         @- erode_size_px: u16 = 3, ["odd, 3 to 31"] { needs: "horace" };
         /// For `erode`: a lit pixel with fewer lit pixels in its neighbourhood, itself included, is an edge pixel.
-        // With 9 of 3×3 pixels, every lit pixel with a dark neighbour is an edge pixel. HORACE's five of eight
-        // neighbours are 7 here, because the pixel itself counts, too.
+        // With 9 of 3×3 pixels, every lit pixel with a dark neighbour is an edge pixel.
         @- erode_threshold: u16 = 9, ["1 to the square of `erode_size_px`"] { needs: "horace" };
     }
 }

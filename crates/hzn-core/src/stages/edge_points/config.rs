@@ -32,7 +32,7 @@ section! {
         /// A larger value skips more lights and small clouds, and short limbs. For a small disc, half of its
         /// circumference in pixels is enough; in a picture of fewer than 80 rows or columns, half of its shorter side
         /// is enough.
-        @70 min_points: u16 = 40, [8.0 or more];
+        @70 min_points: u16 = 40, [3.0 or more];
         /// Points kept per edge, evenly along it; 0 keeps all that fit into memory.
         ///
         /// Fewer points take less time: 200 points take half the time, but single pictures are then lost or much less
@@ -42,6 +42,11 @@ section! {
         @71 keep_points: u16 = 600, ["0 (all) or 16 to 65535"];
         /// How a border pixel becomes an edge point.
         @72 sub_pixel: SubPixel = SubPixel::Linear, [choice];
+        /// For `zernike`: blur of the optics, px (standard deviation); 0 takes an edge for an ideal step.
+        ///
+        /// A blurred edge pulls the point of an ideal step towards the middle of the 7×7 pixels. With the blur known
+        /// the pull is corrected.
+        @- blur_px: f64 = 0.0, [0.0 to 3.0] { needs: "zju" };
     }
 }
 

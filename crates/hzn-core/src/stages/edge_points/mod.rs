@@ -116,7 +116,7 @@ fn locate<T: Real, P: Pixels, O: Observer<T>>(
         // small.
         SubPixel::None => half_pixel(binary, p),
         SubPixel::Erf if cfg!(feature = "erf") => erf::locate(binary, p).and_then(towards_light),
-        SubPixel::Zernike if cfg!(feature = "zju") => zernike::locate(binary, p).and_then(towards_light),
+        SubPixel::Zernike if cfg!(feature = "zju") => zernike::locate(binary, config, p).and_then(towards_light),
         // `Config::check` refuses a method that is not built in.
         // The test is made once a point, so that the reads of most points need no test of their own.
         _ if is_clear(binary, p, MARGIN as u16) => linear::<T, P, O, true>(binary, p, extra_cost),

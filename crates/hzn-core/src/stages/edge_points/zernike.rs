@@ -3,9 +3,13 @@
 //! For a step of height k at distance l from the centre of the unit disc, the moments in the direction of the edge are
 //! A₁₁ = (2k/3)(1 − l²)^(3/2) and A₂₀ = l A₁₁. The edge is therefore at l = A₂₀/A₁₁ along the direction of A₁₁. A real
 //! limb is a ramp and not a step, which pulls the point towards the centre of the patch. As in Wang et al., the centre
-//! of the patch is the pixel with the largest Sobel gradient, so that the distance l and the bias are small. With a
-//! blur of more than about 1.5 px, `linear` is better.
+//! of the patch is the pixel with the largest Sobel gradient, so that the distance l and the bias are small.
+//!
+//! A blurred edge is a mixture of steps at the distances l + t, where t is normally distributed, and moments are
+//! linear: A₁₁ and A₂₀ are the means of those of the steps, and their quotient is a known function of l and of the
+//! width. With `edge_points.blur_px` this function is inverted.
 
+use super::config::Config;
 use super::patch::{Patch, SIDE, brightness};
 use crate::base::real::Real;
 use crate::geometry::pixel::{ImagePoint, Pixel};
@@ -36,10 +40,12 @@ const BOWL: [[f64; 4]; 4] = [
 /// within reach.
 pub(super) fn locate<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
+    config: &Config,
     p: Pixel,
 ) -> Option<(ImagePoint<T>, [T; 2])> {
     let (x, y) = steepest(binary, i32::from(p.x), i32::from(p.y))?;
-    let (offset, direction) = edge(&Patch::read(binary, x, y)?)?;
+    let (quotient, direction) = edge(&Patch::read(binary, x, y)?)?;
+    let offset = distance(quotient, T::from_f64(config.blur_px)) * T::from_f64(RADIUS_PX);
     let (u, v) = (T::from_i32(x) + offset * direction[0], T::from_i32(y) + offset * direction[1]);
     Some((ImagePoint { u, v }, direction))
 }
@@ -74,7 +80,55 @@ fn steepest<T: Real, P: Pixels, O: Observer<T>>(
     Some((best.1, best.2))
 }
 
-/// Returns the distance of the edge from the centre in pixels, and the unit direction towards the light.
+/// Abscissas and weights of the Gauss-Hermite quadrature with seven points, for a normal distribution of variance 1.
+const NORMAL: [(f64, f64); 7] = [
+    (-3.750_439_717_725_742, 5.482_688_559_722_18e-4),
+    (-2.366_759_410_734_541, 3.075_712_396_758_65e-2),
+    (-1.154_405_394_739_968, 2.401_231_786_050_13e-1),
+    (0.0, 4.571_428_571_428_57e-1),
+    (1.154_405_394_739_968, 2.401_231_786_050_13e-1),
+    (2.366_759_410_734_541, 3.075_712_396_758_65e-2),
+    (3.750_439_717_725_742, 5.482_688_559_722_18e-4),
+];
+/// Variance that two squares of one pixel add to the blur, px²: the pixel averages the light, and the masks take the
+/// brightness of a pixel for constant.
+const PIXEL_VARIANCE_PX2: f64 = 2.0 / 12.0;
+/// Largest distance of an edge from the centre, in radii of the disc. Nearer to the rim the disc shows hardly any of
+/// one side, and the quotient would be noise.
+const REACH: f64 = 0.9;
+/// Number of Newton steps that invert the quotient. Three are enough within half a radius.
+const STEPS: usize = 5;
+
+/// Returns the distance of a blurred edge from the centre in radii, where A₂₀/A₁₁ is `quotient`: the quotient itself
+/// for an ideal step.
+fn distance<T: Real>(quotient: T, blur_px: T) -> T {
+    if !(blur_px > T::ZERO) {
+        return quotient;
+    }
+    let width = (blur_px * blur_px + T::from_f64(PIXEL_VARIANCE_PX2)).sqrt() / T::from_f64(RADIUS_PX);
+    let (reach, three) = (T::from_f64(REACH), T::from_f64(3.0));
+    let mut l = quotient;
+    for _ in 0..STEPS {
+        let [mut a11, mut a20, mut a11_by_l, mut a20_by_l] = [T::ZERO; 4];
+        for (at, weight) in NORMAL {
+            let (x, weight) = (l + width * T::from_f64(at), T::from_f64(weight));
+            let root = (T::one() - x * x).max(T::ZERO).sqrt();
+            let cube = root * root * root;
+            a11 += weight * cube;
+            a20 += weight * x * cube;
+            a11_by_l -= weight * three * x * root;
+            a20_by_l += weight * (cube - three * x * x * root);
+        }
+        let slope = a20_by_l * a11 - a20 * a11_by_l;
+        if !(slope > T::ZERO) {
+            break;
+        }
+        l = (l + (quotient * a11 - a20) * a11 / slope).max(-reach).min(reach);
+    }
+    l
+}
+
+/// Returns A₂₀/A₁₁, and the unit direction towards the light.
 fn edge<T: Real>(patch: &Patch<T>) -> Option<(T, [T; 2])> {
     let (mut re, mut im, mut a20, mut largest) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO);
     // The brightness of the middle is subtracted: then the moments depend on the contrast alone, and single precision
@@ -98,8 +152,7 @@ fn edge<T: Real>(patch: &Patch<T>) -> Option<(T, [T; 2])> {
         return None;
     }
     let l = a20 / a11;
-    // Nearer to the rim the disc shows hardly any of one side, and the quotient would be noise.
-    (l.abs() < T::from_f64(0.9)).then(|| (l * T::from_f64(RADIUS_PX), [re / a11, im / a11]))
+    (l.abs() < T::from_f64(REACH)).then(|| (l, [re / a11, im / a11]))
 }
 
 #[cfg(test)]
@@ -128,6 +181,29 @@ mod tests {
                 assert!((BOWL[b][a] - bowl * area).abs() < 2e-5, "BOWL {b} {a}: {}", bowl * area);
             }
         }
+    }
+
+    /// The steps of a blurred edge, integrated in steps of a thousandth, give the quotient that is inverted.
+    #[test]
+    fn the_distance_of_a_blurred_edge_is_found_again() {
+        for blur_px in [0.3, 1.0, 1.5] {
+            let width = f64::sqrt(blur_px * blur_px + PIXEL_VARIANCE_PX2) / RADIUS_PX;
+            for l in [-0.3, -0.1, 0.0, 0.2] {
+                let (mut a11, mut a20) = (0.0, 0.0);
+                for i in -5000..=5000 {
+                    let t = f64::from(i) * 1e-3;
+                    let x = l + t * width;
+                    let moment = libm::exp(-0.5 * t * t) * (1.0 - x * x).max(0.0).powf(1.5);
+                    (a11, a20) = (a11 + moment, a20 + x * moment);
+                }
+                let found = distance(a20 / a11, blur_px);
+                // The quadrature has seven points, and the rim of the disc is no polynomial: 0.03 px.
+                assert!((found - l).abs() * RADIUS_PX < 0.03, "blur {blur_px} px at {l}: {found}");
+                let short = distance((a20 / a11) as f32, blur_px as f32);
+                assert!((f64::from(short) - found).abs() < 1e-5, "{short} {found}");
+            }
+        }
+        assert_eq!(distance(0.3, 0.0), 0.3);
     }
 
     #[test]

@@ -47,9 +47,8 @@ impl<T: Real> Case<'_, T> {
     pub(super) fn expected_cos(&self) -> T {
         if self.expected.free { self.fit.c } else { self.expected.cos }
     }
-    /// Returns the weighted RMS divided by the part of the limb in view that edge points cover; of several answers, the
-    /// one with the smallest score wins.
-    pub(crate) fn score(&self) -> T {
+    /// Returns the weighted RMS divided by the part of the limb in view that edge points cover.
+    pub(super) fn score(&self) -> T {
         self.fit.rms_px.max(T::from_f64(0.05)) / self.cover.share.max(T::from_f64(1e-3))
     }
     /// Returns whether at least this part of the edge's points are inliers.

@@ -16,6 +16,20 @@ choices! {
     }
 }
 
+choices! {
+    /// The answer among several edges.
+    pub enum Choice {
+        /// The edge with the smallest residual for the part of the limb in view that it covers; answers in different
+        /// directions that are nearly as good make the picture `ambiguous`.
+        @- Score = "score";
+        /// The edge with the smallest mean square distance from its conic section (Braun & Barf 2022, (28)); no picture
+        /// is `ambiguous`.
+        @- SectionResidual = "section-residual" needs "dlr";
+        /// The longest edge, and no other one even if it fails (HORACE).
+        @- Longest = "longest" needs "horace";
+    }
+}
+
 section! {
     /// `[gates]` of sensor.toml: the gates that an answer must pass, and the choice among answers.
     "gates" pub struct Config: Copy {
@@ -24,7 +38,7 @@ section! {
         /// A larger value refuses shorter limbs; with a smaller value more edges pass by chance. For a small disc, one
         /// third of its circumference in pixels is enough; in a picture of fewer than 80 rows or columns, one third of
         /// its shorter side is enough.
-        @110 min_inliers: u16 = 24, [8.0 or more];
+        @110 min_inliers: u16 = 24, [3.0 or more];
         /// Shortest length of edge that inliers must cover, px.
         ///
         /// A smaller value answers pictures with less limb in view, but many curves fit a short edge.
@@ -159,6 +173,10 @@ section! {
         /// horizon below the horizon of the point below the camera. An attitude then gives the direction of the Sun, if
         /// the columns `sun_x` to `sun_z` are empty.
         @131 max_unlit: f64 = 0.5, [0.0 to 1.0];
+        /// Which of several edges that pass is the answer.
+        ///
+        /// Every value but `score` examines every edge of the picture, which takes more time.
+        @- choice: Choice = Choice::Score, [choice];
         /// Whether a part of the expected limb must lie in the picture: the limb with the expected half-angle about the
         /// fitted axis.
         @- limb_in_view: bool = false, ["true or false"] { needs: "dlr" };

@@ -52,7 +52,7 @@ use crate::stages::contour::BinaryPicture;
 use crate::stages::fit::azimuth;
 
 pub(crate) use case::Case;
-pub use config::{Config, FixedEdge};
+pub use config::{Choice, Config, FixedEdge};
 use places::along_limb;
 pub(crate) use places::middle_level;
 use shape::{Curve, Residuals, Shape, collect_inliers};
@@ -67,6 +67,15 @@ pub(crate) struct Passed<T> {
     pub(crate) glows: bool,
     /// Probability that the edge is the limb; `None` if it is unknown.
     pub(crate) p_limb: Option<T>,
+}
+
+/// Returns the score of an edge that passed; of several answers, the one with the smallest score wins.
+pub(crate) fn score<T: Real>(case: &Case<'_, T>) -> T {
+    match case.config.choice {
+        // An edge without a section cannot be compared, so it loses.
+        Choice::SectionResidual if cfg!(feature = "dlr") => section::residual(case).unwrap_or(T::from_f64(f64::MAX)),
+        _ => case.score(),
+    }
 }
 
 /// Asks the gates in their order.

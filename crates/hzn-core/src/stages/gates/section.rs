@@ -11,9 +11,13 @@ use crate::model::verdict::Verdict;
 /// Refuses an edge whose points are too far from the section.
 pub(super) fn refuse<T: Real>(case: &Case<'_, T>) -> Result<(), Verdict> {
     let Some(limit) = case.config.max_section_residual.filter(|_| cfg!(feature = "dlr")) else { return Ok(()) };
-    let is_close =
-        section_residual(&case.fit.e, case.expected_cos(), case.blocks).is_some_and(|mean| mean <= T::from_f64(limit));
+    let is_close = residual(case).is_some_and(|mean| mean <= T::from_f64(limit));
     refuse_if(!is_close, Verdict::Residuals)
+}
+
+/// Returns the residual (28) of the edge. It also decides which of several edges is the limb (7.3).
+pub(super) fn residual<T: Real>(case: &Case<'_, T>) -> Option<T> {
+    section_residual(&case.fit.e, case.expected_cos(), case.blocks)
 }
 
 /// Returns the mean square of the points' distances from the conic section of the cone (e, c), along its principal x

@@ -176,8 +176,7 @@ impl Viewer {
         } else if let Some(session) = kept {
             let home = autosave::absolute(session.home());
             self.session = Some(session);
-            return self
-                .add_note(format!("There is no sensor.toml. The one that you opened stays: {}", home.display()));
+            self.add_note(format!("There is no sensor.toml. The one that you opened stays: {}", home.display()));
         } else {
             self.add_note(
                 "There is no sensor.toml, so the pictures are shown but not processed. Make one in the panel \
