@@ -30,9 +30,9 @@ mod tests {
         assert_eq!(limb_in_words(&body, &Input::default(), 400.0), "limb at 17 +- 7 km");
         let input = Input { tone: Some(Tone::Srgb), ..Input::default() };
         body.follow_tone(Tone::Srgb);
-        assert_eq!(limb_in_words(&body, &input, 400.0), "limb at 23.36 +- 4.6 km in pictures of tone srgb");
+        assert_eq!(limb_in_words(&body, &input, 400.0), "limb at 23.363 +- 7 km in pictures of tone srgb");
         body = body::Config { limb: Limb::Height, limb_height_km: 0.0, ..body };
         let balloon = limb_in_words(&body, &input, 30.0);
-        assert!(balloon.starts_with("limb at 0 +- 4.6 km, raised by 1.7"), "{balloon}");
+        assert!(balloon.starts_with("limb at 0 +- 7 km, raised by 1.7"), "{balloon}");
     }
 }

@@ -103,9 +103,9 @@ mod tests {
             let body = body(text);
             (body.limb, (body.limb_height_km * 10.0).round() / 10.0, body.limb_height_sigma_km)
         };
-        assert_eq!(of("[input]\ntone = \"srgb\"\n"), (Limb::Visible, 23.4, 4.6));
-        assert_eq!(of("[input]\ntone = \"bt709\"\n[[bodies]]\nkind = \"earth\"\n"), (Limb::Visible, 21.9, 4.6));
-        assert_eq!(of("[input]\ntone = 2\n"), (Limb::Visible, 22.2, 4.6));
+        assert_eq!(of("[input]\ntone = \"srgb\"\n"), (Limb::Visible, 23.4, 7.0));
+        assert_eq!(of("[input]\ntone = \"bt709\"\n[[bodies]]\nkind = \"earth\"\n"), (Limb::Visible, 21.9, 7.0));
+        assert_eq!(of("[input]\ntone = 2\n"), (Limb::Visible, 22.2, 7.0));
         assert_eq!(of("[input]\ntone = \"unknown\"\n"), (Limb::Visible, 17.0, 7.0));
         let told = "[input]\ntone = \"srgb\"\n[body]\nlimb_height_km = 17\n";
         assert_eq!(of(told), (Limb::Height, 17.0, 7.0));

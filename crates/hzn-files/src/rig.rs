@@ -145,6 +145,13 @@ impl HeadMount {
     }
 }
 
+/// Returns whether a file is a rig.toml, by its name or by its sections. It need not be correct.
+pub fn is_rig(path: &Path) -> bool {
+    let begins = |line: &str| ["[[head]]", "[rig]", "[rig."].iter().any(|name| line.trim_start().starts_with(name));
+    path.file_name().is_some_and(|name| name == "rig.toml")
+        || limited::read_text(path, limited::SETTINGS_BYTES).is_ok_and(|text| text.lines().any(begins))
+}
+
 /// Reads and checks a rig.toml. The files that it names are not read.
 ///
 /// # Errors

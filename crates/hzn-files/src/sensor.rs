@@ -360,8 +360,8 @@ mod tests {
         );
         for (text, what) in [
             ("[edge_points]\nkeep_points = 99999\n", "keep_points: 99999 is refused: must be 0 (all) or 16 to 65535"),
-            ("[edge_points]\nmin_points = -1\n", "min_points: -1 is refused: must be between 8 and 65535"),
-            ("[gates]\nmin_inliers = 65536\n", "min_inliers: 65536 is refused: must be between 8 and 65535"),
+            ("[edge_points]\nmin_points = -1\n", "min_points: -1 is refused: must be between 3 and 65535"),
+            ("[gates]\nmin_inliers = 65536\n", "min_inliers: 65536 is refused: must be between 3 and 65535"),
             ("[consensus]\nseed = -1\n", "seed: -1 is refused: must be between 0 and 4294967295"),
             ("[consensus]\nmax_draws = 5000000000\n", "max_draws: 5000000000 is refused: must be between 1 and 100000"),
             ("[input]\nbits = 300\n", "bits: 300 is refused: must be between 8 and 16"),

@@ -65,6 +65,8 @@ pub(crate) struct Linux {
     ended: Option<Ended>,
     events: Vec<LogLine>,
     counts: Counts,
+    /// Multiple of sigma that is the protection level.
+    protection_factor: f64,
     not_stored: Rarely,
 }
 
@@ -81,6 +83,7 @@ impl Linux {
             ended: None,
             events: Vec::new(),
             counts: Counts::default(),
+            protection_factor: f64::NAN,
         }
     }
 
@@ -247,6 +250,7 @@ impl Board for Linux {
         written.is_ok()
     }
     fn note_sensor(&mut self, config: &Config) {
+        self.protection_factor = config.protection_factor(0);
         self.parts.log.set_config(config);
     }
     fn stack_bytes(&mut self) -> u32 {
@@ -279,7 +283,8 @@ impl Board for Linux {
         };
         // The same conversion as in `hzn run --flight`, so that the numbers have the same bits.
         let report = widen_report(report);
-        let row = Row::from_report(&meta, &report, Some(f64::from(exposure.calculation_us)));
+        let row = Row::from_report(&meta, &report, Some(f64::from(exposure.calculation_us)))
+            .with_protection(self.protection_factor);
         let mut record = FrameRecord::new(row);
         record.candidates = CandidateEdge::from_report(&report);
         record.log = std::mem::take(&mut self.events);

@@ -35,21 +35,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     // A screenshot for documents must not depend on the settings of an earlier run.
     let store = if shot.is_some() || args.measure.is_some() { None } else { Settings::default_path() };
-    let mut settings = store.as_deref().map(Settings::load).unwrap_or_default();
-    if args.light {
-        settings.dark = false;
-    }
-    if let Some(size) = args.size {
-        settings.window = size;
-    }
+    let settings = settings(args, store.as_deref());
     let outcome = Arc::new(Mutex::new(None));
-    let viewport = egui::ViewportBuilder::default()
-        .with_title("hzn viewer")
-        .with_app_id("hzn-viewer")
-        .with_inner_size(settings.window)
-        .with_min_inner_size([720.0, 480.0])
-        .with_drag_and_drop(true);
-    let options = eframe::NativeOptions { viewport, ..Default::default() };
+    let options = eframe::NativeOptions { viewport: viewport(settings.window), ..Default::default() };
     let measure = args.measure.map(|kind| Measure::new(kind, program_start));
     let (args, result) = (args.clone(), Arc::clone(&outcome));
     let store_is_used = store.is_some();
@@ -91,6 +79,27 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     window.map_err(|e| anyhow!("{e}")).context("the window cannot be opened (it needs a display and OpenGL)")?;
     let outcome = outcome.lock().map_err(|_| anyhow!("the window ended with an error"))?.take();
     outcome.unwrap_or(Ok(()))
+}
+
+/// Returns the stored settings, with what the command line says.
+fn settings(args: &Args, store: Option<&Path>) -> Settings {
+    let mut settings = store.map(Settings::load).unwrap_or_default();
+    if args.light {
+        settings.dark = false;
+    }
+    if let Some(size) = args.size {
+        settings.window = size;
+    }
+    settings
+}
+
+fn viewport(size: [f32; 2]) -> egui::ViewportBuilder {
+    egui::ViewportBuilder::default()
+        .with_title("hzn viewer")
+        .with_app_id("hzn-viewer")
+        .with_inner_size(size)
+        .with_min_inner_size([720.0, 480.0])
+        .with_drag_and_drop(true)
 }
 
 /// Checks that a screenshot replaces neither a file of another kind nor a file that is opened.
@@ -140,6 +149,19 @@ struct Window {
     result: RunResult,
 }
 
+impl Window {
+    /// Maximises a window that is larger than the screen, once.
+    fn fit_to_screen(&mut self, ctx: &egui::Context) {
+        let (outer, screen) = ctx.input(|i| (i.viewport().outer_rect, i.viewport().monitor_size));
+        if let (true, Some(outer), Some(screen)) = (self.is_unfitted, outer, screen) {
+            self.is_unfitted = false;
+            if is_too_large(outer.size(), screen) {
+                ctx.send_viewport_cmd(ViewportCommand::Maximized(true));
+            }
+        }
+    }
+}
+
 impl eframe::App for Window {
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
@@ -159,13 +181,7 @@ impl eframe::App for Window {
             measure.after_pass(&self.viewer, &ctx);
         }
         if self.shot.is_none() {
-            let (outer, screen) = ctx.input(|i| (i.viewport().outer_rect, i.viewport().monitor_size));
-            if let (true, Some(outer), Some(screen)) = (self.is_unfitted, outer, screen) {
-                self.is_unfitted = false;
-                if is_too_large(outer.size(), screen) {
-                    ctx.send_viewport_cmd(ViewportCommand::Maximized(true));
-                }
-            }
+            self.fit_to_screen(&ctx);
             let size = ctx.input(|i| i.viewport().inner_rect.map(|r| r.size()));
             if let Some(size) = size {
                 self.viewer.settings_mut().window = size.into();

@@ -30,6 +30,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     check_arguments(args)?;
     if let [one] = args.input.as_slice()
         && ending(one) == "toml"
+        && hzn_files::rig::is_rig(one)
     {
         return rig::run(args, one);
     }

@@ -84,7 +84,6 @@ fn a_link_to_a_folder_above_gives_no_further_pictures() {
     place.write("s.toml", SENSOR.as_bytes());
     let ran = place.run(&["run", "in/**/*.png", "-s", "s.toml"]).expect(0);
     assert_eq!(without_time(&ran.out).len(), 2);
-    ran.says("through links to pictures that are in the list already were left out");
 }
 
 #[test]

@@ -125,9 +125,11 @@ fn write_tone(tone: Option<Tone>) -> String {
             let value = tone.word().map_or_else(|| format!("{:.3}", tone.gamma()), |word| format!("{word:?}"));
             format!("tone = {value}                 # from the files\n")
         }
-        None => "# The files do not say it. With a tone the limb height has a sigma of 4.6 km, without one 7 km.\n\
+        None => {
+            "# The files do not say it. In linear pictures the limb height has a sigma of 4.6 km, in others 7 km.\n\
                  # tone = \"linear\"\n"
-            .to_owned(),
+                .to_owned()
+        }
     };
     format!("{head}{line}")
 }

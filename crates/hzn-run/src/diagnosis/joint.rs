@@ -157,9 +157,14 @@ pub fn find_pair<'a>(facts: impl Iterator<Item = &'a FitFacts>, limb_height_km: 
     };
     let singles = [[0, 0], [1, 1], [2, 2]].into_iter().filter_map(solve);
     let pairs = [[0, 1], [1, 2], [0, 2]].into_iter().filter_map(solve);
-    let apart = pairs.filter(|(_, solved)| solved.correlation().abs() <= MOST_CORRELATION);
-    let (which, pair) = apart.min_by(|a, b| a.1.scatter().total_cmp(&b.1.scatter()))?;
-    let scatter = pair.scatter();
+    let apart: Vec<_> = pairs.filter(|(_, solved)| solved.correlation().abs() <= MOST_CORRELATION).collect();
+    let scatter = apart.iter().map(|(_, solved)| solved.scatter()).reduce(f64::min)?;
+    // An altitude and a limb height change the half-angles nearly alike. Only the limb height has an expected value.
+    let cost = |(which, solved): &([usize; 2], Solved)| {
+        let limb = which.iter().zip(solved.corrections).filter(|(k, _)| is_limb(**k));
+        solved.chi2(scatter) + limb.map(|(_, km)| (km / limb_sigma_km).powi(2)).sum::<f64>()
+    };
+    let (which, pair) = apart.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
     let explains = |single: &Solved| {
         single.chi2(scatter) - pair.chi2(scatter) < LEAST_GAIN || single.scatter() < LEAST_RATIO * scatter
     };

@@ -152,7 +152,7 @@ mod tests {
         );
         assert_eq!((s.duration_s(1), s.duration_s(2)), (Some(1.5), None));
         assert_eq!(Sequence::default().nearest(0.0), None);
-        assert_eq!((s.interval_s(), Sequence::default().interval_s()), (Some(1.25), None));
+        assert_eq!((s.interval_s(), Sequence::default().interval_s()), (Some(1.0), None));
         let mut s = s;
         s.entries[1].time_s = None;
         assert_eq!((s.nearest(0.4), s.duration_s(0), s.duration_s(1)), (Some(0), None, None));

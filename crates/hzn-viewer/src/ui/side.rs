@@ -75,6 +75,26 @@ fn trouble(viewer: &mut Viewer, ui: &mut Ui) -> bool {
     true
 }
 
+/// Shows the status, and how far a known truth is away.
+fn say_status(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, answer: Option<&BodyResult>, status: Status) {
+    let row = answer.map(|a| &a.row).filter(|_| status == Status::Ok);
+    let truth = row.and_then(|row| viewer.truth_of(&frame_view.name, &row.body));
+    let sigmas = row.and_then(|row| quantity::error_sigmas(row, truth));
+    let misses = row.is_some_and(|row| quantity::misses_truth(row, truth));
+    badge(ui, status.name(), if misses { theme::MISSED } else { theme::status(status) });
+    if let Some(sigmas) = sigmas.filter(|_| misses) {
+        small(ui, &format!("The error is {sigmas:.1} σ: the truth lies outside of 3σ."));
+    }
+    if status != Status::Ok {
+        detail(frame_view, answer).iter().for_each(|line| small(ui, line));
+        let hint = "Shows the diagnosis among the stages";
+        if answer.is_some() && ui.link("Why, and what to do").on_hover_text(hint).clicked() {
+            viewer.panels.open(Panel::Stages, &mut viewer.settings);
+            viewer.focus_diagnosis = true;
+        }
+    }
+}
+
 fn answer(viewer: &mut Viewer, ui: &mut Ui) {
     if trouble(viewer, ui) {
         return;
@@ -88,22 +108,7 @@ fn answer(viewer: &mut Viewer, ui: &mut Ui) {
         _ => None,
     };
     if let Some(status) = status {
-        let row = answer.map(|a| &a.row).filter(|_| status == Status::Ok);
-        let truth = row.and_then(|row| viewer.truth_of(&frame_view.name, &row.body));
-        let sigmas = row.and_then(|row| quantity::error_sigmas(row, truth));
-        let misses = row.is_some_and(|row| quantity::misses_truth(row, truth));
-        badge(ui, status.name(), if misses { theme::MISSED } else { theme::status(status) });
-        if let Some(sigmas) = sigmas.filter(|_| misses) {
-            small(ui, &format!("The error is {sigmas:.1} σ: the truth lies outside of 3σ."));
-        }
-        if status != Status::Ok {
-            detail(&frame_view, answer).iter().for_each(|line| small(ui, line));
-            let hint = "Shows the diagnosis among the stages";
-            if answer.is_some() && ui.link("Why, and what to do").on_hover_text(hint).clicked() {
-                viewer.panels.open(Panel::Stages, &mut viewer.settings);
-                viewer.focus_diagnosis = true;
-            }
-        }
+        say_status(viewer, ui, &frame_view, answer, status);
     }
     let Some(answer) = answer else { return };
     egui::Grid::new("answer").num_columns(2).spacing(vec2(8.0, 2.0)).show(ui, |ui| {

@@ -52,20 +52,7 @@ pub(crate) fn call(data: &[u8]) {
                 height: if byte() == 0 { u32::from(byte()) } else { 480 },
                 stride: if byte() == 0 { usize::from(byte()) } else { 640 },
             };
-            let mut number = || f32::from_le_bytes(std::array::from_fn(|_| byte()));
-            let mut known: HznKnown = std::mem::zeroed();
-            assert_eq!(hzn_nothing_known(&mut known) + hzn_nothing_known(ptr::null_mut()), HZN_NULL);
-            known.altitude_m = number();
-            known.position_m = std::array::from_fn(|_| number());
-            known.rate_rad_s = std::array::from_fn(|_| number());
-            known.attitude_wxyz = std::array::from_fn(|_| number());
-            known.attitude_sigma_rad = number();
-            known.sun = std::array::from_fn(|_| number());
-            known.attitude_age_s = number();
-            known.attitude_expires_s = number();
-            known.last_axis = std::array::from_fn(|_| number());
-            known.last_cov_rad2 = std::array::from_fn(|_| number());
-            known.last_age_s = number();
+            let known = any_known(|| f32::from_le_bytes(std::array::from_fn(|_| byte())));
             let mut answer: HznAnswer = std::mem::zeroed();
             hzn_process(sensor, &picture, &known, &mut answer);
             hzn_process(sensor, &picture, ptr::null(), &mut answer);
@@ -77,6 +64,27 @@ pub(crate) fn call(data: &[u8]) {
         }
         dealloc(memory, layout);
     }
+}
+
+/// Returns what is known about a picture, from any numbers.
+fn any_known(mut number: impl FnMut() -> f32) -> HznKnown {
+    // SAFETY: every field is a number, and the function takes null or a writable place.
+    let mut known: HznKnown = unsafe { std::mem::zeroed() };
+    // SAFETY: as above.
+    let codes = unsafe { [hzn_nothing_known(&mut known), hzn_nothing_known(ptr::null_mut())] };
+    assert_eq!(codes, [0, HZN_NULL]);
+    known.altitude_m = number();
+    known.position_m = std::array::from_fn(|_| number());
+    known.rate_rad_s = std::array::from_fn(|_| number());
+    known.attitude_wxyz = std::array::from_fn(|_| number());
+    known.attitude_sigma_rad = number();
+    known.sun = std::array::from_fn(|_| number());
+    known.attitude_age_s = number();
+    known.attitude_expires_s = number();
+    known.last_axis = std::array::from_fn(|_| number());
+    known.last_cov_rad2 = std::array::from_fn(|_| number());
+    known.last_age_s = number();
+    known
 }
 
 /// A camera that gives rows of arbitrary bytes.

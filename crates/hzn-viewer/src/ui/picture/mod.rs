@@ -66,22 +66,7 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
     if pointer(viewer, ui, &response, &mut placement) {
         viewer.view = placement.view;
     }
-    if let Some((_, texture)) = &viewer.textures.shown {
-        let at = Rect::from_min_max(
-            placement.shown_to_screen([-0.5, -0.5]),
-            placement.shown_to_screen([size[0] - 0.5, size[1] - 0.5]),
-        );
-        let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-        painter.image(texture.id(), at, uv, Color32::WHITE);
-        if pane == 0
-            && viewer.settings.shows(Layer::Touched)
-            && !viewer.layers_hidden
-            && placement.plane == Plane::Camera
-            && let Some((_, touched)) = &viewer.textures.touched
-        {
-            painter.image(touched.id(), at, uv, theme::TOUCHED);
-        }
-    }
+    draw_pixels(viewer, &painter, &placement, pane);
     read_out::values(&painter, frame_view, &placement, rect);
     let outcome = frame_view.answers.get(pane);
     if let Some(outcome) = outcome.filter(|_| !viewer.layers_hidden) {
@@ -105,6 +90,26 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
         && let Some(text) = read_out::under_pointer(frame_view, outcome.map(|o| &**o), viewer.body, &placement, at)
     {
         label(&painter, rect.left_bottom() + vec2(10.0, -10.0), Align2::LEFT_BOTTOM, &text);
+    }
+}
+
+/// Draws the picture, and the pixels that were read.
+fn draw_pixels(viewer: &Viewer, painter: &egui::Painter, placement: &Placement<'_>, pane: usize) {
+    let Some((_, texture)) = &viewer.textures.shown else { return };
+    let [width, height] = placement.size;
+    let at = Rect::from_min_max(
+        placement.shown_to_screen([-0.5, -0.5]),
+        placement.shown_to_screen([width - 0.5, height - 0.5]),
+    );
+    let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+    painter.image(texture.id(), at, uv, Color32::WHITE);
+    if pane == 0
+        && viewer.settings.shows(Layer::Touched)
+        && !viewer.layers_hidden
+        && placement.plane == Plane::Camera
+        && let Some((_, touched)) = &viewer.textures.touched
+    {
+        painter.image(touched.id(), at, uv, theme::TOUCHED);
     }
 }
 

@@ -3,18 +3,10 @@
 use std::time::{Duration, Instant};
 
 use super::Viewer;
-use crate::model::Settings;
 
 /// Time from the last change until the settings are stored, so that a border that is dragged does not write a file with
 /// every step.
 const STORE_AFTER: Duration = Duration::from_millis(700);
-
-/// The settings as they were stored, and as they were seen last.
-#[derive(Debug, Default)]
-pub(super) struct KeptSettings {
-    stored: Option<Settings>,
-    seen: Option<(Settings, Instant)>,
-}
 
 impl Viewer {
     /// Stores the settings if they have not changed for a moment.
