@@ -243,7 +243,7 @@ fn range_ms(elapsed_us: &[f64]) -> String {
     format!("{} to {}", two_digits(ends.0 / 1e3), two_digits(ends.1 / 1e3))
 }
 
-/// Adds the times of the stages ([B14] table 4.1), medians over pictures of the camera.
+/// Adds the times of the stages (`[B14]` table 4.1), medians over pictures of the camera.
 fn add_stage_times(s: &mut Section, scene: &Flight) -> anyhow::Result<()> {
     let sensors =
         [("hzn", scene.sensor.clone()), ("horace-2015", preset(Preset::Horace2015, scene, scene.sensor.body.clone()))];

@@ -301,6 +301,7 @@ class Rig:
             The rig has no head of this name, or an altitude, position or attitude is impossible.
         """
 
+@final
 class Sensor:
     """A horizon sensor.
 

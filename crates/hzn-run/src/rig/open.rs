@@ -152,7 +152,7 @@ impl Opened {
     /// Prepares the joint answers.
     ///
     /// # Errors
-    /// A value of rig.toml is out of its limits; [`open`] has refused it already.
+    /// A value of rig.toml is out of its limits; [`open()`] has refused it already.
     pub fn joiner(&self) -> Result<Joiner, Error> {
         Joiner::new(&self.rig, self.heads.iter().map(|head| &head.sensor.config), self.frames.clone())
     }

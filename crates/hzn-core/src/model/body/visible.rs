@@ -8,7 +8,7 @@ use crate::model::tone::Tone;
 // The light next to the limb: the ground there may be half as bright as the air (a dark sea) or twice as bright
 // (cloud), evenly distributed in the logarithm, which moves the edge by 7.5 km ln 4/√12 = 3.0 km. Without a tone, the
 // height has the default sigma, 7 km. So it has in every other tone: cameras change the contrast before they encode a
-// picture, and no file says how. The photograph of the demo puts the limb at 7 km instead of 23 km.
+// picture, and no file says how.
 const SIGMA_KM: f64 = 4.6;
 
 impl Config {
