@@ -42,7 +42,7 @@ pub(crate) trait Measured {
 
 /// Makes a sensor in f32 with the lists of a flight computer.
 pub(crate) fn flight_sensor(config: &Config) -> Result<Sensor<f32, 2048, 256, 512>, String> {
-    Ok(Sensor::from_horizon(Box::new(FlightHorizon::new(config).map_err(|e| e.to_string())?)))
+    Ok(Sensor::from_horizon(FlightHorizon::boxed(config).map_err(|e| e.to_string())?))
 }
 
 /// Makes the same sensor with fewer points, as for a flight computer that is short of time.
@@ -54,14 +54,14 @@ pub(crate) fn sensor_with_fewer_points(config: &Config) -> Result<Sensor<f32, 20
 
 /// Makes a sensor in f64 with the lists of a workstation.
 pub(crate) fn host_sensor(config: &Config) -> Result<Sensor<f64, 16384, 2048, 65536>, String> {
-    Ok(Sensor::from_horizon(Box::new(HostHorizon::new(config).map_err(|e| e.to_string())?)))
+    Ok(Sensor::from_horizon(HostHorizon::boxed(config).map_err(|e| e.to_string())?))
 }
 
 /// Makes a sensor in f32 that keeps every point of an edge.
 pub(crate) fn sensor_with_every_point(config: &Config) -> Result<Sensor<f32, 16384, 2048, 16384>, String> {
     let mut config = config.clone();
     config.edge_points.keep_points = 0;
-    Ok(Sensor::from_horizon(Box::new(Horizon::new(&config).map_err(|e| e.to_string())?)))
+    Ok(Sensor::from_horizon(Horizon::boxed(&config).map_err(|e| e.to_string())?))
 }
 
 fn picture<'a>(case: &Case, frame: &'a Picture) -> Result<Grey<'a, u8>, String> {

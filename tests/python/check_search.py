@@ -37,6 +37,7 @@ PROBES = {
     "opencv": "guide/python/from-opencv/",
     "gallery": "guide/gallery/",
     "where is the limb": "theory/limb/",
+    "own firmware": "guide/own-firmware/",
 }
 FIRST = 3
 

@@ -105,7 +105,7 @@ pub struct Case {
 pub struct Measured {
     /// The answer.
     pub answer: PictureAnswer,
-    /// Instructions of `FlightHorizon::new`, `expect` and `process`.
+    /// Instructions of `Sensor::new`, `expect` and `process`.
     pub calls: [u64; 3],
     /// Instructions of each stage. Their sum is a little above `process`, because reading the timer costs instructions.
     pub stages: [u64; 8],
@@ -135,7 +135,7 @@ impl Case {
     /// # Panics
     /// Panics if the configuration or the prior is refused.
     pub fn answer_on_host(&self) -> PictureAnswer {
-        let mut horizon = Box::new(FlightHorizon::new(&self.sensor).expect("the configuration is valid"));
+        let mut horizon = FlightHorizon::boxed(&self.sensor).expect("the configuration is valid");
         let camera = &self.sensor.camera;
         let layout = Layout::packed(camera.width.into(), camera.height.into(), 1, 8);
         let picture = Grey::try_new(&self.bytes, layout).expect("the picture is whole");

@@ -49,8 +49,8 @@ impl Sensors {
         // enough stack for that.
         let config = config.clone();
         let make = move || Self {
-            host: Box::new(HostHorizon::new(&config).expect("the configuration is valid")),
-            flight: Box::new(FlightHorizon::new(&config).expect("the configuration is valid")),
+            host: HostHorizon::boxed(&config).expect("the configuration is valid"),
+            flight: FlightHorizon::boxed(&config).expect("the configuration is valid"),
         };
         let thread = std::thread::Builder::new().stack_size(64 << 20).spawn(make).expect("a thread can be made");
         thread.join().expect("the configuration is valid")

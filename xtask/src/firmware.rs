@@ -121,7 +121,31 @@ pub(crate) fn test(steps: &mut Steps) -> Outcome {
     } else {
         test_images_once(steps)?;
     }
+    run_own_firmware()?;
     check_c_interface(steps.all)
+}
+
+/// The project that the guide builds from nothing.
+const OWN_FIRMWARE: &str = "examples/own-firmware";
+
+/// Builds the project of the guide as a user does, with its own profile, flags and lock, and runs it in QEMU. Its
+/// output must be the one that the guide shows. Its linker script has 192 KiB of RAM.
+fn run_own_firmware() -> Outcome {
+    let (mut command, built) = Toolchain::find()?.cargo_with_profile("release", "build", "firmware/own", &[]);
+    steps::run(command.current_dir(root().join(OWN_FIRMWARE)))?;
+    let image = built.join("own-firmware");
+    steps::run(Command::new("arm-none-eabi-size").arg(&image))?;
+    let mut qemu = Command::new("timeout");
+    qemu.args(["60", "qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "null"])
+        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(&image);
+    let answer = output_of(&mut qemu)?;
+    let guide = fs::read_to_string(root().join("book/guide/own-firmware.md"))?;
+    let shown = answer.lines().find(|line| line.starts_with("nadir in the camera"));
+    match shown {
+        Some(line) if guide.contains(line) => Ok(()),
+        _ => Err(Trouble::Failed(format!("book/guide/own-firmware.md does not show the output:\n{answer}"))),
+    }
 }
 
 /// Runs the flight image and the navigation on one board, and the sensor alone on the other.

@@ -52,12 +52,17 @@ impl Toolchain {
     /// Returns `cargo build --profile flight` (or another verb, for example `rustc`) for the target, and the folder
     /// that it builds to. This folder is under `dir` of the target folder.
     pub(crate) fn cargo(self, verb: &str, dir: &str, args: &[&str]) -> (Command, PathBuf) {
+        self.cargo_with_profile("flight", verb, dir, args)
+    }
+
+    /// Returns the same as [`Self::cargo`], with another profile.
+    pub(crate) fn cargo_with_profile(self, profile: &str, verb: &str, dir: &str, args: &[&str]) -> (Command, PathBuf) {
         let dir = target().join(dir);
         let mut command = match self {
-            Self::Own => cargo(&[verb, "--profile", "flight"]),
+            Self::Own => cargo(&[verb, "--profile", profile]),
             Self::Debian => {
                 let mut command = Command::new("/usr/bin/cargo");
-                command.args([verb, "--profile", "flight", "--locked", "-Zbuild-std=core"]);
+                command.args([verb, "--profile", profile, "--locked", "-Zbuild-std=core"]);
                 // RUSTC_BOOTSTRAP lets Debian's stable compiler build core from its own sources. The caller's flags and
                 // toolchain settings belong to another compiler, so they are removed.
                 command.env("RUSTC", "/usr/bin/rustc").env("RUSTC_BOOTSTRAP", "1").env_remove("RUSTUP_TOOLCHAIN");
@@ -66,7 +71,7 @@ impl Toolchain {
         };
         command.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
         command.args(["--target", TARGET, "--target-dir"]).arg(&dir).args(args);
-        (command, dir.join(TARGET).join("flight"))
+        (command, dir.join(TARGET).join(profile))
     }
 }
 

@@ -9,7 +9,7 @@ use crate::python;
 use crate::steps::{self, Outcome, Trouble, cargo};
 
 /// The lock files of the repository.
-const LOCKS: &[&str] = &["Cargo.lock", "fuzz/Cargo.lock"];
+const LOCKS: &[&str] = &["Cargo.lock", "examples/own-firmware/Cargo.lock", "fuzz/Cargo.lock"];
 
 /// Writes the lists of parts and checks the licences; with `--advisories FOLDER`, also looks for known faults.
 pub(crate) fn run(args: &[String]) -> Outcome {

@@ -23,7 +23,13 @@ const fn long(name: &'static str, run: fn(&mut Steps) -> Outcome) -> Step {
 
 /// The steps. Those with `steps.all` or of the tier `long` do more with `--all`.
 const STEPS: &[Step] = &[
-    every("format", |_| steps::run(Command::new(steps::cargo_program()).args(["fmt", "--all", "--check"]))),
+    every("format", |_| {
+        let format = ["fmt", "--all", "--check"];
+        steps::run(Command::new(steps::cargo_program()).args(format))?;
+        // A workspace of its own.
+        let own = ["--manifest-path", "examples/own-firmware/Cargo.toml"];
+        steps::run(Command::new(steps::cargo_program()).args(format).args(own))
+    }),
     every("lints", |_| steps::run(cargo(&["clippy", "--all-targets"]).args(["--", "-D", "warnings"]))),
     // Video input needs a decoder. Without one, its tests pass without a check, which would go unseen.
     every("ffmpeg", |_| if has("ffmpeg") { Ok(()) } else { apt_install(&["ffmpeg"]) }),

@@ -53,8 +53,8 @@ fn main() {
         config.body.altitude_km = Some(300.0);
         config.edge_points.min_points = 8;
         config.gates.min_inliers = 8;
-        let mut host = Box::new(HostHorizon::new(&config).expect("the configuration is valid"));
-        let mut flight = Box::new(FlightHorizon::new(&config).expect("the configuration is valid"));
+        let mut host = HostHorizon::boxed(&config).expect("the configuration is valid");
+        let mut flight = FlightHorizon::boxed(&config).expect("the configuration is valid");
         let (double, single) = (host.expect(&Prior::default()), flight.expect(&Prior::default()));
         let (double, single) = (double.expect("an altitude is known"), single.expect("an altitude is known"));
         for n in 0..count {

@@ -78,7 +78,7 @@ fn median_ratio<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: 
     for position in [false, true] {
         let mut config = config.clone();
         config.fit.position = Some(position);
-        sensors.push(Box::new(Horizon::<T, POINTS, BLOCKS, WORDS>::new(&config)?));
+        sensors.push(Horizon::<T, POINTS, BLOCKS, WORDS>::boxed(&config)?);
     }
     let mut ratios = Vec::new();
     for _ in 0..TURNS {

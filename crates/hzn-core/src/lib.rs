@@ -25,31 +25,30 @@
 //! The documentation of each module begins with its equations and their source. The page book/theory/math.md of the
 //! repository has all equations. Tests compare the equations with data from other programs.
 //!
-//! [`Sensor`] holds a checked configuration, and [`Horizon`] holds a sensor with its memory. [`frames`] describes the
+//! [`Horizon`] is a sensor with its memory, and [`Sensor`] in it is a checked configuration. [`frames`] describes the
 //! coordinate frames (camera: x right, y down, z forward), [`pixel`] the image coordinates (pixel centres at integers).
 //! Inside the crate, lengths are in metres and angles in radians. In [`Config`] they are in kilometres and degrees.
 //!
 //! ```
 //! use hzn_core::camera::{self, Model};
 //! use hzn_core::image::{Grey, Layout};
-//! use hzn_core::observer::Unobserved;
-//! use hzn_core::{Config, FlightWorkspace, Prior, Sensor};
+//! use hzn_core::{Config, FlightHorizon, Prior};
 //! use static_cell::ConstStaticCell;
 //!
-//! // The lists of a picture, 85 KB of zeros. In a static they take no flash and never pass over the stack.
-//! static WORKSPACE: ConstStaticCell<FlightWorkspace> = ConstStaticCell::new(FlightWorkspace::new());
+//! // The sensor with its lists, 93 KB of zeros. In a static it takes no flash and never passes over the stack.
+//! static HORIZON: ConstStaticCell<FlightHorizon> = ConstStaticCell::new(FlightHorizon::empty());
 //!
 //! let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
 //! config.body.altitude_km = Some(230.0);
-//! let sensor = Sensor::<f32>::new(&config)?;
-//! let workspace = WORKSPACE.try_take().ok_or("the workspace is in use")?;
+//! let horizon = HORIZON.try_take().ok_or("the sensor is in use")?;
+//! horizon.configure(&config)?;
 //!
 //! // The sky is above, the ground below, of a body as wide as the Earth.
 //! let data: Vec<u8> = (0..64 * 48).map(|i| if i / 64 < 20 { 5 } else { 200 }).collect();
 //! let picture = Grey::try_new(&data[..], Layout::packed(64, 48, 1, 8))?;
 //! // The altitude of this picture, in metres, replaces that of the configuration.
-//! let expected = sensor.expect(&Prior { altitude_m: Some(231.5e3), ..Prior::default() })?;
-//! let report = sensor.process(workspace, &picture, &expected, &Unobserved);
+//! let expected = horizon.expect(&Prior { altitude_m: Some(231.5e3), ..Prior::default() })?;
+//! let report = horizon.process(&picture, &expected);
 //! println!("{} at stage {}", report.status, report.stage.name());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -61,8 +60,8 @@
 //! | [`FlightHorizon`] | f32 | 2048 | 2048 | below 92 KiB |
 //! | [`HostHorizon`] | f64 | 16384 | 16384 | below 1.5 MiB |
 //!
-//! The example above is the form for a microcontroller: tests run it on an emulated board with 192 KiB of RAM. A
-//! [`FlightHorizon`] does not fit there, because [`Horizon::new`] returns it over the stack.
+//! Tests run the example above on an emulated board with 192 KiB of RAM. Several cameras can share one [`Workspace`],
+//! with a [`SensorPlace`] for each of them.
 //!
 //! # Features
 //!
@@ -101,6 +100,6 @@ pub use config::Config;
 pub use observer::{Observer, Unobserved};
 pub use papers::Preset;
 pub use pipeline::{
-    FlightHorizon, FlightWorkspace, Horizon, HostHorizon, HostWorkspace, Sensor, Sequence, Step, Workspace,
+    FlightHorizon, FlightWorkspace, Horizon, HostHorizon, HostWorkspace, Sensor, SensorPlace, Sequence, Step, Workspace,
 };
 pub use report::{Report, Solution};

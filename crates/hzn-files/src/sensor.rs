@@ -166,7 +166,7 @@ fn starting_values(preset: Preset, camera: camera::Config) -> String {
     table.to_string()
 }
 
-/// Checks everything that `Horizon::new` checks.
+/// Checks everything that `Sensor::new` checks.
 ///
 /// # Errors
 /// The first field that is out of its limits.

@@ -17,7 +17,7 @@ fn main() {
     };
     let Config { width, height, .. } = flight.sensor.camera;
     println!("{} {width}x{height}", flight.name);
-    let mut horizon = Box::new(HostHorizon::new(&flight.sensor).expect("the flight's sensor is valid"));
+    let mut horizon = HostHorizon::boxed(&flight.sensor).expect("the flight's sensor is valid");
     let (mut square, mut nees, mut answered) = (0.0, 0.0, 0);
     for frame in &flight.frames {
         let truth = frame.truth().expect("the scene is valid");

@@ -29,7 +29,7 @@ fn main() {
         sensor.bodies.clear();
     }
     let kind = sensor.body.kind;
-    let mut horizon = Box::new(HostHorizon::new(&sensor).expect("the sensor is valid"));
+    let mut horizon = HostHorizon::boxed(&sensor).expect("the sensor is valid");
     for frame in &flight.frames {
         let start = Instant::now();
         let picture = frame.render().expect("the scene is valid");

@@ -10,7 +10,7 @@
 
 void print(const char *text);
 
-static _Alignas(HZN_WORKSPACE_ALIGN) uint8_t memory[HZN_WORKSPACE_SIZE];
+static _Alignas(HZN_WORKSPACE_ALIGN) uint8_t memory[HZN_WORKSPACE_SIZE_608];
 static _Alignas(HZN_WORKSPACE_ALIGN) uint8_t rows_memory[HZN_ROWS_SIZE];
 
 static void print_hex(uint32_t word) {

@@ -75,8 +75,12 @@
 // Version of the structures and functions of this header. hzn_open compares it with that of the library.
 #define HZN_INTERFACE 3
 
-// Bytes that a sensor needs, on every machine.
+// Bytes that a sensor needs which fits 2048 points of an edge, on every machine.
 #define HZN_WORKSPACE_SIZE 114688
+
+// Bytes that a sensor needs which fits 608 points of an edge: enough for the default of edge_points.keep_points,
+// 600. Of a longer list, dropped in the answer counts the border pixels that are left out.
+#define HZN_WORKSPACE_SIZE_608 61440
 
 // Alignment that a sensor needs, bytes.
 #define HZN_WORKSPACE_ALIGN 16
@@ -190,11 +194,25 @@ typedef struct {
   HznEdge edges[16];
 } HznAnswer;
 
+// The structures have the sizes that they have in the library. C99 cannot check this.
+#if defined(__cplusplus)
+#define HZN_ASSERT static_assert
+#elif defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L
+#define HZN_ASSERT _Static_assert
+#else
+#define HZN_ASSERT(condition, message) struct HznSensor
+#endif
+HZN_ASSERT(sizeof(HznKnown) == 108, "the size of HznKnown");
+HZN_ASSERT(sizeof(HznPicture) == 3 * sizeof(size_t) + 8, "the size of HznPicture");
+HZN_ASSERT(sizeof(HznEdge) == 24, "the size of HznEdge");
+HZN_ASSERT(sizeof(HznAnswer) == 484, "the size of HznAnswer");
+#undef HZN_ASSERT
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
 
-// Returns the number of bytes that a sensor needs.
+// Returns the number of bytes that a sensor needs which fits 2048 points of an edge.
 size_t hzn_workspace_size(void);
 
 // Returns the alignment that a sensor needs, in bytes.
@@ -204,7 +222,8 @@ size_t hzn_workspace_align(void);
 uint32_t hzn_version(void);
 
 // Makes a sensor in memory, with every parameter at its default, and writes a pointer to it to out. interface
-// is HZN_INTERFACE.
+// is HZN_INTERFACE. The sensor fits 2048 points of an edge if bytes is HZN_WORKSPACE_SIZE or more, and 608
+// points if it is less, but at least HZN_WORKSPACE_SIZE_608.
 //
 // Safety:
 // memory is null or has bytes writable bytes that nothing else uses as long as the sensor is used. out is null

@@ -13,7 +13,8 @@ use core::ptr::{self, NonNull};
 use hzn_core::body::Expected;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::observer::Unobserved;
-use hzn_core::{FlightWorkspace, Prior, Sensor};
+use hzn_core::pipeline::Workspace;
+use hzn_core::{Prior, Sensor};
 use hzn_flight::Parameters;
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::parameters::Refused;
@@ -78,11 +79,22 @@ pub const HZN_TRUNCATED: i32 = 7;
 
 /// Version of the structures and functions of this header. `hzn_open` compares it with that of the library.
 pub const HZN_INTERFACE: u32 = 3;
-/// Bytes that a sensor needs, on every machine.
+/// Bytes that a sensor needs which fits 2048 points of an edge, on every machine.
 pub const HZN_WORKSPACE_SIZE: usize = 114688;
+/// Bytes that a sensor needs which fits 608 points of an edge: enough for the default of `edge_points.keep_points`,
+/// 600. Of a longer list, `dropped` in the answer counts the border pixels that are left out.
+pub const HZN_WORKSPACE_SIZE_608: usize = 61440;
 /// Alignment that a sensor needs, bytes.
 pub const HZN_WORKSPACE_ALIGN: usize = 16;
-const _: () = assert!(size_of::<HznSensor>() <= HZN_WORKSPACE_SIZE && align_of::<HznSensor>() <= HZN_WORKSPACE_ALIGN);
+
+/// Blocks of eight points.
+const ALL_POINTS: usize = 256;
+const FEWER_POINTS: usize = 76;
+const _: () = {
+    assert!(size_of::<Memory<ALL_POINTS>>() <= HZN_WORKSPACE_SIZE);
+    assert!(size_of::<Memory<FEWER_POINTS>>() <= HZN_WORKSPACE_SIZE_608);
+    assert!(align_of::<Memory<ALL_POINTS>>() <= HZN_WORKSPACE_ALIGN);
+};
 
 /// Is in an open sensor.
 const MAGIC: u64 = 0x687A_6E20_6F70_656E;
@@ -93,30 +105,41 @@ const MAGIC: u64 = 0x687A_6E20_6F70_656E;
 pub struct HznSensor {
     magic: u64,
     kept: KeptTwice<Kept>,
-    /// Each picture fills it anew.
-    workspace: FlightWorkspace,
 }
+
+/// The caller's memory.
+#[repr(C)]
+struct Memory<const BLOCKS: usize> {
+    sensor: HznSensor,
+    /// Each picture fills it anew.
+    workspace: Lists<BLOCKS>,
+}
+
+/// The lists of a picture, with so many blocks of eight points.
+type Lists<const BLOCKS: usize> = Workspace<f32, 2048, BLOCKS, 512>;
 
 /// What outlives a call.
 #[derive(Debug)]
 struct Kept {
     /// Number of the parameter that was refused last; 0: none.
     refused: u16,
+    /// Whether the memory has room for all points, or for fewer.
+    has_all_points: bool,
     /// The parameters from [`hzn_set`]; they are in use after [`hzn_apply`].
     pending: Parameters,
     sensor: Sensor<f32>,
 }
 
-/// Returns the number of bytes that a sensor needs.
+/// Returns the number of bytes that a sensor needs which fits 2048 points of an edge.
 #[unsafe(no_mangle)]
 pub extern "C" fn hzn_workspace_size() -> usize {
-    size_of::<HznSensor>()
+    size_of::<Memory<ALL_POINTS>>()
 }
 
 /// Returns the alignment that a sensor needs, in bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn hzn_workspace_align() -> usize {
-    align_of::<HznSensor>()
+    align_of::<Memory<ALL_POINTS>>()
 }
 
 /// Returns the version of the library: major, minor and patch in one byte each, from the second byte on.
@@ -145,8 +168,19 @@ unsafe fn open_sensor<'a>(sensor: *mut HznSensor) -> Result<&'a mut HznSensor, i
     if sensor.kept.is_intact() { Ok(sensor) } else { Err(HZN_NOT_OPEN) }
 }
 
+/// Returns the lists behind a sensor.
+///
+/// # Safety
+/// [`hzn_open`] made the sensor at this pointer, in memory with room for so many blocks, and nothing else uses the
+/// lists.
+unsafe fn lists<'a, const BLOCKS: usize>(sensor: *mut HznSensor) -> &'a mut Lists<BLOCKS> {
+    // SAFETY: the caller guarantees it. Lists consist of numbers, so that any bytes are valid ones.
+    unsafe { &mut *(&raw mut (*sensor.cast::<Memory<BLOCKS>>()).workspace) }
+}
+
 /// Makes a sensor in `memory`, with every parameter at its default, and writes a pointer to it to `out`. `interface`
-/// is [`HZN_INTERFACE`].
+/// is [`HZN_INTERFACE`]. The sensor fits 2048 points of an edge if `bytes` is [`HZN_WORKSPACE_SIZE`] or more, and 608
+/// points if it is less, but at least [`HZN_WORKSPACE_SIZE_608`].
 ///
 /// # Safety
 /// `memory` is null or has `bytes` writable bytes that nothing else uses as long as the sensor is used. `out` is null
@@ -155,7 +189,9 @@ unsafe fn open_sensor<'a>(sensor: *mut HznSensor) -> Result<&'a mut HznSensor, i
 pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, interface: u32, out: *mut *mut HznSensor) -> i32 {
     let place = memory.cast::<HznSensor>();
     let (Some(_), false) = (NonNull::new(place), out.is_null()) else { return HZN_NULL };
-    if bytes < size_of::<HznSensor>() || !place.is_aligned() {
+    let has_all_points = bytes >= size_of::<Memory<ALL_POINTS>>();
+    let used = if has_all_points { size_of::<Memory<ALL_POINTS>>() } else { size_of::<Memory<FEWER_POINTS>>() };
+    if bytes < used || !place.is_aligned() {
         return HZN_MEMORY;
     }
     if interface != HZN_INTERFACE {
@@ -163,13 +199,13 @@ pub unsafe extern "C" fn hzn_open(memory: *mut u8, bytes: usize, interface: u32,
     }
     let pending = Parameters::defaults();
     let Ok(sensor) = Sensor::new(&pending.sensor) else { return HZN_REFUSED };
-    // SAFETY: `place` is aligned and has room, as checked. A sensor consists of numbers and of bytes that are not read
+    // SAFETY: `memory` is aligned and has room, as checked. A sensor consists of numbers and of bytes that are not read
     // before they are written: all bytes are valid, and zeros are an empty workspace.
     let opened = unsafe {
-        ptr::write_bytes(place, 0, 1);
+        ptr::write_bytes(memory, 0, used);
         &mut *place
     };
-    opened.kept.set(Kept { refused: 0, pending, sensor });
+    opened.kept.set(Kept { refused: 0, has_all_points, pending, sensor });
     opened.kept.complete();
     opened.magic = MAGIC;
     // SAFETY: `out` is not null, and the caller guarantees the rest.
@@ -287,13 +323,11 @@ pub unsafe extern "C" fn hzn_process(
     let (picture, out) = unsafe { (&*picture, &mut *out) };
     *out = NO_ANSWER;
     // SAFETY: the caller guarantees it.
-    let sensor = match unsafe { open_sensor(sensor) } {
-        Ok(sensor) => sensor,
+    let kept = match unsafe { open_sensor(sensor) } {
+        Ok(opened) => opened.kept.get(),
         Err(code) => return code,
     };
-    let HznSensor { kept, workspace, .. } = sensor;
-    let sensor = &kept.get().sensor;
-    let camera = sensor.camera();
+    let camera = kept.sensor.camera();
     if (picture.width, picture.height) != (camera.width().into(), camera.height().into()) {
         return HZN_PICTURE;
     }
@@ -305,8 +339,15 @@ pub unsafe extern "C" fn hzn_process(
     let layout = Layout { width: picture.width, height: picture.height, stride: picture.stride, channels: 1, bits: 8 };
     let Ok(grey) = Grey::try_new(pixels, layout) else { return HZN_PICTURE };
     // SAFETY: the caller guarantees it.
-    let Some((expected, attitude)) = (unsafe { expect(sensor, known) }) else { return HZN_KNOWN };
-    let report = sensor.process(workspace, &grey, &expected, &Unobserved);
+    let Some((expected, attitude)) = (unsafe { expect(&kept.sensor, known) }) else { return HZN_KNOWN };
+    // SAFETY: the sensor is open, and says how much room there is. The caller guarantees that nothing else uses it.
+    let report = unsafe {
+        if kept.has_all_points {
+            kept.sensor.process(lists::<ALL_POINTS>(sensor), &grey, &expected, &Unobserved)
+        } else {
+            kept.sensor.process(lists::<FEWER_POINTS>(sensor), &grey, &expected, &Unobserved)
+        }
+    };
     *out = to_answer(&PictureAnswer::from_report(&report), attitude);
     i32::from(out.status)
 }

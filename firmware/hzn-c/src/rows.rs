@@ -9,7 +9,8 @@ use hzn_core::pipeline::{ROWS_HELD, RowBuffers};
 use hzn_flight::answer::PictureAnswer;
 
 use crate::types::{HznAnswer, HznKnown, NO_ANSWER, to_answer};
-use crate::{HZN_KNOWN, HZN_MEMORY, HZN_NO_ROWS, HZN_NULL, HZN_ROWS_ENDED, HznSensor, expect, open_sensor};
+use crate::{ALL_POINTS, FEWER_POINTS, HznSensor, expect, lists, open_sensor};
+use crate::{HZN_KNOWN, HZN_MEMORY, HZN_NO_ROWS, HZN_NULL, HZN_ROWS_ENDED};
 
 const WIDTH: usize = 1920;
 const HEIGHT: usize = 1080;
@@ -51,23 +52,21 @@ pub unsafe extern "C" fn hzn_process_rows(
     let out = unsafe { &mut *out };
     *out = NO_ANSWER;
     // SAFETY: the caller guarantees it.
-    let sensor = match unsafe { open_sensor(sensor) } {
-        Ok(sensor) => sensor,
+    let kept = match unsafe { open_sensor(sensor) } {
+        Ok(opened) => opened.kept.get(),
         Err(code) => return code,
     };
-    let HznSensor { kept, workspace, .. } = sensor;
-    let sensor = &kept.get().sensor;
     // SAFETY: the caller guarantees it.
-    let Some((expected, attitude)) = (unsafe { expect(sensor, known) }) else { return HZN_KNOWN };
+    let Some((expected, attitude)) = (unsafe { expect(&kept.sensor, known) }) else { return HZN_KNOWN };
     // SAFETY: the memory is aligned and has room. It consists of arrays of numbers, and zeros are empty ones.
     let rows = unsafe {
         ptr::write_bytes(place, 0, 1);
         &mut *place
     };
-    let camera = sensor.camera();
+    let camera = kept.sensor.camera();
     let (width, height) = (usize::from(camera.width()), camera.height());
     let Some(row) = rows.row.get_mut(..width) else { return HZN_NO_ROWS };
-    let Ok(mut stream) = sensor.rows(&mut rows.buffers, 8, &expected) else { return HZN_NO_ROWS };
+    let Ok(mut stream) = kept.sensor.rows(&mut rows.buffers, 8, &expected) else { return HZN_NO_ROWS };
     for _ in 0..height {
         // SAFETY: the caller guarantees it.
         let ended = unsafe { next_row(context, row.as_mut_ptr(), width) };
@@ -78,7 +77,14 @@ pub unsafe extern "C" fn hzn_process_rows(
             return HZN_NO_ROWS;
         }
     }
-    let report = stream.finish(workspace, &Unobserved);
+    // SAFETY: the sensor is open, and says how much room there is. The caller guarantees that nothing else uses it.
+    let report = unsafe {
+        if kept.has_all_points {
+            stream.finish(lists::<ALL_POINTS>(sensor), &Unobserved)
+        } else {
+            stream.finish(lists::<FEWER_POINTS>(sensor), &Unobserved)
+        }
+    };
     *out = to_answer(&PictureAnswer::from_report(&report), attitude);
     i32::from(out.status)
 }

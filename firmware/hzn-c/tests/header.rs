@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use hzn::types::{HznAnswer, HznEdge, HznKnown, HznPicture};
 use hzn_core::verdict::Verdict;
 use hzn_flight::{Parameters, parameters};
 
@@ -14,7 +15,35 @@ fn the_header_is_up_to_date() {
     let bindings = bindings.with_config(config).generate().unwrap();
     let mut made = Vec::new();
     bindings.write(&mut made);
-    compare(&here.join("include/hzn.h"), &for_c(&String::from_utf8(made).unwrap()));
+    let made = for_c(&String::from_utf8(made).unwrap());
+    let (structures, functions) = made.split_once("#ifdef __cplusplus\n").unwrap();
+    compare(&here.join("include/hzn.h"), &format!("{structures}{}#ifdef __cplusplus\n{functions}", assertions()));
+}
+
+/// Returns the lines with which a C compiler checks that its structures have the sizes of the library's.
+fn assertions() -> String {
+    // A picture has a pointer and two lengths.
+    assert_eq!(size_of::<HznPicture>(), 3 * size_of::<usize>() + 8);
+    let sizes = [
+        ("HznKnown", size_of::<HznKnown>().to_string()),
+        ("HznPicture", "3 * sizeof(size_t) + 8".to_owned()),
+        ("HznEdge", size_of::<HznEdge>().to_string()),
+        ("HznAnswer", size_of::<HznAnswer>().to_string()),
+    ];
+    let check =
+        |(name, size): (&str, String)| format!("HZN_ASSERT(sizeof({name}) == {size}, \"the size of {name}\");\n");
+    format!(
+        "// The structures have the sizes that they have in the library. C99 cannot check this.\n\
+         #if defined(__cplusplus)\n\
+         #define HZN_ASSERT static_assert\n\
+         #elif defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L\n\
+         #define HZN_ASSERT _Static_assert\n\
+         #else\n\
+         #define HZN_ASSERT(condition, message) struct HznSensor\n\
+         #endif\n\
+         {}#undef HZN_ASSERT\n\n",
+        sizes.into_iter().map(check).collect::<String>()
+    )
 }
 
 /// Returns the header without the marks of Rust's documentation, and with negative numbers in parentheses: `x HZN_NULL`

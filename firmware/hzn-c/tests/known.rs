@@ -4,7 +4,8 @@ use std::mem::MaybeUninit;
 use std::ptr;
 
 use hzn::types::{HznAnswer, HznKnown, HznPicture};
-use hzn::{HZN_INTERFACE, HZN_KNOWN, HZN_OK, HZN_REJECTED, HZN_WORKSPACE_SIZE, HznSensor};
+use hzn::{HZN_INTERFACE, HZN_KNOWN, HZN_MEMORY, HZN_OK, HZN_REJECTED};
+use hzn::{HZN_WORKSPACE_SIZE, HZN_WORKSPACE_SIZE_608, HznSensor};
 use hzn::{hzn_apply, hzn_nothing_known, hzn_open, hzn_process, hzn_set};
 use hzn_core::verdict::Verdict;
 
@@ -17,7 +18,7 @@ const DOWN_DEG: f64 = 75.0;
 struct Memory([MaybeUninit<u8>; HZN_WORKSPACE_SIZE]);
 
 struct Program {
-    _memory: Box<Memory>,
+    memory: Box<Memory>,
     sensor: *mut HznSensor,
     pixels: Vec<u8>,
 }
@@ -25,6 +26,11 @@ struct Program {
 impl Program {
     /// Makes a sensor, and the picture of a limb of a body as wide as the Earth at 230 km.
     fn new() -> Self {
+        Self::with_bytes(HZN_WORKSPACE_SIZE)
+    }
+
+    /// Makes the same in memory of this size. The rest of the memory is not touched.
+    fn with_bytes(bytes: usize) -> Self {
         let pixel = |i: usize| {
             let (x, y) = (((i % WIDTH) as f64 - 47.5) / 90.0, ((i / WIDTH) as f64 - 35.5) / 90.0);
             let (sin, cos) = DOWN_DEG.to_radians().sin_cos();
@@ -35,14 +41,14 @@ impl Program {
         let mut sensor = ptr::null_mut();
         // SAFETY: the memory has the size and the alignment that a sensor needs.
         unsafe {
-            assert_eq!(hzn_open(memory.0.as_mut_ptr().cast(), HZN_WORKSPACE_SIZE, HZN_INTERFACE, &mut sensor), 0);
+            assert_eq!(hzn_open(memory.0.as_mut_ptr().cast(), bytes, HZN_INTERFACE, &mut sensor), 0);
             let (width, height) = (WIDTH as f64, HEIGHT as f64);
             for (number, value) in [(1, width), (2, height), (4, 90.0), (5, 90.0), (6, 47.5), (7, 35.5), (132, 10.0)] {
                 assert_eq!(hzn_set(sensor, number, value), 0);
             }
             assert_eq!(hzn_apply(sensor), 0);
         }
-        Self { _memory: memory, sensor, pixels: (0..WIDTH * HEIGHT).map(pixel).collect() }
+        Self { memory, sensor, pixels: (0..WIDTH * HEIGHT).map(pixel).collect() }
     }
 
     /// Processes the picture; the camera is at +x of ECEF, and `fill` adds what else is known.
@@ -69,6 +75,28 @@ fn attitude(down_deg: f64) -> [f32; 4] {
     let (y, z) = down_deg.to_radians().sin_cos();
     let half = std::f64::consts::FRAC_1_SQRT_2;
     [half, 0.0, -z * half, y * half].map(|v| v as f32)
+}
+
+#[test]
+fn memory_for_fewer_points_gives_the_same_answer() {
+    let answer = |program: &Program| {
+        let (code, answer) = program.process(|_| ());
+        (code, answer.axis.map(f32::to_bits), answer.cov_rad2.map(f32::to_bits), answer.edge_points, answer.dropped)
+    };
+    let all = answer(&Program::new());
+    assert_eq!(all.0, HZN_OK);
+    let fewer = Program::with_bytes(HZN_WORKSPACE_SIZE_608);
+    assert_eq!(answer(&fewer), all);
+    // Nothing behind the memory was written.
+    // SAFETY: the memory began as zeros.
+    let is_zero = |byte: &MaybeUninit<u8>| unsafe { byte.assume_init() } == 0;
+    assert!(fewer.memory.0[HZN_WORKSPACE_SIZE_608..].iter().all(is_zero));
+    assert!(!fewer.memory.0[HZN_WORKSPACE_SIZE_608 / 2..HZN_WORKSPACE_SIZE_608].iter().all(is_zero));
+    let mut memory = Box::new(Memory([MaybeUninit::zeroed(); HZN_WORKSPACE_SIZE]));
+    let mut sensor = ptr::null_mut();
+    // SAFETY: the memory has more bytes than the call says.
+    let code = unsafe { hzn_open(memory.0.as_mut_ptr().cast(), 32_768, HZN_INTERFACE, &mut sensor) };
+    assert_eq!((code, sensor.is_null()), (HZN_MEMORY, true));
 }
 
 #[test]

@@ -83,7 +83,7 @@ pub fn process_trial(
     prior: PriorKnowledge,
     observer: &impl Observer<f64>,
 ) -> Result<Outcome, SceneError> {
-    horizon.reconfigure(config)?;
+    horizon.configure(config)?;
     let prior = trial.prior(prior.attitude_sigma_deg);
     let expected = horizon.expect(&prior).map_err(|_| SceneError::Pose)?;
     let report = horizon.process_observed(&picture.view(), &expected, observer);

@@ -184,7 +184,7 @@ fn the_level_follows_the_limb_of_the_picture_before() {
     // Each picture uses the threshold that the picture before it gave.
     assert!(levels.windows(2).all(|w| w[1].0 == w[0].1), "{levels:?}");
     // Another configuration resets the threshold, and so does a picture without an answer.
-    sensors.host.reconfigure(&config).unwrap();
+    sensors.host.configure(&config).unwrap();
     let dark = vec![8u8; 640 * 480];
     let expected = sensors.host.expect(&Prior::default()).unwrap();
     let report = sensors.host.process(&Grey::try_new(&dark, Layout::packed(640, 480, 1, 8)).unwrap(), &expected);

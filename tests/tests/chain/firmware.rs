@@ -339,7 +339,7 @@ fn the_sensor_alone_answers_with_the_same_bits() {
     let mut ok = 0;
     for frame in &flight.frames {
         let case = Case { prior: Prior::default(), ..Case::rendered(frame.file.clone(), &sensor, frame) };
-        let mut horizon = Box::new(FlightHorizon::new(&sensor).unwrap());
+        let mut horizon = FlightHorizon::boxed(&sensor).unwrap();
         let picture = Grey::try_new(&case.bytes, Layout::packed(1920, 1080, 1, 8)).unwrap();
         let expected = horizon.expect(&case.prior).unwrap();
         let report = horizon.process(&picture, &expected);

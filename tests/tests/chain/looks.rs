@@ -184,6 +184,7 @@ fn a_thermal_array_answers_by_default() {
     // picture.
     known.fit.half_angle = hzn_core::fit::HalfAngle::Known;
     (known.covariance.sigma_px, known.covariance.correlation_px) = (1e-3, 0.0);
+    let body = sensor.body.clone();
     let [mut sensor, mut known] = [sensor, known].map(|c| HostHorizon::boxed(&c).unwrap());
     let (mut tally, mut bound_deg2, mut count) = (Tally::default(), 0.0, 0.0);
     for seed in 0..60u32 {
@@ -195,7 +196,7 @@ fn a_thermal_array_answers_by_default() {
             roll_rad: core::f64::consts::TAU * random(3),
         };
         let mut scene = Scene::new(camera.clone(), Pose::looking(position_m(20.0, 10.0, 400.0), look_to));
-        scene.body = sensor.config().body.clone();
+        scene.body = body.clone();
         (scene.detector.psf_sigma_px, scene.detector.read_noise, scene.seed) = (0.7, 0.01, seed.into());
         let grey = scene.render().unwrap();
         let view = grey.view();

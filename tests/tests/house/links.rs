@@ -108,7 +108,7 @@ fn the_example_of_the_documents_is_that_of_the_image() {
     let image: Vec<String> = image.lines().map(strip).collect();
     for file in ["README.md", "book/guide/first-steps.md", "crates/hzn-core/README.md", "crates/hzn-core/src/lib.rs"] {
         let text = read(file);
-        let block = text.split("```").find(|block| block.contains("FlightWorkspace::new()")).unwrap_or_default();
+        let block = text.split("```").find(|block| block.contains("FlightHorizon::empty()")).unwrap_or_default();
         let lines = block.lines().skip(1).map(strip);
         let has_own_source = |line: &String| {
             line.is_empty() || ["use ", "let data", "println!", "# "].iter().any(|start| line.starts_with(start))
@@ -117,5 +117,21 @@ fn the_example_of_the_documents_is_that_of_the_image() {
         let foreign: Vec<&String> = shown.iter().filter(|line| !image.contains(line)).collect();
         assert!(foreign.is_empty(), "{file}: the image does not have {foreign:#?}");
         assert!(shown.len() >= 5, "{file}: {shown:#?}");
+    }
+}
+
+/// Tests that the guide shows the files of its project, which the step `firmware` builds and runs.
+#[test]
+fn the_project_of_the_guide_is_that_of_the_folder() {
+    let guide = fs::read_to_string(root().join("book/guide/own-firmware.md")).unwrap();
+    let file = |name: &str| fs::read_to_string(root().join("examples/own-firmware").join(name)).unwrap();
+    for name in ["Cargo.toml", ".cargo/config.toml", "memory.x", "build.rs"] {
+        assert!(guide.contains(&file(name)), "the guide shows another {name}");
+    }
+    let main = file("src/main.rs");
+    let blocks: Vec<&str> = guide.split("```rust\n").skip(1).filter_map(|block| block.split("```").next()).collect();
+    assert_eq!(blocks.len(), 3);
+    for block in blocks.iter().filter(|block| !block.contains("rustc-link-search")) {
+        assert!(main.contains(block), "src/main.rs does not have\n{block}");
     }
 }

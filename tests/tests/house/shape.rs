@@ -30,7 +30,7 @@ fn collect_sources(dir: &Path, out: &mut Vec<PathBuf>) {
 fn for_each_source(mut visit: impl FnMut(&str, &str)) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap();
     let mut paths = Vec::new();
-    for folder in ["benches", "crates", "firmware", "reproduce", "tests", "xtask"] {
+    for folder in ["benches", "crates", "examples", "firmware", "reproduce", "tests", "xtask"] {
         collect_sources(&root.join(folder), &mut paths);
     }
     assert!(paths.len() > 300, "{}", paths.len());

@@ -59,7 +59,7 @@ fn disc(position: bool) -> (Place, PictureAnswer) {
     });
     picture.save(place.path("in/disc.png")).unwrap();
     let config = hzn_files::sensor::load(&place.path("in/sensor.toml")).unwrap().config;
-    let mut horizon = Box::new(FlightHorizon::new(&config).unwrap());
+    let mut horizon = FlightHorizon::boxed(&config).unwrap();
     let grey = Grey::try_new(picture.as_raw(), Layout::packed(320, 240, 1, 8)).unwrap();
     let expected = horizon.expect(&Prior::default()).unwrap();
     (place, PictureAnswer::from_report(&horizon.process(&grey, &expected)))

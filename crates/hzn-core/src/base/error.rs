@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-/// The error of a configuration that is refused. After [`crate::Horizon::new`] accepts a configuration, nothing can
-/// fail on it.
+/// The error of a configuration that is refused. After [`crate::Horizon::configure`] accepts a configuration, nothing
+/// can fail on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConfigError {
     /// The field as it is written in sensor.toml, for example `camera.fx_px`.

@@ -29,7 +29,7 @@ use crate::model::status::Stage;
 /// # config.body.altitude_km = Some(230.0);
 /// # let data: Vec<u8> = (0..64 * 48).map(|i| if i / 64 < 20 { 5 } else { 200 }).collect();
 /// # let picture = Grey::try_new(&data, Layout::packed(64, 48, 1, 8))?;
-/// # let mut horizon = FlightHorizon::new(&config)?;
+/// # let mut horizon = FlightHorizon::boxed(&config)?;
 /// # let expected = horizon.expect(&Prior::default())?;
 ///
 /// /// Counts the pixels that are read.

@@ -36,7 +36,7 @@ pub type Reports<T> = heapless::Vec<Report<T>, MAX_BODIES>;
 /// # config.body.altitude_km = Some(230.0);
 /// # let data: Vec<u8> = (0..64 * 48).map(|i| if i / 64 < 20 { 5 } else { 200 }).collect();
 /// # let picture = Grey::try_new(&data, Layout::packed(64, 48, 1, 8))?;
-/// # let mut horizon = FlightHorizon::new(&config)?;
+/// # let mut horizon = FlightHorizon::boxed(&config)?;
 /// # let expected = horizon.expect(&Prior::default())?;
 /// let report = horizon.process(&picture, &expected);
 /// match &report.solution {

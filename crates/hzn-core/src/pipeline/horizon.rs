@@ -1,13 +1,12 @@
 //! The sensor together with its lists: the type that most programs use.
 
+use super::place::SensorPlace;
 use super::sensor::Sensor;
 use super::workspace::{HOST_POINTS, HOST_WORDS, Workspace};
 use crate::base::error::ConfigError;
 use crate::base::real::Real;
 use crate::config::Config;
-use crate::geometry::camera::Camera;
 use crate::image::Pixels;
-use crate::image::region::Region;
 use crate::model::body::{Expected, Prior, PriorError};
 use crate::model::observer::{Observer, Unobserved};
 use crate::model::report::MAX_BODIES;
@@ -22,21 +21,26 @@ pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 
 /// A horizon sensor: a [`Sensor`] with its [`Workspace`].
 ///
-/// It is large: keep it in a `Box`. A flight computer keeps the two parts apart, the workspace in a `static`, as the
-/// example of the crate does.
+/// It is large, so it is made in place: [`Self::empty`] in a `static` is all zeros, takes no flash and never passes
+/// over the stack, and [`Self::configure`] makes it a sensor there. Until then every picture is refused. On a
+/// workstation, [`Self::boxed`] does both on the heap.
 ///
 /// # Example
 ///
-/// A program makes one for each camera and gives it one picture after another:
+/// A program has one for each camera and gives it one picture after another:
 ///
 /// ```
 /// use hzn_core::camera::{self, Model};
 /// use hzn_core::image::{Grey, Layout};
 /// use hzn_core::{Config, FlightHorizon, Prior};
+/// use static_cell::ConstStaticCell;
+///
+/// static HORIZON: ConstStaticCell<FlightHorizon> = ConstStaticCell::new(FlightHorizon::empty());
 ///
 /// let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
 /// config.body.altitude_km = Some(230.0);
-/// let mut horizon = FlightHorizon::new(&config)?;
+/// let horizon = HORIZON.try_take().ok_or("the sensor is in use")?;
+/// horizon.configure(&config)?;
 ///
 /// // The altitude of this picture, in metres, replaces that of the configuration.
 /// let expected = horizon.expect(&Prior { altitude_m: Some(231.5e3), ..Prior::default() })?;
@@ -49,43 +53,46 @@ pub type FlightHorizon = Horizon<f32, 2048, 256, 512>;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Horizon<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
-    sensor: Sensor<T>,
+    place: SensorPlace<T>,
     workspace: Workspace<T, POINTS, BLOCKS, WORDS>,
     /// Thresholds for the next picture in counts, one for each body.
     levels: [Option<u16>; MAX_BODIES],
 }
 
 impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Horizon<T, POINTS, BLOCKS, WORDS> {
-    /// Makes a sensor. Checks the whole configuration first.
-    ///
-    /// The sensor passes over the caller's stack, also on its way into a `static`: a [`FlightHorizon`] needs more than
-    /// 92 KB there.
-    ///
-    /// # Errors
-    /// Returns the first field that is out of its limits.
-    pub fn new(config: &Config) -> Result<Self, ConfigError> {
-        Ok(Self { sensor: Sensor::new(config)?, workspace: Workspace::new(), levels: [None; MAX_BODIES] })
+    /// Makes a sensor without a configuration: all zeros. It refuses every picture until [`Self::configure`] has
+    /// accepted a configuration.
+    pub const fn empty() -> Self {
+        Self { place: SensorPlace::empty(), workspace: Workspace::new(), levels: [None; MAX_BODIES] }
     }
-    /// Does the same as [`Self::new`], in a box. Another thread builds the sensor, so that the sensor does not pass
-    /// over the caller's stack: the sensor of a workstation can be larger than the free part of a thread's stack.
+    /// Makes a configured sensor in a box. Another thread makes it, because without optimisation the sensor passes over
+    /// the stack: the sensor of a workstation can be larger than the free part of the caller's stack.
     ///
     /// # Errors
-    /// Returns the same errors as [`Self::new`].
+    /// Returns the same errors as [`Self::configure`].
     #[cfg(feature = "std")]
     pub fn boxed(config: &Config) -> Result<std::boxed::Box<Self>, ConfigError> {
         const STACK_BYTES: usize = 16 << 20;
-        // The call goes through a pointer that the compiler cannot see through, so that the stack frame of `new` does
-        // not become a part of this one.
-        let build: fn(&Config) -> Result<std::boxed::Box<Self>, ConfigError> =
-            core::hint::black_box(|config: &Config| Self::new(config).map(std::boxed::Box::new));
+        // The call goes through a pointer that the compiler cannot see through, so that the stack frame of `in_box`
+        // does not become a part of this one.
+        let make: fn(&Config) -> Result<std::boxed::Box<Self>, ConfigError> = core::hint::black_box(Self::in_box);
         std::thread::scope(|scope| {
             let builder = std::thread::Builder::new().stack_size(STACK_BYTES);
-            // If no thread can be started, the sensor is built on this one.
-            builder.spawn_scoped(scope, move || build(config)).ok().and_then(|thread| thread.join().ok())
+            // If no thread can be started, as in a browser, the sensor is made on this one.
+            builder.spawn_scoped(scope, move || make(config)).ok().and_then(|thread| thread.join().ok())
         })
-        .unwrap_or_else(|| build(config))
+        .unwrap_or_else(|| make(config))
     }
-    /// Replaces the configuration, from the next picture on. If it is refused, nothing changes.
+    /// Makes a configured sensor in a box, on this thread. With optimisation it does not pass over the stack.
+    #[cfg(feature = "std")]
+    fn in_box(config: &Config) -> Result<std::boxed::Box<Self>, ConfigError> {
+        // `Box::new` would get the value over the stack.
+        let mut horizon = std::boxed::Box::<Self>::default();
+        horizon.configure(config)?;
+        Ok(horizon)
+    }
+    /// Makes this a sensor with a configuration, from the next picture on. Checks the whole configuration first: if it
+    /// is refused, nothing changes, and an empty sensor stays empty.
     ///
     /// # Errors
     /// Returns the first field that is out of its limits.
@@ -94,47 +101,42 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     /// # use hzn_core::camera::{self, Model};
     /// # use hzn_core::{Config, FlightHorizon};
     /// let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
-    /// let mut horizon = FlightHorizon::new(&config)?;
+    /// let mut horizon = Box::new(FlightHorizon::empty());
+    /// horizon.configure(&config)?;
     /// config.consensus.threshold_px = -1.0;
-    /// let error = horizon.reconfigure(&config).unwrap_err();
+    /// let error = horizon.configure(&config).unwrap_err();
     /// assert_eq!(error.field, "consensus.threshold_px");
-    /// assert_eq!(horizon.config().consensus.threshold_px, 3.0);
+    /// let sensor = horizon.sensor().expect("it was configured");
+    /// assert_eq!(sensor.config().consensus.threshold_px, 3.0);
     /// # Ok::<(), hzn_core::error::ConfigError>(())
     /// ```
-    pub fn reconfigure(&mut self, config: &Config) -> Result<(), ConfigError> {
-        self.sensor = Sensor::new(config)?;
+    pub fn configure(&mut self, config: &Config) -> Result<(), ConfigError> {
+        self.place.configure(config)?;
         // A threshold of the old configuration may belong to another body or another scale of counts.
         self.levels = [None; MAX_BODIES];
         Ok(())
     }
-    /// Returns the configuration.
-    pub fn config(&self) -> &Config {
-        self.sensor.config()
-    }
-    /// Returns the camera with its lens.
-    pub fn camera(&self) -> &Camera<T> {
-        self.sensor.camera()
-    }
-    /// Returns the part of the picture that counts.
-    pub fn region(&self) -> &Region<T> {
-        self.sensor.region()
+    /// Returns the sensor with its configuration and camera; `None` if the place is empty.
+    pub fn sensor(&self) -> Option<&Sensor<T>> {
+        self.place.sensor()
     }
     /// Does the same as [`Sensor::expect`].
     ///
     /// # Errors
-    /// The altitude or the position is impossible.
+    /// The altitude or the position is impossible, or no configuration was accepted yet.
     pub fn expect(&self, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
-        self.sensor.expect(frame)
+        self.expect_body(0, frame)
     }
     /// Does the same as [`Sensor::expect_body`].
     ///
     /// # Errors
-    /// The altitude or the position is impossible, or there is no body of this number.
+    /// The altitude or the position is impossible, there is no body of this number, or no configuration was accepted
+    /// yet.
     pub fn expect_body(&self, which: usize, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
-        self.sensor.expect_body(which, frame)
+        self.sensor().ok_or(PriorError::NotConfigured)?.expect_body(which, frame)
     }
     /// Finds the limb. Returns a report for every input; a picture whose size is not that of the camera is `rejected`
-    /// at the first stage.
+    /// at the first stage, and so is every picture before [`Self::configure`].
     pub fn process<P: Pixels>(&mut self, picture: &P, expected: &Expected<T>) -> Report<T> {
         self.process_observed(picture, expected, &Unobserved)
     }
@@ -145,8 +147,9 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         expected: &Expected<T>,
         observer: &O,
     ) -> Report<T> {
-        let expected = self.remembered(expected);
-        let report = self.sensor.process(&mut self.workspace, picture, &expected, observer);
+        let Some(sensor) = self.place.sensor() else { return Report::empty() };
+        let expected = remembered(&self.levels, expected);
+        let report = sensor.process(&mut self.workspace, picture, &expected, observer);
         self.remember(&expected, &report);
         report
     }
@@ -161,23 +164,51 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         expected: &[Expected<T>],
         observer: &O,
     ) -> Reports<T> {
-        // The list is cut at its capacity before it is collected, because `collect` would panic beyond it.
-        let known: heapless::Vec<Expected<T>, MAX_BODIES> =
-            expected.iter().take(MAX_BODIES).map(|e| self.remembered(e)).collect();
-        let reports = self.sensor.process_each(&mut self.workspace, picture, &known, observer);
+        // The lists are cut at their capacity before they are collected, because `collect` would panic beyond it.
+        let first = expected.iter().take(MAX_BODIES);
+        let Some(sensor) = self.place.sensor() else { return first.map(|_| Report::empty()).collect() };
+        let known: heapless::Vec<Expected<T>, MAX_BODIES> = first.map(|e| remembered(&self.levels, e)).collect();
+        let reports = sensor.process_each(&mut self.workspace, picture, &known, observer);
         for (expected, report) in known.iter().zip(&reports) {
             self.remember(expected, report);
         }
         reports
     }
-    /// Adds the threshold that the last picture gave for this body, if `expected` has none.
-    fn remembered(&self, expected: &Expected<T>) -> Expected<T> {
-        let last = self.levels.get(usize::from(expected.which)).copied().flatten();
-        Expected { level: expected.level.or(last), ..*expected }
-    }
     fn remember(&mut self, expected: &Expected<T>, report: &Report<T>) {
         if let Some(level) = self.levels.get_mut(usize::from(expected.which)) {
             *level = report.next_level;
         }
+    }
+}
+
+impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Default
+    for Horizon<T, POINTS, BLOCKS, WORDS>
+{
+    #[inline(always)]
+    fn default() -> Self {
+        const { Self::empty() }
+    }
+}
+
+/// Adds the threshold that the last picture gave for this body, if `expected` has none.
+fn remembered<T: Real>(levels: &[Option<u16>; MAX_BODIES], expected: &Expected<T>) -> Expected<T> {
+    let last = levels.get(usize::from(expected.which)).copied().flatten();
+    Expected { level: expected.level.or(last), ..*expected }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::camera;
+
+    /// Tests the way without another thread, as in a browser, whose stack has 1 MiB: a sensor of 1.4 MB is made in its
+    /// box. An overflow of the stack would end the test program.
+    #[test]
+    fn a_box_is_filled_in_place() {
+        let config = Config::new(camera::Config::ideal(camera::Model::Pinhole, 64, 48, 60.0));
+        let make = move || HostHorizon::in_box(&config).is_ok_and(|horizon| horizon.sensor().is_some());
+        let made = std::thread::Builder::new().stack_size(256 << 10).spawn(make).unwrap().join();
+        assert!(made.unwrap());
+        assert!(size_of::<HostHorizon>() > 1 << 20);
     }
 }

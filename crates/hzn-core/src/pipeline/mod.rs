@@ -16,6 +16,7 @@ pub mod edges;
 mod further_looks;
 mod horizon;
 mod look;
+mod place;
 mod process;
 mod row_stream;
 mod search;
@@ -28,6 +29,7 @@ mod workspace;
 mod golden;
 
 pub use horizon::{FlightHorizon, Horizon, HostHorizon};
+pub use place::SensorPlace;
 pub use row_stream::{ROWS_HELD, RowBuffers, RowStream, RowStreamError};
 pub use sensor::Sensor;
 pub use sequence::{Sequence, Step};

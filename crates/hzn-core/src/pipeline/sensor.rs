@@ -66,15 +66,28 @@ impl<T: Real> Sensor<T> {
     // Not inlined: the temporary values, some kilobytes, must not lie on the caller's stack.
     #[inline(never)]
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
+        let camera = Self::check(config)?;
+        Ok(Self::from_checked(config, camera))
+    }
+
+    /// Checks the whole configuration, and returns its camera.
+    // A function of its own, and so is the next one: their temporary values lie on the stack one after the other.
+    #[inline(never)]
+    pub(super) fn check(config: &Config) -> Result<Camera<T>, ConfigError> {
         config.check()?;
-        let camera = Camera::try_new(&config.camera)?;
+        Camera::try_new(&config.camera)
+    }
+
+    /// Makes the sensor of a configuration that was checked.
+    #[inline(never)]
+    pub(super) fn from_checked(config: &Config, camera: Camera<T>) -> Self {
         let turn = |m: Mount| Rotation::assume_from_quaternion(m.q_vehicle_from_camera_wxyz.map(T::from_f64));
-        Ok(Self {
+        Self {
             region: Region::new(&config.mask, &camera),
             vehicle_from_camera: config.mount.and_then(turn),
             camera,
             config: config.clone(),
-        })
+        }
     }
 
     /// Returns the configuration.

@@ -1,13 +1,13 @@
 //! `process` returns a report for every picture and never reports NaN or infinity in an answer.
 
 use crate::common::{KINDS, garbage};
-use hzn_core::body::{Kind, Prior};
+use hzn_core::body::{Kind, Prior, PriorError};
 use hzn_core::camera::{self, Model};
 use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Channel, Grey, ImageView, Layout};
 use hzn_core::real::Real;
 use hzn_core::status::Status;
-use hzn_core::{Config, Expected, FlightHorizon, HostHorizon, Preset, Report};
+use hzn_core::{Config, Expected, FlightHorizon, HostHorizon, Preset, Report, Sensor};
 use hzn_core::{report::MAX_LISTED, verdict::Verdict};
 use proptest::prelude::*;
 
@@ -153,7 +153,7 @@ proptest! {
         let bounded = host.process(&picture, &expected);
         sound(&bounded);
         prop_assert!(bounded.counters.work <= most);
-        host.reconfigure(&config(1_000_000_000)).unwrap();
+        host.configure(&config(1_000_000_000)).unwrap();
         let free = host.process(&picture, &expected);
         prop_assert!(free.status != Status::Truncated);
         if free.counters.work * 4 < most {
@@ -190,6 +190,45 @@ fn a_picture_of_another_size_is_rejected() {
 }
 
 #[test]
+fn an_empty_sensor_refuses_pictures_until_a_configuration_is_accepted() {
+    let right = config(Model::Pinhole, false, false, Kind::EarthSphere);
+    let mut wrong = right.clone();
+    wrong.consensus.threshold_px = -1.0;
+    let mut flight = Box::new(FlightHorizon::empty());
+    let other = FlightHorizon::boxed(&right).unwrap().expect(&Prior::default()).unwrap();
+    let [axis, half_angle] = [75f64.to_radians(), f64::from(other.half_angle_rad())];
+    let pixel = |i: i32| {
+        let (x, y) = ((f64::from(i % 96) - 47.5) / 60.0, (f64::from(i / 96) - 31.5) / 60.0);
+        let along = (y * axis.sin() + axis.cos()) / (x * x + y * y + 1.0).sqrt();
+        (110.0 + 90.0 * ((along - half_angle.cos()) * 60.0).clamp(-1.0, 1.0)) as u8
+    };
+    let drawn: Vec<u8> = (0..96 * 64).map(pixel).collect();
+    let picture = Grey::try_new(&drawn, Layout::packed(96, 64, 1, 8)).unwrap();
+    // A refused configuration leaves the sensor empty.
+    for _ in 0..2 {
+        assert!(flight.sensor().is_none());
+        assert_eq!(flight.expect(&Prior::default()).unwrap_err(), PriorError::NotConfigured);
+        assert_eq!(flight.process(&picture, &other).status, Status::Rejected);
+        let each = flight.process_each(&picture, &[other, other]);
+        assert_eq!(each.iter().map(|report| report.status).collect::<Vec<_>>(), [Status::Rejected; 2]);
+        assert_eq!(flight.configure(&wrong).unwrap_err().field, "consensus.threshold_px");
+    }
+    flight.configure(&right).unwrap();
+    let answer = |flight: &mut FlightHorizon| {
+        let expected = flight.expect(&Prior::default()).unwrap();
+        format!("{:?}", flight.process(&picture, &expected))
+    };
+    let before = answer(&mut flight);
+    assert!(before.contains("status: Ok"), "{before}");
+    // A refused configuration changes nothing on a running sensor.
+    assert!(flight.configure(&wrong).is_err());
+    assert_eq!(flight.sensor().unwrap().config(), &right);
+    assert_eq!(answer(&mut flight), before);
+    // The sensor in place is the one that a value would be.
+    assert_eq!(flight.sensor().unwrap(), &Sensor::new(&right).unwrap());
+}
+
+#[test]
 fn grey_colour_and_sixteen_bits_agree() {
     let data = garbage(6, 3, 40);
     let colour: Vec<u8> = data.iter().flat_map(|&v| [v, v, v]).collect();
@@ -210,7 +249,6 @@ fn grey_colour_and_sixteen_bits_agree() {
 
 #[test]
 fn impossible_frames_are_refused_by_name() {
-    use hzn_core::body::PriorError;
     let mut c = config(Model::Pinhole, false, false, Kind::Earth);
     c.body.altitude_km = None;
     let host = HostHorizon::boxed(&c).unwrap();

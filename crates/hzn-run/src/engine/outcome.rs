@@ -80,7 +80,8 @@ impl From<PriorError> for Unprocessed {
             | PriorError::Position
             | PriorError::AttitudeSigma
             | PriorError::Rate
-            | PriorError::NoBody => Status::Unreadable,
+            | PriorError::NoBody
+            | PriorError::NotConfigured => Status::Unreadable,
             // Nothing can be expected of the body: no distance is known, or what is known contradicts itself.
             _ => Status::NoAltitude,
         };

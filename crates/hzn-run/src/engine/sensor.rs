@@ -65,11 +65,8 @@ impl AnySensor {
     /// The first field outside its limits.
     pub fn new(config: &Config, flight: bool) -> Result<Self, ConfigError> {
         let camera = Camera::try_new(&config.camera)?;
-        let kind = if flight {
-            Kind::Flight(Box::new(FlightHorizon::new(config)?))
-        } else {
-            Kind::Host(HostHorizon::boxed(config)?)
-        };
+        let kind =
+            if flight { Kind::Flight(FlightHorizon::boxed(config)?) } else { Kind::Host(HostHorizon::boxed(config)?) };
         let bodies: Vec<_> = config.each_body().iter().map(|b| b.kind).collect();
         Ok(Self { kind, camera, last: vec![None; bodies.len()], time_s: None, bodies })
     }
@@ -93,8 +90,8 @@ impl AnySensor {
     pub fn reconfigure(&mut self, config: &Config) -> Result<(), ConfigError> {
         let camera = Camera::try_new(&config.camera)?;
         match &mut self.kind {
-            Kind::Host(h) => h.reconfigure(config)?,
-            Kind::Flight(h) => h.reconfigure(config)?,
+            Kind::Host(h) => h.configure(config)?,
+            Kind::Flight(h) => h.configure(config)?,
         }
         self.camera = camera;
         self.bodies = config.each_body().iter().map(|b| b.kind).collect();
@@ -241,7 +238,14 @@ fn half_angles<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, co
         let prior = prior(data, which, body)?;
         Ok(horizon.expect_body(which, &prior)?.half_angle_rad().into())
     };
-    horizon.config().each_body().iter().enumerate().map(expect).collect()
+    bodies(horizon).iter().enumerate().map(expect).collect()
+}
+
+/// Returns the bodies that the sensor searches for.
+fn bodies<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+    horizon: &Horizon<T, POINTS, BLOCKS, WORDS>,
+) -> &[body::Config] {
+    horizon.sensor().map_or(&[], |sensor| sensor.config().each_body())
 }
 
 fn prior<T: Real>(data: Option<&FrameData>, which: usize, body: &body::Config) -> Result<Prior<T>, PriorError> {
@@ -295,7 +299,7 @@ fn run<P: Pixels, T: Real + Into<f64>, O: Observer<T>, const POINTS: usize, cons
 ) -> Vec<Processed> {
     let expect = |(which, last): (usize, &Option<LastAnswer>)| {
         let last = last.zip(now_s).and_then(|(last, now_s)| last.to_last(now_s));
-        let body = horizon.config().each_body().get(which).ok_or(PriorError::NoBody)?;
+        let body = bodies(horizon).get(which).ok_or(PriorError::NoBody)?;
         horizon.expect_body(which, &Prior { last, ..prior(data, which, body)? })
     };
     let expected: Vec<_> = last.iter().enumerate().map(expect).collect();

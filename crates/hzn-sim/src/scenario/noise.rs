@@ -270,12 +270,7 @@ fn process_all<'a>(
     sensor: &Config,
     pictures: &[(&'a FlightFrame, &Picture)],
 ) -> Vec<Processed<'a>> {
-    let config = sensor.clone();
-    // A host sensor has some megabytes and is made on the stack before it is moved. The stack of a thread may be too
-    // small.
-    let make = move || HostHorizon::new(&config).map(Box::new);
-    let made = std::thread::Builder::new().stack_size(64 << 20).spawn(make).map(std::thread::JoinHandle::join);
-    let Ok(Ok(Ok(mut horizon))) = made else { return Vec::new() };
+    let Ok(mut horizon) = HostHorizon::boxed(sensor) else { return Vec::new() };
     let mut processed = Vec::new();
     for (frame, picture) in pictures {
         let Ok(truth) = frame.scene.body_truth(sensor.body.kind, &frame.file, frame.time_s) else { continue };

@@ -1,5 +1,5 @@
-//! The example of the documents, on a board with 192 KiB of RAM: the lists of the sensor are in a `static`, and the
-//! sensor is on the stack. A test compares the lines of the documents with this file.
+//! The example of the documents, on a board with 192 KiB of RAM: the sensor and its lists are in a `static`. A test
+//! compares the lines of the documents with this file.
 //!
 //! `picture.bin` is the picture, 64×48 bytes. `answer.bin` is the answer with every bit, and the high-water mark of the
 //! stack in bytes, a little-endian word.
@@ -12,15 +12,14 @@ use core::fmt::Debug;
 use cortex_m_rt::entry;
 use hzn_core::camera::{self, Model};
 use hzn_core::image::{Grey, Layout};
-use hzn_core::observer::Unobserved;
-use hzn_core::{Config, FlightWorkspace, Prior, Report, Sensor};
+use hzn_core::{Config, FlightHorizon, Prior, Report};
 use hzn_firmware::host::{File, exit};
 use hzn_firmware::watermark;
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::Writer;
 use static_cell::ConstStaticCell;
 
-static WORKSPACE: ConstStaticCell<FlightWorkspace> = ConstStaticCell::new(FlightWorkspace::new());
+static HORIZON: ConstStaticCell<FlightHorizon> = ConstStaticCell::new(FlightHorizon::empty());
 static PIXELS: ConstStaticCell<[u8; 64 * 48]> = ConstStaticCell::new([0; 64 * 48]);
 
 /// Any error. It makes `?` work as in the documents, where an error is in a `Box`.
@@ -45,12 +44,12 @@ fn process() -> Result<Report<f32>, Failed> {
     }
     let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 64, 48, 60.0));
     config.body.altitude_km = Some(230.0);
-    let sensor = Sensor::<f32>::new(&config)?;
-    let workspace = WORKSPACE.try_take().ok_or("the workspace is in use")?;
+    let horizon = HORIZON.try_take().ok_or("the sensor is in use")?;
+    horizon.configure(&config)?;
 
     let picture = Grey::try_new(&data[..], Layout::packed(64, 48, 1, 8))?;
-    let expected = sensor.expect(&Prior { altitude_m: Some(231.5e3), ..Prior::default() })?;
-    let report = sensor.process(workspace, &picture, &expected, &Unobserved);
+    let expected = horizon.expect(&Prior { altitude_m: Some(231.5e3), ..Prior::default() })?;
+    let report = horizon.process(&picture, &expected);
     Ok(report)
 }
 

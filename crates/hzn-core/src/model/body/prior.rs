@@ -126,6 +126,8 @@ pub enum PriorError {
     },
     /// The sensor has no body with that number.
     NoBody,
+    /// No configuration was accepted yet.
+    NotConfigured,
 }
 
 impl core::fmt::Display for PriorError {
@@ -172,6 +174,7 @@ impl core::fmt::Display for PriorError {
                 );
             }
             Self::NoBody => "the sensor has no body with this number",
+            Self::NotConfigured => "the sensor has no configuration yet: call `configure` first",
         })
     }
 }
