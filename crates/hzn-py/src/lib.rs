@@ -27,6 +27,7 @@ mod overlay;
 mod parameters;
 mod pickled;
 mod prior;
+mod read;
 mod recording;
 mod report;
 mod rig;
@@ -34,7 +35,9 @@ mod sensor;
 mod sequence;
 mod simulation;
 mod stages;
+mod start;
 mod state;
+mod view;
 
 /// The module `hzn._hzn`.
 #[pyo3::pymodule(gil_used = false)]
@@ -74,6 +77,8 @@ mod _hzn {
         Cone, Fit, Rays, exclude_body, find_borders, find_consensus, find_threshold, fit_cone, fuse_half_angle,
         locate_points, to_rays,
     };
+    #[pymodule_export]
+    use crate::view::render;
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's own spelling")]

@@ -2,8 +2,10 @@
 
 use std::sync::{Arc, OnceLock};
 
+use hzn_files::FrameData;
 use hzn_mcap::{CandidateEdge, FrameRecord, Row};
 use hzn_run::engine::Trace;
+use hzn_run::nadir::Nadir;
 
 use crate::camera::Camera;
 use crate::pickled::Detail;
@@ -27,10 +29,14 @@ impl Report {
         }
     }
 
+    /// Corrects the direction to the centre with what was given with the picture.
+    pub(crate) fn with_nadir(self, known: Option<&FrameData>) -> Self {
+        Self { nadir: Nadir::from_answer(&self.row, known), ..self }
+    }
+
     /// Makes a report from a row alone, for example of a picture that could not be read.
     pub(crate) fn from_row(row: Row) -> Self {
         Self {
-            row,
             candidates: Vec::new(),
             camera: None,
             half_angle_rad: None,
@@ -39,7 +45,9 @@ impl Report {
             drawing: OnceLock::new(),
             stage: "".into(),
             others: Vec::new(),
-            image: None,
+            nadir: Nadir::from_answer(&row, None),
+            row,
+            shown: None,
             bits: None,
         }
     }

@@ -20,7 +20,8 @@ pub(crate) fn number(py: Python<'_>, report: &Report, index: u64) -> PyResult<Re
         drawing: report.drawing.clone(),
         stage: report.stage.clone(),
         others: others.collect::<PyResult<_>>()?,
-        image: report.image.as_ref().map(|image| image.clone_ref(py)),
+        nadir: report.nadir,
+        shown: report.shown.as_ref().map(|shown| shown.clone_ref(py)),
         bits: report.bits,
     })
 }

@@ -25,4 +25,6 @@ pub(crate) struct Pickled {
     pub(crate) detail: Option<Detail>,
     pub(crate) stage: Cow<'static, str>,
     pub(crate) bits: Option<u8>,
+    /// Direction to the centre, and its error.
+    pub(crate) nadir: Option<([f64; 3], f64)>,
 }

@@ -7,13 +7,15 @@ use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, Row};
+use hzn_run::nadir::Nadir;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyWeakrefMethods, PyWeakrefReference};
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::camera::Camera;
 use crate::cells::{candidate, symmetric, table, vector};
 use crate::pickled::{Detail, Pickled};
+use crate::read::Shown;
 use crate::{drawing, errors, notebook, parameters};
 
 /// Return type of `__reduce__` for pickle: a function and its arguments.
@@ -35,8 +37,9 @@ pub(crate) struct Report {
     pub(crate) drawing: OnceLock<Annotations>,
     pub(crate) stage: Cow<'static, str>,
     pub(crate) others: Vec<Py<Self>>,
-    /// The picture, while another object keeps it alive.
-    pub(crate) image: Option<Py<PyWeakrefReference>>,
+    /// The direction to the centre of the body.
+    pub(crate) nadir: Option<Nadir>,
+    pub(crate) shown: Option<Shown>,
     pub(crate) bits: Option<u8>,
 }
 
@@ -53,10 +56,13 @@ impl Report {
         Ok(Self { others: reports.map(|r| Py::new(py, r)).collect::<PyResult<_>>()?, ..first })
     }
 
-    /// Remembers the picture by a weak reference, so that the report does not keep it alive.
-    pub(crate) fn with_image(self, image: &Bound<'_, PyAny>, bits: Option<u8>) -> Self {
-        let image = PyWeakrefReference::new(image).ok().map(Bound::unbind);
-        Self { image, bits, ..self }
+    /// Remembers the picture, so that the report can be shown with it.
+    pub(crate) fn with_picture(self, shown: Option<Shown>, bits: Option<u8>) -> Self {
+        Self { shown, bits, ..self }
+    }
+
+    fn picture<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.shown.as_ref().map_or(Ok(None), |shown| shown.picture(py))
     }
 
     /// Returns the first line of the legend of an overlay.
@@ -168,6 +174,16 @@ impl Report {
     #[getter]
     fn axis_vehicle<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         vector(py, [self.row.axis_v_x, self.row.axis_v_y, self.row.axis_v_z])
+    }
+    #[doc = doc!("Report.nadir")]
+    #[getter]
+    fn nadir<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.nadir.map(|nadir| PyArray1::from_slice(py, &nadir.direction))
+    }
+    #[doc = doc!("Report.nadir_error_deg")]
+    #[getter]
+    fn nadir_error_deg(&self) -> Option<f64> {
+        self.nadir.map(|nadir| nadir.error_deg)
     }
     #[doc = doc!("Report.covariance")]
     #[getter]
@@ -349,6 +365,20 @@ impl Report {
         Ok(dict)
     }
 
+    #[doc = doc!("Report.plot")]
+    #[pyo3(signature = (image = None, *, ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        image: Option<&Bound<'py, PyAny>>,
+        ax: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, this) = (slf.py(), slf.get());
+        let picture = image.map_or_else(|| this.picture(py), |image| Ok(Some(image.clone())))?;
+        let rgb = picture.map(|p| drawing::draw_bare(py, &p, this.bits, this.camera.as_deref())).transpose()?;
+        let size = this.camera.as_ref().map(|camera| (camera.config.width, camera.config.height));
+        py.import("hzn._plot")?.getattr("plot")?.call1((slf, rgb, size, ax))
+    }
+
     #[doc = doc!("Report.to_dict")]
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         parameters::to_python(py, &self.row)
@@ -366,6 +396,7 @@ impl Report {
             detail: this.detail.clone(),
             stage: this.stage.clone(),
             bits: this.bits,
+            nadir: this.nadir.map(|nadir| (nadir.direction, nadir.error_deg)),
         };
         let bytes = serde_json::to_vec(&pickled).map_err(errors::other)?;
         Ok((slf.get_type().getattr("_of")?.unbind(), (PyBytes::new(py, &bytes).unbind(), this.others(py))))
@@ -382,6 +413,7 @@ impl Report {
             stage: pickled.stage,
             others,
             bits: pickled.bits,
+            nadir: pickled.nadir.map(|(direction, error_deg)| Nadir { direction, error_deg }),
             ..Self::from_row(pickled.row)
         })
     }
@@ -401,7 +433,8 @@ impl Report {
     }
     /// Shows the numbers in a notebook, next to the picture with all annotations.
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
-        let image = self.image.as_ref().and_then(|w| w.bind(py).upgrade());
+        // A file that is gone leaves the numbers, which are worth showing.
+        let image = self.picture(py).unwrap_or_default();
         let jpeg = image.map(|image| {
             let rgb =
                 drawing::draw(py, &image, &self.drawing_of_all(), &self.title(), self.bits, self.camera.as_deref())?;

@@ -11,8 +11,9 @@ use pyo3::types::PyDict;
 
 use crate::errors;
 use crate::prior::Prior;
+use crate::read::Read;
 use crate::report::Report;
-use crate::sensor::{Read, Sensor};
+use crate::sensor::Sensor;
 
 #[doc = doc!("Rig")]
 #[pyclass(frozen, module = "hzn")]

@@ -9,18 +9,18 @@ use hzn_files::{FrameData, plausible, sensor};
 use hzn_mcap::{Row, RowMeta};
 use hzn_run::diagnosis::{self, AnyCone};
 use hzn_run::engine::{Processed, Traces, Unprocessed};
-use hzn_run::source::Payload;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::camera::Camera;
 use crate::expected::Expected;
-use crate::image::{Array, View, to_array};
+use crate::image::{Array, View};
 use crate::prior::Prior;
+use crate::read::{Read, Shown};
 use crate::report::Report;
 use crate::state::State;
-use crate::{errors, parameters};
+use crate::{errors, parameters, start};
 
 /// Return type of `__reduce__` for pickle: a function and its arguments.
 type Pickled = (Py<PyAny>, (Py<PyAny>, bool));
@@ -71,6 +71,24 @@ impl Sensor {
         let loaded = sensor::load(&path).map_err(errors::config)?;
         loaded.warnings.iter().try_for_each(|warning| errors::warn(py, warning))?;
         Self::from_config(loaded.config, flight)
+    }
+
+    #[doc = doc!("Sensor.start")]
+    #[staticmethod]
+    #[pyo3(signature = (pictures = None, *, size = None, fov_deg = None, lens = None, altitude_km = None,
+                        body = "earth", flight = false))]
+    fn start(
+        py: Python<'_>,
+        pictures: Option<PathBuf>,
+        size: Option<(u32, u32)>,
+        fov_deg: Option<f64>,
+        lens: Option<&str>,
+        altitude_km: Option<f64>,
+        body: &str,
+        flight: bool,
+    ) -> PyResult<Self> {
+        let config = start::make(py, &start::Said { pictures, size, fov_deg, lens, altitude_km, body })?;
+        Self::from_config(config, flight)
     }
 
     #[doc = doc!("Sensor.parameters")]
@@ -255,34 +273,7 @@ fn warn_of_unused_bits(py: Python<'_>, array: &Array<'_>, bits: Option<u8>) -> P
     array.unused_bits(bits).map_or(Ok(()), |tip| errors::warn(py, format_args!("nothing found: {tip}")))
 }
 
-/// A picture as an array, and what its file says.
-pub(crate) struct Read<'py> {
-    image: Bound<'py, PyAny>,
-    /// Name of the file; empty for an array.
-    pub(crate) file: String,
-    bits: Option<u8>,
-    pub(crate) time_s: Option<f64>,
-}
-
 impl<'py> Read<'py> {
-    /// Takes an array, or reads a picture file.
-    pub(crate) fn from_object(py: Python<'py>, state: &State, image: &Bound<'py, PyAny>) -> PyResult<Self> {
-        match image.extract::<PathBuf>() {
-            Ok(path) => Self::from_file(py, state, path),
-            Err(_) => Ok(Self { image: image.clone(), file: String::new(), bits: None, time_s: None }),
-        }
-    }
-
-    /// Reads a picture file as `hzn run` does.
-    fn from_file(py: Python<'py>, state: &State, path: PathBuf) -> PyResult<Self> {
-        let (shown, file) = (path.display().to_string(), path.file_name().unwrap_or_default().to_string_lossy().into());
-        let decoded = errors::detached(py, || Payload::File(path).decode(Some(&state.config)))?;
-        let (picture, _) = decoded.map_err(|why| errors::image(format!("{shown}: {why}")))?;
-        let bits = Some(picture.layout.bits).filter(|bits| (9..16).contains(bits));
-        let time_s = picture.exif_time_s;
-        Ok(Self { image: to_array(py, picture)?, file, bits, time_s })
-    }
-
     /// Finds the limb of each body. Returns the report of the first body, which has those of the others, and what the
     /// sensor found.
     pub(crate) fn process(
@@ -317,13 +308,13 @@ impl<'py> Read<'py> {
             let elapsed_us = processed.elapsed.as_nanos() as f64 / 1e3;
             let row = Row::from_report(&meta, found, Some(elapsed_us))
                 .with_protection(state.config.protection_factor(which as u8));
-            Ok(Report::new(row, found, traces.get(which), &state.camera))
+            Ok(Report::new(row, found, traces.get(which), &state.camera).with_nadir(Some(data)))
         };
         let reports = processed.iter().zip(bodies).enumerate().map(report).collect::<PyResult<Vec<_>>>()?;
         if reports.iter().all(|report| !report.is_answer()) {
             warn_of_unused_bits(py, &array, bits)?;
         }
-        Ok((Report::from_bodies(py, reports)?.with_image(&self.image, bits), processed))
+        Ok((Report::from_bodies(py, reports)?.with_picture(Shown::new(self, state), bits), processed))
     }
 }
 

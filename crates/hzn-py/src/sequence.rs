@@ -164,7 +164,7 @@ fn process_item(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: so
     let finished: Finished = finished.map_err(|e| errors::other(format!("{e:#}")))?;
     let rows = hzn_run::sink::rows(&finished, &plan.config);
     let report = |(row, found): (hzn_mcap::Row, &engine::BodyOutcome)| match &found.report {
-        Ok(found) => Report::new(row, found, None, &state.camera),
+        Ok(found) => Report::new(row, found, None, &state.camera).with_nadir(finished.data.as_ref()),
         Err(_) => Report::from_row(row),
     };
     Report::from_bodies(py, rows.into_iter().zip(&finished.outcomes).map(report))

@@ -3,12 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera as Lens;
-use hzn_core::image::Layout;
 use hzn_evaluate::{Answer, Evaluation, heads, pair};
 use hzn_files::truth::Truth;
 use hzn_run::results::Results;
-use hzn_run::source::picture::{Picture, Samples};
-use hzn_sim::scenario::{self, FIT_PICTURES, Fit};
+use hzn_sim::scenario::{FIT_PICTURES, Fit};
 use hzn_sim::sensitivity::Design;
 use hzn_sim::{Flight, FlightFrame, Scenario};
 use pyo3::exceptions::PyIndexError;
@@ -20,7 +18,7 @@ use crate::camera::Camera;
 use crate::report::Report;
 use crate::sensor::Sensor;
 use crate::sequence::to_exception;
-use crate::{errors, parameters};
+use crate::{errors, parameters, view};
 
 #[doc = doc!("Simulation")]
 #[pyclass(frozen, module = "hzn")]
@@ -41,14 +39,7 @@ impl Simulation {
         seed: Option<u64>,
         camera: Option<&str>,
     ) -> PyResult<Self> {
-        let scenario = if let Ok(name) = scene.extract::<PathBuf>() {
-            scenario::load(&name.to_string_lossy(), frames, seed)
-        } else {
-            let text = toml::to_string(&parameters::from_python(scene)?).map_err(errors::config)?;
-            // JSON has no dates, but the start time in a scene.toml is a date and not text.
-            scenario::parse(&unquoted_date(&text), Path::new("scene"), frames, seed)
-        };
-        let mut scenario = scenario.map_err(errors::config)?;
+        let mut scenario = view::load(scene, frames, seed)?;
         if let Some(name) = camera {
             scenario = scenario.with_camera(name).map_err(errors::config)?;
         }
@@ -133,12 +124,6 @@ fn known_arguments(scenario: &Scenario, frame: &FlightFrame) -> Value {
     known
 }
 
-/// Removes the quotes of a line like `utc = "2026-06-21T12:00:00Z"`.
-fn unquoted_date(text: &str) -> String {
-    let line = |l: &str| if l.starts_with("utc = ") { l.replace('"', "") } else { l.to_owned() };
-    text.lines().map(line).collect::<Vec<_>>().join("\n")
-}
-
 #[doc = doc!("SimulatedFrame")]
 #[pyclass(frozen, module = "hzn")]
 pub(crate) struct SimulatedFrame {
@@ -160,12 +145,7 @@ impl SimulatedFrame {
     fn image(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let image = self.image.get_or_try_init(py, || {
             let p = errors::detached(py, || self.frame.render())?.map_err(errors::config)?;
-            let layout = Layout::packed(p.width().into(), p.height().into(), p.channels(), p.bits());
-            let samples = match p.samples() {
-                hzn_sim::Samples::Bytes(d) => Samples::Bytes(d.clone()),
-                hzn_sim::Samples::Words(d) => Samples::Words(d.clone()),
-            };
-            Ok::<_, PyErr>(crate::image::to_array(py, Picture::new(samples, layout))?.unbind())
+            Ok::<_, PyErr>(view::to_numpy(py, &p)?.unbind())
         });
         image.map(|i| i.clone_ref(py))
     }

@@ -225,7 +225,7 @@ def test_reports_are_pickled_and_copied(sensor):
 def everything(report):
     """Return all values of a report in a form that can be compared."""
     found = {"repr": repr(report), "others": [everything(other) for other in report.others]}
-    for name in set(dir(report)) - set(dir(object)) - {"others"}:
+    for name in set(dir(report)) - set(dir(object)) - {"others", "plot"}:
         if not name.startswith("_"):
             try:
                 value = getattr(report, name)
@@ -389,11 +389,11 @@ def test_the_example_of_the_readme_runs(tmp_path, hzn_program, monkeypatch, caps
     (tmp_path / "d" / "flight" / "sensor.toml").rename(tmp_path / "sensor.toml")
     (tmp_path / "d" / "flight.mcap").rename(tmp_path / "flight.mcap")
     (tmp_path / "d" / "flight").rename(tmp_path / "flight")
-    image = np.zeros((720, 1280), np.uint8)
-    image[300:] = 200
-    names = {"image": image}
+    (tmp_path / "crates").symlink_to(readme.parent / "crates")
+    pytest.importorskip("matplotlib").use("Agg")
+    names = {}
     exec(example, names)
-    assert names["picture"].shape == (720, 1280, 3) and list(names["table"]["status"]) == ["ok"]
+    assert list(names["table"]["status"]) == ["ok"]
     assert capsys.readouterr().out.splitlines()[-1].split()[1] == "ok"
 
 

@@ -79,3 +79,12 @@ def simulated() -> float:
     result = hzn.evaluate(reports, flight)
     table = hzn.sensitivity(altitude_km=[100.0, 200.0])
     return float(result["evaluations"][0]["answered"]) + float(table["pitch_free_deg"][0])
+
+
+def first_start(image: NDArray[np.uint8]) -> NDArray[np.float64] | None:
+    sensor = hzn.Sensor.start(size=(640, 480), fov_deg=60, lens="pinhole", altitude_km=500.0)
+    picture = hzn.render(sensor, (7000.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), 0.0, world={"name": "mine"}, seed=1)
+    report = hzn.Sensor.start("flight/", fov_deg=60, body="moon").process(picture, detail=True)
+    report.plot(image, ax=None)
+    hzn.Sensor.start(size=(640, 480), fov_deg=60, lens="fish")  # type: ignore[arg-type]
+    return report.nadir if report.nadir_error_deg is not None and report.nadir_error_deg < 0.1 else None

@@ -7,7 +7,8 @@
 //! [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of their rows. [`overlay`] draws
 //! the result over a picture, and [`explain`] describes in words what happened to it. [`diagnosis`] says what would
 //! make a refused limb the expected one. [`disk`] has the errors of files that cannot be written. [`terminal`] makes
-//! text from files safe for a terminal.
+//! text from files safe for a terminal. [`start`] says what pictures tell about a camera without a calibration, and
+//! [`nadir`] turns the limb axis into the direction to the centre.
 //!
 //! The command line, the Python package and the viewer are built on this crate. It prints nothing, and its [`Error`]
 //! contains no exit code and no name of an option.
@@ -20,12 +21,14 @@ pub mod disk;
 pub mod engine;
 mod error;
 pub mod explain;
+pub mod nadir;
 pub mod open;
 pub mod overlay;
 pub mod results;
 pub mod rig;
 pub mod sink;
 pub mod source;
+pub mod start;
 pub mod terminal;
 
 pub use error::{Error, Kind, Remedy};

@@ -108,3 +108,23 @@ fn crates_import_from_below() {
         assert!(!run.contains(theirs), "hzn-run imports {theirs}");
     }
 }
+
+/// A package of the registry has only what is in its own folder, so each crate that is published has the licence texts.
+#[test]
+fn published_crates_have_the_licence_texts() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut published = 0;
+    for entry in fs::read_dir(root.join("crates")).unwrap() {
+        let folder = entry.unwrap().path();
+        let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        let is_published = !manifest.lines().any(|line| line.starts_with("publish"));
+        for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
+            let own = fs::read(folder.join(name)).ok();
+            assert!(own.is_some() || !is_published, "{}: has no {name}", folder.display());
+            let whole = fs::read(root.join(name)).unwrap();
+            assert!(own.is_none_or(|own| own == whole), "{}: its {name} differs", folder.display());
+        }
+        published += u32::from(is_published);
+    }
+    assert!(published > 15, "{published}");
+}

@@ -7,10 +7,11 @@ use hzn_files::start::{self, CameraFacts, MeasuredFov};
 use hzn_run::diagnosis::FieldOfView;
 use hzn_run::disk;
 use hzn_run::open::Request;
-use hzn_run::source::{self, Payload, Source};
+use hzn_run::source::{self, Source};
+use hzn_run::start::{LimbSays, measure_field_of_view, read_camera_facts};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::{limb_fov, tell};
+use crate::tell;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -153,7 +154,15 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// Finds the field of view from the limb, if an altitude is known.
 fn limb_fov(args: &Args, known: &CameraFacts) -> Result<Option<FieldOfView>, Stop> {
     let request = Request { inputs: args.pictures.clone(), ..Request::default() };
-    limb_fov::find(&request, known)
+    match measure_field_of_view(&request, known)? {
+        LimbSays::FieldOfView(found) => Ok(Some(found)),
+        LimbSays::NoAltitude => Ok(None),
+        LimbSays::Nothing(pictures) => Err(usage(format!(
+            "the field of view is not known (no --fov, no usable EXIF), and the limb in {pictures} pictures does not \
+             say it; add the field of view over the whole width, for example --fov 60, and --lens fisheye or --lens \
+             pinhole"
+        ))),
+    }
 }
 
 /// Returns the 1-sigma of a measured field of view in degrees.
@@ -169,43 +178,14 @@ fn fov_sigma_deg(known: &CameraFacts, lens: Model, measured: &MeasuredFov) -> f6
 /// Collects what the pictures and the command line say about the camera.
 fn known(args: &Args, source: &mut dyn Source) -> Result<CameraFacts, Stop> {
     source.notes().iter().for_each(tell::warning);
-    let size_px = one_size(source)?;
     if let Some(km) = args.altitude.filter(|km| !(*km > 0.0 && km.is_finite())) {
         return Err(usage(format!("--altitude {km}: must be above 0 km")));
     }
-    let tone = source::find_tone(source).map(|found| found.tone);
-    let exif = match source.next().transpose()?.map(|item| item.payload) {
-        Some(Payload::File(path)) => source::exif_lens(&path).unwrap_or_default(),
-        _ => start::Exif::default(),
-    };
-    let size_px = [size_px.0, size_px.1];
-    let lens = args.lens.map(Model::from);
     Ok(CameraFacts {
-        size_px,
         fov_deg: args.fov,
-        lens,
-        exif,
-        tone,
+        lens: args.lens.map(Model::from),
         altitude_km: args.altitude,
         body: args.body.into(),
-        measured: None,
+        ..read_camera_facts(source)?
     })
-}
-
-/// Returns the size of the pictures. Refuses pictures of different sizes.
-fn one_size(source: &dyn Source) -> Result<(u32, u32), Stop> {
-    let mut sizes = source.sizes();
-    let Some((first, size)) = sizes.next() else {
-        return Err(usage("none of the pictures can be read, so their size is not known"));
-    };
-    let word = |(w, h): (u32, u32)| format!("{w}x{h}");
-    match sizes.find(|(_, other)| *other != size) {
-        Some((name, other)) => Err(usage(format!(
-            "{first} is {}, but {name} is {}: a sensor.toml is for pictures of one size; give the pictures of one \
-             camera and mode",
-            word(size),
-            word(other)
-        ))),
-        None => Ok(size),
-    }
 }

@@ -37,6 +37,7 @@ from ._hzn import locate as locate
 from ._hzn import open_mcap as open_mcap
 from ._hzn import overlay as overlay
 from ._hzn import read_mcap as read_mcap
+from ._hzn import render as render
 from ._simulation import evaluate as evaluate
 from ._simulation import sensitivity as sensitivity
 from ._simulation import simulate as simulate

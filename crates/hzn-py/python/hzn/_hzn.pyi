@@ -329,6 +329,58 @@ class Sensor:
             The file has an error; the message names file, line, field and limit of the first one.
         """
 
+    @staticmethod
+    def start(
+        pictures: _Path | None = None,
+        *,
+        size: tuple[int, int] | None = None,
+        fov_deg: float | None = None,
+        lens: Literal["pinhole", "fisheye"] | None = None,
+        altitude_km: float | None = None,
+        body: Literal["earth", "moon"] = "earth",
+        flight: bool = False,
+    ) -> Sensor:
+        """Make a sensor for a camera without a calibration: the one that ``hzn init`` writes.
+
+        Unknown properties of the lens get a sigma, which the covariance of the answers includes.
+
+        Parameters
+        ----------
+        pictures
+            Pictures of the camera: a file, a folder, a pattern, a video or a recording. They give the size, the curve
+            between light and counts, and the focal length by their EXIF; or else the limb in them gives the field of
+            view, for which an altitude must be known.
+        size
+            Width and height of the picture, pixels, if there are no pictures yet.
+        fov_deg
+            Field of view over the whole width, degrees.
+        lens
+            Kind of lens; without it, a pinhole up to a field of view of 90 degrees.
+        altitude_km
+            Altitude of all pictures above WGS-84, or above the Moon, km.
+        body
+            The body in the pictures.
+        flight
+            As for `Sensor`.
+
+        Raises
+        ------
+        ConfigError
+            A value is refused, or nothing says the field of view.
+        ImageError
+            The pictures cannot be read, or have different sizes.
+
+        Warns
+        -----
+        UserWarning
+            EXIF contradicts the field of view, or the camera was turned.
+
+        Examples
+        --------
+        >>> sensor = hzn.Sensor.start("iss.jpg", fov_deg=23.5, altitude_km=418)
+        >>> sensor = hzn.Sensor.start(size=(1920, 1080), fov_deg=92, lens="fisheye", altitude_km=240)
+        """
+
     @property
     def parameters(self) -> keys.Parameters:
         """All parameters, as sections and keys of sensor.toml.
@@ -579,6 +631,25 @@ class Report:
         """The same direction in the vehicle's frame, shape (3,), with ``[mount]`` in sensor.toml."""
 
     @property
+    def nadir(self) -> NDArray[np.float64] | None:
+        """Unit vector to the centre of the body in the camera frame, shape (3,).
+
+        The axis of the Earth's limb is not the direction to its centre: at middle latitudes they are up to 0.19 degrees
+        apart. The position that was given with the picture says by which angle, and the attitude in which direction.
+        Without a position or an attitude this is `axis`, and `nadir_error_deg` says how far it can be off. It is exact
+        for a round body and with ``fit.position``. None without an answer, and for another ellipsoid than the Earth
+        without ``fit.position``.
+        """
+
+    @property
+    def nadir_error_deg(self) -> float | None:
+        """Largest angle between `nadir` and the direction to the centre, degrees, apart from the error of `axis`.
+
+        Without an attitude it is the whole angle between axis and centre, without a position that at 45 degrees of
+        latitude. With an attitude it is the effect of three of its sigmas.
+        """
+
+    @property
     def covariance(self) -> NDArray[np.float64] | None:
         """Covariance of the axis on its tangent plane in the camera frame, shape (3, 3) of rank 2, rad²."""
 
@@ -730,6 +801,30 @@ class Report:
     @property
     def stages_us(self) -> dict[str, float]:
         """Time of each stage, microseconds. Needs ``detail=True`` (`HznError`)."""
+
+    def plot(self, image: _Image | None = None, *, ax: Any = None) -> Any:
+        """Draw the picture with the fitted limb, the points (with ``detail=True``) and the answer, with matplotlib.
+
+        Parameters
+        ----------
+        image
+            The processed array. Without it, the array of `Sensor.process` if it still exists, or its file, which is
+            read again; otherwise only the limb is drawn.
+        ax
+            Axes to draw into; without it, a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes.
+
+        Raises
+        ------
+        ImportError
+            matplotlib is not installed.
+        ImageError
+            The picture does not have the size of the camera's picture, or its file cannot be read.
+        """
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row that ``hzn run`` would write, by column; None for an empty cell."""
@@ -949,6 +1044,51 @@ def locate(
     --------
     >>> position_km, covariance_km2 = hzn.locate(
     ...     points, camera=camera, radii_km=[3396.19, 3396.19, 3376.2], attitude=[1, 0, 0, 0], sigma_px=0.1)
+    """
+
+def render(
+    sensor: Sensor,
+    position_km: Sequence[float],
+    attitude: Sequence[float],
+    time_s: float,
+    *,
+    world: _Path | Mapping[str, Any] | None = None,
+    seed: int | None = None,
+) -> _Image:
+    """Render what the sensor's camera sees from one pose, for a simulation that moves the camera itself.
+
+    Parameters
+    ----------
+    sensor
+        The sensor, of which only the camera is used.
+    position_km
+        Position of the camera in the fixed frame of the body (for the Earth ECEF), km, shape (3,).
+    attitude
+        Unit quaternion (w, x, y, z) from the camera frame to the fixed frame of the body.
+    time_s
+        UTC in seconds since 1970. It places Sun and Moon.
+    world
+        Scene whose world, lens errors, exposure and detector are used, as for `simulate`; without it,
+        ``rocket-clean``: the Earth by day, 8 bits, grey, in proportion to the light. ``leo-infrared`` is the Earth in
+        the infrared. Trajectory, motion blur and parts of the vehicle are not used.
+    seed
+        Seed of the noise. Without it, the time is the seed: the same call gives the same picture, and pictures at
+        other times have other noise.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (height, width) or (height, width, 3), uint8 or uint16 as the scene's detector says.
+
+    Raises
+    ------
+    ConfigError
+        The camera is inside the body or below its limb, or another value or the scene is refused.
+
+    Examples
+    --------
+    >>> image = hzn.render(sensor, position_km, q_fixed_from_camera, 1_560_421_800.0)
+    >>> report = sensor.process(image, position_km=position_km)
     """
 
 def overlay(image: _Image, report: Report, *, bits: int | None = None) -> NDArray[np.uint8]:

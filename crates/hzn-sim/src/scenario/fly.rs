@@ -11,6 +11,7 @@ use crate::ellipsoid::EllipsoidLimb;
 use crate::flight::{Flight, FlightFrame};
 use crate::foreground::Foreground;
 use crate::motion::Motion;
+use crate::pose::Pose;
 use crate::scene::{Light, Scene, World};
 use crate::trajectory::Path;
 use hzn_nav::ephemeris;
@@ -147,7 +148,32 @@ impl Scenario {
 
     fn scene(&self, path: &Path, index: usize, time_s: f64) -> Result<Scene, ScenarioError> {
         let pose = self.fault.turn(&path.camera(time_s), time_s);
-        let unix_s = path.unix_s(time_s);
+        let sun = self.ellipsoid().map(|body| self.body_sun(body, path, time_s));
+        let mut scene = self.world_at(pose, path.unix_s(time_s), sun, time_s)?;
+        let shutter = self.shutter;
+        scene.motion = (shutter.exposure_s > 0.0 || shutter.readout_s > 0.0).then(|| Motion {
+            rate_radps: path.camera_rate_radps(time_s),
+            exposure_s: shutter.exposure_s,
+            readout_s: shutter.readout_s,
+        });
+        scene.foreground = self
+            .vehicle
+            .iter()
+            .map(|part| Foreground { polygon_px: part.polygon_px.clone(), brightness: part.brightness })
+            .collect();
+        scene.seed = self.picture_seed().wrapping_mul(1_000_003).wrapping_add(index as u64);
+        Ok(scene)
+    }
+
+    /// Returns the scene of the world through the camera at a pose. `sun` is the direction to the Sun at an ellipsoid
+    /// (body-fixed), and `time_s` is the time in the message for a camera inside the body.
+    pub(super) fn world_at(
+        &self,
+        pose: Pose,
+        unix_s: f64,
+        sun: Option<[f64; 3]>,
+        time_s: f64,
+    ) -> Result<Scene, ScenarioError> {
         let mut scene = Scene::new(self.camera.clone(), pose);
         // The camera flies around the Earth for every body that it looks for.
         scene.body = self.body_config(Kind::Earth);
@@ -171,25 +197,13 @@ impl Scenario {
                 scene.limb_height_by_latitude_km = world.half_level_by_latitude_km();
             }
             World::Ellipsoid(body) => {
-                scene.light = Light::Sun { direction: self.body_sun(body, path, time_s), twilight_rad: 0.0 };
+                scene.light = Light::Sun { direction: sun.unwrap_or_default(), twilight_rad: 0.0 };
                 body.surface.seed = body.surface.seed.wrapping_add(self.seed);
             }
             World::Plain => {}
         }
         scene.optics = self.optics;
-        let shutter = self.shutter;
-        scene.motion = (shutter.exposure_s > 0.0 || shutter.readout_s > 0.0).then(|| Motion {
-            rate_radps: path.camera_rate_radps(time_s),
-            exposure_s: shutter.exposure_s,
-            readout_s: shutter.readout_s,
-        });
-        scene.foreground = self
-            .vehicle
-            .iter()
-            .map(|part| Foreground { polygon_px: part.polygon_px.clone(), brightness: part.brightness })
-            .collect();
         scene.detector = self.detector;
-        scene.seed = self.picture_seed().wrapping_mul(1_000_003).wrapping_add(index as u64);
         Ok(scene)
     }
 

@@ -12,6 +12,7 @@ mod fly;
 mod noise;
 mod planet;
 mod rig;
+mod view;
 
 pub use cameras::{CameraOnVehicle, Clock, Fault};
 pub use exposure::Exposure;

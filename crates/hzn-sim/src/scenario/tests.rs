@@ -198,3 +198,24 @@ fn an_inertial_unit_has_the_errors_that_it_tells() {
     assert!((nalgebra::Vector3::new(row.gyro_x_radps, row.gyro_y_radps, row.gyro_z_radps) - expected).norm() < 1e-12);
     assert!(three(errors.gyro_scale).norm() > 1e-4 && three(errors.gyro_misalignment_rad).norm() > 1e-4);
 }
+
+#[test]
+fn a_view_is_the_picture_of_the_flight_without_its_vehicle_and_motion() {
+    let mut scenario = Scenario::builtin("rocket-clean").unwrap();
+    scenario.capture.frames = 3;
+    let frame = &scenario.flight().unwrap().frames[1];
+    let mut of_flight = frame.scene.clone();
+    assert!(of_flight.motion.take().is_some());
+    let unix_s = scenario.start_unix_s() + frame.time_s;
+    let view = |pose, unix_s| scenario.view(&scenario.camera, pose, unix_s, of_flight.seed);
+    let seen = view(of_flight.pose, unix_s).unwrap();
+    assert_eq!(seen, of_flight);
+    // An hour later the Sun is elsewhere.
+    assert_ne!(view(of_flight.pose, unix_s + 3600.0).unwrap().light, of_flight.light);
+    let inside = crate::Pose { position_m: [6.0e6, 0.0, 0.0], ..of_flight.pose };
+    assert!(view(inside, unix_s).unwrap_err().to_string().contains("inside the Earth"));
+    let jupiter = Scenario::builtin("jupiter").unwrap();
+    let far = crate::Pose { position_m: [1.0e9, 0.0, 0.0], ..of_flight.pose };
+    let refused = jupiter.view(&jupiter.camera, far, unix_s, 0).unwrap_err().to_string();
+    assert!(refused.contains("ellipsoid.sun"), "{refused}");
+}

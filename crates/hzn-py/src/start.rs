@@ -1,0 +1,104 @@
+//! A sensor to start from, as `hzn init` writes it.
+
+use std::path::{Path, PathBuf};
+
+use hzn_core::Config;
+use hzn_core::camera::Model;
+use hzn_files::sensor;
+use hzn_files::start::{Body, CameraFacts, Exif, write_sensor_toml};
+use hzn_run::open::Request;
+use hzn_run::source;
+use hzn_run::start::{LimbSays, measure_field_of_view, read_camera_facts};
+use pyo3::prelude::*;
+
+use crate::errors;
+
+/// What Python says about a camera.
+pub(crate) struct Said<'a> {
+    pub(crate) pictures: Option<PathBuf>,
+    pub(crate) size: Option<(u32, u32)>,
+    pub(crate) fov_deg: Option<f64>,
+    pub(crate) lens: Option<&'a str>,
+    pub(crate) altitude_km: Option<f64>,
+    pub(crate) body: &'a str,
+}
+
+/// Returns the parameters that `hzn init` writes for this camera.
+pub(crate) fn make(py: Python<'_>, said: &Said<'_>) -> PyResult<Config> {
+    let known = errors::detached(py, || complete(said))??;
+    let start = write_sensor_toml(&known).map_err(|why| errors::config(in_python(&why)))?;
+    let parsed = sensor::parse(&start.text, Path::new("Sensor.start")).map_err(errors::config)?;
+    start.warnings.iter().try_for_each(|warning| errors::warn(py, in_python(warning)))?;
+    parsed.warnings.iter().try_for_each(|warning| errors::warn(py, warning))?;
+    if known.exif.turned {
+        errors::warn(
+            py,
+            "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
+        )?;
+    }
+    Ok(parsed.config)
+}
+
+/// Returns what is known about the camera, with the field of view from the limb if nothing else says it.
+fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
+    let lens = said.lens.map(lens).transpose()?;
+    let body = match said.body {
+        "earth" => Body::Earth,
+        "moon" => Body::Moon,
+        other => return Err(errors::config(format!("body: {other:?} is refused: must be earth or moon"))),
+    };
+    if let Some(km) = said.altitude_km.filter(|km| !(*km > 0.0 && km.is_finite())) {
+        return Err(errors::config(format!("altitude_km: {km} is refused: must be above 0")));
+    }
+    let read = match (&said.pictures, said.size) {
+        (Some(path), None) => {
+            let mut source = source::open(std::slice::from_ref(path), None, None).map_err(errors::image)?;
+            read_camera_facts(source.as_mut()).map_err(errors::image)?
+        }
+        (None, Some((width, height))) => of_size([width, height]),
+        _ => return Err(errors::config("give either pictures or size=(width, height)")),
+    };
+    let mut known = CameraFacts { fov_deg: said.fov_deg, lens, altitude_km: said.altitude_km, body, ..read };
+    let Some(path) = said.pictures.clone().filter(|_| !known.has_focal()) else { return Ok(known) };
+    let request = Request { inputs: vec![path], ..Request::default() };
+    match measure_field_of_view(&request, &known).map_err(errors::image)? {
+        LimbSays::FieldOfView(found) => (known.lens, known.measured) = (Some(found.lens), Some(found.measured)),
+        // `write_sensor_toml` says what is missing.
+        LimbSays::NoAltitude => {}
+        LimbSays::Nothing(pictures) => {
+            return Err(errors::config(format!(
+                "fov_deg: is not given, the pictures have no usable EXIF, and the limb in {pictures} of them does not \
+                 say it; add the field of view over the whole width, for example fov_deg=60, and lens=\"fisheye\" or \
+                 lens=\"pinhole\""
+            )));
+        }
+    }
+    Ok(known)
+}
+
+fn of_size(size_px: [u32; 2]) -> CameraFacts {
+    CameraFacts {
+        size_px,
+        fov_deg: None,
+        lens: None,
+        exif: Exif::default(),
+        tone: None,
+        altitude_km: None,
+        body: Body::Earth,
+        measured: None,
+    }
+}
+
+fn lens(name: &str) -> PyResult<Model> {
+    match name {
+        "pinhole" => Ok(Model::Pinhole),
+        "fisheye" => Ok(Model::Equidistant),
+        other => Err(errors::config(format!("lens: {other:?} is refused: must be pinhole or fisheye"))),
+    }
+}
+
+/// Returns a message of `hzn init` with the names of Python's arguments instead of options.
+fn in_python(message: &str) -> String {
+    let named = message.replace("--fov ", "fov_deg=").replace("--altitude ", "altitude_km=");
+    named.replace("--lens fisheye", "lens=\"fisheye\"").replace("--lens pinhole", "lens=\"pinhole\"")
+}

@@ -1,0 +1,98 @@
+//! What the pictures of a camera without a calibration say about it, for the sensor.toml to start from
+//! ([`hzn_files::start`]).
+
+use hzn_files::FrameData;
+use hzn_files::start::{Body, CameraFacts, Exif};
+
+use crate::diagnosis::{FieldOfView, find_field_of_view};
+use crate::error::{Error, unusable};
+use crate::open::{Request, frames_path, load_frames};
+use crate::source::{self, Payload, Picture, Source};
+
+/// Number of pictures that are looked at. The error that all pictures share is larger than that of eight pictures.
+const PICTURES: u64 = 8;
+
+/// The field of view that the limb in the pictures says.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LimbSays {
+    /// The field of view.
+    FieldOfView(FieldOfView),
+    /// No altitude is known for any picture, so the limb says nothing.
+    NoAltitude,
+    /// The limb in this number of pictures does not say it.
+    Nothing(usize),
+}
+
+/// Returns what the pictures say about their camera: size, tone, and EXIF of the first one.
+///
+/// # Errors
+/// No picture can be read, or the pictures have different sizes.
+pub fn read_camera_facts(source: &mut dyn Source) -> Result<CameraFacts, Error> {
+    let size_px = one_size(source)?;
+    let tone = source::find_tone(source).map(|found| found.tone);
+    let exif = match source.next().transpose()?.map(|item| item.payload) {
+        Some(Payload::File(path)) => source::exif_lens(&path).unwrap_or_default(),
+        _ => Exif::default(),
+    };
+    Ok(CameraFacts {
+        size_px,
+        fov_deg: None,
+        lens: None,
+        exif,
+        tone,
+        altitude_km: None,
+        body: Body::default(),
+        measured: None,
+    })
+}
+
+/// Returns the size of the pictures. Refuses pictures of different sizes.
+fn one_size(source: &dyn Source) -> Result<[u32; 2], Error> {
+    let mut sizes = source.sizes();
+    let Some((first, (width, height))) = sizes.next() else {
+        return Err(unusable("none of the pictures can be read, so their size is not known"));
+    };
+    match sizes.find(|(_, other)| *other != (width, height)) {
+        Some((name, other)) => Err(unusable(format!(
+            "{first} is {width}x{height}, but {name} is {}x{}: a sensor.toml is for pictures of one size; give the \
+             pictures of one camera and mode",
+            other.0, other.1
+        ))),
+        None => Ok([width, height]),
+    }
+}
+
+/// Finds the field of view from the limb in some pictures, which have the `known` altitude or one in frames.csv.
+///
+/// # Errors
+/// A file cannot be read.
+pub fn measure_field_of_view(request: &Request, known: &CameraFacts) -> Result<LimbSays, Error> {
+    let mut source = source::open(&request.inputs, None, None)?;
+    let frames = frames_path(request, source.as_ref()).map(|path| load_frames(&path, source.as_ref())).transpose()?;
+    let knows = |data: &FrameData| data.position_km.is_some() || data.altitude_km.is_some();
+    // The pictures of a folder are spread over it. A sequence of unknown length gives its first ones.
+    let step = source.total().map_or(1, |total| (total / PICTURES).max(1));
+    let mut pictures: Vec<(Picture, Option<FrameData>)> = Vec::new();
+    let mut index = 0;
+    while let Some(item) = source.next() {
+        let mut item = item?;
+        index += 1;
+        if (index - 1) % step != 0 {
+            continue;
+        }
+        let data = item.take_prior(frames.as_ref()).filter(knows);
+        if known.altitude_km.is_none() && data.is_none() {
+            continue;
+        }
+        if let Ok((picture, _)) = item.payload.decode(None) {
+            pictures.push((picture, data));
+        }
+        if pictures.len() as u64 >= PICTURES {
+            break;
+        }
+    }
+    if pictures.is_empty() {
+        return Ok(LimbSays::NoAltitude);
+    }
+    Ok(find_field_of_view(&pictures, known).map_or(LimbSays::Nothing(pictures.len()), LimbSays::FieldOfView))
+}
