@@ -22,8 +22,8 @@ mod what_fits;
 
 use std::ffi::OsString;
 
+use clap::FromArgMatches;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{CommandFactory, FromArgMatches};
 
 use exit::Exit;
 
@@ -56,17 +56,9 @@ fn parse() -> commands::Cli {
 
 /// Reads the words of a command line.
 fn read(words: impl Iterator<Item = OsString>) -> Result<commands::Cli, clap::Error> {
-    let mut command = with_negative_numbers(commands::Cli::command());
+    let mut command = commands::command();
     let matches = command.try_get_matches_from_mut(words)?;
     commands::Cli::from_arg_matches(&matches).map_err(|e| e.format(&mut command))
-}
-
-/// Returns a command whose options take a negative number as their value. Without this, clap takes `-1` after `--jobs`
-/// for another option, and the message does not name the number as the fault.
-fn with_negative_numbers(command: clap::Command) -> clap::Command {
-    let takes_value = |arg: &clap::Arg| !arg.is_positional() && arg.get_action().takes_values();
-    let command = command.mut_args(|arg| if takes_value(&arg) { arg.allow_negative_numbers(true) } else { arg });
-    command.mut_subcommands(with_negative_numbers)
 }
 
 /// Adds the list of commands to the error about an unknown one, unless the error has a suggestion.
@@ -74,7 +66,7 @@ fn name_commands(error: &mut clap::Error) {
     if error.kind() != ErrorKind::InvalidSubcommand || error.get(ContextKind::SuggestedSubcommand).is_some() {
         return;
     }
-    let command = commands::Cli::command();
+    let command = commands::command();
     let names: Vec<String> = command.get_subcommands().map(|c| c.get_name().to_owned()).collect();
     let tip = format!("the commands are {}", names.join(", "));
     error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));

@@ -1,5 +1,6 @@
 //! The common preparations of several commands: sensor, frames.csv, sequence.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,8 +8,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 use hzn_files::truth::Truth;
 use hzn_run::disk;
-use hzn_run::open::{Opened, Request, SensorChoice};
-use hzn_run::source::Raw;
+use hzn_run::open::{Opened, Request, SensorChoice, frames_path, sensor_path};
+use hzn_run::sink::Target;
+use hzn_run::source::{Raw, is_stdin};
 
 use crate::exit::{Exit, Stop, usage};
 use crate::tell;
@@ -16,7 +18,7 @@ use crate::tell;
 /// The arguments that select the sensor.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SensorArgs {
-    /// The sensor.toml; without it, the one in the recording or next to the pictures
+    /// The sensor.toml; without it, the one in the recording, next to the pictures, or in the nearest folder above them
     #[arg(short, long, value_name = "FILE")]
     pub(crate) sensor: Option<PathBuf>,
     /// Altitude of the camera in kilometres, for pictures without one in frames.csv or the recording; replaces
@@ -26,6 +28,24 @@ pub(crate) struct SensorArgs {
     /// Use single precision and at most 2048 points, as `FlightHorizon` has
     #[arg(long)]
     pub(crate) flight: bool,
+}
+
+/// The format of a table on stdout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum TableFormat {
+    /// A table with a header
+    Csv,
+    /// JSON Lines: one JSON object a line
+    Jsonl,
+}
+
+impl From<TableFormat> for Target {
+    fn from(format: TableFormat) -> Self {
+        match format {
+            TableFormat::Csv => Self::Csv,
+            TableFormat::Jsonl => Self::Jsonl,
+        }
+    }
 }
 
 /// The arguments that select the pictures.
@@ -49,9 +69,81 @@ pub(crate) struct InputArgs {
 
 /// Opens a sequence with its sensor. Warnings are printed to stderr; notes are left to the command.
 pub(crate) fn open(inputs: &[PathBuf], sensor: &SensorArgs, input: &InputArgs) -> Result<Opened, Stop> {
-    let opened = hzn_run::open::open(&request(inputs, sensor, input)?)?;
+    open_request(&request(inputs, sensor, input)?)
+}
+
+/// Opens a sequence as [`open`] does.
+pub(crate) fn open_request(request: &Request) -> Result<Opened, Stop> {
+    let opened = hzn_run::open::open(request)?;
     opened.warnings.iter().for_each(tell::warning);
+    let source = opened.source.as_ref();
+    tell::detail(|| match source.total() {
+        Some(n) => format!("input: {n} pictures in {}", shown(&source.folder())),
+        None => format!("input: {}", request.inputs.iter().map(|p| shown(p)).collect::<Vec<_>>().join(", ")),
+    });
+    tell::detail(|| match sensor_path(request, source) {
+        Some(path) => format!("sensor: {}", path.display()),
+        None => "sensor: that of the recording".to_owned(),
+    });
+    tell::detail(|| match frames_path(request, source) {
+        Some(path) => format!("table of the pictures: {}", path.display()),
+        None => "table of the pictures: none".to_owned(),
+    });
+    let config = &opened.sensor.config;
+    tell::detail(|| {
+        let (camera, input) = (&config.camera, &config.input);
+        let bits = input.bits.map_or("8".to_owned(), |bits| bits.to_string());
+        let tone = input.tone.map_or("not known".to_owned(), |tone| tone.to_string());
+        let bodies: Vec<&str> = config.each_body().iter().map(|body| body.kind.name()).collect();
+        format!(
+            "camera: {} x {} px, {}; bits {bits}, tone {tone}; looks for {}",
+            camera.width,
+            camera.height,
+            camera.model.name(),
+            bodies.join(", ")
+        )
+    });
     Ok(opened)
+}
+
+/// Returns a path in words.
+fn shown(path: &Path) -> String {
+    if path.as_os_str().is_empty() { "this folder".to_owned() } else { path.display().to_string() }
+}
+
+/// Largest list of pictures on standard input, in bytes.
+const MAX_LIST_BYTES: u64 = 64 << 20;
+
+/// Replaces `-` among the inputs by the names on standard input: one a line, or with a zero byte after each, as
+/// `find -print0` writes them. With `raw`, standard input has the pictures themselves.
+pub(crate) fn list_stdin(inputs: &mut Vec<PathBuf>, raw: Option<Raw>) -> Result<(), Stop> {
+    if raw.is_some() || !inputs.iter().any(|input| is_stdin(input)) {
+        return Ok(());
+    }
+    if inputs.len() > 1 {
+        return Err(usage("-: the list on standard input cannot be combined with other inputs"));
+    }
+    let mut list = Vec::new();
+    std::io::stdin().take(MAX_LIST_BYTES + 1).read_to_end(&mut list)?;
+    if list.len() as u64 > MAX_LIST_BYTES {
+        return Err(usage("standard input has more than 64 MB, which is no list of pictures; --raw reads pictures"));
+    }
+    let end = if list.contains(&0) { 0 } else { b'\n' };
+    let names = list.split(|byte| *byte == end).map(|name| name.strip_suffix(b"\r").unwrap_or(name));
+    *inputs = names.filter(|name| !name.is_empty()).map(path_of).collect::<Result<_, _>>()?;
+    if inputs.is_empty() {
+        return Err(usage("standard input has no names of pictures; write one a line, or give --raw for a stream"));
+    }
+    Ok(())
+}
+
+/// Returns the path with these bytes.
+fn path_of(bytes: &[u8]) -> Result<PathBuf, Stop> {
+    #[cfg(unix)]
+    let path = Some(std::os::unix::ffi::OsStrExt::from_bytes(bytes)).map(|name: &std::ffi::OsStr| PathBuf::from(name));
+    #[cfg(not(unix))]
+    let path = std::str::from_utf8(bytes).ok().map(PathBuf::from);
+    path.ok_or_else(|| usage("standard input is no list of names; --raw reads pictures from it"))
 }
 
 /// Returns what the arguments say about the files to open.
@@ -67,6 +159,7 @@ pub(crate) fn request(inputs: &[PathBuf], sensor: &SensorArgs, input: &InputArgs
         frames: input.frames.clone(),
         altitude_km: sensor.altitude_km,
         flight: sensor.flight,
+        watch: None,
     })
 }
 

@@ -8,6 +8,7 @@
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
 
 use hzn_fly::tell::Tell;
 pub(crate) use hzn_run::terminal::one_line;
@@ -45,6 +46,41 @@ pub(crate) fn bytes(bytes: &[u8]) -> io::Result<()> {
 /// Prints a line to stderr. If stderr is closed, the message is lost and the work goes on.
 pub(crate) fn line(text: impl Display) {
     let _ = writeln!(io::stderr().lock(), "{}", one_line(text));
+}
+
+/// How much is said about the work: 0 what the user must know, 1 also which files and settings are used, 2 also each
+/// picture.
+static LEVEL: AtomicU8 = AtomicU8::new(0);
+
+/// The variable that sets the level where -v is not given.
+const VARIABLE: &str = "HZN_LOG";
+
+/// Sets the level from the number of -v, or else from the variable.
+///
+/// # Errors
+/// The variable has an unknown value.
+pub(crate) fn set_level(verbose: u8) -> Result<(), String> {
+    let level = match (verbose, std::env::var(VARIABLE).unwrap_or_default().as_str()) {
+        (0, "" | "warn") => 0,
+        (0, "info") => 1,
+        (0, "debug") => 2,
+        (0, other) => return Err(format!("{VARIABLE}={other}: the levels are warn, info and debug")),
+        (n, _) => n,
+    };
+    LEVEL.store(level, Ordering::Relaxed);
+    Ok(())
+}
+
+/// Prints a line about files and settings to stderr, from level 1 on.
+pub(crate) fn detail(text: impl FnOnce() -> String) {
+    if LEVEL.load(Ordering::Relaxed) >= 1 {
+        line(text());
+    }
+}
+
+/// Returns whether each picture is told.
+pub(crate) fn tells_pictures() -> bool {
+    LEVEL.load(Ordering::Relaxed) >= 2
 }
 
 /// Returns what shows the lines of a library on stderr, from any thread.

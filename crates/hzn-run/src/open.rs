@@ -3,6 +3,8 @@
 //! same rules, because a picture must have the same answer in each of them.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use hzn_core::Config;
 use hzn_core::body::{self, PriorError};
@@ -30,6 +32,8 @@ pub struct Request {
     pub altitude_km: Option<f64>,
     /// Whether the sensor is that of the flight computer: single precision and 2048 points.
     pub flight: bool,
+    /// If the input is a folder that grows: the flag that ends the wait for further pictures.
+    pub watch: Option<Arc<AtomicBool>>,
 }
 
 /// Where the sensor comes from.
@@ -78,11 +82,19 @@ pub struct Opened {
 /// # Errors
 /// The pictures, the sensor or frames.csv cannot be used.
 pub fn open(request: &Request) -> Result<Opened, Error> {
-    let mut source = source::open(&request.inputs, request.raw, request.topic.as_deref())?;
+    let mut source = match &request.watch {
+        Some(stop) => source::watch(&request.inputs, request.raw, Arc::clone(stop))?,
+        None => source::open(&request.inputs, request.raw, request.topic.as_deref())?,
+    };
     let mut sensor = read_sensor(request, source.as_ref())?;
     let mut warnings: Vec<String> = sensor.warnings.iter().map(Problem::to_string).collect();
     warnings.extend(request.altitude_km.map(|km| set_altitude(&mut sensor, km)).transpose()?.flatten());
     let mut notes = source.notes();
+    // Nobody named this sensor, and it may be of another camera.
+    let above =
+        matches!(request.sensor, SensorChoice::Neighbour).then(|| sensor_path(request, source.as_ref())).flatten();
+    let above = above.filter(|path| path.parent() != Some(&source.folder()));
+    notes.extend(above.map(|path| format!("the sensor is {}, in a folder above the pictures", path.display())));
     notes.extend(complete(source.as_mut(), &mut sensor)?);
     let frames = frames_path(request, source.as_ref()).map(|path| load_frames(&path, source.as_ref())).transpose()?;
     if let Some(frames) = &frames {
@@ -129,7 +141,7 @@ pub fn sensor_path(request: &Request, source: &dyn Source) -> Option<PathBuf> {
     match &request.sensor {
         SensorChoice::File(path) => Some(path.clone()),
         SensorChoice::Ready(_) => None,
-        SensorChoice::Neighbour => neighbour(source, "sensor.toml"),
+        SensorChoice::Neighbour => neighbour(source, "sensor.toml").or_else(|| sensor_above(source)),
     }
 }
 
@@ -143,6 +155,16 @@ fn neighbour(source: &dyn Source, name: &str) -> Option<PathBuf> {
     Some(source.folder().join(name)).filter(|path| source.sensor_toml().is_none() && path.exists())
 }
 
+/// Returns the sensor.toml in the nearest folder above the pictures that has one.
+fn sensor_above(source: &dyn Source) -> Option<PathBuf> {
+    if source.sensor_toml().is_some() {
+        return None;
+    }
+    // With links and `..` resolved, so that each next folder contains the one before.
+    let folder = source.folder().join(".").canonicalize().ok()?;
+    folder.ancestors().skip(1).map(|above| above.join("sensor.toml")).find(|path| path.is_file())
+}
+
 fn read_sensor(request: &Request, source: &dyn Source) -> Result<Sensor, Error> {
     if let SensorChoice::Ready(sensor) = &request.sensor {
         return Ok(*sensor.clone());
@@ -154,7 +176,7 @@ fn read_sensor(request: &Request, source: &dyn Source) -> Result<Sensor, Error> 
         (None, Some(text)) => hzn_files::sensor::parse(text, &folder.join("sensor.toml"))
             .map_err(|e| unusable(format!("the sensor.toml in the recording: {e}")).with_remedy(Remedy::Sensor)),
         (None, None) => {
-            let what = format!("no sensor: there is no sensor.toml in {}", folder_name(&folder));
+            let what = format!("no sensor: there is no sensor.toml in {} or above it", folder_name(&folder));
             Err(unusable(format!("{what} (`hzn init` writes a first one)")).with_remedy(Remedy::Sensor))
         }
     }

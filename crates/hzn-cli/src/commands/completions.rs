@@ -4,8 +4,6 @@ use crate::exit::{Exit, Outcome};
 use crate::tell;
 
 /// Print completions for a shell
-///
-/// For example, in ~/.bashrc:  source <(hzn completions bash)
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The shell
@@ -18,6 +16,8 @@ enum Shell {
     Bash,
     Zsh,
     Fish,
+    Powershell,
+    Elvish,
 }
 
 /// Prints the completions of `command`.
@@ -26,6 +26,8 @@ pub(super) fn run(args: &Args, mut command: clap::Command) -> Outcome {
         Shell::Bash => clap_complete::Shell::Bash,
         Shell::Zsh => clap_complete::Shell::Zsh,
         Shell::Fish => clap_complete::Shell::Fish,
+        Shell::Powershell => clap_complete::Shell::PowerShell,
+        Shell::Elvish => clap_complete::Shell::Elvish,
     };
     // The text goes to memory first, because the generator panics when stdout is closed early.
     let mut text = Vec::new();

@@ -172,7 +172,7 @@ fn write_flight(flight: &Flight, folder: &Path) -> Result<Vec<Truth>, Stop> {
 }
 
 fn process(folder: &Path, out: &Path) -> Result<(), Stop> {
-    match sequence::run(&sequence::Args::quiet_run(folder, out))? {
+    match sequence::run(sequence::Args::quiet_run(folder, out))? {
         Exit::Done => Ok(()),
         Exit::Interrupted => Err(failed(format!("{}: interrupted", folder.display()))),
         _ => Err(failed(format!(

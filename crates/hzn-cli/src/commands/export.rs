@@ -9,6 +9,7 @@ use hzn_run::{disk, explain, overlay, results};
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::files;
+use crate::setup::TableFormat;
 use crate::tell;
 
 /// Turn a recording into a table, pictures, or pictures with overlay
@@ -16,9 +17,12 @@ use crate::tell;
 pub(super) struct Args {
     /// An MCAP of hzn; for tables also a .csv or .jsonl
     file: PathBuf,
-    /// A table: .csv or .jsonl
+    /// A table: .csv, .jsonl, or - for stdout
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Format of the table on stdout
+    #[arg(long, value_name = "FORMAT", default_value = "csv")]
+    format: TableFormat,
     /// The folder for the recorded pictures
     #[arg(long, value_name = "DIR")]
     images: Option<PathBuf>,
@@ -37,7 +41,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.output.is_none() && !pictures {
         return Err(usage("nothing to export: give -o out.csv, -o out.jsonl, --images DIR or --overlay DIR"));
     }
-    if let Some(path) = &args.output
+    let to_file = args.output.as_ref().filter(|path| !source::is_stdin(path));
+    if let Some(path) = to_file
         && sink::target(path)? == sink::Target::Mcap
     {
         return Err(usage(format!("{}: a table must end in .csv or .jsonl", path.display())));
@@ -46,13 +51,17 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage(format!("{}: only a recording (.mcap) contains pictures", file.display())));
     }
     let folders = [&args.images, &args.overlay].into_iter().flatten();
-    let written = args.output.iter().cloned().chain(folders.clone().flat_map(|folder| files::pictures_in(folder)));
+    let written = to_file.into_iter().cloned().chain(folders.clone().flat_map(|folder| files::pictures_in(folder)));
     disk::refuse_inputs(std::slice::from_ref(file), &written.collect::<Vec<_>>())?;
     for folder in folders {
         std::fs::create_dir_all(folder).map_err(|e| disk::cannot_write(folder, &e))?;
     }
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
-    let mut table = args.output.as_deref().map(|path| RowFile::create(path, existing)).transpose()?;
+    let mut table = match (&args.output, to_file) {
+        (_, Some(path)) => Some(RowFile::create(path, existing)?),
+        (Some(_), None) => Some(RowFile::on_stdout(args.format.into())?),
+        (None, None) => None,
+    };
     let (mut rows, mut images) = (0u64, 0u64);
     let mut lost = None;
     if kind == "mcap" {

@@ -1,13 +1,20 @@
 //! `hzn info`: describes the content of a file.
 
+mod facts;
+mod summary;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use hzn_core::status::Status;
+use hzn_core::Config;
 use hzn_mcap::{Contents, Reader, Row};
 use hzn_run::source::{self, decode, ending};
 use hzn_run::{checked_row, explain};
 use hzn_sim::Scenario;
+use serde_json::{Value, json};
+
+use facts::Facts;
+use summary::Summary;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell::{self, one_line};
@@ -20,24 +27,31 @@ use crate::tell::{self, one_line};
 pub(super) struct Args {
     /// The file
     file: PathBuf,
+    /// Print the facts as one JSON object; names of keys have the unit
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
     let (kind, _) = source::check_exists(file)?;
-    let (text, lost) = match kind.as_str() {
+    let (facts, lost) = match kind.as_str() {
         "mcap" => recording(file)?,
         "csv" | "jsonl" => (table(file, &kind)?, None),
         "toml" | "yaml" | "yml" => (sensor(file, &kind)?, None),
         _ => (one_picture(file)?, None),
     };
-    tell::result(text)?;
+    if args.json {
+        tell::file(facts.json().map_err(failed)?)?;
+    } else {
+        tell::result(facts.text())?;
+    }
     lost.iter().for_each(tell::warning);
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
 }
 
 /// The description of a file, and the parts that are missing.
-type Described = (String, Option<String>);
+type Described = (Facts, Option<String>);
 
 fn recording(file: &Path) -> Result<Described, Stop> {
     // The pictures are read too, because the result says whether they are complete.
@@ -49,21 +63,31 @@ fn recording(file: &Path) -> Result<Described, Stop> {
     if summary.frames == 0 && reader.sensor_toml().is_none() && reader.unread_reports() == 0 {
         return foreign(file);
     }
-    let mut out = kind_line("recording of hzn run") + &summary.text();
-    for (key, value) in reader.metadata() {
-        out.push_str(&format!("{:<16} {}\n", one_line(key), one_line(value)));
+    let mut out = Facts::new("recording", "recording of hzn run");
+    summary.describe(&mut out);
+    let metadata: BTreeMap<&str, &str> = reader.metadata().iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
+    for (key, value) in &metadata {
+        out.line(&one_line(key), value.to_string());
     }
+    out.key("metadata", json!(metadata));
+    out.key("is_complete", reader.is_complete());
     if !reader.is_complete() {
-        out.push_str(&unfinished(file));
+        out.line("unfinished", unfinished(file));
     }
     if let Some(compression) = reader.unknown_compression() {
-        out.push_str(&format!("compression      {compression:?}, which hzn does not read\n"));
+        out.fact(
+            "compression",
+            format!("{compression:?}, which hzn does not read"),
+            "unknown_compression",
+            compression,
+        );
     } else if reader.broken_chunks() > 0 {
-        out.push_str(&format!("damaged parts    {}\n", reader.broken_chunks()));
+        out.fact("damaged parts", reader.broken_chunks().to_string(), "damaged_parts", reader.broken_chunks());
     }
     if let Some(Ok(sensor)) = reader.sensor_toml().map(|t| hzn_files::sensor::parse(t, Path::new("sensor.toml"))) {
-        let c = sensor.config.camera;
-        out.push_str(&format!("camera           {} x {} px, {}\n", c.width, c.height, c.model.name()));
+        let c = &sensor.config.camera;
+        let text = format!("{} x {} px, {}", c.width, c.height, c.model.name());
+        out.fact("camera", text, "camera", camera_json(&sensor.config)?);
     }
     // An unfinished file without broken parts is not damaged: its run still goes on, or --resume continues it.
     let unfinished = ending(file) == "part" && reader.broken_chunks() == 0 && reader.unread_reports() == 0;
@@ -71,7 +95,7 @@ fn recording(file: &Path) -> Result<Described, Stop> {
 }
 
 fn unfinished(file: &Path) -> String {
-    format!("unfinished       `hzn run --resume` continues it, `hzn recover {}` closes it\n", one_line(file.display()))
+    format!("`hzn run --resume` continues it, `hzn recover {}` closes it", file.display())
 }
 
 /// Describes the pictures in a recording of another program.
@@ -83,13 +107,15 @@ fn foreign(file: &Path) -> Result<Described, Stop> {
         count += 1;
         span = Some(span.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
     }
-    let mut out = kind_line("recording without results of hzn") + &format!("pictures         {count}\n");
+    let mut out = Facts::new("pictures-in-mcap", "recording without results of hzn");
+    out.fact("pictures", count.to_string(), "pictures", count);
     if let (Some(topic), Some((a, b))) = (reader.topic(), span) {
-        out.push_str(&format!("topic            {}\ntime             {a:.3} to {b:.3} s\n", one_line(topic)));
+        out.fact("topic", topic.to_owned(), "topic", topic);
+        out.time(a, b);
     }
-    for topic in reader.other_topics() {
-        out.push_str(&format!("other topic      {}\n", one_line(topic)));
-    }
+    let others: Vec<&str> = reader.other_topics().collect();
+    others.iter().for_each(|topic| out.line("other topic", (*topic).to_owned()));
+    out.key("other_topics", json!(others));
     let lost = reader.broken().map(|why| format!("{}: {why}; the pictures before that were counted", file.display()));
     Ok((out, lost))
 }
@@ -97,7 +123,7 @@ fn foreign(file: &Path) -> Result<Described, Stop> {
 /// The first columns of results in every version of hzn; later versions only append columns.
 const FIRST_COLUMNS: &[&str] = &["index", "file", "time_s", "body", "status"];
 
-fn table(file: &Path, kind: &str) -> Result<String, Stop> {
+fn table(file: &Path, kind: &str) -> Result<Facts, Stop> {
     let mut notes = Vec::new();
     if kind == "csv" {
         let header = csv::Reader::from_path(file).and_then(|mut r| r.headers().cloned()).map_err(failed)?;
@@ -118,10 +144,12 @@ fn table(file: &Path, kind: &str) -> Result<String, Stop> {
     for row in hzn_run::results::rows(file, kind)? {
         summary.add(&row.map_err(|e| Stop::from(e).with_details(notes.iter().cloned()))?);
     }
-    let mut out = kind_line("results of hzn run") + &summary.text();
-    notes.iter().for_each(|note| out.push_str(&format!("{note}\n")));
+    let mut out = Facts::new("results", "results of hzn run");
+    summary.describe(&mut out);
+    notes.iter().for_each(|note| out.whole_line(note));
+    out.key("is_complete", ending(file) != "part");
     if ending(file) == "part" {
-        out.push_str(&unfinished(file));
+        out.line("unfinished", unfinished(file));
     }
     Ok(out)
 }
@@ -139,11 +167,11 @@ fn other_columns(header: &csv::StringRecord) -> Vec<String> {
 }
 
 /// Describes a frames.csv.
-fn priors(file: &Path) -> Result<String, Stop> {
+fn priors(file: &Path) -> Result<Facts, Stop> {
     let frames = hzn_files::frames::load(file)?;
     let with = |has: fn(&hzn_files::FrameData) -> bool| frames.rows.iter().filter(|r| has(r)).count();
-    let mut out = kind_line("frames.csv, the priors of pictures");
-    out.push_str(&format!("pictures         {}\n", frames.rows.len()));
+    let mut out = Facts::new("frames", "frames.csv, the priors of pictures");
+    out.fact("pictures", frames.rows.len().to_string(), "pictures", frames.rows.len());
     for (name, n) in [
         ("time", with(|r| r.time_s.is_some())),
         ("UTC", with(|r| r.utc_s.is_some())),
@@ -152,16 +180,17 @@ fn priors(file: &Path) -> Result<String, Stop> {
         ("attitude", with(|r| r.q_fixed_from_camera_wxyz.is_some())),
         ("Sun", with(|r| r.sun_camera.is_some())),
     ] {
-        out.push_str(&format!("{:<16} {n}\n", format!("with {name}")));
+        out.fact(&format!("with {name}"), n.to_string(), &format!("with_{}", name.to_lowercase()), n);
     }
     let unused: Vec<&str> = frames.warnings.iter().filter_map(|w| w.field.as_deref()).collect();
     if !unused.is_empty() {
-        out.push_str(&format!("columns not used {}\n", one_line(unused.join(", "))));
+        out.line("columns not used", unused.join(", "));
     }
+    out.key("columns_not_used", json!(unused));
     Ok(out)
 }
 
-fn truth(file: &Path) -> Result<String, Stop> {
+fn truth(file: &Path) -> Result<Facts, Stop> {
     let rows = hzn_files::truth::load(file).map_err(usage)?;
     let mut bodies = BTreeMap::<&str, [usize; 2]>::new();
     for row in &rows {
@@ -169,21 +198,27 @@ fn truth(file: &Path) -> Result<String, Stop> {
         *seen += usize::from(row.has_limb());
         *all += 1;
     }
-    let mut out = kind_line("truth of pictures, for `hzn evaluate RESULTS --truth FILE`");
+    let mut out = Facts::new("truth", "truth of pictures, for `hzn evaluate RESULTS --truth FILE`");
+    let mut each = Vec::new();
     for (body, [seen, all]) in bodies {
-        out.push_str(&format!("{:<16} limb in view in {seen} of {all} pictures\n", one_line(body)));
+        out.line(&one_line(body), format!("limb in view in {seen} of {all} pictures"));
+        each.push(json!({"name": body, "pictures": all, "with_limb": seen}));
     }
+    out.key("bodies", each);
     Ok(out)
 }
 
 /// Describes a table of measurements over time, from the instruments of `hzn simulate` or from another program.
-fn series(file: &Path, header: &csv::StringRecord) -> Result<String, Stop> {
+fn series(file: &Path, header: &csv::StringRecord) -> Result<Facts, Stop> {
     let has = |name: &str| header.iter().position(|column| column == name);
-    let mut out = kind_line(match () {
-        () if has("gyro_x_radps").is_some() => "imu.csv, rates and accelerations of a simulated vehicle",
-        () if has("x_m").is_some() && has("vx_mps").is_some() => "gnss.csv, fixes of a simulated satellite receiver",
-        () => "table that hzn does not know (results, frames.csv, truth.csv, imu.csv, gnss.csv)",
-    });
+    let (kind, words) = match () {
+        () if has("gyro_x_radps").is_some() => ("imu", "imu.csv, rates and accelerations of a simulated vehicle"),
+        () if has("x_m").is_some() && has("vx_mps").is_some() => {
+            ("gnss", "gnss.csv, fixes of a simulated satellite receiver")
+        }
+        () => ("table", "table that hzn does not know (results, frames.csv, truth.csv, imu.csv, gnss.csv)"),
+    };
+    let mut out = Facts::new(kind, words);
     let number = |row: &csv::StringRecord, name: &str| has(name).and_then(|i| row.get(i)?.parse::<f64>().ok());
     let (mut rows, mut span, mut saturated) = (0u64, None::<(f64, f64)>, 0u64);
     for row in csv::Reader::from_path(file).map_err(failed)?.records() {
@@ -194,26 +229,36 @@ fn series(file: &Path, header: &csv::StringRecord) -> Result<String, Stop> {
         }
         saturated += u64::from(number(&row, "saturated") == Some(1.0));
     }
-    out.push_str(&format!("rows             {rows}\n"));
+    out.fact("rows", rows.to_string(), "rows", rows);
     if let Some((a, b)) = span {
-        out.push_str(&format!("time             {a:.3} to {b:.3} s\n"));
+        out.time(a, b);
     }
     if has("saturated").is_some() {
-        out.push_str(&format!("saturated        {saturated}\n"));
+        out.fact("saturated", saturated.to_string(), "saturated", saturated);
     }
-    out.push_str(&format!("columns          {}\n", one_line(header.iter().collect::<Vec<_>>().join(", "))));
+    let columns: Vec<&str> = header.iter().collect();
+    out.fact("columns", columns.join(", "), "columns", columns.clone());
     Ok(out)
 }
 
-/// Returns the first line: the kind of the file.
-fn kind_line(kind: &str) -> String {
-    format!("file             {kind}\n")
+/// Returns the calibration for a program: the keys of `[camera]`, and the bodies.
+fn camera_json(config: &Config) -> Result<Value, Stop> {
+    serde_json::to_value(&config.camera).map_err(failed)
 }
 
-fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
+/// Describes a calibration.
+fn calibration(mut out: Facts, config: &Config) -> Result<Facts, Stop> {
+    out.text_block(&super::camera::describe(config)?);
+    out.key("camera", camera_json(config)?);
+    let body = |body: &hzn_core::body::Config| json!({"kind": body.kind.name(), "altitude_km": body.altitude_km});
+    out.key("bodies", config.each_body().iter().map(body).collect::<Vec<_>>());
+    Ok(out)
+}
+
+fn sensor(file: &Path, kind: &str) -> Result<Facts, Stop> {
     if kind != "toml" {
         let camera = hzn_files::camera_file::load(file, None)?;
-        return Ok(kind_line("camera file") + &super::camera::describe(&hzn_core::Config::new(camera))?);
+        return calibration(Facts::new("camera", "camera file"), &Config::new(camera));
     }
     let text = hzn_files::limited::read_text(file, hzn_files::limited::SETTINGS_BYTES)
         .map_err(|e| failed(format!("{}: cannot be read: {e}", file.display())))?;
@@ -224,128 +269,55 @@ fn sensor(file: &Path, kind: &str) -> Result<String, Stop> {
     }
     let sensor = hzn_files::sensor::load(file)?;
     sensor.warnings.iter().for_each(tell::warning);
-    Ok(kind_line("sensor.toml") + &super::camera::describe(&sensor.config)?)
+    calibration(Facts::new("sensor", "sensor.toml"), &sensor.config)
 }
 
-fn scene(scenario: &Scenario) -> Result<String, Stop> {
-    let mut out = kind_line("scene, for `hzn simulate FILE`");
-    let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {}\n", one_line(value)));
+fn scene(scenario: &Scenario) -> Result<Facts, Stop> {
+    let mut out = Facts::new("scene", "scene, for `hzn simulate FILE`");
     let (capture, camera) = (&scenario.capture, &scenario.camera);
-    line("name", scenario.name.clone());
-    line("pictures", format!("{}, at {} to {} s from {}", capture.frames, capture.from_s, capture.to_s, scenario.utc));
-    line("camera", format!("{} x {} px, {}", camera.width, camera.height, camera.model.name()));
-    line("bodies", scenario.body_names().join(", "));
+    out.fact("name", scenario.name.clone(), "name", scenario.name.clone());
+    let times = format!("{}, at {} to {} s from {}", capture.frames, capture.from_s, capture.to_s, scenario.utc);
+    out.fact("pictures", times, "pictures", capture.frames);
+    out.key("time_s", [capture.from_s, capture.to_s].to_vec());
+    out.key("utc", scenario.utc.to_string());
+    let text = format!("{} x {} px, {}", camera.width, camera.height, camera.model.name());
+    out.fact("camera", text, "camera", serde_json::to_value(camera).map_err(failed)?);
+    out.fact("bodies", scenario.body_names().join(", "), "bodies", scenario.body_names());
     let instruments = [("imu.csv", scenario.imu.is_some()), ("gnss.csv", scenario.gnss.is_some())];
     let written: Vec<&str> = instruments.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
-    line("instruments", if written.is_empty() { "none".to_owned() } else { written.join(", ") });
+    let names = if written.is_empty() { "none".to_owned() } else { written.join(", ") };
+    out.fact("instruments", names, "instruments", written);
     Ok(out)
 }
 
-fn one_picture(file: &Path) -> Result<String, Stop> {
+fn one_picture(file: &Path) -> Result<Facts, Stop> {
     let named = |why: String| failed(format!("{}: {why}", file.display()));
     let bytes = decode::read_file(file).map_err(named)?;
     let p = decode::decode(&bytes, None).map_err(named)?;
     let format = decode::guess_format(&bytes).map(|f| format!("{f:?}").to_uppercase()).unwrap_or_default();
     let l = p.layout;
-    let mut out = kind_line(&format!(
+    let what = format!(
         "{format} picture of {} x {} px, {} of {} bits",
         l.width,
         l.height,
         explain::counted(l.channels.into(), "channel"),
         l.bits
-    ));
+    );
+    let mut out = Facts::new("picture", &what);
+    out.key("format", format);
+    out.key("width_px", l.width);
+    out.key("height_px", l.height);
+    out.key("channels", l.channels);
+    out.key("bits", l.bits);
+    out.key("pictures", p.pages);
     if p.pages > 1 {
-        out.push_str(&format!("pictures         {}; hzn processes only the first\n", p.pages));
+        out.line("pictures", format!("{}; hzn processes only the first", p.pages));
     }
     if let Some(how) = p.display_turn() {
-        out.push_str(&format!("to be shown      {how}; input.orient decides whether hzn turns it\n"));
+        out.fact("to be shown", format!("{how}; input.orient decides whether hzn turns it"), "to_be_shown", how);
     }
     if let Some(t) = p.exif_time_s {
-        out.push_str(&format!("EXIF time        {t:.3} s since 1970, assumed to be UTC\n"));
+        out.fact("EXIF time", format!("{t:.3} s since 1970, assumed to be UTC"), "exif_time_s", t);
     }
     Ok(out)
-}
-
-/// Statistics of rows. They need memory for four numbers a row.
-#[derive(Debug, Default)]
-struct Summary {
-    frames: u64,
-    /// Number of the last row's picture. A picture of several bodies has one row for each body.
-    last: Option<u64>,
-    time: Option<(f64, f64)>,
-    /// The bodies by name, in the order of their first rows.
-    bodies: Vec<(String, BodySummary)>,
-}
-
-/// Results of one body.
-#[derive(Debug, Default)]
-struct BodySummary {
-    statuses: BTreeMap<u8, u64>,
-    sigma_deg: Vec<f64>,
-    rms_px: Vec<f64>,
-    elapsed_us: Vec<f64>,
-    altitude_km: Vec<f64>,
-}
-
-impl Summary {
-    fn add(&mut self, row: &Row) {
-        if self.last.replace(row.index) != Some(row.index) {
-            self.frames += 1;
-        }
-        if let Some(t) = row.time_s {
-            self.time = Some(self.time.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
-        }
-        let place = self.bodies.iter().position(|(name, _)| *name == row.body).unwrap_or_else(|| {
-            self.bodies.push((row.body.clone(), BodySummary::default()));
-            self.bodies.len() - 1
-        });
-        let found = &mut self.bodies[place].1;
-        *found.statuses.entry(row.status as u8).or_default() += 1;
-        found.sigma_deg.extend(row.sigma_max_deg);
-        found.rms_px.extend(row.rms_px);
-        found.elapsed_us.extend(row.elapsed_us);
-        found.altitude_km.extend(row.altitude_est_km);
-    }
-
-    fn text(self) -> String {
-        let mut out = format!("pictures         {}\n", self.frames);
-        let mut line = |name: &str, value: String| out.push_str(&format!("{name:<16} {}\n", one_line(value)));
-        if let Some((a, b)) = self.time {
-            line("time", format!("{a:.3} to {b:.3} s"));
-        }
-        for (name, found) in self.bodies {
-            line("body", name);
-            let rows: u64 = found.statuses.values().sum();
-            for status in Status::ALL {
-                if let Some(n) = found.statuses.get(&(status as u8)) {
-                    line(status.name(), format!("{n} ({:.1} %)", 100.0 * *n as f64 / rows as f64));
-                }
-            }
-            for (name, unit, values) in [
-                ("sigma", "deg", found.sigma_deg),
-                ("RMS", "px", found.rms_px),
-                ("altitude found", "km", found.altitude_km),
-                ("processing", "us", found.elapsed_us),
-            ] {
-                if let Some([low, middle, high]) = percentiles(values) {
-                    let [low, middle, high] = [low, middle, high].map(three_digits);
-                    line(name, format!("median {middle} {unit}, 90 % from {low} to {high}"));
-                }
-            }
-        }
-        out
-    }
-}
-
-/// Formats a number with three significant digits, as a whole number from 100 on. Statistics over pictures are not more
-/// accurate.
-fn three_digits(x: f64) -> String {
-    let before = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
-    format!("{x:.*}", (2 - before).clamp(0, 9) as usize)
-}
-
-fn percentiles(mut values: Vec<f64>) -> Option<[f64; 3]> {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    Some([0.05, 0.5, 0.95].map(|p| values[(p * last as f64).round() as usize]))
 }

@@ -13,15 +13,6 @@ use hzn_run::start::{LimbSays, measure_field_of_view, read_camera_facts};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
 
-const EXAMPLES: &str = "\
-Examples:
-  hzn init                                          every key, into sensor.toml
-  hzn init flight/ --fov 92 --lens fisheye          a fisheye that sees 92 degrees over the width
-  hzn init IMG_0001.JPG --altitude 418 -o iss.toml  the lens as EXIF has it, pictures from 418 km
-  hzn init flight/ --altitude 418                   without EXIF: the field of view from the limb itself
-  hzn init moon/ --fov 40 --body moon --altitude 100
-                                                    a camera in orbit around the Moon";
-
 /// Write a sensor.toml to start from
 ///
 /// With pictures: the file is for the camera that took them. The focal length comes from a field of view (--fov), from
@@ -29,7 +20,6 @@ Examples:
 /// large, because these values are rough; with an altitude the file works at once.
 /// Without pictures: the file has every key with its default and a comment, and only the camera must be filled in.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     /// Pictures of the camera: files, a folder, a glob, a video, or a recording
     #[arg(value_name = "PICTURE")]

@@ -5,6 +5,7 @@ mod camera;
 mod completions;
 mod demo;
 mod evaluate;
+mod examples;
 mod explain;
 mod export;
 #[cfg(target_os = "linux")]
@@ -14,6 +15,7 @@ mod ground;
 mod info;
 mod init;
 mod lens_model;
+mod man;
 mod migrate;
 mod recover;
 mod resume;
@@ -26,7 +28,8 @@ mod view;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-use crate::exit::Outcome;
+use crate::exit::{Outcome, usage};
+use crate::tell;
 
 /// The version with what is needed to build the same program again. The methods are features of `hzn-core` that the
 /// manifest of this crate turns on; a test compares them.
@@ -51,12 +54,16 @@ const LONG_VERSION: &str = concat!(
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Say which files and settings are used; twice, also the result of each picture. HZN_LOG=info and HZN_LOG=debug do
+    /// the same
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    verbose: u8,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
-    Run(run::Args),
+    Run(Box<run::Args>),
     Explain(explain::Args),
     Info(info::Args),
     Export(export::Args),
@@ -75,6 +82,20 @@ enum Command {
     Telecommand(telecommand::Args),
     View(view::Args),
     Completions(completions::Args),
+    Man(man::Args),
+}
+
+/// Returns the whole command line, with the examples of each command.
+pub fn command() -> clap::Command {
+    examples::add(with_negative_numbers(Cli::command()))
+}
+
+/// Returns a command whose options take a negative number as their value. Without this, clap takes `-1` after `--jobs`
+/// for another option, and the message does not name the number as the fault.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let takes_value = |arg: &clap::Arg| !arg.is_positional() && arg.get_action().takes_values();
+    let command = command.mut_args(|arg| if takes_value(&arg) { arg.allow_negative_numbers(true) } else { arg });
+    command.mut_subcommands(with_negative_numbers)
 }
 
 /// Runs one command.
@@ -82,9 +103,10 @@ enum Command {
 /// # Errors
 /// The error, with its exit code.
 pub fn run(cli: Cli) -> Outcome {
+    tell::set_level(cli.verbose).map_err(usage)?;
     match cli.command {
         Command::Demo(args) => demo::run(&args),
-        Command::Run(args) => run::run(&args),
+        Command::Run(args) => run::run(*args),
         Command::Explain(args) => explain::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Export(args) => export::run(&args),
@@ -102,6 +124,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Telemetry(args) => telemetry::run(&args),
         Command::Telecommand(args) => telecommand::run(&args),
         Command::View(args) => view::run(&args),
-        Command::Completions(args) => completions::run(&args, Cli::command()),
+        Command::Completions(args) => completions::run(&args, command()),
+        Command::Man(args) => man::run(&args, command()),
     }
 }

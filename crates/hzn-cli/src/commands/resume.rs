@@ -19,9 +19,9 @@ pub(super) fn skip_stored(
     source: &mut dyn Source,
     stored: &StoredResults,
     plan: &Plan,
-    output: Option<&Path>,
+    outputs: &[PathBuf],
 ) -> Result<Turns, Stop> {
-    let name = output.map(|p| p.display().to_string()).unwrap_or_default();
+    let name = outputs.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
     let other = |what: String| Err(usage(format!("{name}: {what}, or start over with --force")));
     let table = plan.frames.as_ref().map(|frames| &frames.path);
     let changed_table = table.filter(|table| stored.frames > 0 && stored.is_older_than(table));

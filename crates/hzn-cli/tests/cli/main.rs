@@ -29,6 +29,7 @@ mod rewritten;
 mod rig;
 mod run;
 mod sensitivity;
+mod shell;
 mod simulate;
 mod small_limbs;
 mod start;

@@ -46,7 +46,7 @@ const FLUSH_EVERY: Duration = Duration::from_millis(200);
 /// Runs all jobs that `next` returns, on `threads` threads. The first job has the number `first`.
 ///
 /// # Errors
-/// The first error of `next`, of the work or of the output. What was written before remains.
+/// The first error of `next`, of the work or of the output; `stop` is then set. What was written before remains.
 pub(crate) fn run_in_order<K: Work, S, W, F>(
     work: &K,
     threads: usize,
@@ -67,10 +67,8 @@ where
     for _ in 0..window {
         ticket_in.send(()).map_err(Error::failed)?;
     }
-    // Set when the writer stops with an error, so that the source ends too.
-    let give_up = AtomicBool::new(false);
     std::thread::scope(|scope| {
-        let stopped = || stop.load(Ordering::Relaxed) || give_up.load(Ordering::Relaxed);
+        let stopped = || stop.load(Ordering::Relaxed);
         let source_end = scope.spawn(move || hand_out(next, first, &ticket_out, &job_in, stopped));
         for _ in 0..threads {
             let (jobs, results) = (job_out.clone(), result_in.clone());
@@ -79,7 +77,8 @@ where
         drop((job_out, result_in));
         let written = write_in_order(first, &result_out, &ticket_in, out);
         if written.is_err() {
-            give_up.store(true, Ordering::Relaxed);
+            // The source must end too, also one that waits for pictures.
+            stop.store(true, Ordering::Relaxed);
         }
         // With the channels closed, the threads end.
         drop((result_out, ticket_in));

@@ -8,7 +8,7 @@ use super::epochs::{Epoch, Epochs};
 use super::joint::{Joiner, Seen};
 use crate::engine::{self, AnySensor, End, Finished, InOrder, Sink, Turns, Work, run_in_order};
 use crate::error::Error;
-use crate::sink::{self, Output};
+use crate::sink::{self, Outputs};
 
 /// The settings of a run over a rig.
 pub struct Plan {
@@ -46,7 +46,7 @@ pub fn run(
     plan: &Plan,
     epochs: &mut Epochs,
     stop: &AtomicBool,
-    output: &mut Output,
+    output: &mut Outputs,
     seen: &mut dyn FnMut(&FinishedEpoch),
 ) -> Result<End, Error> {
     let mut order = Order {
@@ -54,13 +54,13 @@ pub fn run(
         turns: plan.heads.iter().map(|head| head.plan.turns.clone()).collect(),
         frozen: Frozen { last: vec![None; plan.heads.len()] },
     };
-    let write = |(index, mut heads): (u64, Vec<Option<Finished>>), output: &mut &mut Output| {
+    let write = |(index, mut heads): (u64, Vec<Option<Finished>>), output: &mut &mut Outputs| {
         let joint = order.join(index, &mut heads);
         output.write_heads(&records(plan, &joint, &mut heads))?;
         seen(&FinishedEpoch { joint, heads });
         Ok(())
     };
-    let mut out = InOrder { sink: output, write, flush: |output: &mut &mut Output| output.flush() };
+    let mut out = InOrder { sink: output, write, flush: |output: &mut &mut Outputs| output.flush() };
     run_in_order(plan, plan.threads, || epochs.next(), 0, stop, &mut out)
 }
 

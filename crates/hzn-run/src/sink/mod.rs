@@ -1,8 +1,9 @@
-//! The outputs for results: `.mcap`, `.csv`, `.jsonl` by the ending, or a CSV table on stdout.
+//! The outputs for results: `.mcap`, `.csv`, `.jsonl` by the ending, or a table on stdout.
 //!
 //! A file is written as `NAME.part` and gets its final name at the end, also after Ctrl-C. Therefore every file with
 //! the final name is complete. A crash leaves the `.part` file. [`open`] can continue either.
 
+mod outputs;
 mod record;
 mod stored;
 mod text;
@@ -12,6 +13,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Config;
 use hzn_mcap::{Contents, FrameRecord, Options, Reader, part_path};
 
+pub use outputs::Outputs;
 pub use record::{altitude_km, records, rows};
 pub use stored::StoredResults;
 
@@ -83,16 +85,27 @@ pub struct Settings<'a> {
     pub heads: &'a [(String, &'a Config, String)],
 }
 
-/// Opens an output; without a path, CSV on stdout. Also returns the results that it contains already.
+/// Begins a table on stdout.
+///
+/// # Errors
+/// The format needs a file, or stdout is closed.
+pub fn on_stdout(format: Target, config: &Config) -> Result<Output, Error> {
+    let Some(form) = text_form(format) else {
+        return Err(unusable("a recording (MCAP) needs a file: -o NAME.mcap"));
+    };
+    let kind = Kind::Text(Text::stdout(form)?);
+    Ok(Output { kind, path: None, config: config.clone(), was_final: false })
+}
+
+/// Opens an output file. Also returns the results that it contains already.
 ///
 /// # Errors
 /// It exists and must not, belongs to another sensor, or cannot be written.
-pub fn open(path: Option<&Path>, existing: Existing, settings: Settings<'_>) -> Result<(Output, StoredResults), Error> {
+pub fn open(path: &Path, existing: Existing, settings: Settings<'_>) -> Result<(Output, StoredResults), Error> {
     let output = |kind, stored, was_final| {
-        let (path, config) = (path.map(Path::to_owned), settings.config.clone());
+        let (path, config) = (Some(path.to_owned()), settings.config.clone());
         Ok((Output { kind, path, config, was_final }, stored))
     };
-    let Some(path) = path else { return output(Kind::Text(Text::stdout()?), StoredResults::default(), false) };
     let target = target(path)?;
     if path.is_dir() {
         return Err(unusable(format!("{}: is a folder", path.display())));
@@ -302,10 +315,20 @@ impl Sink for Output {
 /// A table of rows that exist already, in contrast to the output of a run.
 pub struct RowFile {
     text: Text,
+    /// The file; `stdout` for the table on standard output.
     path: PathBuf,
+    is_stdout: bool,
 }
 
 impl RowFile {
+    /// Begins a table on stdout.
+    ///
+    /// # Errors
+    /// The format needs a file, or stdout is closed.
+    pub fn on_stdout(format: Target) -> Result<Self, Error> {
+        let Some(form) = text_form(format) else { return Err(unusable("a table is CSV or JSON Lines")) };
+        Ok(Self { text: Text::stdout(form)?, path: PathBuf::from("stdout"), is_stdout: true })
+    }
     /// Begins a CSV or JSON Lines file.
     ///
     /// # Errors
@@ -324,27 +347,29 @@ impl RowFile {
             let _ = std::fs::remove_file(&part);
             cannot_write(path, &e)
         })?;
-        Ok(Self { text, path: path.to_owned() })
+        Ok(Self { text, path: path.to_owned(), is_stdout: false })
     }
     /// Appends a row.
     ///
     /// # Errors
     /// The disk fails.
     pub fn write(&mut self, row: &hzn_mcap::Row) -> Result<(), Error> {
-        self.text.write(row).map_err(|e| failed(advice(&self.path, &e)))
+        self.text.write(row).map_err(|e| if self.is_stdout { e.into() } else { failed(advice(&self.path, &e)) })
     }
     /// Removes the unfinished file. A file that already has the final name is not changed.
     pub fn discard(self) {
         drop(self.text);
-        let _ = std::fs::remove_file(part_path(&self.path));
+        if !self.is_stdout {
+            let _ = std::fs::remove_file(part_path(&self.path));
+        }
     }
     /// Closes the file and gives it its final name.
     ///
     /// # Errors
     /// The disk fails.
     pub fn finish(self) -> Result<(), Error> {
-        let Self { text, path } = self;
-        text.finish().map_err(|e| cannot_write(&path, &e))
+        let Self { text, path, is_stdout } = self;
+        text.finish().map_err(|e| if is_stdout { e.into() } else { cannot_write(&path, &e) })
     }
 }
 

@@ -49,9 +49,11 @@ impl Out {
 const JSON_HEAD: &[u8] = b"{\"index\":";
 
 impl Text {
-    pub(crate) fn stdout() -> io::Result<Self> {
-        let mut text = Self { out: Out::Stdout(BufWriter::new(FileOnStdout::new())), form: Form::Csv, durable: false };
-        text.out.writer().write_all(header().as_bytes())?;
+    pub(crate) fn stdout(form: Form) -> io::Result<Self> {
+        let mut text = Self { out: Out::Stdout(BufWriter::new(FileOnStdout::new())), form, durable: false };
+        if form == Form::Csv {
+            text.out.writer().write_all(header().as_bytes())?;
+        }
         Ok(text)
     }
 

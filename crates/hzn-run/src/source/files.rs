@@ -14,7 +14,7 @@ use super::raw::{self, Raw};
 use super::sequence::{MAX_SIZES_READ, Source};
 use super::tone::FoundTone;
 use super::{bits, header, natural, turn};
-use crate::error::{Error, unusable};
+use crate::error::Error;
 use crate::explain;
 
 /// Number of pictures whose orientation is read.
@@ -78,6 +78,12 @@ fn have_exif_time(paths: &[PathBuf]) -> Result<bool, String> {
 }
 
 impl Files {
+    /// Returns the picture of a file that is in the folder.
+    pub(super) fn item(&self, path: PathBuf) -> Item {
+        let name = self.name(&path);
+        Item { name, time: self.time, data: None, payload: self.payload(path) }
+    }
+
     fn name(&self, path: &Path) -> String {
         match path.file_name() {
             Some(name) if !self.with_folder => name.to_string_lossy().into_owned(),
@@ -104,9 +110,7 @@ impl Source for Files {
     fn next(&mut self) -> Option<Result<Item, Error>> {
         let path = self.paths.get(self.next)?.clone();
         self.next += 1;
-        let name = self.name(&path);
-        let payload = self.payload(path);
-        Some(Ok(Item { name, time: self.time, data: None, payload }))
+        Some(Ok(self.item(path)))
     }
     fn total(&self) -> Option<u64> {
         Some(self.paths.len() as u64)
@@ -168,13 +172,7 @@ impl Source for Files {
         self.paths.iter().step_by(step).find_map(turned)
     }
     fn want_channel(&mut self, channel: Channel) -> Result<(), Error> {
-        match self.raw {
-            Some(raw) if channel != Channel::Mean && raw.format == raw::Format::Bayer8 => Err(unusable(format!(
-                "raw pictures, {raw}: every cell of a Bayer mosaic becomes one grey pixel; set channel = \"mean\" in \
-                    [input] of sensor.toml"
-            ))),
-            _ => Ok(()),
-        }
+        self.raw.map_or(Ok(()), |raw| raw.check_channel(channel))
     }
     fn notes(&self) -> Vec<String> {
         let note = |((kind, ending), n): (&(Kind, String), &usize)| {

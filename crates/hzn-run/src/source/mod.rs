@@ -24,11 +24,15 @@ pub mod raw;
 mod recording;
 mod rerun;
 mod sequence;
+mod stream;
 mod tone;
 mod turn;
 mod video;
+mod watched;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 pub use bits::{FoundBits, find_bits, with_key};
 pub use find_tone::find_tone;
@@ -70,10 +74,32 @@ pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result
             _ => {}
         }
     }
+    if let ([one], Some(raw)) = (inputs, raw)
+        && is_stdin(one)
+    {
+        return Ok(Box::new(stream::Stream::open(std::io::stdin(), raw)?));
+    }
     if topic.is_some() {
         return Err(unusable("only an MCAP has topics").with_remedy(Remedy::NoTopic));
     }
     Ok(Box::new(files::Files::open(inputs, raw)?))
+}
+
+/// Returns whether an input is standard input, which carries headerless pictures one after another.
+pub fn is_stdin(input: &Path) -> bool {
+    input == Path::new("-")
+}
+
+/// Opens a folder that grows: the pictures in it, then those that arrive, until `stop` is set. Waits for the first
+/// picture.
+///
+/// # Errors
+/// The input is not a folder, or no picture arrived before `stop` was set.
+pub fn watch(inputs: &[PathBuf], raw: Option<Raw>, stop: Arc<AtomicBool>) -> Result<Box<dyn Source>, Error> {
+    match inputs {
+        [folder] if folder.is_dir() => Ok(Box::new(watched::Watched::open(folder, raw, stop)?)),
+        _ => Err(unusable("only one folder can be watched for new pictures")),
+    }
 }
 
 /// Opens a recording. A recording of ours is processed again as it was recorded. Of any other recording, and of another

@@ -4,9 +4,10 @@ use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
-use hzn_core::image::Layout;
+use hzn_core::image::{Channel, Layout};
 
 use super::picture::{Picture, Samples};
+use crate::error::{Error, unusable};
 
 /// Arrangement of the samples in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,6 +110,17 @@ impl Raw {
     pub fn size(&self) -> (u32, u32) {
         let cell = if self.format == Format::Bayer8 { 2 } else { 1 };
         (self.width / cell, self.height / cell)
+    }
+
+    /// Refuses a colour channel of pictures that have none.
+    pub(super) fn check_channel(&self, channel: Channel) -> Result<(), Error> {
+        if channel == Channel::Mean || self.format != Format::Bayer8 {
+            return Ok(());
+        }
+        Err(unusable(format!(
+            "raw pictures, {self}: every cell of a Bayer mosaic becomes one grey pixel; set channel = \"mean\" in [input] \
+             of sensor.toml"
+        )))
     }
 
     fn wrong_length(&self, length: usize) -> String {

@@ -133,7 +133,7 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
     let settings = sink::Settings { config: &config, sensor_toml: &sensor_toml, durable: false, heads: &[] };
     let mut file = match &output {
         Some(path) => {
-            let opened = sink::open(Some(path), Existing::Replace, settings);
+            let opened = sink::open(path, Existing::Replace, settings);
             Some(opened.map_err(|e| e.to_string())?.0)
         }
         None => None,

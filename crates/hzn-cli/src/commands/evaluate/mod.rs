@@ -44,6 +44,9 @@ pub(super) struct Args {
     /// Also write the report: .json or .html; may be given twice
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
+    /// Print the report as JSON with every picture, as -o FILE.json has it
+    #[arg(long)]
+    json: bool,
     /// Number of the worst pictures that are listed and drawn
     #[arg(long, value_name = "N", default_value_t = 6)]
     worst: usize,
@@ -103,7 +106,11 @@ pub(super) fn run(args: &Args) -> Outcome {
         };
         disk::write(path, bytes)?;
     }
-    tell::result(text::report(&report, &worst))?;
+    if args.json {
+        tell::file(serde_json::to_string_pretty(&report).map_err(failed)? + "\n")?;
+    } else {
+        tell::result(text::report(&report, &worst))?;
+    }
     lost.iter().for_each(tell::warning);
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
 }

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use hzn_files::{Frames, Sensor};
 use hzn_run::engine::{Plan, Turns};
-use hzn_run::sink::{Existing, Output};
+use hzn_run::sink::{Existing, Outputs};
 
-use crate::setup::{InputArgs, SensorArgs};
+use crate::setup::{InputArgs, SensorArgs, TableFormat};
 
 /// Process a sequence of pictures
 ///
@@ -20,16 +20,20 @@ use crate::setup::{InputArgs, SensorArgs};
 /// with the joint answer.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// A folder, a pattern in quotes, pictures, a video, an MCAP, or a rig.toml
+    /// A folder, a pattern in quotes, pictures, a video, an MCAP, or a rig.toml; - reads the names of pictures from
+    /// standard input, one a line, or with --raw the pictures themselves
     #[arg(required = true, value_name = "INPUT")]
     pub(super) input: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) sensor: SensorArgs,
     #[command(flatten)]
     pub(super) source: InputArgs,
-    /// Results: .mcap, .csv or .jsonl; without it, CSV on stdout
+    /// Results: .mcap, .csv, .jsonl, or - for stdout; may be given several times; without it, a table on stdout
     #[arg(short, long, value_name = "FILE")]
-    pub(super) output: Option<PathBuf>,
+    pub(super) output: Vec<PathBuf>,
+    /// Format of the results on stdout
+    #[arg(long, value_name = "FORMAT", default_value = "csv")]
+    pub(super) format: TableFormat,
     /// Replace an output that exists
     #[arg(long)]
     pub(super) force: bool,
@@ -45,6 +49,10 @@ pub(crate) struct Args {
     /// Draw the result over every picture, as PNG into this folder
     #[arg(long, value_name = "DIR")]
     pub(super) overlay: Option<PathBuf>,
+    /// After the pictures of the folder, wait for those that arrive in it, until Ctrl-C. A picture is complete when its
+    /// file has not changed for half a second; a file that gets its name when it is complete is always safe
+    #[arg(long)]
+    pub(super) watch: bool,
     /// Number of threads; without it, all cores
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(super) jobs: Option<u16>,
@@ -61,12 +69,14 @@ impl Args {
             input: vec![folder.to_owned()],
             sensor: SensorArgs { sensor: None, altitude_km: None, flight: false },
             source: InputArgs { frames: None, fps: 1.0, raw: None, topic: None },
-            output: Some(output.to_owned()),
+            output: vec![output.to_owned()],
+            format: TableFormat::Csv,
             force: true,
             resume: false,
             durable: false,
             no_images: false,
             overlay: None,
+            watch: false,
             jobs: None,
             quiet: true,
         }
@@ -83,7 +93,7 @@ impl Args {
 
     /// Returns the settings of the pictures of one camera.
     pub(super) fn plan(&self, sensor: Sensor, frames: Option<Frames>) -> Plan {
-        let trace = Output::wants_trace(self.output.as_deref());
+        let trace = Outputs::want_trace(&self.output);
         // If the threshold or a gate comes from the previous picture, pictures are processed one after another.
         let threads = if sensor.config.tracks() { 1 } else { self.jobs.map_or_else(cores, usize::from) };
         Plan {

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use hzn_run::engine::End;
 use hzn_run::rig::{self, Epochs, FinishedEpoch, HeadPlan, Opened, Plan, Request};
-use hzn_run::sink::{self, Output};
-use hzn_run::{disk, explain};
+use hzn_run::sink::{self, Outputs};
+use hzn_run::{disk, explain, source};
 
 use super::args::Args;
 use crate::exit::{Exit, Outcome, Stop, usage};
@@ -23,7 +23,8 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
         flight: args.sensor.flight,
     })?;
     opened.warnings.iter().for_each(tell::warning);
-    disk::refuse_inputs(&opened.files, args.output.as_slice())?;
+    let files: Vec<_> = args.output.iter().filter(|path| !source::is_stdin(path)).cloned().collect();
+    disk::refuse_inputs(&opened.files, &files)?;
     if !args.quiet {
         opened.notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
     }
@@ -33,7 +34,7 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
         plan.heads.iter().zip(texts).map(|(head, text)| (head.name.clone(), &head.plan.config, text)).collect();
     let Some((_, config, _)) = heads.first() else { return Err(usage(format!("{}: has no head", path.display()))) };
     let settings = sink::Settings { config, sensor_toml: &opened.text, durable: args.durable, heads: &heads };
-    let (mut output, _) = sink::open(args.output.as_deref(), args.existing(), settings)?;
+    let (mut output, _) = Outputs::open(&args.output, args.format.into(), args.existing(), settings)?;
     let total = opened.pictures();
     let mut epochs = Epochs::new(opened.heads, opened.rig.rig.sync_s, args.source.fps);
     let mut watch = Watch::new(args.quiet, total);
@@ -60,6 +61,7 @@ fn check(args: &Args) -> Result<(), Stop> {
         ("--sensor", args.sensor.sensor.is_some(), "each head has a sensor of its own: write it into rig.toml"),
         ("--topic", args.source.topic.is_some(), "name the pictures of each head in rig.toml"),
         ("--overlay", args.overlay.is_some(), "draw the pictures of one head: hzn run FOLDER --overlay DIR"),
+        ("--watch", args.watch, "watch the folder of one head"),
         ("--resume", args.resume, "the run of a rig cannot be continued; --force starts again"),
     ];
     match refused.into_iter().find(|(_, is_given, _)| *is_given) {
@@ -69,7 +71,7 @@ fn check(args: &Args) -> Result<(), Stop> {
 }
 
 fn plan(args: &Args, opened: &Opened) -> Result<Plan, Stop> {
-    let is_mcap = Output::wants_trace(args.output.as_deref());
+    let is_mcap = Outputs::want_trace(&args.output);
     let heads: Vec<HeadPlan> = opened
         .heads
         .iter()

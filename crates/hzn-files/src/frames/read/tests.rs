@@ -118,3 +118,14 @@ fn rates_go_to_the_prior() {
     assert_eq!(f.rows[0].to_prior::<f64>(None).rate_rad_s, Some([0.1, -0.2, 0.3]));
     assert_eq!(f.rows[1].to_prior::<f64>(None).rate_rad_s, None);
 }
+
+#[test]
+fn the_schema_has_every_column() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../book/reference/frames.schema.json");
+    let schema: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let properties = schema["properties"].as_object().unwrap();
+    assert_eq!(COLUMNS.len(), properties.len());
+    for column in COLUMNS {
+        assert!(properties.contains_key(*column), "{column} is missing in book/reference/frames.schema.json");
+    }
+}

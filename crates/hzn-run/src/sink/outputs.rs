@@ -1,0 +1,157 @@
+//! Several outputs of one run.
+
+use std::path::{Path, PathBuf};
+
+use hzn_mcap::FrameRecord;
+
+use super::{Existing, Output, Settings, StoredResults, Target, on_stdout, open, rows, target};
+use crate::checked_row::sum;
+use crate::engine::{Finished, Sink};
+use crate::error::{Error, Remedy, unusable};
+
+/// The name of standard output among the outputs.
+const STDOUT: &str = "-";
+
+/// All outputs of a run. Each gets every picture.
+pub struct Outputs {
+    each: Vec<One>,
+    /// Number of the picture that is written next.
+    next: u64,
+}
+
+struct One {
+    output: Output,
+    name: String,
+    /// The results that it contained before this run. Its pictures are compared, not written again.
+    stored: StoredResults,
+}
+
+impl Outputs {
+    /// Opens the outputs; `-` is stdout, and without any path a table on stdout is the only output. `format` is that
+    /// of stdout. Also returns the results that all of them contain already: those of the shortest output.
+    ///
+    /// # Errors
+    /// Two outputs are the same, several are recordings, two contain different results, or one cannot be opened.
+    pub fn open(
+        paths: &[PathBuf],
+        format: Target,
+        existing: Existing,
+        settings: Settings<'_>,
+    ) -> Result<(Self, StoredResults), Error> {
+        Self::check(paths, existing)?;
+        let mut each = Vec::new();
+        for path in order(paths) {
+            let (output, stored) = if path == Path::new(STDOUT) {
+                (on_stdout(format, settings.config)?, StoredResults::default())
+            } else {
+                open(path, existing, settings)?
+            };
+            each.push(One { output, name: path.display().to_string(), stored });
+        }
+        let shortest = each.iter().map(|one| &one.stored).min_by_key(|stored| stored.frames).cloned();
+        let shortest = shortest.unwrap_or_default();
+        let differs = |one: &&One| !one.stored.sums.starts_with(&shortest.sums);
+        if let Some(other) = each.iter().find(differs) {
+            let what = "contains other results than the other outputs, so they are not of one run";
+            return Err(unusable(format!("{}: {what}", other.name)).with_remedy(Remedy::Restart));
+        }
+        Ok((Self { each, next: shortest.frames }, shortest))
+    }
+
+    /// Refuses outputs that contradict each other, before anything is opened.
+    ///
+    /// # Errors
+    /// Two outputs are the same, several are recordings, an ending is not known, or stdout is to be continued.
+    pub fn check(paths: &[PathBuf], existing: Existing) -> Result<(), Error> {
+        let files: Vec<&PathBuf> = paths.iter().filter(|path| *path != Path::new(STDOUT)).collect();
+        if files.len() < paths.len() && existing == Existing::Resume {
+            return Err(unusable("a table on standard output cannot be continued; leave out --resume"));
+        }
+        for (i, path) in paths.iter().enumerate() {
+            if paths.iter().take(i).any(|before| before == path) {
+                return Err(unusable(format!("{}: is given twice as an output", path.display())));
+            }
+        }
+        let targets = files.iter().map(|path| target(path)).collect::<Result<Vec<_>, _>>()?;
+        if targets.iter().filter(|target| **target == Target::Mcap).count() > 1 {
+            return Err(unusable("only one of the outputs can be a recording (.mcap); copy it when it is complete"));
+        }
+        Ok(())
+    }
+
+    /// Returns whether an output stores the edges and points of pictures.
+    pub fn want_trace(paths: &[PathBuf]) -> bool {
+        paths.iter().any(|path| Output::wants_trace(Some(path)))
+    }
+
+    /// Appends the records of an epoch of a rig, as [`Output::write_heads`] does.
+    ///
+    /// # Errors
+    /// The disk fails.
+    pub fn write_heads(&mut self, heads: &[Vec<FrameRecord>]) -> Result<(), Error> {
+        self.each.iter_mut().try_for_each(|one| one.output.write_heads(heads))
+    }
+
+    /// Closes the files and gives them their final names.
+    ///
+    /// # Errors
+    /// The disk fails. The other outputs are finished all the same.
+    pub fn finish(self) -> Result<(), Error> {
+        self.close(Output::finish)
+    }
+
+    /// Closes outputs that were opened to be continued, as [`Output::put_back`] does.
+    ///
+    /// # Errors
+    /// The disk fails.
+    pub fn put_back(self) -> Result<(), Error> {
+        self.close(Output::put_back)
+    }
+
+    fn close(self, how: impl Fn(Output) -> Result<(), Error>) -> Result<(), Error> {
+        let closed: Vec<_> = self.each.into_iter().map(|one| how(one.output)).collect();
+        closed.into_iter().collect()
+    }
+}
+
+impl One {
+    /// Compares the rows of a picture with those that the output contains.
+    fn compare(&self, frame: &Finished) -> Result<(), Error> {
+        let found = rows(frame, &self.output.config).iter().map(sum).collect::<Result<Vec<u32>, _>>()?;
+        let first = frame.index as usize * found.len();
+        if self.stored.sums.get(first..first + found.len()) == Some(found.as_slice()) {
+            return Ok(());
+        }
+        let what = format!("contains another result of its picture {}, {}", frame.index, frame.name);
+        Err(unusable(format!("{}: {what}", self.name)).with_remedy(Remedy::Restart))
+    }
+}
+
+impl Sink for Outputs {
+    fn write(&mut self, frame: &mut Finished) -> Result<(), Error> {
+        for one in &mut self.each {
+            if self.next < one.stored.frames {
+                one.compare(frame)?;
+            } else {
+                one.output.write(frame)?;
+            }
+        }
+        self.next += 1;
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), Error> {
+        self.each.iter_mut().try_for_each(|one| one.output.flush())
+    }
+}
+
+/// Returns the outputs in the order in which a picture is written. A recording comes last, because the pixels and the
+/// drawing are moved into it.
+fn order(paths: &[PathBuf]) -> Vec<&Path> {
+    if paths.is_empty() {
+        return vec![Path::new(STDOUT)];
+    }
+    let mut ordered: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+    ordered.sort_by_key(|path| Output::wants_trace(Some(path)));
+    ordered
+}
