@@ -32,7 +32,7 @@ pub(crate) fn merge_body_defaults<'i>(sensor: &mut DeTable<'i>, values: &'i [Str
 }
 
 /// The keys that set a limb height.
-const HEIGHT_KEYS: [&str; 3] = ["limb_height_km", "limb_height_sigma_km", "limb_height_by_latitude_km"];
+const HEIGHT_KEYS: [&str; 2] = ["limb_height_km", "limb_height_by_latitude_km"];
 
 /// Returns `limb = "height"` for a body whose file sets a limb height; else an empty text.
 fn limb(body: &DeTable<'_>) -> String {
@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(of("[input]\ntone = \"unknown\"\n"), (Limb::Visible, 17.0, 7.0));
         let told = "[input]\ntone = \"srgb\"\n[body]\nlimb_height_km = 17\n";
         assert_eq!(of(told), (Limb::Height, 17.0, 7.0));
-        assert_eq!(of("[input]\ntone = \"srgb\"\n[body]\nlimb_height_sigma_km = 2\n"), (Limb::Height, 17.0, 2.0));
+        assert_eq!(of("[input]\ntone = \"srgb\"\n[body]\nlimb_height_sigma_km = 2\n"), (Limb::Visible, 23.4, 2.0));
         // A written configuration is read as it was, before and after the tone is known.
         for text in ["[body]\nkind = \"earth\"\n", "[input]\ntone = \"srgb\"\n", told] {
             let camera = "[camera]\nwidth = 64\nheight = 48\nmodel = \"pinhole\"\nfx_px = 60.0\nfy_px = 60.0\n\

@@ -66,7 +66,7 @@ pub(crate) struct Linux {
     events: Vec<LogLine>,
     counts: Counts,
     /// Multiple of sigma that is the protection level.
-    protection_factor: f64,
+    protection_factor: Option<f64>,
     not_stored: Rarely,
 }
 
@@ -83,7 +83,7 @@ impl Linux {
             ended: None,
             events: Vec::new(),
             counts: Counts::default(),
-            protection_factor: f64::NAN,
+            protection_factor: None,
         }
     }
 

@@ -71,7 +71,16 @@ fn parts(function: Function) -> Vec<Part> {
             fields.flat_map(|field| record(std::slice::from_ref(field))).collect()
         }
         Function::Navigate => record(Navigation::TABLE),
-        Function::SetAttitude => record(Attitude::TABLE),
+        Function::SetAttitude => {
+            let mut parts = record(Attitude::TABLE);
+            // An attitude always expires: a value that is unknown is refused.
+            for part in &mut parts {
+                if let Part::Number { name: "expires_s", initial, .. } = part {
+                    *initial = None;
+                }
+            }
+            parts
+        }
         Function::SetTime => vec![
             // The P-field of TAI since 1958.
             Part::Fixed(&[0x1F]),

@@ -314,10 +314,11 @@ impl Row {
         }
     }
 
-    /// Sets the protection level of an answer with `p_limb`, from its multiple of `sigma_max_deg`.
+    /// Sets the protection level of an answer with `p_limb`, from its multiple of `sigma_max_deg`; a body without one has none.
     #[must_use]
-    pub fn with_protection(self, factor: f64) -> Self {
-        Self { protection_deg: self.p_limb.and(self.sigma_max_deg).and_then(|sigma| finite(sigma * factor)), ..self }
+    pub fn with_protection(self, factor: Option<f64>) -> Self {
+        let sigma_deg = self.p_limb.and(self.sigma_max_deg);
+        Self { protection_deg: sigma_deg.zip(factor).and_then(|(sigma, factor)| finite(sigma * factor)), ..self }
     }
 
     fn set_answer<T: Real>(&mut self, s: &Solution<T>) {

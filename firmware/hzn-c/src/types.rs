@@ -46,11 +46,11 @@ pub struct HznKnown {
     /// Time from the attitude and the Sun to the exposure, s; NaN: 0. Both are moved by the rate, if it is known.
     pub attitude_age_s: f32,
     /// The attitude and the Sun are not used if they are further from the exposure than this, s; NaN: they do not
-    /// expire.
+    /// expire. 0, less than 0 and infinity are refused.
     pub attitude_expires_s: f32,
     /// `axis` of the last answer. With parameter 132, an answer that is too far from it is refused.
     pub last_axis: [f32; 3],
-    /// `cov_rad2` of that answer.
+    /// `cov_rad2` of that answer. Both are given, or none.
     pub last_cov_rad2: [f32; 6],
     /// Time from the exposure of that answer to this one, s.
     pub last_age_s: f32,
@@ -164,7 +164,7 @@ pub(crate) fn to_prior(values: &HznKnown, body: Kind) -> Option<(Prior<f32>, u8)
     let age_s = if values.attitude_age_s.is_nan() { 0.0 } else { values.attitude_age_s };
     if attitude.is_empty() {
         Some((prior, NOT_GIVEN))
-    } else if !age_s.is_finite() {
+    } else if !age_s.is_finite() || values.attitude_expires_s <= 0.0 || values.attitude_expires_s.is_infinite() {
         None
     } else if age_s.abs() > values.attitude_expires_s {
         Some((prior, EXPIRED))
@@ -175,9 +175,16 @@ pub(crate) fn to_prior(values: &HznKnown, body: Kind) -> Option<(Prior<f32>, u8)
 
 /// Returns the last answer; `Some(None)` if there was none, `None` if it is impossible.
 fn to_last(values: &HznKnown) -> Option<Option<Last<f32>>> {
-    let (Some(axis), Some(covariance)) = (known(values.last_axis)?, known(values.last_cov_rad2)?) else {
-        return Some(None);
+    let (axis, covariance) = match (known(values.last_axis)?, known(values.last_cov_rad2)?) {
+        (Some(axis), Some(covariance)) => (axis, covariance),
+        (None, None) => return Some(None),
+        // One of the two alone would switch the comparison off without a word.
+        _ => return None,
     };
+    let [xx, _, _, yy, _, zz] = covariance;
+    if [xx, yy, zz].iter().any(|variance| *variance < 0.0) {
+        return None;
+    }
     let sigma_rad = Cov3::<Cam, f32>::from_upper(covariance).sigma_max_rad();
     let age_s = values.last_age_s;
     (sigma_rad.is_finite() && age_s.is_finite() && age_s >= 0.0)

@@ -66,6 +66,9 @@ pub struct Sighting {
 pub(crate) struct Geometry {
     /// R + H of the sphere that replaces the body.
     pub(crate) distance_m: f64,
+    /// Altitude of the camera.
+    pub(crate) altitude_m: f64,
+    pub(crate) kind: Kind,
     /// Sine of the half-angle for a limb of the height `limb_m`.
     pub(crate) sin_expected: f64,
     /// Limb height of the sensor's configuration.
@@ -105,14 +108,16 @@ impl Sighting {
         if !(sin > 0.0 && cone.cos > 0.0) {
             return None;
         }
-        let height_m = geometry.limb_m + geometry.distance_m * (sin - geometry.sin_expected);
-        let by_cos_m = -geometry.distance_m * cone.cos / sin;
+        // The air in front of a balloon raises the limb: the height below it is the one to configure.
+        let apparent_m = geometry.limb_m + geometry.distance_m * (sin - geometry.sin_expected);
+        let (height_km, slope) = body.kind.height_below_air_km(apparent_m / 1e3, geometry.altitude_m / 1e3);
+        let by_cos_m = -geometry.distance_m * cone.cos / sin * slope;
         let scores = edge::score_models(&cone)?;
         let noise = edge::variance_of_cos(&cone, &scores);
         let variance_cos = noise + geometry.variance_of_harmonic(&cone, azimuth.as_ref().map(|_| attitude_sigma));
         Some(Self {
             name: name.to_owned(),
-            limb_height_km: height_m / 1e3,
+            limb_height_km: height_km,
             sigma_km: by_cos_m.abs() * variance_cos.sqrt() / 1e3,
             radius_sigma_km: geometry.radius_sigma_m / 1e3,
             km_per_px: by_cos_m.abs() * cone.cos_per_px().max(cone.change_of_cos(|_| 1.0).abs()) / 1e3,
@@ -157,6 +162,8 @@ impl Geometry {
         let radius_m = body.mean_radius_km() * 1e3;
         let sphere = |distance_m: f64| Self {
             distance_m,
+            altitude_m: distance_m - radius_m,
+            kind: body.kind,
             sin_expected: (radius_m + limb_m) / distance_m,
             limb_m,
             cone: None,
@@ -174,6 +181,7 @@ impl Geometry {
                     cone: Some(cone),
                     position_m: Some(position),
                     second_harmonic_cos: second_harmonic_cos(&cone),
+                    altitude_m: altitude,
                     ..Self { sin_expected: sin, ..sphere(radius + altitude) }
                 }
             }

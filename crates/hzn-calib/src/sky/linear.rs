@@ -121,12 +121,17 @@ pub(super) fn reduce(model: &Model, geometry: &Geometry, view: &View, noise: Edg
     if points.len() < MIN_POINTS {
         return None;
     }
-    let sin = geometry.sin_expected + (model.height_km * 1e3 - geometry.limb_m) / geometry.distance_m;
+    // The height as straight rays see it, which changes with the height of the limb and with the air before it.
+    let apparent_km = |km: f64| km + geometry.kind.raised_by_air_km(km, geometry.altitude_m / 1e3);
+    let apparent_m = apparent_km(model.height_km) * 1e3;
+    let slope = apparent_km(model.height_km + 0.5) - apparent_km(model.height_km - 0.5);
+    let sin = geometry.sin_expected + (apparent_m - geometry.limb_m) / geometry.distance_m;
     if !(sin > 0.0 && sin < 1.0) {
         return None;
     }
     let cos = (1.0 - sin * sin).sqrt();
-    let limb = Limb { cos, by_height_km: -sin / cos * 1e3 / geometry.distance_m, azimuth: azimuth(geometry, view) };
+    let by_height_km = -sin / cos * 1e3 / geometry.distance_m * slope;
+    let limb = Limb { cos, by_height_km, azimuth: azimuth(geometry, view) };
     let axis = fit_axis(&points, Vector3::from(view.axis), &limb)?;
     Some(eliminate_axis(model, geometry, &points, axis, &limb, noise))
 }

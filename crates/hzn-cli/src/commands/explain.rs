@@ -401,7 +401,7 @@ impl Explained<'_> {
         for (name, sigma) in self.budget(s.candidate) {
             line("", format!("{sigma:.5} deg from {name}"));
         }
-        if s.p_limb.is_some() {
+        if s.p_limb.is_some() && self.body.is_seen_in_sunlight() {
             let noise = self.body.covariance.as_ref().unwrap_or(&self.config.covariance);
             let (level_deg, probability) = (along * noise.protection_factor(), noise.protection_probability);
             line("protection", format!("the error exceeds {level_deg:.5} deg with probability {probability}"));

@@ -186,9 +186,11 @@ impl Config {
         own.unwrap_or(&self.covariance)
     }
     /// Returns the protection level of answers about body number `which`, as a multiple of `sigma_max_deg`, see
-    /// [`protection_probability`](covariance::Config::protection_probability).
-    pub fn protection_factor(&self, which: u8) -> f64 {
-        self.noise_model_of(which).protection_factor()
+    /// [`protection_probability`](covariance::Config::protection_probability); `None` for a body that shines by itself
+    /// (the Sun, or a thermal camera), because the factors were measured by day.
+    pub fn protection_factor(&self, which: u8) -> Option<f64> {
+        let body = self.each_body().get(usize::from(which))?;
+        body.is_seen_in_sunlight().then(|| self.noise_model_of(which).protection_factor())
     }
     /// Returns whether the threshold of a body, or a gate, depends on the previous picture. Pictures must then come in
     /// order.

@@ -34,12 +34,20 @@ pub(super) struct Expired {
 impl Known {
     /// Returns what has expired at an exposure.
     pub(super) fn expired_at(&self, exposure_us: u64) -> Expired {
-        let (motion, attitude) = (self.navigation.motion, self.attitude);
-        let validities = [motion.map(|motion| motion.validity), attitude.map(|attitude| attitude.validity)];
-        let [navigation_s, attitude_s] = validities.map(|validity| {
-            validity.filter(|validity| validity.has_expired(exposure_us)).map(|validity| validity.age_s(exposure_us))
-        });
-        Expired { navigation_s, attitude_s }
+        let motion = self.navigation.motion.map(|motion| motion.validity);
+        let attitude = self.attitude.filter(|_| self.has_attitude_expired(exposure_us));
+        Expired {
+            navigation_s: motion.filter(|motion| motion.has_expired(exposure_us)).map(|it| it.age_s(exposure_us)),
+            attitude_s: attitude.map(|attitude| attitude.validity.age_s(exposure_us)),
+        }
+    }
+
+    /// Returns whether the attitude and the Sun are out of date. They are, too, when the rate that moved them is:
+    /// without it they would stay behind while the vehicle turns.
+    fn has_attitude_expired(&self, exposure_us: u64) -> bool {
+        let navigation = &self.navigation;
+        let is_rate_lost = navigation.prior.rate_rad_s.is_some() && navigation.has_expired(exposure_us);
+        self.attitude.is_some_and(|attitude| is_rate_lost || attitude.validity.has_expired(exposure_us))
     }
 
     /// Returns the prior of a picture of this body, without the values that have expired.
@@ -49,7 +57,7 @@ impl Known {
         let is_known = !self.navigation.has_expired(exposure_us);
         let prior = if is_known { self.navigation.at(exposure_us) } else { Prior::default() };
         let prior = Prior { last, ..prior };
-        match self.attitude.filter(|attitude| !attitude.validity.has_expired(exposure_us)) {
+        match self.attitude.filter(|_| !self.has_attitude_expired(exposure_us)) {
             Some(TimedAttitude { values, validity }) => {
                 values.moved(prior.rate_rad_s, validity.age_s(exposure_us), body).added_to(prior)
             }
@@ -81,9 +89,8 @@ impl Known {
     /// Returns the attitude and the Sun as they are sent with a picture of this body; `None` if there are none.
     pub(super) fn attitude_at(&self, picture: u32, exposure_us: u64, body: Kind) -> Option<AttitudeState> {
         let TimedAttitude { values, validity } = self.attitude?;
-        let (has_expired, age_s) = (validity.has_expired(exposure_us), validity.age_s(exposure_us));
-        let is_rate_known = !self.navigation.has_expired(exposure_us);
-        let rate = self.navigation.prior.rate_rad_s.filter(|_| is_rate_known);
+        let (has_expired, age_s) = (self.has_attitude_expired(exposure_us), validity.age_s(exposure_us));
+        let rate = self.navigation.prior.rate_rad_s;
         let shown = if has_expired { values } else { values.moved(rate, age_s, body) };
         let state = if has_expired { AttitudeState::EXPIRED } else { AttitudeState::USED };
         let (q, sigma_rad, sun) = shown.numbers();

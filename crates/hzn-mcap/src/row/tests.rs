@@ -46,10 +46,11 @@ fn converts<T: Real>(tolerance: f64) {
     near(row.cov_common_xx, 3e-8);
     near(row.p_limb, 0.875);
     assert_eq!(row.protection_deg, None);
-    near(row.clone().with_protection(6.0).protection_deg, 6.0 * 2e-4f64.to_degrees());
+    near(row.clone().with_protection(Some(6.0)).protection_deg, 6.0 * 2e-4f64.to_degrees());
     // Without an edge that can be the limb there is no level, and without an answer neither.
-    assert_eq!(Row { p_limb: None, ..row.clone() }.with_protection(6.0).protection_deg, None);
-    assert_eq!(Row::unprocessed(&meta(), Status::Unreadable, "").with_protection(6.0).protection_deg, None);
+    assert_eq!(Row { p_limb: None, ..row.clone() }.with_protection(Some(6.0)).protection_deg, None);
+    assert_eq!(row.clone().with_protection(None).protection_deg, None);
+    assert_eq!(Row::unprocessed(&meta(), Status::Unreadable, "").with_protection(Some(6.0)).protection_deg, None);
     // The axis is straight down in the picture, where only the error along x turns the vector: 2e-4 of 0.6.
     assert_eq!((row.picture_x, row.picture_y), (Some(0.0), Some(1.0)));
     near(row.picture_sigma, 2e-4 / 0.6);

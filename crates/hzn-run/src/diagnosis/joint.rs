@@ -29,10 +29,11 @@ pub struct Pair {
     pub pictures: usize,
 }
 
-/// Fewest pictures for a pair: two unknowns, and as many again that agree.
-const ENOUGH: usize = 4;
-/// A pair has to lower χ² by this much: an improvement of three sigmas for the one unknown more.
-const LEAST_GAIN: f64 = 9.0;
+/// Fewest pictures for a pair. With fewer, the scatter of the limb itself often looks like a second wrong value: in one
+/// of ten flights of four pictures.
+const ENOUGH: usize = 8;
+/// A pair has to lower χ² by as much as one unknown more does by chance with this many sigmas.
+const LEAST_SIGMAS: f64 = 3.0;
 /// The scatter about the best single value has to be this many times that about the pair. Below, the limb itself, which
 /// is not equally high everywhere, may be the reason.
 const LEAST_RATIO: f64 = 1.5;
@@ -41,6 +42,15 @@ const MOST_CORRELATION: f64 = 0.95;
 /// A residual counts at most as much as one of this many sigmas.
 const MOST_SIGMAS: f64 = 5.0;
 const ITERATIONS: usize = 10;
+
+/// Returns the improvement of χ² that is as improbable as [`LEAST_SIGMAS`], if the scatter comes from residuals with
+/// this many degrees of freedom: the square of Student's t, by its series in 1/ν (Abramowitz and Stegun, 26.7.5).
+fn least_gain(freedom: usize) -> f64 {
+    let (z, nu) = (LEAST_SIGMAS, freedom.max(1) as f64);
+    let first = (z.powi(3) + z) / (4.0 * nu);
+    let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * nu * nu);
+    (z + first + second).powi(2)
+}
 
 /// The difference of the half-angles of one picture over its 1-sigma, and its change by one unit of each correction.
 struct Equation {
@@ -122,11 +132,13 @@ impl Solved {
         Some(Self { corrections: x, inverse, residuals })
     }
 
-    /// Returns the scatter of the residuals as a 1-sigma, at least that of the edge noise.
-    fn scatter(&self) -> f64 {
+    /// Returns the scatter of the residuals as a 1-sigma, at least that of the edge noise. The residuals are smaller than
+    /// the errors by what the unknowns took.
+    fn scatter(&self, unknowns: usize) -> f64 {
         let mut sizes: Vec<f64> = self.residuals.iter().map(|r| r.abs()).collect();
         sizes.sort_by(f64::total_cmp);
-        sizes.get(sizes.len() / 2).map_or(1.0, |median| (1.4826 * median).max(1.0))
+        let freedom = sizes.len().saturating_sub(unknowns).max(1) as f64 / sizes.len().max(1) as f64;
+        sizes.get(sizes.len() / 2).map_or(1.0, |median| (1.4826 * median / freedom.sqrt()).max(1.0))
     }
 
     fn chi2(&self, scatter: f64) -> f64 {
@@ -158,7 +170,7 @@ pub fn find_pair<'a>(facts: impl Iterator<Item = &'a FitFacts>, limb_height_km: 
     let singles = [[0, 0], [1, 1], [2, 2]].into_iter().filter_map(solve);
     let pairs = [[0, 1], [1, 2], [0, 2]].into_iter().filter_map(solve);
     let apart: Vec<_> = pairs.filter(|(_, solved)| solved.correlation().abs() <= MOST_CORRELATION).collect();
-    let scatter = apart.iter().map(|(_, solved)| solved.scatter()).reduce(f64::min)?;
+    let scatter = apart.iter().map(|(_, solved)| solved.scatter(2)).reduce(f64::min)?;
     // An altitude and a limb height change the half-angles nearly alike. Only the limb height has an expected value.
     let cost = |(which, solved): &([usize; 2], Solved)| {
         let limb = which.iter().zip(solved.corrections).filter(|(k, _)| is_limb(**k));
@@ -166,7 +178,8 @@ pub fn find_pair<'a>(facts: impl Iterator<Item = &'a FitFacts>, limb_height_km: 
     };
     let (which, pair) = apart.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
     let explains = |single: &Solved| {
-        single.chi2(scatter) - pair.chi2(scatter) < LEAST_GAIN || single.scatter() < LEAST_RATIO * scatter
+        let gain = single.chi2(scatter) - pair.chi2(scatter);
+        gain < least_gain(equations.len() - 2) || single.scatter(1) < LEAST_RATIO * scatter
     };
     if singles.into_iter().any(|(_, single)| explains(&single)) {
         return None;
@@ -245,6 +258,27 @@ mod tests {
         for (km, focal) in [(0.0, 1.0), (-30.0, 1.0), (25.0, 1.0), (0.0, 0.9), (0.0, 1.08)] {
             assert_eq!(find_pair(flight(km, focal).iter(), LIMB_KM), None, "{km} km, {focal}");
         }
-        assert_eq!(find_pair(flight(-20.0, 1.06)[..3].iter(), LIMB_KM), None, "three pictures are too few");
+        assert_eq!(find_pair(flight(-20.0, 1.06)[..7].iter(), LIMB_KM), None, "seven pictures are too few");
+    }
+
+    #[test]
+    fn an_uneven_limb_is_rarely_a_pair() {
+        let mut state = 1u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let mut normal = || (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos();
+        for (pictures, scatter_deg) in [(8, 0.1), (8, 0.3), (12, 0.2)] {
+            let mut flight = || -> Vec<FitFacts> {
+                let one = |i: usize| {
+                    let bend = [40.0, -18.0, 25.0, 9.0][i % 4];
+                    facts(120.0 + 25.0 * i as f64, bend, 0.0, 1.0, normal() * scatter_deg / NOISE_DEG)
+                };
+                (0..pictures).map(one).collect()
+            };
+            let found = (0..500).filter(|_| find_pair(flight().iter(), LIMB_KM).is_some()).count();
+            assert!(found <= 10, "{found} of 500 flights of {pictures} pictures");
+        }
     }
 }

@@ -49,7 +49,7 @@ pub(super) fn read(mut contents: impl Read + Seek) -> Option<FoundTone> {
 fn read_png_chunks(contents: &mut (impl Read + Seek)) -> Option<Tone> {
     let mut start = [0; SIGNATURE.len()];
     contents.read_exact(&mut start).ok()?;
-    let [mut coded, mut srgb, mut gamma] = [None; 3];
+    let (mut coded, [mut srgb, mut gamma]) = (None, [None; 2]);
     let mut head = [0; 8];
     while start == SIGNATURE && contents.read_exact(&mut head).is_ok() {
         let [a, b, c, d, kind @ ..] = head;
@@ -66,7 +66,7 @@ fn read_png_chunks(contents: &mut (impl Read + Seek)) -> Option<Tone> {
                     let exponent = f64::from(u32::from_be_bytes(data)) * 1e-5;
                     gamma = Some(exponent).filter(|x| (0.2..=5.0).contains(x)).map(|x| Tone::Gamma(1.0 / x));
                 } else {
-                    coded = transfer(data[1]);
+                    coded = Some(transfer(data[1]));
                 }
             }
             _ => {}
@@ -74,7 +74,8 @@ fn read_png_chunks(contents: &mut (impl Read + Seek)) -> Option<Tone> {
         // A checksum of four bytes ends each chunk.
         contents.seek(SeekFrom::Current(i64::from(length) + 4)).ok()?;
     }
-    coded.or(srgb).or(gamma)
+    // A curve that is none of ours (PQ, HLG) is not that of another chunk.
+    coded.unwrap_or_else(|| srgb.or(gamma))
 }
 
 /// Returns the curve of a code of ITU-T H.273, table 3.

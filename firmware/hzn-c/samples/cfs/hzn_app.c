@@ -157,7 +157,7 @@ static void take(const CFE_SB_Buffer_t *buffer) {
     mid = CFE_SB_MsgIdToValue(id);
     if (mid == HZN_APP_CMD_MID) {
         carry_out(buffer, size);
-    } else if (mid == HZN_APP_SEND_HK_MID) {
+    } else if (mid == HZN_APP_SEND_HK_MID && size == sizeof(HZN_APP_NoArgs_t)) {
         send_housekeeping();
     } else if (mid == HZN_APP_PICTURE_MID && size == sizeof(HZN_APP_Picture_t)) {
         process((const HZN_APP_Picture_t *)buffer);

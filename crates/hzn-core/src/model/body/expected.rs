@@ -2,11 +2,12 @@
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
-use crate::geometry::ellipsoid::LimbCone;
+use crate::geometry::ellipsoid::{EARTH_MEAN_RADIUS_M, LimbCone};
 use crate::geometry::frames::{Cam, Fixed, Rotation, UnitVec3};
 
 use super::apparent::{ApparentBody, below_limb_error};
 use super::position::Target;
+use super::refraction::lowered_m;
 use super::{Config, Kind, LOWEST_ALTITUDE_M, Last, Prior, PriorError};
 
 /// A prior attitude with this 1-sigma or more does not correct the shape of the limb, because it is no better than an
@@ -309,8 +310,15 @@ impl<T: Real> Expected<T> {
         }
         let distance = (self.radius_m + self.limb_m) / self.sin;
         // The difference of the sines is rewritten as a product, so that f32 keeps the metres.
-        let height = self.limb_m - self.raised_m + distance * (self.cos - cos) * (self.cos + cos) / (sin + self.sin);
-        Some((height, -distance * cos / sin))
+        let apparent_m = self.limb_m + distance * (self.cos - cos) * (self.cos + cos) / (sin + self.sin);
+        let by_cos_m = -distance * cos / sin;
+        if !(self.raised_m > T::zero()) {
+            return Some((apparent_m, by_cos_m));
+        }
+        // Only the air of the Earth raises a limb.
+        let radius_m = T::from_f64(EARTH_MEAN_RADIUS_M);
+        let (height_m, slope) = lowered_m(Kind::Earth, radius_m, apparent_m, distance - self.radius_m);
+        Some((height_m, by_cos_m * slope))
     }
 
     /// Returns the limb axis in the fixed frame, when the position is known.

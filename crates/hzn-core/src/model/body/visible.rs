@@ -12,8 +12,8 @@ use crate::model::tone::Tone;
 const SIGMA_KM: f64 = 4.6;
 
 impl Config {
-    /// Sets the height and sigma of the visible limb to those in pictures of this tone, if [`Self::limb`] is
-    /// [`Limb::Visible`] and if the height is still the default. A height that somebody measured or set already is that
+    /// Sets the height of the visible limb to that in pictures of this tone, if [`Self::limb`] is [`Limb::Visible`] and
+    /// if the height is still the default; and the sigma, too, if it is still the default. A height that somebody measured or set already is that
     /// of the pictures.
     ///
     /// The light of the air falls by a factor of e over its scale height h. If half of the counts is the fraction l of
@@ -22,15 +22,14 @@ impl Config {
     pub fn follow_tone(&mut self, tone: Tone) {
         let scale_height_km = self.scale_height_km();
         let default = Self::of_kind(self.kind, self.radii_km);
-        let is_default = [self.limb_height_km, self.limb_height_sigma_km]
-            == [default.limb_height_km, default.limb_height_sigma_km]
-            && self.limb_height_by_latitude_km.is_empty();
+        let is_default = self.limb_height_km == default.limb_height_km && self.limb_height_by_latitude_km.is_empty();
         let Some(light) = tone.light_at_half() else { return };
         if self.limb != Limb::Visible || !is_default || !(scale_height_km > 0.0) {
             return;
         }
         self.limb_height_km += scale_height_km * libm::log(0.5 / light);
-        if tone == Tone::Linear && matches!(self.kind, Kind::Earth | Kind::EarthSphere) {
+        let is_sigma_default = self.limb_height_sigma_km == default.limb_height_sigma_km;
+        if is_sigma_default && tone == Tone::Linear && matches!(self.kind, Kind::Earth | Kind::EarthSphere) {
             self.limb_height_sigma_km = SIGMA_KM;
         }
     }
@@ -65,6 +64,11 @@ mod tests {
         let told = |limb, km| Config { limb, limb_height_km: km, ..Config::default() };
         assert_eq!(height(told(Limb::Height, 17.0), Tone::Srgb), [17.0, 7.0]);
         assert_eq!(height(told(Limb::Visible, 18.9), Tone::Srgb), [18.9, 7.0]);
+        // A sigma alone leaves the height to the tone.
+        let narrow = Config { limb_height_sigma_km: 2.0, ..Config::default() };
+        assert_eq!(height(narrow.clone(), Tone::Linear), [17.0, 2.0]);
+        let [srgb, sigma] = height(narrow, Tone::Srgb);
+        assert!((srgb - 23.36).abs() < 0.01 && sigma == 2.0, "{srgb}");
         let rows = Config { limb_height_by_latitude_km: [[0.0, 25.0]].into_iter().collect(), ..Config::default() };
         assert_eq!(height(rows, Tone::Srgb), [17.0, 7.0]);
         // There is no air whose light could fall with height.
