@@ -144,7 +144,10 @@ fn pictures(flights: u64) -> Outcome {
     let mut campaign = limb_campaign(&target().join("release/hzn"))?;
     steps::run(campaign.args(["--list", "--flights", &flights.to_string()]))?;
     let mut decoys = decoy_campaign(&target().join("release/hzn"))?;
-    steps::run(decoys.arg("--keep").arg(target().join("xtask/decoys")).args(["--flights", &flights.to_string()]))
+    steps::run(decoys.arg("--keep").arg(target().join("xtask/decoys")).args(["--flights", &flights.to_string()]))?;
+    // A flight of the others has eight pictures.
+    let mut discs = python_campaign("tests/python/half_lit_campaign.py", &target().join("release/hzn"))?;
+    steps::run(discs.args(["--pictures", &(8 * flights).to_string()]))
 }
 
 /// Compares errors with protection levels on pictures that programs in Python render, one of each flight.

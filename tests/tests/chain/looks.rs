@@ -3,7 +3,7 @@
 
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Model};
-use hzn_core::frames::UnitVec3;
+use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
 use hzn_core::threshold::{self, Method};
@@ -111,48 +111,52 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     );
 }
 
+/// Returns a disc that is seen from far above and lit from the side, with bright clouds over ground of the brightness
+/// `ground` + 0.1 times a random number.
+fn half_lit_disc(n: u32, ground: f64) -> Scene {
+    let random =
+        |k: u32| f64::from((n + 1u32).wrapping_mul(2_654_435_761).wrapping_add(k * 40_503_001) >> 8 & 0xFFFF) / 65536.0;
+    let altitude_km = 3000.0 * 10f64.powf(random(1));
+    let half_angle = (6371.0 / (6371.0 + altitude_km)).asin();
+    let lens = camera::Config::ideal(Model::Pinhole, 320, 320, 320.0 * (0.25 + 0.15 * random(2)) / half_angle.tan());
+    let turn = std::f64::consts::TAU;
+    let look_to =
+        Look { azimuth_rad: turn * random(3), depression_rad: (89.0 - 3.0 * random(4)).to_radians(), roll_rad: 0.3 };
+    let pose = Pose::looking(position_m(120.0 * random(5) - 60.0, 20.0, altitude_km), look_to);
+    let (phase, side) = ((60.0 + 40.0 * random(6)).to_radians(), turn * random(7));
+    let sun = [phase.sin() * side.cos(), phase.sin() * side.sin(), -phase.cos()];
+    let direction = pose.fixed_from_camera().unwrap().apply(&UnitVec3::try_new(sun).unwrap()).xyz();
+    let mut scene = Scene::new(lens, pose);
+    let clouds = Clouds { cover: 0.3 + 0.3 * random(8), brightness: 0.9, seed: n.into(), ..Visible::default().clouds };
+    scene.disc = hzn_sim::Disc { surface: ground + 0.1 * random(9), clouds: Some(clouds), band: None };
+    scene.light = Light::Sun { direction, twilight_rad: 0.02 };
+    scene.body.limb_height_km = 15.0;
+    (scene.detector.psf_sigma_px, scene.detector.read_noise, scene.seed) = (0.9, 0.01, n.into());
+    scene
+}
+
+/// Returns the report of a disc with these thresholds of further looks, and the true axis.
+fn look_at(scene: &Scene, levels: &[f64]) -> (Report<f64>, UnitVec3<Cam, f64>) {
+    let (picture, axis) = (scene.render().unwrap(), scene.truth("", 0.0).unwrap().axis().unwrap());
+    let mut config = Config::new(scene.camera.clone());
+    (config.body.limb_height_km, config.body.limb_height_sigma_km) = (17.0, 7.0);
+    config.retry.levels = levels.iter().copied().collect();
+    let mut horizon = HostHorizon::boxed(&config).unwrap();
+    let expected = horizon.expect(&hzn_tests::prior_of_scene(scene)).unwrap();
+    (horizon.process(&picture.view(), &expected), axis)
+}
+
 /// Tests discs that are seen from far above and lit from the side, with bright clouds over dark ground. Otsu's
 /// threshold may follow the clouds, so the first look does not answer every picture. After the further looks every
 /// picture has an answer, with an error below five sigma.
 #[test]
 fn half_lit_discs_are_looked_at_again() {
+    let levels = Config::new(half_lit_disc(0, 0.12).camera).retry.levels;
     let (mut answered, mut at_once) = (0, 0);
     let count = 24;
     for n in 0..count {
-        let random = |k: u32| {
-            f64::from((n + 1u32).wrapping_mul(2_654_435_761).wrapping_add(k * 40_503_001) >> 8 & 0xFFFF) / 65536.0
-        };
-        let altitude_km = 3000.0 * 10f64.powf(random(1));
-        let half_angle = (6371.0 / (6371.0 + altitude_km)).asin();
-        let lens =
-            camera::Config::ideal(Model::Pinhole, 320, 320, 320.0 * (0.25 + 0.15 * random(2)) / half_angle.tan());
-        let turn = std::f64::consts::TAU;
-        let look_to = Look {
-            azimuth_rad: turn * random(3),
-            depression_rad: (89.0 - 3.0 * random(4)).to_radians(),
-            roll_rad: 0.3,
-        };
-        let pose = Pose::looking(position_m(120.0 * random(5) - 60.0, 20.0, altitude_km), look_to);
-        let (phase, side) = ((60.0 + 40.0 * random(6)).to_radians(), turn * random(7));
-        let sun = [phase.sin() * side.cos(), phase.sin() * side.sin(), -phase.cos()];
-        let direction = pose.fixed_from_camera().unwrap().apply(&UnitVec3::try_new(sun).unwrap()).xyz();
-        let mut scene = Scene::new(lens.clone(), pose);
-        let clouds =
-            Clouds { cover: 0.3 + 0.3 * random(8), brightness: 0.9, seed: n.into(), ..Visible::default().clouds };
-        scene.disc = hzn_sim::Disc { surface: 0.12 + 0.1 * random(9), clouds: Some(clouds), band: None };
-        scene.light = Light::Sun { direction, twilight_rad: 0.02 };
-        scene.body.limb_height_km = 15.0;
-        (scene.detector.psf_sigma_px, scene.detector.read_noise, scene.seed) = (0.9, 0.01, n.into());
-        let (picture, axis) = (scene.render().unwrap(), scene.truth("", 0.0).unwrap().axis().unwrap());
-        let mut config = Config::new(lens);
-        (config.body.limb_height_km, config.body.limb_height_sigma_km) = (17.0, 7.0);
-        let mut again = HostHorizon::boxed(&config).unwrap();
-        config.retry.levels.clear();
-        let mut once = HostHorizon::boxed(&config).unwrap();
-        let [one, several] = [&mut once, &mut again].map(|horizon| {
-            let expected = horizon.expect(&hzn_tests::prior_of_scene(&scene)).unwrap();
-            horizon.process(&picture.view(), &expected)
-        });
+        let scene = half_lit_disc(n, 0.12);
+        let [(one, axis), (several, _)] = [&[], levels.as_slice()].map(|levels| look_at(&scene, levels));
         println!(
             "{n}: {} once, {} after {} looks: {:?}",
             one.status, several.status, several.counters.looks, several.candidates
@@ -169,6 +173,30 @@ fn half_lit_discs_are_looked_at_again() {
     }
     println!("{at_once} of {count} at the first level, {answered} after all looks");
     assert!(answered == count && at_once < count, "{at_once}, {answered}");
+}
+
+/// Tests the same discs over ground as dark as an ocean. Some clouds are so much brighter than most of the limb that
+/// only a look just above the noise of the sky shows the whole limb. In a few pictures even that look does not: the
+/// limb between the clouds is within three sigmas of the noise.
+#[test]
+fn half_lit_discs_over_dark_ground_are_answered_above_the_noise() {
+    let (mut answered, mut without) = (0, 0);
+    let count = 60;
+    for n in 100..100 + count {
+        let scene = half_lit_disc(n, 0.02);
+        let (before, _) = look_at(&scene, &[0.5, 0.25, 2.0]);
+        let (found, axis) = look_at(&scene, &[0.5, 0.25, 2.0, 0.0]);
+        without += u32::from(before.solution.is_some());
+        let Some(s) = found.solution else {
+            println!("{n}: {:?}", found.candidates);
+            continue;
+        };
+        answered += 1;
+        let off = s.axis.angle_rad(&axis);
+        assert!(off < 5.0 * s.covariance.sigma_max_rad(), "{n}: {:.3}°", off.to_degrees());
+    }
+    println!("{answered} of {count}, {without} without the look above the noise");
+    assert!(answered > without && 10 * answered >= 8 * count, "{answered}, {without}");
 }
 
 /// Tests a limb through a lens of 55 degrees on an array of 32×24. Of the 16 bits, a range of 1200 counts above a sky

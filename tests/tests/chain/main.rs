@@ -7,6 +7,7 @@ mod faint;
 mod firmware;
 mod flight_artefacts;
 mod free_axis;
+mod geostationary;
 mod hard;
 mod heads;
 mod jupiter;

@@ -32,10 +32,11 @@ section! {
         /// (1); `[]` allows only one look.
         ///
         /// Up to 4 looks follow one after the other, until there is an answer. Otsu's threshold follows the brightest
-        /// clouds, and most of the limb of a half-lit disc may lie below it. More looks answer more pictures, but every
-        /// look can give a false answer; all looks share one `limits.max_work`. With a `fixed` threshold there is only
-        /// one look.
-        @- levels: heapless::Vec<f64, MAX_LEVELS> = levels(), [0.05 to 4.0];
+        /// clouds, and most of the limb of a half-lit disc may lie below it. A threshold below `min_sigma` is raised to
+        /// it if the disc of the body is smaller than the picture, and skipped otherwise: 0 is a look just above the
+        /// noise of the sky, for half-lit discs only. More looks answer more pictures, but every look can give a false
+        /// answer; all looks share one `limits.max_work`. With a `fixed` threshold there is only one look.
+        @- levels: heapless::Vec<f64, MAX_LEVELS> = levels(), [0.0 to 4.0];
         /// Lowest threshold of every look, in standard deviations of the dark pixels' noise above their mean; a `fixed`
         /// threshold is kept.
         ///
@@ -60,10 +61,12 @@ section! {
 }
 
 /// The thresholds at 0.5 and 0.25 are for a limb that is dimmer than clouds. The threshold at 2 is for a limb under a
-/// glare, or with lit air above it.
+/// glare, or with lit air above it. The threshold at 0, just above the noise of the sky, is the last one: it shows the
+/// whole lit limb of a half-lit disc, and every faint edge in the sky.
 // With these looks the scene `horace` answers 40 instead of 35 of 46 limbs, and none of 14 pictures without a limb,
-// which is why there are three of them.
-const LEVELS: [f64; 3] = [0.5, 0.25, 2.0];
+// which is why there are three of them. The fourth answers half-lit discs whose clouds are brighter than most of the
+// limb.
+const LEVELS: [f64; 4] = [0.5, 0.25, 2.0, 0.0];
 
 fn levels() -> heapless::Vec<f64, MAX_LEVELS> {
     let mut levels = heapless::Vec::new();

@@ -4,6 +4,7 @@ use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::geometry::camera::Camera;
+use crate::geometry::pixel::ImagePoint;
 use crate::geometry::scaling::ScaledCone;
 use crate::model::report::Solution;
 
@@ -60,6 +61,17 @@ impl<T: Real> FoundLimb<T> {
             }
         }
         count
+    }
+
+    /// Returns whether an image point of `camera` is within `limit_px` of this limb.
+    pub(crate) fn is_within(&self, limit_px: T, point: ImagePoint<T>, camera: &Camera<T>) -> bool {
+        camera.ray(point).is_some_and(|ray| {
+            let (r, gradient) = self.offset(&ray.s, camera);
+            let [x, y, z] = ray.jacobian();
+            let by = |k: usize| x[k & 1] * gradient.x + y[k & 1] * gradient.y + z[k & 1] * gradient.z;
+            let (gu, gv) = (by(0), by(1));
+            r * r <= limit_px * limit_px * (gu * gu + gv * gv)
+        })
     }
 
     /// Returns cos α − s·e for a ray of `camera`, and the vector v with d(s·e) = v·ds.

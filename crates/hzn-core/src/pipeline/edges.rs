@@ -214,7 +214,8 @@ impl<T: Real> Edges<T> {
     /// Returns the largest distance of an inlier from the limb. The distance comes from the noise between neighbouring
     /// points and does not depend on the weights.
     fn threshold(&self, expected: &Expected<T>, config: &consensus::Config) -> consensus::Threshold<T> {
-        consensus::Threshold::new(&self.blocks, self.points.len() as u32, expected, self.focal_px, config)
+        let uneven_px = expected.uneven_px(&self.camera);
+        consensus::Threshold::new(&self.blocks, self.points.len() as u32, expected, self.focal_px, uneven_px, config)
     }
 
     /// Rejects outliers and returns the consensus; `None` if there is none.

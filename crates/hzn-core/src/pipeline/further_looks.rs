@@ -29,6 +29,26 @@ fn goes_on<T>(report: &Report<T>) -> bool {
     matches!(report.status, Status::NoLimb | Status::TooFewPoints | Status::Rejected) && !report.glows()
 }
 
+/// The lowest threshold of a further look.
+#[derive(Clone, Copy)]
+struct Lowest<T> {
+    /// `retry.min_sigma` above the mean of the dark pixels, in counts. Lower thresholds are passed over: there the limb
+    /// was found 25 km too high.
+    counts: T,
+    /// The threshold to which lower ones are raised; 0 if they are not.
+    raised: u16,
+}
+
+impl<T: Real> Lowest<T> {
+    /// Returns the next threshold of `parts` that may be used. `looked` is the lowest threshold that was used.
+    fn next(&self, parts: &mut core::slice::Iter<'_, f64>, first: &Level<T>, looked: u16) -> Option<u16> {
+        parts.map(|&part| first.at_fraction(part).max(self.raised)).find(|&level| {
+            let is_new = level != self.raised || level < looked;
+            is_new && T::from_i32(level.into()) >= self.counts
+        })
+    }
+}
+
 impl<T: Real> Sensor<T> {
     /// Runs everything after the first threshold: the looks, one after the other, until there is an answer or nothing
     /// is left to try.
@@ -38,9 +58,8 @@ impl<T: Real> Sensor<T> {
     // The sample for the threshold is charged here, because the budget does not exist when it is read. A frame that is
     // found stays for all looks, because it belongs to the camera and not to the threshold. `rejected` is kept, because
     // a rejected edge says more about the picture than a later look that found nothing. The noise is measured only
-    // before a second look, so that a picture with an answer does not pay for its reads. Thresholds within this noise
-    // are passed over: there the limb was found 25 km too high. The first threshold is reported, because the user can
-    // set this one.
+    // before a second look, so that a picture with an answer does not pay for its reads. The first threshold is
+    // reported, because the user can set this one.
     pub(super) fn look_at_levels<P: Pixels, O: Observer<T>>(&self, mut look: Look<'_, T, P, O>, first: &Level<T>) {
         let config = &self.config;
         let Look { picture, expected, observer, .. } = look;
@@ -53,6 +72,8 @@ impl<T: Real> Sensor<T> {
         let (mut first, mut is_cleared) = (*first, P::STREAMED);
         self.raise_above_noise(&look, &mut first, &mut work);
         let set_level = first.level;
+        // The lowest threshold of all looks.
+        let mut looked = set_level;
         look.report.level = first.level;
         loop {
             let level = look.report.level;
@@ -84,13 +105,9 @@ impl<T: Real> Sensor<T> {
                 observer.look(look.report.counters.looks, first.level);
                 continue;
             }
-            let lowest = *lowest.get_or_insert_with(|| {
-                work.charge(threshold::NOISE_READS * read);
-                let noise = threshold::dark_noise(picture, &self.region, first.level, config.consensus.seed, observer);
-                first.dark + noise * T::from_f64(config.retry.min_sigma)
-            });
-            let mut levels = others.by_ref().map(|&part| first.at_fraction(part));
-            let Some(level) = levels.find(|&level| T::from_i32(level.into()) >= lowest) else { break };
+            let lowest = *lowest.get_or_insert_with(|| self.lowest_level(&look, &first, &mut work));
+            let Some(level) = lowest.next(&mut others, &first, looked) else { break };
+            looked = looked.min(level);
             look.report.level = level;
             observer.look(look.report.counters.looks, level);
         }
@@ -99,6 +116,25 @@ impl<T: Real> Sensor<T> {
         {
             (look.report.status, look.report.level) = (status, set_level);
         }
+    }
+
+    /// Measures the noise of the dark pixels for the lowest threshold of the further looks.
+    ///
+    /// Thresholds within the noise are raised above it for a disc that fits into the picture: this look shows the whole
+    /// lit limb of a half-lit disc.
+    // For a limb near by, such a look answered more airglow and aurora, and no more limbs.
+    fn lowest_level<P: Pixels, O: Observer<T>>(
+        &self,
+        look: &Look<'_, T, P, O>,
+        first: &Level<T>,
+        work: &mut WorkBudget,
+    ) -> Lowest<T> {
+        let Look { picture, expected, observer, .. } = *look;
+        work.charge(threshold::NOISE_READS * (work::READ + self.region.mask_cost()));
+        let noise = threshold::dark_noise(picture, &self.region, first.level, self.config.consensus.seed, observer);
+        let above = noise * T::from_f64(self.config.retry.min_sigma);
+        let is_disc = expected.phases && expected.fits_into(&self.camera);
+        Lowest { counts: first.dark + above, raised: if is_disc { first.at_noise(above) } else { 0 } }
     }
 
     /// Raises a threshold within the noise of the dark pixels to `retry.min_sigma` above their mean: there an edge

@@ -332,7 +332,7 @@ class Retry(TypedDict, total=False):
 
     levels: _Numbers
     """Thresholds of further looks, on a scale from the mean of the dark pixels (0) to the first look's threshold
-    (1); ``[]`` allows only one look. Values: 0.05 to 4. Default: [0.5, 0.25, 2.0]."""
+    (1); ``[]`` allows only one look. Values: 0 to 4. Default: [0.5, 0.25, 2.0, 0.0]."""
     min_sigma: float
     """Lowest threshold of every look, in standard deviations of the dark pixels' noise above their mean; a ``fixed``
     threshold is kept. Values: 0 to 100. Default: 3.0."""

@@ -2,6 +2,7 @@
 
 use crate::base::linalg::V3;
 use crate::base::real::Real;
+use crate::geometry::camera::Camera;
 use crate::geometry::ellipsoid::{EARTH_MEAN_RADIUS_M, LimbCone};
 use crate::geometry::frames::{Cam, Fixed, Rotation, UnitVec3};
 
@@ -132,6 +133,27 @@ impl<T: Real> Expected<T> {
     /// Returns the expected half-angle in radians.
     pub fn half_angle_rad(&self) -> T {
         self.sin.atan2(self.cos)
+    }
+
+    /// Returns whether the disc of the body is smaller than the diagonal of the picture, so that most of it can be
+    /// seen.
+    pub(crate) fn fits_into(&self, camera: &Camera<T>) -> bool {
+        let (fx, fy) = camera.focal_px();
+        let (w, h) = (T::from_i32(i32::from(camera.width())), T::from_i32(i32::from(camera.height())));
+        let disc_px = self.half_angle_rad() * (fx + fy);
+        disc_px * disc_px <= w * w + h * h
+    }
+
+    /// Returns how far the limb can be from its mean cone because the azimuth of its shape is unknown, in pixels; 0 if
+    /// the disc is larger than the picture.
+    // Of a limb that is larger than the picture, only a short arc is in view, and its axis absorbs most of the shape.
+    pub(crate) fn uneven_px(&self, camera: &Camera<T>) -> T {
+        if !self.fits_into(camera) {
+            return T::ZERO;
+        }
+        let (fx, fy) = camera.focal_px();
+        let [first, second] = self.unknown_harmonics_cos;
+        (first + second) / self.sin * (fx + fy) * T::from_f64(0.5)
     }
 
     /// Returns the body whose position is fitted. Without the feature there is none, so the code for it is left out.

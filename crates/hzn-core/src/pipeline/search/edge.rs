@@ -28,11 +28,11 @@ use crate::stages::rays;
 /// [`CERTAIN_SHARE`] of its points are inliers.
 const CERTAIN_SUPPORT: f64 = 0.5;
 /// See [`CERTAIN_SUPPORT`]. An RMS below a quarter of the largest distance of an inlier replaces this condition.
-const CERTAIN_SHARE: f64 = 0.8;
+pub(super) const CERTAIN_SHARE: f64 = 0.8;
 /// Smallest part of an edge's points that must be inliers. With one inlier in 20 points and a threshold of three
 /// pixels, a cone that is free to turn passes through clutter by chance.
 const MIN_INLIER_SHARE: f64 = 0.05;
-/// The same in a further look.
+/// The same in a further look. The gate `no_consensus` asks less of a half-lit disc.
 const LATER_INLIER_SHARE: f64 = 0.5;
 
 impl<T: Real, O: Observer<T>> Search<'_, T, O> {
@@ -149,7 +149,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         }
         let (fx, fy) = camera.focal_px();
         let focal = (fx + fy) * T::from_f64(0.5);
-        let threshold = Threshold::new(blocks, points.count, expected, focal, &config.consensus);
+        let uneven_px = expected.uneven_px(camera);
+        let threshold = Threshold::new(blocks, points.count, expected, focal, uneven_px, &config.consensus);
         let work = &mut self.work;
         let consensus = consensus::find(blocks, points.count, expected, focal, threshold, &config.consensus, work)?;
         self.report.counters.draws += consensus.draws;

@@ -1,6 +1,7 @@
 //! Takes the edges of one picture from border to verdict, one after the other, and decides which of them is the limb.
 
 mod edge;
+mod join;
 mod order;
 
 use super::look::Look;

@@ -82,6 +82,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
                 !self.is_over()
             });
         }
+        self.join_edges(binary, &ranked, border, &mut marks);
         if self.best.is_some() && !self.examines_all() {
             return;
         }
@@ -181,7 +182,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
 
     /// Follows one edge and returns how it ended; `None` if the edge is a hole, or if the work budget does not allow
     /// it.
-    fn follow<P: Pixels>(
+    pub(super) fn follow<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
         pixel: Pixel,

@@ -26,7 +26,17 @@ impl<T: Real> Threshold<T> {
     ///
     /// Noise raises the threshold at most to the sigma of the limb height. Air does not spread a limb farther, so an
     /// edge with more scatter belongs to something else.
-    pub(crate) fn new(blocks: &[Block<T>], count: u32, expected: &Expected<T>, focal_px: T, config: &Config) -> Self {
+    ///
+    /// `uneven_px` is the largest distance of the limb from its mean cone, [`Expected::uneven_px`]. It doubles as the
+    /// room for noise, so that the threshold stays as it is where the distance is small.
+    pub(crate) fn new(
+        blocks: &[Block<T>],
+        count: u32,
+        expected: &Expected<T>,
+        focal_px: T,
+        uneven_px: T,
+        config: &Config,
+    ) -> Self {
         let told = T::from_f64(config.threshold_px);
         // A disc with a free half-angle has no limb height whose sigma could bound its noise.
         let most = if expected.free { told } else { told.max(expected.limb_sigma_rad() * focal_px) };
@@ -37,6 +47,7 @@ impl<T: Real> Threshold<T> {
         } else {
             told
         };
+        let px = px.max(uneven_px + uneven_px);
         Self { px, factor: px / told }
     }
 }

@@ -16,6 +16,7 @@ mod thinned;
 
 pub(crate) use follow::{BinaryPicture, End};
 pub(crate) use marks::Marks;
+pub(crate) use search::Ranked;
 pub(crate) use thinned::Thinned;
 
 use crate::base::error::{ConfigError, Limit, require};

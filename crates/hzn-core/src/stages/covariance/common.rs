@@ -113,7 +113,7 @@ pub(super) struct Row<T> {
     h12: [T; 2],
     w: T,
     /// Robust weight and number of the point.
-    weight: T,
+    pub(super) weight: T,
     place: usize,
 }
 
@@ -121,6 +121,13 @@ impl<T: Real> Row<T> {
     /// Returns w h x for the shift of this point by one pixel across the limb.
     pub(super) fn shift(&self) -> V3<T> {
         self.h * self.g2.sqrt()
+    }
+    /// Returns the residual r = cos α − s·e, and its square in px² times the weight.
+    pub(super) fn residual(&self, fit: &Fit<T>) -> (T, T) {
+        // 1 − s·e = |s − e|²/2 keeps the digits of a small disc.
+        let d = self.s - fit.e;
+        let r = d.dot(&d) * T::from_f64(0.5) - fit.k;
+        (r, self.w * r * r)
     }
     /// Adds w h hᵀ to the upper triangle of the normal matrix.
     pub(super) fn add_to(&self, normal: &mut [T; 6]) {

@@ -20,6 +20,7 @@ mod noise;
 pub(crate) mod position;
 pub mod reml;
 mod sandwich;
+mod terminator;
 mod third_axis;
 
 use crate::base::linalg::M3;
@@ -89,6 +90,9 @@ pub(crate) fn fuse<T: Real>(
         add(term, more);
     })?;
     if let Some(target) = expected.target().filter(|_| fit.free) {
+        if target.is_in_sunlight && expected.phases && expected.sun_seen.is_none() {
+            terminator::widen(blocks, fit, &mut p);
+        }
         let mut fused = position::fused(blocks, fit, &p, edge, expected, target, fit_config, budget)?;
         if let Some(located) = &mut fused.located {
             let limit_rad = fit_config.yaw_limit_deg.to_radians();

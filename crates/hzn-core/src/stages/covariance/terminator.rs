@@ -1,0 +1,107 @@
+//! Error of a disc that is lit from one side, without the direction to the Sun.
+//!
+//! The edge of such a disc is limb on one side and terminator on the other. If the phase is small, the terminator is so
+//! close to the limb that the fit takes both, and finds another centre and another size. The sunlit half of the limb
+//! fits a cone much better than the whole edge. The half is not known, so that each of eight halves is fitted by one
+//! linear step from the whole cone; the one with the smallest residuals counts. Its cone may be the right one. The
+//! difference is therefore an error of the answer: it is added to the covariance.
+
+use super::answer::ConeCovariance;
+use super::common::part;
+use super::sandwich::response;
+use crate::base::linalg::V3;
+use crate::base::real::Real;
+use crate::geometry::block::Block;
+use crate::stages::fit::Fit;
+
+/// Number of sectors of the azimuth. Four neighbours are a half.
+const SECTORS: usize = 8;
+/// A half counts if its mean square distance is below this part of that of all points.
+// A factor of two in the RMS. The points of a limb have the same noise on both sides, whatever it is.
+const MAX_COST: f64 = 0.25;
+/// Smallest part of the weight that a half must have.
+const LEAST_WEIGHT: f64 = 0.25;
+
+/// Sums of the points in a sector, or in several.
+#[derive(Clone, Copy)]
+struct Sector<T> {
+    /// Upper triangle of Σ w h hᵀ, and Σ w h r with the residual r.
+    normal: [T; 6],
+    right: V3<T>,
+    /// Σ of the robust weights, and of the squared distances times these weights, px².
+    weight: T,
+    cost: T,
+}
+
+impl<T: Real> Sector<T> {
+    fn new() -> Self {
+        Self { normal: [T::ZERO; 6], right: V3::zeros(), weight: T::ZERO, cost: T::ZERO }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.normal.iter_mut().zip(other.normal).for_each(|(sum, more)| *sum += more);
+        self.right += other.right;
+        self.weight += other.weight;
+        self.cost += other.cost;
+    }
+
+    /// Returns the step (δ₁₂, δc) from the whole cone to that of this half, and the mean square distance after it, px².
+    fn step(&self, fit: &Fit<T>) -> Option<(V3<T>, T)> {
+        let step = response(&fit.sums.with_normal(self.normal), fit.mean, true)? * self.right;
+        let [m1, m2] = fit.mean;
+        let (g, about_mean) = (self.right, step.z - m1 * step.x - m2 * step.y);
+        let gain = g.x * step.x + g.y * step.y + g.z * about_mean;
+        Some((step, (self.cost - gain).max(T::ZERO) / self.weight.max(T::from_f64(1e-20))))
+    }
+}
+
+/// Adds the difference between the whole edge and its best half, if the half-angles differ by more than one sigma.
+pub(super) fn widen<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, p: &mut ConeCovariance<T>) {
+    let Some(step) = to_best_half(blocks, fit) else { return };
+    let more = step * step.transpose();
+    if more.m33 > p.whole.m33 + p.late.m33 {
+        p.whole += more;
+        // The light stays the same for many pictures.
+        p.common += more;
+    }
+}
+
+/// Returns the number of the sector of an azimuth, counted from the first tangent.
+fn sector<T: Real>(x: T, y: T) -> usize {
+    let is_steep = x.abs() < y.abs();
+    match (x >= T::ZERO, y >= T::ZERO) {
+        (true, true) => usize::from(is_steep),
+        (false, true) => 3 - usize::from(is_steep),
+        (false, false) => 4 + usize::from(is_steep),
+        (true, false) => 7 - usize::from(is_steep),
+    }
+}
+
+/// Returns the step (δ₁₂, δc) from the fitted cone to that of the half which fits best; `None` if no half fits much
+/// better than the whole edge.
+fn to_best_half<T: Real>(blocks: &[Block<T>], fit: &Fit<T>) -> Option<V3<T>> {
+    let mut sectors = [Sector::new(); SECTORS];
+    let mut whole = Sector::new();
+    part(blocks, fit).for_each(|row| {
+        let (r, cost) = row.residual(fit);
+        let mut one = Sector { right: row.h * r, weight: row.weight, cost, ..Sector::new() };
+        row.add_to(&mut one.normal);
+        whole.add(&one);
+        if let Some(sector) = sectors.get_mut(sector(row.x, row.y)) {
+            sector.add(&one);
+        }
+    });
+    let least_weight = whole.weight * T::from_f64(LEAST_WEIGHT);
+    let mut best = (None, whole.cost / whole.weight.max(T::from_f64(1e-20)) * T::from_f64(MAX_COST));
+    for first in 0..SECTORS {
+        let mut half = Sector::new();
+        sectors.iter().cycle().skip(first).take(SECTORS / 2).for_each(|sector| half.add(sector));
+        if half.weight >= least_weight
+            && let Some((step, cost)) = half.step(fit)
+            && cost < best.1
+        {
+            best = (Some(step), cost);
+        }
+    }
+    best.0
+}
