@@ -27,6 +27,8 @@ PROBES = {
     "rosbag": "guide/ros/",
     "rerun": "guide/ros/",
     "foxglove": "guide/ros/",
+    "basilisk": "guide/tools/",
+    "horizonopnav": "guide/tools/",
     "install": "guide/install/",
     "mask": "guide/mask/",
     "payload": "guide/mask/",

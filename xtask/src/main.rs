@@ -7,6 +7,7 @@
 //! cargo xtask reproduce  compares our numbers with the published ones and writes book/results/reproduction.md
 //! cargo xtask firmware   builds the images for the flight computer and counts their instructions
 //! cargo xtask campaign   looks for faults: fuzzing, killed runs, long runs
+//! cargo xtask dist       makes the files of a release: archive, Debian package, wheel, lists of parts, checksums
 //! cargo xtask keys       writes the files that follow from the keys of sensor.toml: table, template, JSON schema,
 //!                        types of Python
 //! cargo xtask first-command
@@ -20,6 +21,7 @@ mod c_package;
 mod campaign;
 mod demo;
 mod display;
+mod dist;
 mod firmware;
 mod first_command;
 mod flight_build;
@@ -39,7 +41,8 @@ mod wheel;
 
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|first-command|keys|viewer> [OPTION]...
+const USAGE: &str =
+    "usage: cargo xtask <test|bench|reproduce|campaign|dist|firmware|first-command|keys|viewer> [OPTION]...
 
   test [--all] [STEP]...
                      runs the steps of every check, or all steps whose name contains one of the words; --all runs the
@@ -55,6 +58,10 @@ const USAGE: &str = "usage: cargo xtask <test|bench|reproduce|campaign|firmware|
                      measures the numbers of book/results/reproduction.md again and writes the file (see --help there)
   campaign <fuzz|kill|long|flips|parts> [ARG]...
                      looks for faults, and lists what hzn is built from (see book/results/reliability.md)
+  dist [--target TRIPLE] [PART]...
+                     makes the files of a release in target/dist: the static program as an archive and as a Debian
+                     package, the wheel with the program, lists of parts (CycloneDX), SHA256SUMS; then tries them.
+                     The part `crates` compiles each published crate from its package, and runs only if it is named
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into book/results/firmware-cost.md;
                      --by-feature prints only how much flash the methods of published systems take
@@ -76,6 +83,7 @@ fn main() -> ExitCode {
         "bench" => bench::run(rest),
         "reproduce" => reproduce::run(rest),
         "campaign" => campaign::run(rest),
+        "dist" => dist::run(rest),
         "firmware" => firmware::run(rest),
         "first-command" => first_command::run(),
         "keys" => write_keys(),

@@ -7,17 +7,20 @@ use std::process::Command;
 use crate::machine::{apt_install, output, target};
 use crate::steps::{Trouble, run};
 
+/// The system's own Python.
+const SYSTEM: &str = if cfg!(windows) { "python" } else { "python3" };
+
 /// Returns the Python of an environment with the packages that `requirements` lists. The environment is made once, and
 /// made again when the list changes.
 pub(crate) fn prepare_environment(name: &str, requirements: &Path) -> Result<PathBuf, Trouble> {
     let list = fs::read_to_string(requirements)?;
     let dir = target().join("venv").join(name);
-    let python = dir.join("bin/python");
+    let python = dir.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
     let stamp = dir.join("requirements.txt");
     if python.exists() && fs::read_to_string(&stamp).is_ok_and(|have| have == list) {
         return Ok(python);
     }
-    let usable = || output(Command::new("python3").args(["-c", "import ensurepip, venv, tomllib"])).is_some();
+    let usable = || output(Command::new(SYSTEM).args(["-c", "import ensurepip, venv, tomllib"])).is_some();
     if !usable() {
         apt_install(&["python3", "python3-venv"])?;
     }
@@ -25,7 +28,7 @@ pub(crate) fn prepare_environment(name: &str, requirements: &Path) -> Result<Pat
         return Err(Trouble::Missing("needs python3, 3.11 or later, with its venv module".into()));
     }
     let _ = fs::remove_dir_all(&dir);
-    run(Command::new("python3").args(["-m", "venv"]).arg(&dir))?;
+    run(Command::new(SYSTEM).args(["-m", "venv"]).arg(&dir))?;
     run(Command::new(&python)
         .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement"])
         .arg(requirements))

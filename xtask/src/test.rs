@@ -8,6 +8,7 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::demo::{demo_dir, find_recordings, run_demo};
+use crate::dist::exclude_unpublished;
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{self, Outcome, Selection, Step, Steps, Tier, cargo};
 use crate::test_build::build_tests;
@@ -55,7 +56,7 @@ const STEPS: &[Step] = &[
         build_tests()?;
         wheel::run_step(&fs::canonicalize(target().join("debug/hzn"))?, steps.all)
     }),
-    long("positions against Basilisk", |_| wheel::compare_with_basilisk()),
+    long("Basilisk and Rerun", |_| wheel::try_other_tools()),
     long("ignored tests", run_ignored_tests),
     long("killed runs", |_| campaign::kill(1000)),
     long("flipped bits", |_| campaign::flips(20_000)),
@@ -98,13 +99,7 @@ fn check_core_with(features: &str) -> Outcome {
 /// Packs every crate that is meant to be published, without building it again.
 fn check_packages() -> Outcome {
     let mut cargo = cargo(&["package", "--workspace", "--no-verify", "--allow-dirty", "--quiet"]);
-    let ours = ["hzn-py", "hzn-tests", "hzn-fuzz", "hzn-reproduce", "hzn-benches", "xtask"];
-    for unpublished in
-        ours.iter().chain(&["hzn-c", "hzn-firmware", "hzn-mps2", "hzn-setup", "hzn-stm32f405", "hzn-stm32h743"])
-    {
-        cargo.args(["--exclude", unpublished]);
-    }
-    steps::run(&mut cargo)
+    steps::run(cargo.args(exclude_unpublished()))
 }
 
 /// Compares the lens models with those of OpenCV.

@@ -31,7 +31,7 @@ pub(crate) fn run_step(hzn: &Path, every_notebook: bool) -> Outcome {
     steps::run(module(&stubs).arg(tests.join("stubtest.txt")))?;
     steps::run(module(&["mypy", "--strict", "--no-error-summary"]).arg(tests.join("typed.py")))?;
     let pytest = ["pytest", "-q", "-p", "no:cacheprovider", "--durations", "10", "--ignore"];
-    steps::run(module(&pytest).arg(tests.join("basilisk")).arg(&tests))?;
+    steps::run(module(&pytest).arg(tests.join("tools")).arg(&tests))?;
     // The site takes its reference from the docstrings. Its notebooks are executed during the build.
     let config = fs::canonicalize("mkdocs.yml")?;
     let mut site = module(&["mkdocs", "build", "--strict", "--quiet", "--config-file"]);
@@ -44,11 +44,12 @@ pub(crate) fn run_step(hzn: &Path, every_notebook: bool) -> Outcome {
     steps::run(Command::new(&python).arg("tests/python/check_search.py").arg(built))
 }
 
-/// Compares positions with those of Basilisk. It has an environment of its own, because it needs older packages.
-pub(crate) fn compare_with_basilisk() -> Outcome {
-    let tests = fs::canonicalize(Path::new(CRATE).join("tests/basilisk"))?;
+/// Runs the examples with Basilisk and Rerun, and compares positions with those of Basilisk. The environment is a
+/// separate one, because Basilisk needs older packages.
+pub(crate) fn try_other_tools() -> Outcome {
+    let tests = fs::canonicalize(Path::new(CRATE).join("tests/tools"))?;
     build_wheel(AS_IN_THE_TESTS)?;
-    let python = python::prepare_environment("basilisk", &tests.join("requirements.txt"))?;
+    let python = python::prepare_environment("tools", &tests.join("requirements.txt"))?;
     install(&python, &find_wheel(&wheels())?)?;
     let pytest = ["-m", "pytest", "-q", "-p", "no:cacheprovider"];
     steps::run(Command::new(&python).args(pytest).arg(tests).current_dir(make_scratch()?))

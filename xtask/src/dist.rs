@@ -1,0 +1,374 @@
+//! Makes the files of a release: the program as an archive and as a Debian package, the wheel with the library and the
+//! program, the lists of parts, and their checksums.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::machine::{has, output, root, target};
+use crate::python;
+use crate::steps::{self, Outcome, Trouble, cargo, cargo_program};
+
+const USAGE: &str = "usage: cargo xtask dist [--target TRIPLE] [--profile NAME] [PART]...
+  without PART, all of: program, archive, deb, wheel, parts, sums, try; `crates` runs only if it is named";
+
+/// Makes a part.
+type Make = fn(&Dist) -> Outcome;
+
+/// What is made, in this order. `crates` compiles each published crate alone, which takes long.
+const PARTS: &[(&str, Make)] = &[
+    ("crates", Dist::check_crates),
+    ("program", Dist::build_program),
+    ("archive", Dist::make_archive),
+    ("deb", Dist::make_deb),
+    ("wheel", Dist::make_wheel),
+    ("parts", Dist::list_parts),
+    ("sums", Dist::write_sums),
+    ("try", Dist::try_files),
+];
+
+/// Packages that are not published.
+const UNPUBLISHED: &[&str] = &[
+    "hzn-py",
+    "hzn-tests",
+    "hzn-fuzz",
+    "hzn-reproduce",
+    "hzn-benches",
+    "xtask",
+    "hzn-c",
+    "hzn-firmware",
+    "hzn-mps2",
+    "hzn-setup",
+    "hzn-stm32f405",
+    "hzn-stm32h743",
+];
+
+/// Returns the arguments of cargo that leave out the packages that are not published.
+pub(crate) fn exclude_unpublished() -> Vec<String> {
+    UNPUBLISHED.iter().map(|name| format!("--exclude={name}")).collect()
+}
+
+/// A release for one kind of machine.
+struct Dist {
+    /// The kind of machine. On Linux the program is static (musl), so that it runs on every distribution.
+    triple: String,
+    /// The kind of this machine.
+    host: String,
+    profile: String,
+    version: String,
+    /// Time of the commit, which all files have.
+    time: String,
+    /// Python with maturin, cargo-zigbuild and zig.
+    python: PathBuf,
+}
+
+/// Makes the parts that the arguments name. A part that this machine cannot make is named with what it needs.
+pub(crate) fn run(args: &[String]) -> Result<(), String> {
+    std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
+    let (mut triple, mut profile, mut wanted) = (None, "dist".to_owned(), Vec::new());
+    let mut args = args.iter();
+    while let Some(arg) = args.next() {
+        let mut value = || args.next().cloned().ok_or_else(|| format!("{arg}: a value is missing\n{USAGE}"));
+        match arg.as_str() {
+            "--target" => triple = Some(value()?),
+            "--profile" => profile = value()?,
+            part if PARTS.iter().any(|(name, _)| *name == part) => wanted.push(part),
+            other => return Err(format!("{other} is neither an option nor a part\n{USAGE}")),
+        }
+    }
+    let dist = Dist::new(triple, profile).map_err(Trouble::into_message)?;
+    let selected = PARTS.iter().filter(|(name, _)| match wanted.as_slice() {
+        [] => *name != "crates",
+        wanted => wanted.contains(name),
+    });
+    let mut left_out = Vec::new();
+    for (name, make) in selected {
+        println!("\n== {name}");
+        match make(&dist) {
+            Ok(()) => {}
+            Err(Trouble::Missing(why)) => left_out.push(format!("{name}: left out, {why}")),
+            Err(Trouble::Failed(why)) => return Err(format!("{name}: {why}")),
+        }
+    }
+    println!("\n{}", dist.out().display());
+    left_out.iter().for_each(|line| println!("{line}"));
+    let strict = std::env::var("CI").is_ok_and(|v| v == "true");
+    if strict && !left_out.is_empty() { Err(left_out.join("\n")) } else { Ok(()) }
+}
+
+impl Dist {
+    fn new(triple: Option<String>, profile: String) -> Result<Self, Trouble> {
+        let failed = |what: &str| Trouble::Failed(what.to_owned());
+        let about = output(Command::new("rustc").arg("-vV")).ok_or_else(|| failed("rustc cannot be started"))?;
+        let host = about.lines().find_map(|line| line.strip_prefix("host: "));
+        let host = host.ok_or_else(|| failed("rustc does not say its host"))?.to_owned();
+        let manifest = fs::read_to_string("Cargo.toml")?;
+        let version = manifest.lines().find_map(|line| line.strip_prefix("version = \"")?.strip_suffix('"'));
+        let time = output(Command::new("git").args(["log", "-1", "--format=%ct"]));
+        Ok(Self {
+            triple: triple.unwrap_or_else(|| host.replace("-linux-gnu", "-linux-musl")),
+            host,
+            profile,
+            version: version.ok_or_else(|| failed("Cargo.toml has no version"))?.to_owned(),
+            time: time.unwrap_or_else(|| "315532800".to_owned()),
+            python: python::prepare_environment("dist", Path::new("xtask/dist-requirements.txt"))?,
+        })
+    }
+
+    fn is_linux(&self) -> bool {
+        self.triple.contains("-linux-")
+    }
+    /// Returns the kind of processor, such as `x86_64`.
+    fn processor(&self) -> &str {
+        self.triple.split('-').next().unwrap_or_default()
+    }
+    /// Returns the folder of the finished files.
+    fn out(&self) -> PathBuf {
+        target().join("dist")
+    }
+    /// Returns a folder for files on the way.
+    fn work(&self) -> PathBuf {
+        target().join("xtask/dist")
+    }
+    /// Returns the name of the archive, without its ending.
+    fn name(&self) -> String {
+        format!("hzn-{}-{}", self.version, self.triple)
+    }
+
+    fn program(&self, triple: &str) -> PathBuf {
+        let name = if triple.contains("windows") { "hzn.exe" } else { "hzn" };
+        let built = self.work().join("build").join(triple).join(&self.profile);
+        built.join(name)
+    }
+
+    /// Returns a program that runs here, for its completions and manual pages, which are the same on every machine.
+    fn own_program(&self) -> Result<PathBuf, Trouble> {
+        let own = self.program(&self.host.replace("-linux-gnu", "-linux-musl"));
+        let needs = || Trouble::Missing("needs the program for this machine: cargo xtask dist program".into());
+        own.is_file().then_some(own).ok_or_else(needs)
+    }
+
+    fn built(&self) -> Result<PathBuf, Trouble> {
+        let program = self.program(&self.triple);
+        let needs = || Trouble::Missing(format!("needs: cargo xtask dist --target {} program", self.triple));
+        program.is_file().then_some(program).ok_or_else(needs)
+    }
+
+    /// Returns a call of a tool of the environment, which finds zig.
+    fn tool(&self, name: &str) -> Command {
+        let bin = self.python.parent().unwrap_or(Path::new("")).to_path_buf();
+        let mut command = Command::new(bin.join(name));
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let all = std::iter::once(bin).chain(std::env::split_paths(&path));
+        command.env("PATH", std::env::join_paths(all).unwrap_or(path.clone()));
+        command.env("CARGO_INCREMENTAL", "0").env("SOURCE_DATE_EPOCH", &self.time);
+        command
+    }
+
+    fn pack(&self, what: &str, paths: &[&Path]) -> Outcome {
+        steps::run(self.tool("python").arg("xtask/pack.py").arg(what).args(paths))
+    }
+
+    /// Installs the standard library of a target, if it is missing.
+    fn need_target(&self, triple: &str) -> Outcome {
+        let rustup = |args: &[&str]| output(Command::new("rustup").args(args));
+        let installed = rustup(&["target", "list", "--installed"]).unwrap_or_default();
+        if triple == self.host || installed.lines().any(|line| line == triple) {
+            return Ok(());
+        }
+        let added = rustup(&["target", "add", triple]);
+        added.map(|_| ()).ok_or_else(|| Trouble::Missing(format!("needs the target: rustup target add {triple}")))
+    }
+
+    /// Compiles each published crate from its package, in the order of their dependencies.
+    fn check_crates(&self) -> Outcome {
+        let mut publish = cargo(&["publish", "--workspace", "--dry-run"]);
+        publish.args(exclude_unpublished());
+        steps::run(publish.arg("--target-dir").arg(self.work().join("crates")))
+    }
+
+    fn build_program(&self) -> Outcome {
+        self.need_target(&self.triple)?;
+        let mut build = if self.is_linux() {
+            let mut zig = self.tool("cargo-zigbuild");
+            zig.arg("zigbuild");
+            zig
+        } else {
+            let mut native = Command::new(cargo_program());
+            native.arg("build").env("CARGO_INCREMENTAL", "0");
+            native
+        };
+        build.args(["--locked", "--profile", &self.profile, "--target", &self.triple]);
+        build.args(["--package", "hzn-cli", "--bin", "hzn", "--target-dir"]).arg(self.work().join("build"));
+        steps::run(&mut build)
+    }
+
+    /// Writes completions into a folder, and manual pages where `hzn` has them.
+    fn write_helps(&self, bash: &Path, zsh: &Path, fish: &Path, man: &Path) -> Outcome {
+        let own = self.own_program()?;
+        for (shell, path) in [("bash", bash), ("zsh", zsh), ("fish", fish)] {
+            let made = Command::new(&own).args(["completions", shell]).output()?;
+            if !made.status.success() {
+                return Err(Trouble::Failed(format!("hzn completions {shell} ended with {}", made.status)));
+            }
+            write(path, &made.stdout)?;
+        }
+        fs::create_dir_all(man)?;
+        if output(Command::new(&own).args(["man", "--help"])).is_none() {
+            println!("no manual pages: this hzn has no command `man`");
+            return Ok(());
+        }
+        steps::run(Command::new(&own).args(["man", "--force", "--output"]).arg(man))
+    }
+
+    fn make_archive(&self) -> Outcome {
+        let program = self.built()?;
+        let folder = fresh(&self.work().join(self.name()))?;
+        copy(&program, &folder.join(program.file_name().unwrap_or_default()))?;
+        for text in ["README.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"] {
+            copy(Path::new(text), &folder.join(text))?;
+        }
+        let shells = folder.join("completions");
+        let [bash, zsh, fish] = ["hzn.bash", "_hzn", "hzn.fish"].map(|name| shells.join(name));
+        self.write_helps(&bash, &zsh, &fish, &folder.join("man"))?;
+        fs::create_dir_all(self.out())?;
+        let ending = if self.is_linux() { "tar.xz" } else { "zip" };
+        self.pack("archive", &[&folder, &self.out().join(format!("{}.{ending}", self.name()))])
+    }
+
+    fn make_deb(&self) -> Outcome {
+        let processor = match (self.is_linux(), self.processor()) {
+            (true, "x86_64") => "amd64",
+            (true, "aarch64") => "arm64",
+            _ => return Err(Trouble::Missing("it is only for Linux on x86_64 and aarch64".into())),
+        };
+        let program = self.built()?;
+        let folder = fresh(&self.work().join("deb"))?;
+        let usr = folder.join("root/usr");
+        copy(&program, &usr.join("bin/hzn"))?;
+        let share = usr.join("share");
+        self.write_helps(
+            &share.join("bash-completion/completions/hzn"),
+            &share.join("zsh/vendor-completions/_hzn"),
+            &share.join("fish/vendor_completions.d/hzn.fish"),
+            &share.join("man/man1"),
+        )?;
+        let licences = ["LICENSE-MIT", "LICENSE-APACHE"].map(fs::read_to_string);
+        let [mit, apache] = licences;
+        let rights = format!("hzn is licensed under MIT or Apache-2.0, at your choice.\n\n{}\n\n{}", mit?, apache?);
+        write(&share.join("doc/hzn/copyright"), rights.as_bytes())?;
+        let kilobytes = fs::metadata(&program)?.len() / 1024;
+        let control = format!(
+            "Package: hzn\nVersion: {}\nArchitecture: {processor}\nMaintainer: the hzn project <hzn@localhost>\n\
+             Installed-Size: {kilobytes}\nRecommends: ffmpeg\nSection: science\nPriority: optional\n\
+             Description: horizon sensor\n From a picture of a planet's limb to the direction of the planet, with a \
+             covariance\n that a navigation filter can use.\n",
+            self.version
+        );
+        write(&folder.join("debian/control"), control.as_bytes())?;
+        fs::create_dir_all(self.out())?;
+        self.pack("deb", &[&folder, &self.out().join(format!("hzn_{}_{processor}.deb", self.version))])
+    }
+
+    /// Makes the wheel. On Linux its library needs only the GLIBC of manylinux2014, and the program is the static one.
+    fn make_wheel(&self) -> Outcome {
+        let program = self.built()?;
+        let wheels = fresh(&self.work().join("wheels"))?;
+        let mut maturin = self.tool("python");
+        maturin.args(["-m", "maturin", "build", "--locked", "--profile", &self.profile]);
+        maturin.args(["--manifest-path", "crates/hzn-py/Cargo.toml", "--out"]).arg(&wheels);
+        maturin.arg("--target-dir").arg(self.work().join("build"));
+        let library = self.triple.replace("-linux-musl", "-linux-gnu");
+        self.need_target(&library)?;
+        maturin.args(["--target", &library]);
+        if self.is_linux() {
+            maturin.args(["--zig", "--compatibility", "manylinux2014"]);
+        }
+        steps::run(&mut maturin)?;
+        let wheel = only_file(&wheels)?;
+        self.pack("wheel", &[&wheel, &program])?;
+        copy(&wheel, &self.out().join(wheel.file_name().unwrap_or_default()))
+    }
+
+    fn list_parts(&self) -> Outcome {
+        let sbom = ["run", "--quiet", "--package", "hzn-fuzz", "--example", "sbom", "--"];
+        let lists = fresh(&self.work().join("sbom"))?;
+        steps::run(cargo(&sbom).arg(&lists))?;
+        for product in ["hzn-cli", "hzn-py"] {
+            let list = format!("{product}.cdx.json");
+            copy(&lists.join(&list), &self.out().join(list))?;
+        }
+        Ok(())
+    }
+
+    fn write_sums(&self) -> Outcome {
+        self.pack("sums", &[&self.out()])
+    }
+
+    /// Runs the files as their users do: the program in an empty root folder, the wheel in a new environment.
+    fn try_files(&self) -> Outcome {
+        if self.processor() != self.host.split('-').next().unwrap_or_default() {
+            return Err(Trouble::Missing(format!("these files run only on {}", self.processor())));
+        }
+        let program = self.built()?;
+        let empty = fresh(&self.work().join("empty"))?;
+        copy(&program, &empty.join("hzn"))?;
+        let is_root = output(Command::new("id").arg("-u")).is_some_and(|id| id == "0");
+        if self.is_linux() && is_root && has("chroot") {
+            // PATH is only for chroot itself: the empty folder has nothing that it could name.
+            let path = std::env::var_os("PATH").unwrap_or_default();
+            let mut alone = Command::new("chroot");
+            steps::run(alone.arg(&empty).args(["/hzn", "demo"]).env_clear().env("PATH", path))?;
+        } else {
+            steps::run(Command::new(&program).arg("demo").current_dir(&empty))?;
+        }
+        self.try_wheel()
+    }
+
+    fn try_wheel(&self) -> Outcome {
+        let wheels = self.work().join("wheels");
+        let wheel = only_file(&wheels).map_err(|_| Trouble::Missing("needs: cargo xtask dist wheel".into()))?;
+        if self.is_linux() {
+            let newest = output(self.tool("python").args(["xtask/pack.py", "glibc"]).arg(&wheel)).unwrap_or_default();
+            println!("the wheel needs GLIBC {newest}");
+            let minor = newest.strip_prefix("2.").and_then(|rest| rest.split('.').next()?.parse::<u32>().ok());
+            if minor.is_none_or(|minor| minor > 17) {
+                return Err(Trouble::Failed(format!("the wheel needs GLIBC {newest}; manylinux2014 has 2.17")));
+            }
+        }
+        let environment = fresh(&self.work().join("venv"))?;
+        steps::run(self.tool("python").args(["-m", "venv"]).arg(&environment))?;
+        let bin = environment.join(if cfg!(windows) { "Scripts" } else { "bin" });
+        let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+        steps::run(Command::new(bin.join("python")).args(pip).arg(&wheel))?;
+        let away = fresh(&self.work().join("away"))?;
+        steps::run(Command::new(bin.join("hzn")).arg("demo").current_dir(&away))?;
+        let first = "import hzn; print(hzn.simulate('rocket-clean', frames=2)[1].image.shape, hzn.__version__)";
+        steps::run(Command::new(bin.join("python")).args(["-c", first]).current_dir(&away))
+    }
+}
+
+/// Returns an empty folder with this path.
+fn fresh(folder: &Path) -> Result<PathBuf, Trouble> {
+    if folder.exists() {
+        fs::remove_dir_all(folder)?;
+    }
+    fs::create_dir_all(folder)?;
+    Ok(fs::canonicalize(folder)?)
+}
+
+fn copy(from: &Path, to: &Path) -> Outcome {
+    to.parent().map_or(Ok(()), fs::create_dir_all)?;
+    fs::copy(from, to).map_err(|e| Trouble::Failed(format!("{}: {e}", from.display())))?;
+    Ok(())
+}
+
+fn write(path: &Path, contents: &[u8]) -> Outcome {
+    path.parent().map_or(Ok(()), fs::create_dir_all)?;
+    Ok(fs::write(path, contents)?)
+}
+
+fn only_file(folder: &Path) -> Result<PathBuf, Trouble> {
+    let mut found = fs::read_dir(folder)?.flatten().map(|entry| entry.path());
+    found.next().ok_or_else(|| Trouble::Failed(format!("{} is empty", folder.display())))
+}
