@@ -8,7 +8,7 @@ use std::fmt;
 
 use hzn_core::camera::{Camera, Config, Equation, Intrinsic, Model};
 use hzn_core::pixel::ImagePoint;
-use hzn_files::camera_file::{Loaded, Omni};
+use hzn_files::camera_file::{Foreign, Loaded};
 use nalgebra::{DMatrix, DVector};
 
 /// Largest angle off axis that a lens of the plane can show usefully, in degrees: there the picture is 57 focal lengths
@@ -85,6 +85,8 @@ impl std::error::Error for Refusal {}
 struct Sample {
     direction: [f64; 3],
     point_px: [f64; 2],
+    /// The part of the picture that the sample stands for, of any unit.
+    weight: f64,
 }
 
 /// Fits a lens of `model` to a lens over its picture. A lens that has this model already is returned as it is. The
@@ -93,9 +95,25 @@ struct Sample {
 /// # Errors
 /// See [`Refusal`].
 pub fn convert(source: &Loaded, model: Model) -> Result<Conversion, Refusal> {
-    let (start, samples) = match source {
-        Loaded::Lens(config) => (config.clone(), samples_of_camera(config)?),
-        Loaded::Omni(omni) => (start_of_omni(omni), samples_of_omni(omni)),
+    convert_up_to(source, model, 180.0)
+}
+
+/// Fits a lens as [`convert`] does, but only to the rays up to `end_deg` off axis.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn convert_up_to(source: &Loaded, model: Model, end_deg: f64) -> Result<Conversion, Refusal> {
+    let (start, samples, ends_inside) = match source {
+        Loaded::Lens(config) => {
+            let limit_deg = config.theta_max_deg.unwrap_or(f64::INFINITY).min(end_deg);
+            let config = Config { theta_max_deg: Some(limit_deg).filter(|deg| *deg < 180.0), ..config.clone() };
+            let samples = samples_of_camera(&config)?;
+            (config, samples, false)
+        }
+        Loaded::Foreign(lens) => {
+            let (samples, ends_inside) = samples_of_foreign(lens, end_deg);
+            (start_of_foreign(lens), samples, ends_inside)
+        }
     };
     let off_axis = |s: &Sample| s.direction[0].hypot(s.direction[1]).atan2(s.direction[2]).to_degrees();
     let off_axis_deg = samples.iter().map(off_axis).fold(0.0, f64::max);
@@ -110,7 +128,7 @@ pub fn convert(source: &Loaded, model: Model) -> Result<Conversion, Refusal> {
         }
         fit(first_guess(&start, model), &samples)
     };
-    if Camera::<f64>::try_new(&camera).is_err() {
+    if ends_inside || Camera::<f64>::try_new(&camera).is_err() {
         // The lens may turn back beyond the rays that were compared.
         camera.theta_max_deg = Some((off_axis_deg * 1e3).ceil() / 1e3);
         Camera::<f64>::try_new(&camera).map_err(|e| Refusal::NotALens { model, why: e.to_string() })?;
@@ -127,40 +145,46 @@ fn samples_of_camera(config: &Config) -> Result<Vec<Sample>, Refusal> {
     for (row, column) in (0..=CELLS).flat_map(|row| (0..=CELLS).map(move |column| (row, column))) {
         let point_px = [side(config.width, column), side(config.height, row)];
         let ray = camera.unproject(ImagePoint { u: point_px[0], v: point_px[1] });
-        samples.extend(ray.map(|ray| Sample { direction: ray.xyz(), point_px }));
+        samples.extend(ray.map(|ray| Sample { direction: ray.xyz(), point_px, weight: 1.0 }));
     }
     Ok(samples)
 }
 
-/// Returns the directions that this lens shows in the picture, up to where it turns back.
-fn samples_of_omni(omni: &Omni) -> Vec<Sample> {
-    let [width, height] = omni.size_px.map(f64::from);
-    let centre = [omni.intrinsics_px[2], omni.intrinsics_px[3]];
-    let mut samples = Vec::new();
+/// Returns the directions that a foreign lens shows in the picture, up to where it turns back or to `end_deg` off axis,
+/// and whether it ends inside the picture.
+fn samples_of_foreign(lens: &Foreign, end_deg: f64) -> (Vec<Sample>, bool) {
+    let [width, height] = lens.size_px().map(f64::from);
+    let centre = lens.centre_px();
+    let focal_px = lens.focal_px()[0].abs().max(1.0);
+    // A narrow lens needs smaller steps, so that as many points are between its centre and its border.
+    let step_deg = ANGLE_STEP_DEG.min((width.max(height) / f64::from(2 * CELLS) / focal_px).to_degrees());
+    let (mut samples, mut ends_inside) = (Vec::new(), false);
     for azimuth in 0..AZIMUTHS {
         let (sin_a, cos_a) = (core::f64::consts::TAU * f64::from(azimuth) / f64::from(AZIMUTHS)).sin_cos();
         let mut before_px = -1.0;
-        for step in 0..(180.0 / ANGLE_STEP_DEG) as u32 {
-            let (sin, cos) = (ANGLE_STEP_DEG * f64::from(step)).to_radians().sin_cos();
+        for step in 0..=(end_deg.min(180.0) / step_deg) as u32 {
+            let (sin, cos) = (step_deg * f64::from(step)).to_radians().sin_cos();
             let direction = [sin * cos_a, sin * sin_a, cos];
-            let Some(point_px) = omni.project(direction) else { break };
+            let point_px = lens.project(direction).unwrap_or(centre);
             let radius_px = (point_px[0] - centre[0]).hypot(point_px[1] - centre[1]);
             let inside = (-0.5..=width - 0.5).contains(&point_px[0]) && (-0.5..=height - 0.5).contains(&point_px[1]);
             if radius_px <= before_px || !inside {
+                ends_inside |= inside;
                 break;
             }
+            // The samples are closer together near the centre.
+            let weight = (radius_px + 1.0) * (radius_px - before_px).max(0.0);
             before_px = radius_px;
-            samples.push(Sample { direction, point_px });
+            samples.push(Sample { direction, point_px, weight });
         }
     }
-    samples
+    (samples, ends_inside || end_deg < 180.0)
 }
 
-fn start_of_omni(omni: &Omni) -> Config {
-    let [fx, fy, cx, cy] = omni.intrinsics_px;
-    let scale = 1.0 / (1.0 + omni.xi);
-    let ideal = Config::ideal(Model::Eucm, omni.size_px[0], omni.size_px[1], fx * scale);
-    Config { fy_px: fy * scale, cx_px: cx, cy_px: cy, ..ideal }
+fn start_of_foreign(lens: &Foreign) -> Config {
+    let [[width, height], [fx, fy], [cx, cy]] = [lens.size_px().map(f64::from), lens.focal_px(), lens.centre_px()];
+    let ideal = Config::ideal(Model::Eucm, width as u16, height as u16, fx);
+    Config { fy_px: fy, cx_px: cx, cy_px: cy, ..ideal }
 }
 
 /// Returns a lens of the model with the focal length and the limits of the source.
@@ -234,9 +258,9 @@ impl System {
             let error = [sample.point_px[0] - projected.point.u, sample.point_px[1] - projected.point.v];
             for (by, error) in projected.by_intrinsics.iter().zip(error) {
                 let row = DVector::from_column_slice(by.get(..free)?);
-                normal.syger(1.0, &row, &row, 1.0);
-                right.axpy(error, &row, 1.0);
-                square += error * error;
+                normal.syger(sample.weight, &row, &row, 1.0);
+                right.axpy(sample.weight * error, &row, 1.0);
+                square += sample.weight * error * error;
             }
         }
         normal.fill_upper_triangle_with_lower_triangle();
@@ -247,21 +271,23 @@ impl System {
 /// Returns RMS and maximum distance of the image points, and the place of the maximum.
 fn compare(camera: &Config, samples: &[Sample]) -> (f64, f64, [f64; 2]) {
     let equation = Equation::new(camera);
-    let (mut square, mut max_px, mut at) = (0.0, 0.0, [f64::NAN; 2]);
+    let (mut square, mut total, mut max_px, mut at) = (0.0, 0.0, 0.0, [f64::NAN; 2]);
     for sample in samples {
         let p = equation.project(sample.direction).map_or([f64::INFINITY; 2], |p| [p.point.u, p.point.v]);
         let distance = (p[0] - sample.point_px[0]).hypot(p[1] - sample.point_px[1]);
-        square += distance * distance;
+        square += sample.weight * distance * distance;
+        total += sample.weight;
         if !(distance <= max_px) {
             (max_px, at) = (distance, sample.point_px);
         }
     }
-    ((square / samples.len().max(1) as f64).sqrt(), max_px, at)
+    ((square / f64::max(total, 1e-12)).sqrt(), max_px, at)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hzn_files::camera_file::Omni;
 
     fn lens(model: Model, k: &[f64], focal_px: f64) -> Loaded {
         let mut config = Config::ideal(model, 1280, 960, focal_px);
@@ -306,14 +332,14 @@ mod tests {
     #[test]
     fn kalibrs_omni_is_fitted() {
         // The example of Kalibr's documentation.
-        let omni = Omni {
+        let omni = Foreign::Omni(Omni {
             size_px: [752, 480],
             xi: 0.80065662,
             intrinsics_px: [833.006, 830.345, 373.850, 253.749],
             distortion: [-0.33518750, 0.13211436, 0.00055967, 0.00057686],
-        };
+        });
         for (model, limit_px) in [(Model::KannalaBrandt, 1.0), (Model::Eucm, 2.0)] {
-            let fitted = convert(&Loaded::Omni(omni), model).unwrap();
+            let fitted = convert(&Loaded::Foreign(omni.clone()), model).unwrap();
             assert!(fitted.max_px < limit_px && fitted.off_axis_deg > 40.0, "{fitted:?}");
         }
     }

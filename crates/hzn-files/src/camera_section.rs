@@ -29,8 +29,13 @@ pub fn files_of_sensor(path: &Path) -> Vec<PathBuf> {
     [path.to_owned()].into_iter().chain(named_camera_file(&text, path)).collect()
 }
 
-/// Takes `file` and its options out of the `[camera]` table and loads the calibration; `None` if there is no `file`.
-pub(crate) fn camera_from_file(table: &mut DeTable<'_>, text: &str, path: &Path) -> Result<Option<Config>, Problem> {
+/// Takes `file` and its options out of the `[camera]` table and loads the calibration with the doubts about it; `None`
+/// if there is no `file`.
+pub(crate) fn camera_from_file(
+    table: &mut DeTable<'_>,
+    text: &str,
+    path: &Path,
+) -> Result<Option<(Config, Vec<Problem>)>, Problem> {
     let Some(section) = table.get_mut("camera") else { return Ok(None) };
     let DeValue::Table(camera) = section.get_mut() else { return Ok(None) };
     let Some((file, span)) = take(camera, "file") else { return Ok(None) };
@@ -50,7 +55,8 @@ pub(crate) fn camera_from_file(table: &mut DeTable<'_>, text: &str, path: &Path)
     if !file.exists() {
         return Err(refused(format!("{}: no such file (paths are relative to the sensor.toml)", file.display())));
     }
-    let mut config = camera_file::load(&file, name.as_ref().and_then(|(n, _)| n.as_str()))?;
+    let choice = camera_file::Choice { camera: name.as_ref().and_then(|(n, _)| n.as_str()), size_px: None };
+    let (mut config, warnings) = camera_file::load_any(&file, choice)?.exact(&file)?;
     for (key, taken) in angles {
         let Some((value, span)) = taken else { continue };
         let number = match &value {
@@ -67,5 +73,5 @@ pub(crate) fn camera_from_file(table: &mut DeTable<'_>, text: &str, path: &Path)
             _ => config.theta_min_deg = Some(deg),
         }
     }
-    Ok(Some(config))
+    Ok(Some((config, warnings)))
 }

@@ -28,7 +28,7 @@ pub fn parse<T: DeserializeOwned>(
     refuse_old_names(text, path, &places)?;
     check_list_lengths(text, path, &places)?;
     let camera = match camera_from_file(table.get_mut(), text, path)? {
-        Some(camera) => toml::to_string(&camera).unwrap_or_default(),
+        Some((camera, _)) => toml::to_string(&camera).unwrap_or_default(),
         None => String::new(),
     };
     if !camera.is_empty()

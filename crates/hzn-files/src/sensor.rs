@@ -70,7 +70,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     let body_defaults = body_defaults(table.get_ref());
     check_bodies(table.get_ref(), text, path)?;
     check_list_lengths(text, path, &places)?;
-    let from_file = camera_from_file(table.get_mut(), text, path)?;
+    let (from_file, of_camera) = camera_from_file(table.get_mut(), text, path)?.unzip();
     if from_file.is_some() {
         // `Config` requires a camera. This one is a placeholder; `merge_camera` replaces it and keeps the keys next to
         // `file`.
@@ -101,9 +101,9 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
         return Err(problem_at_key("camera.k", None, what, text, path, &places));
     }
     check(&config).map_err(|e| translate_config_error(&e, text, path, &places))?;
-    let warning =
-        |found: plausible::Implausible| problem_at_key(found.key, found.body, found.what, text, path, &places);
-    let warnings = plausible::find_implausible(&config).into_iter().map(warning).collect();
+    let found = plausible::find_implausible(&config).into_iter();
+    let mut warnings = of_camera.unwrap_or_default();
+    warnings.extend(found.map(|doubt| problem_at_key(doubt.key, doubt.body, doubt.what, text, path, &places)));
     Ok(Sensor { config, text: text.to_owned(), warnings })
 }
 

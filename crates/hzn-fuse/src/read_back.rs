@@ -127,6 +127,95 @@ fn read_table<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Error> {
     csv::Reader::from_path(path).map_err(refuse)?.deserialize().collect::<Result<_, _>>().map_err(refuse)
 }
 
+/// The mount and the clock of a camera, as a flight has estimated them.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct EstimatedMount {
+    /// Rotation from the told mount to the estimated one, about the axes of the camera, degrees.
+    pub misalignment_deg: [f64; 3],
+    /// Its 1-sigma.
+    pub misalignment_sigma_deg: [f64; 3],
+    /// Seconds to add to the times of the camera.
+    pub clock_s: f64,
+    /// Its 1-sigma.
+    pub clock_sigma_s: f64,
+}
+
+/// Reads the mount of a camera from the results of `hzn fuse -o`: that of the last smoothed or solved state, else of
+/// the last one of the filter.
+///
+/// # Errors
+/// The file cannot be read, or has no such camera; the message lists its cameras.
+pub fn estimated_mount(path: &Path, camera: &str) -> Result<EstimatedMount, Error> {
+    let (found, known) =
+        if ending(path) == "csv" { mount_of_table(path, camera)? } else { mount_of_recording(path, camera)? };
+    found.ok_or_else(|| {
+        let shown = path.display();
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        Error::unusable(format!("{shown}: has no mount of a camera {camera:?}; its cameras: {known}"))
+    })
+}
+
+type MountAndCameras = (Option<EstimatedMount>, Vec<String>);
+
+fn mount_of_table(path: &Path, camera: &str) -> Result<MountAndCameras, Error> {
+    let refuse = |e: csv::Error| Error::unusable(format!("{}: {e}", path.display()));
+    let mut reader = csv::Reader::from_path(path).map_err(refuse)?;
+    let header = reader.headers().map_err(refuse)?.clone();
+    let known = header.iter().filter_map(|name| name.strip_suffix("_misalignment_x_deg")).map(str::to_owned).collect();
+    let names = ["misalignment_x_deg", "misalignment_y_deg", "misalignment_z_deg"];
+    let sigmas = ["misalignment_sigma_x_deg", "misalignment_sigma_y_deg", "misalignment_sigma_z_deg"];
+    let place = |name: &str| header.iter().position(|c| c.strip_prefix(camera) == Some(&format!("_{name}")));
+    let places: Option<Vec<usize>> =
+        names.iter().chain(&sigmas).chain(&["clock_s", "clock_sigma_s"]).map(|name| place(name)).collect();
+    let (Some(places), Some(phase)) = (places, header.iter().position(|c| c == "phase")) else {
+        return Ok((None, known));
+    };
+    let (mut last, mut is_smoothed) = (None, false);
+    for record in reader.records() {
+        let record = record.map_err(refuse)?;
+        let of_all = record.get(phase) == Some("smoothed");
+        if record.get(phase) == Some("back") || (is_smoothed && !of_all) {
+            continue;
+        }
+        let numbers: Vec<f64> =
+            places.iter().map(|i| record.get(*i).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN)).collect();
+        let [x, y, z, sx, sy, sz, clock_s, clock_sigma_s] = numbers[..] else { continue };
+        (last, is_smoothed) = (
+            Some(EstimatedMount {
+                misalignment_deg: [x, y, z],
+                misalignment_sigma_deg: [sx, sy, sz],
+                clock_s,
+                clock_sigma_s,
+            }),
+            of_all,
+        );
+    }
+    Ok((last, known))
+}
+
+fn mount_of_recording(path: &Path, camera: &str) -> Result<MountAndCameras, Error> {
+    #[derive(Deserialize)]
+    struct Named {
+        name: String,
+        #[serde(flatten)]
+        mount: EstimatedMount,
+    }
+    #[derive(Deserialize)]
+    struct Cameras {
+        cameras: Vec<Named>,
+    }
+    let (mut filtered, mut smoothed, mut known) = (None, None, Vec::new());
+    let take = |topic: &str, json: &[u8]| {
+        let Ok(Cameras { cameras }) = serde_json::from_slice(json) else { return };
+        let found = cameras.iter().find(|c| c.name == camera).map(|c| c.mount);
+        *(if topic == "/nav/smoothed" { &mut smoothed } else { &mut filtered }) = found;
+        known = cameras.into_iter().map(|c| c.name).collect();
+    };
+    let wants = |topic: &str| matches!(topic, "/nav/state" | "/nav/smoothed");
+    hzn_mcap::read_series(path, wants, take).map_err(Error::failed)?;
+    Ok((smoothed.or(filtered), known))
+}
+
 /// Returns the results of `hzn fuse` in a folder: `nav.mcap`, else `nav.csv`, the names that the guide uses.
 pub fn find_solution(folder: &Path) -> Option<PathBuf> {
     ["nav.mcap", "nav.csv"].into_iter().map(|name| folder.join(name)).find(|path| is_solution(path))

@@ -1,6 +1,6 @@
 //! `hzn.Camera`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use hzn_core::camera::{self, Config, Model, Ray};
 use hzn_core::frames::UnitVec3;
@@ -40,6 +40,15 @@ impl Camera {
         Ok(self)
     }
 
+    /// Reads a camera file, and passes its doubts on as warnings.
+    fn from_file(py: Python<'_>, path: &Path, camera: Option<&str>) -> PyResult<Self> {
+        let choice = camera_file::Choice { camera, size_px: None };
+        let read = camera_file::load_any(path, choice).and_then(|read| read.exact(path));
+        let (config, doubts) = read.map_err(errors::config)?;
+        doubts.iter().try_for_each(|doubt| errors::warn(py, format_args!("{doubt}")))?;
+        Self::from_config(config)?.warned(py)
+    }
+
     /// Returns `then` of the ray of each of n points. A row is NaN outside the field of view of the lens or if `then`
     /// is `None`.
     fn each_ray<'py, const N: usize>(
@@ -72,7 +81,7 @@ impl Camera {
     #[staticmethod]
     #[pyo3(signature = (path, *, camera = None))]
     fn from_kalibr(py: Python<'_>, path: PathBuf, camera: Option<&str>) -> PyResult<Self> {
-        Self::from_config(camera_file::load(&path, camera).map_err(errors::config)?)?.warned(py)
+        Self::from_file(py, &path, camera)
     }
 
     #[doc = doc!("Camera.from_opencv")]
@@ -85,7 +94,7 @@ impl Camera {
         fisheye: bool,
     ) -> PyResult<Self> {
         if let Ok(path) = source.extract::<PathBuf>() {
-            return Self::from_config(camera_file::load(&path, None).map_err(errors::config)?)?.warned(source.py());
+            return Self::from_file(source.py(), &path, None);
         }
         let matrix = rows(source, 3, "camera matrix")?;
         let m = matrix.as_array();

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use hzn_fuse::finding::Finding;
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{self, Inputs};
+use hzn_fuse::results::{Determined, Lowered, Solved};
 use hzn_fuse::{Settings, sink};
 use hzn_nav::ephemeris::{self, Place};
 use hzn_nav::filter::{DirectionMeasurement, Innovation, Step};
@@ -104,7 +105,7 @@ pub(crate) fn fuse<'py>(
     mounts: BTreeMap<String, Rows>,
     clocks: BTreeMap<String, f64>,
     given: &Bound<'py, PyAny>,
-    smooth: bool,
+    wanted: (bool, bool),
     rate_hz: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let settings = settings(given)?;
@@ -131,7 +132,8 @@ pub(crate) fn fuse<'py>(
     if let Some(path) = &attitude {
         inputs.attitudes = input::attitudes(path).map_err(to_exception)?;
     }
-    let wanted = Wanted { smoothed: smooth, rate_hz: Some(rate_hz), ..Wanted::default() };
+    let (smoothed, solved) = wanted;
+    let wanted = Wanted { smoothed, solved, rate_hz: Some(rate_hz) };
     let fused = errors::detached(py, || hzn_fuse::fuse(&inputs, &settings, wanted))?.map_err(to_exception)?;
     let states: Vec<Value> = sink::states(&fused).map(|s| to_json(&s)).collect();
     let innovations: Vec<Value> = sink::innovations(&fused).map(|i| to_json(&i)).collect();
@@ -146,8 +148,34 @@ pub(crate) fn fuse<'py>(
         "notes": fused.notes,
         "restarts": fused.counts.restarts,
         "start_s": fused.begin.map(|b| b.time_s),
+        "solved": fused.solved.as_ref().map(|solved| solution(solved, &fused.cameras)),
     });
     parameters::to_python(py, &result)
+}
+
+/// Returns what the solve of the whole flight found out.
+fn solution(solved: &Solved, cameras: &[String]) -> Value {
+    let determined = |d: &Determined| {
+        json!({
+            "name": d.name, "unit": d.unit, "estimate": d.estimate, "sigma": d.sigma, "before": d.before,
+        })
+    };
+    let source = |camera: Option<usize>| camera.and_then(|which| cameras.get(which));
+    let lowered = |l: &Lowered| {
+        json!({
+            "time_s": l.time_s, "camera": source(l.camera), "kind": l.kind.name(), "sigmas": l.sigmas,
+            "weight": l.weight,
+        })
+    };
+    json!({
+        "unknowns": solved.unknowns,
+        "knots": solved.knots,
+        "steps": solved.steps,
+        "is_converged": solved.is_converged,
+        "cost": solved.cost,
+        "determined": solved.determined.iter().map(determined).collect::<Vec<_>>(),
+        "lowered": solved.lowered.iter().map(lowered).collect::<Vec<_>>(),
+    })
 }
 
 fn to_json(record: &impl Serialize) -> Value {

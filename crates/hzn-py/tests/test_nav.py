@@ -126,3 +126,20 @@ def test_fuse_gives_attitudes(tmp_path):
         hzn.nav.fuse([tmp_path / "cam.csv"], mounts={"came": np.eye(3)}, **files)
     with pytest.raises(hzn.ConfigError, match="no such file"):
         hzn.nav.fuse([tmp_path / "none.csv"], **files)
+
+
+def test_solve_takes_the_whole_flight_at_once(tmp_path):
+    truth, position = rotation(np.random.default_rng(11)), np.array([3.2e6, 1.1e6, 5.4e6])
+    write_flight(tmp_path, truth, position)
+    files = {"imu": tmp_path / "imu.csv", "gnss": tmp_path / "gnss.csv", "mounts": {"cam": np.eye(3)}}
+    assert hzn.nav.fuse([tmp_path / "cam.csv"], **files)["solved"] is None
+    result = hzn.nav.solve([tmp_path / "cam.csv"], **files)
+    solved = result["solved"]
+    assert solved["is_converged"] and solved["knots"] > 20 and solved["cost"][1] <= solved["cost"][0]
+    values = {entry["name"]: entry for entry in solved["determined"]}
+    assert values and all(np.all(np.array(v["sigma"]) <= np.array(v["before"]) * 1.001) for v in values.values())
+    assert all({"time_s", "camera", "kind", "sigmas", "weight"} == set(entry) for entry in solved["lowered"])
+    last = [state for state in result["states"] if state["phase"] == "smoothed"][-1]
+    w, x, y, z = (last[name] for name in ("qw", "qx", "qy", "qz"))
+    column = [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)]
+    assert np.allclose(column, truth[:, 0], atol=0.05)

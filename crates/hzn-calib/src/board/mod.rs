@@ -8,6 +8,7 @@ mod bow;
 mod calibrate;
 mod fit;
 mod layout;
+mod mount;
 mod pose;
 #[cfg(test)]
 mod tests;
@@ -15,3 +16,4 @@ mod tests;
 pub use crate::calibrated::{Bow, Calibrated, Dropped, Refusal, Residual, ViewResult, Warning};
 pub use calibrate::{calibrate, calibrate_planar};
 pub use layout::{Board, Corner, PlanarPoint, PlanarView, View};
+pub use mount::{BoardMount, MIN_TILTS, MountRefusal, Tilt, mount};

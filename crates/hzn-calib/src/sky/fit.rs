@@ -4,7 +4,7 @@ use hzn_core::body;
 use hzn_core::camera::{Camera, Config};
 use nalgebra::{DMatrix, DVector};
 
-use super::layout::{COMMON, Layout};
+use super::layout::Layout;
 use super::linear::{self, EdgeNoise, Model, Reduced};
 use super::refusal::Refusal;
 use super::system::{self, PriorEquations, Solution};
@@ -56,7 +56,7 @@ pub(super) struct Fit {
     /// The limb height with its prior, in kilometres.
     pub(super) limb: LimbPrior,
     /// Sigmas of the common shapes, in pixels.
-    pub(super) common_px: [f64; COMMON],
+    pub(super) common_px: Vec<f64>,
     /// RMS distance of the edge points from the principal point, in pixels.
     distance_px: f64,
 }
@@ -138,7 +138,7 @@ impl State {
         let camera = Camera::try_new(&unknowns.before).map_err(|why| Refusal::Lens { why: why.to_string() })?;
         let changes = DVector::zeros(unknowns.list.len());
         let height_km = limb.km;
-        let model = Model::new(&camera, &unknowns.before, &unknowns.list, changes.clone(), height_km);
+        let model = Model::new(&camera, &unknowns.before, unknowns, changes.clone(), height_km);
         let picture = |(view, of): (usize, &View)| {
             let geometry = linear::geometry(body, of)?;
             let noise = linear::measure_noise(&model, &geometry, of)?;
@@ -156,7 +156,7 @@ impl State {
 
     fn solve(&mut self, unknowns: &Unknowns) -> Result<Fit, Refusal> {
         let counted: Vec<&Fitted> = self.pictures.iter().filter(|p| p.counts).collect();
-        let common_px = common_sigmas_px(&counted);
+        let common_px = common_sigmas_px(self.layout, &counted, unknowns.shape_floor);
         let prior = prior_equations(self.layout, &unknowns.covariance, self.limb, &common_px);
         let reduced: Vec<&Reduced> = counted.iter().map(|p| &p.reduced).collect();
         let solved = prior.and_then(|prior| {
@@ -212,7 +212,7 @@ impl State {
     fn linearise(&mut self, unknowns: &Unknowns, views: &[View]) -> bool {
         let config = unknowns.changed_by(self.changes.as_slice());
         let Ok(camera) = Camera::try_new(&config) else { return false };
-        let model = Model::new(&camera, &config, &unknowns.list, self.changes.clone(), self.height_km);
+        let model = Model::new(&camera, &config, unknowns, self.changes.clone(), self.height_km);
         let each = self.pictures.iter().map(|picture| {
             views.get(picture.view).and_then(|view| linear::reduce(&model, &picture.geometry, view, picture.noise))
         });
@@ -227,7 +227,7 @@ impl State {
     fn measure_noise(&mut self, unknowns: &Unknowns, views: &[View]) {
         let config = unknowns.changed_by(self.changes.as_slice());
         let Ok(camera) = Camera::try_new(&config) else { return };
-        let model = Model::new(&camera, &config, &unknowns.list, self.changes.clone(), self.height_km);
+        let model = Model::new(&camera, &config, unknowns, self.changes.clone(), self.height_km);
         for picture in &mut self.pictures {
             let Some(view) = views.get(picture.view) else { continue };
             if let Some(noise) = linear::measure_noise(&model, &picture.geometry, view) {
@@ -269,23 +269,22 @@ fn distance_px<'a>(lens: &Config, views: impl Iterator<Item = &'a View>) -> f64 
 }
 
 /// Returns the sigmas of the common shapes: for the shift the RMS of the residuals, for all others the strongest shape
-/// in the mean of the residuals.
-fn common_sigmas_px(pictures: &[&Fitted]) -> [f64; COMMON] {
+/// in the mean of the residuals of their side, or `floor` of the RMS if that is larger.
+fn common_sigmas_px(layout: Layout, pictures: &[&Fitted], floor: f64) -> Vec<f64> {
     let n = pictures.len().max(1) as f64;
     let rms = (pictures.iter().map(|p| p.noise.rms_px.powi(2)).sum::<f64>() / n).sqrt();
-    let bend = common_bend_px(pictures.iter().map(|p| &p.noise.shapes_px)).max(1e-4);
-    let mut sigmas = [bend; COMMON];
+    let mut sigmas = vec![f64::NAN; layout.common()];
+    for side in 0..layout.sides {
+        let of_side: Vec<_> = pictures.iter().filter(|p| layout.sides == 1 || p.reduced.side == side).collect();
+        let bend = common_bend_px(of_side.iter().map(|p| &p.noise.shapes_px)).max(1e-4).max(floor * rms);
+        layout.shapes(side).iter().for_each(|place| sigmas[place - layout.first_common()] = bend);
+    }
     sigmas[0] = rms.max(MIN_SHIFT_PX);
     sigmas
 }
 
 /// Returns the prior of all unknowns; `None` if the covariance of the lens is singular.
-fn prior_equations(
-    layout: Layout,
-    lens: &DMatrix<f64>,
-    limb: LimbPrior,
-    common_px: &[f64; COMMON],
-) -> Option<PriorEquations> {
+fn prior_equations(layout: Layout, lens: &DMatrix<f64>, limb: LimbPrior, common_px: &[f64]) -> Option<PriorEquations> {
     let mut prior = PriorEquations::new(layout.len());
     let sigma = limb.sigma_km.clamp(1e-6, FREE_KM);
     prior.add(Layout::HEIGHT, &DVector::from_element(1, limb.km), &DMatrix::from_element(1, 1, sigma * sigma))?;

@@ -2,17 +2,22 @@
 //!
 //! The first is the limb height in kilometres. The changes of the intrinsic parameters follow, then the common shift of
 //! all edges and their common shapes in pixels, and last the local radius in sigmas.
+//!
+//! A limb is higher and brighter where the Sun is higher, so that its tilt, bend and further shapes change with the
+//! side of the Sun. With two sides, the edges with the Sun towards their end have shapes of their own.
 
 use crate::noise::bend::{SHAPES, bend_shape, next_shapes};
 
 /// Number of shapes of an edge that all pictures may have in common: a shift, a tilt, a bend, and the next shapes.
-pub(super) const COMMON: usize = 3 + SHAPES;
+const COMMON: usize = 3 + SHAPES;
 
 /// The order of the unknowns for a number of intrinsic parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
     /// Number of intrinsic parameters.
     pub(super) intrinsics: usize,
+    /// Number of sides of the Sun whose edges have shapes of their own: 1 or 2.
+    pub(super) sides: usize,
 }
 
 impl Layout {
@@ -27,13 +32,22 @@ impl Layout {
     pub(super) fn first_common(self) -> usize {
         1 + self.intrinsics
     }
+    /// Returns the number of common shapes: one shift, and the others for each side.
+    pub(super) fn common(self) -> usize {
+        1 + (COMMON - 1) * self.sides
+    }
+    /// Returns the index of each shape of an edge of this side, from 0.
+    pub(super) fn shapes(self, side: usize) -> [usize; COMMON] {
+        let own = self.first_common() + (COMMON - 1) * side.min(self.sides - 1);
+        core::array::from_fn(|i| if i == 0 { self.first_common() } else { own + i })
+    }
     /// Returns the index of the local radius.
     pub(super) fn radius(self) -> usize {
-        1 + self.intrinsics + COMMON
+        1 + self.intrinsics + self.common()
     }
     /// Returns the number of unknowns.
     pub(super) fn len(self) -> usize {
-        2 + self.intrinsics + COMMON
+        2 + self.intrinsics + self.common()
     }
 }
 

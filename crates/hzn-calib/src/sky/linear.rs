@@ -10,11 +10,12 @@
 //! correlated errors are largest at low frequencies, the variance of every other unknown is not too small.
 
 use hzn_core::body;
-use hzn_core::camera::{Camera, Config, Equation, Intrinsic};
+use hzn_core::camera::{Camera, Config, Equation};
 use hzn_core::pixel::ImagePoint;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 
 use super::layout::{Layout, common_shapes};
+use super::unknowns::Unknowns;
 use super::view::View;
 use crate::noise::bend::{SHAPES, shapes_px};
 use crate::noise::cone::{Azimuth, Cone, basis};
@@ -45,17 +46,18 @@ impl<'a> Model<'a> {
     pub(super) fn new(
         camera: &'a Camera<f64>,
         config: &Config,
-        list: &[Intrinsic],
+        unknowns: &Unknowns,
         values: DVector<f64>,
         height_km: f64,
     ) -> Self {
+        let list = &unknowns.list;
         let all = config.model.intrinsics();
         let places = list.iter().filter_map(|i| all.iter().position(|a| a == i)).collect();
         Self {
             camera,
             equation: Equation::new(config),
             places,
-            layout: Layout { intrinsics: list.len() },
+            layout: Layout { intrinsics: list.len(), sides: unknowns.sides },
             values,
             height_km,
         }
@@ -81,6 +83,8 @@ pub(super) struct Reduced {
     pub(super) constant: f64,
     /// Axis of the limb in the camera frame.
     pub(super) axis: Vector3<f64>,
+    /// The side of the Sun, from 0.
+    pub(super) side: usize,
     /// RMS distance of the points from the limb of this lens and limb height, in pixels.
     pub(super) rms_px: f64,
 }
@@ -133,7 +137,14 @@ pub(super) fn reduce(model: &Model, geometry: &Geometry, view: &View, noise: Edg
     let by_height_km = -sin / cos * 1e3 / geometry.distance_m * slope;
     let limb = Limb { cos, by_height_km, azimuth: azimuth(geometry, view) };
     let axis = fit_axis(&points, Vector3::from(view.axis), &limb)?;
-    Some(eliminate_axis(model, geometry, &points, axis, &limb, noise))
+    let side = side_of_sun(view, &points);
+    Some(eliminate_axis(model, geometry, &points, (axis, side), &limb, noise))
+}
+
+/// Returns 1 if the Sun is on the side of the edge's end, else 0, also if nobody knows where the Sun is.
+fn side_of_sun(view: &View, points: &[Located]) -> usize {
+    let Some((sun, (first, last))) = view.prior.sun.zip(points.first().zip(points.last())) else { return 0 };
+    usize::from(Vector3::from(sun.xyz()).dot(&(last.ray - first.ray)) > 0.0)
 }
 
 /// The expected limb of a picture.
@@ -183,7 +194,7 @@ fn eliminate_axis(
     model: &Model,
     geometry: &Geometry,
     points: &[Located],
-    axis: Vector3<f64>,
+    (axis, side): (Vector3<f64>, usize),
     limb: &Limb,
     noise: EdgeNoise,
 ) -> Reduced {
@@ -203,8 +214,8 @@ fn eliminate_axis(
         for (i, by) in p.by_intrinsics.iter().enumerate() {
             row[layout.first_intrinsic() + i] = edge[0] * by[0] + edge[1] * by[1];
         }
-        for (i, shape) in common_shapes(p.along).into_iter().enumerate() {
-            row[layout.first_common() + i] = -shape;
+        for (place, shape) in layout.shapes(side).into_iter().zip(common_shapes(p.along)) {
+            row[place] = -shape;
         }
         (row[n], row[n + 1]) = (-p.ray.dot(&b1) / g, -p.ray.dot(&b2) / g);
         let weight = p.weight / noise.variance_px2;
@@ -222,7 +233,7 @@ fn eliminate_axis(
     at.rows_mut(layout.first_intrinsic(), layout.intrinsics).copy_from(&model.values);
     let moved = &information * &at;
     let constant = square + 2.0 * right.dot(&at) + at.dot(&moved);
-    Reduced { right: right + moved, information, constant, axis, rms_px }
+    Reduced { right: right + moved, information, constant, axis, side, rms_px }
 }
 
 /// Eliminates the last two unknowns.

@@ -257,7 +257,8 @@ fn calibration(mut out: Facts, config: &Config) -> Result<Facts, Stop> {
 
 fn sensor(file: &Path, kind: &str) -> Result<Facts, Stop> {
     if kind != "toml" {
-        let camera = hzn_files::camera_file::load(file, None)?;
+        let (camera, warnings) = hzn_files::camera_file::load_any(file, Default::default())?.exact(file)?;
+        warnings.iter().for_each(tell::warning);
         return calibration(Facts::new("camera", "camera file"), &Config::new(camera));
     }
     let text = hzn_files::limited::read_text(file, hzn_files::limited::SETTINGS_BYTES)

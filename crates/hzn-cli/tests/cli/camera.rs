@@ -104,3 +104,32 @@ fn the_farthest_corner_of_any_lens() {
     let brown = crate::common::SENSOR.replace("\"pinhole\"", "\"brown-conrady\"\nk = [0.0, 0.0, 0.0, 0.0, 0.0]");
     assert!((corner(&brown) - exact).abs() < 0.006);
 }
+
+#[test]
+fn cameras_of_a_stereo_file_are_listed_and_chosen() {
+    let place = Place::new();
+    let matrix = |name: &str, f: f64| format!("{name}: [[{f}, 0, 320], [0, {f}, 240], [0, 0, 1]]\n");
+    let k = |name: &str, k: &str| format!("{name}: [{k}]\n");
+    let eight = "0.5, -2.6, 0, 0, 1.5, 0.4, -2.4, 1.4";
+    let text = matrix("M1", 600.0) + &k("D1", "-0.1, 0, 0, 0, 0") + &matrix("M2", 610.0) + &k("D2", eight);
+    place.write("intrinsics.yml", text.as_bytes());
+    let convert = |more: &[&str]| place.run(&[&["camera", "convert", "intrinsics.yml"], more].concat());
+    convert(&[]).expect(2).says("has the cameras 1, 2; choose one with --camera 1");
+    convert(&["--camera", "1"]).expect(2).says("1.image_width: missing").says("--size WIDTHxHEIGHT");
+    let out = convert(&["--camera", "1", "--size", "640x480"]).expect(0).out;
+    assert!(out.contains("fx_px = 600.0") && out.contains("model = \"brown-conrady\""), "{out}");
+    let second = ["--camera", "2", "--size", "640x480"];
+    convert(&second).expect(2).says("OpenCV's lens with more than five coefficients").says("--model brown-conrady");
+    let fitted = [&second[..], &["--model", "brown-conrady", "--end", "25", "-o", "two.toml"]].concat();
+    convert(&fitted).expect(0).says("brown-conrady fitted over the picture up to").says("maximum error");
+    assert!(place.read("two.toml").contains("theta_max_deg = "));
+    place.write("sized.yml", format!("image_size: [640, 480]\nrms: 7.5\n{text}").as_bytes());
+    place.run(&["camera", "show", "sized.yml"]).expect(2).says("has the cameras 1, 2");
+    place.run(&["camera", "show", "sized.yml", "--camera", "1"]).expect(0).says("the reprojection error is 7.500 px");
+    let other = ["camera", "convert", "sized.yml", "--camera", "1", "--size", "320x240"];
+    place.run(&other).expect(2).says("sized.yml says 640x480; leave out --size");
+    // A sensor.toml chooses a camera in the same way, and passes the doubt on.
+    place.write("s.toml", b"preset = \"hzn\"\n[camera]\nfile = \"sized.yml\"\ncamera = \"1\"\n");
+    place.run(&["camera", "show", "s.toml"]).expect(0);
+    place.run(&["info", "s.toml"]).expect(0).says("the reprojection error is 7.500 px");
+}

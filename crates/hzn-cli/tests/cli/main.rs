@@ -4,6 +4,7 @@ mod bad_input;
 mod bodies;
 mod calibrate;
 mod calibrate_lens;
+mod calibrate_mount;
 mod calibrate_sky;
 mod camera;
 mod campaign;

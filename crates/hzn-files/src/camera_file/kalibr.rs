@@ -3,6 +3,7 @@
 use hzn_core::camera::Model;
 use serde_json::Value;
 
+use super::foreign::Foreign;
 use super::lens::{Coefficients, Lens};
 use super::loaded::Loaded;
 use super::omni::Omni;
@@ -65,11 +66,7 @@ pub(super) fn read(reader: &Reader<'_>, camera: &Value, name: &str) -> Result<Lo
     let coefficients = Coefficients { values: reader.coefficients(camera.get(key), &field(key))?, field: field(key) };
     let lens = reader.lens(camera.get("distortion_model"), &field("distortion_model"))?.unwrap_or(Lens::None);
     let special = match projection {
-        Projection::Pinhole => {
-            let model = reader.model(lens, &coefficients)?;
-            let k = coefficients.values.unwrap_or_default();
-            return Ok(Loaded::Lens(reader.config(model, size, intrinsics, &k)?));
-        }
+        Projection::Pinhole => return reader.loaded(lens, &coefficients, size, intrinsics),
         Projection::Omni => {
             let xi = own.first().copied().unwrap_or(0.0);
             return read_omni(reader, xi, intrinsics, size, lens, &coefficients);
@@ -108,5 +105,5 @@ fn read_omni(
     let values = coefficients.values.as_deref().unwrap_or_default();
     let distortion = core::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
     let omni = Omni { size_px: reader.size(size)?, xi, intrinsics_px, distortion };
-    Ok(omni.to_eucm().map_or(Loaded::Omni(omni), Loaded::Lens))
+    Ok(omni.to_eucm().map_or(Loaded::Foreign(Foreign::Omni(omni)), Loaded::Lens))
 }

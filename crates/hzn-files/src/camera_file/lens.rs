@@ -15,7 +15,7 @@ pub(super) enum Lens {
     Radtan,
     /// k1, k2, p1, p2, k3. OpenCV writes no coefficients for a lens without distortion.
     PlumbBob,
-    /// Three more coefficients in the denominator, which hzn's lens does not have.
+    /// Three more coefficients in the denominator. Hzn's lens does not have them; a fit replaces it.
     Rational,
 }
 
@@ -67,8 +67,8 @@ impl Lens {
                 "there are {n} coefficients, but this lens has five: k1, k2, p1, p2, k3; write 0 for the unused ones"
             )),
             (Self::Radtan | Self::PlumbBob | Self::Rational, Some(n), significant) if significant > 5 => Err(format!(
-                "there are {n} coefficients, but hzn supports five of this lens: k1, k2, p1, p2, k3; calibrate \
-                 without the higher ones (plumb_bob, or a fisheye lens)"
+                "there are {n} coefficients, but hzn supports five of this lens, k1, k2, p1, p2, k3, and eight or \
+                 twelve through a fit (hzn camera convert --model); calibrate without the others"
             )),
             (Self::Rational, None, _) => Err("missing: this lens has k1, k2, p1, p2, k3, k4, k5, k6".into()),
             (Self::Rational, Some(n), _) if n < 8 => {
@@ -76,6 +76,17 @@ impl Lens {
             }
             (Self::Radtan | Self::PlumbBob | Self::Rational, ..) => Ok(Model::BrownConrady),
         }
+    }
+}
+
+impl Lens {
+    /// Returns the coefficients of a lens of OpenCV with 8 or 12 of them, of which more than five are not 0. The two of
+    /// a tilted sensor, which make 14, must be 0.
+    pub(super) fn rational(self, coefficients: &Coefficients) -> Option<[f64; 12]> {
+        let values = coefficients.values.as_deref().filter(|k| matches!(k.len(), 8 | 12 | 14))?;
+        let used = (6..=12).contains(&coefficients.significant_len());
+        let at = |i: usize| values.get(i).copied().unwrap_or(0.0);
+        (used && matches!(self, Self::PlumbBob | Self::Rational)).then(|| core::array::from_fn(at))
     }
 }
 

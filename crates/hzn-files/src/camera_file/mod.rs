@@ -1,5 +1,5 @@
 //! Camera calibrations of other tools: Kalibr camchains, OpenCV's YAML, XML and JSON, EuRoC `sensor.yaml`, ROS's
-//! camera_info, Foxglove's CameraCalibration; camodocal (VINS), ORB-SLAM3, Basalt, COLMAP, Metashape.
+//! camera_info, Foxglove's CameraCalibration; camodocal (VINS), ORB-SLAM3, Basalt, COLMAP, Metashape, OCamCalib.
 //!
 //! | file | lens there | in hzn |
 //! |---|---|---|
@@ -13,11 +13,12 @@
 //! | OpenCV | the same with `fisheye_model: 0`, or with five coefficients | `brown-conrady` |
 //! | ROS, Foxglove | `distortion_model`: `plumb_bob`, or `rational_polynomial` with k4 to k6 = 0 | `brown-conrady` |
 //! | ROS, Foxglove | the same with `distortion_model`: `equidistant`, `fisheye`, `kannala_brandt` | `kannala-brandt` |
-//!
+//! | OpenCV, ROS, COLMAP, Basalt | eight or twelve coefficients | none; a fit replaces it |
+//! | OCamCalib, `calib_results.txt` | a polynomial of the radius | none; a fit replaces it |
 //! | camodocal (VINS) | `KANNALA_BRANDT`; `PINHOLE`; `MEI` | `kannala-brandt`; `brown-conrady`; as Kalibr's `omni` |
 //! | ORB-SLAM3 | `KannalaBrandt8`; `PinHole`; `Rectified` | `kannala-brandt`; `brown-conrady`; `pinhole` |
-//! | Basalt | `kb4`; `ds`; `eucm`; `pinhole`; `pinhole-radtan8` with k4 to k6 = 0 | the lens of this name |
-//! | COLMAP, `cameras.txt` | all but `FOV` and thin prisms; `FULL_OPENCV` with k4 to k6 = 0 | the lens of this name |
+//! | Basalt | `kb4`; `ds`; `eucm`; `pinhole`; `pinhole-radtan8` | the lens of this name |
+//! | COLMAP, `cameras.txt` | all but `FOV` and thin prisms | the lens of this name |
 //! | Metashape | `frame` with k4 = b2 = 0; `fisheye` with p1 = p2 = b2 = 0 | `brown-conrady`; `kannala-brandt` |
 //!
 //! Four coefficients in a row or in a plain list, without either word, are ambiguous. Such a file is refused. The text
@@ -29,6 +30,7 @@
 mod camchain;
 mod camera_matrix;
 mod document;
+mod foreign;
 mod format;
 mod kalibr;
 mod lens;
@@ -36,8 +38,12 @@ mod loaded;
 mod numbers;
 mod omni;
 mod opencv;
+mod rational;
 mod read;
 mod reader;
+mod scaramuzza;
+mod several;
+mod to_imu;
 mod values;
 mod write;
 mod write_kalibr;
@@ -47,10 +53,14 @@ mod write_ros;
 use hzn_core::camera::{Config, Model};
 
 pub use camera_matrix::camera_matrix;
+pub use foreign::Foreign;
 pub use format::{Format, UnsupportedLens};
-pub use loaded::Loaded;
+pub use loaded::{CameraFile, Choice, Loaded};
 pub use omni::Omni;
-pub use read::{load, load_any, parse};
+pub use rational::Rational;
+pub use read::{load, load_any, parse, parse_any};
+pub use scaramuzza::Scaramuzza;
+pub use to_imu::{ToImu, to_imu};
 pub use write::write;
 
 /// Returns the lens of Braun & Barf 2022, (13), with the distance from the centre in pixels

@@ -1,10 +1,10 @@
 //! Reads OpenCV's files, ROS's camera_info and Foxglove's CameraCalibration.
 
-use hzn_core::camera::Config;
 use serde_json::{Map, Value};
 
 use super::camera_matrix::camera_matrix;
 use super::lens::{Coefficients, Lens};
+use super::loaded::Loaded;
 use super::reader::Reader;
 use super::values::{matrix, number, numbers};
 use crate::Problem;
@@ -15,17 +15,27 @@ const DISTORTION: &[&str] = &["distortioncoefficients", "d", "distcoeffs", "dist
 const WIDTH: &[&str] = &["imagewidth", "width"];
 const HEIGHT: &[&str] = &["imageheight", "height"];
 const SIZE: &[&str] = &["imagesize", "size", "resolution"];
+const MODEL: &[&str] = &["distortionmodel"];
+const FISHEYE: &[&str] = &["fisheyemodel"];
+/// Names of the RMS distance of the corners from where the calibration expects them, in pixels.
+const ERROR: &[&str] =
+    &["avgreprojectionerror", "reprojectionerror", "rmsreprojectionerror", "meanreprojectionerror", "rms", "rmserror"];
+/// The names of all values that are read.
+pub(super) const VALUES: &[&[&str]] = &[MATRIX, DISTORTION, WIDTH, HEIGHT, SIZE, MODEL, FISHEYE, ERROR];
+/// Reprojection error above which a calibration is doubtful. Corners are found to a tenth of a pixel, and even a
+/// blurred board or a lens with a coefficient too few rarely leaves a pixel; 2 px is a calibration that failed.
+const DOUBTFUL_ERROR_PX: f64 = 2.0;
 
 /// Reads a file with a camera matrix.
-pub(super) fn read(reader: &Reader<'_>, top: &Map<String, Value>) -> Result<Config, Problem> {
+pub(super) fn read(reader: &Reader<'_>, top: &Map<String, Value>) -> Result<Loaded, Problem> {
     let (key, value) = find(reader, top, MATRIX)?.unwrap_or(("camera_matrix", &Value::Null));
     let intrinsics = read_matrix(reader, value, key)?;
     let (key, value) = find(reader, top, DISTORTION)?.unwrap_or(("distortion_coefficients", &Value::Null));
     let coefficients = Coefficients { values: reader.coefficients(Some(value), key)?, field: key.to_owned() };
     let size = read_size(reader, top)?;
-    let word = find(reader, top, &["distortionmodel"])?;
+    let word = find(reader, top, MODEL)?;
     let stated = reader.lens(word.map(|(_, value)| value), "distortion_model")?;
-    let flag = find(reader, top, &["fisheyemodel"])?.map(|(_, value)| read_flag(reader, value)).transpose()?;
+    let flag = find(reader, top, FISHEYE)?.map(|(_, value)| read_flag(reader, value)).transpose()?;
     let lens = match (stated, flag) {
         (Some(lens), Some(flag)) if flag != (lens == Lens::Fisheye) => {
             let what = "contradicts distortion_model; remove the wrong one of the two";
@@ -36,9 +46,19 @@ pub(super) fn read(reader: &Reader<'_>, top: &Map<String, Value>) -> Result<Conf
         (None, Some(false)) => Lens::PlumbBob,
         (None, None) => lens_of_shape(reader, value, &coefficients)?,
     };
-    let model = reader.model(lens, &coefficients)?;
     let (size, intrinsics) = read_window(reader, top, size, intrinsics)?;
-    reader.config(model, size, intrinsics, coefficients.values.as_deref().unwrap_or_default())
+    reader.loaded(lens, &coefficients, size, intrinsics)
+}
+
+/// Returns a warning for a calibration whose reprojection error is too large.
+pub(super) fn doubt(reader: &Reader<'_>, top: &Map<String, Value>) -> Option<Problem> {
+    let errors = top.iter().filter(|(key, _)| ERROR.contains(&plain(key).as_str()));
+    let (key, px) = errors.filter_map(|(key, value)| Some((key, number(value)?))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let what = format!(
+        "the reprojection error is {px:.3} px, so this calibration has probably failed; a good one is below 1 px. \
+         Calibrate again, and look at each picture's error"
+    );
+    (px > DOUBTFUL_ERROR_PX).then(|| reader.problem(key, what))
 }
 
 /// Returns size and intrinsic parameters of the pictures that a ROS camera sends: `roi` cuts a window out of the full
@@ -110,9 +130,17 @@ fn read_size(reader: &Reader<'_>, top: &Map<String, Value>) -> Result<[f64; 2], 
     }
     let side = |names: &[&str], name: &str| match find(reader, top, names)? {
         Some((key, value)) => number(value).ok_or_else(|| reader.problem(key, "a number of pixels is expected")),
-        None => Err(reader.problem(name, "missing: add the picture's size in pixels to the file")),
+        None => Err(reader.problem(
+            name,
+            "missing: add the picture's size in pixels to the file (image_width, image_height), or pass --size \
+             WIDTHxHEIGHT to hzn camera convert",
+        )),
     };
-    Ok([side(WIDTH, "image_width")?, side(HEIGHT, "image_height")?])
+    let in_file = find(reader, top, WIDTH)?.or(find(reader, top, HEIGHT)?).is_some();
+    match reader.size_px.filter(|_| !in_file) {
+        Some(size_px) => Ok(size_px.map(f64::from)),
+        None => Ok([side(WIDTH, "image_width")?, side(HEIGHT, "image_height")?]),
+    }
 }
 
 /// Returns whether `fisheye_model` is 1.

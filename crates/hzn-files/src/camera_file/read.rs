@@ -5,9 +5,10 @@ use std::path::Path;
 use hzn_core::camera::Config;
 use serde_json::Value;
 
-use super::loaded::Loaded;
+use super::foreign::Foreign;
+use super::loaded::{CameraFile, Choice, Loaded};
 use super::reader::Reader;
-use super::{camchain, document, kalibr, opencv};
+use super::{camchain, document, kalibr, opencv, scaramuzza, several};
 use crate::nearest::suggestion;
 use crate::{Problem, limited};
 
@@ -16,7 +17,7 @@ use crate::{Problem, limited};
 /// # Errors
 /// The file cannot be read, has an unknown format, or has a lens that hzn does not have.
 pub fn load(path: &Path, name: Option<&str>) -> Result<Config, Problem> {
-    exact(load_any(path, name)?, path)
+    Ok(load_any(path, Choice { camera: name, size_px: None })?.exact(path)?.0)
 }
 
 /// Reads a camera file as [`load`] does, but from text; `path` is only used in messages.
@@ -24,23 +25,40 @@ pub fn load(path: &Path, name: Option<&str>) -> Result<Config, Problem> {
 /// # Errors
 /// The errors are those of [`load`].
 pub fn parse(text: &str, path: &Path, name: Option<&str>) -> Result<Config, Problem> {
-    exact(parse_any(text, path, name)?, path)
+    Ok(parse_any(text, path, Choice { camera: name, size_px: None })?.exact(path)?.0)
 }
 
-/// Reads a camera file whose lens may be one that only a fit turns into one of hzn's.
+/// Reads a camera file whose lens may be one that only a fit turns into one of hzn's, with the doubts about it.
 ///
 /// # Errors
-/// The errors are those of [`load`].
-pub fn load_any(path: &Path, name: Option<&str>) -> Result<Loaded, Problem> {
+/// The errors are those of [`load`]; a file of OpenCV with several cameras needs the choice of one.
+pub fn load_any(path: &Path, choice: Choice<'_>) -> Result<CameraFile, Problem> {
     let bytes = limited::read(path, limited::CAMERA_FILE_BYTES)
         .map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
     let text =
         String::from_utf8(bytes).map_err(|_| Problem::new(path, "is not a text in UTF-8, so it is no camera file"))?;
-    parse_any(&text, path, name)
+    parse_any(&text, path, choice)
 }
 
 /// Reads a camera file as [`load_any`] does, but from text.
-fn parse_any(text: &str, path: &Path, name: Option<&str>) -> Result<Loaded, Problem> {
+///
+/// # Errors
+/// The errors are those of [`load_any`].
+pub fn parse_any(text: &str, path: &Path, choice: Choice<'_>) -> Result<CameraFile, Problem> {
+    if let Some(lens) = scaramuzza::of_text(text, path) {
+        let lens = lens?;
+        let turned = Problem::new(
+            path,
+            format!(
+                "the axes of OCamCalib are turned by {:.3} deg about the optical axis against those of the picture, which \
+             the lens here has; a mount that was measured with OCamCalib's axes needs this turn",
+                lens.turn_rad.to_degrees()
+            ),
+        );
+        let side_px = f64::from(lens.size_px[0].max(lens.size_px[1]));
+        let warnings = if lens.turn_rad.abs() * side_px > 1.0 { vec![turned] } else { Vec::new() };
+        return Ok(CameraFile { lens: Loaded::Foreign(Foreign::Scaramuzza(lens)), warnings });
+    }
     let mut value = match camchain::of_colmap(text, path) {
         Some(chain) => chain?,
         None => document::parse(text, path)?,
@@ -48,35 +66,60 @@ fn parse_any(text: &str, path: &Path, name: Option<&str>) -> Result<Loaded, Prob
     if let Some(chain) = value.as_object().and_then(|top| camchain::of_document(top, path)) {
         value = chain?;
     }
-    let reader = Reader { path };
+    let reader = Reader { path, size_px: choice.size_px };
     let Value::Object(top) = &value else { return Err(unknown_format(path)) };
+    let lens = |lens: Loaded| CameraFile { lens, warnings: opencv::doubt(&reader, top).into_iter().collect() };
     let numbered =
         |k: &str| k.strip_prefix("cam").is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    let of_opencv = several::find(top);
+    if !of_opencv.is_empty() {
+        let (name, camera) = choose(&of_opencv, choice.camera, path)?;
+        let reader = Reader { path, ..reader };
+        let doubt = opencv::doubt(&reader, camera).or_else(|| opencv::doubt(&reader, top));
+        let lens = opencv::read(&reader, camera).map_err(|p| in_camera(p, name))?;
+        return Ok(CameraFile { lens, warnings: doubt.into_iter().collect() });
+    }
     let cameras: Vec<&str> = top.keys().map(String::as_str).filter(|k| numbered(k)).collect();
-    match (name, cameras.first()) {
+    match (choice.camera, cameras.first()) {
         (Some(name), _) if !cameras.contains(&name) => {
             Err(Problem::new(path, format!("has no camera {name:?}{}", suggestion(name, &cameras))))
         }
-        (Some(name), _) => kalibr::read(&reader, &top[name], name),
-        (None, Some(first)) => kalibr::read(&reader, &top[*first], first),
-        (None, None) if top.contains_key("intrinsics") => kalibr::read(&reader, &value, ""),
+        (Some(name), _) => kalibr::read(&reader, &top[name], name).map(lens),
+        (None, Some(first)) => kalibr::read(&reader, &top[*first], first).map(lens),
+        (None, None) if top.contains_key("intrinsics") => kalibr::read(&reader, &value, "").map(lens),
         (None, None) if top.keys().any(|key| opencv::MATRIX.contains(&opencv::plain(key).as_str())) => {
-            opencv::read(&reader, top).map(Loaded::Lens)
+            opencv::read(&reader, top).map(lens)
         }
         _ => Err(unknown_format(path)),
     }
 }
 
-/// Refuses a lens that hzn does not have exactly.
-fn exact(loaded: Loaded, path: &Path) -> Result<Config, Problem> {
-    match loaded {
-        Loaded::Lens(config) => Ok(config),
-        Loaded::Omni(_) => {
-            let what = "omni with distortion is a lens that hzn does not have. Fit one of hzn's to it:  hzn camera \
-                        convert FILE --model kannala-brandt -o sensor.toml  states the maximum error";
-            Err(Problem::new(path, what).in_field("camera_model"))
-        }
-    }
+/// Returns the camera of a file that the user means.
+fn choose<'a>(
+    cameras: &'a several::Cameras,
+    name: Option<&str>,
+    path: &Path,
+) -> Result<(&'a str, &'a serde_json::Map<String, Value>), Problem> {
+    let names: Vec<&str> = cameras.iter().map(|(name, _)| name.as_str()).collect();
+    let found = match (name, &cameras[..]) {
+        (Some(name), _) => cameras.iter().find(|(known, _)| known == name).ok_or_else(|| {
+            format!("has no camera {name:?}{}; its cameras are {}", suggestion(name, &names), names.join(", "))
+        }),
+        (None, [only]) => Ok(only),
+        (None, _) => Err(format!(
+            "has the cameras {}; choose one with --camera {} (hzn camera convert or show), or in a sensor.toml with \
+             camera = {1:?} next to file",
+            names.join(", "),
+            names.first().copied().unwrap_or_default()
+        )),
+    };
+    found.map(|(name, camera)| (name.as_str(), camera)).map_err(|what| Problem::new(path, what))
+}
+
+/// Returns the problem with the camera's name before the field.
+fn in_camera(problem: Problem, name: &str) -> Problem {
+    let field = problem.field.as_deref().map_or_else(|| name.to_owned(), |field| format!("{name}.{field}"));
+    problem.in_field(field)
 }
 
 fn unknown_format(path: &Path) -> Problem {
@@ -85,7 +128,7 @@ fn unknown_format(path: &Path) -> Problem {
         "is not a known camera file; expected is a Kalibr camchain (cam0: ...), a EuRoC sensor.yaml (intrinsics, \
          resolution), an OpenCV calibration (camera_matrix or K, image_width, image_height; YAML, XML or JSON), ROS's \
          camera_info, Foxglove's CameraCalibration (JSON), or a file of camodocal (model_type), ORB-SLAM3 \
-         (Camera.type), Basalt, COLMAP (cameras.txt) or Metashape (XML)",
+         (Camera.type), Basalt, COLMAP (cameras.txt), Metashape (XML) or OCamCalib (calib_results.txt)",
     )
 }
 
@@ -187,9 +230,11 @@ mod tests {
         let error = |text: String| read(&text).unwrap_err();
         assert_eq!(
             eight("0.2").unwrap_err(),
-            "cam.yaml: distortion_coefficients: there are 8 coefficients, but hzn supports five of this lens: k1, k2, \
-             p1, p2, k3; calibrate without the higher ones (plumb_bob, or a fisheye lens)"
+            "cam.yaml: OpenCV's lens with more than five coefficients is a lens that hzn does not have. Fit one of hzn's \
+             to it:  hzn camera convert FILE --model brown-conrady -o sensor.toml  states the error"
         );
+        let seven = written("rational_polynomial", &format!("{four}, 0.1, 0, 0.2"), 7);
+        assert!(read(&seven).unwrap_err().contains("7 coefficients, but hzn supports five of this lens"));
         assert_eq!(
             error(written("thin_prism", four, 4)),
             "cam.yaml: distortion_model: \"thin_prism\" is a lens that hzn does not have; valid here: equidistant, \

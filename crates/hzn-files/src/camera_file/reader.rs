@@ -5,13 +5,18 @@ use std::path::Path;
 use hzn_core::camera::{Config, Model};
 use serde_json::Value;
 
+use super::foreign::Foreign;
 use super::lens::{Coefficients, Lens};
+use super::loaded::Loaded;
+use super::rational::Rational;
 use super::values::matrix;
 use crate::Problem;
 
 /// The file that is read.
 pub(super) struct Reader<'a> {
     pub(super) path: &'a Path,
+    /// Width and height of the picture, if the user tells them.
+    pub(super) size_px: Option<[u16; 2]>,
 }
 
 impl Reader<'_> {
@@ -51,6 +56,26 @@ impl Reader<'_> {
     /// Returns hzn's model for the lens. The number of coefficients must fit that model.
     pub(super) fn model(&self, lens: Lens, coefficients: &Coefficients) -> Result<Model, Problem> {
         lens.to_model(coefficients).map_err(|what| self.problem(&coefficients.field, what))
+    }
+
+    /// Builds the lens of a camera whose projection is that of a pinhole.
+    pub(super) fn loaded(
+        &self,
+        lens: Lens,
+        coefficients: &Coefficients,
+        size: [f64; 2],
+        intrinsics_px: [f64; 4],
+    ) -> Result<Loaded, Problem> {
+        if let Some(distortion) = lens.rational(coefficients) {
+            return Ok(Loaded::Foreign(Foreign::Rational(Rational {
+                size_px: self.size(size)?,
+                intrinsics_px,
+                distortion,
+            })));
+        }
+        let model = self.model(lens, coefficients)?;
+        let k = coefficients.values.as_deref().unwrap_or_default();
+        Ok(Loaded::Lens(self.config(model, size, intrinsics_px, k)?))
     }
 
     /// Returns width and height as whole numbers.

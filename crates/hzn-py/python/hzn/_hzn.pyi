@@ -1385,7 +1385,7 @@ def _fuse_flight(
     mounts: dict[str, _Rows],
     clocks: dict[str, float],
     given: dict[str, Any],
-    smooth: bool,
+    wanted: tuple[bool, bool],
     rate_hz: float,
 ) -> dict[str, Any]: ...
 

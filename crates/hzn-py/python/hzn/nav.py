@@ -296,13 +296,68 @@ def fuse(
         ``states`` and ``innovations`` are lists of dictionaries with the names of the results of ``hzn fuse``, for
         ``pandas.DataFrame`` for example; ``cameras``, ``notes``, ``restarts``, ``start_s``. ``verdict`` is
         ``"consistent"``, ``"doubtful"`` or ``"contradicts"``, and ``findings`` is a list of dictionaries with ``level``,
-        ``source`` and ``what``: what contradicts what, the likeliest cause first.
+        ``source`` and ``what``: what contradicts what, the likeliest cause first. ``solved`` is None.
 
     Raises
     ------
     ConfigError
         A file, a mount or a setting is refused, or no two directions give a first attitude.
     """
+    wanted = (smooth, False)
+    return _replay(recordings, imu, gnss, attitude, mounts, clocks, settings, wanted, rate_hz)
+
+
+def solve(
+    recordings: Sequence[str | PathLike[str]],
+    *,
+    imu: str | PathLike[str],
+    gnss: str | PathLike[str] | None = None,
+    attitude: str | PathLike[str] | None = None,
+    mounts: Mapping[str, ArrayLike] | None = None,
+    clocks: Mapping[str, float] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    rate_hz: float = 10.0,
+) -> dict[str, Any]:
+    """Solve a whole flight at once, as ``hzn fuse --solve`` does.
+
+    The result is the most probable flight: attitude, velocity and position at every measurement, with mounts, clocks,
+    biases and limb height, from all measurements together. A measurement that is too far off counts less and is not
+    refused.
+
+    Parameters
+    ----------
+    recordings, imu, gnss, attitude, mounts, clocks, settings, rate_hz
+        The same as for `fuse`.
+
+    Returns
+    -------
+    dict
+        That of `fuse`; the states with ``phase`` ``"smoothed"`` are those of the solve. ``solved`` is a dictionary with
+        ``unknowns``, ``knots``, ``steps``, ``is_converged`` and ``cost`` (before and after); ``determined`` is a list
+        with ``name``, ``unit``, ``estimate``, ``sigma`` and ``before``, the sigma of what was known before: where
+        ``sigma`` is far below it, the flight has determined the value. ``lowered`` is a list of the measurements that
+        count less: ``time_s``, ``camera``, ``kind``, ``sigmas``, ``weight``.
+
+    Raises
+    ------
+    ConfigError
+        A file, a mount or a setting is refused, or no two directions give a first attitude.
+    """
+    wanted = (False, True)
+    return _replay(recordings, imu, gnss, attitude, mounts, clocks, settings, wanted, rate_hz)
+
+
+def _replay(
+    recordings: Sequence[str | PathLike[str]],
+    imu: str | PathLike[str],
+    gnss: str | PathLike[str] | None,
+    attitude: str | PathLike[str] | None,
+    mounts: Mapping[str, ArrayLike] | None,
+    clocks: Mapping[str, float] | None,
+    settings: Mapping[str, Any] | None,
+    wanted: tuple[bool, bool],
+    rate_hz: float,
+) -> dict[str, Any]:
     result: dict[str, Any] = _hzn._fuse_flight(
         [str(path) for path in recordings],
         str(imu),
@@ -311,7 +366,7 @@ def fuse(
         {name: _list(mount, (3, 3), f"mounts[{name!r}]") for name, mount in (mounts or {}).items()},
         dict(clocks or {}),
         dict(settings or {}),
-        smooth,
+        wanted,
         rate_hz,
     )
     return result

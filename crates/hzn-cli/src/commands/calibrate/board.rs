@@ -1,13 +1,13 @@
 //! `hzn calibrate board`: calibrates a camera from pictures of a chessboard.
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use hzn_calib::board::{self, Board};
 use hzn_core::camera::Model;
 use hzn_run::source::{self, Raw};
 
 use super::board_search;
+use super::board_size::BoardSize;
 use super::lens_output::{check_endings, write_all};
 use crate::commands::lens_model;
 use crate::exit::{Exit, Outcome, failed, usage};
@@ -55,25 +55,6 @@ pub(super) struct Args {
     /// Print no notes on stderr
     #[arg(short, long)]
     quiet: bool,
-}
-
-/// Columns and rows of inner corners.
-#[derive(Debug, Clone, Copy)]
-struct BoardSize([u16; 2]);
-
-impl FromStr for BoardSize {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let sides = text.split_once('x').and_then(|(a, b)| Some([a.parse().ok()?, b.parse().ok()?]));
-        let expected = "COLUMNSxROWS of inner corners is expected, for example 9x6";
-        let sides = sides.ok_or_else(|| expected.to_owned())?;
-        if sides.iter().all(|n| (3..=100).contains(n)) {
-            Ok(Self(sides))
-        } else {
-            Err(format!("{expected}; each side has 3 to 100"))
-        }
-    }
 }
 
 pub(super) fn run(args: &Args) -> Outcome {

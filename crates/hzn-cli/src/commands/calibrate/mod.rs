@@ -2,11 +2,14 @@
 
 mod board;
 mod board_search;
+mod board_size;
 mod check;
 mod flight;
 mod lens_output;
 mod lens_page;
 mod lens_text;
+mod mount;
+mod mount_tilts;
 mod noise;
 mod page;
 mod points;
@@ -32,6 +35,7 @@ enum Command {
     Sky(sky_args::Args),
     Check(check::Args),
     Noise(noise::Args),
+    Mount(mount::Args),
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -41,5 +45,6 @@ pub(super) fn run(args: &Args) -> Outcome {
         Command::Sky(args) => sky::run(args),
         Command::Check(args) => check::run(args),
         Command::Noise(args) => noise::run(args),
+        Command::Mount(args) => mount::run(args),
     }
 }

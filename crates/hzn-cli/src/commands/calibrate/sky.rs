@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use hzn_calib::sky::{self, Estimate, Found, FoundMount, LimbPrior, Mount, MountRefusal, Unknowns, View};
+use hzn_core::frames::UnitVec3;
+use hzn_core::{Prior, body};
 use hzn_files::Sensor;
 use hzn_run::disk;
 use hzn_run::engine::Plan;
@@ -130,7 +132,11 @@ pub(super) fn views(
     let Opened { mut source, sensor, frames, .. } = flight::reopen(input, source_args, flight, wide)?;
     let plan = flight::plan(source_args, flight, jobs, frames, sensor);
     let mut progress = Progress::new(source.total(), 0, quiet);
-    let view = |a: flight::Answered<'_>| Some(View::new(a.name, a.points, a.prior, a.solution));
+    // The side of the Sun follows from the attitude, where frames.csv does not have its direction.
+    let view = |a: flight::Answered<'_>| {
+        let sun = a.data.and_then(|data| track::direction(body::Kind::Sun, data)).and_then(UnitVec3::try_new);
+        Some(View::new(a.name, a.points, Prior { sun: sun.or(a.prior.sun), ..a.prior }, a.solution))
+    };
     let views = flight::measure_answers(&plan, source.as_mut(), &mut progress, view)?;
     Ok(views.map(|views| Pictures { views, count: progress.frames(), plan }))
 }

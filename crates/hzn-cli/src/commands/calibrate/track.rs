@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args, sensor: &Sensor) -> Outcome {
 
 /// Returns the direction to the body in the nominal camera frame: the column of the Sun, or the ephemeris with the
 /// attitude. The Moon is near, so that its direction needs a position too.
-fn direction(kind: Kind, data: &FrameData) -> Option<[f64; 3]> {
+pub(super) fn direction(kind: Kind, data: &FrameData) -> Option<[f64; 3]> {
     let given = data.sun_camera.filter(|_| kind == Kind::Sun).and_then(UnitVec3::<hzn_core::frames::Cam, f64>::try_new);
     if let Some(given) = given {
         return Some(given.xyz());

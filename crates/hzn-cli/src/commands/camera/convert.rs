@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use hzn_calib::conversion;
 use hzn_core::camera::{self, Camera, Model};
-use hzn_files::camera_file::{self, Format, Loaded};
+use hzn_files::camera_file::{self, Choice, Format, Loaded};
 use hzn_run::disk;
 use hzn_run::source::ending;
 
@@ -15,8 +15,10 @@ use crate::tell;
 
 /// Convert a calibration: sensor.toml, Kalibr, OpenCV, EuRoC, ROS, Foxglove, or the coefficients of Braun & Barf
 ///
-/// Files of camodocal (VINS), ORB-SLAM3, Basalt, COLMAP (cameras.txt) and Metashape (XML) are read as well, but not
-/// written. --camera chooses one of several cameras: cam0 is the first, and in COLMAP cam1 is the camera with number 1.
+/// Files of camodocal (VINS), ORB-SLAM3, Basalt, COLMAP (cameras.txt), Metashape (XML) and OCamCalib
+/// (calib_results.txt) are read as well, but not written. --camera chooses one of several cameras: cam0 is the first,
+/// and in COLMAP cam1 is the camera with number 1. In a file of OpenCV the cameras have the names that the file gives
+/// them, such as 1 and 2 for M1 and M2; without --camera a message lists them.
 ///
 /// The form of the input is detected from its text; numbers keep their last bit. --model fits another lens over the
 /// picture and prints the error. Examples:
@@ -27,21 +29,25 @@ use crate::tell;
 ///
 ///   hzn camera convert omni.yaml --model kannala-brandt -o sensor.toml
 ///
+///   hzn camera convert calib_results.txt --model kannala-brandt --end 95 -o sensor.toml
+///
+///   hzn camera convert intrinsics.yml --camera 1 --size 640x480 -o sensor.toml
+///
 ///   hzn camera convert --braun-barf 1235,-67.9,13.6,-4.3,0.25 --size 1920x1080 --centre 963.2,536.7
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A sensor.toml, or a camera file of Kalibr, OpenCV, EuRoC, ROS or Foxglove (YAML, XML, JSON)
     #[arg(required_unless_present = "braun_barf")]
     file: Option<PathBuf>,
-    /// Name of the camera in a Kalibr camchain; without it, the first
+    /// Name of the camera in a file of several; without it, the first of a camchain
     #[arg(long, value_name = "NAME", requires = "file")]
     camera: Option<String>,
     /// Instead of a file: r = k1 t + k2 t^3 + k3 t^5 + k4 t^7 + k5 t^9 in pixels (Braun & Barf 2022, eq. 13)
     #[arg(long, value_name = "K1,...,K5", allow_hyphen_values = true, conflicts_with = "file")]
     #[arg(requires_all = ["size", "centre"])]
     braun_barf: Option<Numbers<5>>,
-    /// Size of the picture in pixels, for --braun-barf
-    #[arg(long, value_name = "WIDTHxHEIGHT", requires = "braun_barf")]
+    /// Size of the picture in pixels, for --braun-barf and for a file that does not have it
+    #[arg(long, value_name = "WIDTHxHEIGHT")]
     size: Option<Size>,
     /// Principal point in pixels, pixel centres at integers, for --braun-barf
     #[arg(long, value_name = "U,V", allow_hyphen_values = true, requires = "braun_barf")]
@@ -49,6 +55,9 @@ pub(super) struct Args {
     /// Fit a lens of this model over the picture
     #[arg(long, value_name = "MODEL", value_parser = crate::commands::lens_model::parse)]
     model: Option<Model>,
+    /// The lens ends at this angle off axis in degrees, theta_max_deg, for example at the image circle; so does a fit
+    #[arg(long, value_name = "DEG")]
+    end: Option<f64>,
     /// Form of the result; without it, sensor
     #[arg(long, value_name = "FORM")]
     to: Option<To>,
@@ -130,7 +139,7 @@ impl FromStr for Size {
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let (camera, comment) = read(args)?;
     // A lens that hzn refuses is of no use in another form either.
-    Camera::<f64>::try_new(&camera).map_err(|e| usage(format!("{}: {e}", source(args))))?;
+    Camera::<f64>::try_new(&camera).map_err(|e| usage(format!("{}: {e}{}", source(args), end_hint(args))))?;
     let to = args.to.unwrap_or(To::Sensor);
     if let Some(path) = &args.output {
         check_ending(path, to)?;
@@ -157,6 +166,11 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     Ok(())
 }
 
+/// Returns how theta_max_deg is set, for a lens that is refused without it.
+fn end_hint(args: &Args) -> &'static str {
+    if args.end.is_none() && args.file.is_some() { "; --end DEG sets camera.theta_max_deg" } else { "" }
+}
+
 /// Returns the keys of a sensor.toml that the forms of other tools do not have.
 fn lost_keys(camera: &camera::Config) -> Vec<String> {
     let mut lost = Vec::new();
@@ -178,16 +192,26 @@ fn lost_keys(camera: &camera::Config) -> Vec<String> {
 /// Reads the calibration, and fits the model to it that is asked for. Returns the fit in words as well.
 fn read(args: &Args) -> Result<(camera::Config, Option<String>), Stop> {
     let loaded = load(args)?;
+    let end_deg = args.end.unwrap_or(180.0);
+    if !(end_deg > 0.0 && end_deg <= 180.0) {
+        return Err(usage("--end: an angle above 0 and up to 180 degrees is expected"));
+    }
     let Some(model) = args.model else {
         return match loaded {
-            Loaded::Lens(config) => Ok((config, None)),
-            Loaded::Omni(_) => Err(usage(format!(
-                "{}: omni with distortion is a lens that hzn does not have; --model kannala-brandt fits one of hzn's",
-                source(args)
+            Loaded::Lens(config) => {
+                let limit_deg = args.end.map(|end| config.theta_max_deg.map_or(end, |deg| deg.min(end)));
+                Ok((camera::Config { theta_max_deg: limit_deg.or(config.theta_max_deg), ..config }, None))
+            }
+            Loaded::Foreign(lens) => Err(usage(format!(
+                "{}: {} is a lens that hzn does not have; --model {} fits one of hzn's",
+                source(args),
+                lens.name(),
+                lens.closest().name()
             ))),
         };
     };
-    let fitted = conversion::convert(&loaded, model).map_err(|why| usage(format!("{}: {why}", source(args))))?;
+    let refused = |why| usage(format!("{}: {why}; --end DEG ends the lens at an angle off axis", source(args)));
+    let fitted = conversion::convert_up_to(&loaded, model, end_deg).map_err(refused)?;
     let [u, v] = fitted.max_at_px;
     let words = format!(
         "{} fitted over the picture up to {:.1}° off axis: RMS {:.4} px, maximum error {:.4} px at ({u:.0}, {v:.0})",
@@ -215,12 +239,32 @@ fn load(args: &Args) -> Result<Loaded, Stop> {
     }
     let Some(file) = &args.file else { return Err(usage("no calibration is given")) };
     match ending(file).as_str() {
-        "toml" if args.camera.is_some() => {
-            Err(usage(format!("--camera: {} contains one camera; leave out --camera", file.display())))
-        }
+        "toml" if args.camera.is_some() => Err(one_camera(file)),
         "toml" => Ok(Loaded::Lens(hzn_files::sensor::load(file)?.config.camera)),
-        _ => Ok(camera_file::load_any(file, args.camera.as_deref())?),
+        _ => {
+            let choice = Choice { camera: args.camera.as_deref(), size_px: args.size.map(|size| size.0) };
+            let read = camera_file::load_any(file, choice)?;
+            read.warnings.iter().for_each(tell::warning);
+            if camera_file::to_imu(file, Some(args.camera.as_deref().unwrap_or("cam0"))).is_ok() {
+                let what =
+                    "the pose and the clock of the camera against the inertial unit belong to [mount] and fuse.toml";
+                tell::line(format_args!("note: {what}:  hzn calibrate mount kalibr {}", file.display()));
+            }
+            let [width, height] = match &read.lens {
+                Loaded::Lens(c) => [c.width, c.height],
+                Loaded::Foreign(lens) => lens.size_px(),
+            };
+            if choice.size_px.is_some_and(|size_px| size_px != [width, height]) {
+                return Err(usage(format!("--size: {} says {width}x{height}; leave out --size", file.display())));
+            }
+            Ok(read.lens)
+        }
     }
+}
+
+/// Refuses the name of a camera for a file that has one.
+pub(super) fn one_camera(file: &Path) -> Stop {
+    usage(format!("--camera: {} contains one camera; leave out --camera", file.display()))
 }
 
 /// Returns the origin of the calibration, for messages.

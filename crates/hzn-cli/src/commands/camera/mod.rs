@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Config;
 use hzn_core::camera::{self, Camera};
 use hzn_core::frames::UnitVec3;
+use hzn_files::camera_file::{self, Choice};
 use hzn_run::engine::AnySensor;
 use hzn_run::overlay;
 use hzn_run::source::ending;
@@ -32,6 +33,9 @@ enum Command {
     Show {
         /// A sensor.toml, or a camera file of Kalibr, OpenCV, EuRoC, ROS or Foxglove (YAML, XML, JSON)
         file: PathBuf,
+        /// Name of the camera in a file of several
+        #[arg(long, value_name = "NAME")]
+        camera: Option<String>,
         /// Also draw a map of the picture: degrees per pixel, angles off axis, image circle, limit of the monotone lens
         #[arg(long, value_name = "PNG")]
         picture: Option<PathBuf>,
@@ -44,12 +48,12 @@ enum Command {
 
 pub(super) fn run(args: &Args) -> Outcome {
     match &args.command {
-        Command::Show { file, picture, force } => {
+        Command::Show { file, camera, picture, force } => {
             if let Some(path) = picture {
                 check_map(path)?;
                 files::check_outputs(&hzn_files::files_of_sensor(file), std::slice::from_ref(path), *force)?;
             }
-            let config = load(file)?;
+            let config = load(file, camera.as_deref())?;
             for doubt in hzn_files::plausible::find_implausible(&config) {
                 tell::warning(format_args!("{}: {}: {}", file.display(), doubt.key, doubt.what));
             }
@@ -68,13 +72,19 @@ fn check_map(path: &Path) -> Result<(), Stop> {
     if ending(path) == "png" { Ok(()) } else { Err(usage(format!("{}: a map ends in .png", path.display()))) }
 }
 
-fn load(file: &Path) -> Result<Config, Stop> {
+fn load(file: &Path, name: Option<&str>) -> Result<Config, Stop> {
     match ending(file).as_str() {
+        "toml" if name.is_some() => Err(convert::one_camera(file)),
         "toml" => Ok(hzn_files::sensor::load(file)?.config),
         "csv" | "jsonl" | "mcap" => {
             Err(usage(format!("{}: a sensor.toml or a camera file (YAML, XML, JSON) is expected", file.display())))
         }
-        _ => Ok(Config::new(hzn_files::camera_file::load(file, None)?)),
+        _ => {
+            let (camera, warnings) =
+                camera_file::load_any(file, Choice { camera: name, size_px: None })?.exact(file)?;
+            warnings.iter().for_each(tell::warning);
+            Ok(Config::new(camera))
+        }
     }
 }
 
