@@ -175,7 +175,7 @@ unsafe fn open_sensor<'a>(sensor: *mut HznSensor) -> Result<&'a mut HznSensor, i
 /// lists.
 unsafe fn lists<'a, const BLOCKS: usize>(sensor: *mut HznSensor) -> &'a mut Lists<BLOCKS> {
     // SAFETY: the caller guarantees it. Lists consist of numbers, so that any bytes are valid ones.
-    unsafe { &mut *(&raw mut (*sensor.cast::<Memory<BLOCKS>>()).workspace) }
+    unsafe { &mut (*sensor.cast::<Memory<BLOCKS>>()).workspace }
 }
 
 /// Makes a sensor in `memory`, with every parameter at its default, and writes a pointer to it to `out`. `interface`
