@@ -154,6 +154,12 @@ fn read_files_with_other_readers(steps: &mut Steps) -> Outcome {
     let mut files = find_recordings(&demo_dir());
     files.push(sample);
     steps::run(Command::new(&python).arg("tests/python/check_mcap.py").args(files))?;
+    let folder = target().join("xtask").join("ros");
+    if folder.exists() {
+        fs::remove_dir_all(&folder)?;
+    }
+    let program = target().join("debug/hzn");
+    steps::run(Command::new(&python).arg("tests/python/check_ros.py").arg(program).arg(folder))?;
     let folder = target().join("xtask").join("navigation");
     let programs = ["debug/hzn", "debug/examples/flight"].map(|program| target().join(program));
     steps::run(Command::new(&python).arg("tests/python/check_nav.py").args(programs).arg(folder))?;

@@ -1,7 +1,8 @@
 //! The part of ROS 2's CDR encoding that the two picture messages need.
 
 use crate::frame::EncodedImage;
-use crate::messages::{compressed_format, raw_format};
+use crate::messages::compressed_format;
+use crate::raw_images::raw_format;
 
 /// Reads CDR fields in either byte order. Alignment is counted from the end of the four encapsulation bytes.
 #[derive(Debug)]

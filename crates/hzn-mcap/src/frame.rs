@@ -105,6 +105,13 @@ pub enum ImageFormat {
         /// Rows.
         height: u32,
     },
+    /// Three 16-bit words per pixel, with the lower byte first: red, green, blue.
+    Rgb16 {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
     /// Three bytes per pixel: red, green, blue.
     Rgb8 {
         /// Columns.

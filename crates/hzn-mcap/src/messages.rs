@@ -11,6 +11,7 @@ use prost::Message;
 use serde_json::{Map, Value};
 
 use crate::frame::{Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
+use crate::raw_images::raw_format;
 use crate::row::Row;
 use crate::topics::Topic;
 
@@ -100,6 +101,7 @@ pub(crate) fn image(image: &EncodedImage, frame_id: &str, ns: u64, buffer: &mut 
         ImageFormat::Mono8 { width, height } => raw(buffer, *width, *height, "mono8", 1),
         ImageFormat::Mono16 { width, height } => raw(buffer, *width, *height, "mono16", 2),
         ImageFormat::Rgb8 { width, height } => raw(buffer, *width, *height, "rgb8", 3),
+        ImageFormat::Rgb16 { width, height } => raw(buffer, *width, *height, "rgb16", 6),
     };
     prost::encoding::encode_key(field, prost::encoding::WireType::LengthDelimited, buffer);
     prost::encoding::encode_varint(image.bytes.len() as u64, buffer);
@@ -110,7 +112,10 @@ pub(crate) fn image(image: &EncodedImage, frame_id: &str, ns: u64, buffer: &mut 
 pub(crate) fn image_topic(format: &ImageFormat) -> Topic {
     match format {
         ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Other(_) => Topic::Image,
-        ImageFormat::Mono8 { .. } | ImageFormat::Mono16 { .. } | ImageFormat::Rgb8 { .. } => Topic::RawImage,
+        ImageFormat::Mono8 { .. }
+        | ImageFormat::Mono16 { .. }
+        | ImageFormat::Rgb8 { .. }
+        | ImageFormat::Rgb16 { .. } => Topic::RawImage,
     }
 }
 
@@ -124,45 +129,6 @@ pub(crate) fn compressed_format(name: &str) -> ImageFormat {
     } else {
         ImageFormat::Other(name)
     }
-}
-
-/// Converts a raw picture of any writer, with rows of `step` bytes (0: without padding), to one of the formats of hzn.
-/// An error names what is not supported.
-pub(crate) fn raw_format(
-    width: u32,
-    height: u32,
-    step: u32,
-    encoding: &str,
-    big_endian: bool,
-    data: &[u8],
-) -> Result<EncodedImage, String> {
-    let (format, bytes_per_pixel) = match encoding {
-        "mono8" | "8UC1" => (ImageFormat::Mono8 { width, height }, 1),
-        "mono16" | "16UC1" => (ImageFormat::Mono16 { width, height }, 2),
-        "rgb8" | "bgr8" | "8UC3" => (ImageFormat::Rgb8 { width, height }, 3),
-        other => {
-            return Err(format!(
-                "raw pictures of encoding \"{other}\" are not supported (mono8, mono16, rgb8, bgr8 are)"
-            ));
-        }
-    };
-    let row = width as usize * bytes_per_pixel;
-    let step = if step == 0 { row } else { step as usize };
-    if width == 0
-        || height == 0
-        || step < row
-        || data.len() < step.saturating_mul(height as usize - 1).saturating_add(row)
-    {
-        return Err(format!("a raw picture of {width}x{height} needs more than its {} bytes", data.len()));
-    }
-    let mut bytes: Vec<u8> =
-        data.chunks(step).take(height as usize).flat_map(|r| r.iter().take(row).copied()).collect();
-    match encoding {
-        "bgr8" | "8UC3" => bytes.chunks_exact_mut(3).for_each(|p| p.swap(0, 2)),
-        "mono16" | "16UC1" if big_endian => bytes.chunks_exact_mut(2).for_each(|p| p.swap(0, 1)),
-        _ => {}
-    }
-    Ok(EncodedImage { format, bytes })
 }
 
 /// Reads a picture from a protobuf message with this schema.
@@ -285,15 +251,5 @@ mod tests {
         assert_eq!((time_ns(-3.0), time_ns(f64::NAN)), (0, 0));
         assert_eq!(time_ns(1e30), u64::from(u32::MAX) * 1_000_000_000);
         assert!(stamp(time_ns(1e30)).is_some());
-    }
-
-    #[test]
-    fn raw_pictures_lose_their_padding() {
-        let image = raw_format(2, 2, 3, "mono8", false, &[1, 2, 9, 3, 4]).unwrap();
-        assert_eq!(image.bytes, [1, 2, 3, 4]);
-        assert_eq!(raw_format(1, 1, 0, "bgr8", false, &[1, 2, 3]).unwrap().bytes, [3, 2, 1]);
-        assert_eq!(raw_format(1, 1, 2, "mono16", true, &[1, 2]).unwrap().bytes, [2, 1]);
-        assert!(raw_format(u32::MAX, u32::MAX, u32::MAX, "mono8", false, &[1]).is_err());
-        assert!(raw_format(2, 2, 2, "yuv422", false, &[0; 8]).is_err());
     }
 }

@@ -210,7 +210,7 @@ impl Reader {
                 });
                 self.ready.push_back(frame);
             }
-            Topic::Calibration | Topic::Axis => {}
+            Topic::Calibration | Topic::Axis | Topic::AxisVector | Topic::AxisCovariance => {}
         }
         Ok(())
     }

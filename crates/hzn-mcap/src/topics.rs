@@ -8,6 +8,7 @@ use hzn_core::status::Status;
 use serde_json::{Map, Value, json};
 
 use crate::container::Channel;
+use crate::ros;
 use crate::row::Row;
 
 /// Schema of the fields on `/hzn/report` that are not columns of a row.
@@ -53,10 +54,14 @@ pub(crate) enum Topic {
     Transform = 6,
     Log = 7,
     RawImage = 8,
+    /// The axis for ROS.
+    AxisVector = 9,
+    /// The covariance of the axis for ROS.
+    AxisCovariance = 10,
 }
 
 impl Topic {
-    pub(crate) const ALL: [Self; 8] = [
+    pub(crate) const ALL: [Self; 10] = [
         Self::Report,
         Self::Image,
         Self::Calibration,
@@ -65,6 +70,8 @@ impl Topic {
         Self::Transform,
         Self::Log,
         Self::RawImage,
+        Self::AxisVector,
+        Self::AxisCovariance,
     ];
 
     /// Returns the topic of a channel that a recording declares; `None` if hzn has no such topic, or if its messages
@@ -92,6 +99,8 @@ impl Topic {
             Self::Annotations => "/camera/annotations",
             Self::Axis => "/hzn/axis",
             Self::Transform => "/tf",
+            Self::AxisVector => "/hzn/axis_vector",
+            Self::AxisCovariance => "/hzn/axis_covariance",
             Self::Log => "/log",
         }
     }
@@ -100,6 +109,7 @@ impl Topic {
         fn protobuf<M: Encode>() -> (String, String, Vec<u8>, &'static str) {
             M::get_schema().map_or_else(Default::default, |s| (s.name, s.encoding, s.data.into_owned(), "protobuf"))
         }
+        let ros = |name: &str, text: &str| (name.to_owned(), "ros2msg".to_owned(), text.as_bytes().to_vec(), "cdr");
         match self {
             Self::Report => ("hzn.Report".into(), "jsonschema".into(), report_schema().to_string().into(), "json"),
             Self::Image => protobuf::<CompressedImage>(),
@@ -109,6 +119,8 @@ impl Topic {
             Self::Transform => protobuf::<FrameTransform>(),
             Self::Log => protobuf::<Log>(),
             Self::RawImage => protobuf::<RawImage>(),
+            Self::AxisVector => ros("geometry_msgs/msg/Vector3Stamped", ros::VECTOR),
+            Self::AxisCovariance => ros("std_msgs/msg/Float64MultiArray", ros::MATRIX),
         }
     }
 }

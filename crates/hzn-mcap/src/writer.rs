@@ -17,6 +17,7 @@ use crate::frame::FrameRecord;
 use crate::messages;
 use crate::origin::Origin;
 use crate::part::{create_part, part_path, publish, sync, sync_name};
+use crate::ros;
 use crate::topics::Topic;
 
 /// Longest time from a frame until it is finished, as long as further frames come.
@@ -28,9 +29,9 @@ const BATCH_DATA_BYTES: usize = 1 << 20;
 /// The calibration is repeated after this much of the recording's time, in nanoseconds.
 const CALIBRATION_EVERY_NS: u64 = 1_000_000_000;
 
-/// Largest size in bytes of what surrounds the messages of a chunk: its head, the heads of its indexes (at most seven
+/// Largest size in bytes of what surrounds the messages of a chunk: its head, the heads of its indexes (at most nine
 /// topics of a camera), its entry in the summary.
-const CHUNK_BYTES: u64 = 1024;
+const CHUNK_BYTES: u64 = 1280;
 
 /// Settings of a recording.
 #[derive(Debug, Clone, Default)]
@@ -46,6 +47,9 @@ pub struct Options {
     pub heads: Vec<(String, camera::Config)>,
     /// Further files, attached by name.
     pub files: Vec<(String, String)>,
+    /// Whether the answers are also messages of ROS 2: the axis as `geometry_msgs/msg/Vector3Stamped` on
+    /// `/hzn/axis_vector`, its covariance as `std_msgs/msg/Float64MultiArray` on `/hzn/axis_covariance`.
+    pub ros: bool,
     /// Whether an existing output, or the remains of a run, may be replaced.
     pub force: bool,
     /// Whether a finished frame is on the disk, so that also a power cut cannot lose it. Otherwise the operating system
@@ -87,6 +91,7 @@ pub struct Writer {
     /// Log time of the last frame.
     last_ns: u64,
     frames: u64,
+    ros: bool,
     durable: bool,
     early_sync: EarlySync,
 }
@@ -128,6 +133,7 @@ impl Writer {
             last_calibration_ns: vec![None; options.heads.len().max(1)],
             last_ns: 0,
             frames: 0,
+            ros: options.ros,
             durable: options.durable,
             early_sync: EarlySync::default(),
         }
@@ -240,6 +246,12 @@ impl Writer {
         }
         if let Some(axis) = frame.row.axis() {
             push(Topic::Axis, &mut |b| messages::append(&messages::axis(axis, frame_id, ns), b))?;
+            if self.ros {
+                push(Topic::AxisVector, &mut |b| ros::vector(axis, frame_id, ns, b))?;
+            }
+        }
+        if let Some(covariance) = frame.row.covariance().filter(|_| self.ros) {
+            push(Topic::AxisCovariance, &mut |b| ros::matrix(covariance, b))?;
         }
         if let Some(attitude) = &frame.attitude {
             push(Topic::Transform, &mut |b| messages::append(&messages::transform(attitude, frame_id, ns), b))?;

@@ -57,11 +57,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         std::fs::create_dir_all(folder).map_err(|e| disk::cannot_write(folder, &e))?;
     }
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
-    let mut table = match (&args.output, to_file) {
-        (_, Some(path)) => Some(RowFile::create(path, existing)?),
-        (Some(_), None) => Some(RowFile::on_stdout(args.format.into())?),
-        (None, None) => None,
-    };
+    let mut table = args.output.as_deref().map(|path| open_table(args, path, existing)).transpose()?;
     let (mut rows, mut images) = (0u64, 0u64);
     let mut lost = None;
     if kind == "mcap" {
@@ -89,15 +85,18 @@ pub(super) fn run(args: &Args) -> Outcome {
             }
         }
     }
-    if let Some(table) = table {
-        table.finish()?;
-    }
+    table.map(RowFile::finish).transpose()?;
     let mut written: Vec<String> = args.output.iter().map(|_| explain::counted(rows, "row")).collect();
     written.extend(args.images.iter().map(|_| explain::counted(images, "picture")));
     written.extend(args.overlay.iter().map(|_| explain::counted(images, "overlay")));
     tell::line(written.join(", "));
     lost.iter().for_each(tell::warning);
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+fn open_table(args: &Args, path: &Path, existing: Existing) -> Result<RowFile, Stop> {
+    let is_stdout = source::is_stdin(path);
+    Ok(if is_stdout { RowFile::on_stdout(args.format.into())? } else { RowFile::create(path, existing)? })
 }
 
 fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {

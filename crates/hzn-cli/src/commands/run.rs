@@ -5,6 +5,8 @@ mod rig;
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use hzn_core::config::Orient;
 use hzn_files::frames::Unused;
@@ -36,23 +38,17 @@ pub(super) fn run(mut args: Args) -> Outcome {
     {
         return rig::run(args, one);
     }
-    let request = setup::request(&args.input, &args.sensor, &args.source)?;
     let watching = args.watch.then(stop_flag);
-    let opened = setup::open_request(&Request { watch: watching.clone(), ..request })?;
-    opened.check_size()?;
-    opened.check_altitude()?;
-    let Opened { mut source, sensor, frames, notes, .. } = opened;
-    // The check is made only for folders, because the table next to a single picture also lists all others.
-    if let Some(frames) = frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
-        warn_of_missing_pictures(frames);
-    }
-    refuse_inputs(args, source.as_ref())?;
-    if let Some(drawn) = &args.overlay {
-        prepare_overlays(drawn, args.force || args.resume)?;
-    }
+    let Opened { mut source, sensor, frames, notes, .. } = open(args, watching.as_ref())?;
     let recorded = recorded(&sensor);
     let plan = args.plan(sensor, frames);
-    let settings = sink::Settings { config: &plan.config, sensor_toml: &recorded, durable: args.durable, heads: &[] };
+    let settings = sink::Settings {
+        config: &plan.config,
+        sensor_toml: &recorded,
+        durable: args.durable,
+        ros: args.ros,
+        heads: &[],
+    };
     let (mut output, stored) = Outputs::open(&args.output, args.format.into(), args.existing(), settings)?;
     let plan = Plan { last: stored.last_answers.clone(), ..plan };
     if !args.quiet {
@@ -76,9 +72,7 @@ pub(super) fn run(mut args: Args) -> Outcome {
     output.finish()?;
     let lost = source.describe_loss().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
-    watch.missing.tell(plan.frames.as_ref());
-    watch.times.tell();
-    watch.multi_page.tell();
+    watch.tell(plan.frames.as_ref());
     if !args.quiet {
         watch.sum_up(args, &plan, source.as_ref(), &summary, stored.frames);
     }
@@ -90,6 +84,23 @@ pub(super) fn run(mut args: Args) -> Outcome {
     }
     let missed = watch.progress.any_unprocessed() || lost.is_some() || watch.multi_page.files > 0;
     Ok(if missed { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// Opens the pictures with their sensor, and refuses what cannot be processed or would replace an input.
+fn open(args: &Args, watching: Option<&Arc<AtomicBool>>) -> Result<Opened, Stop> {
+    let request = setup::request(&args.input, &args.sensor, &args.source)?;
+    let opened = setup::open_request(&Request { watch: watching.cloned(), ..request })?;
+    opened.check_size()?;
+    opened.check_altitude()?;
+    // The check is made only for folders, because the table next to a single picture also lists all others.
+    if let Some(frames) = opened.frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
+        warn_of_missing_pictures(frames);
+    }
+    refuse_inputs(args, opened.source.as_ref())?;
+    if let Some(drawn) = &args.overlay {
+        prepare_overlays(drawn, args.force || args.resume)?;
+    }
+    Ok(opened)
 }
 
 /// Returns the sensor.toml that a recording stores. Its pictures are stored as they were processed, that is, already
@@ -115,6 +126,9 @@ fn check_arguments(args: &Args) -> Result<(), Stop> {
     Outputs::check(&args.output, args.existing())?;
     if args.no_images && !args.output.iter().any(|p| ending(p) == "mcap") {
         return Err(usage("--no-images: only an MCAP contains pictures; give -o out.mcap, or leave out --no-images"));
+    }
+    if args.ros && !args.output.iter().any(|p| ending(p) == "mcap") {
+        return Err(usage("--ros: only an MCAP has messages of ROS; give -o out.mcap, or leave out --ros"));
     }
     Ok(())
 }
@@ -198,6 +212,13 @@ impl Watch {
             self.progress.say(&picture_line(frame));
         }
         self.progress.count(frame.outcomes.iter().map(|f| f.status()));
+    }
+
+    /// Tells what is odd about the pictures.
+    fn tell(&self, frames: Option<&Frames>) {
+        self.missing.tell(frames);
+        self.times.tell();
+        self.multi_page.tell();
     }
 
     /// Prints the summary, the commonest refusal, and the command that explains it.

@@ -135,11 +135,12 @@ fn inputs_of_another_kind_are_named() {
 #[test]
 fn pictures_of_other_formats_are_named() {
     let place = Place::with_pictures(1);
-    place.write("a.fits", b"SIMPLE  =                    T / FITS");
+    place.write("a.webp", b"RIFF\x10\0\0\0WEBPVP8 ");
     place.write("a.jp2", b"\0\0\0\x0cjP  \r\n\x87\n");
     place.write("s.toml", SENSOR.as_bytes());
-    for (file, name) in [("a.fits", "FITS"), ("a.jp2", "JPEG 2000")] {
-        let what = format!("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP); it is {name}: convert");
+    for (file, name) in [("a.webp", "WebP"), ("a.jp2", "JPEG 2000")] {
+        let formats = "PNG, JPEG, TIFF, PNM, BMP, FITS, NumPy";
+        let what = format!("is not a picture of a supported format ({formats}); it is {name}: convert");
         place.run(&["run", file, "-s", "s.toml"]).expect(3).says(&what);
     }
     let mut tiff = std::io::Cursor::new(Vec::new());

@@ -81,6 +81,8 @@ pub struct Settings<'a> {
     pub sensor_toml: &'a str,
     /// Whether every flush waits until the results are on the disk, so that a power cut cannot lose them.
     pub durable: bool,
+    /// Whether a recording also has the answers as messages of ROS 2.
+    pub ros: bool,
     /// With a rig, its heads: name, configuration and sensor.toml of each. `sensor_toml` is then the text of rig.toml.
     pub heads: &'a [(String, &'a Config, String)],
 }
@@ -175,9 +177,9 @@ fn text_form(target: Target) -> Option<Form> {
 }
 
 fn options(settings: Settings<'_>, force: bool) -> Options {
-    let Settings { config, sensor_toml, durable, heads } = settings;
+    let Settings { config, sensor_toml, durable, ros, heads } = settings;
     let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
-    let mut options = Options { metadata, force, durable, ..Options::default() };
+    let mut options = Options { metadata, force, durable, ros, ..Options::default() };
     if heads.is_empty() {
         (options.sensor_toml, options.camera) = (sensor_toml.to_owned(), Some(config.camera.clone()));
     } else {

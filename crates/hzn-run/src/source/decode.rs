@@ -7,16 +7,13 @@ use hzn_core::image::Layout;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat};
 
+pub(crate) use super::limits::check_size;
+pub use super::limits::{MAX_BYTES, MAX_SIDE_PX};
 use super::memory::Held;
 use super::paths::open_file;
 use super::picture::{Picture, Samples};
 use super::picture_reader::picture_reader;
-use super::{exif, jpeg, pages};
-
-/// Longest side of a picture that is read, in pixels.
-pub const MAX_SIDE_PX: u32 = 20_000;
-/// Largest decoded picture, in bytes.
-pub const MAX_BYTES: u64 = 512 << 20;
+use super::{arrays, exif, jpeg, pages};
 
 /// Memory that a decoder needs in addition to samples, in bytes. The header must fit into it.
 const SLACK: u64 = 16 << 20;
@@ -63,7 +60,8 @@ pub(super) fn read_file_holding(path: &Path, held: &mut Held) -> Result<Vec<u8>,
     if bytes.is_empty() { Err("file is empty".into()) } else { Ok(bytes) }
 }
 
-/// Decodes PNG, JPEG, TIFF, PNM or BMP. Palettes become colour, and CMYK becomes RGB. If a file contains several
+/// Decodes PNG, JPEG, TIFF, PNM, BMP, one plane of FITS, or an array of NumPy. Palettes become colour, and CMYK becomes
+/// RGB. If a file contains several
 /// pictures, the first is decoded. `expected` is the camera's size in pixels: a picture of another size is refused
 /// before anything large is decoded.
 ///
@@ -75,12 +73,20 @@ pub fn decode(bytes: &[u8], expected: Option<(u32, u32)>) -> Result<Picture, Str
 
 /// Decodes a picture as [`decode`] does, when its memory is free.
 pub(super) fn decode_holding(bytes: &[u8], expected: Option<(u32, u32)>, held: &mut Held) -> Result<Picture, String> {
+    if let Some(array) = arrays::decode(bytes, expected, held) {
+        return array;
+    }
     let mut reader = picture_reader(Cursor::new(bytes)).map_err(|e| e.to_string())?;
     reader.limits(limits(SLACK));
-    let format = reader.format().ok_or_else(|| {
+    let format = reader.format().filter(ImageFormat::reading_enabled).ok_or_else(|| {
         let found = name_foreign(bytes).map(|name| format!("; it is {name}: convert it")).unwrap_or_default();
-        format!("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP){found}")
+        format!("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP, FITS, NumPy){found}")
     })?;
+    if format == ImageFormat::Tiff
+        && let Some(picture) = arrays::decode_wide_tiff(bytes, expected, held)
+    {
+        return picture;
+    }
     let mut decoder = reader.into_decoder().map_err(|e| explain(&e, format, SLACK))?;
     let (width, height) = decoder.dimensions();
     check_size(width, height, expected)?;
@@ -141,35 +147,16 @@ fn limits(bytes: u64) -> image::Limits {
 /// Returns the name of a format that is not supported, from the first bytes.
 fn name_foreign(bytes: &[u8]) -> Option<&'static str> {
     const FORMATS: &[(usize, &[u8], &str)] = &[
-        (0, b"SIMPLE  =", "FITS"),
         (4, b"jP  ", "JPEG 2000"),
         (0, b"\xff\x4f\xff\x51", "JPEG 2000"),
         (8, b"WEBP", "WebP"),
         (0, b"GIF8", "GIF"),
         (4, b"ftypavif", "AVIF"),
         (4, b"ftyphei", "HEIC"),
-        (0, b"\x93NUMPY", "a NumPy array"),
         (0, b"\x89HDF", "HDF5"),
         (0, b"%PDF", "PDF"),
     ];
     FORMATS.iter().find(|(at, magic, _)| bytes.get(*at..).is_some_and(|b| b.starts_with(magic))).map(|(.., name)| *name)
-}
-
-/// Refuses sizes that are zero, above the limit, or not the camera's size.
-pub(crate) fn check_size(width: u32, height: u32, expected: Option<(u32, u32)>) -> Result<(), String> {
-    if width == 0 || height == 0 {
-        return Err(format!("picture of {width}x{height} has no pixels"));
-    }
-    if width > MAX_SIDE_PX || height > MAX_SIDE_PX {
-        return Err(format!("picture of {width}x{height} is larger than the limit of {MAX_SIDE_PX} px a side"));
-    }
-    match expected {
-        Some((w, h)) if (w, h) != (width, height) => Err(format!(
-            "picture is {width}x{height} but the camera is {w}x{h} (camera.width, camera.height in sensor.toml){}",
-            if (h, w) == (width, height) { "; input.orient turns pictures" } else { "" }
-        )),
-        _ => Ok(()),
-    }
 }
 
 /// Returns whether a JPEG is truncated. JPEG decoders fill missing parts with grey, which would pass as a picture. A

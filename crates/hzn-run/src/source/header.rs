@@ -6,9 +6,9 @@ use std::path::Path;
 use image::ImageDecoder;
 use image::metadata::Orientation;
 
-use super::exif;
 use super::paths::open_file;
 use super::picture_reader::picture_reader;
+use super::{arrays, exif};
 
 /// Returns the decoder of a picture file, which has read only the header. `None` if it cannot be read.
 fn open(path: &Path) -> Option<impl ImageDecoder + use<>> {
@@ -40,7 +40,19 @@ pub(super) fn read_orientation(path: &Path) -> Option<Orientation> {
 }
 
 /// Returns whether the samples are words, from the header.
-pub(super) fn has_words(contents: impl Read + Seek) -> bool {
+pub(super) fn has_words(mut contents: impl Read + Seek) -> bool {
+    if let Some(array) = arrays::read_header(&mut contents) {
+        return array.is_ok_and(|array| array.has_words());
+    }
+    if contents.rewind().is_err() {
+        return false;
+    }
+    if arrays::wide_tiff_size(&mut contents).is_some() {
+        return true;
+    }
+    if contents.rewind().is_err() {
+        return false;
+    }
     let reader = picture_reader(contents);
     reader.ok().and_then(|reader| reader.into_decoder().ok()).is_some_and(|decoder| {
         let color = decoder.color_type();
@@ -58,6 +70,11 @@ pub(super) fn has_white_value(path: &Path) -> bool {
 }
 
 /// Returns width and height as [`read_size`] does, from the file's contents.
-pub(super) fn read_size_from(contents: impl Read + Seek) -> Option<(u32, u32)> {
-    picture_reader(contents).ok()?.into_dimensions().ok()
+pub(super) fn read_size_from(mut contents: impl Read + Seek) -> Option<(u32, u32)> {
+    if let Some(array) = arrays::read_header(&mut contents) {
+        return array.ok().map(|array| (array.width, array.height));
+    }
+    contents.rewind().ok()?;
+    let size = picture_reader(&mut contents).ok()?.into_dimensions().ok();
+    size.or_else(|| arrays::wide_tiff_size(contents.rewind().map(|()| contents).ok()?))
 }

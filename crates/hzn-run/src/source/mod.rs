@@ -2,6 +2,8 @@
 //!
 //! A [`Source`] hands out [`Item`]s in the sequence's order without decoding them. The threads decode them.
 
+mod arrays;
+mod bag;
 mod bits;
 pub mod decode;
 mod exif;
@@ -12,6 +14,7 @@ mod header;
 mod input;
 mod item;
 mod jpeg;
+mod limits;
 mod memory;
 mod natural;
 mod pages;
@@ -70,9 +73,18 @@ pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result
     {
         match ending(one).as_str() {
             "mcap" => return open_recording(one, topic),
+            "db3" | "bag" => {
+                return Err(unusable(format!("{}: is a bag of ROS; {}", one.display(), bag::conversion(one))));
+            }
             e if video::ENDINGS.contains(&e) => return Ok(Box::new(video::Video::open(one)?)),
             _ => {}
         }
+    }
+    if let [one] = inputs
+        && raw.is_none()
+        && bag::is_bag(one)
+    {
+        return Ok(Box::new(bag::Bag::open(one, topic)?));
     }
     if let ([one], Some(raw)) = (inputs, raw)
         && is_stdin(one)

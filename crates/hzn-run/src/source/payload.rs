@@ -45,10 +45,8 @@ impl Payload {
             }
             ImageFormat::Mono8 { width, height } => raw(Samples::Bytes(bytes), width, height, 1, 8),
             ImageFormat::Rgb8 { width, height } => raw(Samples::Bytes(bytes), width, height, 3, 8),
-            ImageFormat::Mono16 { width, height } => {
-                let words = bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
-                raw(Samples::Words(words), width, height, 1, 16)
-            }
+            ImageFormat::Mono16 { width, height } => raw(Samples::Words(words(&bytes)), width, height, 1, 16),
+            ImageFormat::Rgb16 { width, height } => raw(Samples::Words(words(&bytes)), width, height, 3, 16),
         }
     }
 
@@ -132,6 +130,11 @@ impl Payload {
             Self::Broken(why) => Err(why),
         }
     }
+}
+
+/// Returns the words of a message, whose lower byte comes first.
+fn words(bytes: &[u8]) -> Vec<u16> {
+    bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect()
 }
 
 /// Returns the size in pixels that the pictures of a sensor have in their files. With EXIF, each picture has its own

@@ -118,8 +118,8 @@ impl Raw {
             return Ok(());
         }
         Err(unusable(format!(
-            "raw pictures, {self}: every cell of a Bayer mosaic becomes one grey pixel; set channel = \"mean\" in [input] \
-             of sensor.toml"
+            "raw pictures, {self}: every cell of a Bayer mosaic becomes one grey pixel; set channel = \"mean\" in \
+             [input] of sensor.toml"
         )))
     }
 

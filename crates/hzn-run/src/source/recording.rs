@@ -52,6 +52,11 @@ impl Recording {
         Ok(recording)
     }
 
+    /// Returns the topic that is read.
+    pub(super) fn topic(&self) -> Option<&str> {
+        self.reader.topic()
+    }
+
     fn frame_name(&self, index: u64) -> String {
         format!("{}#{index:06}", self.name)
     }
@@ -78,6 +83,7 @@ pub(super) fn known_size(image: &EncodedImage) -> Option<(u32, u32)> {
         ImageFormat::Other(_) => None,
         ImageFormat::Mono8 { width, height }
         | ImageFormat::Rgb8 { width, height }
+        | ImageFormat::Rgb16 { width, height }
         | ImageFormat::Mono16 { width, height } => Some((width, height)),
     }
 }

@@ -23,7 +23,11 @@ pub struct FoundTone {
 /// Returns what the contents of a picture file say about its tone.
 pub(super) fn read(mut contents: impl Read + Seek) -> Option<FoundTone> {
     let found = |tone, kind| Some(FoundTone { tone, kind });
-    let format = picture_reader(&mut contents).ok()?.format()?;
+    let format = picture_reader(&mut contents).ok()?.format();
+    contents.rewind().ok()?;
+    let Some(format) = format else {
+        return if header::has_words(contents) { found(Tone::Linear, "of more than 8 bits") } else { None };
+    };
     contents.rewind().ok()?;
     if format == ImageFormat::Png
         && let Some(tone) = read_png_chunks(&mut contents)

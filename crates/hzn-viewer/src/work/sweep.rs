@@ -130,7 +130,8 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
         turns: Turns::default(),
     };
     let mut source = SequenceSource::new(sequence)?;
-    let settings = sink::Settings { config: &config, sensor_toml: &sensor_toml, durable: false, heads: &[] };
+    let settings =
+        sink::Settings { config: &config, sensor_toml: &sensor_toml, durable: false, ros: false, heads: &[] };
     let mut file = match &output {
         Some(path) => {
             let opened = sink::open(path, Existing::Replace, settings);

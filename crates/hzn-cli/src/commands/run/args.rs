@@ -46,6 +46,10 @@ pub(crate) struct Args {
     /// Leave the pictures out of an MCAP
     #[arg(long)]
     pub(super) no_images: bool,
+    /// In an MCAP, write the answers also as messages of ROS 2: the axis as geometry_msgs/Vector3Stamped on
+    /// /hzn/axis_vector, its covariance as std_msgs/Float64MultiArray on /hzn/axis_covariance
+    #[arg(long)]
+    pub(super) ros: bool,
     /// Draw the result over every picture, as PNG into this folder
     #[arg(long, value_name = "DIR")]
     pub(super) overlay: Option<PathBuf>,
@@ -75,6 +79,7 @@ impl Args {
             resume: false,
             durable: false,
             no_images: false,
+            ros: false,
             overlay: None,
             watch: false,
             jobs: None,

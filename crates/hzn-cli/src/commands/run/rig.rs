@@ -33,7 +33,8 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
     let heads: Vec<_> =
         plan.heads.iter().zip(texts).map(|(head, text)| (head.name.clone(), &head.plan.config, text)).collect();
     let Some((_, config, _)) = heads.first() else { return Err(usage(format!("{}: has no head", path.display()))) };
-    let settings = sink::Settings { config, sensor_toml: &opened.text, durable: args.durable, heads: &heads };
+    let settings =
+        sink::Settings { config, sensor_toml: &opened.text, durable: args.durable, ros: args.ros, heads: &heads };
     let (mut output, _) = Outputs::open(&args.output, args.format.into(), args.existing(), settings)?;
     let total = opened.pictures();
     let mut epochs = Epochs::new(opened.heads, opened.rig.rig.sync_s, args.source.fps);

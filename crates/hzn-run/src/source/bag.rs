@@ -1,0 +1,108 @@
+//! The folder of a bag of ROS 2: its recordings, one after another.
+
+use std::path::{Path, PathBuf};
+
+use super::item::Item;
+use super::natural;
+use super::paths::ending;
+use super::payload::Payload;
+use super::recording::Recording;
+use super::sequence::Source;
+use crate::error::{Error, unusable};
+
+/// The file that makes a folder a bag.
+const METADATA: &str = "metadata.yaml";
+
+/// Pictures of one topic in all recordings of a bag.
+pub(super) struct Bag {
+    folder: PathBuf,
+    recordings: Vec<Recording>,
+    /// Number of the recording whose pictures are handed out.
+    current: usize,
+    /// The recordings without pictures of the topic, with the reason.
+    left_out: Vec<String>,
+}
+
+/// Returns whether a folder is a bag.
+pub(super) fn is_bag(folder: &Path) -> bool {
+    folder.join(METADATA).is_file()
+}
+
+/// Returns what to do with a bag that hzn does not read.
+pub(super) fn conversion(from: &Path) -> String {
+    format!(
+        "hzn reads bags in MCAP; `pip install rosbags`, then `rosbags-convert --src {} --dst converted --dst-storage \
+         mcap` writes one",
+        from.display()
+    )
+}
+
+impl Bag {
+    pub(super) fn open(folder: &Path, topic: Option<&str>) -> Result<Self, Error> {
+        let refuse = |what: String| unusable(format!("{}: {what}", folder.display()));
+        let entries = std::fs::read_dir(folder).map_err(|e| refuse(format!("cannot be listed: {e}")))?;
+        let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        paths.sort_by(|a, b| natural::compare(a, b));
+        let (files, others): (Vec<PathBuf>, Vec<PathBuf>) = paths.into_iter().partition(|path| ending(path) == "mcap");
+        if files.is_empty() {
+            return Err(refuse(match others.iter().find(|path| ["db3", "zstd"].contains(&ending(path).as_str())) {
+                Some(path) if ending(path) == "db3" => format!("is a bag in SQLite; {}", conversion(folder)),
+                Some(path) => format!("is a bag of compressed files; `zstd -d {}` unpacks one", path.display()),
+                None => "is a bag without a recording (.mcap)".to_owned(),
+            }));
+        }
+        let mut bag = Self { folder: folder.to_owned(), recordings: Vec::new(), current: 0, left_out: Vec::new() };
+        let mut topic = topic.map(str::to_owned);
+        let mut first_error = None;
+        for path in &files {
+            match Recording::open(path, topic.as_deref()) {
+                Ok(recording) => {
+                    topic = topic.or_else(|| recording.topic().map(str::to_owned));
+                    bag.recordings.push(recording);
+                }
+                Err(e) => {
+                    bag.left_out.push(format!("{e}; this part of the bag is left out"));
+                    first_error.get_or_insert(e);
+                }
+            }
+        }
+        if bag.recordings.is_empty() {
+            Err(first_error.unwrap_or_else(|| refuse("is empty".to_owned())))
+        } else {
+            Ok(bag)
+        }
+    }
+}
+
+impl Source for Bag {
+    fn next(&mut self) -> Option<Result<Item, Error>> {
+        loop {
+            match self.recordings.get_mut(self.current)?.next() {
+                Some(item) => return Some(item),
+                None => self.current += 1,
+            }
+        }
+    }
+    fn total(&self) -> Option<u64> {
+        None
+    }
+    fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_> {
+        Box::new(self.recordings.iter().flat_map(Recording::sizes))
+    }
+    fn folder(&self) -> PathBuf {
+        self.folder.clone()
+    }
+    fn files(&self) -> Vec<PathBuf> {
+        self.recordings.iter().flat_map(Recording::files).collect()
+    }
+    fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
+        Box::new(self.recordings.iter().flat_map(Recording::samples))
+    }
+    fn describe_loss(&self) -> Option<String> {
+        self.recordings.iter().find_map(Recording::describe_loss)
+    }
+    fn notes(&self) -> Vec<String> {
+        let others = self.recordings.first().map(Recording::notes).unwrap_or_default();
+        self.left_out.iter().cloned().chain(others).collect()
+    }
+}

@@ -1,0 +1,216 @@
+"""Writes bags with other libraries, processes them with hzn, and reads the answers of hzn with these libraries.
+
+usage: check_ros.py HZN FOLDER
+
+The script makes FOLDER. `rosbags` writes a bag with the limb of a planet in each encoding of sensor_msgs/Image, and a
+bag in SQLite; `mcap-ros2-support` writes a recording of sensor_msgs/CompressedImage. Each picture must have the answer of
+the grey picture. Both libraries then read what `hzn run --ros` has written. Exits with 1 at the first difference.
+"""
+
+import csv
+import io
+import math
+import struct
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+import numpy as np
+from mcap_ros2.decoder import DecoderFactory
+from mcap_ros2.writer import Writer as Mcap
+from mcap.reader import make_reader
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+W, H, F = 320, 240, 300.0
+SENSOR = f"""preset = "hzn"
+[camera]
+width = {W}
+height = {H}
+model = "pinhole"
+fx_px = {F}
+fy_px = {F}
+cx_px = 159.5
+cy_px = 119.5
+[body]
+kind = "earth-sphere"
+altitude_km = 400.0
+limb = "height"
+"""
+IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+BASE_NS = 1_700_000_000_000_000_000
+
+
+def need(condition, message):
+    if not condition:
+        raise SystemExit(f"check_ros: {message}")
+
+
+def limb():
+    """A bright body of half-angle 70 degrees below its limb, as numbers from 20 to 200."""
+    y, x = np.mgrid[0:H, 0:W].astype(float)
+    s = math.radians(68.0)
+    u, v = (x - 159.5) / F, (y - 119.5) / F
+    cos = (v * math.sin(s) + math.cos(s)) / np.sqrt(1 + u * u + v * v)
+    px = (math.radians(70.38) - np.arccos(np.clip(cos, -1, 1))) * F
+    return 20 + 180 * np.clip(0.5 + px / 2, 0, 1)
+
+
+def encodings(grey):
+    """Returns the bytes and the row length of the picture in each encoding."""
+    byte = np.rint(grey).astype(np.uint8)
+    word = (byte.astype(np.uint16) * 257).astype("<u2")
+    stack = lambda a, n: np.repeat(a[:, :, None], n, axis=2)
+    neutral = np.full_like(byte, 128)
+    plane = np.full(H * W // 2, 128, np.uint8).tobytes()
+    yield "mono8", byte.tobytes(), W, 0
+    padded = np.hstack([byte, np.zeros((H, 12), np.uint8)])
+    yield "8UC1", padded.tobytes(), W + 12, 0
+    yield "mono16", word.tobytes(), 2 * W, 0
+    yield "16UC1", word.astype(">u2").tobytes(), 2 * W, 1
+    for name, n in [("rgb8", 3), ("bgr8", 3), ("8UC3", 3), ("rgba8", 4), ("bgra8", 4), ("8UC4", 4)]:
+        yield name, stack(byte, n).tobytes(), n * W, 0
+    for name, n in [("rgb16", 3), ("bgr16", 3), ("rgba16", 4), ("bgra16", 4), ("16UC3", 3)]:
+        yield name, stack(word, n).tobytes(), 2 * n * W, 0
+    for pattern in ("rggb", "bggr", "gbrg", "grbg"):
+        yield f"bayer_{pattern}8", byte.tobytes(), W, 0
+        yield f"bayer_{pattern}16", word.tobytes(), 2 * W, 0
+    yield "yuv422", np.dstack([neutral, byte]).tobytes(), 2 * W, 0
+    yield "yuv422_yuy2", np.dstack([byte, neutral]).tobytes(), 2 * W, 0
+    yield "nv21", byte.tobytes() + plane, W, 0
+    yield "32FC1", (250 + byte.astype("<f4") / 5).tobytes(), 4 * W, 0
+
+
+def png(grey):
+    """Returns an 8-bit grey PNG."""
+    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    rows = b"".join(b"\0" + row.tobytes() for row in np.rint(grey).astype(np.uint8))
+    head = struct.pack(">IIBBBBB", W, H, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+
+
+def write_bag(folder, store, plugin, pictures):
+    header, time, image = (store.types[n] for n in ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", IMAGE))
+    with Writer(folder, version=9, storage_plugin=plugin) as bag:
+        topic = bag.add_connection("/camera/image_raw", IMAGE, typestore=store)
+        for i, (encoding, data, step, big_endian) in enumerate(pictures):
+            ns = BASE_NS + i * 500_000_000
+            stamp = time(sec=ns // 10**9, nanosec=ns % 10**9)
+            message = image(header=header(stamp=stamp, frame_id="camera_optical_frame"), height=H, width=W,
+                            encoding=encoding, is_bigendian=big_endian, step=step,
+                            data=np.frombuffer(data, np.uint8))
+            bag.write(topic, ns + 7, store.serialize_cdr(message, IMAGE))
+
+
+def hzn(*arguments, code=0):
+    done = subprocess.run([HZN, *map(str, arguments)], capture_output=True, text=True)
+    need(done.returncode == code, f"hzn {' '.join(map(str, arguments))}: {done.returncode}: {done.stderr}")
+    return done
+
+
+def angle_deg(a, b):
+    return math.degrees(math.asin(min(1.0, float(np.linalg.norm(np.cross(a, b))))))
+
+
+def axis(row):
+    return np.array([float(row[f"axis_{k}"]) for k in "xyz"])
+
+
+def check_encodings(folder, store):
+    pictures = list(encodings(limb()))
+    write_bag(folder / "bag", store, StoragePlugin.MCAP, pictures)
+    (folder / "sensor.toml").write_text(SENSOR)
+    answers = folder / "answers.mcap"
+    # The sensor is found above the bag.
+    hzn("run", folder / "bag", "-o", answers, "-o", folder / "answers.csv", "--ros")
+    rows = list(csv.DictReader(open(folder / "answers.csv", newline="")))
+    need(len(rows) == len(pictures), f"{len(rows)} rows of {len(pictures)} pictures")
+    first = rows[0]
+    for row, (encoding, *_), i in zip(rows, pictures, range(len(rows))):
+        need(row["status"] == "ok", f"{encoding}: {row['status']} {row['detail']}")
+        need(abs(float(row["time_s"]) - BASE_NS * 1e-9 - 0.5 * i) < 1e-6, f"{encoding}: time {row['time_s']}")
+        # A mosaic becomes a little softer; everything else has the same counts but for their rounding.
+        off = angle_deg(axis(row), axis(first))
+        need(off < (0.02 if "bayer" in encoding else 0.002), f"{encoding}: {off} degrees from the grey picture")
+    return answers, rows
+
+
+def check_answers(answers, rows):
+    """Reads the messages of ROS in a recording of hzn with mcap-ros2-support."""
+    vectors, matrices = [], []
+    with open(answers, "rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        topics = ["/hzn/axis_vector", "/hzn/axis_covariance"]
+        for schema, channel, message, ros in reader.iter_decoded_messages(topics=topics):
+            if channel.topic == topics[0]:
+                need(schema.name == "geometry_msgs/msg/Vector3Stamped", schema.name)
+                need(ros.header.frame_id == "camera", ros.header.frame_id)
+                stamp = ros.header.stamp.sec + 1e-9 * ros.header.stamp.nanosec
+                vectors.append((stamp, np.array([ros.vector.x, ros.vector.y, ros.vector.z])))
+            else:
+                need([d.size for d in ros.layout.dim] == [3, 3], "layout of the covariance")
+                matrices.append(np.array(list(ros.data)).reshape(3, 3))
+    need(len(vectors) == len(matrices) == len(rows), f"{len(vectors)} vectors, {len(matrices)} matrices")
+    for (stamp, vector), matrix, row in zip(vectors, matrices, rows):
+        need(abs(stamp - float(row["time_s"])) < 1e-6, "stamp")
+        need(np.array_equal(vector, axis(row)), "axis")
+        names = [["xx", "xy", "xz"], ["xy", "yy", "yz"], ["xz", "yz", "zz"]]
+        expected = np.array([[float(row[f"cov_{name}"]) for name in line] for line in names])
+        need(np.array_equal(matrix, expected), "covariance")
+
+
+def check_bytes_of_rosbags(answers, store, rows):
+    """Reads the same bytes with rosbags, whose reader is another program."""
+    with open(answers, "rb") as file:
+        for _, channel, message in make_reader(file).iter_messages(topics=["/hzn/axis_vector"]):
+            vector = store.deserialize_cdr(message.data, "geometry_msgs/msg/Vector3Stamped").vector
+            need(np.array_equal([vector.x, vector.y, vector.z], axis(rows[0])), "axis, read by rosbags")
+            return
+
+
+def check_compressed(folder):
+    definition = "std_msgs/Header header\nstring format\nuint8[] data\n" + "=" * 80 + (
+        "\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" + "=" * 80
+        + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n")
+    path = folder / "compressed.mcap"
+    with open(path, "wb") as file:
+        writer = Mcap(file)
+        schema = writer.register_msgdef(COMPRESSED, definition)
+        for i in range(2):
+            header = {"stamp": {"sec": 5 + i, "nanosec": 250_000_000}, "frame_id": "camera"}
+            message = {"header": header, "format": "mono8; png compressed mono8", "data": png(limb())}
+            writer.write_message("/camera/image/compressed", schema, message, log_time=9 * 10**9 + i)
+        writer.finish()
+    rows = list(csv.DictReader(io.StringIO(hzn("run", path, "-q").stdout)))
+    need([(r["status"], r["time_s"]) for r in rows] == [("ok", "5.25"), ("ok", "6.25")], f"compressed: {rows}")
+
+
+def check_refused(folder, store):
+    write_bag(folder / "sqlite", store, StoragePlugin.SQLITE3, list(encodings(limb()))[:1])
+    for path in [folder / "sqlite", next((folder / "sqlite").glob("*.db3"))]:
+        said = hzn("run", path, code=2).stderr
+        need("rosbags-convert --src" in said, said)
+    # The command that the message names works.
+    program = Path(sys.executable).with_name("rosbags-convert")
+    source, target = folder / "sqlite", folder / "converted"
+    subprocess.run([program, "--src", source, "--dst", target, "--dst-storage", "mcap"], check=True, capture_output=True)
+    rows = list(csv.DictReader(io.StringIO(hzn("run", target, "-q").stdout)))
+    need([r["status"] for r in rows] == ["ok"], f"converted bag: {rows}")
+
+
+def main():
+    folder = Path(sys.argv[2])
+    folder.mkdir(parents=True)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    answers, rows = check_encodings(folder, store)
+    check_answers(answers, rows)
+    check_bytes_of_rosbags(answers, store, rows)
+    check_compressed(folder)
+    check_refused(folder, store)
+    print(f"check_ros: {len(rows)} encodings, 2 compressed pictures, and the answers as messages of ROS are right")
+
+
+if __name__ == "__main__":
+    HZN = sys.argv[1]
+    main()
