@@ -9,7 +9,7 @@ use hzn_sim::{Look, Pose};
 
 /// Distance from the centre of the Earth, above the equator, and the semi-axes of WGS-84; km.
 const DISTANCE_KM: f64 = 42_164.0;
-const AXES_KM: [f64; 3] = [6378.137, 6378.137, 6356.752_314];
+const AXES_KM: [f64; 3] = [6378.137, 6378.137, 6_356.752_314];
 /// Angle of a pixel in the full disc of such a satellite, radians.
 const PIXEL_RAD: f64 = 56e-6;
 const WIDTH: u16 = 5424;
@@ -23,7 +23,7 @@ struct Disc {
 
 /// Draws the disc `scale` times as large as that of the satellite, about the centre of the picture plus `shift_px`.
 fn draw(scale: f64, shift_px: [f64; 2]) -> Disc {
-    let mut lens = camera::Config::ideal(Model::Equidistant, WIDTH.into(), WIDTH.into(), scale / PIXEL_RAD);
+    let mut lens = camera::Config::ideal(Model::Equidistant, WIDTH, WIDTH, scale / PIXEL_RAD);
     (lens.cx_px, lens.cy_px) = (lens.cx_px + shift_px[0], lens.cy_px + shift_px[1]);
     let look_to = Look { azimuth_rad: 0.3, depression_rad: 89.999f64.to_radians(), roll_rad: 0.2 };
     let pose = Pose::looking([DISTANCE_KM * 1e3, 0.0, 0.0], look_to);

@@ -6,6 +6,7 @@ mod expected;
 mod kind;
 mod limb;
 mod lit;
+mod measured;
 mod planets;
 mod position;
 mod prior;
