@@ -143,7 +143,7 @@ pub fn words_from_floats(values: &[f64]) -> Result<Vec<u16>, String> {
     let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
     let [least, largest] = ROOM.map(f64::from);
     let scale = (largest - least) / (high - low);
-    if !(high > low && scale.is_finite()) {
+    if !(high > low && scale > 0.0 && scale.is_finite()) {
         return Err("every number of the picture is the same, or not finite".to_owned());
     }
     let word = |value: &f64| if value.is_finite() { least + (value - low) * scale } else { least };

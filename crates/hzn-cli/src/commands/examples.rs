@@ -84,6 +84,13 @@ hzn calibrate sky flight/ --also k1 -o report.html    one more parameter, and a 
     ),
     ("calibrate check", "hzn calibrate check flight/        whether the calibration still holds"),
     ("calibrate noise", "hzn calibrate noise flight/ -o sensor-calibrated.toml -o noise.html"),
+    ("calibrate mount", "hzn calibrate mount flight nav.csv --told left/sensor.toml --name left -o mount.toml"),
+    ("calibrate mount kalibr", "hzn calibrate mount kalibr a.yaml b.yaml c.yaml --camera cam0 -o mount.toml"),
+    ("calibrate mount flight", "hzn calibrate mount flight nav.csv --told left/sensor.toml -o mount.toml"),
+    (
+        "calibrate mount board",
+        "hzn calibrate mount board tilts/ --board 9x6 --lens sensor.toml --tilt tilt.csv -o mount.toml",
+    ),
     ("camera", "hzn camera show sensor.toml                     lens table and expected limb"),
     (
         "camera show",

@@ -42,6 +42,8 @@ struct Lowest<T> {
 impl<T: Real> Lowest<T> {
     /// Returns the next threshold of `parts` that may be used. `looked` is the lowest threshold that was used.
     fn next(&self, parts: &mut core::slice::Iter<'_, f64>, first: &Level<T>, looked: u16) -> Option<u16> {
+        // The threshold of the dark pixels themselves is only for discs, which raise it.
+        let parts = parts.filter(|&&part| part > 0.0 || self.raised > 0);
         parts.map(|&part| first.at_fraction(part).max(self.raised)).find(|&level| {
             let is_new = level != self.raised || level < looked;
             is_new && T::from_i32(level.into()) >= self.counts

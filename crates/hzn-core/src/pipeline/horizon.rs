@@ -196,7 +196,7 @@ fn remembered<T: Real>(levels: &[Option<u16>; MAX_BODIES], expected: &Expected<T
     Expected { level: expected.level.or(last), ..*expected }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "std"))]
 mod tests {
     use super::*;
     use crate::geometry::camera;

@@ -34,8 +34,6 @@ enum From {
     ///
     /// Kalibr states no sigma of T_cam_imu. Three or more calibrations of the same camera give it by their scatter; for
     /// fewer, --sigma-deg says it.
-    ///
-    ///   hzn calibrate mount kalibr first.yaml second.yaml third.yaml --camera cam0 --name left -o left-mount.toml
     Kalibr {
         /// camchain-imucam files of one camera
         #[arg(required = true, value_name = "YAML")]
@@ -53,8 +51,6 @@ enum From {
         output: OutputArgs,
     },
     /// From an earlier flight: the results of hzn fuse (nav.csv or nav.mcap) and the mount that it was told
-    ///
-    ///   hzn calibrate mount flight nav.csv --told left/sensor.toml --name left -o left-mount.toml
     Flight {
         /// What `hzn fuse -o` wrote
         #[arg(value_name = "NAV")]
@@ -70,8 +66,6 @@ enum From {
     /// The accelerometers tell the direction up in each tilt. Tilt the vehicle by 20 degrees or more, about two
     /// different axes; the board needs to be neither level nor upright. TILT.csv has the columns file, accel_x_mps2,
     /// accel_y_mps2, accel_z_mps2: the name of each picture, and the mean specific force along the vehicle's axes.
-    ///
-    ///   hzn calibrate mount board tilts/ --board 9x6 --lens sensor.toml --tilt tilt.csv --name left -o left-mount.toml
     Board {
         /// Pictures, a folder, or a pattern in quotes
         #[arg(required = true, value_name = "PICTURES")]

@@ -31,11 +31,13 @@ struct Sector<T> {
     /// Σ of the robust weights, and of the squared distances times these weights, px².
     weight: T,
     cost: T,
+    /// Number of points.
+    points: i32,
 }
 
 impl<T: Real> Sector<T> {
     fn new() -> Self {
-        Self { normal: [T::ZERO; 6], right: V3::zeros(), weight: T::ZERO, cost: T::ZERO }
+        Self { normal: [T::ZERO; 6], right: V3::zeros(), weight: T::ZERO, cost: T::ZERO, points: 0 }
     }
 
     fn add(&mut self, other: &Self) {
@@ -43,6 +45,15 @@ impl<T: Real> Sector<T> {
         self.right += other.right;
         self.weight += other.weight;
         self.cost += other.cost;
+        self.points += other.points;
+    }
+
+    /// Returns the mean square distance of the points from a cone that they determined, px². The three unknowns of a
+    /// cone take as many degrees of freedom: a half with few points fits well by chance.
+    fn mean_square(&self, cost: T) -> Option<T> {
+        let freedom = self.points - 3;
+        let points = T::from_i32(self.points);
+        (freedom > 0 && self.weight > T::ZERO).then(|| cost / self.weight * points / T::from_i32(freedom))
     }
 
     /// Returns the step (δ₁₂, δc) from the whole cone to that of this half, and the mean square distance after it, px².
@@ -51,7 +62,7 @@ impl<T: Real> Sector<T> {
         let [m1, m2] = fit.mean;
         let (g, about_mean) = (self.right, step.z - m1 * step.x - m2 * step.y);
         let gain = g.x * step.x + g.y * step.y + g.z * about_mean;
-        Some((step, (self.cost - gain).max(T::ZERO) / self.weight.max(T::from_f64(1e-20))))
+        Some((step, self.mean_square((self.cost - gain).max(T::ZERO))?))
     }
 }
 
@@ -84,15 +95,19 @@ fn to_best_half<T: Real>(blocks: &[Block<T>], fit: &Fit<T>) -> Option<V3<T>> {
     let mut whole = Sector::new();
     part(blocks, fit).for_each(|row| {
         let (r, cost) = row.residual(fit);
-        let mut one = Sector { right: row.h * r, weight: row.weight, cost, ..Sector::new() };
+        let mut one = Sector { right: row.h * r, weight: row.weight, cost, points: 1, ..Sector::new() };
         row.add_to(&mut one.normal);
         whole.add(&one);
         if let Some(sector) = sectors.get_mut(sector(row.x, row.y)) {
             sector.add(&one);
         }
     });
+    // Limb and terminator together are closed. An arc of a limb has no other side.
+    if sectors.iter().any(|sector| sector.points == 0) {
+        return None;
+    }
     let least_weight = whole.weight * T::from_f64(LEAST_WEIGHT);
-    let mut best = (None, whole.cost / whole.weight.max(T::from_f64(1e-20)) * T::from_f64(MAX_COST));
+    let mut best = (None, whole.mean_square(whole.cost)? * T::from_f64(MAX_COST));
     for first in 0..SECTORS {
         let mut half = Sector::new();
         sectors.iter().cycle().skip(first).take(SECTORS / 2).for_each(|sector| half.add(sector));
