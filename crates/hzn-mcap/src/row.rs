@@ -314,7 +314,8 @@ impl Row {
         }
     }
 
-    /// Sets the protection level of an answer with `p_limb`, from its multiple of `sigma_max_deg`; a body without one has none.
+    /// Sets the protection level of an answer with `p_limb`, from its multiple of `sigma_max_deg`; a body without one
+    /// has none.
     #[must_use]
     pub fn with_protection(self, factor: Option<f64>) -> Self {
         let sigma_deg = self.p_limb.and(self.sigma_max_deg);

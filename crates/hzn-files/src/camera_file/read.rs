@@ -50,8 +50,8 @@ pub fn parse_any(text: &str, path: &Path, choice: Choice<'_>) -> Result<CameraFi
         let turned = Problem::new(
             path,
             format!(
-                "the axes of OCamCalib are turned by {:.3} deg about the optical axis against those of the picture, which \
-             the lens here has; a mount that was measured with OCamCalib's axes needs this turn",
+                "the axes of OCamCalib are turned by {:.3} deg about the optical axis against those of the picture, \
+             which the lens here has; a mount that was measured with OCamCalib's axes needs this turn",
                 lens.turn_rad.to_degrees()
             ),
         );
@@ -230,8 +230,8 @@ mod tests {
         let error = |text: String| read(&text).unwrap_err();
         assert_eq!(
             eight("0.2").unwrap_err(),
-            "cam.yaml: OpenCV's lens with more than five coefficients is a lens that hzn does not have. Fit one of hzn's \
-             to it:  hzn camera convert FILE --model brown-conrady -o sensor.toml  states the error"
+            "cam.yaml: OpenCV's lens with more than five coefficients is a lens that hzn does not have. Fit one of \
+             hzn's to it:  hzn camera convert FILE --model brown-conrady -o sensor.toml  states the error"
         );
         let seven = written("rational_polynomial", &format!("{four}, 0.1, 0, 0.2"), 7);
         assert!(read(&seven).unwrap_err().contains("7 coefficients, but hzn supports five of this lens"));

@@ -17,8 +17,8 @@ fn foreign(text: &str) -> Foreign {
 }
 
 const OCAM: &str = "#polynomial coefficients for the DIRECT mapping function (ocam_model.ss in MATLAB).\n\n5 -2.5e+02 \
-                    0.0 1.5e-03 -3.0e-06 9.0e-09 \n\n#polynomial coefficients for the inverse mapping function\n\n2 400.0 \
-                    200.0 \n\n#center: \"row\" and \"column\", starting from 0 (C convention)\n\n241.75 \
+                    0.0 1.5e-03 -3.0e-06 9.0e-09 \n\n#polynomial coefficients for the inverse mapping function\n\n2 \
+                    400.0 200.0 \n\n#center: \"row\" and \"column\", starting from 0 (C convention)\n\n241.75 \
                     318.5\n\n#affine parameters \"c\", \"d\", \"e\"\n\n0.9990 0.0004 -0.0003\n\n#image size: \
                     \"height\" and \"width\"\n\n480 640\n";
 

@@ -132,8 +132,8 @@ impl Solved {
         Some(Self { corrections: x, inverse, residuals })
     }
 
-    /// Returns the scatter of the residuals as a 1-sigma, at least that of the edge noise. The residuals are smaller than
-    /// the errors by what the unknowns took.
+    /// Returns the scatter of the residuals as a 1-sigma, at least that of the edge noise. The residuals are smaller
+    /// than the errors by what the unknowns took.
     fn scatter(&self, unknowns: usize) -> f64 {
         let mut sizes: Vec<f64> = self.residuals.iter().map(|r| r.abs()).collect();
         sizes.sort_by(f64::total_cmp);

@@ -20,8 +20,8 @@ use crate::tell;
 /// Find how a camera is mounted on its vehicle, with the sigma, for sensor.toml and fuse.toml
 ///
 /// The vehicle's axes are those of the inertial unit. The result is the table [mount] (-o mount.toml), which belongs
-/// into the sensor.toml or to --mount of hzn fuse, and the sigmas of mount and clock as settings of the camera for hzn fuse
-/// (--fuse fuse.toml).
+/// into the sensor.toml or to --mount of hzn fuse, and the sigmas of mount and clock as settings of the camera for
+/// hzn fuse (--fuse fuse.toml).
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     #[command(subcommand)]

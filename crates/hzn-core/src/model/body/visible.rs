@@ -13,8 +13,8 @@ const SIGMA_KM: f64 = 4.6;
 
 impl Config {
     /// Sets the height of the visible limb to that in pictures of this tone, if [`Self::limb`] is [`Limb::Visible`] and
-    /// if the height is still the default; and the sigma, too, if it is still the default. A height that somebody measured or set already is that
-    /// of the pictures.
+    /// if the height is still the default; and the sigma, too, if it is still the default. A height that somebody
+    /// measured or set already is that of the pictures.
     ///
     /// The light of the air falls by a factor of e over its scale height h. If half of the counts is the fraction l of
     /// the light, the limb lies h ln(0.5/l) higher than the limb at half of the light. Overexposure follows the same
