@@ -1,6 +1,7 @@
 //! The results of a rig: which rows are compared with which truth.
 
-use std::collections::BTreeSet;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeSet, HashMap};
 
 use hzn_files::rig::JOINT;
 use hzn_files::truth::Truth;
@@ -31,21 +32,53 @@ pub fn are_joint(rows: &[Row]) -> bool {
 }
 
 /// Gives the rows of the joint answer the names of the truth's rows that are nearest in time. A row has the name of its
-/// first head's picture, and another head's if that one has none, but an epoch is one row of the truth.
-pub fn name_by_time(rows: &mut [Row], truth: &[Truth]) {
+/// first head's picture, and another head's if that one has none, but an epoch is one row of the truth. A late head gives
+/// a second epoch near that row, so the epoch with the most heads is kept, and the nearest one of several. Returns the
+/// number of the others, which are removed.
+pub fn name_by_time(rows: &mut Vec<Row>, truth: &[Truth]) -> usize {
     let mut times: Vec<(f64, &str)> = truth.iter().map(|t| (t.time_s, t.file.as_str())).collect();
     times.sort_by(|a, b| a.0.total_cmp(&b.0));
     times.dedup_by(|a, b| a.0 == b.0);
     let step_s = times.windows(2).map(|w| w[1].0 - w[0].0).fold(f64::INFINITY, f64::min);
-    for row in rows {
+    let mut kept: HashMap<(String, String), ((usize, f64), usize)> = HashMap::new();
+    let mut is_kept = vec![true; rows.len()];
+    for (i, row) in rows.iter_mut().enumerate() {
         let Some(time_s) = row.time_s else { continue };
         let after = times.partition_point(|(t, _)| *t < time_s);
         let near = [after.checked_sub(1), Some(after)].into_iter().flatten().filter_map(|i| times.get(i));
         let nearest = near.min_by(|a, b| (a.0 - time_s).abs().total_cmp(&(b.0 - time_s).abs()));
-        if let Some((_, file)) = nearest.filter(|(t, _)| (t - time_s).abs() < 0.5 * step_s) {
-            row.file = (*file).to_owned();
+        let Some((t, file)) = nearest.filter(|(t, _)| (t - time_s).abs() < 0.5 * step_s) else { continue };
+        row.file = (*file).to_owned();
+        let heads = row.heads_used.as_deref().map_or(0, |names| names.split(' ').count());
+        // More heads first, then a smaller distance.
+        let rank = (heads, -(t - time_s).abs());
+        let removed = match kept.entry((row.file.clone(), row.body.clone())) {
+            Entry::Vacant(place) => {
+                place.insert((rank, i));
+                continue;
+            }
+            Entry::Occupied(mut place) if place.get().0 < rank => place.insert((rank, i)).1,
+            Entry::Occupied(_) => i,
+        };
+        if let Some(is_kept) = is_kept.get_mut(removed) {
+            *is_kept = false;
         }
     }
+    let before = rows.len();
+    let mut is_kept = is_kept.into_iter();
+    rows.retain(|_| is_kept.next().unwrap_or(true));
+    before - rows.len()
+}
+
+/// Returns what to tell the user about epochs that [`name_by_time`] removed; `None` if there are none.
+pub fn describe_removed(removed: usize) -> Option<String> {
+    let epochs = if removed == 1 { "1 epoch was" } else { &format!("{removed} epochs were") };
+    (removed > 0).then(|| {
+        format!(
+            "{epochs} left out of the comparison, because another epoch near the same row of the truth has more heads \
+             or is nearer in time: is a head late?"
+        )
+    })
 }
 
 #[cfg(test)]
@@ -73,8 +106,25 @@ mod tests {
     #[test]
     fn an_epoch_has_the_name_of_the_truth_at_its_time() {
         let truth = |file: &str, time_s: f64| Truth { file: file.into(), time_s, ..Truth::default() };
-        let mut rows = [row(Some("rig"), "right-1", 1.04), row(Some("rig"), "left-2", 2.6)];
-        name_by_time(&mut rows, &[truth("left-0", 0.0), truth("left-1", 1.0), truth("left-2", 2.0)]);
-        assert_eq!(rows.map(|row| row.file), ["left-1".to_owned(), "left-2".to_owned()]);
+        let mut rows = vec![row(Some("rig"), "right-1", 1.04), row(Some("rig"), "left-2", 2.6)];
+        let truth = [truth("left-0", 0.0), truth("left-1", 1.0), truth("left-2", 2.0)];
+        assert_eq!(name_by_time(&mut rows, &truth), 0);
+        assert_eq!(rows.iter().map(|row| row.file.as_str()).collect::<Vec<_>>(), ["left-1", "left-2"]);
+        // A late head is an epoch of its own, before or after the one with the other heads.
+        let with = |heads: &str, time_s| Row { heads_used: Some(heads.into()), ..row(Some("rig"), "a", time_s) };
+        let mut rows = vec![
+            with("a b c", 0.0),
+            with("d", 0.3),
+            with("d", 1.0),
+            with("a b c", 1.1),
+            with("a", 2.2),
+            with("b", 2.1),
+            row(Some("rig"), "a", 2.0),
+        ];
+        assert_eq!(name_by_time(&mut rows, &truth), 4);
+        let left: Vec<_> = rows.iter().map(|row| (row.file.as_str(), row.time_s)).collect();
+        assert_eq!(left, [("left-0", Some(0.0)), ("left-1", Some(1.1)), ("left-2", Some(2.1))]);
+        assert!(describe_removed(4).is_some_and(|text| text.starts_with("4 epochs were left out")));
+        assert_eq!(describe_removed(0), None);
     }
 }

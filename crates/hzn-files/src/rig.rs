@@ -251,10 +251,17 @@ fn find_bad_name(name: &str) -> Option<&'static str> {
     if name == JOINT {
         return Some("is the name of the joint answer in the column `head`; choose another one");
     }
-    let is_plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
-    let is_good = !name.is_empty() && name.chars().all(is_plain);
-    (!is_good).then_some("is not a name: use letters, digits, _ and -")
+    if RESERVED.contains(&name) {
+        return Some("is the name of another frame of a recording; choose another one");
+    }
+    let is_plain = |c: char| c.is_alphanumeric() || c == '_';
+    let is_good = name.starts_with(is_plain) && name.chars().all(|c| is_plain(c) || c == '-');
+    // A spreadsheet takes a cell that begins with - for a formula.
+    (!is_good).then_some("is not a name: use letters, digits, _ and -, and begin with no -")
 }
+
+/// The frames that a recording of a rig has besides those of the heads, which have the names of the heads.
+const RESERVED: [&str; 2] = ["vehicle", "fixed"];
 
 /// The value of the column `head` for the joint answer.
 pub const JOINT: &str = "rig";
@@ -330,7 +337,12 @@ mod tests {
         );
         let refused = "is the name of the joint answer in the column `head`; choose another one";
         assert_eq!(with("\"right\"", "\"rig\""), format!("rig.toml:6: [[head]] 2 name: \"rig\" {refused}"));
-        assert!(with("\"right\"", "\"the right\"").contains("use letters, digits, _ and -"));
+        for bad in ["the right", "-right", "", "=a"] {
+            assert!(with("\"right\"", &format!("\"{bad}\"")).contains("use letters, digits, _ and -"), "{bad}");
+        }
+        for reserved in ["vehicle", "fixed"] {
+            assert!(with("\"right\"", &format!("\"{reserved}\"")).contains("is the name of another frame"));
+        }
         let quaternion = "2 is refused: the quaternion's squared length must be 1 (scalar first)";
         assert_eq!(
             with("[0, 0, 0, 1]", "[0, 1, 0, 1]"),

@@ -66,7 +66,7 @@ impl Rig {
         let file = rig::Rig { rig: common, heads: names.iter().zip(mounts).map(head).collect() };
         let states: Vec<_> = sensors.iter().map(|sensor| sensor.get().state()).collect();
         let configs = states.iter().map(|state| &state.config);
-        let joiner = Joiner::new(&file, configs, None).map_err(errors::config)?;
+        let joiner = Joiner::new(&file, configs).map_err(errors::config)?;
         Ok(Self { sensors, names, joiner })
     }
 
@@ -134,6 +134,7 @@ impl Rig {
             reports.set_item(name, Bound::new(py, report)?)?;
         }
         let seen: Vec<Seen<'_>> = frames.iter().map(|frame| Seen::new(frame.as_ref(), false)).collect();
+        self.joiner.check_times(&seen).map_err(errors::config)?;
         let all = PyDict::new(py);
         all.set_item(JOINT, Bound::new(py, Report::from_row(self.joiner.join(0, &seen)))?)?;
         all.update(reports.as_mapping())?;

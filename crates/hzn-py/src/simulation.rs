@@ -195,7 +195,8 @@ pub(crate) fn evaluate<'py>(
             camera = camera.or(recorded.map(|s| s.config.camera));
             let mut rows = heads::select(rows, None).map_err(errors::config)?;
             if heads::are_joint(&rows) {
-                heads::name_by_time(&mut rows, &truth);
+                let removed = heads::describe_removed(heads::name_by_time(&mut rows, &truth));
+                removed.map_or(Ok(()), |what| errors::warn(py, what))?;
             }
             rows
         }

@@ -296,6 +296,13 @@ def test_a_replaced_picture_is_noticed(client, archive, small, tmp_path, format)
     assert sorted(path.name for path in out.iterdir()) == sorted(os.path.basename(shard) for shard in third.shards)
 
 
+def test_texts_are_texts_in_parquet_even_where_all_are_empty(client, archive, small, tmp_path):
+    result = process_archive(archive[:2], small, client=client, out=str(tmp_path))
+    schema = parquet.read_schema(result.shards[0].removeprefix("file://"))
+    for name in ("file", "body", "status", "detail", "head", "heads_used", "heads_excluded"):
+        assert str(schema.field(name).type) == "string", name
+
+
 def test_csv_shards_are_those_of_parquet(client, archive, small, tmp_path):
     both = [
         process_archive(archive[60:90], small, client=client, out=f"{tmp_path}/{kind}", shard_frames=20, format=kind)
@@ -314,8 +321,8 @@ def test_csv_shards_are_those_of_parquet(client, archive, small, tmp_path):
 
 
 def test_texts_of_csv_are_no_formulas(tmp_path, small):
-    texts = ["=1+1", "-2.png", "+a", "@b", "'=c", "'", "'d", "plain", ""]
-    written = ["'=1+1", "'-2.png", "'+a", "'@b", "''=c", "'", "'d", "plain", ""]
+    texts = ["=1+1", "-2.png", "+a", "@b", "'=c", "\t=1", "\r=1", "'", "'d", "plain", ""]
+    written = ["'=1+1", "'-2.png", "'+a", "'@b", "''=c", "'\t=1", "'\r=1", "'", "'d", "plain", ""]
     assert [_shards._guarded(text) for text in texts] == written
     assert [_shards._unguarded(cell) for cell in written] == texts
     report = _shards._process_encoded(small, 0, "=lost.png", None, "-why", hzn._hzn._Prior())

@@ -448,3 +448,9 @@ def test_a_rig_joins_its_heads(sensor):
         hzn.Rig([sensor, sensor], mounts=mounts[:1])
     with pytest.raises(hzn.ConfigError, match=r"\[\[head\]\] 2 mount.q_rig_from_camera_wxyz"):
         hzn.Rig([sensor, sensor], mounts=[mounts[0], [1.0, 1.0, 0.0, 0.0]])
+    moon = hzn.Sensor(camera=CAMERA, body={"kind": "moon"})
+    with pytest.raises(hzn.ConfigError, match="left looks for earth.* and right for moon"):
+        hzn.Rig([sensor, moon], mounts=mounts, names=["left", "right"])
+    known = hzn.Sensor(camera=CAMERA, body={"altitude_km": 400.0}, fit={"half_angle": "known"})
+    with pytest.raises(hzn.ConfigError, match='head head1: fit.half_angle is "known"'):
+        hzn.Rig([sensor, known], mounts=mounts)

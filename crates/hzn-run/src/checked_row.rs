@@ -20,8 +20,8 @@ pub(crate) fn header() -> String {
     format!("{},{COLUMN}\n", Row::COLUMNS.join(","))
 }
 
-/// Characters with which a spreadsheet begins a formula.
-const FORMULA: [char; 4] = ['=', '+', '-', '@'];
+/// Characters with which a spreadsheet begins a formula. Some skip a tab or a carriage return before it.
+const FORMULA: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 
 /// Returns whether a spreadsheet would compute a text, or whether it looks like a [`guarded`] one.
 fn needs_guard(text: &str) -> bool {
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_spreadsheet_computes_no_text() {
-        let begins = ["=1+1", "+1", "-1", "@sum", "'=1", "''-", "'", "'a", "", "-", "a=1", "''"];
+        let begins = ["=1+1", "+1", "-1", "@sum", "'=1", "''-", "'", "'a", "", "-", "a=1", "''", "\t=1", "\r=1", "'\t"];
         for (file, detail) in begins.iter().flat_map(|file| begins.iter().map(move |detail| (file, detail))) {
             let row = Row { file: (*file).to_owned(), detail: (*detail).to_owned(), axis_x: Some(-0.5), ..row() };
             let line = csv_line(&row).unwrap();
@@ -193,7 +193,8 @@ mod tests {
             // Numbers stay numbers, and JSON is read by no spreadsheet.
             assert_eq!(cell("axis_x"), "-0.5");
             assert_eq!(from_json(&json_line(&row).unwrap()).as_ref(), Ok(&row));
-            assert!(String::from_utf8(json_line(&row).unwrap()).unwrap().contains(&format!("\"file\":\"{file}\"")));
+            let written = format!("\"file\":{}", serde_json::to_string(file).unwrap());
+            assert!(String::from_utf8(json_line(&row).unwrap()).unwrap().contains(&written));
         }
     }
 

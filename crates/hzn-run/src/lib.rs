@@ -29,6 +29,7 @@ pub mod rig;
 pub mod sink;
 pub mod source;
 pub mod start;
+mod tangent;
 pub mod terminal;
 
 pub use error::{Error, Kind, Remedy};

@@ -120,6 +120,11 @@ fn a_lost_head_costs_only_itself_and_a_frozen_one_is_excluded() {
     };
     assert!(same("right", "0") && same("back", "0") && same("front", "1") && same("left", "2") && same("right", "3"));
     assert_eq!(heads.len(), 15);
+    // A dark picture has no noise: the second of two is dark, too, and not frozen.
+    fs::copy(file("back", 2), file("back", 3)).unwrap();
+    let (joint, _) = run(&place, &[], 3);
+    assert!(cell(&joint[3], "detail").contains(&format!("back: {dark}")), "{}", cell(&joint[3], "detail"));
+    assert_eq!(cell(&joint[3], "heads_excluded"), "left");
 }
 
 #[test]
@@ -168,4 +173,139 @@ fn errors_name_the_head_and_no_input_is_an_output() {
     place.write("ring/back/sensor.toml", sensor.as_bytes());
     fs::remove_dir_all(place.path("ring/right")).unwrap();
     place.run(&["run", "ring/rig.toml"]).expect(2).says("head right: ");
+}
+
+/// Changes the cells of a column of a table: `change` gets the row's number and the cell.
+fn edit(place: &Place, path: &str, column: &str, change: impl Fn(usize, &str) -> String) {
+    let text = place.read(path);
+    let mut lines = text.lines();
+    let header = lines.next().unwrap();
+    let k = header.split(',').position(|name| name == column).unwrap();
+    let mut out = format!("{header}\n");
+    for (i, line) in lines.enumerate() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        cells[k] = change(i, &cells[k]);
+        out.push_str(&(cells.join(",") + "\n"));
+    }
+    place.write(path, out.as_bytes());
+}
+
+fn shifted(cell: &str, by: f64) -> String {
+    format!("{}", cell.parse::<f64>().unwrap() + by)
+}
+
+#[test]
+fn pictures_without_times_are_not_paired_by_their_count() {
+    let place = ring();
+    fs::remove_file(place.path("ring/left/frames.csv")).unwrap();
+    fs::remove_file(place.path("ring/left/left-00001.png")).unwrap();
+    let says = "head left: the pictures have no times, which a rig needs to pair them; give a frames.csv with time_s";
+    place.run(&["run", "ring/rig.toml", "-o", "out.csv"]).expect(2).says(says);
+    assert!(!place.path("out.csv").exists() && !place.path("out.csv.part").exists());
+}
+
+#[test]
+fn a_vehicle_table_with_another_clock_is_told() {
+    let place = ring();
+    edit(&place, "ring/frames.csv", "time_s", |_, cell| shifted(cell, 0.4));
+    let ran = place.run(&["run", "ring/rig.toml", "-q"]).expect(3);
+    ran.says("16 pictures of the heads front, right, back, left had no row in ring/frames.csv at most 0.1 s away")
+        .says("the smallest distance is 0.400 s")
+        .says("of 16 pictures: 16 without an altitude, not processed");
+    // One row that fits is used.
+    edit(&place, "ring/frames.csv", "time_s", |i, cell| shifted(cell, if i == 2 { -0.45 } else { 0.0 }));
+    let ran = place.run(&["run", "ring/rig.toml", "-q"]).expect(3);
+    ran.says("12 pictures of the heads");
+}
+
+#[test]
+fn a_time_out_of_order_costs_only_the_pair_of_its_picture() {
+    let place = ring();
+    let (good, _) = run(&place, &[], 0);
+    let table = place.read("ring/left/frames.csv");
+    let end: f64 = table.lines().nth(4).unwrap().split(',').nth(1).unwrap().parse().unwrap();
+    // A time that is too early at the end and between others, and one that is far too late.
+    for (row, time_s) in [(3, 0.5 * end), (2, 1.0), (1, 10.0 * end), (0, 20.0 * end)] {
+        place.write("ring/left/frames.csv", table.as_bytes());
+        edit(
+            &place,
+            "ring/left/frames.csv",
+            "time_s",
+            |i, cell| if i == row { time_s.to_string() } else { cell.into() },
+        );
+        let ran = place.run(&["run", "ring/rig.toml", "-o", "out.csv", "--force"]).expect(3);
+        ran.says("head left: 1 picture out of the order of time, first left-0000")
+            .says("such a picture is paired with none");
+        let rows = place.rows("out.csv");
+        let joint: Vec<_> = rows.iter().filter(|row| cell(row, "head") == "rig").collect();
+        assert_eq!((joint.len(), rows.len()), (5, 16 + 5));
+        let full = joint.iter().filter(|row| cell(row, "heads_used") == "front right back left").count();
+        assert_eq!(full, 3, "{row}");
+        let same = |row: &&Vec<(String, String)>| good.iter().any(|other| cell(other, "axis_x") == cell(row, "axis_x"));
+        assert_eq!(joint.iter().filter(|row| same(row)).count(), 3);
+    }
+}
+
+#[test]
+fn a_head_without_a_half_angle_of_its_own_is_refused() {
+    let place = ring();
+    let sensor = place.read("ring/back/sensor.toml");
+    let fit = if sensor.contains("[fit]") {
+        sensor.replace("[fit]", "[fit]\nhalf_angle = \"known\"")
+    } else {
+        format!("{sensor}\n[fit]\nhalf_angle = \"known\"\n")
+    };
+    place.write("ring/back/sensor.toml", fit.as_bytes());
+    place.run(&["run", "ring/rig.toml"]).expect(2).says("head back: fit.half_angle is \"known\"");
+    // One head alone needs no half-angle of its own.
+    let text = place.read("ring/rig.toml");
+    let parts: Vec<&str> = text.split("[[head]]").collect();
+    place.write("ring/rig.toml", format!("{}[[head]]{}", parts[0], parts[3]).as_bytes());
+    let (joint, _) = run(&place, &[], 0);
+    assert!(joint.iter().all(|row| cell(row, "heads_used") == "back"));
+}
+
+#[test]
+fn a_heads_own_rate_turns_its_answer_to_the_time_of_the_epoch() {
+    let place = ring();
+    // The pictures of a head are 0.08 s after those of the others, on a vehicle that turns about its z axis.
+    edit(&place, "ring/left/frames.csv", "time_s", |_, cell| shifted(cell, 0.08));
+    let still = place.read("ring/frames.csv");
+    fs::remove_file(place.path("ring/frames.csv")).unwrap();
+    let (without, _) = run(&place, &[], 0);
+    // The vehicle turns at 0.02 rad/s about its x axis.
+    place.write("ring/frames.csv", still.as_bytes());
+    let (untold, _) = run(&place, &[], 0);
+    for (column, rate) in [("rate_x", "0.02"), ("rate_y", "0"), ("rate_z", "0")] {
+        edit(&place, "ring/frames.csv", column, |_, _| rate.to_owned());
+    }
+    let (told, _) = run(&place, &[], 0);
+    // The same rate in the axes of each camera, which its mount gives.
+    fs::remove_file(place.path("ring/frames.csv")).unwrap();
+    let text = place.read("ring/rig.toml");
+    for (k, head) in HEADS.iter().enumerate() {
+        let mount = text.split("q_rig_from_camera_wxyz = [").nth(k + 1).unwrap().split(']').next().unwrap();
+        let q: Vec<f64> = mount.split(',').map(|x| x.trim().parse().unwrap()).collect();
+        let [w, x, y, z] = [q[0], q[1], q[2], q[3]];
+        // The first row of the rotation from the camera to the vehicle.
+        let own = [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)];
+        for (column, part) in ["rate_x", "rate_y", "rate_z"].into_iter().zip(own) {
+            edit(&place, &format!("ring/{head}/frames.csv"), column, |_, _| format!("{}", 0.02 * part));
+        }
+    }
+    let (own, _) = run(&place, &[], 0);
+    let axis = |row: &Vec<(String, String)>| {
+        ["axis_x", "axis_y", "axis_z"].map(|name| cell(row, name).parse::<f64>().unwrap())
+    };
+    // The tables of the heads and of the vehicle give slightly different answers, but both rates turn them alike.
+    let moved = |to: &Rows, from: &Rows, n: usize| {
+        let (to, from) = (axis(&to[n]), axis(&from[n]));
+        [0, 1, 2].map(|i| to[i] - from[i])
+    };
+    let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    for n in 0..4 {
+        let (own, told) = (moved(&own, &without, n), moved(&told, &untold, n));
+        let away = length([0, 1, 2].map(|i| own[i] - told[i]));
+        assert!(length(own) > 1e-4 && away < 0.05 * length(own), "{own:?} {told:?}");
+    }
 }

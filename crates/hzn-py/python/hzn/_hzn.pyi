@@ -232,7 +232,8 @@ class Rig:
     Raises
     ------
     ConfigError
-        A mount, a name or another value is refused; the message names the head as in a rig.toml.
+        A mount, a name or another value is refused; the message names the head as in a rig.toml. The sensors of
+        several heads must look for the same first body, and must not have ``fit.half_angle = "known"``.
 
     Examples
     --------
@@ -298,7 +299,8 @@ class Rig:
         ImageError
             A picture has another dtype, shape or size than that of its head's camera, or cannot be read.
         ConfigError
-            The rig has no head of this name, or an altitude, position or attitude is impossible.
+            The rig has no head of this name, an altitude, position or attitude is impossible, or the EXIF times of the
+            pictures are more than 0.1 s apart and no ``time_s`` is given.
         """
 
 @final

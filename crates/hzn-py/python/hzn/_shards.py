@@ -25,7 +25,7 @@ from ._hzn import Report, Sensor, __version__, _Prior, _process_encoded, _write_
 
 Shard: TypeAlias = Sequence[tuple[str, Mapping[str, Any]]]
 
-_TEXTS = ("file", "body", "status", "detail")
+_TEXTS = ("file", "body", "status", "detail", "head", "heads_used", "heads_excluded")
 # The texts that others wrote.
 _FOREIGN = ("file", "detail")
 _COUNTS = ("index", "edge_points", "inliers", "candidates", "dropped", "level")
@@ -153,11 +153,11 @@ def _write_parquet(path: str, _: Sensor, reports: Sequence[Report]) -> None:
 
 def _guarded(text: str) -> str:
     """Return a text as `hzn run` writes it into CSV: a spreadsheet must not take it for a formula."""
-    return f"'{text}" if re.match(r"'*[=+\-@]", text) else text
+    return f"'{text}" if re.match(r"'*[=+\-@\t\r]", text) else text
 
 
 def _unguarded(cell: str) -> str:
-    return cell[1:] if re.match(r"'+[=+\-@]", cell) else cell
+    return cell[1:] if re.match(r"'+[=+\-@\t\r]", cell) else cell
 
 
 def _write_csv(path: str, _: Sensor, reports: Sequence[Report]) -> None:

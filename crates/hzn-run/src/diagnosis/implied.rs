@@ -8,6 +8,7 @@ use hzn_core::{Report, Solution};
 use super::any_cone::longest_edge;
 use super::facts::{FitFacts, Implied};
 use crate::engine::trace::{Edge, Fitted};
+use crate::tangent;
 
 /// A point of the picture (u, v), in pixels.
 type Point = [f64; 2];
@@ -135,7 +136,7 @@ fn cone_cos(points: &[Point], axis: [f64; 3], factor: f64, camera: &Camera<f64>)
     let mut e = axis;
     let mut cos = 0.0;
     for _ in 0..6 {
-        let [b1, b2] = tangent_basis(e);
+        let (b1, b2) = tangent::basis(e);
         // Normal equations of x b1·r + y b2·r − c = −e·r.
         let mut n = [[0.0; 4]; 3];
         for r in &rays {
@@ -154,12 +155,6 @@ fn cone_cos(points: &[Point], axis: [f64; 3], factor: f64, camera: &Camera<f64>)
         e = turned.xyz();
     }
     (cos.abs() < 1.0).then_some(cos)
-}
-
-/// Returns two unit vectors perpendicular to an axis.
-fn tangent_basis([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
-    let q = 1.0 / (1.0 + z).max(1e-9);
-    [[1.0 - x * x * q, -x * y * q, -x], [-x * y * q, 1.0 - y * y * q, -y]]
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

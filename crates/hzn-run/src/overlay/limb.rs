@@ -3,6 +3,8 @@
 use hzn_core::camera::Camera;
 use hzn_core::frames::{Cam, UnitVec3};
 
+use crate::tangent::basis;
+
 /// Number of steps around the cone in the search for the parts in view.
 const STEPS: usize = 4096;
 
@@ -56,18 +58,6 @@ fn along(
         out.push(line);
     }
     out
-}
-
-/// Returns two unit vectors that span the plane perpendicular to `axis`.
-fn basis([x, y, z]: [f64; 3]) -> ([f64; 3], [f64; 3]) {
-    // The coordinate axis that is farthest from `axis` gives the best conditioned product.
-    let helper = if x.abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let b1 = cross([x, y, z], helper);
-    let n = b1.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let b1 = b1.map(|v| v / n);
-    (b1, cross([x, y, z], b1))
 }
 
 #[cfg(test)]

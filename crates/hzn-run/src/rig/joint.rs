@@ -2,11 +2,11 @@
 
 use hzn_core::body;
 use hzn_core::camera::Camera;
+use hzn_core::fit::HalfAngle;
 use hzn_core::frames::{Cam, Cov3, Rotation, UnitVec3, Vehicle};
 use hzn_core::rig::{Head, Joint, MOST_HEADS, NoJoint, Rig};
 use hzn_core::status::Status;
 use hzn_core::{Config, Solution};
-use hzn_files::Frames;
 use hzn_files::rig::{self, Common, JOINT};
 use hzn_mcap::{Row, RowMeta, roll_pitch_deg};
 
@@ -24,7 +24,6 @@ pub struct Joiner {
     mounts: Vec<Mount>,
     cameras: Vec<Camera<f64>>,
     body: body::Config,
-    vehicle: Option<Frames>,
 }
 
 /// The picture of a head in an epoch, as the joint answer needs it.
@@ -74,22 +73,27 @@ struct Answered<'a> {
 }
 
 impl Joiner {
-    /// Prepares the joint answers of a rig about the first body of its sensors, in the order of the heads. `vehicle` is
-    /// the table of the vehicle, for its rates.
+    /// Prepares the joint answers of a rig about the first body of its sensors, in the order of the heads.
     ///
     /// # Errors
-    /// A value of the rig is out of its limits, see [`hzn_files::rig::check`], or a sensor has no lens.
-    pub fn new<'a>(
-        file: &rig::Rig,
-        sensors: impl IntoIterator<Item = &'a Config>,
-        vehicle: Option<Frames>,
-    ) -> Result<Self, Error> {
+    /// A value of the rig is out of its limits, see [`hzn_files::rig::check`], a sensor has no lens, the sensors look
+    /// for different first bodies, or one of several sensors fits no half-angle.
+    pub fn new<'a>(file: &rig::Rig, sensors: impl IntoIterator<Item = &'a Config>) -> Result<Self, Error> {
         rig::check(file).map_err(|(key, what)| unusable(format!("{key}: {what}")))?;
         let (mut cameras, mut bodies) = (Vec::new(), Vec::new());
-        for sensor in sensors {
+        for (head, sensor) in file.heads.iter().zip(sensors) {
             cameras.push(Camera::try_new(&sensor.camera).map_err(Error::failed)?);
-            bodies.extend(sensor.each_body().first().cloned());
+            let body = sensor.each_body().first().cloned().unwrap_or_default();
+            if file.heads.len() > 1 && sensor.fit.half_angle == HalfAngle::Known && !body.half_angle_is_free() {
+                return Err(unusable(format!(
+                    "head {}: fit.half_angle is \"known\" in its sensor.toml, so its answers have no half-angle of \
+                     their own and cannot be joined with those of other heads; choose \"fused\" or \"free\"",
+                    head.name
+                )));
+            }
+            bodies.push((&head.name, body));
         }
+        check_bodies(&bodies)?;
         let mount = |head: &rig::Head| head.mount.map(|mount| Mount::new(&file.rig.mount, &mount));
         Ok(Self {
             rig: Rig::new(&file.rig.check()).map_err(Error::failed)?,
@@ -97,9 +101,28 @@ impl Joiner {
             names: file.heads.iter().map(|head| head.name.clone()).collect(),
             mounts: file.heads.iter().filter_map(mount).collect(),
             cameras,
-            body: bodies.into_iter().next().unwrap_or_default(),
-            vehicle,
+            body: bodies.into_iter().next().map(|(_, body)| body).unwrap_or_default(),
         })
+    }
+
+    /// Refuses pictures whose times are further apart than those of one epoch.
+    ///
+    /// # Errors
+    /// The times of two heads, and how far they are apart.
+    pub fn check_times(&self, heads: &[Seen<'_>]) -> Result<(), Error> {
+        let times = || self.names.iter().zip(heads).filter_map(|(name, head)| Some((name, head.frame?.time_s?)));
+        let first = times().min_by(|a, b| a.1.total_cmp(&b.1));
+        let last = times().max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some(((first, first_s), (last, last_s))) = first.zip(last) else { return Ok(()) };
+        if last_s - first_s <= self.common.sync_s {
+            return Ok(());
+        }
+        Err(unusable(format!(
+            "the picture of {last} was taken {:.3} s after that of {first}, and the pictures of one epoch are at most \
+             {} s apart; give time_s if the times in the files are wrong",
+            last_s - first_s,
+            self.common.sync_s
+        )))
     }
 
     /// Returns the rotation from each camera to the vehicle as a quaternion, scalar first.
@@ -116,11 +139,7 @@ impl Joiner {
             [one] => self.single(index, heads, time_s, one),
             several => self.joint(index, heads, time_s, several),
         };
-        row.detail = [row.detail, self.absences(heads)]
-            .into_iter()
-            .filter(|text| !text.is_empty())
-            .collect::<Vec<_>>()
-            .join("; ");
+        row.detail = join([row.detail, self.absences(heads)]);
         let frozen = heads.iter().enumerate().filter(|(_, head)| head.is_frozen).fold(0, |set, (k, _)| set | 1 << k);
         row.heads_excluded = self.listed(frozen | self.bits(row.heads_excluded.as_deref()));
         row
@@ -146,11 +165,13 @@ impl Joiner {
         self.row(index, heads, time_s, status, &NoJoint::NoHead.to_string())
     }
 
-    /// Returns the rotation from a head to the axes that the vehicle has at the time of the epoch.
+    /// Returns the rotation from a head to the axes that the vehicle has at the time of the epoch. The picture's data
+    /// have the rate, in the axes of the camera, whether it comes from the table of the vehicle or of the head.
     fn mount(&self, head: &Answered<'_>, time_s: Option<f64>) -> Option<Rotation<Cam, Vehicle, f64>> {
         let after_s = time_s.zip(head.frame.time_s).map_or(0.0, |(epoch_s, own_s)| epoch_s - own_s);
-        let row = self.vehicle.as_ref().zip(time_s).and_then(|(frames, t)| frames.nearest(t, self.common.sync_s));
-        self.mounts.get(head.k)?.after(after_s, row.and_then(|row| row.rate_rad_s))
+        let mount = self.mounts.get(head.k)?;
+        let rate_rad_s = head.frame.data.as_ref().and_then(|data| data.rate_rad_s);
+        mount.after(after_s, rate_rad_s.and_then(|rate| mount.to_vehicle(rate)))
     }
 
     /// Returns the answer of the only head, in the axes of the vehicle. It keeps the expected half-angle, which several
@@ -187,16 +208,33 @@ impl Joiner {
 
     fn joint(&self, index: u64, heads: &[Seen<'_>], time_s: Option<f64>, answered: &[Answered<'_>]) -> Row {
         let mut cones = [None; MOST_HEADS];
+        let mut without = Vec::new();
         for head in answered {
             let cone = self.cone(head, time_s);
+            if cone.is_none() {
+                without.extend(self.names.get(head.k).map(|name| format!("{name}: no free cone")));
+            }
             if let Some(place) = cones.get_mut(head.k) {
                 *place = cone;
             }
         }
+        let mut row = self.join_cones(index, heads, time_s, answered, &cones);
+        row.detail = join([row.detail, without.join(", ")]);
+        row
+    }
+
+    fn join_cones(
+        &self,
+        index: u64,
+        heads: &[Seen<'_>],
+        time_s: Option<f64>,
+        answered: &[Answered<'_>],
+        cones: &[Option<Head<f64>>; MOST_HEADS],
+    ) -> Row {
         // The largest limb counts: its tilt moves the axis most.
         let cos = answered.iter().filter_map(|head| Some(head.solution.free?.cos)).fold(1.0, f64::min);
         let rig_rad = self.common.mount.sigma_deg.to_radians();
-        match self.rig.join(&cones, self.tilt_rad(cos).hypot(rig_rad)) {
+        match self.rig.join(cones, self.tilt_rad(cos).hypot(rig_rad)) {
             Ok(joint) => {
                 let mut row = self.row(index, heads, time_s, Status::Ok, "");
                 self.set_joint(&mut row, &joint);
@@ -272,6 +310,23 @@ impl Joiner {
     }
 }
 
+/// Refuses heads that look for different first bodies.
+fn check_bodies(bodies: &[(&String, body::Config)]) -> Result<(), Error> {
+    let Some(((first, body), rest)) = bodies.split_first() else { return Ok(()) };
+    match rest.iter().find(|(_, other)| other.kind != body.kind) {
+        Some((other, other_body)) => Err(unusable(format!(
+            "{first} looks for {} and {other} for {}: the heads of a {JOINT} must look for the same first body",
+            body.kind.name(),
+            other_body.kind.name()
+        ))),
+        None => Ok(()),
+    }
+}
+
+fn join(texts: [String; 2]) -> String {
+    texts.into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("; ")
+}
+
 /// Returns the middle of the exposures that are used.
 fn middle_s(answered: &[Answered<'_>]) -> Option<f64> {
     let times = || answered.iter().filter_map(|head| head.frame.time_s);
@@ -300,3 +355,6 @@ fn across(axis: &UnitVec3<Vehicle, f64>, rotation_rad2: &[f64; 6]) -> [f64; 6] {
     // The components of θ × e along x, y and z are (e × x)·θ, (e × y)·θ and (e × z)·θ.
     form(*rotation_rad2, [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
 }
+
+#[cfg(test)]
+mod tests;

@@ -31,6 +31,13 @@ impl Mount {
         let [x, y, z] = half.map(|x| x * sinc);
         Rotation::assume_from_quaternion(turn_after([angle.cos(), x, y, z], self.q_vehicle_from_camera_wxyz))
     }
+
+    /// Returns a vector in the axes of the vehicle, for one in those of the camera. Its length is kept.
+    pub(super) fn to_vehicle(self, camera: [f64; 3]) -> Option<[f64; 3]> {
+        let length = camera.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let mount = Rotation::<Cam, Vehicle, f64>::assume_from_quaternion(self.q_vehicle_from_camera_wxyz)?;
+        Some(mount.apply(&UnitVec3::try_new(camera)?).xyz().map(|x| x * length))
+    }
 }
 
 fn normalise(q: [f64; 4]) -> [f64; 4] {

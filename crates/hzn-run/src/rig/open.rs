@@ -1,9 +1,10 @@
 //! Opens the heads of a rig with their sensors and tables.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use hzn_files::rig::{self, Head, JOINT};
-use hzn_files::{Frames, Problem, Sensor, files_of_sensor};
+use hzn_files::rig::{self, Head};
+use hzn_files::{FrameData, Frames, Problem, Sensor, files_of_sensor};
 
 use super::joint::Joiner;
 use super::mounts::Mount;
@@ -34,7 +35,7 @@ pub struct Opened {
     /// The heads, in the order of rig.toml.
     pub heads: Vec<OpenHead>,
     /// The frames.csv of the vehicle.
-    pub frames: Option<Frames>,
+    pub frames: Option<Arc<Frames>>,
     /// The text of rig.toml.
     pub text: String,
     /// Values that are possible but look wrong.
@@ -55,8 +56,21 @@ pub struct OpenHead {
     pub sensor: Sensor,
     /// The frames.csv next to its pictures.
     pub frames: Option<Frames>,
-    /// The frames.csv of the vehicle, as this head sees it.
-    pub(super) vehicle: Option<Frames>,
+    pub(super) vehicle: Option<Vehicle>,
+}
+
+/// The frames.csv of the vehicle, which all heads share, as one head sees it.
+pub(super) struct Vehicle {
+    pub(super) frames: Arc<Frames>,
+    q_vehicle_from_camera_wxyz: [f64; 4],
+}
+
+impl Vehicle {
+    /// Returns the data of the nearest row, with the time to it in seconds.
+    pub(super) fn nearest(&self, time_s: f64) -> Option<(f64, FrameData)> {
+        let row = self.frames.nearest(time_s, f64::INFINITY)?;
+        Some(((row.time_s? - time_s).abs(), row.seen_by_camera(self.q_vehicle_from_camera_wxyz)))
+    }
 }
 
 /// Opens a rig, and checks every file that it names.
@@ -69,7 +83,7 @@ pub fn open(request: &Request) -> Result<Opened, Error> {
     let folder = request.rig.parent().unwrap_or(Path::new("")).to_owned();
     let beside = || Some(folder.join("frames.csv")).filter(|path| path.exists());
     let path = request.frames.clone().or_else(beside);
-    let frames = path.as_ref().map(|path| hzn_files::frames::load_vehicle(path)).transpose()?;
+    let frames = path.as_ref().map(|path| hzn_files::frames::load_vehicle(path)).transpose()?.map(Arc::new);
     let mut opened = Opened {
         rig: file.clone(),
         heads: Vec::new(),
@@ -82,7 +96,8 @@ pub fn open(request: &Request) -> Result<Opened, Error> {
     for head in &file.heads {
         opened.add(head, &folder, request)?;
     }
-    opened.check_bodies()?;
+    // It checks what the heads must have in common.
+    opened.joiner()?;
     Ok(opened)
 }
 
@@ -108,8 +123,8 @@ impl Opened {
         self.notes.extend(opened.notes.iter().map(name));
         let Some(mount) = &head.mount else { return Err(unusable(format!("{}: [head.mount] is missing", head.name))) };
         let mount = Mount::new(&self.rig.rig.mount, mount);
-        let vehicle = self.frames.as_ref().map(|frames| frames.seen_by_camera(mount.q_vehicle_from_camera_wxyz));
-        if let Some(vehicle) = &vehicle {
+        // The checks are about sizes, which the mount does not change.
+        if let Some(vehicle) = self.frames.as_deref() {
             let config = &opened.sensor.config;
             engine::check_frames(config, request.flight, Some(vehicle)).map_err(|e| named(e.into()))?;
             self.warnings.extend(vehicle.check_sensor(config).iter().map(|w| name(&w.to_string())));
@@ -123,38 +138,23 @@ impl Opened {
             }
         }
         open::check_size(source, &opened.sensor.config).map_err(named)?;
-        let known = vehicle.as_ref().or(opened.frames.as_ref());
+        let known = self.frames.as_deref().or(opened.frames.as_ref());
         open::check_altitude(source, &opened.sensor.config, known).map_err(named)?;
+        let vehicle = self.frames.as_ref().map(|frames| Vehicle {
+            frames: Arc::clone(frames),
+            q_vehicle_from_camera_wxyz: mount.q_vehicle_from_camera_wxyz,
+        });
         let (name, open::Opened { source, sensor, frames, .. }) = (head.name.clone(), opened);
         self.heads.push(OpenHead { name, source, sensor, frames, vehicle });
         Ok(())
     }
 
-    /// Refuses heads that look for different bodies: the joint answer is about the first body of each.
-    fn check_bodies(&self) -> Result<(), Error> {
-        let body = |head: &OpenHead| head.sensor.config.each_body().first().map(|body| body.kind);
-        let Some((first, rest)) = self.heads.split_first() else { return Ok(()) };
-        match rest.iter().find(|head| body(head) != body(first)) {
-            Some(other) => {
-                let kind = |head| body(head).map_or("none", |kind| kind.name());
-                Err(unusable(format!(
-                    "{} looks for {} and {} for {}: the heads of a {JOINT} must look for the same first body",
-                    first.name,
-                    kind(first),
-                    other.name,
-                    kind(other)
-                )))
-            }
-            None => Ok(()),
-        }
-    }
-
     /// Prepares the joint answers.
     ///
     /// # Errors
-    /// A value of rig.toml is out of its limits; [`open()`] has refused it already.
+    /// See [`Joiner::new`]; [`open()`] has refused it already.
     pub fn joiner(&self) -> Result<Joiner, Error> {
-        Joiner::new(&self.rig, self.heads.iter().map(|head| &head.sensor.config), self.frames.clone())
+        Joiner::new(&self.rig, self.heads.iter().map(|head| &head.sensor.config))
     }
 
     /// Returns the number of pictures of all heads, if it is known before.

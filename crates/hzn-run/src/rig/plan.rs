@@ -2,6 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
+use hzn_core::status::Status;
 use hzn_mcap::{FrameRecord, Row};
 
 use super::epochs::{Epoch, Epochs};
@@ -133,11 +134,14 @@ struct Frozen {
 
 impl Frozen {
     /// Returns whether the picture of a head has the bytes of the picture before it. The noise of a camera never
-    /// repeats.
+    /// repeats, but a dark or clipped picture has none: a picture without an answer is never called frozen, so that its
+    /// own reason is reported.
     fn see(&mut self, k: usize, frame: &Finished) -> bool {
         let Some(last) = self.last.get_mut(k) else { return false };
         let now = frame.picture.as_ref().map(|bytes| (frame.time_s, crc32fast::hash(bytes)));
         let before = std::mem::replace(last, now);
-        now.zip(before).is_some_and(|((now_s, now), (before_s, before))| now == before && now_s != before_s)
+        let is_answered = frame.outcomes.first().is_some_and(|outcome| outcome.status() == Status::Ok);
+        is_answered
+            && now.zip(before).is_some_and(|((now_s, now), (before_s, before))| now == before && now_s != before_s)
     }
 }

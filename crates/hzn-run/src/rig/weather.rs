@@ -7,17 +7,29 @@ use hzn_core::frames::UnitVec3;
 use hzn_core::report::Free;
 use hzn_files::rig::Common;
 
-/// Number of azimuths around the limb at which the height is taken. They are 5 degrees apart, which is 250 km or less
-/// for a low orbit and finer than the weather.
-const AZIMUTHS: usize = 72;
+use crate::tangent;
+
+/// Largest distance of two azimuths at which the height is taken: 5 degrees, which is 250 km or less for a low orbit
+/// and finer than the weather.
+const STEP_RAD: f64 = TAU / 72.0;
+
+/// Smallest number of azimuths on an arc. The discrete sums then differ by less than 1% from the integrals.
+const FEWEST: usize = 24;
+
+/// Step of the search for arcs in view. A shorter arc has too few edge points for an answer.
+const SCAN: usize = 720;
+
+/// Shortest arc, one degree. A fit to a shorter arc takes up the same part of the weather, the height with its first
+/// and second derivative, so that the error has a limit; but the equations would be singular.
+const SHORTEST_RAD: f64 = TAU / 360.0;
 
 /// Returns the free fit with the error of the limb's weather: a random height with the 1-sigma and the length of the
 /// configuration, at the part of the limb that the camera sees. `limb_km` is the radius of the limb.
 ///
 /// A height h(ψ) moves the edge at the azimuth ψ outward by h ∂α/∂d. Least squares over the arc takes it for errors of
-/// the axis and of the cosine: with the rows g = (sin α cos ψ, sin α sin ψ, −1), the error is
-/// (GᵀG)⁻¹ Gᵀ sin α ∂α/∂d h. On a short arc, a height that changes along the arc moves the free fit far more than a
-/// constant one.
+/// the axis and of the cosine: with the rows g = (sin α cos ψ, sin α sin ψ, −1) and the widths of the parts of the arc
+/// as weights W, the error is (GᵀWG)⁻¹ GᵀW sin α ∂α/∂d h. On a short arc, a height that changes along the arc moves the
+/// free fit far more than a constant one.
 pub(super) fn with_weather(free: &Free<f64>, camera: &Camera<f64>, limb_km: f64, common: &Common) -> Free<f64> {
     let (sigma_km, length_km) = (common.limb_own_sigma_km, common.limb_own_length_km);
     let cos = free.cos;
@@ -27,12 +39,11 @@ pub(super) fn with_weather(free: &Free<f64>, camera: &Camera<f64>, limb_km: f64,
     }
     // sin α ∂α/∂d, for each kilometre.
     let by_km = sin * sin / (cos * limb_km);
-    let [b1, b2] = tangent(free.axis.xyz());
-    let seen: Vec<f64> = (0..AZIMUTHS)
-        .map(|i| i as f64 * TAU / AZIMUTHS as f64)
-        .filter(|psi| is_in_view(camera, free.axis.xyz(), [b1, b2], [cos, sin], *psi))
-        .collect();
-    let rows: Vec<[f64; 3]> = seen.iter().map(|psi| [sin * psi.cos(), sin * psi.sin(), -1.0]).collect();
+    let (b1, b2) = tangent::basis(free.axis.xyz());
+    let edge = Edge { camera, e: free.axis.xyz(), b: [b1, b2], cos, sin };
+    let seen: Vec<(f64, f64)> = edge.arcs().into_iter().flat_map(azimuths).collect();
+    let rows: Vec<([f64; 3], f64)> =
+        seen.iter().map(|(psi, width)| ([sin * psi.cos(), sin * psi.sin(), -1.0], *width)).collect();
     let mut own = *free;
     let Some(gain) = least_squares(&rows) else {
         // Without an arc the height is taken as a constant.
@@ -40,8 +51,8 @@ pub(super) fn with_weather(free: &Free<f64>, camera: &Camera<f64>, limb_km: f64,
         return own;
     };
     let mut p = [[0.0; 3]; 3];
-    for (i, (a, gi)) in seen.iter().zip(&gain).enumerate() {
-        for (b, gj) in seen.iter().zip(&gain).take(i + 1) {
+    for (i, ((a, _), gi)) in seen.iter().zip(&gain).enumerate() {
+        for ((b, _), gj) in seen.iter().zip(&gain).take(i + 1) {
             let chord_km = 2.0 * limb_km * cos * (0.5 * (a - b)).sin().abs();
             let both = (sigma_km * by_km).powi(2) * (-0.5 * (chord_km / length_km).powi(2)).exp();
             for (row, x) in p.iter_mut().zip(gi) {
@@ -65,39 +76,77 @@ pub(super) fn with_weather(free: &Free<f64>, camera: &Camera<f64>, limb_km: f64,
     own
 }
 
-/// Returns whether the picture has the edge at this azimuth of a cone.
-fn is_in_view(camera: &Camera<f64>, e: [f64; 3], [b1, b2]: [[f64; 3]; 2], [cos, sin]: [f64; 2], psi: f64) -> bool {
-    let (s, c) = psi.sin_cos();
-    let ray: [f64; 3] = std::array::from_fn(|i| cos * e[i] + sin * (c * b1[i] + s * b2[i]));
-    let point = UnitVec3::try_new(ray).and_then(|ray| camera.project(&ray));
-    let inside = |x: f64, size: u16| x >= -0.5 && x <= f64::from(size) - 0.5;
-    point.is_some_and(|p| inside(p.u, camera.width()) && inside(p.v, camera.height()))
+/// The edge of a cone in a picture.
+struct Edge<'a> {
+    camera: &'a Camera<f64>,
+    e: [f64; 3],
+    b: [[f64; 3]; 2],
+    cos: f64,
+    sin: f64,
 }
 
-/// Returns two unit vectors across `e` and across each other.
-fn tangent([x, y, z]: [f64; 3]) -> [[f64; 3]; 2] {
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let helper = if x.abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-    let b1 = cross([x, y, z], helper);
-    let length = b1.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let b1 = b1.map(|x| x / length);
-    [b1, cross([x, y, z], b1)]
+impl Edge<'_> {
+    /// Returns whether the picture has the edge at this azimuth.
+    fn is_in_view(&self, psi: f64) -> bool {
+        let (s, c) = psi.sin_cos();
+        let [b1, b2] = self.b;
+        let ray: [f64; 3] = std::array::from_fn(|i| self.cos * self.e[i] + self.sin * (c * b1[i] + s * b2[i]));
+        let point = UnitVec3::try_new(ray).and_then(|ray| self.camera.project(&ray));
+        let inside = |x: f64, size: u16| x >= -0.5 && x <= f64::from(size) - 0.5;
+        point.is_some_and(|p| inside(p.u, self.camera.width()) && inside(p.v, self.camera.height()))
+    }
+
+    /// Returns the arcs in view as pairs of azimuths, in rising order. The scan begins at the side of the optical axis,
+    /// so that nothing depends on the choice of the tangent vectors.
+    fn arcs(&self) -> Vec<[f64; 2]> {
+        let [b1, b2] = self.b;
+        let middle = b2[2].atan2(b1[2]);
+        let at = |i: usize| middle + i as f64 * TAU / SCAN as f64;
+        let are_seen: Vec<bool> = (0..SCAN).map(|i| self.is_in_view(at(i))).collect();
+        let is_seen = |i: usize| are_seen.get(i % SCAN).copied().unwrap_or_default();
+        if are_seen.iter().all(|is| *is) {
+            return vec![[middle, middle + TAU]];
+        }
+        let is_start = |i: &usize| is_seen(*i) && !is_seen(i + SCAN - 1);
+        let arc = |start: usize| {
+            let after = (start..start + SCAN).find(|i| !is_seen(*i)).unwrap_or(start + 1);
+            let [from, to] = [self.end(at(start), at(start) - TAU / SCAN as f64), self.end(at(after - 1), at(after))];
+            let short = (0.5 * (SHORTEST_RAD - (to - from))).max(0.0);
+            [from - short, to + short]
+        };
+        let arcs: Vec<[f64; 2]> = (0..SCAN).filter(is_start).map(arc).collect();
+        if arcs.is_empty() { vec![[middle - 0.5 * SHORTEST_RAD, middle + 0.5 * SHORTEST_RAD]] } else { arcs }
+    }
+
+    /// Returns the end of an arc by bisection, between an azimuth in view and one that is not.
+    fn end(&self, mut seen: f64, mut unseen: f64) -> f64 {
+        for _ in 0..30 {
+            let half = 0.5 * (seen + unseen);
+            *if self.is_in_view(half) { &mut seen } else { &mut unseen } = half;
+        }
+        seen
+    }
 }
 
-/// Returns (GᵀG)⁻¹ g for each row g of G; `None` if the rows do not determine three unknowns.
-fn least_squares(rows: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
-    let sum = |i: usize, j: usize| rows.iter().map(|g| g[i] * g[j]).sum::<f64>();
+/// Returns the middles and the widths of equal parts of an arc.
+fn azimuths([from, to]: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
+    let count = (((to - from) / STEP_RAD).ceil() as usize).max(FEWEST);
+    let width = (to - from) / count as f64;
+    (0..count).map(move |i| (from + (i as f64 + 0.5) * width, width))
+}
+
+/// Returns (GᵀWG)⁻¹ g w for each row g of G with its weight w; `None` if the rows do not determine three unknowns.
+fn least_squares(rows: &[([f64; 3], f64)]) -> Option<Vec<[f64; 3]>> {
+    let sum = |i: usize, j: usize| rows.iter().map(|(g, w)| g[i] * g[j] * w).sum::<f64>();
     let [a, b, c, d, e, f] = [sum(0, 0), sum(0, 1), sum(0, 2), sum(1, 1), sum(1, 2), sum(2, 2)];
     let minors = [d * f - e * e, c * e - b * f, b * e - c * d, a * f - c * c, b * c - a * e, a * d - b * b];
     let determinant = a * minors[0] + b * minors[1] + c * minors[2];
-    // Three points of a short arc are nearly on a line.
-    if rows.len() < 4 || determinant <= 1e-12 * a * d * f {
+    if !(determinant > 1e-14 * a * d * f) {
         return None;
     }
     let [xx, xy, xz, yy, yz, zz] = minors.map(|m| m / determinant);
-    let solve = |g: &[f64; 3]| {
-        [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| row.iter().zip(g).map(|(r, g)| r * g).sum())
+    let solve = |(g, w): &([f64; 3], f64)| {
+        [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| w * row.iter().zip(g).map(|(r, g)| r * g).sum::<f64>())
     };
     Some(rows.iter().map(solve).collect())
 }
@@ -112,10 +161,16 @@ mod tests {
     const LIMB_KM: f64 = 6396.0;
 
     fn added(fx_px: f64, length_km: f64) -> Free<f64> {
-        let camera = Camera::try_new(&Config::ideal(Model::Pinhole, 640, 480, fx_px)).unwrap();
+        turned(fx_px, length_km, 0.0)
+    }
+
+    /// `roll` turns the picture, so that the tangent vectors have another place on the arc.
+    fn turned(fx_px: f64, length_km: f64, roll: f64) -> Free<f64> {
+        let camera = Camera::try_new(&Config::ideal(Model::Pinhole, 640, 640, fx_px)).unwrap();
         let alpha = 68.6f64.to_radians();
         let free = Free {
-            axis: UnitVec3::<Cam, f64>::try_new([0.0, alpha.sin(), alpha.cos()]).unwrap(),
+            axis: UnitVec3::<Cam, f64>::try_new([alpha.sin() * roll.sin(), alpha.sin() * roll.cos(), alpha.cos()])
+                .unwrap(),
             covariance: Cov3::from_upper([0.0; 6]),
             cos: alpha.cos(),
             var_cos: 0.0,
@@ -140,5 +195,34 @@ mod tests {
         assert!(weather.covariance.sigma_max_rad() > 2.0 * height_rad && weather.var_cos > want);
         // A shorter arc is tilted more.
         assert!(added(1100.0, 1000.0).covariance.sigma_max_rad() > weather.covariance.sigma_max_rad());
+    }
+
+    #[test]
+    fn a_short_arc_has_the_weather_of_a_dense_one() {
+        let both = |free: &Free<f64>| [free.covariance.sigma_max_rad().to_degrees(), free.var_cos.sqrt()];
+        // The limit for a short arc: with h = h0 + h1 ψ + h2 ψ²/2, the axis moves by k h2/sin α across the arc and the
+        // cosine by k (h0 + h2). A height with the correlation exp(−(κψ)²/2) has the variances 1 and 3κ⁴ of h0 and h2,
+        // and the covariance −κ².
+        let (sin, cos) = 68.6f64.to_radians().sin_cos();
+        let (k, square) = (1.5 * sin * sin / (cos * LIMB_KM), (LIMB_KM * cos / 1000.0).powi(2));
+        let want =
+            [(k * 3f64.sqrt() * square / sin).to_degrees(), k * (1.0 - 2.0 * square + 3.0 * square * square).sqrt()];
+        // An arc of ten degrees.
+        let ten = both(&added(3930.0, 1000.0));
+        assert!(ten.iter().zip(want).all(|(ten, want)| (ten / want - 1.0).abs() < 0.03), "{ten:?} {want:?}");
+        // The result has a limit for short arcs, and it changes slowly with the field of view.
+        let mut last = ten;
+        for step in 1..80 {
+            let now = both(&added(3930.0 * 1.05f64.powi(step), 1000.0));
+            let near = now.iter().zip(last).all(|(now, last)| (now / last - 1.0).abs() < 0.03);
+            assert!(near, "{step}: {now:?} after {last:?}");
+            last = now;
+        }
+        // Nothing depends on the place of the arc against the tangent vectors. A quarter of a turn leaves the picture,
+        // but for half a pixel.
+        for fx_px in [300.0, 1000.0, 4000.0, 30_000.0] {
+            let [a, b] = [0.0, TAU / 4.0].map(|roll| both(&turned(fx_px, 1000.0, roll)));
+            assert!(a.iter().zip(b).all(|(a, b)| (a / b - 1.0).abs() < 1e-4), "{a:?} {b:?}");
+        }
     }
 }

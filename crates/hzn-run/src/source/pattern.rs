@@ -1,6 +1,8 @@
 //! The files that a pattern matches, such as `flights/**/*.png`.
 
 use std::collections::{HashSet, VecDeque};
+use std::ffi::OsString;
+use std::fs::{DirEntry, ReadDir};
 use std::path::{Component, Path, PathBuf};
 
 use glob::{MatchOptions, Pattern, PatternError};
@@ -24,7 +26,8 @@ enum Part {
 /// Finds the files and folders that a pattern matches.
 ///
 /// Links to folders are followed, and may form circles. Therefore a folder is visited once with the same rest of the
-/// pattern, on the shortest path. Without this, two links in a circle give more paths than there are atoms.
+/// pattern, on the shortest path. Without this, two links in a circle give more paths than there are atoms. Of several
+/// paths of the same length, the one without links is taken, and then the first one by name.
 ///
 /// # Errors
 /// The pattern is not valid.
@@ -55,7 +58,7 @@ pub(super) fn find(text: &str) -> Result<Matches, PatternError> {
         if let Part::Folders = part {
             waiting.push_back((folder.clone(), rest));
         }
-        for name in entries.flatten().map(|entry| entry.file_name()) {
+        for name in ordered(entries) {
             let path = folder.join(&name);
             match part {
                 // `**` at the end matches only folders.
@@ -73,6 +76,14 @@ pub(super) fn find(text: &str) -> Result<Matches, PatternError> {
         }
     }
     Ok(matches)
+}
+
+/// Returns the names in a folder in an order that does not depend on the file system: links come last.
+fn ordered(entries: ReadDir) -> Vec<OsString> {
+    let key = |entry: DirEntry| (entry.file_type().is_ok_and(|kind| kind.is_symlink()), entry.file_name());
+    let mut names: Vec<_> = entries.flatten().map(key).collect();
+    names.sort();
+    names.into_iter().map(|(_, name)| name).collect()
 }
 
 #[cfg(test)]
@@ -132,5 +143,25 @@ mod tests {
         // A pattern that names a link finds the files behind it.
         assert_eq!(found("**/twice/c/*.png"), [Path::new("c/twice/c/y.png")]);
         assert_eq!(found("c/up/a/b/*.png"), [Path::new("c/up/a/b/x.png")]);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn of_two_paths_the_one_without_a_link_is_taken() {
+        // Names before and after that of the folder, and many of them, because a file system has no order.
+        let links: Vec<String> = (0..40).flat_map(|i| [format!("a{i}"), format!("z{i}")]).collect();
+        let dir = place(&["real/x.png"]);
+        for link in &links {
+            std::os::unix::fs::symlink(dir.path().join("real"), dir.path().join(link)).unwrap();
+        }
+        let text = format!("{}/*/x.png", dir.path().display());
+        assert_eq!(find(&text).unwrap().paths, [dir.path().join("real/x.png")]);
+        std::fs::rename(dir.path().join("real"), dir.path().join(".real")).unwrap();
+        for link in &links {
+            std::fs::remove_file(dir.path().join(link)).unwrap();
+            std::os::unix::fs::symlink(dir.path().join(".real"), dir.path().join(link)).unwrap();
+        }
+        let text = format!("{}/[az]*/x.png", dir.path().display());
+        assert_eq!(find(&text).unwrap().paths, [dir.path().join("a0/x.png")]);
     }
 }

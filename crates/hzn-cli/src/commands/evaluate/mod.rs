@@ -77,7 +77,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut rows = heads::select(rows, args.head.as_deref()).map_err(usage)?;
     let are_joint = heads::are_joint(&rows);
     if are_joint {
-        heads::name_by_time(&mut rows, &truth);
+        heads::describe_removed(heads::name_by_time(&mut rows, &truth)).iter().for_each(tell::warning);
     }
     let sensor = sensor(args.sensor.as_deref(), sensor_toml.as_deref(), folder)?;
     let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok()).filter(|_| !are_joint);

@@ -8,6 +8,7 @@ use hzn_run::sink::{self, Outputs};
 use hzn_run::{disk, explain, source};
 
 use super::args::Args;
+use crate::doubts::MissingPriors;
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::progress::{Counts, Progress, count_text};
 use crate::setup::stop_flag;
@@ -30,21 +31,22 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
     }
     let plan = plan(args, &opened)?;
     let texts: Vec<_> = opened.heads.iter().map(|head| head.sensor.text.clone()).collect();
+    let total = opened.pictures();
+    let mut epochs = Epochs::new(opened.heads, opened.rig.rig.sync_s)?;
     let heads: Vec<_> =
         plan.heads.iter().zip(texts).map(|(head, text)| (head.name.clone(), &head.plan.config, text)).collect();
     let Some((_, config, _)) = heads.first() else { return Err(usage(format!("{}: has no head", path.display()))) };
     let settings =
         sink::Settings { config, sensor_toml: &opened.text, durable: args.durable, ros: args.ros, heads: &heads };
     let (mut output, _) = Outputs::open(&args.output, args.format.into(), args.existing(), settings)?;
-    let total = opened.pictures();
-    let mut epochs = Epochs::new(opened.heads, opened.rig.rig.sync_s, args.source.fps);
     let mut watch = Watch::new(args.quiet, total);
     let end = rig::run(&plan, &mut epochs, &stop_flag(), &mut output, &mut |epoch| watch.see(epoch, &plan));
     let summary = watch.progress.summary(&[]);
     let end = end?;
     output.finish()?;
     let lost = epochs.describe_loss().filter(|_| end == End::Complete);
-    lost.iter().for_each(tell::warning);
+    lost.iter().chain(&epochs.warnings()).for_each(tell::warning);
+    watch.missing.tell(None);
     if !args.quiet {
         watch.sum_up(&summary);
     }
@@ -94,6 +96,7 @@ const MAX_LISTED: u64 = 20;
 struct Watch {
     progress: Progress,
     quiet: bool,
+    missing: MissingPriors,
     unreadable: u64,
     epochs: u64,
     /// The statuses of the joint answers.
@@ -105,7 +108,8 @@ struct Watch {
 impl Watch {
     fn new(quiet: bool, pictures: Option<u64>) -> Self {
         let progress = Progress::new(pictures, 0, quiet);
-        Self { progress, quiet, unreadable: 0, epochs: 0, joint: Counts::default(), excluded: 0 }
+        let missing = MissingPriors::default();
+        Self { progress, quiet, missing, unreadable: 0, epochs: 0, joint: Counts::default(), excluded: 0 }
     }
 
     fn see(&mut self, epoch: &FinishedEpoch, plan: &Plan) {
@@ -116,6 +120,7 @@ impl Watch {
         self.excluded += u64::from(epoch.joint.heads_excluded.is_some());
         for (frame, head) in epoch.heads.iter().zip(&plan.heads) {
             let Some(frame) = frame else { continue };
+            self.missing.count(frame);
             if let Some(why) = frame.unreadable() {
                 self.unreadable += 1;
                 if !self.quiet && self.unreadable <= MAX_LISTED {
