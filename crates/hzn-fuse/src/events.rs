@@ -94,6 +94,11 @@ pub(crate) fn events(
         counts.add_unusable(&one.name, "the row has no time", one.without_time);
         counts.add_unusable(&one.name, "the direction from the vehicle to this body is not known", one.other_bodies);
         counts.add_unusable(&one.name, "a number of the axis, the position or a covariance is missing", one.incomplete);
+        counts.add_unusable(&one.name, "an earlier row has the same body and time", one.duplicate);
+        if let Some((count, first)) = &one.impossible {
+            counts.add_unusable(&one.name, "no answer has such numbers", *count);
+            notes.push(format!("{}: {count} rows are left out, because no answer has such numbers: {first}", one.name));
+        }
     }
     all.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     Ok(all)

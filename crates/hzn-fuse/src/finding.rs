@@ -62,6 +62,8 @@ pub enum Cause {
     Covariance,
     /// The limb height.
     LimbHeight,
+    /// A recording without a usable measurement.
+    Empty,
     /// The frame or the sense of the star tracker's attitudes.
     TrackerFrame,
     /// The inputs as a whole: no single cause explains the contradiction.

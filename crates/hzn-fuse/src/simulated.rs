@@ -161,6 +161,8 @@ fn recording(
         lost: None,
         other_bodies: 0,
         incomplete: 0,
+        duplicate: 0,
+        impossible: None,
     })
 }
 

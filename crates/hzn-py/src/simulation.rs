@@ -189,7 +189,8 @@ pub(crate) fn evaluate<'py>(
     let mut camera = camera.map(|c| c.config.clone());
     let mut rows = match results.extract::<PathBuf>() {
         Ok(path) => {
-            let Results { rows, sensor_toml, lost } = hzn_run::results::read(&path).map_err(to_exception)?;
+            let read = hzn_run::results::read(&path).and_then(Results::checked).map_err(to_exception)?;
+            let Results { rows, sensor_toml, lost, .. } = read;
             lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
             let recorded = sensor_toml.and_then(|t| hzn_files::sensor::parse(&t, Path::new("sensor.toml")).ok());
             camera = camera.or(recorded.map(|s| s.config.camera));

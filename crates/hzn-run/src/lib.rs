@@ -24,6 +24,7 @@ pub mod explain;
 pub mod nadir;
 pub mod open;
 pub mod overlay;
+mod possible;
 pub mod results;
 pub mod rig;
 pub mod sink;

@@ -248,12 +248,22 @@ pub fn complete(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<Stri
     Ok(notes)
 }
 
-/// Takes the tone that the pictures say, if the sensor does not state it. Returns a note if the limb height follows.
+/// Takes the tone that the pictures say, if the sensor does not state it. Returns a note if the limb height follows,
+/// or if the pictures differ.
 fn complete_tone(source: &dyn Source, sensor: &mut Sensor) -> Option<String> {
     if sensor.config.input.tone.is_some() {
         return None;
     }
-    let FoundTone { tone, kind } = source::find_tone(source)?;
+    let Some(FoundTone { tone, kind }) = source::find_tone(source) else {
+        let body = &sensor.config.body;
+        return Some(format!(
+            "the pictures do not agree on their tone ({}): it is taken as unknown, and the limb is expected at {:.1} \
+             +- {:.1} km; if they all have the same one, set tone = ... in [input] of sensor.toml",
+            source::describe_mixed_tones(source)?,
+            body.limb_height_km,
+            body.limb_height_sigma_km
+        ));
+    };
     let before = sensor.config.clone();
     sensor.config.set_tone(tone);
     // A recorded sensor states the tone, because recorded pictures may be in another format.

@@ -7,6 +7,7 @@ use hzn_mcap::{Contents, Reader, Row};
 
 use crate::checked_row::{from_csv, from_json};
 use crate::error::{Error, failed, unusable};
+pub use crate::possible::find_impossible;
 use crate::source::{describe_recording_loss, ending};
 
 /// Results that were read.
@@ -18,6 +19,8 @@ pub struct Results {
     pub sensor_toml: Option<String>,
     /// The damage of the file in words; `None` if it is complete.
     pub lost: Option<String>,
+    /// The first row with an impossible number, see [`find_impossible`]: its place and the reason in words.
+    pub impossible: Option<String>,
 }
 
 /// Reads all rows of results.
@@ -31,14 +34,39 @@ pub fn read(file: &Path) -> Result<Results, Error> {
     match ending(file).as_str() {
         "mcap" => {
             let mut reader = Reader::open(file, Contents::WithoutImages).map_err(failed)?;
-            let rows = reader.by_ref().map(|f| f.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)?;
+            let rows: Vec<Row> = reader.by_ref().map(|f| f.map(|f| f.row)).collect::<Result<_, _>>().map_err(failed)?;
+            let wrong = |(i, row): (usize, &Row)| {
+                Some(format!("{}: row {} ({}): {}", file.display(), i + 1, row.file, find_impossible(row)?))
+            };
+            let impossible = rows.iter().enumerate().find_map(wrong);
             let sensor_toml = reader.sensor_toml().map(str::to_owned);
-            Ok(Results { rows, sensor_toml, lost: describe_recording_loss(&reader, file, "read") })
+            Ok(Results { rows, sensor_toml, lost: describe_recording_loss(&reader, file, "read"), impossible })
         }
         kind @ ("csv" | "jsonl") => {
-            Ok(Results { rows: rows(file, kind)?.collect::<Result<_, _>>()?, ..Results::default() })
+            let mut results = Results::default();
+            for read in numbered_rows(file, kind)? {
+                let (line, row) = read?;
+                if results.impossible.is_none() {
+                    let told = |what| format!("{}:{line}: {}: {what}", file.display(), row.file);
+                    results.impossible = find_impossible(&row).map(told);
+                }
+                results.rows.push(row);
+            }
+            Ok(results)
         }
         _ => Err(unusable(format!("{}: results of `hzn run` are expected: .mcap, .csv or .jsonl", file.display()))),
+    }
+}
+
+impl Results {
+    /// Returns the results if all of their answers are possible ones.
+    ///
+    /// # Errors
+    /// An answer has a number that no answer has, see [`find_impossible`].
+    pub fn checked(self) -> Result<Self, Error> {
+        let Some(what) = &self.impossible else { return Ok(self) };
+        let what = format!("{what}. hzn did not write this; correct the row or remove it");
+        Err(unusable(what))
     }
 }
 
@@ -51,6 +79,13 @@ pub type AllRows = Box<dyn Iterator<Item = Result<Row, Error>>>;
 /// # Errors
 /// The file is of another kind or cannot be read, or a row is not a row of results.
 pub fn rows(file: &Path, kind: &str) -> Result<AllRows, Error> {
+    Ok(Box::new(numbered_rows(file, kind)?.map(|read| read.map(|(_, row)| row))))
+}
+
+/// An iterator over the rows with their lines.
+type NumberedRows = Box<dyn Iterator<Item = Result<(u64, Row), Error>>>;
+
+fn numbered_rows(file: &Path, kind: &str) -> Result<NumberedRows, Error> {
     let name = file.display().to_string();
     let refuse = move |line: u64, why: String| failed(format!("{name}:{line}: not a row of hzn results: {why}"));
     match kind {
@@ -58,15 +93,19 @@ pub fn rows(file: &Path, kind: &str) -> Result<AllRows, Error> {
             let mut reader = csv::Reader::from_path(file).map_err(failed)?;
             let header = reader.headers().map_err(failed)?.clone();
             let row = move |(i, record): (usize, csv::Result<csv::StringRecord>)| {
+                // A text with a line break takes several lines.
+                let line = |record: &csv::StringRecord| record.position().map(csv::Position::line);
+                let line = record.as_ref().ok().and_then(line).unwrap_or(i as u64 + 2);
                 let read = record.map_err(|e| e.to_string()).and_then(|record| from_csv(&record, &header));
-                read.map_err(|why| refuse(i as u64 + 2, why))
+                read.map(|row| (line, row)).map_err(|why| refuse(line, why))
             };
             Ok(drop_incomplete(Box::new(reader.into_records().enumerate().map(row)), file))
         }
         "jsonl" => {
             let lines = std::io::BufReader::new(std::fs::File::open(file)?).split(b'\n');
             let row = move |(i, line): (usize, std::io::Result<Vec<u8>>)| {
-                from_json(&line?).map_err(|why| refuse(i as u64 + 1, why))
+                let number = i as u64 + 1;
+                from_json(&line?).map(|row| (number, row)).map_err(|why| refuse(number, why))
             };
             Ok(drop_incomplete(Box::new(lines.enumerate().map(row)), file))
         }
@@ -74,6 +113,6 @@ pub fn rows(file: &Path, kind: &str) -> Result<AllRows, Error> {
     }
 }
 
-fn drop_incomplete(rows: AllRows, file: &Path) -> AllRows {
+fn drop_incomplete(rows: NumberedRows, file: &Path) -> NumberedRows {
     if ending(file) == "part" { Box::new(rows.take_while(Result::is_ok)) } else { rows }
 }

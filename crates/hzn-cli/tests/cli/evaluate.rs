@@ -114,3 +114,37 @@ fn other_times_and_a_missing_sensor_are_reported() {
     place.write("bad.toml", SENSOR.replace("pinhole", "pinhol").as_bytes());
     place.run(&["evaluate", "out.csv", "--truth", "t.csv", "-s", "bad.toml"]).expect(2).says("did you mean pinhole");
 }
+
+/// A row that another program wrote is no answer if its numbers cannot be those of one.
+#[test]
+fn impossible_answers_are_refused_with_their_column() {
+    let place = place();
+    let table = place.read("out.csv");
+    let columns: Vec<&str> = table.lines().next().unwrap().split(',').filter(|name| *name != "crc32").collect();
+    let column = |name: &str| columns.iter().position(|n| *n == name).unwrap();
+    let cases = [
+        ("axis_x", "1e308", "axis_x, axis_y, axis_z are"),
+        ("axis_x", "nan", "axis_x, axis_y, axis_z are NaN"),
+        ("axis_z", "0.9", "axis_x, axis_y, axis_z are"),
+        ("cov_xx", "-1", "cov_xx is -1, and a variance is a number that is not negative"),
+        ("p_limb", "2", "p_limb is 2, and a probability is 0 to 1"),
+        ("detail", "", ""),
+    ];
+    for (name, value, why) in cases {
+        let row = |(number, line): (usize, &str)| {
+            let mut cells: Vec<&str> = line.split(',').take(columns.len()).collect();
+            if number == 2 {
+                cells[column(name)] = value;
+            }
+            cells.join(",") + "\n"
+        };
+        let spoiled: String = table.lines().enumerate().map(row).collect();
+        place.write("other.csv", spoiled.as_bytes());
+        let args = ["evaluate", "other.csv", "--truth", "in"];
+        if why.is_empty() {
+            place.run(&args).expect(0);
+        } else {
+            place.run(&args).expect(2).says(why).says("other.csv:3: ");
+        }
+    }
+}

@@ -284,6 +284,71 @@ fn spoil_two_rows(table: &Path) {
     std::fs::write(table, spoiled).unwrap();
 }
 
+/// Rows that repeat or contradict themselves, and a file without rows, are told and do not make the answer better.
+#[test]
+fn what_is_no_measurement_is_left_out_and_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    flight(at);
+    let table = std::fs::read_to_string(at.join("left.csv")).unwrap();
+    let (header, rows) = table.split_once('\n').unwrap();
+    let columns: Vec<&str> = header.split(',').filter(|name| *name != "crc32").collect();
+    let column = |name: &str| columns.iter().position(|n| *n == name).unwrap();
+    // A program that rewrites a table drops the checksum.
+    let rewrite = |change: &dyn Fn(&mut Vec<String>)| {
+        let row = |line: &str| {
+            let mut cells: Vec<String> = line.split(',').take(columns.len()).map(str::to_owned).collect();
+            change(&mut cells);
+            cells.join(",") + "\n"
+        };
+        std::fs::write(at.join("left.csv"), columns.join(",") + "\n" + &rows.lines().map(row).collect::<String>())
+            .unwrap();
+        fuse(at, &[&MOUNTS[..], &["-o", "nav.csv", "--force"]].concat())
+    };
+    let line = |text: &str, name: &str| text.lines().find(|l| l.starts_with(name)).unwrap_or_default().to_owned();
+    let (_, plain, _) = rewrite(&|_| {});
+    let taken = line(&plain, "left, limb");
+    assert!(taken.contains(" taken, 0 refused"), "{plain}");
+    // Each row twice in its place.
+    let doubled: String = rows.lines().flat_map(|row| [row, "\n", row, "\n"]).collect();
+    std::fs::write(at.join("left.csv"), format!("{header}\n{doubled}")).unwrap();
+    let (_, said, _) = fuse(at, &[&MOUNTS[..], &["-o", "nav.csv", "--force"]].concat());
+    assert_eq!(line(&said, "left, limb"), taken, "{said}");
+    assert!(said.contains(": an earlier row has the same body and time\n"), "{said}");
+    assert_eq!(line(&said, "verdict"), line(&plain, "verdict"));
+
+    let six = |cov: &str| ["xx", "xy", "xz", "yy", "yz", "zz"].map(|end| column(&format!("{cov}_{end}")));
+    let scale = |cells: &mut Vec<String>, place: usize, factor: f64| {
+        cells[place] = cells[place].parse::<f64>().map_or(String::new(), |x| (x * factor).to_string());
+    };
+    let is_ok = |cells: &Vec<String>| cells[column("status")] == "ok";
+    let (of_cov, of_common) = (six("cov"), six("cov_common"));
+    let larger = |cells: &mut Vec<String>| {
+        for (cov, common) in of_cov.into_iter().zip(of_common) {
+            cells[common] = cells[cov].parse::<f64>().map_or(String::new(), |x| (2.0 * x).to_string());
+        }
+    };
+    let tiny = |cells: &mut Vec<String>| of_cov.into_iter().for_each(|place| scale(cells, place, 1e-280));
+    let long = |cells: &mut Vec<String>| {
+        if is_ok(cells) {
+            cells[column("axis_x")] = "1e308".into();
+        }
+    };
+    let cases: [(&dyn Fn(&mut Vec<String>), &str); 3] =
+        [(&larger, "are larger than the whole"), (&tiny, "are smaller than the rounding"), (&long, "has the length 1")];
+    for (change, why) in cases {
+        let (_, said, errors) = rewrite(change);
+        let all = said + &errors;
+        assert!(all.contains("no answer has such numbers") && all.contains(why), "{why} in {all}");
+        assert!(all.contains("left has no usable measurement") && !all.contains("left, limb"), "{all}");
+    }
+    std::fs::write(at.join("left.csv"), format!("{header}\n")).unwrap();
+    let (_, said, errors) = fuse(at, &[&MOUNTS[..], &["-o", "nav.csv", "--force"]].concat());
+    let all = said + &errors;
+    assert!(all.contains("left has no usable measurement among its 0 rows") && all.contains("left.csv"), "{all}");
+    assert!(!all.contains("consistent"), "{all}");
+}
+
 /// The single-precision covariances of `hzn run --flight` are slightly indefinite; the filter takes them all the same.
 #[test]
 fn every_answer_of_the_flight_program_is_used() {
@@ -337,7 +402,7 @@ fn every_answer_of_the_flight_program_is_used() {
     for line in [
         "not usable             2\n",
         "  cam                  1: a number of the axis, the position or a covariance is missing\n",
-        "  cam, limb            1: the covariance has a negative variance\n",
+        "  cam                  1: no answer has such numbers\n",
     ] {
         assert!(said.contains(line), "{line} in {said}");
     }

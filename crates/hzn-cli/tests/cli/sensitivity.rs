@@ -174,7 +174,7 @@ fn designs_that_cannot_be_are_refused_with_a_reason() {
         place.run(&[&["sensitivity"], args].concat()).expect(2).says(why);
     };
     refused(&[], "--altitude: missing; give it in kilometres");
-    refused(&["--altitude", "5"], "the camera at 5 km is not above the limb at 10 km");
+    refused(&["--altitude", "5"], "the camera at 5 km is not above the limb at 17 km");
     refused(&["--altitude", "high"], "\"high\" is not a number");
     refused(&["--altitude", "200", "--fov", "150:60"], "from the lower to the higher");
     refused(
@@ -190,7 +190,7 @@ fn designs_that_cannot_be_are_refused_with_a_reason() {
     refused(&["--altitude", "200", "--sigma-px", "0"], "--sigma-px: 0 is refused");
     refused(&["--altitude", "200", "-o", "x.pdf"], "a table ends in .csv, a plot in .svg");
     refused(&["--altitude", "200", "-o", "x.svg"], "there is no range to plot over");
-    refused(&["visibility", "--altitude", "5"], "5 km is not above the limb at 10 km");
+    refused(&["visibility", "--altitude", "5"], "5 km is not above the limb at 17 km");
     // No limb in view is a valid result, with advice.
     let ran = place.run(&["sensitivity", "--altitude", "3000", "--fov", "30"]).expect(0);
     assert!(ran.out.lines().nth(1).unwrap().ends_with('-'), "{}", ran.out);
@@ -244,4 +244,17 @@ fn the_third_axis_of_a_flattened_body() {
         .run(&["sensitivity", "yaw", "--altitude", "600", "--second-harmonic=-1"])
         .expect(2)
         .says("--second-harmonic: -1 is refused");
+}
+
+/// Without a sensor.toml the limb is as high and as uncertain as a sensor.toml without these keys says.
+#[test]
+fn the_limb_of_a_design_is_that_of_a_sensor() {
+    let place = Place::new();
+    let design = ["sensitivity", "--fov", "90", "--altitude", "200", "--depression", "10"];
+    let line = |more: &[&str]| place.run(&[&design, more].concat()).expect(0).out;
+    let told = line(&["--limb-height", "17", "--limb-height-sigma", "7"]);
+    let last = |text: &str| text.lines().last().unwrap().to_owned();
+    assert_eq!(last(&line(&[])), last(&told));
+    assert_eq!(last(&line(&["--body", "earth"])), last(&told));
+    assert_ne!(last(&line(&["--limb-height", "10", "--limb-height-sigma", "2"])), last(&told));
 }

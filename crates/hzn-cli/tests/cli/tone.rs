@@ -50,3 +50,16 @@ fn a_wrong_tone_is_refused_with_what_is_possible() {
     let large = error("22");
     assert!(large.contains("[input] tone: 22 is refused: must be between 0.2 and 5"), "{large}");
 }
+
+#[test]
+fn pictures_of_different_tones_are_told() {
+    let mixed = place("a.jpg", "");
+    limb(320, 240, 0.0).save(mixed.path("in/b.png")).unwrap();
+    let ran = mixed.run(&["run", "in"]).expect(0);
+    ran.says(
+        "the pictures do not agree on their tone (srgb, unknown): it is taken as unknown, and the limb is expected",
+    )
+    .says("17.0 +- 7.0 km");
+    let one = place("a.png", "").run(&["run", "in"]).expect(0);
+    assert!(!one.err.contains("do not agree"), "{}", one.err);
+}

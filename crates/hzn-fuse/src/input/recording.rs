@@ -1,5 +1,6 @@
 //! The results of `hzn run` of one camera.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use hzn_core::status::Status;
@@ -11,6 +12,9 @@ use nalgebra::Matrix3;
 
 use super::mount;
 use crate::error::Error;
+
+/// Largest excess of the common part over the whole covariance, as a fraction: both may be written with few digits.
+const MAX_EXCESS: f64 = 1e-3;
 
 /// A body that a camera sees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -94,6 +98,10 @@ pub struct Recording {
     pub other_bodies: usize,
     /// Rows with an answer that are not used, because a number of the axis, the position or a covariance is missing.
     pub incomplete: usize,
+    /// Rows with an answer that are not used, because an earlier row has the same body and time.
+    pub duplicate: usize,
+    /// Rows with an answer that are not used, because no answer has such numbers; with what is wrong with the first.
+    pub impossible: Option<(usize, String)>,
 }
 
 /// Reads a recording of `hzn run`: .mcap, .csv or .jsonl.
@@ -101,7 +109,7 @@ pub struct Recording {
 /// # Errors
 /// The file is not a recording, or its mount is not a rotation.
 pub fn recording(path: &Path) -> Result<Recording, Error> {
-    let Results { rows, sensor_toml, lost } = hzn_run::results::read(path)?;
+    let Results { rows, sensor_toml, lost, .. } = hzn_run::results::read(path)?;
     let config = match &sensor_toml {
         None => None,
         Some(text) => Some(hzn_files::sensor::parse(text, Path::new("sensor.toml")).map_err(Error::unusable)?.config),
@@ -146,7 +154,10 @@ impl Recording {
             lost: None,
             other_bodies: 0,
             incomplete: 0,
+            duplicate: 0,
+            impossible: None,
         };
+        let mut known = HashSet::new();
         for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.status == Status::Ok) {
             let body = match row.body.as_str() {
                 "sun" => Body::Sun,
@@ -161,12 +172,32 @@ impl Recording {
                 recording.without_time += 1;
                 continue;
             };
-            let seen = seen(row, index, time_s, body, limb_sigma_km);
-            recording.incomplete += usize::from(seen.is_none());
-            recording.seen.extend(seen);
+            if let Some(what) = hzn_run::results::find_impossible(row) {
+                recording.add_impossible(row, what);
+                continue;
+            }
+            let Some(seen) = seen(row, index, time_s, body, limb_sigma_km) else {
+                recording.incomplete += 1;
+                continue;
+            };
+            if let Some(what) = seen.find_impossible() {
+                recording.add_impossible(row, what.to_owned());
+                continue;
+            }
+            // The same error twice is no second measurement.
+            if known.insert((row.body.as_str(), time_s.to_bits())) {
+                recording.seen.push(seen);
+            } else {
+                recording.duplicate += 1;
+            }
         }
         recording.rows = rows;
         Ok(recording)
+    }
+
+    fn add_impossible(&mut self, row: &Row, what: String) {
+        let (count, _) = self.impossible.get_or_insert_with(|| (0, format!("{}: {what}", row.file)));
+        *count += 1;
     }
 
     /// Returns the bodies that the camera saw.
@@ -210,6 +241,20 @@ fn seen(row: &Row, index: usize, time_s: f64, body: Body, limb_sigma_km: Option<
 }
 
 impl Seen {
+    /// Returns why the covariances cannot be those of a measurement.
+    fn find_impossible(&self) -> Option<&'static str> {
+        let whole = self.covariance_rad2.into_inner();
+        let mut variances: [f64; 3] = whole.symmetric_eigenvalues().into();
+        variances.sort_by(f64::total_cmp);
+        // The smallest is that along the axis. An axis of unit length is rounded to this variance.
+        if !(variances[1] > f64::EPSILON * f64::EPSILON) {
+            return Some("cov_xx to cov_zz are smaller than the rounding of the axis");
+        }
+        let rest = self.common_rad2.map(|common| (whole - common.into_inner()).symmetric_eigenvalues().min());
+        let is_larger = rest.is_some_and(|rest| !(rest > -MAX_EXCESS * whole.trace()));
+        is_larger.then_some("cov_common_xx to cov_common_zz are larger than the whole, cov_xx to cov_zz")
+    }
+
     /// Returns the largest variance of the slow error and that of the white noise, rad².
     pub fn largest_variances_rad2(&self) -> [f64; 2] {
         let largest = |c: Matrix3<f64>| c.symmetric_eigenvalues().max().max(0.0);

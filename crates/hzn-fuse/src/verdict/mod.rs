@@ -28,8 +28,8 @@ mod suspects;
 use hzn_nav::options::{CameraOptions, Options};
 use nalgebra::Matrix3;
 
-use crate::finding::{Cause, Finding, Verdict};
-use crate::input::{Inputs, Sample};
+use crate::finding::{Cause, Finding, Level, Source, Verdict};
+use crate::input::{Inputs, Recording, Sample};
 use crate::results::Fused;
 use crate::settings::Settings;
 use force::Force;
@@ -85,8 +85,19 @@ fn part<'a>(samples: &'a [Sample], inputs: &Inputs) -> &'a [Sample] {
     samples.get(first..samples.len().min(first + MOST_SAMPLES)).unwrap_or(samples)
 }
 
+/// Returns the finding about a camera that was given and does not count.
+fn without_measurement(recording: &Recording) -> Finding {
+    let name = &recording.name;
+    let what = format!(
+        "{name} has no usable measurement among its {} rows: look at the file of this camera, or leave it out",
+        recording.rows.len()
+    );
+    Finding { level: Level::Doubtful, cause: Cause::Empty, source: Source::Camera(name.clone()), what }
+}
+
 /// Returns the verdict, with what the inputs already showed.
 pub(crate) fn verdict(mut of_inputs: Vec<Finding>, fused: &Fused, given: &Given<'_>) -> Verdict {
+    of_inputs.extend(given.inputs.recordings.iter().filter(|r| r.seen.is_empty()).map(without_measurement));
     of_inputs.extend(solution::test(fused, given.cameras, given.options));
     Verdict::new(of_inputs)
 }

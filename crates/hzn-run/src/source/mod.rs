@@ -38,7 +38,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 pub use bits::{FoundBits, find_bits, with_key};
-pub use find_tone::find_tone;
+pub use find_tone::{describe_mixed_tones, find_tone};
 pub use item::{Item, TimeSource};
 pub use memory::Held;
 pub use paths::{check_exists, ending, open_file};

@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     read.extend([args.results.clone(), truth_path.clone()]);
     read.extend(truth.iter().map(|t| folder.join(&t.file)));
     files::check_outputs(&read, &args.output, args.force)?;
-    let Results { rows, sensor_toml, lost } = hzn_run::results::read(&args.results)?;
+    let Results { rows, sensor_toml, lost, .. } = hzn_run::results::read(&args.results)?.checked()?;
     if let Some(lost) = lost.as_ref().filter(|_| rows.is_empty()) {
         return Err(unreadable(lost));
     }

@@ -40,10 +40,11 @@ pub(crate) struct Args {
     /// Bodies: earth, moon, sun, a planet or moon by name, or a radius in kilometres; several with commas
     #[arg(long, value_name = "BODY", value_delimiter = ',')]
     pub(super) body: Vec<Body>,
-    /// Height of the visible limb, kilometres [default: 10 for the Earth, that of the body for a planet]
+    /// Height of the visible limb, kilometres [default: that of a sensor.toml, 17 for the Earth]
     #[arg(long, value_name = "KM")]
     pub(super) limb_height: Option<Values>,
-    /// 1-sigma of the limb height, kilometres [default: 2, that of the body for a planet]
+    /// 1-sigma of the limb height, kilometres [default: that of a sensor.toml, 7 for the Earth; 2 for a
+    /// body without air]
     #[arg(long, value_name = "KM")]
     pub(super) limb_height_sigma: Option<f64>,
     /// 1-sigma of the altitude, kilometres [default: 0.5]

@@ -3,6 +3,9 @@
 use hzn_core::body::{self, Kind, MOON_RADIUS_KM, SUN_RADIUS_KM};
 use hzn_core::ellipsoid::{EARTH_MEAN_RADIUS_M, WGS84_A_M, WGS84_B_M};
 
+/// 1-sigma of the limb height of a body without air, kilometres: its mountains.
+const BARE_SIGMA_KM: f64 = 2.0;
+
 /// A body, with the limb height that is used if none is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Body {
@@ -10,20 +13,24 @@ pub(super) struct Body {
     pub(super) radius_km: f64,
     pub(super) radii_km: [f64; 3],
     pub(super) limb_height_km: f64,
-    /// 1-sigma of the limb height, and of its second harmonic, if they are known of the body.
-    pub(super) limb_height_sigma_km: Option<f64>,
+    /// Its 1-sigma.
+    pub(super) limb_height_sigma_km: f64,
+    /// 1-sigma of the second harmonic of the limb height, if it is known of the body.
     pub(super) second_harmonic_km: Option<f64>,
 }
 
 impl Body {
-    /// The Earth (WGS-84), with the visible limb at 10 km.
-    pub(super) const EARTH: Self = Self {
-        radius_km: EARTH_MEAN_RADIUS_M / 1e3,
-        radii_km: [WGS84_A_M / 1e3, WGS84_A_M / 1e3, WGS84_B_M / 1e3],
-        limb_height_km: 10.0,
-        limb_height_sigma_km: None,
-        second_harmonic_km: None,
-    };
+    /// Returns the Earth (WGS-84) with the limb height that a sensor.toml has if it says nothing else.
+    pub(super) fn earth() -> Self {
+        let told = body::Config::of_kind(Kind::Earth, None);
+        Self {
+            radius_km: EARTH_MEAN_RADIUS_M / 1e3,
+            radii_km: [WGS84_A_M / 1e3, WGS84_A_M / 1e3, WGS84_B_M / 1e3],
+            limb_height_km: told.limb_height_km,
+            limb_height_sigma_km: told.limb_height_sigma_km,
+            second_harmonic_km: None,
+        }
+    }
 
     /// Returns the body of a sensor.toml.
     pub(super) fn from_config(body: &body::Config) -> Self {
@@ -33,7 +40,7 @@ impl Body {
             radius_km,
             radii_km,
             limb_height_km: body.limb_height_km,
-            limb_height_sigma_km: Some(body.limb_height_sigma_km),
+            limb_height_sigma_km: body.limb_height_sigma_km,
             second_harmonic_km: body.limb_height_harmonic_sigma_km,
         }
     }
@@ -42,10 +49,17 @@ impl Body {
 impl std::str::FromStr for Body {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let bare = |radius_km| Self { radius_km, radii_km: [radius_km; 3], limb_height_km: 0.0, ..Self::EARTH };
+        let bare = |radius_km| Self {
+            radius_km,
+            radii_km: [radius_km; 3],
+            limb_height_km: 0.0,
+            limb_height_sigma_km: BARE_SIGMA_KM,
+            second_harmonic_km: None,
+        };
+        let earth = Self::earth();
         match text {
-            "earth" => Ok(Self::EARTH),
-            "earth-sphere" => Ok(Self { radii_km: [Self::EARTH.radius_km; 3], ..Self::EARTH }),
+            "earth" => Ok(earth),
+            "earth-sphere" => Ok(Self { radii_km: [earth.radius_km; 3], ..earth }),
             "moon" => Ok(bare(MOON_RADIUS_KM)),
             "sun" => Ok(bare(SUN_RADIUS_KM)),
             _ => {

@@ -12,7 +12,7 @@ use crate::exit::{Stop, usage};
 /// Computes fields of view by altitude (Braun & Barf 2022, figures 6 and 7).
 pub(super) fn visibility(args: &Args) -> Result<Study, Stop> {
     let body = match args.body.as_slice() {
-        [] => Body::EARTH,
+        [] => Body::earth(),
         [one] => *one,
         _ => return Err(usage("--body: give one body for this chart")),
     };

@@ -37,7 +37,7 @@ impl<'a> Grid<'a> {
         let bodies = match (args.body.is_empty(), body) {
             (false, _) => args.body.clone(),
             (true, Some(body)) => vec![Body::from_config(body)],
-            (true, None) => vec![Body::EARTH],
+            (true, None) => vec![Body::earth()],
         };
         if let Some(px) = args.sigma_px.filter(|px| !(*px > 0.0)) {
             return Err(usage(format!("--sigma-px: {px} is refused: must be above 0")));
@@ -91,7 +91,7 @@ impl<'a> Grid<'a> {
 
     /// Returns the body of a place in the grid.
     pub(super) fn body(&self, place: &[f64]) -> Body {
-        self.bodies.get(self.body_number(place)).copied().unwrap_or(Body::EARTH)
+        self.bodies.get(self.body_number(place)).copied().unwrap_or_else(Body::earth)
     }
 
     /// Returns the edge noise of each sensor and where it comes from, in words.
@@ -144,7 +144,7 @@ impl<'a> Grid<'a> {
             false => Err(usage(format!("--{name}: {x} is refused: must be 0 or more"))),
         };
         let limb_height = own.map_or(body.limb_height_km, |b| b.limb_height_km);
-        let own_sigma = own.map(|b| b.limb_height_sigma_km).or(body.limb_height_sigma_km);
+        let own_sigma = own.map_or(body.limb_height_sigma_km, |b| b.limb_height_sigma_km);
         let altitude_sigma = args.altitude_sigma.or(own.map(|b| b.altitude_sigma_km)).unwrap_or(0.5);
         let noise = |limb_px: f64| sensor.map(|(s, noise)| noise_of(s).measured(noise.rms_px, limb_px));
         let mut design = Design {
@@ -153,7 +153,7 @@ impl<'a> Grid<'a> {
             altitude_km: value("altitude_km").unwrap_or(f64::NAN),
             altitude_sigma_km: positive("altitude-sigma", altitude_sigma)?,
             limb_height_km: value("limb_height_km").unwrap_or(limb_height),
-            limb_height_sigma_km: positive("limb-height-sigma", args.limb_height_sigma.or(own_sigma).unwrap_or(2.0))?,
+            limb_height_sigma_km: positive("limb-height-sigma", args.limb_height_sigma.unwrap_or(own_sigma))?,
             depression_deg: value("depression_deg").unwrap_or(0.0),
             roll_deg: value("roll_deg").unwrap_or(0.0),
             sigma_px: noise(0.0).map_or(args.sigma_px.unwrap_or(1.0), |n| n.sigma_px),
@@ -190,7 +190,7 @@ fn looking_for(sensor: &Config, body: &Body) -> Config {
     let other = || hzn_core::body::Config {
         radius_km: Some(body.radius_km),
         limb_height_km: body.limb_height_km,
-        limb_height_sigma_km: body.limb_height_sigma_km.unwrap_or(2.0),
+        limb_height_sigma_km: body.limb_height_sigma_km,
         altitude_sigma_km: sensor.body.altitude_sigma_km,
         ..hzn_core::body::Config::of_kind(Kind::Sphere, None)
     };
