@@ -309,3 +309,65 @@ fn a_heads_own_rate_turns_its_answer_to_the_time_of_the_epoch() {
         assert!(length(own) > 1e-4 && away < 0.05 * length(own), "{own:?} {told:?}");
     }
 }
+
+#[test]
+fn the_truth_of_another_frame_is_refused_with_the_right_command() {
+    let place = ring();
+    place.run(&["run", "ring/rig.toml", "-o", "out.csv", "-q"]).expect(0);
+    let refused = |args: &[&str], why: &str| {
+        place.run(&[&["evaluate", "out.csv", "--truth"], args].concat()).expect(2).says(why);
+    };
+    refused(
+        &["ring/front"],
+        "this is the truth of the head front, and the joint answers are in the frame of the vehicle",
+    );
+    refused(&["ring/front"], "give --head front, or --truth ring/front/..");
+    refused(&["ring", "--head", "front"], "not of the head front: give --truth ring/front");
+    refused(&["ring/front", "--head", "left"], "this is the truth of the head front, not of left: give --head front");
+    let told = place.run(&["evaluate", "out.csv", "--truth", "ring"]).expect(0);
+    assert!(!told.err.contains("of another sequence"), "{}", told.err);
+    place.run(&["evaluate", "out.csv", "--truth", "ring/front", "--head", "front"]).expect(0);
+    // The truth of a later flight has the same names.
+    let later = |line: &str| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        cells[1] = cells[1].parse::<f64>().map_or(cells[1].clone(), |t| (t + 1e6).to_string());
+        cells.join(",") + "\n"
+    };
+    let late: String = place.read("ring/truth.csv").lines().map(later).collect();
+    place.write("late.csv", late.as_bytes());
+    place.run(&["evaluate", "out.csv", "--truth", "late.csv"]).expect(0).says("this is the truth of another sequence");
+}
+
+#[test]
+fn the_time_is_that_of_the_heads_that_are_used() {
+    let place = ring();
+    // The mount of the last head is wrong by 10 degrees about x, and its pictures are 0.06 s late.
+    let text = place.read("ring/rig.toml");
+    let (start, last) = text.rsplit_once("q_rig_from_camera_wxyz = ").unwrap();
+    let (right, end) = last.split_once('\n').unwrap();
+    assert!(right.starts_with("[0.82903757"), "{right}");
+    let half = 39f64.to_radians();
+    let wrong = format!("{start}q_rig_from_camera_wxyz = [{}, {}, 0.0, 0.0]\n{end}", half.cos(), half.sin());
+    place.write("ring/rig.toml", wrong.as_bytes());
+    let late = |line: &str| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Ok(time_s) = cells[1].parse::<f64>() {
+            cells[1] = (time_s + 0.06).to_string();
+            cells[2].clear();
+        }
+        cells.join(",") + "\n"
+    };
+    let table: String = place.read("ring/left/frames.csv").lines().map(late).collect();
+    place.write("ring/left/frames.csv", table.as_bytes());
+    let (joint, heads) = run(&place, &[], 0);
+    let own: Vec<&str> =
+        heads.iter().filter(|row| cell(row, "head") == "front").map(|row| cell(row, "time_s")).collect();
+    let mut excluded = 0;
+    for (row, own) in joint.iter().zip(own) {
+        if cell(row, "heads_used") == "front right back" {
+            excluded += 1;
+            assert_eq!(cell(row, "time_s"), own, "{row:?}");
+        }
+    }
+    assert!(excluded > 0, "{joint:?}");
+}

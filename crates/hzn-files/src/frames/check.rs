@@ -7,6 +7,7 @@ use hzn_core::body::Kind;
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
 
 use super::data::{FrameData, Frames};
+use crate::rig::turn_after;
 use crate::{Problem, plausible};
 
 /// Largest plausible distance of a camera, in radii of the body: about twice the Moon's distance from the Earth.
@@ -23,6 +24,15 @@ const SLOW_ALTITUDES_KM: std::ops::Range<f64> = 150.0..10_000.0;
 /// Smallest plausible speed over ground at these altitudes, in km/s. An orbit has at least 1.5 km/s there. A sounding
 /// rocket is slower only around its highest point, while all rows must be this slow.
 const MIN_SPEED_KM_S: f64 = 0.02;
+
+/// Largest plausible rate, in rad/s: ten turns a second, twice the spin of a sounding rocket (5 turns a second).
+const MAX_RATE_RAD_S: f64 = 10.0 * core::f64::consts::TAU;
+/// Fewest turns between rows that say something about the rates. With a faster turn than half a circle from row to row,
+/// one or two may disagree by chance.
+const MIN_TURNS: usize = 3;
+/// Right rates leave less of the turns between rows than no rates do, and rates with a wrong sign twice as much. The
+/// limit lies in the middle.
+const MAX_REST: f64 = 1.5;
 
 /// Number of warnings of a kind that are listed one by one; the others are only counted.
 const MAX_LISTED: usize = 3;
@@ -64,6 +74,7 @@ impl Frames {
         warnings.extend(self.explain_unused_columns(config));
         warnings.extend(self.explain_unused_attitude(config));
         warnings.extend(self.suspect_milliseconds());
+        warnings.extend(self.suspect_rates());
         warnings
     }
 
@@ -111,6 +122,44 @@ impl Frames {
             "with time_s in seconds the positions move by at most {:.1} m/s, which is too slow in space; is time_s in \
              milliseconds?",
             fastest * 1e3
+        );
+        Some(self.problem(row, what))
+    }
+
+    /// Returns one warning if the rates contradict the turns of the table's own attitudes, or without attitudes, if a
+    /// rate is implausibly large: rates in degrees per second are 57 times too large.
+    fn suspect_rates(&self) -> Option<Problem> {
+        let known: Vec<_> = self.rows.iter().filter_map(|r| Some((r, r.time_s?, r.rate_rad_s?))).collect();
+        let attitude = |r: &FrameData| r.q_fixed_from_camera_wxyz;
+        let turn = |(a, b): (&(&FrameData, f64, [f64; 3]), &(&FrameData, f64, [f64; 3]))| {
+            let dt_s = b.1 - a.1;
+            let [w, x, y, z] = attitude(a.0)?;
+            let turned = turn_after([w, -x, -y, -z], attitude(b.0)?);
+            // What is left of the turn if the camera turns by the mean of both rates times a factor.
+            let rest = |factor: f64| {
+                let by = [0, 1, 2].map(|i| -0.5 * factor * dt_s * (a.2[i] + b.2[i]));
+                angle(turn_after(turned, from_rotation_vector(by)))
+            };
+            (dt_s > 0.0).then(|| [rest(1.0), rest(1f64.to_radians()), rest(0.0)])
+        };
+        let turns: Vec<[f64; 3]> = known.iter().zip(known.iter().skip(1)).filter_map(turn).collect();
+        let size = |[x, y, z]: [f64; 3]| x.hypot(y).hypot(z);
+        let hint = "is it in degrees per second? rate_x, rate_y, rate_z are rad/s";
+        if turns.len() < MIN_TURNS {
+            let every = self.rows.iter().filter_map(|r| Some((r, size(r.rate_rad_s?))));
+            let (row, rate) = every.into_iter().find(|(_, rate)| *rate > MAX_RATE_RAD_S)?;
+            return Some(self.problem(row, format!("the rate is {rate:.1} rad/s, which is implausibly large: {hint}")));
+        }
+        let [told, in_degrees, none] = [0, 1, 2].map(|i| median(turns.iter().map(|turn| turn[i]).collect()));
+        if told <= MAX_REST * none {
+            return None;
+        }
+        let (row, ..) = known.first()?;
+        let hint = if MAX_REST * in_degrees < none { hint } else { "are its axes those of the camera, and its signs?" };
+        let what = format!(
+            "the attitudes turn by {:.2} deg from row to row, and the rates miss that by {:.2} deg (medians): {hint}",
+            none.to_degrees(),
+            told.to_degrees()
         );
         Some(self.problem(row, what))
     }
@@ -178,6 +227,25 @@ impl Frames {
     }
 }
 
+/// Returns the angle of a rotation in radians, from 0 to pi.
+fn angle([w, x, y, z]: [f64; 4]) -> f64 {
+    2.0 * x.hypot(y).hypot(z).atan2(w.abs())
+}
+
+/// Returns the rotation about a vector by its length in radians.
+fn from_rotation_vector([x, y, z]: [f64; 3]) -> [f64; 4] {
+    let angle = x.hypot(y).hypot(z);
+    let (sin, cos) = (0.5 * angle).sin_cos();
+    let scale = if angle > 0.0 { sin / angle } else { 0.5 };
+    [cos, scale * x, scale * y, scale * z]
+}
+
+/// Returns the middle value; 0 without values.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or_default()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -239,6 +307,38 @@ mod tests {
             );
             assert_eq!(told(&rows), None);
         }
+    }
+
+    #[test]
+    fn rates_in_degrees_per_second_are_suspected() {
+        let told = |text: &str| read(text).unwrap().suspect_rates().map(|w| w.to_string());
+        // About an axis that is none of the camera's, with a rate that changes: the attitudes of `turn`, told as `rate`.
+        let flight = |turn_rad_s: f64, rate_rad_s: f64, dt_s: f64, has_attitude: bool| {
+            let mut text = "file,time_s,rate_x,rate_y,rate_z,qw,qx,qy,qz\n".to_owned();
+            let axis = [0.48, -0.6, 0.64];
+            let mut q = [0.5, 0.5, -0.5, 0.5];
+            for i in 0..12 {
+                let faster = 1.0 + 0.01 * f64::from(i);
+                let [x, y, z] = axis.map(|a| a * rate_rad_s * faster);
+                let [qw, qx, qy, qz] = q.map(|q: f64| if has_attitude { q.to_string() } else { String::new() });
+                text += &format!("{i},{},{x},{y},{z},{qw},{qx},{qy},{qz}\n", f64::from(i) * dt_s);
+                q = turn_after(q, from_rotation_vector(axis.map(|a| a * turn_rad_s * (faster + 0.005) * dt_s)));
+            }
+            told(&text)
+        };
+        for (rate, dt_s) in [(1e-3, 1.0), (0.035, 1.0), (0.5, 1.0), (0.5, 10.0), (6.0, 0.05), (31.4, 0.25), (31.4, 1.0)]
+        {
+            assert_eq!(flight(rate, rate, dt_s, true), None, "{rate} rad/s");
+            assert_eq!(flight(rate, rate, dt_s, false), None, "{rate} rad/s");
+        }
+        for (rate, dt_s) in [(1e-3, 1.0), (0.035, 1.0), (0.5, 1.0), (6.0, 0.05)] {
+            let found = flight(rate, rate.to_degrees(), dt_s, true).unwrap_or_default();
+            assert!(found.contains("is it in degrees per second?"), "{rate} rad/s: {found}");
+            let found = flight(rate, -rate, dt_s, true).unwrap_or_default();
+            assert!(found.contains("are its axes those of the camera"), "{rate} rad/s: {found}");
+        }
+        let fast = flight(6.0, 6f64.to_degrees(), 0.1, false).unwrap_or_default();
+        assert!(fast.contains("the rate is 343.8 rad/s, which is implausibly large: is it in degrees"), "{fast}");
     }
 
     #[test]

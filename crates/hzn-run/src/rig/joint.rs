@@ -66,6 +66,7 @@ impl<'a> Seen<'a> {
 }
 
 /// A head that has an answer.
+#[derive(Clone, Copy)]
 struct Answered<'a> {
     k: usize,
     solution: &'a Solution<f64>,
@@ -207,20 +208,46 @@ impl Joiner {
     }
 
     fn joint(&self, index: u64, heads: &[Seen<'_>], time_s: Option<f64>, answered: &[Answered<'_>]) -> Row {
-        let mut cones = [None; MOST_HEADS];
-        let mut without = Vec::new();
-        for head in answered {
-            let cone = self.cone(head, time_s);
-            if cone.is_none() {
-                without.extend(self.names.get(head.k).map(|name| format!("{name}: no free cone")));
-            }
-            if let Some(place) = cones.get_mut(head.k) {
-                *place = cone;
-            }
-        }
+        let cones = self.cones(answered, time_s);
+        let is_without = |head: &&Answered<'_>| cones.get(head.k).is_some_and(Option::is_none);
+        let without = answered.iter().filter(is_without).filter_map(|head| self.names.get(head.k));
+        let without: Vec<String> = without.map(|name| format!("{name}: no free cone")).collect();
         let mut row = self.join_cones(index, heads, time_s, answered, &cones);
         row.detail = join([row.detail, without.join(", ")]);
         row
+    }
+
+    /// Returns the free cones of these heads at this time, in the places of the heads.
+    fn cones(&self, answered: &[Answered<'_>], time_s: Option<f64>) -> [Option<Head<f64>>; MOST_HEADS] {
+        let mut cones = [None; MOST_HEADS];
+        for head in answered {
+            if let Some(place) = cones.get_mut(head.k) {
+                *place = self.cone(head, time_s);
+            }
+        }
+        cones
+    }
+
+    /// Moves a joint answer to the middle of the exposures that it uses, if heads were excluded from it. While the
+    /// vehicle turns, an excluded head that is late would otherwise move the time, but not the direction.
+    fn at_the_used(
+        &self,
+        joint: Joint<f64>,
+        time_s: Option<f64>,
+        answered: &[Answered<'_>],
+        tilt_rad: f64,
+    ) -> (Joint<f64>, Option<f64>) {
+        let used: Vec<_> = answered.iter().filter(|head| joint.heads_used >> head.k & 1 == 1).copied().collect();
+        let own_s = middle_s(&used);
+        if own_s == time_s {
+            return (joint, time_s);
+        }
+        match self.rig.join(&self.cones(&used, own_s), tilt_rad) {
+            Ok(Joint { axis, covariance, cos, heads_used, .. }) if heads_used == joint.heads_used => {
+                (Joint { axis, covariance, cos, ..joint }, own_s)
+            }
+            _ => (joint, time_s),
+        }
     }
 
     fn join_cones(
@@ -234,8 +261,10 @@ impl Joiner {
         // The largest limb counts: its tilt moves the axis most.
         let cos = answered.iter().filter_map(|head| Some(head.solution.free?.cos)).fold(1.0, f64::min);
         let rig_rad = self.common.mount.sigma_deg.to_radians();
-        match self.rig.join(cones, self.tilt_rad(cos).hypot(rig_rad)) {
+        let tilt_rad = self.tilt_rad(cos).hypot(rig_rad);
+        match self.rig.join(cones, tilt_rad) {
             Ok(joint) => {
+                let (joint, time_s) = self.at_the_used(joint, time_s, answered, tilt_rad);
                 let mut row = self.row(index, heads, time_s, Status::Ok, "");
                 self.set_joint(&mut row, &joint);
                 if let Some(used) = answered.iter().find(|head| joint.heads_used >> head.k & 1 == 1) {

@@ -55,6 +55,9 @@ pub(super) struct Args {
     force: bool,
 }
 
+/// Largest difference of the times of a picture in the results and in the truth, seconds.
+const SAME_TIME_S: f64 = 1e-3;
+
 pub(super) fn run(args: &Args) -> Outcome {
     for path in &args.output {
         match ending(path).as_str() {
@@ -76,6 +79,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let mut rows = heads::select(rows, args.head.as_deref()).map_err(usage)?;
     let are_joint = heads::are_joint(&rows);
+    truth_of_rig(folder, are_joint, args.head.as_deref())?;
     if are_joint {
         heads::describe_removed(heads::name_by_time(&mut rows, &truth)).iter().for_each(tell::warning);
     }
@@ -87,9 +91,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     let answers: Vec<Answer> = rows.iter().map(Answer::from).collect();
     let cases = pair(&answers, &truth, camera.as_ref())
         .map_err(|e| usage(format!("{} does not match {}: {e}", truth_path.display(), args.results.display())))?;
-    if !are_joint {
-        warn_of_other_times(&rows, &truth);
-    }
+    // An epoch of a rig is not at the time of one picture; it has the name of the row within half a step.
+    let steps = truth.windows(2).map(|w| w[1].time_s - w[0].time_s).filter(|step| *step > 0.0);
+    let allowed_s = if are_joint { 0.5 * steps.fold(f64::INFINITY, f64::min) } else { SAME_TIME_S };
+    warn_of_other_times(&rows, &truth, allowed_s);
     let report = Report {
         results: args.results.display().to_string(),
         truth: truth_path.display().to_string(),
@@ -126,11 +131,45 @@ fn sensor(sensor: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Resul
     })
 }
 
+/// Refuses the truth of one head for the answers of a vehicle, and the reverse, if a rig.toml says whose truth it is:
+/// their axes are in different frames.
+fn truth_of_rig(folder: &Path, are_joint: bool, head: Option<&str>) -> Result<(), Stop> {
+    if folder.join("rig.toml").is_file() {
+        let advice = |name: &str| format!("give --truth {}, the folder of its pictures", folder.join(name).display());
+        return match head {
+            _ if are_joint => Ok(()),
+            Some(name) => {
+                Err(usage(format!("this is the truth of the vehicle, not of the head {name}: {}", advice(name))))
+            }
+            None => Err(usage(format!("this is the truth of a vehicle, not of one camera: {}", advice("HEAD")))),
+        };
+    }
+    let Some(above) = std::path::absolute(folder).ok().and_then(|path| path.parent().map(Path::to_owned)) else {
+        return Ok(());
+    };
+    let Ok(rig) = hzn_files::rig::load(&above.join("rig.toml")) else { return Ok(()) };
+    let place = |path: &Path| std::fs::canonicalize(path).ok();
+    let Some(own) = place(folder) else { return Ok(()) };
+    let is_own = |one: &&hzn_files::rig::Head| place(&above.join(&one.pictures)).as_ref() == Some(&own);
+    let Some(name) = rig.heads.iter().find(is_own).map(|one| one.name.as_str()) else { return Ok(()) };
+    match head {
+        Some(wanted) if wanted != name => {
+            Err(usage(format!("this is the truth of the head {name}, not of {wanted}: give --head {name}")))
+        }
+        None if are_joint => Err(usage(format!(
+            "this is the truth of the head {name}, and the joint answers are in the frame of the vehicle: give --head \
+             {name}, or --truth {}",
+            folder.join("..").display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// Warns if the times differ: two sequences may have the same file names.
-fn warn_of_other_times(rows: &[Row], truth: &[Truth]) {
+fn warn_of_other_times(rows: &[Row], truth: &[Truth], allowed_s: f64) {
     let time = |file: &str| truth.iter().find(|t| file.ends_with(t.file.as_str())).map(|t| t.time_s);
     let other_times =
-        |row: &Row| Some((row.time_s?, time(&row.file)?)).filter(|(here, there)| (here - there).abs() > 1e-3);
+        |row: &Row| Some((row.time_s?, time(&row.file)?)).filter(|(here, there)| (here - there).abs() > allowed_s);
     let other = rows.iter().find_map(|row| other_times(row).map(|(here, there)| (row, here, there)));
     if let Some((row, here, there)) = other {
         let what = "if they are not counted from different instants, this is the truth of another sequence";
