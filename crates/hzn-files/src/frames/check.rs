@@ -131,7 +131,8 @@ impl Frames {
     fn suspect_rates(&self) -> Option<Problem> {
         let known: Vec<_> = self.rows.iter().filter_map(|r| Some((r, r.time_s?, r.rate_rad_s?))).collect();
         let attitude = |r: &FrameData| r.q_fixed_from_camera_wxyz;
-        let turn = |(a, b): (&(&FrameData, f64, [f64; 3]), &(&FrameData, f64, [f64; 3]))| {
+        type Rated<'a> = (&'a FrameData, f64, [f64; 3]);
+        let turn = |(a, b): (&Rated<'_>, &Rated<'_>)| {
             let dt_s = b.1 - a.1;
             let [w, x, y, z] = attitude(a.0)?;
             let turned = turn_after([w, -x, -y, -z], attitude(b.0)?);
