@@ -334,7 +334,8 @@ fn what_is_no_measurement_is_left_out_and_told() {
             cells[column("axis_x")] = "1e308".into();
         }
     };
-    let cases: [(&dyn Fn(&mut Vec<String>), &str); 3] =
+    type Change<'a> = &'a dyn Fn(&mut Vec<String>);
+    let cases: [(Change<'_>, &str); 3] =
         [(&larger, "are larger than the whole"), (&tiny, "are smaller than the rounding"), (&long, "has the length 1")];
     for (change, why) in cases {
         let (_, said, errors) = rewrite(change);
