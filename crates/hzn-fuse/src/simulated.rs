@@ -153,16 +153,8 @@ fn recording(
         name: one.name.clone(),
         mount: Some(rotation(one.mount.map_or([1.0, 0.0, 0.0, 0.0], |m| m.q_vehicle_from_camera_wxyz))),
         camera: Some(one.camera.clone()),
-        limb_sigma_km: None,
-        clock_offset_s: 0.0,
         seen,
-        rows: Vec::new(),
-        without_time: 0,
-        lost: None,
-        other_bodies: 0,
-        incomplete: 0,
-        duplicate: 0,
-        impossible: None,
+        ..Recording::default()
     })
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use hzn_files::FrameData;
 use hzn_files::rig::{self, Common, Head, HeadMount, JOINT};
-use hzn_run::engine::Finished;
+use hzn_run::engine::{BodyOutcome, Finished};
 use hzn_run::rig::{Joiner, Seen};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -119,18 +119,8 @@ impl Rig {
             let data = FrameData { time_s: known.data.time_s.or(read.time_s), ..known.data.clone() };
             let data = FrameData { utc_s: data.time_s, ..data }.seen_by_camera(q_vehicle_from_camera_wxyz);
             let (report, processed) = read.process(py, &state, &data, bits, false)?;
-            frames.push(Some(Finished {
-                index: 0,
-                name: read.file,
-                time_s: data.time_s,
-                data: Some(data),
-                outcomes: processed.into_iter().map(Into::into).collect(),
-                drawing: Default::default(),
-                picture: None,
-                traces: None,
-                tip: None,
-                pages: 1,
-            }));
+            let outcomes = processed.into_iter().map(Into::into).collect();
+            frames.push(Some(finished(read.file, data, outcomes)));
             reports.set_item(name, Bound::new(py, report)?)?;
         }
         let seen: Vec<Seen<'_>> = frames.iter().map(|frame| Seen::new(frame.as_ref(), false)).collect();
@@ -158,5 +148,21 @@ impl Rig {
             }
         }
         Ok(())
+    }
+}
+
+/// Returns the picture of a head as the joint answer takes it.
+fn finished(name: String, data: FrameData, outcomes: Vec<BodyOutcome>) -> Finished {
+    Finished {
+        index: 0,
+        name,
+        time_s: data.time_s,
+        data: Some(data),
+        outcomes,
+        drawing: Default::default(),
+        picture: None,
+        traces: None,
+        tip: None,
+        pages: 1,
     }
 }

@@ -169,6 +169,18 @@ impl SimulatedFrame {
     }
 }
 
+/// Reads the truth from a file, from the truth.csv of a folder, or from rows.
+fn read_truth(truth: &Bound<'_, PyAny>) -> PyResult<Vec<Truth>> {
+    match truth.extract::<PathBuf>() {
+        Ok(path) => {
+            let path = if path.is_dir() { path.join("truth.csv") } else { path };
+            hzn_files::truth::load(&path).map_err(errors::config)
+        }
+        Err(_) => serde_json::from_value::<Vec<Truth>>(parameters::from_python(truth)?)
+            .map_err(|e| errors::config(format!("truth: {e}"))),
+    }
+}
+
 /// Compares results with the truth. Both may be files. Reports without a name are in the order of the truth.
 #[pyfunction]
 #[pyo3(name = "_evaluate")]
@@ -178,14 +190,7 @@ pub(crate) fn evaluate<'py>(
     truth: &Bound<'py, PyAny>,
     camera: Option<&Camera>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let truth = match truth.extract::<PathBuf>() {
-        Ok(path) => {
-            let path = if path.is_dir() { path.join("truth.csv") } else { path };
-            hzn_files::truth::load(&path).map_err(errors::config)?
-        }
-        Err(_) => serde_json::from_value::<Vec<Truth>>(parameters::from_python(truth)?)
-            .map_err(|e| errors::config(format!("truth: {e}")))?,
-    };
+    let truth = read_truth(truth)?;
     let mut camera = camera.map(|c| c.config.clone());
     let mut rows = match results.extract::<PathBuf>() {
         Ok(path) => {

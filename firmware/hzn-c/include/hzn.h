@@ -113,11 +113,11 @@ typedef struct {
   // Time from the attitude and the Sun to the exposure, s; NaN: 0. Both are moved by the rate, if it is known.
   float attitude_age_s;
   // The attitude and the Sun are not used if they are further from the exposure than this, s; NaN: they do not
-  // expire.
+  // expire. 0, less than 0 and infinity are refused.
   float attitude_expires_s;
   // axis of the last answer. With parameter 132, an answer that is too far from it is refused.
   float last_axis[3];
-  // cov_rad2 of that answer.
+  // cov_rad2 of that answer. Both are given, or none.
   float last_cov_rad2[6];
   // Time from the exposure of that answer to this one, s.
   float last_age_s;

@@ -37,7 +37,7 @@ hzn export flight.mcap --overlay drawn/         the pictures with edges, points 
     (
         "fuse",
         "hzn fuse --nadir flight.mcap --imu imu.csv --gnss gnss.csv -o fused.mcap
-hzn fuse --nadir flight.mcap --imu imu.csv --gnss gnss.csv --solve --report fused.html",
+hzn fuse --nadir flight.mcap --imu imu.csv --gnss gnss.csv --solve -o f.mcap --report f.html",
     ),
     (
         "simulate",

@@ -309,19 +309,16 @@ fn what_is_no_measurement_is_left_out_and_told() {
     let (_, plain, _) = rewrite(&|_| {});
     let taken = line(&plain, "left, limb");
     assert!(taken.contains(" taken, 0 refused"), "{plain}");
-    // Each row twice in its place.
     let doubled: String = rows.lines().flat_map(|row| [row, "\n", row, "\n"]).collect();
     std::fs::write(at.join("left.csv"), format!("{header}\n{doubled}")).unwrap();
     let (_, said, _) = fuse(at, &[&MOUNTS[..], &["-o", "nav.csv", "--force"]].concat());
     assert_eq!(line(&said, "left, limb"), taken, "{said}");
     assert!(said.contains(": an earlier row has the same body and time\n"), "{said}");
     assert_eq!(line(&said, "verdict"), line(&plain, "verdict"));
-
     let six = |cov: &str| ["xx", "xy", "xz", "yy", "yz", "zz"].map(|end| column(&format!("{cov}_{end}")));
     let scale = |cells: &mut Vec<String>, place: usize, factor: f64| {
         cells[place] = cells[place].parse::<f64>().map_or(String::new(), |x| (x * factor).to_string());
     };
-    let is_ok = |cells: &Vec<String>| cells[column("status")] == "ok";
     let (of_cov, of_common) = (six("cov"), six("cov_common"));
     let larger = |cells: &mut Vec<String>| {
         for (cov, common) in of_cov.into_iter().zip(of_common) {
@@ -330,7 +327,7 @@ fn what_is_no_measurement_is_left_out_and_told() {
     };
     let tiny = |cells: &mut Vec<String>| of_cov.into_iter().for_each(|place| scale(cells, place, 1e-280));
     let long = |cells: &mut Vec<String>| {
-        if is_ok(cells) {
+        if cells[column("status")] == "ok" {
             cells[column("axis_x")] = "1e308".into();
         }
     };

@@ -195,7 +195,7 @@ fn designs_that_cannot_be_are_refused_with_a_reason() {
     let ran = place.run(&["sensitivity", "--altitude", "3000", "--fov", "30"]).expect(0);
     assert!(ran.out.lines().nth(1).unwrap().ends_with('-'), "{}", ran.out);
     ran.says(
-        "1 of 1 designs see no limb, or too little of it: at 3000 km the limb is 47.1 deg below the horizontal; \
+        "1 of 1 designs see no limb, or too little of it: at 3000 km the limb is 47.0 deg below the horizontal; \
          --depression 47",
     );
 }

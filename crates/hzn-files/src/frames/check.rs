@@ -313,7 +313,8 @@ mod tests {
     #[test]
     fn rates_in_degrees_per_second_are_suspected() {
         let told = |text: &str| read(text).unwrap().suspect_rates().map(|w| w.to_string());
-        // About an axis that is none of the camera's, with a rate that changes: the attitudes of `turn`, told as `rate`.
+        // About an axis that is none of the camera's, with a rate that changes: the attitudes of `turn`, told as
+        // `rate`.
         let flight = |turn_rad_s: f64, rate_rad_s: f64, dt_s: f64, has_attitude: bool| {
             let mut text = "file,time_s,rate_x,rate_y,rate_z,qw,qx,qy,qz\n".to_owned();
             let axis = [0.48, -0.6, 0.64];

@@ -74,7 +74,7 @@ pub struct Seen {
 }
 
 /// A recording.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Recording {
     /// Name of the camera: that of the file without its ending.
     pub name: String,
@@ -142,21 +142,8 @@ impl Recording {
             let bodies = c.each_body().iter().filter(|b| is_earth(b.kind.name()));
             bodies.map(|b| b.limb_height_sigma_km).fold(0.0, f64::max)
         });
-        let mut recording = Self {
-            name,
-            mount,
-            camera: config.map(|c| c.camera.clone()),
-            limb_sigma_km,
-            clock_offset_s: 0.0,
-            seen: Vec::new(),
-            rows: Vec::new(),
-            without_time: 0,
-            lost: None,
-            other_bodies: 0,
-            incomplete: 0,
-            duplicate: 0,
-            impossible: None,
-        };
+        let mut recording =
+            Self { name, mount, camera: config.map(|c| c.camera.clone()), limb_sigma_km, ..Self::default() };
         let mut known = HashSet::new();
         for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.status == Status::Ok) {
             let body = match row.body.as_str() {

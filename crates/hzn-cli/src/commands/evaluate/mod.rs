@@ -91,10 +91,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let answers: Vec<Answer> = rows.iter().map(Answer::from).collect();
     let cases = pair(&answers, &truth, camera.as_ref())
         .map_err(|e| usage(format!("{} does not match {}: {e}", truth_path.display(), args.results.display())))?;
-    // An epoch of a rig is not at the time of one picture; it has the name of the row within half a step.
-    let steps = truth.windows(2).map(|w| w[1].time_s - w[0].time_s).filter(|step| *step > 0.0);
-    let allowed_s = if are_joint { 0.5 * steps.fold(f64::INFINITY, f64::min) } else { SAME_TIME_S };
-    warn_of_other_times(&rows, &truth, allowed_s);
+    warn_of_other_times(&rows, &truth, are_joint);
     let report = Report {
         results: args.results.display().to_string(),
         truth: truth_path.display().to_string(),
@@ -166,7 +163,10 @@ fn truth_of_rig(folder: &Path, are_joint: bool, head: Option<&str>) -> Result<()
 }
 
 /// Warns if the times differ: two sequences may have the same file names.
-fn warn_of_other_times(rows: &[Row], truth: &[Truth], allowed_s: f64) {
+fn warn_of_other_times(rows: &[Row], truth: &[Truth], are_joint: bool) {
+    // An epoch of a rig is not at the time of one picture; it has the name of the row within half a step.
+    let steps = truth.windows(2).map(|w| w[1].time_s - w[0].time_s).filter(|step| *step > 0.0);
+    let allowed_s = if are_joint { 0.5 * steps.fold(f64::INFINITY, f64::min) } else { SAME_TIME_S };
     let time = |file: &str| truth.iter().find(|t| file.ends_with(t.file.as_str())).map(|t| t.time_s);
     let other_times =
         |row: &Row| Some((row.time_s?, time(&row.file)?)).filter(|(here, there)| (here - there).abs() > allowed_s);

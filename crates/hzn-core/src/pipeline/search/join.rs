@@ -43,7 +43,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             let point = ImagePoint { u: T::from_i32(x.into()), v: T::from_i32(y.into()) };
             limb.is_within(limit_px, point, self.camera)
         };
-        let on_limb: Ranked = starts.iter().filter(|start| is_on_limb(start.pixel)).copied().collect();
+        let mut on_limb = starts.clone();
+        on_limb.retain(|start| is_on_limb(start.pixel));
         if on_limb.len() > 1 {
             self.judge_as_one(binary, &on_limb, border, marks);
         }
