@@ -33,8 +33,8 @@ pub fn are_joint(rows: &[Row]) -> bool {
 
 /// Gives the rows of the joint answer the names of the truth's rows that are nearest in time. A row has the name of its
 /// first head's picture, and another head's if that one has none, but an epoch is one row of the truth. A late head
-/// gives a second epoch near that row, so the epoch with the most heads is kept, and the nearest one of several. Returns the
-/// number of the others, which are removed.
+/// gives a second epoch near that row, so the epoch with the most heads is kept, and the nearest one of several.
+/// Returns the number of the others, which are removed.
 pub fn name_by_time(rows: &mut Vec<Row>, truth: &[Truth]) -> usize {
     let mut times: Vec<(f64, &str)> = truth.iter().map(|t| (t.time_s, t.file.as_str())).collect();
     times.sort_by(|a, b| a.0.total_cmp(&b.0));
