@@ -66,6 +66,8 @@ enum From {
     /// The accelerometers tell the direction up in each tilt. Tilt the vehicle by 20 degrees or more, about two
     /// different axes; the board needs to be neither level nor upright. TILT.csv has the columns file, accel_x_mps2,
     /// accel_y_mps2, accel_z_mps2: the name of each picture, and the mean specific force along the vehicle's axes.
+    /// Do not roll the camera by more than 60 degrees between two pictures: near 90 degrees and above, the numbering of
+    /// the corners can turn by half a turn, and the mount is then wrong.
     Board {
         /// Pictures, a folder, or a pattern in quotes
         #[arg(required = true, value_name = "PICTURES")]
