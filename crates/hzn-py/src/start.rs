@@ -65,6 +65,13 @@ fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
         LimbSays::FieldOfView(found) => (known.lens, known.measured) = (Some(found.lens), Some(found.measured)),
         // `write_sensor_toml` says what is missing.
         LimbSays::NoAltitude => {}
+        LimbSays::LensDecides(found) => {
+            return Err(errors::config(format!(
+                "fov_deg: is not given, the pictures have no usable EXIF, and the limb says {}; add lens=\"fisheye\" \
+                 or lens=\"pinhole\", more pictures, or the field of view over the whole width, for example fov_deg=60",
+                found.iter().map(|one| one.describe(known.size_px[0])).collect::<Vec<_>>().join(", but ")
+            )));
+        }
         LimbSays::Nothing(pictures) => {
             return Err(errors::config(format!(
                 "fov_deg: is not given, the pictures have no usable EXIF, and the limb in {pictures} of them does not \

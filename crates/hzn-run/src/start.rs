@@ -17,6 +17,8 @@ const PICTURES: u64 = 8;
 pub enum LimbSays {
     /// The field of view.
     FieldOfView(FieldOfView),
+    /// The limb says another field of view for each kind of lens, and does not tell the kind.
+    LensDecides(Vec<FieldOfView>),
     /// No altitude is known for any picture, so the limb says nothing.
     NoAltitude,
     /// The limb in this number of pictures does not say it.
@@ -94,5 +96,10 @@ pub fn measure_field_of_view(request: &Request, known: &CameraFacts) -> Result<L
     if pictures.is_empty() {
         return Ok(LimbSays::NoAltitude);
     }
-    Ok(find_field_of_view(&pictures, known).map_or(LimbSays::Nothing(pictures.len()), LimbSays::FieldOfView))
+    let mut found = find_field_of_view(&pictures, known);
+    Ok(match (found.len(), found.pop()) {
+        (1, Some(only)) => LimbSays::FieldOfView(only),
+        (0, _) | (_, None) => LimbSays::Nothing(pictures.len()),
+        (_, Some(last)) => LimbSays::LensDecides(found.into_iter().chain([last]).collect()),
+    })
 }

@@ -62,14 +62,14 @@ impl Parameters {
         let determined: Vec<bool> = (0..changes.len()).map(is_determined).collect();
         let scale = unknowns.scale_weights();
         let focal_sigma = (scale.transpose() * covariance * &scale)[(0, 0)].sqrt();
-        let kept = without_undetermined(changes, covariance, &determined)?;
+        let (kept, written) = keep_undetermined(changes, covariance, &unknowns.covariance, &determined)?;
         let mut camera = unknowns.changed_by(kept.as_slice());
         // If nothing is determined, the calibration stays as it was.
         if determined.contains(&true) {
-            camera.covariance = Some(written_covariance(unknowns, covariance, &determined));
+            camera.covariance = Some(written_covariance(unknowns, &written, &determined));
             (camera.focal_sigma_percent, camera.centre_sigma_px) = (0.0, 0.0);
         }
-        let list = parameters(unknowns, &camera, covariance, &determined);
+        let list = parameters(unknowns, &camera, &written, &determined);
         // Parameters that keep their values move the others. Without any determined one, the flight's own value is
         // shown.
         let shown = if determined.contains(&true) { &kept } else { changes };
@@ -77,28 +77,35 @@ impl Parameters {
     }
 }
 
-/// Returns the changes for a lens whose undetermined parameters keep their values: the mean of the others if these are
-/// given. `None` if their covariance is singular.
-fn without_undetermined(
+/// Returns the changes of the lens and their covariance if the undetermined parameters keep their values and their
+/// covariance of before the flight, `prior`. The flight then says how the others depend on them: their mean and covariance
+/// if these are given. `None` if a covariance is singular.
+fn keep_undetermined(
     changes: &DVector<f64>,
     covariance: &DMatrix<f64>,
+    prior: &DMatrix<f64>,
     determined: &[bool],
-) -> Option<DVector<f64>> {
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let fixed: Vec<usize> = determined.iter().enumerate().filter(|(_, known)| !**known).map(|(i, _)| i).collect();
-    let own = DMatrix::from_fn(fixed.len(), fixed.len(), |i, j| covariance[(fixed[i], fixed[j])]);
-    let off = DVector::from_iterator(fixed.len(), fixed.iter().map(|i| changes[*i]));
-    let weights = if fixed.is_empty() { off } else { own.cholesky()?.solve(&off) };
-    let mean = |k: usize| {
-        let shift: f64 = fixed.iter().zip(weights.iter()).map(|(i, w)| covariance[(k, *i)] * w).sum();
-        if determined[k] { changes[k] - shift } else { 0.0 }
+    let own = |c: &DMatrix<f64>| c.select_rows(&fixed).select_columns(&fixed);
+    // The change of every parameter by one of those that are kept, from the covariance of the flight.
+    let slopes = if fixed.is_empty() {
+        DMatrix::zeros(changes.len(), 0)
+    } else {
+        own(covariance).cholesky()?.solve(&covariance.select_rows(&fixed)).transpose()
     };
-    Some(DVector::from_iterator(changes.len(), (0..changes.len()).map(mean)))
+    let given = covariance - &slopes * covariance.select_rows(&fixed);
+    let off = DVector::from_iterator(fixed.len(), fixed.iter().map(|i| changes[*i]));
+    Some((changes - &slopes * off, given + &slopes * own(prior) * slopes.transpose()))
 }
 
 /// Returns the covariance that is written: of the determined parameters, and of those whose sigma is stated.
 fn written_covariance(unknowns: &Unknowns, covariance: &DMatrix<f64>, determined: &[bool]) -> Covariance {
     let kept: Vec<usize> = (0..determined.len()).filter(|i| determined[*i] || unknowns.stated[*i]).collect();
-    let row = |i: &usize| kept.iter().map(|j| covariance[(*i, *j)]).collect();
+    // Rounding errors of parameters that do not depend on each other would be written with fifteen digits.
+    let is_noise = |i: usize, j: usize| covariance[(i, j)].powi(2) < 1e-20 * covariance[(i, i)] * covariance[(j, j)];
+    let at = |i: usize, j: usize| if is_noise(i, j) { 0.0 } else { 0.5 * (covariance[(i, j)] + covariance[(j, i)]) };
+    let row = |i: &usize| kept.iter().map(|j| at(*i, *j)).collect();
     Covariance { order: kept.iter().map(|i| unknowns.list[*i]).collect(), rows: kept.iter().map(row).collect() }
 }
 
@@ -132,4 +139,25 @@ fn motion_of_corner(config: &Config, which: Intrinsic) -> f64 {
     let ray = (0..20).find_map(|k| camera.unproject(at(1.0 - 0.05 * f64::from(k))));
     let projected = ray.and_then(|ray| Equation::new(config).project(ray.xyz()));
     projected.map_or(f64::NAN, |p| p.by_intrinsics[0][place].hypot(p.by_intrinsics[1][place]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_that_is_kept_keeps_its_sigma_too() {
+        let covariance = DMatrix::from_row_slice(2, 2, &[4.0, 1.0, 1.0, 1.0]);
+        let prior = DMatrix::from_row_slice(2, 2, &[9.0, 0.0, 0.0, 100.0]);
+        let changes = DVector::from_vec(vec![3.0, 2.0]);
+        let (kept, written) = keep_undetermined(&changes, &covariance, &prior, &[false, true]).unwrap();
+        // The second one is at its mean for the value that the first one keeps, 2 - 1/4 * 3. Its variance is 1 - 1/4 for
+        // each value of the first one, and it moves by 1/4 of the error of the first one.
+        assert!((kept - DVector::from_vec(vec![0.0, 1.25])).amax() < 1e-12);
+        let want = DMatrix::from_row_slice(2, 2, &[9.0, 9.0 / 4.0, 9.0 / 4.0, 0.75 + 9.0 / 16.0]);
+        assert!((&written - want).amax() < 1e-12, "{written}");
+        // Without a kept value, it is the covariance of the flight.
+        let (all, written) = keep_undetermined(&changes, &covariance, &prior, &[true, true]).unwrap();
+        assert_eq!((all, written), (changes, covariance));
+    }
 }

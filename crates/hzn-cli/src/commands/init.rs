@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use hzn_core::camera::Model;
-use hzn_files::start::{self, CameraFacts, MeasuredFov};
+use hzn_files::start::{self, CameraFacts};
 use hzn_run::diagnosis::FieldOfView;
 use hzn_run::disk;
 use hzn_run::open::Request;
@@ -113,13 +113,9 @@ pub(super) fn run(args: &Args) -> Outcome {
             "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
         );
     }
-    if let Some(FieldOfView { lens, measured, pictures: [kept, seen] }) = &found {
-        let sigma_deg = fov_sigma_deg(&known, *lens, measured);
-        tell::line(format_args!(
-            "the limb in {kept} of {seen} pictures says: {:.1} +- {sigma_deg:.1} degrees wide, as a {}",
-            measured.fov_deg,
-            if *lens == Model::Pinhole { "pinhole" } else { "fisheye" },
-        ));
+    if let Some(found) = &found {
+        let [kept, seen] = found.pictures;
+        tell::line(format_args!("the limb in {kept} of {seen} pictures says: {}", found.describe(known.size_px[0])));
     }
     tell::line(format_args!(
         "{name} written: {} x {} px, {}, {:.1} degrees wide, f = {:.0} px +- {:.1} %, k1 = 0 +- {:.2}",
@@ -147,22 +143,17 @@ fn limb_fov(args: &Args, known: &CameraFacts) -> Result<Option<FieldOfView>, Sto
     match measure_field_of_view(&request, known)? {
         LimbSays::FieldOfView(found) => Ok(Some(found)),
         LimbSays::NoAltitude => Ok(None),
+        LimbSays::LensDecides(found) => Err(usage(format!(
+            "the field of view is not known (no --fov, no usable EXIF), and the limb says {}; add --lens fisheye or \
+             --lens pinhole, more pictures, or the field of view over the whole width, for example --fov 60",
+            found.iter().map(|one| one.describe(known.size_px[0])).collect::<Vec<_>>().join(", but ")
+        ))),
         LimbSays::Nothing(pictures) => Err(usage(format!(
             "the field of view is not known (no --fov, no usable EXIF), and the limb in {pictures} pictures does not \
              say it; add the field of view over the whole width, for example --fov 60, and --lens fisheye or --lens \
              pinhole"
         ))),
     }
-}
-
-/// Returns the 1-sigma of a measured field of view in degrees.
-fn fov_sigma_deg(known: &CameraFacts, lens: Model, measured: &MeasuredFov) -> f64 {
-    let width = f64::from(known.size_px[0]);
-    let at = |factor: f64| {
-        start::focal_px(lens, width, measured.fov_deg).map_or(f64::NAN, |f| start::fov_deg(lens, width, f * factor))
-    };
-    let part = 0.01 * measured.focal_sigma_percent;
-    0.5 * (at(1.0 - part) - at(1.0 + part))
 }
 
 /// Collects what the pictures and the command line say about the camera.

@@ -235,6 +235,17 @@ fn the_limb_gives_the_field_of_view() {
     place.run(&["init", "flight", "--altitude", "500", "-o", "t.toml"]).expect(0).says("degrees wide");
 }
 
+/// A limb that is almost straight fits a pinhole and a narrower fisheye. One picture does not tell which is right.
+#[test]
+fn a_limb_that_fits_two_kinds_of_lens_asks_for_the_kind() {
+    let place = Place::new();
+    let lens = Lens { name: "pinhole", guess: "pinhole", fov_deg: 70.0, k: &[0.0, 0.0] };
+    Flight { frames: 1, altitude_km: 150.0, ..Flight::new(&lens) }.render(&place);
+    let ran = place.run(&["init", "flight", "-o", "f.toml"]).expect(2).says("add --lens fisheye or --lens pinhole");
+    assert!(ran.err.contains("degrees wide, as a fisheye, but"), "{}", ran.err);
+    assert!(!place.path("f.toml").exists());
+}
+
 #[test]
 #[ignore = "takes half a minute; it measures the figures of book/guide/first-steps.md"]
 fn the_limb_gives_the_field_of_view_of_twenty_flights() {

@@ -35,10 +35,14 @@ const MAX_SIGMA: f64 = 0.3;
 const MAX_COMMON_SIGMA: f64 = 0.05;
 /// Solutions closer than this in ln f are the same.
 const SAME: f64 = 0.02;
+/// A kind of lens remains possible if at least this part of the pictures agrees that agrees with the other kind. With the
+/// wrong kind, the field of view changes with the place of the limb, so that few pictures agree. One picture never tells
+/// the kind.
+const AS_MANY: f64 = 0.75;
 /// Pictures farther than this from the common solution, in their 1-sigmas, show something else than the limb.
 const MAX_DISTANCE: f64 = 3.0;
 
-/// The field of view that pictures say.
+/// The field of view that pictures say for one kind of lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldOfView {
     /// Ideal lens that fits the pictures best: [`Model::Pinhole`] or [`Model::Equidistant`].
@@ -47,6 +51,23 @@ pub struct FieldOfView {
     pub measured: MeasuredFov,
     /// Number of pictures with a limb that says so, and the number of pictures that were looked at.
     pub pictures: [usize; 2],
+}
+
+impl FieldOfView {
+    /// Returns the field of view with its 1-sigma and the kind of lens as a text, for pictures of this width.
+    pub fn describe(&self, width_px: u32) -> String {
+        let Self { lens, measured, .. } = self;
+        let kind = if *lens == Model::Pinhole { "pinhole" } else { "fisheye" };
+        let part = 0.01 * measured.focal_sigma_percent;
+        if part >= MAX_SIGMA {
+            return format!("no certain width as a {kind}");
+        }
+        let width_px = f64::from(width_px);
+        let focal_px = start::focal_px(*lens, width_px, measured.fov_deg).unwrap_or(f64::NAN);
+        let at = |factor: f64| start::fov_deg(*lens, width_px, focal_px * factor);
+        let sigma_deg = 0.5 * (at(1.0 - part) - at(1.0 + part));
+        format!("{:.1} +- {sigma_deg:.1} degrees wide, as a {kind}", measured.fov_deg)
+    }
 }
 
 /// What one picture says.
@@ -67,19 +88,47 @@ impl Said {
 }
 
 /// Finds the field of view. The altitude that is `known` is that of pictures without one in their data. If the lens is
-/// not known, both kinds are tried. `None` if no picture shows a limb whose curvature says enough.
-pub fn find_field_of_view(pictures: &[(Picture, Option<FrameData>)], known: &CameraFacts) -> Option<FieldOfView> {
+/// not known, both kinds are tried.
+///
+/// Returns one field of view, one for each kind of lens if the pictures do not tell the kind and the kinds disagree, or
+/// none if no picture shows a limb whose curvature says enough.
+pub fn find_field_of_view(pictures: &[(Picture, Option<FrameData>)], known: &CameraFacts) -> Vec<FieldOfView> {
     let lenses = known.lens.map_or(vec![Model::Equidistant, Model::Pinhole], |lens| vec![lens]);
-    let found = lenses.into_iter().filter_map(|lens| {
-        let said: Vec<Vec<Said>> =
-            pictures.iter().map(|(picture, data)| solutions(picture, data.as_ref(), known, lens)).collect();
-        let Combined { density, ln_focal, sigma, kept } = combine(&said).filter(|c| c.sigma <= MAX_COMMON_SIGMA)?;
-        let fov_deg = start::fov_deg(lens, f64::from(known.size_px[0]), ln_focal.exp());
-        let measured = MeasuredFov { fov_deg, focal_sigma_percent: 100.0 * sigma, pictures: kept };
-        Some((density, FieldOfView { lens, measured, pictures: [kept, pictures.len()] }))
-    });
+    let width_px = f64::from(known.size_px[0]);
+    let one = |lens: Model| {
+        let said = pictures.iter().map(|(picture, data)| solutions(picture, data.as_ref(), known, lens));
+        Some((lens, combine(&said.collect::<Vec<_>>())?))
+    };
+    let mut found: Vec<(Model, Combined)> = lenses.into_iter().filter_map(one).collect();
     // With the right kind of lens, more pictures agree, and each is more certain.
-    found.max_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, found)| found)
+    found.sort_by(|(_, a), (_, b)| b.density.total_cmp(&a.density));
+    let described = |(lens, c): &(Model, Combined)| FieldOfView {
+        lens: *lens,
+        measured: MeasuredFov {
+            fov_deg: start::fov_deg(*lens, width_px, c.ln_focal.exp()),
+            focal_sigma_percent: 100.0 * c.sigma,
+            pictures: c.kept,
+        },
+        pictures: [c.kept, pictures.len()],
+    };
+    let each: Vec<FieldOfView> = found.iter().map(described).collect();
+    // A kind of lens that fits every picture from a few focal lengths on says nothing, but it may be the right one.
+    if let [(lens, best), (other_lens, other)] = found.as_mut_slice()
+        && other.possible as f64 >= AS_MANY * best.kept as f64
+    {
+        let other_fov_deg = start::fov_deg(*other_lens, width_px, other.ln_focal.exp());
+        match start::focal_px(*lens, width_px, other_fov_deg) {
+            Some(focal_px) => best.allow(focal_px.ln(), other.sigma),
+            None => best.sigma = f64::INFINITY,
+        }
+    }
+    let is_certain = |(_, c): &(Model, Combined)| c.sigma <= MAX_COMMON_SIGMA;
+    match found.as_slice() {
+        [best, ..] if is_certain(best) => vec![described(best)],
+        // Each is the answer to whoever says the kind of lens.
+        [_, _] => each,
+        _ => Vec::new(),
+    }
 }
 
 /// Returns the solutions of a picture for an ideal lens.
@@ -137,7 +186,7 @@ fn search(
             fitted.expected_sigma_cos / slope,
         ];
         let said = Said { ln_focal: focal.ln(), noise: factor.sigma, shared };
-        return (said.variance().sqrt() < MAX_SIGMA).then_some(said);
+        return Some(said);
     }
     None
 }
@@ -175,11 +224,30 @@ struct Combined {
     ln_focal: f64,
     /// 1-sigma of `ln_focal`.
     sigma: f64,
+    /// Number of pictures that agree.
     kept: usize,
+    /// The same with the pictures that say nothing, because several focal lengths fit them.
+    possible: usize,
 }
 
-/// Combines the pictures: finds the solution that most pictures share, and averages the pictures that have it.
-fn combine(said: &[Vec<Said>]) -> Option<Combined> {
+impl Combined {
+    /// Makes the sigma larger by another solution that is as probable: that of the mean of both probability densities.
+    fn allow(&mut self, ln_focal: f64, sigma: f64) {
+        let other = (ln_focal - self.ln_focal).powi(2) + sigma * sigma;
+        self.sigma = (0.5 * (self.sigma * self.sigma + other)).sqrt();
+    }
+}
+
+/// Combines the pictures: finds the solution that most pictures share, and averages the pictures that have it. `None` if
+/// there is no solution.
+fn combine(all: &[Vec<Said>]) -> Option<Combined> {
+    let is_certain = |s: &&Said| s.variance().sqrt() < MAX_SIGMA;
+    let silent = all.iter().filter(|said| !said.is_empty() && !said.iter().any(|s| is_certain(&s))).count();
+    let said: Vec<Vec<Said>> = all.iter().map(|said| said.iter().filter(is_certain).copied().collect()).collect();
+    if said.iter().all(Vec::is_empty) {
+        let ln_focal = all.iter().flatten().next()?.ln_focal;
+        return Some(Combined { density: 0.0, ln_focal, sigma: f64::INFINITY, kept: 0, possible: silent });
+    }
     let distance = |s: &Said, x: f64| (s.ln_focal - x).abs() / s.variance().sqrt();
     // The density of the solutions at x: a picture counts with its most probable one.
     let one = |all: &Vec<Said>, x: f64| {
@@ -200,7 +268,7 @@ fn combine(said: &[Vec<Said>]) -> Option<Combined> {
     // The scatter of the pictures contains their noise, and what nobody thought of.
     let spread = mean(&|s| (s.ln_focal - ln_focal).powi(2)).max(mean(&|s| s.noise * s.noise));
     let sigma = (shared + spread / kept.len().max(1) as f64).sqrt();
-    Some(Combined { density: density(peak), ln_focal, sigma, kept: kept.len() })
+    Some(Combined { density: density(peak), ln_focal, sigma, kept: kept.len(), possible: kept.len() + silent })
 }
 
 #[cfg(test)]
