@@ -40,8 +40,10 @@ pub struct Reader {
     metadata: BTreeMap<String, String>,
     /// The first record after the head of the file.
     peeked: Option<Record>,
-    /// Topics by channel id, because the ids of other writers may differ.
-    topics: BTreeMap<u16, Topic>,
+    /// Topics by channel id, because the ids of other writers may differ, and the place in `heads`.
+    topics: BTreeMap<u16, (Topic, usize)>,
+    /// Names of the heads of a rig. The first one is empty: what belongs to no head.
+    heads: Vec<String>,
     schemas: Schemas,
     contents: Contents,
     waiting: Waiting,
@@ -74,6 +76,7 @@ impl Reader {
             metadata: BTreeMap::new(),
             peeked: None,
             topics: BTreeMap::new(),
+            heads: vec![String::new()],
             schemas: Schemas::default(),
             contents,
             waiting: Waiting::default(),
@@ -127,8 +130,12 @@ impl Reader {
     /// Reads a record outside of chunks, or one that a chunk declares.
     fn read_declaration(&mut self, record: &Record) {
         if let Some((id, channel)) = self.schemas.declare(record.op, &record.content) {
-            let topic = Topic::of(&channel);
-            self.topics.extend(topic.map(|topic| (id, topic)));
+            let found = Topic::with_head(&channel);
+            let topic = found.map(|(topic, _)| topic);
+            if let Some((topic, head)) = found {
+                let head = self.place_of_head(head);
+                self.topics.insert(id, (topic, head));
+            }
             if self.contents == Contents::WithoutImages && matches!(topic, Some(Topic::Image | Topic::RawImage)) {
                 self.scanner.skip_channel(id);
             }
@@ -151,6 +158,14 @@ impl Reader {
         }
     }
 
+    /// Returns the place of a head in `heads`, to which it is added if it is new.
+    fn place_of_head(&mut self, name: &str) -> usize {
+        self.heads.iter().position(|known| known == name).unwrap_or_else(|| {
+            self.heads.push(name.to_owned());
+            self.heads.len() - 1
+        })
+    }
+
     /// Assembles frames from the messages of a chunk.
     fn read_chunk(&mut self, record: &Record) -> Result<(), Error> {
         let (chunk, plain) = match Chunk::parse(record, &mut self.inflation) {
@@ -171,7 +186,7 @@ impl Reader {
 
     /// Adds a part to its frame; a report finishes the frame.
     fn read_message(&mut self, m: &Message<'_>) -> Result<(), Error> {
-        let Some(&topic) = self.topics.get(&m.channel) else {
+        let Some(&(topic, head)) = self.topics.get(&m.channel) else {
             self.unread_reports += u64::from(self.foreign_reports.contains(&m.channel));
             return Ok(());
         };
@@ -184,25 +199,27 @@ impl Reader {
             Topic::Image | Topic::RawImage => {
                 let schema = if topic == Topic::Image { "foxglove.CompressedImage" } else { "foxglove.RawImage" };
                 let image = messages::parse_image(schema, m.data).map_err(|e| broken("picture", e))?;
-                self.waiting.add_to(m).images.push_back(image);
+                self.waiting.add_to(m, head).images.push_back(image);
             }
             Topic::Annotations => {
                 let a = drawing::parse(m.data).map_err(|e| broken("annotations", e.to_string()))?;
-                self.waiting.add_to(m).annotations.push_back(a);
+                self.waiting.add_to(m, head).annotations.push_back(a);
             }
             Topic::Transform => {
                 let t = messages::parse_transform(m.data).map_err(|e| broken("attitude", e.to_string()))?;
-                self.waiting.add_to(m).attitudes.extend(t);
+                self.waiting.add_to(m, head).attitudes.extend(t);
             }
             Topic::Log => {
                 let line = messages::parse_log(m.data).map_err(|e| broken("message", e.to_string()))?;
-                self.waiting.add_to(m).log.push(line);
+                self.waiting.add_to(m, head).log.push(line);
             }
             Topic::Report => {
                 let (row, candidates, prior) =
                     messages::parse_report(m.data).map_err(|e| broken("report", e.to_string()))?;
                 let mut frame = FrameRecord { candidates, prior, ..FrameRecord::new(row) };
-                self.waiting.take(m, |parts| {
+                // All reports are on one topic, with the name of the head in them.
+                let head = frame.row.head.as_ref().and_then(|head| self.heads.iter().position(|known| known == head));
+                self.waiting.take(m, head.unwrap_or(0), |parts| {
                     frame.image = parts.images.pop_front();
                     frame.annotations = parts.annotations.pop_front().unwrap_or_default();
                     frame.attitude = parts.attitudes.pop_front();

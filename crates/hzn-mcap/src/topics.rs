@@ -77,7 +77,18 @@ impl Topic {
     /// Returns the topic of a channel that a recording declares; `None` if hzn has no such topic, or if its messages
     /// have another schema there.
     pub(crate) fn of(channel: &Channel) -> Option<Self> {
-        Self::ALL.into_iter().find(|topic| topic.name() == channel.topic && topic.schema().0 == channel.schema)
+        Self::with_head(channel).filter(|(_, head)| head.is_empty()).map(|(topic, _)| topic)
+    }
+
+    /// Returns the topic of a channel and the name of the head of a rig that it belongs to, see [`Self::of_head`]. The
+    /// name is empty for the joint answer of a rig, and for a single camera.
+    pub(crate) fn with_head(channel: &Channel) -> Option<(Self, &str)> {
+        let head = |topic: Self| match channel.topic.strip_suffix(topic.name())? {
+            "" => Some(""),
+            before => before.strip_prefix('/').filter(|head| !head.contains('/')),
+        };
+        let mut known = Self::ALL.into_iter().filter(|topic| topic.schema().0 == channel.schema);
+        known.find_map(|topic| Some((topic, head(topic)?)))
     }
 
     pub(crate) fn id(self) -> u16 {

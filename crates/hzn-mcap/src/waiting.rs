@@ -9,9 +9,9 @@ use crate::frame::{Annotations, Attitude, EncodedImage, LogLine};
 /// most one batch waits.
 const MAX_BYTES: usize = 64 << 20;
 
-/// Log time in nanoseconds and sequence number of a frame's messages. In recordings of hzn, the sequence number is the
+/// Log time in nanoseconds and sequence number of a frame's messages, and number of the head of a rig. In recordings of hzn, the sequence number is the
 /// index of the frame. Other writers may leave it out; then the log time tells the frames apart.
-type Key = (u64, u32);
+type Key = (u64, u32, usize);
 
 /// The parts of a frame. A frame with several records may have several of each kind.
 #[derive(Debug, Default)]
@@ -30,15 +30,15 @@ pub(crate) struct Waiting {
     bytes: usize,
 }
 
-fn key(message: &Message<'_>) -> Key {
-    (message.log_time_ns, message.sequence)
+fn key(message: &Message<'_>, head: usize) -> Key {
+    (message.log_time_ns, message.sequence, head)
 }
 
 impl Waiting {
     /// Returns the parts of the frame of a message, which adds a part to them. If too many bytes wait, the parts of the
     /// earliest other frames are given up, because the reports of these frames are missing.
-    pub(crate) fn add_to(&mut self, message: &Message<'_>) -> &mut Parts {
-        let (key, bytes) = (key(message), size_of::<Parts>() + message.data.len());
+    pub(crate) fn add_to(&mut self, message: &Message<'_>, head: usize) -> &mut Parts {
+        let (key, bytes) = (key(message, head), size_of::<Parts>() + message.data.len());
         self.bytes += bytes;
         while self.bytes > MAX_BYTES
             && let Some(earliest) = self.frames.keys().copied().find(|other| *other != key)
@@ -52,8 +52,13 @@ impl Waiting {
     }
 
     /// Lets `take` take what the record of a report has of the parts of its frame; `None` if the frame has no parts.
-    pub(crate) fn take<T>(&mut self, report: &Message<'_>, take: impl FnOnce(&mut Parts) -> T) -> Option<T> {
-        let key = key(report);
+    pub(crate) fn take<T>(
+        &mut self,
+        report: &Message<'_>,
+        head: usize,
+        take: impl FnOnce(&mut Parts) -> T,
+    ) -> Option<T> {
+        let key = key(report, head);
         let parts = self.frames.get_mut(&key)?;
         let taken = take(parts);
         if parts.images.is_empty() && parts.annotations.is_empty() && parts.attitudes.is_empty() && parts.log.is_empty()
@@ -76,11 +81,11 @@ mod tests {
 
     fn add(waiting: &mut Waiting, message: &Message<'_>) {
         let image = EncodedImage { format: ImageFormat::Png, bytes: vec![message.sequence as u8] };
-        waiting.add_to(message).images.push_back(image);
+        waiting.add_to(message, 0).images.push_back(image);
     }
 
     fn take(waiting: &mut Waiting, report: &Message<'_>) -> Option<Vec<u8>> {
-        waiting.take(report, |parts| parts.images.pop_front())?.map(|image| image.bytes)
+        waiting.take(report, 0, |parts| parts.images.pop_front())?.map(|image| image.bytes)
     }
 
     #[test]
@@ -94,6 +99,8 @@ mod tests {
         assert_eq!(take(&mut waiting, &message(2, 8, b"")), None);
         assert_eq!(take(&mut waiting, &message(1, 7, b"")), Some(vec![7]));
         assert_eq!((waiting.frames.len(), waiting.bytes), (1, size_of::<Parts>() + 4));
+        // A head of a rig has parts of its own.
+        assert_eq!(waiting.take(&message(2, 7, b""), 1, |parts| parts.images.len()), None);
     }
 
     #[test]
@@ -108,7 +115,7 @@ mod tests {
         // A single frame may be larger.
         let (mut waiting, data) = (Waiting::default(), vec![0; MAX_BYTES + 1]);
         add(&mut waiting, &message(0, 0, &data));
-        waiting.add_to(&message(0, 0, b"drawn")).annotations.push_back(Annotations::default());
+        waiting.add_to(&message(0, 0, b"drawn"), 0).annotations.push_back(Annotations::default());
         assert_eq!(take(&mut waiting, &message(0, 0, b"")), Some(vec![0]));
     }
 }

@@ -123,7 +123,7 @@ impl Rig {
             frames.push(Some(finished(read.file, data, outcomes)));
             reports.set_item(name, Bound::new(py, report)?)?;
         }
-        let seen: Vec<Seen<'_>> = frames.iter().map(|frame| Seen::new(frame.as_ref(), false)).collect();
+        let seen: Vec<Seen<'_>> = frames.iter().map(|frame| Seen::new(frame.as_ref(), None)).collect();
         self.joiner.check_times(&seen).map_err(errors::config)?;
         let all = PyDict::new(py);
         all.set_item(JOINT, Bound::new(py, Report::from_row(self.joiner.join(0, &seen)))?)?;

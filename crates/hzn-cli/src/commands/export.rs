@@ -102,18 +102,25 @@ fn open_table(args: &Args, path: &Path, existing: Existing) -> Result<RowFile, S
 fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {
     let Some(image) = frame.image else { return Ok(false) };
     let name = frame.row.file.clone();
+    // The pictures of two heads of a rig may have the same names.
+    let own = |folder: &Path| -> Result<PathBuf, Stop> {
+        let Some(head) = &frame.row.head else { return Ok(folder.to_owned()) };
+        let folder = folder.join(overlay::flat_name(head));
+        std::fs::create_dir_all(&folder).map_err(|e| disk::cannot_write(&folder, &e))?;
+        Ok(folder)
+    };
     if let Some(folder) = &args.images {
         let (bytes, ending) = match &image.format {
             ImageFormat::Png => (image.bytes.clone(), "png"),
             ImageFormat::Jpeg => (image.bytes.clone(), "jpg"),
             _ => (decode(&image, &name)?.to_png().map_err(failed)?, "png"),
         };
-        let path = folder.join(picture_name(&name, ending));
+        let path = own(folder)?.join(picture_name(&name, ending));
         disk::refuse_existing(&path, args.force)?;
         disk::write(&path, bytes)?;
     }
     if let Some(folder) = &args.overlay {
-        let path = folder.join(overlay::file_name(&name));
+        let path = own(folder)?.join(overlay::file_name(&name));
         disk::refuse_existing(&path, args.force)?;
         let picture = decode(&image, &name)?;
         let drawn = overlay::draw_annotations(picture.to_rgb(), &frame.annotations, frame.row.status.name());

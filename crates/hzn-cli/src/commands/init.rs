@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
+use hzn_core::Config;
 use hzn_core::camera::Model;
 use hzn_files::start::{self, CameraFacts};
 use hzn_run::diagnosis::FieldOfView;
 use hzn_run::disk;
-use hzn_run::open::Request;
+use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
 use hzn_run::start::{LimbSays, measure_field_of_view, read_camera_facts};
 
@@ -107,7 +108,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     write(&start.text)?;
     start.warnings.iter().for_each(tell::warning);
     // The commands that read the file say the same, but then it is not clear which option was wrong.
-    hzn_files::sensor::parse(&start.text, &args.output)?.warnings.iter().for_each(tell::warning);
+    let sensor = hzn_files::sensor::parse(&start.text, &args.output)?;
+    sensor.warnings.iter().for_each(tell::warning);
     if known.exif.turned {
         tell::warning(
             "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
@@ -127,14 +129,22 @@ pub(super) fn run(args: &Args) -> Outcome {
         start.focal_sigma_percent,
         start.k1_sigma,
     ));
-    // A field of view from the limb shows that a table gives the altitudes.
-    if known.altitude_km.is_none() && found.is_none() {
+    if !knows_altitudes(args, &sensor.config)? {
         tell::line(
             "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or \
              --altitude KM",
         );
     }
     Ok(Exit::Done)
+}
+
+/// Returns whether the sensor, or a frames.csv next to the pictures, gives altitudes.
+fn knows_altitudes(args: &Args, config: &Config) -> Result<bool, Stop> {
+    let request = Request { inputs: args.pictures.clone(), ..Request::default() };
+    let source = source::open(&args.pictures, None, None)?;
+    let path = open::frames_path(&request, source.as_ref());
+    let frames = path.map(|path| open::load_frames(&path, source.as_ref())).transpose()?;
+    Ok(open::check_altitude(source.as_ref(), config, frames.as_ref()).is_ok())
 }
 
 /// Finds the field of view from the limb, if an altitude is known.

@@ -59,6 +59,12 @@ fn a_simulated_rig_runs_at_once_and_its_answers_fit_the_truth() {
     for topic in ["/left/camera/image", "/front/camera/calibration", "/back/hzn/axis", "/hzn/report", "rig.toml"] {
         assert!(has(topic), "{topic}");
     }
+    place.run(&["export", "out.mcap", "--images", "images", "--overlay", "drawn"]).expect(0);
+    for head in HEADS {
+        let picture = |folder: &str| fs::read(place.path(&format!("{folder}/{head}/{head}-00003.png"))).unwrap();
+        assert_eq!(picture("images"), picture("ring"), "{head}");
+        assert_ne!(picture("drawn"), picture("ring"), "{head}");
+    }
     let left = place.run(&["evaluate", "out.csv", "--truth", "ring/left", "--head", "left"]).expect(0).out;
     assert!(left.contains("4 of 4 pictures"), "{left}");
     place
@@ -125,6 +131,44 @@ fn a_lost_head_costs_only_itself_and_a_frozen_one_is_excluded() {
     let (joint, _) = run(&place, &[], 3);
     assert!(cell(&joint[3], "detail").contains(&format!("back: {dark}")), "{}", cell(&joint[3], "detail"));
     assert_eq!(cell(&joint[3], "heads_excluded"), "left");
+}
+
+/// Pictures, mounts and clocks that belong to another head are told.
+#[test]
+fn what_belongs_to_another_head_is_told() {
+    let place = ring();
+    let good = place.read("ring/rig.toml");
+    place.write("ring/rig.toml", good.replace("pictures = \"right\"", "pictures = \"./front\"").as_bytes());
+    let ran = place.run(&["run", "ring/rig.toml", "-o", "r.csv"]).expect(2);
+    ran.says("head right: ./front: these are the pictures of head front, too");
+    place.write("ring/rig.toml", good.as_bytes());
+    for n in 0..4 {
+        let file = |head: &str| place.path(&format!("ring/{head}/{head}-{n:05}.png"));
+        fs::copy(file("front"), file("right")).unwrap();
+    }
+    let (joint, _) = run(&place, &[], 0);
+    assert_eq!(cell(&joint[0], "heads_used"), "back left");
+    assert_eq!(cell(&joint[0], "heads_excluded"), "front right");
+    assert_eq!(cell(&joint[0], "detail"), "front: the picture of another head, right: the picture of another head");
+    place.run(&["run", "ring/rig.toml", "-o", "r.csv"]).expect(0).says("note: head right was excluded in 4 epochs");
+    // A mount that contradicts the one of the head's sensor.toml.
+    let sensor = place.read("ring/left/sensor.toml");
+    let (start, mount) = sensor.split_once("q_vehicle_from_camera_wxyz = ").unwrap();
+    let rest = mount.split_once('\n').unwrap().1;
+    let other = format!("{start}q_vehicle_from_camera_wxyz = [1.0, 0.0, 0.0, 0.0]\n{rest}");
+    place.write("ring/left/sensor.toml", other.as_bytes());
+    // A clock that is another one.
+    let frames = place.read("ring/back/frames.csv").replace(".0,2021-07-15", ".0,2021-07-16");
+    let late = frames.lines().map(|line| match line.split_once(".0,2021") {
+        Some((start, end)) => {
+            let (file, time_s) = start.rsplit_once(',').unwrap();
+            format!("{file},{}.0,2021{end}\n", time_s.parse::<f64>().unwrap() + 86400.0)
+        }
+        None => format!("{line}\n"),
+    });
+    place.write("ring/back/frames.csv", late.collect::<String>().as_bytes());
+    let ran = place.run(&["run", "ring/rig.toml", "-o", "r.csv", "--force"]).expect(3);
+    ran.says("left: [mount] of its sensor.toml is").says("no picture of back was taken at most");
 }
 
 #[test]

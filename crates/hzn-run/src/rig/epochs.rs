@@ -25,6 +25,8 @@ pub struct Epoch {
 pub struct Epochs {
     heads: Vec<Queue>,
     sync_s: f64,
+    /// Number of epochs with several pictures that a head has a part in.
+    paired: [u64; MOST_HEADS],
 }
 
 /// The next pictures of a head.
@@ -83,7 +85,7 @@ impl Epochs {
             unordered: Unordered::default(),
             unmatched: Unmatched { pictures: 0, nearest_s: f64::INFINITY },
         };
-        let mut epochs = Self { heads: heads.into_iter().map(queue).collect(), sync_s };
+        let mut epochs = Self { heads: heads.into_iter().map(queue).collect(), sync_s, paired: [0; MOST_HEADS] };
         for head in &mut epochs.heads {
             head.time_s(0)?;
         }
@@ -132,7 +134,20 @@ impl Epochs {
                 head.name
             ))
         };
-        self.heads.iter().filter_map(unordered).chain(self.unmatched()).collect()
+        self.heads.iter().filter_map(unordered).chain(self.unpaired()).chain(self.unmatched()).collect()
+    }
+
+    /// Returns which heads have no picture in an epoch with those of others, if there are others.
+    fn unpaired(&self) -> Option<String> {
+        let alone = |(head, paired): (&Queue, &u64)| (head.read > 0 && *paired == 0).then(|| head.name.clone());
+        let alone: Vec<String> = self.heads.iter().zip(&self.paired).filter_map(alone).collect();
+        let (false, true) = (alone.is_empty(), self.heads.len() > 1) else { return None };
+        Some(format!(
+            "no picture of {} was taken at most {} s ([rig] sync_s) from one of another head, so nothing was joined with \
+             it: do the heads have the same clock?",
+            alone.join(", "),
+            self.sync_s
+        ))
     }
 
     /// Returns how many pictures have no row in the table of the vehicle, if any.
@@ -162,7 +177,13 @@ impl Iterator for Epochs {
     type Item = Result<Epoch, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.try_next().transpose()
+        let epoch = self.try_next().transpose()?;
+        if let Ok(Epoch { pictures }) = &epoch
+            && pictures.iter().flatten().count() > 1
+        {
+            self.paired.iter_mut().zip(pictures).for_each(|(paired, own)| *paired += u64::from(own.is_some()));
+        }
+        Some(epoch)
     }
 }
 

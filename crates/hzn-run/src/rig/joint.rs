@@ -30,14 +30,23 @@ pub struct Joiner {
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a> {
     frame: Option<&'a Finished>,
-    is_frozen: bool,
+    repeats: Option<Repeat>,
+}
+
+/// Another picture with the same bytes. The noise of a camera never repeats, so it is not a picture of this head at this
+/// time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Repeat {
+    /// The picture of the epoch before.
+    Before,
+    /// The picture of another head.
+    OtherHead,
 }
 
 impl<'a> Seen<'a> {
-    /// Takes a processed picture; `None` if the head has none in this epoch. `is_frozen` says that it is the picture of
-    /// the epoch before.
-    pub fn new(frame: Option<&'a Finished>, is_frozen: bool) -> Self {
-        Self { frame, is_frozen }
+    /// Takes a processed picture; `None` if the head has none in this epoch. `repeats` says that it is another picture.
+    pub fn new(frame: Option<&'a Finished>, repeats: Option<Repeat>) -> Self {
+        Self { frame, repeats }
     }
 
     fn solution(&self) -> Option<&'a Solution<f64>> {
@@ -47,15 +56,17 @@ impl<'a> Seen<'a> {
 
     /// Returns the head as number `k` of the joint answer, if it has an answer.
     fn answer(&self, k: usize) -> Option<Answered<'a>> {
-        let solution = self.solution().filter(|_| !self.is_frozen)?;
+        let solution = self.solution().filter(|_| self.repeats.is_none())?;
         Some(Answered { k, solution, frame: self.frame? })
     }
 
     /// Returns why the head has no part in the joint answer; `None` if it has an answer.
     fn absence(&self) -> Option<String> {
         let Some(frame) = self.frame else { return Some("no picture".into()) };
-        if self.is_frozen {
-            return Some("the picture of the epoch before".into());
+        match self.repeats {
+            Some(Repeat::Before) => return Some("the picture of the epoch before".into()),
+            Some(Repeat::OtherHead) => return Some("the picture of another head".into()),
+            None => {}
         }
         match frame.outcomes.first() {
             Some(outcome) if self.solution().is_none() => Some(outcome.status().name().into()),
@@ -141,7 +152,8 @@ impl Joiner {
             several => self.joint(index, heads, time_s, several),
         };
         row.detail = join([row.detail, self.absences(heads)]);
-        let frozen = heads.iter().enumerate().filter(|(_, head)| head.is_frozen).fold(0, |set, (k, _)| set | 1 << k);
+        let frozen =
+            heads.iter().enumerate().filter(|(_, head)| head.repeats.is_some()).fold(0, |set, (k, _)| set | 1 << k);
         row.heads_excluded = self.listed(frozen | self.bits(row.heads_excluded.as_deref()));
         row
     }

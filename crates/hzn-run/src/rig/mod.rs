@@ -13,6 +13,6 @@ mod plan;
 mod weather;
 
 pub use epochs::{Epoch, Epochs};
-pub use joint::{Joiner, Seen};
+pub use joint::{Joiner, Repeat, Seen};
 pub use open::{OpenHead, Opened, Request, open};
 pub use plan::{FinishedEpoch, HeadPlan, Plan, run};

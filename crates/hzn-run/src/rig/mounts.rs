@@ -32,6 +32,19 @@ impl Mount {
         Rotation::assume_from_quaternion(turn_after([angle.cos(), x, y, z], self.q_vehicle_from_camera_wxyz))
     }
 
+    /// Returns the angle to another attitude of the camera in degrees.
+    pub(super) fn angle_deg(&self, q_vehicle_from_camera_wxyz: [f64; 4]) -> f64 {
+        let [w, x, y, z] = normalise(q_vehicle_from_camera_wxyz);
+        let [_, x, y, z] = turn_after([w, -x, -y, -z], self.q_vehicle_from_camera_wxyz);
+        2.0 * (x * x + y * y + z * z).sqrt().min(1.0).asin().to_degrees()
+    }
+
+    /// Returns the largest 1-sigma of the rotation about an axis of the vehicle, in degrees.
+    pub(super) fn sigma_deg(&self) -> f64 {
+        let [xx, _, _, yy, _, zz] = self.covariance_rad2;
+        xx.max(yy).max(zz).sqrt().to_degrees()
+    }
+
     /// Returns a vector in the axes of the vehicle, for one in those of the camera. Its length is kept.
     pub(super) fn to_vehicle(self, camera: [f64; 3]) -> Option<[f64; 3]> {
         let length = camera.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -13,6 +13,9 @@ use crate::error::{Error, Remedy, unusable};
 use crate::open::{self, SensorChoice};
 use crate::source::{Raw, Source};
 
+/// Difference of two mounts with quaternions of five digits, degrees.
+const MOUNT_ROUNDING_DEG: f64 = 0.002;
+
 /// The rig.toml to open, and the values that replace those of its files.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
@@ -103,6 +106,15 @@ pub fn open(request: &Request) -> Result<Opened, Error> {
 
 impl Opened {
     fn add(&mut self, head: &Head, folder: &Path, request: &Request) -> Result<(), Error> {
+        let pictures = |head: &Head| folder.join(&head.pictures).canonicalize().ok();
+        let same = |other: &&Head| pictures(other).is_some() && pictures(other) == pictures(head);
+        if let Some(other) = self.rig.heads.iter().take(self.heads.len()).find(same) {
+            let path = head.pictures.display();
+            return Err(unusable(format!(
+                "head {}: {path}: these are the pictures of head {}, too",
+                head.name, other.name
+            )));
+        }
         let sensor = head.sensor.as_ref().map(|path| folder.join(path));
         let own = open::Request {
             inputs: vec![folder.join(&head.pictures)],
@@ -123,6 +135,17 @@ impl Opened {
         self.notes.extend(opened.notes.iter().map(name));
         let Some(mount) = &head.mount else { return Err(unusable(format!("{}: [head.mount] is missing", head.name))) };
         let mount = Mount::new(&self.rig.rig.mount, mount);
+        if let Some(own) = &opened.sensor.config.mount {
+            let angle_deg = mount.angle_deg(own.q_vehicle_from_camera_wxyz);
+            let sigma_deg = self.rig.rig.mount.sigma_deg.hypot(mount.sigma_deg());
+            if angle_deg > 3.0 * sigma_deg + MOUNT_ROUNDING_DEG {
+                self.warnings.push(name(&format!(
+                    "[mount] of its sensor.toml is {angle_deg:.2} degrees away from [head.mount] of rig.toml, which the \
+                     joint answer uses; only the columns of the head's own rows that are in the vehicle's frame use \
+                     [mount]: correct one of them"
+                )));
+            }
+        }
         // The checks are about sizes, which the mount does not change.
         if let Some(vehicle) = self.frames.as_deref() {
             let config = &opened.sensor.config;

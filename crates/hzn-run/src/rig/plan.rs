@@ -6,7 +6,7 @@ use hzn_core::status::Status;
 use hzn_mcap::{FrameRecord, Row};
 
 use super::epochs::{Epoch, Epochs};
-use super::joint::{Joiner, Seen};
+use super::joint::{Joiner, Repeat, Seen};
 use crate::engine::{self, AnySensor, End, Finished, InOrder, Sink, Turns, Work, run_in_order};
 use crate::error::Error;
 use crate::sink::{self, Outputs};
@@ -76,18 +76,15 @@ struct Order<'a> {
 impl Order<'_> {
     /// Judges the pictures of the heads, and joins their answers.
     fn join(&mut self, index: u64, heads: &mut [Option<Finished>]) -> Row {
-        let mut are_frozen = Vec::with_capacity(heads.len());
-        for ((k, frame), (turns, head)) in heads.iter_mut().enumerate().zip(self.turns.iter_mut().zip(&self.plan.heads))
-        {
-            let is_frozen = frame.as_ref().is_some_and(|frame| self.frozen.see(k, frame));
-            are_frozen.push(is_frozen);
+        let repeats = self.frozen.see(heads);
+        for (frame, (turns, head)) in heads.iter_mut().zip(self.turns.iter_mut().zip(&self.plan.heads)) {
             if let Some(frame) = frame {
                 turns.judge(frame, &head.plan.config);
                 frame.picture = frame.picture.take().filter(|_| self.plan.keep_pictures);
             }
         }
         let views: Vec<Seen<'_>> =
-            heads.iter().zip(are_frozen).map(|(frame, is)| Seen::new(frame.as_ref(), is)).collect();
+            heads.iter().zip(repeats).map(|(frame, repeats)| Seen::new(frame.as_ref(), repeats)).collect();
         self.plan.joiner.join(index, &views)
     }
 }
@@ -133,15 +130,24 @@ struct Frozen {
 }
 
 impl Frozen {
-    /// Returns whether the picture of a head has the bytes of the picture before it. The noise of a camera never
-    /// repeats, but a dark or clipped picture has none: a picture without an answer is never called frozen, so that its
-    /// own reason is reported.
-    fn see(&mut self, k: usize, frame: &Finished) -> bool {
-        let Some(last) = self.last.get_mut(k) else { return false };
-        let now = frame.picture.as_ref().map(|bytes| (frame.time_s, crc32fast::hash(bytes)));
-        let before = std::mem::replace(last, now);
-        let is_answered = frame.outcomes.first().is_some_and(|outcome| outcome.status() == Status::Ok);
-        is_answered
-            && now.zip(before).is_some_and(|((now_s, now), (before_s, before))| now == before && now_s != before_s)
+    /// Returns which pictures of an epoch have the bytes of the picture before, or of another head. The noise of a camera
+    /// never repeats, but a dark or clipped picture has none: a picture without an answer never counts, so that its own
+    /// reason is reported.
+    fn see(&mut self, heads: &[Option<Finished>]) -> Vec<Option<Repeat>> {
+        let checksum = |frame: &Finished| Some((frame.time_s, crc32fast::hash(frame.picture.as_ref()?)));
+        let now: Vec<_> = heads.iter().map(|frame| frame.as_ref().and_then(checksum)).collect();
+        let is_answered = |frame: &Finished| frame.outcomes.first().is_some_and(|o| o.status() == Status::Ok);
+        let repeat = |(k, frame): (usize, &Option<Finished>)| {
+            let (now_s, own) = frame.as_ref().filter(|frame| is_answered(frame)).and_then(checksum)?;
+            let others = now.iter().enumerate().filter(|(other, _)| *other != k).filter_map(|(_, seen)| *seen);
+            if others.map(|(_, other)| other).any(|other| other == own) {
+                return Some(Repeat::OtherHead);
+            }
+            let (before_s, before) = self.last.get(k).copied().flatten()?;
+            (own == before && now_s != before_s).then_some(Repeat::Before)
+        };
+        let repeats = heads.iter().enumerate().map(repeat).collect();
+        self.last = now;
+        repeats
     }
 }

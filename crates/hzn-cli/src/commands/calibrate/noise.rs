@@ -71,11 +71,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     let input = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
     let pictures = progress.frames();
     let calibration = Calibration::new(&plan.config.body, &sightings)
-        .map_err(|why| failed(format!("{input}: of {} {why}", explain::counted(pictures, "picture"))))?;
+        .map_err(|why| failed(format!("{input} ({}): {why}", explain::counted(pictures, "picture"))))?;
     let written = noise::into_sensor_toml(&sensor.text, &calibration, &input).map_err(failed)?;
-    tell::result(text::report(&calibration, pictures))?;
+    tell::result(text::report(&calibration, pictures, &plan.config.camera))?;
     for path in args.output.iter().filter(|p| ending(p) == "html") {
-        let html = page::html(&calibration, pictures, &input)?;
+        let html = page::html(&calibration, pictures, &input, &plan.config.camera)?;
         disk::write(path, html)?;
     }
     if let Some(alarm) = calibration.alarm() {

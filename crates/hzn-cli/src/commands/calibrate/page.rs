@@ -1,6 +1,7 @@
 //! The report as one page of HTML that needs no other file.
 
 use hzn_calib::noise::Calibration;
+use hzn_core::camera::Config;
 use hzn_plot::{Chart, Series, Style};
 
 use super::text;
@@ -19,8 +20,8 @@ pub(super) fn simple(title: &str, lines: &[(String, String)], charts: &[Chart]) 
     ))
 }
 
-pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str) -> anyhow::Result<String> {
-    let rows: String = text::lines(calibration, pictures)
+pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str, camera: &Config) -> anyhow::Result<String> {
+    let rows: String = text::lines(calibration, pictures, camera)
         .iter()
         .map(|(name, value)| format!("<tr><td>{name}</td><td>{}</td></tr>", escape(value)))
         .collect();

@@ -99,7 +99,7 @@ fn measure(
             return Ok(None);
         };
         let estimate = sky::estimate(unknowns, &pictures.plan.config.body, &pictures.views, limb)
-            .map_err(|why| failed(format!("{input}: of {}: {why}", counted(pictures.count, "picture"))))?;
+            .map_err(|why| failed(format!("{input} ({}): {why}", counted(pictures.count, "picture"))))?;
         let [percent, sigma] = estimate.focal_percent;
         if pass == PASSES || (percent - before_percent).abs() <= PROCESS_AGAIN_PERCENT {
             return Ok(Some((pictures, estimate)));

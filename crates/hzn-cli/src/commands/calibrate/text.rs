@@ -1,17 +1,21 @@
 //! A calibration in words and numbers.
 
 use hzn_calib::noise::Calibration;
+use hzn_core::camera::{Config, Covariance, Intrinsic};
 use hzn_run::explain::counted;
 
 use crate::tell::one_line;
 
 /// Returns the report.
-pub(super) fn report(calibration: &Calibration, pictures: u64) -> String {
-    lines(calibration, pictures).iter().map(|(name, value)| format!("{name:<14} {}\n", one_line(value))).collect()
+pub(super) fn report(calibration: &Calibration, pictures: u64, camera: &Config) -> String {
+    lines(calibration, pictures, camera)
+        .iter()
+        .map(|(name, value)| format!("{name:<14} {}\n", one_line(value)))
+        .collect()
 }
 
 /// Returns the lines of the report: name and value.
-pub(super) fn lines(calibration: &Calibration, pictures: u64) -> Vec<(&'static str, String)> {
+pub(super) fn lines(calibration: &Calibration, pictures: u64, camera: &Config) -> Vec<(&'static str, String)> {
     let (h, e) = (&calibration.height, &calibration.edge);
     let outliers: Vec<&str> = calibration.pictures.iter().filter(|p| !p.counts).map(|p| p.name.as_str()).collect();
     let answered = calibration.pictures.len();
@@ -48,10 +52,24 @@ pub(super) fn lines(calibration: &Calibration, pictures: u64) -> Vec<(&'static s
     ));
     if let Some(f) = &calibration.focal {
         let sure = f.percent.abs() > 3.0 * f.sigma_percent;
-        let hint = if sure { "; check the camera's calibration" } else { "" };
-        let what = "longer than in sensor.toml, with a free limb height; not applied";
+        // Another shape of the lens changes the half-angle as another focal length does.
+        let hint = match camera.covariance.as_ref().is_some_and(has_shape) {
+            true => {
+                "; its sigma is for the shape of the lens in sensor.toml, which is not certain: `hzn calibrate sky` \
+                     estimates both"
+            }
+            false if sure => "; check the camera's calibration",
+            false => "",
+        };
+        let what = "from that of sensor.toml, with a free limb height; not applied";
         lines.push(("focal length", format!("{:+.2} % ± {:.2} % {what}{hint}", f.percent, f.sigma_percent)));
         lines.push(("", format!("0.1 % of it is {:.2} km of limb height", f.km_per_permille.abs())));
     }
     lines
+}
+
+/// Returns whether a coefficient of the lens has a sigma.
+fn has_shape(covariance: &Covariance) -> bool {
+    use Intrinsic::{CxPx, CyPx, FxPx, FyPx};
+    covariance.order.iter().any(|which| !matches!(which, FxPx | FyPx | CxPx | CyPx))
 }

@@ -1,5 +1,6 @@
 //! `hzn run rig.toml`: processes the pictures of several cameras that are one sensor.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use hzn_run::engine::End;
@@ -101,15 +102,15 @@ struct Watch {
     epochs: u64,
     /// The statuses of the joint answers.
     joint: Counts,
-    /// Number of epochs with an excluded head.
-    excluded: u64,
+    /// Number of epochs in which a head was excluded.
+    excluded: BTreeMap<String, u64>,
 }
 
 impl Watch {
     fn new(quiet: bool, pictures: Option<u64>) -> Self {
         let progress = Progress::new(pictures, 0, quiet);
         let missing = MissingPriors::default();
-        Self { progress, quiet, missing, unreadable: 0, epochs: 0, joint: Counts::default(), excluded: 0 }
+        Self { progress, quiet, missing, unreadable: 0, epochs: 0, joint: Counts::default(), excluded: BTreeMap::new() }
     }
 
     fn see(&mut self, epoch: &FinishedEpoch, plan: &Plan) {
@@ -117,7 +118,9 @@ impl Watch {
         if let Some(count) = self.joint.get_mut(epoch.joint.status as usize) {
             *count += 1;
         }
-        self.excluded += u64::from(epoch.joint.heads_excluded.is_some());
+        for head in epoch.joint.heads_excluded.iter().flat_map(|heads| heads.split(' ')) {
+            *self.excluded.entry(head.to_owned()).or_default() += 1;
+        }
         for (frame, head) in epoch.heads.iter().zip(&plan.heads) {
             let Some(frame) = frame else { continue };
             self.missing.count(frame);
@@ -135,9 +138,9 @@ impl Watch {
     fn sum_up(&self, summary: &str) {
         tell::line(summary);
         tell::line(format_args!("{}: {}", explain::counted(self.epochs, "epoch"), count_text(&self.joint)));
-        if self.excluded > 0 {
-            let epochs = explain::counted(self.excluded, "epoch");
-            tell::line(format_args!("note: a head was excluded in {epochs} (column heads_excluded)"));
+        for (head, epochs) in &self.excluded {
+            let epochs = explain::counted(*epochs, "epoch");
+            tell::line(format_args!("note: head {head} was excluded in {epochs} (column heads_excluded)"));
         }
     }
 }

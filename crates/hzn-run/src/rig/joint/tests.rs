@@ -83,7 +83,7 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
 #[test]
 fn a_head_without_a_free_cone_is_named() {
     let frames = [finished(0.0, true), finished(0.0, false), finished(0.0, false)];
-    let row = joiner().join(0, &frames.each_ref().map(|frame| Seen::new(Some(frame), false)));
+    let row = joiner().join(0, &frames.each_ref().map(|frame| Seen::new(Some(frame), None)));
     assert!(row.detail.contains("right: no free cone, back: no free cone"), "{}", row.detail);
 }
 
@@ -91,8 +91,8 @@ fn a_head_without_a_free_cone_is_named() {
 fn pictures_of_other_times_are_no_epoch() {
     let check = |times: [f64; 2]| {
         let frames = times.map(|time_s| finished(time_s, true));
-        let seen = frames.each_ref().map(|frame| Seen::new(Some(frame), false));
-        joiner().check_times(&[seen[0], Seen::new(None, false), seen[1]]).map_err(|e| e.to_string())
+        let seen = frames.each_ref().map(|frame| Seen::new(Some(frame), None));
+        joiner().check_times(&[seen[0], Seen::new(None, None), seen[1]]).map_err(|e| e.to_string())
     };
     assert_eq!(check([1.0, 1.05]), Ok(()));
     let why = check([4.0, 1.0]).unwrap_err();
