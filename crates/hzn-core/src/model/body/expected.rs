@@ -88,6 +88,8 @@ pub struct Expected<T> {
     pub(crate) free: bool,
     /// Whether the body may be seen as a crescent.
     pub(crate) phases: bool,
+    /// Whether the body is seen in sunlight, so that its edge may be a terminator.
+    pub(crate) is_in_sunlight: bool,
     /// Number of the body among those of the sensor, from 0.
     pub(crate) which: u8,
     /// The body in scaled space, if its position is fitted. The cone, its harmonics and the directions above are then
@@ -245,6 +247,7 @@ impl<T: Real> Expected<T> {
             limb_sigma_m: (limb_sigma * limb_sigma + seen.unknown_m * seen.unknown_m).sqrt(),
             free,
             phases: body.kind != Kind::Sun,
+            is_in_sunlight: body.is_seen_in_sunlight(),
             which: 0,
             target: None,
         };

@@ -58,8 +58,6 @@ pub(crate) struct Target<T> {
     pub(crate) radii_sigma_m: T,
     /// The distance, if it is known.
     pub(crate) range: Option<Range<T>>,
-    /// Whether the body is seen in sunlight.
-    pub(crate) is_in_sunlight: bool,
     /// Whether the body is the Earth, whose altitudes are geodetic.
     pub(crate) is_earth: bool,
     /// The centre of the body in the camera frame, metres, if attitude and position are known.
@@ -104,7 +102,6 @@ impl<T: Real> Target<T> {
             raised_m: T::ZERO,
             radii_sigma_m: T::from_f64(body.radii_sigma_km) * km,
             range: range(body, prior, limb)?,
-            is_in_sunlight: body.is_seen_in_sunlight(),
             is_earth: body.kind == Kind::Earth,
             predicted_m: attitude.and(prior.position_m).map(|x| -(camera_from_fixed * V3::from(x))),
         };

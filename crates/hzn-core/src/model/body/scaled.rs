@@ -55,6 +55,7 @@ impl<T: Real> Expected<T> {
             limb_sigma_m: target.limb_sigma_m,
             free: false,
             phases: body.kind != Kind::Sun,
+            is_in_sunlight: body.is_seen_in_sunlight(),
             which: 0,
             target: Some(target),
         };

@@ -129,6 +129,16 @@ impl<T: Real> Row<T> {
         let r = d.dot(&d) * T::from_f64(0.5) - fit.k;
         (r, self.w * r * r)
     }
+    /// Returns the weight w of the normal equations.
+    pub(super) fn w(&self) -> T {
+        self.w
+    }
+    /// Returns cos 2φ and sin 2φ of the azimuth φ about the axis.
+    pub(super) fn second_harmonic(&self) -> [T; 2] {
+        let (x2, y2) = (self.x * self.x, self.y * self.y);
+        let rho2 = (x2 + y2).max(T::from_f64(1e-20));
+        [(x2 - y2) / rho2, (self.x + self.x) * self.y / rho2]
+    }
     /// Adds w h hᵀ to the upper triangle of the normal matrix.
     pub(super) fn add_to(&self, normal: &mut [T; 6]) {
         let (Self { h, w, .. }, [h1, h2]) = (self, self.h12);

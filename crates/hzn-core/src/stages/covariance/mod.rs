@@ -89,10 +89,11 @@ pub(crate) fn fuse<T: Real>(
         }
         add(term, more);
     })?;
+    // Only of a disc, both sides can be in view.
+    if fit.free && expected.is_in_sunlight && expected.sun_seen.is_none() && expected.fits_into(camera) {
+        terminator::widen(blocks, fit, expected, &mut p);
+    }
     if let Some(target) = expected.target().filter(|_| fit.free) {
-        if target.is_in_sunlight && expected.phases && expected.sun_seen.is_none() {
-            terminator::widen(blocks, fit, &mut p);
-        }
         let mut fused = position::fused(blocks, fit, &p, edge, expected, target, fit_config, budget)?;
         if let Some(located) = &mut fused.located {
             let limit_rad = fit_config.yaw_limit_deg.to_radians();

@@ -45,7 +45,7 @@ pub(super) fn fused<T: Real>(
         return target.range.map(|_| by_direction);
     }
     let given = Sensitivity::new(blocks, fit, target)?;
-    let light_px = if target.is_in_sunlight { edge.shift_px } else { T::ZERO };
+    let light_px = if expected.is_in_sunlight { edge.shift_px } else { T::ZERO };
     let lights = light(&given, expected, &fit.e).map(|v| v * light_px);
     let free = located(fit, sin, p, target, &given, &lights);
     let range = target.range.filter(|_| config.half_angle != HalfAngle::Free);

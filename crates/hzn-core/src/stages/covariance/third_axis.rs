@@ -89,7 +89,7 @@ fn signal_sigmas<T: Real>(
     let (shift, tilt) = (noise.shift_px.to_f64(), noise.tilt_px.to_f64());
     // Light that changes along the limb is a first harmonic in the azimuth from the Sun, which may be unknown.
     let sun = expected.sun_seen.map(|sun| limb.azimuth(&sun.map(Real::to_f64)));
-    let light = if target.is_in_sunlight { shift } else { 0.0 };
+    let light = if expected.is_in_sunlight { shift } else { 0.0 };
     let [light_x, light_y] = sun.map_or([half; 2], |[x, y]| [x.abs(), y.abs()]).map(|part| part * light);
     let turned = target.attitude_sigma_rad.to_f64();
     let radii = per_unit(target.radii_sigma_m);
