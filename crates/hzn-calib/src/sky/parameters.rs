@@ -59,10 +59,19 @@ impl Parameters {
             let halved = sigma(covariance, i) <= DETERMINED * sigma(&unknowns.covariance, i);
             halved && sigma(covariance, i) <= limit(i)
         };
-        let determined: Vec<bool> = (0..changes.len()).map(is_determined).collect();
+        let mut determined: Vec<bool> = (0..changes.len()).map(is_determined).collect();
         let scale = unknowns.scale_weights();
         let focal_sigma = (scale.transpose() * covariance * &scale)[(0, 0)].sqrt();
-        let (kept, written) = keep_undetermined(changes, covariance, &unknowns.covariance, &determined)?;
+        let prior = &unknowns.covariance;
+        let (kept, written) = loop {
+            let (kept, written) = keep_undetermined(changes, covariance, prior, &determined)?;
+            // A parameter that follows one that is kept may be known less well than before the flight.
+            let is_worse = |i: &usize| determined[*i] && sigma(&written, *i) > sigma(prior, *i);
+            match (0..changes.len()).find(is_worse) {
+                Some(worse) => determined[worse] = false,
+                None => break (kept, written),
+            }
+        };
         let mut camera = unknowns.changed_by(kept.as_slice());
         // If nothing is determined, the calibration stays as it was.
         if determined.contains(&true) {

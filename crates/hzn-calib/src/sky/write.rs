@@ -135,7 +135,8 @@ fn two_digits(sigma: f64) -> String {
 }
 
 fn covariance_value(covariance: &Covariance) -> Value {
-    let digits = |x: &f64| format!("{x:.6e}").parse::<f64>().unwrap_or(*x);
+    // With fewer digits, the rounded variance of fx - fy, which move together, may be negative.
+    let digits = |x: &f64| format!("{x:.13e}").parse::<f64>().unwrap_or(*x);
     let order = Array::from_iter(covariance.order.iter().map(|i| i.name()));
     let rows = covariance.rows.iter().map(|row| Value::Array(Array::from_iter(row.iter().map(digits))));
     let mut table = InlineTable::new();

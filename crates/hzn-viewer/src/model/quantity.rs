@@ -1,6 +1,6 @@
 //! The quantities that can be plotted over time.
 
-use hzn_evaluate::{MeasuredPosition, PositionMiss};
+use hzn_evaluate::{MeasuredDirection, MeasuredPosition, Miss, PositionMiss};
 use hzn_files::truth::Truth;
 use hzn_mcap::Row;
 
@@ -106,10 +106,23 @@ pub fn error_deg(row: &Row, truth: Option<&Truth>) -> Option<f64> {
     Some(angle_deg(row.axis()?, truth?.axis()?.xyz()))
 }
 
-/// Returns the error of an answer over its 1-sigma in the worst direction; `None` without a truth.
+/// Returns the error of an answer over its 1-sigma in the direction of the error, as `hzn evaluate` counts it: the root of
+/// the NEES. `None` without a truth.
 pub fn error_sigmas(row: &Row, truth: Option<&Truth>) -> Option<f64> {
-    let sigma = row.sigma_max_deg.filter(|s| *s > 0.0)?;
-    Some(error_deg(row, truth)? / sigma)
+    sigmas_from(row, truth?.axis()?.xyz())
+}
+
+/// Returns the angle from an answer to a direction, over the 1-sigma of the answer in this direction.
+fn sigmas_from(row: &Row, right: [f64; 3]) -> Option<f64> {
+    let found = MeasuredDirection {
+        axis: row.axis()?,
+        covariance_rad2: row.covariance()?,
+        common_rad2: None,
+        half_angle_deg: None,
+        protection_deg: None,
+    };
+    // The half-angle has no part in the error of the direction.
+    Miss::new(&found, right, 1.0)?.nees.map(f64::sqrt)
 }
 
 /// Returns true if the truth lies outside of the 3-sigma of an answer.
@@ -142,6 +155,20 @@ mod tests {
         // Across the line of sight, x has the largest sigma.
         assert!((cross_range_3sigma_km(&row, None).unwrap() - 30.0).abs() < 1e-12);
         assert!(position_miss(&row, None).is_none());
+    }
+
+    /// The error is along the smaller sigma: 4 of it, and 0.4 of the larger one.
+    #[test]
+    fn an_error_counts_in_the_sigma_of_its_direction() {
+        let meta =
+            hzn_mcap::RowMeta { index: 0, file: "a".into(), time_s: None, body: "earth".into(), altitude_km: None };
+        let mut row = Row::unprocessed(&meta, hzn_core::status::Status::Ok, "");
+        (row.axis_x, row.axis_y, row.axis_z, row.sigma_max_deg) = (Some(0.0), Some(0.0), Some(1.0), Some(0.573));
+        (row.cov_xx, row.cov_xy, row.cov_xz) = (Some(1e-4), Some(0.0), Some(0.0));
+        (row.cov_yy, row.cov_yz, row.cov_zz) = (Some(1e-6), Some(0.0), Some(0.0));
+        let e = 0.004f64;
+        assert!((sigmas_from(&row, [0.0, e.sin(), e.cos()]).unwrap() - 4.0).abs() < 1e-6);
+        assert!((sigmas_from(&row, [e.sin(), 0.0, e.cos()]).unwrap() - 0.4).abs() < 1e-6);
     }
 
     #[test]
