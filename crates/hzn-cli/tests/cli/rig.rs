@@ -193,6 +193,8 @@ fn a_turned_mount_is_named_and_two_heads_only_notice_it() {
             && cell(row, "axis_x").is_empty()
     };
     assert!(joint.iter().all(refused), "{joint:?}");
+    let ran = place.run(&["run", "ring/rig.toml", "-o", "two.csv"]).expect(0);
+    ran.says("note: 4 epochs rejected as inconsistent: the heads contradict each other");
 }
 
 #[test]

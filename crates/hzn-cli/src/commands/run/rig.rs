@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use hzn_core::status::Status;
 use hzn_run::engine::End;
 use hzn_run::rig::{self, Epochs, FinishedEpoch, HeadPlan, Opened, Plan, Request};
 use hzn_run::sink::{self, Outputs};
@@ -104,19 +105,34 @@ struct Watch {
     joint: Counts,
     /// Number of epochs in which a head was excluded.
     excluded: BTreeMap<String, u64>,
+    /// Number of epochs that the heads together refuse, by the reason.
+    refused: BTreeMap<String, u64>,
 }
 
 impl Watch {
     fn new(quiet: bool, pictures: Option<u64>) -> Self {
         let progress = Progress::new(pictures, 0, quiet);
         let missing = MissingPriors::default();
-        Self { progress, quiet, missing, unreadable: 0, epochs: 0, joint: Counts::default(), excluded: BTreeMap::new() }
+        Self {
+            progress,
+            quiet,
+            missing,
+            unreadable: 0,
+            epochs: 0,
+            joint: Counts::default(),
+            excluded: BTreeMap::new(),
+            refused: BTreeMap::new(),
+        }
     }
 
     fn see(&mut self, epoch: &FinishedEpoch, plan: &Plan) {
         self.epochs += 1;
         if let Some(count) = self.joint.get_mut(epoch.joint.status as usize) {
             *count += 1;
+        }
+        if epoch.joint.status == Status::Rejected {
+            let why = epoch.joint.detail.split(';').next().unwrap_or_default();
+            *self.refused.entry(why.to_owned()).or_default() += 1;
         }
         for head in epoch.joint.heads_excluded.iter().flat_map(|heads| heads.split(' ')) {
             *self.excluded.entry(head.to_owned()).or_default() += 1;
@@ -138,6 +154,12 @@ impl Watch {
     fn sum_up(&self, summary: &str) {
         tell::line(summary);
         tell::line(format_args!("{}: {}", explain::counted(self.epochs, "epoch"), count_text(&self.joint)));
+        if let Some((why, epochs)) = self.refused.iter().max_by_key(|(_, epochs)| **epochs) {
+            let epochs = explain::counted(*epochs, "epoch");
+            tell::line(format_args!(
+                "note: {epochs} rejected as {why} (column detail; the heads' own rows are below it)"
+            ));
+        }
         for (head, epochs) in &self.excluded {
             let epochs = explain::counted(*epochs, "epoch");
             tell::line(format_args!("note: head {head} was excluded in {epochs} (column heads_excluded)"));
