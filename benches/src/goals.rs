@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::results::{CaseResult, HZN, HZN_FEWER, median};
+use crate::results::{CaseResult, EXPERT, HZN, HZN_FEWER, HZN_SEQUENCE, median};
 use crate::sensors::FEWER;
 use crate::state::State;
 
@@ -17,6 +17,17 @@ const FACTORS: [(&str, State, f64, f64); 7] = [
     ("clean-4096x3072", State::AllFlushed, 30.0, 40.0),
     ("cloudy-4096x3072", State::AllFlushed, 90.0, 120.0),
 ];
+/// The same in a sequence.
+const IN_SEQUENCE: [(&str, State, f64); 5] = [
+    ("clean-1920x1080", State::AllFlushed, 15.0),
+    ("clean-1920x1080", State::PictureFlushed, 13.0),
+    ("clean-1920x1080", State::Warm, 18.0),
+    ("cloudy-1920x1080", State::AllFlushed, 32.0),
+    ("clean-4096x3072", State::AllFlushed, 45.0),
+];
+/// The same against the recipe that looks at every 8th pixel first.
+const AGAINST_EXPERT: [(&str, State, f64); 2] =
+    [("clean-1920x1080", State::PictureFlushed, 5.0), ("clean-4096x3072", State::PictureFlushed, 7.0)];
 /// Two cases, and the goal for the ratio of their times. The second picture has six times the pixels of the first.
 const GROWTH: (&str, &str, f64) = ("clean-1920x1080", "clean-4096x3072", 2.0);
 /// Case, with the goals for nanoseconds per edge point and for the percentage of pixels that are read.
@@ -37,6 +48,18 @@ pub(crate) fn table(cases: &[CaseResult]) -> String {
         let ours = c.ratio(HZN, state);
         let figure = format!("{name}, {}: times as fast as the recipe", state.name());
         row(figure, goal, ours, 1.0 - ours / factor, Some(c.ratio(HZN_FEWER, state)));
+    }
+    for (name, state, factor) in IN_SEQUENCE {
+        let Some(c) = case(name) else { continue };
+        let ours = c.ratio(HZN_SEQUENCE, state);
+        let figure = format!("{name}, {}, in a sequence: times as fast as the recipe", state.name());
+        row(figure, format!("{factor}"), ours, 1.0 - ours / factor, None);
+    }
+    for (name, state, factor) in AGAINST_EXPERT {
+        let Some(c) = case(name) else { continue };
+        let ours = c.ratio_to(EXPERT, HZN_SEQUENCE, state);
+        let figure = format!("{name}, {}, in a sequence: times as fast as the recipe of an expert", state.name());
+        row(figure, format!("{factor}"), ours, 1.0 - ours / factor, None);
     }
     let (small, large, most) = GROWTH;
     if let (Some(small), Some(large)) = (case(small), case(large)) {

@@ -112,15 +112,24 @@ fn run(options: &Options) -> Result<(), String> {
 fn measure(case: &Case, rounds: usize, recipe: &mut Recipe) -> Result<CaseResult, String> {
     let mut single = sensors::flight_sensor(&case.sensor)?;
     let mut fewer = sensors::sensor_with_fewer_points(&case.sensor)?;
+    let mut sequence = sensors::sensor_in_sequence(case)?;
     let mut double = sensors::host_sensor(&case.sensor)?;
-    let names = ["hzn f32", "hzn f32, fewer points", "hzn f64", "recipe, lstsq", "recipe, normal equations"];
+    let names = [
+        "hzn f32",
+        "hzn f32, fewer points",
+        "hzn f32, in a sequence",
+        "hzn f64",
+        "recipe, lstsq",
+        "recipe, normal equations",
+        "recipe, every 8th pixel first",
+    ];
     let mut result = CaseResult::new(case, names.map(|name| ProgramResult::new(name, case)).into());
     let (hzn, recipes) = result.programs.split_at_mut(results::RECIPE);
     for round in 0..rounds {
         for (i, frame) in case.frames.iter().enumerate() {
             for state in State::ALL {
                 let mut level = 1;
-                let sensors: [&mut dyn Measured; 3] = [&mut single, &mut fewer, &mut double];
+                let sensors: [&mut dyn Measured; 4] = [&mut single, &mut fewer, &mut sequence, &mut double];
                 for (sensor, program) in sensors.into_iter().zip(hzn.iter_mut()) {
                     let run = sensor.measure(case, i, state)?;
                     program.add_run(i, state, &run);

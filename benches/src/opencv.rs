@@ -10,8 +10,9 @@ use serde_json::json;
 
 use crate::state::State;
 
-/// How the recipe solves its least squares; also the names in its requests and stages.
-pub(crate) const SOLVERS: [&str; 2] = ["lstsq", "normal equations"];
+/// How the recipe solves its least squares; also the names in its requests and stages. The last one is another recipe,
+/// which looks at every 8th pixel first.
+pub(crate) const SOLVERS: [&str; 3] = ["lstsq", "normal equations", "every 8th pixel"];
 
 /// Running process of the recipe.
 pub(crate) struct Recipe {

@@ -44,11 +44,13 @@ pub(crate) struct CaseResult {
     pub(crate) large_mib: [f64; 2],
 }
 
-/// Place of hzn with its defaults in f32 among the programs, of hzn with fewer points, and of the recipe as one usually
-/// writes it.
+/// Place of hzn with its defaults in f32 among the programs, of hzn with fewer points, of hzn in a sequence, of the
+/// recipe as one usually writes it, and of the recipe of an expert.
 pub(crate) const HZN: usize = 0;
 pub(crate) const HZN_FEWER: usize = 1;
-pub(crate) const RECIPE: usize = 3;
+pub(crate) const HZN_SEQUENCE: usize = 2;
+pub(crate) const RECIPE: usize = 4;
+pub(crate) const EXPERT: usize = 6;
 
 /// Measurements of one program.
 #[derive(Serialize)]
@@ -185,10 +187,15 @@ impl CaseResult {
         }
     }
 
-    /// Returns how many times as fast as the recipe hzn is, in a state.
+    /// Returns how many times as fast as the recipe a program is, in a state.
     pub(crate) fn ratio(&self, program: usize, state: State) -> f64 {
+        self.ratio_to(RECIPE, program, state)
+    }
+
+    /// Returns how many times as fast as a rival a program is, in a state.
+    pub(crate) fn ratio_to(&self, rival: usize, program: usize, state: State) -> f64 {
         let time = |i: usize| self.programs.get(i).map_or(f64::NAN, |p| p.median_us(state));
-        time(RECIPE) / time(program)
+        time(rival) / time(program)
     }
 }
 

@@ -6,7 +6,9 @@ use std::time::Instant;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::real::Real;
 use hzn_core::status::Status;
-use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Prior};
+use hzn_core::{
+    Config, Expected, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report, Step, Tracker, Unobserved,
+};
 
 use crate::cases::{Case, Picture};
 use crate::observers::{Clock, PixelMap};
@@ -14,6 +16,8 @@ use crate::state::{FLUSH_BYTES, State};
 
 /// Value of `keep_points` in the measurement with fewer points.
 pub(crate) const FEWER: u16 = 200;
+/// Distance of the limb from its predicted place in a sequence, pixels.
+pub(crate) const MOVED_PX: f64 = 4.0;
 /// Times that the frames are processed one after another to measure the time of a point.
 const TURNS: usize = 9;
 
@@ -21,6 +25,8 @@ const TURNS: usize = 9;
 pub(crate) struct Sensor<T, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> {
     horizon: Box<Horizon<T, POINTS, BLOCKS, WORDS>>,
     flush: Vec<u8>,
+    /// In a sequence: what the tracker knows before each frame.
+    trackers: Vec<Tracker<T>>,
 }
 
 /// Result of one run.
@@ -52,6 +58,21 @@ pub(crate) fn sensor_with_fewer_points(config: &Config) -> Result<Sensor<f32, 20
     flight_sensor(&config)
 }
 
+/// Makes the same sensor in a sequence: it has just found the limb of each frame [`MOVED_PX`] away.
+pub(crate) fn sensor_in_sequence(case: &Case) -> Result<Sensor<f32, 2048, 256, 512>, String> {
+    let mut config = case.sensor.clone();
+    // A full search comes before the frames are measured, and none of them is the 25th.
+    config.track.full_every = 25;
+    let mut sensor = flight_sensor(&config)?;
+    for frame in &case.frames {
+        let mut tracker = Tracker::default();
+        let (picture, expected) = (picture(case, frame)?, sensor.expect(frame)?);
+        sensor.horizon.track(&mut tracker, &picture, (&expected, &sensor.step(case, None)));
+        sensor.trackers.push(tracker);
+    }
+    Ok(sensor)
+}
+
 /// Makes a sensor in f64 with the lists of a workstation.
 pub(crate) fn host_sensor(config: &Config) -> Result<Sensor<f64, 16384, 2048, 65536>, String> {
     Ok(Sensor::from_horizon(HostHorizon::boxed(config).map_err(|e| e.to_string())?))
@@ -80,7 +101,36 @@ fn prior<T: Real>(frame: &Picture) -> Prior<T> {
 
 impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sensor<T, POINTS, BLOCKS, WORDS> {
     fn from_horizon(horizon: Box<Horizon<T, POINTS, BLOCKS, WORDS>>) -> Self {
-        Self { horizon, flush: vec![1; FLUSH_BYTES] }
+        Self { horizon, flush: vec![1; FLUSH_BYTES], trackers: Vec::new() }
+    }
+
+    fn expect(&self, frame: &Picture) -> Result<Expected<T>, String> {
+        self.horizon.expect(&prior(frame)).map_err(|e| e.to_string())
+    }
+
+    /// Returns the step of a frame in a sequence: the given rate puts the predicted limb [`MOVED_PX`] away.
+    fn step(&self, case: &Case, after_s: Option<f64>) -> Step<T> {
+        let rate = T::from_f64(MOVED_PX / case.sensor.camera.fx_px);
+        Step { after_s: after_s.map(T::from_f64), rate_rad_s: Some([rate, T::ZERO, T::ZERO]), attitude: None }
+    }
+
+    /// Processes a frame, in a sequence with what the tracker knows before it.
+    fn process<O: Observer<T>>(
+        &mut self,
+        case: &Case,
+        frame: usize,
+        expected: &Expected<T>,
+        observer: &O,
+    ) -> Result<(f64, Report<T>), String> {
+        let (picture, step) = (picture(case, case.frame(frame)?)?, self.step(case, Some(1.0)));
+        let mut tracker = self.trackers.get(frame).cloned();
+        let start = Instant::now();
+        let report = match &mut tracker {
+            Some(tracker) => self.horizon.track_observed(tracker, black_box(&picture), (expected, &step), observer),
+            None => self.horizon.process_observed(black_box(&picture), expected, observer),
+        };
+        let report = black_box(report);
+        Ok((start.elapsed().as_secs_f64() * 1e6, report))
     }
 
     fn flush_caches(&mut self) {
@@ -88,14 +138,10 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         black_box(&self.flush);
     }
 
-    fn measure_once(&mut self, case: &Case, frame: &Picture) -> Result<Timed, String> {
-        let picture = picture(case, frame)?;
-        let prior = prior(frame);
+    fn measure_once(&mut self, case: &Case, frame: usize) -> Result<Timed, String> {
         // The expected limb does not depend on the picture, so its time is not measured.
-        let expected = self.horizon.expect(&prior).map_err(|e| e.to_string())?;
-        let start = Instant::now();
-        let report = black_box(self.horizon.process(black_box(&picture), &expected));
-        let elapsed_us = start.elapsed().as_secs_f64() * 1e6;
+        let expected = self.expect(case.frame(frame)?)?;
+        let (elapsed_us, report) = self.process(case, frame, &expected, &Unobserved)?;
         let solution = report.solution.filter(|_| report.status == Status::Ok);
         Ok(Timed {
             elapsed_us,
@@ -115,7 +161,6 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
         if state == State::AllFlushed {
             return Ok(());
         }
-        let before = case.frame(before)?;
         for _ in 0..2 {
             if observed {
                 self.observe(case, before)?;
@@ -127,11 +172,10 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
     }
 
     /// Processes a frame with a clock in its stages, and returns their times in microseconds.
-    fn observe(&mut self, case: &Case, frame: &Picture) -> Result<Vec<(&'static str, f64)>, String> {
-        let picture = picture(case, frame)?;
-        let expected = self.horizon.expect(&prior(frame)).map_err(|e| e.to_string())?;
+    fn observe(&mut self, case: &Case, frame: usize) -> Result<Vec<(&'static str, f64)>, String> {
+        let expected = self.expect(case.frame(frame)?)?;
         let clock = Clock::start();
-        black_box(self.horizon.process_observed(black_box(&picture), &expected, &clock));
+        self.process(case, frame, &expected, &clock)?;
         Ok(clock.stages())
     }
 
@@ -140,7 +184,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
     pub(crate) fn measure_ns_a_point(&mut self, case: &Case) -> Result<Vec<Vec<f64>>, String> {
         let mut all = vec![Vec::new(); case.frames.len()];
         for _ in 0..TURNS {
-            for (frame, list) in case.frames.iter().zip(&mut all) {
+            for (frame, list) in all.iter_mut().enumerate() {
                 let Timed { elapsed_us, points, .. } = self.measure_once(case, frame)?;
                 if points > 0 {
                     list.push(elapsed_us * 1e3 / f64::from(points));
@@ -154,7 +198,7 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Sens
     /// Returns the number of pixels that are read at least once.
     pub(crate) fn count_distinct_pixels(&mut self, case: &Case, frame: &Picture) -> Result<u64, String> {
         let picture = picture(case, frame)?;
-        let expected = self.horizon.expect(&prior(frame)).map_err(|e| e.to_string())?;
+        let expected = self.expect(frame)?;
         let touched = PixelMap::new(case.sensor.camera.width, case.sensor.camera.height);
         self.horizon.process_observed(&picture, &expected, &touched);
         Ok(touched.count())
@@ -166,11 +210,11 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Meas
 {
     fn measure(&mut self, case: &Case, frame: usize, state: State) -> Result<Timed, String> {
         self.prepare(case, frame, state, false)?;
-        self.measure_once(case, case.frame(frame)?)
+        self.measure_once(case, frame)
     }
 
     fn measure_stages(&mut self, case: &Case, frame: usize, state: State) -> Result<Vec<(&'static str, f64)>, String> {
         self.prepare(case, frame, state, true)?;
-        self.observe(case, case.frame(frame)?)
+        self.observe(case, frame)
     }
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::results::{HZN, RECIPE, Results, median};
+use crate::sensors::MOVED_PX;
 use crate::state::State;
 use crate::{goals, growth};
 
@@ -25,11 +26,14 @@ pub(crate) fn markdown(results: &Results) -> String {
          | warm | the program and the picture, which it has just processed |\n\n",
     );
     s.push_str(&pages(results));
-    s.push_str(
+    let _ = write!(
+        s,
         "\nThe recipe solves its least squares with `numpy.linalg.lstsq`, as one usually does; a row of its own shows \
-         it with the normal equations. The ratio is the time of the recipe with `lstsq` divided by the time of the \
-         row. The error is the angle between answer and truth, median / worst (frames answered); the points are those \
-         of the edges that the program used.\n\n",
+         it with the normal equations. An expert looks at every 8th pixel first, and then measures the crossings of \
+         the threshold between them; this recipe takes every crossing for the limb. In a sequence, hzn has found the \
+         limb in the picture before, {MOVED_PX} pixels away (`track.full_every`). The ratio is the time of the recipe \
+         with `lstsq` divided by the time of the row. The error is the angle between answer and truth, median / worst \
+         (frames answered); the points are those of the edges that the program used.\n\n",
     );
     s.push_str(&times(results));
     let _ = write!(s, "\nOur goals and the measured values:\n\n{}", goals::table(&results.cases));

@@ -40,6 +40,7 @@ PROBES = {
     "gallery": "guide/gallery/",
     "where is the limb": "theory/limb/",
     "own firmware": "guide/own-firmware/",
+    "sequences": "guide/sequences/",
 }
 FIRST = 3
 

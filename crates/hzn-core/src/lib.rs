@@ -89,7 +89,7 @@ pub mod rig;
 mod stages;
 
 pub use base::{error, keys, real};
-pub use config::retry;
+pub use config::{retry, track};
 pub use geometry::{camera, ellipsoid, frames, pixel, section};
 pub use image::region;
 pub use model::{body, edge_noise, error_budget, evidence, observer, report, status, tone, verdict, work};
@@ -100,6 +100,7 @@ pub use config::Config;
 pub use observer::{Observer, Unobserved};
 pub use papers::Preset;
 pub use pipeline::{
-    FlightHorizon, FlightWorkspace, Horizon, HostHorizon, HostWorkspace, Sensor, SensorPlace, Sequence, Step, Workspace,
+    FlightHorizon, FlightWorkspace, Horizon, HostHorizon, HostWorkspace, Sensor, SensorPlace, Sequence, Step, Tracker,
+    Workspace,
 };
 pub use report::{Report, Solution};

@@ -88,6 +88,7 @@ cells! {
     u16, "integer", 0;
     u32, "integer", 0;
     u64, "integer", 0;
+    bool, "boolean", false;
     String, "string", String::new();
     Status, "string", Status::Rejected;
 }
@@ -254,6 +255,9 @@ columns! {
         cov_common_yz: Option<f64>,
         /// The common part of the axis's covariance, zz, rad².
         cov_common_zz: Option<f64>,
+        /// Whether the limb was found where the answer to the picture before put it (`track.full_every`); empty if the
+        /// whole picture was searched.
+        tracked: Option<bool>,
         /// The axis in the vehicle's frame, x; only with a mounting. Roll and pitch belong to this direction.
         axis_v_x: Option<f64>,
         /// The axis in the vehicle's frame, y.
@@ -289,6 +293,7 @@ impl Row {
         match (&report.solution, report.status) {
             (Some(solution), Status::Ok) => {
                 row.set_answer(solution);
+                row.tracked = report.is_tracked().then_some(true);
                 row.detail = if report.is_suspect { SUSPECT } else { "" }.to_owned();
             }
             _ => row.detail = describe(report),

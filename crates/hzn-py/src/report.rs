@@ -155,6 +155,11 @@ impl Report {
     fn stage(&self) -> &str {
         &self.stage
     }
+    #[doc = doc!("Report.tracked")]
+    #[getter]
+    fn tracked(&self) -> bool {
+        self.row.tracked == Some(true)
+    }
     #[doc = doc!("Report.detail")]
     #[getter]
     fn detail(&self) -> &str {

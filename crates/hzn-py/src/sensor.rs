@@ -215,10 +215,15 @@ impl Sensor {
         jobs: Option<usize>,
         progress: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let tracks = slf.get().state().config.tracks();
+        let state = slf.get().state();
         let many = slf.py().import("hzn._many")?.getattr("process_many")?;
-        // If the threshold of a picture comes from the previous one, the pictures are processed one after another.
-        many.call1((slf, images, if tracks { Some(1) } else { jobs }, progress))
+        // If a picture depends on the previous one, the pictures are processed one after another.
+        if !state.config.track.is_on() {
+            return many.call1((slf, images, if state.config.tracks() { Some(1) } else { jobs }, progress));
+        }
+        // A sensor of its own, because single pictures that are processed meanwhile are not of the sequence.
+        let own = Self { state: RwLock::new(State::for_sequence(state.config.clone(), state.flight)?) };
+        many.call1((own, images, Some(1), progress))
     }
 
     fn __repr__(&self) -> String {

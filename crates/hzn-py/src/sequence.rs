@@ -63,7 +63,7 @@ impl Sequence {
         let state = if sensor.config.each_body() == state.config.each_body() {
             state
         } else {
-            State::new(Config { input: state.config.input, ..sensor.config.clone() }, state.flight)?
+            state.with_config(Config { input: state.config.input, ..sensor.config.clone() })?
         };
         let mut plan = default_plan(&state, frames);
         plan.config.input = sensor.config.input;

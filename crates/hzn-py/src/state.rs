@@ -20,13 +20,33 @@ pub(crate) struct State {
     core: CoreSensor<f64>,
     /// Idle sensors. Each call takes one or makes one, so threads never wait for each other.
     idle: Mutex<Vec<AnySensor>>,
+    /// Whether the pictures are those of one sequence, in order and on one thread.
+    in_sequence: bool,
 }
 
 impl State {
     pub(crate) fn new(config: Config, flight: bool) -> PyResult<Arc<Self>> {
+        Self::make(config, flight, None)
+    }
+
+    /// Makes the state for one sequence, whose limb is tracked. It must be used on one thread at a time.
+    pub(crate) fn for_sequence(config: Config, flight: bool) -> PyResult<Arc<Self>> {
+        let mut sensor = AnySensor::new(&config, flight).map_err(errors::config)?;
+        sensor.begin_sequence();
+        Self::make(config, flight, Some(sensor))
+    }
+
+    /// Returns the same with another configuration.
+    pub(crate) fn with_config(&self, config: Config) -> PyResult<Arc<Self>> {
+        if self.in_sequence { Self::for_sequence(config, self.flight) } else { Self::new(config, self.flight) }
+    }
+
+    fn make(config: Config, flight: bool, sequence: Option<AnySensor>) -> PyResult<Arc<Self>> {
         let core = CoreSensor::new(&config).map_err(errors::config)?;
         let camera = Arc::new(Camera::from_config(config.camera.clone())?);
-        Ok(Arc::new(Self { config, flight, camera, core, idle: Mutex::default() }))
+        let in_sequence = sequence.is_some();
+        let idle = Mutex::new(sequence.into_iter().collect());
+        Ok(Arc::new(Self { config, flight, camera, core, idle, in_sequence }))
     }
 
     /// Lends a sensor to `work`. A sensor in which `work` panicked is dropped.

@@ -34,6 +34,26 @@ def test_arrays_come_out_in_order(sensor):
     assert list(sensor.process_many([])) == []
 
 
+def test_the_limb_of_a_sequence_is_tracked(sensor):
+    pictures = [limb(0.5 * i) for i in range(12)]
+    pictures[7] = np.full_like(pictures[7], 20)
+    parameters = {**sensor.parameters, "track": {"full_every": 5}}
+    tracking = hzn.Sensor(**parameters)
+    many = list(tracking.process_many(pictures, jobs=4))
+    # Every fifth picture is searched fully, and so is the one without a limb and the one after it.
+    assert [i for i, report in enumerate(many) if report.tracked] == [1, 2, 3, 4, 6, 9, 11]
+    assert [report.status for report in many] == ["no-limb" if i == 7 else "ok" for i in range(12)]
+    for picture, report in zip(pictures, many, strict=True):
+        # A single picture is never tracked.
+        alone = tracking.process(picture)
+        assert not alone.tracked
+        if report.status == "ok":
+            apart = np.linalg.norm(alone.axis - report.axis)
+            assert apart == 0 if not report.tracked else apart < np.radians(report.sigma_max_deg)
+    again = list(tracking.process_many(pictures))
+    assert all(np.array_equal(a.axis, b.axis) for a, b in zip(many, again, strict=True) if a.status == "ok")
+
+
 def test_what_is_known_of_each_picture(sensor):
     many = sensor.process_many((limb(), {"altitude_km": km}) for km in (390.0, 400.0, 410.0))
     assert [r.altitude_km for r in many] == [390.0, 400.0, 410.0]

@@ -53,8 +53,8 @@ pub(super) fn skip_stored(
             // Without the pictures before it, a picture would give another result.
             None if !changed && changed_table.is_none() => {}
             None => {
-                let what = "was changed since these results were written, and with threshold.method = track its result \
-                            cannot be compared alone";
+                let what = "was changed since these results were written, and its result depends on the pictures \
+                            before it, so that it cannot be compared alone";
                 let file = if changed { picture } else { table.map(|p| p.display().to_string()).unwrap_or_default() };
                 return other(format!("{file} {what}"));
             }
@@ -110,7 +110,9 @@ impl Again<'_> {
     /// Returns whether a picture gives its stored rows again, after the answers and turns before it; `None` if that
     /// also depends on the threshold of the pictures before it.
     fn gives_the_same(&mut self, n: u64, item: Item, mut before: Turns) -> Result<Option<bool>, Stop> {
-        if self.plan.config.tracks() {
+        // The limb of a picture in the middle of a block was tracked from the picture before it.
+        let every = u64::from(self.plan.config.track.full_every);
+        if self.plan.config.tracks() || (self.plan.config.track.is_on() && !n.is_multiple_of(every)) {
             return Ok(None);
         }
         let sensor = match &mut self.sensor {

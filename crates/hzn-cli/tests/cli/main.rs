@@ -39,4 +39,5 @@ mod telemetry;
 mod terminal;
 mod told;
 mod tone;
+mod track;
 mod video;

@@ -2,6 +2,7 @@
 
 mod numbers;
 pub mod retry;
+pub mod track;
 
 pub use numbers::SECTIONS;
 
@@ -70,6 +71,9 @@ pub struct Config {
     /// Further looks and division, for a picture without an answer.
     #[cfg_attr(feature = "serde", serde(default))]
     pub retry: retry::Config,
+    /// Search of a limb where the picture before puts it.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub track: track::Config,
     /// Work budget of a picture.
     #[cfg_attr(feature = "serde", serde(default))]
     pub limits: work::Config,
@@ -155,6 +159,7 @@ impl Config {
             covariance: covariance::Config::default(),
             gates: gates::Config::default(),
             retry: retry::Config::default(),
+            track: track::Config::default(),
             limits: work::Config::default(),
         }
     }
@@ -278,6 +283,11 @@ impl Config {
         self.check_position()?;
         self.covariance.check_keys()?;
         self.retry.check_keys()?;
+        // These keys have no number in flight, and any value is safe, so that an image of a flight computer does not
+        // pay for their check.
+        if cfg!(feature = "serde") {
+            self.track.check_keys()?;
+        }
         self.limits.check_keys()?;
         self.input.check_keys()?;
         if let Some(rows) = self.input.scale_to_height {

@@ -1,7 +1,7 @@
 //! The keys of all sections together, and the same keys by their numbers in flight. A number in flight identifies a
 //! parameter of the flight computer.
 
-use super::{Config, Input, Mount, retry};
+use super::{Config, Input, Mount, retry, track};
 use crate::base::keys::{Section, Table};
 use crate::geometry::camera;
 use crate::image::region;
@@ -96,5 +96,6 @@ sections! {
     covariance: edge_noise::Config,
     gates: gates::Config,
     retry: retry::Config,
+    track: track::Config,
     limits: work::Config,
 }

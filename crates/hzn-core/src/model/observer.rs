@@ -64,6 +64,9 @@ pub trait Observer<T> {
     fn level(&self, _level: u16, _mean: T, _samples: u32) {}
     /// A dark frame of `px` pixels lies around the picture and does not count from now on.
     fn dark_frame(&self, _px: u16) {}
+    /// The limb was not found where the last answer puts it, or not without a doubt: the whole picture is searched, and
+    /// what was shown of this picture so far is void.
+    fn begin_again(&self) {}
     /// A further look at a picture without an answer begins: its number (1 for the second look) and its threshold in
     /// counts.
     fn look(&self, _number: u32, _level: u16) {}
@@ -131,6 +134,9 @@ impl<T> Observer<T> for &dyn Observer<T> {
     }
     fn dark_frame(&self, px: u16) {
         (**self).dark_frame(px);
+    }
+    fn begin_again(&self) {
+        (**self).begin_again();
     }
     fn look(&self, number: u32, level: u16) {
         (**self).look(number, level);

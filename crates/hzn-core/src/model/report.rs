@@ -88,6 +88,11 @@ impl<T> Report<T> {
             is_suspect: false,
         }
     }
+    /// Returns whether the limb was found where the answer to the picture before put it, without a search of the
+    /// picture; see [`Tracker`](crate::Tracker).
+    pub fn is_tracked(&self) -> bool {
+        self.solution.is_some() && self.counters.looks == 0
+    }
     /// Returns whether a candidate won that is an edge in a glow, see [`Verdict::Glow`].
     pub(crate) fn glows(&self) -> bool {
         self.candidates.iter().any(|c| c.verdict == Verdict::Glow)
@@ -136,7 +141,8 @@ pub struct Counters {
     pub draws: u32,
     /// Cost of the picture, in the unit of `limits.max_work`.
     pub work: u32,
-    /// Number of looks: 1, or more if the first look gives no answer (`[retry]`).
+    /// Number of looks at the whole picture: 1, or more if the first look gives no answer (`[retry]`). 0 if the limb
+    /// was found where the last answer put it ([`Report::is_tracked`]).
     pub looks: u32,
 }
 

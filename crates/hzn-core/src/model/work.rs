@@ -51,6 +51,8 @@ pub(crate) fn ring_cost(width: u16, height: u16, stride: u16, mask: u32) -> u32 
 pub(crate) const LOOK: u32 = 1000;
 /// Additional cost of a search line each time that it crosses an edge.
 pub(crate) const CROSSING: u32 = 4;
+/// Cost to project a place of a predicted limb into the picture.
+pub(crate) const PLACE: u32 = 6;
 /// Cost of a sub-pixel point with its ray, by the default method. On stripes of one pixel, where every look at the
 /// picture is far from the one before and every branch changes, a Cortex-M7 spends 1400 instructions on it.
 pub(crate) const POINT: u32 = 19;

@@ -1,7 +1,9 @@
 //! The sensor together with its lists: the type that most programs use.
 
 use super::place::SensorPlace;
+use super::reference::Step;
 use super::sensor::Sensor;
+use super::track::Tracker;
 use super::workspace::{HOST_POINTS, HOST_WORDS, Workspace};
 use crate::base::error::ConfigError;
 use crate::base::real::Real;
@@ -150,6 +152,29 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         let Some(sensor) = self.place.sensor() else { return Report::empty() };
         let expected = remembered(&self.levels, expected);
         let report = sensor.process(&mut self.workspace, picture, &expected, observer);
+        self.remember(&expected, &report);
+        report
+    }
+    /// Does the same as [`Sensor::track`]. Before [`Self::configure`] every picture is `rejected`.
+    pub fn track<P: Pixels>(
+        &mut self,
+        tracker: &mut Tracker<T>,
+        picture: &P,
+        (expected, step): (&Expected<T>, &Step<T>),
+    ) -> Report<T> {
+        self.track_observed(tracker, picture, (expected, step), &Unobserved)
+    }
+    /// Does the same as [`Self::track`], with an observer.
+    pub fn track_observed<P: Pixels, O: Observer<T>>(
+        &mut self,
+        tracker: &mut Tracker<T>,
+        picture: &P,
+        (expected, step): (&Expected<T>, &Step<T>),
+        observer: &O,
+    ) -> Report<T> {
+        let Some(sensor) = self.place.sensor() else { return Report::empty() };
+        let expected = remembered(&self.levels, expected);
+        let report = sensor.track(&mut self.workspace, tracker, picture, (&expected, step), observer);
         self.remember(&expected, &report);
         report
     }

@@ -18,10 +18,12 @@ mod horizon;
 mod look;
 mod place;
 mod process;
+mod reference;
 mod row_stream;
 mod search;
 mod sensor;
 mod sequence;
+mod track;
 mod workspace;
 
 #[cfg(test)]
@@ -30,7 +32,9 @@ mod golden;
 
 pub use horizon::{FlightHorizon, Horizon, HostHorizon};
 pub use place::SensorPlace;
+pub use reference::Step;
 pub use row_stream::{ROWS_HELD, RowBuffers, RowStream, RowStreamError};
 pub use sensor::Sensor;
-pub use sequence::{Sequence, Step};
+pub use sequence::Sequence;
+pub use track::Tracker;
 pub use workspace::{FlightWorkspace, HostWorkspace, Workspace};

@@ -65,18 +65,28 @@ impl<T: Real> Sensor<T> {
         observer: &O,
     ) -> Report<T> {
         let mut report = Report::empty();
-        // A picture of another size has another calibration, so its rays would be wrong.
-        if picture.width() == self.camera.width() && picture.height() == self.camera.height() {
-            let look = Look { lists, picture, expected, taken, observer, report: &mut report };
-            // Without the feature there is no division, and the code for rectangles is left out of the image.
-            if cfg!(feature = "horace") {
-                self.look_at_parts(look);
-            } else {
-                self.look(look);
-            }
+        if self.has_size_of(picture) {
+            self.look_at_all(Look { lists, picture, expected, taken, observer, report: &mut report });
         }
         observer.leave();
         report
+    }
+
+    /// Returns whether a picture has the size of the camera. A picture of another size has another calibration, so its
+    /// rays would be wrong.
+    #[inline(always)]
+    pub(super) fn has_size_of(&self, picture: &impl Pixels) -> bool {
+        picture.width() == self.camera.width() && picture.height() == self.camera.height()
+    }
+
+    #[inline(always)]
+    pub(super) fn look_at_all<P: Pixels, O: Observer<T>>(&self, look: Look<'_, T, P, O>) {
+        // Without the feature there is no division, and the code for rectangles is left out of the image.
+        if cfg!(feature = "horace") {
+            self.look_at_parts(look);
+        } else {
+            self.look(look);
+        }
     }
 
     pub(super) fn look<P: Pixels, O: Observer<T>>(&self, look: Look<'_, T, P, O>) {

@@ -10,4 +10,5 @@ mod published;
 mod rig;
 mod rows;
 mod total;
+mod track;
 mod uncertain_lens;

@@ -560,7 +560,8 @@ class Sensor:
             (``altitude_km`` and so on). An iterable is read only as fast as it is processed: each thread takes some
             milliseconds' work or 8 MB at a time, and at least one picture.
         jobs
-            Number of threads; without it, one per core. With ``threshold.method = "track"`` there is only one.
+            Number of threads; without it, one per core. With ``threshold.method = "track"`` and with
+            ``track.full_every`` there is only one.
         progress
             Show a progress bar (needs the package tqdm).
 
@@ -615,6 +616,10 @@ class Report:
     @property
     def stage(self) -> str:
         """Stage that was reached; empty for a report from a recording."""
+
+    @property
+    def tracked(self) -> bool:
+        """Whether the limb was found where the picture before put it, in `Sensor.process_many` with ``[track]``."""
 
     @property
     def detail(self) -> str:

@@ -348,6 +348,17 @@ class Retry(TypedDict, total=False):
     """For ``division``: method that combines the answers of several parts. Default: "median"."""
 
 
+class Track(TypedDict, total=False):
+    """The search of a limb where the picture before puts it, in a sequence."""
+
+    full_every: int
+    """Number of pictures from one full search to the next in a sequence; in between, the limb is first looked for
+    where the last answer puts it. 0 searches every picture fully. Values: 0 to 65535. Default: 0."""
+    normals: int
+    """Number of places along the predicted limb at which its edge is looked for; a larger number is more accurate
+    and takes longer. Values: 32 to 2048. Default: 128."""
+
+
 class Limits(TypedDict, total=False):
     """The bound on the time of the worst picture."""
 
@@ -447,6 +458,8 @@ class _Optional(TypedDict, total=False):
     """The gates that an answer must pass, and the choice among answers."""
     retry: Retry
     """Further looks at a picture without an answer."""
+    track: Track
+    """The search of a limb where the picture before puts it, in a sequence."""
     limits: Limits
     """The bound on the time of the worst picture."""
 

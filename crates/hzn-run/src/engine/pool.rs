@@ -17,6 +17,11 @@ pub(crate) trait Work: Sync {
     /// What each thread has for itself.
     type Worker;
 
+    /// Number of jobs that follow each other on one thread: a block, which begins at each multiple of this number.
+    fn block(&self) -> u64 {
+        1
+    }
+
     /// Makes what a thread has for itself.
     fn worker(&self) -> Result<Self::Worker, Error>;
 
@@ -60,8 +65,11 @@ where
     F: FnMut(&mut S) -> Result<(), Error>,
 {
     let threads = threads.max(1);
-    let window = 2 * threads + 2;
-    let (job_in, job_out) = bounded::<(u64, K::Job)>(window);
+    let block = work.block().max(1);
+    // Each thread needs a block of its own, and the writer waits for the first of them.
+    let window = if threads > 1 { 2 * threads + 2 + threads * (block as usize - 1) } else { 4 };
+    // Threads take single jobs from one lane. Blocks go to the threads in turn, and each of them has its lane.
+    let lanes: Vec<_> = (0..if block > 1 { threads } else { 1 }).map(|_| bounded::<(u64, K::Job)>(window)).collect();
     let (result_in, result_out) = bounded::<Numbered<K::Done>>(window);
     let (ticket_in, ticket_out) = bounded::<()>(window);
     for _ in 0..window {
@@ -69,12 +77,18 @@ where
     }
     std::thread::scope(|scope| {
         let stopped = || stop.load(Ordering::Relaxed);
-        let source_end = scope.spawn(move || hand_out(next, first, &ticket_out, &job_in, stopped));
-        for _ in 0..threads {
-            let (jobs, results) = (job_out.clone(), result_in.clone());
+        for (_, jobs) in lanes.iter().cycle().take(threads) {
+            let (jobs, results) = (jobs.clone(), result_in.clone());
             scope.spawn(move || process_jobs(work, &jobs, &results));
         }
-        drop((job_out, result_in));
+        drop(result_in);
+        // The threads have the only receivers, so that the source ends with them.
+        let lanes: Vec<_> = lanes.into_iter().map(|(jobs, _)| jobs).collect();
+        let send = move |index: u64, job| {
+            let lane = lanes.get((index / block % lanes.len() as u64) as usize);
+            lane.is_some_and(|lane| lane.send((index, job)).is_ok())
+        };
+        let source_end = scope.spawn(move || hand_out(next, first, &ticket_out, send, stopped));
         let written = write_in_order(first, &result_out, &ticket_in, out);
         if written.is_err() {
             // The source must end too, also one that waits for pictures.
@@ -101,7 +115,7 @@ fn hand_out<J>(
     mut next: impl FnMut() -> Option<Result<J, Error>>,
     first: u64,
     tickets: &Receiver<()>,
-    jobs: &Sender<(u64, J)>,
+    send: impl Fn(u64, J) -> bool,
     stopped: impl Fn() -> bool,
 ) -> Result<(), Error> {
     for index in first.. {
@@ -112,7 +126,7 @@ fn hand_out<J>(
             None => break,
             Some(Err(e)) => return Err(e),
             Some(Ok(job)) => {
-                if jobs.send((index, job)).is_err() {
+                if !send(index, job) {
                     break;
                 }
             }

@@ -37,15 +37,17 @@ pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: It
         tip: None,
         pages: decoded.as_ref().map_or(1, |(p, _)| p.pages),
     };
-    let bodies = plan.config.each_body().len();
     let (picture, original) = match decoded {
         Ok(decoded) => decoded,
-        Err(why) => return Ok(finished.into_unreadable(bodies, &why)),
+        Err(why) => return Ok(without_picture(sensor, finished, &why)),
     };
-    let traces = (plan.trace || plan.keep_traces || plan.overlay.is_some()).then(|| Traces::new(bodies));
+    let traces =
+        (plan.trace || plan.keep_traces || plan.overlay.is_some()).then(|| Traces::new(plan.config.each_body().len()));
     let view = match picture.view(plan.config.input.channel) {
         Ok(view) => view,
-        Err(why) => return Ok(finished.into_unreadable(bodies, &format!("{why} (input.channel in sensor.toml)"))),
+        Err(why) => {
+            return Ok(without_picture(sensor, finished, &format!("{why} (input.channel in sensor.toml)")));
+        }
     };
     let data = finished.data.as_ref();
     sensor.set_time(finished.time_s);
@@ -73,6 +75,12 @@ pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: It
         };
     }
     Ok(finished)
+}
+
+/// Finishes a picture that cannot be read. It is a gap in the sequence, after which no limb is tracked.
+fn without_picture(sensor: &mut AnySensor, finished: Finished, why: &str) -> Finished {
+    sensor.forget_limb();
+    finished.into_unreadable(sensor.bodies(), why)
 }
 
 /// Returns the drawing over the picture for all of its bodies.

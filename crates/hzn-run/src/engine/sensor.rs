@@ -8,7 +8,7 @@ use hzn_core::error::ConfigError;
 use hzn_core::frames::{Fixed, UnitVec3};
 use hzn_core::image::{ImageView, Indirect, Pixels};
 use hzn_core::real::Real;
-use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report};
+use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report, Step, Tracker};
 use hzn_files::{FrameData, Frames, Problem};
 use hzn_nav::ephemeris;
 
@@ -16,8 +16,19 @@ use super::trace::{Clock, Traces, Watch};
 use super::widen::widen_report;
 
 enum Kind {
-    Host(Box<HostHorizon>),
-    Flight(Box<FlightHorizon>),
+    Host(Box<HostHorizon>, Tracker<f64>),
+    Flight(Box<FlightHorizon>, Tracker<f32>),
+}
+
+/// What is known about the pictures before, when a picture is processed.
+#[derive(Clone, Copy)]
+struct Before<'a> {
+    /// The last answer of each body.
+    last: &'a [Option<LastAnswer>],
+    /// The time of this picture, seconds.
+    now_s: Option<f64>,
+    /// With tracking: the time since the picture before, if it is known, seconds.
+    after_s: Option<Option<f64>>,
 }
 
 /// A sensor in single or double precision.
@@ -30,6 +41,18 @@ pub struct AnySensor {
     last: Vec<Option<LastAnswer>>,
     /// The time of the next picture in seconds, for `gates.max_rate_deg_s`.
     time_s: Option<f64>,
+    /// With pictures of one sequence in order: what is known of it.
+    sequence: Option<Sequence>,
+    /// [`hzn_core::track::Config::full_every`].
+    full_every: u64,
+}
+
+/// The pictures of a sequence so far.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sequence {
+    pictures: u64,
+    /// The time of the last one, seconds.
+    last_s: Option<f64>,
 }
 
 /// The answer to an earlier picture, for `gates.max_rate_deg_s`.
@@ -65,10 +88,45 @@ impl AnySensor {
     /// The first field outside its limits.
     pub fn new(config: &Config, flight: bool) -> Result<Self, ConfigError> {
         let camera = Camera::try_new(&config.camera)?;
-        let kind =
-            if flight { Kind::Flight(FlightHorizon::boxed(config)?) } else { Kind::Host(HostHorizon::boxed(config)?) };
+        let kind = match flight {
+            true => Kind::Flight(FlightHorizon::boxed(config)?, Tracker::default()),
+            false => Kind::Host(HostHorizon::boxed(config)?, Tracker::default()),
+        };
         let bodies: Vec<_> = config.each_body().iter().map(|b| b.kind).collect();
-        Ok(Self { kind, camera, last: vec![None; bodies.len()], time_s: None, bodies })
+        Ok(Self {
+            kind,
+            camera,
+            last: vec![None; bodies.len()],
+            time_s: None,
+            sequence: None,
+            full_every: config.track.full_every.into(),
+            bodies,
+        })
+    }
+
+    /// Begins a sequence: the next picture is searched fully, and so is every `track.full_every`-th after it; the limb
+    /// of those in between is tracked. The pictures must come in order, until [`Self::end_sequence`].
+    pub fn begin_sequence(&mut self) {
+        self.sequence = Some(Sequence::default());
+        self.forget_limb();
+    }
+
+    /// Returns whether a sequence was begun.
+    pub(super) fn is_in_sequence(&self) -> bool {
+        self.sequence.is_some()
+    }
+
+    /// Ends the sequence: pictures do not depend on each other from now on.
+    pub fn end_sequence(&mut self) {
+        self.sequence = None;
+    }
+
+    /// Tells that a picture of the sequence is missing: the next one is searched fully.
+    pub fn forget_limb(&mut self) {
+        match &mut self.kind {
+            Kind::Host(_, tracker) => tracker.forget(),
+            Kind::Flight(_, tracker) => tracker.forget(),
+        }
     }
 
     /// Sets the last answer of each body, from another run. Answers beyond the number of bodies are ignored.
@@ -90,13 +148,20 @@ impl AnySensor {
     pub fn reconfigure(&mut self, config: &Config) -> Result<(), ConfigError> {
         let camera = Camera::try_new(&config.camera)?;
         match &mut self.kind {
-            Kind::Host(h) => h.configure(config)?,
-            Kind::Flight(h) => h.configure(config)?,
+            Kind::Host(h, _) => h.configure(config)?,
+            Kind::Flight(h, _) => h.configure(config)?,
         }
+        self.forget_limb();
+        self.full_every = config.track.full_every.into();
         self.camera = camera;
         self.bodies = config.each_body().iter().map(|b| b.kind).collect();
         self.last = vec![None; self.bodies.len()];
         Ok(())
+    }
+
+    /// Returns the number of bodies that the sensor searches for.
+    pub(super) fn bodies(&self) -> usize {
+        self.bodies.len()
     }
 
     /// Returns the lens.
@@ -108,8 +173,8 @@ impl AnySensor {
     /// can be expected, for example for an impossible altitude or position.
     pub fn expected_half_angles_rad(&self, data: Option<&FrameData>) -> Vec<Result<f64, PriorError>> {
         match &self.kind {
-            Kind::Host(h) => half_angles(h, data),
-            Kind::Flight(h) => half_angles(h, data),
+            Kind::Host(h, _) => half_angles(h, data),
+            Kind::Flight(h, _) => half_angles(h, data),
         }
     }
 
@@ -151,20 +216,20 @@ impl AnySensor {
     /// Processes a picture without a record. The usual kinds of pictures have their own compiled pipelines; with the
     /// enum, every pixel costs a branch.
     fn process_unwatched(&mut self, view: &ImageView<'_>, data: Option<&FrameData>) -> Vec<Processed> {
-        let now_s = self.take_time(data);
-        let last = &self.last;
+        let (now_s, after_s) = self.take_time(data);
+        let before = Before { last: &self.last, now_s, after_s };
         let processed = match (&mut self.kind, view) {
-            (Kind::Host(h), ImageView::Grey8(p)) => run_unwatched(h, p, data, last, now_s),
-            (Kind::Host(h), ImageView::Grey16(p)) => run_unwatched(h, p, data, last, now_s),
-            (Kind::Host(h), ImageView::Colour8(p)) => run_unwatched(h, p, data, last, now_s),
-            (Kind::Host(h), ImageView::Colour16(p)) => run_unwatched(h, p, data, last, now_s),
-            (Kind::Flight(h), ImageView::Grey8(p)) => run_unwatched(h, p, data, last, now_s),
+            (Kind::Host(h, t), ImageView::Grey8(p)) => run_unwatched(h, t, p, data, before),
+            (Kind::Host(h, t), ImageView::Grey16(p)) => run_unwatched(h, t, p, data, before),
+            (Kind::Host(h, t), ImageView::Colour8(p)) => run_unwatched(h, t, p, data, before),
+            (Kind::Host(h, t), ImageView::Colour16(p)) => run_unwatched(h, t, p, data, before),
+            (Kind::Flight(h, t), ImageView::Grey8(p)) => run_unwatched(h, t, p, data, before),
             // Kinds that few cameras of a flight computer have share the pipeline of the watched pictures.
-            (Kind::Flight(h), view) => {
+            (Kind::Flight(h, t), view) => {
                 let clock = Clock::default();
                 let read = |index| view.read(index);
                 let picture = Indirect::new(view, &read);
-                run(h, &picture, data, last, now_s, &(&clock as &dyn Observer<f32>), &clock)
+                run(h, t, &picture, data, before, &(&clock as &dyn Observer<f32>), &clock)
             }
         };
         self.conclude(processed, data, now_s)
@@ -173,19 +238,28 @@ impl AnySensor {
     /// Processes a picture with picture and observer behind pointers, so that every kind of both uses the same compiled
     /// pipeline.
     fn watch<P: Pixels>(&mut self, picture: &P, data: Option<&FrameData>, watch: &dyn Watch) -> Vec<Processed> {
-        let now_s = self.take_time(data);
-        let last = &self.last;
+        let (now_s, after_s) = self.take_time(data);
+        let before = Before { last: &self.last, now_s, after_s };
         let read = |index| picture.read(index);
         let picture = Indirect::new(picture, &read);
         let processed = match &mut self.kind {
-            Kind::Host(h) => run(h, &picture, data, last, now_s, &(watch as &dyn Observer<f64>), watch),
-            Kind::Flight(h) => run(h, &picture, data, last, now_s, &(watch as &dyn Observer<f32>), watch),
+            Kind::Host(h, t) => run(h, t, &picture, data, before, &(watch as &dyn Observer<f64>), watch),
+            Kind::Flight(h, t) => run(h, t, &picture, data, before, &(watch as &dyn Observer<f32>), watch),
         };
         self.conclude(processed, data, now_s)
     }
 
-    fn take_time(&mut self, data: Option<&FrameData>) -> Option<f64> {
-        self.time_s.take().or(data.and_then(|d| d.time_s))
+    /// Returns the time of the picture, and the one since the picture before in a sequence, see [`Before`].
+    fn take_time(&mut self, data: Option<&FrameData>) -> (Option<f64>, Option<Option<f64>>) {
+        let now_s = self.time_s.take().or(data.and_then(|d| d.time_s));
+        let Some(sequence) = &mut self.sequence else { return (now_s, None) };
+        let (pictures, last_s) = (sequence.pictures, core::mem::replace(&mut sequence.last_s, now_s));
+        sequence.pictures += 1;
+        // Counted here and not from the last full search, so that blocks can be processed apart from each other.
+        if self.full_every > 0 && pictures.is_multiple_of(self.full_every) {
+            self.forget_limb();
+        }
+        (now_s, Some(now_s.zip(last_s).map(|(now, last)| now - last)))
     }
 
     /// Remembers the answers and adds the directions in ECEF.
@@ -279,32 +353,46 @@ fn with_sun<T: Real>(prior: Prior<T>, data: &FrameData, body: &body::Config) -> 
 
 fn run_unwatched<P: Pixels, T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
     horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
+    tracker: &mut Tracker<T>,
     picture: &P,
     data: Option<&FrameData>,
-    last: &[Option<LastAnswer>],
-    now_s: Option<f64>,
+    before: Before<'_>,
 ) -> Vec<Processed> {
     let clock = Clock::default();
-    run(horizon, picture, data, last, now_s, &clock, &clock)
+    run(horizon, tracker, picture, data, before, &clock, &clock)
 }
 
 fn run<P: Pixels, T: Real + Into<f64>, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
     horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
+    tracker: &mut Tracker<T>,
     picture: &P,
     data: Option<&FrameData>,
-    last: &[Option<LastAnswer>],
-    now_s: Option<f64>,
+    before: Before<'_>,
     observer: &O,
     watch: &dyn Watch,
 ) -> Vec<Processed> {
+    let Before { last, now_s, after_s } = before;
+    let mut step = None;
     let expect = |(which, last): (usize, &Option<LastAnswer>)| {
         let last = last.zip(now_s).and_then(|(last, now_s)| last.to_last(now_s));
         let body = bodies(horizon).get(which).ok_or(PriorError::NoBody)?;
-        horizon.expect_body(which, &Prior { last, ..prior(data, which, body)? })
+        let prior = prior(data, which, body)?;
+        step = after_s.map(|after_s| Step::from_prior(&prior, after_s.map(T::from_f64)));
+        horizon.expect_body(which, &Prior { last, ..prior })
     };
     let expected: Vec<_> = last.iter().enumerate().map(expect).collect();
     let known: Vec<_> = expected.iter().filter_map(|e| e.as_ref().ok().copied()).collect();
-    let reports = horizon.process_each_observed(picture, &known, observer);
+    let reports = match (step, last.len(), &known[..]) {
+        (Some(step), 1, [known]) => {
+            // The clocks of the bodies begin here.
+            observer.body(0);
+            [horizon.track_observed(tracker, picture, (known, &step), observer)].into_iter().collect()
+        }
+        _ => {
+            tracker.forget();
+            horizon.process_each_observed(picture, &known, observer)
+        }
+    };
     let times = watch.times();
     let mut done = reports.iter().zip(times);
     // There is one report for each body with an expected half-angle.

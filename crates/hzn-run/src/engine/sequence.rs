@@ -53,6 +53,11 @@ impl Work for Plan {
     type Done = Finished;
     type Worker = AnySensor;
 
+    // The limb is tracked within a block only, so that the rows do not depend on the number of threads.
+    fn block(&self) -> u64 {
+        if self.config.track.is_on() { self.config.track.full_every.into() } else { 1 }
+    }
+
     fn worker(&self) -> Result<AnySensor, Error> {
         let mut sensor = AnySensor::new(&self.config, self.flight).map_err(Error::failed)?;
         sensor.remember(&self.last);
@@ -60,6 +65,10 @@ impl Work for Plan {
     }
 
     fn process(&self, sensor: &mut AnySensor, index: u64, item: Item) -> Result<Finished, Error> {
+        // A run that goes on in the middle of a block begins with a full search, too.
+        if self.config.track.is_on() && (index.is_multiple_of(self.block()) || !sensor.is_in_sequence()) {
+            sensor.begin_sequence();
+        }
         process_one(self, sensor, index, item)
     }
 }

@@ -196,6 +196,9 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
     fn dark_frame(&self, px: u16) {
         self.now().into_iter().for_each(|t| Observer::<T>::dark_frame(t, px));
     }
+    fn begin_again(&self) {
+        self.now().into_iter().for_each(|t| Observer::<T>::begin_again(t));
+    }
     fn look(&self, number: u32, level: u16) {
         self.now().into_iter().for_each(|t| Observer::<T>::look(t, number, level));
     }
@@ -242,6 +245,9 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
     }
     fn dark_frame(&self, px: u16) {
         self.border_px.set(px);
+    }
+    fn begin_again(&self) {
+        self.edges.borrow_mut().clear();
     }
     fn look(&self, _: u32, level: u16) {
         self.further_thresholds.borrow_mut().push(level);

@@ -248,6 +248,9 @@ impl<T: Real + Into<f64>> Observer<T> for PixelTraces {
     fn dark_frame(&self, px: u16) {
         Observer::<T>::dark_frame(&self.traces, px);
     }
+    fn begin_again(&self) {
+        Observer::<T>::begin_again(&self.traces);
+    }
     fn look(&self, number: u32, level: u16) {
         Observer::<T>::look(&self.traces, number, level);
     }

@@ -11,6 +11,7 @@ use crate::base::real::Real;
 use crate::geometry::block::Block;
 use crate::geometry::camera::Camera;
 use crate::geometry::pixel::Pixel;
+use crate::image::Pixels;
 use crate::model::body::Expected;
 use crate::model::found_limb::FoundLimb;
 use crate::model::observer::Observer;
@@ -18,6 +19,7 @@ use crate::model::report::{Candidate, Report, Solution};
 use crate::model::status::Status;
 use crate::model::verdict::Verdict;
 use crate::model::work::WorkBudget;
+use crate::stages::contour::{BinaryPicture, Thinned};
 use crate::stages::{covariance, gates, threshold};
 
 /// Answers farther apart than this contradict each other, in degrees.
@@ -120,6 +122,18 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     /// Returns whether the search is over: the limb is found, or the work budget is used up.
     fn is_over(&self) -> bool {
         self.work.is_exhausted() || self.best.as_ref().is_some_and(|b| b.certain)
+    }
+
+    /// Judges the edge of a predicted limb. Returns whether its answer is certain; an answer that is not says nothing,
+    /// because other edges of the picture were not examined.
+    pub(super) fn judge_tracked<P: Pixels>(&mut self, binary: &BinaryPicture<'_, T, P, O>, edge: &Thinned<'_>) -> bool {
+        self.judge_edge(binary, edge);
+        self.best.as_ref().is_some_and(|best| best.certain && !best.glows)
+    }
+
+    /// Spends work that is done already.
+    pub(super) fn charge(&mut self, cost: u32) {
+        self.work.charge(cost);
     }
 
     /// Keeps the better of two answers. If they point in different directions, the score of the other is kept as the
