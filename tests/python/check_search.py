@@ -41,6 +41,7 @@ PROBES = {
     "where is the limb": "theory/limb/",
     "own firmware": "guide/own-firmware/",
     "sequences": "guide/sequences/",
+    "browser": "guide/browser/",
 }
 FIRST = 3
 

@@ -30,6 +30,7 @@ const PARTS: &[(&str, Make)] = &[
 /// Packages that are not published.
 const UNPUBLISHED: &[&str] = &[
     "hzn-py",
+    "hzn-web",
     "hzn-tests",
     "hzn-fuzz",
     "hzn-reproduce",

@@ -27,6 +27,7 @@ mod first_command;
 mod flight_build;
 mod machine;
 mod miri;
+mod page;
 mod parts;
 mod processors;
 mod python;
@@ -69,6 +70,7 @@ const USAGE: &str =
                      processor time; what cargo downloads is downloaded before and not counted
   keys               writes the tables of book/reference/sensor-toml.md, the template, the JSON schema and the
                      Python types (hzn.keys) from the keys in hzn-core
+  page               builds the page with the sensor in the browser into target/xtask/page
   viewer             makes book/images/viewer.png again; needs `cargo xtask test demo` first
   viewer situations  makes pictures of the window into target/xtask/situations, in four sizes and two themes";
 
@@ -85,6 +87,7 @@ fn main() -> ExitCode {
         "campaign" => campaign::run(rest),
         "dist" => dist::run(rest),
         "firmware" => firmware::run(rest),
+        "page" => page::run(),
         "first-command" => first_command::run(),
         "keys" => write_keys(),
         "viewer" => viewer::run(rest),

@@ -12,7 +12,7 @@ use crate::dist::exclude_unpublished;
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{self, Outcome, Selection, Step, Steps, Tier, cargo};
 use crate::test_build::build_tests;
-use crate::{campaign, firmware, miri, python, viewer, wheel};
+use crate::{campaign, firmware, miri, page, python, viewer, wheel};
 
 const fn every(name: &'static str, run: fn(&mut Steps) -> Outcome) -> Step {
     Step { name, tier: Tier::Every, run }
@@ -57,6 +57,7 @@ const STEPS: &[Step] = &[
         wheel::run_step(&fs::canonicalize(target().join("debug/hzn"))?, steps.all)
     }),
     long("Basilisk and Rerun", |_| wheel::try_other_tools()),
+    long("page in the browser", |_| page::test()),
     long("ignored tests", run_ignored_tests),
     long("killed runs", |_| campaign::kill(1000)),
     long("flipped bits", |_| campaign::flips(20_000)),

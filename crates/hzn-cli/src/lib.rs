@@ -13,7 +13,6 @@ mod doubts;
 pub mod exit;
 mod files;
 mod html;
-mod limb_words;
 mod progress;
 mod refusals;
 mod setup;

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::container::REWRITE;
+use crate::part::parent_folder;
 
 /// Why a recording could not be written or read. The message names a remedy if there is one.
 #[derive(Debug, thiserror::Error)]
@@ -114,14 +115,6 @@ pub enum Error {
         /// The unfinished file.
         path: PathBuf,
     },
-}
-
-/// Returns the folder of `path`; the current folder if `path` has none.
-pub(crate) fn parent_folder(path: &Path) -> PathBuf {
-    match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p.to_path_buf(),
-        _ => PathBuf::from("."),
-    }
 }
 
 /// Converts an error of writing to `path` to the variant with its remedy.

@@ -15,6 +15,8 @@
 //! - [`SeriesWriter`] writes series over time, for example of a navigation filter; [`read_series`] reads them.
 //! - [`Index`] finds pictures and reports without reading the pictures; [`Pictures`] then reads any one of them.
 //!
+//! Without the feature `recordings`, there are only rows, records and drawings, which need no file and no compression.
+//!
 //! # The file
 //!
 //! A file begins with the attachment `sensor.toml` and the metadata `hzn`; then come chunks. Pictures are in separate
@@ -40,44 +42,74 @@
 //! | `/log` | `foxglove.Log` | protobuf |
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "recordings")]
 mod cdr;
+#[cfg(feature = "recordings")]
 mod container;
+#[cfg(feature = "recordings")]
 mod drawing;
+#[cfg(feature = "recordings")]
 mod early_sync;
+#[cfg(feature = "recordings")]
 mod error;
+mod floats;
 mod frame;
+#[cfg(feature = "recordings")]
 mod images;
+#[cfg(feature = "recordings")]
 mod index;
+#[cfg(feature = "recordings")]
 mod messages;
+#[cfg(feature = "recordings")]
 mod origin;
 pub mod palette;
 mod part;
+#[cfg(feature = "recordings")]
 mod pictures;
+#[cfg(feature = "recordings")]
 mod raw_images;
+#[cfg(feature = "recordings")]
 mod reader;
+#[cfg(feature = "recordings")]
 mod recover;
+#[cfg(feature = "recordings")]
 mod ros;
 mod row;
+#[cfg(feature = "recordings")]
 mod series;
+#[cfg(feature = "recordings")]
 mod series_reader;
 mod status_name;
+#[cfg(feature = "recordings")]
 mod topics;
+#[cfg(feature = "recordings")]
 mod waiting;
+#[cfg(feature = "recordings")]
 mod writer;
 
+#[cfg(feature = "recordings")]
 pub use error::Error;
+pub use floats::words_from_floats;
 pub use frame::{Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
+#[cfg(feature = "recordings")]
 pub use images::{ImageReader, InputImage};
+#[cfg(feature = "recordings")]
 pub use index::{Index, IndexEntry};
 pub use part::{check_close, create_part, is_being_written, open_part, part_path, publish, rename, sync, sync_name};
+#[cfg(feature = "recordings")]
 pub use pictures::{Pictures, Place};
-pub use raw_images::words_from_floats;
+#[cfg(feature = "recordings")]
 pub use reader::{Contents, Reader};
+#[cfg(feature = "recordings")]
 pub use recover::{Recovered, Resumed, recover, recover_while, resume};
 pub use row::{Row, RowMeta, roll_pitch_deg};
+#[cfg(feature = "recordings")]
 pub use series::{Placed, SeriesWriter};
+#[cfg(feature = "recordings")]
 pub use series_reader::{begins_with_attachment, read_series};
+#[cfg(feature = "recordings")]
 pub use topics::{IMAGE_TOPIC, report_schema};
+#[cfg(feature = "recordings")]
 pub use writer::{FLUSH_INTERVAL, Options, Writer};
 
 /// A layout of Foxglove's panels for the topics of hzn, for import in Foxglove: the picture with its annotations, plots

@@ -4,13 +4,19 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::error::parent_folder;
-
 /// Returns the name of a recording until it is finished: `out.mcap.part`.
 pub fn part_path(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".part");
     name.into()
+}
+
+/// Returns the folder of `path`; the current folder if `path` has none.
+pub(crate) fn parent_folder(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p.to_path_buf(),
+        _ => PathBuf::from("."),
+    }
 }
 
 /// Opens an unfinished file with its content, or a new one, for reading and writing. The file is locked for this run

@@ -52,6 +52,7 @@ macro_rules! columns {
             /// Names of the columns, in order.
             pub const COLUMNS: [&'static str; [$(stringify!($name)),+].len()] = [$(stringify!($name)),+];
 
+            #[cfg(feature = "recordings")]
             /// Every column: (name, JSON type, whether every row has a value, meaning).
             pub(crate) const CELLS: &'static [(&'static str, &'static str, bool, &'static str)] =
                 &[$((stringify!($name), <$ty as Cell>::JSON, <$ty as Cell>::ALWAYS, concat!($($doc),+))),+];
@@ -65,6 +66,7 @@ macro_rules! columns {
 }
 
 /// The type of a cell.
+#[cfg_attr(not(feature = "recordings"), allow(dead_code, reason = "only recordings have a schema"))]
 trait Cell {
     /// Type of the cell in JSON.
     const JSON: &'static str;

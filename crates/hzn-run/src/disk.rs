@@ -150,6 +150,7 @@ pub fn advice(path: &Path, error: &std::io::Error) -> String {
 }
 
 /// Returns the text of [`advice`] for the file of a run. If the disk is full, it adds that finished pictures are kept.
+#[cfg(feature = "recordings")]
 pub(crate) fn run_advice(path: &Path, error: &std::io::Error) -> String {
     let what = advice(path, error);
     match error.kind() {

@@ -5,28 +5,39 @@
 //! order. The [`engine`] processes them with the sensor on all cores. A [`sink`] takes the results in order.
 //! [`rig`] does the same for several cameras that are one sensor.
 //! [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of their rows. [`overlay`] draws
-//! the result over a picture, and [`explain`] describes in words what happened to it. [`diagnosis`] says what would
-//! make a refused limb the expected one. [`disk`] has the errors of files that cannot be written. [`terminal`] makes
+//! the result over a picture, and [`explained`] describes what happened to it, in the words of [`explain`].
+//! [`diagnosis`] says what would make a refused limb the expected one. [`disk`] has the errors of files that cannot be written. [`terminal`] makes
 //! text from files safe for a terminal. [`start`] says what pictures tell about a camera without a calibration, and
 //! [`nadir`] turns the limb axis into the direction to the centre.
+//!
+//! [`record`] turns an answer into the row of the results; the feature `recordings` adds the files. Without it, a
+//! picture in memory goes through the same code without files, threads and clocks, as a browser has it.
 //!
 //! The command line, the Python package and the viewer are built on this crate. It prints nothing, and its [`Error`]
 //! contains no exit code and no name of an option.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "a library prints nothing; the caller does")]
 
+#[cfg(feature = "recordings")]
 pub mod checked_row;
 pub mod diagnosis;
 pub mod disk;
 pub mod engine;
 mod error;
 pub mod explain;
+pub mod explained;
+mod limb_words;
 pub mod nadir;
 pub mod open;
 pub mod overlay;
+#[cfg(feature = "recordings")]
 mod possible;
+pub mod record;
+#[cfg(feature = "recordings")]
 pub mod results;
+#[cfg(feature = "recordings")]
 pub mod rig;
+#[cfg(feature = "recordings")]
 pub mod sink;
 pub mod source;
 pub mod start;

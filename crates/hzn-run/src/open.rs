@@ -232,7 +232,7 @@ pub fn complete(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<Stri
         let bits = source.bits().filter(|bits| *bits > 8).or(found.map(|f| f.bits));
         if let Some(bits) = bits {
             sensor.config.input.bits = Some(bits);
-            sensor.text = source::with_key(&sensor.text, "bits", i64::from(bits));
+            sensor.text = source::with_key(&sensor.text, "input", "bits", i64::from(bits));
         }
         notes.extend(found.filter(|f| f.bits < 16).map(|f| f.to_string()));
     }
@@ -268,7 +268,7 @@ fn complete_tone(source: &dyn Source, sensor: &mut Sensor) -> Option<String> {
     sensor.config.set_tone(tone);
     // A recorded sensor states the tone, because recorded pictures may be in another format.
     let value = tone.word().map_or_else(|| tone.gamma().into(), toml_edit::Value::from);
-    sensor.text = source::with_key(&sensor.text, "tone", value);
+    sensor.text = source::with_key(&sensor.text, "input", "tone", value);
     let raised = before.each_body().iter().zip(sensor.config.each_body()).find(|(old, new)| old != new)?.1;
     Some(format!(
         "the pictures are {kind}: their tone is taken as {tone}, and the limb is expected at {:.1} +- {:.1} km; if \

@@ -7,7 +7,7 @@ use hzn_files::start::{Body, CameraFacts, Exif};
 use crate::diagnosis::{FieldOfView, find_field_of_view};
 use crate::error::{Error, unusable};
 use crate::open::{Request, frames_path, load_frames};
-use crate::source::{self, Payload, Picture, Source};
+use crate::source::{self, Picture, Source};
 
 /// Number of pictures that are looked at. The error that all pictures share is larger than that of eight pictures.
 const PICTURES: u64 = 8;
@@ -33,8 +33,8 @@ pub fn read_camera_facts(source: &mut dyn Source) -> Result<CameraFacts, Error> 
     let size_px = one_size(source)?;
     let tone = source::find_tone(source).map(|found| found.tone);
     let exif = match source.next().transpose()?.map(|item| item.payload) {
-        Some(Payload::File(path)) => source::exif_lens(&path).unwrap_or_default(),
-        _ => Exif::default(),
+        Some(payload) => payload.exif_lens().unwrap_or_default(),
+        None => Exif::default(),
     };
     Ok(CameraFacts {
         size_px,

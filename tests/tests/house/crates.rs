@@ -74,6 +74,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
             "hzn-plot",
         ],
     ),
+    ("hzn-web", &["hzn-core", "hzn-files", "hzn-mcap", "hzn-run"]),
 ];
 
 /// Returns the crates of this project that a Cargo.toml lists in `[dependencies]`. Dependencies for tests and builds

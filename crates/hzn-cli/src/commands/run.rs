@@ -108,9 +108,9 @@ fn open(args: &Args, watching: Option<&Arc<AtomicBool>>) -> Result<Opened, Stop>
 fn recorded(sensor: &Sensor) -> String {
     let text = match sensor.config.input.orient {
         Orient::AsStored => sensor.text.clone(),
-        _ => source::with_key(&sensor.text, "orient", "as-stored"),
+        _ => source::with_key(&sensor.text, "input", "orient", "as-stored"),
     };
-    if sensor.config.input.invert { source::with_key(&text, "invert", false) } else { text }
+    if sensor.config.input.invert { source::with_key(&text, "input", "invert", false) } else { text }
 }
 
 /// Prints the notes of the pictures, and that a continued run does not draw the pictures of the earlier one.

@@ -8,7 +8,7 @@ use hzn_files::FrameData;
 use super::any_cone::AnyCone;
 use super::facts::FitFacts;
 use super::implied::fit_facts;
-use crate::sink;
+use crate::record::altitude_km;
 
 /// Looks for a limb of any size, and returns what it says if its half-angle differs from the expected one by more than
 /// `gates.max_half_angle_sigma`. `trial` is made from `config`.
@@ -19,7 +19,7 @@ pub fn find_misfit<P: Pixels>(
     data: Option<&FrameData>,
 ) -> Option<FitFacts> {
     let edge = trial.find(picture, data)?;
-    let altitude_km = sink::altitude_km(data, config.each_body().first()?);
+    let altitude_km = altitude_km(data, config.each_body().first()?);
     let camera = Camera::<f64>::try_new(&config.camera).ok()?;
     let fit = fit_facts(&edge, edge.fitted.as_ref()?, &camera, altitude_km, true)?;
     (fit.sigmas.abs() > config.gates.max_half_angle_sigma).then_some(fit)

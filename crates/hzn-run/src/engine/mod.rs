@@ -11,6 +11,7 @@
 //! does not grow with the sequence, even if one picture or the disk is slow.
 
 mod annotate;
+mod clock;
 mod outcome;
 mod plan;
 mod pool;
@@ -27,10 +28,11 @@ pub use annotate::annotate;
 pub use outcome::{BodyOutcome, Finished, Unprocessed};
 pub use plan::Plan;
 pub use pool::End;
+#[cfg(feature = "recordings")]
 pub(crate) use pool::{InOrder, Work, run_in_order};
 pub use process::process_one;
 pub use sensor::{AnySensor, LastAnswer, Processed, check_frames, find_refused};
-pub use sequence::{Sink, run};
+pub use sequence::{Sink, process_alone, run};
 pub use trace::{Trace, Traces, Watch};
 pub use turns::{StoredAnswer, Turns};
 pub use widen::widen_report;

@@ -188,6 +188,8 @@ impl AnySensor {
     ) -> Vec<Processed> {
         match traces {
             Some(traces) => self.process_watched(view, data, traces),
+            // A browser downloads every compiled pipeline, so all pictures share one there. The answers are equal.
+            None if cfg!(target_family = "wasm") => self.process_watched(view, data, &Clock::default()),
             None => self.process_unwatched(view, data),
         }
     }

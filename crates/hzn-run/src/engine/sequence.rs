@@ -48,6 +48,16 @@ pub fn run(
     run_in_order(plan, plan.threads, || source.next(), first, stop, &mut out)
 }
 
+/// Processes one picture without a sequence, on this thread. The result is that of the first picture of a run.
+///
+/// # Errors
+/// The sensor is refused, or an overlay cannot be written.
+pub fn process_alone(plan: &Plan, item: Item) -> Result<Finished, Error> {
+    let mut finished = process_one(plan, &mut plan.worker()?, 0, item)?;
+    plan.turns.clone().judge(&mut finished, &plan.config);
+    Ok(finished)
+}
+
 impl Work for Plan {
     type Job = Item;
     type Done = Finished;

@@ -13,6 +13,7 @@ use hzn_core::report::Candidate;
 use hzn_core::status::Stage;
 use hzn_core::{Observer, Solution};
 
+use super::clock;
 use super::widen::{widen_candidate, widen_solution};
 
 /// One candidate edge.
@@ -115,13 +116,13 @@ impl Trace {
     }
 
     fn switch(&self, next: Option<Stage>) {
-        let now = Instant::now();
-        if let Some((stage, since)) = self.running.get() {
+        let now = clock::now();
+        if let Some(((stage, since), now)) = self.running.get().zip(now) {
             let mut times = self.times.get();
             times[stage as usize] += now - since;
             self.times.set(times);
         }
-        self.running.set(next.map(|stage| (stage, now)));
+        self.running.set(next.zip(now));
     }
 }
 
@@ -146,7 +147,7 @@ impl Watch for Clock {
 
 impl<T> Observer<T> for Clock {
     fn body(&self, _: u8) {
-        self.since.set(Some(Instant::now()));
+        self.since.set(clock::now());
     }
     fn leave(&self) {
         self.times.borrow_mut().push(self.since.get().map_or(Duration::ZERO, |since| since.elapsed()));

@@ -14,7 +14,7 @@ use super::mounts::{Mount, form};
 use super::weather::with_weather;
 use crate::engine::Finished;
 use crate::error::{Error, unusable};
-use crate::sink::altitude_km;
+use crate::record::altitude_km;
 
 /// Joins the answers of the heads about their first body.
 pub struct Joiner {

@@ -4,7 +4,6 @@
 //! the final name is complete. A crash leaves the `.part` file. [`open`] can continue either.
 
 mod outputs;
-mod record;
 mod stored;
 mod text;
 
@@ -14,8 +13,9 @@ use hzn_core::Config;
 use hzn_mcap::{Contents, FrameRecord, Options, Reader, part_path};
 
 pub use outputs::Outputs;
-pub use record::{altitude_km, records, rows};
 pub use stored::StoredResults;
+
+pub use crate::record::{altitude_km, records, rows};
 
 use crate::disk::{advice, cannot_write, refuse_existing};
 use crate::engine::{Finished, Sink};

@@ -59,12 +59,12 @@ pub fn find_bits(source: &dyn Source, sensor: &Config) -> Option<FoundBits> {
     (largest_sample > 0).then_some(FoundBits { bits, largest_sample, pictures })
 }
 
-/// Returns the text of a sensor.toml with this key set in `[input]`. Text that is not TOML is returned unchanged.
-pub fn with_key(text: &str, key: &str, value: impl Into<toml_edit::Value>) -> String {
+/// Returns the text of a sensor.toml with this key set in a section. Text that is not TOML is returned unchanged.
+pub fn with_key(text: &str, section: &str, key: &str, value: impl Into<toml_edit::Value>) -> String {
     let Ok(mut document) = text.parse::<toml_edit::DocumentMut>() else { return text.to_owned() };
-    let input = document.entry("input").or_insert_with(toml_edit::table);
-    if let Some(input) = input.as_table_like_mut() {
-        input.insert(key, toml_edit::value(value));
+    let section = document.entry(section).or_insert_with(toml_edit::table);
+    if let Some(section) = section.as_table_like_mut() {
+        section.insert(key, toml_edit::value(value));
     }
     document.to_string()
 }

@@ -8,7 +8,7 @@ use image::metadata::Orientation;
 
 use super::gather::{self, Gathered, Kind, LeftOut};
 use super::item::{Item, TimeSource};
-use super::paths::ending;
+use super::paths::{ending, open_file};
 use super::payload::Payload;
 use super::raw::{self, Raw};
 use super::sequence::{MAX_SIZES_READ, Source};
@@ -70,7 +70,11 @@ fn out_of_order(paths: &[PathBuf]) -> Option<[String; 2]> {
 /// # Errors
 /// The picture has EXIF that cannot be read: its name and the reason.
 fn have_exif_time(paths: &[PathBuf]) -> Result<bool, String> {
-    match paths.iter().take(MAX_SIZES_READ).find_map(|path| Some((path, header::read_exif_time(path)?))) {
+    match paths
+        .iter()
+        .take(MAX_SIZES_READ)
+        .find_map(|path| Some((path, header::read_exif_time(open_file(path).ok()?)?)))
+    {
         Some((path, Err(why))) => Err(format!("{}: {why}", path.display())),
         Some((_, Ok(time))) => Ok(time.is_some()),
         None => Ok(false),
@@ -164,7 +168,8 @@ impl Source for Files {
             return None;
         }
         let turned = |path: &PathBuf| {
-            let turn = header::read_orientation(path).filter(|turn| *turn != Orientation::NoTransforms)?;
+            let turn =
+                header::read_orientation(open_file(path).ok()?).filter(|turn| *turn != Orientation::NoTransforms)?;
             Some((self.name(path), turn::describe(turn)))
         };
         // A camera writes the orientation into all pictures. Only a few are examined, because each is read as a whole.

@@ -10,9 +10,9 @@ use super::paths::open_file;
 use super::picture_reader::picture_reader;
 use super::{arrays, exif};
 
-/// Returns the decoder of a picture file, which has read only the header. `None` if it cannot be read.
-fn open(path: &Path) -> Option<impl ImageDecoder + use<>> {
-    picture_reader(open_file(path).ok()?).ok()?.into_decoder().ok()
+/// Returns the decoder of a picture file's contents, which has read only the header. `None` if it cannot be read.
+fn decoder<R: Read + Seek + 'static>(contents: R) -> Option<impl ImageDecoder + use<R>> {
+    picture_reader(contents).ok()?.into_decoder().ok()
 }
 
 /// Returns width and height in pixels from the header of a picture file.
@@ -22,21 +22,20 @@ pub(super) fn read_size(path: &Path) -> Option<(u32, u32)> {
 
 /// Returns the time of exposure, if the camera wrote it into the file, or why its EXIF cannot be read. `None` if the
 /// header cannot be read.
-pub(super) fn read_exif_time(path: &Path) -> Option<Result<Option<f64>, String>> {
-    let mut decoder = open(path)?;
+pub(super) fn read_exif_time(contents: impl Read + Seek + 'static) -> Option<Result<Option<f64>, String>> {
+    let mut decoder = decoder(contents)?;
     let block = decoder.exif_metadata().map_err(|e| e.to_string());
     Some(block.and_then(|block| block.map_or(Ok(None), exif::time_s)))
 }
 
 /// Returns the lens data from the file's EXIF. `None` if the header cannot be read or there is no EXIF.
-pub(super) fn read_lens(path: &Path) -> Option<hzn_files::start::Exif> {
-    let mut decoder = open(path)?;
-    decoder.exif_metadata().ok().flatten().and_then(exif::lens)
+pub(super) fn read_lens(contents: impl Read + Seek + 'static) -> Option<hzn_files::start::Exif> {
+    decoder(contents)?.exif_metadata().ok().flatten().and_then(exif::lens)
 }
 
 /// Returns the turn that is needed to show a picture upright, as the camera recorded it.
-pub(super) fn read_orientation(path: &Path) -> Option<Orientation> {
-    open(path)?.orientation().ok()
+pub(super) fn read_orientation(contents: impl Read + Seek + 'static) -> Option<Orientation> {
+    decoder(contents)?.orientation().ok()
 }
 
 /// Returns whether the samples are words, from the header.
@@ -62,10 +61,9 @@ pub(super) fn has_words(mut contents: impl Read + Seek) -> bool {
 
 /// Returns whether the header gives a white value below 65535, as a PNM can. The decoder then scales the samples to all
 /// 16 bits.
-pub(super) fn has_white_value(path: &Path) -> bool {
+pub(super) fn has_white_value(contents: impl Read) -> bool {
     use image::codecs::pnm::PnmDecoder;
-    let Ok(file) = open_file(path) else { return false };
-    let decoder = PnmDecoder::new(BufReader::new(file));
+    let decoder = PnmDecoder::new(BufReader::new(contents));
     decoder.is_ok_and(|d| d.into_inner().1.maximal_sample() < u32::from(u16::MAX))
 }
 

@@ -3,6 +3,7 @@
 //! A [`Source`] hands out [`Item`]s in the sequence's order without decoding them. The threads decode them.
 
 mod arrays;
+#[cfg(feature = "recordings")]
 mod bag;
 mod bits;
 pub mod decode;
@@ -17,6 +18,7 @@ mod jpeg;
 mod limits;
 mod memory;
 mod natural;
+mod one_picture;
 mod pages;
 mod paths;
 mod pattern;
@@ -24,7 +26,9 @@ mod payload;
 pub mod picture;
 mod picture_reader;
 pub mod raw;
+#[cfg(feature = "recordings")]
 mod recording;
+#[cfg(feature = "recordings")]
 mod rerun;
 mod sequence;
 mod stream;
@@ -41,10 +45,12 @@ pub use bits::{FoundBits, find_bits, with_key};
 pub use find_tone::{describe_mixed_tones, find_tone};
 pub use item::{Item, TimeSource};
 pub use memory::Held;
+pub use one_picture::OnePicture;
 pub use paths::{check_exists, ending, open_file};
 pub use payload::Payload;
 pub use picture::Picture;
 pub use raw::Raw;
+#[cfg(feature = "recordings")]
 pub use rerun::{describe_loss as describe_recording_loss, recorded_prior};
 pub use sequence::Source;
 pub use tone::FoundTone;
@@ -69,22 +75,14 @@ use crate::error::{Error, Remedy, unusable};
 pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result<Box<dyn Source>, Error> {
     if let [one] = inputs
         && raw.is_none()
-        && one.is_file()
     {
-        match ending(one).as_str() {
-            "mcap" => return open_recording(one, topic),
-            "db3" | "bag" => {
-                return Err(unusable(format!("{}: is a bag of ROS; {}", one.display(), bag::conversion(one))));
-            }
-            e if video::ENDINGS.contains(&e) => return Ok(Box::new(video::Video::open(one)?)),
-            _ => {}
+        #[cfg(feature = "recordings")]
+        if let Some(source) = open_recorded(one, topic)? {
+            return Ok(source);
         }
-    }
-    if let [one] = inputs
-        && raw.is_none()
-        && bag::is_bag(one)
-    {
-        return Ok(Box::new(bag::Bag::open(one, topic)?));
+        if one.is_file() && video::ENDINGS.contains(&ending(one).as_str()) {
+            return Ok(Box::new(video::Video::open(one)?));
+        }
     }
     if let ([one], Some(raw)) = (inputs, raw)
         && is_stdin(one)
@@ -114,8 +112,24 @@ pub fn watch(inputs: &[PathBuf], raw: Option<Raw>, stop: Arc<AtomicBool>) -> Res
     }
 }
 
+/// Opens a recording or a bag; `None` if the input is neither.
+#[cfg(feature = "recordings")]
+fn open_recorded(one: &Path, topic: Option<&str>) -> Result<Option<Box<dyn Source>>, Error> {
+    if one.is_file() {
+        match ending(one).as_str() {
+            "mcap" => return open_recording(one, topic).map(Some),
+            "db3" | "bag" => {
+                return Err(unusable(format!("{}: is a bag of ROS; {}", one.display(), bag::conversion(one))));
+            }
+            _ => {}
+        }
+    }
+    if bag::is_bag(one) { Ok(Some(Box::new(bag::Bag::open(one, topic)?))) } else { Ok(None) }
+}
+
 /// Opens a recording. A recording of ours is processed again as it was recorded. Of any other recording, and of another
 /// topic, only the pictures are used.
+#[cfg(feature = "recordings")]
 fn open_recording(path: &Path, topic: Option<&str>) -> Result<Box<dyn Source>, Error> {
     if topic.is_none_or(|topic| topic == hzn_mcap::IMAGE_TOPIC)
         && let Some(ours) = rerun::Rerun::open(path)?
@@ -127,10 +141,10 @@ fn open_recording(path: &Path, topic: Option<&str>) -> Result<Box<dyn Source>, E
 
 /// Returns the EXIF time of exposure of a picture file, in seconds since 1970.
 pub fn exif_time_s(path: &Path) -> Option<f64> {
-    header::read_exif_time(path)?.ok().flatten()
+    header::read_exif_time(open_file(path).ok()?)?.ok().flatten()
 }
 
 /// Returns the lens data from a picture file's EXIF.
 pub fn exif_lens(path: &Path) -> Option<hzn_files::start::Exif> {
-    header::read_lens(path)
+    header::read_lens(open_file(path).ok()?)
 }

@@ -6,6 +6,7 @@ use hzn_core::Config;
 use hzn_core::config::Orient;
 use hzn_core::image::Layout;
 use hzn_core::tone::Tone;
+use hzn_files::start::Exif;
 use hzn_mcap::{EncodedImage, ImageFormat};
 
 use super::memory::Held;
@@ -91,12 +92,22 @@ impl Payload {
         }
     }
 
+    /// Returns the lens data from the EXIF of a picture file.
+    pub(crate) fn exif_lens(self) -> Option<Exif> {
+        match self {
+            Self::File(path) => header::read_lens(open_file(&path).ok()?),
+            Self::Encoded(bytes) => header::read_lens(std::io::Cursor::new(bytes)),
+            Self::RawFile(..) | Self::Decoded(_) | Self::Broken(_) => None,
+        }
+    }
+
     /// Returns the largest sample of a picture of 16-bit words. Returns `None` for any other or unreadable picture.
     pub(super) fn largest_word(self, sensor: &Config) -> Option<u16> {
         match &self {
             Self::File(path) if !header::has_words(open_file(path).ok()?) => return None,
-            Self::File(path) if header::has_white_value(path) => return Some(u16::MAX),
+            Self::File(path) if header::has_white_value(open_file(path).ok()?) => return Some(u16::MAX),
             Self::Encoded(bytes) if !header::has_words(std::io::Cursor::new(bytes)) => return None,
+            Self::Encoded(bytes) if header::has_white_value(bytes.as_slice()) => return Some(u16::MAX),
             _ => {}
         }
         self.decode_as_stored(stored_size(sensor), &mut Held::default()).ok()?.0.largest_word()

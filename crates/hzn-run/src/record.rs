@@ -30,8 +30,11 @@ pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
             altitude_km: altitude_km(frame.data.as_ref(), body),
         };
         match &found.report {
-            Ok(report) => Row::from_report(&meta, report, Some(found.elapsed.as_nanos() as f64 / 1e3))
-                .with_protection(config.protection_factor(which)),
+            // Without a clock there is no time, rather than a time of zero.
+            Ok(report) => {
+                Row::from_report(&meta, report, Some(found.elapsed.as_nanos() as f64 / 1e3).filter(|us| *us > 0.0))
+                    .with_protection(config.protection_factor(which))
+            }
             Err(e) => Row::unprocessed(&meta, e.status, e.why.clone()),
         }
     };
