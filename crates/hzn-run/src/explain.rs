@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use hzn_core::covariance::Term;
 use hzn_core::report::Candidate;
+use hzn_core::section::{Kind, Section};
 use hzn_core::status::{Stage, Status};
 use hzn_core::verdict::Verdict;
 use hzn_core::{Report, Solution, evidence, gates};
@@ -70,6 +71,23 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
             "the axis is farther from the last answer than the vehicle can turn (gates.max_rate_deg_s)".into()
         }
     }
+}
+
+/// Says what the limb of an answer is in the plane of a pinhole, and whether its axis is in view there.
+pub fn section_text(solution: &Solution<f64>, is_axis_shown: bool) -> String {
+    let curve = match Section::new(&solution.axis, solution.fused_half_angle_rad.cos()) {
+        // Nearly a parabola: its principal frame lies far away, and lengths say nothing.
+        Some(section) if section.semi_axes().iter().any(|a| !(*a < 1e3)) => "nearly a parabola".to_owned(),
+        Some(section) => {
+            let [along, across] = section.semi_axes();
+            let name = if section.kind() == Kind::Ellipse { "an ellipse" } else { "a hyperbola" };
+            format!("{name} with the semi-axes {along:.4} and {across:.4} focal lengths")
+        }
+        None => "not in front of the camera".to_owned(),
+    };
+    let off_deg = solution.axis.xyz()[2].clamp(-1.0, 1.0).acos().to_degrees();
+    let axis = if is_axis_shown { "the cross" } else { "too far off to be shown" };
+    format!("the limb is {curve}; its axis, {off_deg:.2} deg off the optical axis, is {axis}")
 }
 
 /// The verdicts of candidates, from the one that says least about the body in view to the one that says most: first

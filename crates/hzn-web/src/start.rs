@@ -27,9 +27,19 @@ pub(crate) fn write_sensor_toml(known: &Known, picture: &[u8]) -> Result<Value, 
     let mut from = if fov_deg.is_some() { "the field of view" } else { "EXIF" };
     if !facts.has_focal() && altitude_km.is_some() {
         let (decoded, _) = Payload::Encoded(picture.to_vec()).decode(None)?;
-        if let Some(found) = find_field_of_view(&[(decoded, None)], &facts) {
-            (facts.lens, facts.measured) = (Some(found.lens), Some(found.measured));
-            from = "the limb in the picture";
+        match find_field_of_view(&[(decoded, None)], &facts).as_slice() {
+            [found] => {
+                (facts.lens, facts.measured) = (Some(found.lens), Some(found.measured.clone()));
+                from = "the limb in the picture";
+            }
+            [] => {}
+            several => {
+                let each = several.iter().map(|one| one.describe(facts.size_px[0])).collect::<Vec<_>>();
+                return Err(format!(
+                    "lens: the limb says {}; choose the lens, or give the field of view",
+                    each.join(", but ")
+                ));
+            }
         }
     }
     let start = write(&facts).map_err(|why| in_page(&why))?;

@@ -71,8 +71,9 @@ pub(super) fn rocket(effort: &Effort) -> anyhow::Result<Section> {
     add_rows(&mut s, &["rocket-clean", "rocket"], count, sensors)?;
     s.text(
         "`dlr-2022` rebuilds [BB]: a fixed threshold, whole pixels, RANSAC on three points and their direct estimate, \
-         whose direction uses neither altitude nor limb height. Its covariance is the overbound [BB 37]. In the \
-         paper the edge with the smallest residual is the limb; here the residual is a gate only. The 0.6° of [BB] is \
+         whose direction uses neither altitude nor limb height. Its covariance is the overbound [BB 37]. As in \
+         the paper, the edge with the smallest residual is the limb. Most of its error comes from one threshold for \
+         the whole picture under a lens that darkens towards the corners (book/theory/methods.md). The 0.6° of [BB] is \
          the largest angle between a direction and the aided solution of a flight, which is another statistic than \
          these errors. In `rocket` the half level of the limb moves within the flight, because the camera applies a \
          tone curve to a picture with the Sun's veil. This movement is the sigma of the limb height, and it causes \

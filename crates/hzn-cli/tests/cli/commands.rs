@@ -73,6 +73,27 @@ fn explain_shows_every_stage() {
     place.run(&["explain", "in", "--index", "9"]).expect(2).says("numbered from 0");
 }
 
+/// Without the distortion of the lens, the limb is a conic section, and the direction down is in view although the
+/// picture does not show it.
+#[test]
+fn an_undistorted_overlay_shows_section_and_axis() {
+    let place = Place::with_pictures(1);
+    let [plain, undistorted] = [&[][..], &["--undistorted"]].map(|more| {
+        let args = [&["explain", "in/0000.png", "--overlay", "o.png", "--force"], more].concat();
+        let told = place.run(&args).expect(0).err;
+        (told, image::open(place.path("o.png")).unwrap().to_rgb8())
+    });
+    let count = |picture: &image::RgbImage, colour: [u8; 3]| picture.pixels().filter(|p| p.0 == colour).count();
+    use hzn_mcap::palette::{AXIS, LIMB};
+    assert!(!plain.0.contains("undistorted"), "{}", plain.0);
+    assert_eq!(count(&plain.1, AXIS), 0, "the axis is outside of the picture");
+    assert!(undistorted.0.contains("the limb is a hyperbola with the semi-axes"), "{}", undistorted.0);
+    assert!(undistorted.0.contains("is the cross"), "{}", undistorted.0);
+    assert!(count(&undistorted.1, AXIS) > 20 && count(&undistorted.1, LIMB) > 100);
+    assert_eq!(undistorted.1.dimensions(), plain.1.dimensions());
+    place.run(&["explain", "in/0000.png", "--undistorted"]).expect(2).says("--overlay");
+}
+
 #[test]
 fn info_claims_no_more_than_it_knows() {
     let place = Place::with_pictures(4);

@@ -4,6 +4,7 @@
 
 pub mod canvas;
 pub mod limb;
+pub mod undistorted;
 
 use std::path::Path;
 

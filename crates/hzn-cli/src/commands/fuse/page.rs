@@ -1,8 +1,9 @@
 //! The report of `hzn fuse` as one page of HTML that needs no other file.
 
+use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
 use hzn_fuse::Fused;
 use hzn_fuse::input::Body;
-use hzn_fuse::results::{CameraState, Epoch, Innovation, Kind};
+use hzn_fuse::results::{CameraState, Epoch, Innovation, Kind, Triad};
 use hzn_plot::{Chart, Series, Style};
 use nalgebra::Vector3;
 
@@ -38,6 +39,7 @@ pub(super) fn html(fused: &Fused, results: &str) -> anyhow::Result<String> {
 
 fn charts(fused: &Fused) -> Vec<Chart> {
     let mut all = vec![attitude_sigma(fused), angles(fused), triads(fused), direction_sigma(fused)];
+    all.extend([height(fused), rates(fused), unaided(fused)]);
     for camera in 0..fused.cameras.len() {
         all.push(mount(fused, camera));
     }
@@ -72,7 +74,7 @@ fn line(fused: &Fused, name: &str, style: Style, value: impl Fn(&Epoch) -> f64) 
 }
 
 fn attitude_sigma(fused: &Fused) -> Chart {
-    let mut chart = over_time("Attitude, 3 sigma about the axes of the vehicle", "deg");
+    let mut chart = over_time("Attitude, 3 sigma about the axes of the vehicle ([BB] figures 37 to 44)", "deg");
     for (i, axis) in AXES.iter().enumerate() {
         chart = chart.with_series(line(fused, axis, Style::Line, |e| 3.0 * e.attitude_sigma_rad()[i].to_degrees()));
     }
@@ -88,7 +90,7 @@ fn directions(fused: &Fused, body: Body) -> impl Iterator<Item = &Innovation> {
 }
 
 fn angles(fused: &Fused) -> Chart {
-    let mut chart = over_time("Angle between measured directions and the solution", "deg");
+    let mut chart = over_time("Angle between measured directions and the solution ([BB] figures 37 to 44)", "deg");
     for (body, name) in [(Body::Limb, "limb"), (Body::Sun, "Sun"), (Body::Moon, "Moon")] {
         if directions(fused, body).next().is_none() {
             continue;
@@ -104,21 +106,53 @@ fn angles(fused: &Fused) -> Chart {
 }
 
 fn triads(fused: &Fused) -> Chart {
-    let points = fused.triads.iter().map(|t| (t.time_s, t.angle_rad.to_degrees()));
-    over_time("Attitude of two directions alone (TRIAD) against the filter", "deg").with_series(Series::new(
+    let points =
+        |angle: fn(&Triad) -> f64| fused.triads.iter().map(|t| (t.time_s, angle(t).to_degrees())).collect::<Vec<_>>();
+    over_time("Angle between TRIAD (two directions alone) and the solution ([BB] figures 37 to 44)", "deg")
+        .with_series(Series::new("aided", Style::Dots, points(|t| t.angle_rad)))
+        .with_series(Series::new("unaided", Style::Dots, points(|t| t.unaided_rad)))
+}
+
+/// Returns the height above WGS-84.
+fn height(fused: &Fused) -> Chart {
+    let km = |e: &Epoch| geodetic(e.state.position_m.into_inner().into(), WGS84_A_M, WGS84_B_M).0 / 1e3;
+    // The star tracker alone gives no position: the state then has that of the Earth's centre.
+    let points = fused.epochs.iter().filter(|e| e.state.position_m.into_inner().norm() > 1e6);
+    over_time("Height above WGS-84", "km").with_series(Series::new(
         "",
-        Style::Dots,
-        points,
+        Style::Line,
+        points.map(|e| (e.state.time_s, km(e))),
     ))
 }
 
+fn rates(fused: &Fused) -> Chart {
+    let rate = |i: usize| move |e: &Epoch| e.rate_rad_s.xyz()[i].to_degrees();
+    let lines = AXES.iter().enumerate().map(|(i, axis)| line(fused, axis, Style::Line, rate(i)));
+    lines.fold(over_time("Rate of the vehicle against the Earth", "deg/s"), Chart::with_series)
+}
+
+/// Returns how far the solution without any aid after the first attitude turns away from the aided one.
+fn unaided(fused: &Fused) -> Chart {
+    let turned = |i: usize| {
+        move |e: &Epoch| {
+            let turned = e.unaided.map(|unaided| (unaided.inverse() * e.state.attitude).scaled_axis().xyz()[i]);
+            turned.map_or(f64::NAN, f64::to_degrees)
+        }
+    };
+    let lines = AXES.iter().enumerate().map(|(i, axis)| line(fused, axis, Style::Line, turned(i)));
+    lines.fold(
+        over_time("Rotation from the unaided to the aided attitude, axes of the vehicle", "deg"),
+        Chart::with_series,
+    )
+}
+
 fn direction_sigma(fused: &Fused) -> Chart {
-    let mut chart = over_time("Sigma of the directions, as the sensors tell it", "deg");
+    let mut chart = over_time("3 sigma of the directions, as the sensors tell it ([BB] figure 37)", "deg");
     for (camera, name) in fused.cameras.iter().enumerate() {
         for (body, what) in [(Body::Limb, "limb"), (Body::Sun, "Sun"), (Body::Moon, "Moon")] {
             let points: Vec<(f64, f64)> = directions(fused, body)
                 .filter(|i| i.camera == Some(camera))
-                .filter_map(|i| Some((i.time_s, i.sensor_sigma_rad?.to_degrees())))
+                .filter_map(|i| Some((i.time_s, 3.0 * i.sensor_sigma_rad?.to_degrees())))
                 .collect();
             if !points.is_empty() {
                 chart = chart.with_series(Series::new(format!("{name}, {what}"), Style::Dots, points));

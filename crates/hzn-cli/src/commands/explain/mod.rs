@@ -1,9 +1,10 @@
 //! `hzn explain`: explains the processing of one picture, stage by stage.
 
+mod drawing;
+
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use hzn_mcap::Annotations;
 use hzn_run::engine::{AnySensor, Traces, Unprocessed};
 use hzn_run::explained::{PictureToExplain, Work};
 use hzn_run::open::Opened;
@@ -14,6 +15,7 @@ use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::setup::{self, InputArgs, SensorArgs};
 use crate::tell::{self, one_line};
+use drawing::Drawing;
 
 /// Show what happens to one picture: what is kept, what is dropped, and why
 #[derive(Debug, clap::Args)]
@@ -30,6 +32,10 @@ pub(super) struct Args {
     /// Draw the result over the picture, into this PNG
     #[arg(long, value_name = "PNG")]
     overlay: Option<PathBuf>,
+    /// Draw the overlay as a pinhole would see it, without the distortion of the lens: the limb is a conic section, and
+    /// is drawn beyond the picture, too. A direction down within 75 degrees of the optical axis is in view
+    #[arg(long, requires = "overlay")]
+    undistorted: bool,
     /// Replace the PNG if it exists
     #[arg(long, requires = "overlay")]
     force: bool,
@@ -100,7 +106,7 @@ fn explain(picture: &PictureToExplain<'_>, args: &Args, decoding: Duration) -> O
     sensor.process(&view, data, None);
     let times = sensor.process(&view, data, None);
     let traces = Traces::new(config.each_body().len());
-    let mut drawing = Annotations::default();
+    let mut drawing = Drawing::default();
     let mut statuses = Vec::new();
     let several = config.each_body().len() > 1;
     let processed = sensor.process(&view, data, Some(&traces)).into_iter().zip(times);
@@ -127,12 +133,15 @@ fn explain(picture: &PictureToExplain<'_>, args: &Args, decoding: Duration) -> O
         }
         // The camera includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
         let camera = sensor.camera().with_rate(data.and_then(|d| d.rate_rad_s));
-        drawing.add(engine::annotate(trace, report.solution.as_ref(), &camera));
+        drawing.annotations.add(engine::annotate(trace, report.solution.as_ref(), &camera));
+        drawing.answers.extend(report.solution);
         let status = report.status;
         statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
     }
     if let Some(path) = &args.overlay {
-        overlay::save(&overlay::draw_annotations(pixels.to_rgb(), &drawing, &statuses.join(", ")), path)?;
+        let camera = sensor.camera().with_rate(data.and_then(|d| d.rate_rad_s));
+        let shown = drawing.over(pixels, args.undistorted.then_some(&camera), &statuses.join(", "))?;
+        overlay::save(&shown, path)?;
         tell::line(format_args!("overlay: {}", path.display()));
     }
     Ok(exit)

@@ -1,0 +1,43 @@
+//! What `hzn explain` draws over the picture.
+
+use hzn_core::Solution;
+use hzn_core::camera::Camera;
+use hzn_mcap::Annotations;
+use hzn_run::overlay::undistorted::Undistorted;
+use hzn_run::source::Picture;
+use hzn_run::{explain, overlay};
+
+use crate::exit::{Stop, usage};
+use crate::tell;
+
+/// What is drawn over the picture.
+#[derive(Default)]
+pub(super) struct Drawing {
+    pub(super) annotations: Annotations,
+    pub(super) answers: Vec<Solution<f64>>,
+}
+
+impl Drawing {
+    /// Returns the picture with the drawing, without the distortion of the lens if there is a lens. Says what kind of
+    /// conic section each limb is, and which axis is out of view.
+    pub(super) fn over(
+        &self,
+        picture: &Picture,
+        lens: Option<&Camera<f64>>,
+        title: &str,
+    ) -> Result<image::RgbImage, Stop> {
+        let Some(lens) = lens else {
+            return Ok(overlay::draw_annotations(picture.to_rgb(), &self.annotations, title));
+        };
+        let axes: Vec<_> = self.answers.iter().map(|s| s.axis).collect();
+        let undistorted = Undistorted::new(lens, &axes)
+            .ok_or_else(|| usage("--undistorted: the camera sees nothing within 75 deg of its optical axis"))?;
+        let mut drawing = undistorted.points(&self.annotations);
+        for answer in &self.answers {
+            let limb = undistorted.answer(answer);
+            tell::line(format_args!("undistorted: {}", explain::section_text(answer, !limb.axes.is_empty())));
+            drawing.add(limb);
+        }
+        Ok(overlay::draw_annotations(undistorted.picture(&picture.to_rgb()), &drawing, title))
+    }
+}
