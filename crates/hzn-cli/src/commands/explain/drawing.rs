@@ -3,9 +3,10 @@
 use hzn_core::Solution;
 use hzn_core::camera::Camera;
 use hzn_mcap::Annotations;
+use hzn_run::engine::Trace;
 use hzn_run::overlay::undistorted::Undistorted;
 use hzn_run::source::Picture;
-use hzn_run::{explain, overlay};
+use hzn_run::{engine, explain, overlay};
 
 use crate::exit::{Stop, usage};
 use crate::tell;
@@ -13,11 +14,17 @@ use crate::tell;
 /// What is drawn over the picture.
 #[derive(Default)]
 pub(super) struct Drawing {
-    pub(super) annotations: Annotations,
-    pub(super) answers: Vec<Solution<f64>>,
+    annotations: Annotations,
+    answers: Vec<Solution<f64>>,
 }
 
 impl Drawing {
+    /// Adds the edges, the points and the answer of a body.
+    pub(super) fn add(&mut self, trace: &Trace, solution: Option<&Solution<f64>>, camera: &Camera<f64>) {
+        self.annotations.add(engine::annotate(trace, solution, camera));
+        self.answers.extend(solution.copied());
+    }
+
     /// Returns the picture with the drawing, without the distortion of the lens if there is a lens. Says what kind of
     /// conic section each limb is, and which axis is out of view.
     pub(super) fn over(

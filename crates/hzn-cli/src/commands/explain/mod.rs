@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use hzn_run::engine::{AnySensor, Traces, Unprocessed};
 use hzn_run::explained::{PictureToExplain, Work};
 use hzn_run::open::Opened;
+use hzn_run::overlay;
 use hzn_run::source::{self, Item, Source};
-use hzn_run::{engine, overlay};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
@@ -133,8 +133,7 @@ fn explain(picture: &PictureToExplain<'_>, args: &Args, decoding: Duration) -> O
         }
         // The camera includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
         let camera = sensor.camera().with_rate(data.and_then(|d| d.rate_rad_s));
-        drawing.annotations.add(engine::annotate(trace, report.solution.as_ref(), &camera));
-        drawing.answers.extend(report.solution);
+        drawing.add(trace, report.solution.as_ref(), &camera);
         let status = report.status;
         statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
     }
