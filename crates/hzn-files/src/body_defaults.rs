@@ -34,10 +34,17 @@ pub(crate) fn merge_body_defaults<'i>(sensor: &mut DeTable<'i>, values: &'i [Str
 /// The keys that set a limb height.
 const HEIGHT_KEYS: [&str; 2] = ["limb_height_km", "limb_height_by_latitude_km"];
 
-/// Returns `limb = "height"` for a body whose file sets a limb height; else an empty text.
+/// Returns the height of a thermal band, or `limb = "height"` for a body whose file sets a limb height; else an empty
+/// text.
 fn limb(body: &DeTable<'_>) -> String {
     let is_set = HEIGHT_KEYS.iter().any(|key| body.contains_key(*key));
-    if is_set { format!("limb = {:?}\n", Limb::Height.name()) } else { String::new() }
+    let told = body.get("limb").and_then(|limb| limb.get_ref().as_str());
+    let band = Limb::ALL.iter().find(|limb| told == Some(limb.name())).and_then(|limb| limb.thermal_km());
+    match band {
+        Some([height, sigma]) => format!("limb_height_km = {height:?}\nlimb_height_sigma_km = {sigma:?}\n"),
+        None if is_set => format!("limb = {:?}\n", Limb::Height.name()),
+        None => String::new(),
+    }
 }
 
 /// Returns the values as TOML; `None` for a body with the limb height of the Earth. Wrong values are left to the reader
@@ -118,5 +125,23 @@ mod tests {
             let config = read(&format!("{camera}{text}"));
             assert_eq!(read(&crate::sensor::to_text(&config).unwrap()), config, "{text}");
         }
+    }
+
+    #[test]
+    fn a_thermal_band_has_its_own_height() {
+        let of = |text: &str| body(&format!("[input]\ntone = \"srgb\"\n[body]\n{text}"));
+        let co2 = of("limb = \"co2-15um\"\n");
+        assert!(co2.limb_height_km == 40.0 && (2.0..3.0).contains(&co2.limb_height_sigma_km));
+        assert_eq!(of("limb = \"co2-15um\"\nlimb_height_sigma_km = 4\n").limb_height_sigma_km, 4.0);
+        assert_eq!(of("limb = \"window-8-14um\"\n").limb_height_km, 12.0);
+        assert_eq!(of("limb = \"height\"\nlimb_height_km = 25\n").limb_height_km, 25.0);
+        let camera = "[camera]\nwidth = 64\nheight = 48\nfx_px = 60.0\nfy_px = 60.0\ncx_px = 31.5\ncy_px = 23.5\n";
+        let both = format!("{camera}[body]\nlimb = \"co2-15um\"\nlimb_height_km = 25\n");
+        let refused = crate::sensor::parse(&both, Path::new("s.toml")).unwrap_err().to_string();
+        assert!(refused.contains("s.toml:8: [body] limb: the band gives the limb height: remove"), "{refused}");
+        let written = crate::sensor::parse(&format!("{camera}[body]\nlimb = \"co2-15um\"\n"), Path::new("s.toml"));
+        let config = written.unwrap().config;
+        let again = crate::sensor::parse(&crate::sensor::to_text(&config).unwrap(), Path::new("s.toml")).unwrap();
+        assert_eq!(again.config, config);
     }
 }

@@ -12,6 +12,7 @@ mod estimators;
 mod horace;
 mod infrared;
 mod lens;
+mod limb_heights;
 mod looks;
 mod orbit;
 mod papers;
@@ -53,6 +54,7 @@ pub(crate) const ALL: &[Study] = &[
     reproduced("thresholds", "The controller of the threshold: [B14], 6", controller::thresholds_of_a_flight),
     reproduced("horace", "Criteria of HORACE: [B14], [H15]", horace::criteria),
     reproduced("leo-infrared", "Accuracy and honesty: infrared in low orbit", infrared::flight),
+    reproduced("limb-heights", "Height of the limb at 15 µm", limb_heights::table),
     reproduced("rocket", "Accuracy and honesty: sounding rocket", scenes::rocket),
     reproduced("scenes", "Accuracy and honesty: the other scenes", scenes::others),
     reproduced("position", "Positions: rendered bodies of every size and phase", position::rendered),

@@ -37,7 +37,8 @@ pub fn config_for_calibration(sensor: &Config) -> Option<Config> {
     let mut wide = sensor.clone();
     wide.body = sensor.each_body().get(which)?.clone();
     wide.bodies.clear();
-    [wide.body.limb_height_km, wide.body.limb_height_sigma_km] = WIDE_KM;
+    let [km, sigma_km] = WIDE_KM;
+    wide.body.tell_limb_height(km, sigma_km);
     wide.body.limb_height_by_latitude_km.clear();
     wide.gates.max_sigma_deg = ANY_SIGMA_DEG;
     Some(wide)
@@ -193,8 +194,8 @@ impl Calibration {
             ..sensor.covariance
         };
         let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };
-        body.limb_height_km = round_to_written_digits(self.height.km);
-        body.limb_height_sigma_km = round_to_written_digits(self.height.sigma_km);
+        let [km, sigma_km] = [self.height.km, self.height.sigma_km].map(round_to_written_digits);
+        body.tell_limb_height(km, sigma_km);
         // The measured height already includes the effect of clipped limbs.
         body.clipped_height_km = 0.0;
         body.limb_height_by_latitude_km =

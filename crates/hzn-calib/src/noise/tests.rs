@@ -291,6 +291,10 @@ fn the_keys_are_written_and_all_other_text_stays() {
     c.apply(&mut applied);
     assert_eq!(read, applied);
     // A second calibration replaces the comments of the first and does not repeat them.
+    // A measured height replaces the table of a band, and the body still shines by itself.
+    let band = SENSOR.replace("[body]\n", "[body]\nlimb = \"co2-15um\"\n");
+    let band = into_sensor_toml(&band, &c, "flight").unwrap().text;
+    assert!(band.contains("limb = \"height\"\n") && band.contains("sunlit = false\n"), "{band}");
     let again = into_sensor_toml(text, &c, "flight").unwrap();
     assert_eq!(again.text, *text);
 }

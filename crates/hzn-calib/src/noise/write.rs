@@ -1,7 +1,7 @@
 //! Writes a calibration into the text of a sensor.toml: only the calibrated keys change, and each gets a comment.
 
-use hzn_core::body::Kind;
-use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
+use hzn_core::body::{Kind, Limb};
+use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value, value};
 
 use super::calibration::{Calibration, round_to_written_digits};
 
@@ -74,7 +74,7 @@ fn find_body(document: &mut DocumentMut, kind: Kind) -> Result<&mut dyn TableLik
 
 /// Removes the text that a calibration makes invalid.
 trait RemoveRows {
-    /// Removes rows by latitude if one height was measured, because they would override it.
+    /// Removes rows by latitude if one height was measured, because they would override it, and the table of a band.
     fn remove_rows(&mut self, calibration: &Calibration);
 }
 
@@ -82,6 +82,13 @@ impl RemoveRows for dyn TableLike + '_ {
     fn remove_rows(&mut self, calibration: &Calibration) {
         if calibration.height.by_latitude.is_empty() {
             self.remove("limb_height_by_latitude_km");
+        }
+        let limb = self.get("limb").and_then(Item::as_str);
+        let is_thermal = Limb::ALL.iter().any(|l| limb == Some(l.name()) && l.thermal_km().is_some());
+        if is_thermal {
+            self.insert("limb", value(Limb::Height.name()));
+            // The band said so before.
+            self.entry("sunlit").or_insert(value(false));
         }
     }
 }

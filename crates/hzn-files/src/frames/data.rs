@@ -94,6 +94,7 @@ impl FrameData {
             // The engine adds it, because the ephemeris is not part of this crate.
             sun_elevation_rad: None,
             sun: self.sun_camera.and_then(|s| UnitVec3::try_new(s.map(T::from_f64))),
+            year_part: self.utc_s.map(|s| T::from_f64(body::year_part(s / 86_400.0))),
             last: None,
             rate_rad_s: self.rate_rad_s.map(|rate| rate.map(T::from_f64)),
             pole: self.pole_camera.and_then(|pole| UnitVec3::try_new(pole.map(T::from_f64))),

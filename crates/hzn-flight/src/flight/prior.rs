@@ -6,6 +6,7 @@ use super::known::{Expired, Known};
 use super::navigation::Values;
 use super::validity::Refusal;
 use crate::board::Board;
+use crate::cuc::{Cuc, Epoch};
 use crate::messages::{Code, Event};
 use hzn_core::Prior;
 use hzn_core::body::Kind;
@@ -13,6 +14,16 @@ use hzn_core::body::Kind;
 /// Second number of [`Event::KnownExpired`].
 const NAVIGATION: u32 = 0;
 const ATTITUDE: u32 = 1;
+
+/// Days from the epoch of the time code, 1958-01-01, to that of UTC, 1970-01-01.
+const DAYS_TO_1970: f64 = 4383.0;
+
+/// Returns the part of the year that has passed at a time; `None` if the clock is not correlated. The difference
+/// between TAI and UTC, half a minute, does not matter.
+fn year_part(time: Cuc) -> Option<f32> {
+    let days = time.us as f64 / 86.4e9 - DAYS_TO_1970;
+    (time.epoch == Epoch::Tai).then(|| hzn_core::body::year_part(days) as f32)
+}
 
 impl<B: Board> Flight<'_, B> {
     /// Returns the body that the sensor looks for.
@@ -70,6 +81,20 @@ impl<B: Board> Flight<'_, B> {
             }
         }
         self.has_expired = (is_navigation_told || navigation_s.is_some(), is_attitude_told || attitude_s.is_some());
-        self.known.get().at(exposure_us, self.body())
+        let prior = self.known.get().at(exposure_us, self.body());
+        Prior { year_part: year_part(self.buffers.line.clock.at(exposure_us)), ..prior }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_season_follows_from_the_time_code() {
+        // 1 July 2021 is 18809 days after 1970.
+        let july = Cuc::tai((18_809 + 4383) * 86_400_000_000);
+        assert!((year_part(july).unwrap() - 0.4966).abs() < 0.003);
+        assert_eq!(year_part(Cuc::since_start(july.us)), None);
     }
 }

@@ -393,7 +393,7 @@ class Body(TypedDict, total=False):
     """1σ of the altitude, km; it widens the expected half-angle. Values: 0 to 1e6 km. Default: 0.5."""
     altitude_reference: Literal["ellipsoid", "sphere"]
     """For ``earth``: the surface from which an altitude without a position is measured. Default: "ellipsoid"."""
-    limb: Literal["visible", "height"]
+    limb: Literal["visible", "co2-15um", "window-8-14um", "height"]
     """Where the limb height comes from. Default: "visible"."""
     limb_height_km: float
     """Height of the visible limb above the surface, km; 17 km is right for a cloudless limb in sunlight at 550 nm,

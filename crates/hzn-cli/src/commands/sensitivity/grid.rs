@@ -114,8 +114,7 @@ impl<'a> Grid<'a> {
             return design.sigmas().map_err(usage);
         };
         let mut sensor = one.clone();
-        sensor.body.limb_height_km = design.limb_height_km;
-        sensor.body.limb_height_sigma_km = design.limb_height_sigma_km;
+        sensor.body.tell_limb_height(design.limb_height_km, design.limb_height_sigma_km);
         sensor.body.altitude_sigma_km = design.altitude_sigma_km;
         let place = SensorPlace {
             sensor,

@@ -36,13 +36,13 @@ impl<T: Real> ApparentBody<T> {
     pub(super) fn new(body: &Config, prior: &Prior<T>) -> Result<Self, PriorError> {
         match (body.kind, prior.position_m) {
             // Only the Earth has its ellipsoid here, because the shape of other bodies is fitted in scaled space.
-            (Kind::Earth, Some(p)) => Self::ellipsoid(body, p),
+            (Kind::Earth, Some(p)) => Self::ellipsoid(body, p, prior.year_part),
             _ => Self::sphere(body, prior),
         }
     }
 
     /// Describes the Earth as seen from an ECEF position in metres.
-    fn ellipsoid(body: &Config, p: [T; 3]) -> Result<Self, PriorError> {
+    fn ellipsoid(body: &Config, p: [T; 3], year_part: Option<T>) -> Result<Self, PriorError> {
         let km = T::from_f64(1000.0);
         let (mut limb, mut harmonics) = (T::from_f64(body.limb_height_km) * km, [T::zero(); 2]);
         // The limb height is added to the semi-axes instead of the true parallel surface, because the two differ by at
@@ -56,11 +56,11 @@ impl<T: Real> ApparentBody<T> {
             return Err(PriorError::Position);
         }
         let mut cone = raised(limb);
-        if !body.limb_height_by_latitude_km.is_empty() {
+        if body.is_limb_by_latitude() {
             // Below the limb height there is no cone. The limb then counts as being at the camera's own latitude
             // everywhere.
             let sin = cone.as_ref().map_or(T::one(), |cone| cone.mean_half_angle_rad().sin_cos().0);
-            let [mean, first, second] = body.limb_harmonics_km(latitude, sin);
+            let [mean, first, second] = body.limb_harmonics_km(latitude, sin, year_part);
             (limb, harmonics) = (mean * km, [first * km, second * km]);
             cone = raised(limb);
         }

@@ -113,6 +113,9 @@ fn check<T: Real>(prior: &Prior<T>) -> Result<T, PriorError> {
     if prior.rate_rad_s.is_some_and(|rate| !rate.iter().all(|r| r.abs() <= T::from_f64(MAX_RATE_RAD_S))) {
         return Err(PriorError::Rate);
     }
+    if prior.year_part.is_some_and(|part| !(part >= T::zero() && part <= T::one())) {
+        return Err(PriorError::YearPart);
+    }
     Ok(attitude_sigma)
 }
 
@@ -196,7 +199,8 @@ impl<T: Real> Expected<T> {
     // sigma are kept apart, because clipping adds its own later and `hzn explain` prints each of them.
     fn of_limb(body: &Config, prior: &Prior<T>, attitude_sigma: T) -> Result<Self, PriorError> {
         let km = T::from_f64(1000.0);
-        let limb_sigma = T::from_f64(body.limb_height_sigma_km) * km;
+        let is_placed = prior.position_m.is_some() && prior.year_part.is_some();
+        let limb_sigma = T::from_f64(body.limb_sigma_km(is_placed)) * km;
         let seen = ApparentBody::new(body, prior)?;
         let ApparentBody { sin, limb, .. } = seen;
         let cos2 = T::one() - sin * sin;
@@ -217,8 +221,12 @@ impl<T: Real> Expected<T> {
         // An attitude error ψ leaves k ψ of the k-th harmonic.
         let left = |k: f64| known.map_or(T::one(), |_| (attitude_sigma * T::from_f64(k)).min(T::one()));
         let uneven = |k: f64, amplitude: T| amplitude.abs() * left(k);
-        let unknown_harmonics_cos =
-            [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1]) + scale * seen.unknown_second_m];
+        let away_deg = 90.0 - sin.atan2(cos).to_f64().to_degrees();
+        let [tilt, second] = body.unknown_limb_harmonics_km(is_placed, away_deg).map(|h| T::from_f64(h) * km * scale);
+        let unknown_harmonics_cos = [
+            uneven(1.0, harmonics_cos[0]) + tilt,
+            uneven(2.0, own + harmonics_cos[1]) + scale * seen.unknown_second_m + second,
+        ];
         let limb_sigma_parts_m = [limb_sigma, sin * altitude_sigma, seen.unknown_m, T::zero()];
         let variance = limb_sigma_parts_m.iter().fold(T::zero(), |sum, s| sum + *s * *s);
         let predicted = prior.fixed_from_camera.zip(seen.axis_fixed(body, prior));

@@ -8,6 +8,12 @@ choices! {
         /// The visible limb: its height follows from `input.tone` unless `limb_height_km` has another value than the
         /// default.
         @- Visible = "visible";
+        /// The limb in the band of CO2 at 15 µm, of a thermal camera with such a filter: a table by month and latitude,
+        /// for a time (UTC) and a position; without them its mean, 40 km, with a wider sigma.
+        @- Co2 = "co2-15um";
+        /// The limb from 8 to 14 µm, of a thermal camera without a filter: 12 ± 7 km, because clouds, water vapour and
+        /// ozone form it, and nobody published its height.
+        @- Window = "window-8-14um";
         /// The height is `limb_height_km`, for any tone; without `limb`, a file that has one of the keys
         /// `limb_height_km`, `limb_height_sigma_km` and `limb_height_by_latitude_km` means this.
         @- Height = "height";

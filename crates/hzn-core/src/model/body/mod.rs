@@ -1,6 +1,8 @@
 //! The body whose limb the sensor searches for, and its cone for a given position and altitude.
 
 mod apparent;
+mod band;
+mod band_table;
 mod bounds;
 mod expected;
 mod kind;
@@ -22,6 +24,7 @@ use crate::geometry::ellipsoid::{EARTH_MEAN_RADIUS_M, WGS84_A_M, WGS84_B_M};
 use crate::model::edge_noise;
 use crate::model::threshold;
 
+pub use band::year_part;
 pub use expected::Expected;
 pub use kind::{AltitudeReference, Kind};
 pub use limb::Limb;
@@ -161,6 +164,7 @@ impl Config {
         }
         self.check_figure()?;
         self.check_keys()?;
+        self.check_band()?;
         let rows = &self.limb_height_by_latitude_km;
         let field = "body.limb_height_by_latitude_km";
         for [latitude, height] in rows {
@@ -240,7 +244,7 @@ impl Config {
             let latitude = (f64::from(i) + 0.5) * 180.0 / f64::from(LATITUDES) - 90.0;
             // The rows are weighted by the area of their belt; otherwise the poles would count as much as the equator.
             let area = libm::cos(latitude.to_radians());
-            sum += area * self.limb_height_km(latitude);
+            sum += area * self.limb_height_km(latitude, None);
             weight += area;
         }
         sum / weight
@@ -282,8 +286,11 @@ impl Config {
         cfg!(feature = "position") && (self.kind == Kind::Ellipsoid || self.kind.planet().is_some())
     }
 
-    /// Returns the limb height in kilometres at a geodetic latitude in degrees.
-    fn limb_height_km(&self, latitude_deg: f64) -> f64 {
+    /// Returns the limb height in kilometres at a geodetic latitude in degrees, in a season.
+    fn limb_height_km(&self, latitude_deg: f64, year_part: Option<f64>) -> f64 {
+        if let Some(height) = self.band_height_km(latitude_deg, year_part) {
+            return height;
+        }
         let rows = &self.limb_height_by_latitude_km;
         let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return self.limb_height_km };
         // Beyond the rows the height stays constant, because an extrapolated line would leave every plausible height.
@@ -303,9 +310,10 @@ impl Config {
     /// Returns the mean height along the limb seen from a geodetic latitude, and its first and second harmonic in
     /// azimuth from north, kilometres. `sin` is the sine of the half-angle; it equals the cosine of the angle at the
     /// body's centre between the limb and the nadir.
-    fn limb_harmonics_km<T: Real>(&self, latitude_rad: T, sin: T) -> [T; 3] {
+    fn limb_harmonics_km<T: Real>(&self, latitude_rad: T, sin: T, year_part: Option<T>) -> [T; 3] {
         let (one, cos) = (T::one(), (T::one() - sin * sin).max(T::zero()).sqrt());
         let (here, across) = latitude_rad.sin_cos();
+        let season = year_part.map(Real::to_f64);
         let mut sums = [T::zero(); 3];
         for k in 0..LIMB_SAMPLES {
             // The samples lie between the ends, so that each stands for an equal part of the limb and none counts half.
@@ -314,7 +322,7 @@ impl Config {
             let s = here * sin + across * cos * c;
             // The arc sine would be NaN for a sine that rounding puts above 1; the root of a clamped number is not.
             let latitude = s.atan2((one - s * s).max(T::zero()).sqrt());
-            let height = T::from_f64(self.limb_height_km(latitude.to_f64().to_degrees()));
+            let height = T::from_f64(self.limb_height_km(latitude.to_f64().to_degrees(), season));
             sums = [
                 sums[0] + height,
                 sums[1] + height * c * T::from_f64(2.0),
@@ -335,10 +343,10 @@ impl Config {
         self.kind == Kind::Sun
     }
 
-    /// Returns whether the body is seen in sunlight. This is true except for the Sun and for `sunlit = false`, which
-    /// means that the body itself emits the light, as in the thermal infrared.
+    /// Returns whether the body is seen in sunlight. This is true except for the Sun, for the thermal bands of
+    /// [`Self::limb`], and for `sunlit = false`, which means that the body itself emits the light.
     pub fn is_seen_in_sunlight(&self) -> bool {
-        self.sunlit != Some(false) && self.kind != Kind::Sun
+        self.sunlit.unwrap_or(self.limb.thermal_km().is_none()) && self.kind != Kind::Sun
     }
 
     /// Returns whether only the sunlit limb counts as limb, when the Sun's direction is known.
@@ -359,12 +367,12 @@ mod tests {
         let body = Config { limb_height_by_latitude_km: rows.into_iter().collect(), ..Config::default() };
         assert_eq!(body.check(), Ok(()));
         for (latitude, height) in [(-90.0, 20.0), (-45.0, 22.5), (0.0, 25.0), (45.0, 32.5), (90.0, 40.0)] {
-            assert_eq!(body.limb_height_km(latitude), height);
+            assert_eq!(body.limb_height_km(latitude, None), height);
         }
         // Where the height is linear in latitude, the limb to the north is higher by the same amount by which the limb
         // to the south is lower.
         let sin = 66f64.to_radians().sin();
-        let [mean, first, second] = body.limb_harmonics_km(45f64.to_radians(), sin);
+        let [mean, first, second] = body.limb_harmonics_km(45f64.to_radians(), sin, None);
         assert!(
             (mean - 32.2).abs() < 0.4 && (first - 24.0 / 6.0).abs() < 0.3 && second.abs() < 0.4,
             "{mean} {first} {second}"

@@ -47,6 +47,9 @@ pub struct Prior<T> {
     /// Elevation of the Sun above the horizon at the point below the camera, radians; it follows from the time and the
     /// position. At night no limb is seen in sunlight, see `gates.max_unlit`.
     pub sun_elevation_rad: Option<T>,
+    /// Part of the year that has passed, 0 to 1, see [`year_part`](super::year_part). With a position it selects the
+    /// height of a limb whose band has a table.
+    pub year_part: Option<T>,
     /// 1-sigma of the prior attitude about the axis in radians, 0 or more; 5 degrees if it is left out. It widens the
     /// covariance by the part of the ellipsoid's shape that then remains uncertain. From 30 degrees on, the attitude
     /// does not correct the shape at all.
@@ -92,6 +95,8 @@ pub enum PriorError {
     AttitudeSigma,
     /// The rate of rotation is not finite, or is too large.
     Rate,
+    /// The part of the year is not a number from 0 to 1.
+    YearPart,
     /// The distance is not a finite number above 0.
     Range,
     /// The 1-sigma of the distance is missing, not a finite number, or negative.
@@ -140,6 +145,7 @@ impl core::fmt::Display for PriorError {
                 let place = if altitude < limb { "below" } else { "not above" };
                 return write!(f, "altitude {altitude} km is {place} the limb height {limb} km");
             }
+            Self::YearPart => "the part of the year must be a number from 0 to 1",
             Self::Attitude => "qw, qx, qy, qz must be a rotation: the quaternion's length must be 1 within 0.01",
             Self::AttitudeSigma => "attitude_sigma_deg must be a finite number, 0 or more",
             Self::Rate => "rate_x, rate_y, rate_z must be finite and at most 1000 (rad/s)",
