@@ -9,8 +9,9 @@ use crate::frame::{Annotations, Attitude, EncodedImage, LogLine};
 /// most one batch waits.
 const MAX_BYTES: usize = 64 << 20;
 
-/// Log time in nanoseconds and sequence number of a frame's messages, and number of the head of a rig. In recordings of hzn, the sequence number is the
-/// index of the frame. Other writers may leave it out; then the log time tells the frames apart.
+/// Log time in nanoseconds and sequence number of a frame's messages, and number of the head of a rig. In recordings of
+/// hzn, the sequence number is the index of the frame. Other writers may leave it out; then the log time tells the
+/// frames apart.
 type Key = (u64, u32, usize);
 
 /// The parts of a frame. A frame with several records may have several of each kind.

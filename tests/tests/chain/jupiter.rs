@@ -84,9 +84,9 @@ fn the_terminator_is_no_limb_without_the_sun() {
     }
 }
 
-/// With an altitude alone, the flattening has any azimuth, and the terminator looks like a part of it: the axis was wrong
-/// by 5 to 7 sigmas of both answers. The answer with attitude and Sun is the truth here, because the pointing of the
-/// camera is not known well enough.
+/// With an altitude alone, the flattening has any azimuth, and the terminator looks like a part of it: the axis was
+/// wrong by 5 to 7 sigmas of both answers. The answer with attitude and Sun is the truth here, because the pointing of
+/// the camera is not known well enough.
 #[test]
 fn the_terminator_of_a_flat_disc_is_no_limb_without_attitude_and_sun() {
     let mut answered = 0;

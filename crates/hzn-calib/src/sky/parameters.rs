@@ -87,8 +87,8 @@ impl Parameters {
 }
 
 /// Returns the changes of the lens and their covariance if the undetermined parameters keep their values and their
-/// covariance of before the flight, `prior`. The flight then says how the others depend on them: their mean and covariance
-/// if these are given. `None` if a covariance is singular.
+/// covariance of before the flight, `prior`. The flight then says how the others depend on them: their mean and
+/// covariance if these are given. `None` if a covariance is singular.
 fn keep_undetermined(
     changes: &DVector<f64>,
     covariance: &DMatrix<f64>,
@@ -160,8 +160,8 @@ mod tests {
         let prior = DMatrix::from_row_slice(2, 2, &[9.0, 0.0, 0.0, 100.0]);
         let changes = DVector::from_vec(vec![3.0, 2.0]);
         let (kept, written) = keep_undetermined(&changes, &covariance, &prior, &[false, true]).unwrap();
-        // The second one is at its mean for the value that the first one keeps, 2 - 1/4 * 3. Its variance is 1 - 1/4 for
-        // each value of the first one, and it moves by 1/4 of the error of the first one.
+        // The second one is at its mean for the value that the first one keeps, 2 - 1/4 * 3. Its variance is 1 - 1/4
+        // for each value of the first one, and it moves by 1/4 of the error of the first one.
         assert!((kept - DVector::from_vec(vec![0.0, 1.25])).amax() < 1e-12);
         let want = DMatrix::from_row_slice(2, 2, &[9.0, 9.0 / 4.0, 9.0 / 4.0, 0.75 + 9.0 / 16.0]);
         assert!((&written - want).amax() < 1e-12, "{written}");

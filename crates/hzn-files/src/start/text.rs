@@ -157,8 +157,8 @@ fn write_body(body: Body, altitude_km: Option<f64>) -> String {
         ),
         None => write!(
             t,
-            "# Every picture needs an altitude in kilometres. The columns file, altitude_km (or x_km, y_km, z_km) of a\n\
-             # frames.csv next to the pictures give it, or this key for all pictures:\n# altitude_km = 400.0\n"
+            "# Every picture needs an altitude in kilometres. The columns file, altitude_km (or x_km, y_km, z_km)\n\
+             # of a frames.csv next to the pictures give it, or this key for all pictures:\n# altitude_km = 400.0\n"
         ),
     };
     t

@@ -35,9 +35,9 @@ const MAX_SIGMA: f64 = 0.3;
 const MAX_COMMON_SIGMA: f64 = 0.05;
 /// Solutions closer than this in ln f are the same.
 const SAME: f64 = 0.02;
-/// A kind of lens remains possible if at least this part of the pictures agrees that agrees with the other kind. With the
-/// wrong kind, the field of view changes with the place of the limb, so that few pictures agree. One picture never tells
-/// the kind.
+/// A kind of lens remains possible if at least this part of the pictures agrees that agrees with the other kind. With
+/// the wrong kind, the field of view changes with the place of the limb, so that few pictures agree. One picture never
+/// tells the kind.
 const AS_MANY: f64 = 0.75;
 /// Pictures farther than this from the common solution, in their 1-sigmas, show something else than the limb.
 const MAX_DISTANCE: f64 = 3.0;
@@ -238,8 +238,8 @@ impl Combined {
     }
 }
 
-/// Combines the pictures: finds the solution that most pictures share, and averages the pictures that have it. `None` if
-/// there is no solution.
+/// Combines the pictures: finds the solution that most pictures share, and averages the pictures that have it. `None`
+/// if there is no solution.
 fn combine(all: &[Vec<Said>]) -> Option<Combined> {
     let is_certain = |s: &&Said| s.variance().sqrt() < MAX_SIGMA;
     let silent = all.iter().filter(|said| !said.is_empty() && !said.iter().any(|s| is_certain(&s))).count();

@@ -143,8 +143,8 @@ impl Epochs {
         let alone: Vec<String> = self.heads.iter().zip(&self.paired).filter_map(alone).collect();
         let (false, true) = (alone.is_empty(), self.heads.len() > 1) else { return None };
         Some(format!(
-            "no picture of {} was taken at most {} s ([rig] sync_s) from one of another head, so nothing was joined with \
-             it: do the heads have the same clock?",
+            "no picture of {} was taken at most {} s ([rig] sync_s) from one of another head, so nothing was joined \
+             with it: do the heads have the same clock?",
             alone.join(", "),
             self.sync_s
         ))

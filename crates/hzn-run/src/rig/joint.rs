@@ -33,8 +33,8 @@ pub struct Seen<'a> {
     repeats: Option<Repeat>,
 }
 
-/// Another picture with the same bytes. The noise of a camera never repeats, so it is not a picture of this head at this
-/// time.
+/// Another picture with the same bytes. The noise of a camera never repeats, so it is not a picture of this head at
+/// this time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Repeat {
     /// The picture of the epoch before.

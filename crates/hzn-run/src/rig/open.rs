@@ -106,15 +106,7 @@ pub fn open(request: &Request) -> Result<Opened, Error> {
 
 impl Opened {
     fn add(&mut self, head: &Head, folder: &Path, request: &Request) -> Result<(), Error> {
-        let pictures = |head: &Head| folder.join(&head.pictures).canonicalize().ok();
-        let same = |other: &&Head| pictures(other).is_some() && pictures(other) == pictures(head);
-        if let Some(other) = self.rig.heads.iter().take(self.heads.len()).find(same) {
-            let path = head.pictures.display();
-            return Err(unusable(format!(
-                "head {}: {path}: these are the pictures of head {}, too",
-                head.name, other.name
-            )));
-        }
+        self.check_own_pictures(head, folder)?;
         let sensor = head.sensor.as_ref().map(|path| folder.join(path));
         let own = open::Request {
             inputs: vec![folder.join(&head.pictures)],
@@ -135,17 +127,7 @@ impl Opened {
         self.notes.extend(opened.notes.iter().map(name));
         let Some(mount) = &head.mount else { return Err(unusable(format!("{}: [head.mount] is missing", head.name))) };
         let mount = Mount::new(&self.rig.rig.mount, mount);
-        if let Some(own) = &opened.sensor.config.mount {
-            let angle_deg = mount.angle_deg(own.q_vehicle_from_camera_wxyz);
-            let sigma_deg = self.rig.rig.mount.sigma_deg.hypot(mount.sigma_deg());
-            if angle_deg > 3.0 * sigma_deg + MOUNT_ROUNDING_DEG {
-                self.warnings.push(name(&format!(
-                    "[mount] of its sensor.toml is {angle_deg:.2} degrees away from [head.mount] of rig.toml, which the \
-                     joint answer uses; only the columns of the head's own rows that are in the vehicle's frame use \
-                     [mount]: correct one of them"
-                )));
-            }
-        }
+        self.warnings.extend(self.doubt_mount(&mount, &opened.sensor).map(|doubt| name(&doubt)));
         // The checks are about sizes, which the mount does not change.
         if let Some(vehicle) = self.frames.as_deref() {
             let config = &opened.sensor.config;
@@ -170,6 +152,34 @@ impl Opened {
         let (name, open::Opened { source, sensor, frames, .. }) = (head.name.clone(), opened);
         self.heads.push(OpenHead { name, source, sensor, frames, vehicle });
         Ok(())
+    }
+
+    /// Refuses pictures that another head has, too.
+    fn check_own_pictures(&self, head: &Head, folder: &Path) -> Result<(), Error> {
+        let pictures = |head: &Head| folder.join(&head.pictures).canonicalize().ok();
+        let same = |other: &&Head| pictures(other).is_some() && pictures(other) == pictures(head);
+        match self.rig.heads.iter().take(self.heads.len()).find(same) {
+            Some(other) => Err(unusable(format!(
+                "head {}: {}: these are the pictures of head {}, too",
+                head.name,
+                head.pictures.display(),
+                other.name
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Returns the doubt about a mount of rig.toml that contradicts the one of the head's sensor.
+    fn doubt_mount(&self, mount: &Mount, sensor: &Sensor) -> Option<String> {
+        let angle_deg = mount.angle_deg(sensor.config.mount.as_ref()?.q_vehicle_from_camera_wxyz);
+        let sigma_deg = self.rig.rig.mount.sigma_deg.hypot(mount.sigma_deg());
+        (angle_deg > 3.0 * sigma_deg + MOUNT_ROUNDING_DEG).then(|| {
+            format!(
+                "[mount] of its sensor.toml is {angle_deg:.2} degrees away from [head.mount] of rig.toml, which the \
+                 joint answer uses; only the columns of the head's own rows that are in the vehicle's frame use \
+                 [mount]: correct one of them"
+            )
+        })
     }
 
     /// Prepares the joint answers.

@@ -130,9 +130,9 @@ struct Frozen {
 }
 
 impl Frozen {
-    /// Returns which pictures of an epoch have the bytes of the picture before, or of another head. The noise of a camera
-    /// never repeats, but a dark or clipped picture has none: a picture without an answer never counts, so that its own
-    /// reason is reported.
+    /// Returns which pictures of an epoch have the bytes of the picture before, or of another head. The noise of a
+    /// camera never repeats, but a dark or clipped picture has none: a picture without an answer never counts, so that
+    /// its own reason is reported.
     fn see(&mut self, heads: &[Option<Finished>]) -> Vec<Option<Repeat>> {
         let checksum = |frame: &Finished| Some((frame.time_s, crc32fast::hash(frame.picture.as_ref()?)));
         let now: Vec<_> = heads.iter().map(|frame| frame.as_ref().and_then(checksum)).collect();

@@ -106,8 +106,8 @@ pub fn error_deg(row: &Row, truth: Option<&Truth>) -> Option<f64> {
     Some(angle_deg(row.axis()?, truth?.axis()?.xyz()))
 }
 
-/// Returns the error of an answer over its 1-sigma in the direction of the error, as `hzn evaluate` counts it: the root of
-/// the NEES. `None` without a truth.
+/// Returns the error of an answer over its 1-sigma in the direction of the error, as `hzn evaluate` counts it: the root
+/// of the NEES. `None` without a truth.
 pub fn error_sigmas(row: &Row, truth: Option<&Truth>) -> Option<f64> {
     sigmas_from(row, truth?.axis()?.xyz())
 }

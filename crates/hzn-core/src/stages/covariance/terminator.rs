@@ -6,8 +6,8 @@
 //! linear step from the whole cone; the one with the smallest residuals counts. Its cone may be the right one. The
 //! difference is therefore an error of the answer: it is added to the covariance.
 //!
-//! A flattened body whose north is not known is no circle, and a terminator looks like more flattening. If the flattening
-//! is more than the residuals, each half has a second harmonic of its own.
+//! A flattened body whose north is not known is no circle, and a terminator looks like more flattening. If the
+//! flattening is more than the residuals, each half has a second harmonic of its own.
 
 use super::answer::ConeCovariance;
 use super::common::{Row, part};
