@@ -215,8 +215,11 @@ function sigma(pen, { sigma_deg }, x, y, unit) {
   pen.strokeStyle = "#000";
   pen.fillStyle = "#fff";
   const text = `1σ: ${sigma_deg.map((deg) => `${deg.toFixed(4)}°`).join(" × ")}`;
-  pen.strokeText(text, x, y);
-  pen.fillText(text, x, y);
+  // A text that would leave the picture goes back, and below the arrow.
+  const fits = pen.canvas.width - pen.measureText(text).width - 6 * unit;
+  const place = x > fits ? [Math.max(0, fits), y + 24 * unit] : [x, y];
+  pen.strokeText(text, ...place);
+  pen.fillText(text, ...place);
 }
 
 async function openFile(file) {
