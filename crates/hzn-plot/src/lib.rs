@@ -103,7 +103,10 @@ impl Chart {
         let x = margin(x);
         // The legend has the top of the chart to itself.
         let named = self.series.iter().filter(|s| !s.name.is_empty()).count();
-        let room = named as f64 * 18.0 / f64::from(self.size.1.max(100) - 90);
+        // The share of the plot that the legend covers, of which 90 px of the picture are no part. Room is in shares of
+        // the values, so it is larger: the values have only what the legend leaves.
+        let share = ((named as f64 * 18.0 + 10.0) / f64::from(self.size.1.max(100) - 90)).min(0.7);
+        let room = if named > 0 { share / (1.0 - share) } else { 0.0 };
         // Values that are never negative, such as errors and sigmas, start at zero, so that small differences do not
         // look large.
         let (low, high) = margin(if y.0 >= 0.0 { (0.0, y.1) } else { y });
@@ -219,6 +222,25 @@ mod tests {
         }
         assert!(!svg.contains("NaN"), "{svg}");
         assert_eq!(svg.matches("<circle").count(), 3, "two points and the legend's");
+    }
+
+    /// The largest value of many series is at the right, where the legend is.
+    #[test]
+    fn the_legend_covers_no_value() {
+        for count in [1, 3, 5, 6] {
+            let dot = |i: u32| Series::new(format!("series {i}"), Style::Dots, [(0.0, 0.0), (9.0, f64::from(i + 1))]);
+            let svg = (0..count).fold(Chart::new("t", "x", "y"), |chart, i| chart.with_series(dot(i))).svg().unwrap();
+            let value = |line: &str, key: &str| -> f64 {
+                let (_, rest) = line.split_once(&format!(" {key}=\"")).unwrap();
+                rest.split('"').next().unwrap().parse().unwrap()
+            };
+            let circles = || svg.lines().filter(|line| line.starts_with("<circle"));
+            // The dots of the legend are in the picture, too: they are the last ones.
+            let dots = circles().take(2 * count as usize).map(|line| value(line, "cy")).fold(f64::INFINITY, f64::min);
+            let frame = svg.lines().rev().find(|line| line.starts_with("<rect")).unwrap();
+            let legend = value(frame, "y") + value(frame, "height");
+            assert!(dots > legend, "{count}: {dots} and {legend}");
+        }
     }
 
     #[test]

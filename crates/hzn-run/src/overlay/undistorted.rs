@@ -165,7 +165,8 @@ mod tests {
             .filter(|(_, _, p)| p.0[0] > 100 && p.0[2] > 100)
             .map(|(_, y, _)| f64::from(y))
             .collect();
-        assert!(lit.len() > 300 && lit.iter().all(|y| (y - row).abs() < 1.5), "{row}: {lit:?}");
+        // The line is 1.6 focal lengths long, and interpolation dims some of its pixels.
+        assert!(lit.len() > 100 && lit.iter().all(|y| (y - row).abs() < 1.5), "{row}: {lit:?}");
         assert!(undistorted.points(&marks).inliers.iter().all(|p| (p[1] - row).abs() < 1e-6));
     }
 
