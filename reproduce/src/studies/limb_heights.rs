@@ -74,9 +74,9 @@ fn rust(table: &[Vec<f64>]) -> String {
     let row = |row: &Vec<f64>| row.iter().map(|h| format!("{:.0}", h * 100.0)).collect::<Vec<_>>().join(", ");
     let rows: Vec<String> = table.iter().map(|r| format!("    [{}],\n", row(r))).collect();
     format!(
-        "//! The height of the limb in the band of CO₂ at 15 µm. `cargo xtask reproduce limb-heights` writes this file.\n\n\
-         /// Heights in units of 10 m: one row for the middle of each month, with latitudes from −90° to 90° in steps of \
-         15°.\npub(super) const CO2_HEIGHTS: [[u16; 13]; 12] = [\n{}];\n",
+        "//! The height of the limb in the band of CO₂ at 15 µm. `cargo xtask reproduce limb-heights` writes this \
+         file.\n\n/// Heights in units of 10 m: one row for the middle of each month, with latitudes from −90° to 90° \
+         in steps of 15°.\npub(super) const CO2_HEIGHTS: [[u16; 13]; 12] = [\n{}];\n",
         rows.concat()
     )
 }

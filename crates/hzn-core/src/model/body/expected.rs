@@ -119,6 +119,12 @@ fn check<T: Real>(prior: &Prior<T>) -> Result<T, PriorError> {
     Ok(attitude_sigma)
 }
 
+/// Returns the second harmonic of cos α of the limb cone of an ellipsoid.
+fn second_harmonic_cos<T: Real>(cone: &LimbCone<T>) -> T {
+    let (east, meridian) = cone.half_angles_rad();
+    (meridian.sin_cos().1 - east.sin_cos().1) * T::from_f64(0.5)
+}
+
 /// Returns the prior attitude, if it is better than an unknown one.
 fn useful_attitude<T: Real>(prior: &Prior<T>, sigma_rad: T) -> Option<Rotation<Cam, Fixed, T>> {
     // An attitude with a larger error is worse than none: it would put the shape of the limb at a wrong azimuth, and
@@ -199,7 +205,7 @@ impl<T: Real> Expected<T> {
     // sigma are kept apart, because clipping adds its own later and `hzn explain` prints each of them.
     fn of_limb(body: &Config, prior: &Prior<T>, attitude_sigma: T) -> Result<Self, PriorError> {
         let km = T::from_f64(1000.0);
-        let is_placed = prior.position_m.is_some() && prior.year_part.is_some();
+        let is_placed = prior.is_placed();
         let limb_sigma = T::from_f64(body.limb_sigma_km(is_placed)) * km;
         let seen = ApparentBody::new(body, prior)?;
         let ApparentBody { sin, limb, .. } = seen;
@@ -210,14 +216,10 @@ impl<T: Real> Expected<T> {
         let cos = cos2.sqrt();
         let free = body.half_angle_is_free();
         let altitude_sigma = if free { T::zero() } else { T::from_f64(body.altitude_sigma_km) * km };
-        let tan = sin / cos;
-        let scale = tan / (seen.radius + seen.altitude);
+        let scale = sin / cos / (seen.radius + seen.altitude);
         let known = useful_attitude(prior, attitude_sigma);
         let harmonics_cos = seen.harmonics.map(|h| -scale * h);
-        let own = seen.ellipsoid.as_ref().map_or(T::zero(), |cone: &LimbCone<T>| {
-            let (east, meridian) = cone.half_angles_rad();
-            (meridian.sin_cos().1 - east.sin_cos().1) * T::from_f64(0.5)
-        });
+        let own = seen.ellipsoid.as_ref().map_or(T::zero(), second_harmonic_cos);
         // An attitude error ψ leaves k ψ of the k-th harmonic.
         let left = |k: f64| known.map_or(T::one(), |_| (attitude_sigma * T::from_f64(k)).min(T::one()));
         let uneven = |k: f64, amplitude: T| amplitude.abs() * left(k);

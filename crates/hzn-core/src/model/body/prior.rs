@@ -61,6 +61,13 @@ pub struct Prior<T> {
     pub rate_rad_s: Option<[T; 3]>,
 }
 
+impl<T> Prior<T> {
+    /// Returns whether place and season are known.
+    pub(super) fn is_placed(&self) -> bool {
+        self.position_m.is_some() && self.year_part.is_some()
+    }
+}
+
 /// The answer to an earlier picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Last<T> {
