@@ -29,7 +29,7 @@ pub(crate) fn write_sensor_toml(known: &Known, picture: &[u8]) -> Result<Value, 
         let (decoded, _) = Payload::Encoded(picture.to_vec()).decode(None)?;
         match find_field_of_view(&[(decoded, None)], &facts).as_slice() {
             [found] => {
-                (facts.lens, facts.measured) = (Some(found.lens), Some(found.measured.clone()));
+                (facts.lens, facts.measured) = (Some(found.lens), Some(found.measured));
                 from = "the limb in the picture";
             }
             [] => {}
