@@ -7,7 +7,8 @@ book/theory/limb.md describes the model. `--cell MONTH LATITUDE` prints one heig
 - Air: NRLMSIS 2.1 at medium solar activity, mean of four longitudes at one time of day, so that tides cancel.
 - Lines: the nu2 band of CO2, its hot bands and its isotopologues, from band origins and rotational constants. The
   strength of the main band is 8.2e-18 cm per molecule at 296 K. The others follow from the harmonic oscillator and the
-  isotopic abundances; the 10001/10002 pair shares its strength 28:22, as in published tables.
+  isotopic abundances; the 10001/10002 pair shares its strength 28:22. These numbers are rounded and come from no line
+  database, so that 10 % of the strength is a part of the sigma.
 - Shape: Voigt, with Lorentz widths of 0.092 to 0.060 cm-1/atm that fall with the rotational number, times (296/T)^0.7.
 - Radiance: sum of layers of 2 km along the straight tangent path in local thermal equilibrium, with 420 ppm of CO2.
 - Height: where the radiance through the filter is half of its largest value over tangent heights up to 40 km.
