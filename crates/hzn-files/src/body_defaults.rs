@@ -138,7 +138,7 @@ mod tests {
         let camera = "[camera]\nwidth = 64\nheight = 48\nfx_px = 60.0\nfy_px = 60.0\ncx_px = 31.5\ncy_px = 23.5\n";
         let both = format!("{camera}[body]\nlimb = \"co2-15um\"\nlimb_height_km = 25\n");
         let refused = crate::sensor::parse(&both, Path::new("s.toml")).unwrap_err().to_string();
-        assert!(refused.contains("s.toml:8: [body] limb: the band gives the limb height: remove"), "{refused}");
+        assert!(refused.contains("s.toml:9: [body] limb: the band gives the limb height: remove"), "{refused}");
         let written = crate::sensor::parse(&format!("{camera}[body]\nlimb = \"co2-15um\"\n"), Path::new("s.toml"));
         let config = written.unwrap().config;
         let again = crate::sensor::parse(&crate::sensor::to_text(&config).unwrap(), Path::new("s.toml")).unwrap();

@@ -202,7 +202,8 @@ mod tests {
     #[test]
     fn every_section_has_a_card_and_every_stage() {
         for key in hzn_files::keys::all() {
-            let elsewhere = ["", "mount", "bodies"];
+            // The viewer searches each picture by itself, so that `[track]` changes nothing that it shows.
+            let elsewhere = ["", "mount", "bodies", "track"];
             let shown = CARDS.iter().any(|c| c.sections.contains(&key.section()));
             assert!(shown || elsewhere.contains(&key.section()), "{}", key.path);
         }

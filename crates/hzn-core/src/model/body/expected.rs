@@ -204,8 +204,7 @@ impl<T: Real> Expected<T> {
     // altitude is left out for a free half-angle, because this angle says nothing about the distance. The parts of the
     // sigma are kept apart, because clipping adds its own later and `hzn explain` prints each of them.
     fn of_limb(body: &Config, prior: &Prior<T>, attitude_sigma: T) -> Result<Self, PriorError> {
-        let km = T::from_f64(1000.0);
-        let is_placed = prior.is_placed();
+        let (km, is_placed) = (T::from_f64(1000.0), prior.is_placed());
         let limb_sigma = T::from_f64(body.limb_sigma_km(is_placed)) * km;
         let seen = ApparentBody::new(body, prior)?;
         let ApparentBody { sin, limb, .. } = seen;
