@@ -1,12 +1,22 @@
 //! Results of `hzn fuse` over time: the attitude with its sigmas, and the innovations.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use hzn_fuse::read_back::{Solution, State};
 use hzn_fuse::sink::Phase;
 
 /// Name of the plot of innovations.
 pub const INNOVATIONS: &str = "Nav: innovations";
+
+/// Sources of innovations that are no cameras.
+const OTHER_SOURCES: [&str; 2] = ["gnss", "star-tracker"];
+
+/// Largest difference between a measurement and its picture, as a part of the time between two pictures. Of times that
+/// have nothing to do with each other, a fifth is this close.
+const SAME_TIME: f64 = 0.1;
+/// The difference that two files of one flight may have by rounding, s.
+const LEAST_ROOM_S: f64 = 1e-3;
 
 /// Function that returns a value of a solution.
 pub type StateValue = fn(&State) -> Option<f64>;
@@ -75,6 +85,12 @@ pub struct InnovationSeries {
 pub struct Navigation {
     /// Name of the file.
     pub file: String,
+    /// Folder of the file.
+    pub folder: PathBuf,
+    /// Names of the cameras.
+    pub cameras: Vec<String>,
+    /// Times at which the filter used a direction of a camera, s.
+    camera_times_s: Vec<f64>,
     filter: Vec<State>,
     smoothed: Vec<State>,
     back: Vec<State>,
@@ -103,8 +119,13 @@ impl Navigation {
             series.components.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         }
         innovations.sort_by(|a, b| a.name.cmp(&b.name));
+        let of_cameras = || solution.innovations.iter().filter(|i| !OTHER_SOURCES.contains(&i.source.as_str()));
+        let cameras: BTreeSet<&str> = of_cameras().map(|i| i.source.as_str()).collect();
         Self {
             file: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+            folder: path.parent().map(Path::to_owned).unwrap_or_default(),
+            cameras: cameras.into_iter().map(str::to_owned).collect(),
+            camera_times_s: of_cameras().map(|i| i.time_s).collect(),
             filter: of(Phase::Filter),
             smoothed: of(Phase::Smoothed),
             back: of(Phase::Back),
@@ -126,6 +147,33 @@ impl Navigation {
         let after = self.filter.partition_point(|s| s.time_s < time_s);
         let candidates = self.filter.get(after.saturating_sub(1)..(after + 1).min(self.filter.len()))?;
         candidates.iter().min_by(|a, b| (a.time_s - time_s).abs().total_cmp(&(b.time_s - time_s).abs()))
+    }
+
+    /// Returns true if the results are of these pictures: a camera has the name `camera`, or the cameras took pictures
+    /// when these were taken. Flights of one scene last as long as each other, so that a common span alone says little.
+    /// Results without any direction of a camera are of these pictures if they have a time in common.
+    pub fn is_of(&self, camera: &str, times_s: &[f64]) -> bool {
+        if self.cameras.iter().any(|name| name == camera) {
+            return true;
+        }
+        let mut sorted = times_s.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let (Some(first), Some(last), Some([from, to])) = (sorted.first(), sorted.last(), self.span_s()) else {
+            return false;
+        };
+        let step = (last - first) / (sorted.len().max(2) - 1) as f64;
+        if self.cameras.is_empty() {
+            return from <= last + step && *first <= to + step;
+        }
+        let room = (SAME_TIME * step).max(LEAST_ROOM_S);
+        let during = || self.camera_times_s.iter().filter(|t| (first - room..=last + room).contains(*t));
+        let is_at_a_picture = |t: &&f64| {
+            let after = sorted.partition_point(|x| x < *t);
+            let near = &sorted[after.saturating_sub(1)..(after + 1).min(sorted.len())];
+            near.iter().any(|x| (x - **t).abs() <= room)
+        };
+        let at_pictures = during().filter(is_at_a_picture).count();
+        at_pictures > 0 && 2 * at_pictures > during().count()
     }
 
     /// Returns the first and the last time of all solutions, s.
@@ -178,6 +226,18 @@ mod tests {
         assert_eq!(series.components[0], Component { time_s: 1.0, sigmas: 2.0, taken: false });
         let empty = Navigation::default();
         assert!(empty.nearest(1.0).is_none() && empty.span_s().is_none());
+    }
+
+    #[test]
+    fn results_belong_to_pictures_of_their_times_or_name() {
+        let nav = Navigation::new(Path::new("a/nav.mcap"), &solution(&[60.0, 70.0, 80.0, 90.0]));
+        assert_eq!((nav.cameras.as_slice(), nav.folder.as_path()), (&["left".to_owned()][..], Path::new("a")));
+        assert!(nav.is_of("flight", &[60.5, 70.0, 80.0, 90.0]) && nav.is_of("left", &[7.0]));
+        // The ends are the same, and the pictures between them are others.
+        assert!(!nav.is_of("flight", &[60.0, 67.5, 75.0, 82.5, 90.0]));
+        assert!(!nav.is_of("flight", &[560.0, 570.0]) && !nav.is_of("flight", &[]));
+        let without = Navigation::new(Path::new("nav.csv"), &Solution { innovations: Vec::new(), ..solution(&[5.0]) });
+        assert!(without.is_of("flight", &[4.0, 6.0]) && !without.is_of("flight", &[40.0, 41.0]));
     }
 
     #[test]

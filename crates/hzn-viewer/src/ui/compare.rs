@@ -10,6 +10,9 @@ use crate::work::frame_view::BodyResult;
 /// Function that returns the text of a column in one line of the table.
 type Line = fn(&Column) -> &str;
 
+/// Name of the sensor whose parameters are changed here, next to that of the other one.
+pub(super) const OURS: &str = "this sensor.toml";
+
 /// One value of both answers, and the difference.
 struct Column {
     name: &'static str,
@@ -118,7 +121,7 @@ fn table(ui: &mut Ui, name: &str, columns: &[Column]) {
         });
         ui.end_row();
         let lines: [(&str, Line); 3] =
-            [("session", |c| &c.session), (name, |c| &c.other), ("difference", |c| &c.difference)];
+            [(OURS, |c| &c.session), (name, |c| &c.other), ("difference", |c| &c.difference)];
         for (name, text_of) in lines {
             ui.weak(RichText::new(name).size(12.0));
             for column in columns {

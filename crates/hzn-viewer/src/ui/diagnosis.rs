@@ -15,6 +15,10 @@ use crate::work::trials::OtsuTrial;
 
 /// Difference of the half-angles from which the table of causes is shown, in standard deviations.
 const CONSPICUOUS: f64 = 3.0;
+/// What a picture without a usable altitude needs.
+const NOT_PROCESSED: &str = "The picture is not processed: the altitude says how large the limb is. Set \
+                             body.altitude_km if it is the same in all pictures. Otherwise write the columns file and \
+                             altitude_km into frames.csv next to the pictures, and reload them (F5).";
 /// Number of frames that together say something about a cause.
 const ENOUGH: usize = 3;
 
@@ -42,6 +46,13 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         ui.strong("Diagnosis");
         if let Some(cause) = answer.cause.and_then(|c| c.reason) {
             ui.label(format!("{}: {}", answer.row.status, cause.name()));
+        }
+        // The sensor has not looked at the picture, so the reason is all there is to say.
+        if let Err(why) = &answer.report {
+            links::tip(viewer, ui, why);
+            if answer.row.status == Status::NoAltitude {
+                wrapped(ui, NOT_PROCESSED);
+            }
         }
         if let Some(otsu) = answer.otsu.filter(|_| refused) {
             threshold_cause(viewer, ui, &answer, otsu);

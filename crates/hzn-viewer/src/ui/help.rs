@@ -1,12 +1,20 @@
 //! The help: a list of all keys.
 
-use egui::{RichText, vec2};
+use egui::gui_zoom::kb_shortcuts::{ZOOM_IN, ZOOM_OUT, ZOOM_RESET};
+use egui::{KeyboardShortcut, RichText, vec2};
 
 use super::command;
 use super::viewer::Viewer;
 
 /// Width in points from which the list of keys has two columns.
 const TWO_COLUMNS: f32 = 640.0;
+
+/// Keys that the library of the window handles.
+const TEXT_SIZE: [(KeyboardShortcut, &str); 3] = [
+    (ZOOM_IN, "Larger text and buttons"),
+    (ZOOM_OUT, "Smaller text and buttons"),
+    (ZOOM_RESET, "Text and buttons of the usual size"),
+];
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     if !viewer.showing_help {
@@ -31,11 +39,14 @@ fn contents(ui: &mut egui::Ui) {
     let across = egui::Layout::left_to_right(egui::Align::Min);
     let layout = if ui.available_width() < TWO_COLUMNS { egui::Layout::top_down(egui::Align::Min) } else { across };
     ui.with_layout(layout, |ui| {
-        let half = command::ALL.len().div_ceil(2);
-        for (n, part) in command::ALL.chunks(half).enumerate() {
+        let ctx = ui.ctx();
+        let commands = command::ALL.iter().map(|(c, name, ..)| (c.key(ctx), *name));
+        let keys: Vec<(String, &str)> =
+            commands.chain(TEXT_SIZE.iter().map(|(key, name)| (ctx.format_shortcut(key), *name))).collect();
+        for (n, part) in keys.chunks(keys.len().div_ceil(2)).enumerate() {
             egui::Grid::new(("keys", n)).num_columns(2).spacing(vec2(14.0, 4.0)).show(ui, |ui| {
-                for (c, name, ..) in part {
-                    ui.label(RichText::new(c.key(ui.ctx())).monospace().strong());
+                for (key, name) in part {
+                    ui.label(RichText::new(key).monospace().strong());
                     ui.label(*name);
                     ui.end_row();
                 }

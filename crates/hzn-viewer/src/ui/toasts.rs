@@ -12,7 +12,11 @@ const NOTICED_AFTER: Duration = Duration::from_millis(200);
 /// Largest width of a message, in points.
 const WIDTH: f32 = 420.0;
 
-/// Draws them at the lower right of the picture's area.
+/// Room in points for the text at the foot of the picture, which has up to two lines. It is always left free, because
+/// a message that moved away from the pointer could not be closed.
+const FOOT: f32 = 56.0;
+
+/// Draws them at the lower right of the picture's area, above the text at its foot.
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, area: egui::Rect) {
     if let Some(next) = viewer.toasts.expire(Instant::now()) {
         ctx.request_repaint_after(next);
@@ -28,7 +32,7 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, area: egui::Rect) {
     Area::new(Id::unique("toasts"))
         .order(Order::Foreground)
         .pivot(Align2::RIGHT_BOTTOM)
-        .fixed_pos(area.right_bottom() - vec2(8.0, 8.0))
+        .fixed_pos(area.right_bottom() - vec2(8.0, FOOT))
         .show(ctx, |ui| {
             ui.set_width(width);
             messages(viewer, ui);

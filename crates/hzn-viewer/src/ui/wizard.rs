@@ -61,7 +61,11 @@ fn questions(ui: &mut Ui, wizard: &mut Wizard) {
         ui.label("altitude");
         ui.horizontal(|ui| {
             ui.selectable_value(&mut wizard.one_altitude, true, "one for all pictures");
-            ui.selectable_value(&mut wizard.one_altitude, false, "from frames.csv");
+            let why = "There is no frames.csv with altitudes next to the pictures";
+            ui.add_enabled_ui(wizard.has_altitudes, |ui| {
+                let choice = ui.selectable_value(&mut wizard.one_altitude, false, "from frames.csv");
+                choice.on_disabled_hover_text(why);
+            });
         });
         ui.end_row();
         if wizard.one_altitude {

@@ -12,6 +12,8 @@ pub(super) struct Wizard {
     pub(super) states_fov: bool,
     pub(super) fov_deg: f64,
     pub(super) fisheye: bool,
+    /// The pictures have altitudes of their own, from frames.csv or a recording.
+    pub(super) has_altitudes: bool,
     /// All pictures have one altitude; otherwise frames.csv has them.
     pub(super) one_altitude: bool,
     pub(super) altitude_km: f64,
@@ -27,6 +29,7 @@ impl Wizard {
             states_fov: !known,
             fov_deg: 60.0,
             fisheye: false,
+            has_altitudes,
             one_altitude: !has_altitudes,
             altitude_km: 400.0,
         }

@@ -23,8 +23,8 @@ pub enum Kind {
 /// Something that was read.
 #[derive(Debug)]
 pub enum Companion {
-    /// Results of `hzn fuse`.
-    Navigation(Navigation),
+    /// Results of `hzn fuse`, and whether they must be proven to be of the shown pictures.
+    Navigation(Navigation, bool),
     /// Residuals of a lens calibration.
     Residuals(LensResiduals),
     /// A file cannot be read, for this reason.
@@ -45,28 +45,29 @@ pub fn kind_of(path: &Path) -> Option<Kind> {
 }
 
 /// Returns the files that belong to a sequence by their names: `nav.mcap` or `nav.csv`, and `residuals.csv`. They lie
-/// in one of these folders; the first one with a file counts.
-fn find(folders: &[PathBuf]) -> Vec<PathBuf> {
+/// in one of these folders; the first one with a file counts. The flag of a file is true if it does not lie in `own`,
+/// the folder of these pictures alone.
+fn find(folders: &[PathBuf], own: Option<&Path>) -> Vec<(PathBuf, bool)> {
     let navigation = folders.iter().find_map(|folder| read_back::find_solution(folder));
     let residuals = folders.iter().find_map(|folder| residual_table::find(folder));
-    navigation.into_iter().chain(residuals).collect()
+    navigation.into_iter().chain(residuals).map(|path| (path.clone(), path.parent() != own)).collect()
 }
 
-/// Starts to look in these folders and to read what is found.
-pub fn search(folders: Vec<PathBuf>, wake: Wake) -> Receiver<Companion> {
-    start(move || find(&folders), wake)
+/// Starts to look in these folders and to read what is found. `own` is the folder that has these pictures alone.
+pub fn search(folders: Vec<PathBuf>, own: Option<PathBuf>, wake: Wake) -> Receiver<Companion> {
+    start(move || find(&folders, own.as_deref()), wake)
 }
 
 /// Starts to read a file that the user chose.
 pub fn load(path: PathBuf, wake: Wake) -> Receiver<Companion> {
-    start(move || vec![path], wake)
+    start(move || vec![(path, false)], wake)
 }
 
-fn start(paths: impl FnOnce() -> Vec<PathBuf> + Send + 'static, wake: Wake) -> Receiver<Companion> {
+fn start(paths: impl FnOnce() -> Vec<(PathBuf, bool)> + Send + 'static, wake: Wake) -> Receiver<Companion> {
     let (send, receive) = unbounded();
     std::thread::spawn(move || {
-        for path in paths() {
-            if send.send(read(&path)).is_err() {
+        for (path, is_doubtful) in paths() {
+            if send.send(read(&path, is_doubtful)).is_err() {
                 return;
             }
             wake();
@@ -75,10 +76,10 @@ fn start(paths: impl FnOnce() -> Vec<PathBuf> + Send + 'static, wake: Wake) -> R
     receive
 }
 
-fn read(path: &Path) -> Companion {
+fn read(path: &Path, is_doubtful: bool) -> Companion {
     let read = match kind_of(path) {
         Some(Kind::Navigation) => read_back::read_solution(path)
-            .map(|solution| Companion::Navigation(Navigation::new(path, &solution)))
+            .map(|solution| Companion::Navigation(Navigation::new(path, &solution), is_doubtful))
             .map_err(|e| e.to_string()),
         Some(Kind::Residuals) => residual_table::read(path).map_err(|e| e.to_string()).map(|rows| {
             let arrow = |r: hzn_calib::board::Residual| Arrow { at: r.at_px, error: r.error_px, counts: r.counts };

@@ -12,9 +12,12 @@ const NAV: &str = "time_s,phase,qw,yaw_deg,pitch_deg,roll_deg,sigma_x_deg,sigma_
 const INNOVATIONS: &str =
     "time_s,source,kind,first,second,third,first_sigma,second_sigma,third_sigma,unit,nis,taken,angle_deg\n";
 
-/// Writes times of the pictures, which begin at 100 s.
-fn write_times(pictures: &Path) {
-    let rows: String = (0..4).map(|n| format!("{n}.png,{}\n", 100 + n)).collect();
+/// Times of the pictures at which the cameras of [`write_navigation`] measure, s.
+const TIMES_S: [f64; 4] = [100.0, 101.0, 102.0, 103.0];
+
+/// Writes times of the pictures, s.
+fn write_times(pictures: &Path, times_s: [f64; 4]) {
+    let rows: String = (0..4).zip(times_s).map(|(n, t)| format!("{n}.png,{t}\n")).collect();
     std::fs::write(pictures.join("frames.csv"), format!("file,time_s\n{rows}")).unwrap();
 }
 
@@ -38,7 +41,7 @@ fn offers(window: &Window, plot: &str) -> bool {
 #[test]
 fn results_of_fuse_are_plotted_with_the_pictures() {
     let (dir, pictures) = folder();
-    write_times(&pictures);
+    write_times(&pictures, TIMES_S);
     write_navigation(dir.path(), 99.0);
     // The results lie next to the folder of pictures.
     let mut window = window_on(&pictures);
@@ -76,15 +79,51 @@ fn a_sequence_without_such_results_offers_none() {
 
 #[test]
 fn results_on_another_clock_say_so() {
-    let (dir, pictures) = folder();
-    write_times(&pictures);
-    write_navigation(dir.path(), 5000.0);
+    let (_dir, pictures) = folder();
+    write_times(&pictures, TIMES_S);
+    // In the folder of the pictures, the user has put them there.
+    write_navigation(&pictures, 5000.0);
     let mut window = window_on(&pictures);
     said(&mut window, "nav.csv");
     window.state_mut().settings_mut().plotted = vec!["Nav: attitude".to_owned()];
     window.run_steps(4);
     let why = window.query_by_label_contains("their clocks have other epochs");
     assert!(why.is_some());
+}
+
+/// The span is the same, and the pictures were taken at other times.
+#[test]
+fn results_of_other_pictures_are_named_and_not_shown() {
+    for times_s in [[100.0, 100.6, 101.5, 103.0], [7.0, 8.0, 9.0, 10.0]] {
+        let (dir, pictures) = folder();
+        write_times(&pictures, times_s);
+        write_navigation(dir.path(), 99.0);
+        let mut window = window_on(&pictures);
+        said(&mut window, "is of other pictures than these and is not shown");
+        let words = format!("nav.csv in {} (camera left), 99.0 to 102.8 s", dir.path().display());
+        assert!(window.state().messages().any(|m| m.starts_with(&words)), "{words}");
+        window.run_steps(4);
+        assert!(!offers(&window, "Nav: attitude"));
+        // The user knows better.
+        open(&mut window, &dir.path().join("nav.csv"));
+        said(&mut window, "nav.csv: the plots “Nav: …” show these results of hzn fuse (camera left).");
+        window.run_steps(4);
+        assert!(offers(&window, "Nav: attitude"));
+    }
+}
+
+#[test]
+fn results_next_to_a_recording_are_shown_if_a_camera_has_its_name() {
+    let (dir, pictures) = folder();
+    write_navigation(dir.path(), 99.0);
+    let mut window = window_on(&pictures);
+    for (name, words) in [("left.mcap", "nav.csv: the plots"), ("right.mcap", "is of other pictures than these")] {
+        let recording = dir.path().join(name);
+        run_into(&mut window, &recording);
+        open(&mut window, &recording);
+        until(&mut window, "not opened", |v| v.sequence().inputs == [recording.clone()] && v.is_settled());
+        said(&mut window, words);
+    }
 }
 
 #[test]

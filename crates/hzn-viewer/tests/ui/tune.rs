@@ -100,7 +100,7 @@ fn two_presets_stand_side_by_side() {
     let [a, b] = [0, 1].map(|i| frame_view(&window).answers[i].clone());
     assert_ne!(a.config, b.config);
     assert_eq!(a.config.camera, b.config.camera);
-    assert!(window.query_by_label("Compared with dlr-2022").is_some());
+    assert!(window.query_by_label("Compared with preset dlr-2022").is_some());
 }
 
 #[test]

@@ -11,6 +11,7 @@ pub(super) use circle::remove as remove_circle;
 
 use egui::{Align2, Color32, FontId, PointerButton, Rect, Response, Sense, Ui, Vec2, pos2, vec2};
 
+use super::compare;
 use super::placement::{Placement, area};
 use super::theme;
 use super::viewer::Viewer;
@@ -76,20 +77,23 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
         draw_tools(viewer, ui, &painter, frame_view, &placement);
     }
     if let Some(name) = viewer.other.as_ref().map(|(name, _)| name.clone()) {
-        let title = if pane == 0 { "session".to_owned() } else { name };
+        let title = if pane == 0 { compare::OURS.to_owned() } else { name };
         label(&painter, rect.left_top() + vec2(10.0, 10.0), Align2::LEFT_TOP, &title);
-    }
-    if !viewer.layers_hidden {
-        let percent = 100.0 * placement.scale() * f64::from(ui.ctx().pixels_per_point());
-        label(&painter, rect.right_bottom() - vec2(10.0, 10.0), Align2::RIGHT_BOTTOM, &format!("{percent:.0} %"));
     }
     if let Some(refused) = outcome.and_then(|o| o.refused.as_deref()) {
         notice(&painter, rect, refused, ui.visuals().warn_fg_color);
     }
-    if let Some(at) = response.hover_pos()
-        && let Some(text) = read_out::under_pointer(frame_view, outcome.map(|o| &**o), viewer.body, &placement, at)
-    {
-        label(&painter, rect.left_bottom() + vec2(10.0, -10.0), Align2::LEFT_BOTTOM, &text);
+    let text = response
+        .hover_pos()
+        .and_then(|at| read_out::under_pointer(frame_view, outcome.map(|o| &**o), viewer.body, &placement, at));
+    let foot = rect.left_bottom() + vec2(10.0, -10.0);
+    let described = text.map(|text| label(&painter, foot, Align2::LEFT_BOTTOM, &text));
+    if !viewer.layers_hidden {
+        let percent = 100.0 * placement.scale() * f64::from(ui.ctx().pixels_per_point());
+        // The badge gives way to a long text at the foot of the picture.
+        let foot = described.map_or(rect.bottom(), |text| text.top());
+        let at = pos2(rect.right() - 10.0, foot - 10.0);
+        label(&painter, at, Align2::RIGHT_BOTTOM, &format!("{percent:.0} %"));
     }
 }
 

@@ -75,13 +75,14 @@ pub(super) fn under_pointer(
     Some(text)
 }
 
-/// Draws text on a background that makes it readable on every picture.
-pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) {
+/// Draws text on a background that makes it readable on every picture, and returns its place.
+pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) -> Rect {
     let width = painter.clip_rect().width() - 30.0;
     let galley = painter.layout(text.to_owned(), FontId::proportional(12.5), Color32::from_rgb(236, 238, 242), width);
     let rect = align.anchor_size(at, galley.size() + vec2(14.0, 8.0));
     painter.rect_filled(rect, 5, Color32::from_black_alpha(190));
     painter.galley(rect.min + vec2(7.0, 4.0), galley, Color32::WHITE);
+    rect
 }
 
 /// Draws an error message across the middle of the picture.

@@ -14,10 +14,10 @@ pub(super) fn axis_labels(unit: &'static str) -> impl Fn(GridMark, &RangeInclusi
 }
 
 /// Returns about `count` grid lines, at 1, 2 or 5 times a power of ten. A single line would not show the scale, so
-/// there are more of them then.
-pub(super) fn ticks(input: GridInput, count: f64) -> Vec<GridMark> {
+/// there are up to about `most` of them then.
+pub(super) fn ticks(input: GridInput, count: f64, most: f64) -> Vec<GridMark> {
     let marks = grid(input.bounds, count);
-    if marks.len() == 1 { grid(input.bounds, 2.0 * count) } else { marks }
+    if marks.len() == 1 { grid(input.bounds, most.max(count)) } else { marks }
 }
 
 fn grid((low, high): (f64, f64), count: f64) -> Vec<GridMark> {
@@ -163,12 +163,12 @@ mod tests {
     #[test]
     fn ticks_are_round_numbers() {
         let tick_values = |low: f64, high: f64| -> Vec<f64> {
-            ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }, 4.0).iter().map(|m| m.value).collect()
+            ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }, 4.0, 8.0).iter().map(|m| m.value).collect()
         };
         assert_eq!(tick_values(0.0, 10.0), [0.0, 5.0, 10.0]);
         assert_eq!(tick_values(-0.9, 7.2), [0.0, 5.0]);
         // One line at 0 would not show the scale.
-        let few = ticks(GridInput { bounds: (-190.0, 190.0), base_step_size: 0.0 }, 2.0);
+        let few = ticks(GridInput { bounds: (-190.0, 190.0), base_step_size: 0.0 }, 2.0, 4.0);
         assert_eq!(few.iter().map(|m| m.value).collect::<Vec<_>>(), [-100.0, 0.0, 100.0]);
         assert_eq!(tick_values(100.0, 103.5), [100.0, 101.0, 102.0, 103.0]);
         assert!(tick_values(1.0, 1.0).is_empty() && tick_values(f64::NAN, 1.0).is_empty());
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn no_two_ticks_read_the_same() {
         for (low, high) in [(0.08, 0.13), (100.2, 100.3), (0.0, 1.0), (-3e-5, 4e-5), (0.0, 2400.0)] {
-            let marks = ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }, 4.0);
+            let marks = ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }, 4.0, 8.0);
             let labels: Vec<String> = marks.iter().map(|m| tick_label(m.value, m.step_size)).collect();
             let distinct: std::collections::HashSet<_> = labels.iter().collect();
             assert!(labels.len() > 1 && distinct.len() == labels.len(), "{labels:?}");

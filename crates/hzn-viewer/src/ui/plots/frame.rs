@@ -1,12 +1,17 @@
 //! The parts that all plots share.
 
-use egui::{Color32, Rangef, Response, RichText, Ui, vec2};
+use egui::{Color32, FontId, Rangef, Response, RichText, Ui, vec2};
 use egui_plot::{AxisHints, Plot};
 
 use super::axis::{tick_label, ticks};
 
 /// Width of the labels of the y axis, so that the plots in rows lie exactly below each other.
 pub(super) const LABELS_WIDTH: f32 = 52.0;
+
+/// Size of the labels of the y axis.
+const LABEL_SIZE: f32 = 11.0;
+/// Height of such a label. The plot leaves out labels whose lines are closer than this.
+const LABEL_HEIGHT: f32 = 15.0;
 
 /// Draws title, legend and values of a plot above it, because a legend inside would cover the lines.
 pub(super) fn heading(ui: &mut Ui, title: &str, lines: &[(&str, Color32)], values: &str) {
@@ -39,12 +44,15 @@ pub(super) fn shared_plot<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> 
         .allow_scroll(false)
         // There are few grid lines, and all of them are faint, so that the curve stands out.
         .grid_spacing(Rangef::new(8.0, 1500.0))
-        .x_grid_spacer(|input| ticks(input, 8.0))
-        .y_grid_spacer(move |input| ticks(input, if height < 90.0 { 3.0 } else { 4.0 }))
+        .x_grid_spacer(|input| ticks(input, 8.0, 16.0))
+        .y_grid_spacer(move |input| {
+            ticks(input, if height < 90.0 { 3.0 } else { 4.0 }, f64::from(height / LABEL_HEIGHT))
+        })
         .custom_y_axes(vec![
             AxisHints::new_y()
                 .formatter(|mark, _| tick_label(mark.value, mark.step_size))
                 .min_thickness(LABELS_WIDTH)
+                .tick_label_font(FontId::proportional(LABEL_SIZE))
                 // A low plot has labels, too.
                 .label_spacing(Rangef::new(7.0, 10.0)),
         ])

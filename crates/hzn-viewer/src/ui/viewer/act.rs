@@ -129,7 +129,7 @@ impl Viewer {
 
     pub(in crate::ui) fn compare_with_preset(&mut self, preset: Preset) {
         if let Some(session) = &self.session {
-            self.other = Some((preset.name().to_owned(), session.under_preset(preset)));
+            self.other = Some((format!("preset {}", preset.name()), session.under_preset(preset)));
         }
     }
 

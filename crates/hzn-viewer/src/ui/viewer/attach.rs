@@ -7,6 +7,7 @@ use crossbeam_channel::TryRecvError;
 
 use super::Viewer;
 use super::companions::Companions;
+use crate::model::Navigation;
 use crate::model::settings::Layer;
 use crate::work::companion::{self, Companion};
 
@@ -17,7 +18,10 @@ impl Viewer {
         let beside = self.sequence.default_output_path("nav.mcap");
         let folders = [Some(self.sequence.folder.as_path()), beside.parent()];
         let folders = folders.into_iter().flatten().map(Path::to_owned).collect();
-        let reading = vec![companion::search(folders, Arc::clone(&self.wake))];
+        // Only a folder of pictures is theirs alone; next to a recording lie others.
+        let is_folder = self.sequence.inputs.iter().any(|input| input.is_dir());
+        let own = is_folder.then(|| self.sequence.folder.clone());
+        let reading = vec![companion::search(folders, own, Arc::clone(&self.wake))];
         self.companions = Companions { reading, ..Companions::default() };
     }
 
@@ -45,10 +49,8 @@ impl Viewer {
         });
         for companion in read {
             match companion {
-                Companion::Navigation(navigation) => {
-                    self.add_note(format!("{}: the plots “Nav: …” show these results of hzn fuse.", navigation.file));
-                    self.companions.navigation = Some(navigation);
-                }
+                Companion::Navigation(navigation, true) => self.companions.doubtful = Some(navigation),
+                Companion::Navigation(navigation, false) => self.take_navigation(navigation),
                 Companion::Residuals(residuals) => {
                     let what = "the overlay “Lens residuals” shows these residuals of a calibration";
                     self.add_note(format!("{}: {what}.", residuals.file));
@@ -57,5 +59,40 @@ impl Viewer {
                 Companion::Failed(why) => self.add_problem(why),
             }
         }
+        // The times of a recording are known when all of it is listed.
+        if self.sequence.complete
+            && let Some(navigation) = self.companions.doubtful.take()
+        {
+            self.take_if_of_these(navigation);
+        }
+    }
+
+    fn take_navigation(&mut self, navigation: Navigation) {
+        let what = "the plots “Nav: …” show these results of hzn fuse";
+        self.add_note(format!("{}: {what}{}.", navigation.file, of_cameras(&navigation)));
+        self.companions.navigation = Some(navigation);
+    }
+
+    /// Takes results that lie among those of other pictures, if they are of these.
+    fn take_if_of_these(&mut self, navigation: Navigation) {
+        let times_s: Vec<f64> = self.sequence.entries.iter().filter_map(|e| e.time_s).collect();
+        if navigation.is_of(self.sequence.stem(), &times_s) {
+            return self.take_navigation(navigation);
+        }
+        let (file, folder, cameras) = (&navigation.file, navigation.folder.display(), of_cameras(&navigation));
+        let span = navigation.span_s().map(|[from, to]| format!(", {from:.1} to {to:.1} s")).unwrap_or_default();
+        self.add_note(format!(
+            "{file} in {folder}{cameras}{span} is of other pictures than these and is not shown. To see it, open it \
+             (File, Open file…)."
+        ));
+    }
+}
+
+/// Returns the cameras of results in words.
+fn of_cameras(navigation: &Navigation) -> String {
+    match navigation.cameras.as_slice() {
+        [] => String::new(),
+        [one] => format!(" (camera {one})"),
+        all => format!(" (cameras {})", all.join(", ")),
     }
 }

@@ -12,6 +12,8 @@ pub(in crate::ui) struct Companions {
     pub(in crate::ui) navigation: Option<Navigation>,
     /// Residuals of a lens calibration.
     pub(in crate::ui) residuals: Option<LensResiduals>,
+    /// Results from a folder that may also have results of other pictures.
+    pub(super) doubtful: Option<Navigation>,
     /// Files that are being read.
     pub(super) reading: Vec<Receiver<Companion>>,
 }
@@ -19,6 +21,6 @@ pub(in crate::ui) struct Companions {
 impl Companions {
     /// Returns true while files are being read.
     pub(in crate::ui) fn is_reading(&self) -> bool {
-        !self.reading.is_empty()
+        !self.reading.is_empty() || self.doubtful.is_some()
     }
 }

@@ -1,0 +1,161 @@
+//! Tests that the window says what is missing, and that nothing lies over what is to be read.
+
+use egui::epaint::Shape;
+use egui::{Key, Modifiers, Rect};
+use egui_kittest::kittest::{NodeT, Queryable};
+use hzn_core::status::Status;
+
+use crate::window::*;
+
+/// Returns all texts that are painted, with their places.
+fn painted(window: &Window) -> Vec<(String, Rect)> {
+    fn collect(shape: &Shape, clip: Rect, out: &mut Vec<(String, Rect)>) {
+        match shape {
+            Shape::Vec(all) => all.iter().for_each(|one| collect(one, clip, out)),
+            Shape::Text(text) => {
+                let rect = text.visual_bounding_rect();
+                if clip.intersects(rect) {
+                    out.push((text.galley.text().to_owned(), rect));
+                }
+            }
+            _ => {}
+        }
+    }
+    let mut out = Vec::new();
+    for clipped in &window.output().shapes {
+        collect(&clipped.shape, clipped.clip_rect, &mut out);
+    }
+    out
+}
+
+fn place_of(window: &Window, is_it: impl Fn(&str) -> bool) -> Rect {
+    let texts = painted(window);
+    texts.iter().find(|(text, _)| is_it(text)).unwrap_or_else(|| panic!("not painted: {texts:?}")).1
+}
+
+#[test]
+fn a_picture_without_an_altitude_says_what_it_needs() {
+    let (_dir, pictures) = folder();
+    std::fs::write(pictures.join("sensor.toml"), SENSOR.replace("altitude_km = 240.0", "")).unwrap();
+    let mut window = window_on(&pictures);
+    until(&mut window, "not processed", |v| v.processed() == 4 && !v.is_working());
+    assert_eq!(answer(&window).0, Status::NoAltitude);
+    for words in ["no altitude: set body.altitude_km", "write the columns file and altitude_km into frames.csv"] {
+        assert!(window.query_all_by_label_contains(words).next().is_some(), "{words}");
+    }
+    // The key is a link to its card.
+    window.get_by_label("body.altitude_km").click();
+    window.run_steps(20);
+    assert!(window.query_by_label("altitude_km").is_some());
+}
+
+#[test]
+fn the_form_offers_altitudes_of_a_file_only_if_there_are_some() {
+    for has_altitudes in [false, true] {
+        let (_dir, pictures) = folder();
+        std::fs::remove_file(pictures.join("sensor.toml")).unwrap();
+        if has_altitudes {
+            std::fs::write(pictures.join("frames.csv"), "file,altitude_km\n0.png,240\n").unwrap();
+        }
+        let mut window = window();
+        open(&mut window, &pictures);
+        until(&mut window, "not shown", |v| v.frame_view().is_some());
+        window.run_steps(3);
+        window.get_by_label("Make a sensor.toml…").click();
+        window.run_steps(4);
+        assert_eq!(window.get_by_label("from frames.csv").accesskit_node().is_disabled(), !has_altitudes);
+    }
+}
+
+#[test]
+fn every_plot_has_numbers_at_its_axis_at_every_height() {
+    let (_dir, pictures) = folder();
+    let mut window = sized_window(1440.0, 900.0);
+    open(&mut window, &pictures);
+    until(&mut window, "not processed", |v| v.processed() == 4 && !v.is_working());
+    let names = ["RMS", "3 sigma", "Half-angle", "Points", "Threshold"];
+    window.state_mut().settings_mut().plotted = names.map(str::to_owned).to_vec();
+    for height in [900.0, 920.0, 940.0, 960.0, 980.0, 1000.0, 1040.0, 1080.0, 1120.0] {
+        window.set_size(egui::vec2(1440.0, height));
+        window.run_steps(6);
+        let plot = window.get_by_label("Plot RMS").rect();
+        let texts = painted(&window);
+        let labels = texts.iter().filter(|(text, place)| {
+            text.parse::<f64>().is_ok()
+                && plot.y_range().contains(place.center().y)
+                && place.right() < plot.left() + 60.0
+        });
+        let heights: Vec<f32> = labels.map(|(_, place)| place.height()).collect();
+        assert!(!heights.is_empty(), "{height}: {plot:?}");
+        assert!(heights.iter().all(|h| *h <= 15.0), "the grid leaves room for 15 points: {heights:?}");
+    }
+}
+
+#[test]
+fn the_text_at_the_foot_of_the_picture_lies_over_nothing() {
+    let (_dir, pictures) = folder();
+    let header = "file,u_px,v_px,error_u_px,error_v_px,counts\n";
+    // A message that stays.
+    std::fs::write(pictures.join("residuals.csv"), format!("{header}0.png,100,x,0.3,0.4,1\n")).unwrap();
+    for size in [[1024.0, 768.0], [1440.0, 900.0]] {
+        let mut window = sized_window(size[0], size[1]);
+        open(&mut window, &pictures);
+        settled(&mut window);
+        said(&mut window, "residuals.csv:2");
+        let picture = window.get_by_label("Picture 0.png").rect();
+        window.event(egui::Event::PointerMoved(picture.center()));
+        window.run_steps(10);
+        let foot = place_of(&window, |text| text.contains("off axis"));
+        let message = place_of(&window, |text| text.contains("residuals.csv:2"));
+        assert!(message.bottom() < foot.top(), "{message:?} {foot:?}");
+        let badge = place_of(&window, |text| text.ends_with('%') && text.len() < 8);
+        assert!(!badge.expand(4.0).intersects(foot), "{badge:?} {foot:?}");
+        assert!(picture.contains_rect(badge) && picture.contains_rect(foot));
+    }
+}
+
+#[test]
+fn the_comparison_names_both_sensors_and_shows_its_last_line() {
+    let (dir, pictures) = folder();
+    let file = dir.path().join("other.toml");
+    std::fs::write(&file, SENSOR.replace("altitude_km = 240.0", "altitude_km = 900.0")).unwrap();
+    for size in [[1440.0, 900.0], [1024.0, 768.0]] {
+        let mut window = sized_window(size[0], size[1]);
+        open(&mut window, &pictures);
+        settled(&mut window);
+        menu(&mut window, "Compare", "with another sensor.toml…");
+        path(&mut window, &file, "Open this");
+        until(&mut window, "not compared", |v| v.results().other_len() == 4 && v.processed() == 4);
+        window.run_steps(20);
+        assert!(window.query_all_by_label("this sensor.toml").next().is_some());
+        let last = window.get_by_label_contains("Pictures whose status differs").rect();
+        let picture = window.query_all_by_label("Picture 0.png").next().unwrap().rect();
+        assert!(last.bottom() <= picture.top(), "{last:?} {picture:?}");
+        let clips = window.output().shapes.iter().filter(|s| {
+            matches!(&s.shape, Shape::Text(text)
+            if text.galley.text().starts_with("Pictures whose status differs"))
+        });
+        let clips: Vec<Rect> = clips.map(|s| s.clip_rect).collect();
+        assert!(!clips.is_empty() && clips.iter().all(|clip| clip.bottom() >= last.bottom()), "{clips:?} {last:?}");
+    }
+    let (_dir, mut window) = window_on_flight();
+    window.key_press(Key::X);
+    settled(&mut window);
+    assert!(window.query_by_label("Compared with preset hzn").is_some());
+}
+
+#[test]
+fn the_help_lists_the_keys_of_the_size_of_the_text() {
+    let (_dir, mut window) = window_on_flight();
+    window.key_press(Key::F1);
+    window.run_steps(4);
+    for name in ["Larger text and buttons", "Smaller text and buttons", "Text and buttons of the usual size"] {
+        assert!(window.query_by_label(name).is_some(), "{name}");
+    }
+    window.key_press(Key::F1);
+    window.run_steps(3);
+    let before = window.ctx.zoom_factor();
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Plus);
+    window.run_steps(3);
+    assert!(window.ctx.zoom_factor() > before, "the key does what the help says");
+}
