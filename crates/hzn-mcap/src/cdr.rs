@@ -1,6 +1,7 @@
 //! The part of ROS 2's CDR encoding that the two picture messages need.
 
 use crate::frame::EncodedImage;
+use crate::header::Header;
 use crate::messages::compressed_format;
 use crate::raw_images::raw_format;
 
@@ -45,27 +46,25 @@ impl<'a> Cdr<'a> {
         let n = self.u32()? as usize;
         self.bytes(n)
     }
-    /// Reads a std_msgs/Header and returns its time in seconds.
-    fn header(&mut self) -> Option<f64> {
-        let (s, ns) = (self.u32()? as i32, self.u32()?);
-        self.text()?;
-        Some(f64::from(s) + f64::from(ns) * 1e-9)
+    /// Reads a std_msgs/Header.
+    fn header(&mut self) -> Option<Header> {
+        let time = (self.u32()? as i32, self.u32()?);
+        Some(Header { time: Some(time), frame_id: self.text()?.to_owned() })
     }
 }
 
-/// Reads a picture and the time of its header, in seconds, from `sensor_msgs/msg/Image` or
-/// `sensor_msgs/msg/CompressedImage`.
-pub(crate) fn parse_image(schema: &str, message: &[u8]) -> Result<(EncodedImage, f64), String> {
+/// Reads a picture and its header from `sensor_msgs/msg/Image` or `sensor_msgs/msg/CompressedImage`.
+pub(crate) fn parse_image(schema: &str, message: &[u8]) -> Result<(EncodedImage, Header), String> {
     let short = || "the message ends too early".to_owned();
     let mut c = Cdr::try_new(message).ok_or_else(|| "unknown CDR encapsulation".to_owned())?;
-    let time_s = c.header().ok_or_else(short)?;
+    let head = c.header().ok_or_else(short)?;
     if schema == "sensor_msgs/msg/CompressedImage" {
         let (format, data) = c.text().zip(c.blob()).ok_or_else(short)?;
-        return Ok((EncodedImage { format: compressed_format(format), bytes: data.to_vec() }, time_s));
+        return Ok((EncodedImage { format: compressed_format(format), bytes: data.to_vec() }, head));
     }
     let fields = (|| Some((c.u32()?, c.u32()?, c.text()?, c.u8()?, c.u32()?, c.blob()?)))();
     let (height, width, encoding, big_endian, step, data) = fields.ok_or_else(short)?;
-    Ok((raw_format(width, height, step, encoding, big_endian != 0, data)?, time_s))
+    Ok((raw_format(width, height, step, encoding, big_endian != 0, data)?, head))
 }
 
 #[cfg(test)]
@@ -99,8 +98,9 @@ mod tests {
     #[test]
     fn a_ros_image_is_read_and_a_cut_one_is_not() {
         let m = message();
-        let (image, time_s) = parse_image("sensor_msgs/msg/Image", &m).unwrap();
-        assert_eq!((image.format, image.bytes, time_s), (ImageFormat::Mono8 { width: 2, height: 1 }, vec![7, 9], 12.5));
+        let (image, head) = parse_image("sensor_msgs/msg/Image", &m).unwrap();
+        assert_eq!((image.format, image.bytes), (ImageFormat::Mono8 { width: 2, height: 1 }, vec![7, 9]));
+        assert_eq!((head.time, head.frame_id.as_str()), (Some((12, 500_000_000)), "cam"));
         for n in 0..m.len() {
             assert!(parse_image("sensor_msgs/msg/Image", &m[..n]).is_err(), "{n}");
         }

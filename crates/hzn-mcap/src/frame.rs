@@ -6,12 +6,15 @@ use hzn_files::FrameData;
 use serde::{Deserialize, Serialize};
 
 use crate::row::Row;
+use crate::stamp::Stamp;
 
 /// One frame (of one body) in a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameRecord {
     /// The result.
     pub row: Row,
+    /// The time of the row in whole nanoseconds, if it is known. The messages have it, unless it contradicts the row.
+    pub stamp: Option<Stamp>,
     /// The edges that were examined.
     pub candidates: Vec<CandidateEdge>,
     /// The picture; `None` if it is not recorded.
@@ -32,6 +35,7 @@ impl FrameRecord {
     pub fn new(row: Row) -> Self {
         Self {
             row,
+            stamp: None,
             candidates: Vec::new(),
             image: None,
             annotations: Annotations::default(),

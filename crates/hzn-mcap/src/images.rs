@@ -9,15 +9,37 @@ use crate::cdr;
 use crate::container::{Channel, Chunk, ChunkFault, Inflation, MAGIC, Message, Op, Record, Scanner, Schemas};
 use crate::error::Error;
 use crate::frame::EncodedImage;
+use crate::header::{Decoded, Header};
 use crate::messages;
+use crate::stamp::Stamp;
 
 /// One picture of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InputImage {
     /// Time in seconds: of the message's header for ROS 2, else the log time.
     pub time_s: f64,
+    /// The same time in whole nanoseconds; `None` for times before 0.
+    pub stamp: Option<Stamp>,
     /// The picture, or the reason why it cannot be read.
     pub image: Result<EncodedImage, String>,
+}
+
+impl InputImage {
+    /// Creates a picture from its message. The log time stands for a time that the message does not have.
+    pub(crate) fn new(decoded: Decoded, log_time_ns: u64) -> Self {
+        let (image, header) = match decoded {
+            Ok((image, header)) => (Ok(image), header),
+            Err(why) => (Err(why), Header::default()),
+        };
+        let ns = match header.time {
+            // A time before 0 has no stamp.
+            Some((s, ns)) => u64::try_from(s).ok().map(|s| s * 1_000_000_000 + u64::from(ns)),
+            None => Some(log_time_ns),
+        };
+        let stamp = ns.map(|ns| Stamp::new(ns, &header.frame_id));
+        let before_0 = || header.time.map_or(0.0, |(s, ns)| f64::from(s) + f64::from(ns) * 1e-9);
+        Self { time_s: stamp.as_ref().map_or_else(before_0, Stamp::time_s), stamp, image }
+    }
 }
 
 /// Iterates over the pictures of one topic of an MCAP in file order. It needs the memory of one chunk.
@@ -133,11 +155,7 @@ impl ImageReader {
             self.others.insert(channel.topic.clone());
             return;
         }
-        let log_time_s = message.log_time_ns as f64 * 1e-9;
-        self.ready.push_back(match decode(&channel.schema, message.data) {
-            Ok((image, time_s)) => InputImage { time_s: time_s.unwrap_or(log_time_s), image: Ok(image) },
-            Err(reason) => InputImage { time_s: log_time_s, image: Err(reason) },
-        });
+        self.ready.push_back(InputImage::new(decode(&channel.schema, message.data), message.log_time_ns));
     }
 }
 
@@ -159,17 +177,11 @@ fn ends_as_mcap(path: &Path) -> bool {
 /// Returns the decoder for a channel's pictures; `None` for other messages.
 pub(crate) fn decoder(schema: &str, encoding: &str) -> Option<fn(&str, &[u8]) -> Decoded> {
     match (schema, encoding) {
-        ("foxglove.CompressedImage" | "foxglove.RawImage", "protobuf") => {
-            Some(|schema, data| messages::parse_image(schema, data).map(|image| (image, None)))
-        }
-        ("sensor_msgs/msg/Image" | "sensor_msgs/msg/CompressedImage", "cdr") => {
-            Some(|schema, data| cdr::parse_image(schema, data).map(|(image, time_s)| (image, Some(time_s))))
-        }
+        ("foxglove.CompressedImage" | "foxglove.RawImage", "protobuf") => Some(messages::parse_image),
+        ("sensor_msgs/msg/Image" | "sensor_msgs/msg/CompressedImage", "cdr") => Some(cdr::parse_image),
         _ => None,
     }
 }
-/// A decoded picture with its time in seconds, if the message has one; or the reason why it cannot be decoded.
-pub(crate) type Decoded = Result<(EncodedImage, Option<f64>), String>;
 
 impl Iterator for ImageReader {
     type Item = Result<InputImage, Error>;

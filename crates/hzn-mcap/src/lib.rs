@@ -55,6 +55,8 @@ mod error;
 mod floats;
 mod frame;
 #[cfg(feature = "recordings")]
+mod header;
+#[cfg(feature = "recordings")]
 mod images;
 #[cfg(feature = "recordings")]
 mod index;
@@ -79,6 +81,7 @@ mod row;
 mod series;
 #[cfg(feature = "recordings")]
 mod series_reader;
+mod stamp;
 mod status_name;
 #[cfg(feature = "recordings")]
 mod topics;
@@ -107,6 +110,7 @@ pub use row::{Row, RowMeta, roll_pitch_deg};
 pub use series::{Placed, SeriesWriter};
 #[cfg(feature = "recordings")]
 pub use series_reader::{begins_with_attachment, read_series};
+pub use stamp::Stamp;
 #[cfg(feature = "recordings")]
 pub use topics::{IMAGE_TOPIC, report_schema};
 #[cfg(feature = "recordings")]

@@ -11,6 +11,7 @@ use prost::Message;
 use serde_json::{Map, Value};
 
 use crate::frame::{Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
+use crate::header::{Decoded, Header};
 use crate::raw_images::raw_format;
 use crate::row::Row;
 use crate::topics::Topic;
@@ -132,15 +133,17 @@ pub(crate) fn compressed_format(name: &str) -> ImageFormat {
 }
 
 /// Reads a picture from a protobuf message with this schema.
-pub(crate) fn parse_image(schema: &str, data: &[u8]) -> Result<EncodedImage, String> {
+pub(crate) fn parse_image(schema: &str, data: &[u8]) -> Decoded {
     match schema {
         "foxglove.CompressedImage" => {
             let m = CompressedImage::decode(data).map_err(|e| e.to_string())?;
-            Ok(EncodedImage { format: compressed_format(&m.format), bytes: m.data.into() })
+            let image = EncodedImage { format: compressed_format(&m.format), bytes: m.data.into() };
+            Ok((image, Header { time: None, frame_id: m.frame_id }))
         }
         "foxglove.RawImage" => {
             let m = RawImage::decode(data).map_err(|e| e.to_string())?;
-            raw_format(m.width, m.height, m.step, &m.encoding, false, &m.data)
+            let image = raw_format(m.width, m.height, m.step, &m.encoding, false, &m.data)?;
+            Ok((image, Header { time: None, frame_id: m.frame_id }))
         }
         other => Err(format!("{other} is not a picture")),
     }

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use crate::container::{Channel, Chunk, Fields, Inflation, MAX_RECORD_BYTES, Message, Record};
 use crate::error::Error;
 use crate::images::{InputImage, decoder};
+use crate::stamp::Stamp;
 
 /// The place of one picture in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +37,7 @@ impl Place {
     }
     /// Returns the log time in seconds.
     pub fn log_time_s(&self) -> f64 {
-        self.log_time_ns as f64 * 1e-9
+        Stamp::new(self.log_time_ns, "").time_s()
     }
 }
 
@@ -76,7 +77,7 @@ impl Pictures {
             None => read_record(&mut self.file, place.message).map_err(read)?.map(|r| r.content),
             Some(at) => read_message_in_chunk(&mut self.file, at, place.message).map_err(read)?,
         };
-        let broken = |why: &str| InputImage { time_s: place.log_time_s(), image: Err(why.to_owned()) };
+        let broken = |why: &str| InputImage::new(Err(why.to_owned()), place.log_time_ns);
         let Some(message) = message.as_deref().and_then(Message::parse) else {
             return Ok(broken("the recording does not contain the picture any more, or is damaged at its place"));
         };
@@ -84,12 +85,7 @@ impl Pictures {
         let Some((channel, decode)) = channel.and_then(|c| Some((c, decoder(&c.schema, &c.encoding)?))) else {
             return Ok(broken("is on a channel without pictures"));
         };
-        Ok(match decode(&channel.schema, message.data) {
-            Ok((image, time_s)) => {
-                InputImage { time_s: time_s.unwrap_or_else(|| place.log_time_s()), image: Ok(image) }
-            }
-            Err(why) => broken(&why),
-        })
+        Ok(InputImage::new(decode(&channel.schema, message.data), place.log_time_ns))
     }
 }
 

@@ -10,6 +10,7 @@ use crate::drawing;
 use crate::error::Error;
 use crate::frame::FrameRecord;
 use crate::messages;
+use crate::stamp::Stamp;
 use crate::topics::Topic;
 use crate::waiting::Waiting;
 use crate::writer::SENSOR_TOML;
@@ -198,7 +199,7 @@ impl Reader {
             Topic::Image | Topic::RawImage if self.contents == Contents::WithoutImages => {}
             Topic::Image | Topic::RawImage => {
                 let schema = if topic == Topic::Image { "foxglove.CompressedImage" } else { "foxglove.RawImage" };
-                let image = messages::parse_image(schema, m.data).map_err(|e| broken("picture", e))?;
+                let (image, _) = messages::parse_image(schema, m.data).map_err(|e| broken("picture", e))?;
                 self.waiting.add_to(m, head).images.push_back(image);
             }
             Topic::Annotations => {
@@ -216,7 +217,8 @@ impl Reader {
             Topic::Report => {
                 let (row, candidates, prior) =
                     messages::parse_report(m.data).map_err(|e| broken("report", e.to_string()))?;
-                let mut frame = FrameRecord { candidates, prior, ..FrameRecord::new(row) };
+                let stamp = Some(Stamp::new(m.log_time_ns, "")).filter(|stamp| stamp.is_at(row.time_s));
+                let mut frame = FrameRecord { stamp, candidates, prior, ..FrameRecord::new(row) };
                 // All reports are on one topic, with the name of the head in them.
                 let head = frame.row.head.as_ref().and_then(|head| self.heads.iter().position(|known| known == head));
                 self.waiting.take(m, head.unwrap_or(0), |parts| {

@@ -216,8 +216,13 @@ impl Writer {
         let origin = Origin::find(&frame.row, &self.heads, self.camera.as_ref());
         let frame_id = origin.frame_id;
         let pen_px = drawing::pen_px(origin.camera);
-        // A frame without a time gets the time of the frame before it.
-        let ns = frame.row.time_s.map_or(self.last_ns, messages::time_ns);
+        // Another time than that of the source, for example from a frames.csv, replaces its stamp. A frame without a
+        // time gets the time of the frame before it.
+        let stamp = frame.stamp.as_ref();
+        let exact = stamp.filter(|stamp| stamp.is_at(frame.row.time_s)).map(|stamp| stamp.time_ns);
+        let ns = exact.or_else(|| frame.row.time_s.map(messages::time_ns)).unwrap_or(self.last_ns);
+        // The frames of Foxglove's messages belong to the transforms that hzn writes; those of ROS are the source's.
+        let ros_frame_id = stamp.and_then(|stamp| stamp.frame_id.as_deref()).unwrap_or(frame_id);
         self.last_ns = ns;
         let sequence = frame.row.index as u32;
         let failed = |e| while_writing(&self.part, e);
@@ -247,7 +252,7 @@ impl Writer {
         if let Some(axis) = frame.row.axis() {
             push(Topic::Axis, &mut |b| messages::append(&messages::axis(axis, frame_id, ns), b))?;
             if self.ros {
-                push(Topic::AxisVector, &mut |b| ros::vector(axis, frame_id, ns, b))?;
+                push(Topic::AxisVector, &mut |b| ros::vector(axis, ros_frame_id, ns, b))?;
             }
         }
         if let Some(covariance) = frame.row.covariance().filter(|_| self.ros) {

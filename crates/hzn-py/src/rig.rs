@@ -157,6 +157,7 @@ fn finished(name: String, data: FrameData, outcomes: Vec<BodyOutcome>) -> Finish
         index: 0,
         name,
         time_s: data.time_s,
+        stamp: None,
         data: Some(data),
         outcomes,
         drawing: Default::default(),

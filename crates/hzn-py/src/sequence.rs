@@ -139,7 +139,7 @@ pub(crate) fn process_encoded(
         &state,
         &plan,
         index,
-        source::Item { name, time: source::TimeSource::Table, data: Some(row), payload },
+        source::Item { name, time: source::TimeSource::Table, stamp: None, data: Some(row), payload },
     )
 }
 

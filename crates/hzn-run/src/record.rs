@@ -60,6 +60,7 @@ pub fn records(frame: &mut Finished, config: &Config) -> Vec<FrameRecord> {
         first.annotations = std::mem::take(&mut frame.drawing);
     }
     for (record, found) in records.iter_mut().zip(&frame.outcomes) {
+        record.stamp.clone_from(&frame.stamp);
         match &found.report {
             Ok(report) => record.candidates = CandidateEdge::from_report(report),
             Err(e) => record.log.push(LogLine { level: LogLevel::Error, message: e.why.clone() }),

@@ -2,6 +2,7 @@
 
 mod arrays;
 mod bad_input;
+mod bags;
 mod bodies;
 mod calibrate;
 mod calibrate_lens;

@@ -6,6 +6,7 @@ use hzn_core::Report;
 use hzn_core::body::PriorError;
 use hzn_core::status::Status;
 use hzn_files::FrameData;
+use hzn_mcap::Stamp;
 
 use super::sensor::Processed;
 use super::trace::Traces;
@@ -19,6 +20,8 @@ pub struct Finished {
     pub name: String,
     /// Time in seconds, if it is known.
     pub time_s: Option<f64>,
+    /// The time and the frame of the picture as a recording states them; [`Self::time_s`] can be of another clock.
+    pub stamp: Option<Stamp>,
     /// The prior of this picture from frames.csv or from a recording of ours.
     pub data: Option<FrameData>,
     /// The outcome of each body, in the order of the configuration.

@@ -29,6 +29,7 @@ pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: It
         index,
         name: item.name,
         time_s,
+        stamp: item.stamp,
         data,
         outcomes: Vec::new(),
         drawing: Annotations::default(),

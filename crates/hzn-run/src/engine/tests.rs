@@ -27,6 +27,7 @@ impl Source for Counted<'_> {
         Some(Ok(Item {
             name: self.left.to_string(),
             time: TimeSource::Count,
+            stamp: None,
             data: None,
             payload: Payload::Decoded(picture),
         }))

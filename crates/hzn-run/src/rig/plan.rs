@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use hzn_core::status::Status;
-use hzn_mcap::{FrameRecord, Row};
+use hzn_mcap::{FrameRecord, Row, Stamp};
 
 use super::epochs::{Epoch, Epochs};
 use super::joint::{Joiner, Repeat, Seen};
@@ -91,7 +91,11 @@ impl Order<'_> {
 
 /// Returns the records of an epoch: those of the joint answer, and those of each head.
 fn records(plan: &Plan, joint: &Row, heads: &mut [Option<Finished>]) -> Vec<Vec<FrameRecord>> {
-    let mut records = vec![vec![FrameRecord::new(joint.clone())]];
+    // The time of the joint answer is that of a head if all were triggered at once.
+    let mut stamps = heads.iter().flatten().filter_map(|frame| frame.stamp.as_ref());
+    let stamp = stamps.find(|stamp| stamp.is_at(joint.time_s));
+    let stamp = stamp.map(|stamp| Stamp { frame_id: None, ..stamp.clone() });
+    let mut records = vec![vec![FrameRecord { stamp, ..FrameRecord::new(joint.clone()) }]];
     for (frame, head) in heads.iter_mut().zip(&plan.heads) {
         let own = frame.as_mut().map(|frame| sink::records(frame, &head.plan.config));
         let named = |record: FrameRecord| {

@@ -85,7 +85,7 @@ impl Files {
     /// Returns the picture of a file that is in the folder.
     pub(super) fn item(&self, path: PathBuf) -> Item {
         let name = self.name(&path);
-        Item { name, time: self.time, data: None, payload: self.payload(path) }
+        Item { name, time: self.time, stamp: None, data: None, payload: self.payload(path) }
     }
 
     fn name(&self, path: &Path) -> String {

@@ -1,6 +1,7 @@
 //! A picture on its way from the source to a thread, with the origin of its time.
 
 use hzn_files::{FrameData, Frames};
+use hzn_mcap::Stamp;
 
 use super::payload::Payload;
 
@@ -11,6 +12,8 @@ pub struct Item {
     pub name: String,
     /// The origin of its time, unless [`Self::time_source`] returns another one.
     pub time: TimeSource,
+    /// The time and the frame of the picture as a recording of another program states them.
+    pub stamp: Option<Stamp>,
     /// The prior from the source itself, as a row of frames.csv. A recording of ours has one: the prior of its first
     /// run.
     pub data: Option<FrameData>,

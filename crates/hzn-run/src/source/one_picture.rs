@@ -47,7 +47,7 @@ impl Source for OnePicture {
         if std::mem::replace(&mut self.is_taken, true) {
             return None;
         }
-        Some(Ok(Item { name: self.name.clone(), time: self.time(), data: None, payload: self.payload() }))
+        Some(Ok(Item { name: self.name.clone(), time: self.time(), stamp: None, data: None, payload: self.payload() }))
     }
     fn total(&self) -> Option<u64> {
         Some(1)

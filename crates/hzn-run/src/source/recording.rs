@@ -72,7 +72,8 @@ impl Recording {
             Ok(image) => Payload::from_recorded(image),
             Err(why) => Payload::Broken(why),
         };
-        Some(Ok(Item { name, time: TimeSource::Container(Some(image.time_s)), data: None, payload }))
+        let time = TimeSource::Container(Some(image.time_s));
+        Some(Ok(Item { name, time, stamp: image.stamp, data: None, payload }))
     }
 }
 

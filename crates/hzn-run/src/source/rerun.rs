@@ -84,7 +84,7 @@ fn item(record: FrameRecord) -> Item {
     let picture = record
         .image
         .map_or_else(|| Payload::Broken("the recording does not contain this picture".into()), Payload::from_recorded);
-    Item { name: record.row.file, time: TimeSource::Table, data: Some(data), payload: picture }
+    Item { name: record.row.file, time: TimeSource::Table, stamp: record.stamp, data: Some(data), payload: picture }
 }
 
 impl Source for Rerun {

@@ -67,7 +67,7 @@ impl<R: Read + Send> Source for Stream<R> {
         };
         let name = format!("stdin#{:06}", self.index);
         self.index += 1;
-        Some(Ok(Item { name, time: TimeSource::Count, data: None, payload: self.payload(bytes) }))
+        Some(Ok(Item { name, time: TimeSource::Count, stamp: None, data: None, payload: self.payload(bytes) }))
     }
     fn total(&self) -> Option<u64> {
         None

@@ -297,6 +297,7 @@ impl<'a> FrameInput<'a> {
             index: self.index as u64,
             name: self.name.to_owned(),
             time_s: self.time_s,
+            stamp: None,
             data: self.data.cloned(),
             outcomes,
             drawing: hzn_mcap::Annotations::default(),

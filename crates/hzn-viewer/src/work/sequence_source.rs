@@ -39,6 +39,7 @@ impl Source for SequenceSource {
         Some(self.reader.payload(&place).map(|payload| Item {
             name,
             time: TimeSource::Table,
+            stamp: None,
             data: Some(data),
             payload,
         }))

@@ -10,7 +10,7 @@ use hzn_core::status::Status;
 use hzn_files::FrameData;
 use hzn_mcap::{
     Annotations, Attitude, CandidateEdge, Contents, EncodedImage, FrameRecord, ImageFormat, Index, IndexEntry,
-    LogLevel, LogLine, Options, Place, Reader, Row, RowMeta, Writer,
+    LogLevel, LogLine, Options, Place, Reader, Row, RowMeta, Stamp, Writer,
 };
 
 pub const SENSOR: &str = "preset = \"hzn\"\n";
@@ -43,6 +43,7 @@ pub fn frame(i: u64) -> FrameRecord {
     }
     FrameRecord {
         row,
+        stamp: Some(Stamp { time_ns: 100_000_000_000 + i * 100_000_000, frame_id: None }),
         candidates: vec![CandidateEdge {
             length_px: i as u32,
             points: 7,

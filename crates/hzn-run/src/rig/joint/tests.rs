@@ -70,6 +70,7 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
         index: 0,
         name: String::new(),
         time_s: Some(time_s),
+        stamp: None,
         data: None,
         outcomes: vec![BodyOutcome { report: Ok(report), elapsed: Duration::ZERO }],
         drawing: Default::default(),

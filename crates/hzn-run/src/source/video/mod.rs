@@ -238,7 +238,7 @@ impl Source for Video {
         let name = format!("{}#{:06}", self.stem, self.index);
         let time = self.times.next();
         self.index += 1;
-        Some(Ok(Item { name, time, data: None, payload: Payload::Decoded(picture) }))
+        Some(Ok(Item { name, time, stamp: None, data: None, payload: Payload::Decoded(picture) }))
     }
     fn total(&self) -> Option<u64> {
         self.count

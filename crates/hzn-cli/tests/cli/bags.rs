@@ -1,0 +1,106 @@
+//! Bags of ROS 2: the stamps and frames of their pictures.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use image::ImageFormat;
+use mcap::records::MessageHeader;
+
+use crate::common::{Place, SENSOR, limb};
+
+/// Stamps whose nanoseconds no number of seconds in double precision has.
+const STAMPS: [(u32, u32); 3] = [(1_700_000_069, 487_179_487), (1_700_000_069, 520_000_001), (1_700_000_070, 3)];
+const FRAME: &str = "front_optical";
+
+/// Appends a text in CDR, lower byte first, that begins at a multiple of 4 bytes after the encapsulation.
+fn push_blob(message: &mut Vec<u8>, bytes: &[u8]) {
+    message.resize(message.len().next_multiple_of(4), 0);
+    message.extend_from_slice(&(bytes.len() as u32).to_le_bytes());
+    message.extend_from_slice(bytes);
+}
+
+/// Returns a `sensor_msgs/msg/CompressedImage`.
+fn compressed_image((s, ns): (u32, u32), frame: &str, png: &[u8]) -> Vec<u8> {
+    let mut message = vec![0, 1, 0, 0];
+    message.extend_from_slice(&s.to_le_bytes());
+    message.extend_from_slice(&ns.to_le_bytes());
+    push_blob(&mut message, format!("{frame}\0").as_bytes());
+    push_blob(&mut message, b"png\0");
+    push_blob(&mut message, png);
+    message
+}
+
+/// Writes a bag whose log times are not the stamps.
+fn write_bag(path: &Path, frame: &str) {
+    let mut writer = mcap::Writer::new(fs::File::create(path).unwrap()).unwrap();
+    let schema = writer.add_schema("sensor_msgs/msg/CompressedImage", "ros2msg", b"").unwrap();
+    let channel_id = writer.add_channel(schema, "/front/compressed", "cdr", &BTreeMap::new()).unwrap();
+    for (i, stamp) in STAMPS.into_iter().enumerate() {
+        let mut png = std::io::Cursor::new(Vec::new());
+        limb(320, 240, i as f64).write_to(&mut png, ImageFormat::Png).unwrap();
+        let log_time = 9_000_000_000 + i as u64;
+        let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time: log_time };
+        writer.write_to_known_channel(&header, &compressed_image(stamp, frame, png.get_ref())).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+fn place(frame: &str) -> Place {
+    let place = Place::new();
+    fs::create_dir(place.path("bag")).unwrap();
+    place.write("bag/metadata.yaml", b"rosbag2_bagfile_information:\n  version: 9\n");
+    write_bag(&place.path("bag/bag_0.mcap"), frame);
+    place.write("sensor.toml", SENSOR.as_bytes());
+    place
+}
+
+/// A message of ROS in a recording of hzn: seconds, nanoseconds, log time and frame.
+type Stamped = (u32, u32, u64, String);
+
+/// Returns the headers of all axes in a recording.
+fn axes(path: &Path) -> Vec<Stamped> {
+    let bytes = fs::read(path).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let word = |data: &[u8], at: usize| u32::from_le_bytes(*data[at..].first_chunk().unwrap());
+    let read = |m: mcap::Message<'_>| {
+        let length = word(&m.data, 12) as usize;
+        let frame = String::from_utf8(m.data[16..16 + length - 1].to_vec()).unwrap();
+        (word(&m.data, 4), word(&m.data, 8), m.log_time, frame)
+    };
+    messages.filter(|m| m.channel.topic == "/hzn/axis_vector").map(read).collect()
+}
+
+fn expected(frame: &str) -> Vec<Stamped> {
+    STAMPS.map(|(s, ns)| (s, ns, u64::from(s) * 1_000_000_000 + u64::from(ns), frame.to_owned())).to_vec()
+}
+
+#[test]
+fn the_stamps_and_the_frame_of_a_bag_are_those_of_its_pictures() {
+    let place = place(FRAME);
+    place.run(&["run", "bag", "-s", "sensor.toml", "--ros", "-o", "r.mcap", "-o", "r.csv"]).expect(0);
+    assert_eq!(axes(&place.path("r.mcap")), expected(FRAME));
+    // The covariance has no header: its log time is the stamp.
+    let bytes = fs::read(place.path("r.mcap")).unwrap();
+    let all = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let times: Vec<u64> = all.filter(|m| m.channel.topic == "/hzn/axis_covariance").map(|m| m.log_time).collect();
+    assert_eq!(times, expected(FRAME).iter().map(|axis| axis.2).collect::<Vec<_>>());
+    // A recording of hzn that is processed again has the same times; it does not have the name of the frame.
+    place.run(&["run", "r.mcap", "--ros", "-o", "again.mcap"]).expect(0);
+    assert_eq!(axes(&place.path("again.mcap")), expected("camera"));
+    // Without a name in the header the frame is hzn's own.
+    let unnamed = self::place("");
+    unnamed.run(&["run", "bag", "-s", "sensor.toml", "--ros", "-o", "r.mcap"]).expect(0);
+    assert_eq!(axes(&unnamed.path("r.mcap")), expected("camera"));
+}
+
+#[test]
+fn times_of_a_table_replace_the_stamps_of_a_bag() {
+    let place = place(FRAME);
+    let line = |i: usize| format!("bag_0.mcap#{i:06},{}.5\n", 100 + i);
+    let table = format!("file,time_s\n{}", (0..STAMPS.len()).map(line).collect::<String>());
+    place.write("frames.csv", table.as_bytes());
+    place.run(&["run", "bag", "-s", "sensor.toml", "--frames", "frames.csv", "--ros", "-o", "r.mcap"]).expect(0);
+    let times: Vec<u64> = axes(&place.path("r.mcap")).iter().map(|axis| axis.2).collect();
+    assert_eq!(times, [100_500_000_000, 101_500_000_000, 102_500_000_000]);
+}
