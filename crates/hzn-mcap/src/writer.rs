@@ -216,13 +216,9 @@ impl Writer {
         let origin = Origin::find(&frame.row, &self.heads, self.camera.as_ref());
         let frame_id = origin.frame_id;
         let pen_px = drawing::pen_px(origin.camera);
-        // Another time than that of the source, for example from a frames.csv, replaces its stamp. A frame without a
-        // time gets the time of the frame before it.
-        let stamp = frame.stamp.as_ref();
-        let exact = stamp.filter(|stamp| stamp.is_at(frame.row.time_s)).map(|stamp| stamp.time_ns);
-        let ns = exact.or_else(|| frame.row.time_s.map(messages::time_ns)).unwrap_or(self.last_ns);
+        let ns = log_time_ns(frame).unwrap_or(self.last_ns);
         // The frames of Foxglove's messages belong to the transforms that hzn writes; those of ROS are the source's.
-        let ros_frame_id = stamp.and_then(|stamp| stamp.frame_id.as_deref()).unwrap_or(frame_id);
+        let ros_frame_id = frame.stamp.as_ref().and_then(|stamp| stamp.frame_id.as_deref()).unwrap_or(frame_id);
         self.last_ns = ns;
         let sequence = frame.row.index as u32;
         let failed = |e| while_writing(&self.part, e);
@@ -342,6 +338,13 @@ impl Drop for Writer {
             let _ = self.flush();
         }
     }
+}
+
+/// Returns the log time of a frame in nanoseconds; `None` without a time, so that the frame gets the time of the frame
+/// before it. Another time than that of the source, for example from a frames.csv, replaces its stamp.
+fn log_time_ns(frame: &FrameRecord) -> Option<u64> {
+    let exact = frame.stamp.as_ref().filter(|stamp| stamp.is_at(frame.row.time_s)).map(|stamp| stamp.time_ns);
+    exact.or_else(|| frame.row.time_s.map(messages::time_ns))
 }
 
 pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
