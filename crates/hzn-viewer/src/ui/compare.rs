@@ -32,7 +32,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         _ => Vec::new(),
     };
     let (mut stop, mut go) = (false, None);
-    egui::Panel::top("compare").resizable(false).show(ui, |ui| {
+    let shown = egui::Panel::top("compare").resizable(false).show(ui, |ui| {
         ui.add_space(4.0);
         ui.horizontal(|ui| {
             ui.strong(format!("Compared with {name}"));
@@ -48,6 +48,13 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         go = over_sequence(viewer, ui);
         ui.add_space(4.0);
     });
+    // A panel has the height that its contents had before. Without another pass, a new line would stay cut until the
+    // pointer moves.
+    let (id, height) = (egui::Id::unique("height of the comparison"), shown.response.rect.height());
+    if ui.data(|data| data.get_temp(id)) != Some(height) {
+        ui.data_mut(|data| data.insert_temp(id, height));
+        ui.ctx().request_discard("the comparison has another height");
+    }
     if stop {
         viewer.other = None;
     }

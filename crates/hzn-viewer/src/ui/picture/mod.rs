@@ -21,6 +21,9 @@ use crate::model::settings::Layer;
 use crate::work::FrameView;
 use read_out::{label, notice};
 
+/// Room in points for the badge of the zoom, which has up to six characters.
+const BADGE: f32 = 80.0;
+
 /// Draws the picture, and returns its area.
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) -> Rect {
     let area = egui::CentralPanel::no_frame().show(ui, |ui| {
@@ -90,8 +93,9 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
     let described = text.map(|text| label(&painter, foot, Align2::LEFT_BOTTOM, &text));
     if !viewer.layers_hidden {
         let percent = 100.0 * placement.scale() * f64::from(ui.ctx().pixels_per_point());
-        // The badge gives way to a long text at the foot of the picture.
-        let foot = described.map_or(rect.bottom(), |text| text.top());
+        // The badge gives way to a text at the foot of the picture that reaches it.
+        let reaching = described.filter(|text| text.right() > rect.right() - BADGE);
+        let foot = reaching.map_or(rect.bottom(), |text| text.top());
         let at = pos2(rect.right() - 10.0, foot - 10.0);
         label(&painter, at, Align2::RIGHT_BOTTOM, &format!("{percent:.0} %"));
     }
