@@ -1,12 +1,14 @@
 //! `hzn info`: describes the content of a file.
 
 mod facts;
+mod other;
 mod summary;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hzn_core::Config;
+use hzn_fuse::read_back;
 use hzn_mcap::{Contents, Reader, Row};
 use hzn_run::source::{self, decode, ending};
 use hzn_run::{checked_row, explain};
@@ -21,8 +23,8 @@ use crate::tell::{self, one_line};
 
 /// Say what a file is, and what it contains
 ///
-/// The file may be results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, frames.csv, truth.csv,
-/// imu.csv, gnss.csv, or a picture.
+/// The file may be results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, rig.toml, fuse.toml,
+/// frames.csv, truth.csv, imu.csv, gnss.csv, a picture, or the folder of a bag of ROS 2.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The file
@@ -34,13 +36,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    let (kind, _) = source::check_exists(file)?;
-    let (facts, lost) = match kind.as_str() {
-        "mcap" => recording(file)?,
-        "csv" | "jsonl" => (table(file, &kind)?, None),
-        "toml" | "yaml" | "yml" => (sensor(file, &kind)?, None),
-        _ => (one_picture(file)?, None),
-    };
+    let (facts, lost) = if other::is_bag(file) { other::bag(file)? } else { one_file(file)? };
     if args.json {
         tell::file(facts.json().map_err(failed)?)?;
     } else {
@@ -48,6 +44,17 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     lost.iter().for_each(tell::warning);
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+fn one_file(file: &Path) -> Result<Described, Stop> {
+    let (kind, _) = source::check_exists(file)?;
+    Ok(match kind.as_str() {
+        "mcap" | "csv" if read_back::is_solution(file) => (other::solution(&read_back::read_solution(file)?), None),
+        "mcap" => recording(file)?,
+        "csv" | "jsonl" => (table(file, &kind)?, None),
+        "toml" | "yaml" | "yml" => (sensor(file, &kind)?, None),
+        _ => (one_picture(file)?, None),
+    })
 }
 
 /// The description of a file, and the parts that are missing.
@@ -63,9 +70,10 @@ fn recording(file: &Path) -> Result<Described, Stop> {
     if summary.frames == 0 && reader.sensor_toml().is_none() && reader.unread_reports() == 0 {
         return foreign(file);
     }
-    let mut out = Facts::new("recording", "recording of hzn run");
-    summary.describe(&mut out);
     let metadata: BTreeMap<&str, &str> = reader.metadata().iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
+    let is_flight = metadata.get("program").is_some_and(|program| program.starts_with("hzn fly"));
+    let mut out = Facts::new("recording", if is_flight { "recording of hzn fly" } else { "recording of hzn run" });
+    summary.describe(&mut out);
     for (key, value) in &metadata {
         out.line(&one_line(key), value.to_string());
     }
@@ -267,6 +275,12 @@ fn sensor(file: &Path, kind: &str) -> Result<Facts, Stop> {
     let table = text.parse::<toml::Table>().unwrap_or_default();
     if table.contains_key("trajectory") && table.contains_key("capture") {
         return scene(&hzn_sim::scenario::parse(&text, file, None, None)?);
+    }
+    if table.contains_key("head") {
+        return Ok(other::rig(&hzn_files::rig::parse(&text, file)?));
+    }
+    if let Some(facts) = other::settings(&table, file)? {
+        return Ok(facts);
     }
     let sensor = hzn_files::sensor::load(file)?;
     sensor.warnings.iter().for_each(tell::warning);

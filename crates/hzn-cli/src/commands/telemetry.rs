@@ -11,7 +11,7 @@ use hzn_run::disk;
 
 use super::ground::show;
 use crate::apid::ApidArgs;
-use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::tell;
 
 /// Decode a flight computer's telemetry, from a file or as it comes
@@ -108,5 +108,9 @@ fn stop_flag() -> Arc<AtomicBool> {
 const MAX_BYTES: u64 = 1 << 30;
 
 fn read(path: &Path) -> Result<Vec<u8>, Stop> {
-    limited::read(path, MAX_BYTES).map_err(|e| usage(format!("{}: {e}", path.display())))
+    let bytes = limited::read(path, MAX_BYTES).map_err(|e| usage(format!("{}: {e}", path.display())))?;
+    if bytes.is_empty() {
+        return Err(failed(format!("{}: is empty; was the stream recorded?", path.display())));
+    }
+    Ok(bytes)
 }

@@ -104,3 +104,44 @@ fn times_of_a_table_replace_the_stamps_of_a_bag() {
     let times: Vec<u64> = axes(&place.path("r.mcap")).iter().map(|axis| axis.2).collect();
     assert_eq!(times, [100_500_000_000, 101_500_000_000, 102_500_000_000]);
 }
+
+#[test]
+fn info_knows_a_bag_a_rig_and_the_settings_of_a_filter() {
+    let place = place(FRAME);
+    let out = place.run(&["info", "bag"]).expect(0).out;
+    assert!(out.contains("bag of ROS 2") && out.contains("pictures         3\n"), "{out}");
+    assert!(out.contains("time             1700000069.487 to 1700000070.000 s"), "{out}");
+    let head = |name: &str| {
+        format!(
+            "[[head]]\nname = \"{name}\"\npictures = \"{name}\"\n[head.mount]\nq_rig_from_camera_wxyz = [1, 0, 0, 0]\n"
+        )
+    };
+    place.write("rig.toml", format!("{}{}", head("left"), head("right")).as_bytes());
+    let out = place.run(&["info", "rig.toml"]).expect(0).out;
+    assert!(out.contains("rig.toml, several cameras") && out.contains("right, pictures right"), "{out}");
+    place.write("fuse.toml", b"gate_probability = 0.01\n");
+    let out = place.run(&["info", "fuse.toml"]).expect(0).out;
+    assert!(out.contains("fuse.toml, for `hzn fuse --config FILE`") && out.contains("gate_probability"), "{out}");
+    // A wrong value is still an error that names the key.
+    place.write("fuse.toml", b"gate_probability = 2.0\n");
+    place.run(&["info", "fuse.toml"]).expect(2).says("gate_probability");
+}
+
+#[test]
+fn an_altitude_that_a_table_replaces_is_told() {
+    let place = Place::with_pictures(2);
+    place.write("in/frames.csv", b"file,altitude_km\n0000.png,400\n0001.png,400\n");
+    let what = "--altitude-km is not used: frames.csv has an altitude for every picture";
+    place.run(&["run", "in", "--altitude-km", "500"]).expect(0).says(what);
+    assert!(!place.run(&["run", "in"]).expect(0).err.contains(what));
+    place.write("in/frames.csv", b"file,altitude_km\n0000.png,400\n0001.png,\n");
+    assert!(!place.run(&["run", "in", "--altitude-km", "500"]).expect(0).err.contains(what));
+}
+
+#[test]
+fn an_empty_stream_of_telemetry_is_an_error() {
+    let place = Place::new();
+    place.write("empty.bin", b"");
+    place.run(&["telemetry", "empty.bin", "-o", "e.csv"]).expect(1).says("empty.bin: is empty");
+    assert!(!place.path("e.csv").exists());
+}

@@ -82,6 +82,8 @@ fn logged(place: &Place) -> Vec<Vec<(String, String)>> {
     let mut rows = Vec::new();
     for file in files {
         assert_eq!(file.extension().unwrap(), "mcap", "{}", file.display());
+        let info = place.run(&["info", file.to_str().unwrap()]).out;
+        assert!(info.contains("recording of hzn fly"), "{info}");
         place.run(&["export", file.to_str().unwrap(), "-o", "log.csv", "--force"]).expect(0);
         rows.extend(place.rows("log.csv"));
     }

@@ -75,6 +75,12 @@ fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
     assert!(code == 2 && stderr.contains("nav.csv: exists already; --force"), "{stderr}");
     let (code, _, stderr) = fuse(at, &[&MOUNTS[..], &["-o", "nav.mcap"]].concat());
     assert!(code == 0 && at.join("nav.mcap").is_file() && !at.join("nav.mcap.part").exists(), "{stderr}");
+    for name in ["nav.mcap", "nav.csv"] {
+        let info =
+            assert_cmd::Command::cargo_bin("hzn").unwrap().current_dir(at).args(["info", name]).output().unwrap();
+        let out = String::from_utf8_lossy(&info.stdout);
+        assert!(info.status.success() && out.contains("results of hzn fuse") && out.contains("were taken"), "{out}");
+    }
 }
 
 /// Returns the three errors of an attitude that the summary tells, and the position's.
