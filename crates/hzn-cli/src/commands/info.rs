@@ -36,7 +36,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    let (facts, lost) = if other::is_bag(file) { other::bag(file)? } else { one_file(file)? };
+    let (facts, lost) = if source::is_bag(file) { other::bag(file)? } else { one_file(file)? };
     if args.json {
         tell::file(facts.json().map_err(failed)?)?;
     } else {

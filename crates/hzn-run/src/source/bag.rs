@@ -23,8 +23,8 @@ pub(super) struct Bag {
     left_out: Vec<String>,
 }
 
-/// Returns whether a folder is a bag.
-pub(super) fn is_bag(folder: &Path) -> bool {
+/// Returns whether a folder is a bag of ROS 2.
+pub fn is_bag(folder: &Path) -> bool {
     folder.join(METADATA).is_file()
 }
 

@@ -41,6 +41,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+#[cfg(feature = "recordings")]
+pub use bag::is_bag;
 pub use bits::{FoundBits, find_bits, with_key};
 pub use find_tone::{describe_mixed_tones, find_tone};
 pub use item::{Item, TimeSource};
@@ -124,7 +126,7 @@ fn open_recorded(one: &Path, topic: Option<&str>) -> Result<Option<Box<dyn Sourc
             _ => {}
         }
     }
-    if bag::is_bag(one) { Ok(Some(Box::new(bag::Bag::open(one, topic)?))) } else { Ok(None) }
+    if is_bag(one) { Ok(Some(Box::new(bag::Bag::open(one, topic)?))) } else { Ok(None) }
 }
 
 /// Opens a recording. A recording of ours is processed again as it was recorded. Of any other recording, and of another

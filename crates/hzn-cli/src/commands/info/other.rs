@@ -10,12 +10,7 @@ use serde_json::json;
 use super::facts::Facts;
 use crate::exit::{Stop, failed};
 
-/// Returns whether a folder is a bag of ROS 2.
-pub(super) fn is_bag(folder: &Path) -> bool {
-    folder.is_dir() && folder.join("metadata.yaml").is_file()
-}
-
-/// Describes the folder of a bag, and what is missing in it.
+/// Describes the folder of a bag of ROS 2. The second part names what cannot be read.
 pub(super) fn bag(folder: &Path) -> Result<(Facts, Option<String>), Stop> {
     let mut pictures = source::open(&[folder.to_owned()], None, None)?;
     let (mut count, mut span) = (0u64, None);
