@@ -6,11 +6,18 @@
 //! not, and the scatter between pictures does not show it. The rest of the shape is visible in the mean of the
 //! residuals over all pictures, as the next shapes along the edge (Legendre polynomials of the degrees 3 to 5, each of
 //! RMS 1). The bend is assumed to be as strong as the strongest of these.
+//!
+//! Causes that are smooth and symmetric have almost nothing of these shapes: a lens that is darker away from its axis,
+//! and blur where the scale of the picture changes along the edge. Both bend a limb of air by a few hundredths of a
+//! pixel, which is kilometres of limb height in a small picture. The floor stands for them.
 
 use super::cone::Cone;
 
 /// Number of shapes that are examined in the mean residuals.
 pub(crate) const SHAPES: usize = 3;
+/// Smallest common shape of an edge, as a part of the common shift. It is an assumption: what shifts all edges may
+/// change along them by a fifth, and not be visible in the residuals.
+const MIN_PART_OF_SHIFT: f64 = 0.2;
 
 /// Returns the Legendre polynomials of the degrees 3 to 5 at x from −1 to 1, scaled to an RMS of 1.
 pub(crate) fn next_shapes(x: f64) -> [f64; SHAPES] {
@@ -39,9 +46,12 @@ pub(crate) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
 }
 
 /// Returns the RMS in pixels of the bend that all edges may have in common: the amplitude of the strongest next shape
-/// in the mean of their residuals, or its standard error if that is larger. `edges` has the amplitudes of each edge
-/// ([`shapes_px`]).
-pub(crate) fn common_bend_px<'a>(edges: impl ExactSizeIterator<Item = &'a [f64; SHAPES]> + Clone) -> f64 {
+/// in the mean of their residuals, or its standard error if that is larger, but at least a part of `shift_px`, the
+/// common shift of all edges. `edges` has the amplitudes of each edge ([`shapes_px`]).
+pub(crate) fn common_bend_px<'a>(
+    edges: impl ExactSizeIterator<Item = &'a [f64; SHAPES]> + Clone,
+    shift_px: f64,
+) -> f64 {
     let n = edges.len().max(1) as f64;
     let amplitude = |k: usize| {
         let values = || edges.clone().filter_map(move |shapes| shapes.get(k));
@@ -49,7 +59,7 @@ pub(crate) fn common_bend_px<'a>(edges: impl ExactSizeIterator<Item = &'a [f64; 
         let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / (n * (n - 1.0).max(1.0));
         mean.abs().max(variance.sqrt())
     };
-    (0..SHAPES).map(amplitude).fold(0.0, f64::max)
+    (0..SHAPES).map(amplitude).fold(MIN_PART_OF_SHIFT * shift_px, f64::max)
 }
 
 #[cfg(test)]

@@ -2,10 +2,10 @@
 
 use hzn_core::Config;
 use hzn_core::body::{self, Kind};
-use hzn_core::covariance::{self, Noise};
+use hzn_core::covariance;
 
 use super::bend;
-use super::edge::{LENGTHS_PX, MIN_SIGMA_PX, WHITE};
+use super::edge::{self, LENGTHS_PX, MIN_SIGMA_PX, WHITE};
 use super::height::{MAX_SIGMA_KM, Measured, Solved, solve};
 use super::lag;
 use super::latitude::{Profile, fit_profile};
@@ -242,8 +242,9 @@ fn combine_heights(profile: &Profile, sightings: &[&Sighting], edge: &Edge) -> H
     // Noise that is new at every point averages out along an edge; only the rest can be a shift.
     let correlated = (1.0 - (edge.white_px / edge.sigma_px).powi(2)).max(0.0).sqrt();
     let shift_km = mean_square(&|s| (s.rms_px * correlated).max(MIN_SHIFT_PX) * s.km_per_px).sqrt();
-    let bend_km =
-        bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px)) * mean_square(&|s| s.km_per_bend_px).sqrt();
+    let common_px = (mean_square(&|s| s.rms_px).sqrt() * correlated).max(MIN_SHIFT_PX);
+    let bend_px = bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px), common_px);
+    let bend_km = bend_px * mean_square(&|s| s.km_per_bend_px).sqrt();
     let radius_km = mean_square(&|s| s.radius_sigma_km).sqrt();
     let rows = profile.latitudes_deg.iter().enumerate();
     let row = |(k, deg): (usize, &f64)| [*deg, h[k], covariance[(k, k)].sqrt()];
@@ -267,11 +268,9 @@ fn combine_edges(sightings: &[&Sighting]) -> Edge {
     let models = (0..LENGTHS_PX.len()).flat_map(|i| (0..WHITE.len()).map(move |j| (i, j)));
     let (i, j) = models.min_by(|a, b| cost(a.0, a.1).total_cmp(&cost(b.0, b.1))).unwrap_or_default();
     let rms_px = (sightings.iter().map(|s| s.rms_px * s.rms_px).sum::<f64>() / n).sqrt();
-    // The length that the sensor assumes for correlated errors. Errors with a much shorter length are as good as white.
     let arc_px = sightings.iter().map(|s| s.arc_px).sum::<f64>() / n;
-    let measured = covariance::Config { noise: Noise::Rms, correlation_px: 0.0, ..covariance::Config::default() };
-    let window_px = measured.measured(rms_px, arc_px).correlation_px;
-    let correlated = (1.0 - WHITE[j]) * share_of_mean(window_px / LENGTHS_PX[i]);
+    let window_px = edge::window_px(arc_px);
+    let correlated = edge::correlated_share((LENGTHS_PX[i], WHITE[j]), window_px);
     Edge {
         sigma_px: rms_px.max(MIN_SIGMA_PX),
         correlation_px: median(sightings.iter().map(|s| s.correlation_px)),
@@ -281,11 +280,6 @@ fn combine_edges(sightings: &[&Sighting]) -> Edge {
         white_px: rms_px * (1.0 - correlated).sqrt(),
         bias_px: (rms_px * correlated.sqrt()).max(MIN_SHIFT_PX),
     }
-}
-
-/// Returns the variance of the mean over a window of x correlation lengths, for a Gauss-Markov process of variance 1.
-fn share_of_mean(x: f64) -> f64 {
-    if x < 1e-3 { 1.0 } else { 2.0 * (x - 1.0 + (-x).exp()) / (x * x) }
 }
 
 /// Fits d_i = A_i h − D_i ε: the relative focal length error ε together with the heights and the scatter.

@@ -6,6 +6,7 @@
 //! columns of H in one pass. The likelihood of one picture is flat in L. Therefore the variance of the fit is averaged
 //! over (L, ν), with a prior for L: a quarter of the arc, within a factor of two.
 
+use hzn_core::covariance::{self, Noise};
 use nalgebra::{Matrix3, Vector3};
 
 use super::cone::{Cone, Row, decay};
@@ -91,6 +92,30 @@ fn score_model(rows: &[Row], decays: &[f64], white: f64) -> Option<Score> {
         minus_two_ln_likelihood: freedom * (q / freedom).ln() + log_det + log_det_h,
         variance_px2: q / freedom,
     })
+}
+
+/// Returns the length that the sensor assumes for correlated errors, in pixels. Errors with a much shorter length are as
+/// good as white.
+pub(crate) fn window_px(arc_px: f64) -> f64 {
+    let measured = covariance::Config { noise: Noise::Rms, correlation_px: 0.0, ..covariance::Config::default() };
+    measured.measured(1.0, arc_px).correlation_px
+}
+
+/// Returns the part of the variance of a model (L, ν) that stays in the mean over a window.
+pub(crate) fn correlated_share((length_px, white): (f64, f64), window_px: f64) -> f64 {
+    // The variance of the mean over x correlation lengths, for a Gauss-Markov process of variance 1.
+    let x = window_px / length_px;
+    let share = if x < 1e-3 { 1.0 } else { 2.0 * (x - 1.0 + (-x).exp()) / (x * x) };
+    (1.0 - white) * share
+}
+
+/// Returns the RMS of the correlated part of a picture's residuals, in pixels, for its most likely model.
+pub(crate) fn correlated_px(cone: &Cone, scores: &Scores) -> f64 {
+    let each = scores.iter().zip(LENGTHS_PX).flat_map(|(scores, length)| {
+        scores.iter().zip(WHITE).map(move |(score, white)| (score.minus_two_ln_likelihood, (length, white)))
+    });
+    let likeliest = each.min_by(|a, b| a.0.total_cmp(&b.0)).map_or((LENGTHS_PX[0], 0.0), |(_, model)| model);
+    cone.rms_px() * correlated_share(likeliest, window_px(cone.arc_px())).sqrt()
 }
 
 /// Returns the shortest correlation length, in pixels, at which an exponential process with `sigma_px` gives the fitted

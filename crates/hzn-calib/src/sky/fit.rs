@@ -156,7 +156,7 @@ impl State {
 
     fn solve(&mut self, unknowns: &Unknowns) -> Result<Fit, Refusal> {
         let counted: Vec<&Fitted> = self.pictures.iter().filter(|p| p.counts).collect();
-        let common_px = common_sigmas_px(self.layout, &counted, unknowns.shape_floor);
+        let common_px = common_sigmas_px(self.layout, &counted);
         let prior = prior_equations(self.layout, &unknowns.covariance, self.limb, &common_px);
         let reduced: Vec<&Reduced> = counted.iter().map(|p| &p.reduced).collect();
         let solved = prior.and_then(|prior| {
@@ -268,18 +268,19 @@ fn distance_px<'a>(lens: &Config, views: impl Iterator<Item = &'a View>) -> f64 
     (square / f64::max(total, 1e-12)).sqrt()
 }
 
-/// Returns the sigmas of the common shapes: for the shift the RMS of the residuals, for all others the strongest shape
-/// in the mean of the residuals of their side, or `floor` of the RMS if that is larger.
-fn common_sigmas_px(layout: Layout, pictures: &[&Fitted], floor: f64) -> Vec<f64> {
+/// Returns the sigmas of the common shapes: for the shift the RMS of the residuals, for all others the common bend of
+/// their side ([`common_bend_px`]).
+fn common_sigmas_px(layout: Layout, pictures: &[&Fitted]) -> Vec<f64> {
     let n = pictures.len().max(1) as f64;
-    let rms = (pictures.iter().map(|p| p.noise.rms_px.powi(2)).sum::<f64>() / n).sqrt();
+    let rms_of = |px: &dyn Fn(&Fitted) -> f64| (pictures.iter().map(|p| px(p).powi(2)).sum::<f64>() / n).sqrt();
+    let common_px = rms_of(&|p| p.noise.correlated_px).max(MIN_SHIFT_PX);
     let mut sigmas = vec![f64::NAN; layout.common()];
     for side in 0..layout.sides {
         let of_side: Vec<_> = pictures.iter().filter(|p| layout.sides == 1 || p.reduced.side == side).collect();
-        let bend = common_bend_px(of_side.iter().map(|p| &p.noise.shapes_px)).max(1e-4).max(floor * rms);
+        let bend = common_bend_px(of_side.iter().map(|p| &p.noise.shapes_px), common_px);
         layout.shapes(side).iter().for_each(|place| sigmas[place - layout.first_common()] = bend);
     }
-    sigmas[0] = rms.max(MIN_SHIFT_PX);
+    sigmas[0] = rms_of(&|p| p.noise.rms_px).max(MIN_SHIFT_PX);
     sigmas
 }
 

@@ -76,6 +76,8 @@ pub(super) struct EdgeNoise {
     pub(super) variance_px2: f64,
     /// RMS of the residuals, in pixels.
     pub(super) rms_px: f64,
+    /// RMS of the correlated part of the residuals, in pixels.
+    pub(super) correlated_px: f64,
     /// Amplitudes of the next shapes in the residuals, in pixels.
     pub(super) shapes_px: [f64; SHAPES],
 }
@@ -133,8 +135,12 @@ pub(super) fn measure_noise(model: &Model, geometry: &Geometry, view: &View) -> 
     let variance = edge::variance_of_cos(&cone, &scores) + harmonic;
     let per_px2 = cone.to_cos.dot(&(cone.inverse * cone.to_cos));
     let floor = edge::MIN_SIGMA_PX * edge::MIN_SIGMA_PX;
-    let noise =
-        EdgeNoise { variance_px2: (variance / per_px2).max(floor), rms_px: cone.rms_px(), shapes_px: shapes_px(&cone) };
+    let noise = EdgeNoise {
+        variance_px2: (variance / per_px2).max(floor),
+        rms_px: cone.rms_px(),
+        correlated_px: edge::correlated_px(&cone, &scores),
+        shapes_px: shapes_px(&cone),
+    };
     noise.variance_px2.is_finite().then_some(noise)
 }
 

@@ -16,9 +16,6 @@ const UNKNOWN_K1: f64 = 0.1;
 const UNKNOWN_ASPECT: f64 = 0.01;
 /// Smallest 1-sigma of the ratio of the two focal lengths: it is far below every effect, and keeps the prior regular.
 const MIN_ASPECT: f64 = 1e-5;
-/// Smallest sigma of the shapes of an edge in a check, as a part of the RMS of the residuals. It is an assumption: a
-/// fifth of what is left of an edge may be common to all edges of a side.
-const SHAPE_FLOOR: f64 = 0.2;
 /// Smallest 1-sigma of any other parameter, as a fraction of a focal length or of 1, for the same reason.
 const MIN_SIGMA: f64 = 1e-7;
 
@@ -53,8 +50,6 @@ pub struct Unknowns {
     pub(super) stated: Vec<bool>,
     /// Number of sides of the Sun whose edges have shapes of their own.
     pub(super) sides: usize,
-    /// Smallest sigma of a common shape, as a part of the RMS of the residuals.
-    pub(super) shape_floor: f64,
 }
 
 impl Unknowns {
@@ -91,7 +86,7 @@ impl Unknowns {
             }
         }
         let known = list.iter().map(|i| stated.has(*i)).collect();
-        Self { before: config.clone(), list, covariance, stated: known, sides: 1, shape_floor: 0.0 }
+        Self { before: config.clone(), list, covariance, stated: known, sides: 1 }
     }
 
     /// Returns the calibration with changed parameters.
@@ -138,10 +133,9 @@ impl Unknowns {
     /// Returns the unknowns for a test of the calibration: the scale is free, and all others keep the sigmas of the
     /// calibration. A principal point without a sigma gets one pixel.
     ///
-    /// Bend and asymmetry of the limb are unknowns for each side of the Sun. The residuals show only the shapes that a
-    /// cone cannot follow, and what the fit takes for another lens is not in them; the floor stands for it.
+    /// Bend and asymmetry of the limb are unknowns for each side of the Sun.
     pub(super) fn for_check(config: &Config) -> Self {
-        let mut unknowns = Self { sides: 2, shape_floor: SHAPE_FLOOR, ..Self::of_calibration(config) };
+        let mut unknowns = Self { sides: 2, ..Self::of_calibration(config) };
         let direction = unknowns.scale_direction() * UNKNOWN_FOCAL;
         unknowns.covariance += &direction * direction.transpose();
         unknowns
