@@ -10,6 +10,7 @@ use hzn_core::Config;
 use hzn_core::body::{self, PriorError};
 use hzn_core::config::Orient;
 use hzn_files::{Frames, Problem, Sensor, plausible};
+use toml_edit::DocumentMut;
 
 use crate::engine::{self, AnySensor};
 use crate::error::{Error, Remedy, unusable};
@@ -101,8 +102,42 @@ pub fn open(request: &Request) -> Result<Opened, Error> {
         warnings.extend(frames.warnings.iter().map(Problem::to_string));
         warnings.extend(frames.check_sensor(&sensor.config).iter().map(Problem::to_string));
     }
+    notes.extend(explain_shutter(&sensor, frames.as_ref()));
     engine::check_frames(&sensor.config, request.flight, frames.as_ref())?;
     Ok(Opened { source, sensor, frames, warnings, notes })
+}
+
+/// Readout time of a usual rolling shutter, in seconds: those of small cameras take 10 to 30 ms.
+const USUAL_READOUT_S: f64 = 0.02;
+/// Turn during that time which is worth a note, in radians (0.1 degrees): more than most limbs are uncertain by.
+const WORTH_A_NOTE_RAD: f64 = 0.1 * core::f64::consts::PI / 180.0;
+
+/// Returns a note if only one of the two values that correct a rolling shutter is known: the readout time of the sensor
+/// without rates, or rates without a word about the readout time.
+fn explain_shutter(sensor: &Sensor, frames: Option<&Frames>) -> Option<String> {
+    let readout_s = sensor.config.camera.readout_s;
+    let Some(frames) = frames else {
+        return (readout_s != 0.0).then(|| {
+            format!(
+                "no rates are known, which camera.readout_s = {readout_s} needs: the rows of a picture of a turning \
+                 camera are not corrected, and sigma does not include this error; add rate_x, rate_y, rate_z to \
+                 frames.csv"
+            )
+        });
+    };
+    let rate_rad_s = frames.largest_rate_rad_s();
+    let is_told = sensor
+        .text
+        .parse::<DocumentMut>()
+        .is_ok_and(|text| text.get("camera").and_then(|camera| camera.get("readout_s")).is_some());
+    (!is_told && readout_s == 0.0 && rate_rad_s * USUAL_READOUT_S > WORTH_A_NOTE_RAD).then(|| {
+        format!(
+            "the rates reach {:.1} deg/s, and the sensor does not say how its rows are exposed: this is right for a \
+             global shutter (camera.readout_s = 0 says so); with a rolling shutter, set camera.readout_s, because \
+             sigma does not include the distortion",
+            rate_rad_s.to_degrees()
+        )
+    })
 }
 
 /// Reads a frames.csv. If the names of all pictures are known, only their rows are kept.

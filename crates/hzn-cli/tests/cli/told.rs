@@ -67,6 +67,31 @@ fn times_that_do_not_rise_are_told() {
 }
 
 #[test]
+fn half_of_what_a_rolling_shutter_needs_is_told() {
+    let place = Place::with_pictures(2);
+    let with = |readout: &str, rate: &str| {
+        place.write("in/sensor.toml", SENSOR.replace("[body]", &format!("{readout}\n[body]")).as_bytes());
+        let rows =
+            format!("file,time_s,altitude_km,rate_x,rate_y,rate_z\n0000.png,0,400,{rate}\n0001.png,1,400,{rate}\n");
+        place.write("in/frames.csv", rows.as_bytes());
+        place.run(&["run", "in"]).err
+    };
+    let missing = "2 of 2 rows have no rate_x, rate_y, rate_z, which camera.readout_s = 0.03 needs";
+    assert!(with("readout_s = 0.03", ",,").contains(missing));
+    let unsaid = "the rates reach 28.6 deg/s, and the sensor does not say how its rows are exposed";
+    assert!(with("", "0,0.5,0").contains(unsaid));
+    for (readout, rate) in [("readout_s = 0.03", "0,0.5,0"), ("readout_s = 0", "0,0.5,0"), ("", "0,0.01,0"), ("", ",,")]
+    {
+        let err = with(readout, rate);
+        assert!(!err.contains("needs") && !err.contains("exposed"), "{readout}, {rate}: {err}");
+    }
+    // Without a table there are no rates at all.
+    place.write("in/sensor.toml", SENSOR.replace("[body]", "readout_s = 0.03\n[body]").as_bytes());
+    std::fs::remove_file(place.path("in/frames.csv")).unwrap();
+    place.run(&["run", "in"]).expect(0).says("no rates are known, which camera.readout_s = 0.03 needs");
+}
+
+#[test]
 fn names_with_a_leading_dot_are_names_of_the_folder() {
     let place = Place::with_pictures(2);
     place.write("in/frames.csv", b"file,altitude_km,time_s\n./0000.png,400,5\n././0001.png,400,6\n");

@@ -104,6 +104,22 @@ fn an_uncertain_altitude_allows_the_half_angles_of_its_bounds() {
 }
 
 #[test]
+fn a_bright_patch_of_a_disc_is_no_body_far_away() {
+    let mut config = sensor(640, 480, 686.0);
+    config.fit.position = Some(true);
+    let body = || Disc { axis: unit([0.03, -0.02, 1.0]), half_angle_deg: 15.0, brightness: 60.0 };
+    // Nothing is expected of the half-angle, and the patch has the shape of a sphere that is nine times as far away.
+    let patch = || Disc { axis: unit([0.1, 0.05, 1.0]), half_angle_deg: 1.7, brightness: 150.0 };
+    let report = process(&config, &draw(&config, &[body(), patch()], 6.0, 1.5));
+    if report.solution.is_some() {
+        assert_answer(&report, body().axis);
+    }
+    assert!(report.candidates.iter().any(|edge| edge.verdict == Verdict::NoSky), "{:?}", report.candidates);
+    // The same patch alone in the sky is a body.
+    assert_answer(&process(&config, &draw(&config, &[patch()], 6.0, 1.5)), patch().axis);
+}
+
+#[test]
 fn a_body_of_any_size_is_fitted_as_well() {
     // A radius of 40 px at every focal length: the half-angle is 4e-3 to 4e-6 rad.
     for focal_px in [1e4, 6e5, 1.2e6, 1e7] {

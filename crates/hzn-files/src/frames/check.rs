@@ -75,7 +75,29 @@ impl Frames {
         warnings.extend(self.explain_unused_attitude(config));
         warnings.extend(self.suspect_milliseconds());
         warnings.extend(self.suspect_rates());
+        warnings.extend(self.explain_missing_rates(config));
         warnings
+    }
+
+    /// Returns one warning if rows of a rolling shutter have no rate. Their pictures are not corrected, and sigma does
+    /// not include the error.
+    fn explain_missing_rates(&self, config: &Config) -> Option<Problem> {
+        let readout_s = config.camera.readout_s;
+        let without: Vec<&FrameData> = self.rows.iter().filter(|row| row.rate_rad_s.is_none()).collect();
+        let row = without.first().filter(|_| readout_s != 0.0)?;
+        let what = format!(
+            "{} of {} rows have no rate_x, rate_y, rate_z, which camera.readout_s = {readout_s} needs: the rows of a \
+             picture of a turning camera are not corrected, and sigma does not include this error",
+            without.len(),
+            self.rows.len()
+        );
+        Some(self.problem(row, what))
+    }
+
+    /// Returns the largest rate of a row in rad/s, 0 without rates.
+    pub fn largest_rate_rad_s(&self) -> f64 {
+        let size = |[x, y, z]: [f64; 3]| x.hypot(y).hypot(z);
+        self.rows.iter().filter_map(|row| row.rate_rad_s.map(size)).fold(0.0, f64::max)
     }
 
     /// Returns one warning if the rows have an attitude, but neither a position nor an ellipsoid whose position is

@@ -260,8 +260,8 @@ class Gates(TypedDict, total=False):
     max_lit_sky: float
     """Largest part of the sky beyond the fitted limb that may be lit. Values: 0 to 1. Default: 0.3."""
     dark_sky: float
-    """For Sun and Moon: brightness from which a place in the sky counts as lit, as a fraction of the threshold.
-    Values: above 0 to 1. Default: 0.25."""
+    """For Sun and Moon, and for a position without a known range: brightness from which a place in the sky counts as
+    lit, as a fraction of the threshold. Values: above 0 to 1. Default: 0.25."""
     whole_edge: float
     """Smallest part of an edge's points that must be inliers if the edge winds; 0 turns the check off. Values: 0 to
     1. Default: 0.8."""

@@ -140,6 +140,11 @@ impl<T> Expected<T> {
 }
 
 impl<T: Real> Expected<T> {
+    /// Returns whether a position without a known range is fitted, so that no half-angle is expected.
+    pub(crate) fn has_any_size(&self) -> bool {
+        self.target().is_some_and(|target| target.range.is_none())
+    }
+
     /// Returns the expected half-angle in radians.
     pub fn half_angle_rad(&self) -> T {
         self.sin.atan2(self.cos)

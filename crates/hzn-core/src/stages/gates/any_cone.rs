@@ -9,7 +9,7 @@ use crate::model::verdict::Verdict;
 /// Refuses a position without a known distance if its residuals are neither noise nor less than half of the shift in
 /// the covariance.
 pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> Result<(), Verdict> {
-    let is_any_cone = case.expected.target().is_some_and(|target| target.range.is_none());
+    let is_any_cone = case.expected.has_any_size();
     let shift_px = case.fused.edge.shift_px;
     refuse_if(
         is_any_cone && residuals.exceed_noise() && residuals.rms_px + residuals.rms_px > shift_px,

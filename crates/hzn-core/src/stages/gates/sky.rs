@@ -23,14 +23,15 @@ pub(super) struct Sky<T> {
     pub(super) spread: T,
 }
 
-/// Reads the brightness from the limb outwards to the border of the region. Sky counts as lit from the threshold on;
-/// for a Sun or Moon, from `gates.dark_sky` of it on.
+/// Reads the brightness from the limb outwards to the border of the region. Sky counts as lit from the threshold on. If
+/// no half-angle is expected (a Sun or Moon, or a position without a known range), it counts from `gates.dark_sky` of
+/// the threshold on: any size is right then, and a bright cloud within a disc would pass for a smaller disc far away.
 pub(super) fn measure_sky<T: Real, P: Pixels, O: Observer<T>>(
     case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,
     places: &Places<T>,
 ) -> Sky<T> {
-    let lit_from = if case.expected.free {
+    let lit_from = if case.expected.free || case.expected.has_any_size() {
         (T::from_i32(binary.level.into()) * T::from_f64(case.config.dark_sky)).to_i32().max(1) as u16
     } else {
         binary.level
