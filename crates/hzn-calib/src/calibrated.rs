@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use hzn_core::camera::Config;
+use hzn_core::camera::{Config, Model};
 
 /// A calibrated lens, with everything that a report shows.
 #[derive(Debug, Clone, PartialEq)]
@@ -148,6 +148,17 @@ pub enum Warning {
         /// 1-sigma of the lens from the corners alone, px.
         alone_px: f64,
     },
+    /// Another lens model explains the same points better.
+    OtherModel {
+        /// The model of the calibration.
+        model: Model,
+        /// RMS distance of the points from their projections, px.
+        rms_px: f64,
+        /// The other model.
+        other: Model,
+        /// RMS distance with the other model, px.
+        other_rms_px: f64,
+    },
     /// Pictures that were left out predict worse than those that were fitted: the lens model does not fit the lens, or
     /// the board is not flat.
     Overfitted {
@@ -187,6 +198,13 @@ impl fmt::Display for Warning {
                 "the pictures disagree about the lens: 1 sigma is {between_px:.3} px between pictures, but \
                  {alone_px:.3} px from the noise of the corners; the camera has the larger one. Usual causes: a board \
                  that is not flat, a lens that focuses or zooms, cut or stabilised pictures, another lens model"
+            ),
+            Self::OtherModel { model, rms_px, other, other_rms_px } => write!(
+                f,
+                "{other} explains the same points with an RMS of {other_rms_px:.3} px, {model} with {rms_px:.3} px; the \
+                 sigmas do not contain what a model cannot follow: calibrate with the model {other}",
+                model = model.name(),
+                other = other.name()
             ),
             Self::Overfitted { held_out_rms_px, rms_px } => write!(
                 f,
@@ -232,6 +250,17 @@ pub enum Refusal {
         /// 1-sigma of the focal length, percent; infinite if it is not determined at all.
         focal_sigma_percent: f64,
     },
+    /// Another lens model explains the same points far better.
+    OtherModel {
+        /// The model of the calibration.
+        model: Model,
+        /// RMS distance of the points from their projections, px.
+        rms_px: f64,
+        /// The other model.
+        other: Model,
+        /// RMS distance with the other model, px.
+        other_rms_px: f64,
+    },
     /// The lens is not monotone where points are.
     NotMonotone {
         /// Largest angle off axis of a point, degrees.
@@ -272,6 +301,13 @@ impl fmt::Display for Refusal {
                 f,
                 "the pictures do not determine the lens; tilt the board by 30 to 45 deg in different directions, or \
                  choose a model with fewer coefficients"
+            ),
+            Self::OtherModel { model, rms_px, other, other_rms_px } => write!(
+                f,
+                "this lens is not of the model {model}: it leaves an RMS of {rms_px:.3} px, and {other} leaves \
+                 {other_rms_px:.3} px of the same points; calibrate with the model {other}",
+                model = model.name(),
+                other = other.name()
             ),
             Self::NotMonotone { covered_deg } => write!(
                 f,

@@ -22,6 +22,7 @@ mod finish;
 mod ideal;
 pub mod lens_error;
 pub mod noise;
+mod other_model;
 pub mod points;
 pub mod residual_table;
 mod robust;

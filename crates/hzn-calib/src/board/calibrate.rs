@@ -7,6 +7,7 @@ use super::layout::{Board, PlanarView, View};
 use crate::adjust::{Block, Free, adjust, adjust_pose};
 use crate::calibrated::{Calibrated, Refusal};
 use crate::finish::{add_held_out, finish};
+use crate::other_model;
 
 /// Number of parts into which the pictures are divided for the held-out error.
 const FOLDS: usize = 5;
@@ -64,6 +65,11 @@ pub fn calibrate_planar(model: Model, size_px: [u16; 2], views: &[PlanarView]) -
     let mut calibrated = finish(&fitted.adjusted, &names)?;
     calibrated.bow = bow;
     add_held_out(&mut calibrated, held_out_rms_px(&fitted, bow.is_some()));
+    other_model::compare(model, &mut calibrated, |other| {
+        let mut fitted = fit(other, size_px, views).ok()?;
+        super::bow::bend(&mut fitted.adjusted);
+        Some(finish(&fitted.adjusted, &names).ok()?.rms_px)
+    })?;
     Ok(calibrated)
 }
 

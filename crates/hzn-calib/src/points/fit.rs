@@ -10,6 +10,7 @@ use crate::adjust::{BOW, Block, Observation};
 use crate::calibrated::{Calibrated, Dropped, Refusal};
 use crate::finish::finish;
 use crate::ideal;
+use crate::other_model;
 use crate::staged::{adjust_in_stages, remove_outliers};
 
 /// Smallest number of points of a picture: two determine the rotation, the third shows whether it fits.
@@ -105,7 +106,13 @@ pub fn calibrate(model: Model, size_px: [u16; 2], pictures: &[Points]) -> Result
             }
         }
     }
-    found.map_err(PointsRefusal::Lens)
+    let mut calibrated = found.map_err(PointsRefusal::Lens)?;
+    let rms_px_of = |other| {
+        check(other, size_px, pictures).ok()?;
+        Some(fit(other, size_px, pictures).ok()?.rms_px)
+    };
+    other_model::compare(model, &mut calibrated, rms_px_of).map_err(PointsRefusal::Lens)?;
+    Ok(calibrated)
 }
 
 impl Change {
