@@ -2,7 +2,7 @@
 //! ([`hzn_files::start`]).
 
 use hzn_files::FrameData;
-use hzn_files::start::{Body, CameraFacts, Exif};
+use hzn_files::start::{self, Body, CameraFacts, Exif, StartConfig};
 
 use crate::diagnosis::{FieldOfView, find_field_of_view};
 use crate::error::{Error, unusable};
@@ -11,6 +11,9 @@ use crate::source::{self, Picture, Source};
 
 /// Number of pictures that are looked at. The error that all pictures share is larger than that of eight pictures.
 const PICTURES: u64 = 8;
+/// Difference of the field of view that was told from that of the limb that is worth a warning, in sigmas of both. A
+/// data sheet that is wrong by that much is worth a look, because its error is the same in every picture.
+const DOUBTFUL_SIGMAS: f64 = 1.5;
 
 /// The field of view that the limb in the pictures says.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,4 +105,22 @@ pub fn measure_field_of_view(request: &Request, known: &CameraFacts) -> Result<L
         (0, _) | (_, None) => LimbSays::Nothing(pictures.len()),
         (_, Some(last)) => LimbSays::LensDecides(found.into_iter().chain([last]).collect()),
     })
+}
+
+/// Compares a field of view that was told (or that of the EXIF) with that of the limb. Returns the latter if the two
+/// disagree; `None` if they agree, or if the limb says nothing.
+///
+/// # Errors
+/// A file cannot be read.
+pub fn doubt_field_of_view(
+    request: &Request,
+    known: &CameraFacts,
+    start: &StartConfig,
+) -> Result<Option<FieldOfView>, Error> {
+    let without = CameraFacts { fov_deg: None, exif: Exif::default(), lens: Some(start.lens), ..known.clone() };
+    let LimbSays::FieldOfView(found) = measure_field_of_view(request, &without)? else { return Ok(None) };
+    let of_limb = start::focal_px(start.lens, f64::from(known.size_px[0]), found.measured.fov_deg);
+    let sigma = 0.01 * found.measured.focal_sigma_percent.hypot(start.focal_sigma_percent);
+    let is_doubtful = of_limb.is_some_and(|px| (px / start.focal_px).ln().abs() > DOUBTFUL_SIGMAS * sigma);
+    Ok(is_doubtful.then_some(found))
 }

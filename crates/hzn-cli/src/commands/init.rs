@@ -9,7 +9,7 @@ use hzn_run::diagnosis::FieldOfView;
 use hzn_run::disk;
 use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
-use hzn_run::start::{LimbSays, measure_field_of_view, read_camera_facts};
+use hzn_run::start::{LimbSays, doubt_field_of_view, measure_field_of_view, read_camera_facts};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
@@ -115,6 +115,17 @@ pub(super) fn run(args: &Args) -> Outcome {
             "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
         );
     }
+    if known.has_focal()
+        && let Some(limb) = doubt_field_of_view(&request(args), &known, &start)?
+    {
+        let [kept, seen] = limb.pictures;
+        tell::warning(format_args!(
+            "the limb in {kept} of {seen} pictures says {}, not {:.1} degrees: check the field of view and the kind of \
+             lens (that of a fisheye is not 2 atan(width / 2f)), or leave out --fov and take that of the limb",
+            limb.describe(known.size_px[0]),
+            start.fov_deg
+        ));
+    }
     if let Some(found) = &found {
         let [kept, seen] = found.pictures;
         tell::line(format_args!("the limb in {kept} of {seen} pictures says: {}", found.describe(known.size_px[0])));
@@ -140,17 +151,20 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 /// Returns whether the sensor, or a frames.csv next to the pictures, gives altitudes.
 fn knows_altitudes(args: &Args, config: &Config) -> Result<bool, Stop> {
-    let request = Request { inputs: args.pictures.clone(), ..Request::default() };
+    let request = request(args);
     let source = source::open(&args.pictures, None, None)?;
     let path = open::frames_path(&request, source.as_ref());
     let frames = path.map(|path| open::load_frames(&path, source.as_ref())).transpose()?;
     Ok(open::check_altitude(source.as_ref(), config, frames.as_ref()).is_ok())
 }
 
+fn request(args: &Args) -> Request {
+    Request { inputs: args.pictures.clone(), ..Request::default() }
+}
+
 /// Finds the field of view from the limb, if an altitude is known.
 fn limb_fov(args: &Args, known: &CameraFacts) -> Result<Option<FieldOfView>, Stop> {
-    let request = Request { inputs: args.pictures.clone(), ..Request::default() };
-    match measure_field_of_view(&request, known)? {
+    match measure_field_of_view(&request(args), known)? {
         LimbSays::FieldOfView(found) => Ok(Some(found)),
         LimbSays::NoAltitude => Ok(None),
         LimbSays::LensDecides(found) => Err(usage(format!(

@@ -229,6 +229,16 @@ fn the_limb_gives_the_field_of_view() {
     assert!((fov / 92.0 - 1.0).abs() < 0.1 && (fov - 92.0).abs() < 2.0 * sigma, "{fov} +- {sigma}");
     let score = Score::run(&place, "found.toml");
     assert!(score.answered() > 0.95 && score.within == score.errors_deg.len(), "{score:?}");
+    // A field of view that contradicts it is told; 77 degrees are 2 atan(width / 2f) of this lens.
+    let told = |fov: &str| {
+        let args = ["init", "flight", "--fov", fov, "--lens", "fisheye", "-o", "told.toml", "--force"];
+        place.run(&args).expect(0).err
+    };
+    let warning = told("77");
+    assert!(warning.contains("degrees wide, as a fisheye, not 77.0 degrees"), "{warning}");
+    for right in ["90", "92", "94"] {
+        assert!(!told(right).contains("check the field of view"), "{right}");
+    }
     // An altitude is needed, from the table or from the command line.
     std::fs::remove_file(place.path("flight/frames.csv")).unwrap();
     place.run(&["init", "flight", "-o", "t.toml"]).expect(2).says("--fov").says("--altitude");
