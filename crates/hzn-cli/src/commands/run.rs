@@ -182,6 +182,8 @@ struct Watch {
 
 /// Number of unreadable pictures that are reported one by one.
 const MAX_UNREADABLE_LISTED: u64 = 20;
+/// Number of refused pictures with a limb of another size from which on the answers are doubtful, too.
+const DOUBTFUL_REFUSALS: usize = 3;
 
 impl Watch {
     fn new(progress: Progress, quiet: bool) -> Self {
@@ -254,6 +256,12 @@ impl Watch {
             let request = request.filter(|r| !r.inputs.iter().any(|input| source::is_stdin(input)));
             let fits = request.and_then(|r| what_fits::in_pictures(&r, &plan.config, commonest.pictures));
             fits.iter().for_each(|fits| tell::line(format_args!("note: {fits}")));
+            if fits.is_some() && commonest.pictures.len() >= DOUBTFUL_REFUSALS && self.progress.any_answered() {
+                tell::line(
+                    "note: the answers have the same lens and the same source of altitudes: if one of these is wrong, \
+                     they are wrong, too, and their sigma does not contain it",
+                );
+            }
         }
     }
 }

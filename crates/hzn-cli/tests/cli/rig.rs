@@ -194,6 +194,8 @@ fn a_turned_mount_is_named_and_two_heads_only_notice_it() {
     };
     assert!(joint.iter().all(refused), "{joint:?}");
     let ran = place.run(&["run", "ring/rig.toml", "-o", "two.csv"]).expect(0);
+    // There is no other answer that could be doubtful.
+    assert!(!ran.err.contains("far more often than by chance"), "{}", ran.err);
     ran.says("note: 4 epochs rejected as inconsistent: the heads contradict each other");
 }
 

@@ -94,6 +94,18 @@ fn plan(args: &Args, opened: &Opened) -> Result<Plan, Stop> {
 /// Number of pictures that are reported one by one.
 const MAX_LISTED: u64 = 20;
 
+/// How the reason of an epoch begins whose heads contradict each other.
+const INCONSISTENT: &str = "inconsistent";
+/// Number and share of such epochs from which on the others are doubtful, too. By chance it is below 0.3 %.
+const DOUBTFUL_EPOCHS: u64 = 3;
+const DOUBTFUL_SHARE: f64 = 0.03;
+
+/// Returns whether so many contradictions make the answers of the other epochs doubtful.
+fn casts_doubt(contradicting: u64, joint: &Counts) -> bool {
+    let (epochs, answers) = (joint.iter().sum::<u64>() as f64, joint[Status::Ok as usize]);
+    contradicting >= DOUBTFUL_EPOCHS && contradicting as f64 > DOUBTFUL_SHARE * epochs && answers > 0
+}
+
 /// Counts and messages while the run goes on.
 struct Watch {
     progress: Progress,
@@ -160,9 +172,34 @@ impl Watch {
                 "note: {epochs} rejected as {why} (column detail; the heads' own rows are below it)"
             ));
         }
+        let contradict = |(why, epochs): (&String, &u64)| why.starts_with(INCONSISTENT).then_some(*epochs);
+        let contradicting: u64 = self.refused.iter().filter_map(contradict).sum();
+        if casts_doubt(contradicting, &self.joint) {
+            tell::line(
+                "note: the heads contradict each other far more often than by chance: an error of a mount that is just \
+                 below the limit is in the other answers, too; check the mounts before you use them",
+            );
+        }
         for (head, epochs) in &self.excluded {
             let epochs = explain::counted(*epochs, "epoch");
             tell::line(format_args!("note: head {head} was excluded in {epochs} (column heads_excluded)"));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contradictions_cast_doubt_on_the_other_answers() {
+        let doubtful = |ok, rejected| {
+            let mut joint = Counts::default();
+            (joint[Status::Ok as usize], joint[Status::Rejected as usize]) = (ok, rejected);
+            casts_doubt(rejected, &joint)
+        };
+        assert!(doubtful(22, 8) && doubtful(60, 3));
+        // Chance, a single event, and no answer at all.
+        assert!(!doubtful(1000, 3) && !doubtful(20, 2) && !doubtful(0, 4));
     }
 }
