@@ -193,7 +193,7 @@ fn first_guess(source: &Config, model: Model) -> Config {
     (guess.fy_px, guess.cx_px, guess.cy_px) = (source.fy_px, source.cx_px, source.cy_px);
     (guess.theta_max_deg, guess.theta_min_deg) = (source.theta_max_deg, source.theta_min_deg);
     (guess.focal_sigma_percent, guess.centre_sigma_px) = (source.focal_sigma_percent, source.centre_sigma_px);
-    guess.readout_s = source.readout_s;
+    (guess.readout_s, guess.temperature) = (source.readout_s, source.temperature);
     // Near to an equidistant lens for both.
     guess.k = match model {
         Model::DoubleSphere => [0.0, 0.5].into_iter().collect(),

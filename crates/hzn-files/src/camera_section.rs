@@ -9,7 +9,8 @@ use crate::merge::take;
 use crate::{Problem, camera_file, limited};
 
 /// The keys of `[camera]` that camera files do not have. They may be next to `file`.
-const KEYS_ALLOWED_WITH_FILE: [&str; 4] = ["focal_sigma_percent", "centre_sigma_px", "covariance", "readout_s"];
+const KEYS_ALLOWED_WITH_FILE: [&str; 5] =
+    ["focal_sigma_percent", "centre_sigma_px", "covariance", "temperature", "readout_s"];
 
 /// Returns the camera file that the text of a sensor.toml or scene.toml names; `path` is the file of the text.
 pub fn named_camera_file(text: &str, path: &Path) -> Option<PathBuf> {
@@ -47,7 +48,7 @@ pub(crate) fn camera_from_file(
     let angles = ["theta_max_deg", "theta_min_deg"].map(|key| (key, take(camera, key)));
     if let Some((key, _)) = camera.iter().find(|(key, _)| !KEYS_ALLOWED_WITH_FILE.contains(&&**key.get_ref())) {
         let what = "cannot be next to `file`, which has the whole calibration; only camera, theta_max_deg, \
-                    theta_min_deg, readout_s, covariance and the calibration's sigmas may be";
+                    theta_min_deg, readout_s, temperature, covariance and the calibration's sigmas may be";
         let field = format!("[camera] {}", key.get_ref());
         return Err(Problem::new(path, what).at_offset(text, key.span().start).in_field(field));
     }

@@ -135,8 +135,8 @@ fn find_preset(name: &str) -> Result<Preset, String> {
 /// the camera of `[camera]`.
 fn merge_camera(section: camera::Config, from_file: Option<camera::Config>) -> camera::Config {
     let Some(camera) = from_file else { return section };
-    let camera::Config { focal_sigma_percent, centre_sigma_px, covariance, readout_s, .. } = section;
-    camera::Config { focal_sigma_percent, centre_sigma_px, covariance, readout_s, ..camera }
+    let camera::Config { focal_sigma_percent, centre_sigma_px, covariance, temperature, readout_s, .. } = section;
+    camera::Config { focal_sigma_percent, centre_sigma_px, covariance, temperature, readout_s, ..camera }
 }
 
 /// Returns a configuration as the text of a sensor.toml. It is a function of this crate, so that the code for all keys

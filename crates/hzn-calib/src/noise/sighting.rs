@@ -99,7 +99,7 @@ impl Sighting {
             return None;
         }
         let geometry = Geometry::new(body, prior)?;
-        let camera = &camera.with_rate(prior.rate_rad_s);
+        let camera = &camera.with_rate(prior.rate_rad_s).with_temperature(prior.camera_temperature_c);
         let attitude_sigma = prior.attitude_sigma_rad.unwrap_or(ATTITUDE_SIGMA_RAD);
         let known = with_useful_attitude(prior);
         let azimuth = geometry.cone.as_ref().and_then(|cone| Azimuth::new(cone, &known));

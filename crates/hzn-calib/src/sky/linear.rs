@@ -126,7 +126,7 @@ pub(super) fn geometry(body: &body::Config, view: &View) -> Option<Geometry> {
 
 /// Measures the edge noise of a picture with a free half-angle; `None` if the points do not determine a cone.
 pub(super) fn measure_noise(model: &Model, geometry: &Geometry, view: &View) -> Option<EdgeNoise> {
-    let camera = &model.camera.with_rate(view.prior.rate_rad_s);
+    let camera = &model.camera.with_rate(view.prior.rate_rad_s).with_temperature(view.prior.camera_temperature_c);
     let azimuth = azimuth(geometry, view);
     let cone = Cone::fit(camera, &view.points, view.axis, view.half_angle_rad.cos(), azimuth.as_ref())?;
     let scores = edge::score_models(&cone)?;
@@ -146,7 +146,8 @@ pub(super) fn measure_noise(model: &Model, geometry: &Geometry, view: &View) -> 
 
 /// Linearises a picture and eliminates its axis. The result is `None` if the points have no limb in this lens.
 pub(super) fn reduce(model: &Model, geometry: &Geometry, view: &View, noise: EdgeNoise) -> Option<Reduced> {
-    let camera = &model.camera.with_rate(view.prior.rate_rad_s);
+    let still = &model.camera.clone().with_temperature(view.prior.camera_temperature_c);
+    let camera = &still.with_rate(view.prior.rate_rad_s);
     let points = locate(camera, view);
     if points.len() < MIN_POINTS {
         return None;
@@ -164,7 +165,7 @@ pub(super) fn reduce(model: &Model, geometry: &Geometry, view: &View, noise: Edg
     let limb = Limb { cos, by_height_km, azimuth: azimuth(geometry, view) };
     let axis = fit_axis(&points, Vector3::from(view.axis), &limb)?;
     let side = side_of_sun(view, &points);
-    let columns = Columns { model, camera, geometry, limb: &limb, axis, side };
+    let columns = Columns { model, still, camera, geometry, limb: &limb, axis, side };
     Some(eliminate_axis(&columns, &points, noise))
 }
 
@@ -219,7 +220,8 @@ fn fit_axis(points: &[Located], start: Vector3<f64>, limb: &Limb) -> Option<Vect
 /// What the columns of a picture's equations are made of.
 struct Columns<'a> {
     model: &'a Model<'a>,
-    /// The model's camera, turned by the rate of the picture.
+    /// The model's camera at the temperature of the picture, and turned by its rate.
+    still: &'a Camera<f64>,
     camera: &'a Camera<f64>,
     geometry: &'a Geometry,
     limb: &'a Limb,
@@ -237,7 +239,7 @@ impl Columns<'_> {
         let foot = Place::new(self.camera, ImagePoint { u: u + r * edge[0], v: v + r * edge[1] })?;
         // One more step of Newton: the distance of the foot is the error of the first.
         let (rest, edge, g) = limb.distance(&foot, axis);
-        let projected = model.equation.project(model.camera.ray(foot.image)?.direction().xyz())?;
+        let projected = model.equation.project(self.still.ray(foot.image)?.direction().xyz())?;
         let layout = model.layout;
         let n = layout.len();
         row.fill(0.0);

@@ -37,6 +37,7 @@ mod simulate;
 mod small_limbs;
 mod start;
 mod telemetry;
+mod temperature;
 mod terminal;
 mod told;
 mod tone;

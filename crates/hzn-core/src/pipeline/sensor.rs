@@ -119,6 +119,9 @@ impl<T: Real> Sensor<T> {
     /// The altitude or the position is impossible, or there is no body of this number.
     pub fn expect_body(&self, which: usize, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
         let body = self.config.each_body().get(which).ok_or(PriorError::NoBody)?;
+        if frame.camera_temperature_c.is_some_and(|at| !self.camera.accepts_temperature(at)) {
+            return Err(PriorError::Temperature);
+        }
         let smallest = self.config.fits_position(body).then(|| self.smallest_half_angle_rad());
         let expected = Expected { which: which as u8, ..Expected::try_new(body, frame, smallest)? };
         if cfg!(feature = "position") {
@@ -176,12 +179,14 @@ impl<T: Real> Sensor<T> {
     }
 
     /// Returns the camera for one picture, if it differs from the camera of the sensor: it turns while the picture is
-    /// read out row by row, or its rays are in the scaled space of the body.
+    /// read out row by row, has a temperature that changes its lens, or its rays are in the scaled space of the body.
     pub(super) fn camera_for(&self, expected: &Expected<T>) -> Option<Camera<T>> {
         let rate = expected.rate_rad_s.filter(|_| self.camera.has_rolling_shutter());
+        let temperature = expected.camera_temperature_c.filter(|_| self.camera.has_temperature());
         if let Some(target) = expected.target() {
-            return Some(self.camera.with_rate(rate).with_scaling(target.scaling));
+            return Some(self.camera.with_rate(rate).with_temperature(temperature).with_scaling(target.scaling));
         }
-        Some(self.camera.with_rate(Some(rate?)))
+        let differs = rate.is_some() || temperature.is_some();
+        differs.then(|| self.camera.with_rate(rate).with_temperature(temperature))
     }
 }

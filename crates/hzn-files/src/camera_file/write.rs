@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use hzn_core::camera::{Config, Covariance};
+use hzn_core::camera::{Config, Covariance, Temperature};
 
 use super::format::{Format, UnsupportedLens};
 use super::numbers::{format_list, format_number};
@@ -52,7 +52,24 @@ fn write_sensor(c: &Config) -> String {
     if let Some(covariance) = &c.covariance {
         write_covariance(&mut out, covariance);
     }
+    if let Some(lens) = &c.temperature {
+        write_temperature(&mut out, lens);
+    }
     out
+}
+
+/// Writes `[camera.temperature]`, which is a table as well.
+fn write_temperature(out: &mut String, lens: &Temperature) {
+    let _ = writeln!(out, "\n[camera.temperature]\nreference_c = {}", format_number(lens.reference_c));
+    let others = [
+        ("focal_ppm_per_k", lens.focal_ppm_per_k),
+        ("cx_px_per_k", lens.cx_px_per_k),
+        ("cy_px_per_k", lens.cy_px_per_k),
+        ("untold_sigma_k", lens.untold_sigma_k),
+    ];
+    for (key, value) in others.into_iter().filter(|(_, value)| *value != 0.0) {
+        let _ = writeln!(out, "{key} = {}", format_number(value));
+    }
 }
 
 /// Writes `[camera.covariance]`. It is a table, so it comes after all other keys of `[camera]`.

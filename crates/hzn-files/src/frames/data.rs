@@ -57,6 +57,9 @@ pub struct FrameData {
     /// 1-sigma of that distance, kilometres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_sigma_km: Option<f64>,
+    /// Temperature of the camera, °C.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera_temperature_c: Option<f64>,
     /// Orientations of the second and third body, by name.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub other_bodies: Vec<Orientation>,
@@ -97,6 +100,7 @@ impl FrameData {
             year_part: self.utc_s.map(|s| T::from_f64(body::year_part(s / 86_400.0))),
             last: None,
             rate_rad_s: self.rate_rad_s.map(|rate| rate.map(T::from_f64)),
+            camera_temperature_c: self.camera_temperature_c.map(T::from_f64),
             pole: self.pole_camera.and_then(|pole| UnitVec3::try_new(pole.map(T::from_f64))),
             range_m: self.range_km.map(|km| T::from_f64(km * 1e3)),
             range_sigma_m: self.range_sigma_km.map(|km| T::from_f64(km * 1e3)),
@@ -279,6 +283,7 @@ impl Frames {
             PriorError::AttitudeSigma => row.attitude_sigma_deg.map(|deg| format!("{deg}")),
             PriorError::Rate => row.rate_rad_s.map(|[x, y, z]| format!("{x}, {y}, {z}")),
             PriorError::Attitude => row.q_fixed_from_camera_wxyz.map(|[w, x, y, z]| format!("{w}, {x}, {y}, {z}")),
+            PriorError::Temperature => row.camera_temperature_c.map(|c| format!("{c}")),
             PriorError::Range => row.range_km.map(|km| format!("{km}")),
             PriorError::RangeSigma => row.range_sigma_km.map(|km| format!("{km}")),
             _ => None,

@@ -13,6 +13,7 @@
 //! | `attitude_sigma_deg` | 1σ of that attitude, 5 if it is empty; above 30 the attitude is not used |
 //! | `sun_x`, `sun_y`, `sun_z` | direction to the Sun in the camera frame |
 //! | `rate_x`, `rate_y`, `rate_z` | rate of the camera in its frame, rad/s: rolling shutter, `gates.fixed_edge` |
+//! | `camera_temperature_c` | temperature of the camera, °C: `camera.temperature` |
 
 mod check;
 mod data;

@@ -36,6 +36,7 @@ pub const COLUMNS: &[&str] = &[
     "pole_z",
     "range_km",
     "range_sigma_km",
+    "camera_temperature_c",
 ];
 
 /// Returns the name under which a column is kept, for a known column and for those of a further body: `q_BODY_w` to
@@ -297,6 +298,7 @@ impl<'a> Row<'a> {
             pole_camera: self.vector(["pole_x", "pole_y", "pole_z"])?,
             range_km: self.number("range_km")?,
             range_sigma_km: self.number("range_sigma_km")?,
+            camera_temperature_c: self.number("camera_temperature_c")?,
             other_bodies: self.other_bodies()?,
         };
         self.check_direction("sun_x, sun_y, sun_z", data.sun_camera)?;

@@ -31,7 +31,7 @@ const CAMERA_FILE: [Key; 2] = [
         path: "camera.file",
         doc: "A Kalibr, OpenCV, EuRoC or ROS camera_info file with the calibration. Its path is relative to this \
               sensor.toml. Of the other keys of `[camera]`, only `camera`, `theta_max_deg`, `theta_min_deg`, \
-              `readout_s`, the sigmas and `covariance` are allowed with it.\n",
+              `readout_s`, `temperature`, the sigmas and `covariance` are allowed with it.\n",
         form: Form::Word,
         limits: Limits::Rule("a path"),
         choices: &[],

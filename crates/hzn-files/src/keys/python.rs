@@ -27,8 +27,8 @@ _Rows: TypeAlias = Sequence[Sequence[float]] | Sequence[NDArray[Any]] | NDArray[
 _Polygons: TypeAlias = Sequence[_Rows] | NDArray[Any]
 "#;
 
-/// The one table inside a section that is no section itself.
-const CAMERA_COVARIANCE: &str = r#"
+/// The tables inside a section that are no sections themselves.
+const CAMERA_TABLES: &str = r#"
 
 class CameraCovariance(TypedDict):
     """Covariance of the intrinsic parameters of a camera, as a calibration program reports it."""
@@ -37,6 +37,24 @@ class CameraCovariance(TypedDict):
     """The parameters of the rows and columns, by their names (``fx_px``, ``k1``)."""
     rows: _Rows
     """The matrix row by row, symmetric and positive semidefinite; in px² and the units of the coefficients."""
+
+
+class _Reference(TypedDict):
+    reference_c: float
+    """Temperature for which the other keys of the camera hold, °C."""
+
+
+class CameraTemperature(_Reference, total=False):
+    """How the lens of a camera changes with its temperature; only ``reference_c`` is required."""
+
+    focal_ppm_per_k: float
+    """Relative change of both focal lengths, millionths per kelvin."""
+    cx_px_per_k: float
+    """Motion of the principal point along x, px per kelvin."""
+    cy_px_per_k: float
+    """Motion of the principal point along y, px per kelvin."""
+    untold_sigma_k: float
+    """1σ of the temperature of a picture that comes without one, K."""
 "#;
 
 /// The classes of the whole file. A dictionary that the sensor returns has the camera as keys, never as an object.
@@ -57,7 +75,7 @@ class Parameters(_Optional):
 /// Returns the text of the Python module.
 pub fn module() -> String {
     let defaults = defaults();
-    let mut out = String::from(HEAD) + CAMERA_COVARIANCE;
+    let mut out = String::from(HEAD) + CAMERA_TABLES;
     // A body contains other sections, so it stands after them.
     let (bodies, others): (Vec<_>, Vec<_>) = sections().partition(|table| table.name == "body");
     others.iter().chain(&bodies).for_each(|table| out += &class(table, &defaults));
@@ -131,6 +149,7 @@ fn form(key: &Key) -> String {
         Form::Rows => "_Rows".to_owned(),
         Form::Polygons => "_Polygons".to_owned(),
         _ if key.section() == "body" => class_name(key.name()),
+        _ if key.path == "camera.temperature" => "CameraTemperature".to_owned(),
         _ => "CameraCovariance".to_owned(),
     }
 }

@@ -68,7 +68,7 @@ fn property(key: &Key, defaults: &toml::Table) -> Value {
         Form::Numbers => json!({"type": "array", "items": {"type": "number"}}),
         Form::Rows => json!({"type": "array", "items": {"type": "array", "items": {"type": "number"}}}),
         Form::Polygons => json!({"type": "array", "items": {"type": "array", "items": {"type": "array"}}}),
-        // A body has the same sections as the whole file. The covariance of a camera is a table with rows and columns.
+        // A body has the same sections as the whole file. The tables of a camera have keys of their own.
         _ if key.section() == "body" => json!({"$ref": format!("#/properties/{}", key.name())}),
         _ => json!({"type": "object"}),
     };

@@ -27,6 +27,24 @@ class CameraCovariance(TypedDict):
     """The matrix row by row, symmetric and positive semidefinite; in px² and the units of the coefficients."""
 
 
+class _Reference(TypedDict):
+    reference_c: float
+    """Temperature for which the other keys of the camera hold, °C."""
+
+
+class CameraTemperature(_Reference, total=False):
+    """How the lens of a camera changes with its temperature; only ``reference_c`` is required."""
+
+    focal_ppm_per_k: float
+    """Relative change of both focal lengths, millionths per kelvin."""
+    cx_px_per_k: float
+    """Motion of the principal point along x, px per kelvin."""
+    cy_px_per_k: float
+    """Motion of the principal point along y, px per kelvin."""
+    untold_sigma_k: float
+    """1σ of the temperature of a picture that comes without one, K."""
+
+
 class Camera(TypedDict, total=False):
     """The calibration. Pixel centres are at integers, x points right, y down, z forward, as in OpenCV."""
 
@@ -62,13 +80,17 @@ class Camera(TypedDict, total=False):
     """Covariance of the intrinsic parameters, used instead of the two sigmas; ``order`` names rows and columns
     (``fx_px``, ``fy_px``, ``cx_px``, ``cy_px``, ``k1`` ...), ``rows`` is the matrix. Values: symmetric, positive
     semidefinite."""
+    temperature: CameraTemperature | None
+    """Change of the lens with the temperature of the camera: ``reference_c``, ``focal_ppm_per_k``, ``cx_px_per_k``,
+    ``cy_px_per_k``, and ``untold_sigma_k`` for pictures without a temperature. Values: focal length and centre
+    change by at most 1 % of the focal length."""
     readout_s: float | None
     """Rolling shutter: time from the exposure of the first row to that of the last row, s; 0 for a global shutter,
     negative if the last row comes first. Values: −10 to 10 s. Default: 0."""
     file: str | None
     """A Kalibr, OpenCV, EuRoC or ROS camera_info file with the calibration. Its path is relative to this
     sensor.toml. Of the other keys of ``[camera]``, only ``camera``, ``theta_max_deg``, ``theta_min_deg``,
-    ``readout_s``, the sigmas and ``covariance`` are allowed with it. Values: a path."""
+    ``readout_s``, ``temperature``, the sigmas and ``covariance`` are allowed with it. Values: a path."""
     camera: str | None
     """Name of the camera in ``file``. Values: a name in the file. Default: the first one."""
 

@@ -83,6 +83,7 @@ impl From<PriorError> for Unprocessed {
             | PriorError::Position
             | PriorError::AttitudeSigma
             | PriorError::Rate
+            | PriorError::Temperature
             | PriorError::NoBody
             | PriorError::NotConfigured => Status::Unreadable,
             // Nothing can be expected of the body: no distance is known, or what is known contradicts itself.

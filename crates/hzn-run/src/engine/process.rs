@@ -57,10 +57,8 @@ pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: It
         finished.tip = picture.unused_bits();
     }
     if let Some(traces) = traces.as_ref().filter(|_| plan.trace || plan.overlay.is_some()) {
-        // The drawing is made here, because in the single writing thread it would delay all other threads. The camera
-        // includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
-        let camera = sensor.camera().with_rate(data.and_then(|d| d.rate_rad_s));
-        let drawing = draw(&finished.outcomes, traces, &camera);
+        // The drawing is made here, because in the single writing thread it would delay all other threads.
+        let drawing = draw(&finished.outcomes, traces, &sensor.camera_of(data));
         if let Some(folder) = &plan.overlay {
             let title = status_text(&finished.outcomes, plan);
             let image = overlay::draw_annotations(picture.to_rgb(), &drawing, &title);

@@ -169,6 +169,13 @@ impl AnySensor {
         &self.camera
     }
 
+    /// Returns the lens of one picture: with its temperature, and with the rate of rotation, so that a drawing fits
+    /// each row of a rolling shutter.
+    pub fn camera_of(&self, data: Option<&FrameData>) -> Camera<f64> {
+        let camera = self.camera.with_rate(data.and_then(|d| d.rate_rad_s));
+        camera.with_temperature(data.and_then(|d| d.camera_temperature_c))
+    }
+
     /// Returns the expected half-angle of each body in a picture, in radians. The entry is an error if no half-angle
     /// can be expected, for example for an impossible altitude or position.
     pub fn expected_half_angles_rad(&self, data: Option<&FrameData>) -> Vec<Result<f64, PriorError>> {

@@ -336,7 +336,7 @@ pub fn process_frame(
     let rows = sink::rows(&finished, config);
     let half_angles = sensor.expected_half_angles_rad(input.data);
     // The drawing takes the rotation rate into account, so every row is drawn where the sensor saw it.
-    let camera = &sensor.camera().with_rate(input.data.and_then(|d| d.rate_rad_s));
+    let camera = &sensor.camera_of(input.data);
     let each = bodies.iter().zip(finished.outcomes).zip(rows).zip(half_angles).zip(&watch.traces.each);
     let mut results: Vec<BodyResult> = each
         .map(|((((body, found), row), expected), trace)| {

@@ -35,7 +35,7 @@ pub(super) fn summarise(
     let Some(trials) = trials else { return processed };
     let refused = processed.rows.iter().any(|r| r.status != Status::Ok);
     let otsu = trials.try_otsu(view, input.data, refused).unwrap_or_default();
-    let camera = sensor.camera().with_rate(input.data.and_then(|d| d.rate_rad_s));
+    let camera = sensor.camera_of(input.data);
     for (index, outcome) in finished.outcomes.iter().enumerate() {
         let row = processed.rows.get(index);
         let (Ok(report), Some(trace), Some(row)) = (&outcome.report, traces.each.get(index), row) else {

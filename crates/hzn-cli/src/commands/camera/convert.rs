@@ -186,6 +186,9 @@ fn lost_keys(camera: &camera::Config) -> Vec<String> {
     if camera.covariance.is_some() {
         lost.push("covariance".to_owned());
     }
+    if camera.temperature.is_some() {
+        lost.push("temperature".to_owned());
+    }
     lost
 }
 

@@ -132,13 +132,13 @@ fn explain(picture: &PictureToExplain<'_>, args: &Args, decoding: Duration) -> O
             tell::result(format_args!("{between}{text}"))?;
         }
         // The camera includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
-        let camera = sensor.camera().with_rate(data.and_then(|d| d.rate_rad_s));
+        let camera = sensor.camera_of(data);
         drawing.add(trace, report.solution.as_ref(), &camera);
         let status = report.status;
         statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
     }
     if let Some(path) = &args.overlay {
-        let camera = sensor.camera().with_rate(data.and_then(|d| d.rate_rad_s));
+        let camera = sensor.camera_of(data);
         let shown = drawing.over(pixels, args.undistorted.then_some(&camera), &statuses.join(", "))?;
         overlay::save(&shown, path)?;
         tell::line(format_args!("overlay: {}", path.display()));

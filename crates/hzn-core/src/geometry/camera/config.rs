@@ -1,6 +1,7 @@
 //! `[camera]` of sensor.toml.
 
 use super::intrinsic::{Covariance, Intrinsic};
+use super::temperature::Temperature;
 use crate::base::error::{ConfigError, Limit, between, require};
 use crate::base::keys::{Section, choices, section};
 
@@ -131,6 +132,17 @@ section! {
         @- covariance: Option<Covariance>, serde(default, skip_serializing_if = "Option::is_none"),
             ["symmetric, positive semidefinite"]
             { unset: "none", example: "{ order = [\"fx_px\", \"fy_px\"], rows = [[1.0, 0.9], [0.9, 1.0]] }" };
+        /// Change of the lens with the temperature of the camera: `reference_c`, `focal_ppm_per_k`, `cx_px_per_k`,
+        /// `cy_px_per_k`, and `untold_sigma_k` for pictures without a temperature.
+        ///
+        /// `reference_c` (°C) is the temperature of the calibration. The focal lengths grow by `focal_ppm_per_k`
+        /// millionths a kelvin, and the principal point moves by `cx_px_per_k` and `cy_px_per_k` pixels a kelvin. The
+        /// column `camera_temperature_c` of frames.csv gives the temperature of each picture. A picture without a
+        /// temperature has the lens of the reference; `untold_sigma_k`, the 1σ of its temperature in kelvin, then
+        /// widens the covariance.
+        @- temperature: Option<Temperature>, serde(default, skip_serializing_if = "Option::is_none"),
+            ["focal length and centre change by at most 1 % of the focal length"]
+            { unset: "none", example: "{ reference_c = 20.0, focal_ppm_per_k = 25.0 }" };
         /// Rolling shutter: time from the exposure of the first row to that of the last row, s; 0 for a global shutter,
         /// negative if the last row comes first.
         ///
@@ -173,6 +185,7 @@ impl Config {
             focal_sigma_percent: 0.0,
             centre_sigma_px: 0.0,
             covariance: None,
+            temperature: None,
             readout_s: 0.0,
         }
     }
@@ -218,6 +231,7 @@ impl Config {
         let (w, h) = (f64::from(self.width), f64::from(self.height));
         between("camera.cx_px", self.cx_px, -w, 2.0 * w)?;
         between("camera.cy_px", self.cy_px, -h, 2.0 * h)?;
+        self.check_temperature()?;
         let most = self.model.coefficients().len();
         for (i, &k) in self.k.iter().enumerate() {
             require(k.is_finite(), "camera.k", k, Limit::Finite)?;

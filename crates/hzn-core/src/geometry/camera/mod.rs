@@ -3,6 +3,7 @@
 //! The module uses unit rays and never the plane z = f. The plane cannot represent 90° and more off axis, and is badly
 //! conditioned in single precision. Radial lenses share one code path; Brown-Conrady has a separate one.
 
+mod at_temperature;
 mod brown;
 mod config;
 mod curve;
@@ -14,6 +15,7 @@ mod lens;
 mod radial;
 pub(in crate::geometry) mod ray;
 mod shutter;
+mod temperature;
 mod uncertain;
 
 pub use config::{Config, Model, Projection};
@@ -23,6 +25,7 @@ pub use intrinsic::{Covariance, Intrinsic};
 use lens::Lens;
 pub use ray::Ray;
 use ray::radial_ray;
+pub use temperature::Temperature;
 
 use crate::base::error::{ConfigError, Limit, require};
 use crate::base::linalg::V3;
@@ -78,6 +81,8 @@ pub struct Camera<T> {
     lens: Lens<T>,
     /// Uncertainty of the calibration, as 1-sigma modes.
     modes: uncertain::Modes<T>,
+    /// Change with the temperature; `None` for a lens without `[camera.temperature]`, or at a picture's temperature.
+    temperature: Option<Temperature>,
     /// Time from one row to the next in seconds, and the row that is exposed at the picture's time.
     row_s: T,
     middle_row: T,
@@ -104,6 +109,7 @@ impl<T: Real> Camera<T> {
         let (right, bottom) = (f64::from(c.width) - 0.5, f64::from(c.height) - 0.5);
         let rho_corner =
             corner(-0.5, -0.5).max(corner(right, -0.5)).max(corner(-0.5, bottom)).max(corner(right, bottom));
+        let rho_corner = temperature::farthest_corner(c.temperature, rho_corner);
         let (lens, rho_max, theta_max) = match c.model {
             Model::Pinhole => {
                 let theta = pinhole_limit_rad(c, rho_corner)?;
@@ -143,6 +149,7 @@ impl<T: Real> Camera<T> {
             rho_min: T::from_f64(rho_min),
             lens,
             modes: uncertain::modes(c)?,
+            temperature: c.temperature,
             row_s: T::from_f64(c.readout_s / (f64::from(c.height) - 1.0)),
             middle_row: T::from_f64((f64::from(c.height) - 1.0) * 0.5),
             turning: None,
@@ -164,6 +171,12 @@ impl<T: Real> Camera<T> {
             inv_fy: self.inv_fy * sy,
             cx: centre.u,
             cy: centre.v,
+            // Pixels of the crop are larger by its scale.
+            temperature: self.temperature.map(|lens| Temperature {
+                cx_px_per_k: lens.cx_px_per_k / sx.to_f64(),
+                cy_px_per_k: lens.cy_px_per_k / sy.to_f64(),
+                ..lens
+            }),
             row_s: self.row_s * sy,
             middle_row: crop.crop_point(ImagePoint { u: T::ZERO, v: self.middle_row }).v,
             ..self.clone()

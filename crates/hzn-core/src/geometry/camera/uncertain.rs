@@ -6,6 +6,7 @@
 
 use super::config::Config;
 use super::intrinsic::{INTRINSICS, Intrinsic};
+use super::temperature;
 use crate::base::error::{ConfigError, Limit, require};
 use crate::base::real::Real;
 
@@ -14,9 +15,19 @@ use crate::base::real::Real;
 // Independent modes replace the matrix, so that each one moves the fit once and the covariance adds up squares.
 pub(super) type Modes<T> = heapless::Vec<[T; INTRINSICS], INTRINSICS>;
 
+/// Returns the modes of a calibration, and last that of a temperature that is not told.
+pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
+    let mut modes = modes_of_calibration(config)?;
+    if let Some(mode) = temperature::mode(config.temperature, [config.fx_px, config.fy_px]) {
+        // There is room: the check of the configuration refuses a sigma next to a covariance of all parameters.
+        let _ = modes.push(mode);
+    }
+    Ok(modes)
+}
+
 /// Returns the modes of a calibration, from its covariance or, without one, from its scalar sigmas. There are none when
 /// all sigmas are 0.
-pub(super) fn modes<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
+fn modes_of_calibration<T: Real>(config: &Config) -> Result<Modes<T>, ConfigError> {
     let mut modes = Modes::new();
     if let Some(given) = &config.covariance {
         let order = &given.order;

@@ -76,6 +76,8 @@ pub struct Expected<T> {
     pub(crate) last: Option<Last<T>>,
     /// The camera's rate of rotation in its own axes, rad/s.
     pub(crate) rate_rad_s: Option<[T; 3]>,
+    /// Temperature of the camera, °C.
+    pub(crate) camera_temperature_c: Option<T>,
     /// Radius of the sphere with this half-angle at this altitude, without the limb height, metres.
     pub(crate) radius_m: T,
     /// Scale height of the air in metres; 0 if it is unknown or if there is no air.
@@ -217,8 +219,7 @@ impl<T: Real> Expected<T> {
         if !(sin > T::zero() && cos2 > T::EPSILON) {
             return Err(below_limb_error(seen.altitude, limb));
         }
-        let cos = cos2.sqrt();
-        let free = body.half_angle_is_free();
+        let (cos, free) = (cos2.sqrt(), body.half_angle_is_free());
         let altitude_sigma = if free { T::zero() } else { T::from_f64(body.altitude_sigma_km) * km };
         let scale = sin / cos / (seen.radius + seen.altitude);
         let known = useful_attitude(prior, attitude_sigma);
@@ -254,6 +255,7 @@ impl<T: Real> Expected<T> {
             predicted: predicted.map(|(r, a)| (*r.inverse().apply(&a).v(), attitude_sigma)),
             last: prior.last,
             rate_rad_s: prior.rate_rad_s,
+            camera_temperature_c: prior.camera_temperature_c,
             radius_m: seen.radius,
             scale_height_m: T::from_f64(body.scale_height_km()) * km,
             limb_m: limb,

@@ -59,6 +59,8 @@ pub struct Prior<T> {
     /// The camera's rate of rotation in its own axes, rad/s, up to 1000. It is for a camera with a rolling shutter
     /// (`camera.readout_s`), whose rows are exposed at different times. The picture's time is that of its middle row.
     pub rate_rad_s: Option<[T; 3]>,
+    /// Temperature of the camera, °C, for a lens that changes with it (`camera.temperature`).
+    pub camera_temperature_c: Option<T>,
 }
 
 impl<T> Prior<T> {
@@ -102,6 +104,8 @@ pub enum PriorError {
     AttitudeSigma,
     /// The rate of rotation is not finite, or is too large.
     Rate,
+    /// The temperature of the camera is not finite, or is too far from the reference of the lens.
+    Temperature,
     /// The part of the year is not a number from 0 to 1.
     YearPart,
     /// The distance is not a finite number above 0.
@@ -156,6 +160,10 @@ impl core::fmt::Display for PriorError {
             Self::Attitude => "qw, qx, qy, qz must be a rotation: the quaternion's length must be 1 within 0.01",
             Self::AttitudeSigma => "attitude_sigma_deg must be a finite number, 0 or more",
             Self::Rate => "rate_x, rate_y, rate_z must be finite and at most 1000 (rad/s)",
+            Self::Temperature => {
+                "camera_temperature_c must be a finite number (degrees Celsius), near enough to \
+                 camera.temperature.reference_c that focal length and centre change by at most 1 %"
+            }
             Self::NoAltitude => {
                 "no altitude: set body.altitude_km, or give altitude_km or x_km, y_km, z_km with the frame"
             }

@@ -48,6 +48,7 @@ impl<T: Real> Expected<T> {
             predicted: to_direction.and_then(|u| scaled(&u)).map(|e| (e, attitude_sigma)),
             last: prior.last,
             rate_rad_s: prior.rate_rad_s,
+            camera_temperature_c: prior.camera_temperature_c,
             scale_height_m: T::from_f64(body.scale_height_km()) * km,
             radius_m: target.unit_m - T::from_f64(body.mean_limb_height_km()) * km,
             limb_m: T::from_f64(body.mean_limb_height_km()) * km,
