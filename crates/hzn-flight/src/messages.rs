@@ -132,8 +132,10 @@ numbered_enum! {
         Watchdog = 10 => "reset by the watchdog",
         /// The memory did not keep the parameters. a: copy (1 or 2). b: 0.
         StoreFailed = 11 => "parameters not stored",
-        /// The sensor refused the prior: its altitude, position or attitude is missing or impossible. a: 0. b: 0.
-        KnownRefused = 12 => "the altitude or position is missing or impossible",
+        /// The sensor refused the prior. a: 0 the altitude, position or attitude is missing or impossible, and the
+        /// picture has no answer; 1 the lens cannot have the temperature of the camera that the board gives, and the
+        /// picture has the lens of the reference. b: 0.
+        KnownRefused = 12 => "the altitude, position or temperature is missing or impossible",
         /// The camera sends no pictures. a: time since the last one, ms. b: number of the last one.
         CameraSilent = 13 => "the camera sends no pictures",
         /// A bit of the sensor, of the values from navigation or of the parameters of the flight software changed in

@@ -17,7 +17,7 @@ impl Prior {
     #[new]
     #[pyo3(signature = (*, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
                         rate_rad_s = None, range_km = None, range_sigma_km = None, pole = None, sun = None,
-                        time_s = None))]
+                        time_s = None, camera_temperature_c = None))]
     pub(crate) fn new(
         altitude_km: Option<f64>,
         position_km: Option<[f64; 3]>,
@@ -29,6 +29,7 @@ impl Prior {
         pole: Option<[f64; 3]>,
         sun: Option<[f64; 3]>,
         time_s: Option<f64>,
+        camera_temperature_c: Option<f64>,
     ) -> PyResult<Self> {
         let time_s = number(time_s);
         if time_s.is_some_and(f64::is_infinite) {
@@ -46,6 +47,7 @@ impl Prior {
             range_sigma_km: number(range_sigma_km),
             pole_camera: direction("pole", numbers(pole))?,
             sun_camera: direction("sun", numbers(sun))?,
+            camera_temperature_c: number(camera_temperature_c),
             ..FrameData::default()
         };
         Ok(Self { data })

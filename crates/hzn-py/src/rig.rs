@@ -78,7 +78,7 @@ impl Rig {
 
     #[doc = doc!("Rig.process")]
     #[pyo3(signature = (images, *, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
-                        rate_rad_s = None, sun = None, time_s = None, bits = None))]
+                        rate_rad_s = None, sun = None, time_s = None, camera_temperature_c = None, bits = None))]
     fn process<'py>(
         &self,
         py: Python<'py>,
@@ -90,6 +90,7 @@ impl Rig {
         rate_rad_s: Option<[f64; 3]>,
         sun: Option<[f64; 3]>,
         time_s: Option<f64>,
+        camera_temperature_c: Option<f64>,
         bits: Option<u8>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let known = Prior::new(
@@ -103,6 +104,7 @@ impl Rig {
             None,
             sun,
             time_s,
+            camera_temperature_c,
         )?;
         self.check_names(images)?;
         let mut frames = Vec::with_capacity(self.names.len());

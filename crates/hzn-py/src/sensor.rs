@@ -115,7 +115,7 @@ impl Sensor {
 
     #[doc = doc!("Sensor.expect")]
     #[pyo3(signature = (*, body = 0, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
-                        rate_rad_s = None, time_s = None))]
+                        rate_rad_s = None, time_s = None, camera_temperature_c = None))]
     fn expect(
         &self,
         body: usize,
@@ -125,6 +125,7 @@ impl Sensor {
         attitude_sigma_deg: Option<f64>,
         rate_rad_s: Option<[f64; 3]>,
         time_s: Option<f64>,
+        camera_temperature_c: Option<f64>,
     ) -> PyResult<Expected> {
         let known = Prior::new(
             altitude_km,
@@ -137,6 +138,7 @@ impl Sensor {
             None,
             None,
             time_s,
+            camera_temperature_c,
         )?;
         Expected::new(&self.state(), &known.data, body)
     }
@@ -144,7 +146,7 @@ impl Sensor {
     #[doc = doc!("Sensor.process")]
     #[pyo3(signature = (image, *, altitude_km = None, position_km = None, attitude = None, attitude_sigma_deg = None,
                         rate_rad_s = None, range_km = None, range_sigma_km = None, pole = None, sun = None,
-                        time_s = None, bits = None, detail = false))]
+                        time_s = None, camera_temperature_c = None, bits = None, detail = false))]
     fn process(
         &self,
         py: Python<'_>,
@@ -159,6 +161,7 @@ impl Sensor {
         pole: Option<[f64; 3]>,
         sun: Option<[f64; 3]>,
         time_s: Option<f64>,
+        camera_temperature_c: Option<f64>,
         bits: Option<u8>,
         detail: bool,
     ) -> PyResult<Report> {
@@ -173,6 +176,7 @@ impl Sensor {
             pole,
             sun,
             time_s,
+            camera_temperature_c,
         )?;
         let state = self.state();
         known.tell_doubts(py, &state.config)?;
@@ -193,7 +197,8 @@ impl Sensor {
         position_km: Option<[f64; 3]>,
         bits: Option<u8>,
     ) -> PyResult<Option<String>> {
-        let Prior { data } = Prior::new(altitude_km, position_km, None, None, None, None, None, None, None, None)?;
+        let Prior { data } =
+            Prior::new(altitude_km, position_km, None, None, None, None, None, None, None, None, None)?;
         let state = self.state();
         let array = Array::from_object(image)?;
         state.check_size(&array)?;

@@ -80,6 +80,7 @@ def test_gaps_of_every_kind(sensor):
         pole=three,
         sun=three,
         time_s=math.nan,
+        camera_temperature_c=math.nan,
     )
     report, expected = sensor.process(limb(), **gaps), sensor.process(limb())
     assert report.ok and report.altitude_km == 400.0 and (report.axis == expected.axis).all()
@@ -90,6 +91,23 @@ def test_gaps_of_every_kind(sensor):
     # A gap in a part of an array is a fault.
     with pytest.raises(hzn.ConfigError, match="x_km"):
         sensor.process(limb(), position_km=[7000.0, math.nan, 0.0])
+
+
+def test_the_lens_follows_the_temperature():
+    """A sensor with a temperature answers as one whose lens is that of the temperature."""
+    change = {"reference_c": 20.0, "focal_ppm_per_k": 400.0, "cx_px_per_k": 0.05}
+    body = {"kind": "earth-sphere", "altitude_km": 400.0}
+    sensor = hzn.Sensor(camera={**CAMERA, "temperature": change}, body=body)
+    factor = 1 - 20 * 400e-6
+    cold = {"fx_px": CAMERA["fx_px"] * factor, "fy_px": CAMERA["fy_px"] * factor, "cx_px": CAMERA["cx_px"] - 1.0}
+    expected = hzn.Sensor(camera={**CAMERA, **cold}, body=body).process(limb())
+    told = sensor.process(limb(), camera_temperature_c=0.0)
+    (many,) = sensor.process_many([(limb(), {"camera_temperature_c": 0.0})])
+    for report in (told, many):
+        assert report.ok and np.abs(report.axis - expected.axis).max() < 1e-12
+    assert np.abs(sensor.process(limb()).axis - expected.axis).max() > 1e-4
+    with pytest.raises(hzn.ConfigError, match="camera_temperature_c"):
+        sensor.process(limb(), camera_temperature_c=293.15)
 
 
 def test_a_body_that_has_no_limb_in_view():

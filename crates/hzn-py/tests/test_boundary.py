@@ -76,6 +76,7 @@ PRIOR = [
     "pole",
     "sun",
     "time_s",
+    "camera_temperature_c",
     "bits",
     "detail",
 ]

@@ -73,7 +73,7 @@
 #define HZN_TRUNCATED 7
 
 // Version of the structures and functions of this header. hzn_open compares it with that of the library.
-#define HZN_INTERFACE 3
+#define HZN_INTERFACE 4
 
 // Bytes that a sensor needs which fits 2048 points of an edge, on every machine.
 #define HZN_WORKSPACE_SIZE 114688
@@ -121,6 +121,8 @@ typedef struct {
   float last_cov_rad2[6];
   // Time from the exposure of that answer to this one, s.
   float last_age_s;
+  // Temperature of the camera, °C, for a lens that changes with it (parameters 24 to 28).
+  float camera_temperature_c;
 } HznKnown;
 
 // A picture: one byte per pixel, row by row.
@@ -202,7 +204,7 @@ typedef struct {
 #else
 #define HZN_ASSERT(condition, message) struct HznSensor
 #endif
-HZN_ASSERT(sizeof(HznKnown) == 108, "the size of HznKnown");
+HZN_ASSERT(sizeof(HznKnown) == 112, "the size of HznKnown");
 HZN_ASSERT(sizeof(HznPicture) == 3 * sizeof(size_t) + 8, "the size of HznPicture");
 HZN_ASSERT(sizeof(HznEdge) == 24, "the size of HznEdge");
 HZN_ASSERT(sizeof(HznAnswer) == 484, "the size of HznAnswer");

@@ -54,6 +54,8 @@ pub struct HznKnown {
     pub last_cov_rad2: [f32; 6],
     /// Time from the exposure of that answer to this one, s.
     pub last_age_s: f32,
+    /// Temperature of the camera, °C, for a lens that changes with it (parameters 24 to 28).
+    pub camera_temperature_c: f32,
 }
 
 impl HznKnown {
@@ -70,6 +72,7 @@ impl HznKnown {
         last_axis: [f32::NAN; 3],
         last_cov_rad2: [f32::NAN; 6],
         last_age_s: f32::NAN,
+        camera_temperature_c: f32::NAN,
     };
 }
 
@@ -158,6 +161,7 @@ pub(crate) fn to_prior(values: &HznKnown, body: Kind) -> Option<(Prior<f32>, u8)
         position_m: known(values.position_m)?,
         rate_rad_s: known(values.rate_rad_s)?,
         last: to_last(values)?,
+        camera_temperature_c: (!values.camera_temperature_c.is_nan()).then_some(values.camera_temperature_c),
         ..Prior::default()
     };
     let attitude = AttitudeAndSun::try_new(values.attitude_wxyz, values.attitude_sigma_rad, values.sun).ok()?;

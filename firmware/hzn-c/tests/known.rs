@@ -146,6 +146,26 @@ fn an_unlit_limb_and_a_fast_turn_are_refused() {
 }
 
 #[test]
+fn the_lens_follows_the_temperature() {
+    let program = Program::new();
+    let told = |c: f32| program.process(|known| known.camera_temperature_c = c);
+    let (_, plain) = told(f32::NAN);
+    assert_eq!(told(-10.0).1.axis, plain.axis);
+    // SAFETY: the sensor was opened.
+    unsafe {
+        for (number, value) in [(24, 20.0), (25, 300.0), (27, 0.005)] {
+            assert_eq!(hzn_set(program.sensor, number, value), 0);
+        }
+        assert_eq!(hzn_apply(program.sensor), 0);
+    }
+    assert_eq!(told(20.0).1.axis, plain.axis);
+    let (code, cold) = told(-10.0);
+    assert!(code == HZN_OK && cold.axis != plain.axis);
+    // The lens would change by 8.8 %.
+    assert_ne!(told(-273.0).0, HZN_OK);
+}
+
+#[test]
 fn impossible_values_are_refused() {
     let program = Program::new();
     let refused: [fn(&mut HznKnown); 8] = [

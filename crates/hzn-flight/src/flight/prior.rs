@@ -15,6 +15,9 @@ use hzn_core::body::Kind;
 const NAVIGATION: u32 = 0;
 const ATTITUDE: u32 = 1;
 
+/// First number of [`Event::KnownRefused`].
+const TEMPERATURE: u32 = 1;
+
 /// Days from the epoch of the time code, 1958-01-01, to that of UTC, 1970-01-01.
 const DAYS_TO_1970: f64 = 4383.0;
 
@@ -82,7 +85,19 @@ impl<B: Board> Flight<'_, B> {
         }
         self.has_expired = (is_navigation_told || navigation_s.is_some(), is_attitude_told || attitude_s.is_some());
         let prior = self.known.get().at(exposure_us, self.body());
-        Prior { year_part: year_part(self.buffers.line.clock.at(exposure_us)), ..prior }
+        let camera_temperature_c = self.camera_temperature_c();
+        Prior { year_part: year_part(self.buffers.line.clock.at(exposure_us)), camera_temperature_c, ..prior }
+    }
+
+    /// Returns the temperature of the camera. An event says if the lens cannot have it; the picture then has the lens of
+    /// the reference, because a broken thermometer must not cost the answers.
+    fn camera_temperature_c(&mut self) -> Option<f32> {
+        let told_c = self.board.camera_temperature_c()?;
+        let is_possible = self.sensor.get().camera().accepts_temperature(told_c);
+        if !is_possible {
+            self.send_event(Event::KnownRefused, TEMPERATURE, 0);
+        }
+        is_possible.then_some(told_c)
     }
 }
 

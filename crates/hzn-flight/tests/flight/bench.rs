@@ -44,6 +44,7 @@ pub(crate) struct Bench {
     pub(crate) fed: u32,
     pub(crate) watchdog_reset: bool,
     pub(crate) retained: [u32; RETAINED_WORDS],
+    pub(crate) camera_temperature_c: Option<f32>,
     /// The parameters of the sensor that is in use.
     pub(crate) noted: Option<Config>,
     /// Number of writes of a copy of the parameters.
@@ -78,6 +79,9 @@ impl Board for Bench {
     }
     fn camera_answers(&mut self) -> bool {
         !self.camera_is_dead
+    }
+    fn camera_temperature_c(&mut self) -> Option<f32> {
+        self.camera_temperature_c
     }
     fn next_picture(&mut self) -> Option<Picture> {
         let (pixels, lost) = self.pictures.pop_front()?;

@@ -170,3 +170,45 @@ fn an_edge_that_stays_while_the_vehicle_turns_is_refused_and_told() {
         }
     });
 }
+
+#[test]
+fn the_lens_follows_the_thermometer_of_the_camera() {
+    fly(ready(), |f| {
+        send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
+        let mut direction = |temperature_c: Option<f32>| {
+            f.board().camera_temperature_c = temperature_c;
+            f.board().pictures.push_back((limb(), 0));
+            f.turn();
+            let sent = take_sent(f);
+            (sent.science[0].1.direction.unwrap().axis, sent.events)
+        };
+        // Without the section a temperature changes nothing.
+        let plain = direction(None);
+        assert_eq!(direction(Some(-10.0)), plain);
+        let parameters = [(24, 20.0), (25, 300.0), (26, 0.0), (27, 0.02), (28, 0.0)];
+        let set = command(1, Function::SetParameters, |w| {
+            w.u8(parameters.len() as u8);
+            parameters.iter().for_each(|&(id, value): &(u16, f64)| {
+                w.u16(id);
+                w.f64(value);
+            });
+        });
+        assert_eq!(send(f, &set).answers[0].2, Code::Done);
+        let mut direction = |temperature_c: Option<f32>| {
+            f.board().camera_temperature_c = temperature_c;
+            f.board().pictures.push_back((limb(), 0));
+            f.turn();
+            let sent = take_sent(f);
+            (sent.science[0].1.direction.unwrap().axis, sent.events)
+        };
+        let (reference, _) = direction(None);
+        assert_eq!((reference, direction(Some(20.0)).0), (plain.0, plain.0));
+        let (cold, events) = direction(Some(-10.0));
+        let off = (0..3).map(|i| (cold[i] - reference[i]).powi(2)).sum::<f32>().sqrt();
+        // 30 K move the image by up to 0.6 px and 0.9 % of its coordinates; the focal length is 600 px.
+        assert!((3e-4..0.02).contains(&off) && events.is_empty(), "{off} {events:?}");
+        // A thermometer that counts in kelvin, or is broken, costs an event and not the answer.
+        let (broken, events) = direction(Some(-273.0));
+        assert_eq!((broken, &events[..]), (reference, &[(Event::KnownRefused, 1, 0)][..]));
+    });
+}

@@ -270,6 +270,7 @@ class Rig:
         rate_rad_s: Sequence[float] | None = None,
         sun: Sequence[float] | None = None,
         time_s: float | None = None,
+        camera_temperature_c: float | None = None,
         bits: int | None = None,
     ) -> dict[str, Report]:
         """Find the limb in the pictures of one epoch, and join the answers.
@@ -279,7 +280,7 @@ class Rig:
         images
             The pictures by the name of their head, as for `Sensor.process`. A head without a picture, or with None,
             costs only itself.
-        altitude_km, position_km, attitude_sigma_deg, time_s, bits
+        altitude_km, position_km, attitude_sigma_deg, time_s, camera_temperature_c, bits
             As for `Sensor.process`, for all heads.
         attitude
             Prior attitude of the vehicle: unit quaternion (w, x, y, z) from the vehicle to the fixed frame of the body.
@@ -417,6 +418,7 @@ class Sensor:
         attitude_sigma_deg: float | None = None,
         rate_rad_s: Sequence[float] | None = None,
         time_s: float | None = None,
+        camera_temperature_c: float | None = None,
     ) -> Expected:
         """Compute the expected cone, for the single stages (`hzn.consensus` and its neighbours).
 
@@ -425,7 +427,7 @@ class Sensor:
         body
             Number of the body for a sensor of several bodies, from 0. Stages that get the result work for this body,
             with its threshold and its edge errors.
-        altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s
+        altitude_km, position_km, attitude, attitude_sigma_deg, rate_rad_s, time_s, camera_temperature_c
             As in `process`.
 
         Raises
@@ -449,6 +451,7 @@ class Sensor:
         pole: Sequence[float] | None = None,
         sun: Sequence[float] | None = None,
         time_s: float | None = None,
+        camera_temperature_c: float | None = None,
         bits: int | None = None,
         detail: bool = False,
     ) -> _Result:
@@ -485,6 +488,8 @@ class Sensor:
             Direction to the Sun in the camera frame, shape (3,).
         time_s
             UTC in seconds since 1970. With a position, Sun and Moon get `Report.axis_fixed`.
+        camera_temperature_c
+            Temperature of the camera, °C. With ``camera.temperature`` the picture has the lens of this temperature.
         bits
             Number of significant bits of uint16, 8 to 16. Without it, the sensor's `input.bits` is used, else 16. If
             nothing is found and the upper bits are unused, a warning says so.
@@ -503,7 +508,7 @@ class Sensor:
         ImageError
             The array has another dtype, shape or size than the camera's picture, or the file cannot be read.
         ConfigError
-            An altitude, position or attitude is impossible.
+            An altitude, position, attitude or temperature is impossible.
 
         Warns
         -----
@@ -1347,6 +1352,7 @@ class _Prior:
         pole: Sequence[float] | None = None,
         sun: Sequence[float] | None = None,
         time_s: float | None = None,
+        camera_temperature_c: float | None = None,
     ) -> _Prior: ...
 
 def _process_encoded(

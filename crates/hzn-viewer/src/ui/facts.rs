@@ -53,7 +53,11 @@ pub(super) fn lines(card: &Card, frame_view: &FrameView, outcome: &Outcome, answ
         "Further looks" if c.looks > 1 => vec![format!("{} looks, each with another threshold", c.looks)],
         "Work budget" => vec![format!("{} steps of work", c.work)],
         "Edge points" if reached(Stage::Contour) => edge_points(report, config),
-        "Rays" if reached(Stage::Rays) => vec![format!("{} points became rays", c.edge_points)],
+        "Rays" if reached(Stage::Rays) => {
+            let temperature_c = frame_view.data.as_ref().and_then(|data| data.camera_temperature_c);
+            let points = format!("{} points became rays", c.edge_points);
+            core::iter::once(points).chain(lens(&config.camera, temperature_c)).collect()
+        }
         "Consensus" if reached(Stage::Consensus) => consensus(report, answer),
         "Fit" => answer.solution().map_or_else(Vec::new, |s| fit(s, answer)),
         "Covariance" => answer.solution().map_or_else(Vec::new, |s| covariance(s, answer)),
@@ -123,6 +127,13 @@ fn edge_points(report: &Report<f64>, config: &Config) -> Vec<String> {
         out.push(format!("{} points were located at the global threshold", c.fallback_points));
     }
     out
+}
+
+/// Says which lens a picture has, if the lens changes with the temperature.
+fn lens(camera: &hzn_core::camera::Config, temperature_c: Option<f64>) -> Option<String> {
+    camera.temperature?;
+    let Some(at_c) = temperature_c else { return Some("temperature unknown: the lens of the reference".to_owned()) };
+    Some(format!("lens at {at_c} °C: fx {:.3} px", camera.at_temperature(at_c).fx_px))
 }
 
 fn consensus(report: &Report<f64>, answer: &BodyResult) -> Vec<String> {
@@ -197,6 +208,16 @@ mod tests {
         let long = "ended at gates: residuals, short-arc, no-fit, short-arc, short-arc";
         assert_eq!(shorten_detail(long), "ended at gates: residuals, short-arc ×3, no-fit");
         assert_eq!(shorten_detail("ended at contour"), "ended at contour");
+    }
+
+    #[test]
+    fn a_lens_that_follows_the_temperature_is_told() {
+        use hzn_core::camera::{Config, Model, Temperature};
+        let mut camera = Config::ideal(Model::Pinhole, 640, 480, 500.0);
+        assert_eq!(lens(&camera, Some(0.0)), None);
+        camera.temperature = Some(Temperature { reference_c: 20.0, focal_ppm_per_k: 100.0, ..Temperature::default() });
+        assert_eq!(lens(&camera, Some(0.0)).as_deref(), Some("lens at 0 °C: fx 499.000 px"));
+        assert!(lens(&camera, None).is_some_and(|text| text.contains("reference")));
     }
 
     #[test]

@@ -84,6 +84,7 @@ fn any_known(mut number: impl FnMut() -> f32) -> HznKnown {
     known.last_axis = std::array::from_fn(|_| number());
     known.last_cov_rad2 = std::array::from_fn(|_| number());
     known.last_age_s = number();
+    known.camera_temperature_c = number();
     known
 }
 

@@ -67,6 +67,7 @@ impl Value for bool {
 
 impl<T: Value> Value for Option<T> {
     const FORM: Form = T::FORM;
+    const NUMBERS: u16 = T::NUMBERS;
     const CHOICES: &'static [Choice] = T::CHOICES;
     fn check(&self, path: &'static str, low: f64, above: bool, high: f64) -> Result<(), ConfigError> {
         self.as_ref().map_or(Ok(()), |value| value.check(path, low, above, high))
@@ -80,7 +81,8 @@ impl<T: Value> Value for Option<T> {
             *self = None;
             return Some(());
         }
-        let mut value = T::empty()?;
+        // The numbers of a value arrive one by one, so that the others stay.
+        let mut value = self.clone().or_else(T::empty)?;
         value.set_number(place, number)?;
         *self = Some(value);
         Some(())

@@ -140,7 +140,7 @@ section! {
         /// column `camera_temperature_c` of frames.csv gives the temperature of each picture. A picture without a
         /// temperature has the lens of the reference; `untold_sigma_k`, the 1σ of its temperature in kelvin, then
         /// widens the covariance.
-        @- temperature: Option<Temperature>, serde(default, skip_serializing_if = "Option::is_none"),
+        @24 temperature: Option<Temperature>, serde(default, skip_serializing_if = "Option::is_none"),
             ["focal length and centre change by at most 1 % of the focal length"]
             { unset: "none", example: "{ reference_c = 20.0, focal_ppm_per_k = 25.0 }" };
         /// Rolling shutter: time from the exposure of the first row to that of the last row, s; 0 for a global shutter,

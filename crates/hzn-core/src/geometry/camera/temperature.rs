@@ -36,9 +36,33 @@ pub struct Temperature {
 
 impl Value for Temperature {
     const FORM: Form = Form::Table;
+    const NUMBERS: u16 = 5;
+    fn number(&self, place: u16) -> f64 {
+        let mut copy = *self;
+        copy.slot(place).map_or(f64::NAN, |slot| *slot)
+    }
+    fn set_number(&mut self, place: u16, number: f64) -> Option<()> {
+        *self.slot(place)? = Some(number).filter(|x| x.is_finite())?;
+        Some(())
+    }
+    fn empty() -> Option<Self> {
+        Some(Self::default())
+    }
 }
 
 impl Temperature {
+    /// Returns the number at `place` in flight.
+    fn slot(&mut self, place: u16) -> Option<&mut f64> {
+        match place {
+            0 => Some(&mut self.reference_c),
+            1 => Some(&mut self.focal_ppm_per_k),
+            2 => Some(&mut self.cx_px_per_k),
+            3 => Some(&mut self.cy_px_per_k),
+            4 => Some(&mut self.untold_sigma_k),
+            _ => None,
+        }
+    }
+
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         between("camera.temperature.reference_c", self.reference_c, -273.15, 1000.0)?;
         between("camera.temperature.focal_ppm_per_k", self.focal_ppm_per_k, -1000.0, 1000.0)?;
