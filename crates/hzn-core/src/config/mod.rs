@@ -144,6 +144,7 @@ impl Config {
     /// Makes a sensor with this camera and every other value at its default.
     pub fn new(camera: camera::Config) -> Self {
         Self {
+            covariance: covariance::Config::for_focal_length(0.5 * (camera.fx_px + camera.fy_px)),
             camera,
             mount: None,
             body: body::Config::default(),
@@ -156,7 +157,6 @@ impl Config {
             edge_points: edge_points::Config::default(),
             consensus: consensus::Config::default(),
             fit: fit::Config::default(),
-            covariance: covariance::Config::default(),
             gates: gates::Config::default(),
             retry: retry::Config::default(),
             track: track::Config::default(),

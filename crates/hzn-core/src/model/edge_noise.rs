@@ -48,7 +48,9 @@ section! {
         @102 noise: Noise = Noise::Rms, [choice];
         /// 1σ of an edge point, px; raised to the RMS of the residuals if that is larger.
         ///
-        /// A larger value widens the covariance of clean edges and gives the expected half-angle more weight.
+        /// A larger value widens the covariance of clean edges and gives the expected half-angle more weight. The
+        /// default is that of a pixel of 0.62° (1/92 rad) or less. In a camera with wider pixels, such as a thermal
+        /// array of 32×24, the defaults of this key and of the next three are the same angle and thus fewer pixels.
         // 0.1 px is what sub-pixel points reach on a clean edge. It was 1 px before, which was too large: the mean NEES
         // of infrared pictures was 0.02 instead of about 0.5.
         @100 sigma_px: f64 = 0.1, [above 0.0 to 1e4];
@@ -103,7 +105,28 @@ pub(crate) const LENGTHS_PER_EDGE: f64 = 12.0;
 /// Value of a tilt at the ends of the edge if its RMS along the edge is 1: √3.
 pub(crate) const END_PER_RMS: f64 = 1.732_050_807_568_877_2;
 
+/// Pixels per radian of the coarsest camera on which the floors were measured: the scene `leo-infrared`.
+const COARSEST_PX_PER_RAD: f64 = 92.0;
+
 impl Config {
+    /// Returns the default values for a camera with this focal length: in pixels wider than those of the cameras on
+    /// which the floors were measured, the floors keep their angle.
+    ///
+    /// The floors stand for errors of the scene (light that fades along the limb, a wide profile, clouds), which do not
+    /// grow with the pixel. Without this, a correlation of 60 px is twice as long as the whole limb of 32×24 pixels, so
+    /// that all noise of the edge counts as a shift of the picture, and the fusion with the expected half-angle moves
+    /// the axis by the wrong amount. The error of the sampling does grow with the pixel; the residuals show it.
+    pub fn for_focal_length(focal_px: f64) -> Self {
+        let all = Self::default();
+        // A wrong focal length is refused with the camera.
+        if !(focal_px > 0.0 && focal_px < COARSEST_PX_PER_RAD) {
+            return all;
+        }
+        let [sigma_px, correlation_px, bias_px, tilt_px] =
+            [all.sigma_px, all.correlation_px, all.bias_px, all.tilt_px].map(|px| px * focal_px / COARSEST_PX_PER_RAD);
+        Self { sigma_px, correlation_px, bias_px, tilt_px, ..all }
+    }
+
     /// Returns the values that a picture gives whose residuals have this RMS, along an edge of this length. With `reml`
     /// the correlation length is that of `rms`.
     pub fn measured(&self, rms_px: f64, edge_px: f64) -> Self {
@@ -140,5 +163,26 @@ impl Value for Config {
     const FORM: Form = Form::Table;
     fn check(&self, _path: &'static str, _low: f64, _above: bool, _high: f64) -> Result<(), ConfigError> {
         self.check_keys()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_floors_keep_their_angle_in_wide_pixels() {
+        let floors = |focal_px: f64| {
+            let c = Config::for_focal_length(focal_px);
+            [c.sigma_px, c.correlation_px, c.bias_px, c.tilt_px].map(|px| (px / focal_px, px))
+        };
+        let usual = floors(92.0);
+        for ((wide, wide_px), (angle, px)) in floors(23.0).into_iter().zip(usual) {
+            assert!((wide / angle - 1.0).abs() < 1e-12 && (4.0 * wide_px - px).abs() < 1e-12, "{wide} {angle}");
+        }
+        // Narrow pixels, and a focal length that the camera refuses, have the defaults.
+        for focal_px in [92.0, 1170.0, 0.0, -3.0, f64::NAN] {
+            assert_eq!(Config::for_focal_length(focal_px), Config::default(), "{focal_px}");
+        }
     }
 }
