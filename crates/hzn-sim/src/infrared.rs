@@ -13,6 +13,7 @@ use crate::pose::Pose;
 use crate::radiance::{Grid, Radiance, mean_over_globe};
 use crate::texture::{CellCache, CloudField, Clouds};
 use crate::weather::{Weather, WeatherField};
+use hzn_core::body::Limb;
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
 use hzn_files::limited;
@@ -31,6 +32,10 @@ pub struct Infrared {
     pub brightness: f64,
     /// Relative increase of the disc's brightness over the equator, and its relative decrease over the poles.
     pub by_latitude: f64,
+    /// Band whose name sensor.toml has as `body.limb` (`window-8-14um` or `co2-15um`), in place of the height of this
+    /// world: the sensor then knows the limb as well as that of a real flight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limb: Option<Limb>,
     /// Mean tangent height at which half of the disc's brightness is left, kilometres.
     pub half_level_km: f64,
     /// Increase of that height over the pole in midsummer, kilometres. It is linear in latitude, and negative over the
@@ -62,6 +67,7 @@ impl Default for Infrared {
             season_deg: None,
             brightness: 0.75,
             by_latitude: 0.06,
+            limb: None,
             half_level_km: 25.0,
             half_level_season_km: 4.5,
             scale_km: 4.0,

@@ -14,6 +14,7 @@
 //! | [`infrared`] | the Earth at 15 µm |
 //! | [`radiance`] | a user's table of infrared radiances |
 //! | [`optics`] | fall-off and stray light |
+//! | [`halves`] | two half pictures, one after the other |
 //! | [`motion`] | rotation during a picture |
 //! | [`foreground`] | structure of the vehicle in the picture |
 //! | `height` | height of the limb by latitude |
@@ -39,6 +40,7 @@ pub mod error;
 pub mod flight;
 pub mod foreground;
 pub mod globe;
+pub mod halves;
 mod height;
 pub mod image_circle;
 pub mod infrared;

@@ -29,14 +29,27 @@ impl Scene {
     /// # Errors
     /// Fails if [`Camera::try_new`] refuses the camera, or if the position is not outside the body.
     pub fn render(&self) -> Result<Picture, SceneError> {
+        let light = match &self.halves {
+            None => self.light_on_detector()?,
+            Some(halves) => {
+                let [first, second] = halves.scenes(self);
+                let mut light = first.light_on_detector()?;
+                halves.interleave(&mut light, &second.light_on_detector()?);
+                light
+            }
+        };
+        Ok(self.detector.expose(&light, self.seed))
+    }
+
+    /// Returns the light on every pixel with exposure and blur, of one half picture or of a whole one.
+    fn light_on_detector(&self) -> Result<Vec<Plane>, SceneError> {
         let camera = Camera::<f64>::try_new(&self.camera)?;
         let mut light = self.light()?;
         for plane in &mut light {
             self.expose(plane, &camera);
         }
         let blur = |plane: Plane| apply_image_circle(plane.blurred(self.detector.psf_sigma_px), &camera);
-        let light: Vec<Plane> = light.into_iter().map(blur).collect();
-        Ok(self.detector.expose(&light, self.seed))
+        Ok(light.into_iter().map(blur).collect())
     }
 
     /// Returns the light on every pixel before blur and exposure: one plane, or three for colours.

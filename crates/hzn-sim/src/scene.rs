@@ -8,6 +8,7 @@ use crate::detector::Detector;
 use crate::ellipsoid::Ellipsoid;
 use crate::error::SceneError;
 use crate::foreground::Foreground;
+use crate::halves::Halves;
 use crate::infrared::Infrared;
 use crate::motion::Motion;
 use crate::optics::Optics;
@@ -58,6 +59,9 @@ pub struct Scene {
     /// Rotation during the picture; `None` for an instantaneous picture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<Motion>,
+    /// Two half pictures that are taken one after the other; `None` for a picture that is taken at once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub halves: Option<Halves>,
     /// Factor from light to fractions of full scale; light above 1 is clipped.
     #[serde(default = "one")]
     pub exposure: f64,
@@ -210,6 +214,7 @@ impl Scene {
             foreground: Vec::new(),
             optics: Optics::default(),
             motion: None,
+            halves: None,
             exposure: 1.0,
             detector: Detector::default(),
             seed: 0,

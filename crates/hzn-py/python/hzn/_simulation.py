@@ -26,9 +26,9 @@ def simulate(
     Parameters
     ----------
     scene
-        A built-in scene (``rocket``, ``rocket-clean``, ``leo-infrared``, ``horace``, ``horace-wide``,
-        ``full-disc``, ``sun-moon``, ``tumble``, ``atek``, ``jupiter``, ``enceladus``, ``saturn``, ``geo``), the path of a
-        scene.toml, or its sections and keys as a dictionary.
+        A built-in scene (``rocket``, ``rocket-clean``, ``leo-infrared``, ``thermal-array``, ``horace``,
+        ``horace-wide``, ``full-disc``, ``sun-moon``, ``tumble``, ``atek``, ``jupiter``, ``enceladus``, ``saturn``,
+        ``geo``), the path of a scene.toml, or its sections and keys as a dictionary.
     frames
         Number of pictures; it replaces the number in the scene.
     seed

@@ -92,6 +92,16 @@ impl Scenario {
                 return refuse(&key, n2, "its squared length must be 1");
             }
         }
+        if self.shutter.halves.is_none() && self.shutter.halves_s != 0.0 {
+            let rule = "has no effect without halves: write halves = \"chess\" or \"rows\", or remove it";
+            return refuse("[shutter] halves_s", self.shutter.halves_s, rule);
+        }
+        if let World::Infrared(Infrared { limb: Some(limb), .. }) = &self.world
+            && limb.thermal_km().is_none()
+        {
+            let what = "is no thermal band: write \"window-8-14um\" or \"co2-15um\", or remove it";
+            return Err(ScenarioError::new("[world] infrared.limb", what));
+        }
         self.imu.map_or(Ok(()), |imu| imu.check())?;
         self.gnss.as_ref().map_or(Ok(()), |gnss| gnss.check())?;
         Ok(())
@@ -110,6 +120,7 @@ impl Scenario {
             Limit::new("[optics] ghosts", optics.ghosts, [0.0, UNLIMITED]),
             Limit::new("[shutter] exposure_s", shutter.exposure_s, [0.0, UNLIMITED]),
             Limit::new("[shutter] readout_s", shutter.readout_s, [0.0, UNLIMITED]),
+            Limit::new("[shutter] halves_s", shutter.halves_s, [0.0, UNLIMITED]),
             Limit::new("[exposure] gain", exposure.gain, [ABOVE_ZERO, UNLIMITED]),
             Limit::new("[exposure] target_mean", exposure.target_mean.unwrap_or(0.5), [ABOVE_ZERO, 1.0]),
             Limit::new("[exposure] lag_s", exposure.lag_s, [0.0, UNLIMITED]),

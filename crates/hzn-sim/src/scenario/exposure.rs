@@ -70,7 +70,7 @@ fn mean_light(scene: &Scene) -> Result<f64, SceneError> {
     for part in &mut small.foreground {
         part.polygon_px.iter_mut().for_each(|p| *p = p.map(centre));
     }
-    small.motion = None;
+    (small.motion, small.halves) = (None, None);
     small.exposure = 1.0;
     small.detector = crate::Detector { psf_sigma_px: 0.0, bits: 16, ..crate::Detector::default() };
     let picture = small.render()?;

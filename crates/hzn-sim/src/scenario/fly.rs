@@ -10,6 +10,8 @@ use crate::counter::{Counter, Stream};
 use crate::ellipsoid::EllipsoidLimb;
 use crate::flight::{Flight, FlightFrame};
 use crate::foreground::Foreground;
+use crate::halves::Halves;
+use crate::infrared::Infrared;
 use crate::motion::Motion;
 use crate::pose::Pose;
 use crate::scene::{Light, Scene, World};
@@ -50,6 +52,16 @@ impl Scenario {
             altitude_sigma_km: self.known.position_sigma_km.max(0.05),
             limb_height_km: self.limb_height_in_picture_km(kind),
             ..self.body_config(kind)
+        };
+        let body = |kind: Kind| match &self.world {
+            // The band tells its height, so that the sensor knows the limb as well as in a flight.
+            World::Infrared(Infrared { limb: Some(limb), .. }) if kind == Kind::Earth => {
+                let limb_height_by_latitude_km = Default::default();
+                let mut body = hzn_core::body::Config { limb: *limb, limb_height_by_latitude_km, ..body(kind) };
+                body.follow_band();
+                body
+            }
+            _ => body(kind),
         };
         sensor.input.tone = Some(self.detector.tone.into());
         match self.bodies.as_slice() {
@@ -155,6 +167,11 @@ impl Scenario {
             rate_radps: path.camera_rate_radps(time_s),
             exposure_s: shutter.exposure_s,
             readout_s: shutter.readout_s,
+        });
+        scene.halves = shutter.halves.map(|order| Halves {
+            order,
+            apart_s: shutter.halves_s,
+            rate_radps: path.camera_rate_radps(time_s),
         });
         scene.foreground = self
             .vehicle

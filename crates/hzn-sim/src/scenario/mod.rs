@@ -31,13 +31,14 @@ use hzn_files::utc;
 use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;
+use crate::halves::Order;
 use crate::optics::Optics;
 use crate::scene::World;
 use crate::trajectory::instruments::{Gnss, Imu};
 use crate::trajectory::{Attitude, Path, Trajectory};
 
 /// Scenes that come with hzn: name, description, text of the scene.toml.
-pub const BUILTIN: [(&str, &str, &str); 15] = [
+pub const BUILTIN: [(&str, &str, &str); 16] = [
     (
         "rocket",
         "sounding rocket with the Sun, lens ghosts and payload in view, colour JPEG 1920x1080",
@@ -52,6 +53,11 @@ pub const BUILTIN: [(&str, &str, &str); 15] = [
         "leo-infrared",
         "infrared Earth sensor in low orbit, from nadir to 120 degrees off it, 384x288",
         include_str!("builtin/leo-infrared.toml"),
+    ),
+    (
+        "thermal-array",
+        "thermal array of 32x24 pixels over 110 degrees in low orbit, two half pictures",
+        include_str!("builtin/thermal-array.toml"),
     ),
     (
         "horace",
@@ -245,6 +251,12 @@ pub struct Shutter {
     pub exposure_s: f64,
     /// Time from the first row's exposure to the last row's exposure, seconds; 0 is a global shutter.
     pub readout_s: f64,
+    /// Pixels of two half pictures that are taken one after the other, as thermal arrays do: `chess` or `rows`. Without
+    /// it, the picture is taken at once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub halves: Option<Order>,
+    /// Time from the first half picture to the second, seconds. The time of the picture is in the middle.
+    pub halves_s: f64,
 }
 
 /// `[[vehicle]]`: a part of the vehicle in the picture.

@@ -205,8 +205,11 @@ impl Fit {
             for row in &mut body.limb_height_by_latitude_km {
                 row[1] = digits(row[1] + self.limb_height_km - body.limb_height_km);
             }
-            body.limb_height_km = digits(self.limb_height_km);
-            body.limb_height_sigma_km = digits(self.limb_height_sigma_km);
+            let [height_km, sigma_km] = [self.limb_height_km, self.limb_height_sigma_km].map(digits);
+            if body.limb.thermal_km().is_some() {
+                body.tell_limb_height(height_km, sigma_km);
+            }
+            (body.limb_height_km, body.limb_height_sigma_km) = (height_km, sigma_km);
             // The measured height already includes clipped limbs.
             [body.clipped_height_km, body.clipped_sigma_km] = [0.0; 2];
         }

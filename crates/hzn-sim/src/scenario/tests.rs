@@ -1,7 +1,7 @@
 use nalgebra::UnitQuaternion;
 
 use super::*;
-use crate::scene::Light;
+use crate::scene::{Light, Scene};
 
 #[test]
 fn built_in_scenes_are_valid_and_show_their_bodies() {
@@ -86,6 +86,11 @@ fn what_is_refused_is_named() {
         s.world = World::Infrared(crate::Infrared { half_level_km: 70.0, ..Default::default() });
     });
     assert!(inside.contains("inside the Earth or below its limb"), "{inside}");
+    let limb = error(&|s| {
+        s.world = World::Infrared(crate::Infrared { limb: Some(hzn_core::body::Limb::Visible), ..Default::default() });
+    });
+    assert!(limb.starts_with("[world] infrared.limb: is no thermal band"), "{limb}");
+    assert!(error(&|s| s.shutter.halves_s = 0.25).contains("has no effect without halves"));
     let nothing = error(&|s| {
         s.attitude =
             Attitude::Pointing(crate::trajectory::Pointing { off_nadir_deg: [180.0; 2], ..Default::default() });
@@ -108,6 +113,38 @@ fn sun_stands_where_the_ephemeris_says_and_seeds_change_the_clouds() {
     let up = nalgebra::Vector3::from(a.frames[0].scene.pose.position_m).normalize();
     let elevation = libm::asin(up.dot(&nalgebra::Vector3::from(direction))).to_degrees();
     assert!((elevation - 45.0).abs() < 2.0, "{elevation}");
+}
+
+#[test]
+fn half_pictures_are_those_of_two_poses() {
+    let mut s = Scenario::builtin("thermal-array").unwrap();
+    s.capture.frames = 2;
+    s.detector = Detector { psf_sigma_px: 0.6, bits: 16, ..Detector::default() };
+    let scene = s.flight().unwrap().frames[1].scene.clone();
+    let halves = scene.halves.unwrap();
+    let (whole, [first, second]) = (scene.render().unwrap(), halves.scenes(&scene).map(|half| half.render().unwrap()));
+    let at_once = Scene { halves: None, ..scene }.render().unwrap();
+    let mut differ = 0;
+    for (x, y) in (0..32).flat_map(|x| (0..24).map(move |y| (x, y))) {
+        let half = if (x + y) % 2 == 0 { &first } else { &second };
+        assert_eq!(whole.at(x, y), half.at(x, y));
+        differ += u32::from(whole.at(x, y) != at_once.at(x, y));
+    }
+    // The pose of the picture is in the middle, so that near the limb neither half is that of the pose.
+    assert!(differ > 24, "{differ}");
+}
+
+#[test]
+fn a_sensor_of_a_thermal_band_knows_its_name_or_what_was_measured() {
+    let scenario = Scenario::builtin("thermal-array").unwrap();
+    let mut sensor = scenario.sensor();
+    let limb = hzn_core::body::Limb::Window;
+    assert_eq!((sensor.body.limb, sensor.body.limb_height_km, sensor.body.limb_height_sigma_km), (limb, 12.0, 7.0));
+    let [fit] = Fit::measure(&scenario, 16, &|_, _| ()).unwrap()[..] else { panic!("one body has one fit") };
+    fit.apply(&mut sensor);
+    sensor.check().unwrap();
+    assert_eq!((sensor.body.limb, sensor.body.sunlit), (hzn_core::body::Limb::Height, Some(false)));
+    assert!((sensor.body.limb_height_km - 12.0).abs() < 20.0, "{fit:?}");
 }
 
 #[test]
