@@ -50,7 +50,8 @@ section! {
         ///
         /// A larger value widens the covariance of clean edges and gives the expected half-angle more weight. The
         /// default is that of a pixel of 0.62° (1/92 rad) or less. In a camera with wider pixels, such as a thermal
-        /// array of 32×24, the defaults of this key and of the next three are the same angle and thus fewer pixels.
+        /// array of 32×24, the defaults of this key, `correlation_px`, `bias_px` and `tilt_px` are the same angle and
+        /// thus fewer pixels; this one and `bias_px` are at least 0.062 px.
         // 0.1 px is what sub-pixel points reach on a clean edge. It was 1 px before, which was too large: the mean NEES
         // of infrared pictures was 0.02 instead of about 0.5.
         @100 sigma_px: f64 = 0.1, [above 0.0 to 1e4];
@@ -108,6 +109,11 @@ pub(crate) const END_PER_RMS: f64 = 1.732_050_807_568_877_2;
 /// Pixels per radian of the coarsest camera on which the floors were measured: the scene `leo-infrared`.
 const COARSEST_PX_PER_RAD: f64 = 92.0;
 
+/// RMS of the error that linear interpolation between pixel centres makes for the sharpest possible edge, in pixels. One
+/// pixel has a part p of the light, from a half to 1; the error is (p − ½)(1 − p)/p. The root of its mean square over
+/// all places of the edge is 0.062 px. An edge along the rows has the same error at every point.
+const SAMPLING_PX: f64 = 0.062;
+
 impl Config {
     /// Returns the default values for a camera with this focal length: in pixels wider than those of the cameras on
     /// which the floors were measured, the floors keep their angle.
@@ -115,16 +121,23 @@ impl Config {
     /// The floors stand for errors of the scene (light that fades along the limb, a wide profile, clouds), which do not
     /// grow with the pixel. Without this, a correlation of 60 px is twice as long as the whole limb of 32×24 pixels, so
     /// that all noise of the edge counts as a shift of the picture, and the fusion with the expected half-angle moves
-    /// the axis by the wrong amount. The error of the sampling does grow with the pixel; the residuals show it.
+    /// the axis by the wrong amount. The error of the sampling does grow with the pixel. No sigma of a point or of a
+    /// shift is below it: otherwise an edge along the columns had a sigma of the half-angle that was too small, and one
+    /// of 600 pictures was answered on the body's other side.
     pub fn for_focal_length(focal_px: f64) -> Self {
         let all = Self::default();
         // A wrong focal length is refused with the camera.
         if !(focal_px > 0.0 && focal_px < COARSEST_PX_PER_RAD) {
             return all;
         }
-        let [sigma_px, correlation_px, bias_px, tilt_px] =
-            [all.sigma_px, all.correlation_px, all.bias_px, all.tilt_px].map(|px| px * focal_px / COARSEST_PX_PER_RAD);
-        Self { sigma_px, correlation_px, bias_px, tilt_px, ..all }
+        let scaled = |px: f64| px * focal_px / COARSEST_PX_PER_RAD;
+        Self {
+            sigma_px: scaled(all.sigma_px).max(SAMPLING_PX),
+            correlation_px: scaled(all.correlation_px),
+            bias_px: scaled(all.bias_px).max(SAMPLING_PX),
+            tilt_px: scaled(all.tilt_px),
+            ..all
+        }
     }
 
     /// Returns the values that a picture gives whose residuals have this RMS, along an edge of this length. With `reml`
@@ -174,12 +187,13 @@ mod tests {
     fn the_floors_keep_their_angle_in_wide_pixels() {
         let floors = |focal_px: f64| {
             let c = Config::for_focal_length(focal_px);
-            [c.sigma_px, c.correlation_px, c.bias_px, c.tilt_px].map(|px| (px / focal_px, px))
+            [c.correlation_px, c.tilt_px, c.bias_px, c.sigma_px]
         };
-        let usual = floors(92.0);
-        for ((wide, wide_px), (angle, px)) in floors(23.0).into_iter().zip(usual) {
-            assert!((wide / angle - 1.0).abs() < 1e-12 && (4.0 * wide_px - px).abs() < 1e-12, "{wide} {angle}");
-        }
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        let (wide, usual) = (floors(23.0), floors(92.0));
+        assert!(wide.iter().zip(usual).take(3).all(|(wide, usual)| near(4.0 * wide, usual)), "{wide:?}");
+        // The error of the sampling is a part of a pixel.
+        assert_eq!((wide[3], floors(1.0)[2]), (SAMPLING_PX, SAMPLING_PX));
         // Narrow pixels, and a focal length that the camera refuses, have the defaults.
         for focal_px in [92.0, 1170.0, 0.0, -3.0, f64::NAN] {
             assert_eq!(Config::for_focal_length(focal_px), Config::default(), "{focal_px}");
