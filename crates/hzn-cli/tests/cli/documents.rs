@@ -133,7 +133,7 @@ fn run(place: &Place, command: &str) -> Result<(), String> {
     let mut words = split(command);
     let is_simulated = words[0] == "simulate" && !words.contains(&"--show".to_owned());
     if is_simulated {
-        words.retain(|word| word.parse::<u32>().is_err() && word != "--frames");
+        words.retain(|word| word.parse::<u32>().is_err() && word != "--frames" && word != "--no-noise");
         words.extend(["--frames", "2", "--no-noise", "--force"].map(str::to_owned));
     } else if words[0] == "run" || words[0] == "init" {
         words.push("--force".to_owned());

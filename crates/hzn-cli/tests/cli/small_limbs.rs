@@ -89,3 +89,21 @@ fn answers_to_short_limbs_are_answers_and_not_false() {
         assert!(worst_deg < 1.0, "{name}: {told}");
     }
 }
+
+/// Before the floors of the noise kept their angle in wide pixels, the error was 0.53 to 0.63 degrees.
+#[test]
+fn a_thermal_array_is_as_sure_as_it_is_right() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    for (name, seed) in [("a", "21"), ("b", "22")] {
+        let (truth, json) = (format!("{name}/truth.csv"), format!("{name}.json"));
+        hzn(at, &["simulate", "thermal-array", "--frames", "60", "--seed", seed, "--no-noise", "-o", name, "-q"]);
+        hzn(at, &["run", name, "-o", &format!("{name}.csv"), "-q"]);
+        let told = hzn(at, &["evaluate", &format!("{name}.csv"), "--truth", &truth, "-o", &json]);
+        let json: serde_json::Value = serde_json::from_slice(&std::fs::read(at.join(json)).unwrap()).unwrap();
+        let e = &json["evaluations"][0];
+        assert!(e["answered"].as_u64().unwrap() >= 57, "{told}");
+        let (rms_deg, nees) = (e["errors"]["rms_deg"].as_f64().unwrap(), e["honesty"]["nees"].as_f64().unwrap());
+        assert!(rms_deg < 0.4 && (0.3..3.0).contains(&nees), "{told}");
+    }
+}
