@@ -2,9 +2,13 @@
 
 use hzn_core::config::Input;
 use hzn_core::image::{Channel, ImageView, Layout, Pixels};
+use hzn_mcap::words_from_floats;
 use hzn_run::source::picture;
-use numpy::ndarray::{Array3, ArrayView3, ArrayViewD, Axis, Ix2, Ix3};
-use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::ndarray::{Array3, ArrayD, ArrayView3, ArrayViewD, Axis, Ix2, Ix3};
+use numpy::{
+    IntoPyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
 use pyo3::intern;
 use pyo3::prelude::*;
 
@@ -16,10 +20,12 @@ pub(crate) enum Array<'py> {
     Bytes(PyReadonlyArrayDyn<'py, u8>),
     /// uint16.
     Words(PyReadonlyArrayDyn<'py, u16>),
+    /// Numbers with a fraction as 16 bits, see [`words_from_floats`].
+    Floats(PyReadonlyArrayDyn<'py, u16>),
 }
 
 impl<'py> Array<'py> {
-    /// Takes an array of uint8 or uint16 with the shape (height, width) or (height, width, 1 to 4).
+    /// Takes an array of uint8, uint16 or floats with the shape (height, width) or (height, width, 1 to 4).
     pub(crate) fn from_object(object: &Bound<'py, PyAny>) -> PyResult<Self> {
         let Ok(untyped) = object.cast::<PyUntypedArray>() else {
             if object.is_none() {
@@ -50,16 +56,30 @@ impl<'py> Array<'py> {
         if let Ok(words) = object.cast::<PyArrayDyn<u16>>() {
             return Ok(Self::Words(words.try_readonly().map_err(errors::image)?));
         }
+        if untyped.dtype().kind() == b'f' {
+            return Self::from_floats(object);
+        }
         let dtype = untyped.dtype().to_string();
         Err(errors::image(format!(
-            "dtype {dtype}: uint8 or uint16 is expected; scale to counts and convert with astype(numpy.uint16)"
+            "dtype {dtype}: uint8, uint16 or floats are expected; scale to counts and convert with astype(numpy.uint16)"
         )))
+    }
+
+    /// Takes an array of floats, such as temperatures, as a file of them is taken.
+    fn from_floats(object: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let numbers = object.call_method1("astype", ("float64",))?;
+        let numbers = numbers.cast::<PyArrayDyn<f64>>()?.try_readonly().map_err(errors::image)?;
+        let numbers = numbers.as_array();
+        let values: Vec<f64> = numbers.iter().copied().collect();
+        let words = ArrayD::from_shape_vec(numbers.raw_dim(), words_from_floats(&values).map_err(errors::image)?);
+        let words = words.map_err(errors::image)?.into_pyarray(object.py());
+        Ok(Self::Floats(words.try_readonly().map_err(errors::image)?))
     }
 
     fn shape(&self) -> &[usize] {
         match self {
             Self::Bytes(a) => a.shape(),
-            Self::Words(a) => a.shape(),
+            Self::Words(a) | Self::Floats(a) => a.shape(),
         }
     }
 
@@ -76,7 +96,10 @@ impl<'py> Array<'py> {
         let bits = match (self, bits) {
             (Self::Bytes(_), None | Some(8)) => 8,
             (Self::Bytes(_), Some(_)) => return Err(errors::image("bits: must be 8 for an array of uint8")),
-            (Self::Words(_), None) => 16,
+            (Self::Floats(_), Some(_)) => {
+                return Err(errors::image("bits: must be left out for an array of floats"));
+            }
+            (Self::Words(_) | Self::Floats(_), None) => 16,
             (Self::Words(_), Some(n @ 8..=16)) => n,
             (Self::Words(_), Some(n)) => return Err(errors::image(format!("bits: {n} is refused: must be 8 to 16"))),
         };
@@ -102,7 +125,9 @@ impl<'py> Array<'py> {
         let layout = self.layout(bits)?;
         let packed = match self {
             Self::Bytes(a) => a.as_array().to_slice().map(|d| ImageView::from_bytes(d, layout, channel)),
-            Self::Words(a) => a.as_array().to_slice().map(|d| ImageView::from_words(d, layout, channel)),
+            Self::Words(a) | Self::Floats(a) => {
+                a.as_array().to_slice().map(|d| ImageView::from_words(d, layout, channel))
+            }
         };
         match packed {
             Some(view) => Ok(View::Packed(view.map_err(errors::image)?)),
@@ -114,7 +139,7 @@ impl<'py> Array<'py> {
     pub(crate) fn to_samples(&self) -> picture::Samples {
         match self {
             Self::Bytes(a) => picture::Samples::Bytes(a.as_array().iter().copied().collect()),
-            Self::Words(a) => picture::Samples::Words(a.as_array().iter().copied().collect()),
+            Self::Words(a) | Self::Floats(a) => picture::Samples::Words(a.as_array().iter().copied().collect()),
         }
     }
 }
@@ -155,7 +180,7 @@ impl<'a> Strided<'a> {
         }
         let samples = match array {
             Array::Bytes(a) => Samples::Bytes(to_three_axes(a.as_array())?),
-            Array::Words(a) => Samples::Words(to_three_axes(a.as_array())?),
+            Array::Words(a) | Array::Floats(a) => Samples::Words(to_three_axes(a.as_array())?),
         };
         let channels = match channel {
             Channel::Mean if layout.channels >= 3 => 0..3,

@@ -79,10 +79,28 @@ def test_kinds_of_arrays_give_one_answer(sensor):
     assert np.allclose(hzn.Sensor(**parameters).process(image.astype(np.uint16)).axis, expected, atol=1e-6)
 
 
+def test_temperatures_have_the_answer_of_their_picture(sensor):
+    image = limb()
+    expected = sensor.process(image)
+    celsius = -40.0 + (image.astype(float) - 20.0) / 3.0
+    celsius[0, 0] = np.nan
+    for kind in (celsius, celsius.astype(np.float32), celsius.astype(">f4")[:, :, None], np.asfortranarray(celsius)):
+        answer = sensor.process(kind)
+        assert np.degrees(np.linalg.norm(answer.axis - expected.axis)) < 0.002
+    # The number of bits of a camera's counts says nothing about temperatures.
+    parameters = sensor.parameters
+    parameters["input"]["bits"] = 12
+    assert np.array_equal(hzn.Sensor(**parameters).process(celsius).axis, sensor.process(celsius).axis)
+    with pytest.raises(hzn.ImageError, match="bits: must be left out for an array of floats"):
+        sensor.process(celsius, bits=16)
+    assert hzn.overlay(celsius, expected).shape == (240, 320, 3)
+
+
 @pytest.mark.parametrize(
     ("image", "what"),
     [
-        (limb().astype(float), "dtype float64"),
+        (limb().astype(complex), "dtype complex128"),
+        (np.full((240, 320), 3.5), "every number of the picture is the same, or not finite"),
         (limb().astype(bool), "dtype bool"),
         (limb().tolist(), "not list"),
         (limb()[0], "shape"),

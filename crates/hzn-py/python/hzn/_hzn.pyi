@@ -13,6 +13,7 @@ from . import keys
 
 _Path: TypeAlias = str | PathLike[str]
 _Image: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16]
+_Picture: TypeAlias = _Image | NDArray[np.floating[Any]]
 _Status: TypeAlias = Literal[
     "ok",
     "no-limb",
@@ -261,7 +262,7 @@ class Rig:
 
     def process(
         self,
-        images: dict[str, _Image | _Path | None],
+        images: dict[str, _Picture | _Path | None],
         *,
         altitude_km: float | None = None,
         position_km: Sequence[float] | None = None,
@@ -439,7 +440,7 @@ class Sensor:
 
     def process(
         self,
-        image: _Image | _Path,
+        image: _Picture | _Path,
         *,
         altitude_km: float | None = None,
         position_km: Sequence[float] | None = None,
@@ -463,7 +464,9 @@ class Sensor:
         ----------
         image
             Shape (height, width) or (height, width, channels), uint8 or uint16, with any strides. It is not copied; C
-            order is fastest. Or the path of a picture file, which is read as by ``hzn run``.
+            order is fastest. Of an array of floats, such as temperatures, the smallest becomes 8192 and the largest
+            57344 of 65535, and what lies between keeps its place on the line; the scale moves no limb. A number that is
+            not finite becomes 8192. Or the path of a picture file, which is read as by ``hzn run``.
         altitude_km
             Above WGS-84 for ``earth``, otherwise above the radius. Without it, the parameters' altitude is used.
         position_km
@@ -492,7 +495,7 @@ class Sensor:
             Temperature of the camera, °C. With ``camera.temperature`` the picture has the lens of this temperature.
         bits
             Number of significant bits of uint16, 8 to 16. Without it, the sensor's `input.bits` is used, else 16. If
-            nothing is found and the upper bits are unused, a warning says so.
+            nothing is found and the upper bits are unused, a warning says so. An array of floats has no such number.
         detail
             Keep edges, points and the times of the stages.
 
@@ -518,7 +521,7 @@ class Sensor:
 
     def what_fits(
         self,
-        image: _Image,
+        image: _Picture,
         *,
         altitude_km: float | None = None,
         position_km: Sequence[float] | None = None,
@@ -550,7 +553,7 @@ class Sensor:
 
     def process_many(
         self,
-        images: _Path | Iterable[_Image | _Path | tuple[_Image | _Path, Mapping[str, Any]]],
+        images: _Path | Iterable[_Picture | _Path | tuple[_Picture | _Path, Mapping[str, Any]]],
         *,
         jobs: int | None = None,
         progress: bool = False,
@@ -814,7 +817,7 @@ class Report:
     def stages_us(self) -> dict[str, float]:
         """Time of each stage, microseconds. Needs ``detail=True`` (`HznError`)."""
 
-    def plot(self, image: _Image | None = None, *, ax: Any = None) -> Any:
+    def plot(self, image: _Picture | None = None, *, ax: Any = None) -> Any:
         """Draw the picture with the fitted limb, the points (with ``detail=True``) and the answer, with matplotlib.
 
         Parameters
@@ -1103,7 +1106,7 @@ def render(
     >>> report = sensor.process(image, position_km=position_km)
     """
 
-def overlay(image: _Image, report: Report, *, bits: int | None = None) -> NDArray[np.uint8]:
+def overlay(image: _Picture, report: Report, *, bits: int | None = None) -> NDArray[np.uint8]:
     """Draw limb and axis of a report over its picture; with ``detail=True`` also edges and points.
 
     Parameters
