@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_core::rig::{self, MOST_HEADS};
+use hzn_core::rig::{self, Limb, MOST_HEADS};
 use serde::{Deserialize, Serialize};
 
 use crate::{Problem, document, limited};
@@ -33,7 +33,7 @@ pub struct Common {
     /// Probability that the error exceeds `protection_deg`, if at most one head is wrong.
     pub misleading: f64,
     /// 1σ of a tilt of the limb, kilometres: the amplitude of a height that varies as the cosine of the azimuth, along
-    /// each of two axes. `None` derives it from the altitude, see [`Common::limb_tilt_km`].
+    /// each of two axes. `None` derives it from the half-angle, see [`rig::tilt_km`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limb_tilt_sigma_km: Option<f64>,
     /// 1σ of the limb height that each head has for itself, kilometres: the weather of its part of the limb.
@@ -48,16 +48,6 @@ pub struct Common {
 /// an axis on the Earth moves a head by 0.006° in this time, which is a third of the error of four heads.
 const SYNC_S: f64 = 0.1;
 
-/// Weather moves the half level of an infrared limb by 1 to 2 km from place to place.
-const LIMB_OWN_SIGMA_KM: f64 = 1.5;
-
-/// Weather systems are about 1000 km long.
-const LIMB_OWN_LENGTH_KM: f64 = 1000.0;
-
-/// Change of the limb height with latitude that is not told, km per degree: an infrared limb rises by 4.5 km from the
-/// equator to one pole and falls by as much to the other one.
-const TILT_KM_PER_DEG: f64 = 0.05;
-
 impl Default for Common {
     fn default() -> Self {
         let rig::Config { false_alarm, misleading } = rig::Config::default();
@@ -66,23 +56,14 @@ impl Default for Common {
             false_alarm,
             misleading,
             limb_tilt_sigma_km: None,
-            limb_own_sigma_km: LIMB_OWN_SIGMA_KM,
-            limb_own_length_km: LIMB_OWN_LENGTH_KM,
+            limb_own_sigma_km: Limb::<f64>::OWN_SIGMA_KM,
+            limb_own_length_km: Limb::<f64>::OWN_LENGTH_KM,
             mount: RigMount::default(),
         }
     }
 }
 
 impl Common {
-    /// Returns the 1σ of the tilt of the limb in kilometres, for a limb of this half-angle. Without the key, it is 0.05
-    /// km for each degree between the limb and the point below the camera, which is the amplitude for a height that
-    /// changes by 4.5 km from equator to pole. The amplitude is divided by √2, because the direction of the change may
-    /// be along either of the two axes.
-    pub fn limb_tilt_km(&self, half_angle_deg: f64) -> f64 {
-        let derived = || TILT_KM_PER_DEG * (90.0 - half_angle_deg).max(0.0) * core::f64::consts::FRAC_1_SQRT_2;
-        self.limb_tilt_sigma_km.unwrap_or_else(derived)
-    }
-
     /// Returns the probabilities of the check.
     pub fn check(&self) -> rig::Config {
         rig::Config { false_alarm: self.false_alarm, misleading: self.misleading }
@@ -366,14 +347,6 @@ mod tests {
         assert!(common("limb_tilt_sigma_km = nan").contains("[rig] limb_tilt_sigma_km: NaN is refused"));
         assert_eq!(read("").unwrap_err(), "rig.toml: [[head]]: the file has 0 of them; a rig has 1 to 4 heads");
         assert!(read(&TWO.replace("[[head]]", "[[heads]]")).unwrap_err().contains("did you mean head?"));
-    }
-
-    #[test]
-    fn the_tilt_follows_from_the_altitude() {
-        let rig = Common::default();
-        // From 500 km the limb is 22 degrees from the point below: 1.1 km along one axis.
-        assert!((rig.limb_tilt_km(68.0) - 1.1 / 2f64.sqrt()).abs() < 1e-9);
-        assert_eq!(Common { limb_tilt_sigma_km: Some(0.3), ..rig }.limb_tilt_km(68.0), 0.3);
     }
 
     #[test]

@@ -22,9 +22,14 @@ pub struct Config {
     pub misleading: f64,
 }
 
+impl Config {
+    /// The default probabilities.
+    pub const DEFAULT: Self = Self { false_alarm: 1e-3, misleading: 1e-4 };
+}
+
 impl Default for Config {
     fn default() -> Self {
-        Self { false_alarm: 1e-3, misleading: 1e-4 }
+        Self::DEFAULT
     }
 }
 

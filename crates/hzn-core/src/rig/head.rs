@@ -61,6 +61,6 @@ impl<T: Real> Head<T> {
     }
 }
 
-fn symmetric<T: Real>([xx, xy, xz, yy, yz, zz]: &[T; 6]) -> M3<T> {
+pub(super) fn symmetric<T: Real>([xx, xy, xz, yy, yz, zz]: &[T; 6]) -> M3<T> {
     M3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz)
 }

@@ -56,9 +56,15 @@
 //! ```
 
 mod check;
+mod epoch;
 mod head;
 mod joint;
+mod mount;
+mod weather;
 
 pub use check::{Config, MOST_HEADS, Rig};
+pub use epoch::{Answered, Common, Epoch, EpochAnswer};
 pub use head::Head;
 pub use joint::{Joint, NoJoint};
+pub use mount::Mount;
+pub use weather::{Limb, tilt_km};

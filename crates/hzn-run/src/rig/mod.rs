@@ -10,7 +10,6 @@ mod joint;
 mod mounts;
 mod open;
 mod plan;
-mod weather;
 
 pub use epochs::{Epoch, Epochs};
 pub use joint::{Joiner, Repeat, Seen};

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use hzn_core::rig::Mount;
 use hzn_files::rig::{self, Head};
 use hzn_files::{FrameData, Frames, Problem, Sensor, files_of_sensor};
 
 use super::joint::Joiner;
-use super::mounts::Mount;
+use super::mounts;
 use crate::engine;
 use crate::error::{Error, Remedy, unusable};
 use crate::open::{self, SensorChoice};
@@ -125,8 +126,8 @@ impl Opened {
         let name = |text: &String| format!("{}: {text}", head.name);
         self.warnings.extend(opened.warnings.iter().map(name));
         self.notes.extend(opened.notes.iter().map(name));
-        let Some(mount) = &head.mount else { return Err(unusable(format!("{}: [head.mount] is missing", head.name))) };
-        let mount = Mount::new(&self.rig.rig.mount, mount);
+        let mount = head.mount.as_ref().and_then(|mount| mounts::mount(&self.rig.rig.mount, mount));
+        let Some(mount) = mount else { return Err(unusable(format!("{}: [head.mount] is missing", head.name))) };
         self.warnings.extend(self.doubt_mount(&mount, &opened.sensor).map(|doubt| name(&doubt)));
         // The checks are about sizes, which the mount does not change.
         if let Some(vehicle) = self.frames.as_deref() {
@@ -147,7 +148,7 @@ impl Opened {
         open::check_altitude(source, &opened.sensor.config, known).map_err(named)?;
         let vehicle = self.frames.as_ref().map(|frames| Vehicle {
             frames: Arc::clone(frames),
-            q_vehicle_from_camera_wxyz: mount.q_vehicle_from_camera_wxyz,
+            q_vehicle_from_camera_wxyz: mount.q_vehicle_from_camera_wxyz(),
         });
         let (name, open::Opened { source, sensor, frames, .. }) = (head.name.clone(), opened);
         self.heads.push(OpenHead { name, source, sensor, frames, vehicle });
@@ -170,9 +171,9 @@ impl Opened {
     }
 
     /// Returns the doubt about a mount of rig.toml that contradicts the one of the head's sensor.
-    fn doubt_mount(&self, mount: &Mount, sensor: &Sensor) -> Option<String> {
-        let angle_deg = mount.angle_deg(sensor.config.mount.as_ref()?.q_vehicle_from_camera_wxyz);
-        let sigma_deg = self.rig.rig.mount.sigma_deg.hypot(mount.sigma_deg());
+    fn doubt_mount(&self, mount: &Mount<f64>, sensor: &Sensor) -> Option<String> {
+        let angle_deg = mounts::angle_deg(mount, sensor.config.mount.as_ref()?.q_vehicle_from_camera_wxyz);
+        let sigma_deg = self.rig.rig.mount.sigma_deg.hypot(mounts::sigma_deg(mount));
         (angle_deg > 3.0 * sigma_deg + MOUNT_ROUNDING_DEG).then(|| {
             format!(
                 "[mount] of its sensor.toml is {angle_deg:.2} degrees away from [head.mount] of rig.toml, which the \

@@ -1,0 +1,227 @@
+//! The limb height that a head has for itself: its error in the free fit of the head.
+
+use core::f64::consts::{FRAC_1_SQRT_2, TAU};
+
+use super::head::symmetric;
+use super::mount::upper;
+use crate::base::linalg::{M3, V3, basis, invert_spd3};
+use crate::base::real::Real;
+use crate::geometry::camera::Camera;
+use crate::geometry::frames::{Cam, UnitVec3};
+use crate::model::report::Free;
+
+/// Largest distance of two azimuths at which the height is taken: 5 degrees, which is 250 km or less for a low orbit
+/// and finer than the weather.
+const STEP_RAD: f64 = TAU / 72.0;
+
+/// Smallest number of azimuths on an arc. The discrete sums then differ by less than 1% from the integrals.
+const FEWEST: usize = 24;
+
+/// Step of the search for arcs in view. A shorter arc has too few edge points for an answer.
+const SCAN: usize = 720;
+
+/// Shortest arc, four degrees. A fit to a shorter arc takes up the same part of the weather, the height with its first
+/// and second derivative, so that the error has a limit. At ten degrees it is 3% from the limit. The sums of an arc of
+/// one degree would cancel to the last digits of an `f32`.
+const SHORTEST_RAD: f64 = TAU / 90.0;
+
+/// Most arcs of a limb in a picture: a circle crosses the four borders at most eight times.
+const MOST_ARCS: usize = 4;
+
+/// Most azimuths, if one of these arcs is nearly a circle.
+const MOST: usize = 72 + MOST_ARCS * FEWEST;
+
+/// Change of the limb height with latitude that is not told, km per degree: an infrared limb rises by 4.5 km from the
+/// equator to one pole and falls by as much to the other one.
+const TILT_KM_PER_DEG: f64 = 0.05;
+
+/// What is known of the limb that all heads see.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limb<T> {
+    /// Distance of the limb from the centre of the body, kilometres.
+    pub radius_km: T,
+    /// 1σ of a tilt of the limb, kilometres; `None` derives it from the half-angle, see [`tilt_km`].
+    pub tilt_sigma_km: Option<T>,
+    /// 1σ of the height that each head has for itself, kilometres: the weather of its part of the limb.
+    pub own_sigma_km: T,
+    /// Distance along the limb at which the correlation of that height has fallen to exp(−½), kilometres.
+    pub own_length_km: T,
+}
+
+/// Returns the 1σ of the tilt of a limb of this half-angle in kilometres, if nothing else is known: 0.05 km for each
+/// degree between the limb and the point below the camera, which is the amplitude for a height that changes by 4.5 km
+/// from equator to pole. The amplitude is divided by √2, because the direction of the change may be along either of the
+/// two axes.
+pub fn tilt_km<T: Real>(half_angle_rad: T) -> T {
+    let to_limb_deg = T::from_f64(90.0) - half_angle_rad * T::from_f64(360.0 / TAU);
+    T::from_f64(TILT_KM_PER_DEG * FRAC_1_SQRT_2) * to_limb_deg.max(T::ZERO)
+}
+
+impl<T: Real> Limb<T> {
+    /// The usual value of `own_sigma_km`: weather moves the half level of an infrared limb by 1 to 2 km from place to
+    /// place.
+    pub const OWN_SIGMA_KM: f64 = 1.5;
+    /// The usual value of `own_length_km`: weather systems are about 1000 km long.
+    pub const OWN_LENGTH_KM: f64 = 1000.0;
+
+    /// Returns the 1σ of the axis that a tilt of the limb causes, in radians: the tilt times the derivative of the
+    /// half-angle by the height, tan α/(R + d).
+    pub(super) fn tilt_rad(&self, cos: T) -> T {
+        let sin = (T::one() - cos * cos).max(T::ZERO).sqrt();
+        let km = self.tilt_sigma_km.unwrap_or_else(|| tilt_km(sin.atan2(cos)));
+        if cos > T::ZERO && self.radius_km > T::ZERO { km * sin / (cos * self.radius_km) } else { T::ZERO }
+    }
+
+    /// Returns the free fit with the error of the limb's weather: a random height at the part of the limb that the
+    /// camera sees.
+    ///
+    /// A height h(ψ) moves the edge at the azimuth ψ outward by h ∂α/∂d. Least squares over the arc takes it for errors
+    /// of the axis and of the cosine: with the rows g = (sin α cos ψ, sin α sin ψ, −1) and the widths of the parts of
+    /// the arc as weights W, the error is (GᵀWG)⁻¹ GᵀW sin α ∂α/∂d h. On a short arc, a height that changes along the
+    /// arc moves the free fit far more than a constant one.
+    pub(super) fn with_weather(&self, free: &Free<T>, camera: &Camera<T>) -> Free<T> {
+        let (one, cos) = (T::one(), free.cos);
+        let sin = (one - cos * cos).max(T::ZERO).sqrt();
+        if !(self.own_sigma_km > T::ZERO && cos > T::ZERO && sin > T::ZERO && self.radius_km > T::ZERO) {
+            return *free;
+        }
+        // sin α ∂α/∂d times the height.
+        let by_height = self.own_sigma_km * sin * sin / (cos * self.radius_km);
+        let (b1, b2) = basis(free.axis.v());
+        let edge = Edge { camera, e: *free.axis.v(), b: [b1, b2], cos, sin };
+        let arcs = edge.arcs();
+        let middle = arcs.first().zip(arcs.last()).map_or(T::ZERO, |(a, b)| (a[0] + b[1]) * T::from_f64(0.5));
+        let chords = self.radius_km * cos * T::from_f64(2.0) / self.own_length_km;
+        let mut own = *free;
+        let Some(p) = taken_up(&arcs, middle, sin, chords) else {
+            // Without an arc the height is taken as a constant.
+            own.var_cos += by_height * by_height;
+            return own;
+        };
+        let p = p * (by_height * by_height);
+        let (s, c) = middle.sin_cos();
+        // The directions to the middle of the arcs and along them.
+        let (to, along) = (b1 * c + b2 * s, b2 * c - b1 * s);
+        let both = to * along.transpose();
+        let added = to * to.transpose() * p.m11 + (both + both.transpose()) * p.m12 + along * along.transpose() * p.m22;
+        own.covariance.upper_rad2 = upper(&(symmetric(&free.covariance.upper_rad2) + added));
+        let with_cos = to * p.m13 + along * p.m23;
+        own.axis_with_cos = free.axis_with_cos.map(|[x, y, z]| [x + with_cos.x, y + with_cos.y, z + with_cos.z]);
+        own.var_cos += p.m33;
+        own
+    }
+}
+
+/// Returns the covariance of what the fit takes up of a height with the 1σ 1, on the axis towards the middle of the
+/// arcs, the axis along them, and the cosine. `chords` is the diameter of the limb in lengths of the weather. `None` if
+/// the arcs do not determine three unknowns.
+///
+/// The unknowns of the sums are the factors of 1, sin δ and 1 − cos δ, each divided by its largest value, with δ from
+/// the middle: a short arc then loses no digits.
+fn taken_up<T: Real>(arcs: &[[T; 2]], middle: T, sin: T, chords: T) -> Option<M3<T>> {
+    let (one, half, two) = (T::one(), T::from_f64(0.5), T::from_f64(2.0));
+    let mut seen = heapless::Vec::<(T, V3<T>), MOST>::new();
+    let (mut scale_sin, mut scale_cos) = (T::ZERO, T::ZERO);
+    for &[from, to] in arcs {
+        let count = ((to - from) / T::from_f64(STEP_RAD)).to_i32().saturating_add(1).max(FEWEST as i32);
+        let width = (to - from) / T::from_i32(count);
+        for i in 0..count {
+            let delta = from - middle + (T::from_i32(i) + half) * width;
+            let (s, _) = delta.sin_cos();
+            let (h, _) = (delta * half).sin_cos();
+            let versine = two * h * h;
+            (scale_sin, scale_cos) = (scale_sin.max(s.abs()), scale_cos.max(versine));
+            // There is room for all of them, see `MOST`. The third number becomes the height's place in the sum.
+            let _ = seen.push((delta, V3::new(width, s, versine)));
+        }
+    }
+    let scaled = |row: &V3<T>| V3::new(one, row.y / scale_sin, row.z / scale_cos);
+    let normal = seen.iter().fold(M3::zeros(), |sum, (_, row)| sum + scaled(row) * scaled(row).transpose() * row.x);
+    let inverse = invert_spd3(&upper(&normal))?;
+    for (_, row) in &mut seen {
+        *row = inverse * scaled(row) * row.x;
+    }
+    let mut p = M3::zeros();
+    for (i, (a, gain)) in seen.iter().enumerate() {
+        let mut before = V3::zeros();
+        for (b, other) in seen.iter().take(i) {
+            let (chord, _) = ((*a - *b) * half).sin_cos();
+            let chord = chords * chord;
+            before += other * (-half * chord * chord).exp();
+        }
+        let cross = gain * before.transpose();
+        p += gain * gain.transpose() + cross + cross.transpose();
+    }
+    // sin α (x cos δ + y sin δ) − z equals the sum of the three terms.
+    let (x, y) = (-one / (scale_cos * sin), one / (scale_sin * sin));
+    let zero = T::ZERO;
+    let from_terms = M3::new(zero, zero, x, zero, y, zero, -one, zero, -one / scale_cos);
+    Some(from_terms * p * from_terms.transpose())
+}
+
+/// The edge of a cone in a picture.
+struct Edge<'a, T> {
+    camera: &'a Camera<T>,
+    e: V3<T>,
+    b: [V3<T>; 2],
+    cos: T,
+    sin: T,
+}
+
+impl<T: Real> Edge<'_, T> {
+    /// Returns whether the picture has the edge at this azimuth.
+    fn is_in_view(&self, psi: T) -> bool {
+        let (s, c) = psi.sin_cos();
+        let ray = self.e * self.cos + (self.b[0] * c + self.b[1] * s) * self.sin;
+        let point = self.camera.project(&UnitVec3::<Cam, T>::assume_unit(ray));
+        let half = T::from_f64(0.5);
+        let inside = |x: T, size: u16| x >= -half && x <= T::from_i32(size.into()) - half;
+        point.is_some_and(|p| inside(p.u, self.camera.width()) && inside(p.v, self.camera.height()))
+    }
+
+    /// Returns the arcs in view as pairs of azimuths, in rising order, within one turn.
+    fn arcs(&self) -> heapless::Vec<[T; 2], MOST_ARCS> {
+        let mut arcs = heapless::Vec::new();
+        let step = T::from_f64(TAU / SCAN as f64);
+        // The scan begins opposite the optical axis, so that an arc seldom lies across its ends, and that nothing
+        // depends on the choice of the tangent vectors.
+        let opposite = (-self.b[1].z).atan2(-self.b[0].z);
+        let at = |i: usize| opposite + T::from_i32(i as i32) * step;
+        let middle = opposite + T::from_f64(0.5 * TAU);
+        let half = T::from_f64(0.5 * SHORTEST_RAD);
+        let Some(first) = (0..SCAN).find(|&i| !self.is_in_view(at(i))) else {
+            let _ = arcs.push([opposite, opposite + T::from_f64(TAU)]);
+            return arcs;
+        };
+        let mut start = None;
+        for i in first + 1..=first + SCAN {
+            match (start, self.is_in_view(at(i))) {
+                (None, true) => start = Some(self.end(at(i), at(i - 1))),
+                (Some(from), false) => {
+                    let to = self.end(at(i - 1), at(i));
+                    let short = (half - (to - from) * T::from_f64(0.5)).max(T::ZERO);
+                    // A lens that bends a limb into more arcs than a circle can have loses the last of them.
+                    let _ = arcs.push([from - short, to + short]);
+                    start = None;
+                }
+                _ => {}
+            }
+        }
+        if arcs.is_empty() {
+            let _ = arcs.push([middle - half, middle + half]);
+        }
+        arcs
+    }
+
+    /// Returns the end of an arc by bisection, between an azimuth in view and one that is not.
+    fn end(&self, mut seen: T, mut unseen: T) -> T {
+        for _ in 0..30 {
+            let half = (seen + unseen) * T::from_f64(0.5);
+            *if self.is_in_view(half) { &mut seen } else { &mut unseen } = half;
+        }
+        seen
+    }
+}
+
+#[cfg(test)]
+mod tests;
