@@ -111,6 +111,16 @@ impl AttitudeAndSun {
         }
     }
 
+    /// Returns the values in the axes of a camera on a vehicle, for values in the axes of the vehicle.
+    pub(crate) fn seen_by(&self, q_vehicle_from_camera_wxyz: [f32; 4]) -> Self {
+        let q = q_vehicle_from_camera_wxyz;
+        Self {
+            q_fixed_from_camera_wxyz: self.q_fixed_from_camera_wxyz.map(|vehicle| product(vehicle, q)),
+            sun: self.sun.map(|sun| turned_back(q, sun)),
+            ..*self
+        }
+    }
+
     /// Adds the values to a prior.
     #[must_use]
     pub fn added_to(&self, prior: Prior<f32>) -> Prior<f32> {
@@ -144,7 +154,7 @@ fn product([aw, ax, ay, az]: [f32; 4], [bw, bx, by, bz]: [f32; 4]) -> [f32; 4] {
 }
 
 /// Returns a vector in axes that have turned by a quaternion.
-fn turned_back([w, x, y, z]: [f32; 4], [a, b, c]: [f32; 3]) -> [f32; 3] {
+pub(crate) fn turned_back([w, x, y, z]: [f32; 4], [a, b, c]: [f32; 3]) -> [f32; 3] {
     let [_, a, b, c] = product(product([w, -x, -y, -z], [0.0, a, b, c]), [w, x, y, z]);
     [a, b, c]
 }

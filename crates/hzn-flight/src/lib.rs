@@ -16,6 +16,7 @@
 //! | [`assembly`] | the packets of a picture put together on the ground |
 //! | [`packet`] | space packets on a serial line |
 //! | [`inbox`] | whole packets from a line that is not perfect |
+//! | [`joint`] | the joint answer of several heads as a record |
 //! | [`messages`] | the contents of packets |
 //! | [`navigation`] | the records of position, attitude and Sun among them |
 //! | [`attitude`] | the attitude and the Sun, moved to the exposure |
@@ -39,6 +40,7 @@ pub mod bytes;
 pub mod cuc;
 pub mod flight;
 pub mod inbox;
+pub mod joint;
 pub mod layout;
 pub mod messages;
 pub mod navigation;

@@ -56,6 +56,8 @@ numbered_enum! {
         Navigation = 0x108 => "navigation",
         /// The attitude and the Sun that a picture was processed with.
         Attitude = 0x109 => "attitude",
+        /// The joint answer of the heads of a rig.
+        Rig = 0x10A => "rig",
         /// A telecommand.
         Command = 0x1C0 => "telecommand",
     }

@@ -12,10 +12,17 @@ use crate::packet::{Apid, MAX_BYTES};
 
 /// Most bytes that are read in a turn. More bytes wait in the memory of the serial port.
 // A line that never pauses would otherwise keep the loop from its pictures and its watchdog.
-const MAX_READ: usize = 1024;
+pub(super) const MAX_READ: usize = 1024;
 /// Most work of a turn, in examined bytes: two of the longest packets. Packets inside of packets could otherwise make a
 /// thousand times the work of their bytes.
-const MAX_EFFORT: usize = 2 * MAX_BYTES;
+pub(super) const MAX_EFFORT: usize = 2 * MAX_BYTES;
+
+/// Returns whether the inbox is asked for a packet: one may be complete, or the line is silent, so that it is known that
+/// the line pauses.
+#[inline(always)]
+pub(super) fn may_hold_packet(filled: Filled, is_done: bool, effort: usize) -> bool {
+    filled != Filled::Full && !is_done && effort < MAX_EFFORT
+}
 
 /// A packet that was received.
 enum Received {
@@ -45,8 +52,7 @@ impl<B: Board> Flight<'_, B> {
             // Without this, and with pauses that were not always noticed, 59 of 200 339 telecommands were lost.
             let (count, filled) = inbox.fill(now_us, most, is_done, || board.receive());
             bytes += count;
-            // A packet may be complete; if the line is silent, it is known that the line pauses.
-            while filled != Filled::Full && !is_done && self.buffers.inbox.effort() < MAX_EFFORT {
+            while may_hold_packet(filled, is_done, self.buffers.inbox.effort()) {
                 match self.handle_packet(now_us) {
                     Some(is_command) => is_done = is_command,
                     None => break,
@@ -76,11 +82,7 @@ impl<B: Board> Flight<'_, B> {
             Received::Command { sequence: packet.sequence, bytes: packet.user.len() }
         })?;
         match received {
-            Received::Broken => {
-                // No acknowledgement, because APID and sequence count of a broken packet may be wrong.
-                self.state.broken = self.state.broken.saturating_add(1);
-                self.send_event(Event::CommandRejected, Code::Broken as u32, 0);
-            }
+            Received::Broken => self.note_broken_packet(),
             Received::Foreign => self.state.foreign = self.state.foreign.saturating_add(1),
             Received::Command { sequence, bytes } => {
                 self.handle_command(sequence, bytes);
@@ -90,9 +92,15 @@ impl<B: Board> Flight<'_, B> {
         Some(false)
     }
 
+    pub(super) fn note_broken_packet(&mut self) {
+        // No acknowledgement, because APID and sequence count of a broken packet may be wrong.
+        self.state.broken = self.state.broken.saturating_add(1);
+        self.send_event(Event::CommandRejected, Code::Broken as u32, 0);
+    }
+
     /// Carries out and acknowledges a telecommand, whose user data are in the memory for packets that are sent.
     #[inline(never)]
-    fn handle_command(&mut self, sequence: u16, bytes: usize) {
+    pub(super) fn handle_command(&mut self, sequence: u16, bytes: usize) {
         // The data are copied, because the command may use every buffer.
         let user = self.buffers.line.out;
         let mut from = Reader::new(user.get(..bytes).unwrap_or_default());

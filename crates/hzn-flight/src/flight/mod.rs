@@ -22,6 +22,7 @@
 //! | `reports` | limits of what is sent, flags of housekeeping |
 //! | `housekeeping` | housekeeping and events are sent |
 //! | `line` | packets on the line, with their counts |
+//! | [`rig`] | several of these loops, one for each head, and their joint answer |
 
 use hzn_core::Sensor;
 use hzn_twice::KeptTwice;
@@ -52,6 +53,7 @@ mod pictures;
 mod prior;
 mod recovery;
 mod reports;
+pub mod rig;
 mod science;
 mod self_check;
 mod telecommands;
@@ -95,7 +97,8 @@ pub struct Flight<'a, B> {
     start: Option<[u32; 2]>,
     board: B,
     buffers: &'a mut Buffers,
-    workspace: &'a mut Lists,
+    /// `None` if a rig lends the lists for each turn, because its heads share them.
+    workspace: Option<&'a mut Lists>,
     // Kept twice, because they are used for the whole flight: every answer after a flipped bit would be wrong.
     sensor: KeptTwice<Sensor<f32>>,
     operations: KeptTwice<Operations>,
@@ -136,7 +139,12 @@ impl<'a, B: Board> Flight<'a, B> {
     /// Keep the flight software where it is: it has two sensors, 15 KB, and a copy needs that much of the stack.
     // Not inlined, like the other large functions, so that each can use the same part of the stack.
     #[inline(never)]
-    pub fn start(mut board: B, buffers: &'a mut Buffers, workspace: &'a mut Lists) -> Option<Self> {
+    pub fn start(board: B, buffers: &'a mut Buffers, workspace: &'a mut Lists) -> Option<Self> {
+        Self::start_with(board, buffers, Some(workspace))
+    }
+
+    #[inline(always)]
+    fn start_with(mut board: B, buffers: &'a mut Buffers, workspace: Option<&'a mut Lists>) -> Option<Self> {
         let recovery = Recovery::begin(&mut board);
         let loaded = store::load(&mut board, &mut buffers.table, recovery.choice());
         Self::new(board, buffers, workspace, recovery, &loaded)
@@ -156,7 +164,7 @@ impl<'a, B: Board> Flight<'a, B> {
     fn new(
         mut board: B,
         buffers: &'a mut Buffers,
-        workspace: &'a mut Lists,
+        workspace: Option<&'a mut Lists>,
         recovery: Recovery,
         loaded: &Loaded,
     ) -> Option<Self> {

@@ -47,7 +47,8 @@ impl<B: Board> Flight<'_, B> {
         // The request stays until it is met, because this picture may be incomplete or stuck.
         let wanted = self.dump_edges;
         let edge = &mut self.buffers.edge;
-        let mut viewer = Viewer::new(self.sensor.get(), expected.get(), self.workspace, edge, wanted);
+        let Some(workspace) = self.workspace.as_deref_mut() else { return };
+        let mut viewer = Viewer::new(self.sensor.get(), expected.get(), workspace, edge, wanted);
         self.board.show(&mut viewer);
         let seen = viewer.into_seen();
         let Some((mut report, stuck)) = self.accept(seen) else { return };

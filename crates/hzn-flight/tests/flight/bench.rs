@@ -234,7 +234,7 @@ pub(crate) fn take_sent(flight: &mut Flight<'_, Bench>) -> Sent {
                 let pixels: Vec<_> = pixels.map(|p| pixel::Pixel { x: p.x, y: p.y }).collect();
                 out.edge.extend(&pixels[..part.count.into()]);
             }
-            Apid::Command => panic!("a flight computer sends no commands"),
+            Apid::Rig | Apid::Command => panic!("a flight computer with one head sends none"),
         }
         assert!(r.rest().is_empty(), "{packet:?}");
     }

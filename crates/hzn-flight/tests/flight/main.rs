@@ -9,6 +9,8 @@ mod line;
 mod navigation;
 mod parameters;
 mod recovery;
+mod rig;
+mod rig_bench;
 mod rows;
 mod silence;
 

@@ -1,0 +1,184 @@
+//! The telecommands of a rig: those to one head, and those to all.
+
+use hzn_core::Prior;
+
+use super::{Rig, RigBoard};
+use crate::attitude::turned_back;
+use crate::board::Board;
+use crate::bytes::Reader;
+use crate::flight::attitude::{TimedAttitude, read_attitude};
+use crate::flight::navigation::{Values, read_navigation, read_prior};
+use crate::flight::{Flight, listen};
+use crate::messages::{Acknowledge, Code, Function, Mode};
+use crate::packet::{Apid, ApidBase, MAX_BYTES};
+
+/// A packet that was received.
+enum Received {
+    Broken,
+    Foreign,
+    /// A telecommand to this base, whose user data have this length.
+    Command {
+        base: ApidBase,
+        sequence: u16,
+        bytes: usize,
+    },
+}
+
+impl<B: RigBoard, const N: usize> Rig<'_, B, N> {
+    /// Takes the bytes that have arrived, and handles at most one telecommand, like the loop of one head.
+    pub(super) fn listen(&mut self) {
+        let now_us = self.now_us();
+        self.buffers.inbox.reset_effort();
+        let (mut bytes, mut is_done) = (0, false);
+        loop {
+            let (board, inbox) = (self.board, &mut self.buffers.inbox);
+            let most = (listen::MAX_READ - bytes).min(listen::MAX_EFFORT.saturating_sub(inbox.effort()));
+            if most == 0 {
+                break;
+            }
+            let receive = || board.try_borrow_mut().ok().and_then(|mut board| board.receive());
+            let (count, filled) = inbox.fill(now_us, most, is_done, receive);
+            bytes += count;
+            while listen::may_hold_packet(filled, is_done, self.buffers.inbox.effort()) {
+                match self.handle_packet(now_us) {
+                    Some(is_command) => is_done = is_command,
+                    None => break,
+                }
+            }
+            if filled != crate::inbox::Filled::Ready {
+                break;
+            }
+        }
+        for flight in self.heads.iter_mut().flatten() {
+            flight.limiter.add_received(bytes as u16);
+        }
+    }
+
+    /// Handles a packet that has arrived. Returns whether it was a telecommand; `None` if there is no packet.
+    fn handle_packet(&mut self, now_us: u64) -> Option<bool> {
+        let heads = self.heads.iter().flatten().map(|flight| flight.buffers.line.base());
+        let mut bases = [None; 1 + hzn_core::rig::MOST_HEADS];
+        for (place, base) in bases.iter_mut().zip(core::iter::once(self.setup.base).chain(heads)) {
+            *place = Some(base);
+        }
+        let super::RigBuffers { line, inbox } = &mut *self.buffers;
+        let room = &mut line.out;
+        let received = inbox.next(now_us, |packet| {
+            let Some(packet) = packet else { return Received::Broken };
+            let is_of = |base: &&ApidBase| base.subject(&packet) == Some(Apid::Command);
+            let Some(base) = bases.iter().flatten().find(is_of) else { return Received::Foreign };
+            if let Some(room) = room.get_mut(..packet.user.len()) {
+                room.copy_from_slice(packet.user);
+            }
+            Received::Command { base: *base, sequence: packet.sequence, bytes: packet.user.len() }
+        })?;
+        match received {
+            // Nobody knows whose packet it was, so that the first head counts it.
+            Received::Broken => {
+                if let Some(first) = self.heads.iter_mut().flatten().next() {
+                    first.note_broken_packet();
+                }
+            }
+            Received::Foreign => {
+                if let Some(first) = self.heads.iter_mut().flatten().next() {
+                    first.state.foreign = first.state.foreign.saturating_add(1);
+                }
+            }
+            Received::Command { base, sequence, bytes } if base == self.setup.base => {
+                self.handle_command(sequence, bytes);
+                return Some(true);
+            }
+            Received::Command { base, sequence, bytes } => {
+                let room = &self.buffers.line.out;
+                let is_meant = |flight: &&mut Flight<'_, _>| flight.buffers.line.base() == base;
+                let head = self.heads.iter_mut().flatten().find(is_meant);
+                if let Some(flight) = head.filter(|flight| flight.mode != Mode::ShutDown) {
+                    flight.check_operations();
+                    flight.buffers.line.out = *room;
+                    flight.handle_command(sequence, bytes);
+                }
+                return Some(true);
+            }
+        }
+        Some(false)
+    }
+
+    /// Carries out and acknowledges a telecommand to the rig.
+    #[inline(never)]
+    fn handle_command(&mut self, sequence: u16, bytes: usize) {
+        let user: [u8; MAX_BYTES] = self.buffers.line.out;
+        let mut from = Reader::new(user.get(..bytes).unwrap_or_default());
+        let number = from.u8().unwrap_or(0);
+        let window = self.heads.iter().flatten().next().map_or(0, |first| first.operations.get().sequence_window);
+        let ahead = self.last_sequence.map(|last| sequence.wrapping_sub(last) & 0x3FFF);
+        let is_replay = window > 0 && ahead.is_some_and(|ahead| !(1..=window).contains(&ahead));
+        let (code, detail) = match Function::from_number(number) {
+            _ if is_replay => (Code::Sequence, self.last_sequence.unwrap_or(0)),
+            Some(function) => {
+                self.last_sequence = Some(sequence);
+                self.carry_out(function, from)
+            }
+            None => (Code::Unknown, 0),
+        };
+        let record = Acknowledge { function: number, sequence, code: code as u8, detail };
+        let may_answer = match self.heads.iter_mut().flatten().next() {
+            Some(first) => code == Code::Done || first.may_answer(Acknowledge::BYTES),
+            None => false,
+        };
+        if may_answer {
+            let now_us = self.now_us();
+            self.send(now_us, Apid::Acknowledge, |out| record.write(out));
+        }
+    }
+
+    /// Lets each head carry out a telecommand. Returns the first refusal, or that all have done it.
+    fn carry_out(&mut self, function: Function, from: Reader<'_>) -> (Code, u16) {
+        match function {
+            Function::Ping if from.rest().is_empty() => return (Code::Done, 0),
+            Function::SetParameters
+            | Function::TryParameters
+            | Function::StageParameters
+            | Function::CommitParameters
+            | Function::ReadParameters
+            | Function::DumpEdges => return (Code::Refused, 0),
+            _ => {}
+        }
+        let mut outcome = (Code::Done, 0);
+        for flight in self.heads.iter_mut().flatten().filter(|flight| flight.mode != Mode::ShutDown) {
+            let code = flight.carry_out_for_vehicle(function, from);
+            if outcome.0 == Code::Done {
+                outcome = (code, flight.detail);
+            }
+        }
+        outcome
+    }
+}
+
+impl<B: Board> Flight<'_, B> {
+    /// Carries out a telecommand whose rate, attitude and Sun are in the axes of the vehicle.
+    fn carry_out_for_vehicle(&mut self, function: Function, mut from: Reader<'_>) -> Code {
+        self.detail = 0;
+        // A telecommand may copy what it does not change.
+        self.check_operations();
+        self.check_memory(None);
+        let now_us = self.board.now_us();
+        let (from, q) = (&mut from, self.vehicle_from_camera());
+        let clock = &self.buffers.line.clock;
+        let values = match function {
+            Function::SetKnown => read_prior(from),
+            Function::Navigate => read_navigation(from, clock, now_us),
+            Function::SetAttitude => {
+                let read = read_attitude(from, clock, now_us);
+                let seen = |it: TimedAttitude| Some(TimedAttitude { values: it.values.seen_by(q?), ..it });
+                // A head without a mount cannot use the attitude, and the one that it has would be out of date.
+                return self.set_attitude(read.map(|attitude| attitude.and_then(seen)));
+            }
+            _ => return self.carry_out(function, from),
+        };
+        let turned = |values: Values| {
+            let rate_rad_s = values.prior.rate_rad_s.zip(q).map(|(rate, q)| turned_back(q, rate));
+            Values { prior: Prior { rate_rad_s, ..values.prior }, ..values }
+        };
+        self.set_known(values.map(turned))
+    }
+}
