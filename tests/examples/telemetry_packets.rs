@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use hzn_flight::answer::{Direction, Edge, Outcome, Position};
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::cuc::Cuc;
+use hzn_flight::joint::RigAnswer;
 use hzn_flight::layout::user_bytes;
 use hzn_flight::messages::{
     Acknowledge, AttitudeState, Code, EDGE_PIXELS, EdgePart, EdgePixel, Event, EventRecord, Exposure, Housekeeping,
@@ -59,6 +60,7 @@ fn values(apid: Apid, user: &[u8]) -> Option<Vec<f64>> {
         }
         Apid::Navigation => out.extend(NavigationState::read(from)?.values()),
         Apid::Attitude => out.extend(AttitudeState::read(from)?.values()),
+        Apid::Rig => out.extend(RigAnswer::read(from)?.values()),
         Apid::Command => return None,
     }
     from.rest().is_empty().then_some(out)
@@ -71,6 +73,7 @@ fn limit_choices(apid: Apid, user: &mut [u8], draw: u8) {
         Apid::Science => (user[Exposure::BYTES], user[Exposure::BYTES + 1]) = (draw % 10, draw % 8),
         Apid::Event => (user[0], user[1], user[2]) = (0, 1 + draw % Event::ALL.len() as u8, draw % 3),
         Apid::Acknowledge => user[3] = draw % Code::ALL.len() as u8,
+        Apid::Rig => (user[12], user[13]) = (draw % 10, draw % 4),
         Apid::Candidate => user[4 + Edge::BYTES - 1] = draw % 23,
         _ => {}
     }

@@ -93,6 +93,13 @@ TABLES = {
     "f4:body_x f4:body_y f4:body_z",
     0x108: "u4:picture u1:state f4:age_s f4:altitude f4:x f4:y f4:z f4:vx f4:vy f4:vz f4:rate_x f4:rate_y f4:rate_z",
     0x109: "u4:picture u1:state f4:age_s f4:qw f4:qx f4:qy f4:qz f4:sigma f4:sun_x f4:sun_y f4:sun_z",
+    0x10A: (
+        "u4:epoch u8:exposure_us u1:status u1:outcome u1:expected u1:seen u1:answered u1:used u1:excluded u1:repeated "
+        "u2:repairs u4:picture_0 u4:picture_1 u4:picture_2 u4:picture_3 f4:axis_x f4:axis_y f4:axis_z "
+        "f4:cov_xx f4:cov_xy f4:cov_xz f4:cov_yy f4:cov_yz f4:cov_zz "
+        "f4:common_xx f4:common_xy f4:common_xz f4:common_yy f4:common_yz f4:common_zz "
+        "f4:half_angle f4:separation f4:separation_limit f4:protection"
+    ),
 }
 
 

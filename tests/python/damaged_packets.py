@@ -113,7 +113,7 @@ class Line:
                 length = struct.pack(">H", draw.choice([draw.randrange(2000), draw.randrange(65536)]))
                 return whole[:8] + length + whole[10:]
             case "type telemetry":
-                return self.forbidden(kind=PacketType.TM, apid=draw.choice([COMMAND_APID, *range(0x100, 0x109)]))
+                return self.forbidden(kind=PacketType.TM, apid=draw.choice([COMMAND_APID, *range(0x100, 0x10B)]))
             case "segment":
                 flags = [SequenceFlags.FIRST_SEGMENT, SequenceFlags.CONTINUATION_SEGMENT, SequenceFlags.LAST_SEGMENT]
                 return self.forbidden(flags=draw.choice(flags))

@@ -22,6 +22,7 @@ pub mod commander;
 pub mod encode;
 mod error;
 pub mod incoming;
+mod joint;
 mod outcome;
 mod outputs;
 pub mod station;

@@ -7,6 +7,7 @@ use hzn_flight::answer::Position;
 use hzn_flight::assembly::{Assembled, Assembly};
 use hzn_flight::bytes::Reader;
 use hzn_flight::cuc::{Cuc, Epoch};
+use hzn_flight::joint::{Outcome, RigAnswer};
 use hzn_flight::messages::{
     Acknowledge, AttitudeState, Code, EdgePart, EdgePixel, Event, EventRecord, Function, Housekeeping, Mode,
     NavigationState, ParameterValue, Severity,
@@ -18,6 +19,7 @@ use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, 
 use hzn_run::disk::Checked;
 
 use crate::error::Error;
+use crate::joint::joint_row;
 use crate::outcome;
 use crate::outputs::{Sink, write_housekeeping};
 use crate::tai;
@@ -60,6 +62,8 @@ pub struct StreamCounts {
     assembly: Assembly,
     /// Packets of the first version of telemetry.
     old: u64,
+    /// Packets of computers with another base.
+    other: u64,
     /// Candidates and values of pictures whose packets did not come.
     incomplete: u64,
 }
@@ -83,6 +87,10 @@ impl StreamCounts {
         self.count_lost(packet);
         let subject = self.base.subject(packet);
         let is_telemetry = subject.is_some_and(|apid| apid != Apid::Command);
+        if subject.is_none() && is_of_another_base(packet) {
+            self.other += 1;
+            return Ok(());
+        }
         let Some(time) = packet.time.filter(|_| is_telemetry) else {
             self.old += u64::from(is_telemetry);
             if !is_telemetry {
@@ -113,6 +121,13 @@ impl StreamCounts {
             Some(Apid::Acknowledge) => Acknowledge::read(from).map(|a| self.acknowledge(time, &a)).is_some(),
             Some(Apid::Parameters) => ParameterValue::read(from).map(|value| self.parameter(time, value)).is_some(),
             Some(Apid::Edge) => EdgePart::read(from).map(|part| self.edge(time, &part, from)).is_some(),
+            Some(Apid::Rig) => match RigAnswer::read(from) {
+                Some(answer) => {
+                    self.joint(&answer, sink)?;
+                    true
+                }
+                None => false,
+            },
             Some(Apid::Command) | None => false,
         };
         if !is_understood {
@@ -208,6 +223,20 @@ impl StreamCounts {
         sink.write(record)
     }
 
+    /// Takes the joint answer of a rig.
+    fn joint(&mut self, answer: &RigAnswer, sink: &mut Option<Sink>) -> Result<(), Error> {
+        self.answers += 1;
+        if answer.outcome != Outcome::Answer as u8 {
+            let why = Outcome::from_number(answer.outcome).map_or("?", Outcome::name);
+            let time = Cuc::since_start(answer.exposure_us);
+            self.note(time, LogLevel::Warning, &format!("epoch {}: {why}", answer.epoch));
+        }
+        let Some(sink) = sink else { return Ok(()) };
+        let mut record = FrameRecord::new(joint_row(answer));
+        record.log = std::mem::take(&mut self.log);
+        sink.write(record)
+    }
+
     fn note(&mut self, time: Cuc, level: LogLevel, message: &str) {
         let line = self.log(time, level, message);
         self.seen.push(Seen::Note(level, line));
@@ -227,7 +256,7 @@ impl StreamCounts {
 
     /// Returns the counts in words.
     pub(crate) fn summary(&self) -> String {
-        let Self { packets, answers, lost, cut, skipped, incomplete, old, .. } = self;
+        let Self { packets, answers, lost, cut, skipped, incomplete, old, other, .. } = self;
         let mut text = format!("{packets} packets, {answers} answers");
         if *lost > 0 {
             text += &format!(", {lost} packets lost on the way");
@@ -238,6 +267,9 @@ impl StreamCounts {
         if *incomplete > 0 {
             text += &format!(", {incomplete} answers without some of their candidates");
         }
+        if *other > 0 {
+            text += &format!(", {other} packets of other computers or heads (see --apid-base)");
+        }
         if *old > 0 {
             text += &format!(
                 ", {old} packets of version 1 (times in microseconds), which this program does not read; use the \
@@ -246,6 +278,12 @@ impl StreamCounts {
         }
         text
     }
+}
+
+/// Returns whether a packet is telemetry of a computer or a head with another base.
+fn is_of_another_base(packet: &Packet<'_>) -> bool {
+    let base = ApidBase::try_new(packet.apid - packet.apid % ApidBase::STEP);
+    base.and_then(|base| base.subject(packet)).is_some_and(|apid| apid != Apid::Command)
 }
 
 /// Fills the columns of the position, which is no part of a report that came by telemetry.

@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use hzn_core::status::{Stage, Status};
 use hzn_core::verdict::Verdict;
+use hzn_flight::joint::Outcome;
 use hzn_flight::layout::user_data;
 use hzn_flight::messages::{Code, Event, Mode, Severity};
 use hzn_flight::packet::{Apid, ApidBase};
@@ -50,7 +51,8 @@ fn labels(packet: Apid, field: &str) -> Option<Vec<(u64, String)>> {
     match (packet, field) {
         (Apid::Housekeeping, "mode") => named!(Mode::ALL),
         (Apid::Housekeeping, "last_status") => Some(status().chain([(255, "none".to_owned())]).collect()),
-        (Apid::Science, "status") => Some(status().collect()),
+        (Apid::Science | Apid::Rig, "status") => Some(status().collect()),
+        (Apid::Rig, "outcome") => named!(Outcome::ALL),
         (Apid::Science, "stage") => named!(Stage::ALL),
         (Apid::Candidate, "verdict") => named!(Verdict::ALL),
         (Apid::Event, "number") => named!(Event::ALL),

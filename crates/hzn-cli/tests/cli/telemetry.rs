@@ -6,6 +6,7 @@ use hzn_core::{FlightHorizon, Prior};
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::Writer;
 use hzn_flight::cuc::Cuc;
+use hzn_flight::joint::RigAnswer;
 use hzn_flight::messages::{Acknowledge, Code, Event, EventRecord, Exposure, Function, Severity};
 use hzn_flight::packet::{self, Apid, ApidBase};
 use image::{GrayImage, Luma};
@@ -157,6 +158,54 @@ fn what_is_missing_refused_or_of_another_version_is_told() {
     assert!(column("axis_x").parse::<f64>().is_ok() && column("position_x_km").is_empty());
 }
 
+/// The joint answer of a rig has the columns of `hzn run rig.toml`; the packets of its heads have other bases.
+#[test]
+fn joint_answers_become_the_rows_of_a_rig() {
+    let place = Place::new();
+    let mut stream = Stream::default();
+    let joint = RigAnswer {
+        epoch: 1,
+        exposure_us: 2_500_000,
+        heads_expected: 0b1111,
+        heads_seen: 0b1101,
+        heads_answered: 0b1101,
+        heads_used: 0b0101,
+        heads_excluded: 0b1000,
+        picture_0: 7,
+        axis: [0.0, 0.6, 0.8],
+        cov: [1e-6, 0.0, 0.0, 0.64e-6, -0.48e-6, 0.36e-6],
+        cov_common: [f32::NAN; 6],
+        half_angle_rad: 1.2,
+        separation_rad: 1e-3,
+        separation_limit_rad: 2e-3,
+        protection_rad: 4e-3,
+        ..RigAnswer::default()
+    };
+    stream.add(Apid::Rig, Some(Cuc::since_start(2_500_000)), |w| joint.write(w));
+    let none = RigAnswer { epoch: 2, status: 6, outcome: 3, axis: [f32::NAN; 3], cov: [f32::NAN; 6], ..joint };
+    stream.add(Apid::Rig, Some(Cuc::since_start(3_500_000)), |w| none.write(w));
+    let base = ApidBase::try_new(0x120).unwrap();
+    let mut out = [0; packet::MAX_BYTES];
+    let user = |w: &mut Writer<'_>| EventRecord::default().write(w);
+    let n = packet::write(&mut out, base, Apid::Event, 0, Some(Cuc::since_start(0)), user).unwrap();
+    stream.bytes.extend(&out[..n]);
+    place.write("sent.bin", &stream.bytes);
+    let ran = place.run(&["telemetry", "sent.bin", "-o", "sent.csv"]).expect(0);
+    for text in ["epoch 2: inconsistent", "3 packets, 2 answers", "1 packets of other computers or heads"] {
+        assert!(ran.err.contains(text), "{text:?} is not in\n{}", ran.err);
+    }
+    let row = cells(&place, "sent.csv");
+    let column = |name: &str| row.iter().find(|(c, _)| c == name).unwrap().1.as_str();
+    let number = |name: &str| column(name).parse::<f64>().unwrap();
+    assert_eq!(["head", "status", "heads_used", "heads_excluded"].map(column), ["rig", "ok", "head0 head2", "head3"]);
+    assert_eq!(column("detail"), "head1: no picture");
+    assert!((number("axis_v_z") - 0.8).abs() < 1e-6 && (number("sigma_max_deg") - 0.0573).abs() < 1e-4);
+    assert!((number("separation_deg") * 2.0 - number("separation_limit_deg")).abs() < 1e-6);
+    assert!((number("protection_deg") - 4e-3f64.to_degrees()).abs() < 1e-6);
+    let rows = std::fs::read_to_string(place.path("sent.csv")).unwrap();
+    assert!(rows.lines().nth(2).unwrap().contains("rejected"));
+}
+
 /// The dictionary in the book is what the program prints.
 #[test]
 fn the_dictionary_is_that_of_the_records() {
@@ -166,7 +215,7 @@ fn the_dictionary_is_that_of_the_records() {
     let command = "hzn telemetry --xtce > book/reference/telemetry.xtce.xml";
     assert!(printed == committed, "write the file again: {command}");
     let moved = place.run(&["telemetry", "--xtce", "--apid-base", "0x240"]).expect(0).out;
-    // Only the APIDs move: 0x100 to 0x109 become 0x240 to 0x249, and that of telecommands 0x1C0 to 0x300.
+    // Only the APIDs move: 0x100 to 0x10A become 0x240 to 0x24A, and that of telecommands 0x1C0 to 0x300.
     let apid = |digits: &str| format!("packet_apid\" value=\"{digits}");
     let packets = committed.replace(&apid("25"), &apid("57")).replace(&apid("26"), &apid("58"));
     assert_eq!(moved, packets.replace("binaryValue=\"19C0\"", "binaryValue=\"1B00\""));
