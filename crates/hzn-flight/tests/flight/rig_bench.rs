@@ -9,7 +9,7 @@ use hzn_flight::answer::PictureAnswer;
 use hzn_flight::assembly::Assembly;
 use hzn_flight::board::{Board, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::{Reader, Writer};
-use hzn_flight::flight::rig::{Rig, RigBoard, RigBuffers, Setup, fingerprint};
+use hzn_flight::flight::rig::{Heads, Rig, RigBoard, RigBuffers, Setup, fingerprint};
 use hzn_flight::flight::{Buffers, Lists};
 use hzn_flight::joint::RigAnswer;
 use hzn_flight::messages::{Acknowledge, AttitudeState, Code, Event, EventRecord, Exposure, Function, Mode};
@@ -80,22 +80,29 @@ pub(crate) struct Bench {
     pub(crate) cameras: Vec<Camera>,
 }
 
-impl Board for Bench {
+/// The board, which the test holds, too.
+pub(crate) struct Shared<'a>(pub(crate) &'a RefCell<Bench>);
+
+impl Board for Shared<'_> {
     fn now_us(&mut self) -> u64 {
-        self.now_us += 10;
-        self.now_us
+        let this = &mut *self.0.borrow_mut();
+        this.now_us += 10;
+        this.now_us
     }
     fn receive(&mut self) -> Option<u8> {
-        self.line.pop_front()
+        let this = &mut *self.0.borrow_mut();
+        this.line.pop_front()
     }
     fn send(&mut self, bytes: &[u8]) {
-        self.sent.extend(bytes);
+        let this = &mut *self.0.borrow_mut();
+        this.sent.extend(bytes);
     }
     fn lift_off(&mut self) -> bool {
         true
     }
     fn power_fails(&mut self) -> bool {
-        self.power_fails
+        let this = &mut *self.0.borrow_mut();
+        this.power_fails
     }
     fn was_watchdog_reset(&mut self) -> bool {
         false
@@ -105,22 +112,26 @@ impl Board for Bench {
         true
     }
     fn next_picture(&mut self) -> Option<Picture> {
-        let camera = &mut self.cameras[self.head];
-        camera.pictures.front().filter(|taken| taken.ready_us <= self.now_us)?;
+        let this = &mut *self.0.borrow_mut();
+        let camera = &mut this.cameras[this.head];
+        camera.pictures.front().filter(|taken| taken.ready_us <= this.now_us)?;
         let taken = camera.pictures.pop_front()?;
         camera.pixels = taken.pixels;
         Some(Picture { bytes: camera.pixels.len(), exposure_us: taken.exposure_us, lost: 0 })
     }
     fn show(&mut self, viewer: &mut Viewer<'_>) {
-        viewer.see(&self.cameras[self.head].pixels);
+        let this = &mut *self.0.borrow_mut();
+        viewer.see(&this.cameras[this.head].pixels);
     }
     fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
+        let this = &mut *self.0.borrow_mut();
         into.fill(0xFF);
-        let kept = &self.cameras[self.head].copies[usize::from(copy) - 1];
+        let kept = &this.cameras[this.head].copies[usize::from(copy) - 1];
         into[..kept.len()].copy_from_slice(kept);
     }
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool {
-        self.cameras[self.head].copies[usize::from(copy) - 1] = bytes.to_vec();
+        let this = &mut *self.0.borrow_mut();
+        this.cameras[this.head].copies[usize::from(copy) - 1] = bytes.to_vec();
         true
     }
     fn stack_bytes(&mut self) -> u32 {
@@ -134,12 +145,14 @@ impl Board for Bench {
     }
 }
 
-impl RigBoard for Bench {
+impl RigBoard for Shared<'_> {
     fn select_head(&mut self, head: u8) {
-        self.head = head.into();
+        let this = &mut *self.0.borrow_mut();
+        this.head = head.into();
     }
     fn picture_checksum(&mut self) -> Option<u32> {
-        Some(fingerprint(&self.cameras[self.head].pixels))
+        let this = &mut *self.0.borrow_mut();
+        Some(fingerprint(&this.cameras[this.head].pixels))
     }
 }
 
@@ -202,11 +215,12 @@ pub(crate) fn take_sent(board: &RefCell<Bench>) -> Sent {
 }
 
 /// Makes a rig of four heads, and lets it fly.
-pub(crate) fn fly<R>(board: &RefCell<Bench>, turns: impl FnOnce(&mut Rig<'_, Bench, 4>) -> R) -> R {
+pub(crate) fn fly<R>(board: &RefCell<Bench>, turns: impl FnOnce(&mut Rig<'_, Shared<'_>, 4>) -> R) -> R {
     let (setup, mut rig_buffers, mut lists) = (setup(), RigBuffers::new(), Box::new(Lists::new()));
     let mut buffers = Box::new([const { Buffers::new() }; 4]);
-    let checked = setup.check().unwrap();
-    let mut rig = Box::new(Rig::new(board, checked, &mut rig_buffers, &mut buffers, &mut lists));
+    let (mut cameras, mut heads) = (Shared(board), Box::new(Heads::new()));
+    let own = (&mut rig_buffers, &mut *buffers);
+    let mut rig = Rig::new(&mut cameras, setup.check().unwrap(), &mut heads, own, &mut lists);
     // The first turn makes the heads, and the second one begins to listen.
     rig.turn();
     rig.turn();
@@ -257,7 +271,7 @@ pub(crate) fn send(
 }
 
 /// Runs a turn after a pause of the line.
-pub(crate) fn quiet_turn(board: &RefCell<Bench>, rig: &mut Rig<'_, Bench, 4>) {
+pub(crate) fn quiet_turn(board: &RefCell<Bench>, rig: &mut Rig<'_, Shared<'_>, 4>) {
     board.borrow_mut().now_us += 200_000;
     rig.turn();
 }

@@ -31,12 +31,12 @@ impl<B: RigBoard, const N: usize> Rig<'_, B, N> {
         self.buffers.inbox.reset_effort();
         let (mut bytes, mut is_done) = (0, false);
         loop {
-            let (board, inbox) = (self.board, &mut self.buffers.inbox);
+            let (board, inbox) = (&mut self.board, &mut self.buffers.inbox);
             let most = (listen::MAX_READ - bytes).min(listen::MAX_EFFORT.saturating_sub(inbox.effort()));
             if most == 0 {
                 break;
             }
-            let receive = || board.try_borrow_mut().ok().and_then(|mut board| board.receive());
+            let receive = || board.as_deref_mut()?.receive();
             let (count, filled) = inbox.fill(now_us, most, is_done, receive);
             bytes += count;
             while listen::may_hold_packet(filled, is_done, self.buffers.inbox.effort()) {
@@ -49,14 +49,14 @@ impl<B: RigBoard, const N: usize> Rig<'_, B, N> {
                 break;
             }
         }
-        for flight in self.heads.iter_mut().flatten() {
+        for flight in self.heads.loops.iter_mut().flatten() {
             flight.limiter.add_received(bytes as u16);
         }
     }
 
     /// Handles a packet that has arrived. Returns whether it was a telecommand; `None` if there is no packet.
     fn handle_packet(&mut self, now_us: u64) -> Option<bool> {
-        let heads = self.heads.iter().flatten().map(|flight| flight.buffers.line.base());
+        let heads = self.heads.loops.iter().flatten().map(|flight| flight.buffers.line.base());
         let mut bases = [None; 1 + hzn_core::rig::MOST_HEADS];
         for (place, base) in bases.iter_mut().zip(core::iter::once(self.setup.base).chain(heads)) {
             *place = Some(base);
@@ -75,32 +75,33 @@ impl<B: RigBoard, const N: usize> Rig<'_, B, N> {
         match received {
             // Nobody knows whose packet it was, so that the first head counts it.
             Received::Broken => {
-                if let Some(first) = self.heads.iter_mut().flatten().next() {
-                    first.note_broken_packet();
-                }
+                self.with_head(0, Flight::note_broken_packet);
             }
             Received::Foreign => {
-                if let Some(first) = self.heads.iter_mut().flatten().next() {
-                    first.state.foreign = first.state.foreign.saturating_add(1);
-                }
-            }
-            Received::Command { base, sequence, bytes } if base == self.setup.base => {
-                self.handle_command(sequence, bytes);
-                return Some(true);
+                self.with_head(0, |first| first.state.foreign = first.state.foreign.saturating_add(1));
             }
             Received::Command { base, sequence, bytes } => {
-                let room = &self.buffers.line.out;
-                let is_meant = |flight: &&mut Flight<'_, _>| flight.buffers.line.base() == base;
-                let head = self.heads.iter_mut().flatten().find(is_meant);
-                if let Some(flight) = head.filter(|flight| flight.mode != Mode::ShutDown) {
-                    flight.check_operations();
-                    flight.buffers.line.out = *room;
-                    flight.handle_command(sequence, bytes);
+                if base == self.setup.base {
+                    self.handle_command(sequence, bytes);
+                } else {
+                    self.pass_on(base, sequence, bytes);
                 }
                 return Some(true);
             }
         }
         Some(false)
+    }
+
+    /// Lets the head with this base carry out and acknowledge a telecommand.
+    fn pass_on(&mut self, base: ApidBase, sequence: u16, bytes: usize) {
+        let is_meant = |flight: &Flight<'_, _>| flight.buffers.line.base() == base && flight.mode != Mode::ShutDown;
+        let Some(k) = self.heads.loops.iter().position(|head| head.as_ref().is_some_and(is_meant)) else { return };
+        let room = self.buffers.line.out;
+        self.with_head(k, |flight| {
+            flight.check_operations();
+            flight.buffers.line.out = room;
+            flight.handle_command(sequence, bytes);
+        });
     }
 
     /// Carries out and acknowledges a telecommand to the rig.
@@ -109,7 +110,7 @@ impl<B: RigBoard, const N: usize> Rig<'_, B, N> {
         let user: [u8; MAX_BYTES] = self.buffers.line.out;
         let mut from = Reader::new(user.get(..bytes).unwrap_or_default());
         let number = from.u8().unwrap_or(0);
-        let window = self.heads.iter().flatten().next().map_or(0, |first| first.operations.get().sequence_window);
+        let window = self.loops().next().map_or(0, |first| first.operations.get().sequence_window);
         let ahead = self.last_sequence.map(|last| sequence.wrapping_sub(last) & 0x3FFF);
         let is_replay = window > 0 && ahead.is_some_and(|ahead| !(1..=window).contains(&ahead));
         let (code, detail) = match Function::from_number(number) {
@@ -121,10 +122,8 @@ impl<B: RigBoard, const N: usize> Rig<'_, B, N> {
             None => (Code::Unknown, 0),
         };
         let record = Acknowledge { function: number, sequence, code: code as u8, detail };
-        let may_answer = match self.heads.iter_mut().flatten().next() {
-            Some(first) => code == Code::Done || first.may_answer(Acknowledge::BYTES),
-            None => false,
-        };
+        let may_answer =
+            code == Code::Done || self.with_head(0, |first| first.may_answer(Acknowledge::BYTES)) == Some(true);
         if may_answer {
             let now_us = self.now_us();
             self.send(now_us, Apid::Acknowledge, |out| record.write(out));
@@ -144,10 +143,13 @@ impl<B: RigBoard, const N: usize> Rig<'_, B, N> {
             _ => {}
         }
         let mut outcome = (Code::Done, 0);
-        for flight in self.heads.iter_mut().flatten().filter(|flight| flight.mode != Mode::ShutDown) {
-            let code = flight.carry_out_for_vehicle(function, from);
-            if outcome.0 == Code::Done {
-                outcome = (code, flight.detail);
+        for k in 0..N {
+            let carry_out = |flight: &mut Flight<'_, _>| {
+                let is_on = flight.mode != Mode::ShutDown;
+                is_on.then(|| (flight.carry_out_for_vehicle(function, from), flight.detail))
+            };
+            if let Some(own) = self.with_head(k, carry_out).flatten().filter(|_| outcome.0 == Code::Done) {
+                outcome = own;
             }
         }
         outcome

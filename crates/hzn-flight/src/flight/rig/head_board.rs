@@ -1,7 +1,5 @@
 //! The part of a board that belongs to one head.
 
-use core::cell::RefCell;
-
 use hzn_core::status::Status;
 use hzn_core::{Config, Report, Solution};
 
@@ -44,23 +42,23 @@ pub(super) struct HeadAnswer {
 /// The board, as the loop of one head sees it.
 #[derive(Debug)]
 pub struct HeadBoard<'a, B> {
-    shared: &'a RefCell<B>,
+    /// The board, while the rig lends it: for a turn of the head, or for a telecommand.
+    pub(super) lent: Option<&'a mut B>,
     head: u8,
     /// The answer of this turn.
     pub(super) answer: Option<HeadAnswer>,
 }
 
 impl<'a, B: RigBoard> HeadBoard<'a, B> {
-    pub(super) fn new(shared: &'a RefCell<B>, head: u8) -> Self {
-        Self { shared, head, answer: None }
+    pub(super) fn new(head: u8, lent: Option<&'a mut B>) -> Self {
+        Self { lent, head, answer: None }
     }
 
-    /// Calls a function of the board for this head.
-    fn with<R>(&self, otherwise: R, call: impl FnOnce(&mut B) -> R) -> R {
-        // Nothing holds the board while a loop runs, so that it is always free.
-        let Ok(mut board) = self.shared.try_borrow_mut() else { return otherwise };
+    /// Calls a function of the board for this head. Without the board, which a loop always has, it returns `otherwise`.
+    fn with<R>(&mut self, otherwise: R, call: impl FnOnce(&mut B) -> R) -> R {
+        let Some(board) = self.lent.as_deref_mut() else { return otherwise };
         board.select_head(self.head);
-        call(&mut board)
+        call(board)
     }
 }
 

@@ -21,7 +21,6 @@ mod epoch;
 mod head_board;
 
 use core::array;
-use core::cell::RefCell;
 
 use hzn_core::error::{ConfigError, Limit};
 use hzn_core::rig::{self, Answered, Common, Limb, MOST_HEADS, Mount};
@@ -141,16 +140,37 @@ impl RigBuffers {
     }
 }
 
+/// The loops of the heads, 15 KB each; keep them in a `static`.
+#[derive(Debug)]
+pub struct Heads<'a, B, const N: usize> {
+    loops: [Option<Flight<'a, HeadBoard<'a, B>>>; N],
+}
+
+impl<B, const N: usize> Default for Heads<'_, B, N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<B, const N: usize> Heads<'_, B, N> {
+    /// Makes room for the heads.
+    pub const fn new() -> Self {
+        const { assert!(N >= 1 && N <= MOST_HEADS, "a rig has one to four heads") };
+        Self { loops: [const { None }; N] }
+    }
+}
+
 /// The flight software of a rig with `N` heads, 1 to 4. Keep it where it is once it has made a turn.
 #[derive(Debug)]
 pub struct Rig<'a, B, const N: usize> {
-    board: &'a RefCell<B>,
+    /// `None` while it is lent to a head.
+    board: Option<&'a mut B>,
     setup: &'a Setup,
     buffers: &'a mut RigBuffers,
     lists: Option<&'a mut Lists>,
     /// The buffers of the heads, until the first turn.
     start: Option<&'a mut [Buffers; N]>,
-    heads: [Option<Flight<'a, HeadBoard<'a, B>>>; N],
+    heads: &'a mut Heads<'a, B, N>,
     // Kept twice like the sensors: they outlive a turn.
     joining: KeptTwice<Joining>,
     pending: KeptTwice<Pending>,
@@ -163,24 +183,22 @@ pub struct Rig<'a, B, const N: usize> {
 
 impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
     /// Makes a rig. The first turn loads the parameters of the heads and runs their self-checks.
-    ///
-    /// A head takes 15 KB. They are made where they lie, one after the other, so that the stack holds one of them.
     pub fn new(
-        board: &'a RefCell<B>,
+        board: &'a mut B,
         setup: CheckedSetup<'a>,
-        buffers: &'a mut RigBuffers,
-        heads: &'a mut [Buffers; N],
+        heads: &'a mut Heads<'a, B, N>,
+        buffers: (&'a mut RigBuffers, &'a mut [Buffers; N]),
         lists: &'a mut Lists,
     ) -> Self {
-        const { assert!(N >= 1 && N <= MOST_HEADS, "a rig has one to four heads") };
+        let (buffers, start) = buffers;
         buffers.line.set_base(setup.setup.base);
         Self {
-            board,
+            board: Some(board),
             setup: setup.setup,
             buffers,
             lists: Some(lists),
-            start: Some(heads),
-            heads: [const { None }; N],
+            start: Some(start),
+            heads,
             joining: KeptTwice::new(setup.joining),
             pending: KeptTwice::new(Pending::NONE),
             number: 0,
@@ -189,16 +207,37 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
         }
     }
 
+    /// Makes the loops of the heads, one after the other, so that the stack holds one of them.
     #[inline(never)]
     fn load(&mut self, buffers: &'a mut [Buffers; N]) {
-        for ((place, buffers), head) in self.heads.iter_mut().zip(buffers).zip(0u8..) {
-            *place = Flight::start_with(HeadBoard::new(self.board, head), buffers, None);
+        for ((place, buffers), head) in self.heads.loops.iter_mut().zip(buffers).zip(0u8..) {
+            *place = Flight::start_with(HeadBoard::new(head, self.board.take()), buffers, None);
+            self.board = place.as_mut().and_then(|flight| flight.board.lent.take());
         }
+    }
+
+    /// Returns the board.
+    pub fn board(&mut self) -> Option<&mut B> {
+        self.board.as_deref_mut()
+    }
+
+    /// Lends the board and the lists to a head for a call. `None` if there is no such head.
+    fn with_head<R>(&mut self, k: usize, call: impl FnOnce(&mut Flight<'a, HeadBoard<'a, B>>) -> R) -> Option<R> {
+        let flight = self.heads.loops.get_mut(k)?.as_mut()?;
+        (flight.board.lent, flight.workspace) = (self.board.take(), self.lists.take());
+        let result = call(flight);
+        (self.board, self.lists) = (flight.board.lent.take(), flight.workspace.take());
+        Some(result)
+    }
+
+    /// Returns the loops of the heads.
+    fn loops(&self) -> impl Iterator<Item = &Flight<'a, HeadBoard<'a, B>>> {
+        self.heads.loops.iter().flatten()
     }
 
     /// Returns the mode of a head; `None` before the first turn, or if there is no such head.
     pub fn mode(&self, head: usize) -> Option<Mode> {
-        self.heads.get(head)?.as_ref().map(Flight::mode)
+        self.heads.loops.get(head)?.as_ref().map(Flight::mode)
     }
 
     /// Runs one turn of every head, with at most one telecommand and one picture of each. Call it for ever.
@@ -211,14 +250,12 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
         }
         self.joining.complete();
         self.pending.complete();
-        for flight in self.heads.iter_mut().flatten() {
-            flight.workspace = self.lists.take();
-            flight.turn();
-            self.lists = flight.workspace.take();
+        for k in 0..N {
+            self.with_head(k, Flight::turn);
         }
         self.check_memory();
         for k in 0..N {
-            if let Some(answer) = self.heads.get_mut(k).and_then(|head| take_answer(head.as_mut()?)) {
+            if let Some(answer) = self.with_head(k, take_answer).flatten() {
                 self.add(k, answer);
             }
         }
@@ -229,14 +266,13 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
         }
     }
 
-    fn is_powered(&self) -> bool {
-        let fails = self.board.try_borrow_mut().is_ok_and(|mut board| board.power_fails());
-        !fails && self.heads.iter().flatten().any(|flight| flight.mode != Mode::ShutDown)
+    fn is_powered(&mut self) -> bool {
+        let fails = self.board().is_some_and(B::power_fails);
+        !fails && self.loops().any(|flight| flight.mode != Mode::ShutDown)
     }
 
-    fn now_us(&self) -> u64 {
-        // Nothing holds the board between the turns of the heads.
-        self.board.try_borrow_mut().map_or(0, |mut board| board.now_us())
+    fn now_us(&mut self) -> u64 {
+        self.board().map_or(0, B::now_us)
     }
 
     /// Adds the answer of a head to its epoch. An answer that comes after its epoch has no part in a joint answer.
@@ -253,7 +289,7 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
     /// Returns the heads that should have a picture.
     fn expected(&self) -> u8 {
         let is_expected = |flight: &Flight<'_, _>| flight.mode == Mode::Flight && !flight.camera.is_silent();
-        let heads = self.heads.iter().enumerate();
+        let heads = self.heads.loops.iter().enumerate();
         heads.fold(0, |set, (k, head)| set | u8::from(head.as_ref().is_some_and(is_expected)) << k)
     }
 
@@ -280,14 +316,14 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
         let epoch = self.pending.change(Pending::close);
         let Some(opened_us) = epoch.opened_us() else { return };
         let Joining { rig, mut common } = *self.joining.get();
-        let Some(first) = self.heads.iter().flatten().next() else { return };
+        let Some(first) = self.loops().next() else { return };
         let body = &first.sensor.get().config().body;
         common.limb.radius_km = (body.mean_radius_km() + body.limb_height_km) as f32;
         let mounts: [Option<Mount<f32>>; MOST_HEADS] = array::from_fn(|k| self.mount(k));
         let answered: [Option<Answered<'_, f32>>; MOST_HEADS] = array::from_fn(|k| {
             let head = epoch.heads.get(k)?.as_ref().filter(|_| epoch.repeated >> k & 1 == 0)?;
             // A head that looks for another body sees another direction.
-            let sensor = self.heads.get(k)?.as_ref()?.sensor.get();
+            let sensor = self.heads.loops.get(k)?.as_ref()?.sensor.get();
             Some(Answered {
                 solution: head.solution.as_ref().filter(|_| sensor.config().body.kind == body.kind)?,
                 camera: sensor.camera(),
@@ -321,15 +357,15 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
     }
 
     fn mount(&self, k: usize) -> Option<Mount<f32>> {
-        let q = self.heads.get(k)?.as_ref()?.vehicle_from_camera()?;
+        let q = self.heads.loops.get(k)?.as_ref()?.vehicle_from_camera()?;
         Mount::new([1.0, 0.0, 0.0, 0.0], q, self.setup.mounts_rad2.get(k)?)
     }
 
     /// Sends a packet of the rig with a time on the board's clock. Its time code is that of the first head.
     fn send(&mut self, clock_us: u64, apid: Apid, user: impl FnOnce(&mut crate::bytes::Writer<'_>)) {
-        if let Some(first) = self.heads.iter_mut().flatten().next() {
-            let time = first.buffers.line.clock.at(clock_us);
-            self.buffers.line.send(&mut first.board, apid, time, user);
+        let Some(time) = self.loops().next().map(|first| first.buffers.line.clock.at(clock_us)) else { return };
+        if let Some(board) = self.board.as_deref_mut() {
+            self.buffers.line.send(board, apid, time, user);
         }
     }
 }

@@ -62,11 +62,11 @@ fn answer(exposure_us: u64, checksum: u32) -> head_board::HeadAnswer {
 
 #[test]
 fn a_flipped_bit_costs_the_epoch() {
-    let (board, setup) = (RefCell::new(Silent(0)), Setup::new(ApidBase::DEFAULT));
+    let (mut board, setup) = (Silent(0), Setup::new(ApidBase::DEFAULT));
     let (mut buffers, mut lists) = (RigBuffers::new(), Box::new(Lists::new()));
-    let mut heads = Box::new([const { Buffers::new() }; 2]);
-    let checked = setup.check().unwrap();
-    let mut rig = Box::new(Rig::new(&board, checked, &mut buffers, &mut heads, &mut lists));
+    let mut own = Box::new([const { Buffers::new() }; 2]);
+    let (mut heads, checked) = (Box::new(Heads::new()), setup.check().unwrap());
+    let mut rig = Rig::new(&mut board, checked, &mut heads, (&mut buffers, &mut own), &mut lists);
     rig.turn();
     rig.add(0, answer(1000, 1));
     rig.pending.value_mut().repeated ^= 1;
