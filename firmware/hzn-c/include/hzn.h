@@ -85,8 +85,17 @@
 // Alignment that a sensor needs, bytes.
 #define HZN_WORKSPACE_ALIGN 16
 
+// Bytes that a rig needs in addition to its sensors, on every machine; it has the alignment of a sensor.
+#define HZN_RIG_SIZE 16384
+
+// Largest number of heads of a rig.
+#define HZN_RIG_HEADS 4
+
 // Bytes that the rows of a picture need, on every machine; they have the alignment of a sensor.
 #define HZN_ROWS_SIZE 147456
+
+// A rig. Its content is hidden: only pointers to it are passed.
+typedef struct HznRig HznRig;
 
 // A sensor. Its content is hidden: only pointers to it are passed.
 typedef struct HznSensor HznSensor;
@@ -196,6 +205,56 @@ typedef struct {
   HznEdge edges[16];
 } HznAnswer;
 
+// What the heads of a rig share, and their mounts. hzn_rig_usual fills it.
+typedef struct {
+  // Probability of a false alarm of the check of each head by the others, for each epoch.
+  double false_alarm;
+  // Probability that the error exceeds protection_rad, if at most one head is wrong.
+  double misleading;
+  // 1-sigma of a tilt of the limb that all heads share, km; NaN: it follows from the half-angle.
+  float limb_tilt_sigma_km;
+  // 1-sigma of the limb height that each head has for itself, km.
+  float limb_own_sigma_km;
+  // Distance along the limb at which the correlation of that height has fallen to exp(-1/2), km.
+  float limb_own_length_km;
+  // 1-sigma of the attitude of the rig on the vehicle about each axis, rad.
+  float sigma_rad;
+  // Quaternion from each camera to the vehicle, scalar first; NaN: there is no such head.
+  float q_vehicle_from_camera_wxyz[4][4];
+  // Covariance of each mount: xx, xy, xz, yy, yz, zz of a small rotation about the axes of the vehicle, rad².
+  float mount_cov_rad2[4][6];
+} HznRigSetup;
+
+// The joint answer of a rig. A set of heads has the bit 2^k for head k. Without a direction (status not 0) its numbers
+// are NaN. After a call that returns an error, status is 255.
+typedef struct {
+  // Middle of the exposures that are used, s, from the instant of the heads' times; NaN: not known.
+  double time_s;
+  // Unit vector to the body, vehicle's frame.
+  float axis_vehicle[3];
+  // Covariance of axis_vehicle: xx, xy, xz, yy, yz, zz, rad².
+  float cov_rad2[6];
+  // Half-angle of the limb, rad.
+  float half_angle_rad;
+  // Angle by which the axis moves without the head that agrees least, rad; NaN with one head.
+  float separation_rad;
+  // Largest such angle that the covariance allows, rad.
+  float separation_limit_rad;
+  // Angle that the error exceeds with the probability misleading, if at most one head is wrong, rad; NaN with one
+  // head.
+  float protection_rad;
+  // Status: the value that hzn_rig_join returned.
+  uint8_t status;
+  // Heads that have a picture.
+  uint8_t heads_seen;
+  // Heads that have an answer and a mount.
+  uint8_t heads_answered;
+  // Heads that are in the joint answer.
+  uint8_t heads_used;
+  // Heads that the check excluded.
+  uint8_t heads_excluded;
+} HznRigAnswer;
+
 // The structures have the sizes that they have in the library. C99 cannot check this.
 #if defined(__cplusplus)
 #define HZN_ASSERT static_assert
@@ -208,6 +267,8 @@ HZN_ASSERT(sizeof(HznKnown) == 112, "the size of HznKnown");
 HZN_ASSERT(sizeof(HznPicture) == 3 * sizeof(size_t) + 8, "the size of HznPicture");
 HZN_ASSERT(sizeof(HznEdge) == 24, "the size of HznEdge");
 HZN_ASSERT(sizeof(HznAnswer) == 484, "the size of HznAnswer");
+HZN_ASSERT(sizeof(HznRigSetup) == 192, "the size of HznRigSetup");
+HZN_ASSERT(sizeof(HznRigAnswer) == 72, "the size of HznRigAnswer");
 #undef HZN_ASSERT
 
 #ifdef __cplusplus
@@ -276,6 +337,47 @@ int32_t hzn_process(HznSensor *sensor,
                     const HznPicture *picture,
                     const HznKnown *known,
                     HznAnswer *out);
+
+// Writes the usual values to setup: those of a rig.toml that has none, with exact mounts. The quaternions are NaN: a
+// head without one has no part in the joint answer.
+//
+// Safety:
+// setup is null or writable.
+int32_t hzn_rig_usual(HznRigSetup *setup);
+
+// Makes a rig in memory and writes a pointer to it to out. interface is HZN_INTERFACE. The sensors of the heads
+// are opened by hzn_open, each in memory of its own. A setup with an impossible number is refused.
+//
+// Safety:
+// memory is null or has bytes writable bytes that nothing else uses as long as the rig is used. setup is null or
+// readable. out is null or writable.
+int32_t hzn_rig_open(uint8_t *memory,
+                     size_t bytes,
+                     uint32_t interface,
+                     const HznRigSetup *setup,
+                     HznRig **out);
+
+// Finds the limb in the picture of head head, 0 to 3, as hzn_process does, and keeps the
+// answer for the epoch; it replaces an earlier one of this head. time_s is the middle of the exposure in seconds from
+// any instant that all heads share; NaN: it is not known, and the picture counts as triggered with the others.
+//
+// Safety:
+// rig is null or from hzn_rig_open. The others are as for hzn_process.
+int32_t hzn_rig_process(HznRig *rig,
+                        uint32_t head,
+                        double time_s,
+                        HznSensor *sensor,
+                        const HznPicture *picture,
+                        const HznKnown *known,
+                        HznAnswer *out);
+
+// Joins the answers of the heads since the last call and begins the next epoch. Returns 0 and the direction in out;
+// 1 if no head has an answer; 6 if the heads contradict each other or do not determine a direction.
+//
+// Safety:
+// rig is null or from hzn_rig_open. out is null or writable.
+int32_t hzn_rig_join(HznRig *rig,
+                     HznRigAnswer *out);
 
 // Finds the limb in a picture that comes row by row. next_row writes the next row, width bytes, and returns 0; any
 // other number ends the picture, and hzn_process_rows returns HZN_ROWS_ENDED. context can take the number, which

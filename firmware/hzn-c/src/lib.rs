@@ -14,12 +14,13 @@ use hzn_core::body::Expected;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::observer::Unobserved;
 use hzn_core::pipeline::Workspace;
-use hzn_core::{Prior, Sensor};
+use hzn_core::{Prior, Report, Sensor};
 use hzn_flight::Parameters;
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::parameters::Refused;
 use hzn_twice::KeptTwice;
 
+pub mod rig;
 pub mod rows;
 pub mod types;
 
@@ -313,33 +314,47 @@ pub unsafe extern "C" fn hzn_process(
     known: *const HznKnown,
     out: *mut HznAnswer,
 ) -> i32 {
+    // SAFETY: the caller guarantees it.
+    match unsafe { find_limb(sensor, picture, known, out) } {
+        Ok((report, _)) => report.status as i32,
+        Err(code) => code,
+    }
+}
+
+/// Does the same as [`hzn_process`]. Returns the report with the rate that was known, or the error.
+///
+/// # Safety
+/// As for [`hzn_process`].
+unsafe fn find_limb(
+    sensor: *mut HznSensor,
+    picture: *const HznPicture,
+    known: *const HznKnown,
+    out: *mut HznAnswer,
+) -> Result<(Report<f32>, Option<[f32; 3]>), i32> {
     if picture.is_null() || out.is_null() {
-        return HZN_NULL;
+        return Err(HZN_NULL);
     }
     if !picture.is_aligned() || !out.is_aligned() || !known.is_aligned() {
-        return HZN_MEMORY;
+        return Err(HZN_MEMORY);
     }
     // SAFETY: the pointers are neither null nor unaligned, and the caller guarantees the rest.
     let (picture, out) = unsafe { (&*picture, &mut *out) };
     *out = NO_ANSWER;
     // SAFETY: the caller guarantees it.
-    let kept = match unsafe { open_sensor(sensor) } {
-        Ok(opened) => opened.kept.get(),
-        Err(code) => return code,
-    };
+    let kept = unsafe { open_sensor(sensor) }?.kept.get();
     let camera = kept.sensor.camera();
     if (picture.width, picture.height) != (camera.width().into(), camera.height().into()) {
-        return HZN_PICTURE;
+        return Err(HZN_PICTURE);
     }
     if picture.pixels.is_null() || picture.bytes > isize::MAX as usize {
-        return HZN_PICTURE;
+        return Err(HZN_PICTURE);
     }
     // SAFETY: the caller guarantees it; the pointer is not null, and the length is possible for a slice.
     let pixels = unsafe { core::slice::from_raw_parts(picture.pixels, picture.bytes) };
     let layout = Layout { width: picture.width, height: picture.height, stride: picture.stride, channels: 1, bits: 8 };
-    let Ok(grey) = Grey::try_new(pixels, layout) else { return HZN_PICTURE };
+    let Ok(grey) = Grey::try_new(pixels, layout) else { return Err(HZN_PICTURE) };
     // SAFETY: the caller guarantees it.
-    let Some((expected, attitude)) = (unsafe { expect(&kept.sensor, known) }) else { return HZN_KNOWN };
+    let Some((expected, attitude)) = (unsafe { expect(&kept.sensor, known) }) else { return Err(HZN_KNOWN) };
     // SAFETY: the sensor is open, and says how much room there is. The caller guarantees that nothing else uses it.
     let report = unsafe {
         if kept.has_all_points {
@@ -349,7 +364,9 @@ pub unsafe extern "C" fn hzn_process(
         }
     };
     *out = to_answer(&PictureAnswer::from_report(&report), attitude);
-    i32::from(out.status)
+    // SAFETY: the caller guarantees it. The rate was accepted above, so that all of its numbers are known, or none.
+    let rate_rad_s = unsafe { known.as_ref() }.map(|known| known.rate_rad_s).filter(|[x, ..]| !x.is_nan());
+    Ok((report, rate_rad_s))
 }
 
 /// Returns the expected limb, and what became of the attitude and the Sun; `None` if the values are impossible.

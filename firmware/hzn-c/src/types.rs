@@ -126,6 +126,76 @@ pub struct HznAnswer {
     pub edges: [HznEdge; 16],
 }
 
+/// What the heads of a rig share, and their mounts. `hzn_rig_usual` fills it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct HznRigSetup {
+    /// Probability of a false alarm of the check of each head by the others, for each epoch.
+    pub false_alarm: f64,
+    /// Probability that the error exceeds `protection_rad`, if at most one head is wrong.
+    pub misleading: f64,
+    /// 1-sigma of a tilt of the limb that all heads share, km; NaN: it follows from the half-angle.
+    pub limb_tilt_sigma_km: f32,
+    /// 1-sigma of the limb height that each head has for itself, km.
+    pub limb_own_sigma_km: f32,
+    /// Distance along the limb at which the correlation of that height has fallen to exp(-1/2), km.
+    pub limb_own_length_km: f32,
+    /// 1-sigma of the attitude of the rig on the vehicle about each axis, rad.
+    pub sigma_rad: f32,
+    /// Quaternion from each camera to the vehicle, scalar first; NaN: there is no such head.
+    pub q_vehicle_from_camera_wxyz: [[f32; 4]; 4],
+    /// Covariance of each mount: xx, xy, xz, yy, yz, zz of a small rotation about the axes of the vehicle, rad².
+    pub mount_cov_rad2: [[f32; 6]; 4],
+}
+
+/// The joint answer of a rig. A set of heads has the bit 2^k for head k. Without a direction (status not 0) its numbers
+/// are NaN. After a call that returns an error, `status` is 255.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct HznRigAnswer {
+    /// Middle of the exposures that are used, s, from the instant of the heads' times; NaN: not known.
+    pub time_s: f64,
+    /// Unit vector to the body, vehicle's frame.
+    pub axis_vehicle: [f32; 3],
+    /// Covariance of `axis_vehicle`: xx, xy, xz, yy, yz, zz, rad².
+    pub cov_rad2: [f32; 6],
+    /// Half-angle of the limb, rad.
+    pub half_angle_rad: f32,
+    /// Angle by which the axis moves without the head that agrees least, rad; NaN with one head.
+    pub separation_rad: f32,
+    /// Largest such angle that the covariance allows, rad.
+    pub separation_limit_rad: f32,
+    /// Angle that the error exceeds with the probability `misleading`, if at most one head is wrong, rad; NaN with one
+    /// head.
+    pub protection_rad: f32,
+    /// Status: the value that `hzn_rig_join` returned.
+    pub status: u8,
+    /// Heads that have a picture.
+    pub heads_seen: u8,
+    /// Heads that have an answer and a mount.
+    pub heads_answered: u8,
+    /// Heads that are in the joint answer.
+    pub heads_used: u8,
+    /// Heads that the check excluded.
+    pub heads_excluded: u8,
+}
+
+/// What is in place of a joint answer when a call is refused.
+pub(crate) const NO_RIG_ANSWER: HznRigAnswer = HznRigAnswer {
+    time_s: f64::NAN,
+    axis_vehicle: [f32::NAN; 3],
+    cov_rad2: [f32::NAN; 6],
+    half_angle_rad: f32::NAN,
+    separation_rad: f32::NAN,
+    separation_limit_rad: f32::NAN,
+    protection_rad: f32::NAN,
+    status: u8::MAX,
+    heads_seen: 0,
+    heads_answered: 0,
+    heads_used: 0,
+    heads_excluded: 0,
+};
+
 /// A candidate edge.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default)]

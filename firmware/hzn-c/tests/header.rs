@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hzn::types::{HznAnswer, HznEdge, HznKnown, HznPicture};
+use hzn::types::{HznAnswer, HznEdge, HznKnown, HznPicture, HznRigAnswer, HznRigSetup};
 use hzn_core::verdict::Verdict;
 use hzn_flight::{Parameters, parameters};
 
@@ -29,6 +29,8 @@ fn assertions() -> String {
         ("HznPicture", "3 * sizeof(size_t) + 8".to_owned()),
         ("HznEdge", size_of::<HznEdge>().to_string()),
         ("HznAnswer", size_of::<HznAnswer>().to_string()),
+        ("HznRigSetup", size_of::<HznRigSetup>().to_string()),
+        ("HznRigAnswer", size_of::<HznRigAnswer>().to_string()),
     ];
     let check =
         |(name, size): (&str, String)| format!("HZN_ASSERT(sizeof({name}) == {size}, \"the size of {name}\");\n");
@@ -50,7 +52,13 @@ fn assertions() -> String {
 /// would otherwise be the difference `x - 1`.
 fn for_c(made: &str) -> String {
     let line = |line: &str| {
-        let line = line.replace("[`", "").replace("`]", "").replace("rows::", "").replace('`', "");
+        let line = line
+            .replace("[`", "")
+            .replace("`]", "")
+            .replace("rows::", "")
+            .replace("(crate::hzn_open)", "")
+            .replace("(crate::hzn_process)", "")
+            .replace('`', "");
         let line = line.replace("// # Safety", "// Safety:");
         match line.strip_prefix("#define ").and_then(|rest| rest.split_once(' ')) {
             Some((name, value)) if value.starts_with('-') => format!("#define {name} ({value})\n"),

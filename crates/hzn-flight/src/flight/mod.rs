@@ -69,12 +69,8 @@ use reports::Limiter;
 /// The memory of the flight software in addition to the lists of a picture; keep it in a `static`.
 #[derive(Debug)]
 pub struct Buffers {
-    line: Line,
     inbox: Inbox,
-    /// A table of parameters on its way from or to memory, or parameters that wait for their commit.
-    // One memory for both saves 4 KB. A table that passes through it removes the parameters that wait.
-    table: [u8; table::MAX_BYTES],
-    edge: LongestEdge,
+    own: HeadBuffers,
 }
 
 impl Default for Buffers {
@@ -86,7 +82,30 @@ impl Default for Buffers {
 impl Buffers {
     /// Makes buffers of all zeros.
     pub const fn new() -> Self {
-        Self { line: Line::new(), inbox: Inbox::new(), table: [0; table::MAX_BYTES], edge: LongestEdge::NONE }
+        Self { inbox: Inbox::new(), own: HeadBuffers::new() }
+    }
+}
+
+/// The same for a head of a [`rig`], which listens for all of its heads.
+#[derive(Debug)]
+pub struct HeadBuffers {
+    line: Line,
+    /// A table of parameters on its way from or to memory, or parameters that wait for their commit.
+    // One memory for both saves 4 KB. A table that passes through it removes the parameters that wait.
+    table: [u8; table::MAX_BYTES],
+    edge: LongestEdge,
+}
+
+impl Default for HeadBuffers {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl HeadBuffers {
+    /// Makes buffers of all zeros.
+    pub const fn new() -> Self {
+        Self { line: Line::new(), table: [0; table::MAX_BYTES], edge: LongestEdge::NONE }
     }
 }
 
@@ -96,7 +115,9 @@ pub struct Flight<'a, B> {
     /// What the first turn reports: why copies 1 and 2 of the parameters cannot be used.
     start: Option<[u32; 2]>,
     board: B,
-    buffers: &'a mut Buffers,
+    buffers: &'a mut HeadBuffers,
+    /// `None` in a rig, which listens for its heads.
+    inbox: Option<&'a mut Inbox>,
     /// `None` if a rig lends the lists for each turn, because its heads share them.
     workspace: Option<&'a mut Lists>,
     // Kept twice, because they are used for the whole flight: every answer after a flipped bit would be wrong.
@@ -140,14 +161,20 @@ impl<'a, B: Board> Flight<'a, B> {
     // Not inlined, like the other large functions, so that each can use the same part of the stack.
     #[inline(never)]
     pub fn start(board: B, buffers: &'a mut Buffers, workspace: &'a mut Lists) -> Option<Self> {
-        Self::start_with(board, buffers, Some(workspace))
+        let Buffers { inbox, own } = buffers;
+        Self::start_with(board, own, Some(inbox), Some(workspace))
     }
 
     #[inline(always)]
-    fn start_with(mut board: B, buffers: &'a mut Buffers, workspace: Option<&'a mut Lists>) -> Option<Self> {
+    fn start_with(
+        mut board: B,
+        buffers: &'a mut HeadBuffers,
+        inbox: Option<&'a mut Inbox>,
+        workspace: Option<&'a mut Lists>,
+    ) -> Option<Self> {
         let recovery = Recovery::begin(&mut board);
         let loaded = store::load(&mut board, &mut buffers.table, recovery.choice());
-        Self::new(board, buffers, workspace, recovery, &loaded)
+        Self::new(board, buffers, (inbox, workspace), recovery, &loaded)
     }
 
     /// Sends the events of the start, runs the self-checks and enters the first mode.
@@ -163,8 +190,8 @@ impl<'a, B: Board> Flight<'a, B> {
     #[inline(never)]
     fn new(
         mut board: B,
-        buffers: &'a mut Buffers,
-        workspace: Option<&'a mut Lists>,
+        buffers: &'a mut HeadBuffers,
+        (inbox, workspace): (Option<&'a mut Inbox>, Option<&'a mut Lists>),
         recovery: Recovery,
         loaded: &Loaded,
     ) -> Option<Self> {
@@ -188,6 +215,7 @@ impl<'a, B: Board> Flight<'a, B> {
             sensor: KeptTwice::new(Sensor::new(&loaded.parameters.sensor).ok()?),
             board,
             buffers,
+            inbox,
             workspace,
             operations: KeptTwice::new(loaded.parameters.operations.clone()),
             is_not_stored: loaded.copy == 0,

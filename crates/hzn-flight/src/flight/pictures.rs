@@ -5,7 +5,7 @@ use hzn_core::status::Status;
 use hzn_core::{Prior, Report, Sequence, Step};
 use hzn_twice::KeptTwice;
 
-use super::{Buffers, Flight, longest_edge};
+use super::{Flight, HeadBuffers, longest_edge};
 use crate::board::{Board, Picture};
 use crate::messages::{Event, Mode};
 use crate::view::{Seen, StuckPlaces, Viewer};
@@ -73,7 +73,7 @@ impl<B: Board> Flight<'_, B> {
         self.send_answer(&report, picture.exposure_us, done_us);
         if wanted {
             self.dump_edges = false;
-            let Buffers { line, edge, .. } = &mut *self.buffers;
+            let HeadBuffers { line, edge, .. } = &mut *self.buffers;
             let time = line.clock.at(picture.exposure_us);
             longest_edge::send(edge, line, &mut self.board, time, self.number);
         }

@@ -86,7 +86,7 @@ fn a_silent_late_blinded_or_frozen_head_costs_only_itself() {
         rig.turn();
         let all = take_sent(&board).rig[0];
         // The vehicle does not turn. The next epoch begins after the wait for the silent head.
-        let next = |rig: &mut Rig<'_, Shared<'_>, 4>| {
+        let next = |rig: &mut Rig<'_, '_, Shared<'_>, 4>| {
             rig.turn();
             let at_once = take_sent(&board);
             board.borrow_mut().now_us += 600_000;

@@ -10,7 +10,7 @@ use hzn_flight::assembly::Assembly;
 use hzn_flight::board::{Board, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::flight::rig::{Heads, Rig, RigBoard, RigBuffers, Setup, fingerprint};
-use hzn_flight::flight::{Buffers, Lists};
+use hzn_flight::flight::{HeadBuffers, Lists};
 use hzn_flight::joint::RigAnswer;
 use hzn_flight::messages::{Acknowledge, AttitudeState, Code, Event, EventRecord, Exposure, Function, Mode};
 use hzn_flight::packet::{self, Apid, ApidBase, Scan};
@@ -215,9 +215,9 @@ pub(crate) fn take_sent(board: &RefCell<Bench>) -> Sent {
 }
 
 /// Makes a rig of four heads, and lets it fly.
-pub(crate) fn fly<R>(board: &RefCell<Bench>, turns: impl FnOnce(&mut Rig<'_, Shared<'_>, 4>) -> R) -> R {
+pub(crate) fn fly<R>(board: &RefCell<Bench>, turns: impl FnOnce(&mut Rig<'_, '_, Shared<'_>, 4>) -> R) -> R {
     let (setup, mut rig_buffers, mut lists) = (setup(), RigBuffers::new(), Box::new(Lists::new()));
-    let mut buffers = Box::new([const { Buffers::new() }; 4]);
+    let mut buffers = Box::new([const { HeadBuffers::new() }; 4]);
     let (mut cameras, mut heads) = (Shared(board), Box::new(Heads::new()));
     let own = (&mut rig_buffers, &mut *buffers);
     let mut rig = Rig::new(&mut cameras, setup.check().unwrap(), &mut heads, own, &mut lists);
@@ -271,7 +271,7 @@ pub(crate) fn send(
 }
 
 /// Runs a turn after a pause of the line.
-pub(crate) fn quiet_turn(board: &RefCell<Bench>, rig: &mut Rig<'_, Shared<'_>, 4>) {
+pub(crate) fn quiet_turn(board: &RefCell<Bench>, rig: &mut Rig<'_, '_, Shared<'_>, 4>) {
     board.borrow_mut().now_us += 200_000;
     rig.turn();
 }

@@ -24,7 +24,7 @@ enum Received {
     },
 }
 
-impl<B: RigBoard, const N: usize> Rig<'_, B, N> {
+impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
     /// Takes the bytes that have arrived, and handles at most one telecommand, like the loop of one head.
     pub(super) fn listen(&mut self) {
         let now_us = self.now_us();
@@ -49,14 +49,14 @@ impl<B: RigBoard, const N: usize> Rig<'_, B, N> {
                 break;
             }
         }
-        for flight in self.heads.loops.iter_mut().flatten() {
+        for flight in &mut self.heads.loops {
             flight.limiter.add_received(bytes as u16);
         }
     }
 
     /// Handles a packet that has arrived. Returns whether it was a telecommand; `None` if there is no packet.
     fn handle_packet(&mut self, now_us: u64) -> Option<bool> {
-        let heads = self.heads.loops.iter().flatten().map(|flight| flight.buffers.line.base());
+        let heads = self.heads.loops.iter().map(|flight| flight.buffers.line.base());
         let mut bases = [None; 1 + hzn_core::rig::MOST_HEADS];
         for (place, base) in bases.iter_mut().zip(core::iter::once(self.setup.base).chain(heads)) {
             *place = Some(base);
@@ -95,7 +95,7 @@ impl<B: RigBoard, const N: usize> Rig<'_, B, N> {
     /// Lets the head with this base carry out and acknowledge a telecommand.
     fn pass_on(&mut self, base: ApidBase, sequence: u16, bytes: usize) {
         let is_meant = |flight: &Flight<'_, _>| flight.buffers.line.base() == base && flight.mode != Mode::ShutDown;
-        let Some(k) = self.heads.loops.iter().position(|head| head.as_ref().is_some_and(is_meant)) else { return };
+        let Some(k) = self.heads.loops.iter().position(is_meant) else { return };
         let room = self.buffers.line.out;
         self.with_head(k, |flight| {
             flight.check_operations();

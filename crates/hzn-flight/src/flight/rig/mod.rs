@@ -27,7 +27,7 @@ use hzn_core::rig::{self, Answered, Common, Limb, MOST_HEADS, Mount};
 use hzn_twice::KeptTwice;
 
 use super::line::Line;
-use super::{Buffers, Flight, Lists};
+use super::{Flight, HeadBuffers, Lists};
 use crate::board::Board;
 use crate::inbox::Inbox;
 use crate::joint::RigAnswer;
@@ -143,7 +143,8 @@ impl RigBuffers {
 /// The loops of the heads, 15 KB each; keep them in a `static`.
 #[derive(Debug)]
 pub struct Heads<'a, B, const N: usize> {
-    loops: [Option<Flight<'a, HeadBoard<'a, B>>>; N],
+    // Not an array of options, which would not be all zeros and would take flash.
+    loops: heapless::Vec<Flight<'a, HeadBoard<'a, B>>, N>,
 }
 
 impl<B, const N: usize> Default for Heads<'_, B, N> {
@@ -153,24 +154,24 @@ impl<B, const N: usize> Default for Heads<'_, B, N> {
 }
 
 impl<B, const N: usize> Heads<'_, B, N> {
-    /// Makes room for the heads.
+    /// Makes room for the heads, of all zeros.
     pub const fn new() -> Self {
         const { assert!(N >= 1 && N <= MOST_HEADS, "a rig has one to four heads") };
-        Self { loops: [const { None }; N] }
+        Self { loops: heapless::Vec::new() }
     }
 }
 
 /// The flight software of a rig with `N` heads, 1 to 4. Keep it where it is once it has made a turn.
 #[derive(Debug)]
-pub struct Rig<'a, B, const N: usize> {
+pub struct Rig<'h, 'a, B, const N: usize> {
     /// `None` while it is lent to a head.
     board: Option<&'a mut B>,
     setup: &'a Setup,
     buffers: &'a mut RigBuffers,
     lists: Option<&'a mut Lists>,
     /// The buffers of the heads, until the first turn.
-    start: Option<&'a mut [Buffers; N]>,
-    heads: &'a mut Heads<'a, B, N>,
+    start: Option<&'a mut [HeadBuffers; N]>,
+    heads: &'h mut Heads<'a, B, N>,
     // Kept twice like the sensors: they outlive a turn.
     joining: KeptTwice<Joining>,
     pending: KeptTwice<Pending>,
@@ -181,13 +182,13 @@ pub struct Rig<'a, B, const N: usize> {
     last_sequence: Option<u16>,
 }
 
-impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
+impl<'h, 'a, B: RigBoard, const N: usize> Rig<'h, 'a, B, N> {
     /// Makes a rig. The first turn loads the parameters of the heads and runs their self-checks.
     pub fn new(
         board: &'a mut B,
         setup: CheckedSetup<'a>,
-        heads: &'a mut Heads<'a, B, N>,
-        buffers: (&'a mut RigBuffers, &'a mut [Buffers; N]),
+        heads: &'h mut Heads<'a, B, N>,
+        buffers: (&'a mut RigBuffers, &'a mut [HeadBuffers; N]),
         lists: &'a mut Lists,
     ) -> Self {
         let (buffers, start) = buffers;
@@ -209,10 +210,16 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
 
     /// Makes the loops of the heads, one after the other, so that the stack holds one of them.
     #[inline(never)]
-    fn load(&mut self, buffers: &'a mut [Buffers; N]) {
-        for ((place, buffers), head) in self.heads.loops.iter_mut().zip(buffers).zip(0u8..) {
-            *place = Flight::start_with(HeadBoard::new(head, self.board.take()), buffers, None);
-            self.board = place.as_mut().and_then(|flight| flight.board.lent.take());
+    fn load(&mut self, buffers: &'a mut [HeadBuffers; N]) {
+        // A second call of `new` with the same heads begins anew.
+        self.heads.loops.clear();
+        for (buffers, head) in buffers.iter_mut().zip(0u8..) {
+            let flight = Flight::start_with(HeadBoard::new(head, self.board.take()), buffers, None, None);
+            // There is room for all of them.
+            if let Some(flight) = flight {
+                let _ = self.heads.loops.push(flight);
+            }
+            self.board = self.heads.loops.last_mut().and_then(|flight| flight.board.lent.take());
         }
     }
 
@@ -223,7 +230,7 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
 
     /// Lends the board and the lists to a head for a call. `None` if there is no such head.
     fn with_head<R>(&mut self, k: usize, call: impl FnOnce(&mut Flight<'a, HeadBoard<'a, B>>) -> R) -> Option<R> {
-        let flight = self.heads.loops.get_mut(k)?.as_mut()?;
+        let flight = self.heads.loops.get_mut(k)?;
         (flight.board.lent, flight.workspace) = (self.board.take(), self.lists.take());
         let result = call(flight);
         (self.board, self.lists) = (flight.board.lent.take(), flight.workspace.take());
@@ -232,12 +239,12 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
 
     /// Returns the loops of the heads.
     fn loops(&self) -> impl Iterator<Item = &Flight<'a, HeadBoard<'a, B>>> {
-        self.heads.loops.iter().flatten()
+        self.heads.loops.iter()
     }
 
     /// Returns the mode of a head; `None` before the first turn, or if there is no such head.
     pub fn mode(&self, head: usize) -> Option<Mode> {
-        self.heads.loops.get(head)?.as_ref().map(Flight::mode)
+        self.heads.loops.get(head).map(Flight::mode)
     }
 
     /// Runs one turn of every head, with at most one telecommand and one picture of each. Call it for ever.
@@ -289,8 +296,7 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
     /// Returns the heads that should have a picture.
     fn expected(&self) -> u8 {
         let is_expected = |flight: &Flight<'_, _>| flight.mode == Mode::Flight && !flight.camera.is_silent();
-        let heads = self.heads.loops.iter().enumerate();
-        heads.fold(0, |set, (k, head)| set | u8::from(head.as_ref().is_some_and(is_expected)) << k)
+        self.loops().enumerate().fold(0, |set, (k, flight)| set | u8::from(is_expected(flight)) << k)
     }
 
     /// Replaces values whose bits changed in memory. The epoch is lost.
@@ -323,7 +329,7 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
         let answered: [Option<Answered<'_, f32>>; MOST_HEADS] = array::from_fn(|k| {
             let head = epoch.heads.get(k)?.as_ref().filter(|_| epoch.repeated >> k & 1 == 0)?;
             // A head that looks for another body sees another direction.
-            let sensor = self.heads.loops.get(k)?.as_ref()?.sensor.get();
+            let sensor = self.heads.loops.get(k)?.sensor.get();
             Some(Answered {
                 solution: head.solution.as_ref().filter(|_| sensor.config().body.kind == body.kind)?,
                 camera: sensor.camera(),
@@ -357,7 +363,7 @@ impl<'a, B: RigBoard, const N: usize> Rig<'a, B, N> {
     }
 
     fn mount(&self, k: usize) -> Option<Mount<f32>> {
-        let q = self.heads.loops.get(k)?.as_ref()?.vehicle_from_camera()?;
+        let q = self.heads.loops.get(k)?.vehicle_from_camera()?;
         Mount::new([1.0, 0.0, 0.0, 0.0], q, self.setup.mounts_rad2.get(k)?)
     }
 

@@ -64,7 +64,7 @@ fn answer(exposure_us: u64, checksum: u32) -> head_board::HeadAnswer {
 fn a_flipped_bit_costs_the_epoch() {
     let (mut board, setup) = (Silent(0), Setup::new(ApidBase::DEFAULT));
     let (mut buffers, mut lists) = (RigBuffers::new(), Box::new(Lists::new()));
-    let mut own = Box::new([const { Buffers::new() }; 2]);
+    let mut own = Box::new([const { HeadBuffers::new() }; 2]);
     let (mut heads, checked) = (Box::new(Heads::new()), setup.check().unwrap());
     let mut rig = Rig::new(&mut board, checked, &mut heads, (&mut buffers, &mut own), &mut lists);
     rig.turn();
