@@ -94,8 +94,8 @@ fn score_model(rows: &[Row], decays: &[f64], white: f64) -> Option<Score> {
     })
 }
 
-/// Returns the length that the sensor assumes for correlated errors, in pixels. Errors with a much shorter length are as
-/// good as white.
+/// Returns the length that the sensor assumes for correlated errors, in pixels. Errors with a much shorter length are
+/// as good as white.
 pub(crate) fn window_px(arc_px: f64) -> f64 {
     let measured = covariance::Config { noise: Noise::Rms, correlation_px: 0.0, ..covariance::Config::default() };
     measured.measured(1.0, arc_px).correlation_px

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use hzn_core::Config;
 use hzn_core::camera::Model;
-use hzn_files::start::{self, CameraFacts};
+use hzn_files::start::{self, CameraFacts, StartConfig};
 use hzn_run::diagnosis::FieldOfView;
 use hzn_run::disk;
 use hzn_run::open::{self, Request};
@@ -115,16 +115,8 @@ pub(super) fn run(args: &Args) -> Outcome {
             "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
         );
     }
-    if known.has_focal()
-        && let Some(limb) = doubt_field_of_view(&request(args), &known, &start)?
-    {
-        let [kept, seen] = limb.pictures;
-        tell::warning(format_args!(
-            "the limb in {kept} of {seen} pictures says {}, not {:.1} degrees: check the field of view and the kind of \
-             lens (that of a fisheye is not 2 atan(width / 2f)), or leave out --fov and take that of the limb",
-            limb.describe(known.size_px[0]),
-            start.fov_deg
-        ));
+    if known.has_focal() {
+        tell_doubt(args, &known, &start)?;
     }
     if let Some(found) = &found {
         let [kept, seen] = found.pictures;
@@ -156,6 +148,20 @@ fn knows_altitudes(args: &Args, config: &Config) -> Result<bool, Stop> {
     let path = open::frames_path(&request, source.as_ref());
     let frames = path.map(|path| open::load_frames(&path, source.as_ref())).transpose()?;
     Ok(open::check_altitude(source.as_ref(), config, frames.as_ref()).is_ok())
+}
+
+/// Warns about a field of view that the limb contradicts.
+fn tell_doubt(args: &Args, known: &CameraFacts, start: &StartConfig) -> Result<(), Stop> {
+    if let Some(limb) = doubt_field_of_view(&request(args), known, start)? {
+        let [kept, seen] = limb.pictures;
+        tell::warning(format_args!(
+            "the limb in {kept} of {seen} pictures says {}, not {:.1} degrees: check the field of view and the kind of \
+             lens (that of a fisheye is not 2 atan(width / 2f)), or leave out --fov and take that of the limb",
+            limb.describe(known.size_px[0]),
+            start.fov_deg
+        ));
+    }
+    Ok(())
 }
 
 fn request(args: &Args) -> Request {

@@ -89,8 +89,8 @@ impl<B: Board> Flight<'_, B> {
         Prior { year_part: year_part(self.buffers.line.clock.at(exposure_us)), camera_temperature_c, ..prior }
     }
 
-    /// Returns the temperature of the camera. An event says if the lens cannot have it; the picture then has the lens of
-    /// the reference, because a broken thermometer must not cost the answers.
+    /// Returns the temperature of the camera. An event says if the lens cannot have it; the picture then has the lens
+    /// of the reference, because a broken thermometer must not cost the answers.
     fn camera_temperature_c(&mut self) -> Option<f32> {
         let told_c = self.board.camera_temperature_c()?;
         let is_possible = self.sensor.get().camera().accepts_temperature(told_c);

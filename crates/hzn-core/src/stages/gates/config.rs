@@ -73,8 +73,8 @@ section! {
         /// Beyond the edge of a cloud are other clouds, so a smaller value refuses more clouds. Ghosts in the sky next
         /// to a limb light up to a quarter of this sky, so a smaller value also refuses limbs next to ghosts.
         @116 max_lit_sky: f64 = 0.3, [0.0 to 1.0];
-        /// For Sun and Moon, and for a position without a known range: brightness from which a place in the sky counts as
-        /// lit, as a fraction of the threshold.
+        /// For Sun and Moon, and for a position without a known range: brightness from which a place in the sky counts
+        /// as lit, as a fraction of the threshold.
         ///
         /// These bodies stand in a dark sky. A glare fades outwards and does not count. A bright spot of a cloud may
         /// have the size of the Sun, but it lies among other clouds; a smaller value refuses more of these spots, and
