@@ -149,15 +149,20 @@ impl Case {
         let n = table::write(&parameters, 1, &mut bytes).expect("a table fits");
         let [x, y, z] = self.prior.position_m.unwrap_or([f32::NAN; 3]);
         let altitude = self.prior.altitude_m.unwrap_or(f32::NAN);
-        out.extend_from_slice(b"CASE");
-        out.extend_from_slice(&(n as u32).to_le_bytes());
-        out.extend_from_slice(&(self.bytes.len() as u32).to_le_bytes());
-        for float in [altitude, x, y, z, 0.0] {
-            out.extend_from_slice(&float.to_le_bytes());
-        }
-        out.extend_from_slice(&bytes[..n]);
-        out.extend_from_slice(&self.bytes);
+        write_case(out, &bytes[..n], [altitude, x, y, z], &self.bytes);
     }
+}
+
+/// Writes a case with its parameter table, its prior (altitude and position, m) and its picture.
+fn write_case(out: &mut Vec<u8>, table: &[u8], prior: [f32; 4], picture: &[u8]) {
+    out.extend_from_slice(b"CASE");
+    out.extend_from_slice(&(table.len() as u32).to_le_bytes());
+    out.extend_from_slice(&(picture.len() as u32).to_le_bytes());
+    for float in prior.into_iter().chain([0.0]) {
+        out.extend_from_slice(&float.to_le_bytes());
+    }
+    out.extend_from_slice(table);
+    out.extend_from_slice(picture);
 }
 
 /// Returns the bytes of an answer. Two answers have equal bytes if every bit is equal.
@@ -185,6 +190,48 @@ pub fn measure(board: Board, cases: &[Case]) -> Vec<Measured> {
 /// Panics if QEMU or the image fails.
 pub fn measure_rows(board: Board, cases: &[Case]) -> Vec<Measured> {
     run(board, "rows", cases)
+}
+
+/// What the image `rig` measures and sends.
+#[derive(Debug)]
+pub struct MeasuredRig {
+    /// Instructions of a turn without a picture.
+    pub idle: u64,
+    /// Instructions of a turn with a picture of the first head.
+    pub one: u64,
+    /// Instructions of a turn with pictures of all heads, with their joint answer.
+    pub all: u64,
+    /// Memory of a rig with one head, without the lists of a picture, in bytes.
+    pub first_bytes: u32,
+    /// Memory of each further head, in bytes.
+    pub further_bytes: u32,
+    /// The packets of the last turn.
+    pub sent: Vec<u8>,
+}
+
+/// Runs the pictures of four heads through the image `rig` of a board. The parameters of each head are given, too.
+///
+/// # Panics
+/// Panics if QEMU or the image fails.
+pub fn measure_rig(board: Board, heads: &[(Parameters, Vec<u8>); 4]) -> MeasuredRig {
+    let mut cases = Vec::new();
+    for (parameters, picture) in heads {
+        let mut bytes = [0; table::MAX_BYTES];
+        let n = table::write(parameters, 1, &mut bytes).expect("a table fits");
+        write_case(&mut cases, &bytes[..n], [f32::NAN; 4], picture);
+    }
+    let results = run_cases(board, "rig", &cases);
+    let (words, sent) = results.split_at(20);
+    let mut words = words.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word));
+    let mut word = || words.next().expect("five words are written");
+    MeasuredRig {
+        idle: instructions(word().into()),
+        one: instructions(word().into()),
+        all: instructions(word().into()),
+        first_bytes: word(),
+        further_bytes: word(),
+        sent: sent.to_vec(),
+    }
 }
 
 /// Runs a picture through the image `chain` of a board and returns the eleven words of its answer. The source of the
@@ -220,18 +267,23 @@ fn run_picture(board: Board, image: &str, picture: &[u8]) -> Vec<u8> {
 }
 
 fn run(board: Board, image: &str, cases: &[Case]) -> Vec<Measured> {
-    let dir = tempfile::tempdir().expect("a temporary folder can be made");
     let mut input = Vec::new();
     cases.iter().for_each(|case| case.write(&mut input));
-    std::fs::write(dir.path().join("cases.bin"), input).expect("the folder is writable");
-    let status = board.qemu(&board.image(image), 10).args(["-serial", "null"]).current_dir(dir.path()).status();
-    let status = status.expect("qemu-system-arm is installed");
-    assert!(status.success(), "{}: the image ended with {status}", board.name());
-    let results = std::fs::read(dir.path().join("results.bin")).expect("the image wrote its results");
+    let results = run_cases(board, image, &input);
     let mut from = Reader::new(&results);
     let out: Vec<_> = std::iter::from_fn(|| read(&mut from)).collect();
     assert!(from.rest().is_empty() && out.len() == cases.len(), "{}: results are cut off", board.name());
     out
+}
+
+/// Runs an image that reads `cases.bin`, and returns its `results.bin`.
+fn run_cases(board: Board, image: &str, cases: &[u8]) -> Vec<u8> {
+    let dir = tempfile::tempdir().expect("a temporary folder can be made");
+    std::fs::write(dir.path().join("cases.bin"), cases).expect("the folder is writable");
+    let status = board.qemu(&board.image(image), 10).args(["-serial", "null"]).current_dir(dir.path()).status();
+    let status = status.expect("qemu-system-arm is installed");
+    assert!(status.success(), "{}: the image ended with {status}", board.name());
+    std::fs::read(dir.path().join("results.bin")).expect("the image wrote its results")
 }
 
 /// Returns the instructions of an interval, in ticks of the timer. A tick takes 40 ns, an instruction 1024 ns. Reading

@@ -38,7 +38,7 @@ const BOARDS: [Board; 3] = [
     Board { name: "stm32f405", package: "hzn-stm32f405", core: M4, images: &["example", "flight"], always: &[] },
 ];
 /// Images of the boards with memory for pictures.
-const IMAGES: [&str; 6] = ["chain", "flight", "line", "measure", "nav", "rows"];
+const IMAGES: [&str; 7] = ["chain", "flight", "line", "measure", "nav", "rig", "rows"];
 /// Document with the costs.
 const COSTS: &str = "book/results/firmware-cost.md";
 
@@ -166,7 +166,11 @@ fn test_every_image(steps: &mut Steps) -> Outcome {
     build_flight_image(METHODS)?;
     let vendor_port = build_vendor_port(M7.dir, &root())?;
     steps::run(Command::new(target().join("debug/examples/stack_bound")).arg(vendor_port))?;
-    run_image_tests(steps, "", &["firmware::", "line_cost::", "navigation::", "recovery::", "silence::"])?;
+    run_image_tests(
+        steps,
+        "",
+        &["firmware::", "line_cost::", "navigation::", "recovery::", "rig_image::", "silence::"],
+    )?;
     compare_costs("--check")
 }
 

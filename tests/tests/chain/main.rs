@@ -19,6 +19,7 @@ mod published;
 mod real;
 mod recovery;
 mod rendered;
+mod rig_image;
 mod rows;
 mod silence;
 mod suns;

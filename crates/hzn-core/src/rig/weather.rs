@@ -18,8 +18,8 @@ const STEP_RAD: f64 = TAU / 72.0;
 const FEWEST: usize = 24;
 
 /// Number of azimuths at which arcs in view are searched. If there is none, the search is finer: an arc shorter than
-/// half a degree has too few edge points for an answer. Most pictures need the first search only, which saves half of the
-/// time of a joint answer.
+/// half a degree has too few edge points for an answer. Most pictures need the first search only, which saves half of
+/// the time of a joint answer.
 const SCANS: [usize; 2] = [180, 720];
 
 /// Shortest arc, four degrees. A fit to a shorter arc takes up the same part of the weather, the height with its first

@@ -3,7 +3,7 @@
 //! A packet that is no telecommand for this computer is counted and gets no answer, because another computer on the
 //! line may own it, and because the line may return the packets of this computer.
 
-use super::{Flight, HeadBuffers};
+use super::Flight;
 use crate::board::Board;
 use crate::bytes::Reader;
 use crate::inbox::{Filled, Inbox};
@@ -40,12 +40,12 @@ impl<B: Board> Flight<'_, B> {
     // One telecommand, because writing parameters to flash may take seconds, and the watchdog is fed once a turn.
     pub(super) fn listen(&mut self) {
         let now_us = self.board.now_us();
-        let Some(inbox) = self.inbox.as_deref_mut() else { return };
+        // Given back below, because handling a packet needs the rest of the loop.
+        let Some(inbox) = self.inbox.take() else { return };
         inbox.reset_effort();
         let (mut bytes, mut is_done) = (0, false);
         loop {
             let board = &mut self.board;
-            let Some(inbox) = self.inbox.as_deref_mut() else { return };
             let most = (MAX_READ - bytes).min(MAX_EFFORT.saturating_sub(inbox.effort()));
             if most == 0 {
                 break;
@@ -54,8 +54,8 @@ impl<B: Board> Flight<'_, B> {
             // Without this, and with pauses that were not always noticed, 59 of 200 339 telecommands were lost.
             let (count, filled) = inbox.fill(now_us, most, is_done, || board.receive());
             bytes += count;
-            while may_hold_packet(filled, is_done, self.effort()) {
-                match self.handle_packet(now_us) {
+            while may_hold_packet(filled, is_done, inbox.effort()) {
+                match self.handle_packet(inbox, now_us) {
                     Some(is_command) => is_done = is_command,
                     None => break,
                 }
@@ -64,20 +64,15 @@ impl<B: Board> Flight<'_, B> {
                 break;
             }
         }
+        self.inbox = Some(inbox);
         self.limiter.add_received(bytes as u16);
     }
 
-    fn effort(&self) -> usize {
-        self.inbox.as_deref().map_or(usize::MAX, Inbox::effort)
-    }
-
     /// Handles a packet that has arrived. Returns whether it was a telecommand; `None` if there is no packet.
-    fn handle_packet(&mut self, now_us: u64) -> Option<bool> {
+    fn handle_packet(&mut self, inbox: &mut Inbox, now_us: u64) -> Option<bool> {
         let base = self.buffers.line.base();
         // The memory for packets that are sent is free now.
-        let HeadBuffers { line, .. } = &mut *self.buffers;
-        let inbox = self.inbox.as_deref_mut()?;
-        let room = &mut line.out;
+        let room = &mut self.buffers.line.out;
         let received = inbox.next(now_us, |packet| {
             let Some(packet) = packet else { return Received::Broken };
             if base.subject(&packet) != Some(Apid::Command) {

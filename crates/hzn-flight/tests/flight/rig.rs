@@ -129,8 +129,13 @@ fn a_silent_late_blinded_or_frozen_head_costs_only_itself() {
         let frozen = take_sent(&board).rig[0];
         assert_eq!([frozen.heads_seen, frozen.heads_repeated], [0b1111, 0b1000]);
         assert_eq!([frozen.heads_used, frozen.heads_excluded], [0b0111, 0b1000]);
+    });
+}
 
-        // One head has no check by others, and keeps the expected half-angle.
+#[test]
+fn a_head_that_is_switched_off_costs_only_itself() {
+    let board = ready();
+    fly(&board, |rig| {
         send(&board, 0x120, 1, Function::SetMode, |w| w.u8(Mode::Standby as u8));
         send(&board, 0x130, 2, Function::SetMode, |w| w.u8(Mode::Standby as u8));
         send(&board, 0x140, 3, Function::SetMode, |w| w.u8(Mode::Standby as u8));

@@ -9,11 +9,12 @@
 //! | telecommand to the rig's base | what it does |
 //! |---|---|
 //! | `mode`, `time`, `process-once`, `reset-counters`, `report`, `arm` | each head carries it out |
-//! | `known`, `navigate`, `attitude` | the same; rate, attitude and Sun are in the axes of the vehicle, and each head turns them by its mount |
+//! | `known`, `navigate`, `attitude` | the same; rate, attitude and Sun are in the axes of the vehicle, see below |
 //! | `ping` | the rig answers |
 //! | others, such as `set` | refused, because they are meant for one head: send them to its base |
 //!
-//! The mount of a head is `mount.q_vehicle_from_camera_wxyz` of its parameters. A head without one works on, but has no
+//! The mount of a head is `mount.q_vehicle_from_camera_wxyz` of its parameters. Each head turns rate, attitude and Sun
+//! from the vehicle's axes to its own. A head without one works on, but has no
 //! part in the joint answer.
 
 mod commands;
