@@ -17,8 +17,8 @@ pub(super) const MAX_READ: usize = 1024;
 /// thousand times the work of their bytes.
 pub(super) const MAX_EFFORT: usize = 2 * MAX_BYTES;
 
-/// Returns whether the inbox is asked for a packet: one may be complete, or the line is silent, so that it is known that
-/// the line pauses.
+/// Returns whether the inbox is asked for a packet: one may be complete, or the line is silent, so that it is known
+/// that the line pauses.
 #[inline(always)]
 pub(super) fn may_hold_packet(filled: Filled, is_done: bool, effort: usize) -> bool {
     filled != Filled::Full && !is_done && effort < MAX_EFFORT

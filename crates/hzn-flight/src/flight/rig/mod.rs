@@ -14,8 +14,7 @@
 //! | others, such as `set` | refused, because they are meant for one head: send them to its base |
 //!
 //! The mount of a head is `mount.q_vehicle_from_camera_wxyz` of its parameters. Each head turns rate, attitude and Sun
-//! from the vehicle's axes to its own. A head without one works on, but has no
-//! part in the joint answer.
+//! from the vehicle's axes to its own. A head without a mount works on, but has no part in the joint answer.
 
 mod commands;
 mod epoch;
