@@ -345,8 +345,9 @@ int32_t hzn_process(HznSensor *sensor,
 // setup is null or writable.
 int32_t hzn_rig_usual(HznRigSetup *setup);
 
-// Makes a rig in memory and writes a pointer to it to out. interface is HZN_INTERFACE. The sensors of the heads
-// are opened by hzn_open, each in memory of its own. A setup with an impossible number is refused.
+// Makes a rig in memory and writes a pointer to it to out. interface is HZN_INTERFACE. The sensors of the
+// heads are opened by hzn_open, each in memory of its own. A setup with an impossible number is
+// refused.
 //
 // Safety:
 // memory is null or has bytes writable bytes that nothing else uses as long as the rig is used. setup is null or
@@ -358,8 +359,8 @@ int32_t hzn_rig_open(uint8_t *memory,
                      HznRig **out);
 
 // Finds the limb in the picture of head head, 0 to 3, as hzn_process does, and keeps the
-// answer for the epoch; it replaces an earlier one of this head. time_s is the middle of the exposure in seconds from
-// any instant that all heads share; NaN: it is not known, and the picture counts as triggered with the others.
+// answer for the epoch; it replaces an earlier one of this head. time_s is the middle of the exposure in seconds
+// from any instant that all heads share; NaN: it is not known, and the picture counts as triggered with the others.
 //
 // Safety:
 // rig is null or from hzn_rig_open. The others are as for hzn_process.
