@@ -1,5 +1,6 @@
-//! The part of ROS 2's CDR encoding that the two picture messages need.
+//! The part of ROS 2's CDR encoding that pictures and calibrations need.
 
+use crate::camera_info::CameraInfo;
 use crate::frame::EncodedImage;
 use crate::header::Header;
 use crate::messages::compressed_format;
@@ -36,6 +37,11 @@ impl<'a> Cdr<'a> {
         let bytes = *self.bytes(4)?.first_chunk::<4>()?;
         Some(if self.big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
     }
+    fn f64(&mut self) -> Option<f64> {
+        self.at = self.at.next_multiple_of(8);
+        let bytes = *self.bytes(8)?.first_chunk::<8>()?;
+        Some(if self.big_endian { f64::from_be_bytes(bytes) } else { f64::from_le_bytes(bytes) })
+    }
     /// Reads a text: the length, then the bytes. The length includes a final zero byte.
     fn text(&mut self) -> Option<&'a str> {
         let n = self.u32()? as usize;
@@ -65,6 +71,23 @@ pub(crate) fn parse_image(schema: &str, message: &[u8]) -> Result<(EncodedImage,
     let fields = (|| Some((c.u32()?, c.u32()?, c.text()?, c.u8()?, c.u32()?, c.blob()?)))();
     let (height, width, encoding, big_endian, step, data) = fields.ok_or_else(short)?;
     Ok((raw_format(width, height, step, encoding, big_endian != 0, data)?, head))
+}
+
+/// Largest number of coefficients of a distortion; the models of ROS have at most 14.
+const MAX_COEFFICIENTS: usize = 64;
+
+/// Reads a `sensor_msgs/msg/CameraInfo` up to its camera matrix; `None` if it ends too early.
+pub(crate) fn parse_camera_info(message: &[u8]) -> Option<CameraInfo> {
+    let mut c = Cdr::try_new(message)?;
+    c.header()?;
+    let (height, width, model) = (c.u32()?, c.u32()?, c.text()?.to_owned());
+    let count = Some(c.u32()? as usize).filter(|count| *count <= MAX_COEFFICIENTS)?;
+    let distortion = (0..count).map(|_| c.f64()).collect::<Option<_>>()?;
+    let mut matrix = [0.0; 9];
+    for value in &mut matrix {
+        *value = c.f64()?;
+    }
+    Some(CameraInfo { size_px: [width, height], model, distortion, matrix })
 }
 
 #[cfg(test)]

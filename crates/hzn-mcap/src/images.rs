@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use crate::camera_info::{self, CameraInfo};
 use crate::cdr;
 use crate::container::{Channel, Chunk, ChunkFault, Inflation, MAGIC, Message, Op, Record, Scanner, Schemas};
 use crate::error::Error;
@@ -52,6 +53,8 @@ pub struct ImageReader {
     path: PathBuf,
     topic: Option<String>,
     others: BTreeSet<String>,
+    /// The first calibration of each topic.
+    cameras: BTreeMap<String, CameraInfo>,
     schemas: Schemas,
     channels: BTreeMap<u16, Channel>,
     inflation: Inflation,
@@ -82,6 +85,7 @@ impl ImageReader {
             path: path.to_path_buf(),
             topic: topic.map(str::to_owned),
             others: BTreeSet::new(),
+            cameras: BTreeMap::new(),
             schemas: Schemas::default(),
             channels: BTreeMap::new(),
             inflation: Inflation::default(),
@@ -105,6 +109,12 @@ impl ImageReader {
     /// Returns the topics with pictures that were skipped so far.
     pub fn other_topics(&self) -> impl Iterator<Item = &str> {
         self.others.iter().map(String::as_str)
+    }
+
+    /// Returns the calibration of the pictures' camera among those that were read so far, with its topic.
+    pub fn camera(&self) -> Option<(&str, &CameraInfo)> {
+        let topic = camera_info::topic_of(self.topic()?, self.cameras.keys().map(String::as_str))?;
+        self.cameras.get_key_value(topic).map(|(topic, camera)| (topic.as_str(), camera))
     }
 
     /// Reads the next record. Returns `false` at the end, and sets [`Self::broken`] if the end is not that of a
@@ -150,6 +160,14 @@ impl ImageReader {
     /// Decodes the picture of a message, if the message has one and its topic is wanted.
     fn add(&mut self, message: &Message<'_>) {
         let Some(channel) = self.channels.get(&message.channel) else { return };
+        if channel.schema == camera_info::SCHEMA && channel.encoding == "cdr" {
+            if !self.cameras.contains_key(&channel.topic)
+                && let Some(camera) = cdr::parse_camera_info(message.data)
+            {
+                self.cameras.insert(channel.topic.clone(), camera);
+            }
+            return;
+        }
         let Some(decode) = decoder(&channel.schema, &channel.encoding) else { return };
         if *self.topic.get_or_insert_with(|| channel.topic.clone()) != channel.topic {
             self.others.insert(channel.topic.clone());

@@ -43,6 +43,8 @@
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "recordings")]
+mod camera_info;
+#[cfg(feature = "recordings")]
 mod cdr;
 #[cfg(feature = "recordings")]
 mod container;
@@ -90,6 +92,8 @@ mod waiting;
 #[cfg(feature = "recordings")]
 mod writer;
 
+#[cfg(feature = "recordings")]
+pub use camera_info::CameraInfo;
 #[cfg(feature = "recordings")]
 pub use error::Error;
 pub use floats::words_from_floats;

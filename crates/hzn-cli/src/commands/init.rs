@@ -100,6 +100,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Ok(Exit::Done);
     };
     let mut known = known(args, source.as_mut())?;
+    if let Some(text) = calibrated(args, &known)? {
+        write(&text)?;
+        return finish(args, &text);
+    }
     let found = if known.has_focal() { None } else { limb_fov(args, &known)? };
     if let Some(found) = &found {
         (known.lens, known.measured) = (Some(found.lens), Some(found.measured));
@@ -107,9 +111,6 @@ pub(super) fn run(args: &Args) -> Outcome {
     let start = start::write_sensor_toml(&known).map_err(usage)?;
     write(&start.text)?;
     start.warnings.iter().for_each(tell::warning);
-    // The commands that read the file say the same, but then it is not clear which option was wrong.
-    let sensor = hzn_files::sensor::parse(&start.text, &args.output)?;
-    sensor.warnings.iter().for_each(tell::warning);
     if known.exif.turned {
         tell::warning(
             "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
@@ -132,6 +133,14 @@ pub(super) fn run(args: &Args) -> Outcome {
         start.focal_sigma_percent,
         start.k1_sigma,
     ));
+    finish(args, &start.text)
+}
+
+/// Says what looks wrong in the written file, and what it needs.
+fn finish(args: &Args, text: &str) -> Outcome {
+    // The commands that read the file say the same, but then it is not clear which option was wrong.
+    let sensor = hzn_files::sensor::parse(text, &args.output)?;
+    sensor.warnings.iter().for_each(tell::warning);
     if !knows_altitudes(args, &sensor.config)? {
         tell::line(
             "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or \
@@ -139,6 +148,39 @@ pub(super) fn run(args: &Args) -> Outcome {
         );
     }
     Ok(Exit::Done)
+}
+
+/// Returns the text of the file with the calibration that a bag of ROS has beside its pictures; `None` without one, or
+/// if the command line says what the lens is.
+fn calibrated(args: &Args, known: &CameraFacts) -> Result<Option<String>, Stop> {
+    if args.fov.is_some() || args.lens.is_some() {
+        return Ok(None);
+    }
+    let Some(source::RecordedCamera { topic, camera }) = source::find_camera(&args.pictures)? else { return Ok(None) };
+    let camera = match camera {
+        Ok(camera) if [camera.width, camera.height].map(u32::from) == known.size_px => camera,
+        Ok(camera) => {
+            let ([width, height], (w, h)) = (known.size_px, (camera.width, camera.height));
+            tell::warning(format_args!(
+                "{topic} is for {w} x {h} px and the pictures are {width} x {height}: not used"
+            ));
+            return Ok(None);
+        }
+        Err(what) => {
+            tell::warning(format_args!("{topic} is not used: {what}"));
+            return Ok(None);
+        }
+    };
+    let text = start::write_calibrated(known, &camera, &topic).map_err(usage)?;
+    tell::line(format_args!(
+        "{} written: {} x {} px, {}, f = {:.1} px, from {topic}",
+        args.output.display(),
+        camera.width,
+        camera.height,
+        camera.model.name(),
+        camera.fx_px
+    ));
+    Ok(Some(text))
 }
 
 /// Returns whether the sensor, or a frames.csv next to the pictures, gives altitudes.

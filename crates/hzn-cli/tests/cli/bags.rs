@@ -94,6 +94,76 @@ fn the_stamps_and_the_frame_of_a_bag_are_those_of_its_pictures() {
     assert_eq!(axes(&unnamed.path("r.mcap")), expected("camera"));
 }
 
+/// Returns a `sensor_msgs/msg/CameraInfo` up to its camera matrix.
+fn camera_info(width: u32, model: &str, distortion: &[f64], matrix: [f64; 9]) -> Vec<u8> {
+    let mut message = vec![0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+    push_blob(&mut message, b"cam\0");
+    message.extend_from_slice(&240u32.to_le_bytes());
+    message.extend_from_slice(&width.to_le_bytes());
+    push_blob(&mut message, format!("{model}\0").as_bytes());
+    message.resize(message.len().next_multiple_of(4), 0);
+    message.extend_from_slice(&(distortion.len() as u32).to_le_bytes());
+    // Numbers of 8 bytes begin at multiples of 8 after the encapsulation.
+    message.resize((message.len() - 4).next_multiple_of(8) + 4, 0);
+    message.extend(distortion.iter().chain(&matrix).flat_map(|x| x.to_le_bytes()));
+    message
+}
+
+/// Writes a bag with calibrations, by topic, and one picture between them and the next.
+fn write_calibrated_bag(path: &Path, infos: &[(&str, Vec<u8>)]) {
+    let mut writer = mcap::Writer::new(fs::File::create(path).unwrap()).unwrap();
+    let schema = writer.add_schema("sensor_msgs/msg/CompressedImage", "ros2msg", b"").unwrap();
+    let pictures = writer.add_channel(schema, "/front/image_raw/compressed", "cdr", &BTreeMap::new()).unwrap();
+    let schema = writer.add_schema("sensor_msgs/msg/CameraInfo", "ros2msg", b"").unwrap();
+    let mut png = std::io::Cursor::new(Vec::new());
+    limb(320, 240, 0.0).write_to(&mut png, ImageFormat::Png).unwrap();
+    let put = |writer: &mut mcap::Writer<fs::File>, channel_id, data: &[u8]| {
+        let header = MessageHeader { channel_id, sequence: 0, log_time: 1, publish_time: 1 };
+        writer.write_to_known_channel(&header, data).unwrap();
+    };
+    put(&mut writer, pictures, &compressed_image(STAMPS[0], FRAME, png.get_ref()));
+    for (topic, message) in infos {
+        let channel = writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap();
+        put(&mut writer, channel, message);
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn a_start_takes_the_calibration_of_a_bag() {
+    let place = Place::new();
+    let matrix = [301.5, 0.0, 160.25, 0.0, 302.5, 119.5, 0.0, 0.0, 1.0];
+    let front = camera_info(320, "plumb_bob", &[-0.25, 0.0625, 1e-4, -2e-4, 0.0], matrix);
+    let rear = camera_info(320, "equidistant", &[0.0; 4], [9.0, 0.0, 9.0, 0.0, 9.0, 9.0, 0.0, 0.0, 1.0]);
+    let both = [("/rear/camera_info", rear), ("/front/camera_info", front.clone())];
+    write_calibrated_bag(&place.path("a.mcap"), &both);
+    let ran = place.run(&["init", "a.mcap", "--altitude", "400"]).expect(0);
+    ran.says("320 x 240 px, brown-conrady, f = 301.5 px, from /front/camera_info");
+    let camera = hzn_files::sensor::load(&place.path("sensor.toml")).unwrap().config.camera;
+    assert_eq!([camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px], [301.5, 302.5, 160.25, 119.5]);
+    assert_eq!((camera.coefficient(0), camera.coefficient(3)), (-0.25, -2e-4));
+    place.run(&["run", "a.mcap", "-s", "sensor.toml"]).expect(0);
+    // What the command line says about the lens, and what no camera has, is not taken from the bag.
+    place.run(&["init", "a.mcap", "--fov", "56", "-o", "fov.toml"]).expect(0).says("56.0 degrees wide");
+    for (info, what) in [
+        (camera_info(320, "plumb_bob", &[], [0.0; 9]), "is all zeros: the camera is not calibrated"),
+        (camera_info(640, "plumb_bob", &[0.0; 5], matrix), "is for 640 x 240 px and the pictures are 320 x 240"),
+    ] {
+        write_calibrated_bag(&place.path("b.mcap"), &[("/front/camera_info", info)]);
+        place.run(&["init", "b.mcap", "-o", "b.toml"]).expect(2).says(what).says("add the field of view");
+    }
+}
+
+#[test]
+fn a_bag_in_sqlite_is_converted_by_its_folder() {
+    let place = Place::new();
+    fs::create_dir(place.path("old")).unwrap();
+    place.write("old/old_0.db3", b"SQLite format 3\0");
+    place.run(&["run", "old/old_0.db3"]).expect(2).says("rosbags-convert --src old --dst");
+    place.write("old.bag", b"#ROSBAG V2.0\n");
+    place.run(&["run", "old.bag"]).expect(2).says("rosbags-convert --src old.bag --dst");
+}
+
 #[test]
 fn times_of_a_table_replace_the_stamps_of_a_bag() {
     let place = place(FRAME);

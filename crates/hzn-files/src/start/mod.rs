@@ -25,7 +25,7 @@ mod guess;
 mod tests;
 mod text;
 
-use hzn_core::camera::Model;
+use hzn_core::camera::{Config, Model};
 
 pub use exif::Exif;
 pub use facts::{Body, CameraFacts, MeasuredFov, StartConfig};
@@ -75,6 +75,14 @@ pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
         centre_sigma_px: guess.centre_sigma_px,
         warnings,
     })
+}
+
+/// Writes a sensor.toml for a camera with a calibration; `from` says where that comes from.
+///
+/// # Errors
+/// A number of the calibration is not TOML.
+pub fn write_calibrated(facts: &CameraFacts, camera: &Config, from: &str) -> Result<String, toml::ser::Error> {
+    text::write_calibrated(facts, camera, from)
 }
 
 /// Chooses the lens: a pinhole, unless it is given.

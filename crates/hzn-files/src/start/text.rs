@@ -42,6 +42,25 @@ pub(super) fn write_text(
     text
 }
 
+/// Writes the text of the file for a calibrated camera.
+pub(super) fn write_calibrated(facts: &CameraFacts, camera: &Config, from: &str) -> Result<String, toml::ser::Error> {
+    let mut text = format!(
+        "# A sensor.toml by `hzn init`. The calibration comes from {from}, which does not say how sure it is:\n\
+         # focal_sigma_percent and centre_sigma_px in [camera] are for that.\n\
+         # Every other key with its default:  hzn init -o all.toml\n\
+         \n\
+         preset = \"hzn\"\n\
+         \n\
+         [camera]\n{}",
+        toml::to_string(camera)?
+    );
+    text += &write_body(facts.body, facts.altitude_km);
+    if facts.body == Body::Earth {
+        text += &write_tone(facts.tone);
+    }
+    Ok(text)
+}
+
 /// Writes the size of the pictures, the lens, the focal length with its source, and the picture's centre as the
 /// principal point.
 fn write_camera(facts: &CameraFacts, camera: &Config, focal: &Focal, fov_deg: f64, comparison: Option<&str>) -> String {

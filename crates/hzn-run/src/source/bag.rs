@@ -28,8 +28,18 @@ pub fn is_bag(folder: &Path) -> bool {
     folder.join(METADATA).is_file()
 }
 
-/// Returns what to do with a bag that hzn does not read.
+/// Returns the recordings of a bag, and its other files, in their order.
+pub(super) fn files(folder: &Path) -> std::io::Result<[Vec<PathBuf>; 2]> {
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
+    paths.sort_by(|a, b| natural::compare(a, b));
+    let (files, others) = paths.into_iter().partition(|path| ending(path) == "mcap");
+    Ok([files, others])
+}
+
+/// Returns what to do with a bag that hzn does not read. A bag of ROS 2 is converted by its folder.
 pub(super) fn conversion(from: &Path) -> String {
+    let folder = from.parent().filter(|folder| ending(from) == "db3" && !folder.as_os_str().is_empty());
+    let from = folder.unwrap_or(if ending(from) == "db3" { Path::new(".") } else { from });
     format!(
         "hzn reads bags in MCAP; `pip install rosbags`, then `rosbags-convert --src {} --dst converted --dst-storage \
          mcap` writes one",
@@ -40,10 +50,7 @@ pub(super) fn conversion(from: &Path) -> String {
 impl Bag {
     pub(super) fn open(folder: &Path, topic: Option<&str>) -> Result<Self, Error> {
         let refuse = |what: String| unusable(format!("{}: {what}", folder.display()));
-        let entries = std::fs::read_dir(folder).map_err(|e| refuse(format!("cannot be listed: {e}")))?;
-        let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-        paths.sort_by(|a, b| natural::compare(a, b));
-        let (files, others): (Vec<PathBuf>, Vec<PathBuf>) = paths.into_iter().partition(|path| ending(path) == "mcap");
+        let [files, others] = files(folder).map_err(|e| refuse(format!("cannot be listed: {e}")))?;
         if files.is_empty() {
             return Err(refuse(match others.iter().find(|path| ["db3", "zstd"].contains(&ending(path).as_str())) {
                 Some(path) if ending(path) == "db3" => format!("is a bag in SQLite; {}", conversion(folder)),

@@ -6,6 +6,8 @@ mod arrays;
 #[cfg(feature = "recordings")]
 mod bag;
 mod bits;
+#[cfg(feature = "recordings")]
+mod calibration;
 pub mod decode;
 mod exif;
 mod files;
@@ -44,6 +46,8 @@ use std::sync::atomic::AtomicBool;
 #[cfg(feature = "recordings")]
 pub use bag::is_bag;
 pub use bits::{FoundBits, find_bits, with_key};
+#[cfg(feature = "recordings")]
+pub use calibration::{RecordedCamera, find_camera};
 pub use find_tone::{describe_mixed_tones, find_tone};
 pub use item::{Item, TimeSource};
 pub use memory::Held;
