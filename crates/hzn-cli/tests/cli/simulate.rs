@@ -228,7 +228,7 @@ fn radiances_of_ones_own() {
 fn built_in_scenes_can_be_listed_and_printed() {
     let at = tempfile::tempdir().unwrap();
     let (code, list, _) = hzn(at.path(), "1", &["simulate", "--list"]);
-    assert_eq!((code, list.lines().count()), (0, 15));
+    assert_eq!((code, list.lines().count()), (0, 16));
     for line in list.lines() {
         let name = line.split_whitespace().next().unwrap();
         let (code, text, _) = hzn(at.path(), "1", &["simulate", name, "--show"]);
