@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::detector::Plane;
-use crate::scene::Scene;
+use crate::pose::Pose;
 
 /// Pixels of the two half pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,12 +28,9 @@ pub struct Halves {
 }
 
 impl Halves {
-    /// Returns the scenes of the first and of the second half.
-    pub(crate) fn scenes(&self, scene: &Scene) -> [Scene; 2] {
-        [-0.5, 0.5].map(|part| {
-            let pose = scene.pose.disturbed(self.rate_radps.map(|rate| rate * self.apart_s * part));
-            Scene { pose, halves: None, ..scene.clone() }
-        })
+    /// Returns the poses of the first and of the second half.
+    pub(crate) fn poses(&self, pose: &Pose) -> [Pose; 2] {
+        [-0.5, 0.5].map(|part| pose.disturbed(self.rate_radps.map(|rate| rate * self.apart_s * part)))
     }
 
     /// Puts the light of the second half into the planes of the first one.

@@ -32,9 +32,10 @@ impl Scene {
         let light = match &self.halves {
             None => self.light_on_detector()?,
             Some(halves) => {
-                let [first, second] = halves.scenes(self);
-                let mut light = first.light_on_detector()?;
-                halves.interleave(&mut light, &second.light_on_detector()?);
+                let half = |pose| Self { pose, halves: None, ..self.clone() }.light_on_detector();
+                let [first, second] = halves.poses(&self.pose).map(half);
+                let mut light = first?;
+                halves.interleave(&mut light, &second?);
                 light
             }
         };

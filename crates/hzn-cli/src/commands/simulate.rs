@@ -24,9 +24,9 @@ use crate::tell::{self, one_line};
 /// are next to the folders. The limb height and noise model in sensor.toml are measured on other pictures of the scene;
 /// for a planet or moon (`[world.ellipsoid]`) the limb height is the scene's own.
 ///
-/// Built-in scenes: rocket, rocket-clean, leo-infrared, thermal-array, horace, horace-wide, full-disc, sun-moon, tumble,
-/// atek, ring, pair, jupiter, enceladus, saturn, geo. `hzn simulate SCENE --show` prints one; change it and give it as a
-/// file.
+/// Built-in scenes: rocket, rocket-clean, leo-infrared, thermal-array, horace, horace-wide, full-disc, sun-moon,
+/// tumble, atek, ring, pair, jupiter, enceladus, saturn, geo. `hzn simulate SCENE --show` prints one; change it and
+/// give it as a file.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A built-in scene, or a scene.toml

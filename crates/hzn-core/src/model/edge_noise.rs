@@ -109,9 +109,9 @@ pub(crate) const END_PER_RMS: f64 = 1.732_050_807_568_877_2;
 /// Pixels per radian of the coarsest camera on which the floors were measured: the scene `leo-infrared`.
 const COARSEST_PX_PER_RAD: f64 = 92.0;
 
-/// RMS of the error that linear interpolation between pixel centres makes for the sharpest possible edge, in pixels. One
-/// pixel has a part p of the light, from a half to 1; the error is (p − ½)(1 − p)/p. The root of its mean square over
-/// all places of the edge is 0.062 px. An edge along the rows has the same error at every point.
+/// RMS of the error that linear interpolation between pixel centres makes for the sharpest possible edge, in pixels.
+/// One pixel has a part p of the light, from a half to 1; the error is (p − ½)(1 − p)/p. The root of its mean square
+/// over all places of the edge is 0.062 px. An edge along the rows has the same error at every point.
 const SAMPLING_PX: f64 = 0.062;
 
 impl Config {

@@ -92,9 +92,16 @@ impl Scenario {
                 return refuse(&key, n2, "its squared length must be 1");
             }
         }
+        self.check_halves_and_limb()?;
+        self.imu.map_or(Ok(()), |imu| imu.check())?;
+        self.gnss.as_ref().map_or(Ok(()), |gnss| gnss.check())?;
+        Ok(())
+    }
+
+    fn check_halves_and_limb(&self) -> Result<(), ScenarioError> {
         if self.shutter.halves.is_none() && self.shutter.halves_s != 0.0 {
-            let rule = "has no effect without halves: write halves = \"chess\" or \"rows\", or remove it";
-            return refuse("[shutter] halves_s", self.shutter.halves_s, rule);
+            let what = "has no effect without halves: write halves = \"chess\" or \"rows\", or remove it";
+            return Err(ScenarioError::new("[shutter] halves_s", what));
         }
         if let World::Infrared(Infrared { limb: Some(limb), .. }) = &self.world
             && limb.thermal_km().is_none()
@@ -102,8 +109,6 @@ impl Scenario {
             let what = "is no thermal band: write \"window-8-14um\" or \"co2-15um\", or remove it";
             return Err(ScenarioError::new("[world] infrared.limb", what));
         }
-        self.imu.map_or(Ok(()), |imu| imu.check())?;
-        self.gnss.as_ref().map_or(Ok(()), |gnss| gnss.check())?;
         Ok(())
     }
 

@@ -122,8 +122,9 @@ fn half_pictures_are_those_of_two_poses() {
     s.detector = Detector { psf_sigma_px: 0.6, bits: 16, ..Detector::default() };
     let scene = s.flight().unwrap().frames[1].scene.clone();
     let halves = scene.halves.unwrap();
-    let (whole, [first, second]) = (scene.render().unwrap(), halves.scenes(&scene).map(|half| half.render().unwrap()));
-    let at_once = Scene { halves: None, ..scene }.render().unwrap();
+    let render = |pose| Scene { pose, halves: None, ..scene.clone() }.render().unwrap();
+    let (whole, [first, second]) = (scene.render().unwrap(), halves.poses(&scene.pose).map(render));
+    let at_once = render(scene.pose);
     let mut differ = 0;
     for (x, y) in (0..32).flat_map(|x| (0..24).map(move |y| (x, y))) {
         let half = if (x + y) % 2 == 0 { &first } else { &second };
