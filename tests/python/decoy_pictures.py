@@ -17,6 +17,8 @@ import limb_pictures as limb
 
 WIDTH, HEIGHT = 640, 480
 PICTURES = 3
+# Scale height of the layers of airglow, as a part of the thickness that is drawn.
+THICKNESS = 1.0
 # The pictures with a limb that belong to this campaign have the same size.
 limb.WIDTH, limb.HEIGHT = WIDTH, HEIGHT
 V, U = np.mgrid[0:HEIGHT, 0:WIDTH].astype(np.float32)
@@ -153,7 +155,7 @@ def airglow(rng, scene):
     hit = (b * b > a * c) & (b < 0)
     nearest = np.maximum(-b / a, 0)
     tangent = np.where(b < 0, (np.linalg.norm(p + q * nearest[:, None], axis=1) - 1) * limb.MEAN_KM, 1e4)
-    peak, thick = rng.uniform(85, 105), rng.uniform(3, 12)
+    peak, thick = rng.uniform(85, 105), rng.uniform(3, 12) * THICKNESS
     heights = np.linspace(-600, 160, 761)
     # The integral along a line of sight with this tangent height, in steps of 2 km of height above the layer's foot.
     level = np.arange(peak - 4 * thick, peak + 8 * thick, 0.5)
@@ -322,4 +324,5 @@ def render_flight(folder, seed, kind, pictures=PICTURES):
         rows.append(",".join([name, *(f"{n:.9f}" for n in numbers)]))
     (folder / "frames.csv").write_text("\n".join(rows) + "\n")
     (folder / "sensor.toml").write_text(limb.sensor_toml(rng, lens))
+    (folder / "tone").write_text("srgb" if srgb else "linear")
     return truth

@@ -40,6 +40,15 @@ SHARES = (1e-1, 1e-2, 1e-3, 1e-4)
 COLUMNS = ("state", "sensor", "seed", "kind", "limb_px", "status", "error_deg", "sigma_max_deg", "protection_deg", "p_limb")
 
 
+def render(folder, seed, kind):
+    """Renders one picture of a kind, of the limb or without it. Returns its truth."""
+    is_limb = kind in limb_pictures.CLASSES
+    limb_pictures.WIDTH, limb_pictures.HEIGHT = SMALL if is_limb else (decoy_pictures.WIDTH, decoy_pictures.HEIGHT)
+    program = limb_pictures if is_limb else decoy_pictures
+    (truth,) = program.render_flight(folder, seed, kind, 1).values()
+    return truth
+
+
 @dataclasses.dataclass
 class State:
     """The kinds of pictures of a state, and for each sensor the columns of frames.csv and lines of sensor.toml."""
@@ -50,11 +59,8 @@ class State:
     def render(self, folder, seed):
         """Renders one picture. Returns its kind, the limb's axis, and the number of sunlit pixels of the limb."""
         kind = self.kinds[seed % len(self.kinds)]
-        is_limb = kind in limb_pictures.CLASSES
-        limb_pictures.WIDTH, limb_pictures.HEIGHT = SMALL if is_limb else (decoy_pictures.WIDTH, decoy_pictures.HEIGHT)
-        render = limb_pictures.render_flight if is_limb else decoy_pictures.render_flight
-        ((axis, *rest),) = render(folder, seed, kind, 1).values()
-        return kind, axis, rest[0] if is_limb else 0
+        axis, *rest = render(folder, seed, kind)
+        return kind, axis, rest[0] if kind in limb_pictures.CLASSES else 0
 
 
 STATES = {

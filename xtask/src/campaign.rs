@@ -30,6 +30,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign packets [COUNT]
        cargo xtask campaign pictures [FLIGHTS]
        cargo xtask campaign integrity [PICTURES [SEED [STATE]...]]
+       cargo xtask campaign night [PICTURES [SEED]]
        cargo xtask campaign miri
        cargo xtask campaign paths
        cargo xtask campaign processors [PICTURES]
@@ -51,6 +52,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   integrity
         renders PICTURES (200) pictures of each state (day, low Sun, no limb, matching ghost, night), each of a flight
         of its own, from SEED (700000) on, and counts errors above protection_deg
+  night renders PICTURES (300) pictures of layers of airglow of each kind, from SEED (810000) on, and as many limbs by
+        day with a wrong time and edges that are no limb, and counts the answers of body.night = \"airglow\"
   miri  runs the tests of the flight software and of the C interface in Miri
   paths builds the images of the flight computer and the wheel in another folder; their bytes must be the same
   processors
@@ -80,6 +83,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
             let states = args.get(3..).unwrap_or_default();
             integrity(number(200)?, number_at(2, 700_000)?, states).map_err(Trouble::into_message)
         }
+        Some("night") => night(number(300)?, number_at(2, 810_000)?).map_err(Trouble::into_message),
         Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
         Some("miri") => miri::campaign().map_err(Trouble::into_message),
         Some("paths") => paths().map_err(Trouble::into_message),
@@ -159,6 +163,13 @@ fn integrity(pictures: u64, first_seed: u64, states: &[String]) -> Outcome {
         campaign.arg("--states").args(states);
     }
     steps::run(&mut campaign)
+}
+
+/// Looks for the airglow on pictures of the night that a program in Python renders, and on pictures that show none.
+fn night(pictures: u64, first_seed: u64) -> Outcome {
+    steps::run(&mut cargo(&["build", "--release", "--bin", "hzn"]))?;
+    let mut campaign = python_campaign("tests/python/night_campaign.py", &target().join("release/hzn"))?;
+    steps::run(campaign.args(["--list", "--pictures", &pictures.to_string(), "--first-seed", &first_seed.to_string()]))
 }
 
 /// Returns the call of the campaign on pictures of another program.

@@ -304,6 +304,7 @@ impl PictureAnswer {
                 axis_by_cos: self.position.map(|p| widen(p.axis_by_cos)).filter(|v| !v.iter().any(|x| x.is_nan())),
                 position: None,
                 p_limb: None,
+                is_airglow: false,
                 rms_px: d.rms_px.into(),
                 inliers: d.inliers,
                 arc_px: d.arc_px.into(),

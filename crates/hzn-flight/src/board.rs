@@ -70,8 +70,8 @@ pub trait Board {
     fn feed_watchdog(&mut self);
     /// Returns whether the camera answers.
     fn camera_answers(&mut self) -> bool;
-    /// Returns the temperature of the camera, °C, for a lens that changes with it (`camera.temperature`); `None` if there
-    /// is no thermometer, or if it does not answer. Asked once for each picture.
+    /// Returns the temperature of the camera, °C, for a lens that changes with it (`camera.temperature`); `None` if
+    /// there is no thermometer, or if it does not answer. Asked once for each picture.
     fn camera_temperature_c(&mut self) -> Option<f32> {
         None
     }

@@ -9,7 +9,7 @@ use hzn_core::report::Position;
 use hzn_core::status::Status;
 use hzn_core::{Report, Solution};
 
-use detail::{SUSPECT, describe};
+use detail::{describe, describe_answer};
 use serde::{Deserialize, Serialize};
 
 use crate::status_name;
@@ -296,7 +296,7 @@ impl Row {
             (Some(solution), Status::Ok) => {
                 row.set_answer(solution);
                 row.tracked = report.is_tracked().then_some(true);
-                row.detail = if report.is_suspect { SUSPECT } else { "" }.to_owned();
+                row.detail = describe_answer(report, solution);
             }
             _ => row.detail = describe(report),
         }

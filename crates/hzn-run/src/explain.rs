@@ -56,6 +56,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Departure => "the edge leaves the fitted limb smoothly (gates.max_departure)".into(),
         Verdict::Band => "behind the edge there is a narrow band, and then the sky again (gates.max_band)".into(),
         Verdict::Night => "it is night at this time and position (gates.max_unlit, body.sunlit)".into(),
+        Verdict::Layer => "at night, the light below the edge does not become less: it is no layer of airglow".into(),
         Verdict::Faint => "the brightness hardly changes across the edge, as in twilight".into(),
         Verdict::Unlikely => format!("its probability to be the limb is below {} (gates.min_p_limb)", s.min_p_limb),
         Verdict::Glow => "light reaches high above the edge: it is airglow or aurora (gates.max_glow)".into(),
@@ -67,9 +68,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
             "the given Sun does not light this limb (gates.max_unlit); a thermal camera sets body.sunlit = false".into()
         }
         Verdict::Fixed => "suspect: fixed in the picture, while the vehicle turns (gates.fixed_edge)".into(),
-        Verdict::Rate => {
-            "the axis is farther from the last answer than the vehicle can turn (gates.max_rate_deg_s)".into()
-        }
+        Verdict::Rate => "the axis is farther from the last answer than it can turn (gates.max_rate_deg_s)".into(),
     }
 }
 
@@ -109,6 +108,7 @@ const ORDER: &[Verdict] = &[
     Verdict::Sun,
     Verdict::Faint,
     Verdict::Band,
+    Verdict::Layer,
     Verdict::Attitude,
     Verdict::Rate,
     Verdict::Straight,

@@ -9,7 +9,7 @@ use hzn_files::FrameData;
 use hzn_mcap::roll_pitch_deg;
 
 use crate::diagnosis::{self, AnyCone};
-use crate::engine::{AnySensor, Trace};
+use crate::engine::{AnySensor, ExpectedLimb, Trace};
 use crate::error::{Error, unusable};
 use crate::explain;
 use crate::limb_words::limb_in_words;
@@ -60,8 +60,9 @@ impl PictureToExplain<'_> {
         let levels = config.threshold_of(which as u8);
         let fits = self.what_fits(report, sensor);
         let is_dark = report.solution.is_none() && self.is_answered_inverted(sensor, which)?;
+        let limb = sensor.expected_limbs(data).into_iter().nth(which).and_then(Result::ok);
         let explained =
-            Explained { name, config, body, levels, data, picture, trace, report, half_angle, fits, is_dark };
+            Explained { name, config, body, levels, data, picture, trace, report, half_angle, limb, fits, is_dark };
         Ok(Some(explained.text(times)))
     }
 
@@ -101,6 +102,8 @@ struct Explained<'a> {
     trace: &'a Trace,
     report: &'a Report<f64>,
     half_angle: f64,
+    /// The limb that was expected.
+    limb: Option<ExpectedLimb>,
     /// What would fit a limb of another size.
     fits: Option<String>,
     /// Whether the inverted picture has an answer.
@@ -240,7 +243,7 @@ impl Explained<'_> {
             Some(d) if d.altitude_km.is_some() => format!("altitude {km} km given with the picture"),
             _ => format!("altitude {km} km"),
         };
-        let limb = limb_in_words(self.body, &self.config.input, km);
+        let limb = limb_in_words(self.body, &self.config.input, self.limb, km);
         format!("{cone} ({from}, {limb})")
     }
 

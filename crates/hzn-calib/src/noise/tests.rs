@@ -75,6 +75,7 @@ pub(crate) fn solution(axis: Vector3<f64>, half_angle_rad: f64) -> Solution<f64>
         axis_by_cos: None,
         position: None,
         p_limb: None,
+        is_airglow: false,
         rms_px: 0.1,
         inliers: 400,
         arc_px: 800.0,

@@ -22,6 +22,7 @@ mod gates;
 mod hostile;
 mod kept_inputs;
 mod migrate;
+mod night;
 mod outputs;
 mod pictures;
 mod position_input;

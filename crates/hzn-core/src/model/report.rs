@@ -313,6 +313,9 @@ pub struct Solution<T> {
     /// Probability that the edge of the answer is the limb, from all [evidence](crate::evidence). It is only known for
     /// bodies with air. `None` when the half-angle was not fitted, or when the answer came by telemetry.
     pub p_limb: Option<T>,
+    /// Whether the limb is the outer edge of the layer of airglow (`body.night`). `false` when the answer came by
+    /// telemetry.
+    pub is_airglow: bool,
     /// Weighted RMS distance of the inliers from the limb in pixels.
     pub rms_px: T,
     /// Number of inliers: edge points with a weight above 0 in the fit.

@@ -87,4 +87,7 @@ verdicts! {
     /// The candidate won, but its edge stays in the picture while the vehicle turns: it belongs to the window, the lens
     /// or the vehicle.
     Fixed = 27, "fixed";
+    /// It is night, `body.night` asks for the airglow, and the edge is not the outer edge of its layer: below it the
+    /// light does not become less.
+    Layer = 28, "layer";
 }

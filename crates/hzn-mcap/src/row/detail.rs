@@ -1,11 +1,15 @@
 //! The column `detail` in words.
 
-use hzn_core::Report;
 use hzn_core::real::Real;
 use hzn_core::status::{Stage, Status};
+use hzn_core::{Report, Solution};
 
-/// The detail of an answer whose edge stays in the picture while the vehicle turns.
-pub(super) const SUSPECT: &str = "suspect: fixed in the picture";
+/// Describes what an answer is besides the limb by day: the limb of the airglow, or an edge that stays in the picture
+/// while the vehicle turns.
+pub(super) fn describe_answer<T: Real>(report: &Report<T>, solution: &Solution<T>) -> String {
+    let parts = [(solution.is_airglow, "airglow"), (report.is_suspect, "suspect: fixed in the picture")];
+    parts.into_iter().filter(|(holds, _)| *holds).map(|(_, text)| text).collect::<Vec<_>>().join("; ")
+}
 
 /// Describes the last stage, the verdict of each candidate, and the number of looks if there was more than one.
 pub(super) fn describe<T: Real>(report: &Report<T>) -> String {

@@ -22,6 +22,7 @@ fn report<T: Real>(status: Status) -> Report<T> {
         axis_by_cos: None,
         position: None,
         p_limb: Some(number(0.875)),
+        is_airglow: false,
         rms_px: number(f64::NAN),
         inliers: 500,
         arc_px: number(900.0),

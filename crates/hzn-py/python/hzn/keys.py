@@ -423,6 +423,14 @@ class Body(TypedDict, total=False):
     limb_height_sigma_km: float
     """1σ of the limb height, km; 7 km spans the visible wavelengths and usual tones. Values: 0 to 10000 km. Default:
     7.0."""
+    night: Literal["refuse", "airglow"]
+    """What the sensor does in a picture in which the Sun is known to be down, from time and position. Default:
+    "refuse"."""
+    airglow_height_km: float
+    """Height of the outer edge of the airglow above the surface, km; for ``night = "airglow"``. At this height it
+    has half of its counts in the picture. Values: 60 to 400 km. Default: 106.0."""
+    airglow_height_sigma_km: float
+    """1σ of ``airglow_height_km``, km. Values: 0 to 10000 km. Default: 8.0."""
     limb_height_harmonic_sigma_km: float | None
     """1σ of the second harmonic of the limb height along the limb, km; it limits how well the rotation about the
     line to the body is known (``fit.yaw_limit_deg``). Values: 0 to 10000 km. Default: ``limb_height_sigma_km``."""

@@ -12,6 +12,7 @@
 
 mod annotate;
 mod clock;
+mod expected_limb;
 mod outcome;
 mod plan;
 mod pool;
@@ -25,6 +26,7 @@ mod turns;
 mod widen;
 
 pub use annotate::annotate;
+pub use expected_limb::ExpectedLimb;
 pub use outcome::{BodyOutcome, Finished, Unprocessed};
 pub use plan::Plan;
 pub use pool::End;

@@ -12,6 +12,7 @@ use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Rep
 use hzn_files::{FrameData, Frames, Problem};
 use hzn_nav::ephemeris;
 
+use super::expected_limb::ExpectedLimb;
 use super::trace::{Clock, Traces, Watch};
 use super::widen::widen_report;
 
@@ -179,9 +180,14 @@ impl AnySensor {
     /// Returns the expected half-angle of each body in a picture, in radians. The entry is an error if no half-angle
     /// can be expected, for example for an impossible altitude or position.
     pub fn expected_half_angles_rad(&self, data: Option<&FrameData>) -> Vec<Result<f64, PriorError>> {
+        self.expected_limbs(data).into_iter().map(|limb| limb.map(|limb| limb.half_angle_rad)).collect()
+    }
+
+    /// Returns the expected limb of each body in a picture, as [`Self::expected_half_angles_rad`] does.
+    pub fn expected_limbs(&self, data: Option<&FrameData>) -> Vec<Result<ExpectedLimb, PriorError>> {
         match &self.kind {
-            Kind::Host(h, _) => half_angles(h, data),
-            Kind::Flight(h, _) => half_angles(h, data),
+            Kind::Host(h, _) => expected_limbs(h, data),
+            Kind::Flight(h, _) => expected_limbs(h, data),
         }
     }
 
@@ -313,13 +319,13 @@ pub struct Processed {
     pub elapsed: Duration,
 }
 
-fn half_angles<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+fn expected_limbs<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
     horizon: &Horizon<T, POINTS, BLOCKS, WORDS>,
     data: Option<&FrameData>,
-) -> Vec<Result<f64, PriorError>> {
+) -> Vec<Result<ExpectedLimb, PriorError>> {
     let expect = |(which, body)| {
         let prior = prior(data, which, body)?;
-        Ok(horizon.expect_body(which, &prior)?.half_angle_rad().into())
+        Ok(ExpectedLimb::from_expected(&horizon.expect_body(which, &prior)?))
     };
     bodies(horizon).iter().enumerate().map(expect).collect()
 }

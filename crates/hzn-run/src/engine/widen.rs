@@ -44,6 +44,7 @@ pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Solution<f
         axis_by_cos: s.axis_by_cos.map(|by| by.map(Into::into)),
         position: s.position.as_ref().map(Position::to_f64),
         p_limb: s.p_limb.map(Into::into),
+        is_airglow: s.is_airglow,
         rms_px: s.rms_px.into(),
         inliers: s.inliers,
         arc_px: s.arc_px.into(),

@@ -8,7 +8,7 @@ use crate::geometry::frames::{Cam, Fixed, Rotation, UnitVec3};
 
 use super::apparent::{ApparentBody, below_limb_error};
 use super::position::Target;
-use super::{Config, Kind, LOWEST_ALTITUDE_M, Last, Prior, PriorError};
+use super::{Config, Kind, LOWEST_ALTITUDE_M, Last, Night, Prior, PriorError};
 
 /// A prior attitude with this 1-sigma or more does not correct the shape of the limb, because it is no better than an
 /// unknown attitude: 30 degrees (book/theory/math.md, ellipsoid).
@@ -92,6 +92,8 @@ pub struct Expected<T> {
     pub(crate) phases: bool,
     /// Whether the body is seen in sunlight, so that its edge may be a terminator.
     pub(crate) is_in_sunlight: bool,
+    /// Whether the limb is the outer edge of the layer of airglow.
+    pub(crate) is_airglow: bool,
     /// Number of the body among those of the sensor, from 0.
     pub(crate) which: u8,
     /// The body in scaled space, if its position is fitted. The cone, its harmonics and the directions above are then
@@ -173,6 +175,11 @@ impl<T: Real> Expected<T> {
         (first + second) / self.sin * (fx + fy) * T::from_f64(0.5)
     }
 
+    /// Returns the expected height of the limb and its 1-sigma, metres, without the bending of light.
+    pub fn limb_height_and_sigma_m(&self) -> (T, T) {
+        (self.limb_m - self.raised_m, self.limb_sigma_parts_m[0])
+    }
+
     /// Returns the body whose position is fitted. Without the feature there is none, so the code for it is left out.
     pub(crate) fn target(&self) -> Option<&Target<T>> {
         if cfg!(feature = "position") { self.target.as_ref() } else { None }
@@ -201,7 +208,12 @@ impl<T: Real> Expected<T> {
         {
             return Self::in_scaled_space(body, prior, target, smallest_rad);
         }
-        Self::of_limb(body, prior, attitude_sigma)
+        let expected = Self::of_limb(body, prior, attitude_sigma)?;
+        if body.night == Night::Airglow && expected.is_night() {
+            let of_layer = Self::of_limb(&body.with_airglow(), prior, attitude_sigma)?;
+            return Ok(Self { is_airglow: true, ..of_layer });
+        }
+        Ok(expected)
     }
 
     /// Computes the expected cone of the limb, from the altitude or the position of the camera.
@@ -221,8 +233,7 @@ impl<T: Real> Expected<T> {
         }
         let (cos, free) = (cos2.sqrt(), body.half_angle_is_free());
         let altitude_sigma = if free { T::zero() } else { T::from_f64(body.altitude_sigma_km) * km };
-        let scale = sin / cos / (seen.radius + seen.altitude);
-        let known = useful_attitude(prior, attitude_sigma);
+        let (scale, known) = (sin / cos / (seen.radius + seen.altitude), useful_attitude(prior, attitude_sigma));
         let harmonics_cos = seen.harmonics.map(|h| -scale * h);
         let own = seen.ellipsoid.as_ref().map_or(T::zero(), second_harmonic_cos);
         // An attitude error ψ leaves k ψ of the k-th harmonic.
@@ -264,6 +275,7 @@ impl<T: Real> Expected<T> {
             free,
             phases: body.kind != Kind::Sun,
             is_in_sunlight: body.is_seen_in_sunlight(),
+            is_airglow: false,
             which: 0,
             target: None,
         };

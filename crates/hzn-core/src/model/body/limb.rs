@@ -19,3 +19,13 @@ choices! {
         @- Height = "height";
     }
 }
+
+choices! {
+    /// What the sensor does in a picture in which the Sun is known to be down.
+    pub enum Night {
+        /// Refuse every edge: at night no part of the limb is seen in sunlight.
+        @0 Refuse = "refuse";
+        /// Search for the outer edge of the layer of airglow.
+        @1 Airglow = "airglow";
+    }
+}

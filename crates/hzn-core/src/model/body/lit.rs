@@ -4,6 +4,9 @@ use super::Expected;
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 
+/// Lowest elevation of the Sun that lights a limb, in degrees: the end of twilight.
+pub(crate) const LOWEST_SUN_DEG: f64 = -18.0;
+
 /// cos 75°: the part of the largest elevation of the Sun along the limb that a point needs.
 const CUSP: f64 = 0.258_819_045_102_520_76;
 /// Distance between terminator and limb that does not matter, pixels.
@@ -46,5 +49,24 @@ impl<T: Real> Expected<T> {
         // A build without positions does not read the arguments and would warn about them.
         let _ = (sun, e, c, focal_px);
         T::ZERO
+    }
+}
+
+impl<T> Expected<T> {
+    /// Returns whether the limb is the outer edge of the layer of airglow.
+    pub fn is_airglow(&self) -> bool {
+        self.is_airglow
+    }
+}
+
+impl<T: Real> Expected<T> {
+    /// Returns whether the Sun is known to light no part of the limb: it is more than dip + 18° below the horizon of
+    /// the point below the camera.
+    ///
+    /// The limb is as far from this point as the dip of the horizon, 90° − α, along the surface. At the limb's part
+    /// that is nearest to the Sun, the Sun stands higher by the dip. At 18° below the horizon there, twilight ends.
+    pub(crate) fn is_night(&self) -> bool {
+        let dip = T::from_f64(core::f64::consts::FRAC_PI_2) - self.half_angle_rad();
+        self.sun_elevation_rad.is_some_and(|elevation| elevation + dip < T::from_f64(LOWEST_SUN_DEG.to_radians()))
     }
 }

@@ -9,6 +9,7 @@ mod kind;
 mod limb;
 mod lit;
 mod measured;
+mod night;
 mod planets;
 mod position;
 mod prior;
@@ -27,7 +28,8 @@ use crate::model::threshold;
 pub use band::year_part;
 pub use expected::Expected;
 pub use kind::{AltitudeReference, Kind};
-pub use limb::Limb;
+pub use limb::{Limb, Night};
+pub(crate) use lit::LOWEST_SUN_DEG;
 pub use planets::Planet;
 pub(crate) use position::Target;
 pub use prior::{Last, Prior, PriorError};
@@ -107,6 +109,21 @@ section! {
         /// limb's light. In linear pictures the default becomes 4.6 km. A larger sigma gives the expected half-angle
         /// less weight.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
+        /// What the sensor does in a picture in which the Sun is known to be down, from time and position.
+        ///
+        /// `airglow` searches for the outer edge of the layer of airglow, and refuses every other edge. It is for the
+        /// Earth in visible light and a camera above the layer. Without a time, or by day, it changes nothing.
+        @39 night: Night = Night::Refuse, [choice];
+        /// Height of the outer edge of the airglow above the surface, km; for `night = "airglow"`. At this height it
+        /// has half of its counts in the picture.
+        ///
+        /// With the default value the height follows from the tone: 102 km for linear counts, 110 km for a photograph.
+        @42 airglow_height_km: f64 = 106.0, [60.0 to 400.0];
+        /// 1σ of `airglow_height_km`, km.
+        ///
+        /// The default covers peaks from 85 to 105 km and layers of 3 to 12 km, and follows from the tone as well. A
+        /// filter that passes one line, or the mean of a flight, allows a smaller value.
+        @43 airglow_height_sigma_km: f64 = 8.0, [0.0 to 1e4];
         /// 1σ of the second harmonic of the limb height along the limb, km; it limits how well the rotation about the
         /// line to the body is known (`fit.yaw_limit_deg`).
         ///
@@ -165,6 +182,7 @@ impl Config {
         self.check_figure()?;
         self.check_keys()?;
         self.check_band()?;
+        self.check_night()?;
         let rows = &self.limb_height_by_latitude_km;
         let field = "body.limb_height_by_latitude_km";
         for [latitude, height] in rows {

@@ -57,6 +57,7 @@ impl<T: Real> Expected<T> {
             free: false,
             phases: body.kind != Kind::Sun,
             is_in_sunlight: body.is_seen_in_sunlight(),
+            is_airglow: false,
             which: 0,
             target: Some(target),
         };

@@ -20,6 +20,7 @@ impl Config {
     /// the light, the limb lies h ln(0.5/l) higher than the limb at half of the light. Overexposure follows the same
     /// law, and comes on top unchanged: full scale at 1/B of the light moves both limbs by h ln B.
     pub fn follow_tone(&mut self, tone: Tone) {
+        self.follow_tone_at_night(tone);
         let scale_height_km = self.scale_height_km();
         let default = Self::of_kind(self.kind, self.radii_km);
         let is_default = self.limb_height_km == default.limb_height_km && self.limb_height_by_latitude_km.is_empty();

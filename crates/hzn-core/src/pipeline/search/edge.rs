@@ -280,6 +280,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             axis_by_cos: Some((b1 * by_1 + b2 * by_2).into()),
             position: None,
             p_limb: None,
+            is_airglow: expected.is_airglow,
             rms_px: fit.rms_px,
             inliers: fit.inliers,
             arc_px: fit.arc_px,

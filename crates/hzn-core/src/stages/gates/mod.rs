@@ -18,6 +18,7 @@ mod glow;
 mod half_angle;
 mod hidden;
 mod indistinct;
+mod layer;
 mod lens;
 mod line;
 mod night;
@@ -104,7 +105,12 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     night::refuse(case)?;
     sun::refuse(case)?;
     faint::refuse(case, binary, &places)?;
-    band::refuse(case, binary, &places, &sky)?;
+    if case.expected.is_airglow {
+        // A layer is a band.
+        layer::refuse(case, binary, &places, &sky)?;
+    } else {
+        band::refuse(case, binary, &places, &sky)?;
+    }
     attitude::refuse(case)?;
     rate::refuse(case)?;
 
@@ -124,7 +130,9 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
 
     hidden::refuse(case)?;
     side::refuse(case)?;
-    let evidence = evidence::weigh(case, binary, &places, &sky, &residuals);
+    // The weights are those of sunlit limbs, for which a layer of airglow is evidence against the limb.
+    let is_weighed = !case.expected.is_airglow;
+    let evidence = is_weighed.then(|| evidence::weigh(case, binary, &places, &sky, &residuals)).flatten();
     evidence.iter().for_each(|evidence| binary.observer.evidence(case.number, evidence));
     let p_limb = unlikely::refuse(case, evidence.as_ref())?;
     Ok(Passed { glows, p_limb })

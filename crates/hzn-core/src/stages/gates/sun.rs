@@ -4,11 +4,8 @@ use super::case::{Case, refuse_if};
 use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
-use crate::model::body::Expected;
+use crate::model::body::{Expected, LOWEST_SUN_DEG};
 use crate::model::verdict::Verdict;
-
-/// Lowest elevation of the Sun that lights a limb, in degrees: the end of twilight.
-pub(super) const LOWEST_SUN_DEG: f64 = -18.0;
 
 /// Refuses a limb of which the Sun lights too small a part.
 pub(super) fn refuse<T: Real>(case: &Case<'_, T>) -> Result<(), Verdict> {

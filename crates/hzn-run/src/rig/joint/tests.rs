@@ -51,6 +51,7 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
         axis_by_cos: None,
         position: None,
         p_limb: None,
+        is_airglow: false,
         rms_px: 0.1,
         inliers: 100,
         arc_px: 300.0,
