@@ -327,6 +327,9 @@ fn evidence_text(term: evidence::Term) -> &'static str {
         evidence::Term::BrightAir => "log of the light 1.5 scale heights up, if too bright for air",
         evidence::Term::FaintHighAir => "log of the light three scale heights up, if too faint for air",
         evidence::Term::Layer => "a second edge below, as the ground has below airglow",
+        evidence::Term::SecondEdge => "fall of the light below the edge to a break at one depth",
+        evidence::Term::Flat => "log of how uneven and how much darker the body is inside, if it is little",
+        evidence::Term::MottledSky => "log of how uneven the sky is",
         evidence::Term::Attitude => "agreement with the given attitude",
         evidence::Term::Sun => "the given Sun lights the edge",
     }

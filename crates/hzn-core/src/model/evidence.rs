@@ -1,7 +1,7 @@
 //! The evidence that an edge is the limb, and the probability that follows from it.
 //!
 //! The logarithm of the odds is ln(prior odds) + b + Σ w x, where x are the values of the terms. A term that the
-//! picture does not show adds nothing. The weights come from a logistic regression (`tests/python/fit_evidence.py`).
+//! picture does not show adds nothing. The weights come from a logistic regression (`tests/python/decoy_campaign.py --fit`).
 
 use crate::base::real::Real;
 
@@ -31,14 +31,23 @@ pub enum Term {
     /// How abruptly the brightness changes between 40 and 140 km below the edge, alike everywhere along the edge: 0 to
     /// 3. The ground below a layer of airglow has such a second edge.
     Layer = 8,
+    /// How much the brightness falls below the edge, and how abruptly it changes at one depth between 70 and 130 km,
+    /// against its bends at other depths: 0 to 3.75. A layer of airglow becomes fainter inwards, without clouds, and
+    /// ends at the limb of the ground.
+    SecondEdge = 9,
+    /// Where the body is as bright and as even far inside as next to the edge: the logarithm of both differences
+    /// together, −2.5 to 0. The air before the ground makes a limb darker inwards, and clouds make it uneven.
+    Flat = 10,
+    /// How uneven the sky is along the edge: the logarithm, 0 to 4. Ground next to an edge is uneven, and space is not.
+    MottledSky = 11,
     /// A given attitude: the logarithm of the likelihood ratio.
-    Attitude = 9,
+    Attitude = 12,
     /// A given Sun that lights the edge: the logarithm of the likelihood ratio.
-    Sun = 10,
+    Sun = 13,
 }
 
 /// Number of terms.
-const TERMS: usize = 11;
+const TERMS: usize = 14;
 
 impl Term {
     /// All terms in the order of their numbers.
@@ -52,6 +61,9 @@ impl Term {
         Self::BrightAir,
         Self::FaintHighAir,
         Self::Layer,
+        Self::SecondEdge,
+        Self::Flat,
+        Self::MottledSky,
         Self::Attitude,
         Self::Sun,
     ];
@@ -68,6 +80,9 @@ impl Term {
             Self::BrightAir => "bright-air",
             Self::FaintHighAir => "faint-high-air",
             Self::Layer => "layer",
+            Self::SecondEdge => "second-edge",
+            Self::Flat => "flat",
+            Self::MottledSky => "mottled-sky",
             Self::Attitude => "attitude",
             Self::Sun => "sun",
         }
@@ -75,9 +90,10 @@ impl Term {
 }
 
 /// Weights of the terms in their order. The values of attitude and Sun are likelihood ratios already.
-const WEIGHTS: [f64; TERMS] = [1.39, -0.43, -1.93, -0.85, -1.47, 2.13, -1.69, 1.21, -2.45, 1.0, 1.0];
+const WEIGHTS: [f64; TERMS] =
+    [0.64, -0.40, -2.03, -0.61, -0.52, 1.91, -3.40, 1.20, -1.84, -3.69, 2.34, -1.55, 1.0, 1.0];
 /// The constant b.
-const CONSTANT: f64 = -1.43;
+const CONSTANT: f64 = 2.49;
 
 /// The evidence that an edge is the limb.
 #[derive(Debug, Clone, Copy)]

@@ -218,45 +218,86 @@ fn a_camera_below_the_airglow_sees_no_glow() {
     assert!(above.solution.is_none(), "{:?}", above.solution);
 }
 
-/// Draws the Earth's limb from 400 km with air: the brightness falls by e over `scale_height_px` above the limb, or
-/// within the pixel of [`draw`] if this is 0.
-fn earth_limb(config: &Config, scale_height_px: f64) -> Vec<u8> {
+/// Draws an edge in the place of the Earth's limb from 400 km. `light` is the brightness above the sky, as a part of that
+/// of the body, at a height above the edge in km and at an image point.
+fn earth_edge(light: impl Fn(f64, [f64; 2]) -> f64) -> Vec<u8> {
     let (half_angle_deg, per_px) = ((6388.0 / 6771.0f64).asin().to_degrees(), 1.0 / 1200f64);
-    let disc = Disc { axis: unit([0.1, 0.94, 0.33]), half_angle_deg, brightness: 180.0 };
-    if scale_height_px == 0.0 {
-        return draw(config, &[disc], 5.0, 1.5);
-    }
+    let axis = unit([0.1, 0.94, 0.33]);
     let mut noise = Noise(9);
     (0..640 * 480)
         .map(|i| {
-            let ray = unit([(f64::from(i % 640) - 319.5) * per_px, (f64::from(i / 640) - 239.5) * per_px, 1.0]);
-            let above_px = (angle_deg(ray, disc.axis) - half_angle_deg).to_radians() / per_px;
-            let depth = core::f64::consts::LN_2 * (-above_px / scale_height_px).exp();
-            (5.0 + disc.brightness * -(-depth).exp_m1() + 1.5 * noise.normal()).round().clamp(0.0, 255.0) as u8
+            let at = [f64::from(i % 640), f64::from(i / 640)];
+            let ray = unit([(at[0] - 319.5) * per_px, (at[1] - 239.5) * per_px, 1.0]);
+            // The distance of the limb is 2244 km.
+            let above_km = (angle_deg(ray, axis) - half_angle_deg).to_radians() * 2244.0;
+            (5.0 + 180.0 * light(above_km, at) + 1.5 * noise.normal()).round().clamp(0.0, 255.0) as u8
         })
         .collect()
 }
 
-#[test]
-fn an_edge_without_air_is_an_unlikely_limb() {
+/// Light of sunlit air at a height above the edge, as a part of that of thick air.
+fn air(above_km: f64) -> f64 {
+    -(-core::f64::consts::LN_2 * (-above_km / 7.5).exp()).exp_m1()
+}
+
+/// Light of the limb by day: the body becomes darker inwards.
+fn limb_light(above_km: f64) -> f64 {
+    air(above_km) * (1.0 - 0.2 * (-above_km / 100.0).clamp(0.0, 1.0))
+}
+
+fn earth_sensor() -> Config {
     let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 1200.0));
     config.body.kind = Kind::EarthSphere;
     config.body.altitude_km = Some(400.0);
-    // The scale height of 7.5 km at a distance of 2244 km has 4 px.
-    let p_limb = |config: &Config, scale_height_px: f64| {
-        process(config, &earth_limb(config, scale_height_px)).solution.and_then(|s| s.p_limb)
-    };
-    let [limb, ghost] = [4.0, 0.0].map(|scale_height_px| p_limb(&config, scale_height_px).unwrap());
-    assert!(limb > 0.98 && ghost < 0.9 && ghost > 0.75, "{limb} {ghost}");
-    config.gates.min_p_limb = 0.9;
-    assert_eq!(p_limb(&config, 4.0), Some(limb));
-    let refused = process(&config, &earth_limb(&config, 0.0));
+    config.gates.min_p_limb = 0.0;
+    config
+}
+
+fn p_limb_of(config: &Config, light: impl Fn(f64, [f64; 2]) -> f64) -> f64 {
+    process(config, &earth_edge(light)).solution.and_then(|s| s.p_limb).expect("the edge has a probability")
+}
+
+#[test]
+fn what_lies_on_both_sides_of_an_edge_is_evidence() {
+    let config = earth_sensor();
+    let odds = |p: f64| p / (1.0 - p);
+    let day = p_limb_of(&config, |km, _| limb_light(km));
+    assert!(day > 0.98, "{day}");
+    // A flat body, as that of a ghost.
+    let flat = p_limb_of(&config, |km, _| air(km));
+    assert!(odds(flat) < 0.1 * odds(day), "flat {flat} {day}");
+    // The light of a layer of airglow falls with the root of the depth, and ends at the limb of the ground.
+    let layer = |km: f64| air(km) * (15.0 / (-km).max(15.0)).sqrt();
+    let night = p_limb_of(&config, |km, _| layer(km) * if km < -95.0 { 0.6 } else { 1.0 });
+    let without_end = p_limb_of(&config, |km, _| layer(km));
+    assert!(odds(night) < 0.05 * odds(without_end), "layer {night} {without_end}");
+    // Ground beyond the edge is uneven.
+    let mottled = |km: f64, [u, _]: [f64; 2]| limb_light(km) + 0.05 * (1.0 + (u / 20.0).sin());
+    let coast = p_limb_of(&config, mottled);
+    assert!(odds(coast) < 0.5 * odds(day), "mottled {coast} {day}");
+    // A thermal camera sees no sunlit air, so that none of it is evidence.
+    let mut thermal = config.clone();
+    thermal.body.sunlit = Some(false);
+    let [flat, day] = [p_limb_of(&thermal, |km, _| air(km)), p_limb_of(&thermal, |km, _| limb_light(km))];
+    assert!(flat > 0.9 && (odds(flat) / odds(day)).ln().abs() < 1.0, "thermal {flat} {day}");
+}
+
+#[test]
+fn an_edge_without_air_is_an_unlikely_limb() {
+    let mut config = earth_sensor();
+    let limb = p_limb_of(&config, |km, _| limb_light(km));
+    let sharp = |km: f64, _: [f64; 2]| f64::from(u8::from(km < 0.0));
+    let ghost = p_limb_of(&config, sharp);
+    assert!(limb > 0.98 && ghost < 0.5, "{limb} {ghost}");
+    config.gates.min_p_limb = 0.75;
+    assert_eq!(p_limb_of(&config, |km, _| limb_light(km)), limb);
+    let refused = process(&config, &earth_edge(sharp));
     assert!(refused.solution.is_none(), "{:?}", refused.solution);
     assert!(refused.candidates.iter().any(|c| c.verdict == Verdict::Unlikely), "{:?}", refused.candidates);
     config.gates.min_p_limb = 0.0;
     // Rarer limbs make every edge less probable.
     config.gates.prior_odds = 0.01;
-    assert!(p_limb(&config, 4.0).unwrap() < 0.5 * limb);
+    assert!(p_limb_of(&config, |km, _| limb_light(km)) < 0.5 * limb);
     // The weights are those of the Earth.
     let moon = sensor(640, 480, 600.0);
     let config = Config { body: hzn_core::body::Config { altitude_km: Some(500.0), ..moon.body.clone() }, ..moon };

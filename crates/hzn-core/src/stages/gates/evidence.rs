@@ -4,7 +4,8 @@
 //! has the ground below it, with a second edge of its own.
 
 use super::case::Case;
-use super::places::{MAX_PLACES, Place, Places, mean_brightness};
+use super::places::{MAX_PLACES, Places, mean_brightness};
+use super::profile::{LEAST, Light, Values};
 use super::shape::Residuals;
 use super::sky::Sky;
 use super::turn::angle_rad;
@@ -47,8 +48,6 @@ const USUAL_BEND: f64 = 0.05;
 /// Part of the false edges whose direction is that of the limb: ghosts that match it, and airglow. The fit of the
 /// weights has the same part.
 const FOLLOWING: f64 = 0.4;
-/// Fewest places along the edge that must show something.
-const LEAST: usize = 3;
 
 /// Weighs the evidence. `None` if the picture is not of a kind for which the weights hold: without a fitted half-angle,
 /// and for a body without known air, because the weights come from pictures of the Earth.
@@ -72,8 +71,8 @@ pub(super) fn weigh<T: Real, P: Pixels, O: Observer<T>>(
     evidence.set(Term::Gaps, (one - case.cover.share) + (one - inliers).max(zero));
     let floor = T::from_f64(FLOOR_PX);
     evidence.set(Term::Misfit, (residuals.rms_px.max(floor) / residuals.noise_px.max(floor)).ln());
-    // Of a picture that came row by row, only lit and dark pixels are left.
-    if !P::STREAMED {
+    // Of a picture that came row by row, only lit and dark pixels are left. A thermal picture shows no sunlit air.
+    if !P::STREAMED && expected.is_in_sunlight {
         Looks::new(case, binary, places, sky).weigh(binary, places, &mut evidence);
     }
     if let Some((axis, sigma)) = &expected.predicted {
@@ -100,16 +99,10 @@ fn ln_ratio_of_direction<T: Real>(against: T) -> T {
     -(along + (T::one() - along) * against).ln()
 }
 
-/// Values from 0 on, one for each place along the edge.
-type Values<T> = heapless::Vec<T, MAX_PLACES>;
-
 /// What the picture shows on both sides of the edge.
 struct Looks<T> {
-    /// Height in metres to pixels, multiplied by the derivative of s·e by a pixel.
-    by_m: T,
-    scale_height_m: T,
-    /// Brightness of the sky without air, in counts. `shows_air` is false if it is unknown.
-    sky: T,
+    light: Light<T>,
+    /// Whether the brightness of the sky is known.
     shows_air: bool,
     /// Whether the camera is so high that a layer of airglow has a limb.
     is_above_layer: bool,
@@ -128,14 +121,12 @@ impl<T: Real> Looks<T> {
             / (c.max(T::from_f64(1e-6)) * (expected.radius_m + expected.limb_m).max(T::one()));
         let (altitude_m, _) = expected.altitude_and_sigma_m();
         let looks = Self {
-            by_m,
-            scale_height_m: expected.scale_height_m,
-            sky: sky.median,
+            light: Light { by_m, scale_height_m: expected.scale_height_m, sky: sky.median },
             shows_air: true,
             is_above_layer: altitude_m > expected.scale_height_m * T::from_f64(LAYER_SCALE_HEIGHTS),
         };
         let Some(middle) = places.get(places.len() / 2) else { return looks };
-        let dark_px = looks.scale_px(middle) * T::from_f64(DARK_SCALE_HEIGHTS);
+        let dark_px = looks.light.scale_px(middle) * T::from_f64(DARK_SCALE_HEIGHTS);
         if dark_px <= T::from_f64(NEAREST_PX) {
             return looks;
         }
@@ -144,13 +135,8 @@ impl<T: Real> Looks<T> {
             let _ = mean_brightness(place, -dark_px, binary).map(|b| far.push(b));
         }
         let shows_air = far.len() >= LEAST;
-        let sky = if shows_air { T::from_i32(median::median_of_counts(&far).into()) } else { looks.sky };
-        Self { sky, shows_air, ..looks }
-    }
-
-    /// Returns the scale height of the air at a place, in pixels.
-    fn scale_px(&self, place: &Place<T>) -> T {
-        self.scale_height_m * self.by_m / place.by_px
+        let sky = if shows_air { T::from_i32(median::median_of_counts(&far).into()) } else { looks.light.sky };
+        Self { light: Light { sky, ..looks.light }, shows_air, ..looks }
     }
 
     fn weigh<P: Pixels, O: Observer<T>>(
@@ -161,22 +147,23 @@ impl<T: Real> Looks<T> {
     ) {
         let (mut body, mut air, mut high) = (Values::new(), Values::new(), Values::new());
         for place in places {
-            let scale_px = self.scale_px(place);
+            let scale_px = self.light.scale_px(place);
             let off = scale_px * T::from_f64(SCALE_HEIGHTS);
             let shown = self.shows_air && scale_px >= T::from_f64(LEAST_SCALE_HEIGHT_PX);
             let inside = off.max(T::from_f64(if shown { 0.0 } else { INSIDE_PX }));
-            let Some(step) = self.above_sky(place, inside, binary) else { continue };
+            let Some(step) = self.light.above_sky(place, inside, binary) else { continue };
             let _ = body.push(step.max(T::ZERO));
             let part = |light: T| (light / step.max(T::one())).max(T::ZERO);
-            if shown && let Some(light) = self.above_sky(place, -off, binary) {
+            if shown && let Some(light) = self.light.above_sky(place, -off, binary) {
                 let _ = air.push(part(light));
-                let _ = self.above_sky(place, -(off + off), binary).map(|light| high.push(part(light)));
+                let _ = self.light.above_sky(place, -(off + off), binary).map(|light| high.push(part(light)));
             }
         }
         if self.shows_air && body.len() >= LEAST {
             let most = body.iter().fold(T::one(), |most, x| most.max(*x));
             let body = median::median_of_reals(&body, most);
-            evidence.set(Term::Sky, (self.sky / (self.sky + body).max(T::one())).max(T::ZERO));
+            evidence.set(Term::Sky, (self.light.sky / (self.light.sky + body).max(T::one())).max(T::ZERO));
+            self.light.mottled_sky(body, binary, places).iter().for_each(|x| evidence.set(Term::MottledSky, *x));
         }
         let ln_of = |values: &Values<T>, faintest: f64, usual: f64| {
             let part = (values.len() >= LEAST).then(|| median::median_of_reals(values, T::one()))?;
@@ -194,17 +181,9 @@ impl<T: Real> Looks<T> {
         {
             let usual = T::from_f64(USUAL_BEND);
             evidence.set(Term::Layer, ((usual + bend.min(T::one())) / usual).ln());
+            self.light.second_edge(binary, places).iter().for_each(|x| evidence.set(Term::SecondEdge, *x));
         }
-    }
-
-    /// Returns the brightness above the sky at a distance inwards of a place.
-    fn above_sky<P: Pixels, O: Observer<T>>(
-        &self,
-        place: &Place<T>,
-        inwards_px: T,
-        binary: &BinaryPicture<'_, T, P, O>,
-    ) -> Option<T> {
-        mean_brightness(place, inwards_px, binary).map(|b| T::from_i32(b.into()) - self.sky)
+        self.light.flatness(binary, places).iter().for_each(|x| evidence.set(Term::Flat, *x));
     }
 
     /// Returns the bend of the profile of the brightness below the edge that all places share: the largest value that
@@ -223,11 +202,12 @@ impl<T: Real> Looks<T> {
         // The smallest bend upwards and downwards at each depth, and the number of places that show it.
         let mut common = [([T::from_f64(9.0); 2], 0); BENDS];
         for place in places.iter().step_by(2) {
-            let step_px = T::from_f64(LAYER_STEP_M) * self.by_m / place.by_px;
+            let step_px = T::from_f64(LAYER_STEP_M) * self.light.by_m / place.by_px;
             if !(step_px > T::from_f64(LEAST_STEP_PX)) {
                 continue;
             }
-            let light = |k: i32| self.above_sky(place, step_px * T::from_i32(k), binary).map(|light| light.max(one));
+            let light =
+                |k: i32| self.light.above_sky(place, step_px * T::from_i32(k), binary).map(|light| light.max(one));
             let (Some(mut before), Some(mut here)) = (light(2), light(3)) else { continue };
             for (k, (least, looks)) in (4..).zip(&mut common) {
                 let Some(after) = light(k) else { break };

@@ -27,6 +27,7 @@ mod no_sky;
 mod out_of_view;
 mod places;
 mod polyline;
+mod profile;
 mod radius;
 mod rate;
 mod residuals;

@@ -61,6 +61,15 @@ pub(super) fn mean_brightness<T: Real, P: Pixels, O: Observer<T>>(
     inwards_px: T,
     binary: &BinaryPicture<'_, T, P, O>,
 ) -> Option<u16> {
+    u16::try_from(sum_of_nine(place, inwards_px, binary)? / 9).ok()
+}
+
+/// Returns the sum of the same nine pixels. In a dim picture, the whole counts of the mean would hide small steps.
+pub(super) fn sum_of_nine<T: Real, P: Pixels, O: Observer<T>>(
+    place: &Place<T>,
+    inwards_px: T,
+    binary: &BinaryPicture<'_, T, P, O>,
+) -> Option<u32> {
     let half = T::from_f64(0.5);
     let [x, y] = place.inwards_by(inwards_px).map(|at| at + half);
     if !(x >= T::one() && y >= T::one()) {
@@ -79,7 +88,7 @@ pub(super) fn mean_brightness<T: Real, P: Pixels, O: Observer<T>>(
             sum += u32::from(binary.brightness(u, v));
         }
     }
-    u16::try_from(sum / 9).ok()
+    Some(sum)
 }
 
 /// Distance from the limb at which the brightness on both sides is read for the threshold of the next picture, in
