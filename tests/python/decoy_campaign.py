@@ -5,9 +5,9 @@ the probability `p_limb`.
     python decoy_campaign.py --hzn target/release/hzn --flights 40 --first-seed 11000 --keep target/fitted --fit
 
 decoy_pictures.py and decoy_more.py paint the edges, limb_pictures.py the limbs; all 640x480, in flights of three
-pictures. The sensor has default settings and gets the position, and in a second run an attitude with errors of 5 degrees
-per axis as well. With --keep a campaign that was stopped continues after its last flight; if the program was built again,
-it processes the kept pictures again. With --check the program exits with 1 if the shares are too large.
+pictures. The sensor has default settings and gets the position, and in a second run an attitude with errors of 5
+degrees per axis as well. With --keep a campaign that was stopped continues after its last flight; if the program was
+built again, it processes the kept pictures again. With --check the program exits with 1 if the shares are too large.
 
 --fit prints the weights of the evidence (crates/hzn-core/src/model/evidence.rs): a logistic regression on the answers
 of the kinds that are not in HELD_OUT, without the gate on p_limb. Ghosts that are softer than 0.8 scale heights of the

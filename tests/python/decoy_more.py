@@ -1,5 +1,5 @@
-"""More kinds of edges that are no limb, for decoy_pictures.py. They have another look than the first sixteen: light from
-one side, relief, spirals, branches. `KINDS` of decoy_pictures.py has them, too."""
+"""More kinds of edges that are no limb, for decoy_pictures.py. They have another look than the first sixteen: light
+from one side, relief, spirals, branches. `KINDS` of decoy_pictures.py has them, too."""
 
 import math
 

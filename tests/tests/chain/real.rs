@@ -99,6 +99,23 @@ fn iss_limb_over_broken_cloud_reduced() {
     assert!(f.error_deg(a.axis) <= 1e-3, "{}°", f.error_deg(a.axis));
 }
 
+/// The limit 0.75 for the probability of the limb must not refuse a photograph of it, in either precision.
+#[test]
+fn photographs_of_the_limb_are_probable() {
+    let files = ["iss-limb-2020-11-20.jpg", "iss064e002941-solar-array.jpg"];
+    let full = files.map(|file| format!("full/{file}"));
+    for file in files.into_iter().chain(["opssat-2020-08-16.png"]).chain(full.iter().map(String::as_str)) {
+        let photograph = Photograph::load(file);
+        let mut sensors = Sensors::new(&photograph.sensor);
+        let expected = sensors.host.expect(&Prior::default()).expect("the prior is possible");
+        let host = sensors.host.process(&photograph.view(), &expected).solution.and_then(|s| s.p_limb);
+        let expected = sensors.flight.expect(&Prior::default()).expect("the prior is possible");
+        let flight = sensors.flight.process(&photograph.view(), &expected).solution.and_then(|s| s.p_limb);
+        println!("{file}: {host:.4?} {flight:.4?}");
+        assert!(host.is_some_and(|p| p > 0.95) && flight.is_none_or(|p| p > 0.95), "{file}: {host:?}");
+    }
+}
+
 #[test]
 fn iss_limb_is_the_same_at_both_sizes() {
     let answers = ["full/iss-limb-2020-11-20.jpg", "iss-limb-2020-11-20.jpg"].map(|file| {

@@ -1,7 +1,8 @@
 //! The evidence that an edge is the limb, and the probability that follows from it.
 //!
 //! The logarithm of the odds is ln(prior odds) + b + Σ w x, where x are the values of the terms. A term that the
-//! picture does not show adds nothing. The weights come from a logistic regression (`tests/python/decoy_campaign.py --fit`).
+//! picture does not show adds nothing. The weights come from a logistic regression
+//! (`tests/python/decoy_campaign.py --fit`).
 
 use crate::base::real::Real;
 

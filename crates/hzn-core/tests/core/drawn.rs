@@ -218,8 +218,8 @@ fn a_camera_below_the_airglow_sees_no_glow() {
     assert!(above.solution.is_none(), "{:?}", above.solution);
 }
 
-/// Draws an edge in the place of the Earth's limb from 400 km. `light` is the brightness above the sky, as a part of that
-/// of the body, at a height above the edge in km and at an image point.
+/// Draws an edge in the place of the Earth's limb from 400 km. `light` is the brightness above the sky, as a part of
+/// that of the body, at a height above the edge in km and at an image point.
 fn earth_edge(light: impl Fn(f64, [f64; 2]) -> f64) -> Vec<u8> {
     let (half_angle_deg, per_px) = ((6388.0 / 6771.0f64).asin().to_degrees(), 1.0 / 1200f64);
     let axis = unit([0.1, 0.94, 0.33]);

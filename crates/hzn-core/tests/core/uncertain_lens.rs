@@ -39,6 +39,8 @@ fn sensor(k1_sigma: f64) -> Config {
     let mut config = Config::new(camera);
     config.body.kind = Kind::EarthSphere;
     (config.body.altitude_km, config.body.altitude_sigma_km) = (Some(500.0), 5.0);
+    // A drawn limb is flat and has no air, as a ghost.
+    config.gates.min_p_limb = 0.0;
     config
 }
 

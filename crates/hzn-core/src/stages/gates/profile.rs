@@ -87,8 +87,8 @@ impl<T: Real> Light<T> {
     /// Returns how much the light falls below the edge, multiplied by the logarithm of its largest bend between 70 and
     /// 130 km below the edge over its usual bend and unevenness. `None` if the picture does not resolve the depths.
     ///
-    /// The bend is the second difference of ln b, and the median of its amount along the edge: cities and moonlight make
-    /// the ground brighter than the layer at some places, and darker at others. A layer of airglow has no clouds.
+    /// The bend is the second difference of ln b, and the median of its amount along the edge: cities and moonlight
+    /// make the ground brighter than the layer at some places, and darker at others. A layer of airglow has no clouds.
     pub(super) fn second_edge<P: Pixels, O: Observer<T>>(
         &self,
         binary: &BinaryPicture<'_, T, P, O>,
