@@ -73,7 +73,7 @@
 #define HZN_TRUNCATED 7
 
 // Version of the structures and functions of this header. hzn_open compares it with that of the library.
-#define HZN_INTERFACE 4
+#define HZN_INTERFACE 3
 
 // Bytes that a sensor needs which fits 2048 points of an edge, on every machine.
 #define HZN_WORKSPACE_SIZE 114688

@@ -79,7 +79,7 @@ pub const HZN_REJECTED: i32 = 6;
 pub const HZN_TRUNCATED: i32 = 7;
 
 /// Version of the structures and functions of this header. `hzn_open` compares it with that of the library.
-pub const HZN_INTERFACE: u32 = 4;
+pub const HZN_INTERFACE: u32 = 3;
 /// Bytes that a sensor needs which fits 2048 points of an edge, on every machine.
 pub const HZN_WORKSPACE_SIZE: usize = 114688;
 /// Bytes that a sensor needs which fits 608 points of an edge: enough for the default of `edge_points.keep_points`,
