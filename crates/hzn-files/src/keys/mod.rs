@@ -124,7 +124,8 @@ fn format_number(x: f64) -> String {
 /// Returns the defaults as TOML, by section.
 fn defaults() -> toml::Table {
     use hzn_core::camera::{Config, Model};
-    let config = hzn_core::Config::new(Config::ideal(Model::default(), 2, 2, 1.0));
+    // In pixels as narrow as those of usual cameras: some defaults are smaller in wider ones.
+    let config = hzn_core::Config::new(Config::ideal(Model::default(), 2, 2, 1000.0));
     let mut table = toml::Table::try_from(config).unwrap_or_default();
     // A camera has no defaults.
     table.remove("camera");

@@ -237,15 +237,15 @@ class Covariance(TypedDict, total=False):
     or the values below (``told``). Default: "rms"."""
     sigma_px: float
     """1σ of an edge point, px; raised to the RMS of the residuals if that is larger. Values: above 0 to 10000 px.
-    Default: 0.062."""
+    Default: 0.1."""
     correlation_px: float
     """Correlation length of the errors of edge points along the edge, px; 0 for white errors. Values: 0 to 1e6 px.
-    Default: 0.6521739130434783."""
+    Default: 60.0."""
     bias_px: float
-    """1σ of a shift that all points of an edge have in common, px. Values: 0 to 10000 px. Default: 0.062."""
+    """1σ of a shift that all points of an edge have in common, px. Values: 0 to 10000 px. Default: 0.3."""
     tilt_px: float
     """1σ of a tilt that the whole edge has in common, px: an error that goes from −1 to 1 times this value along the
-    edge. Values: 0 to 10000 px. Default: 0.0010869565217391304."""
+    edge. Values: 0 to 10000 px. Default: 0.1."""
     bend_px: float
     """1σ of a bend that the whole edge has in common, px: an error that is this value at both ends of the edge, and
     minus half of it in the middle. Values: 0 to 10000 px. Default: 0.0."""
