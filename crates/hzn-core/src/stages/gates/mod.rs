@@ -132,8 +132,8 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     hidden::refuse(case)?;
     side::refuse(case)?;
     // The weights are those of sunlit limbs, for which a layer of airglow is evidence against the limb.
-    let is_weighed = !case.expected.is_airglow;
-    let evidence = is_weighed.then(|| evidence::weigh(case, binary, &places, &sky, &residuals)).flatten();
+    let evidence =
+        if case.expected.is_airglow { None } else { evidence::weigh(case, binary, &places, &sky, &residuals) };
     evidence.iter().for_each(|evidence| binary.observer.evidence(case.number, evidence));
     let p_limb = unlikely::refuse(case, evidence.as_ref())?;
     Ok(Passed { glows, p_limb })
