@@ -4,6 +4,7 @@ import csv
 import math
 import subprocess
 
+import numpy as np
 import pytest
 
 import hzn

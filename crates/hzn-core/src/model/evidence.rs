@@ -90,11 +90,15 @@ impl Term {
     }
 }
 
-/// Weights of the terms in their order. The values of attitude and Sun are likelihood ratios already.
-const WEIGHTS: [f64; TERMS] =
-    [0.64, -0.40, -2.03, -0.61, -0.52, 1.91, -3.40, 1.20, -1.84, -3.69, 2.34, -1.55, 1.0, 1.0];
+/// Weights of the terms in their order, in hundredths. The values of attitude and Sun are likelihood ratios already.
+// Whole numbers: a flight computer without double precision would convert each number in software.
+const WEIGHTS_PERCENT: [i16; TERMS] = [64, -40, -203, -61, -52, 191, -340, 120, -184, -369, 234, -155, 100, 100];
 /// The constant b.
 const CONSTANT: f64 = 2.49;
+
+fn weight<T: Real>(percent: i16) -> T {
+    T::from_i32(percent.into()) / T::from_i32(100)
+}
 
 /// The evidence that an edge is the limb.
 #[derive(Debug, Clone, Copy)]
@@ -120,16 +124,16 @@ impl<T: Real> Evidence<T> {
 
     /// Returns the logarithm of a term's likelihood ratio, except for a constant; 0 without a value.
     pub fn ln_ratio(&self, term: Term) -> T {
-        let weight = WEIGHTS.get(term as usize).copied().unwrap_or(0.0);
-        self.value(term).map_or(T::ZERO, |value| value * T::from_f64(weight))
+        let percent = WEIGHTS_PERCENT.get(term as usize).copied().unwrap_or(0);
+        self.value(term).map_or(T::ZERO, |value| value * weight(percent))
     }
 
     /// Returns the logarithm of the likelihood ratio of all terms.
     pub fn ln_ratio_of_all(&self) -> T {
         self.values
             .iter()
-            .zip(WEIGHTS)
-            .filter_map(|(value, weight)| value.map(|x| x * T::from_f64(weight)))
+            .zip(WEIGHTS_PERCENT)
+            .filter_map(|(value, percent)| value.map(|x| x * weight(percent)))
             .fold(T::from_f64(CONSTANT), |sum, x| sum + x)
     }
 
