@@ -1,7 +1,7 @@
 //! Whether another lens model explains the same points far better.
 //!
 //! The covariance of a lens has the disagreement between pictures. What a wrong model bends in all of them alike is not
-//! in it: a fisheye that was calibrated as an ideal equidistant lens had answers with a mean NEES of 4 to 25.
+//! in it, so that the answers with such a lens are wrong by many sigmas.
 
 use hzn_core::camera::Model;
 

@@ -8,7 +8,7 @@
 //! The columns are those of the foot of the point, the nearest point of the limb. There they are the exact derivatives
 //! of the distance, and they do not depend on the error of the point. Columns at the point itself change with r by r/f
 //! and more. Their products with r then have the mean Σ r²/f, which no number of pictures averages out. Where a common
-//! bend of all edges is an unknown, too, that mean made the focal length 0.6 % to 1 % too long, 1 to 1.5 sigma.
+//! bend of all edges is an unknown, too, that mean makes the focal length too long by more than its sigma.
 //!
 //! Edge errors are correlated. The variance of a point is therefore raised until the fitted cos α has the variance that
 //! the noise models of the picture give it. cos α has the lowest spatial frequency of what is left without the axis. As

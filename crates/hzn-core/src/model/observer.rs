@@ -65,7 +65,7 @@ pub trait Observer<T> {
     /// A dark frame of `px` pixels lies around the picture and does not count from now on.
     fn dark_frame(&self, _px: u16) {}
     /// The limb was not found where the last answer puts it, or not without a doubt: the whole picture is searched, and
-    /// what was shown of this picture so far is void.
+    /// everything that was shown of this picture before is void.
     fn begin_again(&self) {}
     /// A further look at a picture without an answer begins: its number (1 for the second look) and its threshold in
     /// counts.

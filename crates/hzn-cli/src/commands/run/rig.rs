@@ -100,7 +100,7 @@ const INCONSISTENT: &str = "inconsistent";
 const DOUBTFUL_EPOCHS: u64 = 3;
 const DOUBTFUL_SHARE: f64 = 0.03;
 
-/// Returns whether so many contradictions make the answers of the other epochs doubtful.
+/// Returns whether the answers of the other epochs are doubtful after this number of contradictions.
 fn casts_doubt(contradicting: u64, joint: &Counts) -> bool {
     let (epochs, answers) = (joint.iter().sum::<u64>() as f64, joint[Status::Ok as usize]);
     contradicting >= DOUBTFUL_EPOCHS && contradicting as f64 > DOUBTFUL_SHARE * epochs && answers > 0
