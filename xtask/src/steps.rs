@@ -1,6 +1,7 @@
 //! Runs named steps, measures their time and prints a complete summary.
 
 use std::ffi::OsString;
+use std::fmt;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -86,7 +87,7 @@ pub(crate) struct Steps {
     /// Whether a step that cannot run counts as a failure.
     strict: bool,
     began: Instant,
-    done: Vec<(&'static str, Duration, Outcome)>,
+    done: Vec<(&'static str, Cost, Outcome)>,
     passed: u64,
     failed: u64,
 }
@@ -109,19 +110,20 @@ impl Steps {
 
     fn run_step(&mut self, Step { name, run, .. }: &Step) {
         println!("\n== {name}");
-        let start = Instant::now();
+        let (start, used) = (Instant::now(), processor_seconds());
         let outcome = run(self);
-        let time = start.elapsed();
+        let cost =
+            Cost { time: start.elapsed(), processor_s: processor_seconds().zip(used).map(|(now, then)| now - then) };
         let word = match &outcome {
             Ok(()) => "ok",
             Err(Trouble::Failed(_)) => "FAILED",
             Err(Trouble::Missing(_)) => "left out",
         };
-        println!("== {name}: {word} ({:.1} s)", time.as_secs_f64());
+        println!("== {name}: {word} ({cost})");
         if let Err(Trouble::Failed(why) | Trouble::Missing(why)) = &outcome {
             println!("   {why}");
         }
-        self.done.push((name, time, outcome));
+        self.done.push((name, cost, outcome));
     }
 
     /// Runs `cargo test` with arguments and adds up its result lines.
@@ -153,13 +155,13 @@ impl Steps {
     fn conclude(self) -> Result<(), String> {
         let mut wrong = 0;
         println!("\nsummary, {:.0} s in all", self.began.elapsed().as_secs_f64());
-        for (name, time, outcome) in &self.done {
+        for (name, cost, outcome) in &self.done {
             let (word, why) = match outcome {
                 Ok(()) => ("ok      ", ""),
                 Err(Trouble::Failed(why)) => ("FAILED  ", why.as_str()),
                 Err(Trouble::Missing(why)) => ("left out", why.as_str()),
             };
-            println!("  {word} {:7.1} s  {name}{}{why}", time.as_secs_f64(), if why.is_empty() { "" } else { ": " });
+            println!("  {word} {cost}  {name}{}{why}", if why.is_empty() { "" } else { ": " });
             let counts = match outcome {
                 Ok(()) => false,
                 Err(Trouble::Failed(_)) => true,
@@ -176,6 +178,29 @@ impl Steps {
             n => Err(format!("{n} of {} steps did not succeed", self.done.len())),
         }
     }
+}
+
+/// What a step took.
+struct Cost {
+    time: Duration,
+    /// Time of all processors together, s, where the system tells it: it says what a step costs on a busy machine, too.
+    processor_s: Option<f64>,
+}
+
+impl fmt::Display for Cost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:7.1} s", self.time.as_secs_f64())?;
+        self.processor_s.map_or(Ok(()), |used| write!(f, ", {used:7.1} s of processors"))
+    }
+}
+
+/// Returns the processor time of all programs that this one has run to their end, s. Linux tells it in hundredths.
+fn processor_seconds() -> Option<f64> {
+    let line = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The name of the program, in brackets, may contain spaces. Fields 16 and 17 of proc(5) are user and system time.
+    let fields: Vec<_> = line.rsplit(')').next()?.split_whitespace().collect();
+    let ticks = |at: usize| fields.get(at)?.parse::<f64>().ok();
+    Some((ticks(13)? + ticks(14)?) / 100.0)
 }
 
 /// Returns the numbers of passed and failed tests in a line like `test result: ok. 12 passed; 0 failed; ...`.

@@ -1,10 +1,14 @@
 //! What is odd about the pictures of a run. It is counted while the run goes on, and told once at its end.
 
+mod rates;
+
 use hzn_core::body::PriorError;
 use hzn_core::status::Status;
 use hzn_files::Frames;
 use hzn_run::engine::{BodyOutcome, Finished};
 use hzn_run::explain;
+
+pub(crate) use rates::Rates;
 
 use crate::tell;
 

@@ -19,7 +19,11 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::NoConsensus => "too few edge points agree on one limb".into(),
         Verdict::FewInliers => format!("fewer than {} inliers (gates.min_inliers)", s.min_inliers),
         Verdict::ShortArc => short_arc_text(s.min_arc_px),
-        Verdict::Residuals => format!("rms above {} px (gates.max_rms_px)", s.max_rms_px),
+        Verdict::Residuals => format!(
+            "rms above {} px (gates.max_rms_px), or, without a known distance, above the noise of the edge: any smooth \
+             curve is near some cone",
+            s.max_rms_px
+        ),
         Verdict::HalfAngle => format!(
             "half-angle more than {} sigma from the expected one (gates.max_half_angle_sigma)",
             s.max_half_angle_sigma

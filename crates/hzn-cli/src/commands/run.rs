@@ -20,7 +20,7 @@ use hzn_run::{disk, explain};
 pub(super) use args::{Args, cores};
 
 use super::resume;
-use crate::doubts::{MissingPriors, MultiPageFiles, Times};
+use crate::doubts::{MissingPriors, MultiPageFiles, Rates, Times};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
@@ -174,6 +174,7 @@ struct Watch {
     tipped: bool,
     missing: MissingPriors,
     times: Times,
+    rates: Rates,
     refusals: Refusals,
     multi_page: MultiPageFiles,
     /// Number of pictures that could not be read.
@@ -193,6 +194,7 @@ impl Watch {
             tipped: quiet,
             missing: MissingPriors::default(),
             times: Times::default(),
+            rates: Rates::default(),
             refusals: Refusals::default(),
             multi_page: MultiPageFiles::default(),
             unreadable: 0,
@@ -202,6 +204,7 @@ impl Watch {
     fn see(&mut self, frame: &Finished) {
         self.missing.count(frame);
         self.times.count(frame);
+        self.rates.count(frame);
         self.refusals.count(frame);
         self.multi_page.count(frame);
         if let Some(tip) = frame.tip.as_ref().filter(|_| !self.tipped) {
@@ -230,6 +233,7 @@ impl Watch {
     fn tell(&self, frames: Option<&Frames>) {
         self.missing.tell(frames);
         self.times.tell();
+        self.rates.tell();
         self.multi_page.tell();
     }
 

@@ -92,6 +92,30 @@ fn half_of_what_a_rolling_shutter_needs_is_told() {
 }
 
 #[test]
+fn rates_that_contradict_the_answers_are_told() {
+    let place = Place::new();
+    for i in 0..7 {
+        let path = place.path(&format!("in/{i:04}.png"));
+        // The camera turns up by half a degree from picture to picture.
+        limb(320, 240, 10.0 * f64::from(i)).save_with_format(path, ImageFormat::Png).unwrap();
+    }
+    let with = |rate_x: f64| {
+        let row = |i| format!("{i:04}.png,{i},400,{rate_x},0,0\n");
+        let rows: String = (0..7).map(row).collect();
+        let table = format!("file,time_s,altitude_km,rate_x,rate_y,rate_z\n{rows}");
+        place.write("in/frames.csv", table.as_bytes());
+        place.run(&["run", "in"]).expect(0).err
+    };
+    let right = with(0.5f64.to_radians());
+    assert!(!right.contains("the rates miss"), "{right}");
+    let degrees = with(0.5);
+    assert!(degrees.contains("the axis turns by 0.50 deg from answer to answer, and the rates miss"), "{degrees}");
+    assert!(degrees.contains("are they in degrees per second?"), "{degrees}");
+    let negated = with(-0.5f64.to_radians());
+    assert!(negated.contains("do they have the opposite sign?"), "{negated}");
+}
+
+#[test]
 fn names_with_a_leading_dot_are_names_of_the_folder() {
     let place = Place::with_pictures(2);
     place.write("in/frames.csv", b"file,altitude_km,time_s\n./0000.png,400,5\n././0001.png,400,6\n");
