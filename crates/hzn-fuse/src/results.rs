@@ -227,6 +227,8 @@ pub struct Counts {
     pub waiting: usize,
     /// How often the filter began again.
     pub restarts: usize,
+    /// How often of these because the measurements refused its attitude, and not because it was unknown.
+    pub restarts_when_wrong: usize,
 }
 
 impl Counts {

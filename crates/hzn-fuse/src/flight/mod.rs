@@ -1,6 +1,7 @@
 //! The replay of a flight.
 
 mod first;
+mod lost;
 mod runner;
 
 use hzn_nav::frames::{Cam, Rotation, Vehicle};
@@ -92,6 +93,7 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     fused.cameras = names.clone();
     counts.before_start = fused.counts.before_start;
     counts.restarts = fused.counts.restarts;
+    counts.restarts_when_wrong = fused.counts.restarts_when_wrong;
     counts.waiting = fused.counts.waiting;
     counts.without_reference = fused.counts.without_reference;
     for ((source, why), count) in std::mem::take(&mut fused.counts.unusable) {

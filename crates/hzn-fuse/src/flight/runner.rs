@@ -1,15 +1,15 @@
 //! The filter over the samples and measurements of a flight.
 
 use hzn_nav::filter::{DirectionMeasurement, Filter, Unusable};
-use hzn_nav::frames::{Covariance, Rotation, Vector, Vehicle};
+use hzn_nav::frames::{Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::gravity::gravity;
-use hzn_nav::layout::Layout;
 use hzn_nav::options::{CameraOptions, StartSigmas};
 use hzn_nav::strapdown::{Imu, Nominal};
 use hzn_nav::vectors::{Direction, triad};
 use nalgebra::SMatrix;
 
 use super::first::{first_attitude, sight_sigma};
+use super::lost::{Lost, refused_in_a_row};
 use crate::data::Flight;
 use crate::error::Error;
 use crate::events::{Event, Source, mix};
@@ -23,10 +23,6 @@ use crate::track::Track;
 
 /// Longest time between limb and Sun for a pair without the filter, s.
 const PAIR_S: f64 = 0.6;
-/// Fewest directions to one body in a row whose refusal shows that the attitude is lost.
-const FEWEST_REFUSED: usize = 5;
-/// 1-sigma of the attitude above which directions are not taken one by one, rad (15°).
-const LARGE_RAD: f64 = 0.26;
 
 /// Whether the filter could use a measurement, or why not.
 type Used = Result<(), &'static str>;
@@ -55,6 +51,9 @@ pub(super) struct Runner<'a, const N: usize> {
     sights: Vec<Sight>,
     /// Directions since the last (new) start: their body, and whether the gate took them.
     verdicts: Vec<(Body, bool)>,
+    /// The same for the attitudes of a star tracker.
+    attitude_verdicts: Vec<bool>,
+    lost: Lost,
     record: bool,
     recorded: Vec<Recorded<N>>,
     track: Track,
@@ -92,6 +91,8 @@ impl<'a, const N: usize> Runner<'a, N> {
             last: None,
             sights: Vec::new(),
             verdicts: Vec::new(),
+            attitude_verdicts: Vec::new(),
+            lost: Lost::default(),
             record,
             recorded: Vec::new(),
             track: Track::default(),
@@ -149,10 +150,14 @@ impl<'a, const N: usize> Runner<'a, N> {
 
     fn predict(&mut self, imu: &Imu, saturated: bool) {
         let imu = &self.usable(imu, &self.filter);
-        if self.record {
-            self.filter.predict_recorded(imu, saturated, &mut self.transition);
+        let step = if self.record {
+            self.filter.predict_recorded(imu, saturated, &mut self.transition)
         } else {
-            self.filter.predict(imu, saturated);
+            self.filter.predict(imu, saturated)
+        };
+        if self.lost.see(step, &self.filter) {
+            // How the vehicle has turned since these sights is not known.
+            self.sights.clear();
         }
         if let Some(last) = self.last {
             self.unaided = self.unaided.step(&last, imu);
@@ -286,7 +291,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         self.pair(&sight);
         self.sights.push(sight);
         self.sights.retain(|s| s.time_s > time_s - self.settings.start.window_s);
-        if self.is_attitude_unknown() {
+        if self.lost.is_unknown(&self.filter) {
             // The equations of the update hold for small angles; they would spoil the mounts.
             self.out.counts.waiting += 1;
             self.begin_again(time_s, "the attitude was not known any more", false);
@@ -303,11 +308,6 @@ impl<'a, const N: usize> Runner<'a, N> {
         self.verdicts.push((seen.body, done.taken));
         self.restart_if_lost(time_s, seen.body);
         Ok(())
-    }
-
-    /// Returns whether the attitude is less well known than the filter's equations can take.
-    fn is_attitude_unknown(&self) -> bool {
-        self.filter.sigmas(Layout::ATTITUDE).max() > LARGE_RAD
     }
 
     /// Takes the position of the body's centre.
@@ -349,11 +349,8 @@ impl<'a, const N: usize> Runner<'a, N> {
                 return self.begin_again(time_s, &format!("{refused} of {many} directions were refused"), true);
             }
         }
-        let own = || self.verdicts.iter().rev().filter(|(b, _)| *b == body);
-        let in_a_row = own().take_while(|(_, taken)| !taken).count();
-        // The more often this body confirmed the attitude, the more it takes to give the attitude up.
-        let confirmed = own().filter(|(_, taken)| *taken).count();
-        if in_a_row >= confirmed.clamp(FEWEST_REFUSED, many.max(FEWEST_REFUSED)) {
+        let own = self.verdicts.iter().filter(|(b, _)| *b == body).map(|(_, taken)| *taken);
+        if let Some(in_a_row) = refused_in_a_row(own, many) {
             let why = format!("{in_a_row} directions in a row to the {} were refused", body.name());
             self.begin_again(time_s, &why, true);
         }
@@ -364,16 +361,35 @@ impl<'a, const N: usize> Runner<'a, N> {
     fn begin_again(&mut self, time_s: f64, why: &str, was_wrong: bool) {
         let Sighted::Attitude(wahba, _) = attitude(&self.sights, &self.reckoning) else { return };
         let least = Covariance::isotropic(self.settings.start.attitude_deg.to_radians().powi(2));
-        self.filter.set_attitude(&wahba.attitude, &(wahba.covariance_rad2 + least));
+        self.begin_at(time_s, &wahba.attitude, &(wahba.covariance_rad2 + least), why, was_wrong);
+    }
+
+    /// Begins again with an attitude and its covariance.
+    fn begin_at(
+        &mut self,
+        time_s: f64,
+        attitude: &Rotation<Vehicle, Fixed>,
+        covariance_rad2: &Covariance<Fixed>,
+        why: &str,
+        was_wrong: bool,
+    ) {
+        self.filter.set_attitude(attitude, covariance_rad2);
+        self.lost = Lost::default();
         self.verdicts.clear();
+        self.attitude_verdicts.clear();
         self.begins = true;
         self.track.restarts.push((self.track.states.len(), was_wrong));
         self.out.counts.restarts += 1;
-        self.out.notes.push(format!("at {time_s:.1} s the filter began again: {why}"));
+        self.out.counts.restarts_when_wrong += usize::from(was_wrong);
+        // While the samples stay saturated, it begins again with each measurement: one note is enough.
+        if !self.out.notes.last().is_some_and(|last| last.ends_with(why)) {
+            self.out.notes.push(format!("at {time_s:.1} s the filter began again: {why}"));
+        }
     }
 
     fn measure_fix(&mut self, time_s: f64, index: usize) -> Used {
         let Some(fix) = self.flight.inputs.gnss.get(index) else { return Ok(()) };
+        self.lost.keep_from_receiver(&mut self.filter);
         let [position_sigma, velocity_sigma] = self.settings.fix_sigmas(fix);
         let done = self.filter.update_position(&fix.position_m, position_sigma).map_err(Unusable::as_str)?;
         self.keep(time_s, None, Kind::Position, &done);
@@ -387,8 +403,20 @@ impl<'a, const N: usize> Runner<'a, N> {
     fn measure_attitude(&mut self, time_s: f64, index: usize) -> Used {
         let Some(seen) = self.flight.inputs.attitudes.get(index) else { return Ok(()) };
         let attitude = seen.fixed_from_vehicle.ok_or("qw, qx, qy, qz are not a unit quaternion")?;
+        let covariance_rad2 = Covariance::isotropic(seen.sigma_rad.powi(2));
+        if self.lost.is_unknown(&self.filter) {
+            let why = "an attitude of the star tracker came after the attitude was not known any more";
+            self.begin_at(time_s, &attitude, &covariance_rad2, why, false);
+            return Ok(());
+        }
         let done = self.filter.update_attitude(&attitude, seen.sigma_rad).map_err(Unusable::as_str)?;
         self.keep(time_s, None, Kind::Attitude, &done);
+        self.attitude_verdicts.push(done.taken);
+        let many = self.settings.restart_after as usize;
+        if let Some(in_a_row) = refused_in_a_row(self.attitude_verdicts.iter().copied(), many) {
+            let why = format!("{in_a_row} attitudes of the star tracker in a row were refused");
+            self.begin_at(time_s, &attitude, &covariance_rad2, &why, true);
+        }
         Ok(())
     }
 

@@ -34,9 +34,12 @@ pub(super) fn test(fused: &Fused, cameras: &[CameraOptions], options: &Options) 
     for ((camera, kind), innovations) in &by_source(fused) {
         all.extend(source(fused, *camera, *kind, innovations));
     }
-    let restarts = fused.counts.restarts;
+    let restarts = fused.counts.restarts_when_wrong;
     if restarts > RESTARTS {
-        let what = format!("the filter began again {restarts} times: the directions do not stay with one attitude");
+        let what = format!(
+            "the filter began again {restarts} times, because its attitude was refused: the directions do not stay with \
+             one attitude"
+        );
         all.push(Finding { level: Level::Contradicts, cause: Cause::Unknown, source: Source::All, what });
     }
     all

@@ -4,6 +4,7 @@ use crate::common::{Draws, Slow, scene};
 use hzn_fuse::finding::{Cause, Level};
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{Attitude, Inputs};
+use hzn_fuse::results::Kind;
 use hzn_fuse::settings::{ErrorSetting, Treatment};
 use hzn_fuse::simulated::inputs;
 use hzn_fuse::{Fused, Settings, fuse, truth};
@@ -53,6 +54,41 @@ fn a_star_tracker_replaces_receiver_and_cameras() {
         let sigma_m = fused.epochs.last().unwrap().position_covariance_m2.as_inner().trace().sqrt();
         assert!(sigma_m > 6e6, "the position is not known: {sigma_m} m");
     }
+}
+
+/// The spin saturates the gyros for a quarter of a minute. How the vehicle turned meanwhile is not known, so the next
+/// attitude of the star tracker begins the filter again, with cameras and without, however often attitudes come.
+#[test]
+fn a_star_tracker_finds_the_attitude_again_after_saturated_gyros() {
+    for (seed, step_s) in [(3, 1.0), (4, 2.5), (5, 10.0)] {
+        let scene = scene(seed);
+        let mut all = inputs(&scene, &mut Slow::new(seed, 0.1), 0.0).unwrap();
+        all.attitudes = tracked(&scene, (1..(429.0 / step_s) as u32).map(|k| step_s * f64::from(k)));
+        let with_cameras = fly(&all, &Settings::default());
+        all.recordings.clear();
+        for fused in [with_cameras, fly(&all, &Settings::default())] {
+            let refused = fused.innovations.iter().filter(|i| i.kind == Kind::Attitude && !i.taken).count();
+            let (nees, _) = scored(&fused, &scene);
+            println!("every {step_s} s: {refused} refused, NEES {nees:.2}, {:?}", fused.notes);
+            assert!(fused.counts.saturated > 100, "the spin saturates the gyros");
+            assert!(refused as f64 * step_s < 10.0, "{refused} right attitudes are refused");
+            assert!(nees < 6.0 && fused.counts.restarts >= 1, "{nees}");
+            assert_eq!(fused.verdict.level(), Level::Consistent, "{:?}", fused.verdict);
+        }
+    }
+}
+
+/// A hole of a minute in the samples: the directions afterwards find the attitude again, and none of them is to blame.
+#[test]
+fn a_hole_in_the_samples_is_no_contradiction() {
+    let scene = scene(1);
+    let mut all = inputs(&scene, &mut Slow::new(1, 0.1), 0.0).unwrap();
+    all.imu.retain(|s| !(200.0..260.0).contains(&s.imu.time_s));
+    let fused = fly(&all, &Settings::default());
+    let (nees, _) = scored(&fused, &scene);
+    println!("NEES {nees:.2}, {:?}, {:?}", fused.notes, fused.verdict);
+    assert!(nees < 6.0 && fused.counts.gaps == 1, "{nees}");
+    assert_eq!(fused.verdict.level(), Level::Consistent, "{:?}", fused.verdict);
 }
 
 /// The inertial unit of the scene `rocket` is 30 times worse than that of the paper, whose table the defaults are: its

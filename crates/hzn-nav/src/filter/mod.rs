@@ -152,6 +152,8 @@ pub struct Filter<const N: usize> {
     layout: Layout,
     covariance: SMatrix<f64, N, N>,
     last_imu: Option<Imu>,
+    /// How long the samples have been saturated or missing without a break, at most the time of [`predict`], s.
+    gap_s: f64,
 }
 
 impl<const N: usize> Filter<N> {
@@ -175,6 +177,7 @@ impl<const N: usize> Filter<N> {
             layout,
             covariance: SMatrix::zeros(),
             last_imu: None,
+            gap_s: 0.0,
         };
         for (slot, options) in filter.cameras.iter_mut().zip(cameras) {
             *slot = Some(Camera {

@@ -13,6 +13,9 @@ use crate::gravity::{earth_rate, gradient};
 use crate::layout::Layout;
 use crate::strapdown::Imu;
 
+/// Longest time during which an unknown rate or force is taken to be the same, s. The sigma of the attitude is then that
+/// of the rate times one second, for any number of samples a second, and grows on with the square root of the time.
+const LONGEST_SAME_S: f64 = 1.0;
 /// Number of vehicle components.
 const V: usize = Layout::VEHICLE;
 
@@ -125,6 +128,7 @@ impl<const N: usize> Filter<N> {
         }
         // The errors grow in both directions of time.
         let noise = self.process_noise(libm::fabs(dt), gap);
+        self.gap_s = if gap { (self.gap_s + libm::fabs(dt)).min(LONGEST_SAME_S) } else { 0.0 };
         // The noise enters during the step: half before it, half after it.
         let noise = (transition * noise * transition.transpose() + noise) * 0.5;
         let vehicle = moved * rows.transpose() + noise;
@@ -179,8 +183,8 @@ impl<const N: usize> Filter<N> {
     fn process_noise(&self, dt: f64, gap: bool) -> SMatrix<f64, V, V> {
         let imu = &self.options.imu;
         let sum = |[white, tuning]: [f64; 2]| (white * white + tuning * tuning) * dt;
-        // A wrong rate is the same during the whole gap.
-        let constant = |sigma: f64| if gap { (sigma * dt) * (sigma * dt) } else { 0.0 };
+        // A wrong rate is the same from sample to sample: its angle grows with the time, and not with its root.
+        let constant = |sigma: f64| if gap { sigma * sigma * dt * (dt + 2.0 * self.gap_s) } else { 0.0 };
         let (turn, speed) =
             (sum(imu.gyro_noise) + constant(imu.gap_rate_rad_s), sum(imu.accel_noise) + constant(imu.gap_accel_m_s2));
         let mut noise = SMatrix::<f64, V, V>::zeros();
