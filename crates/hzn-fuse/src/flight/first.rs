@@ -38,6 +38,7 @@ pub(super) fn first_attitude(
     let mut sights: Vec<Sight> = Vec::new();
     let mut bodies: Vec<Body> = Vec::new();
     let mut contradicts = false;
+    let mut without_reference: Vec<Body> = Vec::new();
     for event in flight.events {
         let Some(fix) = place_near(flight.inputs, event.time_s) else { continue };
         let found = match event.source {
@@ -56,7 +57,10 @@ pub(super) fn first_attitude(
                     let on_vehicle = options.mount * seen.axis;
                     Some(Sight { time_s: event.time_s, camera, body: seen.body, on_vehicle, reference, sigma_rad })
                 });
-                let Some(sight) = sight.filter(|s| s.on_vehicle.is_finite()) else { continue };
+                let Some(sight) = sight.filter(|s| s.on_vehicle.is_finite()) else {
+                    without_reference.extend(seen.filter(|seen| seen.axis.is_finite()).map(|seen| seen.body));
+                    continue;
+                };
                 if !bodies.contains(&sight.body) {
                     bodies.push(sight.body);
                 }
@@ -76,11 +80,11 @@ pub(super) fn first_attitude(
         let begin = Begin { time_s: event.time_s, directions, chi2 };
         return Ok(found_at(begin, attitude, covariance_rad2, &fix, settings));
     }
-    Err(no_attitude(&bodies, contradicts, settings))
+    Err(no_attitude(&bodies, &without_reference, contradicts, settings))
 }
 
 /// Says why there is no first attitude.
-fn no_attitude(bodies: &[Body], contradicts: bool, settings: &Settings) -> Error {
+fn no_attitude(bodies: &[Body], without_reference: &[Body], contradicts: bool, settings: &Settings) -> Error {
     if contradicts {
         return Error::unusable(
             "no first attitude: the directions contradict each other by more than their sigmas. Are the mounts right \
@@ -88,13 +92,24 @@ fn no_attitude(bodies: &[Body], contradicts: bool, settings: &Settings) -> Error
         );
     }
     let seen = bodies.iter().map(|b| b.name()).collect::<Vec<_>>().join(" and ");
-    let seen =
-        if seen.is_empty() { "no direction at a time with a position".to_owned() } else { format!("only {seen}") };
+    let window_s = settings.start.window_s;
+    let seen = match bodies {
+        [] => format!("within {window_s} s the recordings have no direction at a time with a position"),
+        [_] => format!("within {window_s} s the recordings have only {seen}"),
+        _ => format!("the recordings have {seen}, but never within {window_s} s and far enough from one line"),
+    };
+    let lost = match without_reference {
+        [] => String::new(),
+        [first, ..] => format!(
+            ". Not used are {} directions, the first to the {}, whose rows do not say where the body is (columns \
+             axis_e_x, axis_e_y, axis_e_z): a run with positions and utc in frames.csv writes them",
+            without_reference.len(),
+            first.name()
+        ),
+    };
     Error::unusable(format!(
-        "no first attitude: within {} s the recordings have {seen}. Two directions are needed, for example limb and \
-         Sun (bodies = [\"earth\", \"sun\"] in sensor.toml), or a star tracker (--attitude FILE); a longer window is \
-         [start] window_s in fuse.toml",
-        settings.start.window_s
+        "no first attitude: {seen}{lost}. Two directions are needed, for example limb and Sun (bodies = [\"earth\", \
+         \"sun\"] in sensor.toml), or a star tracker (--attitude FILE); a longer window is [start] window_s in fuse.toml"
     ))
 }
 

@@ -196,6 +196,10 @@ fn mounts(recordings: &[Recording]) -> Result<Vec<Rotation<Cam, Vehicle>>, Error
             if other.name == *name {
                 return Err(Error::unusable(format!("{name}: two recordings have this name; rename one of the files")));
             }
+            if other.seen.len() > 1 && other.seen == one.seen {
+                let what = "have the same rows: give each recording once, or the other camera's file";
+                return Err(Error::unusable(format!("{} and {name} {what}", other.name)));
+            }
             if known.angle_to(&mount) < SAME_MOUNT_RAD && overlap(other, one) {
                 let what =
                     "have the same mount, but took pictures at the same time: two cameras cannot. Correct one with";

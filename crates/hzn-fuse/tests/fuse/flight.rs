@@ -262,6 +262,13 @@ fn inputs_that_contradict_each_other_are_refused_in_words() {
     assert!(epoch.contains("left: its times 1560000") && epoch.contains("--clock left=SECONDS"), "{epoch}");
     let dark = error(&|i| i.recordings.iter_mut().for_each(|r| r.seen.retain(|s| s.body == Body::Limb)));
     assert!(dark.contains("only limb") && dark.contains("--attitude FILE"), "{dark}");
+    let twice = error(&|i| i.recordings[1].seen = i.recordings[0].seen.clone());
+    assert!(twice.contains("left and right have the same rows"), "{twice}");
+    let unknown = error(&|i| {
+        let sights = i.recordings.iter_mut().flat_map(|r| &mut r.seen);
+        sights.filter(|s| s.body == Body::Sun).for_each(|s| s.reference = None);
+    });
+    assert!(unknown.contains("only limb. Not used are") && unknown.contains("the first to the sun"), "{unknown}");
     let name = error(&|i| i.recordings[1].name = "left".into());
     assert!(name.contains("two recordings have this name"), "{name}");
     // The told offset of a clock puts them together again.

@@ -68,6 +68,12 @@ struct Unmatched {
     nearest_s: f64,
 }
 
+/// Returns whether times that are this far apart belong to one epoch. Times that a table gives to the millisecond, such
+/// as 20.0 s and 20.1 s, differ by a little more than 0.1 s in binary numbers; a microsecond is allowed for that.
+pub(super) fn is_in_sync(apart_s: f64, sync_s: f64) -> bool {
+    apart_s <= sync_s + 1e-6
+}
+
 impl Epochs {
     /// Begins with the first picture of each head.
     ///
@@ -113,7 +119,7 @@ impl Epochs {
             let time_s = head.time_s(0)?.flatten();
             let is_near = |time_s: f64| {
                 let is_nearer = following_s.is_some_and(|next_s| (next_s - time_s).abs() < time_s - first_s);
-                time_s - first_s <= self.sync_s && !is_nearer
+                is_in_sync(time_s - first_s, self.sync_s) && !is_nearer
             };
             if k == opener || time_s.is_some_and(is_near) {
                 epoch = head.take(k, self.sync_s, epoch).unwrap_or_default();
@@ -252,7 +258,7 @@ impl Queue {
         let own = item.take_prior(self.frames.as_ref());
         let data = match self.vehicle.as_ref().zip(time_s) {
             Some((vehicle, time_s)) => match vehicle.nearest(time_s) {
-                Some((away_s, data)) if away_s <= sync_s => Some(data),
+                Some((away_s, data)) if is_in_sync(away_s, sync_s) => Some(data),
                 nearest => {
                     let away_s = nearest.map_or(f64::INFINITY, |(away_s, _)| away_s);
                     self.unmatched.pictures += 1;
@@ -269,5 +275,20 @@ impl Queue {
             *place = Some((number, item));
         }
         Some(epoch)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_in_sync;
+
+    #[test]
+    fn times_of_a_table_that_are_just_in_sync_are() {
+        for k in 0..100 {
+            let time_s = 10.0 * f64::from(k);
+            assert!(is_in_sync(time_s + 0.1 - time_s, 0.1) && !is_in_sync(time_s + 0.101 - time_s, 0.1));
+        }
+        // Seconds since 1970.
+        assert!(is_in_sync(1_605_861_000.1 - 1_605_861_000.0, 0.1));
     }
 }

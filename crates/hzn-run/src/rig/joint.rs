@@ -10,6 +10,7 @@ use hzn_core::{Config, Solution};
 use hzn_files::rig::{self, JOINT};
 use hzn_mcap::{Row, RowMeta, roll_pitch_deg};
 
+use super::epochs::is_in_sync;
 use super::mounts;
 use crate::engine::Finished;
 use crate::error::{Error, unusable};
@@ -120,7 +121,7 @@ impl Joiner {
         let first = times().min_by(|a, b| a.1.total_cmp(&b.1));
         let last = times().max_by(|a, b| a.1.total_cmp(&b.1));
         let Some(((first, first_s), (last, last_s))) = first.zip(last) else { return Ok(()) };
-        if last_s - first_s <= self.sync_s {
+        if is_in_sync(last_s - first_s, self.sync_s) {
             return Ok(());
         }
         Err(unusable(format!(

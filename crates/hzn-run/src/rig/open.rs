@@ -145,7 +145,16 @@ impl Opened {
         }
         open::check_size(source, &opened.sensor.config).map_err(named)?;
         let known = self.frames.as_deref().or(opened.frames.as_ref());
-        open::check_altitude(source, &opened.sensor.config, known).map_err(named)?;
+        open::check_altitude(source, &opened.sensor.config, known).map_err(|why| {
+            let Some(vehicle) = self.frames.as_ref() else { return named(why) };
+            let what = format!("{why}, or write altitude_km or x_km, y_km, z_km into {}", vehicle.path.display());
+            let what = if opened.frames.as_ref().is_some_and(Frames::has_distances) {
+                format!("{what}: that table replaces the one of the head, which has them")
+            } else {
+                what
+            };
+            named(unusable(what).with_remedy(Remedy::Altitude))
+        })?;
         let vehicle = self.frames.as_ref().map(|frames| Vehicle {
             frames: Arc::clone(frames),
             q_vehicle_from_camera_wxyz: mount.q_vehicle_from_camera_wxyz(),

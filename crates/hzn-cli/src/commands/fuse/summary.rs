@@ -198,6 +198,9 @@ fn counts(counts: &Counts) -> Vec<(String, String)> {
     shown.map(|(name, count)| (name.to_owned(), count.to_string())).chain(reasons).collect()
 }
 
+/// NEES of a row from which on the truth itself is doubtful.
+const OF_ANOTHER_FLIGHT: f64 = 1000.0;
+
 /// Returns the errors against the truth in words.
 fn errors(misses: &[Miss]) -> Option<String> {
     let n = misses.len() as f64;
@@ -209,10 +212,17 @@ fn errors(misses: &[Miss]) -> Option<String> {
     let nees = misses.iter().map(|m| m.nees).sum::<f64>() / n;
     let worst = misses.iter().map(|m| m.attitude_rad.norm()).fold(0.0, f64::max).to_degrees();
     let last = misses.last()?.attitude_rad.norm().to_degrees();
+    // The largest NEES of a right flight is some tens; that of another clock or frame is in the thousands.
+    let is_other = misses.iter().filter(|m| m.nees > OF_ANOTHER_FLIGHT).count() * 2 > misses.len();
+    let doubt = if is_other {
+        "; is the truth of this flight (its clock, its frame, the sign of its quaternions)?"
+    } else {
+        ""
+    };
     let position = (misses.iter().map(|m| m.position_m.norm_squared()).sum::<f64>() / n).sqrt();
     Some(format!(
         "{:.3} {:.3} {:.3} deg RMS, largest {worst:.3}, at the end {last:.3}; NEES {nees:.2} (ideal 3); position \
-         {position:.1} m",
+         {position:.1} m{doubt}",
         rms(0),
         rms(1),
         rms(2)

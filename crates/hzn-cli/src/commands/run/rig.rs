@@ -174,6 +174,14 @@ impl Watch {
         }
         let contradict = |(why, epochs): (&String, &u64)| why.starts_with(INCONSISTENT).then_some(*epochs);
         let contradicting: u64 = self.refused.iter().filter_map(contradict).sum();
+        let answers = self.joint[Status::Ok as usize];
+        if contradicting >= DOUBTFUL_EPOCHS && answers == 0 {
+            tell::line(
+                "note: the heads contradict each other in every epoch: are the mounts in rig.toml those of these heads \
+                 (not exchanged, not inverted, q_vehicle_from_camera_wxyz with the scalar first), are the pictures of \
+                 each head its own and not mirrored, and do all heads have the same clock?",
+            );
+        }
         if casts_doubt(contradicting, &self.joint) {
             tell::line(
                 "note: the heads contradict each other far more often than by chance: an error of a mount that is just \
