@@ -15,6 +15,7 @@
 
 mod adjust;
 mod clocks;
+mod faults;
 mod force;
 mod motion;
 mod place;

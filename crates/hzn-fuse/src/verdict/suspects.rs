@@ -3,6 +3,7 @@
 use hzn_nav::filter::chi2_limit;
 use nalgebra::{DVector, Matrix3, Vector3};
 
+use super::faults::Fault;
 use super::motion::Reckoning;
 use super::problem::Problem;
 use super::state::State;
@@ -33,12 +34,8 @@ enum Kind {
     Searched(usize, f64, (f64, f64)),
     /// Rates that are multiplied by a matrix.
     Gyro(Matrix3<f64>),
-    /// Attitudes of the star tracker that are inverted.
-    Inverted,
-    /// Mounts of cameras that are inverted, or exchanged.
-    Mounts(Vec<usize>),
-    /// Pictures of a camera that are mirrored.
-    Mirrored(usize),
+    /// A fault without a size.
+    Fault(Fault),
 }
 
 /// A suspicion that was tried.
@@ -49,6 +46,8 @@ struct Tried {
     /// The limits of `gain` for doubt and for contradiction.
     limits: [f64; 2],
     state: State,
+    /// Another value of the searched error that explains as much.
+    other_value: Option<f64>,
 }
 
 /// Tries all suspicions; returns what explains the directions best, if anything explains them better than no error
@@ -84,12 +83,14 @@ fn suspects(problem: &Problem, names: &[String]) -> Vec<Suspect> {
     for (number, name) in names.iter().enumerate() {
         let camera = || Source::Camera(name.clone());
         add(Cause::Mount, camera(), Kind::Free(s.mount(number), 3, 3.0));
-        add(Cause::Mount, camera(), Kind::Mounts(vec![number]));
-        add(Cause::Lens, camera(), Kind::Mirrored(number));
         add(Cause::CameraClock, camera(), Kind::Searched(s.clock(number), LAG_S.0, LAG_S));
-        for other in number + 1..names.len() {
-            add(Cause::Mount, Source::Cameras, Kind::Mounts(vec![number, other]));
-        }
+    }
+    for fault in Fault::of_cameras(names.len()) {
+        let cause = if fault.is_mirrored() { Cause::Lens } else { Cause::Mount };
+        let one = fault.cameras().filter(|cameras| cameras.len() == 1);
+        let name = one.and_then(|cameras| names.get(*cameras.first()?));
+        let source = name.map_or(Source::Cameras, |name| Source::Camera(name.clone()));
+        add(cause, source, Kind::Fault(fault));
     }
     add(Cause::CameraClock, Source::Cameras, Kind::Searched(s.clocks(), LAG_S.0, LAG_S));
     add(Cause::GyroBias, Source::Imu, Kind::Free(s.bias(), 3, 0.1));
@@ -102,7 +103,9 @@ fn suspects(problem: &Problem, names: &[String]) -> Vec<Suspect> {
         add(Cause::GyroAxes, Source::Imu, Kind::Free(s.unit(), 3, 3.0));
     } else {
         add(Cause::TrackerFrame, Source::StarTracker, Kind::Free(s.tracker(), 3, 3.0));
-        add(Cause::TrackerFrame, Source::StarTracker, Kind::Inverted);
+        for fault in [Fault::InvertedTracker, Fault::ScalarLastTracker, Fault::InertialTracker] {
+            add(Cause::TrackerFrame, Source::StarTracker, Kind::Fault(fault));
+        }
     }
     let degree = 1f64.to_radians();
     add(Cause::GyroUnit, Source::Imu, Kind::Gyro(Matrix3::identity() * degree));
@@ -125,7 +128,7 @@ fn try_out(problem: &Problem, suspect: Suspect, samples: &[Sample], max_step_s: 
     let mut other = problem.clone();
     let none = DVector::zeros(problem.shared.len());
     let (mut freed, mut alternatives) = (0, 1.0);
-    let mut begin = None;
+    let mut begins = Vec::new();
     match &suspect.kind {
         Kind::Free(first, count, sigma) => {
             other.sigmas.iter_mut().skip(*first).take(*count).for_each(|s| *s = *sigma);
@@ -135,39 +138,61 @@ fn try_out(problem: &Problem, suspect: Suspect, samples: &[Sample], max_step_s: 
             *other.sigmas.get_mut(*at)? = *sigma;
             freed = 1;
             alternatives = SEARCHED;
-            begin = searched(&other, *at, *largest, *step);
+            begins = searched(&other, *at, *largest, *step);
         }
         Kind::Gyro(matrix) => {
             other = problem.with_reckoning(Reckoning::new(samples, max_step_s, matrix));
             alternatives = SEARCHED;
         }
-        Kind::Inverted => other.tracked.iter_mut().for_each(|t| {
-            let turn = super::problem::about_pole(t.time_s);
-            t.attitude = turn * (turn.inverse() * t.attitude).inverse();
-        }),
-        Kind::Mirrored(camera) => {
-            for look in other.looks.iter_mut().filter(|look| look.camera == *camera) {
-                look.measured.x = -look.measured.x;
-                look.by_height.x = -look.by_height.x;
+        Kind::Fault(fault) => {
+            fault.mend(&mut other)?;
+            if *fault == Fault::InertialTracker {
+                alternatives = SEARCHED;
             }
         }
-        Kind::Mounts(cameras) => change_mounts(&mut other, cameras)?,
     }
-    let begin = match begin {
-        Some(begin) => begin,
-        None => other.begin(none)?,
-    };
-    let (state, found) = other.adjust(begin);
+    if begins.is_empty() {
+        begins.push(other.begin(none)?);
+    }
+    let adjusted: Vec<(State, f64)> = begins.into_iter().map(|begin| other.adjust(begin)).collect();
+    let ((state, found), other_value) = smallest(adjusted, &suspect.kind)?;
     // A value that was chosen among many must be rarer by their number; without a free error that is all.
     let limits = RARE.map(|p| match freed {
         0 => 2.0 * (alternatives / p).ln(),
         freed => chi2_limit(freed, p / alternatives),
     });
-    Some(Tried { suspect, gain: cost - found, limits, state })
+    Some(Tried { suspect, gain: cost - found, limits, state, other_value })
 }
 
-/// Returns the best of the states that begin with a value of one error.
-fn searched(problem: &Problem, at: usize, largest: f64, step: f64) -> Option<State> {
+/// Most values of a search that are adjusted.
+const MOST_ADJUSTED: usize = 3;
+/// Difference in χ² up to which two values explain the directions equally well (3σ).
+const EQUAL: f64 = 9.0;
+
+/// Of the adjusted states of a search, returns the one with the smallest value among those that explain the directions
+/// equally well, and the value of another of these. Limb and Sun, for example, show only how high the Sun is: at two
+/// times of a day it is as high.
+fn smallest(mut adjusted: Vec<(State, f64)>, kind: &Kind) -> Option<((State, f64), Option<f64>)> {
+    let best = adjusted.iter().map(|(_, cost)| *cost).min_by(f64::total_cmp)?;
+    adjusted.retain(|(_, cost)| *cost <= best + EQUAL);
+    let value = |state: &State| match kind {
+        Kind::Searched(at, ..) => state.shared.get(*at).copied().unwrap_or_default(),
+        _ => 0.0,
+    };
+    adjusted.sort_by(|a, b| value(&a.0).abs().total_cmp(&value(&b.0).abs()));
+    let mut each = adjusted.into_iter();
+    let first = each.next()?;
+    let is_other = |(state, _): &(State, f64)| {
+        let step = if let Kind::Searched(_, _, (_, step)) = kind { *step } else { 0.0 };
+        (value(state) - value(&first.0)).abs() > step
+    };
+    let other = each.find(is_other).map(|(state, _)| value(&state));
+    Some((first, other))
+}
+
+/// Returns the states that begin with a value of one error and are better than those with its neighbours, the best
+/// first.
+fn searched(problem: &Problem, at: usize, largest: f64, step: f64) -> Vec<State> {
     let steps = (largest / step) as i32;
     let begin = |k: i32| {
         let mut shared = DVector::zeros(problem.shared.len());
@@ -176,23 +201,13 @@ fn searched(problem: &Problem, at: usize, largest: f64, step: f64) -> Option<Sta
         let cost = problem.cost(&state);
         Some((state, cost))
     };
-    let all = (-steps..=steps).filter_map(begin);
-    all.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(state, _)| state)
-}
-
-/// Inverts the mount of one camera, or exchanges those of two.
-fn change_mounts(problem: &mut Problem, cameras: &[usize]) -> Option<()> {
-    let told = |camera: usize| problem.looks.iter().find(|l| l.camera == camera).map(|l| l.mount);
-    let mounts: Vec<_> = cameras.iter().map(|c| told(*c)).collect::<Option<_>>()?;
-    for look in &mut problem.looks {
-        let place = cameras.iter().position(|c| *c == look.camera);
-        match (place, mounts.as_slice()) {
-            (Some(_), [one]) => look.mount = one.inverse(),
-            (Some(0), [_, other]) | (Some(1), [other, _]) => look.mount = *other,
-            _ => {}
-        }
-    }
-    Some(())
+    let all: Vec<(State, f64)> = (-steps..=steps).filter_map(begin).collect();
+    let cost = |i: Option<usize>| i.and_then(|i| all.get(i)).map_or(f64::INFINITY, |(_, cost)| *cost);
+    let is_lowest = |i: &usize| cost(Some(*i)) <= cost(i.checked_sub(1)).min(cost(Some(i + 1)));
+    let mut lowest: Vec<usize> = (0..all.len()).filter(is_lowest).collect();
+    lowest.sort_by(|a, b| cost(Some(*a)).total_cmp(&cost(Some(*b))));
+    lowest.truncate(MOST_ADJUSTED);
+    lowest.into_iter().filter_map(|i| all.get(i).map(|(state, _)| state.clone())).collect()
 }
 
 /// Says what a suspicion found.
@@ -208,19 +223,17 @@ fn words(problem: &Problem, tried: &Tried, names: &[String]) -> String {
             let value_s = tried.state.shared[*at];
             let [late, early] = ["late", "early"].map(|word| format!("{:.1} s {word}", value_s.abs()));
             if tried.suspect.cause == Cause::Utc {
-                let word = if value_s > 0.0 { late } else { early };
-                return format!("the UTC of the recordings is probably {word}: Sun and Moon are elsewhere");
+                let by =
+                    |value_s: f64| format!("{:.0} s {}", value_s.abs(), if value_s > 0.0 { "late" } else { "early" });
+                let or = tried.other_value.map(|other_s| format!(" (or {}, which explains as much)", by(other_s)));
+                let (word, or) = (by(value_s), or.unwrap_or_default());
+                return format!("the UTC of the recordings is probably {word}{or}: Sun and Moon are elsewhere");
             }
             let word = if value_s < 0.0 { late } else { early };
             let what = "against the inertial unit: check the times, or give --clock";
             format!("the clock of {name} is probably {word} {what}")
         }
-        Kind::Mounts(cameras) if cameras.len() == 1 => {
-            format!("the mount of {name} is probably inverted: it is the rotation from camera to vehicle")
-        }
-        Kind::Mounts(_) => format!("the mounts or the recordings of {name} are probably exchanged"),
-        Kind::Mirrored(_) => format!("the pictures of {name} are probably mirrored"),
-        Kind::Inverted => "the star tracker's quaternions are probably inverted: vehicle to ECEF is expected".into(),
+        Kind::Fault(fault) => fault.words(name),
         Kind::Gyro(matrix) if tried.suspect.cause == Cause::GyroAxes => {
             format!("axes or signs of the gyros are probably wrong: {} fit better", axes(matrix))
         }

@@ -7,8 +7,9 @@ use hzn_fuse::input::{Attitude, Inputs};
 use hzn_fuse::results::Kind;
 use hzn_fuse::settings::{ErrorSetting, Treatment};
 use hzn_fuse::simulated::inputs;
-use hzn_fuse::{Fused, Settings, fuse, truth};
-use hzn_nav::frames::{Fixed, Rotation, Vector};
+use hzn_fuse::{Error, Fused, Settings, fuse, truth};
+use hzn_nav::frames::{Fixed, Rotation, Vector, Vehicle};
+use hzn_nav::gravity::EARTH_RATE_RAD_S;
 use hzn_sim::Scenario;
 
 const SIGMA_DEG: f64 = 0.05;
@@ -76,6 +77,40 @@ fn a_star_tracker_finds_the_attitude_again_after_saturated_gyros() {
             assert_eq!(fused.verdict.level(), Level::Consistent, "{:?}", fused.verdict);
         }
     }
+}
+
+/// Attitudes in other words than ours: the verdict says which.
+#[test]
+fn a_star_tracker_with_other_quaternions_is_named() {
+    let scene = scene(1);
+    let right = inputs(&scene, &mut Slow::new(1, 0.1), 0.0).unwrap();
+    let told = tracked(&scene, (0..30).map(|k| 110.0 + 10.0 * f64::from(k)));
+    let changed = |change: &dyn Fn(f64, [f64; 4]) -> [f64; 4]| {
+        let mut all = right.clone();
+        let each = |a: &Attitude| {
+            let wxyz = change(a.time_s, a.fixed_from_vehicle.unwrap().wxyz());
+            Attitude { fixed_from_vehicle: Rotation::assume_from_quaternion(wxyz), ..*a }
+        };
+        all.attitudes = told.iter().map(each).collect();
+        let findings = match fuse(&all, &Settings::default(), Wanted { rate_hz: Some(1.0), ..Wanted::default() }) {
+            Ok(fused) => fused.verdict.findings,
+            Err(Error::Contradicts { finding, .. }) => vec![*finding],
+            Err(other) => panic!("{other}"),
+        };
+        findings.iter().map(|f| f.what.clone()).collect::<Vec<_>>().join("; ")
+    };
+    let same = changed(&|_, wxyz| wxyz);
+    assert_eq!(same, "");
+    let inverted = changed(&|_, [w, x, y, z]| [w, -x, -y, -z]);
+    assert!(inverted.contains("quaternions are probably inverted"), "{inverted}");
+    let last = changed(&|_, [w, x, y, z]| [x, y, z, w]);
+    assert!(last.contains("have probably the scalar last"), "{last}");
+    let inertial = changed(&|time_s, wxyz| {
+        let angle_rad = 1.3 + EARTH_RATE_RAD_S * time_s;
+        let turn = Rotation::<Fixed, Fixed>::from_scaled_axis(Vector::new(0.0, 0.0, angle_rad));
+        (turn * Rotation::<Vehicle, Fixed>::assume_from_quaternion(wxyz).unwrap()).wxyz()
+    });
+    assert!(inertial.contains("relative to inertial axes"), "{inertial}");
 }
 
 /// A hole of a minute in the samples: the directions afterwards find the attitude again, and none of them is to blame.

@@ -169,6 +169,17 @@ fn of_cameras() -> Vec<Wrong> {
             }
         });
     });
+    add("both mounts inverse", mount, cameras, |i| {
+        for recording in &mut i.recordings {
+            recording.mount = Rotation::assume_from_quaternion(recording.mount.unwrap().inverse().wxyz());
+        }
+    });
+    add("both upside down", &[Cause::Lens], cameras, |i| {
+        each(i, |s| s.axis = s.axis.component_mul(&Vector::new(1.0, -1.0, 1.0)));
+    });
+    add("both turned by 180°", mount, cameras, |i| {
+        each(i, |s| s.axis = s.axis.component_mul(&Vector::new(-1.0, -1.0, 1.0)));
+    });
     add("left mirrored", &[Cause::Lens], left, |i| {
         i.recordings[0].seen.iter_mut().for_each(|s| s.axis = s.axis.component_mul(&Vector::new(-1.0, 1.0, 1.0)));
     });

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use hzn_files::vehicle::VehicleRow;
 use hzn_fuse::Fused;
+use hzn_fuse::finding::Level;
 use hzn_fuse::results::{Counts, Determined, Epoch, Kind, Solved};
 use hzn_fuse::truth::{self, Miss};
 
@@ -79,10 +80,13 @@ pub(super) fn lines(fused: &Fused, truth: Option<&[VehicleRow]>) -> Vec<(String,
 
 /// Returns the errors of the solutions against the truth: names and values.
 fn against(fused: &Fused, truth: &[VehicleRow]) -> Vec<(String, String)> {
+    // Where the inputs contradict each other, a large error is no surprise.
+    let is_doubted = fused.verdict.level() == Level::Contradicts;
     let later = if fused.solved.is_some() { "solve" } else { "smoother" };
     let all = [("filter", &fused.epochs), (later, &fused.smoothed)].into_iter();
-    let named = all
-        .filter_map(|(name, epochs)| Some((format!("error of the {name}"), errors(&truth::compare(epochs, truth))?)));
+    let named = all.filter_map(|(name, epochs)| {
+        Some((format!("error of the {name}"), errors(&truth::compare(epochs, truth), is_doubted)?))
+    });
     named.collect()
 }
 
@@ -202,7 +206,7 @@ fn counts(counts: &Counts) -> Vec<(String, String)> {
 const OF_ANOTHER_FLIGHT: f64 = 1000.0;
 
 /// Returns the errors against the truth in words.
-fn errors(misses: &[Miss]) -> Option<String> {
+fn errors(misses: &[Miss], is_doubted: bool) -> Option<String> {
     let n = misses.len() as f64;
     if misses.is_empty() {
         return None;
@@ -213,7 +217,7 @@ fn errors(misses: &[Miss]) -> Option<String> {
     let worst = misses.iter().map(|m| m.attitude_rad.norm()).fold(0.0, f64::max).to_degrees();
     let last = misses.last()?.attitude_rad.norm().to_degrees();
     // The largest NEES of a right flight is some tens; that of another clock or frame is in the thousands.
-    let is_other = misses.iter().filter(|m| m.nees > OF_ANOTHER_FLIGHT).count() * 2 > misses.len();
+    let is_other = !is_doubted && misses.iter().filter(|m| m.nees > OF_ANOTHER_FLIGHT).count() * 2 > misses.len();
     let doubt = if is_other {
         "; is the truth of this flight (its clock, its frame, the sign of its quaternions)?"
     } else {
