@@ -40,6 +40,8 @@ pub struct Counts {
     pub answers: u64,
     /// Pictures that were lost.
     pub lost: u64,
+    /// Pictures that the flight software refused, such as those of a wrong size. An event says why.
+    pub refused: u64,
 }
 
 /// The parts of the computer that the flight software uses.
@@ -65,6 +67,8 @@ pub(crate) struct Linux {
     ended: Option<Ended>,
     events: Vec<LogLine>,
     counts: Counts,
+    /// Number of pictures that were handed out to be processed.
+    handed_out: u64,
     /// Multiple of sigma that is the protection level.
     protection_factor: Option<f64>,
     not_stored: Rarely,
@@ -83,6 +87,7 @@ impl Linux {
             ended: None,
             events: Vec::new(),
             counts: Counts::default(),
+            handed_out: 0,
             protection_factor: None,
         }
     }
@@ -127,7 +132,7 @@ impl Linux {
         self.ended.as_ref().filter(|_| !takes_pictures || self.next.is_none())
     }
     pub(crate) fn counts(&self) -> Counts {
-        self.counts
+        Counts { refused: self.handed_out.saturating_sub(self.counts.pictures), ..self.counts }
     }
     pub(crate) fn parts(&mut self) -> &mut Parts {
         &mut self.parts
@@ -226,6 +231,7 @@ impl Board for Linux {
         }
         let shot = self.next.take()?;
         self.counts.lost += u64::from(shot.lost);
+        self.handed_out += 1;
         let exposure_us = shot.ready.saturating_duration_since(self.start).as_micros() as u64;
         let picture = Picture { bytes: shot.pixels.len(), exposure_us, lost: shot.lost };
         if let Some(before) = self.current.replace(shot) {

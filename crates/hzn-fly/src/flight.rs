@@ -213,6 +213,13 @@ fn open_camera(settings: &Settings, config: &Config, tell: &Tell) -> Result<Box<
     let raw = settings.raw.unwrap_or(Raw { width, height, format: Format::Mono8 });
     if raw.size() != (width, height) {
         let (w, h) = raw.size();
+        if u64::from(w) * u64::from(h) == u64::from(width) * u64::from(height) {
+            // The flight software compares the number of bytes, so it would take them for pictures of the camera.
+            return Err(Error::usage(format!(
+                "pictures of {w}x{h} have as many pixels as the camera of the parameters with {width}x{height}: which \
+                 is right? --raw {width}x{height} takes them as they are, --load -s FILE gives another camera"
+            )));
+        }
         let what = "every picture will be refused until the parameters fit (event 6)";
         tell(&format!("warning: pictures of {w}x{h}, but the camera of the parameters has {width}x{height}: {what}"));
     }

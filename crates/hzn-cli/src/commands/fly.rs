@@ -71,6 +71,7 @@ pub(super) fn run(args: Args) -> Outcome {
     match summary.ended {
         Some(Ended::Failed(why)) => Err(failed(why)),
         Some(Ended::Partial { .. }) => Ok(Exit::SomeUnreadable),
+        Some(Ended::Whole) | None if summary.counts.refused > 0 => Ok(Exit::SomeUnreadable),
         Some(Ended::Whole) | None => Ok(Exit::Done),
     }
 }
@@ -84,6 +85,10 @@ fn tell_summary(summary: &Summary) {
     let mut text = format!("{} pictures, {} answers", counts.pictures, counts.answers);
     if counts.lost > 0 {
         text += &format!(", {} pictures lost", counts.lost);
+    }
+    if counts.refused > 0 {
+        let what = "refused without an answer (the events say why: a wrong size, no altitude, stuck pixels)";
+        text += &format!(", {} pictures {what}", counts.refused);
     }
     let (logged, missing) = summary.logged;
     text += &format!("; {logged} in the log");

@@ -215,7 +215,10 @@ fn bad_input_is_told() {
     // Now the parameters are there.
     assert_eq!(fly_on(&place, &picture, &[]).0, Some(0));
     let (code, said) = fly_on(&place, &[0; 4 * 80 * 60], &["--raw", "80x60:mono8"]);
-    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(code, Some(3), "{said}");
+    assert!(said.contains("4 pictures refused without an answer"), "{said}");
+    let (turned_code, turned) = fly_on(&place, &picture, &["--raw", "240x320:mono8"]);
+    assert!(turned_code == Some(2) && turned.contains("240x320 have as many pixels"), "{turned}");
     assert!(said.contains("pictures of 80x60, but the camera of the parameters has 320x240"), "{said}");
     assert!(said.contains("picture of wrong size") && said.contains("0 pictures"), "{said}");
 }
