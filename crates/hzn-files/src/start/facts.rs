@@ -68,8 +68,12 @@ pub struct StartConfig {
     pub fov_deg: f64,
     /// 1-sigma of the focal length, in percent, with the part that the shape of the lens explains.
     pub focal_sigma_percent: f64,
-    /// 1-sigma of the coefficient k1, which is the shape of the lens.
+    /// 1-sigma of the coefficient k1 with k2 = 0, which is the main part of the shape of the lens.
     pub k1_sigma: f64,
+    /// 1-sigma of the coefficient k2.
+    pub k2_sigma: f64,
+    /// 1-sigma of the coefficients p1 and p2 (decentring); `None` for a fisheye, whose model does not have them.
+    pub p_sigma: Option<f64>,
     /// 1-sigma of the principal point, in pixels.
     pub centre_sigma_px: f64,
     /// Warnings for the user.

@@ -6,9 +6,11 @@
 //! - **Scale.** Makers state the focal length of a series lens, and thus its field of view, to ± 5 %. With a uniform
 //!   distribution in this range 1-sigma is 5 %/√3. EXIF has the nominal focal length: ± 10 %. A zoom lens gives it in
 //!   steps, and it does not include the change by focusing. The 35 mm equivalent is also rounded to a millimetre.
-//! - **Shape.** The guessed lens is ideal (pinhole or equidistant) and has a coefficient k1 = 0 with a sigma, which
-//!   `guess.rs` derives from the other lenses of the family. A field of view fixes the lens at the picture's edges, so
-//!   that focal length and k1 change together there.
+//! - **Shape.** The guessed lens is ideal (pinhole or equidistant) and has the coefficients k1 = k2 = 0 with a sigma,
+//!   which `guess.rs` derives from the other lenses of the family and from public calibrations. A field of view fixes
+//!   the lens at the picture's edges, so that focal length and shape change together there.
+//! - **Decentring.** A pinhole has p1 = p2 = 0 with a sigma from public calibrations. The model of a fisheye does not
+//!   have these coefficients.
 //! - **Centre.** In published calibrations the distance of the principal point from the picture's centre is, in percent
 //!   of the width (x, y): EuRoC 1.1, 1.2; TUM RGB-D fr1 0.1, 2.5; KITTI odometry 1.0, 0.2. Their root mean square is
 //!   1.3 %; 1.5 % is written. A picture that is cropped on one side is not covered.
@@ -72,6 +74,8 @@ pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
         fov_deg,
         focal_sigma_percent: guess.focal_sigma_percent,
         k1_sigma: guess.k1_sigma,
+        k2_sigma: guess.k2_sigma,
+        p_sigma: guess.p_sigma,
         centre_sigma_px: guess.centre_sigma_px,
         warnings,
     })

@@ -47,7 +47,12 @@ fn what_is_written_loads_and_is_the_camera_of_the_facts() {
         let covariance = config.camera.covariance.unwrap();
         let sigma = |i: usize| covariance.rows[i][i].sqrt();
         assert!((100.0 * sigma(0) / start.focal_px / start.focal_sigma_percent - 1.0).abs() < 1e-3);
-        assert!((sigma(2) - 74.0).abs() < 0.01 && (sigma(4) / start.k1_sigma - 1.0).abs() < 1e-3);
+        assert!((sigma(2) - 74.0).abs() < 0.01 && (sigma(5) / start.k2_sigma - 1.0).abs() < 1e-3);
+        // The first mode of the shape is that with the value of k2.
+        let k1_variance = covariance.rows[4][4] - covariance.rows[4][5].powi(2) / covariance.rows[5][5];
+        assert!((k1_variance.sqrt() / start.k1_sigma - 1.0).abs() < 1e-3);
+        // Only a pinhole has p1 and p2.
+        assert_eq!(start.p_sigma.map(|p| [p, p]), (lens == Model::Pinhole).then(|| [sigma(6), sigma(7)]));
     }
 }
 
@@ -126,8 +131,10 @@ fn a_field_of_view_fixes_the_edge_and_a_focal_length_the_middle() {
     let edge_percent = |start: &StartConfig| {
         let config = crate::sensor::parse(&start.text, Path::new("s.toml")).unwrap().config;
         let (f, rows) = (start.focal_px, config.camera.covariance.unwrap().rows);
-        let edge = 2464.0 / f;
-        let variance = rows[0][0] / (f * f) + 2.0 * edge * edge * rows[0][4] / f + edge.powi(4) * rows[4][4];
+        let edge2 = (2464.0 / f).powi(2);
+        // The change of the edge with f, k1 and k2, which are the parameters 0, 4 and 5.
+        let by = [(0, 1.0 / f), (4, edge2), (5, edge2 * edge2)];
+        let variance: f64 = by.iter().flat_map(|(i, a)| by.map(|(j, b)| a * b * rows[*i][j])).sum();
         100.0 * variance.sqrt()
     };
     for (fov, lens) in [(92.0, Model::Equidistant), (92.0, Model::Pinhole), (180.0, Model::Equidistant)] {

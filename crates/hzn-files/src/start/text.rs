@@ -102,23 +102,29 @@ fn write_camera(facts: &CameraFacts, camera: &Config, focal: &Focal, fov_deg: f6
 /// Writes the covariance of the guess, with a comment for each sigma.
 fn write_covariance(guess: &Guess, focal: &Focal) -> String {
     let together = if focal.is_at_edge {
-        ". A lens with another k1 and the\n# same field of view has another focal length, so that both change together"
+        "\n# A lens of another shape and the same field of view has another focal length, so that both change together."
     } else {
         ""
     };
+    let decentring = guess
+        .p_sigma
+        .map_or_else(String::new, |p| format!("# Decentring, p1 and p2: {p} (RMS of public calibrations: 0.0017).\n"));
     let family = match guess.camera.model {
         Model::BrownConrady => "distortion between none and that of a fisheye",
         _ => "equidistant, equisolid or stereographic",
     };
     let mut t = format!(
         "\n# 1 sigma of what is not known. Focal length: {:.1} % for {}.\n\
-         # Shape of the lens, k1: {:.3} ({family}){together}.\n\
+         # Shape of the lens: k1 {:.3} ({family}), and k2 {:.2e},\n\
+         # with which k1 changes, too (public calibrations).{together}\n\
+         {decentring}\
          # Principal point: {:.0} px on each axis, 1.5 % of the width. It turns all answers by the same angle. Its\n\
          # variance {:.0} px² is larger for cropped pictures.\n\
          [camera.covariance]\n",
         focal.percent,
         focal.sigma_from,
         guess.k1_sigma,
+        guess.k2_sigma,
         guess.centre_sigma_px,
         guess.centre_sigma_px.powi(2),
     );
@@ -126,7 +132,8 @@ fn write_covariance(guess: &Guess, focal: &Focal) -> String {
         let names: Vec<String> = covariance.order.iter().map(|i| format!("\"{}\"", i.name())).collect();
         let _ = writeln!(t, "order = [{}]\nrows = [", names.join(", "));
         for row in &covariance.rows {
-            let numbers: Vec<String> = row.iter().map(|x| format!("{x:.4e}")).collect();
+            // The matrix stays positive definite with this number of digits.
+            let numbers: Vec<String> = row.iter().map(|x| format!("{x:.6e}")).collect();
             let _ = writeln!(t, "    [{}],", numbers.join(", "));
         }
         t.push_str("]\n");

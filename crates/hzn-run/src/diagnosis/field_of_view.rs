@@ -70,15 +70,18 @@ impl FieldOfView {
     }
 }
 
+/// Number of errors that all pictures share: two of the shape of the lens, two of its centre, and the altitude.
+const SHARED: usize = 5;
+
 /// What one picture says.
 #[derive(Debug, Clone, Copy)]
 struct Said {
     ln_focal: f64,
     /// 1-sigma from the edge noise.
     noise: f64,
-    /// Changes of `ln_focal` by one sigma of what all pictures share: shape, two coordinates of the principal point,
-    /// expected half-angle.
-    shared: [f64; 4],
+    /// Changes of `ln_focal` by one sigma of what all pictures share: two of the shape, two coordinates of the
+    /// principal point, expected half-angle.
+    shared: [f64; SHARED],
 }
 
 impl Said {
@@ -173,14 +176,15 @@ fn search(
         let free = fitted.solution.free?;
         // ∂cos/∂ln f from the sigma of the factor, which is that of the cosine over this slope.
         let slope = free.var_cos.max(0.0).sqrt() / factor.sigma;
-        let [k1, centre] = sigmas(guess.camera.covariance.as_ref()?)?;
+        let (shapes, centre) = sigmas(guess.camera.covariance.as_ref()?)?;
         let by = |changed: CameraConfig| {
             let other = Camera::try_new(&changed).ok()?;
             Some(cos_change(&edge, free.axis.xyz(), &camera, &other)? / slope)
         };
         let edge_radius = 0.5 * width / exact.camera.fx_px;
         let shared = [
-            by(with_shape(&exact.camera, k1, edge_radius))?,
+            by(with_shape(&exact.camera, shapes[0], edge_radius))?,
+            by(with_shape(&exact.camera, shapes[1], edge_radius))?,
             by(CameraConfig { cx_px: exact.camera.cx_px + centre, ..exact.camera.clone() })?,
             by(CameraConfig { cy_px: exact.camera.cy_px + centre, ..exact.camera.clone() })?,
             fitted.expected_sigma_cos / slope,
@@ -199,21 +203,27 @@ fn guess(known: &CameraFacts, fov_deg: f64, lens: Model) -> Option<Config> {
     Some(hzn_files::sensor::parse(&text, std::path::Path::new("sensor.toml")).ok()?.config)
 }
 
-/// Returns the 1-sigma of k1 and of the principal point.
-fn sigmas(covariance: &Covariance) -> Option<[f64; 2]> {
-    let sigma = |which: Intrinsic| {
-        let place = covariance.order.iter().position(|i| *i == which)?;
-        Some(covariance.rows.get(place)?.get(place)?.sqrt())
+/// Returns the two independent 1-sigma changes of the shape, as k1 and k2, and the 1-sigma of the principal point.
+fn sigmas(covariance: &Covariance) -> Option<([[f64; 2]; 2], f64)> {
+    let at = |one: Intrinsic, other: Intrinsic| {
+        let place = |which| covariance.order.iter().position(|i| *i == which);
+        covariance.rows.get(place(one)?)?.get(place(other)?).copied()
     };
-    Some([sigma(Intrinsic::K1)?, sigma(Intrinsic::CxPx)?])
+    use Intrinsic::{CxPx, K1, K2};
+    let k2 = at(K2, K2)?.sqrt();
+    let by_k2 = at(K1, K2)? / k2;
+    let k1 = (at(K1, K1)? - by_k2 * by_k2).max(0.0).sqrt();
+    Some(([[k1, 0.0], [by_k2, k2]], at(CxPx, CxPx)?.sqrt()))
 }
 
-/// Returns the lens with a coefficient k1 and the same angle at the edge of the picture, `edge_radius` focal lengths
-/// from the middle.
-fn with_shape(camera: &CameraConfig, k1: f64, edge_radius: f64) -> CameraConfig {
-    let scale = 1.0 / (1.0 + k1 * edge_radius * edge_radius);
+/// Returns the lens with the coefficients k1 and k2 and the same angle at the edge of the picture, `edge_radius` focal
+/// lengths from the middle.
+fn with_shape(camera: &CameraConfig, [k1, k2]: [f64; 2], edge_radius: f64) -> CameraConfig {
+    let edge2 = edge_radius * edge_radius;
+    let scale = 1.0 / (1.0 + edge2 * (k1 + k2 * edge2));
     let mut camera = CameraConfig { fx_px: camera.fx_px * scale, fy_px: camera.fy_px * scale, ..camera.clone() };
     camera.set_intrinsic(Intrinsic::K1, k1);
+    camera.set_intrinsic(Intrinsic::K2, k2);
     camera
 }
 
@@ -264,7 +274,7 @@ fn combine(all: &[Vec<Said>]) -> Option<Combined> {
     let total: f64 = kept.iter().map(|s| 1.0 / s.variance()).sum();
     let mean = |value: &dyn Fn(&Said) -> f64| kept.iter().map(|s| value(s) / s.variance()).sum::<f64>() / total;
     let ln_focal = mean(&|s| s.ln_focal);
-    let shared: f64 = (0..4).map(|i| mean(&|s| s.shared[i]).powi(2)).sum();
+    let shared: f64 = (0..SHARED).map(|i| mean(&|s| s.shared[i]).powi(2)).sum();
     // The scatter of the pictures contains their noise, and what nobody thought of.
     let spread = mean(&|s| (s.ln_focal - ln_focal).powi(2)).max(mean(&|s| s.noise * s.noise));
     let sigma = (shared + spread / kept.len().max(1) as f64).sqrt();
@@ -278,7 +288,7 @@ mod tests {
     /// Each picture has the true solution and another one that scatters, which is found first.
     #[test]
     fn the_solution_that_all_pictures_share_wins() {
-        let said = |ln_focal: f64, noise: f64| Said { ln_focal, noise, shared: [0.0, 0.0, 0.0, 0.01] };
+        let said = |ln_focal: f64, noise: f64| Said { ln_focal, noise, shared: [0.0, 0.0, 0.0, 0.0, 0.01] };
         let all: Vec<Vec<Said>> = (0..8)
             .map(|i| {
                 let i = f64::from(i);
