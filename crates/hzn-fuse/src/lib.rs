@@ -13,7 +13,7 @@
 //! | [`finding`] | the verdict: whether the inputs agree with each other, and the likeliest cause if not |
 //! | [`results`] | what comes out |
 //! | `simulated` | recordings of simulated flights without pictures, with the feature of this name |
-//! | [`sink`] | results as files: CSV, MCAP, AEM, CK, frames.csv |
+//! | [`sink`] | results as files: CSV, MCAP, AEM, OEM, CK, frames.csv |
 //! | [`read_back`] | these files (CSV, MCAP) back into numbers |
 
 #![forbid(unsafe_code)]

@@ -1,4 +1,4 @@
-//! The part of ROS 2's CDR encoding that pictures and calibrations need.
+//! The part of ROS 2's CDR encoding that pictures, calibrations, inertial units and receivers need.
 
 use crate::camera_info::CameraInfo;
 use crate::frame::EncodedImage;
@@ -42,6 +42,13 @@ impl<'a> Cdr<'a> {
         let bytes = *self.bytes(8)?.first_chunk::<8>()?;
         Some(if self.big_endian { f64::from_be_bytes(bytes) } else { f64::from_le_bytes(bytes) })
     }
+    fn numbers<const N: usize>(&mut self) -> Option<[f64; N]> {
+        let mut numbers = [0.0; N];
+        for number in &mut numbers {
+            *number = self.f64()?;
+        }
+        Some(numbers)
+    }
     /// Reads a text: the length, then the bytes. The length includes a final zero byte.
     fn text(&mut self) -> Option<&'a str> {
         let n = self.u32()? as usize;
@@ -83,11 +90,47 @@ pub(crate) fn parse_camera_info(message: &[u8]) -> Option<CameraInfo> {
     let (height, width, model) = (c.u32()?, c.u32()?, c.text()?.to_owned());
     let count = Some(c.u32()? as usize).filter(|count| *count <= MAX_COEFFICIENTS)?;
     let distortion = (0..count).map(|_| c.f64()).collect::<Option<_>>()?;
-    let mut matrix = [0.0; 9];
-    for value in &mut matrix {
-        *value = c.f64()?;
-    }
-    Some(CameraInfo { size_px: [width, height], model, distortion, matrix })
+    Some(CameraInfo { size_px: [width, height], model, distortion, matrix: c.numbers()? })
+}
+
+/// Reads a `sensor_msgs/msg/Imu`: header, rates and specific forces. `None` if it ends too early.
+pub(crate) fn parse_imu(message: &[u8]) -> Option<(Header, [[f64; 3]; 2])> {
+    let mut c = Cdr::try_new(message)?;
+    let head = c.header()?;
+    // The orientation and its covariance.
+    c.numbers::<13>()?;
+    let mut vector = || {
+        let values = c.numbers::<3>()?;
+        // A covariance that begins with -1 says that the message does not have the values.
+        let [first, ..] = c.numbers::<9>()?;
+        Some(if first == -1.0 { [f64::NAN; 3] } else { values })
+    };
+    let both = [vector()?, vector()?];
+    Some((head, both))
+}
+
+/// What a `sensor_msgs/msg/NavSatFix` says.
+pub(crate) struct NavSatFix {
+    pub(crate) header: Header,
+    pub(crate) has_fix: bool,
+    /// Latitude and longitude in degrees, height in metres.
+    pub(crate) place: [f64; 3],
+    /// Variances to east, north and up in m², if they are known.
+    pub(crate) variances_m2: Option<[f64; 3]>,
+}
+
+/// Reads a `sensor_msgs/msg/NavSatFix`; `None` if it ends too early.
+pub(crate) fn parse_fix(message: &[u8]) -> Option<NavSatFix> {
+    let mut c = Cdr::try_new(message)?;
+    let header = c.header()?;
+    // The status: -1 is no fix. The services, a number of two bytes, follow.
+    let status = c.u8()? as i8;
+    c.at = c.at.next_multiple_of(2);
+    c.bytes(2)?;
+    let place = c.numbers()?;
+    let [xx, _, _, _, yy, _, _, _, zz] = c.numbers()?;
+    let is_known = c.u8()? != 0;
+    Some(NavSatFix { header, has_fix: status >= 0, place, variances_m2: is_known.then_some([xx, yy, zz]) })
 }
 
 #[cfg(test)]

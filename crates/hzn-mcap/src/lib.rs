@@ -13,6 +13,7 @@
 //! - [`Reader`] reads the frames, also from broken files; [`recover`] closes a broken file, [`resume`] continues it.
 //! - [`ImageReader`] reads pictures from MCAP files of any writer, as an input.
 //! - [`SeriesWriter`] writes series over time, for example of a navigation filter; [`read_series`] reads them.
+//! - [`read_instruments`] reads inertial units and receivers in recordings of ROS 2.
 //! - [`Index`] finds pictures and reports without reading the pictures; [`Pictures`] then reads any one of them.
 //!
 //! Without the feature `recordings`, there are only rows, records and drawings, which need no file and no compression.
@@ -63,6 +64,8 @@ mod images;
 #[cfg(feature = "recordings")]
 mod index;
 #[cfg(feature = "recordings")]
+mod instruments;
+#[cfg(feature = "recordings")]
 mod messages;
 #[cfg(feature = "recordings")]
 mod origin;
@@ -102,6 +105,8 @@ pub use frame::{Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord,
 pub use images::{ImageReader, InputImage};
 #[cfg(feature = "recordings")]
 pub use index::{Index, IndexEntry};
+#[cfg(feature = "recordings")]
+pub use instruments::{InstrumentMessage, Measured, read_instruments};
 pub use part::{check_close, create_part, is_being_written, open_part, part_path, publish, rename, sync, sync_name};
 #[cfg(feature = "recordings")]
 pub use pictures::{Pictures, Place};

@@ -38,7 +38,20 @@ pub fn read_series(
     wants: impl Fn(&str) -> bool,
     mut take: impl FnMut(&str, &[u8]),
 ) -> Result<(), Error> {
-    let path = path.as_ref();
+    let is_whole = read_messages(path.as_ref(), |channel, message| {
+        if channel.encoding == "json" && wants(&channel.topic) {
+            take(&channel.topic, message.data);
+        }
+    });
+    is_whole.map(|_| ())
+}
+
+/// Hands all messages to `take`, in file order, and returns whether the file has its end. A file that was cut off or
+/// damaged gives the messages before that place.
+///
+/// # Errors
+/// Those of [`read_series`].
+pub(crate) fn read_messages(path: &Path, mut take: impl FnMut(&Channel, &Message<'_>)) -> Result<bool, Error> {
     let read = |source| Error::Read { path: path.to_path_buf(), source };
     let file = File::open(path).map_err(read)?;
     let scanner = Scanner::try_new(BufReader::with_capacity(1 << 16, file)).map_err(read)?;
@@ -46,14 +59,13 @@ pub fn read_series(
     let (mut schemas, mut inflation) = (Schemas::default(), Inflation::default());
     let mut channels: BTreeMap<u16, Channel> = BTreeMap::new();
     let mut hand = |channels: &BTreeMap<u16, Channel>, message: &Message<'_>| {
-        let wanted = |c: &&Channel| c.encoding == "json" && wants(&c.topic);
-        if let Some(channel) = channels.get(&message.channel).filter(wanted) {
-            take(&channel.topic, message.data);
+        if let Some(channel) = channels.get(&message.channel) {
+            take(channel, message);
         }
     };
     while let Some(record) = scanner.next().map_err(read)? {
         match record.op {
-            Op::DATA_END => break,
+            Op::DATA_END => return Ok(true),
             Op::CHUNK => {
                 let (chunk, plain) = match Chunk::parse(&record, &mut inflation) {
                     Ok(read) => read,
@@ -71,7 +83,7 @@ pub fn read_series(
             op => channels.extend(schemas.declare(op, &record.content)),
         }
     }
-    Ok(())
+    Ok(false)
 }
 
 #[cfg(test)]

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use hzn_fuse::finding::Finding;
 use hzn_fuse::flight::Wanted;
-use hzn_fuse::input::{self, Inputs};
+use hzn_fuse::input::{self, Inputs, Map};
 use hzn_fuse::results::{Determined, Lowered, Solved};
+use hzn_fuse::sink::Utc;
 use hzn_fuse::{Settings, sink};
 use hzn_nav::ephemeris::{self, Place};
 use hzn_nav::filter::{DirectionMeasurement, Innovation, Step};
@@ -104,6 +105,7 @@ pub(crate) fn fuse<'py>(
     attitude: Option<PathBuf>,
     mounts: BTreeMap<String, Rows>,
     clocks: BTreeMap<String, f64>,
+    tables: (Vec<String>, Option<String>),
     given: &Bound<'py, PyAny>,
     wanted: (bool, bool),
     rate_hz: f64,
@@ -125,12 +127,17 @@ pub(crate) fn fuse<'py>(
         let recording = found.ok_or_else(|| errors::config(format!("clocks: there is no camera {name:?}")))?;
         recording.clock_offset_s = *offset_s;
     }
-    inputs.imu = input::imu(&imu).map_err(to_exception)?;
+    let (columns, utc) = tables;
+    let map = Map::parse(columns.iter().map(String::as_str)).map_err(to_exception)?;
+    let utc = utc.as_deref().map(Utc::parse).transpose().map_err(to_exception)?;
+    inputs.imu = input::imu(&imu, &map).map_err(to_exception)?;
+    let mut read = Vec::new();
     if let Some(path) = &gnss {
-        inputs.gnss = input::gnss(path).map_err(to_exception)?;
+        let receiver = input::gnss(path, &map, utc.map(|utc| utc.unix_s)).map_err(to_exception)?;
+        (inputs.gnss, read) = (receiver.fixes, receiver.notes);
     }
     if let Some(path) = &attitude {
-        inputs.attitudes = input::attitudes(path).map_err(to_exception)?;
+        inputs.attitudes = input::attitudes(path, &map).map_err(to_exception)?;
     }
     let (smoothed, solved) = wanted;
     let wanted = Wanted { smoothed, solved, rate_hz: Some(rate_hz) };
@@ -145,7 +152,7 @@ pub(crate) fn fuse<'py>(
         "cameras": fused.cameras,
         "states": states,
         "innovations": innovations,
-        "notes": fused.notes,
+        "notes": read.iter().chain(&fused.notes).collect::<Vec<_>>(),
         "restarts": fused.counts.restarts,
         "start_s": fused.begin.map(|b| b.time_s),
         "solved": fused.solved.as_ref().map(|solved| solution(solved, &fused.cameras)),

@@ -4,6 +4,7 @@
 //! [`open`] opens a sequence with its sensor, by the same rules for every program. A [`source`] hands out pictures in
 //! order. The [`engine`] processes them with the sensor on all cores. A [`sink`] takes the results in order.
 //! [`rig`] does the same for several cameras that are one sensor.
+//! [`instruments`] makes tables of the inertial unit and the receiver in a recording.
 //! [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of their rows. [`overlay`] draws
 //! the result over a picture, and [`explained`] describes what happened to it, in the words of [`explain`].
 //! [`diagnosis`] says what would make a refused limb the expected one. [`disk`] has the errors of files that cannot be
@@ -26,6 +27,8 @@ pub mod engine;
 mod error;
 pub mod explain;
 pub mod explained;
+#[cfg(feature = "recordings")]
+pub mod instruments;
 mod limb_words;
 pub mod nadir;
 pub mod open;

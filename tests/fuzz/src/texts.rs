@@ -4,6 +4,7 @@ use std::path::Path;
 
 use hzn_core::HostHorizon;
 use hzn_core::body::Kind;
+use hzn_fuse::input::Map;
 
 use crate::input::with_file;
 
@@ -65,9 +66,9 @@ pub(crate) fn camera_file(bytes: &[u8]) {
 pub(crate) fn tables(bytes: &[u8]) {
     let Some((which, rest)) = bytes.split_first() else { return };
     with_file("table.csv", rest, |path, _| match which % 6 {
-        0 => drop(hzn_fuse::input::imu(path)),
-        1 => drop(hzn_fuse::input::gnss(path)),
-        2 => drop(hzn_fuse::input::attitudes(path)),
+        0 => drop(hzn_fuse::input::imu(path, &Map::default())),
+        1 => drop(hzn_fuse::input::gnss(path, &Map::default(), None)),
+        2 => drop(hzn_fuse::input::attitudes(path, &Map::default())),
         3 => drop(hzn_files::truth::load(path)),
         4 => drop(hzn_calib::points::table::load(path, [640, 480])),
         _ => drop(hzn_fuse::Settings::load(path)),

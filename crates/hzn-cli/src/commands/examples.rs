@@ -31,13 +31,16 @@ hzn info sensor.toml --json    the same facts for a program, as one JSON object"
         "export",
         "hzn export flight.mcap -o flight.csv            the rows of a recording, as a table
 hzn export flight.mcap -o - --format jsonl      the same on standard output
-hzn export flight.mcap --overlay drawn/         the pictures with edges, points and limb",
+hzn export flight.mcap --overlay drawn/         the pictures with edges, points and limb
+hzn export bag/ --imu imu.csv --gnss gnss.csv   from ROS 2, the tables of `hzn fuse`",
     ),
     ("recover", "hzn recover flight.mcap.part        keeps what is complete, in flight.mcap"),
     (
         "fuse",
         "hzn fuse --nadir flight.mcap --imu imu.csv --gnss gnss.csv -o fused.mcap
-hzn fuse --nadir flight.mcap --imu imu.csv --gnss gnss.csv --solve -o f.mcap --report f.html",
+hzn fuse --nadir flight.mcap --imu imu.csv --gnss gnss.csv --solve -o f.mcap --report f.html
+hzn fuse --nadir f.mcap --imu imu.csv --gnss log.nmea --utc 2026-06-13T04:00:00Z -o f2.mcap
+hzn fuse --nadir f.mcap --imu log.csv --map imu:gyro=wx:wy:wz,deg/s --gnss gnss.csv -o f2.mcap",
     ),
     (
         "simulate",

@@ -3,19 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use hzn_mcap::{Contents, FrameRecord, ImageFormat, Reader};
+use hzn_run::instruments::Instrument;
 use hzn_run::sink::{self, Existing, RowFile};
 use hzn_run::source::{self, ending};
 use hzn_run::{disk, explain, overlay, results};
 
+use super::export_instruments;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::files;
 use crate::setup::TableFormat;
 use crate::tell;
 
 /// Turn a recording into a table, pictures, or pictures with overlay
+///
+/// From a recording of ROS 2, --imu and --gnss write the tables of inertial unit and receiver that `hzn fuse` reads.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// An MCAP of hzn; for tables also a .csv or .jsonl
+    /// An MCAP of hzn; for tables also a .csv or .jsonl; for --imu and --gnss a recording or bag folder of ROS 2
     file: PathBuf,
     /// A table: .csv, .jsonl, or - for stdout
     #[arg(short, long, value_name = "FILE")]
@@ -29,17 +33,38 @@ pub(super) struct Args {
     /// The folder for the recorded pictures with everything drawn over them, as PNG
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
+    /// A table of the inertial unit for `hzn fuse --imu`, from the messages sensor_msgs/Imu of ROS 2
+    #[arg(long, value_name = "CSV")]
+    imu: Option<PathBuf>,
+    /// A table of the receiver for `hzn fuse --gnss`, from the messages sensor_msgs/NavSatFix of ROS 2
+    #[arg(long, value_name = "CSV")]
+    gnss: Option<PathBuf>,
+    /// The topic for --imu or --gnss, if there are several; may be given twice
+    #[arg(long, value_name = "TOPIC")]
+    topic: Vec<String>,
     /// Replace files that exist
     #[arg(long)]
     force: bool,
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
+    let tables = [(Instrument::Imu, &args.imu), (Instrument::Gnss, &args.gnss)];
+    let tables: Vec<(Instrument, &Path)> =
+        tables.into_iter().filter_map(|(which, path)| Some((which, path.as_deref()?))).collect();
+    if !tables.is_empty() {
+        if args.output.is_some() || args.images.is_some() || args.overlay.is_some() {
+            return Err(usage("--imu and --gnss are for recordings of ROS 2, the other outputs for those of hzn"));
+        }
+        return export_instruments::run(&args.file, &tables, &args.topic, args.force);
+    }
     let file = &args.file;
     let (kind, _) = source::check_exists(file)?;
     let pictures = args.images.is_some() || args.overlay.is_some();
     if args.output.is_none() && !pictures {
-        return Err(usage("nothing to export: give -o out.csv, -o out.jsonl, --images DIR or --overlay DIR"));
+        return Err(usage(
+            "nothing to export: give -o out.csv, -o out.jsonl, --images DIR or --overlay DIR; or --imu imu.csv, --gnss \
+             gnss.csv for a recording of ROS 2",
+        ));
     }
     let to_file = args.output.as_ref().filter(|path| !source::is_stdin(path));
     if let Some(path) = to_file

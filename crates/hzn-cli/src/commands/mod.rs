@@ -8,6 +8,7 @@ mod evaluate;
 mod examples;
 mod explain;
 mod export;
+mod export_instruments;
 #[cfg(target_os = "linux")]
 mod fly;
 mod fuse;

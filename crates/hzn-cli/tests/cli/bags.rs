@@ -215,3 +215,113 @@ fn an_empty_stream_of_telemetry_is_an_error() {
     place.run(&["telemetry", "empty.bin", "-o", "e.csv"]).expect(1).says("empty.bin: is empty");
     assert!(!place.path("e.csv").exists());
 }
+
+/// Appends numbers of 8 bytes, which begin at a multiple of 8 after the encapsulation.
+fn push_numbers(message: &mut Vec<u8>, numbers: &[f64]) {
+    message.resize((message.len() - 4).next_multiple_of(8) + 4, 0);
+    message.extend(numbers.iter().flat_map(|x| x.to_le_bytes()));
+}
+
+fn stamped((s, ns): (u32, u32), frame: &str) -> Vec<u8> {
+    let mut message = vec![0, 1, 0, 0];
+    message.extend([s, ns].iter().flat_map(|word| word.to_le_bytes()));
+    push_blob(&mut message, format!("{frame}\0").as_bytes());
+    message
+}
+
+/// Returns a `sensor_msgs/msg/Imu`. `known` is the first number of the covariance of the rates.
+fn imu(stamp: (u32, u32), gyro: [f64; 3], accel: [f64; 3], known: f64) -> Vec<u8> {
+    let mut message = stamped(stamp, "imu_link");
+    push_numbers(&mut message, &[0.0, 0.0, 0.0, 1.0]);
+    push_numbers(&mut message, &[-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    push_numbers(&mut message, &gyro);
+    push_numbers(&mut message, &[known, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.1]);
+    push_numbers(&mut message, &accel);
+    push_numbers(&mut message, &[0.0; 9]);
+    message
+}
+
+/// Returns a `sensor_msgs/msg/NavSatFix`.
+fn fix(stamp: (u32, u32), status: i8, place: [f64; 3], variances: Option<[f64; 3]>) -> Vec<u8> {
+    let mut message = stamped(stamp, "gps");
+    message.extend([status as u8, 0, 1, 0]);
+    push_numbers(&mut message, &place);
+    let [xx, yy, zz] = variances.unwrap_or_default();
+    push_numbers(&mut message, &[xx, 0.0, 0.0, 0.0, yy, 0.0, 0.0, 0.0, zz]);
+    message.push(u8::from(variances.is_some()));
+    message
+}
+
+/// Writes a bag with messages of instruments: topic, type and message.
+fn write_instruments(path: &Path, messages: &[(&str, &str, Vec<u8>)]) {
+    let mut writer = mcap::Writer::new(fs::File::create(path).unwrap()).unwrap();
+    for (i, (topic, kind, data)) in messages.iter().enumerate() {
+        let schema = writer.add_schema(&format!("sensor_msgs/msg/{kind}"), "ros2msg", b"").unwrap();
+        let channel_id = writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap();
+        let log_time = 9_000_000_000 + i as u64;
+        let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time: log_time };
+        writer.write_to_known_channel(&header, data).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn instruments_of_a_bag_become_tables_for_fuse() {
+    let place = Place::new();
+    let (gyro, accel) = ([0.1, -0.2, 0.3], [9.5, 0.25, -1e-3]);
+    let mut short = imu(STAMPS[2], gyro, accel, 0.0);
+    short.truncate(200);
+    let messages = [
+        ("/imu", "Imu", imu(STAMPS[0], gyro, accel, 0.1)),
+        ("/gps", "NavSatFix", fix(STAMPS[0], -1, [0.0; 3], None)),
+        ("/imu", "Imu", imu(STAMPS[1], gyro, accel, -1.0)),
+        ("/gps", "NavSatFix", fix(STAMPS[1], 0, [47.5, 8.25, 512.0], Some([4.0, 9.0, 25.0]))),
+        ("/gps", "NavSatFix", fix((0, 0), 2, [-47.5, -8.25, 1e5], None)),
+        ("/imu", "Imu", short),
+    ];
+    fs::create_dir(place.path("bag")).unwrap();
+    place.write("bag/metadata.yaml", b"rosbag2_bagfile_information:\n  version: 9\n");
+    write_instruments(&place.path("bag/bag_0.mcap"), &messages);
+    let ran = place.run(&["export", "bag", "--imu", "imu.csv", "--gnss", "gnss.csv"]).expect(0);
+    for words in ["about the axes of the frame imu_link", "1 message of /gps have no fix", "gnss.csv: 2 rows of /gps"] {
+        assert!(ran.err.contains(words), "{words} in {}", ran.err);
+    }
+    let imu_csv = place.read("imu.csv");
+    let lines: Vec<&str> = imu_csv.lines().collect();
+    assert_eq!(lines[0], "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2");
+    // The stamp has all its digits; rates that the message does not have are empty.
+    assert_eq!(
+        lines[1..],
+        ["1700000069.487179487,0.1,-0.2,0.3,9.5,0.25,-0.001", "1700000069.520000001,,,,9.5,0.25,-0.001"]
+    );
+    let gnss_csv = place.read("gnss.csv");
+    let rows = ["1700000069.520000001,47.5,8.25,512,3,5", "9.000000004,-47.5,-8.25,100000,,"];
+    assert_eq!(gnss_csv.lines().skip(1).collect::<Vec<_>>(), rows);
+    let read = hzn_fuse::input::gnss(&place.path("gnss.csv"), &hzn_fuse::input::Map::default(), None).unwrap();
+    assert!(read.fixes[0].position_sigma_m == 5.0 && read.fixes[1].position_sigma_m.is_nan());
+    // Nothing is replaced, and nothing else is written beside these tables.
+    place.run(&["export", "bag", "--imu", "imu.csv"]).expect(2).says("exists already");
+    place.run(&["export", "bag", "--imu", "i.csv", "-o", "t.csv"]).expect(2).says("recordings of ROS 2");
+    // Several topics: one is chosen by name.
+    let two =
+        [("/a/imu", "Imu", imu(STAMPS[0], gyro, accel, 0.0)), ("/b/imu", "Imu", imu(STAMPS[1], accel, gyro, 0.0))];
+    write_instruments(&place.path("two.mcap"), &two);
+    let export = ["export", "two.mcap", "--imu", "two.csv"];
+    place
+        .run(&export)
+        .expect(2)
+        .says("several topics have sensor_msgs/msg/Imu: /a/imu, /b/imu; choose one with --topic");
+    place.run(&[&export[..], &["--topic", "/c"]].concat()).expect(2).says("there are /a/imu, /b/imu");
+    place.run(&[&export[..], &["--topic", "/b/imu"]].concat()).expect(0);
+    assert!(place.read("two.csv").contains("1700000069.520000001,9.5,"));
+    place
+        .run(&["export", "two.mcap", "--gnss", "g.csv"])
+        .expect(1)
+        .says("there are no messages sensor_msgs/msg/NavSatFix");
+    // A recording without its end gives what comes before.
+    let bytes = fs::read(place.path("bag/bag_0.mcap")).unwrap();
+    place.write("cut.mcap", &bytes[..bytes.len() / 2]);
+    let cut = place.run(&["export", "cut.mcap", "--imu", "cut.csv"]);
+    assert!(cut.code != 0, "{}", cut.err);
+    place.run(&["export", "none.db3", "--imu", "cut.csv", "--force"]).expect(2).says("no such file");
+}

@@ -18,7 +18,7 @@ impl Errors for Exact {
     }
 }
 
-fn flight(folder: &Path) {
+pub fn flight(folder: &Path) {
     let mut scene = Scenario::builtin("atek").unwrap();
     scene.capture.frames = 75;
     write(&scene, &inputs(&scene, &mut Exact, 0.0).unwrap(), folder).unwrap();
@@ -31,7 +31,7 @@ fn fuse(folder: &Path, args: &[&str]) -> (i32, String, String) {
 }
 
 /// Runs `hzn fuse` in a folder with these arguments.
-fn bare(folder: &Path, args: &[&str]) -> (i32, String, String) {
+pub fn bare(folder: &Path, args: &[&str]) -> (i32, String, String) {
     let out = assert_cmd::Command::cargo_bin("hzn")
         .expect("the binary is built")
         .current_dir(folder)
@@ -43,7 +43,7 @@ fn bare(folder: &Path, args: &[&str]) -> (i32, String, String) {
     (out.status.code().unwrap_or(-1), text(&out.stdout), text(&out.stderr))
 }
 
-const MOUNTS: [&str; 4] = ["--mount", "left=left.toml", "--mount", "right=right.toml"];
+pub const MOUNTS: [&str; 4] = ["--mount", "left=left.toml", "--mount", "right=right.toml"];
 
 #[test]
 fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
@@ -51,7 +51,7 @@ fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
     let at = dir.path();
     flight(at);
     let more = ["--truth", "vehicle.csv", "--smooth", "--report", "nav.html", "--utc", "2019-06-13T04:00:00Z"];
-    let files = ["-o", "nav.csv", "--aem", "nav.aem", "--ck", "nav.bc", "--write-frames", "left=left-frames.csv"];
+    let files = ["-o", "nav.csv", "--aem", "nav.aem", "--oem", "nav.oem", "--ck", "nav.bc", "--write-frames", "left=left-frames.csv"];
     let args = [&MOUNTS[..], &more, &files].concat();
     let (code, stdout, stderr) = fuse(at, &args);
     assert_eq!(code, 0, "{stderr}");
@@ -67,6 +67,15 @@ fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
     charts.iter().for_each(|chart| assert!(page.contains(chart), "{chart}"));
     assert!(!page.contains("NaN"));
     assert!(read("nav.aem").contains("ATTITUDE_DIR = A2B") && read("nav.tf").contains("HZN_BODY"));
+    // The OEM has the positions of the smoothed solution, in kilometres.
+    let (oem, states) = (read("nav.oem"), read("nav.csv"));
+    let last: Vec<f64> = oem.lines().last().unwrap().split(' ').filter_map(|word| word.parse().ok()).collect();
+    let place = states.lines().next().unwrap().split(',').position(|name| name == "x_m").unwrap();
+    let is_last = |row: &str| {
+        let cells = row.split(',').skip(place).take(3).map(|cell| cell.parse::<f64>().unwrap_or(f64::NAN));
+        row.contains("smoothed") && cells.zip(&last).all(|(m, km)| (1e-3 * m - km).abs() < 2e-6)
+    };
+    assert!(oem.contains("REF_FRAME = ITRF-97") && last.len() == 6 && states.lines().any(is_last), "{last:?}");
     let frames = read("left-frames.csv");
     let with_attitude = frames.lines().filter(|line| !line.ends_with(",,,")).count();
     assert!((50..75).contains(&with_attitude), "{with_attitude} of {}", frames.lines().count());
@@ -84,7 +93,7 @@ fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
 }
 
 /// Returns the three errors of an attitude that the summary tells, and the position's.
-fn told_errors(stdout: &str, who: &str) -> ([f64; 3], f64) {
+pub fn told_errors(stdout: &str, who: &str) -> ([f64; 3], f64) {
     let name = format!("error of the {who}");
     let line = stdout.lines().find(|line| line.starts_with(&name)).unwrap_or_else(|| panic!("{name} in {stdout}"));
     let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();

@@ -38,6 +38,8 @@ const CASES: &[Case] = &[
     ("a.csv", &["export", "a.csv", "-o", "a.csv", "--force"]),
     ("new.csv.part", &["export", "new.csv.part", "-o", "new.csv", "--force"]),
     ("a.mcap", &["export", "a.mcap", "--images", "links", "--force"]),
+    ("a.mcap", &["export", "a.mcap", "--imu", "./a.mcap", "--force"]),
+    ("a.mcap", &["export", "a.mcap", "--imu", "i.csv", "--gnss", "a.mcap", "--force"]),
     ("a.mcap", &["export", "a.mcap", "--overlay", "links", "--force"]),
     ("a.csv", &["recover", "a.csv", "-o", "a.csv", "--force"]),
     ("a.mcap", &["recover", "a.mcap", "-o", "./a.mcap", "--force"]),

@@ -18,6 +18,7 @@ mod evaluate;
 mod faults;
 mod fly;
 mod fuse;
+mod fuse_tables;
 mod gates;
 mod hostile;
 mod kept_inputs;

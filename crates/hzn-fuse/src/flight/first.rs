@@ -14,6 +14,8 @@ use crate::results::Begin;
 use crate::settings::Settings;
 use crate::start::{DeadReckoning, Sight, Sighted, attitude};
 
+/// Acceleration that a vehicle may have between a fix and the start, m/s²: 10 g.
+const ACCELERATION_M_S2: f64 = 100.0;
 /// Speed in a low orbit: the sigma of a velocity that nobody measures, m/s.
 const ORBIT_M_S: f64 = 7.8e3;
 /// Longest time from a fix to the start, s.
@@ -78,7 +80,7 @@ pub(super) fn first_attitude(
         };
         let Some((attitude, covariance_rad2, directions, chi2)) = found else { continue };
         let begin = Begin { time_s: event.time_s, directions, chi2 };
-        return Ok(found_at(begin, attitude, covariance_rad2, &fix, settings));
+        return Ok(found_at(begin, attitude, covariance_rad2, &fix, &flight.inputs.gnss, settings));
     }
     Err(no_attitude(&bodies, &without_reference, contradicts, settings))
 }
@@ -119,22 +121,41 @@ fn found_at(
     attitude: Rotation<Vehicle, Fixed>,
     covariance_rad2: Covariance<Fixed>,
     fix: &Fix,
+    fixes: &[Fix],
     settings: &Settings,
 ) -> Found {
     let dt = begin.time_s - fix.time_s;
-    let [position, velocity] = settings.fix_sigmas(fix);
-    let moved = if fix.velocity_m_s.is_finite() { fix.velocity_m_s } else { Vector::zeros() };
+    let [position, told] = settings.fix_sigmas(fix);
+    let (moved, velocity, drift) = if fix.velocity_m_s.is_finite() {
+        (fix.velocity_m_s, told, 0.0)
+    } else {
+        let (moved, sigma) = by_difference(fixes, fix, position).unwrap_or((Vector::zeros(), ORBIT_M_S));
+        (moved, sigma, sigma * dt)
+    };
     let state =
         Nominal { time_s: begin.time_s, attitude, velocity_m_s: moved, position_m: fix.position_m + moved * dt };
-    // The vehicle may accelerate by 10 g in between.
-    let g = 100.0;
     Found {
         state,
         covariance_rad2,
-        position_sigma_m: position.hypot(0.5 * g * dt * dt),
-        velocity_sigma_m_s: velocity.hypot(g * dt.abs()),
+        position_sigma_m: position.hypot(drift).hypot(0.5 * ACCELERATION_M_S2 * dt * dt),
+        velocity_sigma_m_s: velocity.hypot(ACCELERATION_M_S2 * dt.abs()),
         begin,
     }
+}
+
+/// Returns the velocity at a fix from the position of a neighbour, and its 1-sigma: of the two neighbours, that with
+/// the smaller sigma. `None` without one.
+fn by_difference(fixes: &[Fix], fix: &Fix, position_sigma_m: f64) -> Option<(Vector<Fixed>, f64)> {
+    let is_near = |other: &&Fix| {
+        let dt = (other.time_s - fix.time_s).abs();
+        dt > 0.0 && dt <= FIX_S && other.position_m.is_finite()
+    };
+    let difference = |other: &Fix| {
+        let dt = other.time_s - fix.time_s;
+        let noise = position_sigma_m * 2f64.sqrt() / dt.abs();
+        ((other.position_m - fix.position_m) / dt, noise.hypot(0.5 * ACCELERATION_M_S2 * dt.abs()))
+    };
+    fixes.iter().filter(is_near).map(difference).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Returns the attitude of all sights; if they contradict each other, that of all but one camera's.

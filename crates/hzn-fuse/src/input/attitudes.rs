@@ -4,6 +4,8 @@ use std::path::Path;
 
 use hzn_nav::frames::{Fixed, Rotation, Vehicle};
 
+use super::columns::ATTITUDE;
+use super::map::Map;
 use super::table::Table;
 use crate::error::Error;
 
@@ -18,18 +20,18 @@ pub struct Attitude {
     pub sigma_rad: f64,
 }
 
-const NAMES: [&str; 6] = ["time_s", "qw", "qx", "qy", "qz", "sigma_deg"];
-
-/// Reads a table with the columns `time_s`, `qw`, `qx`, `qy`, `qz` (vehicle to ECEF) and `sigma_deg`.
+/// Reads a table with the columns `time_s`, `qw`, `qx`, `qy`, `qz` (vehicle to ECEF) and `sigma_deg`, or those that the
+/// map names.
 ///
 /// # Errors
-/// The file cannot be read, a column is missing, or a cell is not a number.
-pub fn attitudes(path: &Path) -> Result<Vec<Attitude>, Error> {
-    let table = Table::read(path, &NAMES, 6)?;
-    let attitude = |row: &[f64]| {
-        let [time_s, w, x, y, z, sigma_deg] = row.try_into().unwrap_or([f64::NAN; 6]);
+/// The file cannot be read, a column is missing or there twice, or a cell is not a number.
+pub fn attitudes(path: &Path, map: &Map) -> Result<Vec<Attitude>, Error> {
+    let table = Table::read(path, &ATTITUDE, map)?;
+    let needed = ["time", "qw", "qx", "qy", "qz", "sigma"];
+    table.require(&needed)?;
+    let attitude = |[time_s, w, x, y, z, sigma_deg]: [f64; 6]| {
         let fixed_from_vehicle = super::rotation([w, x, y, z]).ok();
         Attitude { time_s, fixed_from_vehicle, sigma_rad: sigma_deg.to_radians() }
     };
-    Ok(table.rows().map(attitude).collect())
+    Ok(table.rows(needed).map(attitude).collect())
 }

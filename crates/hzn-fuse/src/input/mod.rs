@@ -1,9 +1,12 @@
 //! The files of a flight.
 
 mod attitudes;
+mod columns;
 mod gnss;
 mod imu;
+mod map;
 mod mount;
+mod nmea;
 mod recording;
 mod table;
 
@@ -11,8 +14,9 @@ use hzn_nav::frames::Rotation;
 use nalgebra::Quaternion;
 
 pub use attitudes::{Attitude, attitudes};
-pub use gnss::{Fix, gnss};
+pub use gnss::{Fix, Receiver, gnss};
 pub use imu::{Sample, imu};
+pub use map::Map;
 pub use mount::mount;
 pub use recording::{Body, Centre, Recording, Seen, recording};
 

@@ -5,6 +5,7 @@ mod ck;
 mod csv;
 mod frames;
 mod mcap;
+mod oem;
 mod record;
 mod utc;
 
@@ -13,5 +14,6 @@ pub use ck::{CkOptions, write_ck};
 pub use csv::{write_innovations, write_states};
 pub use frames::write_frames;
 pub use mcap::write_mcap;
+pub use oem::write_oem;
 pub use record::{CameraRecord, InnovationRecord, Phase, StateRecord, innovations, states};
 pub use utc::Utc;

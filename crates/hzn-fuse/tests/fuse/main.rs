@@ -4,6 +4,7 @@ mod common;
 mod common_part;
 mod flight;
 mod solve;
+mod tables;
 mod tracker;
 mod two_bodies;
 mod verdict;

@@ -1400,6 +1400,7 @@ def _fuse_flight(
     attitude: str | None,
     mounts: dict[str, _Rows],
     clocks: dict[str, float],
+    tables: tuple[list[str], str | None],
     given: dict[str, Any],
     wanted: tuple[bool, bool],
     rate_hz: float,

@@ -266,6 +266,8 @@ def fuse(
     attitude: str | PathLike[str] | None = None,
     mounts: Mapping[str, ArrayLike] | None = None,
     clocks: Mapping[str, float] | None = None,
+    columns: Sequence[str] = (),
+    utc: str | None = None,
     settings: Mapping[str, Any] | None = None,
     smooth: bool = False,
     rate_hz: float = 10.0,
@@ -277,12 +279,17 @@ def fuse(
     recordings
         Results of ``hzn run``, one file for each camera (.mcap, .csv, .jsonl); the name of a camera is that of its file.
     imu, gnss, attitude
-        Tables of the inertial unit, the receiver and a star tracker, with the columns of ``hzn fuse``. With a star tracker,
-        the attitude needs neither a receiver nor recordings; without a receiver the position is not known.
+        Tables of the inertial unit, the receiver and a star tracker, with the columns of ``hzn fuse``; the file of the
+        receiver may be NMEA 0183. With a star tracker, the attitude needs neither a receiver nor recordings; without a
+        receiver the position is not known.
     mounts
         Mounts by the name of the camera, shape (3, 3), instead of those of the recordings.
     clocks
         Seconds to add to the times of a camera, by its name.
+    columns
+        Columns with other names or units, as ``--map`` of ``hzn fuse``: ``["imu:time=t_us,us"]``.
+    utc
+        UTC of time 0, such as ``"2019-06-13T04:00:00Z"``, from which the times of NMEA count.
     settings
         Sections and keys of a fuse.toml that differ from the defaults.
     smooth
@@ -304,7 +311,8 @@ def fuse(
         A file, a mount or a setting is refused, or no two directions give a first attitude.
     """
     wanted = (smooth, False)
-    return _replay(recordings, imu, gnss, attitude, mounts, clocks, settings, wanted, rate_hz)
+    tables = (columns, utc)
+    return _replay(recordings, imu, gnss, attitude, mounts, clocks, tables, settings, wanted, rate_hz)
 
 
 def solve(
@@ -315,6 +323,8 @@ def solve(
     attitude: str | PathLike[str] | None = None,
     mounts: Mapping[str, ArrayLike] | None = None,
     clocks: Mapping[str, float] | None = None,
+    columns: Sequence[str] = (),
+    utc: str | None = None,
     settings: Mapping[str, Any] | None = None,
     rate_hz: float = 10.0,
 ) -> dict[str, Any]:
@@ -326,7 +336,7 @@ def solve(
 
     Parameters
     ----------
-    recordings, imu, gnss, attitude, mounts, clocks, settings, rate_hz
+    recordings, imu, gnss, attitude, mounts, clocks, columns, utc, settings, rate_hz
         The same as for `fuse`.
 
     Returns
@@ -344,7 +354,8 @@ def solve(
         A file, a mount or a setting is refused, or no two directions give a first attitude.
     """
     wanted = (False, True)
-    return _replay(recordings, imu, gnss, attitude, mounts, clocks, settings, wanted, rate_hz)
+    tables = (columns, utc)
+    return _replay(recordings, imu, gnss, attitude, mounts, clocks, tables, settings, wanted, rate_hz)
 
 
 def _replay(
@@ -354,6 +365,7 @@ def _replay(
     attitude: str | PathLike[str] | None,
     mounts: Mapping[str, ArrayLike] | None,
     clocks: Mapping[str, float] | None,
+    tables: tuple[Sequence[str], str | None],
     settings: Mapping[str, Any] | None,
     wanted: tuple[bool, bool],
     rate_hz: float,
@@ -365,6 +377,7 @@ def _replay(
         None if attitude is None else str(attitude),
         {name: _list(mount, (3, 3), f"mounts[{name!r}]") for name, mount in (mounts or {}).items()},
         dict(clocks or {}),
+        (list(tables[0]), tables[1]),
         dict(settings or {}),
         wanted,
         rate_hz,

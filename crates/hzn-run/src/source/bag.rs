@@ -36,8 +36,25 @@ pub(super) fn files(folder: &Path) -> std::io::Result<[Vec<PathBuf>; 2]> {
     Ok([files, others])
 }
 
+/// Returns the recordings of a bag.
+///
+/// # Errors
+/// It has none in MCAP, or cannot be listed.
+pub fn recordings(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let refuse = |what: String| unusable(format!("{}: {what}", folder.display()));
+    let [files, others] = files(folder).map_err(|e| refuse(format!("cannot be listed: {e}")))?;
+    if files.is_empty() {
+        return Err(refuse(match others.iter().find(|path| ["db3", "zstd"].contains(&ending(path).as_str())) {
+            Some(path) if ending(path) == "db3" => format!("is a bag in SQLite; {}", conversion(folder)),
+            Some(path) => format!("is a bag of compressed files; `zstd -d {}` unpacks one", path.display()),
+            None => "is a bag without a recording (.mcap)".to_owned(),
+        }));
+    }
+    Ok(files)
+}
+
 /// Returns what to do with a bag that hzn does not read. A bag of ROS 2 is converted by its folder.
-pub(super) fn conversion(from: &Path) -> String {
+pub fn conversion(from: &Path) -> String {
     let folder = from.parent().filter(|folder| ending(from) == "db3" && !folder.as_os_str().is_empty());
     let from = folder.unwrap_or(if ending(from) == "db3" { Path::new(".") } else { from });
     format!(
@@ -50,14 +67,7 @@ pub(super) fn conversion(from: &Path) -> String {
 impl Bag {
     pub(super) fn open(folder: &Path, topic: Option<&str>) -> Result<Self, Error> {
         let refuse = |what: String| unusable(format!("{}: {what}", folder.display()));
-        let [files, others] = files(folder).map_err(|e| refuse(format!("cannot be listed: {e}")))?;
-        if files.is_empty() {
-            return Err(refuse(match others.iter().find(|path| ["db3", "zstd"].contains(&ending(path).as_str())) {
-                Some(path) if ending(path) == "db3" => format!("is a bag in SQLite; {}", conversion(folder)),
-                Some(path) => format!("is a bag of compressed files; `zstd -d {}` unpacks one", path.display()),
-                None => "is a bag without a recording (.mcap)".to_owned(),
-            }));
-        }
+        let files = recordings(folder)?;
         let mut bag = Self { folder: folder.to_owned(), recordings: Vec::new(), current: 0, left_out: Vec::new() };
         let mut topic = topic.map(str::to_owned);
         let mut first_error = None;

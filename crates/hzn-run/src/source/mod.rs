@@ -44,7 +44,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 #[cfg(feature = "recordings")]
-pub use bag::is_bag;
+pub use bag::{conversion, is_bag, recordings as recordings_of_bag};
 pub use bits::{FoundBits, find_bits, with_key};
 #[cfg(feature = "recordings")]
 pub use calibration::{RecordedCamera, find_camera};

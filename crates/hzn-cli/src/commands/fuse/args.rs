@@ -19,17 +19,25 @@ pub(crate) struct Args {
     /// Samples of the inertial unit: time_s, gyro_{x,y,z}_radps, accel_{x,y,z}_mps2, saturated
     #[arg(long, value_name = "CSV", required_unless_present = "show_config")]
     pub(super) imu: Option<PathBuf>,
-    /// Fixes of the receiver: time_s, x_m, y_m, z_m, vx_mps, vy_mps, vz_mps, position_sigma_m, velocity_sigma_mps.
-    /// With a star tracker the attitude needs none; the position is then not known
-    #[arg(long, value_name = "CSV", required_unless_present_any = ["show_config", "attitude"])]
+    /// Fixes of the receiver: NMEA 0183, or a table with time_s and either x_m, y_m, z_m (ECEF) or lat_deg, lon_deg,
+    /// height_m (above WGS-84). Velocities vx_mps, vy_mps, vz_mps, or v_north_mps, v_east_mps and v_down_mps or
+    /// v_up_mps, and sigmas position_sigma_m, velocity_sigma_mps, horizontal_sigma_m, vertical_sigma_m may be left out.
+    /// With a star tracker the attitude needs no receiver; the position is then not known
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["show_config", "attitude"])]
     pub(super) gnss: Option<PathBuf>,
     /// Attitudes of a star tracker: time_s, qw, qx, qy, qz (vehicle to ECEF), sigma_deg
     #[arg(long, value_name = "CSV")]
     pub(super) attitude: Option<PathBuf>,
+    /// A column of a table that somebody else wrote, once for each: TABLE (imu, gnss, attitude), what it is, its name in
+    /// the file, and its unit if that is another. Several names with colons mean the three axes:
+    /// --map imu:time=t_us,us --map imu:gyro=wx:wy:wz,deg/s. A wrong name is answered with all right ones
+    #[arg(long, value_name = "TABLE:NAME=COLUMN,UNIT")]
+    pub(super) map: Vec<String>,
     /// The mount of a camera, instead of that in its recording: a TOML file with the table [mount]
     #[arg(long, value_name = "CAMERA=FILE", value_parser = pair)]
     pub(super) mount: Vec<(String, String)>,
-    /// Seconds to add to the times of a camera, if its clock has another epoch than the inertial unit
+    /// Seconds to add to the times of a camera, or of gnss or attitude, if its clock has another epoch than the inertial
+    /// unit
     #[arg(long, value_name = "CAMERA=SECONDS", value_parser = pair, allow_hyphen_values = true)]
     pub(super) clock: Vec<(String, String)>,
     /// Settings of the filter: a fuse.toml
@@ -44,13 +52,16 @@ pub(crate) struct Args {
     /// The attitude as a CCSDS attitude ephemeris message; it needs --utc
     #[arg(long, value_name = "FILE", requires = "utc")]
     pub(super) aem: Option<PathBuf>,
+    /// Position and velocity as a CCSDS orbit ephemeris message; it needs --utc and --gnss
+    #[arg(long, value_name = "FILE", requires_all = ["utc", "gnss"])]
+    pub(super) oem: Option<PathBuf>,
     /// The attitude as a SPICE CK of type 3 (FILE.bc), with FILE.tsc and FILE.tf next to it; it needs --utc
     #[arg(long, value_name = "FILE", requires = "utc")]
     pub(super) ck: Option<PathBuf>,
-    /// UTC of time 0 of the inertial unit, for example 2019-06-13T04:00:00Z
+    /// UTC of time 0 of the inertial unit, for example 2019-06-13T04:00:00Z; the times of NMEA count from it
     #[arg(long, value_name = "TIME")]
     pub(super) utc: Option<String>,
-    /// Name of the vehicle in the AEM
+    /// Name of the vehicle in the AEM and the OEM
     #[arg(long, value_name = "NAME", default_value = "VEHICLE")]
     pub(super) object: String,
     /// SPICE's number of the vehicle in the CK
@@ -73,7 +84,7 @@ pub(crate) struct Args {
     /// Compare with the truth of `hzn simulate`: its vehicle.csv
     #[arg(long, value_name = "CSV")]
     pub(super) truth: Option<PathBuf>,
-    /// Replace outputs that exist, and write --aem and --ck although the inputs contradict each other
+    /// Replace outputs that exist, and write --aem, --oem and --ck although the inputs contradict each other
     #[arg(long)]
     pub(super) force: bool,
     /// Print a fuse.toml with all defaults and do nothing else

@@ -9,7 +9,8 @@ use std::path::Path;
 
 use hzn_fuse::finding::Level;
 use hzn_fuse::flight::Wanted;
-use hzn_fuse::input::{self, Inputs};
+use hzn_fuse::input::{self, Inputs, Map};
+use hzn_fuse::sink::Utc;
 use hzn_fuse::{Fused, Settings, truth};
 
 use crate::exit::{Exit, Outcome, Stop, unreadable, usage};
@@ -94,22 +95,46 @@ fn inputs(args: &Args) -> Result<Inputs, Stop> {
         let recording = found.ok_or_else(|| usage(format!("--mount {name}: no such camera; {known}")))?;
         recording.mount = Some(input::mount(Path::new(file))?);
     }
+    tables(args, &mut inputs)?;
     for (name, seconds) in &args.clock {
-        let found = inputs.recordings.iter_mut().find(|r| r.name == *name);
-        let recording = found.ok_or_else(|| usage(format!("--clock {name}: no such camera; {known}")))?;
-        recording.clock_offset_s = match seconds.parse::<f64>() {
+        let offset_s = match seconds.parse::<f64>() {
             Ok(offset) if offset.is_finite() => offset,
             _ => return Err(usage(format!("--clock {name}={seconds}: a number of seconds is expected"))),
         };
-    }
-    if let Some(path) = &args.imu {
-        inputs.imu = input::imu(path)?;
-    }
-    if let Some(path) = &args.gnss {
-        inputs.gnss = input::gnss(path)?;
-    }
-    if let Some(path) = &args.attitude {
-        inputs.attitudes = input::attitudes(path)?;
+        if let Some(recording) = inputs.recordings.iter_mut().find(|r| r.name == *name) {
+            recording.clock_offset_s = offset_s;
+        } else if name == "gnss" {
+            inputs.gnss.iter_mut().for_each(|fix| fix.time_s += offset_s);
+        } else if name == "attitude" {
+            inputs.attitudes.iter_mut().for_each(|attitude| attitude.time_s += offset_s);
+        } else {
+            return Err(usage(format!("--clock {name}: no such camera, and neither gnss nor attitude; {known}")));
+        }
     }
     Ok(inputs)
+}
+
+/// Reads the tables of inertial unit, receiver and star tracker.
+fn tables(args: &Args, inputs: &mut Inputs) -> Result<(), Stop> {
+    let map = Map::parse(args.map.iter().map(String::as_str))?;
+    for (table, is_given) in
+        [("imu", args.imu.is_some()), ("gnss", args.gnss.is_some()), ("attitude", args.attitude.is_some())]
+    {
+        if map.has(table) && !is_given {
+            return Err(usage(format!("--map {table}:... needs --{table} FILE")));
+        }
+    }
+    if let Some(path) = &args.imu {
+        inputs.imu = input::imu(path, &map)?;
+    }
+    if let Some(path) = &args.gnss {
+        let utc = args.utc.as_deref().map(Utc::parse).transpose()?;
+        let receiver = input::gnss(path, &map, utc.map(|utc| utc.unix_s))?;
+        receiver.notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
+        inputs.gnss = receiver.fixes;
+    }
+    if let Some(path) = &args.attitude {
+        inputs.attitudes = input::attitudes(path, &map)?;
+    }
+    Ok(())
 }

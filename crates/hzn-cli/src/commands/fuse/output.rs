@@ -56,10 +56,10 @@ impl<'a> Outputs<'a> {
         all
     }
 
-    /// Returns the files that carry the attitude to other programs.
+    /// Returns the files that carry the solution to other programs.
     pub(super) fn attitudes(&self) -> Vec<PathBuf> {
         let ck = self.args.ck.iter().flat_map(|ck| [ck.clone(), ck.with_extension("tsc"), ck.with_extension("tf")]);
-        self.args.aem.iter().cloned().chain(ck).collect()
+        self.args.aem.iter().chain(&self.args.oem).cloned().chain(ck).collect()
     }
 
     /// Returns a warning if the UTC of the flight is later than the list of leap seconds.
@@ -98,11 +98,12 @@ impl<'a> Outputs<'a> {
             // Others take an attitude without its verdict.
             return Ok(self.all().iter().filter(|path| !self.attitudes().contains(path)).map(shown).collect());
         }
-        if let (Some(path), Some(utc)) = (&args.aem, self.utc) {
+        if let Some(utc) = self.utc {
             let created = Utc::now().iso(0.0);
             let object_name = args.object.clone();
             let options = AemOptions { utc, object_id: object_name.clone(), object_name, created };
-            sink::write_aem(fused, &options, create(path)?)?;
+            args.aem.iter().try_for_each(|path| Ok::<(), Stop>(sink::write_aem(fused, &options, create(path)?)?))?;
+            args.oem.iter().try_for_each(|path| Ok::<(), Stop>(sink::write_oem(fused, &options, create(path)?)?))?;
         }
         if let (Some(path), Some(utc)) = (&args.ck, self.utc) {
             sink::write_ck(fused, &CkOptions { utc, spacecraft: args.spacecraft }, path)?;

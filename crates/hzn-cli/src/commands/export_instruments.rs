@@ -1,0 +1,79 @@
+//! `hzn export --imu --gnss`: the tables of `hzn fuse` from a recording of ROS 2.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use hzn_run::explain::counted;
+use hzn_run::instruments::{self, Exported, Instrument};
+
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::files;
+use crate::tell::{self, one_line};
+
+/// Writes the tables.
+pub(super) fn run(input: &Path, tables: &[(Instrument, &Path)], wanted: &[String], force: bool) -> Outcome {
+    let recordings = instruments::recordings(input)?;
+    let written: Vec<PathBuf> = tables.iter().map(|(_, path)| path.to_path_buf()).collect();
+    files::check_outputs(&recordings, &written, force)?;
+    let topics = instruments::topics(&recordings)?;
+    if let Some(unknown) = wanted.iter().find(|topic| !topics.contains_key(*topic)) {
+        let list = topics.keys().cloned().collect::<Vec<_>>().join(", ");
+        let known = if list.is_empty() { "there are none".to_owned() } else { format!("there are {list}") };
+        return Err(usage(format!("--topic {unknown}: no instrument has this topic; {known}")));
+    }
+    let chosen = tables.iter().map(|(which, _)| choose(input, *which, &topics, wanted));
+    let chosen = chosen.collect::<Result<Vec<&str>, Stop>>()?;
+    let mut is_cut = false;
+    for ((which, table), topic) in tables.iter().zip(chosen) {
+        let exported = instruments::write_table(&recordings, *which, topic, table)?;
+        is_cut |= !exported.cut.is_empty();
+        report(*which, table, &exported)?;
+    }
+    Ok(if is_cut { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// Chooses the topic of an instrument: the one that was asked for, or the only one.
+fn choose<'a>(
+    input: &Path,
+    which: Instrument,
+    topics: &'a BTreeMap<String, String>,
+    wanted: &[String],
+) -> Result<&'a str, Stop> {
+    let own = || topics.iter().filter(|(_, schema)| *schema == which.schema()).map(|(topic, _)| topic.as_str());
+    let asked: Vec<&str> = own().filter(|topic| wanted.iter().any(|w| w == topic)).collect();
+    let all: Vec<&str> = if asked.is_empty() { own().collect() } else { asked };
+    match all.as_slice() {
+        [only] => Ok(only),
+        [] => Err(failed(format!("{}: there are no messages {}", input.display(), which.schema()))),
+        several => Err(usage(format!(
+            "{}: several topics have {}: {}; choose one with --topic",
+            input.display(),
+            which.schema(),
+            several.join(", ")
+        ))),
+    }
+}
+
+/// Says what was written, and what `hzn fuse` takes it for.
+fn report(which: Instrument, table: &Path, exported: &Exported) -> Result<(), Stop> {
+    let Exported { rows, topic, frame_id, left_out, cut } = exported;
+    tell::line(one_line(format!("{}: {} of {topic}", table.display(), counted(*rows, "row"))));
+    if which == Instrument::Imu && !frame_id.is_empty() {
+        let what = "hzn fuse takes these axes for those of the vehicle";
+        tell::line(one_line(format!("note: the rates are about the axes of the frame {frame_id}; {what}")));
+    }
+    if *left_out > 0 {
+        let what = match which {
+            Instrument::Imu => "end too early",
+            Instrument::Gnss => "have no fix, or end too early",
+        };
+        tell::warning(format_args!("{} of {topic} {what}, and were left out", counted(*left_out, "message")));
+    }
+    for path in cut {
+        tell::warning(format_args!("{}: was cut off or is damaged; what comes before was written", path.display()));
+    }
+    if *rows == 0 {
+        return Err(failed(format!("{topic}: no message has a measurement")));
+    }
+    Ok(())
+}

@@ -1,0 +1,148 @@
+//! The tables of `hzn fuse` from a recording of ROS 2: inertial unit and receiver.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use hzn_mcap::{InstrumentMessage, Measured, read_instruments};
+
+use crate::disk::{self, Checked};
+use crate::error::{Error, unusable};
+use crate::source;
+
+/// An instrument in a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Instrument {
+    /// The inertial unit: `sensor_msgs/msg/Imu`.
+    Imu,
+    /// The receiver: `sensor_msgs/msg/NavSatFix`.
+    Gnss,
+}
+
+impl Instrument {
+    /// Returns the schema of its messages.
+    pub fn schema(self) -> &'static str {
+        match self {
+            Self::Imu => "sensor_msgs/msg/Imu",
+            Self::Gnss => "sensor_msgs/msg/NavSatFix",
+        }
+    }
+
+    fn header(self) -> &'static str {
+        match self {
+            Self::Imu => "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2",
+            Self::Gnss => "time_s,lat_deg,lon_deg,height_m,horizontal_sigma_m,vertical_sigma_m",
+        }
+    }
+}
+
+/// A table that was written.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Exported {
+    /// Number of rows.
+    pub rows: u64,
+    /// The topic of the messages.
+    pub topic: String,
+    /// The frame that the first message names; empty without one.
+    pub frame_id: String,
+    /// Messages without a fix, and messages that end too early. They are left out.
+    pub left_out: u64,
+    /// The files that have no end, so that messages may be missing.
+    pub cut: Vec<PathBuf>,
+}
+
+/// Returns the topics of the instruments in some recordings, each with its schema.
+///
+/// # Errors
+/// A file cannot be read, or is not an MCAP.
+pub fn topics(recordings: &[PathBuf]) -> Result<BTreeMap<String, String>, Error> {
+    let mut found = BTreeMap::new();
+    for path in recordings {
+        let mut add = |message: &InstrumentMessage<'_>| {
+            if !found.contains_key(message.topic) {
+                found.insert(message.topic.to_owned(), message.schema.to_owned());
+            }
+        };
+        read_instruments(path, &mut add).map_err(unusable)?;
+    }
+    Ok(found)
+}
+
+/// Returns the recordings of an input: a recording in MCAP, or the folder of a bag.
+///
+/// # Errors
+/// There is none.
+pub fn recordings(input: &Path) -> Result<Vec<PathBuf>, Error> {
+    if source::is_bag(input) {
+        return source::recordings_of_bag(input);
+    }
+    match source::check_exists(input)?.0.as_str() {
+        "mcap" => Ok(vec![input.to_owned()]),
+        _ => Err(unusable(format!("{}: is not a recording; {}", input.display(), source::conversion(input)))),
+    }
+}
+
+/// Writes the messages of a topic as a table that `hzn fuse` reads.
+///
+/// # Errors
+/// A recording cannot be read, or the table cannot be written.
+pub fn write_table(
+    recordings: &[PathBuf],
+    instrument: Instrument,
+    topic: &str,
+    table: &Path,
+) -> Result<Exported, Error> {
+    let cannot_write = |e: std::io::Error| disk::cannot_write(table, &e);
+    let mut out = BufWriter::new(Checked::create(table).map_err(cannot_write)?);
+    let mut exported = Exported { topic: topic.to_owned(), ..Exported::default() };
+    writeln!(out, "{}", instrument.header()).map_err(cannot_write)?;
+    for path in recordings {
+        let mut written = Ok(());
+        let is_whole = read_instruments(path, |message| {
+            if message.topic != topic || written.is_err() {
+                return;
+            }
+            let Some(row) = row(instrument, message) else {
+                exported.left_out += 1;
+                return;
+            };
+            if exported.rows == 0 {
+                exported.frame_id.clone_from(&message.frame_id);
+            }
+            exported.rows += 1;
+            written = writeln!(out, "{row}");
+        });
+        written.map_err(cannot_write)?;
+        if !is_whole.map_err(Error::failed)? {
+            exported.cut.push(path.clone());
+        }
+    }
+    out.flush().map_err(cannot_write)?;
+    Ok(exported)
+}
+
+/// Returns the row of a message; `None` if it has no measurement.
+fn row(instrument: Instrument, message: &InstrumentMessage<'_>) -> Option<String> {
+    let (s, ns) = message.time;
+    let mut row = format!("{s}.{ns:09}");
+    let mut add = |value: f64| {
+        row.push(',');
+        // An empty cell is a value that is not known.
+        if value.is_finite() {
+            let _ = write!(row, "{value}");
+        }
+    };
+    match (instrument, message.measured?) {
+        (Instrument::Imu, Measured::Imu { gyro_rad_s, accel_m_s2 }) => {
+            gyro_rad_s.into_iter().chain(accel_m_s2).for_each(&mut add);
+        }
+        (Instrument::Gnss, Measured::Fix { has_fix: true, lat_lon_deg: [lat, lon], height_m, variances_m2 }) => {
+            [lat, lon, height_m].into_iter().for_each(&mut add);
+            let [east, north, up] = variances_m2.unwrap_or([f64::NAN; 3]);
+            [east.max(north).sqrt(), up.sqrt()].into_iter().for_each(&mut add);
+        }
+        _ => return None,
+    }
+    Some(row)
+}
