@@ -33,7 +33,7 @@ pub struct Common {
     /// Probability that the error exceeds `protection_deg`, if at most one head is wrong.
     pub misleading: f64,
     /// 1σ of a tilt of the limb, kilometres: the amplitude of a height that varies as the cosine of the azimuth, along
-    /// each of two axes. `None` derives it from the half-angle, see [`rig::tilt_km`].
+    /// each of two axes. `None` derives it from the half-angle, see [`hzn_core::body::tilt_km`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limb_tilt_sigma_km: Option<f64>,
     /// 1σ of the limb height that each head has for itself, kilometres: the weather of its part of the limb.

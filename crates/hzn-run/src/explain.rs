@@ -153,6 +153,8 @@ pub fn term_text(term: Term) -> &'static str {
         Term::CommonBend => "a bend that the whole edge shares",
         Term::UnknownAzimuth => "the limb's unknown azimuth",
         Term::Lens => "the calibration of the lens",
+        Term::LimbTilt => "a tilt of the limb",
+        Term::LowSun => "the low Sun",
         Term::Clipping => "the limb height where the picture is clipped at full scale",
         Term::LimbHeight => "the limb height",
         Term::Altitude => "the altitude",

@@ -23,25 +23,31 @@ pub enum Term {
     UnknownAzimuth = 4,
     /// The calibration of the lens.
     Lens = 5,
+    /// A tilt of the limb: its height changes with latitude. The weights of the fusion leave it out.
+    LimbTilt = 6,
+    /// A Sun that is low over a part of the limb, which raises the edge there. The weights of the fusion leave it out.
+    LowSun = 7,
     /// The height of the limb, through the expected half-angle.
-    LimbHeight = 6,
+    LimbHeight = 8,
     /// The altitude, through the expected half-angle.
-    Altitude = 7,
+    Altitude = 9,
     /// The local radius of the body, through the expected half-angle.
-    Radius = 8,
+    Radius = 10,
     /// The height of a limb that is clipped at full scale, through the expected half-angle.
-    Clipping = 9,
+    Clipping = 11,
 }
 
 impl Term {
     /// All terms in the order of their numbers.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::EdgeNoise,
         Self::CommonShift,
         Self::CommonTilt,
         Self::CommonBend,
         Self::UnknownAzimuth,
         Self::Lens,
+        Self::LimbTilt,
+        Self::LowSun,
         Self::LimbHeight,
         Self::Altitude,
         Self::Radius,
@@ -50,7 +56,7 @@ impl Term {
 }
 
 /// Number of terms that are known before the expected half-angle is fused. The other terms come from the fusion.
-const FIT_TERMS: usize = 6;
+const FIT_TERMS: usize = 8;
 
 /// The covariance of an answer's axis, term by term. The sum of the terms is the whole covariance.
 #[derive(Debug, Clone, Copy)]

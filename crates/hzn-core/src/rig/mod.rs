@@ -67,4 +67,4 @@ pub use epoch::{Answered, Common, Epoch, EpochAnswer};
 pub use head::Head;
 pub use joint::{Joint, NoJoint};
 pub use mount::Mount;
-pub use weather::{Limb, tilt_km};
+pub use weather::Limb;

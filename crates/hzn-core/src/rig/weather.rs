@@ -1,6 +1,6 @@
 //! The limb height that a head has for itself: its error in the free fit of the head.
 
-use core::f64::consts::{FRAC_1_SQRT_2, TAU};
+use core::f64::consts::TAU;
 
 use super::head::symmetric;
 use super::mount::upper;
@@ -8,6 +8,7 @@ use crate::base::linalg::{M3, V3, basis, invert_spd3};
 use crate::base::real::Real;
 use crate::geometry::camera::Camera;
 use crate::geometry::frames::{Cam, UnitVec3};
+use crate::model::body::tilt_km;
 use crate::model::report::Free;
 
 /// Largest distance of two azimuths at which the height is taken: 5 degrees, which is 250 km or less for a low orbit
@@ -35,10 +36,6 @@ type Arcs<T> = heapless::Vec<[T; 2], MOST_ARCS>;
 /// Most azimuths, if one of these arcs is nearly a circle.
 const MOST: usize = 72 + MOST_ARCS * FEWEST;
 
-/// Change of the limb height with latitude that is not told, km per degree: an infrared limb rises by 4.5 km from the
-/// equator to one pole and falls by as much to the other one.
-const TILT_KM_PER_DEG: f64 = 0.05;
-
 /// What is known of the limb that all heads see.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limb<T> {
@@ -50,15 +47,6 @@ pub struct Limb<T> {
     pub own_sigma_km: T,
     /// Distance along the limb at which the correlation of that height has fallen to exp(−½), kilometres.
     pub own_length_km: T,
-}
-
-/// Returns the 1σ of the tilt of a limb of this half-angle in kilometres, if nothing else is known: 0.05 km for each
-/// degree between the limb and the point below the camera, which is the amplitude for a height that changes by 4.5 km
-/// from equator to pole. The amplitude is divided by √2, because the direction of the change may be along either of the
-/// two axes.
-pub fn tilt_km<T: Real>(half_angle_rad: T) -> T {
-    let to_limb_deg = T::from_f64(90.0) - half_angle_rad * T::from_f64(360.0 / TAU);
-    T::from_f64(TILT_KM_PER_DEG * FRAC_1_SQRT_2) * to_limb_deg.max(T::ZERO)
 }
 
 impl<T: Real> Limb<T> {

@@ -423,6 +423,9 @@ class Body(TypedDict, total=False):
     limb_height_sigma_km: float
     """1σ of the limb height, km; 7 km spans the visible wavelengths and usual tones. Values: 0 to 10000 km. Default:
     7.0."""
+    limb_tilt_sigma_km: float | None
+    """1σ of a tilt of the limb, km: the amplitude of a height that varies with the azimuth like a cosine, along each
+    of two axes. Values: 0 to 1000 km. Default: from the altitude."""
     night: Literal["refuse", "airglow"]
     """What the sensor does in a picture in which the Sun is known to be down, from time and position. Default:
     "refuse"."""

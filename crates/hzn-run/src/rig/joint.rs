@@ -97,7 +97,7 @@ impl Joiner {
         let body = bodies.into_iter().next().map(|(_, body)| body).unwrap_or_default();
         let limb = Limb {
             radius_km: body.mean_radius_km() + body.limb_height_km,
-            tilt_sigma_km: file.rig.limb_tilt_sigma_km,
+            tilt_sigma_km: file.rig.limb_tilt_sigma_km.or(body.limb_tilt_sigma_km),
             own_sigma_km: file.rig.limb_own_sigma_km,
             own_length_km: file.rig.limb_own_length_km,
         };

@@ -25,9 +25,6 @@ const CO2_MEAN_KM: f64 = 40.0;
 // radius ρ, κ = (ρ/L)². For 600 km of altitude ρ is 2600 km, so that they are 1.1 and 1.0 km. From far away they are
 // smaller, and from a lower orbit the first one is at most 1.3 km.
 const WEATHER_HARMONIC_KM: f64 = 1.1;
-/// Change of the height with latitude that is not known, kilometres per degree.
-// The RMS of the table between neighbouring latitudes is 0.04, its largest 0.13; a rig assumes the same 0.05.
-const CLIMATE_TILT_KM_PER_DEG: f64 = 0.05;
 /// Height of the limb from 8 to 14 µm, and its 1-sigma, kilometres.
 // No published value was found. The tops of clouds are the limb where there are clouds: the tropopause is at 8 km at
 // the poles and at 17 km at the equator. Without them water vapour ends at about 6 km, and ozone shines at 20 to 40 km
@@ -101,14 +98,10 @@ impl Config {
         if is_default && is_placed { libm::sqrt(CO2_COMMON_KM * CO2_COMMON_KM + WEATHER_KM * WEATHER_KM) } else { told }
     }
 
-    /// Returns the 1-sigma amplitudes of the first and second harmonic of the limb height along the limb that nothing
-    /// tells, kilometres, for a limb that is this many degrees from the point below the camera.
-    pub(super) fn unknown_limb_harmonics_km(&self, is_placed: bool, away_deg: f64) -> [f64; 2] {
-        if self.limb.thermal_km().is_none() {
-            return [0.0; 2];
-        }
-        let climate = if is_placed { 0.0 } else { CLIMATE_TILT_KM_PER_DEG * away_deg };
-        [libm::hypot(WEATHER_HARMONIC_KM, climate), WEATHER_HARMONIC_KM]
+    /// Returns the 1-sigma amplitude of each of the first two harmonics of the limb height along the limb that the
+    /// weather of a thermal band has, kilometres. [`Self::tilt_sigma_m`] has the climate.
+    pub(super) fn weather_harmonic_km(&self) -> f64 {
+        if self.limb.thermal_km().is_some() { WEATHER_HARMONIC_KM } else { 0.0 }
     }
 
     /// Returns the height in kilometres from the table of the band at a geodetic latitude in degrees; the mean over the
@@ -199,7 +192,7 @@ mod tests {
         assert!((neither.limb_m - 40e3).abs() < 1e-6);
         // Over the north pole the limb is that of 66° north in every direction.
         assert!((both.limb_m - body.band_height_km(66.0, Some(0.5 / 12.0)).unwrap() * 1e3).abs() < 400.0);
-        assert!(both.unknown_harmonics_cos[0] < neither.unknown_harmonics_cos[0]);
+        assert!(both.tilt_sigma_m < neither.tilt_sigma_m);
         assert!(both.unknown_harmonics_cos[1] > 0.0);
         // A told sigma stays.
         let told = Config { limb_height_sigma_km: 4.0, ..co2() };

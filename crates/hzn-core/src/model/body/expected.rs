@@ -62,6 +62,8 @@ pub struct Expected<T> {
     /// 1-sigma amplitudes of the azimuthal harmonics of cos α that the fit cannot correct, because the azimuth of north
     /// or the position is unknown.
     pub(crate) unknown_harmonics_cos: [T; 2],
+    /// 1-sigma of a tilt of the limb along each of two axes, metres.
+    pub(crate) tilt_sigma_m: T,
     /// Threshold that the previous picture proposes, counts.
     pub(crate) level: Option<u16>,
     /// Direction to the Sun in the camera frame, if only the sunlit limb of the body counts as limb.
@@ -239,11 +241,10 @@ impl<T: Real> Expected<T> {
         // An attitude error ψ leaves k ψ of the k-th harmonic.
         let left = |k: f64| known.map_or(T::one(), |_| (attitude_sigma * T::from_f64(k)).min(T::one()));
         let uneven = |k: f64, amplitude: T| amplitude.abs() * left(k);
-        let away_deg = 90.0 - sin.atan2(cos).to_f64().to_degrees();
-        let [tilt, second] = body.unknown_limb_harmonics_km(is_placed, away_deg).map(|h| T::from_f64(h) * km * scale);
+        let weather = T::from_f64(body.weather_harmonic_km()) * km * scale;
         let unknown_harmonics_cos = [
-            uneven(1.0, harmonics_cos[0]) + tilt,
-            uneven(2.0, own + harmonics_cos[1]) + scale * seen.unknown_second_m + second,
+            uneven(1.0, harmonics_cos[0]) + weather,
+            uneven(2.0, own + harmonics_cos[1]) + scale * seen.unknown_second_m + weather,
         ];
         let limb_sigma_parts_m = [limb_sigma, sin * altitude_sigma, seen.unknown_m, T::zero()];
         let variance = limb_sigma_parts_m.iter().fold(T::zero(), |sum, s| sum + *s * *s);
@@ -259,6 +260,7 @@ impl<T: Real> Expected<T> {
             fixed_from_camera: known,
             harmonics_cos,
             unknown_harmonics_cos,
+            tilt_sigma_m: body.tilt_sigma_m(is_placed, sin.atan2(cos)),
             level: prior.level,
             sun: prior.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
             sun_seen: prior.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),

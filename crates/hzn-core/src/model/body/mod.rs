@@ -8,6 +8,7 @@ mod expected;
 mod kind;
 mod limb;
 mod lit;
+mod low_sun;
 mod measured;
 mod night;
 mod planets;
@@ -16,6 +17,7 @@ mod prior;
 mod refraction;
 mod scaled;
 mod shape;
+mod tilt;
 mod visible;
 
 use crate::base::error::{ConfigError, Limit, above, between, require};
@@ -33,6 +35,7 @@ pub(crate) use lit::LOWEST_SUN_DEG;
 pub use planets::Planet;
 pub(crate) use position::Target;
 pub use prior::{Last, Prior, PriorError};
+pub use tilt::tilt_km;
 
 /// Radius of the Sun's photosphere in kilometres (IAU 2015).
 pub const SUN_RADIUS_KM: f64 = 695_700.0;
@@ -109,6 +112,15 @@ section! {
         /// limb's light. In linear pictures the default becomes 4.6 km. A larger sigma gives the expected half-angle
         /// less weight.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
+        /// 1σ of a tilt of the limb, km: the amplitude of a height that varies with the azimuth like a cosine, along each
+        /// of two axes.
+        ///
+        /// One picture cannot see such a tilt, because it looks like another attitude; it widens the covariance of the
+        /// axis by this height over the distance to the limb. A rig uses the same key. The default, for the Earth, is
+        /// 0.05 km for each degree between the limb and the point below the camera, divided by √2; it is 0 if
+        /// `limb_height_by_latitude_km`, or the table of `co2-15um` with a time and a position, tells how the height
+        /// changes.
+        @- limb_tilt_sigma_km: Option<f64> = None, [0.0 to 1000.0] { unset: "from the altitude", example: "0.8" };
         /// What the sensor does in a picture in which the Sun is known to be down, from time and position.
         ///
         /// `airglow` searches for the outer edge of the layer of airglow, and refuses every other edge. It is for the

@@ -41,6 +41,7 @@ impl<T: Real> Expected<T> {
             fixed_from_camera: None,
             harmonics_cos: [T::ZERO; 2],
             unknown_harmonics_cos: [T::ZERO; 2],
+            tilt_sigma_m: T::ZERO,
             level: prior.level,
             sun: sun.filter(|_| body.is_sunlit()),
             sun_seen: sun.filter(|_| body.is_seen_in_sunlight()),
@@ -66,6 +67,7 @@ impl<T: Real> Expected<T> {
         if size.is_some() {
             expected.sigma_cos = expected.sigma_cos_of_parts();
             expected.set_uneven_limb(body);
+            expected.tilt_sigma_m = body.tilt_sigma_m(false, expected.half_angle_rad());
             expected.is_curved = expected.bends();
         }
         Ok(expected)
@@ -78,7 +80,7 @@ impl<T: Real> Expected<T> {
     }
 
     /// Returns |∂cos/∂d|, 1/m.
-    fn cos_per_m(&self) -> T {
+    pub(crate) fn cos_per_m(&self) -> T {
         self.sin * self.sin / (self.cos * (self.radius_m + self.limb_m))
     }
 

@@ -129,7 +129,7 @@ fn projected<T: Real>([k1, k2]: [T; 2], c: &M3<T>) -> [T; 3] {
 
 /// Returns the change of the axis for δc = 1 with a fixed half-angle: the solution of the normal equations for the
 /// right-hand side Σ w Bᵀs.
-fn fixed_half_angle_gain<T: Real>(fit: &Fit<T>) -> Option<[T; 2]> {
+pub(super) fn fixed_half_angle_gain<T: Real>(fit: &Fit<T>) -> Option<[T; 2]> {
     let (sums, mean) = (&fit.sums, fit.mean);
     let n = invert_spd2(sums.normal_fixed(mean))?;
     let (k1, k2) = (mean[0] * sums.n[5] - sums.n[2], mean[1] * sums.n[5] - sums.n[4]);

@@ -22,6 +22,7 @@ pub mod reml;
 mod sandwich;
 mod terminator;
 mod third_axis;
+mod uneven;
 
 use crate::base::linalg::M3;
 use crate::base::real::Real;
@@ -75,6 +76,8 @@ pub(crate) fn fuse<T: Real>(
     // The part of the edge noise is taken before the other terms are added, because a gate replaces this part alone.
     let mut edge = noise.edge(p.m33);
     let mut p = ConeCovariance { whole: p, common: M3::zeros(), late: M3::zeros() };
+    // Variance of the axis that the residuals add for a tilt and a bend.
+    let mut shown = T::ZERO;
     common::add_terms(blocks, fit, expected, &noise, camera, |term, more| {
         if term == Term::CommonBend {
             // Half of the bend looks like another half-angle. If it were added before the fusion, the expected
@@ -84,11 +87,21 @@ pub(crate) fn fuse<T: Real>(
             p.whole += more;
             p.common += more;
         }
+        if matches!(term, Term::CommonTilt | Term::CommonBend) {
+            shown += more.m11 + more.m22;
+        }
         if term == Term::Lens {
             edge.lens_var_cos = more.m33;
         }
         add(term, more);
     })?;
+    let tilt = uneven::tilt(expected);
+    p.late += tilt;
+    add(Term::LimbTilt, &tilt);
+    if let Some(low_sun) = uneven::low_sun(fit, expected, shown) {
+        p.late += low_sun;
+        add(Term::LowSun, &low_sun);
+    }
     // Only of a disc, both sides can be in view.
     if fit.free && expected.is_in_sunlight && expected.sun_seen.is_none() && expected.fits_into(camera) {
         terminator::widen(blocks, fit, expected, &mut p);

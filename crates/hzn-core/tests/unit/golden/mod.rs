@@ -15,6 +15,7 @@ mod position;
 #[cfg(feature = "position")]
 mod position_runs;
 mod projection;
+mod uneven;
 #[cfg(feature = "zju")]
 mod zju;
 
