@@ -7,7 +7,8 @@ sight, which meets the ground or passes it at a tangent height:
 * Light of the air: 1 - exp(-tau). The optical depth tau along the limb decays exponentially with the tangent height. The
   vertical optical depths of red, green and blue are 0.06, 0.11 and 0.24.
 * Ground: ocean, land and clouds from sums of plane waves on the sphere, seen through the air.
-* Sunlight: full above the horizon, and weaker by a smooth step of a few degrees around the terminator.
+* Sunlight: full above the horizon, and weaker by a smooth step of a few degrees around the terminator. With `shade` it is
+  light that the air scatters once: the Sun's way through the air weakens it, most of all in deep air (ScatteredOnce).
 
 The camera adds the Sun with a halo, ghosts (discs and rings), stray light, vignetting, stars, blur, noise, clipping at
 full scale, an sRGB or a linear tone curve, and JPEG artefacts.
@@ -126,6 +127,7 @@ class World:
     continents: Waves
     cover: float
     softness: float
+    shade: "ScatteredOnce | None" = None
 
 
 def draw_world(rng):
@@ -137,6 +139,53 @@ def draw_world(rng):
         cover=rng.uniform(-0.3, 0.6),
         softness=rng.uniform(0.05, 0.6),
     )
+
+
+class ScatteredOnce:
+    """Light of the limb for air that scatters each ray of the Sun once, relative to thick air under a high Sun.
+
+    A line of sight that touches the Earth has the optical depth x, and air of the density exp(-s^2/2) along it, s in units
+    of sqrt(R H). The light that comes from s is weakened by the air before it, and by the Sun's way through the air: the
+    depth of a horizontal line times Chapman's function of the Sun's elevation there.
+    """
+
+    DEPTHS = np.geomspace(1e-3, 40, 70)
+    SINES = np.linspace(-0.15, 0.6, 76)
+    AHEAD = np.linspace(-1, 1, 9)
+
+    def __init__(self, scale_height_km):
+        self.curve = MEAN_KM / (2 * scale_height_km)
+        s = np.linspace(-5, 5, 201)
+        density = np.exp(-s * s / 2) / math.sqrt(2 * math.pi)
+        before = np.cumsum(density) * (s[1] - s[0])
+        turn = s * math.sqrt(scale_height_km / MEAN_KM)
+        sine = self.SINES[:, None, None] + turn * self.AHEAD[:, None]
+        way = self.way(sine) / math.sqrt(4 * math.pi * self.curve)
+        self.light = np.stack([
+            (x * density * np.exp(-x * before - x * way * density * math.sqrt(2 * math.pi))).sum(-1) * (s[1] - s[0])
+            for x in self.DEPTHS])
+
+    def way(self, sine):
+        """The Sun's way through the air in units of the way from the zenith."""
+        day = 1 / np.sqrt(sine * sine + 2 / (math.pi * self.curve))
+        below = 2 * math.sqrt(math.pi * self.curve / 2) * np.exp(np.minimum(self.curve * sine * sine, 60)) - day
+        return np.where(sine >= 0, day, below)
+
+    def at(self, depth, sine, ahead):
+        """Light for each depth (points, colours), by the sine of the Sun's elevation and its cosine along the line."""
+        def place(grid, values):
+            at = np.interp(values, grid, np.arange(len(grid)))
+            low = np.minimum(at.astype(int), len(grid) - 2)
+            return low, at - low
+
+        axes = [place(np.log(self.DEPTHS), np.log(np.maximum(depth, 1e-12))), place(self.SINES, sine[:, None]),
+                place(self.AHEAD, ahead[:, None])]
+        total = 0.0
+        for corner in np.ndindex(2, 2, 2):
+            weight = math.prod(part if up else 1 - part for up, (_, part) in zip(corner, axes))
+            total = total + weight * self.light[tuple(low + up for up, (low, _) in zip(corner, axes))]
+        # Thinner air than the table's has light in proportion to its depth.
+        return total * np.minimum(depth / self.DEPTHS[0], 1)
 
 
 def radiance(world, rays, rotation, position_km, sun):
@@ -156,7 +205,11 @@ def radiance(world, rays, rotation, position_km, sun):
     light = np.zeros((len(lines), 3))
     air = ~hit & (tangent_km < 150)
     depth = VERTICAL_DEPTH * slant * np.exp(-np.clip(tangent_km[air], -5, None) / world.scale_height_km)[:, None]
-    light[air] = world.air * (1 - np.exp(-depth)) * sunlight[air, None]
+    ahead = lines @ sun
+    if world.shade:
+        light[air] = world.air * world.shade.at(depth, elevation[air], ahead[air])
+    else:
+        light[air] = world.air * (1 - np.exp(-depth)) * sunlight[air, None]
     ground = np.nonzero(hit)[0]
     if len(ground):
         places = unit(position_km + lines[ground] * distance[ground, None])
@@ -167,7 +220,13 @@ def radiance(world, rays, rotation, position_km, sun):
         upwards = np.clip(-(lines[ground] * normal[ground]).sum(1), 0, 1)
         path = 1 / np.maximum(upwards, 1.6 / slant)
         through = np.exp(-VERTICAL_DEPTH * path[:, None])
-        light[ground] = albedo * lit * through + world.air * (1 - through) * sunlight[ground, None]
+        if world.shade:
+            lit = lit * np.exp(-VERTICAL_DEPTH * world.shade.way(elevation[ground])[:, None])
+            deep = np.broadcast_to(VERTICAL_DEPTH * slant, through.shape)
+            share = world.shade.at(deep, elevation[ground], ahead[ground]) / (1 - np.exp(-deep))
+        else:
+            share = sunlight[ground, None]
+        light[ground] = albedo * lit * through + world.air * (1 - through) * share
     shape = rays.shape[:2]
     return light.reshape(*shape, 3), tangent_km.reshape(shape), sunlight.reshape(shape)
 
@@ -315,10 +374,11 @@ def sensor_toml(rng, lens, focal_sigma_percent=0.3, centre_sigma_px=1.0):
     return "\n".join([*lines, "", "[body]", 'kind = "earth"', ""])
 
 
-def render_flight(folder, seed, kind, pictures):
+def render_flight(folder, seed, kind, pictures, shade=False):
     """Writes pictures, frames.csv and sensor.toml. Returns the truth per picture.
 
-    frames.csv has positions, directions to the Sun, and attitudes with random errors of ATTITUDE_SIGMA_DEG per axis.
+    frames.csv has positions, directions to the Sun, and attitudes with random errors of ATTITUDE_SIGMA_DEG per axis. With
+    `shade` the air scatters light once.
 
     The truth is the limb axis in the camera, and the number of limb pixels that sunlight reaches.
     """
@@ -327,6 +387,8 @@ def render_flight(folder, seed, kind, pictures):
     folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     camera, world = draw_camera(rng, exposures), draw_world(rng)
+    if shade:
+        world.shade = ScatteredOnce(world.scale_height_km)
     rays, seen = camera.lens.rays()
     altitude_km = math.exp(rng.uniform(math.log(70), math.log(900)))
     about = unit(rng.normal(size=3))
