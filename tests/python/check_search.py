@@ -1,4 +1,5 @@
-"""Searches the built documentation for words that a reader types, and checks that each leads to its page.
+"""Searches the built documentation for words that a reader types, and checks that each leads to its page, and that the
+equations are set.
 
 usage: check_search.py SITE
 
@@ -79,7 +80,17 @@ def find_pages(query, words, index):
     return sorted(best, key=best.get, reverse=True)
 
 
+def check_equations(site):
+    """Exit if a page of the theory shows TeX, or if the page of the equations has none that is set."""
+    pages = {page: page.read_text() for page in site.glob("theory/*/index.html")}
+    if raw := [str(page) for page, text in pages.items() if "$$" in text or 'class="arithmatex"' in text]:
+        sys.exit(f"equations are not set: {raw}")
+    if "<math " not in pages[site / "theory/math/index.html"]:
+        sys.exit("theory/math has no equation")
+
+
 def main(site):
+    check_equations(Path(site))
     places, words, index = load(Path(site))
     failed = 0
     for query, wanted in PROBES.items():
