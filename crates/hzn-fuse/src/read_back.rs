@@ -128,7 +128,7 @@ fn read_table<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Error> {
 }
 
 /// The mount and the clock of a camera, as a flight has estimated them.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct EstimatedMount {
     /// Rotation from the told mount to the estimated one, about the axes of the camera, degrees.
     pub misalignment_deg: [f64; 3],
@@ -138,6 +138,12 @@ pub struct EstimatedMount {
     pub clock_s: f64,
     /// Its 1-sigma.
     pub clock_sigma_s: f64,
+    /// The mount that the flight was told, scalar first; `None` in results of version 0.1.0.
+    #[serde(default)]
+    pub told_q_vehicle_from_camera_wxyz: Option<[f64; 4]>,
+    /// The verdict over the flight; `None` in results of version 0.1.0.
+    #[serde(skip)]
+    pub verdict: Option<String>,
 }
 
 /// Reads the mount of a camera from the results of `hzn fuse -o`: that of the last smoothed or solved state, else of
@@ -167,6 +173,9 @@ fn mount_of_table(path: &Path, camera: &str) -> Result<MountAndCameras, Error> {
     let place = |name: &str| header.iter().position(|c| c.strip_prefix(camera) == Some(&format!("_{name}")));
     let places: Option<Vec<usize>> =
         names.iter().chain(&sigmas).chain(&["clock_s", "clock_sigma_s"]).map(|name| place(name)).collect();
+    let told: Option<Vec<usize>> =
+        ["w", "x", "y", "z"].map(|part| place(&format!("told_q_vehicle_from_camera_{part}"))).into_iter().collect();
+    let verdict = header.iter().position(|c| c == "verdict");
     let (Some(places), Some(phase)) = (places, header.iter().position(|c| c == "phase")) else {
         return Ok((None, known));
     };
@@ -177,8 +186,10 @@ fn mount_of_table(path: &Path, camera: &str) -> Result<MountAndCameras, Error> {
         if record.get(phase) == Some("back") || (is_smoothed && !of_all) {
             continue;
         }
-        let numbers: Vec<f64> =
-            places.iter().map(|i| record.get(*i).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN)).collect();
+        let number = |i: &usize| record.get(*i).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN);
+        let numbers: Vec<f64> = places.iter().map(number).collect();
+        let told =
+            told.as_ref().and_then(|places| <[f64; 4]>::try_from(places.iter().map(number).collect::<Vec<_>>()).ok());
         let [x, y, z, sx, sy, sz, clock_s, clock_sigma_s] = numbers[..] else { continue };
         (last, is_smoothed) = (
             Some(EstimatedMount {
@@ -186,6 +197,8 @@ fn mount_of_table(path: &Path, camera: &str) -> Result<MountAndCameras, Error> {
                 misalignment_sigma_deg: [sx, sy, sz],
                 clock_s,
                 clock_sigma_s,
+                told_q_vehicle_from_camera_wxyz: told,
+                verdict: verdict.and_then(|i| record.get(i)).map(str::to_owned),
             }),
             of_all,
         );
@@ -203,11 +216,13 @@ fn mount_of_recording(path: &Path, camera: &str) -> Result<MountAndCameras, Erro
     #[derive(Deserialize)]
     struct Cameras {
         cameras: Vec<Named>,
+        #[serde(default)]
+        verdict: Option<String>,
     }
     let (mut filtered, mut smoothed, mut known) = (None, None, Vec::new());
     let take = |topic: &str, json: &[u8]| {
-        let Ok(Cameras { cameras }) = serde_json::from_slice(json) else { return };
-        let found = cameras.iter().find(|c| c.name == camera).map(|c| c.mount);
+        let Ok(Cameras { cameras, verdict }) = serde_json::from_slice(json) else { return };
+        let found = cameras.iter().find(|c| c.name == camera).map(|c| EstimatedMount { verdict, ..c.mount.clone() });
         *(if topic == "/nav/smoothed" { &mut smoothed } else { &mut filtered }) = found;
         known = cameras.into_iter().map(|c| c.name).collect();
     };

@@ -298,6 +298,8 @@ pub struct Solved {
 pub struct Fused {
     /// Names of the cameras.
     pub cameras: Vec<String>,
+    /// The mounts that were told, in the same order.
+    pub told_mounts: Vec<Rotation<Cam, Vehicle>>,
     /// How the filter began.
     pub begin: Option<Begin>,
     /// The solution from the start on.

@@ -70,6 +70,19 @@ fn an_earlier_flight() {
     assert!((found[0] - half.cos()).abs() < 1e-8 && (found[3] - half.sin()).abs() < 1e-8, "{found:?}");
     assert!(out.contains("0.0900, 0.1000, 0.1500 deg") && out.contains("sigma = 0.150"), "{out}");
     assert!(out.contains("sigma = 0.0110"), "{out}");
+    // What `hzn fuse` also writes: the mount that the flight was told, and the verdict over it.
+    let with = |told: &str, verdict: &str| {
+        let parts = ["w", "x", "y", "z"].map(|part| format!(",left_told_q_vehicle_from_camera_{part}"));
+        let header = columns.replace('\n', &format!("{},verdict\n", parts.concat()));
+        let rows = rows.replace('\n', &format!(",{told},{verdict}\n"));
+        place.write("nav.csv", (header + &rows).as_bytes());
+        flight("left")
+    };
+    let (quarter, other) = ("0.7071067811865476,0,0,0.7071067811865476", "1,0,0,0");
+    assert_eq!(with(quarter, "consistent").expect(0).out, out);
+    with(quarter, "doubtful").expect(0).says("the verdict of hzn fuse over this flight is `doubtful`");
+    with(quarter, "contradicts").expect(1).says("the verdict of hzn fuse over this flight is `contradicts`");
+    with(other, "consistent").expect(2).says("is not the mount that the flight was told for left");
 }
 
 #[test]

@@ -18,7 +18,7 @@ impl Errors for Exact {
     }
 }
 
-pub fn flight(folder: &Path) {
+pub(crate) fn flight(folder: &Path) {
     let mut scene = Scenario::builtin("atek").unwrap();
     scene.capture.frames = 75;
     write(&scene, &inputs(&scene, &mut Exact, 0.0).unwrap(), folder).unwrap();
@@ -31,7 +31,7 @@ fn fuse(folder: &Path, args: &[&str]) -> (i32, String, String) {
 }
 
 /// Runs `hzn fuse` in a folder with these arguments.
-pub fn bare(folder: &Path, args: &[&str]) -> (i32, String, String) {
+pub(crate) fn bare(folder: &Path, args: &[&str]) -> (i32, String, String) {
     let out = assert_cmd::Command::cargo_bin("hzn")
         .expect("the binary is built")
         .current_dir(folder)
@@ -43,7 +43,7 @@ pub fn bare(folder: &Path, args: &[&str]) -> (i32, String, String) {
     (out.status.code().unwrap_or(-1), text(&out.stdout), text(&out.stderr))
 }
 
-pub const MOUNTS: [&str; 4] = ["--mount", "left=left.toml", "--mount", "right=right.toml"];
+pub(crate) const MOUNTS: [&str; 4] = ["--mount", "left=left.toml", "--mount", "right=right.toml"];
 
 #[test]
 fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
@@ -51,7 +51,18 @@ fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
     let at = dir.path();
     flight(at);
     let more = ["--truth", "vehicle.csv", "--smooth", "--report", "nav.html", "--utc", "2019-06-13T04:00:00Z"];
-    let files = ["-o", "nav.csv", "--aem", "nav.aem", "--oem", "nav.oem", "--ck", "nav.bc", "--write-frames", "left=left-frames.csv"];
+    let files = [
+        "-o",
+        "nav.csv",
+        "--aem",
+        "nav.aem",
+        "--oem",
+        "nav.oem",
+        "--ck",
+        "nav.bc",
+        "--write-frames",
+        "left=left-frames.csv",
+    ];
     let args = [&MOUNTS[..], &more, &files].concat();
     let (code, stdout, stderr) = fuse(at, &args);
     assert_eq!(code, 0, "{stderr}");
@@ -93,7 +104,7 @@ fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
 }
 
 /// Returns the three errors of an attitude that the summary tells, and the position's.
-pub fn told_errors(stdout: &str, who: &str) -> ([f64; 3], f64) {
+pub(crate) fn told_errors(stdout: &str, who: &str) -> ([f64; 3], f64) {
     let name = format!("error of the {who}");
     let line = stdout.lines().find(|line| line.starts_with(&name)).unwrap_or_else(|| panic!("{name} in {stdout}"));
     let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();

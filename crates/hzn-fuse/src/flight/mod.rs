@@ -91,6 +91,7 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     let findings = verdict::of_inputs(&given);
     let mut fused = replay(&flight, settings, wanted).map_err(|error| explained(error, &findings))?;
     fused.cameras = names.clone();
+    fused.told_mounts = mounts.clone();
     counts.before_start = fused.counts.before_start;
     counts.restarts = fused.counts.restarts;
     counts.restarts_when_wrong = fused.counts.restarts_when_wrong;

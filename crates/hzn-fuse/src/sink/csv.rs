@@ -72,7 +72,9 @@ fn header(fused: &Fused) -> Vec<String> {
         three("misalignment");
         three("misalignment_sigma");
         names.extend(["clock_s", "clock_sigma_s"].map(|what| format!("{name}_{what}")));
+        names.extend(["w", "x", "y", "z"].map(|part| format!("{name}_told_q_vehicle_from_camera_{part}")));
     }
+    names.push("verdict".to_owned());
     names
 }
 
@@ -88,6 +90,8 @@ fn cells(s: &StateRecord) -> Vec<String> {
     for camera in &s.cameras {
         numbers.extend([camera.misalignment_deg, camera.misalignment_sigma_deg].concat());
         numbers.extend([camera.clock_s, camera.clock_sigma_s]);
+        numbers.extend(camera.told_q_vehicle_from_camera_wxyz);
     }
-    [s.time_s.to_string(), phase].into_iter().chain(numbers.iter().map(f64::to_string)).collect()
+    let numbers = numbers.iter().map(f64::to_string);
+    [s.time_s.to_string(), phase].into_iter().chain(numbers).chain([s.verdict.to_owned()]).collect()
 }

@@ -1,7 +1,7 @@
 //! One record for each solution and each innovation, the same in every kind of file.
 
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
-use hzn_nav::frames::{Covariance, Fixed, Rotation, Vector, Vehicle};
+use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -86,6 +86,9 @@ pub struct StateRecord {
     pub limb_latitude_sigma_km: [f64; 2],
     /// The cameras, in the order of the recordings.
     pub cameras: Vec<CameraRecord>,
+    /// The verdict over the flight: `consistent`, `doubtful` or `contradicts`. It is the same in every record, so that a
+    /// program that takes the results sees it.
+    pub verdict: &'static str,
 }
 
 /// The estimated errors of a camera.
@@ -101,6 +104,8 @@ pub struct CameraRecord {
     pub clock_s: f64,
     /// Its 1-sigma.
     pub clock_sigma_s: f64,
+    /// The mount that was told, scalar first.
+    pub told_q_vehicle_from_camera_wxyz: [f64; 4],
 }
 
 /// An innovation.
@@ -167,12 +172,13 @@ fn state(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
     let per_hour = |v: Vector3<f64>| deg(v * 3600.0);
     let [sigma_x_deg, sigma_y_deg, sigma_z_deg] = deg(epoch.attitude_sigma_rad());
     let largest = |p: &Covariance<Fixed>| p.as_inner().diagonal().max().max(0.0).sqrt();
-    let camera = |(name, state): (&String, &CameraState)| CameraRecord {
+    let camera = |((name, state), told): ((&String, &CameraState), &Rotation<Cam, Vehicle>)| CameraRecord {
         name: name.clone(),
         misalignment_deg: deg(state.misalignment_rad.into_inner()),
         misalignment_sigma_deg: deg(state.misalignment_sigma_rad),
         clock_s: state.clock_s,
         clock_sigma_s: state.clock_sigma_s,
+        told_q_vehicle_from_camera_wxyz: told.wxyz(),
     };
     StateRecord {
         time_s: now.time_s,
@@ -206,7 +212,8 @@ fn state(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
         limb_height_sigma_km: epoch.limb_height_sigma_km,
         limb_latitude_km: epoch.corrections.limb_latitude_km,
         limb_latitude_sigma_km: epoch.limb_latitude_sigma_km,
-        cameras: fused.cameras.iter().zip(&epoch.cameras).map(camera).collect(),
+        cameras: fused.cameras.iter().zip(&epoch.cameras).zip(&fused.told_mounts).map(camera).collect(),
+        verdict: fused.verdict.level().name(),
     }
 }
 

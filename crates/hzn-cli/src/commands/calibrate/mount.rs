@@ -202,6 +202,9 @@ fn mean(each: &[Rotation3<f64>]) -> Option<(Rotation3<f64>, Option<[f64; 3]>)> {
     Some((mean, (each.len() >= MIN_REPEATED).then(|| [0, 1, 2].map(scatter))))
 }
 
+/// Cosine of half the angle between two mounts that are the same: 0.005 degrees.
+const SAME_MOUNT: f64 = 1.0 - 1e-9;
+
 fn of_flight(file: &Path, told: &Path, name: &str) -> Result<Found, Stop> {
     let estimated = read_back::estimated_mount(file, name)?;
     let sigma_deg = estimated.misalignment_sigma_deg;
@@ -209,7 +212,24 @@ fn of_flight(file: &Path, told: &Path, name: &str) -> Result<Found, Stop> {
         let what = "the flight did not end with an estimate of the mount";
         return Err(failed(format!("{}: {name}: {what}", file.display())));
     }
+    let shown = file.display();
+    match estimated.verdict.as_deref() {
+        Some("contradicts") => {
+            let what = "the verdict of hzn fuse over this flight is `contradicts`, so its mounts can be wrong by many \
+                        sigma: mend its inputs first";
+            return Err(failed(format!("{shown}: {what}")));
+        }
+        Some("doubtful") => {
+            tell::warning(format_args!("{shown}: the verdict of hzn fuse over this flight is `doubtful`"));
+        }
+        _ => {}
+    }
     let [w, x, y, z] = input::mount(told)?.wxyz();
+    let is_other = |had: [f64; 4]| (had.iter().zip([w, x, y, z]).map(|(a, b)| a * b).sum::<f64>()).abs() < SAME_MOUNT;
+    if estimated.told_q_vehicle_from_camera_wxyz.is_some_and(is_other) {
+        let what = "is not the mount that the flight was told for";
+        return Err(usage(format!("--told {}: {what} {name} (the result says which, {shown})", told.display())));
+    }
     let told_mount = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z)).to_rotation_matrix();
     let step = Vector3::from(estimated.misalignment_deg).map(f64::to_radians);
     let clock = (estimated.clock_sigma_s > 0.0).then_some((estimated.clock_s, estimated.clock_sigma_s));
