@@ -68,7 +68,19 @@ fn tables_of_others_give_the_same_flight() {
         (&["--map", "imu:time=t_ms,ms"][..], "log.csv: there is no column t_ms for time; did you mean t_us?"),
         (&["--map", "imu:time=t_us,hours"], "the unit \"hours\" is unknown; time can be in s, ms, us, ns"),
         (&["--map", "attitude:time=t"], "--map attitude:... needs --attitude FILE"),
-        (&["--clock", "gps=1"], "--clock gps: no such camera, and neither gnss nor attitude"),
+        (
+            &[
+                "--map",
+                "imu:time=t_us,us",
+                "--map",
+                "imu:gyro=wx:wy:wz,deg/s",
+                "--map",
+                "imu:accel=ax:ay:az,g",
+                "--clock",
+                "gps=1",
+            ],
+            "--clock gps: no such camera, and neither gnss nor attitude",
+        ),
     ] {
         let files = ["--imu", "log.csv", "--gnss", "gnss.csv", "-o", "none.csv"];
         let (code, _, stderr) = run(&[&files[..], more].concat());
