@@ -93,6 +93,14 @@ fn of_one(name: &str, place: &Place) -> Option<Finding> {
             let what = format!("the positions in {name} are {:.1} km from the receiver's", m / 1e3);
             Some(finding(Cause::Receiver, source, what))
         }
+        Place::Near(m) => {
+            let what = format!(
+                "the positions that the pictures of {name} were processed with are {:.1} km from the receiver's: are \
+                 both ECEF coordinates at the same times?",
+                m / 1e3
+            );
+            Some(Finding { level: Level::Doubtful, ..finding(Cause::ReceiverFrame, Source::Receiver, what) })
+        }
         Place::Agrees => None,
     }
 }

@@ -18,6 +18,9 @@ const TOLD_SIGMA_M: f64 = 500.0;
 /// 1-sigma of the place below the vehicle, m: a limb that is higher on one side turns the axis. It is the default sigma
 /// of the limb height.
 const BELOW_SIGMA_M: f64 = 7000.0;
+/// Distance of the told positions from the receiver's that is told, m. A limb that is 1 km higher on one side turns the
+/// axis by as much as 4 km of distance from a low orbit; more is a coarse or a wrong position.
+const TOLD_APART_M: f64 = 5000.0;
 /// Fewest pictures of a camera.
 const FEWEST: usize = 5;
 /// Sigmas above which positions do not belong to one place.
@@ -34,6 +37,8 @@ pub(super) enum Place {
     Lag(f64),
     /// They lie apart by this distance, m (median).
     Apart(f64),
+    /// They lie apart by this distance, m (median), which a limb that is higher on one side could explain, but only just.
+    Near(f64),
 }
 
 /// Compares the positions of a recording with those of the receiver.
@@ -60,7 +65,14 @@ pub(super) fn place(recording: &Recording, fixes: &[Fix], settings: &Settings) -
         return Place::Lag(fit.lag_s);
     }
     let distance_m = median(now.iter().map(|m| m.distance_m)).unwrap_or(0.0);
-    if share(&now) > 0.5 { Place::Apart(distance_m) } else { Place::Agrees }
+    let moved_m = median(now.iter().map(|m| clock_s * m.velocity_m_s.norm() * BELOW_SIGMA_M / TOLD_SIGMA_M));
+    if share(&now) > 0.5 {
+        Place::Apart(distance_m)
+    } else if distance_m > TOLD_APART_M.hypot(APART * moved_m.unwrap_or(0.0)) + settings.gnss.position_sigma_m {
+        Place::Near(distance_m)
+    } else {
+        Place::Agrees
+    }
 }
 
 /// The told position of a picture against that of the receiver. The components across the vertical count by the ratio

@@ -225,6 +225,9 @@ fn of_the_receiver() -> Vec<Wrong> {
     add("receiver turned by 90°", &[Cause::ReceiverFrame], receiver, |i| {
         turn_receiver(i, Rotation::from_scaled_axis(Vector::new(0.0, 0.0, 90f64.to_radians())));
     });
+    add("receiver turned by 0.5°", &[Cause::ReceiverFrame], receiver, |i| {
+        turn_receiver(i, Rotation::from_scaled_axis(Vector::new(0.0, 0.0, 0.5f64.to_radians())));
+    });
     add("receiver's y negated", &[Cause::ReceiverFrame], receiver, |i| {
         for fix in &mut i.gnss {
             let flip = |v: Vector<Fixed>| v.component_mul(&Vector::new(1.0, -1.0, 1.0));
