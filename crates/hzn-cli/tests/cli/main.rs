@@ -38,6 +38,7 @@ mod shell;
 mod simulate;
 mod small_limbs;
 mod start;
+mod start_calibrated;
 mod telemetry;
 mod temperature;
 mod terminal;

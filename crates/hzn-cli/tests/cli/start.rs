@@ -3,15 +3,15 @@
 use crate::common::{Place, angle_deg, cell};
 
 /// A real lens, the word for the guess, and its field of view in degrees.
-struct Lens {
-    name: &'static str,
-    guess: &'static str,
-    fov_deg: f64,
+pub struct Lens<'a> {
+    pub name: &'static str,
+    pub guess: &'static str,
+    pub fov_deg: f64,
     /// Coefficients of the true lens.
-    k: &'static [f64],
+    pub k: &'a [f64],
 }
 
-const LENSES: [Lens; 5] = [
+const LENSES: [Lens<'_>; 5] = [
     Lens { name: "equidistant", guess: "fisheye", fov_deg: 92.0, k: &[0.0] },
     // 2 sin θ/2 and 2 tan θ/2 as series.
     Lens { name: "equisolid", guess: "fisheye", fov_deg: 92.0, k: &[-1.0 / 24.0, 1.0 / 1920.0, -1.0 / 322_560.0] },
@@ -27,37 +27,41 @@ const LENSES: [Lens; 5] = [
 ];
 
 /// A flight in low orbit with a camera that sees the limb in every picture.
-struct Flight<'a> {
-    lens: &'a Lens,
+pub struct Flight<'a> {
+    lens: &'a Lens<'a>,
     fov_deg: f64,
     altitude_km: f64,
     frames: u32,
-    seed: u32,
+    pub seed: u32,
+    /// Principal point.
+    pub centre_px: [f64; 2],
 }
 
 impl<'a> Flight<'a> {
-    fn new(lens: &'a Lens) -> Self {
-        Self { lens, fov_deg: lens.fov_deg, altitude_km: 500.0, frames: 20, seed: 11 }
+    pub fn new(lens: &'a Lens<'a>) -> Self {
+        Self { lens, fov_deg: lens.fov_deg, altitude_km: 500.0, frames: 20, seed: 11, centre_px: [159.5, 119.5] }
     }
 
     /// Renders the flight into the folder `flight`.
-    fn render(&self, place: &Place) {
+    pub fn render(&self, place: &Place) {
         let half = (0.5 * self.fov_deg).to_radians();
         let (model, x) = match self.lens.guess {
             "pinhole" => ("brown-conrady", half.tan()),
             _ => ("kannala-brandt", half),
         };
-        let radius = self.lens.k.iter().rev().fold(1.0, |sum, k| (sum - 1.0 + k) * x * x + 1.0) * x;
+        // p1 and p2 of a pinhole follow k1 and k2, and are no part of the radius.
+        let radial = self.lens.k.get(..2).filter(|_| self.lens.guess == "pinhole").unwrap_or(self.lens.k);
+        let radius = radial.iter().rev().fold(1.0, |sum, k| (sum - 1.0 + k) * x * x + 1.0) * x;
         let focal_px = 160.0 / radius;
         let limb_deg = (6388.0 / (6371.0 + self.altitude_km)).asin().to_degrees();
         let off_nadir_deg = [limb_deg - 0.2 * self.fov_deg, limb_deg + 0.15 * self.fov_deg];
         let scene = format!(
             "name = \"flight\"\nutc = 2021-07-15T00:00:00Z\nseed = {}\n[capture]\nto_s = 5800.0\nframes = {}\n\
              [camera]\nwidth = 320\nheight = 240\nmodel = \"{model}\"\nfx_px = {focal_px}\nfy_px = {focal_px}\n\
-             cx_px = 159.5\ncy_px = 119.5\nk = {:?}\n[trajectory.orbit]\nperigee_km = {}\ninclination_deg = 97.8\n\
+             cx_px = {}\ncy_px = {}\nk = {:?}\n[trajectory.orbit]\nperigee_km = {}\ninclination_deg = 97.8\n\
              [attitude.pointing]\noff_nadir_deg = {off_nadir_deg:?}\nazimuth_deg = [0.0, 2880.0]\n\
              roll_deg = [0.0, 1080.0]\n[world.infrared]\n[detector]\npsf_sigma_px = 1.0\nread_noise = 0.02\n",
-            self.seed, self.frames, self.lens.k, self.altitude_km,
+            self.seed, self.frames, self.centre_px[0], self.centre_px[1], self.lens.k, self.altitude_km,
         );
         place.write("scene.toml", scene.as_bytes());
         place.run(&["simulate", "scene.toml", "-o", "flight", "-q"]).expect(0);
@@ -66,16 +70,16 @@ impl<'a> Flight<'a> {
 
 /// Answers compared with the truth.
 #[derive(Debug, Default, Clone)]
-struct Score {
+pub struct Score {
     pictures: usize,
-    errors_deg: Vec<f64>,
+    pub errors_deg: Vec<f64>,
     nees: Vec<f64>,
-    within: usize,
+    pub within: usize,
 }
 
 impl Score {
     /// Runs a sensor over the folder `flight`.
-    fn run(place: &Place, sensor: &str) -> Self {
+    pub fn run(place: &Place, sensor: &str) -> Self {
         place.run(&["run", "flight", "--sensor", sensor, "-o", "r.csv", "--force", "-q"]).expect(0);
         let truth = place.rows("flight/truth.csv");
         let mut score = Self { pictures: truth.len(), ..Self::default() };
@@ -100,13 +104,13 @@ impl Score {
         self.nees.extend(&other.nees);
         self.within += other.within;
     }
-    fn answered(&self) -> f64 {
+    pub fn answered(&self) -> f64 {
         self.errors_deg.len() as f64 / self.pictures as f64
     }
-    fn rms_deg(&self) -> f64 {
+    pub fn rms_deg(&self) -> f64 {
         (self.errors_deg.iter().map(|e| e * e).sum::<f64>() / self.errors_deg.len() as f64).sqrt()
     }
-    fn mean_nees(&self) -> f64 {
+    pub fn mean_nees(&self) -> f64 {
         self.nees.iter().sum::<f64>() / self.nees.len() as f64
     }
 }
@@ -124,7 +128,7 @@ fn nees(axis: [f64; 3], truth: [f64; 3], rows: [[f64; 3]; 3]) -> f64 {
 }
 
 /// Writes the sensor of a user who knows only a field of view.
-fn init(place: &Place, lens: &Lens, fov_deg: f64) {
+pub fn init(place: &Place, lens: &Lens<'_>, fov_deg: f64) {
     let fov = fov_deg.to_string();
     let args = ["init", "flight", "--fov", &fov, "--lens", lens.guess, "-o", "mine.toml", "--force"];
     place.run(&args).expect(0);
@@ -272,7 +276,7 @@ fn the_limb_gives_the_field_of_view_of_twenty_flights() {
         let fov_deg = low + (high - low) * part(0.618_034);
         let altitude_km = 250.0 + 650.0 * part(0.414_214);
         let place = Place::new();
-        Flight { lens, fov_deg, altitude_km, frames: 8, seed: 1000 + i }.render(&place);
+        Flight { fov_deg, altitude_km, frames: 8, seed: 1000 + i, ..Flight::new(lens) }.render(&place);
         let [found, sigma] = found_fov(&place);
         println!("{} {fov_deg:.1} deg at {altitude_km:.0} km: {found:.1} +- {sigma:.1}", lens.name);
         assert!((found / fov_deg - 1.0).abs() < 0.1, "{found} instead of {fov_deg}");
