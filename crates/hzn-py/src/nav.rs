@@ -127,18 +127,7 @@ pub(crate) fn fuse<'py>(
         let recording = found.ok_or_else(|| errors::config(format!("clocks: there is no camera {name:?}")))?;
         recording.clock_offset_s = *offset_s;
     }
-    let (columns, utc) = tables;
-    let map = Map::parse(columns.iter().map(String::as_str)).map_err(to_exception)?;
-    let utc = utc.as_deref().map(Utc::parse).transpose().map_err(to_exception)?;
-    inputs.imu = input::imu(&imu, &map).map_err(to_exception)?;
-    let mut read = Vec::new();
-    if let Some(path) = &gnss {
-        let receiver = input::gnss(path, &map, utc.map(|utc| utc.unix_s)).map_err(to_exception)?;
-        (inputs.gnss, read) = (receiver.fixes, receiver.notes);
-    }
-    if let Some(path) = &attitude {
-        inputs.attitudes = input::attitudes(path, &map).map_err(to_exception)?;
-    }
+    let read = read_tables(&mut inputs, [Some(&imu), gnss.as_ref(), attitude.as_ref()], &tables)?;
     let (smoothed, solved) = wanted;
     let wanted = Wanted { smoothed, solved, rate_hz: Some(rate_hz) };
     let fused = errors::detached(py, || hzn_fuse::fuse(&inputs, &settings, wanted))?.map_err(to_exception)?;
@@ -158,6 +147,27 @@ pub(crate) fn fuse<'py>(
         "solved": fused.solved.as_ref().map(|solved| solution(solved, &fused.cameras)),
     });
     parameters::to_python(py, &result)
+}
+
+/// Reads the tables of inertial unit, receiver and star tracker, with the columns of the map and the UTC of time 0.
+/// Returns what the receiver's file says besides.
+fn read_tables(
+    inputs: &mut Inputs,
+    [imu, gnss, attitude]: [Option<&PathBuf>; 3],
+    (columns, utc): &(Vec<String>, Option<String>),
+) -> PyResult<Vec<String>> {
+    let map = Map::parse(columns.iter().map(String::as_str)).map_err(to_exception)?;
+    let utc = utc.as_deref().map(Utc::parse).transpose().map_err(to_exception)?;
+    if let Some(path) = imu {
+        inputs.imu = input::imu(path, &map).map_err(to_exception)?;
+    }
+    if let Some(path) = attitude {
+        inputs.attitudes = input::attitudes(path, &map).map_err(to_exception)?;
+    }
+    let Some(path) = gnss else { return Ok(Vec::new()) };
+    let receiver = input::gnss(path, &map, utc.map(|utc| utc.unix_s)).map_err(to_exception)?;
+    inputs.gnss = receiver.fixes;
+    Ok(receiver.notes)
 }
 
 /// Returns what the solve of the whole flight found out.

@@ -51,12 +51,17 @@ pub(super) fn run(args: &Args) -> Outcome {
     let tables = [(Instrument::Imu, &args.imu), (Instrument::Gnss, &args.gnss)];
     let tables: Vec<(Instrument, &Path)> =
         tables.into_iter().filter_map(|(which, path)| Some((which, path.as_deref()?))).collect();
-    if !tables.is_empty() {
-        if args.output.is_some() || args.images.is_some() || args.overlay.is_some() {
-            return Err(usage("--imu and --gnss are for recordings of ROS 2, the other outputs for those of hzn"));
-        }
-        return export_instruments::run(&args.file, &tables, &args.topic, args.force);
+    if tables.is_empty() {
+        return export_rows(args);
     }
+    if args.output.is_some() || args.images.is_some() || args.overlay.is_some() {
+        return Err(usage("--imu and --gnss are for recordings of ROS 2, the other outputs for those of hzn"));
+    }
+    export_instruments::run(&args.file, &tables, &args.topic, args.force)
+}
+
+/// Writes the rows and the pictures of a recording of hzn.
+fn export_rows(args: &Args) -> Outcome {
     let file = &args.file;
     let (kind, _) = source::check_exists(file)?;
     let pictures = args.images.is_some() || args.overlay.is_some();

@@ -28,10 +28,10 @@ const LENSES: [Lens<'_>; 5] = [
 
 /// A flight in low orbit with a camera that sees the limb in every picture.
 pub struct Flight<'a> {
-    lens: &'a Lens<'a>,
-    fov_deg: f64,
-    altitude_km: f64,
-    frames: u32,
+    pub lens: &'a Lens<'a>,
+    pub fov_deg: f64,
+    pub altitude_km: f64,
+    pub frames: u32,
     pub seed: u32,
     /// Principal point.
     pub centre_px: [f64; 2],

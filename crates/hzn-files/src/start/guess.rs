@@ -10,9 +10,9 @@ const CENTRE_FRACTION: f64 = 0.015;
 /// 1-sigma of the second mode of the shape, k2 ρ⁴ at the edge ρ of the picture, and its growth with ρ² in narrow fields
 /// of view. The mode is k2 ρ (ρ² − edge²)(ρ² − edge²/3): it leaves the two places alone that fix k1.
 ///
-/// Of 943 calibrated cameras in Gyroflow's public lens profiles (CC0), it is 0.030 for fisheyes and 0.023 for lenses that
-/// are nearer to a pinhole, RMS without the farthest 3 %; of the latter 0.016 below 50 degrees, 0.019 to 70 degrees, and
-/// 0.029 above. In wide fields of view it hardly depends on k1. `tests/python/lens_shapes.py` measures it.
+/// Of 943 calibrated cameras in Gyroflow's public lens profiles (CC0), it is 0.030 for fisheyes and 0.023 for lenses
+/// that are nearer to a pinhole, RMS without the farthest 3 %; of the latter 0.016 below 50 degrees, 0.019 to 70
+/// degrees, and 0.029 above. In wide fields of view it hardly depends on k1. `tests/python/lens_shapes.py` measures it.
 const SECOND_SHAPE: f64 = 0.025;
 const SECOND_SHAPE_BY_RHO2: f64 = 0.13;
 /// 1-sigma of p1 and p2. The calibrations of 17 cameras in the public settings of OpenVINS, VINS-Fusion, Kimera-VIO and
@@ -88,8 +88,8 @@ fn of_modes(model: Model, modes: &[Vec<(Intrinsic, f64)>]) -> Covariance {
 /// Returns the 1-sigma of k1 of a lens that is taken for ideal. `edge` is the radius of the picture's edge in focal
 /// lengths.
 ///
-/// With k2 = 0, each lens that the camera may have gives a k1: the ideal lens with this k1 equals it at the edge and at edge/√3,
-/// where the difference of two lenses with the same edge is largest.
+/// With k2 = 0, each lens that the camera may have gives a k1: the ideal lens with this k1 equals it at the edge and at
+/// edge/√3, where the difference of two lenses with the same edge is largest.
 ///
 /// - A fisheye is equidistant, equisolid (2 sin θ/2) or stereographic (2 tan θ/2). The 1-sigma is their root mean
 ///   square, 0.054 for narrow fields of view. The orthographic lens, sin θ, lies at 3 sigma; it is rare.

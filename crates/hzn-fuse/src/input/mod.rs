@@ -2,6 +2,7 @@
 
 mod attitudes;
 mod columns;
+mod fix;
 mod gnss;
 mod imu;
 mod map;
@@ -14,7 +15,8 @@ use hzn_nav::frames::Rotation;
 use nalgebra::Quaternion;
 
 pub use attitudes::{Attitude, attitudes};
-pub use gnss::{Fix, Receiver, gnss};
+pub use fix::{Fix, Receiver};
+pub use gnss::gnss;
 pub use imu::{Sample, imu};
 pub use map::Map;
 pub use mount::mount;

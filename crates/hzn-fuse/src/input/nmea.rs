@@ -1,7 +1,7 @@
 //! NMEA 0183: the sentences of a satellite navigation receiver that have a position, a date or a sigma.
 //!
-//! A position comes from GGA or GNS, a date from RMC or ZDA, and sigmas from GST, whoever the talker is (GP, GN, GL, ...).
-//! A velocity is not taken: RMC and VTG have the speed over ground, and a vehicle that climbs has another one.
+//! A position comes from GGA or GNS, a date from RMC or ZDA, and sigmas from GST, whoever the talker is (GP, GN, GL,
+//! ...). A velocity is not taken: RMC and VTG have the speed over ground, and a vehicle that climbs has another one.
 //! Source: the sentences as the interface descriptions of receivers print them (u-blox M8, section 31).
 
 use std::path::Path;
@@ -10,7 +10,7 @@ use hzn_files::limited;
 use hzn_nav::frames::Vector;
 use jiff::civil::Date;
 
-use super::gnss::{Fix, Receiver, ecef_m};
+use super::fix::{Fix, Receiver, ecef_m};
 use crate::error::Error;
 
 /// Largest file in bytes: a week of ten sentences a second.

@@ -28,16 +28,16 @@ pub(crate) struct Args {
     /// Attitudes of a star tracker: time_s, qw, qx, qy, qz (vehicle to ECEF), sigma_deg
     #[arg(long, value_name = "CSV")]
     pub(super) attitude: Option<PathBuf>,
-    /// A column of a table that somebody else wrote, once for each: TABLE (imu, gnss, attitude), what it is, its name in
-    /// the file, and its unit if that is another. Several names with colons mean the three axes:
+    /// A column of a table that somebody else wrote, once for each: TABLE (imu, gnss, attitude), what it is, its name
+    /// in the file, and its unit if that is another. Several names with colons mean the three axes:
     /// --map imu:time=t_us,us --map imu:gyro=wx:wy:wz,deg/s. A wrong name is answered with all right ones
     #[arg(long, value_name = "TABLE:NAME=COLUMN,UNIT")]
     pub(super) map: Vec<String>,
     /// The mount of a camera, instead of that in its recording: a TOML file with the table [mount]
     #[arg(long, value_name = "CAMERA=FILE", value_parser = pair)]
     pub(super) mount: Vec<(String, String)>,
-    /// Seconds to add to the times of a camera, or of gnss or attitude, if its clock has another epoch than the inertial
-    /// unit
+    /// Seconds to add to the times of a camera, or of gnss or attitude, if its clock has another epoch than the
+    /// inertial unit
     #[arg(long, value_name = "CAMERA=SECONDS", value_parser = pair, allow_hyphen_values = true)]
     pub(super) clock: Vec<(String, String)>,
     /// Settings of the filter: a fuse.toml
