@@ -43,8 +43,7 @@ pub struct Expected<T> {
     pub(crate) cos: T,
     /// sin α₀.
     pub(crate) sin: T,
-    /// 1-sigma of cos α₀ from altitude, limb height and unknown radius; without the altitude when the half-angle is
-    /// free.
+    /// 1-sigma of cos α₀ from limb height, unknown radius and, unless the half-angle is free, altitude.
     pub(crate) sigma_cos: T,
     /// Whether cos α bends so much within a sigma that `sigma_cos` must not be fused, see [`Self::update`].
     pub(crate) is_curved: bool,
@@ -56,8 +55,7 @@ pub struct Expected<T> {
     pub(crate) ellipsoid: Option<LimbCone<T>>,
     /// Prior attitude, from the camera to the fixed frame.
     pub(crate) fixed_from_camera: Option<Rotation<Cam, Fixed, T>>,
-    /// Difference of the limb from the mean cone as a function of azimuth about the axis: first and second harmonic of
-    /// cos α, counted from north.
+    /// Difference of the limb from the mean cone: first and second harmonic of cos α by azimuth from north.
     pub(crate) harmonics_cos: [T; 2],
     /// 1-sigma amplitudes of the azimuthal harmonics of cos α that the fit cannot correct, because the azimuth of north
     /// or the position is unknown.

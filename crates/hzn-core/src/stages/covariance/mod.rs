@@ -76,32 +76,12 @@ pub(crate) fn fuse<T: Real>(
     // The part of the edge noise is taken before the other terms are added, because a gate replaces this part alone.
     let mut edge = noise.edge(p.m33);
     let mut p = ConeCovariance { whole: p, common: M3::zeros(), late: M3::zeros() };
-    // Variance of the axis that the residuals add for a tilt and a bend.
-    let mut shown = T::ZERO;
-    common::add_terms(blocks, fit, expected, &noise, camera, |term, more| {
-        if term == Term::CommonBend {
-            // Half of the bend looks like another half-angle. If it were added before the fusion, the expected
-            // half-angle would get more weight in every picture.
-            p.late = *more;
-        } else {
-            p.whole += more;
-            p.common += more;
-        }
-        if matches!(term, Term::CommonTilt | Term::CommonBend) {
-            shown += more.m11 + more.m22;
-        }
+    add_to(&mut p, blocks, fit, expected, &noise, camera, |term, more| {
         if term == Term::Lens {
             edge.lens_var_cos = more.m33;
         }
         add(term, more);
     })?;
-    let tilt = uneven::tilt(expected);
-    p.late += tilt;
-    add(Term::LimbTilt, &tilt);
-    if let Some(low_sun) = uneven::low_sun(fit, expected, shown) {
-        p.late += low_sun;
-        add(Term::LowSun, &low_sun);
-    }
     // Only of a disc, both sides can be in view.
     if fit.free && expected.is_in_sunlight && expected.sun_seen.is_none() && expected.fits_into(camera) {
         terminator::widen(blocks, fit, expected, &mut p);
@@ -115,4 +95,37 @@ pub(crate) fn fuse<T: Real>(
         return Some(fused);
     }
     fused(fit, &p, edge, expected, fit_config, budget)
+}
+
+/// Adds the errors that all points share to the covariance of the edge noise, and calls `add` with each of them.
+fn add_to<T: Real>(
+    p: &mut ConeCovariance<T>,
+    blocks: &[Block<T>],
+    fit: &Fit<T>,
+    expected: &Expected<T>,
+    noise: &noise::EdgeNoiseModel<T>,
+    camera: &Camera<T>,
+    mut add: impl FnMut(Term, &M3<T>),
+) -> Option<()> {
+    // Variance of the axis that the residuals add for a tilt and a bend.
+    let mut shown = T::ZERO;
+    common::add_terms(blocks, fit, expected, noise, camera, |term, more| {
+        if term == Term::CommonBend {
+            // Half of the bend looks like another half-angle. If it were added before the fusion, the expected
+            // half-angle would get more weight in every picture.
+            p.late += *more;
+        } else {
+            p.whole += *more;
+            p.common += *more;
+        }
+        if matches!(term, Term::CommonTilt | Term::CommonBend) {
+            shown += more.m11 + more.m22;
+        }
+        add(term, more);
+    })?;
+    uneven::add_terms(fit, expected, shown, |term, more| {
+        p.late += *more;
+        add(term, more);
+    });
+    Some(())
 }

@@ -10,6 +10,7 @@ use super::fusion::fixed_half_angle_gain;
 use crate::base::linalg::{M3, V3, basis};
 use crate::base::real::Real;
 use crate::model::body::Expected;
+use crate::model::error_budget::Term;
 use crate::stages::fit::Fit;
 
 /// Part of the half length of an arc at which its height is taken, on both sides of the middle: a straight line through
@@ -28,8 +29,17 @@ const AZIMUTHS: [[f64; 2]; 4] = {
     [[C, S], [S, C], [-S, C], [-C, S]]
 };
 
+/// Calls `add` with each term and its covariance of (δ₁₂, δc). `shown` is the variance of the axis, rad², that the
+/// residuals of the picture already add for a tilt and a bend.
+pub(super) fn add_terms<T: Real>(fit: &Fit<T>, expected: &Expected<T>, shown: T, mut add: impl FnMut(Term, &M3<T>)) {
+    add(Term::LimbTilt, &tilt(expected));
+    if let Some(p) = low_sun(fit, expected, shown) {
+        add(Term::LowSun, &p);
+    }
+}
+
 /// Returns the covariance of (δ₁₂, δc) from a tilt of the limb.
-pub(super) fn tilt<T: Real>(expected: &Expected<T>) -> M3<T> {
+fn tilt<T: Real>(expected: &Expected<T>) -> M3<T> {
     let variance = expected.tilt_rad() * expected.tilt_rad();
     let mut p = M3::zeros();
     (p.m11, p.m22) = (variance, variance);
@@ -39,10 +49,9 @@ pub(super) fn tilt<T: Real>(expected: &Expected<T>) -> M3<T> {
 /// Returns the covariance of (δ₁₂, δc) from a Sun that is low over a part of the limb; `None` where it is unknown or
 /// high.
 ///
-/// The rise of the edge lies between nothing and that of light which is scattered once. `shown` is the variance of the
-/// axis, rad², that the residuals of the picture already add for a tilt and a bend: a low Sun that they show counts only
-/// once.
-pub(super) fn low_sun<T: Real>(fit: &Fit<T>, expected: &Expected<T>, shown: T) -> Option<M3<T>> {
+/// The rise of the edge lies between nothing and that of light which is scattered once. A low Sun that the residuals show
+/// counts only once.
+fn low_sun<T: Real>(fit: &Fit<T>, expected: &Expected<T>, shown: T) -> Option<M3<T>> {
     // The position of a body has its own term for the light.
     if expected.target().is_some() || !(expected.scale_height_m > T::ZERO) {
         return None;
