@@ -117,9 +117,9 @@ section! {
         ///
         /// One picture cannot see such a tilt, because it looks like another attitude; it widens the covariance of the
         /// axis by this height over the distance to the limb. A rig uses the same key. The default, for the Earth, is
-        /// 0.05 km for each degree between the limb and the point below the camera, divided by √2; it is 0 if
-        /// `limb_height_by_latitude_km`, or the table of `co2-15um` with a time and a position, tells how the height
-        /// changes.
+        /// 0.05 km for each degree between the limb and the point below the camera, divided by √2, and half of this for
+        /// a limb in sunlight; it is 0 if `limb_height_by_latitude_km`, or the table of `co2-15um` with a time and a
+        /// position, tells how the height changes.
         @- limb_tilt_sigma_km: Option<f64> = None, [0.0 to 1000.0] { unset: "from the altitude", example: "0.8" };
         /// What the sensor does in a picture in which the Sun is known to be down, from time and position.
         ///

@@ -8,15 +8,17 @@ use core::f64::consts::{FRAC_1_SQRT_2, TAU};
 use super::{Config, Expected, Kind, Limb};
 use crate::base::real::Real;
 
-/// Change of the limb height with latitude that is not told, km per degree.
+/// Change of the height of a thermal limb with latitude that is not told, km per degree.
 // An infrared limb rises by 4.5 km from the equator to one pole and falls by as much to the other one: 0.05. The table
-// of the band of CO₂ has an RMS of 0.04 between neighbouring latitudes, and 0.13 at most. The visible limb lies between
-// two extremes: the density of clear air at 17 km falls by 1 to 2 km of height from the tropics to a pole (0.02), and
-// the tops of clouds from 17 km to 8 km (0.1).
+// of the band of CO₂ has an RMS of 0.04 between neighbouring latitudes, and 0.13 at most.
 const TILT_KM_PER_DEG: f64 = 0.05;
+/// The same for a limb in sunlight, as a part of it.
+// The density of clear air at 17 km falls by 1 to 2 km of height from the equator to a pole: in NRLMSIS 2.1 the RMS
+// between latitudes 15° apart, over the months, is 0.024 km per degree, and 0.046 at most. The residuals show clouds.
+const PART_IN_SUNLIGHT: f64 = 0.5;
 
-/// Returns the 1σ of the tilt of a limb of this half-angle in kilometres, if nothing else is known: 0.05 km for each
-/// degree between the limb and the point below the camera, which is the amplitude for a height that changes by 4.5 km
+/// Returns the 1σ of the tilt of a thermal limb of this half-angle in kilometres, if nothing else is known: 0.05 km for
+/// each degree between the limb and the point below the camera, which is the amplitude for a height that changes by 4.5 km
 /// from equator to pole. The amplitude is divided by √2, because the direction of the change may be along either of the
 /// two axes.
 pub fn tilt_km<T: Real>(half_angle_rad: T) -> T {
@@ -35,7 +37,11 @@ impl Config {
         // What the height does with latitude is told by a table; without an attitude it is an unknown harmonic.
         let is_told = !self.limb_height_by_latitude_km.is_empty() || (self.limb == Limb::Co2 && is_placed);
         let is_earth = matches!(self.kind, Kind::Earth | Kind::EarthSphere);
-        if is_earth && !is_told { tilt_km(half_angle_rad) * km } else { T::ZERO }
+        if !is_earth || is_told {
+            return T::ZERO;
+        }
+        let part = if self.is_seen_in_sunlight() { PART_IN_SUNLIGHT } else { 1.0 };
+        tilt_km(half_angle_rad) * T::from_f64(part) * km
     }
 }
 
@@ -59,10 +65,10 @@ mod tests {
             let prior = Prior { position_m: Some(place), year_part, ..Prior::default() };
             Expected::<f64>::new(body, &prior).unwrap()
         };
-        // From 600 km the limb is 23.6° away: 0.05 · 23.6/√2 = 0.83 km, and 1 km of height is 0.02°.
+        // From 600 km the limb is 23.6° away: 0.025 · 23.6/√2 = 0.42 km, and 1 km of height is 0.02°.
         let usual = at(&Config::default(), None);
-        assert!((usual.tilt_sigma_m - 833.0).abs() < 5.0, "{}", usual.tilt_sigma_m);
-        assert!((usual.tilt_rad().to_degrees() - 0.0171).abs() < 2e-4, "{}", usual.tilt_rad().to_degrees());
+        assert!((usual.tilt_sigma_m - 416.4).abs() < 2.0, "{}", usual.tilt_sigma_m);
+        assert!((usual.tilt_rad().to_degrees() - 0.00853).abs() < 1e-4, "{}", usual.tilt_rad().to_degrees());
         let told = Config { limb_tilt_sigma_km: Some(2.0), ..Config::default() };
         assert_eq!(at(&told, None).tilt_sigma_m, 2000.0);
         let rows = [[-90.0, 12.0], [90.0, 21.0]].into_iter().collect();
