@@ -171,8 +171,7 @@ impl<T: Real> Expected<T> {
             return T::ZERO;
         }
         let (fx, fy) = camera.focal_px();
-        let [first, second] = self.unknown_harmonics_cos;
-        (first + second) / self.sin * (fx + fy) * T::from_f64(0.5)
+        self.uneven_rad() * (fx + fy) * T::from_f64(0.5)
     }
 
     /// Returns the expected height of the limb and its 1-sigma, metres, without the bending of light.

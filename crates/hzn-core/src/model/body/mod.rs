@@ -1,6 +1,7 @@
 //! The body whose limb the sensor searches for, and its cone for a given position and altitude.
 
 mod apparent;
+mod azimuth;
 mod band;
 mod band_table;
 mod bounds;

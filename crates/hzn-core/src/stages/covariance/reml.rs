@@ -18,7 +18,7 @@ use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::geometry::cone::Azimuth;
 use crate::model::body::Expected;
-use crate::stages::fit::{self, Fit};
+use crate::stages::fit::Fit;
 
 /// One point of an edge, in the order of the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -168,7 +168,7 @@ pub(super) fn averaged<T: Real>(
     floor_px: f64,
 ) -> Option<[T; 6]> {
     let (b1, b2) = basis(&fit.e);
-    let azimuth = fit::azimuth(expected);
+    let azimuth = expected.azimuth();
     let rows = || rows(blocks, fit, azimuth.as_ref());
     let posterior = Posterior::new(rows, fit.arc_px.to_f64(), fit.rms_px.to_f64(), floor_px)?;
     let of_length = |length_px: f64| correlated(blocks, &fit.e, &b1, &b2, fit.mean, T::from_f64(length_px));

@@ -12,7 +12,6 @@
 //! covariance, for the altitude estimate, and for the test of the candidate. `covariance` fuses the two half-angles.
 
 mod angle;
-mod azimuth;
 mod circle;
 pub(crate) mod closed;
 mod cone;
@@ -32,7 +31,6 @@ use crate::geometry::camera::Camera;
 use crate::model::body::Expected;
 use crate::model::edge_noise;
 use crate::stages::consensus::Consensus;
-pub(crate) use azimuth::azimuth;
 pub(crate) use cone::Fit;
 use cone::count_points;
 pub use config::{Config, HalfAngle, Method};

@@ -1,6 +1,5 @@
 //! The default method: Gauss-Newton on the sphere with Tukey's weights, then with fixed weights.
 
-use super::azimuth::azimuth;
 use super::cone::{Cone, State};
 use super::config::{Config, HalfAngle};
 use super::sums::{HalfAngleRow, Sums, Weights, means, pass};
@@ -34,7 +33,7 @@ pub(super) fn sphere<T: Real>(
     config: &Config,
     noise: &edge_noise::Config,
 ) -> Option<Cone<T>> {
-    let azimuth = azimuth(expected);
+    let azimuth = expected.azimuth();
     let azimuth = azimuth.as_ref();
     let known = config.half_angle == HalfAngle::Known && !expected.free;
     let (robust, sums) = robust(blocks, start, expected, threshold_px, known, config, noise, azimuth)?;

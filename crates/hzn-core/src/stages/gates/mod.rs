@@ -51,7 +51,6 @@ use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::model::verdict::Verdict;
 use crate::stages::contour::BinaryPicture;
-use crate::stages::fit::azimuth;
 
 pub(crate) use case::Case;
 pub use config::{Choice, Config, FixedEdge};
@@ -115,7 +114,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     attitude::refuse(case)?;
     rate::refuse(case)?;
 
-    let curve = Curve::new(case.fit, azimuth(case.expected));
+    let curve = Curve::new(case.fit, case.expected.azimuth());
     let mut shape = Shape::new();
     collect_inliers(case.blocks, case.fit, &curve, case.camera, &mut shape);
     let residuals = Residuals::new(&curve, &shape, case.config);
