@@ -62,8 +62,8 @@ fn texts() -> Seeds {
 fn files() -> Result<Seeds, Box<dyn std::error::Error>> {
     let mut seeds = Seeds::new();
     let picture = GrayImage::from_fn(32, 24, |x, y| Luma([if y > 10 { 200 } else { (x * 7 % 20) as u8 }]));
-    let formats = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Tiff, ImageFormat::Pnm, ImageFormat::Bmp];
-    for format in formats {
+    let [png, webp] = [ImageFormat::Png, ImageFormat::WebP];
+    for format in [png, ImageFormat::Jpeg, ImageFormat::Tiff, ImageFormat::Pnm, ImageFormat::Bmp, webp] {
         let mut bytes = Cursor::new(Vec::new());
         picture.write_to(&mut bytes, format)?;
         let name = format!("{format:?}").to_lowercase();

@@ -29,11 +29,12 @@ fn every_lossless_kind_gives_the_same_answer() {
         ("grey16.tif", DynamicImage::ImageLuma16(grey.to_luma16())),
         ("grey.bmp", grey.clone()),
         ("grey.pgm", grey.clone()),
+        ("colour.webp", DynamicImage::ImageRgb8(grey.to_rgb8())),
     ] {
         picture.save(place.path(&format!("in/{name}"))).unwrap();
     }
     let found = axes(&place, &["run", "in"]);
-    assert_eq!(found.len(), 10);
+    assert_eq!(found.len(), 11);
     let expected = plain(0.0);
     for axis in found {
         assert!(angle_deg(axis, expected) < 1e-3, "{axis:?} is not {expected:?}");

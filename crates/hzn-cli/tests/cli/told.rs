@@ -184,11 +184,11 @@ fn inputs_of_another_kind_are_named() {
 #[test]
 fn pictures_of_other_formats_are_named() {
     let place = Place::with_pictures(1);
-    place.write("a.webp", b"RIFF\x10\0\0\0WEBPVP8 ");
+    place.write("a.gif", b"GIF89a");
     place.write("a.jp2", b"\0\0\0\x0cjP  \r\n\x87\n");
     place.write("s.toml", SENSOR.as_bytes());
-    for (file, name) in [("a.webp", "WebP"), ("a.jp2", "JPEG 2000")] {
-        let formats = "PNG, JPEG, TIFF, PNM, BMP, FITS, NumPy";
+    for (file, name) in [("a.gif", "GIF"), ("a.jp2", "JPEG 2000")] {
+        let formats = "PNG, JPEG, TIFF, PNM, BMP, WebP, FITS, NumPy";
         let what = format!("is not a picture of a supported format ({formats}); it is {name}: convert");
         place.run(&["run", file, "-s", "s.toml"]).expect(3).says(&what);
     }

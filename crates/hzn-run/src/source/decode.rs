@@ -60,10 +60,9 @@ pub(super) fn read_file_holding(path: &Path, held: &mut Held) -> Result<Vec<u8>,
     if bytes.is_empty() { Err("file is empty".into()) } else { Ok(bytes) }
 }
 
-/// Decodes PNG, JPEG, TIFF, PNM, BMP, one plane of FITS, or an array of NumPy. Palettes become colour, and CMYK becomes
-/// RGB. If a file contains several
-/// pictures, the first is decoded. `expected` is the camera's size in pixels: a picture of another size is refused
-/// before anything large is decoded.
+/// Decodes PNG, JPEG, TIFF, PNM, BMP, WebP, one plane of FITS, or an array of NumPy. Palettes become colour, and CMYK
+/// becomes RGB. If a file contains several pictures, the first is decoded. `expected` is the
+/// camera's size in pixels: a picture of another size is refused before anything large is decoded.
 ///
 /// # Errors
 /// The reason why it cannot be decoded, for the picture's result.
@@ -80,7 +79,7 @@ pub(super) fn decode_holding(bytes: &[u8], expected: Option<(u32, u32)>, held: &
     reader.limits(limits(SLACK));
     let format = reader.format().filter(ImageFormat::reading_enabled).ok_or_else(|| {
         let found = name_foreign(bytes).map(|name| format!("; it is {name}: convert it")).unwrap_or_default();
-        format!("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP, FITS, NumPy){found}")
+        format!("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP, WebP, FITS, NumPy){found}")
     })?;
     if format == ImageFormat::Tiff
         && let Some(picture) = arrays::decode_wide_tiff(bytes, expected, held)
@@ -128,10 +127,12 @@ pub(super) fn decode_holding(bytes: &[u8], expected: Option<(u32, u32)>, held: &
 }
 
 /// Returns the memory that a decoder may need for a picture of `samples` bytes. A TIFF also has a compressed strip or
-/// tile in memory. A progressive JPEG has coefficients of 16 bits for samples of 8 bits.
+/// tile in memory. A progressive JPEG has coefficients of 16 bits for samples of 8 bits. A WebP has planes of
+/// brightness and colour, or four channels.
 fn budget(samples: u64, format: ImageFormat, structure: jpeg::Structure) -> u64 {
     let times = match format {
         ImageFormat::Tiff => 2,
+        ImageFormat::WebP => 3,
         _ if structure.is_progressive => 3,
         _ => 1,
     };
@@ -149,7 +150,6 @@ fn name_foreign(bytes: &[u8]) -> Option<&'static str> {
     const FORMATS: &[(usize, &[u8], &str)] = &[
         (4, b"jP  ", "JPEG 2000"),
         (0, b"\xff\x4f\xff\x51", "JPEG 2000"),
-        (8, b"WEBP", "WebP"),
         (0, b"GIF8", "GIF"),
         (4, b"ftypavif", "AVIF"),
         (4, b"ftyphei", "HEIC"),

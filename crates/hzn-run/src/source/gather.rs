@@ -8,8 +8,9 @@ use super::{natural, pattern, video};
 use crate::error::{Error, Remedy, unusable};
 
 /// Endings of the picture files that can be read.
-const PICTURES: &[&str] =
-    &["png", "jpg", "jpeg", "jpe", "tif", "tiff", "pnm", "pgm", "ppm", "pbm", "bmp", "fits", "fit", "fts", "npy"];
+const PICTURES: &[&str] = &[
+    "png", "jpg", "jpeg", "jpe", "tif", "tiff", "pnm", "pgm", "ppm", "pbm", "bmp", "webp", "fits", "fit", "fts", "npy",
+];
 /// Endings of files that often lie next to pictures but are not pictures.
 const COMPANIONS: &[&str] = &["csv", "toml", "txt", "md", "json", "jsonl", "yaml", "yml", "xml", "log", "mcap", "part"];
 
@@ -109,7 +110,9 @@ impl Gathered {
         if !raw && COMPANIONS.contains(&ending(input).as_str()) {
             // The shell expands `hzn run flight/*` to a list that contains these files.
             if alone {
-                return Err(unusable(format!("{text}: is not a picture (PNG, JPEG, TIFF, PNM, BMP, FITS, NumPy)")));
+                return Err(unusable(format!(
+                    "{text}: is not a picture (PNG, JPEG, TIFF, PNM, BMP, WebP, FITS, NumPy)"
+                )));
             }
             return Ok(());
         }
@@ -143,7 +146,8 @@ impl Gathered {
 
     /// Returns the error for inputs without a picture.
     fn empty(&self, inputs: &[PathBuf], raw: bool) -> Error {
-        let what = if raw { "no headerless files" } else { "no pictures (PNG, JPEG, TIFF, PNM, BMP, FITS, NumPy)" };
+        let what =
+            if raw { "no headerless files" } else { "no pictures (PNG, JPEG, TIFF, PNM, BMP, WebP, FITS, NumPy)" };
         let name = inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
         let what = format!("{name}: {what} in this folder");
         match self.left_out.keys().next() {

@@ -38,6 +38,7 @@ mod tone;
 mod turn;
 mod video;
 mod watched;
+mod webp;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,6 +1,11 @@
-//! Counts the pictures in one picture file: pages of a TIFF, frames of an animated PNG, consecutive pictures of a PNM.
+//! Counts the pictures in one picture file: pages of a TIFF, frames of an animated PNG or WebP, consecutive pictures
+//! of a PNM.
+
+use std::io::Cursor;
 
 use image::ImageFormat;
+
+use super::webp;
 
 /// Largest number of pictures that is counted, so that a malicious file cannot cause an endless loop.
 const MAX_PAGES: u32 = 100_000;
@@ -11,6 +16,7 @@ pub(super) fn count(bytes: &[u8], format: ImageFormat) -> u32 {
         ImageFormat::Tiff => tiff(bytes),
         ImageFormat::Png => animation(bytes),
         ImageFormat::Pnm => portable(bytes),
+        ImageFormat::WebP => Some(webp::frames(Cursor::new(bytes))),
         _ => None,
     };
     pages.unwrap_or(1).max(1)

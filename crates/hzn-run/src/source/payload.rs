@@ -41,8 +41,9 @@ impl Payload {
         };
         match format {
             ImageFormat::Png | ImageFormat::Jpeg => Self::Encoded(bytes),
+            ImageFormat::Other(name) if name == "webp" => Self::Encoded(bytes),
             ImageFormat::Other(name) => {
-                Self::Broken(format!("pictures in {name} are not supported; record PNG or JPEG"))
+                Self::Broken(format!("pictures in {name} are not supported; record PNG, JPEG or WebP"))
             }
             ImageFormat::Mono8 { width, height } => raw(Samples::Bytes(bytes), width, height, 1, 8),
             ImageFormat::Rgb8 { width, height } => raw(Samples::Bytes(bytes), width, height, 3, 8),

@@ -80,8 +80,10 @@ impl Recording {
 /// Returns width and height in pixels, if they are known without decoding.
 pub(super) fn known_size(image: &EncodedImage) -> Option<(u32, u32)> {
     match image.format {
-        ImageFormat::Png | ImageFormat::Jpeg => header::read_size_from(std::io::Cursor::new(&image.bytes)),
-        ImageFormat::Other(_) => None,
+        // Of the other formats, the header of a WebP is known.
+        ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Other(_) => {
+            header::read_size_from(std::io::Cursor::new(&image.bytes))
+        }
         ImageFormat::Mono8 { width, height }
         | ImageFormat::Rgb8 { width, height }
         | ImageFormat::Rgb16 { width, height }

@@ -6,7 +6,7 @@ use hzn_core::tone::Tone;
 use image::{ImageDecoder, ImageFormat};
 
 use super::picture_reader::picture_reader;
-use super::{exif, header};
+use super::{exif, header, webp};
 
 /// First bytes of a PNG.
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
@@ -39,6 +39,10 @@ pub(super) fn read(mut contents: impl Read + Seek) -> Option<FoundTone> {
     if format == ImageFormat::Jpeg {
         return found(Tone::Srgb, "JPEG");
     }
+    if format == ImageFormat::WebP && webp::is_lossy(&mut contents) {
+        return found(Tone::Srgb, "lossy WebP");
+    }
+    contents.rewind().ok()?;
     if header::has_words(&mut contents) {
         return found(Tone::Linear, "of more than 8 bits");
     }
@@ -133,6 +137,8 @@ mod tests {
         let words: ImageBuffer<Luma<u16>, Vec<u16>> = ImageBuffer::new(8, 6);
         let colour = encoded(&DynamicImage::ImageRgb8(RgbImage::new(8, 6)), ImageFormat::Jpeg);
         assert_eq!((tone(&grey(ImageFormat::Jpeg)), tone(&colour)), (Some(Tone::Srgb), Some(Tone::Srgb)));
+        // A lossless WebP says as little as a PNG.
+        assert_eq!(tone(&encoded(&DynamicImage::ImageRgb8(RgbImage::new(8, 6)), ImageFormat::WebP)), None);
         for format in [ImageFormat::Png, ImageFormat::Tiff, ImageFormat::Pnm] {
             assert_eq!(tone(&encoded(&DynamicImage::ImageLuma16(words.clone()), format)), Some(Tone::Linear));
             assert_eq!(tone(&grey(format)), None);
