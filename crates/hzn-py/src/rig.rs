@@ -167,5 +167,6 @@ fn finished(name: String, data: FrameData, outcomes: Vec<BodyOutcome>) -> Finish
         traces: None,
         tip: None,
         pages: 1,
+        mask: None,
     }
 }

@@ -154,6 +154,7 @@ fn default_plan(state: &State, frames: Option<hzn_files::Frames>) -> Plan {
         keep_traces: false,
         keep_picture: false,
         overlay: None,
+        masks: None,
         last: Vec::new(),
         turns: Turns::default(),
     }

@@ -63,6 +63,7 @@ fn plan(config: Config) -> Plan {
         keep_traces: true,
         keep_picture: false,
         overlay: None,
+        masks: None,
         last: Vec::new(),
         turns: Turns::default(),
     }

@@ -14,6 +14,7 @@ hzn run flight.mp4 -s sensor.toml --altitude-km 30 a video, all pictures from on
 hzn run flight/ -o - --format jsonl | head -1      JSON Lines on standard output
 ls flight/*.png | hzn run - -s flight/sensor.toml  the pictures of a list
 hzn run inbox/ --watch -o live.csv                 pictures as they arrive, until Ctrl-C
+hzn run flight/ -o a.csv --mask-pictures masks/    what hides the stars, for a star tracker
 hzn run rig.toml -o rig.csv                        several cameras that are one sensor",
     ),
     (

@@ -26,7 +26,7 @@ pub(super) fn skip_stored(
     let table = plan.frames.as_ref().map(|frames| &frames.path);
     let changed_table = table.filter(|table| stored.frames > 0 && stored.is_older_than(table));
     changed_table.iter().for_each(|table| tell_changed(table));
-    let mut again = Again { sensor: None, plan: Plan { overlay: None, ..plan.clone() }, stored };
+    let mut again = Again { sensor: None, plan: Plan { overlay: None, masks: None, ..plan.clone() }, stored };
     let mut turns = Turns::default();
     for n in 0..stored.frames {
         let Some(item) = source.next() else {

@@ -1,6 +1,7 @@
 //! `hzn run`: processes a sequence of pictures and writes the results.
 
 mod args;
+mod picture_folders;
 mod rig;
 
 use std::cmp::Ordering;
@@ -41,7 +42,7 @@ pub(super) fn run(mut args: Args) -> Outcome {
     let watching = args.watch.then(stop_flag);
     let Opened { mut source, sensor, frames, notes, .. } = open(args, watching.as_ref())?;
     let recorded = recorded(&sensor);
-    let plan = args.plan(sensor, frames);
+    let plan = args.plan(sensor, frames)?;
     let settings = sink::Settings {
         config: &plan.config,
         sensor_toml: &recorded,
@@ -52,7 +53,7 @@ pub(super) fn run(mut args: Args) -> Outcome {
     let (mut output, stored) = Outputs::open(&args.output, args.format.into(), args.existing(), settings)?;
     let plan = Plan { last: stored.last_answers.clone(), ..plan };
     if !args.quiet {
-        tell_notes(&notes, stored.frames, plan.overlay.is_some());
+        tell_notes(&notes, stored.frames, plan.overlay.is_some() || plan.masks.is_some());
     }
     let total = source.total();
     let plan = match resume::skip_stored(source.as_mut(), &stored, &plan, &args.output) {
@@ -98,9 +99,7 @@ fn open(args: &Args, watching: Option<&Arc<AtomicBool>>) -> Result<Opened, Stop>
     }
     tell_unused_altitude(args, opened.frames.as_ref());
     refuse_inputs(args, opened.source.as_ref())?;
-    if let Some(drawn) = &args.overlay {
-        prepare_overlays(drawn, args.force || args.resume)?;
-    }
+    picture_folders::prepare(args)?;
     Ok(opened)
 }
 
@@ -145,26 +144,11 @@ fn check_arguments(args: &Args) -> Result<(), Stop> {
 
 /// Refuses outputs that are also read.
 fn refuse_inputs(args: &Args, source: &dyn Source) -> Result<(), Stop> {
-    if let Some(drawn) = args.overlay.as_deref().filter(|drawn| disk::is_same(drawn, &source.folder())) {
-        let what = "is the folder of the pictures, and they would be replaced; choose another folder";
-        return Err(usage(format!("--overlay {}: {what}", drawn.display())));
-    }
-    let drawn = args.overlay.as_deref().map(files::pictures_in).unwrap_or_default();
+    let drawn = picture_folders::check(args, source)?;
     let files = args.output.iter().filter(|path| !source::is_stdin(path));
     let written: Vec<PathBuf> = files.cloned().chain(drawn).collect();
     let request = setup::request(&args.input, &args.sensor, &args.source)?;
     Ok(disk::refuse_inputs(&files::of_sequence(source, &request), &written)?)
-}
-
-/// Makes the folder of the overlays. If `may_have_files` is true, the folder may already contain files.
-fn prepare_overlays(drawn: &Path, may_have_files: bool) -> Result<(), Stop> {
-    std::fs::create_dir_all(drawn).map_err(|e| disk::cannot_write(drawn, &e))?;
-    let has_files = std::fs::read_dir(drawn).map_err(|e| disk::cannot_write(drawn, &e))?.next().is_some();
-    if has_files && !may_have_files {
-        let what = "contains files already; choose another folder, or --force replaces files of the same name";
-        return Err(usage(format!("--overlay {}: {what}", drawn.display())));
-    }
-    Ok(())
 }
 
 /// Counts and messages while the run goes on.
@@ -177,6 +161,7 @@ struct Watch {
     rates: Rates,
     refusals: Refusals,
     multi_page: MultiPageFiles,
+    masks: picture_folders::Masks,
     /// Number of pictures that could not be read.
     unreadable: u64,
 }
@@ -197,6 +182,7 @@ impl Watch {
             rates: Rates::default(),
             refusals: Refusals::default(),
             multi_page: MultiPageFiles::default(),
+            masks: picture_folders::Masks::default(),
             unreadable: 0,
         }
     }
@@ -207,6 +193,9 @@ impl Watch {
         self.rates.count(frame);
         self.refusals.count(frame);
         self.multi_page.count(frame);
+        if !self.quiet {
+            self.masks.count(frame, &self.progress);
+        }
         if let Some(tip) = frame.tip.as_ref().filter(|_| !self.tipped) {
             self.tipped = true;
             self.progress.say(&format!("note: nothing was found in {}: {tip}", frame.name));
@@ -244,6 +233,7 @@ impl Watch {
             n => format!(" (after {n} that were finished before)"),
         };
         tell::line(format_args!("{summary}{before}"));
+        self.masks.tell();
         if let Some(further) = self.refusals.further() {
             tell::line(format_args!("note: {further}"));
         }

@@ -32,6 +32,7 @@ const CASES: &[Case] = &[
     ("a.mcap", &["run", "a.mcap", "-o", "a.mcap", "--force"]),
     ("a.mcap", &["run", "a.mcap", "-o", "./a.mcap"]),
     ("other/0001.png", &["run", "in/0000.png", "other/0001.png", "--overlay", "other", "--force"]),
+    ("other/0001.png", &["run", "in/0000.png", "other/0001.png", "--mask-pictures", "other", "--force"]),
     ("in/0000.png", &["explain", "in", "--overlay", "in/0000.png", "--force"]),
     ("in/0001.png", &["explain", "in", "--overlay", "in/0001.png"]),
     ("f.csv", &["explain", "in", "--frames", "f.csv", "--overlay", "f-link.png", "--force"]),

@@ -22,6 +22,7 @@ mod fuse_tables;
 mod gates;
 mod hostile;
 mod kept_inputs;
+mod mask;
 mod migrate;
 mod night;
 mod outputs;

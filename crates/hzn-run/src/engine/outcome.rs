@@ -2,14 +2,15 @@
 
 use std::time::Duration;
 
-use hzn_core::Report;
 use hzn_core::body::PriorError;
 use hzn_core::status::Status;
+use hzn_core::{Report, Solution};
 use hzn_files::FrameData;
 use hzn_mcap::Stamp;
 
 use super::sensor::Processed;
 use super::trace::Traces;
+use crate::mask::MaskOutcome;
 
 /// A processed picture.
 #[derive(Debug)]
@@ -36,6 +37,8 @@ pub struct Finished {
     pub tip: Option<String>,
     /// Number of pictures in the file; only the first was processed.
     pub pages: u32,
+    /// What became of the mask, if the plan asks for masks.
+    pub mask: Option<MaskOutcome>,
 }
 
 /// The outcome of one body in one picture.
@@ -94,6 +97,10 @@ impl From<PriorError> for Unprocessed {
 }
 
 impl Finished {
+    /// Returns the answer of each body.
+    pub fn answers(&self) -> Vec<Option<&Solution<f64>>> {
+        self.outcomes.iter().map(|found| found.report.as_ref().ok()?.solution.as_ref()).collect()
+    }
     /// Returns the reason why the picture could not be read, if it could not.
     pub fn unreadable(&self) -> Option<&str> {
         let errors = self.outcomes.iter().filter_map(|f| f.report.as_ref().err());

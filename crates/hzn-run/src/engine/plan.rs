@@ -1,10 +1,13 @@
 //! The settings of a run.
 
+use std::sync::Arc;
+
 use hzn_core::Config;
 use hzn_files::Frames;
 
 use super::sensor::LastAnswer;
 use super::turns::Turns;
+use crate::mask::MaskFolder;
 
 /// The settings of a run, for every picture.
 #[derive(Debug, Clone)]
@@ -27,6 +30,8 @@ pub struct Plan {
     pub keep_picture: bool,
     /// Draw an overlay of every picture into this folder.
     pub overlay: Option<std::path::PathBuf>,
+    /// Write a mask of every answered picture into this folder.
+    pub masks: Option<Arc<MaskFolder>>,
     /// The last answers of the run that this one continues, one for each body.
     pub last: Vec<Option<LastAnswer>>,
     /// The answers and turns of the run that this one continues.

@@ -13,11 +13,20 @@ use crate::error::{Error, failed};
 use crate::overlay;
 use crate::source::{Held, Item};
 
-/// Decodes and processes one picture.
+/// Decodes and processes one picture, and writes its mask.
 ///
 /// # Errors
-/// An overlay cannot be written.
-pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: Item) -> Result<Finished, Error> {
+/// An overlay or a mask cannot be written.
+pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, item: Item) -> Result<Finished, Error> {
+    let mut finished = process_and_draw(plan, sensor, index, item)?;
+    if let Some(masks) = &plan.masks {
+        let data = finished.data.as_ref();
+        finished.mask = Some(masks.write(&finished.name, &finished.answers(), data, &sensor.camera_of(data))?);
+    }
+    Ok(finished)
+}
+
+fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: Item) -> Result<Finished, Error> {
     let time = item.time_source(plan.frames.as_ref());
     let data = item.take_prior(plan.frames.as_ref());
     // It is dropped at the end of this function, after the picture.
@@ -37,6 +46,7 @@ pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: It
         traces: None,
         tip: None,
         pages: decoded.as_ref().map_or(1, |(p, _)| p.pages),
+        mask: None,
     };
     let (picture, original) = match decoded {
         Ok(decoded) => decoded,

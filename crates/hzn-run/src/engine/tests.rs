@@ -70,6 +70,7 @@ fn a_slow_disk_does_not_fill_the_memory() {
         keep_traces: false,
         keep_picture: false,
         overlay: None,
+        masks: None,
         last: Vec::new(),
         turns: Turns::default(),
     };

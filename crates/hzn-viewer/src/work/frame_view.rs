@@ -305,6 +305,7 @@ impl<'a> FrameInput<'a> {
             traces: None,
             tip: None,
             pages: 1,
+            mask: None,
         }
     }
 }

@@ -126,6 +126,7 @@ fn run(task: Task, stop: &AtomicBool, send: &Sender<Event>, wake: &Wake) -> Resu
         keep_traces: false,
         keep_picture: output.is_some(),
         overlay: None,
+        masks: None,
         last: Vec::new(),
         turns: Turns::default(),
     };

@@ -34,6 +34,7 @@ fn row_of_file(file: &Path, sensor: &Path) -> Value {
         keep_traces: false,
         keep_picture: false,
         overlay: None,
+        masks: None,
         last: Vec::new(),
         turns: engine::Turns::default(),
     };

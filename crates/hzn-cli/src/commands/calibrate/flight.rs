@@ -67,6 +67,7 @@ pub(super) fn plan(input: &InputArgs, flight: bool, jobs: Option<u16>, frames: O
         keep_traces: true,
         keep_picture: false,
         overlay: None,
+        masks: None,
         last: Vec::new(),
         turns: Turns::default(),
     }

@@ -1,19 +1,22 @@
 //! The arguments of `hzn run`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use hzn_files::{Frames, Sensor};
 use hzn_run::engine::{Plan, Turns};
+use hzn_run::mask::MaskFolder;
 use hzn_run::sink::{Existing, Outputs};
 
+use crate::exit::{Stop, usage};
 use crate::setup::{InputArgs, SensorArgs, TableFormat};
 
 /// Process a sequence of pictures
 ///
-/// Pictures are PNG, JPEG, TIFF, PNM or BMP, in a folder, as a pattern, or one by one; or headerless (--raw); or a
-/// video (through ffmpeg on PATH); or an MCAP with an image topic. The pictures of a folder or pattern are sorted by
-/// name, and numbers in names are compared by value (img2 before img10). An MCAP of an earlier run is processed again
-/// with its own sensor, names, times and positions. A picture that cannot be read becomes a row with status
+/// Pictures are PNG, JPEG, TIFF, PNM, BMP or WebP, in a folder, as a pattern, or one by one; or headerless (--raw);
+/// or a video (through ffmpeg on PATH); or an MCAP with an image topic. The pictures of a folder or pattern are sorted
+/// by name, and numbers in names are compared by value (img2 before img10). An MCAP of an earlier run is processed
+/// again with its own sensor, names, times and positions. A picture that cannot be read becomes a row with status
 /// `unreadable`; the run goes on.
 ///
 /// A rig.toml names several cameras that are one sensor: each picture has the row of its camera, and each epoch a row
@@ -53,6 +56,13 @@ pub(crate) struct Args {
     /// Draw the result over every picture, as PNG into this folder
     #[arg(long, value_name = "DIR")]
     pub(super) overlay: Option<PathBuf>,
+    /// Write a mask of every answered picture, as PNG into this folder: 255 where the body hides the stars, its limb
+    /// moved outwards by three sigmas, with Sun and Moon where their direction is known
+    #[arg(long, value_name = "DIR")]
+    pub(super) mask_pictures: Option<PathBuf>,
+    /// Move the outlines in the masks farther outwards by this angle
+    #[arg(long, value_name = "DEG", default_value = "0", requires = "mask_pictures", value_parser = margin_deg)]
+    pub(super) mask_margin_deg: f64,
     /// After the pictures of the folder, wait for those that arrive in it, until Ctrl-C. A picture is complete when its
     /// file has not changed for half a second; a file that gets its name when it is complete is always safe
     #[arg(long)]
@@ -81,6 +91,8 @@ impl Args {
             no_images: false,
             ros: false,
             overlay: None,
+            mask_pictures: None,
+            mask_margin_deg: 0.0,
             watch: false,
             jobs: None,
             quiet: true,
@@ -97,11 +109,17 @@ impl Args {
     }
 
     /// Returns the settings of the pictures of one camera.
-    pub(super) fn plan(&self, sensor: Sensor, frames: Option<Frames>) -> Plan {
+    ///
+    /// # Errors
+    /// The sensor is refused.
+    pub(super) fn plan(&self, sensor: Sensor, frames: Option<Frames>) -> Result<Plan, Stop> {
         let trace = Outputs::want_trace(&self.output);
         // If the threshold or a gate comes from the previous picture, pictures are processed one after another.
         let threads = if sensor.config.tracks() { 1 } else { self.jobs.map_or_else(cores, usize::from) };
-        Plan {
+        let masks = self.mask_pictures.as_deref();
+        let masks = masks.map(|folder| MaskFolder::new(folder, &sensor.config, self.mask_margin_deg)).transpose();
+        Ok(Plan {
+            masks: masks.map_err(usage)?.map(Arc::new),
             config: sensor.config,
             flight: self.sensor.flight,
             threads,
@@ -113,7 +131,15 @@ impl Args {
             overlay: self.overlay.clone(),
             last: Vec::new(),
             turns: Turns::default(),
-        }
+        })
+    }
+}
+
+/// Reads the margin of the masks.
+fn margin_deg(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(deg) if (0.0..=90.0).contains(&deg) => Ok(deg),
+        _ => Err("must be a number from 0 to 90".to_owned()),
     }
 }
 

@@ -66,6 +66,7 @@ fn check(args: &Args) -> Result<(), Stop> {
         ("--sensor", args.sensor.sensor.is_some(), "each head has a sensor of its own: write it into rig.toml"),
         ("--topic", args.source.topic.is_some(), "name the pictures of each head in rig.toml"),
         ("--overlay", args.overlay.is_some(), "draw the pictures of one head: hzn run FOLDER --overlay DIR"),
+        ("--mask-pictures", args.mask_pictures.is_some(), "use one head: hzn run FOLDER --mask-pictures DIR"),
         ("--watch", args.watch, "watch the folder of one head"),
         ("--resume", args.resume, "the run of a rig cannot be continued; --force starts again"),
     ];
@@ -81,12 +82,12 @@ fn plan(args: &Args, opened: &Opened) -> Result<Plan, Stop> {
         .heads
         .iter()
         .map(|head| {
-            let mut plan = args.plan(head.sensor.clone(), None);
+            let mut plan = args.plan(head.sensor.clone(), None)?;
             // A picture that repeats the one before it is found by its bytes.
             plan.keep_picture = true;
-            HeadPlan { name: head.name.clone(), plan }
+            Ok(HeadPlan { name: head.name.clone(), plan })
         })
-        .collect();
+        .collect::<Result<_, Stop>>()?;
     let threads = heads.iter().map(|head| head.plan.threads).min().unwrap_or(1);
     Ok(Plan { heads, joiner: opened.joiner()?, threads, keep_pictures: is_mcap && !args.no_images })
 }

@@ -79,6 +79,7 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
         traces: None,
         tip: None,
         pages: 1,
+        mask: None,
     }
 }
 
