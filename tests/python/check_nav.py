@@ -1,4 +1,4 @@
-"""Reads the attitude files of ``hzn fuse`` with other libraries: SPICE (CK, SCLK, FK), ccsds-ndm (AEM), mcap.
+"""Reads the attitude files of ``hzn fuse`` with other libraries: SPICE (CK, SCLK, FK), ccsds-ndm and brahe (AEM), mcap.
 
 Usage: check_nav.py HZN EXAMPLE FOLDER. EXAMPLE writes a flight without pictures.
 
@@ -10,10 +10,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import brahe as bh
 import numpy as np
 import spiceypy as spice
 from ccsds_ndm.ndm_io import NdmIo
 from mcap.reader import make_reader
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "crates/hzn-py/examples"))
+import brahe_aem
 
 SPACECRAFT = -999
 UTC = "2019-06-13T04:00:00Z"
@@ -28,12 +32,12 @@ def rotation(w: float, x: float, y: float, z: float) -> np.ndarray:
     ])
 
 
-def fuse(hzn: str, folder: Path, output: str) -> None:
+def fuse(hzn: str, folder: Path, output: str, *more: str) -> None:
     """Run ``hzn fuse`` on the flight."""
     command = [hzn, "fuse", "--imu", folder / "imu.csv", "--gnss", folder / "gnss.csv", "-o", folder / output]
     for camera in ("left", "right"):
         command += ["--nadir", folder / f"{camera}.csv", "--mount", f"{camera}={folder / camera}.toml"]
-    command += ["--utc", UTC, "--aem", folder / "nav.aem", "--ck", folder / "nav.bc", "--force", "--smooth"]
+    command += ["--utc", UTC, "--aem", folder / "nav.aem", "--ck", folder / "nav.bc", "--force", "--smooth", *more]
     subprocess.run(command, check=True, capture_output=True)
 
 
@@ -74,6 +78,35 @@ def check_aem(folder: Path, rows: list[dict[str, str]]) -> None:
     print(f"AEM: {len(states)} attitudes, differences below {worst:.1e}")
 
 
+def check_brahe(folder: Path, rows: list[dict[str, str]]) -> None:
+    """Compare the AEM of version 2.0 with the CSV, as the example with brahe reads it, at and between its times."""
+    start = bh.Epoch.from_datetime(2019, 6, 13, 4, 0, 0.0, 0.0, bh.TimeSystem.UTC)
+    attitude = brahe_aem.read(folder / "nav.aem")
+    times = np.array([float(row["time_s"]) for row in rows])
+    truth = np.array([rotation(*(float(row[name]) for name in ("qw", "qx", "qy", "qz"))) for row in rows])
+    for time_s, matrix in zip(times, truth, strict=True):
+        # The times of the message have microseconds.
+        assert angle_deg(brahe_aem.fixed_from_vehicle(attitude, start + time_s), matrix) < 1e-3, time_s
+    # A time between two of the message: the turn from the first one is that part of the whole turn.
+    i = int(np.argmin(np.abs(np.diff(times) - 1)))
+    between = brahe_aem.fixed_from_vehicle(attitude, start + (times[i] + times[i + 1]) / 2)
+    whole, part = angle_deg(truth[i], truth[i + 1]), angle_deg(truth[i], between)
+    assert whole > 0.01, whole
+    assert abs(part - whole / 2) < 0.01 * whole, (part, whole)
+    # The error of the attitude is within three sigmas, about each axis.
+    with (folder / "vehicle.csv").open() as file:
+        vehicle = list(csv.DictReader(file))
+    misses = brahe_aem.misses(attitude, start, vehicle, rows)
+    assert len(misses) > 100, len(misses)
+    assert np.mean(np.abs(misses) < 3) > 0.97, np.abs(misses).max()
+    print(f"AEM in brahe: {len(rows)} attitudes; {len(misses)} errors, at most {np.abs(misses).max():.2f} sigmas")
+
+
+def angle_deg(a: np.ndarray, b: np.ndarray) -> float:
+    """Return the angle of the rotation between two matrices."""
+    return 2 * np.degrees(np.arcsin(min(1.0, np.linalg.norm(a - b) / np.sqrt(8))))
+
+
 def check_mcap(folder: Path) -> None:
     """Read the recording."""
     with (folder / "nav.mcap").open("rb") as file:
@@ -99,6 +132,8 @@ def main() -> None:
     check_ck(folder, rows)
     check_aem(folder, rows)
     check_mcap(folder)
+    fuse(hzn, folder, "nav.csv", "--aem-version", "2.0")
+    check_brahe(folder, rows)
 
 
 if __name__ == "__main__":

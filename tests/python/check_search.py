@@ -29,6 +29,8 @@ PROBES = {
     "rerun": "guide/ros/",
     "foxglove": "guide/ros/",
     "basilisk": "guide/tools/",
+    "brahe": "guide/tools/",
+    "star trackers": "guide/tools/",
     "horizonopnav": "guide/tools/",
     "install": "guide/install/",
     "mask": "guide/mask/",

@@ -1,7 +1,7 @@
-//! CCSDS attitude ephemeris message (AEM), version 1.0, in keyword = value notation.
+//! CCSDS attitude ephemeris message (AEM) in keyword = value notation.
 //!
-//! Source: CCSDS 504.0-B-1, section 4. The quaternion turns the axes of frame A onto those of frame B; it is that of
-//! the rotation from the vehicle's frame to ECEF, scalar last.
+//! Sources: CCSDS 504.0-B-1 (version 1.0) and 504.0-B-2 (version 2.0), section 4. The quaternion turns the axes of
+//! frame A onto those of frame B; it is that of the rotation from the vehicle's frame to ECEF, scalar last.
 
 use std::io::Write;
 
@@ -9,9 +9,21 @@ use super::Utc;
 use crate::error::Error;
 use crate::results::{Epoch, Fused};
 
+/// Version of a message. Programs read one or the other: GMAT and ccsds-ndm the first, brahe the second, Orekit both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum AemVersion {
+    /// 1.0 of 2008.
+    #[default]
+    One,
+    /// 2.0 of 2024. The direction A to B and the place of the scalar are no keywords any more, because they are fixed.
+    Two,
+}
+
 /// Header of a message.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AemOptions {
+    /// Version of the message.
+    pub version: AemVersion,
     /// UTC of time 0.
     pub utc: Utc,
     /// Name of the vehicle.
@@ -33,12 +45,15 @@ pub fn write_aem(fused: &Fused, options: &AemOptions, mut out: impl Write) -> Re
     };
     let iso = |epoch: &Epoch| options.utc.iso(epoch.state.time_s);
     let AemOptions { object_name, object_id, created, .. } = options;
+    let [version, frame, direction, scalar] = match options.version {
+        AemVersion::One => ["1.0", "ITRF-97", "ATTITUDE_DIR = A2B\n", "QUATERNION_TYPE = LAST\n"],
+        AemVersion::Two => ["2.0", "ITRF1997", "", ""],
+    };
     let mut text = format!(
-        "CCSDS_AEM_VERS = 1.0\nCREATION_DATE = {created}\nORIGINATOR = HZN\n\nMETA_START\nOBJECT_NAME = \
-         {object_name}\nOBJECT_ID = {object_id}\nCENTER_NAME = EARTH\nREF_FRAME_A = ITRF-97\nREF_FRAME_B = \
-         SC_BODY_1\nATTITUDE_DIR = A2B\nTIME_SYSTEM = UTC\nSTART_TIME = {}\nSTOP_TIME = {}\nATTITUDE_TYPE = \
-         QUATERNION\nQUATERNION_TYPE = LAST\nINTERPOLATION_METHOD = LINEAR\nINTERPOLATION_DEGREE = 1\nMETA_STOP\n\n\
-         DATA_START\n",
+        "CCSDS_AEM_VERS = {version}\nCREATION_DATE = {created}\nORIGINATOR = HZN\n\nMETA_START\nOBJECT_NAME = \
+         {object_name}\nOBJECT_ID = {object_id}\nCENTER_NAME = EARTH\nREF_FRAME_A = {frame}\nREF_FRAME_B = \
+         SC_BODY_1\n{direction}TIME_SYSTEM = UTC\nSTART_TIME = {}\nSTOP_TIME = {}\nATTITUDE_TYPE = \
+         QUATERNION\n{scalar}INTERPOLATION_METHOD = LINEAR\nINTERPOLATION_DEGREE = 1\nMETA_STOP\n\nDATA_START\n",
         iso(first),
         iso(last)
     );

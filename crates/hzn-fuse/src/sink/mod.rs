@@ -9,7 +9,7 @@ mod oem;
 mod record;
 mod utc;
 
-pub use aem::{AemOptions, write_aem};
+pub use aem::{AemOptions, AemVersion, write_aem};
 pub use ck::{CkOptions, write_ck};
 pub use csv::{write_innovations, write_states};
 pub use frames::write_frames;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_fuse::finding::{Cause, Finding, Source};
 use hzn_fuse::input::Inputs;
+use hzn_fuse::sink::AemVersion;
 
 /// Fuse the results of `hzn run` with inertial unit and receiver: attitude and position with covariance
 ///
@@ -55,6 +56,9 @@ pub(crate) struct Args {
     /// Position and velocity as a CCSDS orbit ephemeris message; it needs --utc and --gnss
     #[arg(long, value_name = "FILE", requires_all = ["utc", "gnss"])]
     pub(super) oem: Option<PathBuf>,
+    /// Version of the AEM: programs read the one of 2008, or that of 2024
+    #[arg(long, value_name = "VERSION", default_value = "1.0", requires = "aem")]
+    pub(super) aem_version: Version,
     /// The attitude as a SPICE CK of type 3 (FILE.bc), with FILE.tsc and FILE.tf next to it; it needs --utc
     #[arg(long, value_name = "FILE", requires = "utc")]
     pub(super) ck: Option<PathBuf>,
@@ -116,6 +120,26 @@ impl Args {
                 mount.map(|(_, file)| Path::new(file)).or(recording.map(PathBuf::as_path))
             }
             Source::Cameras | Source::All => None,
+        }
+    }
+}
+
+/// The version of an AEM.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Version {
+    /// CCSDS 504.0-B-1, which GMAT, Orekit and ccsds-ndm read
+    #[value(name = "1.0")]
+    One,
+    /// CCSDS 504.0-B-2, which brahe and Orekit read
+    #[value(name = "2.0")]
+    Two,
+}
+
+impl From<Version> for AemVersion {
+    fn from(version: Version) -> Self {
+        match version {
+            Version::One => Self::One,
+            Version::Two => Self::Two,
         }
     }
 }

@@ -101,7 +101,13 @@ impl<'a> Outputs<'a> {
         if let Some(utc) = self.utc {
             let created = Utc::now().iso(0.0);
             let object_name = args.object.clone();
-            let options = AemOptions { utc, object_id: object_name.clone(), object_name, created };
+            let options = AemOptions {
+                version: args.aem_version.into(),
+                utc,
+                object_id: object_name.clone(),
+                object_name,
+                created,
+            };
             args.aem.iter().try_for_each(|path| Ok::<(), Stop>(sink::write_aem(fused, &options, create(path)?)?))?;
             args.oem.iter().try_for_each(|path| Ok::<(), Stop>(sink::write_oem(fused, &options, create(path)?)?))?;
         }
