@@ -3,9 +3,15 @@
     python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 accuracy
     python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 faults
     python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 pair
+    python rig_campaign.py --hzn target/release/hzn --flights 10 --frames 100 coarse
+    python rig_campaign.py --hzn target/release/hzn --flights 10 --frames 30 mounts
 
 The sensors of the scene `ring` are told a limb height of 15 +- 10 km while the limb is at 25 km. Its change with
 latitude is told or not. The mounts are exact, unless a fault turns one of them.
+
+`coarse` flies the scene with random attitudes and pictures of a quarter of the size, and compares the coarse direction
+with the truth. `mounts` tells mounts that are wrong by about a degree, lets the vehicle turn, and compares the mounts of
+`hzn calibrate rig` with the true ones.
 """
 
 import argparse
@@ -245,6 +251,124 @@ def pair_of(program, root, seed, frames):
     return counts
 
 
+ORBIT = "[trajectory.orbit]\nperigee_km = 500.0\ninclination_deg = 97.4\nnode_deg = 30.0\n"
+POINTING = re.compile(r"\[attitude\.pointing\]\n(\w+ = \[[^\n]*\n)+")
+STEP_S = 60.0
+
+
+def smaller(text):
+    """Returns the scene with pictures of a quarter of the size."""
+    for key, value in (("width", "160"), ("height", "120"), ("fx_px", "138.5"), ("fy_px", "138.5"), ("cx_px", "79.5"),
+                       ("cy_px", "59.5")):
+        text = re.sub(rf"(?m)^{key} = .*$", f"{key} = {value}", text)
+    return text
+
+
+def coarse_of(program, root, seed, frames):
+    """Flies random attitudes. Returns the angles between coarse direction and truth, their sigmas, and the answers."""
+    random = np.random.default_rng(seed)
+    rows = ["time_s,x_km,y_km,z_km,qw,qx,qy,qz"]
+    for i in range(frames + 1):
+        along = math.tau * i * STEP_S / 5670.0
+        place = 6871.0 * np.array([math.cos(along), 0.3 * math.sin(along), math.sqrt(0.91) * math.sin(along)])
+        q = random.normal(size=4)
+        q /= np.linalg.norm(q)
+        rows.append(",".join(repr(float(x)) for x in [i * STEP_S, *place, *q]))
+    (root / f"attitudes-{seed}.csv").write_text("\n".join(rows) + "\n")
+
+    def change(text):
+        text = text.replace(ORBIT, f'[trajectory.table]\nfile = "attitudes-{seed}.csv"\n')
+        text, count = POINTING.subn("", text)
+        assert count == 1 and "trajectory.table" in text, text
+        text = text.replace("[capture]\nto_s = 5670.0", f"[capture]\nto_s = {frames * STEP_S}")
+        return smaller(text.replace('name = "ring"\n', 'name = "ring"\nattitude = "table"\n', 1))
+
+    folder = root / f"coarse-{seed}"
+    simulate(program, folder, "ring", seed, frames, change)
+    joint, _ = run(program, folder, write_rig(folder, HEADS))
+    truth, result = truths(folder), []
+    for row in joint:
+        axis = np.array([float(by_time(truth, row)[f"axis_{k}"]) for k in "xyz"])
+        if row["status"] == "ok":
+            result.append(("ok", math.nan, math.nan))
+        elif not row["coarse_x"]:
+            result.append(("none", math.nan, math.nan))
+        else:
+            coarse = np.array([float(row[f"coarse_{k}"]) for k in "xyz"])
+            error = math.degrees(math.atan2(np.linalg.norm(np.cross(axis, coarse)), axis @ coarse))
+            result.append(("coarse", error, float(row["coarse_sigma_deg"])))
+    shutil.rmtree(folder)
+    return result
+
+
+def print_coarse(results):
+    rows = [row for result in results for row in result]
+    errors = np.array([[error, sigma] for kind, error, sigma in rows if kind == "coarse"])
+    count = {kind: sum(row[0] == kind for row in rows) for kind in ("ok", "coarse", "none")}
+    print("| attitudes | answers | coarse directions | neither | median error, deg | worst | median sigma | within 3 sigma |\n"
+          "|---:|---:|---:|---:|---:|---:|---:|---:|")
+    within = (errors[:, 0] <= 3 * errors[:, 1]).mean()
+    print(f"| {len(rows)} | {count['ok']} | {count['coarse']} | {count['none']} | {np.median(errors[:, 0]):.1f} "
+          f"| {errors[:, 0].max():.1f} | {np.median(errors[:, 1]):.1f} | {100 * within:.1f} % |")
+
+
+def rotation(q):
+    w, x, y, z = q / np.linalg.norm(q)
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
+def small_turn(matrix):
+    """Returns the rotation vector of a small rotation, degrees."""
+    return np.degrees([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]]) / 2
+
+
+def mount_and_covariance(path, head):
+    block = next(b for b in path.read_text().split("[[head]]") if f'name = "{head}"' in b)
+    numbers = lambda key: np.array([float(x) for x in re.search(rf"{key} = \[([^\]]*)\]", block)[1].split(",") if x.strip()])
+    xx, xy, xz, yy, yz, zz = numbers("covariance_deg2")
+    return rotation(numbers("q_rig_from_camera_wxyz")), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def mounts_of(program, root, seed, frames):
+    """Calibrates wrong mounts on a flight that turns. Returns errors and sigmas about the principal axes, degrees."""
+    folder = root / f"mounts-{seed}"
+    turning = ("[attitude.pointing]\noff_nadir_deg = [45.0, 91.0]\nazimuth_deg = [0.0, 330.0]\n"
+               "roll_deg = [-25.0, 25.0]\n")
+    weather = WEATHER if seed % 2 else ""
+    simulate(program, folder, "ring", seed, frames, lambda text: POINTING.sub(turning, text) + weather)
+    tell_limb(folder, True)
+    random = np.random.default_rng(seed)
+    wrong = {head: turned(told_mount(folder, head), random.normal(size=3), random.normal()) for head in HEADS}
+    out = folder / "calibrated.toml"
+    report = hzn(program, "calibrate", "rig", write_rig(folder, HEADS, mounts=wrong), "-o", out, "-q", "-j", 1)
+    true = {head: rotation(told_mount(folder, head)) for head in HEADS}
+    found = {head: mount_and_covariance(out, head) for head in HEADS}
+    result = []
+    for a, b in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)):
+        (ra, pa), (rb, pb) = found[HEADS[a]], found[HEADS[b]]
+        # The turn of b against a about the axes of the rig.
+        error = small_turn(rb @ true[HEADS[b]].T @ true[HEADS[a]] @ ra.T)
+        values, vectors = np.linalg.eigh(pa + pb)
+        result += list(zip(np.abs(vectors.T @ error), np.sqrt(values)))
+    shutil.rmtree(folder)
+    assert "epochs" in report
+    return result
+
+
+def print_mounts(results):
+    rows = np.array([row for result in results for row in result])
+    # The prior of each mount is 5 degrees; a direction that keeps half of it is not determined.
+    rows = rows[rows[:, 1] < 2.5]
+    within = (rows[:, 0] <= 3 * rows[:, 1]).mean()
+    ratio = np.sqrt(((rows[:, 0] / rows[:, 1]) ** 2).mean())
+    print("| flights | directions | RMS error, deg | median sigma | largest sigma | error/sigma, RMS | within 3 sigma |\n"
+          "|---:|---:|---:|---:|---:|---:|---:|")
+    print(f"| {len(results)} | {len(rows)} | {np.sqrt((rows[:, 0] ** 2).mean()):.4f} | {np.median(rows[:, 1]):.4f} "
+          f"| {rows[:, 1].max():.3f} | {ratio:.2f} | {100 * within:.1f} % |")
+
+
 def fly(args, work):
     """Flies all seeds. Returns the results, one for each."""
     seeds = range(args.first_seed, args.first_seed + args.flights)
@@ -266,13 +390,19 @@ def merge(results):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["accuracy", "faults", "pair"])
+    parser.add_argument("what", choices=["accuracy", "faults", "pair", "coarse", "mounts"])
     parser.add_argument("--hzn", default="target/release/hzn")
     parser.add_argument("--flights", type=int, default=10)
     parser.add_argument("--first-seed", type=int, default=100)
     parser.add_argument("--frames", type=int, default=8)
     parser.add_argument("--jobs", type=int, default=1)
     args = parser.parse_args()
+    if args.what in ("coarse", "mounts"):
+        work, show = {"coarse": (coarse_of, print_coarse), "mounts": (mounts_of, print_mounts)}[args.what]
+        results = fly(args, work)
+        print(f"{args.flights} flights of {args.frames} epochs, seeds from {args.first_seed}\n")
+        show(results)
+        return
     total = merge(fly(args, {"accuracy": accuracy_of, "faults": faults_of, "pair": pair_of}[args.what]))
     print(f"{args.flights} flights of {args.frames} epochs, seeds from {args.first_seed}\n")
     if args.what == "faults":

@@ -6,6 +6,7 @@
 //! | [`points`] | pixels with known directions |
 //! | [`sky`] | the limb in the pictures of a flight: mount and lens |
 //! | [`noise`] | the pictures of a flight: limb height and noise |
+//! | [`rig`] | the limbs that several heads see together: their mounts |
 //!
 //! [`conversion`] changes a lens into another model, and [`lens_error`] says how well it is known. [`residual_table`]
 //! reads and writes residuals.csv, the residuals of a lens calibration.
@@ -25,6 +26,7 @@ pub mod noise;
 mod other_model;
 pub mod points;
 pub mod residual_table;
+pub mod rig;
 mod robust;
 pub mod sky;
 mod staged;

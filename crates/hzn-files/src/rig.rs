@@ -168,6 +168,14 @@ pub fn parse(text: &str, path: &Path) -> Result<Rig, Problem> {
     document::parse(text, path, check)
 }
 
+/// Writes a rig.toml as text.
+///
+/// # Errors
+/// A path is not UTF-8.
+pub fn to_text(rig: &Rig) -> Result<String, String> {
+    toml::to_string(rig).map_err(|e| e.to_string())
+}
+
 type Refused = (String, String);
 
 /// Checks the values of a rig.toml.

@@ -276,6 +276,19 @@ columns! {
         separation_deg: Option<f64>,
         /// The largest such angle that the covariances allow, degrees.
         separation_limit_deg: Option<f64>,
+        /// Coarse direction to the body in the vehicle's frame, x, if a rig has no answer: from what its heads see of
+        /// body and sky. It is never an answer.
+        coarse_x: Option<f64>,
+        /// Coarse direction to the body, y.
+        coarse_y: Option<f64>,
+        /// Coarse direction to the body, z.
+        coarse_z: Option<f64>,
+        /// RMS of the angles between that direction and the directions that fit what the heads see, degrees.
+        coarse_sigma_deg: Option<f64>,
+        /// Height of the limb that explains the half-angle of a rig's answer at the given altitude, kilometres.
+        limb_height_est_km: Option<f64>,
+        /// 1σ of that height, from the half-angle and the altitude, kilometres.
+        limb_height_est_sigma_km: Option<f64>,
     }
 }
 

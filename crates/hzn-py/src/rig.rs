@@ -122,7 +122,8 @@ impl Rig {
             let data = FrameData { utc_s: data.time_s, ..data }.seen_by_camera(q_vehicle_from_camera_wxyz);
             let (report, processed) = read.process(py, &state, &data, bits, false)?;
             let outcomes = processed.into_iter().map(Into::into).collect();
-            frames.push(Some(finished(read.file, data, outcomes)));
+            let glimpse = Some(read.glimpse(&state, bits)?);
+            frames.push(Some(Finished { glimpse, ..finished(read.file, data, outcomes) }));
             reports.set_item(name, Bound::new(py, report)?)?;
         }
         let seen: Vec<Seen<'_>> = frames.iter().map(|frame| Seen::new(frame.as_ref(), None)).collect();
@@ -164,6 +165,7 @@ fn finished(name: String, data: FrameData, outcomes: Vec<BodyOutcome>) -> Finish
         outcomes,
         drawing: Default::default(),
         picture: None,
+        glimpse: None,
         traces: None,
         tip: None,
         pages: 1,

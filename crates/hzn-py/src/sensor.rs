@@ -5,6 +5,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use hzn_core::Config;
 use hzn_core::body::PriorError;
+use hzn_core::rig::Glimpse;
 use hzn_files::{FrameData, plausible, sensor};
 use hzn_mcap::{Row, RowMeta};
 use hzn_run::diagnosis::{self, AnyCone};
@@ -284,6 +285,16 @@ fn warn_of_unused_bits(py: Python<'_>, array: &Array<'_>, bits: Option<u8>) -> P
 }
 
 impl<'py> Read<'py> {
+    /// Reads the brightness at places all over the picture, after [`Self::process`] accepted it.
+    pub(crate) fn glimpse(&self, state: &State, bits: Option<u8>) -> PyResult<Glimpse> {
+        let array = Array::from_object(&self.image)?;
+        let bits = array.bits(bits.or(self.bits), &state.config.input);
+        Ok(match array.view(bits, state.config.input.channel)? {
+            View::Packed(view) => Glimpse::take(&view, state.region()),
+            View::Strided(view) => Glimpse::take(&view, state.region()),
+        })
+    }
+
     /// Finds the limb of each body. Returns the report of the first body, which has those of the others, and what the
     /// sensor found.
     pub(crate) fn process(

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use hzn_core::region::Region;
 use hzn_core::{Config, Expected, Sensor as CoreSensor};
 use hzn_files::FrameData;
 use hzn_run::engine::AnySensor;
@@ -74,6 +75,11 @@ impl State {
             ));
         }
         Ok(&self.core)
+    }
+
+    /// Returns the region of the pictures that is used.
+    pub(crate) fn region(&self) -> &Region<f64> {
+        self.core.region()
     }
 
     /// Returns an error if the array does not have the size of the camera's picture.

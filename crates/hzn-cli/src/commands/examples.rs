@@ -55,7 +55,8 @@ hzn simulate mine.toml -o mine --seed 7    the changed scene, with other random 
 hzn init flight/ --fov 92 --lens fisheye          a fisheye that sees 92 degrees over the width
 hzn init IMG_0001.JPG --altitude 418 -o iss.toml  the lens as EXIF has it, pictures from 418 km
 hzn init flight/ --altitude 418                   without EXIF: the field of view from the limb
-hzn init moon/ --fov 40 --body moon --altitude 100   a camera in orbit around the Moon",
+hzn init moon/ --fov 40 --body moon --altitude 100   a camera in orbit around the Moon
+hzn init --rig left right --mount 1,0,0,0 --mount 0,0,0,1   several heads, into rig.toml",
     ),
     (
         "migrate",
@@ -72,7 +73,8 @@ hzn evaluate flight.csv --truth flight --json     everything as JSON, on standar
         "sensitivity",
         "hzn sensitivity --fov 40:120:20 --altitude 500    which field of view is accurate enough
 hzn sensitivity -s sensor.toml --altitude 100:900:100   a sensor of yours, by altitude
-hzn sensitivity visibility --altitude 500         when an arc or the whole disc is in view",
+hzn sensitivity visibility --altitude 500         when an arc or the whole disc is in view
+hzn sensitivity rig --fov 20:90:10 --altitude 500 --size 640x480 -o heads.svg   how many heads",
     ),
     ("calibrate", "hzn calibrate noise flight/ -o noise.toml      limb height and edge noise of a flight"),
     (
@@ -94,6 +96,11 @@ hzn calibrate sky flight/ --also k1 -o report.html    one more parameter, and a 
     (
         "calibrate mount board",
         "hzn calibrate mount board tilts/ --board 9x6 --lens sensor.toml --tilt tilt.csv -o mount.toml",
+    ),
+    (
+        "calibrate rig",
+        "hzn calibrate rig ring/rig.toml -o ring/calibrated.toml   the mounts of the heads
+hzn calibrate rig ring/rig.toml --check                   whether a head has turned",
     ),
     ("camera", "hzn camera show sensor.toml                     lens table and expected limb"),
     (

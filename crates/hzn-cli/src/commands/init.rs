@@ -1,6 +1,6 @@
 //! `hzn init`: writes a sensor.toml to start from.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use hzn_core::Config;
 use hzn_core::camera::Model;
@@ -11,6 +11,7 @@ use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
 use hzn_run::start::{LimbSays, doubt_field_of_view, measure_field_of_view, read_camera_facts};
 
+use super::init_rig;
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
 
@@ -20,6 +21,7 @@ use crate::tell;
 /// their EXIF, or else from the curvature of the limb in them, for which an altitude must be known. Its sigmas are
 /// large, because these values are rough; with an altitude the file works at once.
 /// Without pictures: the file has every key with its default and a comment, and only the camera must be filled in.
+/// With --rig: the file is a rig.toml for several cameras, each with its pictures in a folder, and its sensor.toml there.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Pictures of the camera: files, a folder, a glob, a video, or a recording
@@ -37,9 +39,15 @@ pub(super) struct Args {
     /// Altitude of all pictures above WGS-84, or above the Moon, kilometres, if no frames.csv gives one
     #[arg(long, value_name = "KM", requires = "pictures")]
     altitude: Option<f64>,
-    /// The file to write
-    #[arg(short, long, value_name = "FILE", default_value = "sensor.toml")]
-    output: PathBuf,
+    /// Write a rig.toml for several cameras (heads); the pictures are a folder for each head
+    #[arg(long, requires = "pictures", conflicts_with_all = ["fov", "lens", "altitude"])]
+    rig: bool,
+    /// With --rig: rotation from the camera to the rig as a quaternion, scalar first; once for each folder, in order
+    #[arg(long, value_name = "W,X,Y,Z", requires = "rig", allow_hyphen_values = true)]
+    mount: Vec<init_rig::Mount>,
+    /// The file to write [default: sensor.toml, with --rig rig.toml]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
     /// Replace a file that exists
     #[arg(long)]
     force: bool,
@@ -81,19 +89,29 @@ impl From<Lens> for Model {
     }
 }
 
+impl Args {
+    /// Returns the file to write.
+    fn output(&self) -> &Path {
+        self.output.as_deref().unwrap_or(Path::new(if self.rig { "rig.toml" } else { "sensor.toml" }))
+    }
+}
+
 pub(super) fn run(args: &Args) -> Outcome {
+    if args.rig {
+        return init_rig::run(&args.pictures, &args.mount, args.output(), args.force);
+    }
     if let Some(file) = args.pictures.iter().find(|p| source::ending(p) == "toml") {
         let name = file.display();
         return Err(usage(format!("{name}: is a file to write, not a picture; name it with -o:  hzn init -o {name}")));
     }
-    let name = args.output.display();
+    let name = args.output().display();
     let source = if args.pictures.is_empty() { None } else { Some(source::open(&args.pictures, None, None)?) };
     let read = source.as_ref().map(|source| source.files()).unwrap_or_default();
-    disk::refuse_inputs(&read, std::slice::from_ref(&args.output))?;
-    if args.output.exists() && !args.force {
+    disk::refuse_inputs(&read, &[args.output().to_owned()])?;
+    if args.output().exists() && !args.force {
         return Err(usage(format!("{name}: exists already; choose another name with -o, or --force replaces it")));
     }
-    let write = |text: &str| disk::write(&args.output, text);
+    let write = |text: &str| disk::write(args.output(), text);
     let Some(mut source) = source else {
         write(hzn_files::template::SENSOR_TOML)?;
         tell::line(format_args!("{name} written; fill in [camera], then look at it with  hzn camera show {name}"));
@@ -139,7 +157,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// Says what looks wrong in the written file, and what it needs.
 fn finish(args: &Args, text: &str) -> Outcome {
     // The commands that read the file say the same, but then it is not clear which option was wrong.
-    let sensor = hzn_files::sensor::parse(text, &args.output)?;
+    let sensor = hzn_files::sensor::parse(text, args.output())?;
     sensor.warnings.iter().for_each(tell::warning);
     if !knows_altitudes(args, &sensor.config)? {
         tell::line(
@@ -174,7 +192,7 @@ fn calibrated(args: &Args, known: &CameraFacts) -> Result<Option<String>, Stop> 
     let text = start::write_calibrated(known, &camera, &topic).map_err(usage)?;
     tell::line(format_args!(
         "{} written: {} x {} px, {}, f = {:.1} px, from {topic}",
-        args.output.display(),
+        args.output().display(),
         camera.width,
         camera.height,
         camera.model.name(),

@@ -15,6 +15,7 @@ mod fuse;
 mod ground;
 mod info;
 mod init;
+mod init_rig;
 mod lens_model;
 mod man;
 mod migrate;

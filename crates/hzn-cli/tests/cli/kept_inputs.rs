@@ -148,6 +148,7 @@ const CASES: &[Case] = &[
         "in/sensor.toml",
         &["calibrate", "mount", "flight", "f.csv", "--told", "in/sensor.toml", "-o", "link/sensor.toml", "--force"],
     ),
+    ("in/sensor.toml", &["calibrate", "rig", "in/sensor.toml", "-o", "link/sensor.toml", "--force"]),
     ("lens.toml", &["calibrate", "mount", "kalibr", "lens.toml", "--fuse", "lens.toml", "--force"]),
     ("in/sensor.toml", &["camera", "convert", "in/sensor.toml", "-o", "in/sensor.toml", "--force"]),
     ("in/sensor.toml", &["camera", "show", "in/sensor.toml", "--picture", "sensor-link.png", "--force"]),

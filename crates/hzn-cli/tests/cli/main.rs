@@ -33,6 +33,7 @@ mod rerun;
 mod resume;
 mod rewritten;
 mod rig;
+mod rig_mounts;
 mod run;
 mod sensitivity;
 mod shell;

@@ -258,3 +258,27 @@ fn the_limb_of_a_design_is_that_of_a_sensor() {
     assert_eq!(last(&line(&["--body", "earth"])), last(&told));
     assert_ne!(last(&line(&["--limb-height", "10", "--limb-height-sigma", "2"])), last(&told));
 }
+
+#[test]
+fn several_heads_by_number_angle_and_mount() {
+    let place = Place::new();
+    let rig = |more: &[&str]| {
+        let camera =
+            ["sensitivity", "rig", "--fov", "60", "--altitude", "500", "--size", "640x480", "--limb-height", "25"];
+        place.run(&[&camera[..], &["--sigma-px", "0.3", "--correlation-px", "25", "--force"], more].concat())
+    };
+    rig(&["-o", "r.csv", "-o", "r.svg"]).expect(0);
+    let rms = |row: usize| cell(&rows(&place.read("r.csv"))[row], "rms_deg").parse::<f64>().unwrap();
+    // One, two, three and four heads.
+    assert!(rms(0) > 2.0 * rms(1) && rms(1) > rms(2) && rms(2) > rms(3), "{}", place.read("r.csv"));
+    assert!(place.read("r.svg").contains("<svg"));
+    let four = rms(3);
+    rig(&["--heads", "2", "--between", "30,90,180", "-o", "r.csv"]).expect(0);
+    assert!(rms(0) > rms(1), "{}", place.read("r.csv"));
+    rig(&["--heads", "4", "--mount-sigma", "0.05", "-o", "r.csv"]).expect(0);
+    assert!(rms(0) > four);
+    rig(&["--heads", "5"]).expect(2).says("--heads: 5 is refused: a rig has 1 to 4 heads");
+    rig(&["--between", "0"]).expect(2).says("--between: 0 is refused");
+    rig(&["--mount-sigma", "-1"]).expect(2);
+    rig(&["--depression", "10"]).expect(2).says("the heads of a rig look at the limb");
+}

@@ -58,6 +58,8 @@ pub struct EpochAnswer<T> {
     pub common: Option<Cov3<Vehicle, T>>,
     /// Half-angle of the limb, rad.
     pub half_angle_rad: T,
+    /// 1σ of the cosine of that half-angle; `None` if the half-angle was not fitted.
+    pub cos_sigma: Option<T>,
     /// The heads that are in the answer: bit k for head k.
     pub heads_used: u8,
     /// The heads that the check excluded.
@@ -108,6 +110,7 @@ impl<T: Real> Rig<T> {
             covariance: joint.covariance,
             common: None,
             half_angle_rad: (T::one() - cos * cos).max(T::ZERO).sqrt().atan2(cos),
+            cos_sigma: Some(joint.cos.1),
             heads_used: joint.heads_used,
             heads_excluded: joint.heads_excluded,
             separation_rad: joint.separation_rad,
@@ -155,6 +158,7 @@ fn single<T: Real>(common: &Common<T>, head: &Answered<'_, T>, k: u8) -> Option<
         covariance: in_vehicle(&solution.covariance),
         common: solution.common.as_ref().map(in_vehicle),
         half_angle_rad: solution.half_angle_rad,
+        cos_sigma: solution.free.as_ref().map(|free| free.var_cos.max(T::ZERO).sqrt()),
         heads_used: 1 << k,
         heads_excluded: 0,
         separation_rad: None,

@@ -56,14 +56,18 @@
 //! ```
 
 mod check;
+mod coarse;
 mod epoch;
+mod glimpse;
 mod head;
 mod joint;
 mod mount;
 mod weather;
 
 pub use check::{Config, MOST_HEADS, Rig};
+pub use coarse::{Coarse, GlimpsedHead, Light, coarse};
 pub use epoch::{Answered, Common, Epoch, EpochAnswer};
+pub use glimpse::Glimpse;
 pub use head::Head;
 pub use joint::{Joint, NoJoint};
 pub use mount::Mount;

@@ -71,7 +71,7 @@ impl<T: Real> Limb<T> {
     /// of the axis and of the cosine: with the rows g = (sin α cos ψ, sin α sin ψ, −1) and the widths of the parts of
     /// the arc as weights W, the error is (GᵀWG)⁻¹ GᵀW sin α ∂α/∂d h. On a short arc, a height that changes along the
     /// arc moves the free fit far more than a constant one.
-    pub(super) fn with_weather(&self, free: &Free<T>, camera: &Camera<T>) -> Free<T> {
+    pub fn with_weather(&self, free: &Free<T>, camera: &Camera<T>) -> Free<T> {
         let (one, cos) = (T::one(), free.cos);
         let sin = (one - cos * cos).max(T::ZERO).sqrt();
         if !(self.own_sigma_km > T::ZERO && cos > T::ZERO && sin > T::ZERO && self.radius_km > T::ZERO) {

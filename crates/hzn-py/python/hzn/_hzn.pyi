@@ -294,7 +294,10 @@ class Rig:
             The joint answer as ``"rig"``, whose axis and covariance are in the axes of the vehicle, and the report of
             each head with a picture. `Report.to_dict` has the columns of the check: ``heads_used``,
             ``heads_excluded``, ``separation_deg``, ``protection_deg``. If the heads contradict each other, the status
-            is ``rejected`` and `Report.detail` begins with ``inconsistent``.
+            is ``rejected`` and `Report.detail` begins with ``inconsistent``. Without an answer, ``coarse_x``,
+            ``coarse_y``, ``coarse_z`` and ``coarse_sigma_deg`` have the coarse direction to the body, if the heads tell
+            one; a place of a picture counts as lit from an eighth of full scale on, or from the level of a sensor with
+            ``threshold.method = "fixed"``.
 
         Raises
         ------

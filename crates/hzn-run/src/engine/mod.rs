@@ -33,6 +33,8 @@ pub use pool::End;
 #[cfg(feature = "recordings")]
 pub(crate) use pool::{InOrder, Work, run_in_order};
 pub use process::process_one;
+#[cfg(feature = "recordings")]
+pub(crate) use sensor::prior;
 pub use sensor::{AnySensor, LastAnswer, Processed, check_frames, find_refused};
 pub use sequence::{Sink, process_alone, run};
 pub use trace::{Trace, Traces, Watch};

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use hzn_core::body::PriorError;
+use hzn_core::rig::Glimpse;
 use hzn_core::status::Status;
 use hzn_core::{Report, Solution};
 use hzn_files::FrameData;
@@ -31,6 +32,8 @@ pub struct Finished {
     pub drawing: hzn_mcap::Annotations,
     /// The picture as PNG or JPEG, if the plan asks for it.
     pub picture: Option<Vec<u8>>,
+    /// The brightness at places all over the picture, if it could be read.
+    pub glimpse: Option<Glimpse>,
     /// What the pipeline showed of its work, one record for each body, if the plan asks for it.
     pub traces: Option<Traces>,
     /// Advice, if nothing was found and the picture itself suggests a reason.

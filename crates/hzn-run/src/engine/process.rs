@@ -43,6 +43,7 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         outcomes: Vec::new(),
         drawing: Annotations::default(),
         picture: None,
+        glimpse: None,
         traces: None,
         tip: None,
         pages: decoded.as_ref().map_or(1, |(p, _)| p.pages),
@@ -61,6 +62,7 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         }
     };
     let data = finished.data.as_ref();
+    finished.glimpse = sensor.glimpse(&view);
     sensor.set_time(finished.time_s);
     finished.outcomes = sensor.process(&view, data, traces.as_ref()).into_iter().map(BodyOutcome::from).collect();
     if finished.outcomes.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {

@@ -8,6 +8,7 @@ use hzn_core::error::ConfigError;
 use hzn_core::frames::{Fixed, UnitVec3};
 use hzn_core::image::{ImageView, Indirect, Pixels};
 use hzn_core::real::Real;
+use hzn_core::rig::Glimpse;
 use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report, Step, Tracker};
 use hzn_files::{FrameData, Frames, Problem};
 use hzn_nav::ephemeris;
@@ -191,6 +192,14 @@ impl AnySensor {
         }
     }
 
+    /// Reads the brightness at places all over a picture. `None` if it has not the size of the camera.
+    pub fn glimpse(&self, view: &ImageView<'_>) -> Option<Glimpse> {
+        match &self.kind {
+            Kind::Host(h, _) => glimpse(h, view),
+            Kind::Flight(h, _) => glimpse(h, view),
+        }
+    }
+
     /// Processes one picture and returns one result for each body, in order. For Sun and Moon the result also has the
     /// direction in ECEF, from the time and the position.
     pub fn process(
@@ -330,6 +339,15 @@ fn expected_limbs<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize,
     bodies(horizon).iter().enumerate().map(expect).collect()
 }
 
+fn glimpse<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+    horizon: &Horizon<T, POINTS, BLOCKS, WORDS>,
+    view: &ImageView<'_>,
+) -> Option<Glimpse> {
+    let region = horizon.sensor()?.region();
+    let has_size = view.width() == region.width() && view.height() == region.height();
+    has_size.then(|| Glimpse::take(view, region))
+}
+
 /// Returns the bodies that the sensor searches for.
 fn bodies<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
     horizon: &Horizon<T, POINTS, BLOCKS, WORDS>,
@@ -337,7 +355,12 @@ fn bodies<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>
     horizon.sensor().map_or(&[], |sensor| sensor.config().each_body())
 }
 
-fn prior<T: Real>(data: Option<&FrameData>, which: usize, body: &body::Config) -> Result<Prior<T>, PriorError> {
+/// Returns what is known of a body in a picture.
+pub(crate) fn prior<T: Real>(
+    data: Option<&FrameData>,
+    which: usize,
+    body: &body::Config,
+) -> Result<Prior<T>, PriorError> {
     data.map_or(Ok(Prior::default()), |d| Ok(with_sun(d.for_body(which, body)?.to_prior(None), d, body)))
 }
 

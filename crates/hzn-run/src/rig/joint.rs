@@ -1,17 +1,18 @@
 //! The joint answer of one epoch, as a row.
 
 use hzn_core::body;
-use hzn_core::camera::Camera;
 use hzn_core::fit::HalfAngle;
 use hzn_core::frames::{Cov3, UnitVec3, Vehicle};
+use hzn_core::report::Free;
 use hzn_core::rig::{Answered, Common, EpochAnswer, Limb, Mount, NoJoint, Rig};
 use hzn_core::status::Status;
-use hzn_core::{Config, Solution};
+use hzn_core::{Config, Sensor};
 use hzn_files::rig::{self, JOINT};
 use hzn_mcap::{Row, RowMeta, roll_pitch_deg};
 
 use super::epochs::is_in_sync;
-use super::mounts;
+use super::seen::Seen;
+use super::{coarse, mounts};
 use crate::engine::Finished;
 use crate::error::{Error, unusable};
 use crate::record::altitude_km;
@@ -23,52 +24,8 @@ pub struct Joiner {
     sync_s: f64,
     names: Vec<String>,
     mounts: Vec<Mount<f64>>,
-    cameras: Vec<Camera<f64>>,
+    sensors: Vec<Sensor<f64>>,
     body: body::Config,
-}
-
-/// The picture of a head in an epoch, as the joint answer needs it.
-#[derive(Debug, Clone, Copy)]
-pub struct Seen<'a> {
-    frame: Option<&'a Finished>,
-    repeats: Option<Repeat>,
-}
-
-/// Another picture with the same bytes. The noise of a camera never repeats, so it is not a picture of this head at
-/// this time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Repeat {
-    /// The picture of the epoch before.
-    Before,
-    /// The picture of another head.
-    OtherHead,
-}
-
-impl<'a> Seen<'a> {
-    /// Takes a processed picture; `None` if the head has none in this epoch. `repeats` says that it is another picture.
-    pub fn new(frame: Option<&'a Finished>, repeats: Option<Repeat>) -> Self {
-        Self { frame, repeats }
-    }
-
-    fn solution(&self) -> Option<&'a Solution<f64>> {
-        let report = self.frame?.outcomes.first()?.report.as_ref().ok()?;
-        report.solution.as_ref().filter(|_| report.status == Status::Ok)
-    }
-
-    /// Returns why the head has no part in the joint answer; `None` if it has an answer.
-    fn absence(&self) -> Option<String> {
-        let Some(frame) = self.frame else { return Some("no picture".into()) };
-        match self.repeats {
-            Some(Repeat::Before) => return Some("the picture of the epoch before".into()),
-            Some(Repeat::OtherHead) => return Some("the picture of another head".into()),
-            None => {}
-        }
-        match frame.outcomes.first() {
-            Some(outcome) if self.solution().is_none() => Some(outcome.status().name().into()),
-            Some(_) => None,
-            None => Some(Status::NoLimb.name().into()),
-        }
-    }
 }
 
 impl Joiner {
@@ -79,9 +36,9 @@ impl Joiner {
     /// for different first bodies, or one of several sensors fits no half-angle.
     pub fn new<'a>(file: &rig::Rig, sensors: impl IntoIterator<Item = &'a Config>) -> Result<Self, Error> {
         rig::check(file).map_err(|(key, what)| unusable(format!("{key}: {what}")))?;
-        let (mut cameras, mut bodies) = (Vec::new(), Vec::new());
+        let (mut own, mut bodies) = (Vec::new(), Vec::new());
         for (head, sensor) in file.heads.iter().zip(sensors) {
-            cameras.push(Camera::try_new(&sensor.camera).map_err(Error::failed)?);
+            own.push(Sensor::new(sensor).map_err(Error::failed)?);
             let body = sensor.each_body().first().cloned().unwrap_or_default();
             if file.heads.len() > 1 && sensor.fit.half_angle == HalfAngle::Known && !body.half_angle_is_free() {
                 return Err(unusable(format!(
@@ -107,7 +64,7 @@ impl Joiner {
             sync_s: file.rig.sync_s,
             names: file.heads.iter().map(|head| head.name.clone()).collect(),
             mounts: file.heads.iter().filter_map(mount).collect(),
-            cameras,
+            sensors: own,
             body,
         })
     }
@@ -130,6 +87,28 @@ impl Joiner {
             last_s - first_s,
             self.sync_s
         )))
+    }
+
+    /// Returns the free cones of the heads at an epoch with the error of the limb's weather, in the cameras' own axes;
+    /// `None` for a head without one.
+    pub fn cones(&self, heads: &[Seen<'_>]) -> Vec<Option<Free<f64>>> {
+        let cone = |(k, head): (usize, &Seen<'_>)| {
+            let answered = self.answered(k, head, None)?;
+            Some(self.common.limb.with_weather(answered.solution.free.as_ref()?, answered.camera))
+        };
+        heads.iter().enumerate().map(cone).collect()
+    }
+
+    /// Returns the brightness from which on head `k` sees something lit, if this picture has a limb.
+    pub(super) fn level(&self, k: usize, frame: Option<&Finished>) -> Option<u16> {
+        let (sensor, glimpse) = (self.sensors.get(k)?, frame?.glimpse.as_ref()?);
+        let solution = Seen::new(frame, None).solution()?;
+        glimpse.level_at_limb(sensor.camera(), &solution.axis, solution.fused_half_angle_rad.cos())
+    }
+
+    /// Returns what is known of the limb that all heads see.
+    pub fn limb(&self) -> &Limb<f64> {
+        &self.common.limb
     }
 
     /// Returns the rotation from each camera to the vehicle as a quaternion, scalar first.
@@ -163,6 +142,7 @@ impl Joiner {
         let frozen =
             heads.iter().enumerate().filter(|(_, head)| head.repeats.is_some()).fold(0, |set, (k, _)| set | 1 << k);
         row.heads_excluded = self.listed(frozen | self.bits(row.heads_excluded.as_deref()));
+        coarse::set(&mut row, &self.sensors, &self.mounts, heads);
         row
     }
 
@@ -172,7 +152,7 @@ impl Joiner {
         let frame = head.frame?;
         Some(Answered {
             solution,
-            camera: self.cameras.get(k)?,
+            camera: self.sensors.get(k)?.camera(),
             mount: self.mounts.get(k)?,
             time_s: frame.time_s.zip(start_s).map(|(own_s, start_s)| own_s - start_s),
             // The picture's data have the rate in the axes of the camera, whether it comes from the table of the
@@ -215,18 +195,34 @@ impl Joiner {
             ] = common.upper_rad2.map(Some);
         }
         row.half_angle_deg = Some(answer.half_angle_rad.to_degrees());
+        let used = heads.iter().enumerate().find(|(k, _)| answer.heads_used >> k & 1 == 1);
+        self.set_heights(&mut row, used, answer);
         row.protection_deg = answer.protection_rad.map(f64::to_degrees);
         row.heads_used = self.listed(answer.heads_used);
         row.heads_excluded = self.listed(answer.heads_excluded);
         let separation = answer.separation_rad.map(|(moved, allowed)| (moved.to_degrees(), allowed.to_degrees()));
         row.separation_deg = separation.map(|(moved, _)| moved);
         row.separation_limit_deg = separation.map(|(_, allowed)| allowed);
-        let used = heads.iter().enumerate().find(|(k, _)| answer.heads_used >> k & 1 == 1);
         // The direction in the fixed frame is the same for all heads.
         if let Some(fixed) = used.and_then(|(_, head)| head.solution()?.axis_fixed) {
             [row.axis_e_x, row.axis_e_y, row.axis_e_z] = fixed.xyz().map(Some);
         }
         row
+    }
+
+    /// Sets the altitude that follows from the half-angle and the limb height, and the limb height that follows from the
+    /// half-angle and the altitude.
+    fn set_heights(&self, row: &mut Row, used: Option<(usize, &Seen<'_>)>, answer: &EpochAnswer<f64>) {
+        let Some((k, head)) = used else { return };
+        let expected = self.sensors.get(k).and_then(|sensor| coarse::expected(sensor, head));
+        let Some((expected, sigma)) = expected.zip(answer.cos_sigma) else { return };
+        let (cos, var_cos) = (answer.half_angle_rad.cos(), sigma * sigma);
+        let km = |found: Option<(f64, f64)>| {
+            let found = found.filter(|(m, sigma_m)| m.is_finite() && sigma_m.is_finite());
+            (found.map(|(m, _)| m / 1e3), found.map(|(_, sigma_m)| sigma_m / 1e3))
+        };
+        (row.altitude_est_km, row.altitude_est_sigma_km) = km(expected.altitude(cos, var_cos));
+        (row.limb_height_est_km, row.limb_height_est_sigma_km) = km(expected.measured_limb_height_m(cos, var_cos));
     }
 
     fn set_direction(&self, row: &mut Row, axis: &UnitVec3<Vehicle, f64>, upper_rad2: [f64; 6]) {

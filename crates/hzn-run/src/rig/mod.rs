@@ -5,13 +5,17 @@
 //! epochs on all cores, and joins the answers of the heads in the order of time, so that the rows are the same for any
 //! number of threads.
 
+mod coarse;
 mod epochs;
 mod joint;
+mod levels;
 mod mounts;
 mod open;
 mod plan;
+mod seen;
 
 pub use epochs::{Epoch, Epochs};
-pub use joint::{Joiner, Repeat, Seen};
+pub use joint::Joiner;
 pub use open::{OpenHead, Opened, Request, open};
-pub use plan::{FinishedEpoch, HeadPlan, Plan, run};
+pub use plan::{FinishedEpoch, HeadPlan, Plan, look, run};
+pub use seen::{Repeat, Seen};

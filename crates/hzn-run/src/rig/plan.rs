@@ -6,7 +6,9 @@ use hzn_core::status::Status;
 use hzn_mcap::{FrameRecord, Row, Stamp};
 
 use super::epochs::{Epoch, Epochs};
-use super::joint::{Joiner, Repeat, Seen};
+use super::joint::Joiner;
+use super::levels::Levels;
+use super::seen::{Repeat, Seen};
 use crate::engine::{self, AnySensor, End, Finished, InOrder, Sink, Turns, Work, run_in_order};
 use crate::error::Error;
 use crate::sink::{self, Outputs};
@@ -37,6 +39,8 @@ pub struct FinishedEpoch {
     pub joint: Row,
     /// The pictures of the heads; `None` for a head without one.
     pub heads: Vec<Option<Finished>>,
+    /// Which of them are other pictures.
+    pub repeats: Vec<Option<Repeat>>,
 }
 
 /// Runs all epochs. `seen` is called for each in order, after it is written.
@@ -50,18 +54,34 @@ pub fn run(
     output: &mut Outputs,
     seen: &mut dyn FnMut(&FinishedEpoch),
 ) -> Result<End, Error> {
-    let mut order = Order {
-        plan,
-        turns: plan.heads.iter().map(|head| head.plan.turns.clone()).collect(),
-        frozen: Frozen { last: vec![None; plan.heads.len()] },
-    };
+    let mut order = Order::new(plan);
     let write = |(index, mut heads): (u64, Vec<Option<Finished>>), output: &mut &mut Outputs| {
-        let joint = order.join(index, &mut heads);
+        let (joint, repeats) = order.join(index, &mut heads);
         output.write_heads(&records(plan, &joint, &mut heads))?;
-        seen(&FinishedEpoch { joint, heads });
+        seen(&FinishedEpoch { joint, heads, repeats });
         Ok(())
     };
     let mut out = InOrder { sink: output, write, flush: |output: &mut &mut Outputs| output.flush() };
+    run_in_order(plan, plan.threads, || epochs.next(), 0, stop, &mut out)
+}
+
+/// Runs all epochs without an output. `seen` is called for each in order.
+///
+/// # Errors
+/// A source breaks off.
+pub fn look(
+    plan: &Plan,
+    epochs: &mut Epochs,
+    stop: &AtomicBool,
+    seen: &mut dyn FnMut(&FinishedEpoch),
+) -> Result<End, Error> {
+    let mut order = Order::new(plan);
+    let write = |(index, mut heads): (u64, Vec<Option<Finished>>), _: &mut ()| {
+        let (joint, repeats) = order.join(index, &mut heads);
+        seen(&FinishedEpoch { joint, heads, repeats });
+        Ok(())
+    };
+    let mut out = InOrder { sink: (), write, flush: |_: &mut ()| Ok(()) };
     run_in_order(plan, plan.threads, || epochs.next(), 0, stop, &mut out)
 }
 
@@ -71,11 +91,21 @@ struct Order<'a> {
     /// The turns of each head.
     turns: Vec<Turns>,
     frozen: Frozen,
+    levels: Levels,
 }
 
-impl Order<'_> {
+impl<'a> Order<'a> {
+    fn new(plan: &'a Plan) -> Self {
+        Self {
+            plan,
+            turns: plan.heads.iter().map(|head| head.plan.turns.clone()).collect(),
+            frozen: Frozen { last: vec![None; plan.heads.len()] },
+            levels: Levels::new(plan.heads.len()),
+        }
+    }
+
     /// Judges the pictures of the heads, and joins their answers.
-    fn join(&mut self, index: u64, heads: &mut [Option<Finished>]) -> Row {
+    fn join(&mut self, index: u64, heads: &mut [Option<Finished>]) -> (Row, Vec<Option<Repeat>>) {
         let repeats = self.frozen.see(heads);
         for (frame, (turns, head)) in heads.iter_mut().zip(self.turns.iter_mut().zip(&self.plan.heads)) {
             if let Some(frame) = frame {
@@ -83,9 +113,16 @@ impl Order<'_> {
                 frame.picture = frame.picture.take().filter(|_| self.plan.keep_pictures);
             }
         }
+        let levels = &mut self.levels;
+        let levels: Vec<_> = heads
+            .iter()
+            .enumerate()
+            .map(|(k, frame)| levels.see(k, self.plan.joiner.level(k, frame.as_ref())))
+            .collect();
+        let views = heads.iter().zip(&repeats).zip(levels);
         let views: Vec<Seen<'_>> =
-            heads.iter().zip(repeats).map(|(frame, repeats)| Seen::new(frame.as_ref(), repeats)).collect();
-        self.plan.joiner.join(index, &views)
+            views.map(|((frame, repeats), level)| Seen::new(frame.as_ref(), *repeats).with_level(level)).collect();
+        (self.plan.joiner.join(index, &views), repeats)
     }
 }
 

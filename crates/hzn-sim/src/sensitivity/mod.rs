@@ -8,6 +8,7 @@
 //! | `correlated` | the sum over all pairs of points with correlated errors |
 //! | [`sigmas`] | the covariance of these points with correlated errors |
 //! | [`of_sensor`] | the covariance of these points by the sensor itself, with all terms of its error budget |
+//! | [`rig`] | several heads that are one sensor, by the equations of the sensor |
 //! | [`third_axis`] | the rotation about the line to a flattened body |
 //! | [`mod@reference`] | published results, computed independently of this program |
 //! | [`chart`] | the conic that is seen from each altitude; the error of a spherical Earth |
@@ -18,10 +19,12 @@ pub mod design;
 mod limb_samples;
 pub mod of_sensor;
 pub mod reference;
+pub mod rig;
 pub mod sigmas;
 pub mod third_axis;
 
 pub use design::{Design, DesignError};
 pub use of_sensor::SensorPlace;
+pub use rig::{RigDesign, RigSigmas};
 pub use sigmas::{DirectionSigmas, Sigmas};
 pub use third_axis::{ThirdAxis, ThirdAxisSigmas};

@@ -56,11 +56,68 @@ impl Design {
         let samples = self.sample_limb(&camera, half_angle_rad);
         Ok(Sigmas::new(self, &camera, half_angle_rad, &samples))
     }
+
+    /// Returns the variance of the expected cos α: sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
+    pub(super) fn variance_cos(&self, half_angle_rad: f64) -> f64 {
+        let (sin, cos) = half_angle_rad.sin_cos();
+        let distance_km = self.radius_km + self.altitude_km;
+        let by_limb = self.limb_height_sigma_km / (distance_km * cos);
+        let by_altitude = self.altitude_sigma_km * sin / (distance_km * cos);
+        sin * sin * (by_limb * by_limb + by_altitude * by_altitude)
+    }
 }
 
 impl Sigmas {
     /// Returns `None` if the points do not determine a direction with a free half-angle.
     fn new(design: &Design, camera: &Camera<f64>, half_angle_rad: f64, samples: &[LimbSample]) -> Option<Self> {
+        let Sums { normal, noise: x, plane } = Sums::new(design, camera, half_angle_rad, samples)?;
+        let n = normal.try_inverse()?;
+        let free = n * x * n;
+        // With a known half-angle only the upper two rows count.
+        let n2 = normal.fixed_view::<2, 2>(0, 0).into_owned().try_inverse()?;
+        let known = n2 * x.fixed_view::<2, 2>(0, 0) * n2;
+        let k = free.column(2) / (free[(2, 2)] + design.variance_cos(half_angle_rad));
+        let fused = free - k * free.row(2);
+        let (tilt, across) = tangent(&Vector3::from(design.axis()));
+        let direction_sigmas =
+            |p: Matrix2<f64>| DirectionSigmas { pitch_deg: root_deg(p.m11), roll_deg: root_deg(p.m22) };
+        let upper = |p: Matrix3<f64>| p.fixed_view::<2, 2>(0, 0).into_owned();
+        let is_pinhole = design.camera.model == Model::Pinhole;
+        let paper = is_pinhole.then(|| plane.covariance(design.sigma_px * design.sigma_px)).flatten();
+        let sigmas = Self {
+            half_angle_deg: half_angle_rad.to_degrees(),
+            limb_px: samples.len() as f64 * samples.iter().find_map(|s| s.step_px).unwrap_or(1.0),
+            free: direction_sigmas(upper(free)),
+            fused: direction_sigmas(upper(fused)),
+            known: direction_sigmas(known),
+            largest_deg: root_deg(upper(fused).symmetric_eigenvalues().max()),
+            braun_barf: paper.map(|p| DirectionSigmas {
+                pitch_deg: root_deg(tilt.dot(&(p * tilt))),
+                roll_deg: root_deg(across.dot(&(p * across))),
+            }),
+            braun_barf_bound_deg: paper.map(|p| root_deg(p.symmetric_eigenvalues().max())),
+        };
+        sigmas.free.pitch_deg.is_finite().then_some(sigmas)
+    }
+}
+
+/// The sums over the points of a limb.
+pub(super) struct Sums {
+    /// Normal equations of the axis (towards the optical axis, across) and of the cosine of the half-angle.
+    normal: Matrix3<f64>,
+    /// The same sum for correlated errors.
+    noise: Matrix3<f64>,
+    plane: Plane,
+}
+
+impl Sums {
+    /// Returns `None` if the lens has no ray for a point.
+    pub(super) fn new(
+        design: &Design,
+        camera: &Camera<f64>,
+        half_angle_rad: f64,
+        samples: &[LimbSample],
+    ) -> Option<Self> {
         let e = Vector3::from(design.axis());
         let (tilt, across) = tangent(&e);
         let variance = design.sigma_px * design.sigma_px;
@@ -86,41 +143,13 @@ impl Sigmas {
                 plane.add(&s, &e, half_angle_rad.cos(), design.camera.fx_px, rho(sample));
             }
         }
-        let x = correlated(&rows) * variance;
-        let n = normal.try_inverse()?;
-        let free = n * x * n;
-        // With a known half-angle only the upper two rows count.
-        let n2 = normal.fixed_view::<2, 2>(0, 0).into_owned().try_inverse()?;
-        let known = n2 * x.fixed_view::<2, 2>(0, 0) * n2;
-        let k = free.column(2) / (free[(2, 2)] + Self::variance_cos(design, half_angle_rad));
-        let fused = free - k * free.row(2);
-        let direction_sigmas =
-            |p: Matrix2<f64>| DirectionSigmas { pitch_deg: root_deg(p.m11), roll_deg: root_deg(p.m22) };
-        let upper = |p: Matrix3<f64>| p.fixed_view::<2, 2>(0, 0).into_owned();
-        let paper = is_pinhole.then(|| plane.covariance(variance)).flatten();
-        let sigmas = Self {
-            half_angle_deg: half_angle_rad.to_degrees(),
-            limb_px: samples.len() as f64 * samples.iter().find_map(|s| s.step_px).unwrap_or(1.0),
-            free: direction_sigmas(upper(free)),
-            fused: direction_sigmas(upper(fused)),
-            known: direction_sigmas(known),
-            largest_deg: root_deg(upper(fused).symmetric_eigenvalues().max()),
-            braun_barf: paper.map(|p| DirectionSigmas {
-                pitch_deg: root_deg(tilt.dot(&(p * tilt))),
-                roll_deg: root_deg(across.dot(&(p * across))),
-            }),
-            braun_barf_bound_deg: paper.map(|p| root_deg(p.symmetric_eigenvalues().max())),
-        };
-        sigmas.free.pitch_deg.is_finite().then_some(sigmas)
+        Some(Self { normal, noise: correlated(&rows) * variance, plane })
     }
 
-    /// Returns the variance of the expected cos α: sin²α [(∂α/∂d)² σ_d² + (∂α/∂H)² σ_H²].
-    fn variance_cos(design: &Design, half_angle_rad: f64) -> f64 {
-        let (sin, cos) = half_angle_rad.sin_cos();
-        let distance_km = design.radius_km + design.altitude_km;
-        let by_limb = design.limb_height_sigma_km / (distance_km * cos);
-        let by_altitude = design.altitude_sigma_km * sin / (distance_km * cos);
-        sin * sin * (by_limb * by_limb + by_altitude * by_altitude)
+    /// Returns the covariance of the axis and of the cosine, both fitted; `None` if the points do not determine them.
+    pub(super) fn free_covariance(&self) -> Option<Matrix3<f64>> {
+        let n = self.normal.try_inverse()?;
+        Some(n * self.noise * n)
     }
 }
 

@@ -302,6 +302,7 @@ impl<'a> FrameInput<'a> {
             outcomes,
             drawing: hzn_mcap::Annotations::default(),
             picture: None,
+            glimpse: None,
             traces: None,
             tip: None,
             pages: 1,

@@ -13,6 +13,8 @@ mod mount_tilts;
 mod noise;
 mod page;
 mod points;
+mod rig;
+mod rig_text;
 mod sky;
 mod sky_args;
 mod sky_text;
@@ -36,6 +38,7 @@ enum Command {
     Check(check::Args),
     Noise(noise::Args),
     Mount(mount::Args),
+    Rig(rig::Args),
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -46,5 +49,6 @@ pub(super) fn run(args: &Args) -> Outcome {
         Command::Check(args) => check::run(args),
         Command::Noise(args) => noise::run(args),
         Command::Mount(args) => mount::run(args),
+        Command::Rig(args) => rig::run(args),
     }
 }

@@ -15,7 +15,7 @@ use super::sweep::Values;
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Sigmas of the direction, or of the rotation about it; or the field of view that shows each kind of limb; or the
-    /// error of treating the Earth as a sphere
+    /// error of treating the Earth as a sphere; or the error of several heads that are one sensor
     #[arg(value_enum, default_value_t = What::Sigma)]
     pub(super) what: What,
     /// Field of view across the width, degrees
@@ -66,6 +66,22 @@ pub(crate) struct Args {
     /// the limb height]
     #[arg(long, value_name = "KM")]
     pub(super) second_harmonic: Option<f64>,
+    /// For `rig`: number of heads
+    #[arg(long, value_name = "N", default_value = "1,2,3,4")]
+    pub(super) heads: Values,
+    /// For `rig`: angle between the directions in which neighbouring heads look, degrees [default: evenly around]
+    #[arg(long, value_name = "DEG")]
+    pub(super) between: Option<Values>,
+    /// For `rig`: 1-sigma of the mount of each head about each axis, degrees
+    #[arg(long, value_name = "DEG", default_value = "0")]
+    pub(super) mount_sigma: Values,
+    /// For `rig`: 1-sigma of the limb height that each head has for itself, kilometres [default: 1.5]
+    #[arg(long, value_name = "KM")]
+    pub(super) own_height_sigma: Option<f64>,
+    /// For `rig`: 1-sigma of a tilt of the limb, kilometres [default: 0.05 for each degree between the limb and the
+    /// point below the vehicle, over the root of two]
+    #[arg(long, value_name = "KM")]
+    pub(super) tilt_sigma: Option<f64>,
     /// 1-sigma of an edge point, pixels [default: 1]; with `--sensor` and `noise = "rms"` the RMS of the residuals
     /// [default: that of the simulated scene next to the sensor.toml]
     #[arg(long, value_name = "PX")]
@@ -91,6 +107,9 @@ pub(super) enum What {
     Visibility,
     /// Angles between centre, geodetic vertical and limb axis of WGS-84, by latitude and altitude
     SphericalEarth,
+    /// Error of the direction from several heads that look at the limb all around, by the equations of `hzn run
+    /// rig.toml`: by their number, the angle between them, their field of view, mounts and altitude
+    Rig,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

@@ -73,6 +73,14 @@ impl<'a> Grid<'a> {
         if args.what == What::Yaw {
             axis("azimuth_deg", "azimuth of the view [deg]", &args.azimuth.0);
         }
+        if args.what == What::Rig {
+            if let Some(between) = &args.between {
+                axis("between_deg", "angle between heads [deg]", &between.0);
+            }
+            axis("mount_sigma_deg", "sigma of a mount [deg]", &args.mount_sigma.0);
+            // The lines of a plot are the numbers of heads, so another quantity comes first.
+            axis("heads", "heads", &args.heads.0);
+        }
         axis("depression_deg", "depression [deg]", &args.depression.0);
         axis("roll_deg", "roll of the camera [deg]", &args.roll.0);
         let radii: Vec<f64> = bodies.iter().map(|b| b.radius_km).collect();

@@ -5,6 +5,7 @@ mod body;
 mod charts;
 mod grid;
 mod noise;
+mod rig;
 mod sigma;
 mod study;
 mod sweep;
@@ -35,6 +36,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         What::Yaw => yaw::compute(args)?,
         What::Visibility => charts::visibility(args)?,
         What::SphericalEarth => charts::spherical_earth(args)?,
+        What::Rig => rig::compute(args)?,
     };
     for path in &args.output {
         let bytes = if ending(path) == "csv" {

@@ -9,7 +9,7 @@ use super::{Expected, Kind};
 impl<T: Real> Expected<T> {
     /// Returns the altitude in metres and its sigma from a measured cos α and its variance; `None` when the half-angle
     /// says nothing about the distance.
-    pub(crate) fn altitude(&self, cos: T, var_cos: T) -> Option<(T, T)> {
+    pub fn altitude(&self, cos: T, var_cos: T) -> Option<(T, T)> {
         let sin = (T::one() - cos * cos).sqrt();
         if self.free || !(sin > T::zero() && cos > T::zero()) {
             return None;
@@ -41,5 +41,13 @@ impl<T: Real> Expected<T> {
         let radius_m = T::from_f64(EARTH_MEAN_RADIUS_M);
         let (height_m, slope) = lowered_m(Kind::Earth, radius_m, apparent_m, distance - self.radius_m);
         Some((height_m, by_cos_m * slope))
+    }
+
+    /// Returns the limb height of [`Self::limb_height_m`] with its sigma from the variance of cos α and from the
+    /// altitude, metres.
+    pub fn measured_limb_height_m(&self, cos: T, var_cos: T) -> Option<(T, T)> {
+        let (height_m, by_cos_m) = self.limb_height_m(cos)?;
+        let [_, altitude_m, _, _] = self.limb_sigma_parts_m;
+        Some((height_m, (by_cos_m * by_cos_m * var_cos + altitude_m * altitude_m).sqrt()))
     }
 }

@@ -76,6 +76,7 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
         outcomes: vec![BodyOutcome { report: Ok(report), elapsed: Duration::ZERO }],
         drawing: Default::default(),
         picture: None,
+        glimpse: None,
         traces: None,
         tip: None,
         pages: 1,

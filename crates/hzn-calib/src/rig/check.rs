@@ -1,0 +1,85 @@
+//! Whether the told mounts still hold.
+
+use nalgebra::{DMatrix, DVector, Matrix3};
+
+use super::adjust::Adjusted;
+use super::quantile::chi2;
+
+/// Sigmas of the limit: told mounts that are right are refused in 0.3 % of the cases.
+const SIGMAS: f64 = 2.75;
+
+/// What a flight says about the told mounts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Check {
+    /// No turn is significant.
+    Holds,
+    /// This head has turned, by this angle and with this 1-sigma, radians, against the others: without it they agree.
+    Turned(usize, f64, f64),
+    /// The mounts contradict each other, and no single head explains it.
+    Contradict,
+}
+
+/// Compares adjusted mounts with the told ones. `told_rad2` is the covariance of each told mount about the axes of the
+/// rig.
+///
+/// A head is named only if exactly one exclusion leaves heads that agree: with two heads, nothing says which of them has
+/// turned.
+pub fn check(adjusted: &Adjusted, told_rad2: &[Matrix3<f64>]) -> Check {
+    let all: Vec<usize> = (0..told_rad2.len()).collect();
+    if agree(adjusted, told_rad2, &all) {
+        return Check::Holds;
+    }
+    let without = |k: usize| all.iter().copied().filter(|j| *j != k).collect::<Vec<_>>();
+    let mut explaining = all.iter().copied().filter(|k| all.len() > 2 && agree(adjusted, told_rad2, &without(*k)));
+    match (explaining.next(), explaining.next()) {
+        (Some(k), None) => {
+            let others = without(k);
+            let part = 1.0 / others.len() as f64;
+            let size = 3 * all.len();
+            let gain = DMatrix::from_fn(3, size, |axis, i| match (i % 3 == axis, i / 3 == k) {
+                (false, _) => 0.0,
+                (true, true) => 1.0,
+                (true, false) => -part,
+            });
+            let turn = &gain * turns(adjusted);
+            let spread = &gain * with_told(adjusted, told_rad2) * gain.transpose();
+            let angle = turn.norm();
+            let along = &turn / angle;
+            Check::Turned(k, angle, along.dot(&(spread * &along)).max(0.0).sqrt())
+        }
+        _ => Check::Contradict,
+    }
+}
+
+fn turns(adjusted: &Adjusted) -> DVector<f64> {
+    DVector::from_iterator(3 * adjusted.turns.len(), adjusted.turns.iter().flat_map(|turn| turn.iter().copied()))
+}
+
+/// Returns the covariance of the turns, with that of the told mounts.
+fn with_told(adjusted: &Adjusted, told_rad2: &[Matrix3<f64>]) -> DMatrix<f64> {
+    let mut covariance = adjusted.covariance.clone();
+    for (k, told) in told_rad2.iter().enumerate() {
+        let mut block = covariance.fixed_view_mut::<3, 3>(3 * k, 3 * k);
+        block += told;
+    }
+    covariance
+}
+
+/// Returns whether the turns of some heads agree.
+fn agree(adjusted: &Adjusted, told_rad2: &[Matrix3<f64>], heads: &[usize]) -> bool {
+    let Some((first, others)) = heads.split_first().filter(|(_, others)| !others.is_empty()) else { return true };
+    let freedom = 3 * others.len();
+    let relative = DMatrix::from_fn(freedom, 3 * told_rad2.len(), |i, j| {
+        let (own, is_axis) = (others[i / 3], i % 3 == j % 3);
+        match (is_axis, j / 3) {
+            (true, k) if k == own => 1.0,
+            (true, k) if k == *first => -1.0,
+            _ => 0.0,
+        }
+    });
+    let turn = &relative * turns(adjusted);
+    let spread = &relative * with_told(adjusted, told_rad2) * relative.transpose();
+    // Without a covariance there is no contradiction that could be measured.
+    let Some(root) = spread.cholesky() else { return true };
+    turn.dot(&root.solve(&turn)) <= chi2(freedom, SIGMAS)
+}

@@ -1,0 +1,226 @@
+//! `hzn calibrate rig`: the mounts of the heads of a rig, from the limbs that they see together.
+
+use std::path::{Path, PathBuf};
+
+use hzn_calib::rig::{Adjusted, Check, Epoch, Settings, Sighting, adjust, check};
+use hzn_files::rig::{Head, HeadMount};
+use hzn_run::disk;
+use hzn_run::engine::{self, End, Turns};
+use hzn_run::explain::counted;
+use hzn_run::rig::{self, Epochs, FinishedEpoch, HeadPlan, Opened, Plan, Request, Seen};
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+
+use super::rig_text;
+use crate::commands::run::cores;
+use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::files;
+use crate::progress::Progress;
+use crate::setup::stop_flag;
+use crate::tell;
+
+/// Find how the heads of a rig are mounted to each other, from the limbs that they see together
+///
+/// The pictures of rig.toml are processed. Its mounts are the start, and may be wrong by some degrees; their sigmas are
+/// not used. The turns of all heads, the half-angle of each epoch and a height of the limb for each head are adjusted
+/// together, so that neither the altitude nor the limb height needs to be known. The mean of all turns stays zero: the
+/// limb says nothing about the attitude of the whole rig on the vehicle.
+///
+/// The heads see a turn about the direction to the Earth only while the vehicle turns under it. The report names the
+/// turns that the pictures do not determine. With --check, nothing is adjusted: the command says whether the told
+/// mounts still hold within their sigmas, and which head has turned if three or more heads tell it. Exit code 0 for
+/// `holds`, 1 for `does not hold`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The rig.toml
+    #[arg(value_name = "RIG.TOML")]
+    rig: PathBuf,
+    /// Write a rig.toml with these mounts and their covariance, next to the one that is read
+    #[arg(short, long, value_name = "TOML", conflicts_with = "check")]
+    output: Option<PathBuf>,
+    /// Replace a file that exists
+    #[arg(long)]
+    force: bool,
+    /// Say whether the mounts of rig.toml still hold
+    #[arg(long)]
+    check: bool,
+    /// 1-sigma of each mount about each axis before the adjustment, in degrees
+    #[arg(long, value_name = "DEG", default_value_t = 5.0)]
+    prior_deg: f64,
+    /// frames.csv of the vehicle; without it, the one next to rig.toml
+    #[arg(long, value_name = "CSV")]
+    frames: Option<PathBuf>,
+    /// Altitude in kilometres, if sensor.toml and frames.csv have none
+    #[arg(long, value_name = "KM")]
+    altitude_km: Option<f64>,
+    /// Number of threads; without it, all cores
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Print no progress on stderr
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Speed of the point below a vehicle in low orbit, km/s, with which the limb passes its weather.
+const GROUND_SPEED_KM_S: f64 = 7.0;
+
+pub(super) fn run(args: &Args) -> Outcome {
+    if !(args.prior_deg > 0.0 && args.prior_deg <= 90.0) {
+        return Err(usage("--prior-deg: must be above 0 and at most 90"));
+    }
+    let outputs: Vec<PathBuf> = args.output.iter().cloned().collect();
+    files::check_outputs(std::slice::from_ref(&args.rig), &outputs, args.force)?;
+    let opened = rig::open(&Request {
+        rig: args.rig.clone(),
+        frames: args.frames.clone(),
+        altitude_km: args.altitude_km,
+        ..Request::default()
+    })?;
+    check_output(args, &opened)?;
+    opened.warnings.iter().for_each(tell::warning);
+    if opened.heads.len() < 2 {
+        return Err(usage(format!("{}: one head has no mount relative to another one", args.rig.display())));
+    }
+    let (names, heads) = (opened.rig.heads.clone(), opened.rig.rig);
+    let Some(found) = look(args, opened)? else {
+        tell::line("interrupted; nothing was measured");
+        return Ok(Exit::Interrupted);
+    };
+    let settings = Settings {
+        told: names.iter().map(told).collect(),
+        prior_rad: args.prior_deg.to_radians(),
+        own_sigma_km: heads.limb_own_sigma_km,
+        radius_km: found.radius_km,
+        independent: independent(&found.times_s, heads.limb_own_sigma_km, heads.limb_own_length_km),
+    };
+    let adjusted = adjust(&settings, &found.epochs)
+        .map_err(|why| failed(format!("{}: of {}: {why}", args.rig.display(), counted(found.count, "epoch"))))?;
+    if args.check {
+        let told_rad2: Vec<Matrix3<f64>> = names.iter().map(told_rad2).collect();
+        let checked = check(&adjusted, &told_rad2);
+        tell::result(rig_text::check_report(&names, &adjusted, &checked))?;
+        return Ok(if checked == Check::Holds { Exit::Done } else { Exit::Failed });
+    }
+    tell::result(rig_text::report(&names, &adjusted))?;
+    if let Some(path) = &args.output {
+        write(args, path, &adjusted)?;
+    }
+    Ok(Exit::Done)
+}
+
+/// Refuses an output that is read, that exists, or whose paths would lead elsewhere.
+fn check_output(args: &Args, opened: &Opened) -> Result<(), Stop> {
+    let Some(output) = &args.output else { return Ok(()) };
+    files::check_outputs(&opened.files, std::slice::from_ref(output), args.force)?;
+    let folder = |path: &Path| path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
+    let (own, other) = (folder(output).canonicalize().ok(), folder(&args.rig).canonicalize().ok());
+    if own.is_none() || own != other {
+        let what = "its paths are relative to its folder, so write it next to";
+        return Err(usage(format!("{}: {what} {}", output.display(), args.rig.display())));
+    }
+    Ok(())
+}
+
+/// The cones of a run.
+struct Found {
+    epochs: Vec<Epoch>,
+    times_s: Vec<f64>,
+    count: u64,
+    radius_km: f64,
+}
+
+/// Processes the pictures. `None` if the run was interrupted.
+fn look(args: &Args, opened: Opened) -> Result<Option<Found>, Stop> {
+    let (joiner, total, mounts) = (opened.joiner()?, opened.pictures(), opened.rig.heads.clone());
+    let sync_s = opened.rig.rig.sync_s;
+    let head = |head: &rig::OpenHead| HeadPlan {
+        name: head.name.clone(),
+        plan: engine::Plan {
+            config: head.sensor.config.clone(),
+            flight: false,
+            threads: if head.sensor.config.tracks() { 1 } else { args.jobs.map_or_else(cores, usize::from) },
+            frames: None,
+            fps: 1.0,
+            trace: false,
+            keep_traces: false,
+            // A picture that repeats the one before it is found by its bytes.
+            keep_picture: true,
+            overlay: None,
+            last: Vec::new(),
+            turns: Turns::default(),
+        },
+    };
+    let heads: Vec<HeadPlan> = opened.heads.iter().map(head).collect();
+    let threads = heads.iter().map(|head| head.plan.threads).min().unwrap_or(1);
+    let plan = Plan { heads, joiner, threads, keep_pictures: false };
+    let mut epochs = Epochs::new(opened.heads, sync_s)?;
+    let mut progress = Progress::new(total, 0, args.quiet);
+    let radius_km = plan.joiner.limb().radius_km;
+    let mut found = Found { epochs: Vec::new(), times_s: Vec::new(), count: 0, radius_km };
+    let end = rig::look(&plan, &mut epochs, &stop_flag(), &mut |epoch| {
+        found.count += 1;
+        for frame in epoch.heads.iter().flatten() {
+            progress.count(frame.outcomes.iter().map(|outcome| outcome.status()).take(1));
+        }
+        found.times_s.extend(epoch.joint.time_s);
+        found.epochs.push(sightings(epoch, &plan, &mounts));
+    })?;
+    progress.finish();
+    epochs.warnings().iter().for_each(tell::warning);
+    Ok((end == End::Complete).then_some(found))
+}
+
+/// Returns what the heads see at an epoch, at the time of its first picture.
+fn sightings(epoch: &FinishedEpoch, plan: &Plan, mounts: &[Head]) -> Epoch {
+    let frames = epoch.heads.iter().zip(&epoch.repeats);
+    let seen: Vec<Seen<'_>> = frames.map(|(frame, repeats)| Seen::new(frame.as_ref(), *repeats)).collect();
+    let start_s = epoch.heads.iter().find_map(|frame| frame.as_ref()?.time_s);
+    let cones = plan.joiner.cones(&seen).into_iter();
+    let one = |((cone, frame), head): ((Option<_>, &Option<engine::Finished>), &Head)| {
+        let frame = frame.as_ref()?;
+        let rate = frame.data.as_ref().and_then(|data| data.rate_rad_s).map_or_else(Vector3::zeros, Vector3::from);
+        let late_s = start_s.zip(frame.time_s).map_or(0.0, |(start_s, own_s)| start_s - own_s);
+        // A direction that stays where it is turns backwards in the axes of the rig.
+        Sighting::new(&cone?, Rotation3::new(told(head) * rate * -late_s))
+    };
+    cones.zip(&epoch.heads).zip(mounts).map(one).collect()
+}
+
+fn told(head: &Head) -> Rotation3<f64> {
+    let [w, x, y, z] = head.mount.map_or([1.0, 0.0, 0.0, 0.0], |mount| mount.q_rig_from_camera_wxyz);
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix()
+}
+
+fn told_rad2(head: &Head) -> Matrix3<f64> {
+    let [xx, xy, xz, yy, yz, zz] = head.mount.map_or([0.0; 6], |mount| mount.covariance_rad2());
+    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+}
+
+/// Returns which part of the epochs is independent: those within one length of the limb's weather see the same one.
+fn independent(times_s: &[f64], sigma_km: f64, length_km: f64) -> f64 {
+    let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    match steps.get(steps.len() / 2) {
+        Some(step) if sigma_km > 0.0 => (step * GROUND_SPEED_KM_S / length_km).min(1.0),
+        _ => 1.0,
+    }
+}
+
+fn write(args: &Args, path: &Path, adjusted: &Adjusted) -> Result<(), Stop> {
+    let mut rig = hzn_files::rig::load(&args.rig)?;
+    let deg2 = 1f64.to_degrees().powi(2);
+    for (k, (head, mount)) in rig.heads.iter_mut().zip(&adjusted.mounts).enumerate() {
+        let q = UnitQuaternion::from_rotation_matrix(mount);
+        let p = adjusted.block(k) * deg2;
+        head.mount = Some(HeadMount {
+            q_rig_from_camera_wxyz: [q.w, q.i, q.j, q.k],
+            sigma_deg: (p.trace() / 3.0).sqrt(),
+            covariance_deg2: Some([p.m11, p.m12, p.m13, p.m22, p.m23, p.m33]),
+        });
+    }
+    let [used, _] = adjusted.epochs;
+    let text = hzn_files::rig::to_text(&rig).map_err(|e| failed(format!("{}: {e}", path.display())))?;
+    let text = format!("# The mounts are those of hzn calibrate rig, from {}.\n{text}", counted(used as u64, "epoch"));
+    disk::write_whole(path, &text)?;
+    tell::line(format_args!("wrote {}", path.display()));
+    Ok(())
+}

@@ -1,0 +1,72 @@
+//! The mounts of a rig in words and numbers.
+
+use hzn_calib::rig::{Adjusted, Check};
+use hzn_files::rig::Head;
+use hzn_run::explain::counted;
+
+use crate::tell::one_line;
+
+/// Returns the report of an adjustment.
+pub(super) fn report(heads: &[Head], adjusted: &Adjusted) -> String {
+    lines(heads, adjusted).iter().map(|(name, value)| format!("{name:<14} {}\n", one_line(value))).collect()
+}
+
+/// Returns the report of a check: the verdict, and what the pictures say.
+pub(super) fn check_report(heads: &[Head], adjusted: &Adjusted, check: &Check) -> String {
+    let verdict = match check {
+        Check::Holds => "holds: the heads see one limb with the mounts of rig.toml, within their sigmas".into(),
+        Check::Turned(k, angle, sigma) => {
+            let name = heads.get(*k).map_or("", |head| head.name.as_str());
+            let (angle, sigma) = (angle.to_degrees(), sigma.to_degrees());
+            format!("does not hold: {name} has turned by {angle:.3}° ± {sigma:.3}° against the other heads")
+        }
+        Check::Contradict if heads.len() == 2 => {
+            "does not hold: the two heads contradict each other, and nothing says which of them has turned".into()
+        }
+        Check::Contradict => "does not hold: the heads contradict each other, and no single head explains it".into(),
+    };
+    format!("{:<14} {}\n{}", "mounts", one_line(&verdict), report(heads, adjusted))
+}
+
+fn lines(heads: &[Head], adjusted: &Adjusted) -> Vec<(String, String)> {
+    let [used, left_out] = adjusted.epochs;
+    let left_out = match left_out {
+        0 => String::new(),
+        several => format!("; {several} more contradict them and do not count"),
+    };
+    let chi2 = adjusted.chi2;
+    let mut lines = vec![
+        ("epochs".to_owned(), format!("{} with two or more heads{left_out}", counted(used as u64, "epoch"))),
+        ("chi-square".to_owned(), format!("{chi2:.2} a degree of freedom; a value above 1 has widened the sigmas")),
+    ];
+    for (k, head) in heads.iter().enumerate() {
+        let other = usize::from(k == 0);
+        let (turn, _) = adjusted.relative(k, other);
+        let other = heads.get(other).map_or("", |head| head.name.as_str());
+        let sigmas: Vec<String> =
+            adjusted.axes(k).iter().map(|(_, sigma_rad, _)| format!("{:.3}°", sigma_rad.to_degrees())).collect();
+        let turn_deg = turn.norm().to_degrees();
+        let sigmas = sigmas.join(", ");
+        lines.push((
+            head.name.clone(),
+            format!("turned by {turn_deg:.3}° against {other}; 1-sigma about three axes {sigmas}"),
+        ));
+        for (axis, sigma_rad, is_determined) in adjusted.axes(k) {
+            if !is_determined {
+                let [x, y, z]: [f64; 3] = axis.into();
+                let sigma_deg = sigma_rad.to_degrees();
+                lines.push((
+                    String::new(),
+                    format!(
+                        "not determined: a turn about ({x:.2}, {y:.2}, {z:.2}) of the rig, ± {sigma_deg:.1}°; turn the \
+                         vehicle about other axes"
+                    ),
+                ));
+            }
+        }
+        if let Some((km, sigma_km)) = adjusted.heights_km.get(k) {
+            lines.push((String::new(), format!("limb {km:+.2} ± {sigma_km:.2} km above the common one")));
+        }
+    }
+    lines
+}

@@ -1,0 +1,58 @@
+//! The coarse direction of an epoch without an answer, for its row.
+
+use hzn_core::frames::{Cam, UnitVec3};
+use hzn_core::rig::{GlimpsedHead, Light, Mount, coarse};
+use hzn_core::status::Status;
+use hzn_core::{Expected, Sensor, threshold};
+use hzn_mcap::Row;
+
+use super::seen::Seen;
+use crate::engine;
+
+/// The part of full scale from which on a place is lit, if no picture of the head had a limb yet. The sky with the
+/// camera's own level is usually below a tenth, and an exposure for the body gives it a third or more.
+const LIT: f64 = 0.125;
+
+/// Returns the level of a picture from which on it is lit: the one of the sensor, the one that was seen, or a part of
+/// full scale.
+fn level_of(config: &threshold::Config, seen: Option<u16>, full_scale: u16) -> u16 {
+    let full_scale = f64::from(full_scale);
+    let fixed = || {
+        let unit = if config.level < 1.0 { full_scale } else { 1.0 };
+        (config.method == threshold::Method::Fixed).then_some(config.level * unit)
+    };
+    fixed().unwrap_or_else(|| seen.map_or(LIT * full_scale, f64::from)).clamp(1.0, 65535.0) as u16
+}
+
+/// Writes the coarse direction into the row of an epoch without an answer.
+pub(super) fn set(row: &mut Row, sensors: &[Sensor<f64>], mounts: &[Mount<f64>], heads: &[Seen<'_>]) {
+    let Some(body) = sensors.first().and_then(|sensor| sensor.config().each_body().first()) else { return };
+    // The Sun and the Moon are nowhere near as large as a picture.
+    if row.status == Status::Ok || body.half_angle_is_free() {
+        return;
+    }
+    let all = || sensors.iter().zip(mounts).zip(heads);
+    let glimpsed = all().filter_map(|((sensor, mount), head)| {
+        let glimpse = head.frame.filter(|_| head.repeats.is_none())?.glimpse.as_ref()?;
+        let level = level_of(sensor.config().threshold_of(0), head.level, glimpse.full_scale());
+        Some(GlimpsedHead { glimpse, level, camera: sensor.camera(), mount })
+    });
+    let half_angle = all().find_map(|((sensor, _), head)| expected(sensor, head)).map(|e| [e.half_angle_rad(); 2]);
+    let sun = || {
+        all().find_map(|((_, mount), head)| {
+            let sun: UnitVec3<Cam, f64> = engine::prior(head.frame?.data.as_ref(), 0, body).ok()?.sun?;
+            Some(mount.after(0.0, None)?.apply(&sun))
+        })
+    };
+    let light = if body.is_seen_in_sunlight() { Light::Sun(sun()) } else { Light::Own };
+    if let Some(coarse) = coarse(glimpsed, half_angle, &light) {
+        [row.coarse_x, row.coarse_y, row.coarse_z] = coarse.axis.xyz().map(Some);
+        row.coarse_sigma_deg = Some(coarse.sigma_rad.to_degrees());
+    }
+}
+
+/// Returns what is expected of the first body in the picture of a head.
+pub(super) fn expected(sensor: &Sensor<f64>, head: &Seen<'_>) -> Option<Expected<f64>> {
+    let body = sensor.config().each_body().first()?;
+    sensor.expect(&engine::prior(head.frame?.data.as_ref(), 0, body).ok()?).ok()
+}
