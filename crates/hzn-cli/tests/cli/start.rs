@@ -3,7 +3,7 @@
 use crate::common::{Place, angle_deg, cell};
 
 /// A real lens, the word for the guess, and its field of view in degrees.
-pub struct Lens<'a> {
+pub(crate) struct Lens<'a> {
     pub name: &'static str,
     pub guess: &'static str,
     pub fov_deg: f64,
@@ -27,7 +27,7 @@ const LENSES: [Lens<'_>; 5] = [
 ];
 
 /// A flight in low orbit with a camera that sees the limb in every picture.
-pub struct Flight<'a> {
+pub(crate) struct Flight<'a> {
     pub lens: &'a Lens<'a>,
     pub fov_deg: f64,
     pub altitude_km: f64,
@@ -38,12 +38,12 @@ pub struct Flight<'a> {
 }
 
 impl<'a> Flight<'a> {
-    pub fn new(lens: &'a Lens<'a>) -> Self {
+    pub(crate) fn new(lens: &'a Lens<'a>) -> Self {
         Self { lens, fov_deg: lens.fov_deg, altitude_km: 500.0, frames: 20, seed: 11, centre_px: [159.5, 119.5] }
     }
 
     /// Renders the flight into the folder `flight`.
-    pub fn render(&self, place: &Place) {
+    pub(crate) fn render(&self, place: &Place) {
         let half = (0.5 * self.fov_deg).to_radians();
         let (model, x) = match self.lens.guess {
             "pinhole" => ("brown-conrady", half.tan()),
@@ -70,7 +70,7 @@ impl<'a> Flight<'a> {
 
 /// Answers compared with the truth.
 #[derive(Debug, Default, Clone)]
-pub struct Score {
+pub(crate) struct Score {
     pictures: usize,
     pub errors_deg: Vec<f64>,
     nees: Vec<f64>,
@@ -79,7 +79,7 @@ pub struct Score {
 
 impl Score {
     /// Runs a sensor over the folder `flight`.
-    pub fn run(place: &Place, sensor: &str) -> Self {
+    pub(crate) fn run(place: &Place, sensor: &str) -> Self {
         place.run(&["run", "flight", "--sensor", sensor, "-o", "r.csv", "--force", "-q"]).expect(0);
         let truth = place.rows("flight/truth.csv");
         let mut score = Self { pictures: truth.len(), ..Self::default() };
@@ -104,13 +104,13 @@ impl Score {
         self.nees.extend(&other.nees);
         self.within += other.within;
     }
-    pub fn answered(&self) -> f64 {
+    pub(crate) fn answered(&self) -> f64 {
         self.errors_deg.len() as f64 / self.pictures as f64
     }
-    pub fn rms_deg(&self) -> f64 {
+    pub(crate) fn rms_deg(&self) -> f64 {
         (self.errors_deg.iter().map(|e| e * e).sum::<f64>() / self.errors_deg.len() as f64).sqrt()
     }
-    pub fn mean_nees(&self) -> f64 {
+    pub(crate) fn mean_nees(&self) -> f64 {
         self.nees.iter().sum::<f64>() / self.nees.len() as f64
     }
 }
@@ -128,7 +128,7 @@ fn nees(axis: [f64; 3], truth: [f64; 3], rows: [[f64; 3]; 3]) -> f64 {
 }
 
 /// Writes the sensor of a user who knows only a field of view.
-pub fn init(place: &Place, lens: &Lens<'_>, fov_deg: f64) {
+pub(crate) fn init(place: &Place, lens: &Lens<'_>, fov_deg: f64) {
     let fov = fov_deg.to_string();
     let args = ["init", "flight", "--fov", &fov, "--lens", lens.guess, "-o", "mine.toml", "--force"];
     place.run(&args).expect(0);

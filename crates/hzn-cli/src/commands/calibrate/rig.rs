@@ -145,6 +145,7 @@ fn look(args: &Args, opened: Opened) -> Result<Option<Found>, Stop> {
             // A picture that repeats the one before it is found by its bytes.
             keep_picture: true,
             overlay: None,
+            masks: None,
             last: Vec::new(),
             turns: Turns::default(),
         },

@@ -1,10 +1,10 @@
 use std::path::Path;
 use std::time::Duration;
 
-use hzn_core::Report;
 use hzn_core::camera::Model;
 use hzn_core::report::Free;
 use hzn_core::status::Stage;
+use hzn_core::{Report, Solution};
 
 use super::*;
 use crate::engine::BodyOutcome;
