@@ -39,14 +39,14 @@ pub enum Came {
 }
 
 impl Incoming {
-    /// Opens a line.
+    /// Opens a line. `patience` says whether the other end may come later.
     ///
     /// # Errors
     /// The line cannot be opened.
-    pub fn open(address: &Address) -> Result<Self, Error> {
+    pub fn open(address: &Address, patience: Patience) -> Result<Self, Error> {
         let (sender, notices) = unbounded();
         let tell = Arc::new(move |text: &str| drop(sender.send(text.to_owned())));
-        let (link, bytes) = Link::open(address, Patience::Fails, Arc::default(), tell).map_err(Error::failed)?;
+        let (link, bytes) = Link::open(address, patience, Arc::default(), tell).map_err(Error::failed)?;
         Ok(Self { link: Some(link), bytes, name: address.to_string(), notices })
     }
 
@@ -73,6 +73,11 @@ impl Incoming {
     pub fn can_send(&self) -> bool {
         self.link.is_some()
     }
+    /// Returns whether the other end is connected. Standard input always is.
+    pub fn is_connected(&self) -> bool {
+        self.link.as_ref().is_none_or(Link::is_connected)
+    }
+
     /// Returns the name of the line.
     pub fn name(&self) -> &str {
         &self.name

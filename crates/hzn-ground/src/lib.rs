@@ -3,6 +3,7 @@
 //! | module | idea |
 //! |---|---|
 //! | [`mod@encode`] | the text of a command as packets |
+//! | [`mod@alarms`] | what an operator should look at |
 //! | [`commander`] | commands, each with its acknowledgement |
 //! | [`incoming`] | bytes that come, commands that go |
 //! | [`station`] | packets on their way from bytes to files |
@@ -18,6 +19,7 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "a library prints nothing; the caller does")]
 
+pub mod alarms;
 pub mod commander;
 pub mod encode;
 mod error;
@@ -32,6 +34,7 @@ pub mod xtce;
 mod xtce_commands;
 mod xtce_text;
 
+pub use alarms::{SILENT_AFTER, alarms};
 pub use commander::{Answered, Commander};
 pub use encode::{encode, loaded_files, write_packet};
 pub use error::Error;

@@ -71,7 +71,12 @@ impl Station {
         let mut rest = &bytes[..];
         loop {
             match packet::scan(rest) {
-                Scan::More { .. } => break,
+                Scan::More { skip } => {
+                    // Noise without the beginning of a packet is not kept, however long it is.
+                    counts.skipped += skip as u64;
+                    rest = rest.get(skip..).unwrap_or_default();
+                    break;
+                }
                 Scan::Bad { skip } => {
                     counts.cut += 1;
                     counts.skipped += skip as u64;

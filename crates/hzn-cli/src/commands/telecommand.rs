@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hzn_fly::link::Address;
+use hzn_fly::link::{Address, Patience};
 use hzn_ground::{Commander, Incoming, encode, loaded_files, write_packet};
 use hzn_run::disk;
 
@@ -58,7 +58,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let tell = tell::to_stderr();
     if let Some(address) = &args.to {
         let commander = Commander::new(args.apids.apid_base, args.sequence, &args.commands, tell.clone())?;
-        let is_done = Incoming::open(address)?.command(commander, &tell)?;
+        let is_done = Incoming::open(address, Patience::Fails)?.command(commander, &tell)?;
         return Ok(if is_done { Exit::Done } else { Exit::Failed });
     }
     let mut out = Vec::new();

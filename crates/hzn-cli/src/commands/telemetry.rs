@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use hzn_files::limited;
-use hzn_fly::link::Address;
+use hzn_fly::link::{Address, Patience};
 use hzn_ground::{Commander, Incoming, Station, loaded_files, xtce};
 use hzn_run::disk;
 
@@ -61,7 +61,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let name = file.display().to_string();
     let live = if Address::is_address(&name) {
         let address: Address = name.parse().map_err(usage)?;
-        Some(Incoming::open(&address)?)
+        Some(Incoming::open(&address, Patience::Fails)?)
     } else if file == Path::new("-") {
         Some(Incoming::stdin()?)
     } else {

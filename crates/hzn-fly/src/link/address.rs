@@ -29,7 +29,7 @@ pub enum Address {
 
 /// The forms of an address, for messages.
 pub const FORMS: &str = "udp:LOCAL[,REMOTE], tcp:HOST:PORT, tcp-listen:HOST:PORT or serial:DEVICE[:BAUD]; \
-                         LOCAL and REMOTE are HOST:PORT";
+                         LOCAL and REMOTE are HOST:PORT; LOCAL may be a PORT, which only this computer reaches";
 /// Speed of a serial line whose address names none.
 const BAUD: u32 = 115_200;
 
@@ -51,10 +51,10 @@ impl FromStr for Address {
                     Some((local, remote)) => (local, Some(host_and_port(remote)?)),
                     None => (rest, None),
                 };
-                Ok(Self::Udp { local: host_and_port(local)?, remote })
+                Ok(Self::Udp { local: own_port(local)?, remote })
             }
             "tcp" => Ok(Self::Tcp(host_and_port(rest)?)),
-            "tcp-listen" => Ok(Self::TcpListen(host_and_port(rest)?)),
+            "tcp-listen" => Ok(Self::TcpListen(own_port(rest)?)),
             "serial" => {
                 let (device, baud) = match rest.rsplit_once(':') {
                     Some((device, baud)) => (device, baud.parse().ok().filter(|&b| b > 0)),
@@ -68,6 +68,15 @@ impl FromStr for Address {
             }
             _ => Err(format!("it must be {FORMS}")),
         }
+    }
+}
+
+/// Returns the address of a port of this computer. Without a host it is that of the loopback, so that no other computer
+/// reaches it unless the user says so.
+fn own_port(text: &str) -> Result<String, String> {
+    match text.parse::<u16>() {
+        Ok(port) => Ok(format!("127.0.0.1:{port}")),
+        Err(_) => host_and_port(text),
     }
 }
 
@@ -108,6 +117,10 @@ mod tests {
         }
         let default: Address = "serial:/dev/ttyUSB0".parse().unwrap();
         assert_eq!(default.to_string(), "serial:/dev/ttyUSB0:115200");
+        // A port alone is one of the loopback.
+        for (text, whole) in [("udp:5001", "udp:127.0.0.1:5001"), ("tcp-listen:5000", "tcp-listen:127.0.0.1:5000")] {
+            assert_eq!(text.parse::<Address>().unwrap().to_string(), whole);
+        }
     }
 
     #[test]
@@ -115,7 +128,9 @@ mod tests {
         let error = |text: &str| text.parse::<Address>().unwrap_err();
         assert!(error("ground").contains("tcp:HOST:PORT"));
         assert!(error("http:ground:80").contains("tcp:HOST:PORT"));
-        for text in ["udp:5000", "udp::5000", "tcp:ground", "tcp:ground:99999", "udp:a:1,b"] {
+        for text in
+            ["udp:", "udp::5000", "udp:70000", "tcp:ground", "tcp:ground:99999", "udp:a:1,b", "udp:1,2", "tcp:5000"]
+        {
             assert!(error(text).contains("must be HOST:PORT"), "{text}");
         }
         assert!(error("serial:").contains("needs a device"));

@@ -8,7 +8,7 @@ mod connection;
 
 use std::io::{self, Read, Write};
 use std::net::TcpListener;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -57,12 +57,20 @@ struct Shared {
     latency: Arc<Latency>,
     dropped: AtomicU64,
     number: AtomicU64,
+    /// The program has no more use for the line.
+    is_closed: AtomicBool,
     tell: Tell,
 }
 
-/// A line that is open.
+/// A line that is open. When it is dropped, it is not opened again after its end.
 pub struct Link {
     shared: Arc<Shared>,
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        self.shared.is_closed.store(true, Ordering::Relaxed);
+    }
 }
 
 impl Link {
@@ -85,6 +93,7 @@ impl Link {
             latency,
             dropped: AtomicU64::new(0),
             number: AtomicU64::new(0),
+            is_closed: AtomicBool::new(false),
             tell,
         });
         let named = |e: io::Error| io::Error::new(e.kind(), explain(address, &e));
@@ -158,9 +167,9 @@ impl Link {
 }
 
 impl Shared {
-    /// Takes connections for ever.
+    /// Takes connections until the line is closed.
     fn accept(self: &Arc<Self>, listener: &TcpListener) {
-        loop {
+        while !self.is_closed() {
             let Ok((stream, from)) = listener.accept() else {
                 thread::sleep(AGAIN);
                 continue;
@@ -182,7 +191,11 @@ impl Shared {
         }
     }
 
-    /// Keeps the line open for ever.
+    fn is_closed(&self) -> bool {
+        self.is_closed.load(Ordering::Relaxed)
+    }
+
+    /// Keeps the line open until it is closed.
     fn keep_open(self: &Arc<Self>, mut connection: Option<Connection>) {
         let mut is_again = connection.is_none();
         loop {
@@ -191,10 +204,16 @@ impl Shared {
                     (self.tell)(&format!("{}: connected", self.address));
                 }
                 let end = self.serve(connection);
+                if self.is_closed() {
+                    return;
+                }
                 (self.tell)(&format!("{}: {end}; it is opened again every second", self.address));
             }
             is_again = true;
             thread::sleep(AGAIN);
+            if self.is_closed() {
+                return;
+            }
             connection = Connection::open(&self.address, &self.tell).ok();
         }
     }

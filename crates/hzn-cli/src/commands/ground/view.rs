@@ -7,7 +7,7 @@ use hzn_core::frames::{Cam, Cov3};
 use hzn_core::status::Status;
 use hzn_flight::assembly::Assembled;
 use hzn_flight::messages::{Housekeeping, Mode};
-use hzn_ground::{Seen, StreamCounts};
+use hzn_ground::{SILENT_AFTER, Seen, StreamCounts, alarms};
 use hzn_mcap::LogLevel;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -128,7 +128,7 @@ impl View {
         spans.push(Span::from(format!("{packets} packets, {lost} lost, {cut} broken  ")));
         spans.push(match self.silent {
             None => Span::from("no packet yet").fg(Color::Yellow),
-            Some(t) if t < Duration::from_secs(10) => Span::from("heard now").fg(Color::Green),
+            Some(t) if t < SILENT_AFTER => Span::from("heard now").fg(Color::Green),
             Some(t) => Span::from(format!("silent for {} s", t.as_secs())).fg(Color::Red).bold(),
         });
         Line::from(spans)
@@ -247,25 +247,6 @@ fn bounds(values: impl Iterator<Item = f64>) -> (f64, f64) {
     }
     let room = ((high - low) * 0.1).max(1e-3);
     (low - room, high + room)
-}
-
-/// Returns what an operator should look at.
-fn alarms(h: &Housekeeping) -> Vec<String> {
-    let bit = |byte: u8, bit: u8, text: &str| (byte & bit != 0).then(|| text.to_owned());
-    let repairs = (h.repairs > 0).then(|| format!("{} memory errors repaired", h.repairs));
-    let withheld = (h.withheld > 0).then(|| format!("{} messages withheld", h.withheld));
-    let all = [
-        bit(h.self_check, 1, "camera failed its check"),
-        bit(h.self_check, 2, "memory failed its check"),
-        bit(h.self_check, 4, "parameters failed their check"),
-        bit(h.flags, 1, "parameters in use are not stored"),
-        bit(h.flags, 2, "shut-down is armed"),
-        bit(h.flags, 8, "the camera is silent"),
-        bit(h.flags, 16, "parameters wait for their commit"),
-        repairs,
-        withheld,
-    ];
-    all.into_iter().flatten().collect()
 }
 
 #[cfg(test)]
