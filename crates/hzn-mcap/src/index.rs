@@ -79,7 +79,11 @@ impl Index {
                 index.file.seek_relative(-9).map_err(read)?;
                 break;
             }
-            let Some(content) = index.read_content(length).map_err(read)? else { break };
+            let begin = index.position;
+            let Some(content) = index.read_content(length).map_err(read)? else {
+                index.go_back(begin).map_err(read)?;
+                break;
+            };
             index.read_declaration(op, &content);
         }
         Ok(index)
@@ -113,14 +117,25 @@ impl Index {
         self.pictures.len()
     }
 
-    /// Returns the entries of the next part of the file, which may be empty; `None` at the end.
+    /// Returns the entries of the next part of the file, which may be empty; `None` at the end. If another program still
+    /// writes the file, a later call goes on with what was added, unless [`Index::is_complete`].
     ///
     /// # Errors
     /// The file cannot be read, or a report cannot be decoded.
     pub fn next_part(&mut self) -> Result<Option<Vec<IndexEntry>>, Error> {
         let mut found = Vec::new();
+        let begin = self.position;
         let more = self.step(&mut found).map_err(|source| Error::Read { path: self.path.clone(), source })??;
+        if !more && !self.complete {
+            self.go_back(begin).map_err(|source| Error::Read { path: self.path.clone(), source })?;
+        }
         Ok(more.then_some(found))
+    }
+
+    /// Goes back to the beginning of a record that is not whole yet.
+    fn go_back(&mut self, to: u64) -> io::Result<()> {
+        self.position = to;
+        self.file.seek(SeekFrom::Start(to)).map(|_| ())
     }
 
     fn step(&mut self, found: &mut Vec<IndexEntry>) -> io::Result<Result<bool, Error>> {
