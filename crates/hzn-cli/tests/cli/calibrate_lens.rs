@@ -96,8 +96,14 @@ fn wrong_boards_and_pictures_are_named() {
     let (code, report, stderr) = calibrate(&["--board", "9x6", "--model", "brown-conrady", "--force"]);
     let other = "small.png: it has 641x481 px, but most pictures have 640x480 px";
     assert!(code == 0 && stderr.contains(other) && report.contains("4 of 5 used"), "{code} {stderr} {report}");
-    std::fs::remove_file(place.path("camera.toml")).unwrap();
     std::fs::remove_file(place.path("boards/small.png")).unwrap();
+    // A copy of a picture says nothing new.
+    std::fs::copy(place.path("boards/left01.jpg"), place.path("boards/left01b.jpg")).unwrap();
+    let (code, report, stderr) = calibrate(&["--board", "9x6", "--model", "brown-conrady", "--force"]);
+    let copy = "left01b.jpg: it has the corners of left01.jpg to the last bit: it is a copy";
+    assert!(code == 0 && stderr.contains(copy) && report.contains("4 of 5 used"), "{code} {stderr} {report}");
+    std::fs::remove_file(place.path("camera.toml")).unwrap();
+    std::fs::remove_file(place.path("boards/left01b.jpg")).unwrap();
     image::GrayImage::new(640, 480).save(place.path("boards/empty.png")).unwrap();
     for name in ["left02.jpg", "left03.jpg"] {
         std::fs::remove_file(place.path(&format!("boards/{name}"))).unwrap();

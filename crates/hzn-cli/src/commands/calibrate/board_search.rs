@@ -105,7 +105,11 @@ fn sort_out(searched: &[Searched], board: &Board) -> Result<Pictures, Stop> {
                 "it has {}x{} px, but most pictures have {}x{} px; a scaled or cut picture shows another lens",
                 other[0], other[1], size[0], size[1]
             )),
-            Ok((_, Ok(found))) => found.corners.clone(),
+            // Corners of another exposure differ at least by noise. A copy would count as independent.
+            Ok((_, Ok(found))) => match views.iter().find(|view: &&View| view.corners == found.corners) {
+                Some(first) => leave_out(format!("it has the corners of {} to the last bit: it is a copy", first.name)),
+                None => found.corners.clone(),
+            },
             Ok((_, Err(why))) => leave_out(why.to_string()),
             Err(why) => {
                 unreadable += 1;
