@@ -190,7 +190,7 @@ fn a_flight_calibrates_the_guess() {
     };
     let edge_px = radius(focal, &numbers(&new, "k")) - radius(real, flight.lens.k);
     assert!(edge_px.abs() < 1.0, "{edge_px} px at the edge");
-    assert!((numbers(&new, "k")[0] + 0.045).abs() < 0.015, "{new}");
+    assert!((numbers(&new, "k")[0] - flight.lens.k[0]).abs() < 0.02, "{new}");
     // The gates are those of any calibrated lens again.
     assert!(!new.contains("max_rival_ratio") && !new.contains("min_evidence"), "{new}");
     let score = Score::run(&place, "new.toml");
