@@ -117,7 +117,8 @@ fn check(row: &Row, root: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Fails if the command is no study, no chore of `cargo xtask` and no command of `hzn`. The sources list them.
+/// Fails if the command is no study, no chore of `cargo xtask`, no test of the whole chain and no command of `hzn`. The
+/// sources list them.
 fn check_command(command: &str, root: &Path) -> anyhow::Result<()> {
     let lists = |file: &str, entry: String| -> anyhow::Result<bool> {
         Ok(std::fs::read_to_string(root.join(file)).with_context(|| file.to_owned())?.contains(&entry))
@@ -125,6 +126,10 @@ fn check_command(command: &str, root: &Path) -> anyhow::Result<()> {
     let words: Vec<&str> = command.split_whitespace().collect();
     let is_known = match words.as_slice() {
         ["cargo", "xtask", "reproduce", study] => lists("reproduce/src/studies/mod.rs", format!("\"{study}\", "))?,
+        ["cargo", "test", "-p", "hzn-tests", "--test", "chain", test, ..] => {
+            let (file, name) = test.split_once("::").ok_or_else(|| anyhow!("{test}: file::test is expected"))?;
+            lists(&format!("tests/tests/chain/{file}.rs"), format!("fn {name}"))?
+        }
         ["cargo", "xtask", rest @ ..] => lists("xtask/src/main.rs", format!("  {} ", rest.join(" ")))?,
         ["hzn", name, ..] => {
             let commands = root.join("crates/hzn-cli/src/commands");
@@ -274,6 +279,8 @@ mod tests {
         for known in ["cargo xtask bench ransac", "hzn sensitivity --fov 94.4", "hzn fuse --show-config"] {
             command(known).unwrap();
         }
+        command("cargo test -p hzn-tests --test chain published::wang -- --nocapture").unwrap();
+        assert!(command("cargo test -p hzn-tests --test chain published::tang").is_err());
         for unknown in ["cargo xtask reproduce weather", "cargo xtask brew", "hzn dance", "make", "hzn"] {
             assert!(command(unknown).unwrap_err().to_string().contains("no command"), "{unknown}");
         }
