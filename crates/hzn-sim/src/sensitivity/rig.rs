@@ -142,7 +142,7 @@ mod tests {
 
     fn rig(azimuths_deg: &[f64]) -> RigDesign {
         let head = Design {
-            camera: camera::Config::ideal(Model::Pinhole, 640, 480, 60.0),
+            camera: camera::Config::ideal(Model::Pinhole, 640, 480, 554.0),
             radius_km: 6371.0,
             altitude_km: 500.0,
             altitude_sigma_km: 0.0,
