@@ -22,8 +22,8 @@ pub enum Check {
 /// Compares adjusted mounts with the told ones. `told_rad2` is the covariance of each told mount about the axes of the
 /// rig.
 ///
-/// A head is named only if exactly one exclusion leaves heads that agree: with two heads, nothing says which of them has
-/// turned.
+/// A head is named only if exactly one exclusion leaves heads that agree: with two heads, nothing says which of them
+/// has turned.
 pub fn check(adjusted: &Adjusted, told_rad2: &[Matrix3<f64>]) -> Check {
     let all: Vec<usize> = (0..told_rad2.len()).collect();
     if agree(adjusted, told_rad2, &all) {

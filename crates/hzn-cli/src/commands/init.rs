@@ -21,7 +21,7 @@ use crate::tell;
 /// their EXIF, or else from the curvature of the limb in them, for which an altitude must be known. Its sigmas are
 /// large, because these values are rough; with an altitude the file works at once.
 /// Without pictures: the file has every key with its default and a comment, and only the camera must be filled in.
-/// With --rig: the file is a rig.toml for several cameras, each with its pictures in a folder, and its sensor.toml there.
+/// With --rig: the file is a rig.toml for several cameras, each with a folder for its pictures and its sensor.toml.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Pictures of the camera: files, a folder, a glob, a video, or a recording

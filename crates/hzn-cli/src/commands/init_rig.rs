@@ -31,10 +31,10 @@ impl FromStr for Mount {
 pub(super) fn run(folders: &[PathBuf], mounts: &[Mount], output: &Path, force: bool) -> Outcome {
     if mounts.len() != folders.len() {
         return Err(usage(format!(
-            "--rig: {} folders and {} mounts: give --mount W,X,Y,Z for each folder in the same order, the rotation from \
-             the camera to the rig as a quaternion, scalar first. It comes from the drawing, from Kalibr's T_cn_cnm1, or \
-             from `hzn calibrate mount`. Some degrees are good enough to begin with: `hzn calibrate rig` then finds the \
-             mounts from the limbs that the heads see together",
+            "--rig: {} folders and {} mounts: give --mount W,X,Y,Z for each folder in the same order, the rotation \
+             from the camera to the rig as a quaternion, scalar first. It comes from the drawing, from Kalibr's \
+             T_cn_cnm1, or from `hzn calibrate mount`. Some degrees are good enough to begin with: `hzn calibrate rig` \
+             then finds the mounts from the limbs that the heads see together",
             folders.len(),
             mounts.len()
         )));

@@ -8,8 +8,9 @@
 //! exp(−Σ w_k / w̄)
 //! ```
 //!
-//! Of all distributions of a positive number with the mean w̄, the exponential one assumes least. The answer is the mean
-//! of the directions, and its sigma is the RMS of their angles to it: where only a region is known, this is its size.
+//! Of all distributions of a positive number with the mean w̄, the exponential one assumes least. The answer is the
+//! mean of the directions, and its sigma is the RMS of their angles to it: where only a region is known, this is its
+//! size.
 //!
 //! A body in visible light may be dark: then a dark place says nothing. Without the direction to the Sun, day and night
 //! are equally probable, and the same for all heads. With it, each place of the body is lit, dark, or in twilight.

@@ -16,6 +16,7 @@ mod expected_limb;
 mod outcome;
 mod plan;
 mod pool;
+mod prior;
 mod process;
 mod sensor;
 mod sequence;
@@ -32,9 +33,9 @@ pub use plan::Plan;
 pub use pool::End;
 #[cfg(feature = "recordings")]
 pub(crate) use pool::{InOrder, Work, run_in_order};
-pub use process::process_one;
 #[cfg(feature = "recordings")]
-pub(crate) use sensor::prior;
+pub(crate) use prior::prior;
+pub use process::process_one;
 pub use sensor::{AnySensor, LastAnswer, Processed, check_frames, find_refused};
 pub use sequence::{Sink, process_alone, run};
 pub use trace::{Trace, Traces, Watch};

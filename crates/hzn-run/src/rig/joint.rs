@@ -210,8 +210,8 @@ impl Joiner {
         row
     }
 
-    /// Sets the altitude that follows from the half-angle and the limb height, and the limb height that follows from the
-    /// half-angle and the altitude.
+    /// Sets the altitude that follows from the half-angle and the limb height, and the limb height that follows from
+    /// the half-angle and the altitude.
     fn set_heights(&self, row: &mut Row, used: Option<(usize, &Seen<'_>)>, answer: &EpochAnswer<f64>) {
         let Some((k, head)) = used else { return };
         let expected = self.sensors.get(k).and_then(|sensor| coarse::expected(sensor, head));
