@@ -23,10 +23,12 @@ mod refusal;
 pub(crate) mod sighting;
 #[cfg(test)]
 pub(crate) mod tests;
+mod words;
 mod write;
 
 pub use calibration::{Calibration, Edge, Focal, Height, MIN_PICTURES, Picture, config_for_calibration};
 pub use points::{PointRecorder, WeightedPoints};
 pub use refusal::Refusal;
 pub use sighting::{Sighting, shares};
+pub use words::lines;
 pub use write::{Written, into_sensor_toml};

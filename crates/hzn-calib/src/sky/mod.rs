@@ -22,6 +22,7 @@ mod mount;
 mod normal_law;
 mod observable;
 mod parameters;
+mod passes;
 mod refusal;
 mod system;
 #[cfg(test)]
@@ -31,6 +32,7 @@ mod track;
 mod track_tests;
 mod unknowns;
 mod view;
+mod words;
 mod write;
 
 pub use check::{Check, DEFAULT_DETECT_PERCENT, Deviation, Verdict, check};
@@ -38,8 +40,10 @@ pub use estimate::{Estimate, MIN_PICTURES, Picture, estimate};
 pub use mount::{Mount, MountRefusal, estimate_mount};
 pub use observable::Observability;
 pub use parameters::Determined;
+pub use passes::estimate_in_passes;
 pub use refusal::Refusal;
 pub use track::{Sight, Track, TrackRefusal, estimate_track};
 pub use unknowns::{LimbPrior, Parameter, Unknowns};
 pub use view::View;
+pub use words::{check_lines, lines, track_lines};
 pub use write::{Found, FoundMount, Written, into_sensor_toml};

@@ -11,6 +11,7 @@
 //! does not grow with the sequence, even if one picture or the disk is slow.
 
 mod annotate;
+mod answers;
 mod clock;
 mod expected_limb;
 mod outcome;
@@ -27,6 +28,7 @@ mod turns;
 mod widen;
 
 pub use annotate::annotate;
+pub use answers::{Answered, measure_answers};
 pub use expected_limb::ExpectedLimb;
 pub use outcome::{BodyOutcome, Finished, Unprocessed};
 pub use plan::Plan;

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use hzn_calib::noise::{self, WeightedPoints};
-use hzn_core::{Prior, Solution};
-use hzn_files::{FrameData, Frames, Sensor};
-use hzn_run::engine::{self, End, Finished, Plan, Sink, Turns};
+use hzn_calib::noise;
+use hzn_files::{Frames, Sensor};
+pub(super) use hzn_run::engine::Answered;
+use hzn_run::engine::{self, Finished, Plan, Turns};
 use hzn_run::open::{self, Opened, Request, SensorChoice};
 use hzn_run::source::{Source, ending};
 
@@ -23,18 +23,6 @@ pub(super) fn check_endings(output: &[PathBuf]) -> Result<(), Stop> {
         }
     }
     Ok(())
-}
-
-/// A sink that stores nothing; only the measurements of the pictures are kept.
-struct NoSink;
-
-impl Sink for NoSink {
-    fn write(&mut self, _: &mut Finished) -> Result<(), hzn_run::Error> {
-        Ok(())
-    }
-    fn flush(&mut self) -> Result<(), hzn_run::Error> {
-        Ok(())
-    }
 }
 
 /// Returns the sensor with a very wide prior of the limb height.
@@ -73,52 +61,16 @@ pub(super) fn plan(input: &InputArgs, flight: bool, jobs: Option<u16>, frames: O
     }
 }
 
-/// An answer of the pipeline with its edge points.
-pub(super) struct Answered<'a> {
-    /// Name of the picture.
-    pub(super) name: &'a str,
-    /// Number of the body, from 0.
-    pub(super) which: usize,
-    /// Edge points of the answer with their weights.
-    pub(super) points: WeightedPoints,
-    /// The prior of the picture, without defaults of the sensor.
-    pub(super) prior: Prior<f64>,
-    /// The row of the picture in frames.csv.
-    pub(super) data: Option<&'a FrameData>,
-    /// The answer.
-    pub(super) solution: &'a Solution<f64>,
-}
-
 /// Processes the flight and measures each answer: one for a body and picture. Returns `None` if the run was
 /// interrupted.
 pub(super) fn measure_answers<T>(
     plan: &Plan,
     source: &mut dyn Source,
     progress: &mut Progress,
-    mut measure: impl FnMut(Answered<'_>) -> Option<T>,
+    measure: impl FnMut(Answered<'_>) -> Option<T>,
 ) -> Result<Option<Vec<T>>, Stop> {
-    let mut measured = Vec::new();
-    let mut seen = |frame: &Finished| {
-        progress.count(frame.outcomes.iter().map(engine::BodyOutcome::status));
-        measured.extend((0..frame.outcomes.len()).filter_map(|which| measure(answer(frame, which)?)));
-    };
-    let end = engine::run(plan, source, 0, &stop_flag(), &mut NoSink, &mut seen)?;
+    let seen = |frame: &Finished| progress.count(frame.outcomes.iter().map(engine::BodyOutcome::status));
+    let measured = engine::measure_answers(plan, source, &stop_flag(), seen, measure)?;
     progress.finish();
-    Ok((end == End::Complete).then_some(measured))
-}
-
-/// Returns the answer of a picture for one body, from 0; `None` without one.
-fn answer(frame: &Finished, which: usize) -> Option<Answered<'_>> {
-    let report = frame.outcomes.get(which)?.report.as_ref().ok()?;
-    let solution = report.solution.as_ref()?;
-    let edges = frame.traces.as_ref()?.each.get(which)?.edges();
-    let edge = edges.iter().find(|e| e.candidate == solution.candidate)?;
-    Some(Answered {
-        name: &frame.name,
-        which,
-        points: edge.points.iter().copied().zip(edge.weights.iter().copied()).collect(),
-        data: frame.data.as_ref(),
-        prior: frame.data.as_ref().map_or_else(Prior::default, |d| d.to_prior(None)),
-        solution,
-    })
+    Ok(measured)
 }

@@ -1,10 +1,10 @@
 //! The report as one page of HTML that needs no other file.
 
-use hzn_calib::noise::Calibration;
+use hzn_calib::noise::{self, Calibration};
 use hzn_core::camera::Config;
 use hzn_plot::{Chart, Series, Style};
+use hzn_run::explain::counted;
 
-use super::text;
 use crate::html::{STYLE, escape};
 
 /// Returns a page with a title, lines of name and value, and plots.
@@ -21,7 +21,7 @@ pub(super) fn simple(title: &str, lines: &[(String, String)], charts: &[Chart]) 
 }
 
 pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str, camera: &Config) -> anyhow::Result<String> {
-    let rows: String = text::lines(calibration, pictures, camera)
+    let rows: String = noise::lines(calibration, &counted(pictures, "picture"), camera)
         .iter()
         .map(|(name, value)| format!("<tr><td>{name}</td><td>{}</td></tr>", escape(value)))
         .collect();

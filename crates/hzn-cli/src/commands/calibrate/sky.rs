@@ -21,13 +21,6 @@ use crate::progress::Progress;
 use crate::setup::{self, InputArgs, SensorArgs};
 use crate::tell;
 
-/// Number of times that the pictures are processed at most. The first lens may be several percent wrong, and with it
-/// the choice of the edge points.
-const PASSES: usize = 3;
-/// The pictures are processed again if the focal length changes by more than this, in percent: the edge points at the
-/// border of a wide picture then move by about a pixel.
-const PROCESS_AGAIN_PERCENT: f64 = 0.2;
-
 /// The pictures of a flight for `sky` and `check`, and the number of all pictures.
 pub(super) struct Pictures {
     pub(super) views: Vec<View>,
@@ -66,20 +59,10 @@ pub(super) fn load(input: &[PathBuf], sensor: &SensorArgs, source: &InputArgs) -
     Ok((opened.sensor, opened.notes))
 }
 
-/// Returns the limb height of the sensor as a prior. The error of the altitude moves the limb by the same amount.
+/// Returns the limb height of the sensor as a prior.
 pub(super) fn limb_prior(sensor: &Sensor, free: bool) -> Result<LimbPrior, Stop> {
-    let body = sensor.config.each_body().iter().find(|b| !b.half_angle_is_free());
-    let body = body.ok_or_else(|| usage("the sensor looks only for Sun and Moon, which have no limb height"))?;
-    let rows = &body.limb_height_by_latitude_km;
-    let heights = || rows.iter().map(|[_, km]| *km);
-    let (km, spread_km) = if rows.is_empty() {
-        (body.limb_height_km, 0.0)
-    } else {
-        let [low, high] = [heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max)];
-        (0.5 * (low + high), 0.5 * (high - low))
-    };
-    let sigma_km = body.limb_height_sigma_km.hypot(spread_km).hypot(body.altitude_sigma_km);
-    Ok(LimbPrior { km, sigma_km: if free { f64::INFINITY } else { sigma_km } })
+    let prior = LimbPrior::of_sensor(&sensor.config, free);
+    prior.ok_or_else(|| usage("the sensor looks only for Sun and Moon, which have no limb height"))
 }
 
 /// Processes the pictures and estimates the lens, with the estimated lens again if it differs. `None` if interrupted.
@@ -90,33 +73,25 @@ fn measure(
     limb: LimbPrior,
     input: &str,
 ) -> Result<Option<(Pictures, Estimate)>, Stop> {
-    let mut used = sensor.clone();
-    used.config.camera.covariance = None;
-    used.config.camera.focal_sigma_percent = unknowns.focal_sigma_percent();
-    let mut before_percent = 0.0;
-    for pass in 1..=PASSES {
-        let Some(pictures) = views(&args.input, &args.source, args.sensor.flight, args.jobs, args.quiet, &used)? else {
-            return Ok(None);
-        };
-        let estimate = sky::estimate(unknowns, &pictures.plan.config.body, &pictures.views, limb)
-            .map_err(|why| failed(format!("{input} ({}): {why}", counted(pictures.count, "picture"))))?;
-        let [percent, sigma] = estimate.focal_percent;
-        if pass == PASSES || (percent - before_percent).abs() <= PROCESS_AGAIN_PERCENT {
-            return Ok(Some((pictures, estimate)));
-        }
+    let wide = flight::with_wide_limb(sensor)?;
+    let mut last = None;
+    let process = |camera: &hzn_core::camera::Config| -> Result<Option<Vec<View>>, Stop> {
+        let mut used = sensor.clone();
+        used.config.camera = camera.clone();
+        last = views(&args.input, &args.source, args.sensor.flight, args.jobs, args.quiet, &used)?;
+        Ok(last.as_mut().map(|pictures| std::mem::take(&mut pictures.views)))
+    };
+    let again = |[percent, sigma]: [f64; 2]| {
         if !args.quiet {
             let what = "the pictures are processed again with this lens";
             tell::line(format_args!("note: the focal length differs by {percent:+.2} % ± {sigma:.2} %; {what}"));
         }
-        before_percent = percent;
-        let camera = estimate.camera.clone();
-        used.config.camera = hzn_core::camera::Config {
-            covariance: None,
-            focal_sigma_percent: sigma.max(PROCESS_AGAIN_PERCENT),
-            ..camera
-        };
-    }
-    Ok(None)
+    };
+    let found = sky::estimate_in_passes(&sensor.config, &wide.config.body, unknowns, limb, process, again)?;
+    let (Some(found), Some(pictures)) = (found, last) else { return Ok(None) };
+    let refused = |why| failed(format!("{input} ({}): {why}", counted(pictures.count, "picture")));
+    let (estimate, views) = found.map_err(refused)?;
+    Ok(Some((Pictures { views, ..pictures }, estimate)))
 }
 
 /// Processes the pictures with a sensor. Returns `None` if the run was interrupted.
@@ -152,7 +127,7 @@ fn write(
     for path in args.output.iter().filter(|p| ending(p) == "html") {
         let html = page::simple(
             &format!("Lens from the limb: {input}"),
-            &sky_text::lines(estimate, estimate.pictures.len() as u64, mount.as_ref()),
+            &sky::lines(estimate, &counted(estimate.pictures.len() as u64, "picture"), mount.as_ref()),
             &[sky_text::heights(estimate)],
         )?;
         disk::write_whole(path, &html)?;
