@@ -13,10 +13,17 @@ use crate::work::open::Request;
 ///
 /// Opens a recording that `hzn run` wrote (.mcap), a folder of pictures, single pictures, or a video. Without an
 /// argument, the window is empty and takes files by menu or by drag and drop.
+///
+/// With --follow, the window shows new pictures of a folder, or of a recording that grows, as they come. It keeps the
+/// newest 9000 pictures.
+///
+/// The line of a flight computer shows its telemetry, and sends telecommands: tcp:HOST:PORT, udp:LOCAL[,REMOTE],
+/// tcp-listen:HOST:PORT or serial:DEVICE[:BAUD]. A port without a host (udp:5001) is one that only this computer
+/// reaches.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "hzn-viewer", version, max_term_width = 100)]
 pub struct Args {
-    /// A recording, a folder, pictures, or a video
+    /// A recording, a folder, pictures, a video, or the line of a flight computer
     #[arg(value_name = "INPUT")]
     pub input: Vec<PathBuf>,
     /// The sensor.toml; without it, the one in the recording or next to the pictures
@@ -37,6 +44,9 @@ pub struct Args {
     /// Compute with single precision and at most 2048 points, as `FlightHorizon` has
     #[arg(long)]
     pub flight: bool,
+    /// Show new pictures as they come: of one folder, or of a recording that another program writes
+    #[arg(long)]
+    pub follow: bool,
     /// Index of the first picture to show, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub frame: usize,
@@ -75,6 +85,7 @@ impl Args {
             fps: self.fps,
             raw: self.raw,
             frame: self.frame,
+            follow: self.follow,
         }
     }
 }

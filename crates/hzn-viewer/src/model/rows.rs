@@ -50,6 +50,17 @@ impl ResultHistory {
         self.generation += 1;
         self.current.insert(index, processed);
     }
+    /// Forgets the results of the first pictures. The others count from 0 again.
+    pub fn forget_first(&mut self, count: usize) {
+        fn shift<T>(results: &mut HashMap<usize, T>, by: usize) {
+            *results = results.drain().filter_map(|(index, result)| Some((index.checked_sub(by)?, result))).collect();
+        }
+        self.generation += 1;
+        self.recorded.drain(..count.min(self.recorded.len()));
+        shift(&mut self.current, count);
+        shift(&mut self.previous, count);
+        shift(&mut self.other, count);
+    }
     /// Begins with other parameters: the results so far become the previous ones. `as_recorded` is true if the
     /// parameters are those of the file's results.
     pub fn begin_version(&mut self, as_recorded: bool) {

@@ -82,6 +82,10 @@ pub enum Layer {
     Axis,
     /// Expected places of the Sun and the Moon.
     Sky,
+    /// Latitudes and longitudes on the body.
+    Grid,
+    /// The local vertical: nadir, and lines of one elevation.
+    Vertical,
     /// Masked parts.
     Mask,
     /// The image circle.
@@ -94,7 +98,7 @@ pub enum Layer {
 
 impl Layer {
     /// All layers, in the order in which they are listed.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::Touched,
         Self::Edges,
         Self::Rejected,
@@ -102,6 +106,8 @@ impl Layer {
         Self::Limb,
         Self::Axis,
         Self::Sky,
+        Self::Grid,
+        Self::Vertical,
         Self::Mask,
         Self::Circle,
         Self::Truth,
@@ -117,6 +123,8 @@ impl Layer {
             Self::Limb => "Fitted limb",
             Self::Axis => "Axis and 3σ",
             Self::Sky => "Sun and Moon",
+            Self::Grid => "Latitude, longitude",
+            Self::Vertical => "Local vertical",
             Self::Mask => "Mask",
             Self::Circle => "Image circle",
             Self::Truth => "True limb",

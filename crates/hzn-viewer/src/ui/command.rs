@@ -13,6 +13,8 @@ pub enum Command {
     OpenPath,
     /// Opens the same files again.
     Reload,
+    /// Shows new pictures as they come.
+    Follow,
     /// Saves the sensor.toml.
     Save,
     /// Saves the sensor.toml under another path.
@@ -99,6 +101,7 @@ pub(super) const ALL: &[(Command, &str, Modifiers, Key)] = &[
     (Command::OpenFolder, "Open folder…", Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::O),
     (Command::OpenPath, "Open path…", Modifiers::COMMAND, Key::L),
     (Command::Reload, "Reload the pictures", Modifiers::NONE, Key::F5),
+    (Command::Follow, "Follow new pictures", Modifiers::SHIFT, Key::F),
     (Command::Save, "Save sensor.toml", Modifiers::COMMAND, Key::S),
     (Command::SaveAs, "Save sensor.toml as…", Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::S),
     (Command::Undo, "Undo", Modifiers::COMMAND, Key::Z),

@@ -6,8 +6,8 @@ use super::command::Command;
 use super::panels::Panel;
 use super::viewer::Viewer;
 use super::{
-    command, compare, dialogs, help, number, picture, plots, questions, side, stages, study, theme, timeline, toasts,
-    top, wizard,
+    calibration, command, compare, dialogs, help, live, number, picture, plots, questions, side, stages, study, theme,
+    timeline, toasts, top, wizard,
 };
 
 impl Viewer {
@@ -42,6 +42,9 @@ impl Viewer {
         }
         self.panels.set_size(ctx.content_rect().size());
         top::show(self, ui);
+        if self.live.is_some() {
+            return self.show_live(ui);
+        }
         // The welcome page has nothing to play, to plot or to tune.
         let is_open = !self.sequence.title.is_empty();
         if is_open {
@@ -60,6 +63,7 @@ impl Viewer {
         questions::show(self, &ctx);
         wizard::show(self, &ctx);
         study::show(self, &ctx, rect);
+        calibration::show(self, &ctx, rect);
         help::show(self, &ctx);
         self.drive_background(&ctx);
         self.autosave(&ctx);
@@ -78,6 +82,19 @@ impl Viewer {
         let asks = self.changes.is_asking() || self.path_dialog.is_some() || self.wizard.is_some();
         let is_covered = ctx.memory(|m| m.top_modal_layer().is_some());
         !asks && (!is_covered || (self.showing_help && command == Command::Help))
+    }
+
+    /// Draws the window on a flight computer, which has no pictures.
+    fn show_live(&mut self, ui: &mut egui::Ui) {
+        let ctx = ui.ctx().clone();
+        let rect = ui.available_rect_before_wrap();
+        live::show(self, ui);
+        toasts::show(self, &ctx, rect);
+        dialogs::show(self, &ctx, rect);
+        help::show(self, &ctx);
+        self.keep_settings(&ctx);
+        self.close_if_due(&ctx);
+        self.focus_ring.draw(&ctx);
     }
 
     /// Draws the panels around the picture.

@@ -2,6 +2,8 @@
 //! draws.
 
 mod altitude_trial;
+mod calibration;
+mod calibration_window;
 mod camera_card;
 mod chips;
 mod command;
@@ -10,10 +12,13 @@ mod diagnosis;
 mod dialogs;
 mod facts;
 mod focus_ring;
+mod follow;
 mod help;
 mod histogram;
 mod layout;
 mod links;
+mod live;
+mod live_view;
 mod number;
 mod offered;
 mod panels;

@@ -208,9 +208,11 @@ fn layers(viewer: &mut Viewer, ui: &mut Ui) {
         }
     });
     ui.add_enabled_ui(!viewer.layers_hidden, |ui| {
+        let has_grid = viewer.frame_view.as_ref().is_some_and(|f| f.grid().is_some());
         for layer in Layer::ALL {
             if (layer == Layer::Truth && viewer.truth.is_empty())
                 || (layer == Layer::Lens && viewer.companions.residuals.is_none())
+                || (layer == Layer::Grid && !has_grid)
             {
                 continue;
             }
@@ -261,6 +263,8 @@ fn colour(layer: Layer) -> Color32 {
         Layer::Limb => theme::LIMB,
         Layer::Axis => theme::AXIS,
         Layer::Sky => theme::SKY,
+        Layer::Grid => theme::GRID,
+        Layer::Vertical => theme::VERTICAL,
         Layer::Mask => theme::MASK,
         Layer::Circle => theme::CIRCLE,
         Layer::Truth => theme::TRUTH,

@@ -7,6 +7,7 @@ use super::panels::Panel;
 use super::path_dialog::{PathDialog, Purpose};
 use super::viewer::Viewer;
 use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
+use crate::model::settings::Layer;
 use crate::model::{FileChange, Session};
 
 /// A situation of the window.
@@ -24,6 +25,8 @@ pub enum Situation {
     Navigation,
     /// The image circle is being dragged.
     Circle,
+    /// Latitudes and longitudes, and the local vertical, are drawn.
+    Ground,
     /// The window asks before it replaces a sensor.toml.
     Replace,
     /// Another program changed the sensor.toml that is saved.
@@ -47,6 +50,10 @@ impl Viewer {
                 self.panels.open(Panel::Plots, &mut self.settings);
             }
             Situation::Circle => self.run(Command::Circle, ctx),
+            Situation::Ground => {
+                self.settings.show(Layer::Grid, true);
+                self.settings.show(Layer::Vertical, true);
+            }
             Situation::Replace => {
                 let dialog = |s: &Session| PathDialog::new(Purpose::SaveSensor, s.home());
                 self.path_dialog = self.session.as_ref().map(dialog);

@@ -21,6 +21,10 @@ pub(super) const LENS: Color32 = Color32::from_rgb(86, 180, 233);
 pub(super) const EXPECTED: Color32 = Color32::from_rgb(235, 238, 245);
 /// Sun and Moon.
 pub(super) const SKY: Color32 = Color32::from_rgb(255, 236, 170);
+/// Latitudes and longitudes.
+pub(super) const GRID: Color32 = Color32::from_rgb(150, 222, 190);
+/// The local vertical.
+pub(super) const VERTICAL: Color32 = Color32::from_rgb(255, 150, 130);
 /// Masked parts.
 pub(super) const MASK: Color32 = Color32::from_rgb(120, 120, 132);
 /// The image circle.

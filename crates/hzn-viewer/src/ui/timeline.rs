@@ -1,14 +1,19 @@
 //! The time line: the status of every picture as a colour, the position in the sequence, and the player.
 
+use std::time::Duration;
+
 use egui::{Align2, Color32, FontId, Rangef, Rect, RichText, Sense, Shape, Stroke, Ui, pos2, vec2};
 use hzn_core::status::Status;
 
+use super::follow::OLD;
 use super::panels::Panel;
 use super::plots::{MARGIN, TimeAxis};
 use super::viewer::Viewer;
 use super::{Command, chips, theme};
 use crate::model::playback::SPEEDS;
 
+/// Time between two drawings of the age of the newest picture.
+const AGE_EVERY: Duration = Duration::from_millis(200);
 /// Width that is kept free for the progress of work on the whole sequence.
 const WORK_WIDTH: f32 = 260.0;
 
@@ -113,14 +118,16 @@ fn icon_button(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
 }
 
 /// Shows number, time and name of the picture.
-fn place(viewer: &Viewer, ui: &mut Ui) {
+fn place(viewer: &mut Viewer, ui: &mut Ui) {
     let count = viewer.sequence.len();
     if count == 0 {
         return;
     }
     let frame = viewer.playback.frame();
     let more = if viewer.sequence.complete { "" } else { "…" };
-    ui.label(format!("{} of {count}{more}", frame + 1));
+    follow(viewer, ui);
+    let before = viewer.follow.forgotten;
+    ui.label(format!("{} of {}{more}", before + frame + 1, before + count));
     if let Some(entry) = viewer.sequence.entries.get(frame) {
         let time = entry.time_s.map_or("time unknown".to_owned(), |t| format!("{t:.3} s"));
         ui.label(RichText::new(time).monospace().size(12.0));
@@ -130,6 +137,24 @@ fn place(viewer: &Viewer, ui: &mut Ui) {
         ui.allocate_ui_with_layout(room, layout, |ui| {
             ui.add(egui::Label::new(RichText::new(&entry.name).weak()).truncate());
         });
+    }
+}
+
+/// Shows whether the newest picture is followed, and its age.
+fn follow(viewer: &mut Viewer, ui: &mut Ui) {
+    if !viewer.follow.is_open {
+        return;
+    }
+    let hint = format!("{} ({})", Command::Follow.name(), Command::Follow.key(ui.ctx()));
+    if ui.selectable_label(viewer.follow.jumps, "Follow").on_hover_text(hint).clicked() {
+        viewer.toggle_follow();
+    }
+    if let Some(age) = viewer.follow.age() {
+        let (is_old, s) = (age >= OLD, age.as_secs_f64());
+        let text = if s < 10.0 { format!("newest {s:.1} s ago") } else { format!("newest {s:.0} s ago") };
+        let colour = if is_old { theme::warning(ui.visuals().dark_mode) } else { ui.visuals().weak_text_color() };
+        ui.colored_label(colour, text).on_hover_text("Time since the newest picture was found");
+        ui.ctx().request_repaint_after(AGE_EVERY);
     }
 }
 

@@ -8,6 +8,7 @@ use super::panels::Panel;
 use super::path_dialog::{PathDialog, Purpose};
 use super::viewer::Viewer;
 use crate::model::autosave::absolute;
+use crate::work::calibration::Kind;
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     egui::Panel::top("top").show(ui, |ui| {
@@ -26,6 +27,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
 /// Draws the switches at the right.
 fn toggles(viewer: &mut Viewer, ui: &mut Ui) {
     let shows = |panel| viewer.panels.shows(panel, &viewer.settings);
+    let is_live = viewer.live.is_some();
     let theme = if viewer.settings.dark { "Light" } else { "Dark" };
     let all = [
         (Command::Help, "Help", viewer.showing_help),
@@ -34,7 +36,9 @@ fn toggles(viewer: &mut Viewer, ui: &mut Ui) {
         (Command::Plots, "Plots", shows(Panel::Plots)),
         (Command::Answer, "Answer", shows(Panel::Answer)),
     ];
-    for (command, text, on) in all {
+    // The window on a flight computer has no such panels.
+    let is_panel = |c: Command| matches!(c, Command::Stages | Command::Plots | Command::Answer);
+    for (command, text, on) in all.into_iter().filter(|(c, ..)| !(is_live && is_panel(*c))) {
         let hint = format!("{} ({})", command.name(), command.key(ui.ctx()));
         if ui.selectable_label(on, text).on_hover_text(hint).clicked() {
             viewer.run(command, &ui.ctx().clone());
@@ -51,7 +55,8 @@ fn title(viewer: &Viewer, ui: &mut Ui) {
         let mut add = |words: &str, colour| {
             text.append(words, 0.0, egui::TextFormat::simple(font.clone(), colour));
         };
-        add(&viewer.sequence.title, ui.visuals().strong_text_color());
+        let title = viewer.live.as_ref().map_or(viewer.sequence.title.as_str(), |_| "flight computer");
+        add(title, ui.visuals().strong_text_color());
         if let Some(session) = &viewer.session {
             let name = session.path().and_then(|p| p.file_name()).map(|n| n.to_string_lossy().into_owned());
             let of_recording = viewer.sequence.recording.is_some();
@@ -125,6 +130,7 @@ fn file_menu(viewer: &mut Viewer, ui: &mut Ui) {
     }
     let is_open = !viewer.sequence.title.is_empty();
     menu_entry(viewer, ui, Command::Reload, is_open);
+    menu_entry(viewer, ui, Command::Follow, is_open);
     ui.separator();
     menu_entry(viewer, ui, Command::Save, has_sensor);
     menu_entry(viewer, ui, Command::SaveAs, has_sensor);
@@ -137,6 +143,15 @@ fn edit_menu(viewer: &mut Viewer, ui: &mut Ui) {
     menu_entry(viewer, ui, Command::Redo, redo);
     menu_entry(viewer, ui, Command::Reset, changed);
     menu_entry(viewer, ui, Command::Diff, changed);
+    ui.separator();
+    let can_calibrate = viewer.session.is_some() && !viewer.sequence.is_empty() && viewer.calibration.is_none();
+    for kind in [Kind::Noise, Kind::Lens] {
+        let button = egui::Button::new(format!("{}…", kind.name()));
+        if ui.add_enabled(can_calibrate, button).clicked() {
+            viewer.calibrate(kind);
+            ui.close();
+        }
+    }
     ui.separator();
     menu_entry(viewer, ui, Command::Mask, viewer.session.is_some());
     menu_entry(viewer, ui, Command::Circle, viewer.session.is_some());

@@ -1,6 +1,6 @@
 //! Processing of the whole sequence in the background, from the shown picture outwards.
 
-use std::collections::VecDeque;
+use std::collections::{HashSet, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -39,6 +39,8 @@ pub struct Task {
     pub from: usize,
     /// Single precision and at most 2048 points, as `FlightHorizon` has.
     pub flight: bool,
+    /// The pictures to process; `None` processes all.
+    pub only: Option<Vec<usize>>,
 }
 
 /// An event of the background work.
@@ -68,15 +70,21 @@ impl Background {
     pub fn start(task: Task, wake: Wake) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let (send, events) = unbounded();
-        let total = task.sequence.len();
+        let count = task.sequence.len();
         // A video is read forward only, and a sensor that follows earlier answers needs the pictures in order.
         let in_order = task.slots.iter().any(|s| s.setup.config.tracks())
             || task.sequence.entries.iter().any(|e| matches!(e.place, Place::Video(_)));
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = if in_order { 1 } else { cores.saturating_sub(1).max(1) };
         let from = if in_order { 0 } else { task.from };
+        let mut order = outwards(from, count);
+        if let Some(only) = &task.only {
+            let only: HashSet<usize> = only.iter().copied().collect();
+            order.retain(|i| only.contains(i));
+        }
+        let total = order.len();
         let shared = Arc::new(Shared {
-            order: Mutex::new(outwards(from, total)),
+            order: Mutex::new(order),
             task,
             stop: Arc::clone(&stop),
             woken: Mutex::new(Instant::now()),

@@ -59,6 +59,7 @@ enum Message {
     Open(Vec<std::path::PathBuf>),
     Recording(hzn_mcap::Pictures),
     Request(Box<FrameRequest>),
+    Renumbered,
 }
 
 /// Handle of the thread. The thread ends when the handle is dropped.
@@ -110,6 +111,10 @@ impl Engine {
     /// Sets the reader for the pictures of the recording.
     pub fn set_recording(&self, pictures: hzn_mcap::Pictures) {
         let _ = self.send.send(Message::Recording(pictures));
+    }
+    /// Tells that the pictures have other numbers now, so that nothing that is kept belongs to its number.
+    pub fn renumber(&self) {
+        let _ = self.send.send(Message::Renumbered);
     }
     /// Requests a picture. Earlier requests that have not been answered are dropped.
     pub fn request(&self, request: FrameRequest) {
@@ -171,6 +176,11 @@ impl Worker {
                         self.ahead.clear();
                     }
                     Message::Recording(pictures) => self.store.set_recording(pictures),
+                    Message::Renumbered => {
+                        self.store.forget();
+                        (self.shown, self.histogram, newest) = (None, None, None);
+                        self.ahead.clear();
+                    }
                     Message::Request(request) => newest = Some(request),
                 }
             }
@@ -213,6 +223,7 @@ impl Worker {
             answers: Vec::new(),
             version: request.setups.first().map_or(0, |s| s.version),
             decoding,
+            grid: Arc::default(),
             latency: request.since.elapsed(),
         };
         let Ok(picture) = picture else { return frame_view };

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::HashSet;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use egui::{Color32, ColorImage};
@@ -22,6 +22,7 @@ use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Trace, Traces, Watch};
 use hzn_run::source::Picture;
 use hzn_run::{overlay, sink};
 
+use super::ground;
 use super::paint::Recipe;
 use super::residuals::{Residual, ellipse, residuals};
 use super::trials::{OtsuTrial, Trials};
@@ -55,6 +56,8 @@ pub struct FrameView {
     pub histogram: Option<Arc<Histogram>>,
     /// Time to read and decode the picture; `None` if it was already decoded.
     pub decoding: Option<Duration>,
+    /// Latitudes and longitudes of the body, computed when they are drawn first; see [`FrameView::grid`].
+    pub(super) grid: Arc<OnceLock<Option<ground::Grid>>>,
     /// Time from the request to the answer.
     pub latency: Duration,
 }
@@ -64,6 +67,14 @@ impl FrameView {
     pub fn size(&self) -> Option<Point> {
         let layout = self.picture.as_ref().ok()?.layout;
         Some([layout.width.into(), layout.height.into()])
+    }
+    /// Returns latitudes and longitudes of the first body, if the position and the attitude of the picture are given.
+    pub fn grid(&self) -> Option<&ground::Grid> {
+        let compute = || {
+            let figure_km = self.answers.first()?.config.body.figure_km()?;
+            ground::grid(self.data.as_ref()?, figure_km, self.camera.as_deref()?)
+        };
+        self.grid.get_or_init(compute).as_ref()
     }
 }
 

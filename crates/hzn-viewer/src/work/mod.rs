@@ -1,15 +1,21 @@
 //! Work on separate threads, so that the window does not wait: opening, decoding, processing and exporting.
 
 pub mod background;
+pub mod calibration;
 mod canvas;
 pub mod caption;
 pub mod check;
 pub mod companion;
 pub mod demo;
 pub mod engine;
+mod entry;
 pub mod export;
+mod frame_joiner;
 pub mod frame_view;
+mod frames_table;
+pub mod ground;
 pub mod job;
+pub mod line;
 pub mod open;
 pub mod paint;
 pub mod plots;
@@ -26,6 +32,7 @@ pub mod trials;
 pub use engine::{Engine, FrameRequest, Setup};
 pub use frame_view::{BodyResult, FrameView};
 pub use job::Job;
+pub use line::Line;
 
 use std::sync::Arc;
 

@@ -1,16 +1,22 @@
 //! Opening of a sequence. Pictures are reported as they are found, so that a long recording is on the screen at once.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Receiver, Sender, unbounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use hzn_files::Frames;
 use hzn_files::truth::{self, Truth};
-use hzn_mcap::{Index, IndexEntry, Row};
+use hzn_mcap::{Index, Row};
 use hzn_run::open;
-use hzn_run::source::{self, Item, Payload, Raw, Source, TimeSource};
+use hzn_run::source::{self, Raw, Source, TimeSource};
 
 use super::Wake;
+use super::entry::entry_of;
+use super::frame_joiner::FrameJoiner;
+use super::frames_table::FramesTable;
 use crate::model::{Entry, Fingerprint, Place};
 
 /// Request to open a sequence, with the files that belong to it.
@@ -30,6 +36,8 @@ pub struct Request {
     pub raw: Option<Raw>,
     /// Index of the picture to begin with, from 0.
     pub frame: usize,
+    /// Waits for further pictures of a folder or a recording that grows.
+    pub follow: bool,
 }
 
 /// A sensor.toml.
@@ -65,8 +73,8 @@ pub enum Event {
     Opened(Box<Opened>),
     /// Further pictures, with the results from the file.
     Frames(Vec<(Entry, Vec<Row>)>),
-    /// Reader for the pictures of the recording, as far as its channels are known.
-    Pictures(hzn_mcap::Pictures),
+    /// The recording, and a reader for its pictures, as far as its channels are known.
+    Pictures(PathBuf, hzn_mcap::Pictures),
     /// All pictures were reported.
     End {
         /// The recording was not closed, so it can be recovered.
@@ -78,21 +86,48 @@ pub enum Event {
     Failed(String),
 }
 
-/// Starts to open a sequence and returns the events.
-pub fn start(request: Request, wake: Wake) -> Receiver<Event> {
-    let (send, receive) = unbounded();
+/// Events that wait for the window. A window that is not drawn holds up the opening, which then takes no more memory.
+const WAITING: usize = 1024;
+/// Time between two looks at a recording that grows.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// Longest wait for the final name of a recording.
+const RENAMED_WITHIN: Duration = Duration::from_secs(10);
+/// Looks without news after which no further results of the last picture are expected.
+const QUIET_LOOKS: u32 = 2;
+
+/// An opening. It ends when the handle is dropped.
+#[derive(Debug)]
+pub struct Opening {
+    /// The events.
+    pub events: Receiver<Event>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Drop for Opening {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Starts to open a sequence.
+pub fn start(request: Request, wake: Wake) -> Opening {
+    let (send, events) = bounded(WAITING);
+    let stop = Arc::new(AtomicBool::new(false));
+    let of_thread = Arc::clone(&stop);
     std::thread::spawn(move || {
-        let events = EventSender { channel: send, wake };
+        let events = EventSender { channel: send, wake, stop: of_thread };
         if let Err(why) = run(&request, &events) {
             events.send(Event::Failed(why));
         }
     });
-    receive
+    Opening { events, stop }
 }
 
 struct EventSender {
     channel: Sender<Event>,
     wake: Wake,
+    /// Nobody waits for further events.
+    stop: Arc<AtomicBool>,
 }
 
 impl EventSender {
@@ -101,6 +136,9 @@ impl EventSender {
         let is_received = self.channel.send(event).is_ok();
         (self.wake)();
         is_received
+    }
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 }
 
@@ -111,6 +149,10 @@ fn run(request: &Request, events: &EventSender) -> Result<(), String> {
             Err(format!("{}: {what}", one.display()))
         }
         [one] if one.is_file() && is_recording(one) => open_recording(one, request, events),
+        // A recording has another name until it is finished.
+        [one] if request.follow && is_recording(one) && hzn_mcap::part_path(one).is_file() => {
+            open_recording(&hzn_mcap::part_path(one), request, events)
+        }
         [one] if is_table(one) => Err(format!("{}: is neither a picture nor a recording", one.display())),
         _ => open_pictures(request, events),
     }
@@ -209,102 +251,79 @@ fn open_recording(path: &Path, request: &Request, events: &EventSender) -> Resul
         complete_sensor(&mut opened, source.as_mut(), frames.as_ref());
     }
     events.send(Event::Opened(Box::new(opened)));
-    let mut joiner = FrameJoiner { name: title(path), frames, pending: HashMap::new(), pictures_only: 0, last: None };
-    let mut known = 0;
-    loop {
-        let part = match index.next_part() {
-            Ok(Some(part)) => part,
-            Ok(None) => break,
-            Err(e) => {
-                events.send(Event::End { cut_off: false, note: Some(e.to_string()) });
-                return Ok(());
-            }
-        };
-        if part.is_empty() {
-            continue;
-        }
-        if known != index.channels() {
-            known = index.channels();
-            events.send(Event::Pictures(index.pictures().map_err(|e| e.to_string())?));
-        }
-        let batch = joiner.join(part, index.has_reports());
-        if !batch.is_empty() && !events.send(Event::Frames(batch)) {
-            return Ok(());
-        }
+    let joiner = FrameJoiner::new(title(path), frames);
+    let Some(note) = read_parts(path, &mut index, joiner, request.follow, events)? else { return Ok(()) };
+    if request.follow {
+        wait_for_name(path, events);
     }
-    if let Some(last) = joiner.last.take() {
-        events.send(Event::Frames(vec![last]));
-    }
+    // What comes after a part that cannot be read is unknown.
+    let cut_off = !index.is_complete() && note.is_none();
     let broken = index.broken_chunks();
-    let note = (broken > 0).then(|| format!("{broken} parts of the recording are damaged; their pictures are missing"));
-    events.send(Event::End { cut_off: !index.is_complete(), note });
+    let damaged = || format!("{broken} parts of the recording are damaged; their pictures are missing");
+    let note = note.or_else(|| (broken > 0).then(damaged));
+    events.send(Event::End { cut_off, note });
     Ok(())
 }
 
-/// Joins pictures and their results.
-struct FrameJoiner {
-    name: String,
-    frames: Option<Frames>,
-    /// Pictures whose results have not been read yet, by log time and sequence number.
-    pending: HashMap<(u64, u32), VecDeque<hzn_mcap::Place>>,
-    /// Number of pictures so far, in a recording without results.
-    pictures_only: u64,
-    /// The last picture; results of further bodies may follow.
-    last: Option<(Entry, Vec<Row>)>,
+/// Waits until a recording that is complete has its final name. Its writer gives it the name after the last byte.
+fn wait_for_name(path: &Path, events: &EventSender) {
+    let is_part = path.extension().is_some_and(|ending| ending == "part");
+    let begin = Instant::now();
+    while is_part && path.exists() && begin.elapsed() < RENAMED_WITHIN && !events.is_stopped() {
+        std::thread::sleep(LOOK_EVERY);
+    }
 }
 
-impl FrameJoiner {
-    /// Takes the first picture of a frame.
-    fn take_pending(&mut self, frame: (u64, u32)) -> Option<hzn_mcap::Place> {
-        let places = self.pending.get_mut(&frame)?;
-        let place = places.pop_front();
-        if places.is_empty() {
-            self.pending.remove(&frame);
-        }
-        place
-    }
-
-    fn join(&mut self, part: Vec<IndexEntry>, has_reports: bool) -> Vec<(Entry, Vec<Row>)> {
-        let mut out = Vec::new();
-        for found in part {
-            match found {
-                IndexEntry::Picture(place) if has_reports => {
-                    self.pending.entry(place.frame()).or_default().push_back(place);
+/// Reads all parts of a recording, and with `follow` those that are still added to it. Returns why it cannot be read
+/// further; the outer `None` means that nobody waits for the pictures.
+fn read_parts(
+    path: &Path,
+    index: &mut Index,
+    mut joiner: FrameJoiner,
+    follow: bool,
+    events: &EventSender,
+) -> Result<Option<Option<String>>, String> {
+    let (mut known, mut quiet) = (0, 0);
+    loop {
+        let batch = match index.next_part() {
+            Ok(Some(part)) if part.is_empty() => continue,
+            Ok(Some(part)) => {
+                quiet = 0;
+                if known != index.channels() {
+                    known = index.channels();
+                    let pictures = index.pictures().map_err(|e| e.to_string())?;
+                    events.send(Event::Pictures(path.to_owned(), pictures));
                 }
-                IndexEntry::Picture(place) => {
-                    let name = format!("{}#{:06}", self.name, self.pictures_only);
-                    self.pictures_only += 1;
-                    let data = self.frames.as_ref().and_then(|f| f.get(&name)).cloned();
-                    let time_s = match &self.frames {
-                        Some(frames) if frames.has_times() => data.as_ref().and_then(|d| d.time_s),
-                        _ => Some(place.log_time_s()),
-                    };
-                    out.push((Entry { name, time_s, data, place: Place::Recorded(place) }, Vec::new()));
-                }
-                IndexEntry::Report(at, row, _, given) => {
-                    if let Some((entry, rows)) = &mut self.last
-                        && rows.first().is_some_and(|r| r.index == row.index)
-                        && entry.name == row.file
-                    {
-                        rows.push(*row);
-                        continue;
-                    }
-                    out.extend(self.last.take());
-                    let data = hzn_run::source::recorded_prior(&row, *given);
-                    let place = self.take_pending(at.frame()).map_or(Place::Nowhere, Place::Recorded);
-                    let entry = Entry { name: row.file.clone(), time_s: row.time_s, data: Some(data), place };
-                    self.last = Some((entry, vec![*row]));
-                }
+                joiner.join(part, index.has_reports())
             }
+            Ok(None) if follow && !index.is_complete() => {
+                std::thread::sleep(LOOK_EVERY);
+                quiet += 1;
+                // The results of further bodies come together with those of the first one.
+                let last = if quiet == QUIET_LOOKS { joiner.take_last() } else { None };
+                last.into_iter().collect()
+            }
+            Ok(None) => {
+                let last: Vec<_> = joiner.take_last().into_iter().collect();
+                return Ok(events.send(Event::Frames(last)).then_some(None));
+            }
+            Err(e) => return Ok(Some(Some(e.to_string()))),
+        };
+        let is_gone = !batch.is_empty() && !events.send(Event::Frames(batch));
+        if is_gone || events.is_stopped() {
+            return Ok(None);
         }
-        out
     }
 }
 
 /// Opens pictures in separate files, or a video.
 fn open_pictures(request: &Request, events: &EventSender) -> Result<(), String> {
-    let open = || source::open(&request.inputs, request.raw, None);
-    let mut source = open().map_err(|e| e.to_string())?;
+    let source = if request.follow {
+        source::watch(&request.inputs, request.raw, Arc::clone(&events.stop))
+    } else {
+        source::open(&request.inputs, request.raw, None)
+    };
+    let mut source = source.map_err(|e| e.to_string())?;
     let (mut opened, frames) = read_companions(request, &source.folder(), None);
     opened.title = match request.inputs.as_slice() {
         [one] => title(one),
@@ -313,9 +332,11 @@ fn open_pictures(request: &Request, events: &EventSender) -> Result<(), String> 
     opened.notes.extend(source.notes());
     complete_sensor(&mut opened, source.as_mut(), frames.as_ref());
     events.send(Event::Opened(Box::new(opened)));
+    let path = request.frames.clone().unwrap_or_else(|| source.folder().join("frames.csv"));
+    let mut table = FramesTable::new(path, frames);
     let mut batch = Vec::new();
     for index in 0u64.. {
-        let mut item = match source.next() {
+        let item = match source.next() {
             None => break,
             Some(Ok(item)) => item,
             Some(Err(e)) => {
@@ -324,33 +345,21 @@ fn open_pictures(request: &Request, events: &EventSender) -> Result<(), String> 
                 return Ok(());
             }
         };
-        let time = item.time_source(frames.as_ref());
-        let data = item.take_prior(frames.as_ref());
-        let Item { name, payload, .. } = item;
-        let place = match payload {
-            Payload::File(path) => Place::File(path),
-            Payload::RawFile(path, raw) => Place::RawFile(path, raw),
-            _ => Place::Video(index),
-        };
-        let exif = || match &place {
-            Place::File(path) => source::exif_time_s(path),
-            _ => None,
-        };
-        let time_s = match (time, request.fps) {
-            // No time is invented for a folder without times.
-            (TimeSource::Count, None) => None,
-            (time, fps) => time.time_s(data.as_ref(), exif, index, fps.unwrap_or(1.0)),
-        };
-        let takes_long = time == TimeSource::Exif || matches!(place, Place::Video(_));
-        batch.push((Entry { name, time_s, data, place }, Vec::new()));
+        if request.follow {
+            table.renew();
+        }
+        let (entry, time) = entry_of(item, index, table.frames.as_ref(), request.fps);
+        let takes_long = time == TimeSource::Exif || matches!(entry.place, Place::Video(_)) || request.follow;
+        batch.push((entry, Vec::new()));
         // To know the times, a video is decoded and a file is opened. This takes long, so the pictures found so far are
-        // sent.
-        if takes_long && batch.len() >= 25 && !events.send(Event::Frames(std::mem::take(&mut batch))) {
+        // sent. A picture that has just arrived is sent at once.
+        let enough = if request.follow { 1 } else { 25 };
+        if takes_long && batch.len() >= enough && !events.send(Event::Frames(std::mem::take(&mut batch))) {
             return Ok(());
         }
     }
     events.send(Event::Frames(batch));
-    let missing = frames.as_ref().and_then(|f| missing_note(f, request, &source.folder()));
+    let missing = table.frames.as_ref().and_then(|f| missing_note(f, request, &source.folder()));
     events.send(Event::End { cut_off: false, note: source.describe_loss().or(missing) });
     Ok(())
 }
@@ -372,7 +381,7 @@ mod tests {
     use std::sync::Arc;
 
     fn all_events(request: Request) -> Vec<Event> {
-        start(request, Arc::new(|| {})).iter().collect()
+        start(request, Arc::new(|| {})).events.iter().collect()
     }
 
     fn request_for(path: &Path) -> Request {

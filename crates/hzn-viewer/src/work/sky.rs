@@ -72,6 +72,11 @@ fn hides(body: &BodyResult, kind: Kind, direction: [f64; 3]) -> bool {
     is_beyond && body.solution().is_some_and(within)
 }
 
+/// Returns the direction to the Sun in the camera frame: the given one, or else that of time, position and attitude.
+pub(super) fn sun(data: &FrameData) -> Option<[f64; 3]> {
+    data.sun_camera.or_else(|| from_ephemeris(data, ephemeris::sun))
+}
+
 fn from_ephemeris(data: &FrameData, place: impl Fn(f64) -> ephemeris::Place) -> Option<[f64; 3]> {
     let turn = Rotation::<Cam, Fixed, f64>::assume_from_quaternion(data.q_fixed_from_camera_wxyz?)?.inverse();
     let seen = place(data.utc_s?).seen_from(data.position_km?.map(|km| km * 1e3).into());

@@ -29,6 +29,10 @@ impl Store {
     pub fn open(&mut self, inputs: Vec<PathBuf>) {
         *self = Self { reader: Reader::new(inputs, None), ..Self::default() };
     }
+    /// Drops all pictures.
+    pub fn forget(&mut self) {
+        self.kept.clear();
+    }
     /// Sets the reader for the pictures of the recording.
     pub fn set_recording(&mut self, pictures: Pictures) {
         self.reader.recording = Some(pictures);

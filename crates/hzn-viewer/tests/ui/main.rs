@@ -1,10 +1,13 @@
 //! Tests of the viewer through its accessibility tree and by mouse, as a user or a screen reader would drive it.
 
+mod calibrate;
 mod causes;
 mod clear;
 mod companions;
 mod exports;
 mod found;
+mod ground;
+mod live;
 mod mouse;
 mod overwrite;
 mod small;

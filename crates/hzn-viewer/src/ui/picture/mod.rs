@@ -1,10 +1,13 @@
 //! The panel with the picture and its overlays.
 
 mod circle;
+mod ground;
+mod inset;
 mod lens;
 mod mask;
 mod overlays;
 mod read_out;
+mod strokes;
 mod welcome;
 
 pub(super) use circle::remove as remove_circle;
@@ -75,6 +78,7 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
     let outcome = frame_view.answers.get(pane);
     if let Some(outcome) = outcome.filter(|_| !viewer.layers_hidden) {
         overlays::draw(viewer, &painter, frame_view, outcome, &placement);
+        inset::draw(viewer, &painter, frame_view, outcome, rect);
     }
     if pane == 0 {
         draw_tools(viewer, ui, &painter, frame_view, &placement);

@@ -3,6 +3,8 @@
 use egui::{Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 use hzn_core::pixel::ImagePoint;
 
+use super::ground;
+use super::strokes::{cross, lines};
 use crate::model::Plane;
 use crate::model::settings::Layer;
 use crate::model::view::Point;
@@ -35,6 +37,7 @@ pub(super) fn draw(
             dashed_ellipse(painter, ellipse, placement);
         }
     }
+    ground::draw(viewer, painter, frame_view, outcome, placement);
     for answer in &outcome.bodies {
         body(viewer, painter, answer, placement);
     }
@@ -174,20 +177,6 @@ fn place_label(arrow: Rect, direction: Vec2, size: Vec2, frame: Rect) -> Rect {
     let ahead = |r: &Rect| (r.center() - c).dot(direction);
     places.sort_by(|a, b| ahead(a).total_cmp(&ahead(b)));
     places.into_iter().find(|r| frame.expand(0.5).contains_rect(*r)).unwrap_or(places[0])
-}
-
-fn cross(painter: &Painter, at: Pos2, arm: f32, stroke: Stroke) {
-    painter.line_segment([at - vec2(arm, 0.0), at + vec2(arm, 0.0)], stroke);
-    painter.line_segment([at - vec2(0.0, arm), at + vec2(0.0, arm)], stroke);
-}
-
-fn lines(painter: &Painter, placement: &Placement<'_>, lines: &[Vec<Point>], stroke: Stroke) {
-    for line in lines {
-        // A point that the plane cannot show ends the line.
-        for part in line.split(|p| placement.to_screen(*p).is_none()) {
-            painter.add(Shape::line(part.iter().filter_map(|p| placement.to_screen(*p)).collect(), stroke));
-        }
-    }
 }
 
 /// Draws lines with dashes, above a dark line that keeps them visible on clouds.

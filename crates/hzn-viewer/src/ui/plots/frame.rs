@@ -33,12 +33,12 @@ pub(super) fn heading(ui: &mut Ui, title: &str, lines: &[(&str, Color32)], value
 }
 
 /// Names the plot for screen readers.
-pub(super) fn set_label(response: &Response, name: &str) {
+pub(in crate::ui) fn set_label(response: &Response, name: &str) {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Plot {name}")));
 }
 
 /// Returns a plot with the properties that all plots share.
-pub(super) fn shared_plot<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> {
+pub(in crate::ui) fn shared_plot<'a>(id: impl egui::AsIdSalt, height: f32) -> Plot<'a> {
     Plot::new(id)
         .height(height)
         .allow_scroll(false)

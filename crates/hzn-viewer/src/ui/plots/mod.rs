@@ -13,6 +13,7 @@ use egui::{RichText, ScrollArea, Ui};
 use super::viewer::Viewer;
 use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
 use crate::model::quantity::QUANTITIES;
+pub(super) use frame::{set_label, shared_plot};
 pub(super) use over_time::{MARGIN, TimeAxis};
 pub(super) use residuals::RESIDUALS;
 pub(super) use sheet::sheet;

@@ -20,6 +20,7 @@ impl Viewer {
             Command::OpenFolder => self.ask_folder(),
             Command::OpenPath => self.path_dialog = Some(PathDialog::new(Purpose::Open, &self.sequence.folder)),
             Command::Reload => self.reload_pictures(),
+            Command::Follow => self.toggle_follow(),
             Command::Save => self.save(),
             Command::SaveAs => {
                 if let Some(session) = &self.session {

@@ -55,7 +55,8 @@ impl Viewer {
         let version = |s: &Session| s.config().map(|_| s.version());
         let wanted =
             (self.session.as_ref().and_then(version), self.other.as_ref().and_then(|(_, session)| version(session)));
-        if !self.sequence.complete || !background::has_pictures(&self.sequence) {
+        let is_known = self.sequence.complete || self.follow.is_open;
+        if !is_known || !background::has_pictures(&self.sequence) {
             return;
         }
         if self.work.wanted != wanted {
@@ -66,6 +67,10 @@ impl Viewer {
             (self.work.running, self.work.stopped) = (None, false);
             self.work.due = Some(Instant::now() + AFTER_CHANGE);
         }
+        if self.follow.is_open {
+            let own = self.session.as_ref().and_then(|s| slot(s, true));
+            return self.work_on_added(own.into_iter().collect());
+        }
         let Some(due) = self.work.due.filter(|_| !self.work.stopped) else { return };
         let left = due.saturating_duration_since(Instant::now());
         if !left.is_zero() {
@@ -74,8 +79,13 @@ impl Viewer {
         self.work.due = None;
         let slots = self.missing_slots();
         if !slots.is_empty() {
-            let task =
-                Task { sequence: self.sequence.clone(), slots, from: self.playback.frame(), flight: self.flight };
+            let task = Task {
+                sequence: self.sequence.clone(),
+                slots,
+                from: self.playback.frame(),
+                flight: self.flight,
+                only: None,
+            };
             self.work.running = Some(Background::start(task, Arc::clone(&self.wake)));
         }
     }
@@ -92,7 +102,9 @@ impl Viewer {
                 Event::Other(index, version, rows) if other == Some(version) => self.rows.set_other(index, rows),
                 Event::End => {
                     self.work.running = None;
-                    self.work.complete = self.work.wanted;
+                    if !self.follow.is_open {
+                        self.work.complete = self.work.wanted;
+                    }
                 }
                 _ => {}
             }

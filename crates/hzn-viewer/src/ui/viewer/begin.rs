@@ -10,7 +10,9 @@ use hzn_files::truth::Truth;
 use super::Viewer;
 use super::changes::Leave;
 use crate::model::{Place, Session, autosave};
+use crate::ui::calibration_window::CalibrationWindow;
 use crate::ui::wizard_form::Wizard;
+use crate::work::calibration::{self, Calibration, Kind};
 use crate::work::demo;
 use crate::work::open::Request;
 use crate::work::study::{Study, Task};
@@ -36,6 +38,25 @@ impl Viewer {
         self.set_session(session);
         warnings.into_iter().for_each(|w| self.add_note(w));
         self.add_note(format!("Save the sensor.toml to keep it: {}", home.display()));
+    }
+
+    /// Returns true while a calibration runs.
+    pub fn is_calibrating(&self) -> bool {
+        self.calibration.as_ref().is_some_and(|window| window.running.is_some())
+    }
+
+    /// Starts a calibration on the pictures.
+    pub(in crate::ui) fn calibrate(&mut self, kind: Kind) {
+        let Some(session) = &self.session else { return self.add_note("Open a sensor.toml first.") };
+        let (Some(config), None) = (session.config().map(Arc::clone), session.problem()) else {
+            return self.add_note("The sensor.toml has an error; mend it first.");
+        };
+        let version = session.version();
+        let sensor_toml = session.sheet().text().to_owned();
+        let task =
+            calibration::Task { kind, sequence: self.sequence.clone(), config, sensor_toml, flight: self.flight };
+        let running = Some(Calibration::start(task, Arc::clone(&self.wake)));
+        self.calibration = Some(CalibrationWindow { kind, running, result: None, version });
     }
 
     /// Returns the folder of the demo flight: next to the settings, or in the folder for temporary files.

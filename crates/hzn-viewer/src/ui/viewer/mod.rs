@@ -6,8 +6,10 @@ mod auto;
 mod begin;
 mod changes;
 mod companions;
+mod follow;
 mod jobs;
 mod keep_settings;
+mod line;
 mod outputs;
 mod request_key;
 mod sequence_work;
@@ -20,10 +22,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::Receiver;
 use hzn_files::truth::Truth;
+use hzn_fly::link::Address;
 
+use super::calibration_window::CalibrationWindow;
 use super::focus_ring::FocusRing;
+use super::follow::Follow;
+use super::live_view::LiveView;
 use super::offered::Offered;
 use super::panels::{Panel, Panels};
 use super::path_dialog::PathDialog;
@@ -66,6 +71,8 @@ pub struct Viewer {
     pub(super) other: Option<(String, Session)>,
     pub(super) flight: bool,
     pub(super) playback: Playback,
+    /// The state of a sequence that grows.
+    pub(super) follow: Follow,
     pub(super) view: View,
     pub(super) body: usize,
     /// Candidate that the pointer is on in the column of stages.
@@ -85,7 +92,11 @@ pub struct Viewer {
     checking: Option<Check>,
     pub(super) damaged: Damaged,
     pub(super) wizard: Option<Wizard>,
+    /// The flight computer whose telemetry is shown instead of pictures.
+    pub(super) live: Option<LiveView>,
     pub(super) study: Option<StudyWindow>,
+    /// The calibration on the pictures.
+    pub(super) calibration: Option<CalibrationWindow>,
     pub(super) summary: Summary,
     pub(super) missed: Missed,
     /// The plots that the sequence offers.
@@ -123,7 +134,7 @@ pub struct Viewer {
     /// Position in the list of the worst pictures.
     worst: usize,
     request: Request,
-    opening: Option<Receiver<open::Event>>,
+    opening: Option<open::Opening>,
     /// Number of messages when the opening began.
     messages_before: usize,
     pub(super) sweep: Option<Sweep>,
@@ -157,6 +168,7 @@ impl Viewer {
             other: None,
             flight: false,
             playback: Playback::default(),
+            follow: Follow::default(),
             view: View::FIT,
             body: 0,
             pointed: None,
@@ -170,7 +182,9 @@ impl Viewer {
             checking: None,
             damaged: Damaged::new(),
             wizard: None,
+            live: None,
             study: None,
+            calibration: None,
             summary: Summary::default(),
             missed: Missed::default(),
             offered: Offered::default(),
@@ -210,8 +224,14 @@ impl Viewer {
         }
     }
 
-    /// Opens another sequence.
+    /// Opens another sequence, or the line to a flight computer.
     pub fn open(&mut self, request: Request) {
+        if let [one] = request.inputs.as_slice()
+            && Address::is_address(&one.to_string_lossy())
+        {
+            return self.open_line(&one.to_string_lossy());
+        }
+        self.live = None;
         self.messages_before = self.toasts.len();
         // A session that waits for its sequence does not come to another one.
         self.restoring = None;
@@ -287,12 +307,15 @@ impl Viewer {
     /// Returns true if the screen shows the requested picture, processed with the current parameters.
     pub fn is_settled(&self) -> bool {
         let version = self.session.as_ref().map_or(0, Session::version);
-        self.opening.is_none()
+        if let Some(live) = &self.live {
+            return live.line.live().last.is_some();
+        }
+        (self.opening.is_none() || self.follow.is_open)
             && self.frame_view.as_ref().is_some_and(|s| s.index == self.playback.frame() && s.version == version)
     }
     /// Returns true if nothing is being opened and there is no picture.
     pub fn is_without_pictures(&self) -> bool {
-        self.opening.is_none() && self.sequence.is_empty()
+        self.live.is_none() && self.opening.is_none() && self.sequence.is_empty()
     }
     /// Returns the number of pictures that are processed with the current parameters.
     pub fn processed(&self) -> usize {

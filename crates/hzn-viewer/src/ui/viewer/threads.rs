@@ -27,7 +27,8 @@ const AT_ONCE_PLAYING: Duration = Duration::from_millis(40);
 impl Viewer {
     /// Takes all messages of the threads.
     pub(in crate::ui) fn poll(&mut self, ctx: &egui::Context) {
-        let opening_events: Vec<open::Event> = self.opening.iter().flat_map(|r| r.try_iter()).collect();
+        let opening_events: Vec<open::Event> = self.opening.iter().flat_map(|o| o.events.try_iter()).collect();
+        self.notice_navigation();
         for event in opening_events {
             // An opening that ended has no further events.
             if self.opening.is_some() {
@@ -81,6 +82,11 @@ impl Viewer {
 
     /// Takes over a processed picture.
     fn take_frame(&mut self, frame_view: FrameView) {
+        let entry = self.sequence.entries.get(frame_view.index);
+        if entry.is_none_or(|entry| entry.name != frame_view.name) {
+            // The pictures of a growing sequence have moved since the request.
+            return;
+        }
         if let Some(outcome) = frame_view.answers.first()
             && self.session.as_ref().is_some_and(|s| s.version() == frame_view.version)
             && !outcome.bodies.is_empty()
@@ -103,9 +109,9 @@ impl Viewer {
                 self.changes.question = Some(Leave::Sequence(Box::new(self.request.clone())));
             }
             open::Event::Opened(opened) => self.begin_sequence(*opened),
-            open::Event::Pictures(pictures) => {
+            open::Event::Pictures(path, pictures) => {
                 self.engine.set_recording(pictures);
-                self.sequence.recording = self.request.inputs.first().cloned();
+                self.sequence.recording = Some(path);
             }
             open::Event::Frames(frames) => {
                 for (entry, rows) in frames {
@@ -115,6 +121,7 @@ impl Viewer {
                         self.rows.record(index, row);
                     }
                 }
+                self.take_added();
             }
             open::Event::End { cut_off, note } => self.complete_sequence(cut_off, note),
             open::Event::Failed(why) => {
@@ -137,7 +144,7 @@ impl Viewer {
         };
         (self.rows, self.truth) = (ResultHistory::default(), opened.truth);
         (self.frame_view, self.requested, self.sweep) = (None, None, None);
-        (self.mask, self.circle) = (None, None);
+        (self.mask, self.circle, self.calibration) = (None, None, None);
         (self.worst, self.body) = (0, 0);
         self.view = View::FIT;
         self.unscrolled = vec![Panel::Answer, Panel::Stages];
@@ -148,6 +155,7 @@ impl Viewer {
         self.toasts.remove_first(self.messages_before);
         self.search_companions();
         self.playback.go(self.request.frame, usize::MAX);
+        self.begin_following();
         self.engine.open(self.request.inputs.clone());
         self.begin_sensor(opened.sensor);
         for note in opened.notes {
@@ -189,6 +197,7 @@ impl Viewer {
     fn complete_sequence(&mut self, cut_off: bool, note: Option<String>) {
         self.opening = None;
         self.sequence.complete = true;
+        self.end_following();
         self.playback.set_usual_speed(self.sequence.interval_s());
         self.playback.go(self.playback.frame(), self.sequence.len());
         if cut_off {

@@ -1,0 +1,14 @@
+//! The state of the window that calibrates.
+
+use crate::work::calibration::{Calibration, Kind, Measured};
+
+/// A calibration: in progress, or with its result.
+pub(super) struct CalibrationWindow {
+    pub(super) kind: Kind,
+    /// Work in progress; `None` when it has ended.
+    pub(super) running: Option<Calibration>,
+    /// The result, or why there is none.
+    pub(super) result: Option<Result<Measured, String>>,
+    /// Version of the session that was calibrated. The result belongs to it alone.
+    pub(super) version: u64,
+}

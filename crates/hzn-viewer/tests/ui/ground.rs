@@ -1,0 +1,57 @@
+//! Where the camera looks.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use egui_kittest::kittest::Queryable;
+use hzn_sim::flight::rocket;
+use hzn_viewer::model::settings::Layer;
+
+use super::window::{flight, folder, settled, window_on};
+
+/// Writes a rendered flight with positions, and with attitudes if they are wanted.
+fn write(folder: &Path, has_attitude: bool) {
+    let flight = rocket(320, 180, 3, 7706);
+    let mut table = "file,time_s,x_km,y_km,z_km".to_owned();
+    table += if has_attitude { ",qw,qx,qy,qz\n" } else { "\n" };
+    for frame in &flight.frames {
+        let picture = frame.render().unwrap();
+        let path = folder.join(&frame.file);
+        std::fs::write(&path, picture.encode(&path).unwrap()).unwrap();
+        let [x, y, z] = frame.scene.pose.position_m.map(|m| m / 1e3);
+        write!(table, "{},{},{x},{y},{z}", frame.file, frame.time_s).unwrap();
+        if has_attitude {
+            let [w, x, y, z] = frame.scene.pose.q_fixed_from_camera_wxyz;
+            write!(table, ",{w},{x},{y},{z}").unwrap();
+        }
+        table.push('\n');
+    }
+    std::fs::write(folder.join("frames.csv"), table).unwrap();
+    std::fs::write(folder.join("sensor.toml"), toml::to_string(&flight.sensor).unwrap()).unwrap();
+}
+
+#[test]
+fn latitudes_and_longitudes_need_a_position_and_an_attitude() {
+    for has_attitude in [true, false] {
+        let dir = tempfile::tempdir().unwrap();
+        write(dir.path(), has_attitude);
+        let mut window = window_on(dir.path());
+        window.state_mut().settings_mut().show(Layer::Grid, true);
+        window.state_mut().settings_mut().show(Layer::Vertical, true);
+        settled(&mut window);
+        window.run_steps(3);
+        assert_eq!(window.query_by_label("Latitude, longitude").is_some(), has_attitude);
+        assert!(window.query_by_label("Local vertical").is_some());
+        let grid = window.state().frame_view().unwrap().grid().map(|grid| grid.parallels.len());
+        assert_eq!(grid.is_some_and(|n| n > 0), has_attitude, "{grid:?}");
+    }
+}
+
+#[test]
+fn pictures_without_positions_have_no_grid() {
+    let (_dir, pictures) = folder();
+    flight(&pictures);
+    let window = window_on(&pictures);
+    assert!(window.query_by_label("Latitude, longitude").is_none());
+    assert!(window.state().frame_view().unwrap().grid().is_none());
+}
