@@ -113,9 +113,6 @@ fn the_telemetry_of_a_flight_computer_is_shown() {
     assert!(window.query_by_label("301 packets, 300 answers").is_some());
     assert!(window.query_by_label_contains("the camera is silent").is_some());
     assert!(window.query_by_label("42 s ago").is_some() && window.query_by_label("flight").is_some());
-    for plot in ["angle from the optical axis, °", "3σ, °", "altitude of the free fit, km"] {
-        assert!(window.query_all_by_label(plot).next().is_some(), "{plot}");
-    }
     // A gap in the counts of the packets is a loss.
     for n in 0..40 {
         let packet = computer.answer();
@@ -154,9 +151,6 @@ fn an_hour_at_ten_pictures_a_second_takes_bounded_memory() {
     assert!(has(window.state(), |l| (l.points.len(), l.counts().lost), (ANSWERS, 0)));
     let newest_s = |v: &Viewer| v.live(|l| l.points.back().unwrap().time_s).unwrap();
     assert!((newest_s(window.state()) - 3700.0).abs() < 1e-6);
-    window.get_by_label("1 h").click();
-    window.run_steps(3);
-    assert!(window.query_all_by_label("3σ, °").next().is_some());
 }
 
 #[test]
