@@ -40,7 +40,7 @@ pub use estimate::{Estimate, MIN_PICTURES, Picture, estimate};
 pub use mount::{Mount, MountRefusal, estimate_mount};
 pub use observable::Observability;
 pub use parameters::Determined;
-pub use passes::estimate_in_passes;
+pub use passes::{Estimated, estimate_in_passes};
 pub use refusal::Refusal;
 pub use track::{Sight, Track, TrackRefusal, estimate_track};
 pub use unknowns::{LimbPrior, Parameter, Unknowns};

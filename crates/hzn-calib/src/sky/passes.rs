@@ -14,6 +14,9 @@ const PASSES: usize = 3;
 /// border of a wide picture then move by about a pixel.
 const PROCESS_AGAIN_PERCENT: f64 = 0.2;
 
+/// The estimate with the views that it is made of, or why the flight does not determine the lens.
+pub type Estimated = Result<(Estimate, Vec<View>), Refusal>;
+
 /// Processes the pictures of a flight and estimates the lens, with the estimated lens again if it differs. `process`
 /// gets the lens to process with and returns the views, or `None` if it was interrupted. `again` gets the difference of
 /// the focal length and its sigma, in percent, before the pictures are processed again. `body` is the body that the
@@ -28,7 +31,7 @@ pub fn estimate_in_passes<E>(
     limb: LimbPrior,
     mut process: impl FnMut(&camera::Config) -> Result<Option<Vec<View>>, E>,
     mut again: impl FnMut([f64; 2]),
-) -> Result<Option<Result<(Estimate, Vec<View>), Refusal>>, E> {
+) -> Result<Option<Estimated>, E> {
     let focal_sigma_percent = unknowns.focal_sigma_percent();
     let mut used = camera::Config { covariance: None, focal_sigma_percent, ..sensor.camera.clone() };
     let mut before_percent = 0.0;

@@ -88,7 +88,7 @@ impl Fault {
             }
             Self::InvertedTracker => each_attitude(problem, |told| told.inverse()),
             Self::ScalarLastTracker => each_attitude(problem, |told| with_scalar_first(&told)),
-            Self::InertialTracker => problem.to_fixed_axes()?,
+            Self::InertialTracker => problem.refer_to_fixed_axes()?,
         }
         Some(())
     }
@@ -149,7 +149,7 @@ const VALUES: [i32; 3] = [32, 10, 20];
 impl Problem {
     /// Turns attitudes that are relative to inertial axes to fixed axes. The angle at the time 0 comes from a search:
     /// the times need not be UTC.
-    fn to_fixed_axes(&mut self) -> Option<()> {
+    fn refer_to_fixed_axes(&mut self) -> Option<()> {
         // The problem has its attitudes in axes that do not turn and are those of ECEF at the time 0.
         let told: Vec<_> = self.tracked.iter().map(|t| about_pole(t.time_s).inverse() * t.attitude).collect();
         let turned = |angle_rad: f64| {

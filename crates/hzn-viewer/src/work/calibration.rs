@@ -161,6 +161,7 @@ impl Run {
             keep_traces: true,
             keep_picture: false,
             overlay: None,
+            masks: None,
             last: Vec::new(),
             turns: Turns::default(),
         };
