@@ -66,8 +66,6 @@ impl Disc {
         let mut config = Config::new(self.lens.clone());
         config.body =
             body::Config { altitude_sigma_km: 1.0, limb_height_km: 0.0, limb_height_sigma_km: 0.5, ..config.body };
-        // The disc has no air and one brightness, as a ghost of the lens has. The air of the Earth would be 4 px high.
-        config.gates.min_p_limb = 0.0;
         let mut horizon = HostHorizon::boxed(&config).unwrap();
         let prior = Prior {
             position_m: Some([DISTANCE_KM * 1e3, 0.0, 0.0]),

@@ -25,8 +25,6 @@ fn sensor(scene: &Scene) -> Config {
     let mut sensor = Config::new(scene.camera.clone());
     sensor.body = body::Config { altitude_sigma_km: 0.1, limb_height_sigma_km: 1.0, ..scene.body.clone() };
     sensor.covariance = hzn_core::covariance::Config::given(0.1, 30.0);
-    // The limb of these scenes is a step without air, and most bodies are flat: a ghost of the lens looks like that.
-    sensor.gates.min_p_limb = 0.0;
     sensor
 }
 

@@ -93,7 +93,7 @@ fn rows_have_the_points_and_the_answer_of_the_picture() {
         config.threshold.level = own.max(1).into();
         // These gates read brightness, and none is left of rows that are gone. A dark frame cannot be searched for
         // either.
-        (config.gates.max_band, config.gates.max_departure, config.gates.min_p_limb) = (1.0, 1e6, 0.0);
+        (config.gates.max_band, config.gates.max_departure) = (1.0, 1e6);
         config.retry.frame_px = 0;
         let sensor = Sensor::new(&config).unwrap();
         let (there, here) = (EdgePoints::default(), EdgePoints::default());

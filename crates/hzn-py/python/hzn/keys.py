@@ -311,7 +311,7 @@ class Gates(TypedDict, total=False):
     turns the gates ``band`` and ``faint`` off. Values: 0 to 1. Default: 0.5."""
     min_p_limb: float
     """Smallest probability that the edge of an answer is the limb (column ``p_limb``); 0 turns the gate off. Values:
-    0 to 1. Default: 0.5."""
+    0 to 1. Default: 0.0."""
     prior_odds: float
     """Odds that an edge that passes all other gates is the limb, before its evidence is weighed. Values: above 0 to
     1e9. Default: 50.0."""

@@ -133,13 +133,11 @@ section! {
         @- max_band: f64 = 0.5, [0.0 to 1.0];
         /// Smallest probability that the edge of an answer is the limb (column `p_limb`); 0 turns the gate off.
         ///
-        /// The default refuses an answer that is more probably false than right: a filter with an innovation test drops
-        /// a false answer, so that it costs as much as a lost one. Set 0.75 if a false answer costs as much as three
-        /// right ones, and 0.9 if it costs as much as nine, for example where no filter checks the answer. With a larger
-        /// value fewer false answers pass, and more limbs are refused. Set 0 for drawn pictures of the Earth without
-        /// air, which look like ghosts of the lens. Bodies without known air, Sun and Moon have no such probability.
-        // An answer is worth giving if (1 − p) C < p, so p > C/(1 + C) with the cost C of a false answer: 1 gives 0.5.
-        @135 min_p_limb: f64 = 0.5, [0.0 to 1.0];
+        /// Set it to 0.75 if a false answer costs as much as three right answers, and to 0.9 if it costs as much as
+        /// nine. With a larger value fewer false answers pass, and more limbs are refused, such as drawn ones without
+        /// air. Bodies without known air, Sun and Moon have no such probability.
+        // An answer is worth giving if (1 − p) C < p, so p > C/(1 + C) with the cost C of a false answer: 3 gives 0.75.
+        @135 min_p_limb: f64 = 0.0, [0.0 to 1.0];
         /// Odds that an edge that passes all other gates is the limb, before its evidence is weighed.
         ///
         /// The default is for a camera that sees a limb in half of its pictures: the other gates let about one in fifty
