@@ -9,10 +9,9 @@ pictures. The sensor has default settings and gets the position, and in a second
 degrees per axis as well. With --keep a campaign that was stopped continues after its last flight; if the program was
 built again, it processes the kept pictures again. With --check the program exits with 1 if the shares are too large.
 
---fit prints the weights of the evidence (crates/hzn-core/src/model/evidence.rs) in hundredths: a logistic regression with
-four classes (the limb and the three kinds of FAMILIES) on the answers of the kinds that are not in HELD_OUT, without the
-gate on p_limb. Ghosts that are softer than 0.8 scale heights of the air are left out, because nothing tells them from a
-limb.
+--fit prints the weights of the evidence (crates/hzn-core/src/model/evidence.rs): a logistic regression on the answers
+of the kinds that are not in HELD_OUT, without the gate on p_limb. Ghosts that are softer than 0.8 scale heights of the
+air are left out, because nothing tells them from a limb.
 """
 
 import argparse
@@ -39,25 +38,11 @@ HELD_OUT = ["cyclone", "foil", "plume", "river", "cable"]
 KINDS = [*decoy_pictures.KINDS, *limb_pictures.CLASSES]
 # A ghost counts as sharp if the softness of its edge is below this many scale heights.
 SHARP = 0.8
-# Terms with a weight, and the sign of the weight: what speaks for the limb (1) or against it (-1). Attitude and Sun are
-# likelihood ratios already.
-TERMS = {"curvature": 1, "half-angle": -1, "gaps": -1, "misfit": -1, "sky": -1, "faint-air": 1, "bright-air": -1,
-         "faint-high-air": 1, "layer": -1, "second-edge": -1, "flat": 1, "layer-height": 1}
-# Kinds of false edges, and the terms that can tell the limb from them. All kinds of pictures that have no family of their
-# own are of the first one.
-FAMILIES = {
-    "other": ["curvature", "half-angle", "gaps", "misfit", "sky", "faint-air", "bright-air", "faint-high-air", "flat"],
-    "ghost": ["half-angle", "gaps", "misfit", "sky", "faint-air", "bright-air", "faint-high-air", "flat"],
-    "airglow": ["curvature", "sky", "bright-air", "layer", "second-edge", "layer-height"],
-}
-# False answers of each family for as many right answers as the prior odds. Few lights in the lens match the limb: of the
-# false answers to other kinds, one in thirty is to a disc of light of any size.
-SHARES = {"other": 1.0, "ghost": 0.03, "airglow": 1.0}
-# Smallest share in the regression, so that a rare family has weights, too; the constant takes it back.
-LEAST_SHARE = 0.2
-# For how many right answers those of the fit count. About as many flights have a false answer, and the three pictures of a
-# flight show nearly the same edge.
-COUNT = 60.0
+# Terms with a weight. Attitude and Sun are likelihood ratios already.
+TERMS = ["curvature", "half-angle", "gaps", "misfit", "sky", "faint-air", "bright-air", "faint-high-air", "layer",
+         "second-edge", "flat", "mottled-sky"]
+# Shares of the false answers in the fit. The first is for all kinds but ghosts and airglow together.
+SHARES = {"other": 0.6, "ghost": 0.2, "airglow": 0.2}
 SENSORS = {"default": limb_campaign.POSITION, "with an attitude": limb_campaign.POSITION + limb_campaign.ATTITUDE}
 # Expectation of the figures: share of the pictures without a limb that have an answer, and of lost true answers. The
 # limits of --check are those of a few flights, twice as wide, and one flight of three pictures more: they show the
@@ -70,7 +55,7 @@ def evidence(hzn, folder, name):
     command = [hzn, "explain", str(folder / name), "--sensor", str(folder / "used.toml"), "--frames",
                str(folder / "used.csv")]
     text = subprocess.run(command, capture_output=True, text=True).stdout
-    found = {m[1]: float(m[2]) for m in re.finditer(r"^ +(?:[+-]\d+\.\d+ +){3}([a-z-]+) +(-?\d+\.\d+)  ", text, re.M)}
+    found = {m[1]: float(m[2]) for m in re.finditer(r"^ +[+-]\d+\.\d+ ([a-z-]+) +(-?\d+\.\d+)  ", text, re.M)}
     return [found.get(term, 0.0) for term in TERMS]
 
 
@@ -114,58 +99,28 @@ def family(record):
 
 
 def fit(records):
-    """Prints the weights of a logistic regression with four classes. Right answers have the weight 1, false ones SHARES.
-
-    The score of the limb against a family is linear in the terms of the family, with weights of the signs of TERMS. A
-    term that has the other sign in these few answers would be chance.
-    """
+    """Prints the weights of a logistic regression. Right and false answers have equal weights, false ones SHARES."""
     used = [r for r in records if r["answered"] and r["kind"] not in HELD_OUT and (r["kind"] != "ghost" or r["sharp"])]
     # A limb with a large error is a limb.
     used = [r for r in used if r["right"] or r["kind"] not in limb_pictures.CLASSES]
-    families = list(FAMILIES)
-    label = np.array([0 if r["right"] else 1 + families.index(family(r)) for r in used])
+    right = np.array([r["right"] for r in used])
     values = np.array([[*r["values"], 1.0] for r in used])
-    counts = np.bincount(label, minlength=4)
-    shares = np.array([SHARES[name] for name in families])
-    balanced = np.maximum(shares, LEAST_SHARE)
-    weight = COUNT * np.array([1.0, *balanced])[label] / counts[label]
-    allowed = np.array([[*(term in FAMILIES[name] for term in TERMS), True] for name in families])
-    sign = np.array([*TERMS.values(), 0])
-    # Gaussian prior of sigma 2 on each weight but the constant.
-    prior = np.array([*np.full(len(TERMS), 0.25), 0.0])
-
-    def loss(solution):
-        scores = np.hstack([np.zeros((len(used), 1)), -values @ solution.T])
-        scores -= scores.max(1, keepdims=True)
-        p = np.exp(scores) / np.exp(scores).sum(1, keepdims=True)
-        off = p[:, 1:] - (label[:, None] == np.arange(1, 4))
-        value = -(weight * np.log(p[np.arange(len(used)), label] + 1e-300)).sum() + (prior * solution**2).sum() / 2
-        return value, -(off * weight[:, None]).T @ values + prior * solution
-
-    # Accelerated gradient steps, with a step length that is halved until the loss is below its bound.
-    solution = ahead = np.zeros((3, len(TERMS) + 1))
-    step, momentum = 1e-3, 1.0
-    for _ in range(20000):
-        at, gradient = loss(ahead)
-        while True:
-            after = np.where(allowed, ahead - step * gradient, 0.0)
-            after = np.where(after * sign < 0, 0.0, after)
-            move = after - ahead
-            if loss(after)[0] <= at + (gradient * move).sum() + (move * move).sum() / (2 * step) + 1e-12:
-                break
-            step /= 2
-        change = after - solution
-        # A step that goes back begins anew.
-        faster = 1.0 if (change * -move).sum() > 0 else (1 + math.sqrt(1 + 4 * momentum**2)) / 2
-        ahead = after + (momentum - 1) / faster * change if faster > 1 else after
-        solution, momentum, step = after, faster, step * 1.1
-        if np.abs(change).max() < 1e-7:
-            break
-    solution[:, -1] += np.log(balanced / shares)
-    print(f"{counts[0]} right answers; false: " + ", ".join(f"{n} {name}" for n, name in zip(counts[1:], families)))
-    print(f"{'':<15} " + " ".join(f"{name:>8}" for name in families))
-    for term, column in zip([*TERMS, "constant"], 100 * solution.T):
-        print(f"{term:<15} " + " ".join(f"{x:8.0f}" for x in column))
+    total = 200.0
+    weight = np.where(right, total / max(right.sum(), 1), 0.0)
+    for name, share in SHARES.items():
+        members = np.array([not r["right"] and family(r) == name for r in used])
+        weight[members] = total * share / max(members.sum(), 1)
+    # Newton's method with a Gaussian prior of sigma 2 on each weight but the constant.
+    prior = np.diag([*np.full(len(TERMS), 0.25), 1e-6])
+    solution = np.zeros(len(TERMS) + 1)
+    for _ in range(50):
+        p = 1 / (1 + np.exp(-values @ solution))
+        gradient = values.T @ (weight * (right - p)) - prior @ solution
+        hessian = values.T @ (values * (weight * p * (1 - p))[:, None]) + prior
+        solution += np.linalg.solve(hessian, gradient)
+    print(f"{right.sum()} right and {(~right).sum()} false answers")
+    for name, x in zip([*TERMS, "constant"], solution):
+        print(f"{name:<15} {x:+.2f}")
 
 
 def share(part, whole):
@@ -231,7 +186,7 @@ def main():
     parser.add_argument("--flights", type=int, default=20, help="flights of each kind, with three pictures (20)")
     parser.add_argument("--first-seed", type=int, default=3000, help="seed of the first flight of each kind (3000)")
     parser.add_argument("--keep", type=pathlib.Path, help="folder of the flights; a stopped campaign continues")
-    parser.add_argument("--limit", type=float, default=0.5, help="limit of p_limb (gates.min_p_limb, 0.5)")
+    parser.add_argument("--limit", type=float, default=0.75, help="limit of p_limb (gates.min_p_limb, 0.75)")
     parser.add_argument("--odds", type=float, default=50, help="prior odds (gates.prior_odds, 50)")
     parser.add_argument("--fit", action="store_true", help="prints the weights of the evidence")
     parser.add_argument("--check", action="store_true", help="exits with 1 if too many answers are false, or are lost")

@@ -114,6 +114,3 @@ def cable(rng, _):
 # decoy_pictures.render_flight finds a painter by its name, and takes the seed from its place.
 KINDS = {kind.__name__: kind for kind in (glint, cyclone, tank, crater, foil, plume, river, cable)}
 decoy.KINDS.update(KINDS)
-
-# The limbs of this campaign have one class more.
-decoy.limb.CLASSES[decoy.limb.SHALLOW] = decoy.limb.CLASSES["day"]

@@ -8,7 +8,7 @@ Every picture is a flight of its own: another lens, calibration error, altitude,
 therefore independent of each other, and binomial intervals hold. The sensor has default settings and gets the position;
 the other sensors of a state get an attitude with errors of 5 degrees, the direction to the Sun, or the time (utc) as well.
 
-The first table has the misleading answers of each state, without a gate on p_limb and with the limit 0.75. With
+The first table has the misleading answers of each state, without a gate on p_limb and with the default limit 0.75. With
 the state `day` a second table has the quantiles of error / sigma_max_deg among answers to a limb in view, from which
 `protection_factor` in hzn-core is taken. --keep FILE appends the answers to a CSV file, and starts after those it has.
 """

@@ -41,9 +41,6 @@ CLASSES = {
     "day, overexposed": ((25.0, 80.0), (1.3, 3.0)),
     "low Sun": ((-5.0, 15.0), (0.45, 1.3)),
 }
-# Scale height of the air, km, and that of air whose light ends sharply: haze and high clouds, which red light shows.
-# decoy_more.py adds the class SHALLOW, by day, so that the other campaigns keep their three classes.
-AIR_KM, SHALLOW_AIR_KM, SHALLOW = (6.5, 8.5), (2.5, 6.5), "day, shallow air"
 
 
 def unit(v):
@@ -133,9 +130,9 @@ class World:
     shade: "ScatteredOnce | None" = None
 
 
-def draw_world(rng, scale_height_km=AIR_KM):
+def draw_world(rng):
     return World(
-        scale_height_km=rng.uniform(*scale_height_km),
+        scale_height_km=rng.uniform(6.5, 8.5),
         air=np.array([0.55, 0.62, 0.75]) * rng.uniform(0.6, 1.2),
         clouds=Waves(rng, ((8, 6), (25, 10), (80, 14), (250, 18), (700, 20))),
         continents=Waves(rng, ((2, 4), (6, 6), (20, 8), (70, 8))),
@@ -389,7 +386,7 @@ def render_flight(folder, seed, kind, pictures, shade=False):
     rng, errors = (np.random.default_rng([list(CLASSES).index(kind), seed, *more]) for more in ([], [1]))
     folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    camera, world = draw_camera(rng, exposures), draw_world(rng, SHALLOW_AIR_KM if kind == SHALLOW else AIR_KM)
+    camera, world = draw_camera(rng, exposures), draw_world(rng)
     if shade:
         world.shade = ScatteredOnce(world.scale_height_km)
     rays, seen = camera.lens.rays()

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 
 use hzn_core::covariance::Term;
-use hzn_core::evidence::FalseEdge;
 use hzn_core::report::Candidate;
 use hzn_core::section::{Kind, Section};
 use hzn_core::status::{Stage, Status};
@@ -305,15 +304,17 @@ pub fn evidence(
     let mut lines = Vec::new();
     if let Some((edge, evidence)) = shown.and_then(|edge| Some((edge.candidate, edge.evidence?))) {
         let odds = gates.prior_odds;
-        let p_limb = evidence.p_limb(odds);
-        lines.push(("evidence", format!("edge {edge} is the limb with probability {p_limb:.4}: prior odds {odds}")));
-        let against = FalseEdge::ALL.map(|kind| (kind.name(), evidence.ln_ratio_of_all(kind)));
-        let text = against.map(|(name, ratio)| format!("{name} {ratio:+.2}")).join(", ");
-        lines.push(("", format!("log likelihood ratios of the limb to false edges: {text}")));
+        let (p_limb, ratio) = (evidence.p_limb(odds), evidence.ln_ratio_of_all());
+        lines.push((
+            "evidence",
+            format!(
+                "edge {edge} is the limb with probability {p_limb:.4}: odds {odds}, log likelihood ratio {ratio:+.2}"
+            ),
+        ));
         for term in evidence::Term::ALL {
             if let Some(value) = evidence.value(term) {
-                let ratios = FalseEdge::ALL.map(|kind| format!("{:+6.2}", evidence.ln_ratio(term, kind))).join(" ");
-                lines.push(("", format!("{ratios} {:<15} {value:.4}  {}", term.name(), evidence_text(term))));
+                let (name, ratio, text) = (term.name(), evidence.ln_ratio(term), evidence_text(term));
+                lines.push(("", format!("{ratio:+6.2} {name:<15} {value:.4}  {text}")));
             }
         }
     }
@@ -334,8 +335,7 @@ fn evidence_text(term: evidence::Term) -> &'static str {
         evidence::Term::Layer => "a second edge below, as the ground has below airglow",
         evidence::Term::SecondEdge => "fall of the light below the edge to a break at one depth",
         evidence::Term::Flat => "log of how uneven and how much darker the body is inside, if it is little",
-        evidence::Term::LayerHeight => "squared difference from the half-angle of airglow, less that from the limb's",
-        evidence::Term::NoLayer => "no layer of airglow can be seen",
+        evidence::Term::MottledSky => "log of how uneven the sky is",
         evidence::Term::Attitude => "agreement with the given attitude",
         evidence::Term::Sun => "the given Sun lights the edge",
     }

@@ -1,41 +1,10 @@
 //! The evidence that an edge is the limb, and the probability that follows from it.
 //!
-//! An edge that is no limb is of one of three kinds. The logarithm of the odds of the limb against kind k is
-//! ln(prior odds) + b_k + Σ w_k x, where x are the values of the terms; the three odds together give the probability. A
-//! term that the picture does not show adds nothing. The weights come from a logistic regression with four classes
+//! The logarithm of the odds is ln(prior odds) + b + Σ w x, where x are the values of the terms. A term that the
+//! picture does not show adds nothing. The weights come from a logistic regression
 //! (`tests/python/decoy_campaign.py --fit`).
 
 use crate::base::real::Real;
-
-/// A kind of edge that is no limb.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-// The numbers are fixed because they are the indices of the weights.
-#[repr(u8)]
-pub enum FalseEdge {
-    /// An edge in any direction: ice, a coast, a cloud, the vehicle, or light in the lens.
-    Other = 0,
-    /// Light in the lens that has the form and the place of the limb.
-    Ghost = 1,
-    /// The edge of a layer of airglow above the night side.
-    Airglow = 2,
-}
-
-/// Number of kinds.
-const KINDS: usize = 3;
-
-impl FalseEdge {
-    /// All kinds in the order of their numbers.
-    pub const ALL: [Self; KINDS] = [Self::Other, Self::Ghost, Self::Airglow];
-
-    /// Returns the name of the kind.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Other => "other",
-            Self::Ghost => "ghost",
-            Self::Airglow => "airglow",
-        }
-    }
-}
 
 /// The evidence for and against an edge that has passed all other gates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,20 +39,16 @@ pub enum Term {
     /// Where the body is as bright and as even far inside as next to the edge: the logarithm of both differences
     /// together, −2.5 to 0. The air before the ground makes a limb darker inwards, and clouds make it uneven.
     Flat = 10,
-    /// Squared difference between the fitted half-angle and that of a layer of airglow over its variance, less the same
-    /// for the limb, −9 to 9.
-    LayerHeight = 11,
-    /// 1 where no layer of airglow can be seen: the Sun is known to light all of the limb, the camera is below the layer,
-    /// or the body is not seen in sunlight.
-    NoLayer = 12,
+    /// How uneven the sky is along the edge: the logarithm, 0 to 4. Ground next to an edge is uneven, and space is not.
+    MottledSky = 11,
     /// A given attitude: the logarithm of the likelihood ratio.
-    Attitude = 13,
+    Attitude = 12,
     /// A given Sun that lights the edge: the logarithm of the likelihood ratio.
-    Sun = 14,
+    Sun = 13,
 }
 
 /// Number of terms.
-const TERMS: usize = 15;
+const TERMS: usize = 14;
 
 impl Term {
     /// All terms in the order of their numbers.
@@ -99,8 +64,7 @@ impl Term {
         Self::Layer,
         Self::SecondEdge,
         Self::Flat,
-        Self::LayerHeight,
-        Self::NoLayer,
+        Self::MottledSky,
         Self::Attitude,
         Self::Sun,
     ];
@@ -119,26 +83,22 @@ impl Term {
             Self::Layer => "layer",
             Self::SecondEdge => "second-edge",
             Self::Flat => "flat",
-            Self::LayerHeight => "layer-height",
-            Self::NoLayer => "no-layer",
+            Self::MottledSky => "mottled-sky",
             Self::Attitude => "attitude",
             Self::Sun => "sun",
         }
     }
 }
 
-/// Weights of the terms in their order, in hundredths, against each kind of false edge. The values of attitude and Sun
-/// are likelihood ratios already; edges that follow the limb agree with them as the limb does. Where no layer can be seen,
-/// airglow is out of the question.
+/// Weights of the terms in their order, in hundredths. The values of attitude and Sun are likelihood ratios already.
 // Whole numbers: a flight computer without double precision would convert each number in software.
-#[rustfmt::skip]
-const WEIGHTS_PERCENT: [[i16; TERMS]; KINDS] = [
-    [98, -65, -343, -149,   0, 141, -42,   0,    0,    0, 196,   0,    0, 100, 100],
-    [ 0, -25,    0,    0, -37, 152,   0, 153,    0,    0, 292,   0,    0,   0,   0],
-    [68,   0,    0,    0,  -8,   0,   0,   0, -200, -457,   0, 115, 3000,   0,   0],
-];
-/// The constants b_k, in hundredths.
-const CONSTANTS_PERCENT: [i16; KINDS] = [131, 958, 23];
+const WEIGHTS_PERCENT: [i16; TERMS] = [64, -40, -203, -61, -52, 191, -340, 120, -184, -369, 234, -155, 100, 100];
+/// The constant b.
+const CONSTANT: f64 = 2.49;
+
+fn weight<T: Real>(percent: i16) -> T {
+    T::from_i32(percent.into()) / T::from_i32(100)
+}
 
 /// The evidence that an edge is the limb.
 #[derive(Debug, Clone, Copy)]
@@ -162,34 +122,27 @@ impl<T: Real> Evidence<T> {
         self.values.get(term as usize).copied().flatten()
     }
 
-    /// Returns the logarithm of a term's likelihood ratio of the limb to a kind of false edge, except for a constant; 0
-    /// without a value.
-    pub fn ln_ratio(&self, term: Term, to: FalseEdge) -> T {
-        let weights = WEIGHTS_PERCENT.get(to as usize);
-        let percent = weights.and_then(|weights| weights.get(term as usize)).copied().unwrap_or(0);
-        self.value(term).map_or(T::ZERO, |value| value * T::from_i32(percent.into()) / T::from_i32(100))
+    /// Returns the logarithm of a term's likelihood ratio, except for a constant; 0 without a value.
+    pub fn ln_ratio(&self, term: Term) -> T {
+        let percent = WEIGHTS_PERCENT.get(term as usize).copied().unwrap_or(0);
+        self.value(term).map_or(T::ZERO, |value| value * weight(percent))
     }
 
-    /// Returns the logarithm of the likelihood ratio of the limb to a kind of false edge, of all terms.
-    pub fn ln_ratio_of_all(&self, to: FalseEdge) -> T {
-        let weights = WEIGHTS_PERCENT.get(to as usize);
-        let constant = CONSTANTS_PERCENT.get(to as usize).copied().unwrap_or(0);
-        let shown = self.values.iter().zip(weights.into_iter().flatten());
-        let percent = |percent: i16| T::from_i32(percent.into());
-        let sum = shown
-            .filter_map(|(value, weight)| value.filter(|_| *weight != 0).map(|x| x * percent(*weight)))
-            .fold(percent(constant), |sum, x| sum + x);
-        sum / T::from_i32(100)
+    /// Returns the logarithm of the likelihood ratio of all terms.
+    pub fn ln_ratio_of_all(&self) -> T {
+        self.values
+            .iter()
+            .zip(WEIGHTS_PERCENT)
+            .filter_map(|(value, percent)| value.map(|x| x * weight(percent)))
+            .fold(T::from_f64(CONSTANT), |sum, x| sum + x)
     }
 
     /// Returns the probability that the edge is the limb. `prior_odds` are the odds before the evidence is weighed.
     pub fn p_limb(&self, prior_odds: T) -> T {
         // Beyond this number the probability is 0 or 1 in single precision.
         let most = T::from_f64(80.0);
-        let against = FalseEdge::ALL.iter().fold(T::ZERO, |against, kind| {
-            let ln_ratio = self.ln_ratio_of_all(*kind).max(-most).min(most);
-            against + (-ln_ratio).exp()
-        });
+        let ln_ratio = self.ln_ratio_of_all().max(-most).min(most);
+        let against = (-ln_ratio).exp();
         prior_odds / (prior_odds + against)
     }
 
@@ -212,35 +165,15 @@ mod tests {
 
     #[test]
     fn probabilities_follow_odds_and_evidence() {
-        let ln_ratios = |evidence: &Evidence<f64>| FalseEdge::ALL.map(|kind| evidence.ln_ratio_of_all(kind));
-        let p_limb = |evidence: &Evidence<f64>, odds: f64| {
-            odds / (odds + ln_ratios(evidence).iter().map(|ln_ratio| (-ln_ratio).exp()).sum::<f64>())
-        };
         let mut evidence = Evidence::<f64>::new();
-        assert_eq!(ln_ratios(&evidence), CONSTANTS_PERCENT.map(|percent| f64::from(percent) / 100.0));
-        assert!((evidence.p_limb(9.0) - p_limb(&evidence, 9.0)).abs() < 1e-12);
-        // An attitude is evidence against an edge in any direction only.
-        let before = ln_ratios(&evidence);
-        evidence.set(Term::Attitude, 5.0);
-        let after = ln_ratios(&evidence);
-        assert!((after[0] - before[0] - 5.0).abs() < 1e-12 && after[1..] == before[1..], "{after:?}");
+        evidence.set(Term::Attitude, -CONSTANT);
+        assert!((evidence.p_limb(9.0) - 0.9).abs() < 1e-12, "no evidence leaves the odds");
+        evidence.set(Term::Attitude, 9f64.ln() - CONSTANT);
+        assert!((evidence.p_limb(1.0) - 0.9).abs() < 1e-12);
         let (mut far, mut single) = (evidence, Evidence::<f32>::new());
         far.set(Term::Attitude, -1e6);
-        assert!(far.p_limb(50.0) >= 0.0 && far.p_limb(50.0) < 1e-30);
         single.set(Term::Attitude, 1e6);
-        single.set(Term::NoLayer, 1.0);
-        assert!(single.p_limb(50.0) > 0.999_999 && single.p_limb(50.0) <= 1.0);
-    }
-
-    #[test]
-    fn evidence_against_one_kind_does_not_hide_another() {
-        let mut evidence = Evidence::<f64>::new();
-        evidence.set(Term::Attitude, 1e6);
-        evidence.set(Term::NoLayer, 1.0);
-        // No air and a flat body: a ghost that matches the limb has its direction, too.
-        for (term, value) in [(Term::FaintAir, -2.5), (Term::FaintHighAir, -1.9), (Term::Flat, -2.5)] {
-            evidence.set(term, value);
-        }
-        assert!(evidence.p_limb(50.0) < 0.5, "{}", evidence.p_limb(50.0));
+        assert!(far.p_limb(50.0) >= 0.0 && far.p_limb(50.0) < 1e-30);
+        assert_eq!(single.p_limb(50.0), 1.0);
     }
 }

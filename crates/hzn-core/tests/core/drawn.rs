@@ -271,6 +271,10 @@ fn what_lies_on_both_sides_of_an_edge_is_evidence() {
     let night = p_limb_of(&config, |km, _| layer(km) * if km < -95.0 { 0.6 } else { 1.0 });
     let without_end = p_limb_of(&config, |km, _| layer(km));
     assert!(odds(night) < 0.05 * odds(without_end), "layer {night} {without_end}");
+    // Ground beyond the edge is uneven.
+    let mottled = |km: f64, [u, _]: [f64; 2]| limb_light(km) + 0.05 * (1.0 + (u / 20.0).sin());
+    let coast = p_limb_of(&config, mottled);
+    assert!(odds(coast) < 0.5 * odds(day), "mottled {coast} {day}");
     // A thermal camera sees no sunlit air, so that none of it is evidence.
     let mut thermal = config.clone();
     thermal.body.sunlit = Some(false);
@@ -292,7 +296,7 @@ fn an_edge_without_air_is_an_unlikely_limb() {
     assert!(refused.candidates.iter().any(|c| c.verdict == Verdict::Unlikely), "{:?}", refused.candidates);
     config.gates.min_p_limb = 0.0;
     // Rarer limbs make every edge less probable.
-    config.gates.prior_odds = 0.001;
+    config.gates.prior_odds = 0.01;
     assert!(p_limb_of(&config, |km, _| limb_light(km)) < 0.5 * limb);
     // The weights are those of the Earth.
     let moon = sensor(640, 480, 600.0);

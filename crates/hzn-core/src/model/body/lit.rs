@@ -69,17 +69,4 @@ impl<T: Real> Expected<T> {
         let dip = T::from_f64(core::f64::consts::FRAC_PI_2) - self.half_angle_rad();
         self.sun_elevation_rad.is_some_and(|elevation| elevation + dip < T::from_f64(LOWEST_SUN_DEG.to_radians()))
     }
-
-    /// Returns whether the Sun is known to light every part of the limb, or the twilight above it: at the part that is
-    /// farthest from the Sun, the Sun stands lower by the dip.
-    pub(crate) fn is_day(&self) -> bool {
-        let dip = T::from_f64(core::f64::consts::FRAC_PI_2) - self.half_angle_rad();
-        self.sun_elevation_rad.is_some_and(|elevation| elevation - dip > T::from_f64(LOWEST_SUN_DEG.to_radians()))
-    }
-
-    /// Returns cos α of a limb of this height in metres; 0 from the height of the camera on.
-    pub(crate) fn cos_of_limb_at(&self, height_m: T) -> T {
-        let sin = self.sin * (self.radius_m + height_m) / (self.radius_m + self.limb_m);
-        (T::one() - sin * sin).max(T::ZERO).sqrt()
-    }
 }

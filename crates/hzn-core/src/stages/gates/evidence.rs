@@ -12,7 +12,6 @@ use super::turn::angle_rad;
 use crate::base::median;
 use crate::base::real::Real;
 use crate::image::Pixels;
-use crate::model::body::Expected;
 use crate::model::evidence::{Evidence, Term};
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
@@ -46,8 +45,9 @@ const LAYER_SCALE_HEIGHTS: f64 = 14.0;
 const LEAST_STEP_PX: f64 = 2.0;
 /// Second difference of the logarithm of the brightness that is usual below a limb by day.
 const USUAL_BEND: f64 = 0.05;
-/// Largest amount of the term of the half-angle of a layer.
-const LARGEST_HEIGHT: f64 = 9.0;
+/// Part of the false edges whose direction is that of the limb: ghosts that match it, and airglow. The fit of the
+/// weights has the same part.
+const FOLLOWING: f64 = 0.4;
 
 /// Weighs the evidence. `None` if the picture is not of a kind for which the weights hold: without a fitted half-angle,
 /// and for a body without known air, because the weights come from pictures of the Earth.
@@ -75,34 +75,28 @@ pub(super) fn weigh<T: Real, P: Pixels, O: Observer<T>>(
     if !P::STREAMED && expected.is_in_sunlight {
         Looks::new(case, binary, places, sky).weigh(binary, places, &mut evidence);
     }
-    if expected.is_in_sunlight && !expected.is_day() && is_above_layer(expected) {
-        // The same variance, because the height of the layer is as uncertain as that of the limb.
-        let layer = expected.cos_of_limb_at(expected.scale_height_m * T::from_f64(LAYER_SCALE_HEIGHTS));
-        let variance = expected.variance_towards(layer, one).unwrap_or(expected.sigma_cos * expected.sigma_cos);
-        let (off, most) = (fit.c - layer, T::from_f64(LARGEST_HEIGHT));
-        evidence.set(Term::LayerHeight, (off * off / (var_cos + variance) - z2).max(-most).min(most));
-    } else {
-        evidence.set(Term::NoLayer, one);
-    }
     if let Some((axis, sigma)) = &expected.predicted {
         // The density of the direction is Gaussian for a limb, and 1/(4π) for an edge that may give any direction.
         let variance = (*sigma * *sigma + case.sigma_max_rad * case.sigma_max_rad).max(T::EPSILON);
         let off = angle_rad(&fused.e, axis);
         let two = one + one;
         let most = (off * off / (two * variance)).min(T::from_f64(50.0));
-        evidence.set(Term::Attitude, -(variance / two).ln() - most);
+        evidence.set(Term::Attitude, ln_ratio_of_direction(variance / two * most.exp()));
     }
     if expected.sun_seen.is_some() && case.config.max_unlit < 1.0 {
         // The Sun lights half of all directions, and this edge passed the gate.
-        evidence.set(Term::Sun, T::from_f64(core::f64::consts::LN_2));
+        evidence.set(Term::Sun, ln_ratio_of_direction(T::from_f64(0.5)));
     }
     Some(evidence)
 }
 
-/// Returns whether the camera is so high that a layer of airglow has a limb.
-fn is_above_layer<T: Real>(expected: &Expected<T>) -> bool {
-    let (altitude_m, _) = expected.altitude_and_sigma_m();
-    altitude_m > expected.scale_height_m * T::from_f64(LAYER_SCALE_HEIGHTS)
+/// Returns the logarithm of the likelihood ratio of a direction. `against` is the likelihood of an edge that may give
+/// any direction over that of the limb.
+///
+/// The direction is no evidence against edges that follow the limb.
+fn ln_ratio_of_direction<T: Real>(against: T) -> T {
+    let along = T::from_f64(FOLLOWING);
+    -(along + (T::one() - along) * against).ln()
 }
 
 /// What the picture shows on both sides of the edge.
@@ -110,7 +104,7 @@ struct Looks<T> {
     light: Light<T>,
     /// Whether the brightness of the sky is known.
     shows_air: bool,
-    /// Whether the camera is above every layer of airglow.
+    /// Whether the camera is so high that a layer of airglow has a limb.
     is_above_layer: bool,
 }
 
@@ -125,10 +119,11 @@ impl<T: Real> Looks<T> {
         // An angle is a height divided by the distance (R + d) cot α of the limb; that of s·e = cos ρ is sin ρ dρ.
         let by_m = (T::one() - c * c).max(T::ZERO)
             / (c.max(T::from_f64(1e-6)) * (expected.radius_m + expected.limb_m).max(T::one()));
+        let (altitude_m, _) = expected.altitude_and_sigma_m();
         let looks = Self {
             light: Light { by_m, scale_height_m: expected.scale_height_m, sky: sky.median },
             shows_air: true,
-            is_above_layer: is_above_layer(expected),
+            is_above_layer: altitude_m > expected.scale_height_m * T::from_f64(LAYER_SCALE_HEIGHTS),
         };
         let Some(middle) = places.get(places.len() / 2) else { return looks };
         let dark_px = looks.light.scale_px(middle) * T::from_f64(DARK_SCALE_HEIGHTS);
@@ -168,6 +163,7 @@ impl<T: Real> Looks<T> {
             let most = body.iter().fold(T::one(), |most, x| most.max(*x));
             let body = median::median_of_reals(&body, most);
             evidence.set(Term::Sky, (self.light.sky / (self.light.sky + body).max(T::one())).max(T::ZERO));
+            self.light.mottled_sky(body, binary, places).iter().for_each(|x| evidence.set(Term::MottledSky, *x));
         }
         let ln_of = |values: &Values<T>, faintest: f64, usual: f64| {
             let part = (values.len() >= LEAST).then(|| median::median_of_reals(values, T::one()))?;

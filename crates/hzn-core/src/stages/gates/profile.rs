@@ -1,5 +1,5 @@
 //! The profile of the brightness across an edge, which tells the limb from edges of things: the body below a limb
-//! becomes darker inwards or has clouds, and a layer of airglow ends at the limb of the ground.
+//! becomes darker inwards or has clouds, space above it is even, and a layer of airglow ends at the limb of the ground.
 
 use super::places::{MAX_PLACES, Place, Places, sum_of_nine};
 use crate::base::median::median_of_reals;
@@ -35,6 +35,10 @@ const LEAST_SCALE_HEIGHT_PX: f64 = 0.6;
 /// Sum of the fall and the unevenness from which on a body is not flat, and the part that noise and vignetting make.
 const USUAL_CHANGE: f64 = 0.06;
 const FLOOR: f64 = 0.005;
+/// Where the sky is read for its unevenness, in scale heights and pixels.
+const SKY: [f64; 2] = [8.0, 8.0];
+/// Unevenness of space, as a part of the step at the edge: half of it is a floor for noise.
+const USUAL_SKY: f64 = 0.02;
 /// Fewest places along the edge that must show something.
 pub(super) const LEAST: usize = 3;
 /// Largest ratio of two brightnesses that is told from a larger one.
@@ -148,6 +152,24 @@ impl<T: Real> Light<T> {
         let fall = -middle(&all)?.max(T::from_f64(1e-3)).ln();
         let change = fall.max(T::ZERO) + unevenness(&all)? + T::from_f64(FLOOR);
         Some((change / T::from_f64(USUAL_CHANGE)).ln().min(T::ZERO))
+    }
+
+    /// Returns the logarithm of the unevenness of the sky along the edge, 0 where it is usual. `step` is the brightness
+    /// of the body above the sky. `None` if too few places show the sky.
+    pub(super) fn mottled_sky<P: Pixels, O: Observer<T>>(
+        &self,
+        step: T,
+        binary: &BinaryPicture<'_, T, P, O>,
+        places: &Places<T>,
+    ) -> Option<T> {
+        let step = step.max(T::one());
+        let all = places.iter().filter_map(|place| {
+            let off = (self.scale_px(place) * T::from_f64(SKY[0])).max(T::from_f64(SKY[1]));
+            Some((brightness(place, -off, binary)? / step).min(T::from_f64(MOST)))
+        });
+        let spread = spread(&gather(all))?.min(T::one());
+        let usual = T::from_f64(USUAL_SKY);
+        Some(((spread + usual * T::from_f64(0.5)) / usual).ln().max(T::ZERO))
     }
 }
 
