@@ -6,10 +6,10 @@ use hzn_core::Config;
 use hzn_core::camera::Model;
 use hzn_files::start::{self, CameraFacts, StartConfig};
 use hzn_run::diagnosis::FieldOfView;
-use hzn_run::disk;
 use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
 use hzn_run::start::{LimbSays, doubt_field_of_view, measure_field_of_view, read_camera_facts};
+use hzn_run::{disk, explain};
 
 use super::init_rig;
 use crate::exit::{Exit, Outcome, Stop, usage};
@@ -239,9 +239,9 @@ fn limb_fov(args: &Args, known: &CameraFacts) -> Result<Option<FieldOfView>, Sto
             found.iter().map(|one| one.describe(known.size_px[0])).collect::<Vec<_>>().join(", but ")
         ))),
         LimbSays::Nothing(pictures) => Err(usage(format!(
-            "the field of view is not known (no --fov, no usable EXIF), and the limb in {pictures} pictures does not \
-             say it; add the field of view over the whole width, for example --fov 60, and --lens fisheye or --lens \
-             pinhole"
+            "the field of view is not known (no --fov, no usable EXIF), and the limb in {} does not say it; \
+             add the field of view over the whole width, for example --fov 60, and --lens fisheye or --lens pinhole",
+            explain::counted(pictures as u64, "picture")
         ))),
     }
 }

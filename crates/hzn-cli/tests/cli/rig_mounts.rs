@@ -102,8 +102,9 @@ fn a_rig_without_a_limb_says_where_the_body_is() {
         bytes
     };
     for head in HEADS {
-        let bytes = picture(if head == "front" { 40_000 } else { 2000 });
         for i in 0..2 {
+            // A picture that repeats the one before it is of a frozen head, and says nothing.
+            let bytes = picture(i + if head == "front" { 40_000 } else { 2000 });
             fs::write(place.path(&format!("ring/{head}/{head}-{i:05}.png")), &bytes).unwrap();
         }
     }

@@ -136,6 +136,8 @@ fn panorama<T: Real>(off_nadir_deg: f64, runs: u32) -> Statistics {
         altitude_sigma_km: 0.0,
         limb_height_km: 0.0,
         limb_height_sigma_km: 0.1,
+        // The drawn limb is the ellipsoid, without weather.
+        limb_tilt_sigma_km: Some(0.0),
         ..body::Config::default()
     };
     let mut rng = crate::base::rng::Rng::new(21);
