@@ -20,7 +20,6 @@ mod expected;
 mod image;
 mod locate;
 mod made;
-mod mask;
 mod nav;
 mod notebook;
 mod numbered;

@@ -8,7 +8,6 @@ use hzn_run::engine::Trace;
 use hzn_run::nadir::Nadir;
 
 use crate::camera::Camera;
-use crate::mask::Masking;
 use crate::pickled::Detail;
 use crate::report::Report;
 
@@ -35,11 +34,6 @@ impl Report {
         Self { nadir: Nadir::from_answer(&self.row, known), ..self }
     }
 
-    /// Adds what the mask of the picture is drawn from.
-    pub(crate) fn with_masking(self, masking: &Arc<Masking>) -> Self {
-        Self { masking: Some(Arc::clone(masking)), ..self }
-    }
-
     /// Makes a report from a row alone, for example of a picture that could not be read.
     pub(crate) fn from_row(row: Row) -> Self {
         Self {
@@ -47,7 +41,6 @@ impl Report {
             camera: None,
             half_angle_rad: None,
             placed: None,
-            masking: None,
             detail: None,
             drawing: OnceLock::new(),
             stage: "".into(),

@@ -16,7 +16,6 @@ pub(crate) fn number(py: Python<'_>, report: &Report, index: u64) -> PyResult<Re
         camera: report.camera.clone(),
         half_angle_rad: report.half_angle_rad,
         placed: report.placed.clone(),
-        masking: report.masking.clone(),
         detail: report.detail.clone(),
         drawing: report.drawing.clone(),
         stage: report.stage.clone(),

@@ -14,7 +14,6 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::camera::Camera;
 use crate::cells::{candidate, symmetric, table, vector};
-use crate::mask::{self, Masking};
 use crate::pickled::{Detail, Pickled};
 use crate::read::Shown;
 use crate::{drawing, errors, notebook, parameters};
@@ -32,8 +31,6 @@ pub(crate) struct Report {
     pub(crate) half_angle_rad: Option<f64>,
     /// The answer, if it has a position: its limb is not that of a cone.
     pub(crate) placed: Option<Box<hzn_core::Solution<f64>>>,
-    /// What the mask is drawn from; `None` for a report of a recording, or one that was pickled.
-    pub(crate) masking: Option<Arc<Masking>>,
     /// Edges and points, if they were requested or recorded.
     pub(crate) detail: Option<Detail>,
     /// Annotations, computed on first use, because tracing the limb takes longer than processing the picture.
@@ -387,12 +384,6 @@ impl Report {
         py.import("hzn._plot")?.getattr("plot")?.call1((slf, rgb, size, ax))
     }
 
-    #[doc = doc!("Report.mask")]
-    #[pyo3(signature = (*, margin_deg = 0.0))]
-    fn mask<'py>(&self, py: Python<'py>, margin_deg: f64) -> PyResult<Bound<'py, PyArray2<bool>>> {
-        mask::draw(py, self, margin_deg)
-    }
-
     #[doc = doc!("Report.to_dict")]
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         parameters::to_python(py, &self.row)
@@ -401,13 +392,35 @@ impl Report {
     /// Pickles the report without its picture.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Reduced> {
         let (py, this) = (slf.py(), slf.get());
-        let bytes = serde_json::to_vec(&Pickled::new(this)).map_err(errors::other)?;
+        let pickled = Pickled {
+            row: this.row.clone(),
+            candidates: this.candidates.clone(),
+            camera: this.camera.as_ref().map(|c| c.config.clone()),
+            half_angle_rad: this.half_angle_rad,
+            drawing: this.placed.as_ref().map(|_| this.drawing().clone()),
+            detail: this.detail.clone(),
+            stage: this.stage.clone(),
+            bits: this.bits,
+            nadir: this.nadir.map(|nadir| (nadir.direction, nadir.error_deg)),
+        };
+        let bytes = serde_json::to_vec(&pickled).map_err(errors::other)?;
         Ok((slf.get_type().getattr("_of")?.unbind(), (PyBytes::new(py, &bytes).unbind(), this.others(py))))
     }
     #[staticmethod]
     fn _of(pickled: &[u8], others: Vec<Py<Self>>) -> PyResult<Self> {
         let pickled: Pickled = serde_json::from_slice(pickled).map_err(errors::other)?;
-        pickled.into_report(others)
+        Ok(Self {
+            candidates: pickled.candidates,
+            camera: pickled.camera.map(Camera::from_config).transpose()?.map(Arc::new),
+            half_angle_rad: pickled.half_angle_rad,
+            drawing: pickled.drawing.map(OnceLock::from).unwrap_or_default(),
+            detail: pickled.detail,
+            stage: pickled.stage,
+            others,
+            bits: pickled.bits,
+            nadir: pickled.nadir.map(|(direction, error_deg)| Nadir { direction, error_deg }),
+            ..Self::from_row(pickled.row)
+        })
     }
     fn __bool__(&self) -> bool {
         self.ok()

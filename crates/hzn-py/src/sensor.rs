@@ -17,7 +17,6 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::camera::Camera;
 use crate::expected::Expected;
 use crate::image::{Array, View};
-use crate::mask::Masking;
 use crate::prior::Prior;
 use crate::read::{Read, Shown};
 use crate::report::Report;
@@ -332,10 +331,7 @@ impl<'py> Read<'py> {
                 .with_protection(state.config.protection_factor(which as u8));
             Ok(Report::new(row, found, traces.get(which), &state.camera).with_nadir(Some(data)))
         };
-        let answers = processed.iter().map(|p| p.report.as_ref().ok()?.solution).collect();
-        let masking = Arc::new(Masking { state: Arc::clone(state), answers, data: data.clone() });
-        let reports = processed.iter().zip(bodies).enumerate().map(report);
-        let reports = reports.map(|r| r.map(|r| r.with_masking(&masking))).collect::<PyResult<Vec<_>>>()?;
+        let reports = processed.iter().zip(bodies).enumerate().map(report).collect::<PyResult<Vec<_>>>()?;
         if reports.iter().all(|report| !report.is_answer()) {
             warn_of_unused_bits(py, &array, bits)?;
         }

@@ -6,7 +6,6 @@ use hzn_core::region::Region;
 use hzn_core::{Config, Expected, Sensor as CoreSensor};
 use hzn_files::FrameData;
 use hzn_run::engine::AnySensor;
-use hzn_run::mask::Masker;
 use pyo3::prelude::*;
 
 use crate::camera::Camera;
@@ -66,11 +65,6 @@ impl State {
     /// Returns what is known of the limb of a body before a picture with these data.
     pub(crate) fn expect_body(&self, body: usize, data: &FrameData) -> PyResult<Expected<f64>> {
         self.core.expect_body(body, &data.to_prior(None)).map_err(errors::config)
-    }
-
-    /// Returns what makes masks from answers.
-    pub(crate) fn masker(&self) -> Masker {
-        Masker::from(self.core.clone())
     }
 
     /// Returns the sensor in double precision. Single stages do not exist in the precision of the flight computer.

@@ -844,38 +844,6 @@ class Report:
             The picture does not have the size of the camera's picture, or its file cannot be read.
         """
 
-    def mask(self, *, margin_deg: float = 0.0) -> NDArray[np.bool_]:
-        """Return which pixels are covered, so that they show no star.
-
-        The mask covers the whole body, its night side too, out to three sigmas beyond the limb. Sun and Moon are in it
-        if they were found, or if their direction is known: ``sun``, or the attitude with ``time_s`` in UTC (for the
-        Moon also ``position_km``); the margin is then three sigmas of the attitude. All reports of a picture have the
-        same mask.
-
-        Parameters
-        ----------
-        margin_deg
-            Angle that is added to the margin, degrees.
-
-        Returns
-        -------
-        numpy.ndarray
-            Shape (height, width), bool: True where a body may cover a part of the pixel. Pixels beyond the image
-            circle are False.
-
-        Raises
-        ------
-        HznError
-            The first body of the sensor has no answer; the arc is too short for the outline of an ellipsoid; or the
-            report is from a recording, or was pickled.
-
-        Examples
-        --------
-        >>> report = sensor.process(image, altitude_km=500)
-        >>> if report.ok:
-        ...     stars = np.where(report.mask(), 0, image)
-        """
-
     def to_dict(self) -> dict[str, Any]:
         """Return the row that ``hzn run`` would write, by column; None for an empty cell."""
 
