@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use hzn_flight::messages::Housekeeping;
 
-/// A flight computer that sends nothing for so long is silent. It sends its housekeeping every second unless a parameter
-/// says otherwise.
+/// A flight computer that sends nothing for so long is silent. It sends its housekeeping every second unless a
+/// parameter says otherwise.
 pub const SILENT_AFTER: Duration = Duration::from_secs(10);
 
 /// Returns the alarms of a state of the flight computer, in words.

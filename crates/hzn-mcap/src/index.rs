@@ -117,8 +117,8 @@ impl Index {
         self.pictures.len()
     }
 
-    /// Returns the entries of the next part of the file, which may be empty; `None` at the end. If another program still
-    /// writes the file, a later call goes on with what was added, unless [`Index::is_complete`].
+    /// Returns the entries of the next part of the file, which may be empty; `None` at the end. If another program
+    /// still writes the file, a later call goes on with what was added, unless [`Index::is_complete`].
     ///
     /// # Errors
     /// The file cannot be read, or a report cannot be decoded.

@@ -19,11 +19,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::NoConsensus => "too few edge points agree on one limb".into(),
         Verdict::FewInliers => format!("fewer than {} inliers (gates.min_inliers)", s.min_inliers),
         Verdict::ShortArc => short_arc_text(s.min_arc_px),
-        Verdict::Residuals => format!(
-            "rms above {} px (gates.max_rms_px), or, without a known distance, above the noise of the edge: any smooth \
-             curve is near some cone",
-            s.max_rms_px
-        ),
+        Verdict::Residuals => residuals_text(s.max_rms_px),
         Verdict::HalfAngle => format!(
             "half-angle more than {} sigma from the expected one (gates.max_half_angle_sigma)",
             s.max_half_angle_sigma
@@ -74,6 +70,13 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Fixed => "suspect: fixed in the picture, while the vehicle turns (gates.fixed_edge)".into(),
         Verdict::Rate => "the axis is farther from the last answer than it can turn (gates.max_rate_deg_s)".into(),
     }
+}
+
+fn residuals_text(max_rms_px: f64) -> String {
+    format!(
+        "rms above {max_rms_px} px (gates.max_rms_px), or, without a known distance, above the noise of the edge: any \
+         smooth curve is near some cone"
+    )
 }
 
 /// Says what the limb of an answer is in the plane of a pinhole, and whether its axis is in view there.

@@ -116,12 +116,17 @@ fn export_rows(args: &Args) -> Outcome {
         }
     }
     table.map(RowFile::finish).transpose()?;
+    tell::line(counts_text(args, rows, images));
+    lost.iter().for_each(tell::warning);
+    Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// Says how much was written.
+fn counts_text(args: &Args, rows: u64, images: u64) -> String {
     let mut written: Vec<String> = args.output.iter().map(|_| explain::counted(rows, "row")).collect();
     written.extend(args.images.iter().map(|_| explain::counted(images, "picture")));
     written.extend(args.overlay.iter().map(|_| explain::counted(images, "overlay")));
-    tell::line(written.join(", "));
-    lost.iter().for_each(tell::warning);
-    Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
+    written.join(", ")
 }
 
 fn open_table(args: &Args, path: &Path, existing: Existing) -> Result<RowFile, Stop> {

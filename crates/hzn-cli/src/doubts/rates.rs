@@ -84,7 +84,8 @@ impl Rates {
             "are they rad/s about the axes of the camera, and at the times of the pictures?"
         };
         Some(format!(
-            "the axis turns by {:.2} deg from answer to answer, and the rates miss that by {:.2} deg (medians): {cause}",
+            "the axis turns by {:.2} deg from answer to answer, and the rates miss that by {:.2} deg (medians): \
+             {cause}",
             none.to_degrees(),
             told.to_degrees()
         ))

@@ -111,7 +111,8 @@ fn no_attitude(bodies: &[Body], without_reference: &[Body], contradicts: bool, s
     };
     Error::unusable(format!(
         "no first attitude: {seen}{lost}. Two directions are needed, for example limb and Sun (bodies = [\"earth\", \
-         \"sun\"] in sensor.toml), or a star tracker (--attitude FILE); a longer window is [start] window_s in fuse.toml"
+         \"sun\"] in sensor.toml), or a star tracker (--attitude FILE); a longer window is [start] window_s in \
+         fuse.toml"
     ))
 }
 

@@ -86,8 +86,8 @@ pub struct StateRecord {
     pub limb_latitude_sigma_km: [f64; 2],
     /// The cameras, in the order of the recordings.
     pub cameras: Vec<CameraRecord>,
-    /// The verdict over the flight: `consistent`, `doubtful` or `contradicts`. It is the same in every record, so that a
-    /// program that takes the results sees it.
+    /// The verdict over the flight: `consistent`, `doubtful` or `contradicts`. It is the same in every record, so that
+    /// a program that takes the results sees it.
     pub verdict: &'static str,
 }
 

@@ -58,8 +58,8 @@ impl Fault {
         }
     }
 
-    /// Returns whether the pictures show a mirror image. Pictures that are turned by half a turn look like a camera that
-    /// is.
+    /// Returns whether the pictures show a mirror image. Pictures that are turned by half a turn look like a camera
+    /// that is.
     pub(super) fn is_mirrored(&self) -> bool {
         matches!(self, Self::Pictures(_, Orientation::LeftRight | Orientation::UpDown))
     }

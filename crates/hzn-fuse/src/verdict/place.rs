@@ -37,7 +37,8 @@ pub(super) enum Place {
     Lag(f64),
     /// They lie apart by this distance, m (median).
     Apart(f64),
-    /// They lie apart by this distance, m (median), which a limb that is higher on one side could explain, but only just.
+    /// They lie apart by this distance, m (median), which a limb that is higher on one side could explain, but only
+    /// just.
     Near(f64),
 }
 

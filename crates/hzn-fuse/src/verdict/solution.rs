@@ -37,8 +37,8 @@ pub(super) fn test(fused: &Fused, cameras: &[CameraOptions], options: &Options) 
     let restarts = fused.counts.restarts_when_wrong;
     if restarts > RESTARTS {
         let what = format!(
-            "the filter began again {restarts} times, because its attitude was refused: the directions do not stay with \
-             one attitude"
+            "the filter began again {restarts} times, because its attitude was refused: the directions do not stay \
+             with one attitude"
         );
         all.push(Finding { level: Level::Contradicts, cause: Cause::Unknown, source: Source::All, what });
     }

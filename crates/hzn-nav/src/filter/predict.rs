@@ -13,8 +13,9 @@ use crate::gravity::{earth_rate, gradient};
 use crate::layout::Layout;
 use crate::strapdown::Imu;
 
-/// Longest time during which an unknown rate or force is taken to be the same, s. The sigma of the attitude is then that
-/// of the rate times one second, for any number of samples a second, and grows on with the square root of the time.
+/// Longest time during which an unknown rate or force is taken to be the same, s. The sigma of the attitude is then
+/// that of the rate times one second, for any number of samples a second, and grows on with the square root of the
+/// time.
 const LONGEST_SAME_S: f64 = 1.0;
 /// Number of vehicle components.
 const V: usize = Layout::VEHICLE;

@@ -40,8 +40,8 @@ impl Sink for NoSink {
     }
 }
 
-/// Processes the pictures and measures each answer: one for a body and picture. `plan` must keep the traces; `seen` gets
-/// each picture. Returns `None` if `stop` was set before the end.
+/// Processes the pictures and measures each answer: one for a body and picture. `plan` must keep the traces; `seen`
+/// gets each picture. Returns `None` if `stop` was set before the end.
 ///
 /// # Errors
 /// The source fails, see [`run`](super::run).

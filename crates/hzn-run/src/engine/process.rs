@@ -80,10 +80,8 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
     }
     finished.traces = traces.filter(|_| plan.keep_traces);
     if plan.keep_picture {
-        finished.picture = match original {
-            Some(bytes) => Some(bytes),
-            None => Some(picture.to_png().map_err(|e| failed(format!("{}: {e}", finished.name)))?),
-        };
+        let png = || picture.to_png().map_err(|e| failed(format!("{}: {e}", finished.name)));
+        finished.picture = Some(original.map_or_else(png, Ok)?);
     }
     Ok(finished)
 }

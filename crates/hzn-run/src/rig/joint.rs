@@ -10,8 +10,8 @@ use hzn_core::{Config, Sensor};
 use hzn_files::rig::{self, JOINT};
 use hzn_mcap::{Row, RowMeta, roll_pitch_deg};
 
-use super::epochs::is_in_sync;
 use super::seen::Seen;
+use super::sync::is_in_sync;
 use super::{coarse, mounts};
 use crate::engine::Finished;
 use crate::error::{Error, unusable};

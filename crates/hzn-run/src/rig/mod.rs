@@ -13,6 +13,7 @@ mod mounts;
 mod open;
 mod plan;
 mod seen;
+mod sync;
 
 pub use epochs::{Epoch, Epochs};
 pub use joint::Joiner;

@@ -94,8 +94,8 @@ impl Growing {
         if state != self.state {
             (self.state, self.since) = (state, Instant::now());
         }
-        // A file of no bytes waits for its content. One that was removed is handed out, because a picture that a program
-        // takes away unseen must have a row.
+        // A file of no bytes waits for its content. One that was removed is handed out, because a picture that a
+        // program takes away unseen must have a row.
         let is_empty = state.is_some_and(|(bytes, _)| bytes == 0);
         !is_empty && (self.since.elapsed() >= STILL || has_end(&self.path))
     }

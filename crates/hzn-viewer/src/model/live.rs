@@ -1,5 +1,5 @@
-//! What the window knows of a flight computer whose telemetry comes over a line. Its memory is bounded, however long the
-//! line is open.
+//! What the window knows of a flight computer whose telemetry comes over a line. Its memory is bounded, however long
+//! the line is open.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};

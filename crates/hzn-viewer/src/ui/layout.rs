@@ -58,13 +58,7 @@ impl Viewer {
         if is_open && self.panels.stages_float() && self.panels.shows(Panel::Stages, &self.settings) {
             stages::show_over(self, &ctx, rect);
         }
-        toasts::show(self, &ctx, rect);
-        dialogs::show(self, &ctx, rect);
-        questions::show(self, &ctx);
-        wizard::show(self, &ctx);
-        study::show(self, &ctx, rect);
-        calibration::show(self, &ctx, rect);
-        help::show(self, &ctx);
+        self.show_windows(&ctx, rect);
         self.drive_background(&ctx);
         self.autosave(&ctx);
         self.keep_settings(&ctx);
@@ -74,6 +68,17 @@ impl Viewer {
         self.close_if_due(&ctx);
         self.focus_ring.draw(&ctx);
         self.request_frame();
+    }
+
+    /// Draws what lies over the picture.
+    fn show_windows(&mut self, ctx: &egui::Context, rect: egui::Rect) {
+        toasts::show(self, ctx, rect);
+        dialogs::show(self, ctx, rect);
+        questions::show(self, ctx);
+        wizard::show(self, ctx);
+        study::show(self, ctx, rect);
+        calibration::show(self, ctx, rect);
+        help::show(self, ctx);
     }
 
     /// Returns true if a key may start a command: no question, form or dialog is open. The key of the help also closes

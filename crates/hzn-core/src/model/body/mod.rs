@@ -113,15 +113,14 @@ section! {
         /// limb's light. In linear pictures the default becomes 4.6 km. A larger sigma gives the expected half-angle
         /// less weight.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
-        /// 1σ of a tilt of the limb, km: the amplitude of a height that varies with the azimuth like a cosine, along each
-        /// of two axes.
+        /// 1σ of a tilt of the limb, km: the amplitude of a height that varies with the azimuth like a cosine, along
+        /// each of two axes.
         ///
         /// One picture cannot see such a tilt, because it looks like another attitude; it widens the covariance of the
-        /// axis by this height over the distance to the limb. A rig uses the same key. The default, for the Earth, is
-        /// 0.05 km for each degree between the limb and the point below the camera, divided by √2, and half of this for
-        /// a limb in sunlight; it is 0 if `limb_height_by_latitude_km`, or the table of `co2-15um` with a time and a
-        /// position, tells how the height changes.
-        @- limb_tilt_sigma_km: Option<f64> = None, [0.0 to 1000.0] { unset: "from the altitude", example: "0.8" };
+        /// axis by this height over the distance to the limb. A rig uses the same key, and derives it from the
+        /// altitude if it is not told: 0.05 km for each degree between the limb and the point below the camera,
+        /// divided by √2. For one camera that is a good value for a thermal limb, and half of it for one in sunlight.
+        @- limb_tilt_sigma_km: Option<f64> = None, [0.0 to 1000.0] { unset: "0 for one camera", example: "0.8" };
         /// What the sensor does in a picture in which the Sun is known to be down, from time and position.
         ///
         /// `airglow` searches for the outer edge of the layer of airglow, and refuses every other edge. It is for the

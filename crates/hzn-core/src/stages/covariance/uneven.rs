@@ -1,10 +1,10 @@
 //! Errors from a limb whose height changes along the edge, in kilometres of height.
 //!
-//! Near the middle of the arc, a height is A + B sin δ + D (1 − cos δ), with the azimuth δ from the middle. The fit takes
-//! all of it for another cone: with u = |∂cos α/∂d|, the axis moves by −u D/sin α towards the middle and by u B/sin α
-//! along the arc, and cos α by −u (A + D). No residual shows these errors, so that they follow from what is known of the
-//! limb, at a few operations for each picture. They are added after the fusion and change no weight; the free fit, from
-//! which a rig and a filter compute these errors themselves, does not have them.
+//! Near the middle of the arc, a height is A + B sin δ + D (1 − cos δ), with the azimuth δ from the middle. The fit
+//! takes all of it for another cone: with u = |∂cos α/∂d|, the axis moves by −u D/sin α towards the middle and by u
+//! B/sin α along the arc, and cos α by −u (A + D). No residual shows these errors, so that they follow from what is
+//! known of the limb, at a few operations for each picture. They are added after the fusion and change no weight; the
+//! free fit, from which a rig and a filter compute these errors themselves, does not have them.
 
 use super::fusion::fixed_half_angle_gain;
 use crate::base::linalg::{M3, V3, basis};
@@ -49,8 +49,8 @@ fn tilt<T: Real>(expected: &Expected<T>) -> M3<T> {
 /// Returns the covariance of (δ₁₂, δc) from a Sun that is low over a part of the limb; `None` where it is unknown or
 /// high.
 ///
-/// The rise of the edge lies between nothing and that of light which is scattered once. A low Sun that the residuals show
-/// counts only once.
+/// The rise of the edge lies between nothing and that of light which is scattered once. A low Sun that the residuals
+/// show counts only once.
 fn low_sun<T: Real>(fit: &Fit<T>, expected: &Expected<T>, shown: T) -> Option<M3<T>> {
     // The position of a body has its own term for the light.
     if expected.target().is_some() || !(expected.scale_height_m > T::ZERO) {

@@ -62,17 +62,19 @@ impl Viewer {
                     self.ask(PathDialog::new(Purpose::Rerun, &self.sequence.default_output_path(&name)));
                 }
             }
-            Command::ExportPicture => {
-                let name = hzn_run::overlay::file_name(self.frame_view.as_ref().map_or("picture", |s| &s.name));
-                let name = format!("overlay-{name}");
-                self.ask(PathDialog::new(Purpose::Picture, &self.sequence.default_output_path(&name)));
-            }
+            Command::ExportPicture => self.ask_export(),
             Command::Stages => self.panels.toggle(Panel::Stages, &mut self.settings),
             Command::Answer => self.panels.toggle(Panel::Answer, &mut self.settings),
             Command::Plots => self.panels.toggle(Panel::Plots, &mut self.settings),
             Command::Theme => self.settings.dark = !self.settings.dark,
             Command::Help => self.showing_help = !self.showing_help,
         }
+    }
+
+    fn ask_export(&mut self) {
+        let name = hzn_run::overlay::file_name(self.frame_view.as_ref().map_or("picture", |s| &s.name));
+        let name = format!("overlay-{name}");
+        self.ask(PathDialog::new(Purpose::Picture, &self.sequence.default_output_path(&name)));
     }
 
     /// Opens the same files again, at the same picture.
