@@ -425,7 +425,7 @@ class Body(TypedDict, total=False):
     7.0."""
     limb_tilt_sigma_km: float | None
     """1σ of a tilt of the limb, km: the amplitude of a height that varies with the azimuth like a cosine, along each
-    of two axes. Values: 0 to 1000 km. Default: from the altitude."""
+    of two axes. Values: 0 to 1000 km. Default: from the band."""
     night: Literal["refuse", "airglow"]
     """What the sensor does in a picture in which the Sun is known to be down, from time and position. Default:
     "refuse"."""

@@ -257,7 +257,7 @@ impl<T: Real> Expected<T> {
             fixed_from_camera: known,
             harmonics_cos,
             unknown_harmonics_cos,
-            tilt_sigma_m: body.tilt_sigma_m(),
+            tilt_sigma_m: body.tilt_sigma_m(is_placed, sin.atan2(cos)),
             level: prior.level,
             sun: prior.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
             sun_seen: prior.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),

@@ -117,10 +117,10 @@ section! {
         /// each of two axes.
         ///
         /// One picture cannot see such a tilt, because it looks like another attitude; it widens the covariance of the
-        /// axis by this height over the distance to the limb. A rig uses the same key, and derives it from the
-        /// altitude if it is not told: 0.05 km for each degree between the limb and the point below the camera,
-        /// divided by √2. For one camera that is a good value for a thermal limb, and half of it for one in sunlight.
-        @- limb_tilt_sigma_km: Option<f64> = None, [0.0 to 1000.0] { unset: "0 for one camera", example: "0.8" };
+        /// axis by this height over the distance to the limb. If it is not told, a rig, and a thermal band without time
+        /// and position, have 0.05 km for each degree between the limb and the point below the camera, divided by √2;
+        /// for other limbs it is 0. Half of that value is right for a limb in sunlight.
+        @- limb_tilt_sigma_km: Option<f64> = None, [0.0 to 1000.0] { unset: "from the band", example: "0.8" };
         /// What the sensor does in a picture in which the Sun is known to be down, from time and position.
         ///
         /// `airglow` searches for the outer edge of the layer of airglow, and refuses every other edge. It is for the

@@ -67,7 +67,7 @@ impl<T: Real> Expected<T> {
         if size.is_some() {
             expected.sigma_cos = expected.sigma_cos_of_parts();
             expected.set_uneven_limb(body);
-            expected.tilt_sigma_m = body.tilt_sigma_m();
+            expected.tilt_sigma_m = body.tilt_sigma_m(false, expected.half_angle_rad());
             expected.is_curved = expected.bends();
         }
         Ok(expected)

@@ -22,10 +22,16 @@ pub fn tilt_km<T: Real>(half_angle_rad: T) -> T {
 }
 
 impl Config {
-    /// Returns the 1σ of the tilt of the limb along each of two axes, metres.
-    // A prior for every camera would double the sigma of scenes whose limb has no tilt, so that it is told.
-    pub(super) fn tilt_sigma_m<T: Real>(&self) -> T {
-        T::from_f64(self.limb_tilt_sigma_km.unwrap_or_default() * 1000.0)
+    /// Returns the 1σ of the tilt of the limb along each of two axes, metres. `is_placed` says whether place and season
+    /// are known, so that the band says how the height changes.
+    // A prior for every limb in sunlight would double the sigma of scenes whose limb has no tilt, so that it is told.
+    pub(super) fn tilt_sigma_m<T: Real>(&self, is_placed: bool, half_angle_rad: T) -> T {
+        let km = T::from_f64(1000.0);
+        match self.limb_tilt_sigma_km {
+            Some(told) => T::from_f64(told) * km,
+            None if is_placed || self.limb.thermal_km().is_none() => T::ZERO,
+            None => tilt_km(half_angle_rad) * km,
+        }
     }
 }
 
