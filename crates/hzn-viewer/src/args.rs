@@ -17,8 +17,8 @@ use crate::work::open::Request;
 /// With --follow, the window shows new pictures of a folder, or of a recording that grows, as they come. It keeps the
 /// newest 9000 pictures.
 ///
-/// The line of a flight computer shows its telemetry, and sends telecommands: tcp:HOST:PORT, udp:LOCAL[,REMOTE],
-/// tcp-listen:HOST:PORT or serial:DEVICE[:BAUD]. A port without a host (udp:5001) is one that only this computer
+/// The line of a flight computer shows its telemetry, and sends telecommands: tcp:HOST:PORT, udp:LOCAL,REMOTE,
+/// tcp-listen:HOST:PORT or serial:DEVICE:BAUD. A port without a host (udp:5001) is one that only this computer
 /// reaches.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "hzn-viewer", version, max_term_width = 100)]
