@@ -19,7 +19,7 @@ pub(super) const FEWEST: usize = 5;
 /// An epoch whose χ² is beyond this number of sigmas does not count. One of a thousand good ones is left out.
 const LEFT_OUT_SIGMAS: f64 = 3.09;
 
-/// What is known before the adjustment.
+/// The told mounts, and the sigmas that the adjustment begins with.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// The told rotation from each camera to the rig.

@@ -54,7 +54,7 @@ fn choose<'a>(
     }
 }
 
-/// Says what was written, and what `hzn fuse` takes it for.
+/// Says how many rows were written, which axes `hzn fuse` takes theirs for, and which messages were left out.
 fn report(which: Instrument, table: &Path, exported: &Exported) -> Result<(), Stop> {
     let Exported { rows, topic, frame_id, left_out, cut } = exported;
     tell::line(one_line(format!("{}: {} of {topic}", table.display(), counted(*rows, "row"))));

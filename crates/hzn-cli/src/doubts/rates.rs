@@ -12,17 +12,18 @@ const MIN_PAIRS: usize = 5;
 /// Right rates leave less of the turns than no rates do, and rates with a wrong sign twice as much. The limit lies in
 /// the middle.
 const MAX_REST: f64 = 1.5;
-/// What is left must exceed this many sigma of the noise of both answers.
+/// The rates are doubted only if the turn that they leave exceeds this many sigma of the noise of both answers.
 const MIN_SIGMAS: f64 = 3.0;
 /// Fastest turn of the direction to a body in an orbit, rad/s, see `hzn_core::Sequence`: no rate of a camera says it.
 const ORBIT_RAD_S: f64 = 1.24e-3;
 
-/// What is left of the turn of the axis between two answers, rad, when the camera turns by a factor times the rates.
+/// The turn of the axis between two answers, rad, after the rates, times a factor, are taken out of it.
 struct Rest {
+    /// With the rates as they are.
     told: f64,
     in_degrees: f64,
     negated: f64,
-    /// The turn itself.
+    /// With nothing taken out.
     none: f64,
 }
 
