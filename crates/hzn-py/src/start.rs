@@ -93,6 +93,7 @@ fn of_size(size_px: [u32; 2]) -> CameraFacts {
         altitude_km: None,
         body: Body::Earth,
         measured: None,
+        image_circle_px: None,
     }
 }
 

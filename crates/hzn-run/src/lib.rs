@@ -28,6 +28,7 @@ pub mod engine;
 mod error;
 pub mod explain;
 pub mod explained;
+mod image_circle;
 #[cfg(feature = "recordings")]
 pub mod instruments;
 mod limb_words;

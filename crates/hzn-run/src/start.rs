@@ -6,6 +6,7 @@ use hzn_files::start::{self, Body, CameraFacts, Exif, StartConfig};
 
 use crate::diagnosis::{FieldOfView, find_field_of_view};
 use crate::error::{Error, unusable};
+use crate::image_circle::find_image_circle;
 use crate::open::{Request, frames_path, load_frames};
 use crate::source::{self, Picture, Source};
 
@@ -28,26 +29,39 @@ pub enum LimbSays {
     Nothing(usize),
 }
 
-/// Returns what the pictures say about their camera: size, tone, and EXIF of the first one.
+/// Returns what the pictures say about their camera: size and tone, EXIF of the first one, and the image circle of a
+/// fisheye.
 ///
 /// # Errors
 /// No picture can be read, or the pictures have different sizes.
 pub fn read_camera_facts(source: &mut dyn Source) -> Result<CameraFacts, Error> {
     let size_px = one_size(source)?;
     let tone = source::find_tone(source).map(|found| found.tone);
-    let exif = match source.next().transpose()?.map(|item| item.payload) {
-        Some(payload) => payload.exif_lens().unwrap_or_default(),
-        None => Exif::default(),
-    };
+    let step = source.total().map_or(1, |total| (total / PICTURES).max(1));
+    let mut exif = None;
+    let mut pictures: Vec<Picture> = Vec::new();
+    let mut index = 0;
+    while let Some(item) = source.next() {
+        let item = item?;
+        exif = exif.or_else(|| Some(item.payload.exif_lens().unwrap_or_default()));
+        if index % step == 0 {
+            pictures.extend(item.payload.decode(None).map(|(picture, _)| picture));
+        }
+        index += 1;
+        if pictures.len() as u64 >= PICTURES {
+            break;
+        }
+    }
     Ok(CameraFacts {
         size_px,
         fov_deg: None,
         lens: None,
-        exif,
+        exif: exif.unwrap_or_default(),
         tone,
         altitude_km: None,
         body: Body::default(),
         measured: None,
+        image_circle_px: find_image_circle(&pictures),
     })
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::Config;
 use hzn_core::camera::Model;
-use hzn_files::start::{self, CameraFacts, StartConfig};
+use hzn_files::start::{self, CameraFacts, ImageCircle, StartConfig};
 use hzn_run::diagnosis::FieldOfView;
 use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
@@ -127,6 +127,8 @@ pub(super) fn run(args: &Args) -> Outcome {
         (known.lens, known.measured) = (Some(found.lens), Some(found.measured));
     }
     let start = start::write_sensor_toml(&known).map_err(usage)?;
+    // What the file says is checked before it is written: a refused file helps nobody.
+    hzn_files::sensor::parse(&start.text, args.output())?;
     write(&start.text)?;
     start.warnings.iter().for_each(tell::warning);
     if known.exif.turned {
@@ -151,7 +153,24 @@ pub(super) fn run(args: &Args) -> Outcome {
         start.focal_sigma_percent,
         start.k1_sigma,
     ));
+    tell_circle(&start);
     finish(args, &start.text)
+}
+
+/// Says which image circle the file has.
+fn tell_circle(start: &StartConfig) {
+    match start.image_circle {
+        Some(ImageCircle::Seen { theta_max_deg }) => tell::line(format_args!(
+            "all pictures are dark beyond {theta_max_deg:.1} degrees off axis: taken as the rim of the image circle \
+             (theta_max_deg), which is masked; if it is the whole Earth in a camera that looks at the nadir, remove \
+             that line"
+        )),
+        Some(ImageCircle::Assumed { theta_max_deg }) => tell::line(format_args!(
+            "the corners lie too far off axis to be in the image: theta_max_deg = {theta_max_deg:.1} masks what is \
+             beyond the sides"
+        )),
+        None => {}
+    }
 }
 
 /// Says what looks wrong in the written file, and what it needs.

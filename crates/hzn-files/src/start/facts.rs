@@ -3,6 +3,7 @@
 use hzn_core::camera::Model;
 use hzn_core::tone::Tone;
 
+use super::circle::ImageCircle;
 use super::exif::Exif;
 
 /// Known properties of a camera.
@@ -25,6 +26,9 @@ pub struct CameraFacts {
     pub body: Body,
     /// Field of view that the limb in the pictures says. It is used if neither a field of view nor EXIF is known.
     pub measured: Option<MeasuredFov>,
+    /// Radius about the picture's centre beyond which no light arrives, in pixels, if the pictures show it. The file of
+    /// a fisheye limits the lens to it.
+    pub image_circle_px: Option<f64>,
 }
 
 impl CameraFacts {
@@ -76,6 +80,8 @@ pub struct StartConfig {
     pub p_sigma: Option<f64>,
     /// 1-sigma of the principal point, in pixels.
     pub centre_sigma_px: f64,
+    /// The image circle that the file has.
+    pub image_circle: Option<ImageCircle>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
 }

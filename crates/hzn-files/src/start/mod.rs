@@ -19,6 +19,7 @@
 //! its crate LGPL). openMVG's has not changed since 2019. Cameras that write a focal length mostly also write the pitch
 //! of their pixels or the 35 mm equivalent.
 
+mod circle;
 mod exif;
 mod facts;
 mod focal;
@@ -29,6 +30,7 @@ mod text;
 
 use hzn_core::camera::{Config, Model};
 
+pub use circle::ImageCircle;
 pub use exif::Exif;
 pub use facts::{Body, CameraFacts, MeasuredFov, StartConfig};
 pub use focal::{focal_px, fov_deg};
@@ -67,8 +69,9 @@ pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
     let (focal, warnings, comparison) = choose_focal(known, exif, lens, width)?;
     let guess = Guess::new(lens, facts.size_px, &focal);
     let fov_deg = fov_deg(lens, width, focal.px);
+    let circle = ImageCircle::choose(facts, &guess.camera, fov_deg);
     Ok(StartConfig {
-        text: text::write_text(facts, &guess, &focal, fov_deg, comparison.as_deref()),
+        text: text::write_text(facts, &guess, &focal, fov_deg, circle, comparison.as_deref()),
         lens,
         focal_px: focal.px,
         fov_deg,
@@ -77,6 +80,7 @@ pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
         k2_sigma: guess.k2_sigma,
         p_sigma: guess.p_sigma,
         centre_sigma_px: guess.centre_sigma_px,
+        image_circle: circle,
         warnings,
     })
 }

@@ -16,6 +16,7 @@ fn known(fov_deg: Option<f64>, lens: Option<Model>, exif: Exif) -> CameraFacts {
         altitude_km: Some(418.0),
         body: Body::Earth,
         measured: None,
+        image_circle_px: None,
     }
 }
 
@@ -168,4 +169,28 @@ fn the_tone_of_the_files_is_written_or_asked_for() {
     // The relief of the Moon has no tone.
     let moon = CameraFacts { body: Body::Moon, tone: Some(Tone::Srgb), ..known(Some(40.0), None, Exif::default()) };
     assert!(!write_sensor_toml(&moon).unwrap().text.contains("[input]"));
+}
+
+#[test]
+fn an_image_circle_limits_a_fisheye_only() {
+    let start = |fov_deg, lens, image_circle_px| {
+        let facts = CameraFacts {
+            size_px: [600, 600],
+            image_circle_px,
+            ..known(Some(fov_deg), Some(lens), Exif::default())
+        };
+        let start = write_sensor_toml(&facts).unwrap();
+        let config = crate::sensor::parse(&start.text, Path::new("sensor.toml")).unwrap().config;
+        (start.image_circle, config.camera.theta_max_deg)
+    };
+    // 250 px of 300 px, which are 90 degrees.
+    let (circle, deg) = start(180.0, Model::Equidistant, Some(250.0));
+    assert!(matches!(circle, Some(ImageCircle::Seen { .. })) && (deg.unwrap() - 75.0).abs() < 0.051, "{deg:?}");
+    assert_eq!(start(180.0, Model::Equidistant, None), (None, None));
+    assert_eq!(start(80.0, Model::Pinhole, Some(250.0)), (None, None));
+    // A whole Earth in the middle of the picture.
+    assert_eq!(start(100.0, Model::Equidistant, Some(250.0)), (None, None));
+    // The corners would be 205 degrees off axis, which no lens can have.
+    let (circle, deg) = start(290.0, Model::Equidistant, None);
+    assert!(matches!(circle, Some(ImageCircle::Assumed { .. })) && deg == Some(145.0), "{deg:?}");
 }

@@ -6,6 +6,7 @@ use hzn_core::body::MOON_RADIUS_KM;
 use hzn_core::camera::{Config, Model};
 use hzn_core::tone::Tone;
 
+use super::circle::{self, ImageCircle};
 use super::facts::{Body, CameraFacts};
 use super::focal::Focal;
 use super::guess::Guess;
@@ -20,6 +21,7 @@ pub(super) fn write_text(
     guess: &Guess,
     focal: &Focal,
     fov_deg: f64,
+    circle: Option<ImageCircle>,
     comparison: Option<&str>,
 ) -> String {
     let mut text = String::from(
@@ -34,6 +36,9 @@ pub(super) fn write_text(
          [camera]\n",
     );
     text += &write_camera(facts, &guess.camera, focal, fov_deg, comparison);
+    if !guess.camera.model.is_planar() {
+        text += &write_circle(circle, fov_deg);
+    }
     text += &write_covariance(guess, focal);
     text += &write_body(facts.body, facts.altitude_km);
     if facts.body == Body::Earth {
@@ -88,15 +93,28 @@ fn write_camera(facts: &CameraFacts, camera: &Config, focal: &Focal, fov_deg: f6
         "fx_px = {:.1}\nfy_px = {:.1}\ncx_px = {:.1}                 # the picture's centre\ncy_px = {:.1}\n",
         camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px
     );
-    if !is_planar {
-        let _ = writeln!(
-            t,
-            "# theta_max_deg = {:.0}            # radius of the image circle in degrees off axis, if its rim is in the \
-             picture",
-            0.5 * fov_deg
-        );
-    }
     t
+}
+
+/// Writes the radius of the image circle, or a comment that says what it is for.
+fn write_circle(circle: Option<ImageCircle>, fov_deg: f64) -> String {
+    match circle {
+        Some(ImageCircle::Seen { theta_max_deg }) => format!(
+            "# All pictures are dark beyond this angle off axis: this is the rim of the image circle, which must not\n\
+             # pass for a limb. If it is the whole Earth in a camera that looks at the nadir, remove this line.\n\
+             theta_max_deg = {theta_max_deg:.1}\n"
+        ),
+        Some(ImageCircle::Assumed { theta_max_deg }) => format!(
+            "# The corners would be more than {:.0} degrees off axis: the image circle ends at the sides, as assumed.\n\
+             theta_max_deg = {theta_max_deg:.1}\n",
+            circle::MAX_DEG
+        ),
+        None => format!(
+            "# theta_max_deg = {:.0}            # radius of the image circle in degrees off axis, if its rim is in the \
+             picture\n",
+            0.5 * fov_deg
+        ),
+    }
 }
 
 /// Writes the covariance of the guess, with a comment for each sigma.

@@ -94,10 +94,10 @@ impl Payload {
     }
 
     /// Returns the lens data from the EXIF of a picture file.
-    pub(crate) fn exif_lens(self) -> Option<Exif> {
+    pub(crate) fn exif_lens(&self) -> Option<Exif> {
         match self {
-            Self::File(path) => header::read_lens(open_file(&path).ok()?),
-            Self::Encoded(bytes) => header::read_lens(std::io::Cursor::new(bytes)),
+            Self::File(path) => header::read_lens(open_file(path).ok()?),
+            Self::Encoded(bytes) => header::read_lens(std::io::Cursor::new(bytes.clone())),
             Self::RawFile(..) | Self::Decoded(_) | Self::Broken(_) => None,
         }
     }

@@ -49,6 +49,7 @@ impl Wizard {
             altitude_km: self.one_altitude.then_some(self.altitude_km),
             body: start::Body::Earth,
             measured: None,
+            image_circle_px: None,
         };
         let start = start::write_sensor_toml(&facts).map_err(|e| e.to_string())?;
         Ok((start.text, start.warnings))
