@@ -2,6 +2,7 @@
 
 use hzn_core::Config;
 use hzn_core::body::{self, Kind};
+use hzn_core::camera::INTRINSICS;
 use hzn_core::covariance;
 
 use super::bend;
@@ -14,6 +15,8 @@ use super::sighting::Sighting;
 
 /// Smallest number of pictures with an answer. With fewer pictures the scatter is not known to a quarter.
 pub const MIN_PICTURES: usize = 12;
+/// 1-sigma that a sensor assumes for an unmeasured limb, in kilometres. A height that is less certain is no gain.
+const DEFAULT_SIGMA_KM: f64 = 2.0 * MAX_SIGMA_KM;
 /// Floor of the common shift of an edge, in pixels: the default of `covariance.sigma_px`. Blur and threshold move the
 /// middle of an edge by fractions of a pixel, even if the edge is smooth.
 const MIN_SHIFT_PX: f64 = 0.1;
@@ -49,7 +52,7 @@ pub fn config_for_calibration(sensor: &Config) -> Option<Config> {
 pub struct Height {
     /// Height; with rows by latitude it is their mean over the visible limb.
     pub km: f64,
-    /// 1-sigma for the sensor: the root sum of squares of the five parts that follow.
+    /// 1-sigma for the sensor: the root sum of squares of the six parts that follow.
     pub sigma_km: f64,
     /// Part from edge noise, over all pictures.
     pub statistical_km: f64,
@@ -61,11 +64,29 @@ pub struct Height {
     /// Part from a bend that all edges have in common, which the fit takes for another height. It is assumed to be as
     /// strong as the next shapes along the edge in the mean of the residuals.
     pub bend_km: f64,
+    /// Part from the lens: what its sigmas in sensor.toml change in all pictures alike.
+    pub lens_km: f64,
     /// Part from the local radius if no position is known.
     pub radius_km: f64,
     /// Rows of (geodetic latitude in degrees, height, 1-sigma from edge noise and scatter); empty if one height
     /// explains all pictures equally well.
     pub by_latitude: Vec<[f64; 3]>,
+}
+
+impl Height {
+    /// Returns the parts of the sigma with their names, the largest first.
+    fn parts_km(&self) -> [(&'static str, f64); 6] {
+        let mut parts = [
+            ("edge noise", self.statistical_km),
+            ("scatter between pictures", self.scatter_km),
+            ("a common shift of all edges", self.shift_km),
+            ("a bend that all edges share", self.bend_km),
+            ("the lens", self.lens_km),
+            ("the local radius, because no position is known", self.radius_km),
+        ];
+        parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        parts
+    }
 }
 
 /// Edge noise of all pictures.
@@ -159,6 +180,9 @@ impl Calibration {
         if height.statistical_km > MAX_SIGMA_KM {
             return Err(vague(height.statistical_km));
         }
+        if height.lens_km > MAX_SIGMA_KM {
+            return Err(Refusal::Lens { lens_km: height.lens_km, max_km: MAX_SIGMA_KM });
+        }
         let counts = |s: &Sighting| consistent.iter().any(|t| std::ptr::eq(*t, s));
         let picture = |s: &Sighting| Picture {
             name: s.name.clone(),
@@ -178,9 +202,13 @@ impl Calibration {
         })
     }
 
-    /// Returns the alarm if the pictures do not agree with each other.
+    /// Returns the alarm if the pictures do not agree with each other, or if the height is no gain.
     pub fn alarm(&self) -> Option<Refusal> {
-        (self.chi2 > MAX_CHI2).then_some(Refusal::Alarm { chi2: self.chi2, max_chi2: MAX_CHI2 })
+        if self.chi2 > MAX_CHI2 {
+            return Some(Refusal::Alarm { chi2: self.chi2, max_chi2: MAX_CHI2 });
+        }
+        let parts_km = self.height.parts_km();
+        (self.height.sigma_km > DEFAULT_SIGMA_KM).then_some(Refusal::NoBetter { parts_km, max_km: DEFAULT_SIGMA_KM })
     }
 
     /// Writes the values into a sensor that looks for the body, as [`super::into_sensor_toml`] does for the file.
@@ -246,16 +274,22 @@ fn combine_heights(profile: &Profile, sightings: &[&Sighting], edge: &Edge) -> H
     let bend_px = bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px), common_px);
     let bend_km = bend_px * mean_square(&|s| s.km_per_bend_px).sqrt();
     let radius_km = mean_square(&|s| s.radius_sigma_km).sqrt();
+    // The lens is the same in all pictures, so that its modes change the mean height and average out in nothing.
+    let by_mode = |k: usize| sightings.iter().map(|s| s.km_by_lens[k]).sum::<f64>() / n;
+    let lens_km = (0..INTRINSICS).map(|k| by_mode(k).powi(2)).sum::<f64>().sqrt();
     let rows = profile.latitudes_deg.iter().enumerate();
     let row = |(k, deg): (usize, &f64)| [*deg, h[k], covariance[(k, k)].sqrt()];
     Height {
         km,
-        sigma_km: (mean_variance + scatter2 + [shift_km, bend_km, radius_km].map(|km| km * km).iter().sum::<f64>())
-            .sqrt(),
+        sigma_km: (mean_variance
+            + scatter2
+            + [shift_km, bend_km, lens_km, radius_km].map(|km| km * km).iter().sum::<f64>())
+        .sqrt(),
         statistical_km,
         scatter_km,
         shift_km,
         bend_km,
+        lens_km,
         radius_km,
         by_latitude: rows.map(row).collect(),
     }

@@ -6,7 +6,7 @@
 //! (Σ w h hᵀ) δ = Σ w r h. The change of c is a·δ with a = (m, 1).
 
 use hzn_core::Prior;
-use hzn_core::camera::Camera;
+use hzn_core::camera::{Camera, INTRINSICS};
 use hzn_core::ellipsoid::LimbCone;
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
@@ -25,6 +25,8 @@ struct EdgePoint {
     derivatives: [Vector3<f64>; 2],
     /// Offset from the principal point, in pixels.
     off_px: [f64; 2],
+    /// Motion of the image point by each 1-sigma mode of the lens, in pixels.
+    by_lens_px: [[f64; 2]; INTRINSICS],
     weight: f64,
     /// Distance to the next of these points along the edge, in pixels; 0 for the last.
     step_px: f64,
@@ -49,6 +51,8 @@ pub(crate) struct Row {
     pub(crate) azimuth_rad: f64,
     /// Change of r per relative change of the focal length, in pixels.
     pub(crate) by_focal_px: f64,
+    /// Change of r by each 1-sigma mode of the lens, in pixels; those beyond the number of modes are 0.
+    pub(crate) by_lens_px: [f64; INTRINSICS],
 }
 
 /// A fitted cone.
@@ -113,6 +117,7 @@ impl Cone {
             let (x, y) = (p.ray.dot(&b1), p.ray.dot(&b2));
             let offset = azimuth.map_or(0.0, |a| a.offset(&p.ray, &axis));
             let slopes = [axis.dot(&p.derivatives[0]), axis.dot(&p.derivatives[1])];
+            let across = |[u, v]: &[f64; 2]| (slopes[0] * u + slopes[1] * v) / g;
             Row {
                 h: Vector3::new(x - m[0], y - m[1], -1.0) / g,
                 r_px: (cos + offset - d) / g,
@@ -121,7 +126,8 @@ impl Cone {
                 step_px: p.step_px,
                 along: 0.0,
                 azimuth_rad: y.atan2(x),
-                by_focal_px: (slopes[0] * p.off_px[0] + slopes[1] * p.off_px[1]) / g,
+                by_focal_px: across(&p.off_px),
+                by_lens_px: core::array::from_fn(|k| across(&p.by_lens_px[k])),
             }
         };
         let mut rows: Vec<Row> = points.iter().map(row).collect();
@@ -201,8 +207,10 @@ fn locate_edge_points(camera: &Camera<f64>, points: &[([f64; 2], f64)]) -> Vec<E
             let j = ray.jacobian();
             let derivatives = [0, 1].map(|k| Vector3::new(j[0][k], j[1][k], j[2][k]));
             let off_px = [u - centre.u, v - centre.v];
+            let mut by_lens_px = [[0.0; 2]; INTRINSICS];
+            by_lens_px.iter_mut().zip(camera.shifts_by_lens(&ray.direction())).for_each(|(to, by)| *to = by);
             let ray = Vector3::from(ray.direction().xyz());
-            Some(([u, v], EdgePoint { ray, derivatives, off_px, weight, step_px: 0.0 }))
+            Some(([u, v], EdgePoint { ray, derivatives, off_px, by_lens_px, weight, step_px: 0.0 }))
         })
         .collect();
     let ahead: Vec<[f64; 2]> = located.iter().skip(1).map(|p| p.0).collect();

@@ -21,6 +21,20 @@ pub enum Refusal {
         /// Number of pictures.
         pictures: usize,
     },
+    /// The lens is so uncertain that it moves the limb height of all pictures too much.
+    Lens {
+        /// 1-sigma of the limb height from the sigmas of the lens in sensor.toml, in kilometres.
+        lens_km: f64,
+        /// Largest 1-sigma, in kilometres.
+        max_km: f64,
+    },
+    /// The limb height is less certain than that of a sensor without a calibration.
+    NoBetter {
+        /// The parts of its 1-sigma with their names, in kilometres, the largest first.
+        parts_km: [(&'static str, f64); 6],
+        /// 1-sigma without a calibration, in kilometres.
+        max_km: f64,
+    },
     /// Too many pictures measure a limb height that disagrees with the others.
     Inconsistent {
         /// Number of pictures that disagree.
@@ -51,6 +65,21 @@ impl fmt::Display for Refusal {
                  improve on the default. Sigma falls with the root of the number of pictures and with the square of \
                  the field of view; take more pictures, or pictures with a longer limb"
             ),
+            Self::Lens { lens_km, max_km } => write!(
+                f,
+                "the lens in sensor.toml is not known well enough: its sigmas move the limb height of all pictures by \
+                 {lens_km:.1} km, but at most {max_km:.1} km is useful. Calibrate the lens first, with a board \
+                 (`hzn calibrate board`) or in flight (`hzn calibrate sky`)"
+            ),
+            Self::NoBetter { parts_km, max_km } => {
+                let sigma_km = parts_km.iter().map(|(_, km)| km * km).sum::<f64>().sqrt();
+                let [(name, km), ..] = parts_km;
+                write!(
+                    f,
+                    "the limb height would have a sigma of {sigma_km:.1} km, most of it ({km:.1} km) from {name}: the \
+                     {max_km:.1} km of a sensor without a calibration are not worse"
+                )
+            }
             Self::Inconsistent { inconsistent, pictures } => write!(
                 f,
                 "{inconsistent} of {pictures} pictures measure limb heights that disagree with the others. Either \

@@ -5,7 +5,7 @@
 //! values (d₀, α₀) and ∂d/∂cos α = −(R + H) cot α.
 
 use hzn_core::body::{self, Kind};
-use hzn_core::camera::Camera;
+use hzn_core::camera::{Camera, INTRINSICS};
 use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, from_geodetic, geodetic};
 use hzn_core::{Prior, Solution};
 use nalgebra::Vector3;
@@ -45,6 +45,8 @@ pub struct Sighting {
     pub km_per_bend_px: f64,
     /// Change of the limb height per relative change of the focal length, in kilometres.
     pub km_per_focal: f64,
+    /// Change of the limb height by each 1-sigma mode of the lens in sensor.toml, in kilometres; 0 beyond their number.
+    pub(super) km_by_lens: [f64; INTRINSICS],
     /// Weighted RMS distance of the edge points from the limb, in pixels.
     pub rms_px: f64,
     /// Length of the edge that the points cover, in pixels.
@@ -124,6 +126,7 @@ impl Sighting {
             km_per_bend_px: by_cos_m.abs() * cone.change_of_cos(|row| bend::bend_shape(row.along)).abs() / 1e3,
             shapes_px: bend::shapes_px(&cone),
             km_per_focal: by_cos_m * cone.change_of_cos(|row| row.by_focal_px) / 1e3,
+            km_by_lens: core::array::from_fn(|k| by_cos_m * cone.change_of_cos(|row| row.by_lens_px[k]) / 1e3),
             rms_px: cone.rms_px(),
             arc_px: cone.arc_px(),
             correlation_px: edge::equivalent_length_px(&cone, cone.rms_px(), noise),

@@ -86,7 +86,17 @@ pub(crate) fn solution(axis: Vector3<f64>, half_angle_rad: f64) -> Solution<f64>
 /// Returns sightings of a limb at `limb_km` from 180 km altitude on, with `fov_deg`. `scatter_km` is the scatter
 /// between pictures.
 fn flight(count: usize, fov_deg: f64, limb_km: f64, scatter_km: f64, noise: Noise, seed: u64) -> Vec<Sighting> {
-    let config = camera(fov_deg);
+    flight_through(camera(fov_deg), count, limb_km, scatter_km, noise, seed)
+}
+
+fn flight_through(
+    config: camera::Config,
+    count: usize,
+    limb_km: f64,
+    scatter_km: f64,
+    noise: Noise,
+    seed: u64,
+) -> Vec<Sighting> {
     let camera = Camera::try_new(&config).unwrap();
     let mut draws = Draws(seed);
     let radius = earth().mean_radius_km();
@@ -270,6 +280,24 @@ fn a_longer_focal_length_raises_the_limb_as_predicted() {
     let (before, after) = (at(&camera), at(&longer.unwrap()));
     let grown = after.limb_height_km - before.limb_height_km;
     assert!((grown / (before.km_per_focal * 1e-3) - 1.0).abs() < 0.02, "{grown} {}", before.km_per_focal);
+}
+
+#[test]
+fn what_the_lens_may_change_belongs_to_the_sigma_of_the_height() {
+    let with = |focal_sigma_percent| {
+        let config = camera::Config { focal_sigma_percent, ..camera(90.0) };
+        Calibration::new(&earth(), &flight_through(config, 16, 18.7, 0.5, Noise(0.3, 40.0, 0.5), 11))
+    };
+    let exact = with(0.0).unwrap();
+    assert_eq!(exact.height.lens_km, 0.0);
+    let permille = exact.focal.unwrap().km_per_permille.abs();
+    let known = with(0.1).unwrap().height;
+    assert!((known.lens_km / permille - 1.0).abs() < 1e-6, "{known:?} {permille}");
+    let grown = known.sigma_km.powi(2) - exact.height.sigma_km.powi(2);
+    assert!((grown.sqrt() / permille - 1.0).abs() < 1e-6 && known.km == exact.height.km, "{known:?}");
+    // The lens of a data sheet.
+    let refused = with(2.9).unwrap_err();
+    assert!(matches!(refused, Refusal::Lens { lens_km, .. } if lens_km > 3.5), "{refused}");
 }
 
 const SENSOR: &str = "# mine\npreset = \"hzn\"\n\n[camera]\nwidth = 960\nheight = 720\nmodel = \"equidistant\"\nfx_px \

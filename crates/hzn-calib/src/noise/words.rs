@@ -21,6 +21,9 @@ pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<
         ("", format!("{:.2} km for a common shift of all edges by their correlated RMS, at least 0.1 px", h.shift_km)),
         ("", format!("{:.2} km for a bend that all edges share", h.bend_km)),
     ];
+    if h.lens_km > 0.0 {
+        lines.push(("", format!("{:.2} km for the lens, whose sigmas are in sensor.toml", h.lens_km)));
+    }
     if h.radius_km > 0.0 {
         lines.push(("", format!("{:.2} km for the local radius, which is unknown without a position", h.radius_km)));
     }

@@ -102,6 +102,9 @@ fn limb_lines(calibration: &Calibration, source: &str) -> Vec<Line> {
         format!("{:.2} km from a shift of all edges by their correlated RMS, at least 0.1 px", h.shift_km),
         format!("{:.2} km from a bend that all edges have in common", h.bend_km),
     ];
+    if h.lens_km > 0.0 {
+        parts.push(format!("{:.2} km from the lens", h.lens_km));
+    }
     if h.radius_km > 0.0 {
         parts.push(format!("{:.2} km from the radius, which is unknown without a position", h.radius_km));
     }

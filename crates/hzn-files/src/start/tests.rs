@@ -174,11 +174,8 @@ fn the_tone_of_the_files_is_written_or_asked_for() {
 #[test]
 fn an_image_circle_limits_a_fisheye_only() {
     let start = |fov_deg, lens, image_circle_px| {
-        let facts = CameraFacts {
-            size_px: [600, 600],
-            image_circle_px,
-            ..known(Some(fov_deg), Some(lens), Exif::default())
-        };
+        let facts =
+            CameraFacts { size_px: [600, 600], image_circle_px, ..known(Some(fov_deg), Some(lens), Exif::default()) };
         let start = write_sensor_toml(&facts).unwrap();
         let config = crate::sensor::parse(&start.text, Path::new("sensor.toml")).unwrap().config;
         (start.image_circle, config.camera.theta_max_deg)

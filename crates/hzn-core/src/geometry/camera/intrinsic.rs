@@ -4,7 +4,7 @@ use crate::base::keys::{Form, Value};
 
 /// Maximum number of intrinsic parameters: two focal lengths, two coordinates of the principal point, five
 /// coefficients.
-pub(crate) const INTRINSICS: usize = 9;
+pub const INTRINSICS: usize = 9;
 
 /// An intrinsic parameter, with its name in sensor.toml.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

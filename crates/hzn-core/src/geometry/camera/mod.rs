@@ -20,7 +20,7 @@ mod uncertain;
 
 pub use config::{Config, Model, Projection};
 pub use equation::{Equation, Projected};
-pub(crate) use intrinsic::INTRINSICS;
+pub use intrinsic::INTRINSICS;
 pub use intrinsic::{Covariance, Intrinsic};
 use lens::Lens;
 pub use ray::Ray;
@@ -388,6 +388,31 @@ impl<T: Real> Camera<T> {
     /// Returns the 1-sigma modes of the intrinsic parameters; `None` for a lens that is known exactly.
     pub(crate) fn intrinsic_modes(&self) -> Option<&[[T; INTRINSICS]]> {
         (!self.modes.is_empty()).then_some(&self.modes)
+    }
+
+    /// Returns how the image point of a ray (camera frame) moves by each 1-sigma mode of the calibration, in pixels
+    /// (u, v). The modes are independent of each other; there are none for a lens that is known exactly.
+    ///
+    /// ```
+    /// use hzn_core::camera::{Camera, Config};
+    /// use hzn_core::frames::UnitVec3;
+    ///
+    /// let known_to_a_percent = Config { focal_sigma_percent: 1.0, ..Config::pinhole(640, 480, 500.0) };
+    /// let camera = Camera::<f64>::try_new(&known_to_a_percent)?;
+    /// let ray = UnitVec3::try_new([0.2, 0.0, 1.0]).unwrap();
+    /// // The point is 100 px off the principal point, and a percent of it is 1 px.
+    /// let [du, dv] = camera.shifts_by_lens(&ray)[0];
+    /// assert!((du - 1.0).abs() < 1e-9 && dv.abs() < 1e-9);
+    /// # Ok::<(), hzn_core::error::ConfigError>(())
+    /// ```
+    pub fn shifts_by_lens(&self, ray: &UnitVec3<Cam, T>) -> heapless::Vec<[T; 2], INTRINSICS> {
+        let [x, y, z] = ray.xyz();
+        let by = self.shift_by_intrinsics(&V3::new(x, y, z));
+        let moved = |mode: &[T; INTRINSICS]| {
+            let sum = |axis: usize| mode.iter().zip(&by).map(|(m, by)| *m * by[axis]).fold(T::ZERO, |a, b| a + b);
+            [sum(0), sum(1)]
+        };
+        self.modes.iter().map(moved).collect()
     }
 
     /// Returns the motion of the image point of the ray `s` (camera frame), in pixels (u, v), when each parameter grows
