@@ -26,6 +26,9 @@ impl Implausible {
     }
 }
 
+/// What is said of two focal lengths that differ, if nothing says that the pixels are so.
+pub const NOT_SQUARE: &str = "make pixels that are not square";
+
 /// Largest usual distance of the principal point from the picture's middle, as a fraction of the side. A cropped
 /// picture may exceed it.
 const MAX_OFF_CENTRE: f64 = 0.2;
@@ -206,8 +209,7 @@ fn check_centre(c: &camera::Config) -> Option<Implausible> {
 fn check_focal(c: &camera::Config) -> Option<Implausible> {
     let ratio = c.fx_px / c.fy_px;
     if (ratio - 1.0).abs() > MAX_FOCAL_DIFFERENCE && (1.0 / ratio - 1.0).abs() > MAX_FOCAL_DIFFERENCE {
-        let what =
-            format!("{} and fy_px = {} make pixels that are not square: is one of them wrong?", c.fx_px, c.fy_px);
+        let what = format!("{} and fy_px = {} {NOT_SQUARE}: is one of them wrong?", c.fx_px, c.fy_px);
         return Some(Implausible::new("camera.fx_px", what));
     }
     let half = half_width_deg(c)?;

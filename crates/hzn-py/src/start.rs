@@ -94,6 +94,7 @@ fn of_size(size_px: [u32; 2]) -> CameraFacts {
         body: Body::Earth,
         measured: None,
         image_circle_px: None,
+        pixel_aspect: 1.0,
     }
 }
 

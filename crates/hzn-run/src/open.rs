@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use hzn_core::Config;
 use hzn_core::body::{self, PriorError};
+use hzn_core::camera;
 use hzn_core::config::Orient;
 use hzn_files::{Frames, Problem, Sensor, plausible};
 use toml_edit::DocumentMut;
@@ -88,7 +89,9 @@ pub fn open(request: &Request) -> Result<Opened, Error> {
         None => source::open(&request.inputs, request.raw, request.topic.as_deref())?,
     };
     let mut sensor = read_sensor(request, source.as_ref())?;
+    let aspect = source.pixel_aspect();
     let mut warnings: Vec<String> = sensor.warnings.iter().map(Problem::to_string).collect();
+    warnings.retain(|text| aspect == 1.0 || !text.contains(plausible::NOT_SQUARE));
     warnings.extend(request.altitude_km.map(|km| set_altitude(&mut sensor, km)).transpose()?.flatten());
     let mut notes = source.notes();
     // Nobody named this sensor, and it may be of another camera.
@@ -97,6 +100,7 @@ pub fn open(request: &Request) -> Result<Opened, Error> {
     let above = above.filter(|path| path.parent() != Some(&source.folder()));
     notes.extend(above.map(|path| format!("the sensor is {}, in a folder above the pictures", path.display())));
     notes.extend(complete(source.as_mut(), &mut sensor)?);
+    warnings.extend(doubt_pixels(aspect, &sensor.config.camera));
     let frames = frames_path(request, source.as_ref()).map(|path| load_frames(&path, source.as_ref())).transpose()?;
     if let Some(frames) = &frames {
         warnings.extend(frames.warnings.iter().map(Problem::to_string));
@@ -105,6 +109,24 @@ pub fn open(request: &Request) -> Result<Opened, Error> {
     notes.extend(explain_shutter(&sensor, frames.as_ref()));
     engine::check_frames(&sensor.config, request.flight, frames.as_ref())?;
     Ok(Opened { source, sensor, frames, warnings, notes })
+}
+
+/// Difference of the ratio of the focal lengths from that of the pixels that is worth a warning. Calibrations of square
+/// pixels have differences of 0.3 %, and a container knows no others than ratios of small numbers.
+const PIXELS_DIFFER: f64 = 0.02;
+
+/// Returns a warning if the container says that its pixels are not square, and the lens says otherwise.
+fn doubt_pixels(aspect: f64, camera: &camera::Config) -> Option<String> {
+    let told = camera.fy_px / camera.fx_px;
+    // A picture that is turned by 90 degrees has the inverse.
+    let differs = |aspect: f64| (told / aspect).ln().abs() > PIXELS_DIFFER;
+    (aspect != 1.0 && differs(aspect) && differs(1.0 / aspect)).then(|| {
+        format!(
+            "the pixels of the video are {aspect:.3} times as wide as high, but fy_px is {told:.3} times fx_px in \
+             [camera]: set fy_px to {:.1}, or the answers are wrong by degrees",
+            aspect * camera.fx_px
+        )
+    })
 }
 
 /// Readout time of a usual rolling shutter, in seconds: those of small cameras take 10 to 30 ms.

@@ -37,6 +37,7 @@ pub enum LimbSays {
 pub fn read_camera_facts(source: &mut dyn Source) -> Result<CameraFacts, Error> {
     let size_px = one_size(source)?;
     let tone = source::find_tone(source).map(|found| found.tone);
+    let pixel_aspect = source.pixel_aspect();
     let step = source.total().map_or(1, |total| (total / PICTURES).max(1));
     let mut exif = None;
     let mut pictures: Vec<Picture> = Vec::new();
@@ -62,6 +63,7 @@ pub fn read_camera_facts(source: &mut dyn Source) -> Result<CameraFacts, Error> 
         body: Body::default(),
         measured: None,
         image_circle_px: find_image_circle(&pictures),
+        pixel_aspect,
     })
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Config;
 use hzn_core::camera::Model;
 use hzn_files::start::{self, CameraFacts, ImageCircle, StartConfig};
+use hzn_files::{Problem, plausible};
 use hzn_run::diagnosis::FieldOfView;
 use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
@@ -120,7 +121,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut known = known(args, source.as_mut())?;
     if let Some(text) = calibrated(args, &known)? {
         write(&text)?;
-        return finish(args, &text);
+        return finish(args, &text, &known);
     }
     let found = if known.has_focal() { None } else { limb_fov(args, &known)? };
     if let Some(found) = &found {
@@ -154,7 +155,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         start.k1_sigma,
     ));
     tell_circle(&start);
-    finish(args, &start.text)
+    finish(args, &start.text, &known)
 }
 
 /// Says which image circle the file has.
@@ -174,10 +175,14 @@ fn tell_circle(start: &StartConfig) {
 }
 
 /// Says what looks wrong in the written file, and what it needs.
-fn finish(args: &Args, text: &str) -> Outcome {
+fn finish(args: &Args, text: &str, known: &CameraFacts) -> Outcome {
     // The commands that read the file say the same, but then it is not clear which option was wrong.
     let sensor = hzn_files::sensor::parse(text, args.output())?;
-    sensor.warnings.iter().for_each(tell::warning);
+    let is_known = |text: &String| known.pixel_aspect != 1.0 && text.contains(plausible::NOT_SQUARE);
+    sensor.warnings.iter().map(Problem::to_string).filter(|text| !is_known(text)).for_each(tell::warning);
+    if known.pixel_aspect != 1.0 {
+        tell::line(format_args!("the pixels are {:.3} times as wide as high, as the video says", known.pixel_aspect));
+    }
     if !knows_altitudes(args, &sensor.config)? {
         tell::line(
             "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or \

@@ -29,6 +29,8 @@ pub struct CameraFacts {
     /// Radius about the picture's centre beyond which no light arrives, in pixels, if the pictures show it. The file of
     /// a fisheye limits the lens to it.
     pub image_circle_px: Option<f64>,
+    /// Width of a pixel over its height; 1 for nearly all cameras, but not for every video.
+    pub pixel_aspect: f64,
 }
 
 impl CameraFacts {

@@ -38,12 +38,13 @@ pub(super) struct Guess {
 }
 
 impl Guess {
-    /// Makes the guess for an ideal lens ([`Model::Pinhole`] or [`Model::Equidistant`]) and its focal length.
-    pub(super) fn new(ideal: Model, size_px: [u32; 2], focal: &Focal) -> Self {
+    /// Makes the guess for an ideal lens ([`Model::Pinhole`] or [`Model::Equidistant`]) and its focal length in columns.
+    pub(super) fn new(ideal: Model, size_px: [u32; 2], pixel_aspect: f64, focal: &Focal) -> Self {
         use Intrinsic::{CxPx, CyPx, FxPx, FyPx, K1, K2, P1, P2};
         let [width, height] = size_px.map(|n| u16::try_from(n).unwrap_or(u16::MAX));
         let model = if ideal == Model::Pinhole { Model::BrownConrady } else { Model::KannalaBrandt };
         let mut camera = Config::ideal(model, width, height, focal.px);
+        camera.fy_px *= pixel_aspect;
         camera.set_intrinsic(K1, 0.0);
         let edge2 = (0.5 * f64::from(size_px[0]) / focal.px).powi(2);
         let k1_sigma = k1_sigma(ideal, edge2.sqrt());
@@ -54,7 +55,7 @@ impl Guess {
         // changes the focal length, so that the edge stays. A focal length from EXIF is that of the middle and has
         // nothing to do with the shape.
         let at_edge = |part: f64| if focal.is_at_edge { part * focal.px } else { 0.0 };
-        let focal_mode = |px: f64| [(FxPx, px), (FyPx, px)];
+        let focal_mode = |px: f64| [(FxPx, px), (FyPx, px * pixel_aspect)];
         let mut modes = vec![
             focal_mode(0.01 * focal.percent * focal.px).to_vec(),
             vec![(CxPx, centre_sigma_px)],
@@ -149,7 +150,7 @@ mod tests {
                     continue;
                 }
                 let focal = Focal::from_stated(ideal, 640.0, fov_deg).unwrap();
-                let mut camera = Guess::new(ideal, [640, 480], &focal).camera;
+                let mut camera = Guess::new(ideal, [640, 480], 1.0, &focal).camera;
                 let covariance = camera.covariance.as_mut().unwrap();
                 for value in covariance.rows.iter_mut().flatten() {
                     *value = format!("{value:.6e}").parse().unwrap();

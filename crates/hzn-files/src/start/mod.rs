@@ -67,7 +67,7 @@ pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
     });
     let known = stated.transpose()?.or(measured.filter(|_| exif.is_err()));
     let (focal, warnings, comparison) = choose_focal(known, exif, lens, width)?;
-    let guess = Guess::new(lens, facts.size_px, &focal);
+    let guess = Guess::new(lens, facts.size_px, facts.pixel_aspect, &focal);
     let fov_deg = fov_deg(lens, width, focal.px);
     let circle = ImageCircle::choose(facts, &guess.camera, fov_deg);
     Ok(StartConfig {

@@ -17,6 +17,7 @@ fn known(fov_deg: Option<f64>, lens: Option<Model>, exif: Exif) -> CameraFacts {
         body: Body::Earth,
         measured: None,
         image_circle_px: None,
+        pixel_aspect: 1.0,
     }
 }
 

@@ -88,6 +88,9 @@ fn write_camera(facts: &CameraFacts, camera: &Config, focal: &Focal, fov_deg: f6
         Some(comparison) => writeln!(t, "# From {}; for comparison, {comparison}.", focal.from),
         None => writeln!(t, "# From {}; {fov_deg:.1} degrees wide.", focal.from),
     };
+    if facts.pixel_aspect != 1.0 {
+        let _ = writeln!(t, "# A pixel is {:.4} times as wide as high, as the video says.", facts.pixel_aspect);
+    }
     let _ = write!(
         t,
         "fx_px = {:.1}\nfy_px = {:.1}\ncx_px = {:.1}                 # the picture's centre\ncy_px = {:.1}\n",

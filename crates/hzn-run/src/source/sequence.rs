@@ -60,6 +60,10 @@ pub trait Source: Send {
     fn display_turn(&self) -> Option<(String, &'static str)> {
         None
     }
+    /// Returns the width of a pixel over its height, as the container says it. A lens with fx = fy needs 1.
+    fn pixel_aspect(&self) -> f64 {
+        1.0
+    }
     /// Announces that a colour channel is wanted. Some sources must know this before they read.
     ///
     /// # Errors

@@ -50,6 +50,7 @@ impl Wizard {
             body: start::Body::Earth,
             measured: None,
             image_circle_px: None,
+            pixel_aspect: 1.0,
         };
         let start = start::write_sensor_toml(&facts).map_err(|e| e.to_string())?;
         Ok((start.text, start.warnings))

@@ -48,6 +48,8 @@ pub(super) struct Video {
     /// Significant bits of a sample.
     bits: u8,
     pix_fmt: String,
+    /// Width of a pixel over its height.
+    pixel_aspect: f64,
     /// The turn that the container asks for when the video is shown.
     rotation: Option<&'static str>,
     frames: Running,
@@ -69,7 +71,7 @@ impl Video {
             "-select_streams",
             "v:0",
             "-show_entries",
-            "stream=width,height,pix_fmt,nb_frames:stream_side_data=rotation:stream_tags=rotate",
+            "stream=width,height,sample_aspect_ratio,pix_fmt,nb_frames:stream_side_data=rotation:stream_tags=rotate",
             "-of",
             "default=nw=1",
         ]);
@@ -99,6 +101,7 @@ impl Video {
             channels: 1,
             bits,
             pix_fmt: pix_fmt.to_owned(),
+            pixel_aspect: entry("sample_aspect_ratio").and_then(parse_ratio).unwrap_or(1.0),
             rotation,
             frames,
             pixels,
@@ -136,6 +139,13 @@ impl Video {
         });
         None
     }
+}
+
+/// Returns the value of a ratio such as `4:3`; `None` for the `0:1` and `N/A` of an unknown one.
+fn parse_ratio(text: &str) -> Option<f64> {
+    let (over, under) = text.trim().split_once(':')?;
+    let ratio = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;
+    (ratio > 0.0 && ratio.is_finite()).then_some(ratio)
 }
 
 /// Returns the bits of a stream's luma, and the arguments that make ffmpeg write it.
@@ -191,6 +201,9 @@ fn start(path: &Path, arguments: &[String]) -> Result<(Running, Pixels, JoinHand
 }
 
 impl Source for Video {
+    fn pixel_aspect(&self) -> f64 {
+        self.pixel_aspect
+    }
     fn display_turn(&self) -> Option<(String, &'static str)> {
         self.rotation.map(|how| (self.stem.clone(), how))
     }
