@@ -4,6 +4,9 @@ use hzn_core::camera::{Config, Covariance, Intrinsic};
 
 use super::calibration::Calibration;
 
+/// 1-sigma from which on a focal length is not determined: it could as well be nothing.
+const UNKNOWN_PERCENT: f64 = 100.0;
+
 /// Returns the lines of a report: name and value. `pictures` is the number of all pictures in words.
 pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<(&'static str, String)> {
     let (h, e) = (&calibration.height, &calibration.edge);
@@ -55,7 +58,12 @@ pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<
             false => "",
         };
         let what = "from that of sensor.toml, with a free limb height; not applied";
-        lines.push(("focal length", format!("{:+.2} % ± {:.2} % {what}{hint}", f.percent, f.sigma_percent)));
+        let told = if f.sigma_percent < UNKNOWN_PERCENT {
+            format!("{:+.2} % ± {:.2} % {what}{hint}", f.percent, f.sigma_percent)
+        } else {
+            "not determined: the pictures do not separate it from the limb height".to_owned()
+        };
+        lines.push(("focal length", told));
         lines.push(("", format!("0.1 % of it is {:.2} km of limb height", f.km_per_permille.abs())));
     }
     lines

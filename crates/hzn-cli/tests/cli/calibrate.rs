@@ -120,6 +120,49 @@ fn a_flight_gives_limb_height_and_noise_or_the_reason_why_not() {
     assert!(!at.join("few.toml").exists() && !at.join("wrong.toml").exists());
 }
 
+/// Writes each of the first pictures of the flight several times, with its rows in frames.csv.
+fn write_copies(at: &Path, folder: &str, pictures: usize, copies: usize) {
+    std::fs::create_dir(at.join(folder)).unwrap();
+    let table = std::fs::read_to_string(at.join("flight/frames.csv")).unwrap();
+    let mut lines = table.lines().filter(|line| !line.starts_with('#'));
+    let mut out = format!("{}\n", lines.next().unwrap());
+    for line in lines.take(pictures) {
+        let (name, rest) = line.split_once(',').unwrap();
+        for copy in 0..copies {
+            let other = name.replace(".png", &format!("-{copy}.png"));
+            std::fs::copy(at.join("flight").join(name), at.join(folder).join(&other)).unwrap();
+            out += &format!("{other},{rest}\n");
+        }
+    }
+    std::fs::write(at.join(folder).join("frames.csv"), out).unwrap();
+}
+
+#[test]
+fn a_copy_of_a_picture_says_nothing_new() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    render_flight(at);
+    write_copies(at, "one", 1, 16);
+    write_copies(at, "thrice", 16, 3);
+    let sensor = ["--sensor", "mine.toml", "-q"];
+    let run = |what: &str, folder: &str| hzn(at, &[&["calibrate", what, folder], &sensor[..]].concat());
+    let (code, stdout, stderr) = run("noise", "one");
+    assert!(code == 1 && stderr.contains("15 pictures are left out"), "{stdout}{stderr}");
+    for what in ["noise", "sky", "check"] {
+        let (once, thrice) = (run(what, "flight"), run(what, "thrice"));
+        assert_eq!(once.0, thrice.0, "{what}: {} {}", once.2, thrice.2);
+        let told = "32 pictures are left out: each is an earlier picture to the last bit, as small-00000-1.png is \
+                    small-00000-0.png";
+        assert!(!once.2.contains("left out") && thrice.2.contains(told), "{what}: {} {}", once.2, thrice.2);
+        assert_eq!(thrice.2.matches("32 pictures").count(), 1, "{what}: {}", thrice.2);
+        // The report is the same, but for the number of pictures.
+        let rest = |text: &str| text.lines().filter(|l| !l.starts_with("pictures")).collect::<Vec<_>>().join("\n");
+        let (once, thrice) = (rest(&once.1), rest(&thrice.1).replace("-0.png", ".png"));
+        let [once, thrice] = [once, thrice].map(|text| text.replace("thrice", "flight"));
+        assert_eq!(once, thrice, "{what}");
+    }
+}
+
 #[test]
 fn sun_and_moon_have_no_limb_height() {
     let dir = tempfile::tempdir().unwrap();

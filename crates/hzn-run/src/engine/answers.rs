@@ -1,5 +1,6 @@
 //! The answers of a run with their edge points, for a calibration on the pictures of a flight.
 
+use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 
 use hzn_core::{Prior, Solution};
@@ -40,8 +41,33 @@ impl Sink for NoSink {
     }
 }
 
+/// What a flight measured.
+#[derive(Debug, Clone)]
+pub struct Measured<T> {
+    /// One measurement for a body and picture.
+    pub answers: Vec<T>,
+    /// Names of the pictures that were left out, because they are an earlier picture to the last bit, with the name of
+    /// that one.
+    pub copies: Vec<(String, String)>,
+}
+
+impl<T> Measured<T> {
+    /// Returns in words how many pictures were left out as copies; `None` if none was.
+    pub fn copies_in_words(&self) -> Option<String> {
+        let (copy, first) = self.copies.first()?;
+        Some(match self.copies.len() {
+            1 => format!("1 picture is left out: {copy} is {first} to the last bit, and says nothing new"),
+            n => format!(
+                "{n} pictures are left out: each is an earlier picture to the last bit, as {copy} is {first}, and \
+                 says nothing new"
+            ),
+        })
+    }
+}
+
 /// Processes the pictures and measures each answer: one for a body and picture. `plan` must keep the traces; `seen`
-/// gets each picture. Returns `None` if `stop` was set before the end.
+/// gets each picture. A picture whose samples are those of an earlier one is left out: another exposure differs at
+/// least by noise, and a copy would count as independent. Returns `None` if `stop` was set before the end.
 ///
 /// # Errors
 /// The source fails, see [`run`](super::run).
@@ -51,11 +77,18 @@ pub fn measure_answers<T>(
     stop: &AtomicBool,
     mut seen: impl FnMut(&Finished),
     mut measure: impl FnMut(Answered<'_>) -> Option<T>,
-) -> Result<Option<Vec<T>>, Error> {
-    let mut measured = Vec::new();
+) -> Result<Option<Measured<T>>, Error> {
+    let mut measured = Measured { answers: Vec::new(), copies: Vec::new() };
+    let mut firsts: HashMap<u64, String> = HashMap::new();
     let mut each = |frame: &Finished| {
         seen(frame);
-        measured.extend((0..frame.outcomes.len()).filter_map(|which| measure(answer(frame, which)?)));
+        let Some(digest) = frame.traces.as_ref().map(|traces| traces.samples_digest) else { return };
+        if let Some(first) = firsts.get(&digest) {
+            measured.copies.push((frame.name.clone(), first.clone()));
+            return;
+        }
+        firsts.insert(digest, frame.name.clone());
+        measured.answers.extend((0..frame.outcomes.len()).filter_map(|which| measure(answer(frame, which)?)));
     };
     let end = sequence::run(plan, source, 0, stop, &mut NoSink, &mut each)?;
     Ok((end == End::Complete).then_some(measured))

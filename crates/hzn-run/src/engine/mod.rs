@@ -28,7 +28,7 @@ mod turns;
 mod widen;
 
 pub use annotate::annotate;
-pub use answers::{Answered, measure_answers};
+pub use answers::{Answered, Measured, measure_answers};
 pub use expected_limb::ExpectedLimb;
 pub use outcome::{BodyOutcome, Finished, Unprocessed};
 pub use plan::Plan;

@@ -78,7 +78,7 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         }
         finished.drawing = drawing;
     }
-    finished.traces = traces.filter(|_| plan.keep_traces);
+    finished.traces = traces.filter(|_| plan.keep_traces).map(|traces| traces.with_digest(picture.digest()));
     if plan.keep_picture {
         let png = || picture.to_png().map_err(|e| failed(format!("{}: {e}", finished.name)));
         finished.picture = Some(original.map_or_else(png, Ok)?);

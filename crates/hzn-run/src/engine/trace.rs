@@ -159,6 +159,8 @@ impl<T> Observer<T> for Clock {
 pub struct Traces {
     /// The records in the order of the bodies.
     pub each: Vec<Trace>,
+    /// Digest of the samples: equal for pictures that are equal to the last bit; 0 if nobody asked for it.
+    pub samples_digest: u64,
     clock: Clock,
     now: Cell<usize>,
 }
@@ -167,6 +169,12 @@ impl Traces {
     /// Makes empty records for this number of bodies.
     pub fn new(bodies: usize) -> Self {
         Self { each: vec![Trace::default(); bodies], ..Self::default() }
+    }
+    /// Returns the records with the digest of the picture's samples.
+    #[must_use]
+    pub(super) fn with_digest(mut self, digest: u64) -> Self {
+        self.samples_digest = digest;
+        self
     }
     fn now(&self) -> Option<&Trace> {
         self.each.get(self.now.get())

@@ -1,5 +1,6 @@
 //! A calibration on the pictures of the sequence, with the code of `hzn calibrate`.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -93,7 +94,13 @@ impl Calibration {
         let (send, end) = bounded(1);
         let (stop, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
         let total = task.sequence.len() as u64;
-        let run = Run { task, stop: Arc::clone(&stop), done: Arc::clone(&done), wake: Arc::clone(&wake) };
+        let run = Run {
+            task,
+            stop: Arc::clone(&stop),
+            done: Arc::clone(&done),
+            wake: Arc::clone(&wake),
+            copies: RefCell::default(),
+        };
         std::thread::spawn(move || {
             if let Some(measured) = run.run().transpose() {
                 let _ = send.send(measured);
@@ -123,9 +130,17 @@ struct Run {
     stop: Arc<AtomicBool>,
     done: Arc<AtomicU64>,
     wake: Wake,
+    /// Which pictures were left out as copies of others, in words.
+    copies: RefCell<Option<String>>,
 }
 
 impl Run {
+    /// Returns the lines of a report, with the pictures that were left out.
+    fn lines<N: Into<String>>(&self, lines: Vec<(N, String)>) -> Vec<(String, String)> {
+        let copies = self.copies.take().map(|words| ("copies".to_owned(), words));
+        lines.into_iter().map(|(name, value)| (name.into(), value)).chain(copies).collect()
+    }
+
     /// Measures. `None` if it was stopped.
     fn run(&self) -> Result<Option<Measured>, String> {
         let wide = noise::config_for_calibration(&self.task.config)
@@ -171,7 +186,10 @@ impl Run {
             self.done.fetch_add(1, Ordering::Relaxed);
             (self.wake)();
         };
-        engine::measure_answers(&plan, &mut source, &self.stop, seen, measure).map_err(|e| format!("{e:#}"))
+        let measured = engine::measure_answers(&plan, &mut source, &self.stop, seen, measure);
+        let Some(measured) = measured.map_err(|e| format!("{e:#}"))? else { return Ok(None) };
+        *self.copies.borrow_mut() = measured.copies_in_words();
+        Ok(Some(measured.answers))
     }
 
     fn noise(&self, wide: &Config) -> Result<Option<Measured>, String> {
@@ -184,7 +202,7 @@ impl Run {
         let lines = noise::lines(&found, &self.pictures(), &wide.camera);
         let height = |p: &noise::Picture| HeightOf { km: p.km, sigma_km: p.sigma_km, counts: p.counts };
         Ok(Some(Measured {
-            lines: lines.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
+            lines: self.lines(lines),
             keys: written.keys,
             text: found.alarm().map_or(Ok(written.text), |why| Err(why.to_string())),
             heights: found.pictures.iter().map(height).collect(),
@@ -214,7 +232,7 @@ impl Run {
         let doubt = estimate.alarm().or_else(|| estimate.undetermined());
         let height = |p: &sky::Picture| HeightOf { km: p.km, sigma_km: p.sigma_km, counts: p.counts };
         Ok(Some(Measured {
-            lines: sky::lines(&estimate, &self.pictures(), None),
+            lines: self.lines(sky::lines(&estimate, &self.pictures(), None)),
             keys: written.keys,
             text: doubt.map_or(Ok(written.text), |why| Err(why.to_string())),
             heights: estimate.pictures.iter().map(height).collect(),

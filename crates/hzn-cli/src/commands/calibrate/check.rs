@@ -59,6 +59,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line("interrupted; nothing was measured");
         return Ok(Exit::Interrupted);
     };
+    found.tell_copies();
     let input = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
     let camera = &sensor.config.camera;
     let check = sky::check(camera, &found.plan.config.body, &found.views, limb, args.detect_percent)

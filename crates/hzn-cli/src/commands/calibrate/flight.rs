@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use hzn_calib::noise;
 use hzn_files::{Frames, Sensor};
 pub(super) use hzn_run::engine::Answered;
-use hzn_run::engine::{self, Finished, Plan, Turns};
+use hzn_run::engine::{self, Finished, Measured, Plan, Turns};
 use hzn_run::open::{self, Opened, Request, SensorChoice};
 use hzn_run::source::{Source, ending};
 
@@ -13,6 +13,7 @@ use crate::commands::run::cores;
 use crate::exit::{Stop, usage};
 use crate::progress::Progress;
 use crate::setup::{self, InputArgs, SensorArgs, stop_flag};
+use crate::tell;
 
 /// Refuses outputs of another kind.
 pub(super) fn check_endings(output: &[PathBuf]) -> Result<(), Stop> {
@@ -61,16 +62,22 @@ pub(super) fn plan(input: &InputArgs, flight: bool, jobs: Option<u16>, frames: O
     }
 }
 
-/// Processes the flight and measures each answer: one for a body and picture. Returns `None` if the run was
-/// interrupted.
+/// Processes the flight and measures each answer: one for a body and picture. Pictures that are copies of others are
+/// left out. Returns `None` if the run was interrupted.
 pub(super) fn measure_answers<T>(
     plan: &Plan,
     source: &mut dyn Source,
     progress: &mut Progress,
     measure: impl FnMut(Answered<'_>) -> Option<T>,
-) -> Result<Option<Vec<T>>, Stop> {
+) -> Result<Option<Measured<T>>, Stop> {
     let seen = |frame: &Finished| progress.count(frame.outcomes.iter().map(engine::BodyOutcome::status));
     let measured = engine::measure_answers(plan, source, &stop_flag(), seen, measure)?;
     progress.finish();
     Ok(measured)
+}
+
+/// Says which pictures are copies, and returns the measurements.
+pub(super) fn without_copies<T>(measured: Measured<T>) -> Vec<T> {
+    measured.copies_in_words().iter().for_each(tell::warning);
+    measured.answers
 }

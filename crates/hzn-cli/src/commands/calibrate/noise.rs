@@ -68,6 +68,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line("interrupted; nothing was measured");
         return Ok(Exit::Interrupted);
     };
+    let sightings = flight::without_copies(sightings);
     let input = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
     let pictures = progress.frames();
     let calibration = Calibration::new(&plan.config.body, &sightings)

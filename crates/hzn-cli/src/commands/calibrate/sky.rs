@@ -25,7 +25,16 @@ use crate::tell;
 pub(super) struct Pictures {
     pub(super) views: Vec<View>,
     pub(super) count: u64,
+    /// Which pictures were left out as copies of others, in words.
+    copies: Option<String>,
     pub(super) plan: Plan,
+}
+
+impl Pictures {
+    /// Says which pictures are copies of others.
+    pub(super) fn tell_copies(&self) {
+        self.copies.iter().for_each(tell::warning);
+    }
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -89,6 +98,7 @@ fn measure(
     };
     let found = sky::estimate_in_passes(&sensor.config, &wide.config.body, unknowns, limb, process, again)?;
     let (Some(found), Some(pictures)) = (found, last) else { return Ok(None) };
+    pictures.tell_copies();
     let refused = |why| failed(format!("{input} ({}): {why}", counted(pictures.count, "picture")));
     let (estimate, views) = found.map_err(refused)?;
     Ok(Some((Pictures { views, ..pictures }, estimate)))
@@ -113,7 +123,12 @@ pub(super) fn views(
         Some(View::new(a.name, a.points, Prior { sun: sun.or(a.prior.sun), ..a.prior }, a.solution))
     };
     let views = flight::measure_answers(&plan, source.as_mut(), &mut progress, view)?;
-    Ok(views.map(|views| Pictures { views, count: progress.frames(), plan }))
+    Ok(views.map(|measured| Pictures {
+        copies: measured.copies_in_words(),
+        views: measured.answers,
+        count: progress.frames(),
+        plan,
+    }))
 }
 
 /// Writes the reports and the sensor.

@@ -48,6 +48,7 @@ pub(super) fn run(args: &Args, sensor: &Sensor) -> Outcome {
         tell::line("interrupted; nothing was measured");
         return Ok(Exit::Interrupted);
     };
+    let sights = flight::without_copies(sights);
     let pictures = counted(progress.frames(), "picture");
     let track =
         sky::estimate_track(&unknowns, &sights).map_err(|why| failed(format!("{input}: of {pictures}: {why}")))?;
