@@ -24,6 +24,7 @@ mod events;
 pub mod finding;
 pub mod flight;
 pub mod input;
+mod orbit;
 pub mod read_back;
 mod reference;
 pub mod results;

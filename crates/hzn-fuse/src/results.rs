@@ -270,6 +270,22 @@ pub struct Lowered {
     pub weight: f64,
 }
 
+/// The orbit of a satellite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Orbit {
+    /// Semi-major axis at the end, m.
+    pub semi_axis_m: f64,
+    /// Eccentricity at the end.
+    pub eccentricity: f64,
+    /// Inclination at the end, rad.
+    pub inclination_rad: f64,
+    /// 1-sigma of the position radial, along and across the orbit, m: root of the mean over the pictures.
+    pub sigma_m: [f64; 3],
+    /// The same of the posterior Cramér-Rao bound: no estimator has a smaller error. It is below the sigma where
+    /// measurements count less.
+    pub bound_m: [f64; 3],
+}
+
 /// How the whole flight was solved at once.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Solved {
@@ -291,6 +307,8 @@ pub struct Solved {
     pub lowered: Vec<Lowered>,
     /// Number of measurements of each source.
     pub sources: BTreeMap<(Option<usize>, Kind), usize>,
+    /// The orbit, if it joined the states instead of an inertial unit.
+    pub orbit: Option<Orbit>,
 }
 
 /// The results of a flight.

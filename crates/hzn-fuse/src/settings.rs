@@ -193,6 +193,24 @@ impl Default for Gnss {
     }
 }
 
+/// The orbit of a satellite without an inertial unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Orbit {
+    /// Accelerations beyond the gravity to J4, as white noise, m/s²/√Hz: harmonics with the longitude are 3·10⁻⁵ m/s² in
+    /// low orbit and last some minutes, and drag above 400 km is less.
+    pub accel_noise_mps2_rthz: f64,
+    /// Correlation time of the slow error of a limb, s, instead of that of the camera: in a quarter of an orbit another
+    /// part of the limb, with another light and weather, comes into view.
+    pub slow_error_time_s: f64,
+}
+
+impl Default for Orbit {
+    fn default() -> Self {
+        Self { accel_noise_mps2_rthz: 1e-3, slow_error_time_s: 1400.0 }
+    }
+}
+
 /// The content of a fuse.toml. Every key may be left out. The defaults are those of Braun & Barf 2022, table 3.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -214,6 +232,8 @@ pub struct Settings {
     pub limb_height: LimbHeight,
     /// The satellite navigation receiver.
     pub gnss: Gnss,
+    /// The orbit of a satellite without an inertial unit.
+    pub orbit: Orbit,
 }
 
 impl Default for Settings {
@@ -227,6 +247,7 @@ impl Default for Settings {
             start: Start::default(),
             limb_height: LimbHeight::default(),
             gnss: Gnss::default(),
+            orbit: Orbit::default(),
         }
     }
 }
@@ -286,6 +307,8 @@ impl Settings {
             sigma("[limb_height] latitude_sigma_km", self.limb_height.latitude_sigma_km),
             above("[gnss] position_sigma_m", self.gnss.position_sigma_m),
             above("[gnss] velocity_sigma_mps", self.gnss.velocity_sigma_mps),
+            above("[orbit] accel_noise_mps2_rthz", self.orbit.accel_noise_mps2_rthz),
+            above("[orbit] slow_error_time_s", self.orbit.slow_error_time_s),
         ];
         all.extend(imu.accel_noise_mg_rthz.map(|x| sigma("[imu] accel_noise_mg_rthz", x)));
         all.extend(imu.gyro_noise_deg_rth.map(|x| sigma("[imu] gyro_noise_deg_rth", x)));

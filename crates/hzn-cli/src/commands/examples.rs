@@ -40,6 +40,7 @@ hzn export bag/ --imu imu.csv --gnss gnss.csv   from ROS 2, the tables of `hzn f
         "fuse",
         "hzn fuse --nadir flight.mcap --imu imu.csv --gnss gnss.csv -o fused.mcap
 hzn fuse --nadir flight.mcap --imu imu.csv --gnss gnss.csv --solve -o f.mcap --report f.html
+hzn fuse --nadir flight.mcap --attitude startracker.csv --solve -o orbit.csv
 hzn fuse --nadir f.mcap --imu imu.csv --gnss log.nmea --utc 2026-06-13T04:00:00Z -o f2.mcap
 hzn fuse --nadir f.mcap --imu log.csv --map imu:gyro=wx:wy:wz,deg/s --gnss gnss.csv -o f2.mcap",
     ),

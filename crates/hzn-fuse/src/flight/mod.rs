@@ -13,6 +13,7 @@ use crate::error::Error;
 use crate::events::{clean, events};
 use crate::finding::{Finding, Level, Verdict};
 use crate::input::{Inputs, Recording};
+use crate::orbit;
 use crate::results::{Counts, Fused};
 use crate::settings::{ErrorSetting, Limb, Settings, Treatment};
 use crate::smooth::{MAX_EPOCHS, smooth};
@@ -55,6 +56,9 @@ pub struct Wanted {
 /// measurements than a smoother can keep.
 pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fused, Error> {
     let mounts = mounts(&inputs.recordings)?;
+    if inputs.imu.is_empty() {
+        return without_unit(inputs, settings, &mounts, wanted);
+    }
     let mut counts = Counts::default();
     let samples = clean(&inputs.imu, settings.imu.max_step_s, &mut counts);
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
@@ -130,6 +134,22 @@ pub fn with_problem<R>(
     let ran = Runner::<MANY>::new(&flight, settings, false)?.run(Some(1.0))?;
     let (problem, first) = Problem::new(&flight, &all, &ran.track)?;
     Ok(call(&problem, &first))
+}
+
+/// Fuses a flight without an inertial unit: gravity joins the states of a satellite.
+fn without_unit(
+    inputs: &Inputs,
+    settings: &Settings,
+    mounts: &[Rotation<Cam, Vehicle>],
+    wanted: Wanted,
+) -> Result<Fused, Error> {
+    if wanted.solved {
+        return orbit::fuse(inputs, settings, mounts);
+    }
+    Err(Error::unusable(
+        "there is no sample of an inertial unit; give --imu FILE, or --solve for the orbit of a satellite from limbs and \
+         attitudes",
+    ))
 }
 
 /// Refuses settings that need a receiver.

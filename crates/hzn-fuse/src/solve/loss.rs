@@ -11,7 +11,7 @@ pub enum Loss {
 
 impl Loss {
     /// Returns the cost and the weight of an error with a square, for a limit of the square.
-    pub(super) fn of(self, square: f64, limit: f64) -> (f64, f64) {
+    pub(crate) fn of(self, square: f64, limit: f64) -> (f64, f64) {
         if square <= limit {
             return (square, 1.0);
         }

@@ -14,7 +14,7 @@ mod loss;
 mod others;
 mod problem;
 mod report;
-mod slow;
+pub(crate) mod slow;
 mod turning;
 
 pub(crate) use adjust::solve;

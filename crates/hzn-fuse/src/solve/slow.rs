@@ -14,15 +14,15 @@ const LEAST: f64 = 1e-6;
 
 /// The slow errors that follow each other.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Link {
+pub(crate) struct Link {
     /// The slow error before it, with the time in between over the correlation time.
-    pub(super) before: Option<(usize, f64)>,
-    pub(super) index: usize,
+    pub(crate) before: Option<(usize, f64)>,
+    pub(crate) index: usize,
 }
 
 impl Link {
     /// Returns the error of the process; `block` gives the block of a slow error.
-    pub(super) fn error(&self, slow: &[Vector3<f64>], block: impl Fn(usize) -> usize) -> Linear {
+    pub(crate) fn error(&self, slow: &[Vector3<f64>], block: impl Fn(usize) -> usize) -> Linear {
         let at = |i: usize| slow.get(i).copied().unwrap_or_default();
         let one = DMatrix::identity(3, 3);
         let dense = |v: Vector3<f64>| DVector::from_column_slice(v.as_slice());

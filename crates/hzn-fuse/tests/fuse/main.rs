@@ -3,6 +3,7 @@
 mod common;
 mod common_part;
 mod flight;
+mod orbit;
 mod solve;
 mod tables;
 mod tracker;

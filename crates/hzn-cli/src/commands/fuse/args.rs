@@ -17,8 +17,9 @@ pub(crate) struct Args {
     /// its file without the ending. A star tracker can replace them
     #[arg(long, value_name = "FILE", required_unless_present_any = ["show_config", "attitude"])]
     pub(super) nadir: Vec<PathBuf>,
-    /// Samples of the inertial unit: time_s, gyro_{x,y,z}_radps, accel_{x,y,z}_mps2, saturated
-    #[arg(long, value_name = "CSV", required_unless_present = "show_config")]
+    /// Samples of the inertial unit: time_s, gyro_{x,y,z}_radps, accel_{x,y,z}_mps2, saturated. Without it, --solve
+    /// finds the orbit of a satellite from limbs and a star tracker
+    #[arg(long, value_name = "CSV", required_unless_present_any = ["show_config", "solve"])]
     pub(super) imu: Option<PathBuf>,
     /// Fixes of the receiver: NMEA 0183, or a table with time_s and either x_m, y_m, z_m (ECEF) or lat_deg, lon_deg,
     /// height_m (above WGS-84). Velocities vx_mps, vy_mps, vz_mps, or v_north_mps, v_east_mps and v_down_mps or
@@ -53,8 +54,8 @@ pub(crate) struct Args {
     /// The attitude as a CCSDS attitude ephemeris message; it needs --utc
     #[arg(long, value_name = "FILE", requires = "utc")]
     pub(super) aem: Option<PathBuf>,
-    /// Position and velocity as a CCSDS orbit ephemeris message; it needs --utc and --gnss
-    #[arg(long, value_name = "FILE", requires_all = ["utc", "gnss"])]
+    /// Position and velocity as a CCSDS orbit ephemeris message; it needs --utc, and --gnss if there is an inertial unit
+    #[arg(long, value_name = "FILE", requires = "utc")]
     pub(super) oem: Option<PathBuf>,
     /// Version of the AEM: programs read the one of 2008, or that of 2024
     #[arg(long, value_name = "VERSION", default_value = "1.0", requires = "aem")]
@@ -79,7 +80,8 @@ pub(crate) struct Args {
     pub(super) smooth: bool,
     /// Also solve the whole flight at once: the most probable states, mounts, clocks and biases from all measurements.
     /// It replaces --smooth. It says which values the flight determined, and gives wrong measurements less weight
-    /// instead of refusing them
+    /// instead of refusing them. Without --imu and --gnss, gravity joins the limbs of a satellite, and --attitude gives
+    /// its attitude: the result is the orbit
     #[arg(long, conflicts_with = "smooth")]
     pub(super) solve: bool,
     /// Largest number of solutions per second in the results

@@ -38,6 +38,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     if !(args.rate > 0.0) {
         return Err(usage(format!("--rate {}: must be above 0", args.rate)));
     }
+    if args.oem.is_some() && args.imu.is_some() && args.gnss.is_none() {
+        return Err(usage("--oem needs --gnss: without a receiver the inertial unit gives no position"));
+    }
     let outputs = Outputs::new(args)?;
     let inputs = inputs(args)?;
     let unknown = settings.cameras.keys().find(|name| inputs.recordings.iter().all(|r| r.name != **name));

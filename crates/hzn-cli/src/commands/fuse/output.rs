@@ -64,7 +64,7 @@ impl<'a> Outputs<'a> {
 
     /// Returns a warning if the UTC of the flight is later than the list of leap seconds.
     pub(super) fn leap_seconds(&self, fused: &Fused) -> Option<String> {
-        let end_s = fused.epochs.last().map(|e| e.state.time_s)?;
+        let end_s = fused.epochs.last().or(fused.smoothed.last()).map(|e| e.state.time_s)?;
         let unix_s = self.utc?.unix_s + end_s;
         (!are_leap_seconds_known(unix_s)).then(|| {
             "the flight is later than 2026-06-28, when the list of leap seconds of this version expires; a leap second \

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hzn_files::vehicle::VehicleRow;
 use hzn_fuse::Fused;
 use hzn_fuse::finding::Level;
-use hzn_fuse::results::{Counts, Determined, Epoch, Kind, Solved};
+use hzn_fuse::results::{Counts, Determined, Epoch, Kind, Orbit, Solved};
 use hzn_fuse::truth::{self, Miss};
 
 use crate::exit::Stop;
@@ -112,14 +112,16 @@ const MOST_NAMED: usize = 5;
 /// Returns what the solve of the whole flight found: names and values.
 fn solve(fused: &Fused, solved: &Solved) -> Vec<(String, String)> {
     let [before, after] = solved.cost;
+    let first = if solved.orbit.is_some() { "first orbit" } else { "filter's solution" };
     let mut out = vec![(
         "solve".to_owned(),
         format!(
-            "{} unknowns, {} states, {} steps; squared errors over their sigmas {before:.0} at the filter's solution, \
-             {after:.0} at the end",
+            "{} unknowns, {} states, {} steps; squared errors over their sigmas {before:.0} at the {first}, {after:.0} \
+             at the end",
             solved.unknowns, solved.knots, solved.steps
         ),
     )];
+    out.extend(solved.orbit.iter().flat_map(orbit));
     if let (Some(filter), Some(last)) = (fused.epochs.last(), fused.smoothed.last()) {
         let text = format!("{} deg before (filter), {} after (solve)", three(filter), three(last));
         out.push(("  3 sigma at the end".to_owned(), text));
@@ -138,6 +140,27 @@ fn solve(fused: &Fused, solved: &Solved) -> Vec<(String, String)> {
         out.push((format!("  {}", source_name(fused, *camera, *kind)), text));
     }
     out
+}
+
+/// Returns what is known of an orbit: names and values.
+fn orbit(orbit: &Orbit) -> [(String, String); 3] {
+    let km = |m: [f64; 3]| m.map(|m| format!("{:.2}", 1e-3 * m)).join(" ");
+    [
+        (
+            "  orbit at the end".to_owned(),
+            format!(
+                "semi-major axis {:.1} km, eccentricity {:.4}, inclination {:.2} deg",
+                1e-3 * orbit.semi_axis_m,
+                orbit.eccentricity,
+                orbit.inclination_rad.to_degrees()
+            ),
+        ),
+        ("  position, sigma".to_owned(), format!("{} km radial, along, across the orbit", km(orbit.sigma_m))),
+        (
+            "  Cramer-Rao bound".to_owned(),
+            format!("{} km: no estimator has a smaller sigma from these measurements", km(orbit.bound_m)),
+        ),
+    ]
 }
 
 /// Says how much better an error is known than before.

@@ -1,0 +1,120 @@
+//! Levenberg and Marquardt's steps to the most probable orbit.
+
+use super::dynamics::Motion;
+use super::estimates::Estimates;
+use super::problem::{Problem, Weighed};
+use crate::error::Error;
+use crate::solve::Loss;
+use crate::sparse::{Factor, Marginals, Normal, Pattern};
+
+/// Most steps of a loss, and the decrease of the cost that ends them: far below the change of 1 that a sigma of an
+/// unknown makes.
+const STEPS: (usize, f64) = (40, 1e-3);
+/// The least damping and the largest.
+const DAMPING: [f64; 2] = [1e-9, 1e8];
+
+/// The most probable estimates.
+pub(super) struct Adjusted {
+    pub(super) estimates: Estimates,
+    pub(super) errors: Vec<Weighed>,
+    pub(super) steps: usize,
+    pub(super) is_converged: bool,
+    /// The sum of the squares at the first estimates and at the end.
+    pub(super) cost: [f64; 2],
+}
+
+fn cost(errors: &[Weighed]) -> f64 {
+    let cost: f64 = errors.iter().map(|e| e.cost).sum();
+    if cost.is_finite() { cost } else { f64::INFINITY }
+}
+
+/// Returns which blocks the errors join.
+pub(super) fn pattern(estimates: &Estimates, errors: &[Weighed]) -> Result<Pattern, Error> {
+    let joined: Vec<Vec<usize>> =
+        errors.iter().map(|e| e.linear.derivatives.iter().map(|(block, _)| *block).collect()).collect();
+    Pattern::new(&estimates.sizes(), joined.iter().map(Vec::as_slice))
+}
+
+fn normal<'a>(pattern: &'a Pattern, errors: &[Weighed], is_weighed: bool) -> Normal<'a> {
+    let mut normal = Normal::new(pattern);
+    for error in errors {
+        if error.weight < 1.0 && is_weighed {
+            normal.add(&error.linear.clone().weighted(error.weight));
+        } else {
+            normal.add(&error.linear);
+        }
+    }
+    normal
+}
+
+/// Descends from the first estimates to the most probable ones.
+pub(super) fn adjust(problem: &Problem<'_>, first: Estimates) -> Result<Adjusted, Error> {
+    let begin = first.knots.first().copied().unwrap_or_else(Motion::zeros);
+    let left = || Error::failed("--solve: the first orbit does not see the Earth as the pictures do");
+    let errors = problem.errors(&first, &begin, Loss::Huber).ok_or_else(left)?;
+    let pattern = pattern(&first, &errors)?;
+    let mut factor = Factor::new(&pattern)?;
+    let before = cost(&errors);
+    let mut at = Adjusted { estimates: first, errors, steps: 0, is_converged: false, cost: [before, before] };
+    for loss in [Loss::Huber, Loss::Bounded] {
+        at.errors = problem.errors(&at.estimates, &begin, loss).ok_or_else(left)?;
+        descend(problem, &pattern, &mut factor, &mut at, (&begin, loss));
+    }
+    at.cost[1] = cost(&at.errors);
+    Ok(at)
+}
+
+fn descend(
+    problem: &Problem<'_>,
+    pattern: &Pattern,
+    factor: &mut Factor<'_>,
+    at: &mut Adjusted,
+    (begin, loss): (&Motion, Loss),
+) {
+    let mut damping = 0.0;
+    at.is_converged = false;
+    for _ in 0..STEPS.0 {
+        let normal = normal(pattern, &at.errors, true);
+        let current = cost(&at.errors);
+        at.steps += 1;
+        let gain = loop {
+            let tried = factor.compute(&normal, damping).and_then(|()| {
+                let step = factor.step(&normal);
+                let part = |block: usize| step.rows(pattern.start(block), pattern.size(block)).into_owned();
+                let estimates = at.estimates.moved(part);
+                let errors = problem.errors(&estimates, begin, loss)?;
+                (cost(&errors) <= current).then_some((estimates, errors))
+            });
+            match tried {
+                Some((estimates, errors)) => {
+                    (at.estimates, at.errors) = (estimates, errors);
+                    break current - cost(&at.errors);
+                }
+                // No smaller step is better: this is the minimum, up to rounding.
+                None if damping > DAMPING[1] => break 0.0,
+                None => damping = (damping * 100.0).max(DAMPING[0]),
+            }
+        };
+        damping = if damping > DAMPING[0] { damping * 1e-3 } else { 0.0 };
+        if gain < STEPS.1 {
+            at.is_converged = true;
+            return;
+        }
+    }
+}
+
+/// Calls a function with the covariance of the estimates: with the weights of the loss, or with all measurements
+/// whole.
+pub(super) fn with_marginals<R>(
+    at: &Adjusted,
+    is_weighed: bool,
+    call: impl FnOnce(&Marginals<'_>, &Factor<'_>, &Pattern) -> R,
+) -> Result<R, Error> {
+    let pattern = pattern(&at.estimates, &at.errors)?;
+    let mut factor = Factor::new(&pattern)?;
+    factor
+        .compute(&normal(&pattern, &at.errors, is_weighed), 0.0)
+        .ok_or_else(|| Error::failed("--solve: the limbs do not determine the orbit; give more of them"))?;
+    let marginals = Marginals::new(&pattern, &factor);
+    Ok(call(&marginals, &factor, &pattern))
+}

@@ -1,0 +1,128 @@
+//! The unknowns of an orbit.
+
+use hzn_nav::frames::{Cam, Rotation, Vehicle};
+use hzn_nav::options::{CameraOptions, Mode, Options};
+use nalgebra::{DVector, Vector3};
+
+use super::dynamics::Motion;
+
+/// Places of the errors that last the whole flight, with what was known of them before.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Places {
+    pub(super) mounts: Vec<Option<usize>>,
+    pub(super) clocks: Vec<Option<usize>>,
+    pub(super) height: Option<usize>,
+    pub(super) latitude: Option<usize>,
+    /// 1-sigma of each: rad, s, km.
+    pub(super) sigmas: Vec<f64>,
+}
+
+impl Places {
+    pub(super) fn new(options: &Options, cameras: &[CameraOptions]) -> Self {
+        let mut out = Self::default();
+        for camera in cameras {
+            let mount = out.add(&camera.misalignment, 3);
+            let clock = out.add(&camera.clock, 1);
+            out.mounts.push(mount);
+            out.clocks.push(clock);
+        }
+        out.height = out.add(&options.limb_height, 1);
+        out.latitude = out.add(&options.limb_latitude, 2);
+        out
+    }
+
+    /// Adds an error with this number of components, unless it does not exist or is known exactly.
+    fn add(&mut self, block: &hzn_nav::options::Block, components: usize) -> Option<usize> {
+        let exists = block.mode != Mode::Off && block.sigma > 0.0;
+        let first = self.sigmas.len();
+        exists.then(|| {
+            self.sigmas.extend(std::iter::repeat_n(block.sigma, components));
+            first
+        })
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.sigmas.len()
+    }
+}
+
+/// Estimates of all unknowns.
+#[derive(Debug, Clone)]
+pub(super) struct Estimates {
+    /// Times of the knots, s.
+    pub(super) times_s: Vec<f64>,
+    pub(super) knots: Vec<Motion>,
+    pub(super) shared: DVector<f64>,
+    /// The slow error of each sight over its root.
+    pub(super) slow: Vec<Vector3<f64>>,
+    /// The error of each attitude of the star tracker, rad in ECEF.
+    pub(super) attitudes: Vec<Vector3<f64>>,
+}
+
+impl Estimates {
+    pub(super) fn shared_block(&self) -> usize {
+        self.knots.len()
+    }
+    pub(super) fn slow_block(&self, index: usize) -> usize {
+        self.knots.len() + 1 + index
+    }
+    pub(super) fn attitude_block(&self, row: usize) -> usize {
+        self.knots.len() + 1 + self.slow.len() + row
+    }
+
+    /// Returns the sizes of all blocks.
+    pub(super) fn sizes(&self) -> Vec<usize> {
+        let mut sizes = vec![6; self.knots.len()];
+        sizes.push(self.shared.len());
+        sizes.resize(sizes.len() + self.slow.len() + self.attitudes.len(), 3);
+        sizes
+    }
+
+    /// Returns the number of the last knot at or before a time.
+    pub(super) fn knot_before(&self, time_s: f64) -> usize {
+        self.times_s.partition_point(|t| *t <= time_s).saturating_sub(1)
+    }
+
+    /// Returns the estimates after a step, whose parts `part` gives.
+    pub(super) fn moved(&self, part: impl Fn(usize) -> DVector<f64>) -> Self {
+        let mut out = self.clone();
+        for (i, knot) in out.knots.iter_mut().enumerate() {
+            *knot += part(i).fixed_rows::<6>(0);
+        }
+        out.shared += part(self.shared_block());
+        for (i, slow) in out.slow.iter_mut().enumerate() {
+            *slow += part(self.slow_block(i)).fixed_rows::<3>(0);
+        }
+        for (i, attitude) in out.attitudes.iter_mut().enumerate() {
+            *attitude += part(self.attitude_block(i)).fixed_rows::<3>(0);
+        }
+        out
+    }
+
+    fn three(&self, place: Option<usize>) -> Vector3<f64> {
+        place.map_or_else(Vector3::zeros, |first| self.shared.fixed_rows::<3>(first).into_owned())
+    }
+    fn one(&self, place: Option<usize>) -> f64 {
+        place.and_then(|i| self.shared.get(i)).copied().unwrap_or(0.0)
+    }
+
+    /// Returns the estimated mount of a camera whose told one is given.
+    pub(super) fn mount(
+        &self,
+        places: &Places,
+        camera: usize,
+        told: &Rotation<Cam, Vehicle>,
+    ) -> Rotation<Cam, Vehicle> {
+        let place = places.mounts.get(camera).copied().flatten();
+        *told * Rotation::from_scaled_axis(self.three(place).into())
+    }
+    pub(super) fn clock_s(&self, places: &Places, camera: usize) -> f64 {
+        self.one(places.clocks.get(camera).copied().flatten())
+    }
+    pub(super) fn height_km(&self, places: &Places) -> f64 {
+        self.one(places.height)
+    }
+    pub(super) fn latitude_km(&self, places: &Places) -> [f64; 2] {
+        [self.one(places.latitude), self.one(places.latitude.map(|first| first + 1))]
+    }
+}

@@ -1,0 +1,79 @@
+//! The orbit of a satellite from limbs and attitudes alone, without an inertial unit and a receiver.
+//!
+//! The unknowns are position and velocity at knots, which the motion in the Earth's gravity joins, mounts and clocks of
+//! the cameras, the limb height, the slow error of each direction, and the errors of the attitudes. See
+//! `book/theory/solve.md`.
+
+mod adjust;
+mod case;
+mod dynamics;
+mod estimates;
+mod problem;
+mod report;
+mod sights;
+mod start;
+mod verdict;
+
+use hzn_nav::frames::{Cam, Rotation, Vehicle};
+
+use crate::error::Error;
+use crate::input::Inputs;
+use crate::results::{Begin, Counts, Fused};
+use crate::settings::{Limb, Settings};
+use case::Case;
+
+/// Finds the orbit. `mounts` are those of the recordings.
+///
+/// # Errors
+/// There are too few limbs with an attitude, or they do not determine an orbit.
+pub(crate) fn fuse(inputs: &Inputs, settings: &Settings, mounts: &[Rotation<Cam, Vehicle>]) -> Result<Fused, Error> {
+    check(inputs, settings)?;
+    let case = Case::new(inputs, settings, mounts);
+    let mut counts = Counts::default();
+    let solution = case.solve(&inputs.attitudes, &mut counts)?;
+    let names: Vec<String> = inputs.recordings.iter().map(|r| r.name.clone()).collect();
+    let (epochs, solved) = report::report(&case, &solution, &names)?;
+    let verdict = verdict::verdict(&case, &solution, &names, &epochs);
+    let mut notes = vec![
+        "the orbit is that of limbs and attitudes alone; the longitude is that of the attitudes, whose frame no limb \
+         can test"
+            .to_owned(),
+    ];
+    if !solved.is_converged {
+        notes.push(format!("--solve did not converge in {} steps", solved.steps));
+    }
+    let first_s = solution.sights.first().map_or(0.0, |sight| sight.time_s);
+    Ok(Fused {
+        cameras: names,
+        told_mounts: mounts.to_vec(),
+        begin: Some(Begin { time_s: first_s, directions: 0, chi2: 0.0 }),
+        smoothed: epochs,
+        solved: Some(solved),
+        counts,
+        verdict,
+        notes,
+        ..Fused::default()
+    })
+}
+
+/// Refuses inputs that give no orbit, and says what is needed.
+fn check(inputs: &Inputs, settings: &Settings) -> Result<(), Error> {
+    if inputs.has_receiver() {
+        return Err(Error::unusable("a receiver needs the samples of an inertial unit; give --imu FILE too"));
+    }
+    if inputs.attitudes.is_empty() {
+        return Err(Error::unusable(
+            "without an inertial unit, limbs give an orbit only with attitudes; give --attitude FILE, or --imu FILE",
+        ));
+    }
+    if inputs.recordings.is_empty() {
+        return Err(Error::unusable("an orbit needs limbs; give --nadir FILE, the results of `hzn run`"));
+    }
+    match inputs.recordings.iter().find(|r| settings.camera(&r.name).limb == Limb::Position) {
+        Some(one) => Err(Error::unusable(format!(
+            "{}: limb = \"position\" in fuse.toml needs an inertial unit and a receiver; the orbit takes the axes",
+            one.name
+        ))),
+        None => Ok(()),
+    }
+}

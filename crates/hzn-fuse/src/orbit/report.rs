@@ -1,0 +1,216 @@
+//! The orbit with its covariance, and what was determined.
+
+use hzn_nav::filter::Corrections;
+use hzn_nav::frames::{Covariance, Fixed, Rotation, Vector, Vehicle};
+use hzn_nav::gravity::earth_rate;
+use hzn_nav::strapdown::Nominal;
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+use super::adjust::with_marginals;
+use super::case::{Case, Solution};
+use super::dynamics::{GM_M3_S2, Motion, carried_with_derivative, noise};
+use super::problem::position;
+use crate::error::Error;
+use crate::input::Body;
+use crate::results::{CameraState, Determined, Epoch, Kind, Lowered, Orbit, Solved};
+
+/// Returns the solutions at the pictures, and how they were found.
+pub(super) fn report(case: &Case<'_>, solution: &Solution, names: &[String]) -> Result<(Vec<Epoch>, Solved), Error> {
+    let at = &solution.adjusted;
+    let missing = || Error::failed("--solve: a covariance is missing");
+    let (mut epochs, mut solved) = with_marginals(at, true, |marginals, factor, pattern| {
+        let own = |knot: usize| marginals.block(knot, knot);
+        let block = at.estimates.shared_block();
+        let shared = marginals.block(block, block)?;
+        let sigma = |i: usize| shared.get((i, i)).copied().unwrap_or(0.0).max(0.0).sqrt();
+        let cameras = cameras(case, solution, &sigma);
+        let mut epochs = epochs(case, solution, &own, &cameras)?;
+        let of_limb = |place: Option<usize>| place.map_or(0.0, sigma);
+        for epoch in &mut epochs {
+            epoch.limb_height_sigma_km = of_limb(case.places.height);
+            epoch.limb_latitude_sigma_km =
+                [of_limb(case.places.latitude), of_limb(case.places.latitude.map(|i| i + 1))];
+        }
+        let solved = Solved {
+            unknowns: pattern.len(),
+            knots: at.estimates.knots.len(),
+            factor_numbers: factor.len(),
+            steps: at.steps,
+            is_converged: at.is_converged,
+            cost: at.cost,
+            determined: determined(case, solution, names, &sigma),
+            lowered: lowered(solution),
+            sources: std::collections::BTreeMap::new(),
+            orbit: None,
+        };
+        Some((epochs, solved))
+    })?
+    .ok_or_else(missing)?;
+    let corrections = Corrections {
+        limb_height_km: at.estimates.height_km(&case.places),
+        limb_latitude_km: at.estimates.latitude_km(&case.places),
+        ..Corrections::default()
+    };
+    epochs.iter_mut().for_each(|epoch| epoch.corrections = corrections);
+    let bound = with_marginals(at, false, |marginals, _, _| {
+        self::epochs(case, solution, &|knot| marginals.block(knot, knot), &[])
+    })?
+    .ok_or_else(missing)?;
+    solved.orbit = orbit(&epochs, &bound);
+    for sight in &solution.sights {
+        *solved.sources.entry((Some(sight.camera), Kind::Direction(Body::Limb))).or_default() += 1;
+    }
+    Ok((epochs, solved))
+}
+
+/// Returns the axes radial, along and across the orbit, as columns in ECEF.
+fn orbit_axes(state: &Nominal) -> Matrix3<f64> {
+    let inertial = (state.velocity_m_s + earth_rate().cross(&state.position_m)).into_inner();
+    let radial = state.position_m.into_inner().normalize();
+    let across = radial.cross(&inertial).normalize();
+    Matrix3::from_columns(&[radial, across.cross(&radial), across])
+}
+
+/// Returns the elements at the end, and the RMS sigmas and bounds of the position.
+fn orbit(epochs: &[Epoch], bound: &[Epoch]) -> Option<Orbit> {
+    let last = epochs.last()?;
+    let rms = |all: &[Epoch]| -> [f64; 3] {
+        let sum: Vector3<f64> = all
+            .iter()
+            .map(|epoch| {
+                let axes = orbit_axes(&epoch.state);
+                (axes.transpose() * epoch.position_covariance_m2.as_inner() * axes).diagonal()
+            })
+            .sum();
+        (sum / all.len().max(1) as f64).map(|v| v.max(0.0).sqrt()).into()
+    };
+    let x = last.state.position_m.into_inner();
+    let v = (last.state.velocity_m_s + earth_rate().cross(&last.state.position_m)).into_inner();
+    let semi_axis_m = 1.0 / (2.0 / x.norm() - v.norm_squared() / GM_M3_S2);
+    let momentum = x.cross(&v);
+    let eccentricity = (v.cross(&momentum) / GM_M3_S2 - x.normalize()).norm();
+    Some(Orbit {
+        semi_axis_m,
+        eccentricity,
+        inclination_rad: (momentum.z / momentum.norm()).clamp(-1.0, 1.0).acos(),
+        sigma_m: rms(epochs),
+        bound_m: rms(bound),
+    })
+}
+
+fn cameras(case: &Case<'_>, solution: &Solution, sigma: &dyn Fn(usize) -> f64) -> Vec<CameraState> {
+    let estimates = &solution.adjusted.estimates;
+    let camera = |(which, told): (usize, &Rotation<_, Vehicle>)| {
+        let mount = estimates.mount(&case.places, which, told);
+        let place = case.places.mounts.get(which).copied().flatten();
+        let clock = case.places.clocks.get(which).copied().flatten();
+        let misalignment_sigma_rad =
+            place.map_or_else(Vector3::zeros, |first| Vector3::from_fn(|i, _| sigma(first + i)));
+        CameraState {
+            misalignment_rad: (told.inverse() * mount).scaled_axis(),
+            misalignment_sigma_rad,
+            clock_s: estimates.clock_s(&case.places, which),
+            clock_sigma_s: clock.map_or(0.0, sigma),
+            mount,
+            camera_sigma_rad: misalignment_sigma_rad.max(),
+        }
+    };
+    case.mounts.iter().enumerate().map(camera).collect()
+}
+
+/// Returns the motion at each picture with its covariance; `None` if a covariance is missing.
+fn epochs(
+    case: &Case<'_>,
+    solution: &Solution,
+    own: &dyn Fn(usize) -> Option<nalgebra::DMatrix<f64>>,
+    cameras: &[CameraState],
+) -> Option<Vec<Epoch>> {
+    let estimates = &solution.adjusted.estimates;
+    let mut out: Vec<Epoch> = Vec::new();
+    for sight in &solution.sights {
+        if out.last().is_some_and(|last| last.state.time_s == sight.time_s) {
+            continue;
+        }
+        let knot = estimates.knot_before(sight.time_s);
+        let time_s = sight.time_s - estimates.times_s.get(knot)?;
+        let (motion, by) = carried_with_derivative(estimates.knots.get(knot)?, time_s);
+        let before: Matrix6<f64> = own(knot)?.fixed_view::<6, 6>(0, 0).into_owned();
+        let covariance = by * before * by.transpose() + noise(time_s, case.settings.orbit.accel_noise_mps2_rthz);
+        out.push(epoch(solution, sight, (&motion, &covariance), cameras)?);
+    }
+    Some(out)
+}
+
+fn epoch(
+    solution: &Solution,
+    sight: &super::sights::Sight,
+    (motion, covariance): (&Motion, &Matrix6<f64>),
+    cameras: &[CameraState],
+) -> Option<Epoch> {
+    let part = |first: usize| -> Covariance<Fixed> {
+        let part: Matrix3<f64> = covariance.fixed_view::<3, 3>(first, first).into_owned();
+        ((part + part.transpose()) * 0.5).into()
+    };
+    let attitudes = &solution.attitudes;
+    let attitude = attitudes.at(sight.between, 0.0)?;
+    let later = attitudes.at(sight.between, 1.0).unwrap_or(attitude);
+    let sigma_rad = attitudes.rows.get(sight.between.row).map_or(0.0, |row| row.2);
+    Some(Epoch {
+        state: Nominal {
+            time_s: sight.time_s,
+            attitude,
+            velocity_m_s: Vector::from(motion.fixed_rows::<3>(3).into_owned()),
+            position_m: position(motion).into(),
+        },
+        attitude_covariance_rad2: Covariance::isotropic(sigma_rad * sigma_rad),
+        velocity_covariance_m2_s2: part(3),
+        position_covariance_m2: part(0),
+        corrections: Corrections::default(),
+        gyro_bias_sigma_rad_s: Vector3::zeros(),
+        accel_bias_sigma_m_s2: Vector3::zeros(),
+        limb_height_sigma_km: 0.0,
+        limb_latitude_sigma_km: [0.0; 2],
+        cameras: cameras.to_vec(),
+        rate_rad_s: attitude.inverse() * (later * attitude.inverse()).scaled_axis(),
+        unaided: None,
+    })
+}
+
+fn lowered(solution: &Solution) -> Vec<Lowered> {
+    let errors = solution.adjusted.errors.iter().filter(|e| e.weight < 1.0);
+    let one = |e: &super::problem::Weighed| {
+        let sight = solution.sights.get(e.sight?)?;
+        Some(Lowered {
+            time_s: sight.time_s,
+            camera: Some(sight.camera),
+            kind: Kind::Direction(Body::Limb),
+            sigmas: e.linear.error.norm(),
+            weight: e.weight,
+        })
+    };
+    errors.filter_map(one).collect()
+}
+
+/// Returns what was known of the errors of the whole flight before and afterwards.
+fn determined(case: &Case<'_>, solution: &Solution, names: &[String], sigma: &dyn Fn(usize) -> f64) -> Vec<Determined> {
+    let (places, estimates) = (&case.places, &solution.adjusted.estimates);
+    let mut out = Vec::new();
+    let mut add = |name: String, unit: &'static str, factor: f64, first: Option<usize>, len: usize| {
+        let Some(first) = first else { return };
+        let each = |value: &dyn Fn(usize) -> f64| (first..first + len).map(|i| factor * value(i)).collect();
+        out.push(Determined {
+            name,
+            unit,
+            estimate: each(&|i| estimates.shared.get(i).copied().unwrap_or(0.0)),
+            sigma: each(sigma),
+            before: each(&|i| places.sigmas.get(i).copied().unwrap_or(0.0)),
+        });
+    };
+    add("limb height".into(), "km", 1.0, places.height, 1);
+    add("limb by latitude".into(), "km", 1.0, places.latitude, 2);
+    for ((name, mount), clock) in names.iter().zip(&places.mounts).zip(&places.clocks) {
+        add(format!("mount of {name}"), "deg", 1f64.to_degrees(), *mount, 3);
+        add(format!("clock of {name}"), "s", 1.0, *clock, 1);
+    }
+    out
+}

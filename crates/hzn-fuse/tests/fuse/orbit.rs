@@ -1,0 +1,247 @@
+//! The orbit from limbs and attitudes alone: simulated orbits with drawn errors, against truth and bound.
+
+use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M};
+use hzn_fuse::finding::Level;
+use hzn_fuse::flight::Wanted;
+use hzn_fuse::input::{Attitude, Body, Inputs, Recording, Seen};
+use hzn_fuse::settings::ErrorSetting;
+use hzn_fuse::{Fused, Settings, fuse};
+use hzn_nav::frames::{Cam, Covariance, Rotation, Vector, Vehicle};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use crate::common::Draws;
+
+/// Rate of the Earth's rotation, rad/s.
+const SPIN: f64 = 7.292_115e-5;
+/// White noise of a limb's axis, its slow error, the noise of the star tracker, and the mount, rad.
+const WHITE: f64 = 3e-4;
+const SLOW: f64 = 3e-4;
+const TRACKER: f64 = 5e-5;
+const MOUNT: f64 = 3.5e-4;
+/// Correlation time of the slow error, s.
+const SLOW_S: f64 = 1400.0;
+/// Sigma of the limb height, km, and seconds between two pictures.
+const HEIGHT_KM: f64 = 3.0;
+const STEP_S: f64 = 60.0;
+
+/// Kepler's elements at the start: semi-major axis (m), eccentricity, inclination, node, argument of the perigee and
+/// true anomaly (degrees).
+#[derive(Clone, Copy)]
+struct Elements([f64; 6]);
+
+const ORBITS: [(&str, Elements); 3] = [
+    ("500 km, near-polar", Elements([6.871e6, 0.001, 97.4, 20.0, 30.0, 0.0])),
+    ("700 km, inclined", Elements([7.071e6, 0.001, 51.6, 130.0, 80.0, 200.0])),
+    ("400 x 900 km", Elements([7.021e6, 0.0356, 63.4, 250.0, 110.0, 40.0])),
+];
+
+/// Position and velocity in inertial axes, which are those of ECEF at time 0.
+type Truth = (Vector3<f64>, Vector3<f64>);
+
+impl Elements {
+    fn start(self) -> Truth {
+        let [a, e, i, node, perigee, anomaly] = self.0;
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), node.to_radians())
+            * Rotation3::from_axis_angle(&Vector3::x_axis(), i.to_radians())
+            * Rotation3::from_axis_angle(&Vector3::z_axis(), perigee.to_radians());
+        let (sin, cos) = anomaly.to_radians().sin_cos();
+        let p = a * (1.0 - e * e);
+        let speed = (3.986_004_418e14 / p).sqrt();
+        (
+            turn * (Vector3::new(cos, sin, 0.0) * (p / (1.0 + e * cos))),
+            turn * (Vector3::new(-sin, e + cos, 0.0) * speed),
+        )
+    }
+}
+
+/// Gravity in inertial axes: the zonal harmonics J2 to J4 as the gradient of their potential by differences, the
+/// tesseral harmonic of degree and order 2, and drag. The last two are not in the dynamics of the solve.
+fn acceleration(x: &Vector3<f64>, v: &Vector3<f64>, time_s: f64) -> Vector3<f64> {
+    let potential = |x: &Vector3<f64>| {
+        let (r, s) = (x.norm(), x.z / x.norm());
+        let ratio = 6_378_137.0 / r;
+        let zonal = 1.082_626_68e-3 * ratio.powi(2) * (1.5 * s * s - 0.5)
+            - 2.532_66e-6 * ratio.powi(3) * (2.5 * s.powi(3) - 1.5 * s)
+            - 1.619_62e-6 * ratio.powi(4) * (35.0 * s.powi(4) - 30.0 * s * s + 3.0) / 8.0;
+        let longitude = x.y.atan2(x.x) - SPIN * time_s;
+        let tesseral = ratio.powi(2)
+            * 3.0
+            * (1.0 - s * s)
+            * (1.5745e-6 * (2.0 * longitude).cos() - 9.039e-7 * (2.0 * longitude).sin());
+        3.986_004_418e14 / r * (tesseral - zonal)
+    };
+    let gradient = Vector3::from_fn(|i, _| {
+        let mut step = Vector3::zeros();
+        step[i] = 100.0;
+        (potential(&(x + step)) - potential(&(x - step))) / 200.0
+    });
+    let density = 5e-13 * (-(x.norm() - 6_871e3) / 60e3).exp();
+    let wind = v - Vector3::new(0.0, 0.0, SPIN).cross(x);
+    gradient - x * (3.986_004_418e14 / x.norm().powi(3)) - wind * (0.5 * density * 0.022 * wind.norm())
+}
+
+fn step((x, v): Truth, time_s: f64, h: f64) -> Truth {
+    let slope = |x: Vector3<f64>, v: Vector3<f64>, t: f64| (v, acceleration(&x, &v, t));
+    let (x1, v1) = slope(x, v, time_s);
+    let (x2, v2) = slope(x + x1 * (h / 2.0), v + v1 * (h / 2.0), time_s + h / 2.0);
+    let (x3, v3) = slope(x + x2 * (h / 2.0), v + v2 * (h / 2.0), time_s + h / 2.0);
+    let (x4, v4) = slope(x + x3 * h, v + v3 * h, time_s + h);
+    (x + (x1 + (x2 + x3) * 2.0 + x4) * (h / 6.0), v + (v1 + (v2 + v3) * 2.0 + v4) * (h / 6.0))
+}
+
+/// The true position and velocity in ECEF at a time.
+struct Place {
+    time_s: f64,
+    position_m: Vector3<f64>,
+    /// Radial, along and across the orbit, as columns.
+    axes: Matrix3<f64>,
+}
+
+/// Returns the attitude of a vehicle that looks down along z, and forward along x.
+fn looking_down(axes: &Matrix3<f64>) -> UnitQuaternion<f64> {
+    let [up, along, across] = [0, 1, 2].map(|i| Vector3::from(axes.column(i)));
+    let down = Matrix3::from_columns(&[along, -across, -up]);
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(down))
+}
+
+/// Returns the direction of the axis of a limb 40 km high.
+fn axis_of_limb(position_m: &Vector3<f64>) -> Vector3<f64> {
+    let cone = LimbCone::try_new((*position_m).into(), WGS84_A_M + 40e3, WGS84_B_M + 40e3).unwrap();
+    cone.axis.xyz().into()
+}
+
+/// Simulates a flight: the inputs as a user has them, with the errors that the covariances tell.
+fn simulate(elements: Elements, seed: u64, span_s: f64) -> (Inputs, Vec<Place>) {
+    let mut draws = Draws(seed);
+    let mut three = |sigma: f64| Vector3::from_fn(|_, _| sigma * draws.normal());
+    let mount_error = three(MOUNT);
+    let height_km = three(HEIGHT_KM).x;
+    let mut slow = three(SLOW);
+    let mut truth = elements.start();
+    let mount = UnitQuaternion::from_euler_angles(0.4, -0.3, 0.2);
+    let (mut seen, mut attitudes, mut places) = (Vec::new(), Vec::new(), Vec::new());
+    let keep = (-STEP_S / SLOW_S).exp();
+    for number in 0..(span_s / STEP_S) as usize {
+        let time_s = number as f64 * STEP_S;
+        let (x, v) = truth;
+        let to_fixed = Rotation3::from_axis_angle(&Vector3::z_axis(), -SPIN * time_s);
+        let position_m = to_fixed * x;
+        let radial = x.normalize();
+        let across = radial.cross(&v).normalize();
+        let axes = to_fixed.into_inner() * Matrix3::from_columns(&[radial, across.cross(&radial), across]);
+        let (attitude, limb_axis) = (looking_down(&axes), axis_of_limb(&position_m));
+        let true_mount = mount * UnitQuaternion::from_scaled_axis(mount_error);
+        let to_camera = (attitude * true_mount).inverse();
+        let axis = to_camera * limb_axis;
+        // A camera that sees the limb on one side: a higher limb moves the axis there.
+        let side = axis.cross(&Vector3::x()).normalize();
+        let by_height = side * 1.2e-4;
+        let measured = (axis + by_height * height_km + slow + three(WHITE)).normalize();
+        let unit = Vector::<Cam>::from(measured);
+        seen.push(Seen {
+            time_s,
+            body: Body::Limb,
+            axis: unit,
+            covariance_rad2: Covariance::across(&unit, WHITE * WHITE + SLOW * SLOW),
+            common_rad2: Some(Covariance::across(&unit, SLOW * SLOW)),
+            reference: None,
+            altitude_km: Some((position_m.norm() - 6_371e3) / 1e3 + three(5.0).x),
+            by_limb_height: by_height.into(),
+            centre: None,
+            row: number,
+        });
+        let told = UnitQuaternion::from_scaled_axis(three(TRACKER)) * attitude;
+        attitudes.push(Attitude { time_s, fixed_from_vehicle: Some(told.into()), sigma_rad: TRACKER });
+        places.push(Place { time_s, position_m, axes });
+        slow = slow * keep + three(SLOW) * (1.0 - keep * keep).sqrt();
+        for i in 0..6 {
+            truth = step(truth, time_s + 10.0 * f64::from(i), 10.0);
+        }
+    }
+    let told_mount: Rotation<Cam, Vehicle> = mount.into();
+    let recording = Recording {
+        name: "cam".into(),
+        mount: Some(told_mount),
+        seen,
+        limb_sigma_km: Some(HEIGHT_KM),
+        ..Recording::default()
+    };
+    (Inputs { attitudes, recordings: vec![recording], ..Inputs::default() }, places)
+}
+
+fn settings() -> Settings {
+    let mut settings = Settings::default();
+    settings.camera.misalignment_deg = ErrorSetting { sigma: MOUNT.to_degrees(), ..settings.camera.misalignment_deg };
+    // Camera and star tracker have one clock.
+    settings.camera.clock_s = ErrorSetting { sigma: 0.0, ..settings.camera.clock_s };
+    settings
+}
+
+fn solve(inputs: &Inputs) -> Fused {
+    fuse(inputs, &settings(), Wanted { solved: true, ..Wanted::default() }).unwrap()
+}
+
+/// Adds the squares of the errors of a flight, of their sigmas and of both together, radial, along and across.
+fn add(sums: &mut [Vector3<f64>; 3], fused: &Fused, places: &[Place]) {
+    for epoch in &fused.smoothed {
+        let place = places.iter().find(|p| p.time_s == epoch.state.time_s).unwrap();
+        let error = place.axes.transpose() * (epoch.state.position_m.into_inner() - place.position_m);
+        let variance = (place.axes.transpose() * epoch.position_covariance_m2.as_inner() * place.axes).diagonal();
+        sums[0] += error.component_mul(&error);
+        sums[1] += variance;
+        sums[2] += error.component_mul(&error).component_div(&variance);
+    }
+    let n = fused.smoothed.len() as f64;
+    assert!(n > 100.0, "{n}");
+}
+
+#[test]
+fn the_error_is_that_of_the_bound() {
+    let seeds: u64 = std::env::var("HZN_FLIGHTS").ok().and_then(|n| n.parse().ok()).unwrap_or(2);
+    for (name, elements) in ORBITS {
+        let mut sums = [Vector3::zeros(); 3];
+        let (mut count, mut bound) = (0.0, Vector3::zeros());
+        let mut verdicts = Vec::new();
+        for seed in 0..seeds {
+            let (inputs, places) = simulate(elements, 1000 + seed, 3.0 * 5800.0);
+            let fused = solve(&inputs);
+            add(&mut sums, &fused, &places);
+            count += fused.smoothed.len() as f64;
+            let orbit = fused.solved.as_ref().and_then(|s| s.orbit).unwrap();
+            bound += Vector3::from(orbit.bound_m).map(|b| b * b) / seeds as f64;
+            verdicts.push(fused.verdict.level());
+            assert!(fused.verdict.level() != Level::Contradicts, "{name}: {:?}", fused.verdict);
+        }
+        let (rms, nees) = ((sums[0] / count).map(f64::sqrt), sums[2] / count);
+        let bound = bound.map(f64::sqrt);
+        let km = |v: &Vector3<f64>| format!("{:.2} {:.2} {:.2} km", v.x / 1e3, v.y / 1e3, v.z / 1e3);
+        let ratio = rms.norm() / bound.norm();
+        println!(
+            "{name}: error {}, bound {} (radial along across), ratio {ratio:.2}, NEES {:.2} {:.2} {:.2}, {verdicts:?}",
+            km(&rms),
+            km(&bound),
+            nees.x,
+            nees.y,
+            nees.z
+        );
+        // Two flights scatter: each has a handful of independent errors.
+        let [most, least] = if seeds < 10 { [2.0, 0.1] } else { [1.3, 0.5] };
+        assert!(ratio < most, "{name}: {ratio}");
+        let nees_most = if seeds < 10 { 5.0 } else { 2.0 };
+        assert!(nees.iter().all(|n| (least..nees_most).contains(n)), "{name}: {nees}");
+    }
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let (inputs, _) = simulate(ORBITS[0].1, 7, 3000.0);
+    let error = |inputs: &Inputs, solved: bool| {
+        fuse(inputs, &settings(), Wanted { solved, ..Wanted::default() }).unwrap_err().to_string()
+    };
+    assert!(error(&inputs, false).contains("--imu FILE, or --solve"), "{}", error(&inputs, false));
+    let none = Inputs { attitudes: Vec::new(), ..inputs.clone() };
+    assert!(error(&none, true).contains("--attitude FILE"), "{}", error(&none, true));
+    let mut short = inputs.clone();
+    short.recordings[0].seen.truncate(3);
+    assert!(error(&short, true).contains("at least 6"), "{}", error(&short, true));
+}
