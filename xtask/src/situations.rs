@@ -26,7 +26,7 @@ const fn shot(name: &'static str, open: &'static str, frame: &'static str, situa
     Shot { name, open: Some(open), frame, situation }
 }
 
-const SHOTS: [Shot; 11] = [
+const SHOTS: [Shot; 14] = [
     Shot { name: "welcome", open: None, frame: "0", situation: None },
     shot("ok", "rocket.mcap", "5", None),
     shot("refused", "discs", "1", Some("stages")),
@@ -38,6 +38,9 @@ const SHOTS: [Shot; 11] = [
     shot("circle", "rocket.mcap", "5", Some("circle")),
     shot("replace", "rocket", "5", Some("replace")),
     shot("changed", "rocket", "5", Some("changed")),
+    shot("palette", "rocket.mcap", "5", Some("palette")),
+    shot("steady", "unmasked", "5", Some("stages")),
+    shot("rig", "ring/rig.toml", "0", None),
 ];
 
 /// Makes all pictures in target/xtask/situations.
@@ -94,6 +97,16 @@ fn prepare(folder: &Path) -> Result<(), Trouble> {
             _ => format!("{line}\n"),
         };
         fs::write(&sensor, text.lines().map(wrong).collect::<String>())?;
+    }
+    if missing("unmasked") {
+        copy(&folder.join("rocket"), &folder.join("unmasked"), |_| true)?;
+        let sensor = folder.join("unmasked/sensor.toml");
+        let text = fs::read_to_string(&sensor)?;
+        let kept = |line: &&str| !line.trim_start().starts_with("polygons_px");
+        fs::write(&sensor, text.lines().filter(kept).map(|line| format!("{line}\n")).collect::<String>())?;
+    }
+    if missing("ring") {
+        hzn(folder, &["simulate", "ring", "-o", "ring", "--frames", "12"])?;
     }
     if missing("bare") {
         copy(&folder.join("rocket"), &folder.join("bare"), |name| name.ends_with(".jpg"))?;

@@ -17,13 +17,15 @@ use crate::work::open::Request;
 /// With --follow, the window shows new pictures of a folder, or of a recording that grows, as they come. It keeps the
 /// newest 9000 pictures.
 ///
+/// A rig.toml shows the pictures of all heads side by side and on one sphere, and their check by each other.
+///
 /// The line of a flight computer shows its telemetry, and sends telecommands: tcp:HOST:PORT, udp:LOCAL,REMOTE,
 /// tcp-listen:HOST:PORT or serial:DEVICE:BAUD. A port without a host (udp:5001) is one that only this computer
 /// reaches.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "hzn-viewer", version, max_term_width = 100)]
 pub struct Args {
-    /// A recording, a folder, pictures, a video, or the line of a flight computer
+    /// A recording, a folder, pictures, a video, a rig.toml, or the line of a flight computer
     #[arg(value_name = "INPUT")]
     pub input: Vec<PathBuf>,
     /// The sensor.toml; without it, the one in the recording or next to the pictures

@@ -1,16 +1,18 @@
 //! Measures the speed and the memory of the real window: `hzn-viewer --measure`, for book/guide/viewer.md.
 
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use clap::ValueEnum;
 
-use crate::model::Look;
+use crate::model::{Look, Place};
 use crate::ui::{Command, Viewer};
 
 /// Time from the start until a window has nothing to do any more.
 const SETTLED: Duration = Duration::from_secs(15);
 /// Number of parameter changes that are timed.
 const CHANGES: usize = 200;
+/// Number of pictures that arrive and are timed.
+const ARRIVALS: usize = 40;
 
 /// The quantity to measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -23,6 +25,8 @@ pub enum Kind {
     Play,
     /// Processor time while pictures are played at the speed of the sequence.
     RealTime,
+    /// Time from a picture that arrives in the folder to the picture on the screen; needs --follow.
+    Follow,
 }
 
 /// Times of one parameter change. `answer` counts from the request, all others count from the change.
@@ -93,6 +97,7 @@ impl Measure {
             Kind::Tune => self.tune(viewer),
             Kind::Play => self.play(viewer, ctx),
             Kind::RealTime => self.real_time(viewer, ctx),
+            Kind::Follow => self.follow(viewer),
         }
     }
 
@@ -119,7 +124,11 @@ impl Measure {
             // The end of the sequence is the end of the measurement.
             ctx.request_repaint();
         }
-        if self.seen && self.kind != Kind::RealTime {
+        if self.kind == Kind::Follow && newest(viewer).is_some_and(|shown| self.shown != Some(shown)) {
+            // The next pass comes when this one is on the screen.
+            ctx.request_repaint();
+        }
+        if self.seen && !matches!(self.kind, Kind::RealTime | Kind::Follow) {
             // The next pass comes when this one is on the screen.
             ctx.request_repaint();
         }
@@ -220,6 +229,33 @@ impl Measure {
         true
     }
 
+    /// Compares the time of each new picture that is on the screen with that of its file.
+    fn follow(&mut self, viewer: &Viewer) -> bool {
+        let on_screen = newest(viewer).filter(|_| self.seen);
+        if on_screen.is_none() || on_screen == self.shown {
+            return false;
+        }
+        // The first picture was there before the measurement.
+        let is_first = self.shown.is_none();
+        self.shown = on_screen;
+        if !is_first && let Some(screen) = age_of_shown(viewer) {
+            self.times.push(Times { screen, ..Times::default() });
+        }
+        if self.times.len() < ARRIVALS {
+            return false;
+        }
+        let mut each: Vec<Duration> = self.times.iter().map(|t| t.screen).collect();
+        each.sort();
+        let quantile = |part: f64| each[(part * (ARRIVALS - 1) as f64) as usize].as_secs_f64() * 1e3;
+        println!(
+            "{ARRIVALS} pictures, from the folder to the screen: median {:.0} ms, 95 % {:.0} ms, at most {:.0} ms",
+            quantile(0.5),
+            quantile(0.95),
+            quantile(1.0)
+        );
+        true
+    }
+
     fn play(&mut self, viewer: &mut Viewer, ctx: &egui::Context) -> bool {
         let count = viewer.sequence().len();
         if self.changed.is_none() {
@@ -248,6 +284,28 @@ impl Measure {
         }
         is_finished
     }
+}
+
+/// Returns the number of the picture that is shown, if it is the newest one with its result.
+fn newest(viewer: &Viewer) -> Option<usize> {
+    let index = viewer.frame_view().filter(|_| viewer.is_settled())?.index;
+    (index + 1 == viewer.sequence().len()).then_some(index)
+}
+
+/// Returns the time since the file of the shown picture got its name; `None` if the system does not know it.
+fn age_of_shown(viewer: &Viewer) -> Option<Duration> {
+    let entry = viewer.sequence().entries.get(viewer.frame_view()?.index)?;
+    let Place::File(path) = &entry.place else { return None };
+    let data = std::fs::metadata(path).ok()?;
+    #[cfg(unix)]
+    let arrived = {
+        use std::os::unix::fs::MetadataExt;
+        let whole = Duration::from_secs(u64::try_from(data.ctime()).ok()?);
+        SystemTime::UNIX_EPOCH + whole + Duration::from_nanos(u64::try_from(data.ctime_nsec()).ok()?)
+    };
+    #[cfg(not(unix))]
+    let arrived = data.modified().ok()?;
+    arrived.elapsed().ok()
 }
 
 /// Returns the processor time of all threads of this process so far, or zero if the system does not report it.

@@ -11,7 +11,7 @@ use crate::exit::{Exit, Outcome, failed};
 #[derive(Debug, clap::Args)]
 #[command(disable_help_flag = true)]
 pub(super) struct Args {
-    /// A recording, a folder, pictures or a video, and options of `hzn-viewer`
+    /// A recording, a folder, pictures, a video or a rig.toml, and options of `hzn-viewer`
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
     arguments: Vec<OsString>,
 }

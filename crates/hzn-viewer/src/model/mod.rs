@@ -20,6 +20,7 @@ pub mod session;
 pub mod settings;
 pub mod sheet;
 pub mod slider_range;
+pub mod steady_edge;
 pub mod view;
 
 pub use hzn_run::diagnosis;

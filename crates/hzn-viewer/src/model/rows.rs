@@ -8,6 +8,7 @@ use hzn_mcap::Row;
 use super::cause::{Cause, Group};
 use super::diagnosis::FitFacts;
 use super::quantity::angle_deg;
+use super::steady_edge::{EdgeCells, SteadyEdges};
 
 /// Results by picture and body: those of the file, of the current parameters, of the parameters before, and of the
 /// sensor that is compared with.
@@ -21,6 +22,8 @@ pub struct ResultHistory {
     previous: HashMap<usize, Vec<Row>>,
     other: HashMap<usize, Vec<Row>>,
     generation: u64,
+    /// The edges of the pictures with a current result.
+    steady: SteadyEdges,
 }
 
 /// Results of a picture, with the causes and the fits of its bodies.
@@ -32,6 +35,8 @@ pub struct Processed {
     pub causes: Vec<Cause>,
     /// Fit of each body's longest edge, if there is one.
     pub fits: Vec<Option<FitFacts>>,
+    /// Where the picture has edges.
+    pub edges: EdgeCells,
 }
 
 impl ResultHistory {
@@ -48,7 +53,11 @@ impl ResultHistory {
     /// Stores the results of a picture with the current parameters.
     pub fn set_current(&mut self, index: usize, processed: Processed) {
         self.generation += 1;
-        self.current.insert(index, processed);
+        // A picture that is shown is processed twice.
+        if !self.current.contains_key(&index) {
+            self.steady.add(&processed.edges);
+        }
+        self.current.insert(index, Processed { edges: EdgeCells::default(), ..processed });
     }
     /// Forgets the results of the first pictures. The others count from 0 again.
     pub fn forget_first(&mut self, count: usize) {
@@ -67,10 +76,15 @@ impl ResultHistory {
         self.previous.extend(self.current.drain().map(|(index, processed)| (index, processed.rows)));
         self.recorded_is_current = as_recorded;
         self.generation += 1;
+        self.steady = SteadyEdges::default();
     }
     /// Returns a number that changes with every change of the results.
     pub fn generation(&self) -> u64 {
         self.generation
+    }
+    /// Returns how often the pictures with a current result have an edge at the same pixels.
+    pub fn steady(&self) -> &SteadyEdges {
+        &self.steady
     }
     /// Stores the results of the sensor that is compared with.
     pub fn set_other(&mut self, index: usize, rows: Vec<Row>) {

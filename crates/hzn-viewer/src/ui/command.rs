@@ -91,6 +91,8 @@ pub enum Command {
     Plots,
     /// Switches between dark and light colours.
     Theme,
+    /// Finds a command or a key of sensor.toml by its name.
+    Palette,
     /// Shows or hides the help.
     Help,
 }
@@ -133,13 +135,14 @@ pub(super) const ALL: &[(Command, &str, Modifiers, Key)] = &[
     (Command::Circle, "Drag the image circle", Modifiers::NONE, Key::I),
     (Command::Layers, "Hide or show all overlays", Modifiers::NONE, Key::H),
     (Command::Compare, "Compare", Modifiers::NONE, Key::X),
-    (Command::ProcessAll, "Process all pictures again", Modifiers::COMMAND, Key::P),
+    (Command::ProcessAll, "Process all pictures again", Modifiers::SHIFT, Key::F5),
     (Command::Rerun, "Run all pictures into a new MCAP…", Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::P),
     (Command::ExportPicture, "Save picture with overlays…", Modifiers::COMMAND, Key::E),
     (Command::Answer, "Answer panel", Modifiers::NONE, Key::A),
     (Command::Stages, "Stages panel", Modifiers::NONE, Key::S),
     (Command::Plots, "Plots panel", Modifiers::NONE, Key::P),
     (Command::Theme, "Dark or light theme", Modifiers::NONE, Key::D),
+    (Command::Palette, "Find a command or a key…", Modifiers::COMMAND, Key::P),
     (Command::Help, "This help", Modifiers::NONE, Key::F1),
 ];
 

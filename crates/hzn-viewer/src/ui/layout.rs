@@ -6,8 +6,8 @@ use super::command::Command;
 use super::panels::Panel;
 use super::viewer::Viewer;
 use super::{
-    calibration, command, compare, dialogs, help, live, number, picture, plots, questions, side, stages, study, theme,
-    timeline, toasts, top, wizard,
+    calibration, command, compare, dialogs, help, live, number, palette, picture, plots, questions, rig, side, stages,
+    study, theme, timeline, toasts, top, wizard,
 };
 
 impl Viewer {
@@ -42,8 +42,8 @@ impl Viewer {
         }
         self.panels.set_size(ctx.content_rect().size());
         top::show(self, ui);
-        if self.live.is_some() {
-            return self.show_live(ui);
+        if self.live.is_some() || self.rig.is_some() {
+            return self.show_other(ui);
         }
         // The welcome page has nothing to play, to plot or to tune.
         let is_open = !self.sequence.title.is_empty();
@@ -79,6 +79,7 @@ impl Viewer {
         study::show(self, ctx, rect);
         calibration::show(self, ctx, rect);
         help::show(self, ctx);
+        palette::show(self, ctx);
     }
 
     /// Returns true if a key may start a command: no question, form or dialog is open. The key of the help also closes
@@ -89,14 +90,16 @@ impl Viewer {
         !asks && (!is_covered || (self.showing_help && command == Command::Help))
     }
 
-    /// Draws the window on a flight computer, which has no pictures.
-    fn show_live(&mut self, ui: &mut egui::Ui) {
+    /// Draws the window on a flight computer or on a rig, which have no sequence of pictures.
+    fn show_other(&mut self, ui: &mut egui::Ui) {
         let ctx = ui.ctx().clone();
         let rect = ui.available_rect_before_wrap();
         live::show(self, ui);
+        rig::show(self, ui);
         toasts::show(self, &ctx, rect);
         dialogs::show(self, &ctx, rect);
         help::show(self, &ctx);
+        palette::show(self, &ctx);
         self.keep_settings(&ctx);
         self.close_if_due(&ctx);
         self.focus_ring.draw(&ctx);

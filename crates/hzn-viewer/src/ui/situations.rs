@@ -27,6 +27,8 @@ pub enum Situation {
     Circle,
     /// Latitudes and longitudes, and the local vertical, are drawn.
     Ground,
+    /// The palette is open.
+    Palette,
     /// The window asks before it replaces a sensor.toml.
     Replace,
     /// Another program changed the sensor.toml that is saved.
@@ -48,6 +50,10 @@ impl Viewer {
                 let names = NAV_QUANTITIES.iter().take(2).map(|q| q.name).chain([INNOVATIONS]);
                 self.settings.plotted = names.map(str::to_owned).collect();
                 self.panels.open(Panel::Plots, &mut self.settings);
+            }
+            Situation::Palette => {
+                self.run(Command::Palette, ctx);
+                self.palette.iter_mut().for_each(|palette| palette.text = "thresh".into());
             }
             Situation::Circle => self.run(Command::Circle, ctx),
             Situation::Ground => {

@@ -8,7 +8,7 @@ use hzn_files::keys;
 use super::facts::{self, CARDS, Card};
 use super::panels::Panel;
 use super::viewer::Viewer;
-use super::{Command, altitude_trial, camera_card, diagnosis, histogram, parameters, theme};
+use super::{Command, altitude_trial, camera_card, diagnosis, histogram, parameters, steady_edge, theme};
 use crate::work::frame_view::{BodyResult, Outcome};
 
 /// Smallest width of the column in points.
@@ -49,6 +49,7 @@ fn contents(viewer: &mut Viewer, ui: &mut Ui) {
         let outcome = viewer.frame_view.as_ref().and_then(|s| s.answers.first().cloned());
         altitude_trial::show(viewer, ui);
         diagnosis::show(viewer, ui);
+        steady_edge::show(viewer, ui);
         for card in CARDS {
             show_card(viewer, ui, card, outcome.as_deref());
         }

@@ -23,6 +23,8 @@ pub(super) const EXPECTED: Color32 = Color32::from_rgb(235, 238, 245);
 pub(super) const SKY: Color32 = Color32::from_rgb(255, 236, 170);
 /// Latitudes and longitudes.
 pub(super) const GRID: Color32 = Color32::from_rgb(150, 222, 190);
+/// Coastlines.
+pub(super) const COAST: Color32 = Color32::from_rgb(235, 225, 180);
 /// The local vertical.
 pub(super) const VERTICAL: Color32 = Color32::from_rgb(255, 150, 130);
 /// Masked parts.

@@ -27,7 +27,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
 /// Draws the switches at the right.
 fn toggles(viewer: &mut Viewer, ui: &mut Ui) {
     let shows = |panel| viewer.panels.shows(panel, &viewer.settings);
-    let is_live = viewer.live.is_some();
+    let is_live = viewer.live.is_some() || viewer.rig.is_some();
     let theme = if viewer.settings.dark { "Light" } else { "Dark" };
     let all = [
         (Command::Help, "Help", viewer.showing_help),
@@ -55,8 +55,9 @@ fn title(viewer: &Viewer, ui: &mut Ui) {
         let mut add = |words: &str, colour| {
             text.append(words, 0.0, egui::TextFormat::simple(font.clone(), colour));
         };
+        let rig = viewer.rig.as_ref().map(|rig| rig.path.display().to_string());
         let title = viewer.live.as_ref().map_or(viewer.sequence.title.as_str(), |_| "flight computer");
-        add(title, ui.visuals().strong_text_color());
+        add(rig.as_deref().unwrap_or(title), ui.visuals().strong_text_color());
         if let Some(session) = &viewer.session {
             let name = session.path().and_then(|p| p.file_name()).map(|n| n.to_string_lossy().into_owned());
             let of_recording = viewer.sequence.recording.is_some();
@@ -152,6 +153,8 @@ fn edit_menu(viewer: &mut Viewer, ui: &mut Ui) {
             ui.close();
         }
     }
+    ui.separator();
+    menu_entry(viewer, ui, Command::Palette, true);
     ui.separator();
     menu_entry(viewer, ui, Command::Mask, viewer.session.is_some());
     menu_entry(viewer, ui, Command::Circle, viewer.session.is_some());

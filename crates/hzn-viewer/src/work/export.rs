@@ -23,7 +23,7 @@ use super::caption::{self, Caption, Writer};
 use super::frame_view::{FrameInput, FrameView, Outcome, process_frame};
 use super::job::{Done, JobError, Progress};
 use super::sequence_source::SequenceSource;
-use super::sky;
+use super::{sky, stars};
 use crate::model::settings::Layer;
 use crate::model::{Sequence, atomic_file};
 
@@ -137,18 +137,26 @@ impl Drawn<'_> {
     fn draw_sky(&self, canvas: &mut Canvas, writer: &mut Writer, outcome: &Outcome, layers: &[Layer]) {
         let camera = Camera::try_new(&outcome.config.camera).ok().filter(|_| layers.contains(&Layer::Sky));
         let Some(camera) = camera else { return };
-        let radius = 9.0 * self.pen();
         for place in sky::places(self.data, self.truth, &outcome.bodies, &camera) {
-            let at = |i: u32| {
-                let (s, c) = (f64::from(i) / 48.0 * std::f64::consts::TAU).sin_cos();
-                [place.at[0] + radius * c, place.at[1] + radius * s]
-            };
-            canvas.polyline(&(0..=48).map(at).collect::<Vec<_>>(), self.pen(), SKY);
-            let [r, g, b] = SKY;
-            let corner = [place.at[0] + 1.4 * radius, place.at[1] - 7.0 * self.pen()].map(|x| x as f32);
-            let size = 14.0 * self.pen() as f32;
-            writer.write(&mut canvas.image, corner, &place.name, size, f32::INFINITY, Color32::from_rgb(r, g, b));
+            self.draw_place(canvas, writer, place.at, 9.0, &place.name);
         }
+        for star in stars::places(self.data, &outcome.bodies, &camera) {
+            self.draw_place(canvas, writer, star.at, 5.0, star.name);
+        }
+    }
+
+    /// Draws a circle with a name next to it.
+    fn draw_place(&self, canvas: &mut Canvas, writer: &mut Writer, at: [f64; 2], radius: f64, name: &str) {
+        let radius = radius * self.pen();
+        let around = |i: u32| {
+            let (s, c) = (f64::from(i) / 48.0 * std::f64::consts::TAU).sin_cos();
+            [at[0] + radius * c, at[1] + radius * s]
+        };
+        canvas.polyline(&(0..=48).map(around).collect::<Vec<_>>(), self.pen(), SKY);
+        let [r, g, b] = SKY;
+        let corner = [at[0] + 1.4 * radius, at[1] - 7.0 * self.pen()].map(|x| x as f32);
+        let size = 14.0 * self.pen() as f32;
+        writer.write(&mut canvas.image, corner, name, size, f32::INFINITY, Color32::from_rgb(r, g, b));
     }
 }
 

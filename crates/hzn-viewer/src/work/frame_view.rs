@@ -22,10 +22,10 @@ use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Trace, Traces, Watch};
 use hzn_run::source::Picture;
 use hzn_run::{overlay, sink};
 
-use super::ground;
 use super::paint::Recipe;
 use super::residuals::{Residual, ellipse, residuals};
 use super::trials::{OtsuTrial, Trials};
+use super::{coast, ground};
 use crate::model::cause::Cause;
 use crate::model::diagnosis::{FitFacts, find_fit};
 use crate::model::view::Point;
@@ -71,8 +71,8 @@ impl FrameView {
     /// Returns latitudes and longitudes of the first body, if the position and the attitude of the picture are given.
     pub fn grid(&self) -> Option<&ground::Grid> {
         let compute = || {
-            let figure_km = self.answers.first()?.config.body.figure_km()?;
-            ground::grid(self.data.as_ref()?, figure_km, self.camera.as_deref()?)
+            let body = &self.answers.first()?.config.body;
+            coast::grid(self.data.as_ref()?, body, self.camera.as_deref()?)
         };
         self.grid.get_or_init(compute).as_ref()
     }

@@ -40,6 +40,8 @@ pub struct Grid {
     pub meridians: Vec<NamedLine>,
     /// Latitude (along the normal of the surface) and longitude of the point below the camera, degrees.
     pub below_deg: [f64; 2],
+    /// Coastlines, if the body has them.
+    pub coasts: Vec<Vec<Point>>,
 }
 
 /// The local vertical at the camera.
@@ -61,14 +63,14 @@ pub struct Vertical {
 }
 
 /// Position of the camera and its attitude, in the axes of the body.
-struct Pose {
+pub(super) struct Pose {
     position_km: [f64; 3],
     camera_from_fixed: Rotation<Fixed, Cam, f64>,
     figure_km: [f64; 3],
 }
 
 impl Pose {
-    fn new(data: &FrameData, figure_km: [f64; 3]) -> Option<Self> {
+    pub(super) fn new(data: &FrameData, figure_km: [f64; 3]) -> Option<Self> {
         let camera_from_fixed =
             Rotation::<Cam, Fixed, f64>::assume_from_quaternion(data.q_fixed_from_camera_wxyz?)?.inverse();
         Some(Self { position_km: data.position_km?, camera_from_fixed, figure_km })
@@ -102,7 +104,7 @@ impl Pose {
     }
 
     /// Returns the place of a point of the surface in the picture, if the camera sees it.
-    fn project(&self, lat_rad: f64, lon_rad: f64, camera: &Camera<f64>) -> Option<Point> {
+    pub(super) fn project(&self, lat_rad: f64, lon_rad: f64, camera: &Camera<f64>) -> Option<Point> {
         let (point, normal) = self.surface(lat_rad, lon_rad);
         let to_point: [f64; 3] = std::array::from_fn(|i| point[i] - self.position_km[i]);
         if dot(to_point, normal) >= 0.0 {
@@ -161,6 +163,7 @@ pub fn grid(data: &FrameData, figure_km: [f64; 3], camera: &Camera<f64>) -> Opti
         parallels: (south..=north).filter(|n| (*n as f64 * step).abs() < 90.0).map(parallel).filter(seen).collect(),
         meridians: (west..=east).map(meridian).filter(seen).collect(),
         below_deg: [lat, lon],
+        coasts: Vec::new(),
     })
 }
 
@@ -210,7 +213,7 @@ pub fn vertical(
 }
 
 /// Returns the parts of a line: it is broken where a point is not in view.
-fn parts(points: impl Iterator<Item = Option<Point>>) -> Vec<Vec<Point>> {
+pub(super) fn parts(points: impl Iterator<Item = Option<Point>>) -> Vec<Vec<Point>> {
     let mut parts = vec![Vec::new()];
     for point in points {
         match (point, parts.last_mut()) {

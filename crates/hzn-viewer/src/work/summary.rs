@@ -11,6 +11,7 @@ use super::trials::Trials;
 use crate::model::Processed;
 use crate::model::cause::Cause;
 use crate::model::diagnosis::find_fit;
+use crate::model::steady_edge::EdgeCells;
 
 /// Processes a picture and returns its results with their causes and fits. Without `trials` there are only results.
 pub(super) fn summarise(
@@ -51,5 +52,10 @@ pub(super) fn summarise(
         let fit = (!answered).then(|| find_fit(&trace.edges(), report, row.altitude_km, &camera, trial)).flatten();
         processed.fits.push(fit.map(|(facts, _)| facts));
     }
+    let size = [input.picture.layout.width, input.picture.layout.height];
+    let each: Vec<_> = traces.each.iter().map(|trace| trace.edges()).collect();
+    let chosen = |outcome: &BodyOutcome| Some(outcome.report.as_ref().ok()?.solution.as_ref()?.candidate);
+    let bodies = each.iter().map(|edges| edges.as_slice()).zip(finished.outcomes.iter().map(chosen));
+    processed.edges = EdgeCells::of(size, bodies);
     processed
 }

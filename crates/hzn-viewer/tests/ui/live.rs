@@ -51,7 +51,7 @@ impl Computer {
         };
         let status = if n.is_multiple_of(10) { Status::NoLimb } else { Status::Ok };
         let answer = PictureAnswer {
-            outcome: Outcome { status: status as u8, ..Outcome::default() },
+            outcome: Outcome { status: status as u8, solved: u8::from(status == Status::Ok), ..Outcome::default() },
             direction: (status == Status::Ok).then_some(direction),
             position: None,
             edges: Default::default(),
@@ -113,6 +113,9 @@ fn the_telemetry_of_a_flight_computer_is_shown() {
     assert!(window.query_by_label("301 packets, 300 answers").is_some());
     assert!(window.query_by_label_contains("the camera is silent").is_some());
     assert!(window.query_by_label("42 s ago").is_some() && window.query_by_label("flight").is_some());
+    for plot in ["angle from the optical axis, °", "3σ, °", "altitude of the free fit, km"] {
+        assert!(window.query_all_by_label(plot).next().is_some(), "{plot}");
+    }
     // A gap in the counts of the packets is a loss.
     for n in 0..40 {
         let packet = computer.answer();
@@ -128,6 +131,20 @@ fn the_telemetry_of_a_flight_computer_is_shown() {
     stream.write_all(&computer.housekeeping(0)).unwrap();
     until(&mut window, "the packet after noise is lost", |v| has(v, |l| l.housekeeping.as_ref().unwrap().flags, 0));
     assert!(window.query_by_label_contains("the camera is silent").is_none());
+}
+
+#[test]
+fn plots_without_a_value_say_so() {
+    let mut window = window();
+    let (_listener, mut stream) = window_on_line(&mut window);
+    let mut computer = Computer { picture: 9, ..Computer::default() };
+    stream.write_all(&computer.answer()).unwrap();
+    until(&mut window, "no answer came", |v| has(v, |l| l.counts().answers, 1));
+    assert!(window.query_by_label_contains("No picture of this time has an answer").is_some());
+    stream.write_all(&computer.answer()).unwrap();
+    until(&mut window, "no answer came", |v| has(v, |l| l.counts().answers, 2));
+    assert!(window.query_by_label_contains("No picture of this time has an answer").is_none());
+    assert!(window.query_by_label("3σ, °").is_some());
 }
 
 #[test]
@@ -151,6 +168,9 @@ fn an_hour_at_ten_pictures_a_second_takes_bounded_memory() {
     assert!(has(window.state(), |l| (l.points.len(), l.counts().lost), (ANSWERS, 0)));
     let newest_s = |v: &Viewer| v.live(|l| l.points.back().unwrap().time_s).unwrap();
     assert!((newest_s(window.state()) - 3700.0).abs() < 1e-6);
+    window.get_by_label("1 h").click();
+    window.run_steps(3);
+    assert!(window.query_all_by_label("3σ, °").next().is_some());
 }
 
 #[test]

@@ -64,6 +64,9 @@ pub(super) fn show(axis: &mut Axis, ui: &mut Ui, live: &Live) {
             (axis.follows, axis.end_s) = (false, axis.end_s - by_s);
         }
     }
+    if curves.is_empty() {
+        ui.weak("No picture of this time has an answer, so there is nothing to plot.");
+    }
     ui.strong("status of each picture");
     band(ui, shown.map(|p| (p.time_s - axis.end_s, p.status)), range);
 }

@@ -27,6 +27,8 @@ pub(super) fn draw(
     if viewer.settings.shows(Layer::Grid)
         && let Some(grid) = frame_view.grid()
     {
+        lines(painter, placement, &grid.coasts, Stroke::new(3.4, Color32::from_black_alpha(90)));
+        lines(painter, placement, &grid.coasts, Stroke::new(1.4, theme::COAST));
         // Parallels have their names at a third of their length and meridians at two thirds, so that names rarely meet.
         for (named, at) in [(&grid.parallels, 0.33), (&grid.meridians, 0.67)] {
             for line in named {

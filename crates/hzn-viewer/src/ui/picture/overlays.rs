@@ -12,7 +12,7 @@ use crate::ui::placement::Placement;
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
 use crate::work::frame_view::{BodyResult, Outcome};
-use crate::work::{FrameView, sky};
+use crate::work::{FrameView, sky, stars};
 
 /// Draws all layers that are switched on.
 pub(super) fn draw(
@@ -28,6 +28,10 @@ pub(super) fn draw(
             let outline: Vec<Pos2> = polygon.iter().filter_map(|p| placement.to_screen(*p)).collect();
             hatch(painter, &outline);
         }
+    }
+    if let Some(area) = &viewer.steady.area {
+        let closed: Vec<Point> = area.polygon.iter().chain(area.polygon.first()).copied().collect();
+        dashed_lines(painter, placement, &[closed], theme::TRUTH, 1.8);
     }
     if on(Layer::Circle)
         && let Some(camera) = placement.camera
@@ -60,6 +64,14 @@ pub(super) fn draw(
             let colour = theme::SKY.gamma_multiply(if place.is_hidden { 0.5 } else { 1.0 });
             painter.circle_stroke(at, 11.0, Stroke::new(1.5, colour));
             painter.text(at + vec2(14.0, 0.0), Align2::LEFT_CENTER, place.name, FontId::proportional(12.0), colour);
+        }
+        for star in stars::places(frame_view.data.as_ref(), &outcome.bodies, camera) {
+            let Some(at) = placement.to_screen(star.at) else { continue };
+            // A bright star has a larger circle.
+            let radius = (7.0 - 1.3 * star.magnitude as f32).clamp(3.0, 9.0);
+            painter.circle_stroke(at, radius, Stroke::new(1.0, theme::SKY));
+            let (font, colour) = (FontId::proportional(11.0), theme::SKY.gamma_multiply(0.85));
+            painter.text(at + vec2(radius + 3.0, 0.0), Align2::LEFT_CENTER, star.name, font, colour);
         }
     }
 }

@@ -14,6 +14,9 @@ use crate::work::open::Request;
 impl Viewer {
     /// Executes a command.
     pub fn run(&mut self, command: Command, ctx: &egui::Context) {
+        if self.go_epoch(command) {
+            return;
+        }
         let count = self.sequence.len();
         match command {
             Command::Open => self.ask(PathDialog::new(Purpose::Open, &self.sequence.folder)),
@@ -67,6 +70,7 @@ impl Viewer {
             Command::Answer => self.panels.toggle(Panel::Answer, &mut self.settings),
             Command::Plots => self.panels.toggle(Panel::Plots, &mut self.settings),
             Command::Theme => self.settings.dark = !self.settings.dark,
+            Command::Palette => self.toggle_palette(),
             Command::Help => self.showing_help = !self.showing_help,
         }
     }

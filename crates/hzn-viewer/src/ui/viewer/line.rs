@@ -15,6 +15,7 @@ impl Viewer {
             Ok(line) => {
                 (self.sequence, self.session, self.frame_view) = (Sequence::default(), None, None);
                 (self.wizard, self.study, self.mask, self.circle) = (None, None, None, None);
+                self.rig = None;
                 self.live = Some(LiveView::new(line));
             }
             Err(why) => self.add_problem(why),

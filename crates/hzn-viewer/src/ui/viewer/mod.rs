@@ -12,6 +12,7 @@ mod keep_settings;
 mod line;
 mod outputs;
 mod request_key;
+mod rig;
 mod sequence_work;
 mod threads;
 mod unsaved;
@@ -30,8 +31,11 @@ use super::focus_ring::FocusRing;
 use super::follow::Follow;
 use super::live_view::LiveView;
 use super::offered::Offered;
+use super::palette_state::Palette;
 use super::panels::{Panel, Panels};
 use super::path_dialog::PathDialog;
+use super::rig_view::RigView;
+use super::steady_offer::SteadyOffer;
 use super::study_window::StudyWindow;
 use super::summary::{Missed, Summary};
 use super::textures::Textures;
@@ -94,6 +98,8 @@ pub struct Viewer {
     pub(super) wizard: Option<Wizard>,
     /// The flight computer whose telemetry is shown instead of pictures.
     pub(super) live: Option<LiveView>,
+    /// The rig whose heads are shown instead of one sequence.
+    pub(super) rig: Option<RigView>,
     pub(super) study: Option<StudyWindow>,
     /// The calibration on the pictures.
     pub(super) calibration: Option<CalibrationWindow>,
@@ -111,6 +117,8 @@ pub struct Viewer {
     pub(super) focus_diagnosis: bool,
     /// Plot that was switched on last; the plots scroll to it.
     pub(super) new_plot: Option<String>,
+    /// An edge of the vehicle that could be masked.
+    pub(super) steady: SteadyOffer,
     pub(super) panels: Panels,
     /// Columns that show their top when they are drawn next, because other pictures were opened.
     unscrolled: Vec<Panel>,
@@ -128,6 +136,8 @@ pub struct Viewer {
     pub(super) mask: Option<MaskEdit>,
     pub(super) circle: Option<CircleEdit>,
     pub(super) showing_help: bool,
+    /// The palette while it is open.
+    pub(super) palette: Option<Palette>,
     pub(super) focus_ring: FocusRing,
     pub(super) showing_diff: bool,
     pub(super) layers_hidden: bool,
@@ -183,6 +193,7 @@ impl Viewer {
             damaged: Damaged::new(),
             wizard: None,
             live: None,
+            rig: None,
             study: None,
             calibration: None,
             summary: Summary::default(),
@@ -193,6 +204,7 @@ impl Viewer {
             focus_key: None,
             focus_diagnosis: false,
             new_plot: None,
+            steady: SteadyOffer::default(),
             panels: Panels::default(),
             unscrolled: Vec::new(),
             plot_span: None,
@@ -204,6 +216,7 @@ impl Viewer {
             mask: None,
             circle: None,
             showing_help: false,
+            palette: None,
             focus_ring: FocusRing::default(),
             showing_diff: false,
             layers_hidden: false,
@@ -231,7 +244,12 @@ impl Viewer {
         {
             return self.open_line(&one.to_string_lossy());
         }
-        self.live = None;
+        if let [one] = request.inputs.as_slice()
+            && self.open_if_rig(one)
+        {
+            return;
+        }
+        (self.live, self.rig) = (None, None);
         self.messages_before = self.toasts.len();
         // A session that waits for its sequence does not come to another one.
         self.restoring = None;
@@ -247,6 +265,7 @@ impl Viewer {
         // A sensor.toml applies to the pictures that are open.
         if let [one] = inputs.as_slice()
             && one.extension().is_some_and(|e| e == "toml")
+            && !hzn_files::rig::is_rig(one)
         {
             match Session::open(one) {
                 Ok(session) => self.leave(Leave::Sensor(Box::new(session.opened_by_user())), None),
@@ -307,6 +326,9 @@ impl Viewer {
     /// Returns true if the screen shows the requested picture, processed with the current parameters.
     pub fn is_settled(&self) -> bool {
         let version = self.session.as_ref().map_or(0, Session::version);
+        if let Some(is_settled) = self.rig_is_settled() {
+            return is_settled;
+        }
         if let Some(live) = &self.live {
             return live.line.live().last.is_some();
         }
@@ -315,7 +337,7 @@ impl Viewer {
     }
     /// Returns true if nothing is being opened and there is no picture.
     pub fn is_without_pictures(&self) -> bool {
-        self.live.is_none() && self.opening.is_none() && self.sequence.is_empty()
+        self.live.is_none() && self.rig.is_none() && self.opening.is_none() && self.sequence.is_empty()
     }
     /// Returns the number of pictures that are processed with the current parameters.
     pub fn processed(&self) -> usize {

@@ -8,9 +8,11 @@ use super::changes::Leave;
 use super::request_key::RequestKey;
 use super::sequence_work::SequenceWork;
 use crate::model::settings::Layer;
+use crate::model::steady_edge::EdgeCells;
 use crate::model::{Place, Processed, ResultHistory, Sequence, Session, View, autosave};
 use crate::ui::panels::Panel;
 use crate::work::check::Check;
+use crate::work::frame_view::Outcome;
 use crate::work::open::{self, SensorText};
 use crate::work::sweep::{self, Sweep};
 use crate::work::{FrameRequest, FrameView, Setup};
@@ -95,6 +97,7 @@ impl Viewer {
                 rows: outcome.bodies.iter().map(|b| b.row.clone()).collect(),
                 causes: outcome.bodies.iter().filter_map(|b| b.cause).collect(),
                 fits: outcome.bodies.iter().map(|b| b.fit).collect(),
+                edges: edge_cells(&frame_view, outcome),
             };
             self.rows.set_current(frame_view.index, processed);
         }
@@ -295,4 +298,11 @@ impl Viewer {
         (self.requested, self.requested_at) = (Some(key), request.since);
         self.engine.request(request);
     }
+}
+
+/// Returns where a picture has edges.
+fn edge_cells(frame_view: &FrameView, outcome: &Outcome) -> EdgeCells {
+    let Ok(picture) = &frame_view.picture else { return EdgeCells::default() };
+    let bodies = outcome.bodies.iter().map(|b| (b.edges.as_slice(), b.solution().map(|s| s.candidate)));
+    EdgeCells::of([picture.layout.width, picture.layout.height], bodies)
 }
