@@ -213,8 +213,8 @@ mod tests {
         steady.add(&EdgeCells::of(SIZE, std::iter::once((edges, chosen))));
     }
 
-    /// Counts 20 answers with a limb at a height that depends on the picture, and 20 pictures without an answer. All but
-    /// every `missing`-th of these show a boom.
+    /// Counts 20 answers with a limb at a height that depends on the picture, and 20 pictures without an answer. Most of
+    /// these show a boom, but every `missing`-th does not.
     fn seen(limb_y: impl Fn(u16) -> u16, missing: u16) -> SteadyEdges {
         let mut steady = SteadyEdges::default();
         for n in 0..20 {

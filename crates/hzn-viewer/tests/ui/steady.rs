@@ -9,8 +9,8 @@ use hzn_core::pixel::ImagePoint;
 
 use crate::window::*;
 
-/// Writes pictures with a bright panel at the right: seven of a limb that moves by `step_rad` from picture to picture, and
-/// seven of the sky.
+/// Writes pictures with a bright panel at the right: seven of a limb that moves by `step_rad` from picture to picture,
+/// and seven of the sky.
 fn flight_with_a_panel(folder: &Path, step_rad: f64) {
     let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, WIDTH, HEIGHT, 260.0)).unwrap();
     let half_angle = (6381.0088f64 / 6611.0088).asin();
