@@ -21,7 +21,8 @@ hzn run rig.toml -o rig.csv                        several cameras that are one 
         "explain",
         "hzn explain flight/0001.png                  each stage of one picture, with advice
 hzn explain flight.mcap --index 12           the picture with number 12 of a recording
-hzn explain flight/0001.png --overlay a.png  the same, and a drawing",
+hzn explain flight/0001.png --overlay a.png  the same, and a drawing
+hzn explain rig.toml --index 3               the heads of one epoch, and their joint answer",
     ),
     (
         "info",

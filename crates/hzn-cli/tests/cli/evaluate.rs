@@ -51,6 +51,8 @@ fn a_run_against_its_truth_as_text_json_and_page() {
     assert_eq!(ranges.iter().map(|r| r["with_limb"].as_u64().unwrap()).sum::<u64>(), 5);
 
     let page = place.read("r.html");
+    let command = "<code>hzn evaluate out.mcap --truth in/truth.csv -o r.json -o r.html</code>";
+    assert!(page.contains(command) && page.contains(&format!("hzn {}", env!("CARGO_PKG_VERSION"))));
     assert!(page.matches("<svg").count() >= 4 && page.contains("data:image/jpeg;base64,"));
     // The Stanford diagram as picture and table.
     for text in ["below the line: misleading", "<td>above 1: misleading</td><td>0</td><td>0</td>"] {

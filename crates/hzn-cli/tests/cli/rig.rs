@@ -419,3 +419,31 @@ fn the_time_is_that_of_the_heads_that_are_used() {
     }
     assert!(excluded > 0, "{joint:?}");
 }
+
+#[test]
+fn the_heads_of_an_epoch_are_explained_with_their_joint_answer() {
+    let place = ring();
+    let out = place.run(&["explain", "ring/rig.toml", "--index", "2", "--overlay", "o.png"]).expect(0).out;
+    for head in HEADS {
+        let text = out.split(&format!("head {head}\n")).nth(1).unwrap();
+        assert!(text.contains(&format!("{head}-00002.png")) && text.contains("contour"), "{text}");
+    }
+    assert!(out.contains("rig: ok") && out.contains("used: front right back left"), "{out}");
+    // The joint answer is that of the run, which also knows the epochs before.
+    let (joint, _) = run(&place, &[], 0);
+    let number = |name: &str| cell(&joint[2], name).parse::<f64>().unwrap();
+    let [x, y, z] = ["axis_x", "axis_y", "axis_z"].map(number);
+    assert!(out.contains(&format!("{x:+.6} {y:+.6} {z:+.6} in the axes of the vehicle")), "{out}");
+    assert!(out.contains(&format!("the limit is {:.4} deg", number("separation_limit_deg"))), "{out}");
+    // Two pictures of 320 x 240 lie side by side, and two below them.
+    let drawn = image::open(place.path("o.png")).unwrap();
+    assert_eq!((drawn.width(), drawn.height()), (648, 488));
+    place.run(&["explain", "ring/rig.toml", "--index", "4"]).expect(2).says("the rig has 4 epochs, numbered from 0");
+    place.run(&["explain", "ring/rig.toml", "--overlay", "o.png"]).expect(2).says("--force replaces it");
+    let input = ["explain", "ring/rig.toml", "--overlay", "ring/left/left-00000.png", "--force"];
+    place.run(&input).expect(2).says("is the input itself");
+    place
+        .run(&["explain", "ring/rig.toml", "--sensor", "ring/left/sensor.toml"])
+        .expect(2)
+        .says("write it into rig.toml");
+}

@@ -18,6 +18,13 @@ pub struct Epoch {
     pub(super) pictures: [Option<(u64, Item)>; MOST_HEADS],
 }
 
+impl Epoch {
+    /// Returns the pictures, in the order of the heads.
+    pub fn into_pictures(self) -> impl Iterator<Item = Option<Item>> {
+        self.pictures.into_iter().map(|picture| picture.map(|(_, item)| item))
+    }
+}
+
 /// The pictures of the heads, epoch after epoch.
 ///
 /// The earliest picture that is not yet taken opens an epoch. Each other head adds its next picture if that is at most

@@ -7,7 +7,7 @@ use hzn_core::camera::{Config, Equation, Intrinsic};
 use hzn_plot::{Chart, Series, Style};
 
 use super::lens_text::{self, Reasons};
-use crate::html::{STYLE, escape};
+use crate::html::{STYLE, escape, provenance};
 
 /// Width of the pictures of the frame, in pixels of the page.
 const WIDTH: f64 = 640.0;
@@ -38,7 +38,7 @@ pub(super) fn html(calibrated: &Calibrated, reasons: &Reasons, pictures: &str) -
          long; grey points are outliers. Neighbours that point the same way show an error of the lens model.\
          </figcaption></figure><figure>{}<figcaption><b>Coverage</b>: number of points in each part of the picture. \
          A red cell has none.</figcaption></figure>{}{}{}</div><h2>Pictures</h2><table><tr><th>picture</th>\
-         <th>points</th><th>outliers</th><th>RMS [px]</th><th>tilt [deg]</th><th></th></tr>{views}</table></html>\n",
+         <th>points</th><th>outliers</th><th>RMS [px]</th><th>tilt [deg]</th><th></th></tr>{views}</table>{}</html>\n",
         escape(pictures),
         quiver(calibrated),
         calibrated.rms_px,
@@ -46,6 +46,7 @@ pub(super) fn html(calibrated: &Calibrated, reasons: &Reasons, pictures: &str) -
         radial(calibrated).svg()?,
         uncertainty(calibrated).svg()?,
         by_distance(calibrated).svg()?,
+        provenance(),
     ))
 }
 

@@ -5,7 +5,7 @@ use hzn_core::camera::Config;
 use hzn_plot::{Chart, Series, Style};
 use hzn_run::explain::counted;
 
-use crate::html::{STYLE, escape};
+use crate::html::{STYLE, escape, provenance};
 
 /// Returns a page with a title, lines of name and value, and plots.
 pub(super) fn simple(title: &str, lines: &[(String, String)], charts: &[Chart]) -> anyhow::Result<String> {
@@ -15,8 +15,9 @@ pub(super) fn simple(title: &str, lines: &[(String, String)], charts: &[Chart]) 
     let plots = charts.iter().map(Chart::svg).collect::<Result<String, _>>()?;
     Ok(format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{STYLE}</style>\
-         <h1>{0}</h1><table>{rows}</table><div class=\"plots\">{plots}</div></html>\n",
-        escape(title)
+         <h1>{0}</h1><table>{rows}</table><div class=\"plots\">{plots}</div>{1}</html>\n",
+        escape(title),
+        provenance()
     ))
 }
 
@@ -29,10 +30,11 @@ pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str, camer
     Ok(format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Limb height and \
             noise</title><style>{STYLE}</style>\
-         <h1>Limb height and noise: {}</h1>{alarm}<table>{rows}</table><div class=\"plots\">{}{}</div></html>\n",
+         <h1>Limb height and noise: {}</h1>{alarm}<table>{rows}</table><div class=\"plots\">{}{}</div>{}</html>\n",
         escape(flight),
         heights(calibration).svg()?,
-        correlation(calibration).svg()?
+        correlation(calibration).svg()?,
+        provenance()
     ))
 }
 

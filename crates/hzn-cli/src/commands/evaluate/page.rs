@@ -7,6 +7,7 @@ use hzn_plot::{Chart, Series, Style};
 use super::report::Report;
 use super::text;
 use super::worst::Drawn;
+use crate::html::{escape, provenance};
 
 const STYLE: &str = "\
 body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;padding:0 1rem;color:#222}\
@@ -61,7 +62,7 @@ pub(super) fn html(report: &Report, worst: &[Drawn]) -> anyhow::Result<String> {
         body.push_str("</div>");
     }
     let head = format!("<meta charset=\"utf-8\"><title>hzn evaluate</title><style>{STYLE}</style>");
-    Ok(format!("<!doctype html><html lang=\"en\"><head>{head}</head><body>{body}</body></html>\n"))
+    Ok(format!("<!doctype html><html lang=\"en\"><head>{head}</head><body>{body}{}</body></html>\n", provenance()))
 }
 
 /// Returns the charts of one body.
@@ -162,8 +163,4 @@ fn stanford(e: &Evaluation, frames: &[Case]) -> Option<Chart> {
             .with_series(dots("misleading", &|limb, error, level| limb && error > level))
             .with_series(dots("no limb in view", &|limb, _, _| !limb)),
     )
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

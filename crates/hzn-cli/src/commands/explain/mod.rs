@@ -1,15 +1,18 @@
 //! `hzn explain`: explains the processing of one picture, stage by stage.
 
 mod drawing;
+mod rig;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use hzn_core::Config;
+use hzn_files::FrameData;
 use hzn_run::engine::{AnySensor, Traces, Unprocessed};
 use hzn_run::explained::{PictureToExplain, Work};
 use hzn_run::open::Opened;
 use hzn_run::overlay;
-use hzn_run::source::{self, Item, Source};
+use hzn_run::source::{self, Item, Source, ending};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
@@ -20,16 +23,16 @@ use drawing::Drawing;
 /// Show what happens to one picture: what is kept, what is dropped, and why
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// A picture; or a folder, video or MCAP together with --index
+    /// A picture; or a folder, video or MCAP together with --index; or a rig.toml, of which one epoch is explained
     frame: PathBuf,
-    /// Number of the picture in a sequence, from 0
+    /// Number of the picture in a sequence, or of the epoch of a rig, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     index: u64,
     #[command(flatten)]
     sensor: SensorArgs,
     #[command(flatten)]
     source: InputArgs,
-    /// Draw the result over the picture, into this PNG
+    /// Draw the result over the picture, into this PNG; of a rig, the pictures of all heads side by side
     #[arg(long, value_name = "PNG")]
     overlay: Option<PathBuf>,
     /// Draw the overlay as a pinhole would see it, without the distortion of the lens: the limb is a conic section, and
@@ -45,6 +48,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.overlay {
         check_overlay(path)?;
     }
+    if ending(&args.frame) == "toml" && hzn_files::rig::is_rig(&args.frame) {
+        return rig::run(args, &args.frame);
+    }
     let inputs = std::slice::from_ref(&args.frame);
     let opened = setup::open(inputs, &args.sensor, &args.source)?;
     opened.notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
@@ -56,24 +62,46 @@ pub(super) fn run(args: &Args) -> Outcome {
         files::check_outputs(&read, std::slice::from_ref(path), args.force)?;
     }
     let mut item = item(source.as_mut(), args.index)?;
-    let config = &sensor.config;
     let data = item.take_prior(frames.as_ref());
+    let Explained { exit, drawing } = explain_item(item, &sensor.config, data.as_ref(), "", args)?;
+    if let (Some(path), Some(drawing)) = (&args.overlay, drawing) {
+        overlay::save(&drawing, path)?;
+        tell::line(format_args!("overlay: {}", path.display()));
+    }
+    Ok(exit)
+}
+
+/// What is left after a picture is explained.
+struct Explained {
+    exit: Exit,
+    /// The drawing over the picture, if one is wanted and the picture can be read.
+    drawing: Option<image::RgbImage>,
+}
+
+/// Decodes and explains a picture. The title of its drawing begins with `title`.
+fn explain_item(
+    item: Item,
+    config: &Config,
+    data: Option<&FrameData>,
+    title: &str,
+    args: &Args,
+) -> Result<Explained, Stop> {
+    let Item { name, payload, .. } = item;
     let decoding = Instant::now();
-    let picture = match item.payload.decode(Some(config)) {
+    let picture = match payload.decode(Some(config)) {
         Ok((picture, _)) => picture,
         Err(why) => {
-            tell::result(format_args!("{}\n", one_line(format_args!("{}: unreadable: {why}", item.name))))?;
-            return Ok(Exit::SomeUnreadable);
+            tell::result(format_args!("{}\n", one_line(format_args!("{name}: unreadable: {why}"))))?;
+            return Ok(Explained { exit: Exit::SomeUnreadable, drawing: None });
         }
     };
     let decoding = decoding.elapsed();
     if picture.pages > 1 {
         let what = "pictures; only the first is explained";
-        tell::line(format_args!("note: {} contains {} {what}", item.name, picture.pages));
+        tell::line(format_args!("note: {name} contains {} {what}", picture.pages));
     }
     let flight = args.sensor.flight;
-    let picture = PictureToExplain { name: &item.name, config, data: data.as_ref(), picture: &picture, flight };
-    explain(&picture, args, decoding)
+    explain(&PictureToExplain { name: &name, config, data, picture: &picture, flight }, title, args, decoding)
 }
 
 /// Refuses an overlay that is not a PNG.
@@ -97,7 +125,7 @@ fn item(source: &mut dyn Source, index: u64) -> Result<Item, Stop> {
 }
 
 /// Processes the picture and explains each body; draws the overlay.
-fn explain(picture: &PictureToExplain<'_>, args: &Args, decoding: Duration) -> Outcome {
+fn explain(picture: &PictureToExplain<'_>, title: &str, args: &Args, decoding: Duration) -> Result<Explained, Stop> {
     let PictureToExplain { name: file, config, data, picture: pixels, .. } = *picture;
     let mut sensor = AnySensor::new(config, args.sensor.flight).map_err(usage)?;
     let half_angles = sensor.expected_half_angles_rad(data);
@@ -137,11 +165,9 @@ fn explain(picture: &PictureToExplain<'_>, args: &Args, decoding: Duration) -> O
         let status = report.status;
         statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
     }
-    if let Some(path) = &args.overlay {
-        let camera = sensor.camera_of(data);
-        let shown = drawing.over(pixels, args.undistorted.then_some(&camera), &statuses.join(", "))?;
-        overlay::save(&shown, path)?;
-        tell::line(format_args!("overlay: {}", path.display()));
-    }
-    Ok(exit)
+    let camera = sensor.camera_of(data);
+    let title = format!("{title}{}", statuses.join(", "));
+    let over = |_| drawing.over(pixels, args.undistorted.then_some(&camera), &title);
+    let drawing = args.overlay.as_ref().map(over).transpose()?;
+    Ok(Explained { exit, drawing })
 }

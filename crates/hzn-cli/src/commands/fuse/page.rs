@@ -8,7 +8,7 @@ use hzn_plot::{Chart, Series, Style};
 use nalgebra::Vector3;
 
 use super::summary;
-use crate::html::{STYLE, escape};
+use crate::html::{STYLE, escape, provenance};
 
 /// Rules of style in addition to those of all reports.
 const MORE_STYLE: &str = ".plots{grid-template-columns:repeat(auto-fit,minmax(520px,1fr));margin:1.5rem 0}\
@@ -32,8 +32,9 @@ pub(super) fn html(fused: &Fused, results: &str) -> anyhow::Result<String> {
     Ok(format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>hzn fuse</title>\
          <style>{STYLE}{MORE_STYLE}</style><h1>Attitude and position: {}</h1>{notes}<table>{table}</table>\
-         <div class=\"plots\">{plots}</div></html>\n",
-        escape(results)
+         <div class=\"plots\">{plots}</div>{}</html>\n",
+        escape(results),
+        provenance()
     ))
 }
 

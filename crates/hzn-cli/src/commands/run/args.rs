@@ -28,7 +28,7 @@ pub(crate) struct Args {
     #[arg(required = true, value_name = "INPUT")]
     pub(super) input: Vec<PathBuf>,
     #[command(flatten)]
-    pub(super) sensor: SensorArgs,
+    pub(crate) sensor: SensorArgs,
     #[command(flatten)]
     pub(super) source: InputArgs,
     /// Results: .mcap, .csv, .jsonl, or - for stdout; may be given several times; without it, a table on stdout
@@ -132,6 +132,15 @@ impl Args {
             last: Vec::new(),
             turns: Turns::default(),
         })
+    }
+
+    /// Returns the settings of the pictures of a head of a rig.
+    ///
+    /// # Errors
+    /// The sensor is refused.
+    pub(crate) fn rig_plan(&self, sensor: Sensor) -> Result<Plan, Stop> {
+        // A picture that repeats the one before it is found by its bytes.
+        Ok(Plan { keep_picture: true, ..self.plan(sensor, None)? })
     }
 }
 

@@ -82,9 +82,7 @@ fn plan(args: &Args, opened: &Opened) -> Result<Plan, Stop> {
         .heads
         .iter()
         .map(|head| {
-            let mut plan = args.plan(head.sensor.clone(), None)?;
-            // A picture that repeats the one before it is found by its bytes.
-            plan.keep_picture = true;
+            let plan = args.rig_plan(head.sensor.clone())?;
             Ok(HeadPlan { name: head.name.clone(), plan })
         })
         .collect::<Result<_, Stop>>()?;
