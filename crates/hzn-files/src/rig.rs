@@ -28,6 +28,9 @@ pub struct Rig {
 pub struct Common {
     /// Longest time between two pictures of one epoch, seconds.
     pub sync_s: f64,
+    /// In flight, the time after the first picture of an epoch at which it ends without the heads that are late,
+    /// seconds. Allow for the calculation of all heads.
+    pub wait_s: f64,
     /// Probability of a false alarm of the check, for each epoch.
     pub false_alarm: f64,
     /// Probability that the error exceeds `protection_deg`, if at most one head is wrong.
@@ -48,11 +51,15 @@ pub struct Common {
 /// an axis on the Earth moves a head by 0.006° in this time, which is a third of the error of four heads.
 const SYNC_S: f64 = 0.1;
 
+/// Several times the calculation of four heads, and less than the time between two pictures of a slow camera.
+const WAIT_S: f64 = 0.5;
+
 impl Default for Common {
     fn default() -> Self {
         let rig::Config { false_alarm, misleading } = rig::Config::default();
         Self {
             sync_s: SYNC_S,
+            wait_s: WAIT_S,
             false_alarm,
             misleading,
             limb_tilt_sigma_km: None,
@@ -218,6 +225,7 @@ fn check_common(rig: &Common) -> Result<(), Refused> {
     // A time of days or a height of a planet's radius is a wrong unit.
     let limits = [
         ("sync_s", rig.sync_s, 1e-6, 3600.0),
+        ("wait_s", rig.wait_s, 0.0, 3600.0),
         ("limb_tilt_sigma_km", rig.limb_tilt_sigma_km.unwrap_or_default(), 0.0, 1000.0),
         ("limb_own_sigma_km", rig.limb_own_sigma_km, 0.0, 1000.0),
         ("limb_own_length_km", rig.limb_own_length_km, 1.0, 1e6),

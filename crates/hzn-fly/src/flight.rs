@@ -9,17 +9,18 @@ use hzn_core::Config;
 use hzn_core::config::Orient;
 use hzn_flight::flight::{Buffers, Flight, Lists};
 use hzn_flight::messages::Mode;
-use hzn_flight::{Parameters, parameters, table};
 use hzn_run::source::raw::{Format, Raw};
 
-use crate::board::{Counts, Linux, Parts};
+use crate::board::{Linux, Parts};
 use crate::camera::{Camera, Capture, DeviceCamera, Ended, Pipe, Samples, V4l2};
 use crate::error::Error;
 use crate::flash::Flash;
+use crate::head::{Counts, Feed, Head};
 use crate::latency::{Latency, LatencySummary};
 use crate::link::{Address, Link, Patience};
-use crate::log::Log;
+use crate::log::{Log, Sensors};
 use crate::notify::Notify;
+use crate::prepare::{parameters_for, prepare_parameters};
 use crate::signals::Lines;
 use crate::tell::Tell;
 
@@ -30,6 +31,8 @@ pub enum Source {
     Stdin,
     /// A camera of Video4Linux 2, by its device.
     Device(PathBuf),
+    /// The heads of a rig.toml, each with its own pictures.
+    Rig(PathBuf),
 }
 
 /// The settings of a flight.
@@ -56,6 +59,8 @@ pub struct Settings {
 pub struct Summary {
     /// Pictures, answers, losses.
     pub counts: Counts,
+    /// Epochs of a rig, and those with a joint answer.
+    pub epochs: (u64, u64),
     /// Answers in the log, and answers that are missing there.
     pub logged: (u64, u64),
     /// Packets for which the line had no room.
@@ -66,20 +71,28 @@ pub struct Summary {
     pub ended: Option<Ended>,
 }
 
-/// Flies until the pictures end or a signal stops the program.
-///
-/// In the mode shut-down the log is closed and the loop waits: power may be cut, and only another start ends the mode.
-///
-/// # Errors
-/// The flight cannot start: no parameters, no camera, a line or a folder that cannot be used.
-pub fn fly(settings: Settings, tell: Tell) -> Result<Summary, Error> {
-    // First of all, because the other threads inherit it.
-    let lines = Lines::listen().map_err(|e| Error::failed(format!("signals: {e}")))?;
+/// Flies one camera until the pictures end or a signal stops the program.
+pub(crate) fn fly(settings: &Settings, lines: Arc<Lines>, tell: Tell) -> Result<Summary, Error> {
     let state = &settings.state;
     let in_state = |e: std::io::Error| Error::failed(format!("{}: {e}", state.display()));
     let flash = Flash::open(state).map_err(in_state)?;
-    let config = prepare_parameters(&settings, &flash, &tell)?;
-    let capture = Capture::start(open_camera(&settings, &config, &tell)?).map_err(in_state)?;
+    let given = settings.sensor.clone().map(parameters_for);
+    let replaces = (settings.replaces_parameters, "sensor.toml");
+    let config = prepare_parameters(given.as_ref(), replaces, &flash, &tell)?.sensor;
+    let capture = Capture::start(open_camera(settings, &config, &tell)?).map_err(in_state)?;
+    let sensors = Sensors { configs: vec![config], rig: None };
+    let parts = open_parts(settings, sensors, lines, &tell)?;
+    let head = Head::new(None, Feed::Camera(capture), flash, tell);
+    run(Linux::new(parts, vec![head], None))
+}
+
+/// Opens what all heads share: the line to the ground and the log.
+pub(crate) fn open_parts(
+    settings: &Settings,
+    sensors: Sensors,
+    lines: Arc<Lines>,
+    tell: &Tell,
+) -> Result<Parts, Error> {
     let latency = Arc::new(Latency::default());
     let line = match &settings.line {
         None => None,
@@ -88,12 +101,11 @@ pub fn fly(settings: Settings, tell: Tell) -> Result<Summary, Error> {
             Some(opened.map_err(Error::failed)?)
         }
     };
-    let log_folder = state.join("log");
-    let log = Log::open(&log_folder, settings.log_bytes, &config, tell.clone())
+    let log_folder = settings.state.join("log");
+    let log = Log::open(&log_folder, settings.log_bytes, sensors, tell.clone())
         .map_err(|e| Error::failed(format!("{}: {e}", log_folder.display())))?;
     let notify = Notify::from_environment();
-    let parts = Parts { capture, line, latency, flash, log, lines, notify, tell };
-    run(Linux::new(parts))
+    Ok(Parts { line, latency, log, lines, notify, tell: tell.clone() })
 }
 
 fn run(board: Linux) -> Result<Summary, Error> {
@@ -111,10 +123,10 @@ fn run(board: Linux) -> Result<Summary, Error> {
             (flight.board().parts().tell)(&format!("{} mode", now.name()));
         }
         let takes_pictures = flight.mode() == Mode::Flight;
-        if flight.mode() == Mode::ShutDown || flight.board().ended(takes_pictures).is_some() {
+        if flight.mode() == Mode::ShutDown || flight.board().ended(|_| takes_pictures).is_some() {
             break;
         }
-        flight.board().wait(takes_pictures);
+        flight.board().wait(|_| takes_pictures);
         flight.turn();
     }
     let is_shut_down = flight.mode() == Mode::ShutDown;
@@ -122,10 +134,10 @@ fn run(board: Linux) -> Result<Summary, Error> {
 }
 
 /// Closes log and line. A computer that is shut down then waits for the end of power, or for a signal to stop.
-fn end(board: &mut Linux, is_shut_down: bool) -> Summary {
+pub(crate) fn end(board: &mut Linux, is_shut_down: bool) -> Summary {
+    board.heads().iter().for_each(|head| head.flash.end());
     let parts = board.parts();
     let logged = parts.log.finish();
-    parts.flash.end();
     let dropped_packets = parts.line.as_ref().map_or(0, |(link, _)| {
         link.drain(Duration::from_secs(1));
         link.dropped()
@@ -144,73 +156,34 @@ fn end(board: &mut Linux, is_shut_down: bool) -> Summary {
         dropped_packets,
         latency: parts.latency.summary(),
         counts: board.counts(),
-        ended: board.ended(false).cloned(),
+        epochs: board.epochs(),
+        ended: board.ended(|_| false).cloned(),
     }
-}
-
-/// Stores the parameters of the settings if there are none, and returns the sensor that will be used.
-fn prepare_parameters(settings: &Settings, flash: &Flash, tell: &Tell) -> Result<Config, Error> {
-    let has_copies = flash.has_copies();
-    if let Some(sensor) = settings.sensor.as_ref().filter(|_| !has_copies || settings.replaces_parameters) {
-        store(sensor, flash)?;
-    }
-    if settings.sensor.is_none() && !has_copies {
-        let what = "no parameters are stored yet: give --sensor FILE once";
-        return Err(Error::usage(format!("{}: {what}", settings.state.display())));
-    }
-    let newest = newest(flash).map_or_else(Parameters::defaults, |(parameters, _)| parameters);
-    if let Some(sensor) = &settings.sensor {
-        let given = Parameters::new(sensor.clone());
-        let is_other = |id: &u16| given.get(*id).map(f64::to_bits) != newest.get(*id).map(f64::to_bits);
-        let mut others: Vec<&str> = given.sensor_numbers().filter(is_other).filter_map(parameters::name).collect();
-        others.dedup();
-        if !others.is_empty() {
-            let (names, state) = (others.join(", "), settings.state.display());
-            let what = "the stored parameters are used; --load replaces them";
-            tell(&format!("warning: {state} has other values than sensor.toml for {names}: {what}"));
-        }
-    }
-    let body = &newest.sensor.body;
-    if body.altitude_km.is_none() && !body.half_angle_is_free() {
-        let what = "a picture has no answer until a telecommand gives the altitude (known or navigate)";
-        tell(&format!("warning: body.altitude_km is not set: {what}"));
-    }
-    Ok(newest.sensor)
-}
-
-/// Returns the newest valid copy of the parameters, and its generation.
-fn newest(flash: &Flash) -> Option<(Parameters, u32)> {
-    let read = |copy| {
-        let mut bytes = vec![0; table::MAX_BYTES];
-        flash.read_copy(copy, &mut bytes);
-        table::read(&bytes).ok()
-    };
-    [read(1), read(2)].into_iter().flatten().max_by_key(|(_, generation)| *generation)
-}
-
-/// Stores the parameters of a sensor in both copies. Every picture is processed from the start (`boot.mode` = 1),
-/// because the program starts when it is wanted, unlike a microcontroller.
-fn store(sensor: &Config, flash: &Flash) -> Result<(), Error> {
-    let mut parameters = Parameters::new(sensor.clone());
-    parameters.operations.boot_mode = 1;
-    parameters.check_flyable().map_err(|key| {
-        Error::usage(format!("{key} has a value that the flight software does not support; leave it at its default"))
-    })?;
-    parameters.check().map_err(|e| Error::usage(e.to_string()))?;
-    let generation = newest(flash).map_or(0, |(_, generation)| generation);
-    let mut bytes = vec![0; table::MAX_BYTES];
-    for (copy, generation) in [(1, generation.wrapping_add(1)), (2, generation.wrapping_add(2))] {
-        let n = table::write(&parameters, generation, &mut bytes).unwrap_or(0);
-        let written = flash.write_copy(copy, bytes.get(..n).unwrap_or_default());
-        written.map_err(|e| Error::failed(format!("{}: {e}", flash.folder().display())))?;
-    }
-    Ok(())
 }
 
 fn open_camera(settings: &Settings, config: &Config, tell: &Tell) -> Result<Box<dyn Camera>, Error> {
     let (width, height) = (u32::from(config.camera.width), u32::from(config.camera.height));
     check_input(settings.sensor.as_ref())?;
     let raw = settings.raw.unwrap_or(Raw { width, height, format: Format::Mono8 });
+    check_raw(raw, config, tell)?;
+    match &settings.source {
+        Source::Stdin => Ok(Box::new(Pipe::new(std::io::stdin(), Samples::Raw(raw)))),
+        Source::Device(path) if settings.raw.is_some() => {
+            Err(Error::usage(format!("{}: --raw is for pictures on standard input only", path.display())))
+        }
+        // The heads of a rig open their own.
+        Source::Rig(path) | Source::Device(path) => {
+            let opener = Box::new(V4l2::new(path, width, height));
+            let camera = DeviceCamera::open(opener, tell.clone())
+                .map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+            Ok(Box::new(camera))
+        }
+    }
+}
+
+/// Refuses pictures without headers that the flight software would take for others, and tells which it will refuse.
+pub(crate) fn check_raw(raw: Raw, config: &Config, tell: &Tell) -> Result<(), Error> {
+    let (width, height) = (u32::from(config.camera.width), u32::from(config.camera.height));
     if raw.size() != (width, height) {
         let (w, h) = raw.size();
         if u64::from(w) * u64::from(h) == u64::from(width) * u64::from(height) {
@@ -223,22 +196,11 @@ fn open_camera(settings: &Settings, config: &Config, tell: &Tell) -> Result<Box<
         let what = "every picture will be refused until the parameters fit (event 6)";
         tell(&format!("warning: pictures of {w}x{h}, but the camera of the parameters has {width}x{height}: {what}"));
     }
-    match &settings.source {
-        Source::Stdin => Ok(Box::new(Pipe::new(std::io::stdin(), Samples::Raw(raw)))),
-        Source::Device(path) if settings.raw.is_some() => {
-            Err(Error::usage(format!("{}: --raw is for pictures on standard input only", path.display())))
-        }
-        Source::Device(path) => {
-            let opener = Box::new(V4l2::new(path, width, height));
-            let camera = DeviceCamera::open(opener, tell.clone())
-                .map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
-            Ok(Box::new(camera))
-        }
-    }
+    Ok(())
 }
 
 /// Refuses what the flight software does not do to a picture.
-fn check_input(sensor: Option<&Config>) -> Result<(), Error> {
+pub(crate) fn check_input(sensor: Option<&Config>) -> Result<(), Error> {
     let Some(input) = sensor.map(|config| config.input) else { return Ok(()) };
     let key = match (input.orient, input.invert, input.scale_to_height) {
         (Orient::AsStored, false, None) => return Ok(()),
@@ -254,6 +216,7 @@ mod tests {
     use std::sync::mpsc;
 
     use hzn_core::camera::{self, Model};
+    use hzn_flight::{Parameters, table};
 
     use super::*;
 
@@ -279,18 +242,19 @@ mod tests {
                 let pixels: &[u8] = &[9; 3 * 64 * 48];
                 let samples = Samples::Raw("64x48:mono8".parse().unwrap());
                 let tell: Tell = Arc::new(|_: &str| ());
-                let log = Log::open(&dir.path().join("log"), 1 << 20, &parameters.sensor, tell.clone()).unwrap();
+                let sensors = Sensors { configs: vec![parameters.sensor.clone()], rig: None };
+                let log = Log::open(&dir.path().join("log"), 1 << 20, sensors, tell.clone()).unwrap();
+                let capture = Capture::start(Box::new(Pipe::new(pixels, samples))).unwrap();
+                let head = Head::new(None, Feed::Camera(capture), flash, tell.clone());
                 let parts = Parts {
-                    capture: Capture::start(Box::new(Pipe::new(pixels, samples))).unwrap(),
                     line: None,
                     latency: Arc::new(Latency::default()),
-                    flash,
                     log,
                     lines: Arc::new(Lines::default()),
                     notify: Notify::from_environment(),
                     tell,
                 };
-                done.send((boot_mode, run(Linux::new(parts)).unwrap())).unwrap();
+                done.send((boot_mode, run(Linux::new(parts, vec![head], None)).unwrap())).unwrap();
             });
         }
         for _ in 0..3 {

@@ -3,9 +3,14 @@
 //! | module | idea |
 //! |---|---|
 //! | [`link`] | the line over UDP, TCP or a serial port; the ground uses it too |
-//! | [`flight`] | the flight: preparation, loop, end |
+//! | `start` | the start of a flight, of one camera or of a rig |
+//! | [`flight`] | the flight of one camera: preparation, loop, end |
+//! | `rig` | the flight of several cameras (heads) that are one sensor |
+//! | `prepare` | the parameters of a head before the flight |
 //! | `board` | Linux as the board of the flight software |
-//! | [`camera`] | pictures from a pipe or a camera of Video4Linux 2 |
+//! | `head` | a camera of the board: its pictures, its parameters, its counts |
+//! | [`joint`] | the joint answer of a rig as a row |
+//! | [`camera`] | pictures from a pipe, a camera of Video4Linux 2, or a recording |
 //! | [`flash`] | the files that hold parameters and survive a crash |
 //! | [`log`] | the answers as recordings, within a share of the disk |
 //! | `log_clock` | the time of the log |
@@ -13,7 +18,7 @@
 //! | `signals` | the lines of the vehicle, and the wish to stop |
 //! | [`latency`] | the time from the last byte of a picture to its packet |
 //!
-//! Only [`link`], [`latency`] and [`tell`] exist on other systems.
+//! Only [`link`], [`joint`], [`latency`] and [`tell`] exist on other systems.
 #![forbid(unsafe_code)]
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "a library prints nothing; the caller does")]
 
@@ -27,6 +32,9 @@ mod error;
 pub mod flash;
 #[cfg(target_os = "linux")]
 pub mod flight;
+#[cfg(target_os = "linux")]
+mod head;
+pub mod joint;
 pub mod latency;
 pub mod link;
 #[cfg(target_os = "linux")]
@@ -36,10 +44,19 @@ mod log_clock;
 #[cfg(target_os = "linux")]
 mod notify;
 #[cfg(target_os = "linux")]
+mod prepare;
+#[cfg(target_os = "linux")]
+mod rig;
+#[cfg(target_os = "linux")]
 mod signals;
+#[cfg(target_os = "linux")]
+mod start;
 pub mod tell;
 
 #[cfg(target_os = "linux")]
-pub use board::Counts;
 #[cfg(target_os = "linux")]
 pub use error::Error;
+#[cfg(target_os = "linux")]
+pub use head::Counts;
+#[cfg(target_os = "linux")]
+pub use start::fly;

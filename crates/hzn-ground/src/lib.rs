@@ -24,7 +24,6 @@ pub mod commander;
 pub mod encode;
 mod error;
 pub mod incoming;
-mod joint;
 mod outcome;
 mod outputs;
 pub mod station;

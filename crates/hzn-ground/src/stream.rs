@@ -14,12 +14,12 @@ use hzn_flight::messages::{
 };
 use hzn_flight::packet::{Apid, ApidBase, Packet};
 use hzn_flight::{Parameters, parameters};
+use hzn_fly::joint::joint_row;
 use hzn_fly::tell::Tell;
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, LogLevel, LogLine, Row, RowMeta};
 use hzn_run::disk::Checked;
 
 use crate::error::Error;
-use crate::joint::joint_row;
 use crate::outcome;
 use crate::outputs::{Sink, write_housekeeping};
 use crate::tai;
@@ -232,7 +232,7 @@ impl StreamCounts {
             self.note(time, LogLevel::Warning, &format!("epoch {}: {why}", answer.epoch));
         }
         let Some(sink) = sink else { return Ok(()) };
-        let mut record = FrameRecord::new(joint_row(answer));
+        let mut record = FrameRecord::new(joint_row(answer, |k| format!("head{k}")));
         record.log = std::mem::take(&mut self.log);
         sink.write(record)
     }

@@ -17,7 +17,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("hzn-evaluate", &["hzn-core", "hzn-files", "hzn-mcap"]),
     ("hzn-run", &["hzn-core", "hzn-nav", "hzn-files", "hzn-flight", "hzn-mcap"]),
     ("hzn-fuse", &["hzn-core", "hzn-nav", "hzn-files", "hzn-sim", "hzn-mcap", "hzn-run"]),
-    ("hzn-fly", &["hzn-core", "hzn-nav", "hzn-mcap", "hzn-flight", "hzn-run"]),
+    ("hzn-fly", &["hzn-core", "hzn-nav", "hzn-files", "hzn-mcap", "hzn-flight", "hzn-run"]),
     ("hzn-ground", &["hzn-core", "hzn-nav", "hzn-files", "hzn-flight", "hzn-mcap", "hzn-run", "hzn-fly"]),
     ("hzn-plot", &[]),
     (

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use hzn_fly::camera::Ended;
-use hzn_fly::flight::{Settings, Source, Summary, fly};
+use hzn_fly::flight::{Settings, Source, Summary};
 use hzn_fly::link::Address;
 use hzn_run::disk;
 use hzn_run::source::Raw;
@@ -23,13 +23,14 @@ use crate::tell;
 /// picture.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// The device of a camera, such as /dev/video0; or - for pictures without headers on standard input
+    /// The device of a camera, such as /dev/video0; - for pictures without headers on standard input; or a rig.toml,
+    /// whose heads have devices, named pipes or pictures with times
     source: PathBuf,
     /// The sensor.toml whose parameters are stored, if none are stored yet
     #[arg(short, long, value_name = "FILE")]
     sensor: Option<PathBuf>,
-    /// Store the parameters of --sensor even if other parameters are stored already
-    #[arg(long, requires = "sensor")]
+    /// Store the parameters of --sensor, or those of a rig.toml, even if other parameters are stored already
+    #[arg(long)]
     load: bool,
     /// Size and format of the pictures on standard input (formats as for `hzn run`); without it, those of the
     /// parameters as mono8
@@ -51,14 +52,26 @@ pub(super) fn run(args: Args) -> Outcome {
     if let Some(Address::Udp { remote: None, .. }) = &args.line {
         return Err(usage("--line: udp needs the ground's address too, as in udp:0.0.0.0:5001,192.168.1.2:5000"));
     }
+    let is_rig = args.source.is_file() && hzn_files::rig::is_rig(&args.source);
+    if is_rig && args.sensor.is_some() {
+        return Err(usage("--sensor: the sensors of a rig are those that rig.toml names"));
+    }
+    if args.load && args.sensor.is_none() && !is_rig {
+        return Err(usage("--load stores the parameters of --sensor FILE: give this file, too"));
+    }
     let sensor = args.sensor.as_deref().map(hzn_files::sensor::load).transpose()?;
     sensor.iter().flat_map(|sensor| &sensor.warnings).for_each(tell::warning);
     let from_systemd = || std::env::var_os("STATE_DIRECTORY").map(PathBuf::from);
     let state = args.state.or_else(from_systemd).unwrap_or_else(|| "hzn-fly".into());
     let read = args.sensor.as_deref().map(hzn_files::files_of_sensor).unwrap_or_default();
+    let read = if is_rig { vec![args.source.clone()] } else { read };
     disk::refuse_inputs(&read, &hzn_fly::flash::files(&state))?;
     let settings = Settings {
-        source: if args.source.as_os_str() == "-" { Source::Stdin } else { Source::Device(args.source) },
+        source: match args.source {
+            path if is_rig => Source::Rig(path),
+            path if path.as_os_str() == "-" => Source::Stdin,
+            path => Source::Device(path),
+        },
         raw: args.raw,
         sensor: sensor.map(|sensor| sensor.config),
         replaces_parameters: args.load,
@@ -66,7 +79,8 @@ pub(super) fn run(args: Args) -> Outcome {
         state,
         log_bytes: args.log_mb * 1_000_000,
     };
-    let summary = fly(settings, tell::to_stderr()).map_err(|e| if e.is_usage { usage(e) } else { failed(e) })?;
+    let summary =
+        hzn_fly::fly(&settings, tell::to_stderr()).map_err(|e| if e.is_usage { usage(e) } else { failed(e) })?;
     tell_summary(&summary);
     match summary.ended {
         Some(Ended::Failed(why)) => Err(failed(why)),
@@ -89,6 +103,9 @@ fn tell_summary(summary: &Summary) {
     if counts.refused > 0 {
         let what = "refused without an answer (the events say why: a wrong size, no altitude, stuck pixels)";
         text += &format!(", {} pictures {what}", counts.refused);
+    }
+    if let (epochs @ 1.., joint) = summary.epochs {
+        text += &format!("; {epochs} epochs, {joint} joint answers");
     }
     let (logged, missing) = summary.logged;
     text += &format!("; {logged} in the log");

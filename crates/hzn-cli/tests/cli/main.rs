@@ -17,6 +17,7 @@ mod documents;
 mod evaluate;
 mod faults;
 mod fly;
+mod fly_rig;
 mod fuse;
 mod fuse_tables;
 mod gates;

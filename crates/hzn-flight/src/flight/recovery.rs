@@ -23,6 +23,11 @@ const STABLE_US: u64 = 60_000_000;
 const ARMED_US: u64 = 10_000_000;
 /// A bit of the word with the sequence count of the last telecommand: there was one.
 const HAS_SEQUENCE: u32 = 1 << 16;
+/// Place of the sequence count of the last telecommand to the rig in this word, for the first head of a rig. A count has
+/// 14 bits.
+const RIG_SEQUENCE_AT: u32 = 17;
+/// A bit of this word: there was a telecommand to the rig.
+const HAS_RIG_SEQUENCE: u32 = 1 << 31;
 /// The value of "since lift-off" before lift-off.
 const ON_THE_GROUND: u32 = u32::MAX;
 
@@ -39,6 +44,8 @@ pub(super) struct Recovery {
     armed_until_us: u64,
     /// Sequence count of the last telecommand that was taken.
     last_sequence: Option<u16>,
+    /// The same for telecommands to the rig whose first head this is.
+    rig_sequence: Option<u16>,
     /// Seconds since lift-off that are kept for a reset.
     kept_s: Option<u32>,
     is_stable: bool,
@@ -62,6 +69,8 @@ impl Recovery {
             line_was_off: false,
             armed_until_us: 0,
             last_sequence: (is_kept && sequence & HAS_SEQUENCE != 0).then_some(sequence as u16),
+            rig_sequence: (is_kept && sequence & HAS_RIG_SEQUENCE != 0)
+                .then_some((sequence >> RIG_SEQUENCE_AT & 0x3FFF) as u16),
             kept_s: None,
             is_stable: false,
         };
@@ -82,7 +91,9 @@ impl Recovery {
         // Only the kept count starts again, so that housekeeping still says why this run began.
         let resets = if self.is_stable { 0 } else { self.watchdog_resets };
         let sequence = self.last_sequence.map_or(0, |sequence| HAS_SEQUENCE | u32::from(sequence));
-        let words = [u32::from(self.starts) << 16 | u32::from(resets), since_ms, sequence];
+        let of_rig =
+            self.rig_sequence.map_or(0, |sequence| HAS_RIG_SEQUENCE | u32::from(sequence & 0x3FFF) << RIG_SEQUENCE_AT);
+        let words = [u32::from(self.starts) << 16 | u32::from(resets), since_ms, sequence | of_rig];
         let [counts, since_ms, sequence] = words;
         let kept: [u32; RETAINED_WORDS] = [counts, since_ms, sequence, checksum(words)];
         board.write_retained(kept);
@@ -93,6 +104,14 @@ impl Recovery {
     pub(super) fn note_sequence(&mut self, board: &mut impl Board, sequence: u16, now_us: u64) {
         self.last_sequence = Some(sequence);
         self.keep(board, now_us);
+    }
+    /// Takes note of a telecommand to the rig whose first head this is.
+    pub(super) fn note_rig_sequence(&mut self, board: &mut impl Board, sequence: u16, now_us: u64) {
+        self.rig_sequence = Some(sequence);
+        self.keep(board, now_us);
+    }
+    pub(super) fn rig_sequence(&self) -> Option<u16> {
+        self.rig_sequence
     }
     pub(super) fn last_sequence(&self) -> Option<u16> {
         self.last_sequence

@@ -6,6 +6,7 @@ use hzn_core::image::{Grey, Layout};
 use hzn_core::observer::Unobserved;
 use hzn_core::rig::{Answered, Common, Limb, Mount};
 use hzn_core::status::Status;
+use hzn_flight::Parameters;
 use hzn_flight::bytes::Writer;
 use hzn_flight::flight::Lists;
 use hzn_flight::flight::rig::{Rig, Setup};
@@ -218,6 +219,35 @@ fn telecommands_mean_one_head_or_all() {
         }
         assert_eq!((&board.borrow().cameras[0].copies, rig.mode(0)), (&before, Some(Mode::ShutDown)));
     });
+}
+
+#[test]
+fn a_replay_after_a_reset_is_refused() {
+    let window = Parameters::number_of("line.sequence_window").unwrap();
+    let board = board(&[0, 1, 2, 3].map(|k| {
+        let mut p = parameters(k);
+        p.set(window, 100.0).unwrap();
+        p
+    }));
+    // A head has a count of its own.
+    for (count, own) in [(7, Code::Done), (8, Code::Sequence), (9, Code::Sequence)] {
+        fly(&board, |rig| {
+            let answer = |rig: &mut Rig<'_, '_, Shared<'_>, 4>, base: u16, count: u16| {
+                send(&board, base, count, Function::Ping, |_| ());
+                quiet_turn(&board, rig);
+                take_sent(&board).answers
+            };
+            assert_eq!(answer(rig, 0x100, count), [(0x100, Code::Done)]);
+            assert_eq!(answer(rig, 0x100, count), [(0x100, Code::Sequence)]);
+            assert_eq!(answer(rig, 0x110, 3), [(0x110, own)]);
+        });
+        // The computer is reset, and somebody sends the last telecommand again.
+        fly(&board, |rig| {
+            send(&board, 0x100, count, Function::Ping, |_| ());
+            quiet_turn(&board, rig);
+            assert_eq!(take_sent(&board).answers, [(0x100, Code::Sequence)]);
+        });
+    }
 }
 
 #[test]

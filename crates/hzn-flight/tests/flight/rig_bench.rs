@@ -68,6 +68,7 @@ pub(crate) struct Camera {
     pub(crate) pictures: VecDeque<Taken>,
     pub(crate) pixels: Vec<u8>,
     pub(crate) copies: [Vec<u8>; 2],
+    pub(crate) retained: [u32; RETAINED_WORDS],
 }
 
 #[derive(Default)]
@@ -138,7 +139,12 @@ impl Board for Shared<'_> {
         0
     }
     fn read_retained(&mut self) -> [u32; RETAINED_WORDS] {
-        [0; RETAINED_WORDS]
+        let this = &mut *self.0.borrow_mut();
+        this.cameras[this.head].retained
+    }
+    fn write_retained(&mut self, words: [u32; RETAINED_WORDS]) {
+        let this = &mut *self.0.borrow_mut();
+        this.cameras[this.head].retained = words;
     }
     fn keep_answer(&mut self, _exposure: &Exposure, _report: &Report<f32>) -> bool {
         true

@@ -21,6 +21,17 @@ pub struct Shot {
     pub lost: u32,
     /// Time when the last byte came.
     pub ready: Instant,
+    /// Time and name, if the picture was taken before the flight.
+    pub recorded: Option<Recorded>,
+}
+
+/// What a recording says about a picture.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Recorded {
+    /// Time of the middle of the exposure on the clock of the flight, µs.
+    pub exposure_us: u64,
+    /// Its name.
+    pub name: String,
 }
 
 /// What the thread sends.
@@ -73,7 +84,7 @@ fn run(mut camera: Box<dyn Camera>, empty: &Receiver<Vec<u8>>, sender: &Sender<F
             Next::Picture { lost } => {
                 let ready = Instant::now();
                 number += u64::from(lost);
-                let shot = Shot { pixels, number, lost, ready };
+                let shot = Shot { pixels, number, lost, ready, recorded: None };
                 number += 1;
                 if sender.send(FromCamera::Shot(shot)).is_err() {
                     return;

@@ -1,15 +1,17 @@
-//! Pictures from a camera or a pipe, as the flight loop takes them: one byte for each pixel, row by row.
+//! Pictures from a camera, a pipe or a recording, as the flight loop takes them: one byte for each pixel, row by row.
 
 mod capture;
 mod device;
 mod pipe;
+mod recording;
 mod samples;
 #[cfg(target_os = "linux")]
 mod v4l2;
 
-pub use capture::{Capture, FromCamera, Shot};
+pub use capture::{Capture, FromCamera, Recorded, Shot};
 pub use device::{Device, DeviceCamera, OpenDevice};
 pub use pipe::Pipe;
+pub use recording::Recording;
 pub use samples::Samples;
 #[cfg(target_os = "linux")]
 pub use v4l2::V4l2;

@@ -33,7 +33,16 @@ pub struct Log {
     written: Arc<AtomicU64>,
     /// Whether the last answer could not be written.
     fails: Arc<AtomicBool>,
-    config: Arc<Mutex<Config>>,
+    configs: Arc<Mutex<Vec<Config>>>,
+}
+
+/// What a recording says about its sensors.
+#[derive(Debug, Clone)]
+pub struct Sensors {
+    /// The sensors that fly: one, or those of the heads.
+    pub configs: Vec<Config>,
+    /// Of a rig: the names of its heads, and the text of its rig.toml.
+    pub rig: Option<(Vec<String>, String)>,
 }
 
 impl Log {
@@ -42,12 +51,13 @@ impl Log {
     ///
     /// # Errors
     /// The folder cannot be made or read.
-    pub fn open(folder: &Path, limit_bytes: u64, config: &Config, tell: Tell) -> io::Result<Self> {
+    pub fn open(folder: &Path, limit_bytes: u64, sensors: Sensors, tell: Tell) -> io::Result<Self> {
         let mut folder = Folder::open(folder, limit_bytes.max(MIN_LIMIT_BYTES))?;
         folder.recover(&tell);
         let (sender, answers) = bounded(WAITING);
         let (lost, written) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
-        let (config, fails) = (Arc::new(Mutex::new(config.clone())), Arc::new(AtomicBool::new(false)));
+        let Sensors { configs, rig } = sensors;
+        let (configs, fails) = (Arc::new(Mutex::new(configs)), Arc::new(AtomicBool::new(false)));
         let mut writing = Writing {
             folder,
             file: None,
@@ -55,16 +65,19 @@ impl Log {
             lost: Arc::clone(&lost),
             written: Arc::clone(&written),
             fails: Arc::clone(&fails),
-            config: Arc::clone(&config),
+            configs: Arc::clone(&configs),
+            rig,
             tell,
         };
         let thread = thread::Builder::new().name("log".into()).spawn(move || writing.run(&answers))?;
-        Ok(Self { sender: Some(sender), thread: Some(thread), lost, written, fails, config })
+        Ok(Self { sender: Some(sender), thread: Some(thread), lost, written, fails, configs })
     }
 
-    /// Sets the configuration that the next files name.
-    pub fn set_config(&self, config: &Config) {
-        *self.config.lock().unwrap_or_else(PoisonError::into_inner) = config.clone();
+    /// Sets the configuration of a head that the next files name.
+    pub fn set_config(&self, head: usize, config: &Config) {
+        if let Some(place) = self.configs.lock().unwrap_or_else(PoisonError::into_inner).get_mut(head) {
+            place.clone_from(config);
+        }
     }
 
     /// Adds an answer, without waiting. If there is no room, the answer is lost and counted. Returns false if it is
@@ -95,7 +108,8 @@ struct Writing {
     lost: Arc<AtomicU64>,
     written: Arc<AtomicU64>,
     fails: Arc<AtomicBool>,
-    config: Arc<Mutex<Config>>,
+    configs: Arc<Mutex<Vec<Config>>>,
+    rig: Option<(Vec<String>, String)>,
     tell: Tell,
 }
 
@@ -143,15 +157,8 @@ impl Writing {
             Some(file) => file,
             None => {
                 let path = self.folder.make_room();
-                let config = self.config.lock().unwrap_or_else(PoisonError::into_inner).clone();
-                // A configuration that was accepted has a text.
-                let sensor_toml = toml::to_string(&config).unwrap_or_default();
-                let metadata = [("program".to_owned(), format!("hzn fly {}", env!("CARGO_PKG_VERSION")))].into();
-                let camera = Some(config.camera);
-                Writer::create(
-                    path,
-                    &Options { sensor_toml, metadata, camera, force: true, durable: true, ..Options::default() },
-                )?
+                let configs = self.configs.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                Writer::create(path, &options(configs, self.rig.as_ref()))?
             }
         };
         Ok(self.file.insert(file))
@@ -183,6 +190,28 @@ impl Writing {
     }
 }
 
+/// Returns the settings of a recording.
+fn options(configs: Vec<Config>, rig: Option<&(Vec<String>, String)>) -> Options {
+    // A configuration that was accepted has a text.
+    let text = |config: &Config| toml::to_string(config).unwrap_or_default();
+    let metadata = [("program".to_owned(), format!("hzn fly {}", env!("CARGO_PKG_VERSION")))].into();
+    let mut options = Options { metadata, force: true, durable: true, ..Options::default() };
+    match rig {
+        None => {
+            options.sensor_toml = configs.first().map(text).unwrap_or_default();
+            options.camera = configs.into_iter().next().map(|config| config.camera);
+        }
+        Some((names, rig_toml)) => {
+            options.files.push(("rig.toml".to_owned(), rig_toml.clone()));
+            for (name, config) in names.iter().zip(configs) {
+                options.files.push((format!("{name}/sensor.toml"), text(&config)));
+                options.heads.push((name.clone(), config.camera));
+            }
+        }
+    }
+    options
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;
@@ -194,8 +223,8 @@ mod tests {
 
     use super::*;
 
-    fn config() -> Config {
-        Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 600.0))
+    fn sensors() -> Sensors {
+        Sensors { configs: vec![Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 600.0))], rig: None }
     }
     fn record(index: u64) -> FrameRecord {
         let meta = RowMeta {
@@ -229,7 +258,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let (mut most, limit) = (0, MIN_LIMIT_BYTES);
         for start in [0, 1500] {
-            let mut log = Log::open(dir.path(), limit, &config(), quiet()).unwrap();
+            let mut log = Log::open(dir.path(), limit, sensors(), quiet()).unwrap();
             for index in start..start + 1500 {
                 while log.sender.as_ref().unwrap().is_full() {
                     thread::sleep(Duration::from_millis(1));
@@ -253,7 +282,7 @@ mod tests {
     #[test]
     fn what_a_crash_left_is_closed() {
         let dir = tempfile::tempdir().unwrap();
-        let mut log = Log::open(dir.path(), MIN_LIMIT_BYTES, &config(), quiet()).unwrap();
+        let mut log = Log::open(dir.path(), MIN_LIMIT_BYTES, sensors(), quiet()).unwrap();
         assert!((0..40).all(|index| log.add(record(index))));
         thread::sleep(2 * FLUSH_INTERVAL);
         // A copy of the folder now is what a crash leaves.
@@ -267,7 +296,7 @@ mod tests {
         let told = Arc::new(Mutex::new(Vec::<String>::new()));
         let list = Arc::clone(&told);
         let tell: Tell = Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned()));
-        let mut log = Log::open(after.path(), MIN_LIMIT_BYTES, &config(), tell).unwrap();
+        let mut log = Log::open(after.path(), MIN_LIMIT_BYTES, sensors(), tell).unwrap();
         log.add(record(40));
         log.finish();
         assert_eq!(indexes(after.path()), (0..=40).collect::<Vec<_>>());
@@ -279,7 +308,7 @@ mod tests {
     fn a_full_disk_costs_the_oldest_recordings_first() {
         let dir = tempfile::tempdir().unwrap();
         for start in [0, 10, 20] {
-            let mut log = Log::open(dir.path(), MIN_LIMIT_BYTES, &config(), quiet()).unwrap();
+            let mut log = Log::open(dir.path(), MIN_LIMIT_BYTES, sensors(), quiet()).unwrap();
             (start..start + 10).for_each(|index| assert!(log.add(record(index))));
             log.finish();
         }
@@ -315,7 +344,7 @@ mod tests {
         let told = Arc::new(Mutex::new(Vec::<String>::new()));
         let list = Arc::clone(&told);
         let tell: Tell = Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned()));
-        let mut log = Log::open(&folder, MIN_LIMIT_BYTES, &config(), tell).unwrap();
+        let mut log = Log::open(&folder, MIN_LIMIT_BYTES, sensors(), tell).unwrap();
         fs::remove_dir(&folder).unwrap();
         // The writer has a thread of its own, so nobody knows which answer is the first that the flight software is
         // told of.

@@ -111,12 +111,16 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
         let mut from = Reader::new(user.get(..bytes).unwrap_or_default());
         let number = from.u8().unwrap_or(0);
         let window = self.loops().next().map_or(0, |first| first.operations.get().sequence_window);
-        let ahead = self.last_sequence.map(|last| sequence.wrapping_sub(last) & 0x3FFF);
+        // The first head keeps the count of the rig for the time after a reset.
+        let last_sequence = self.loops().next().and_then(|first| first.recovery.rig_sequence());
+        let ahead = last_sequence.map(|last| sequence.wrapping_sub(last) & 0x3FFF);
         let is_replay = window > 0 && ahead.is_some_and(|ahead| !(1..=window).contains(&ahead));
         let (code, detail) = match Function::from_number(number) {
-            _ if is_replay => (Code::Sequence, self.last_sequence.unwrap_or(0)),
+            _ if is_replay => (Code::Sequence, last_sequence.unwrap_or(0)),
             Some(function) => {
-                self.last_sequence = Some(sequence);
+                let now_us = self.now_us();
+                // Before it is carried out: after a reset in the middle its replay is refused, too.
+                self.with_head(0, |first| first.recovery.note_rig_sequence(&mut first.board, sequence, now_us));
                 self.carry_out(function, from)
             }
             None => (Code::Unknown, 0),

@@ -4,6 +4,7 @@ use hzn_core::status::Status;
 use hzn_core::{Config, Report, Solution};
 
 use crate::board::{Board, Image, Picture, RETAINED_WORDS};
+use crate::joint::RigAnswer;
 use crate::messages::Exposure;
 use crate::view::Viewer;
 
@@ -18,6 +19,8 @@ pub trait RigBoard: Board {
     fn picture_checksum(&mut self) -> Option<u32> {
         None
     }
+    /// Keeps a joint answer, whose packet was sent just now. Most boards keep nothing.
+    fn keep_joint(&mut self, _answer: &RigAnswer) {}
 }
 
 /// Returns a checksum of about 4000 pixels of a picture. The noise of fewer pixels than these never repeats.

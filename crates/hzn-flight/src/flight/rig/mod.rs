@@ -178,8 +178,6 @@ pub struct Rig<'h, 'a, B, const N: usize> {
     /// Number of the last epoch.
     number: u32,
     repairs: u16,
-    /// Sequence count of the last telecommand to the rig since the start.
-    last_sequence: Option<u16>,
 }
 
 impl<'h, 'a, B: RigBoard, const N: usize> Rig<'h, 'a, B, N> {
@@ -204,7 +202,6 @@ impl<'h, 'a, B: RigBoard, const N: usize> Rig<'h, 'a, B, N> {
             pending: KeptTwice::new(Pending::NONE),
             number: 0,
             repairs: 0,
-            last_sequence: None,
         }
     }
 
@@ -360,6 +357,9 @@ impl<'h, 'a, B: RigBoard, const N: usize> Rig<'h, 'a, B, N> {
         };
         let record = record.with(&joint);
         self.send(exposure_us, Apid::Rig, |out| record.write(out));
+        if let Some(board) = self.board() {
+            board.keep_joint(&record);
+        }
     }
 
     fn mount(&self, k: usize) -> Option<Mount<f32>> {

@@ -8,14 +8,13 @@ use hzn_mcap::{Row, RowMeta, roll_pitch_deg};
 /// The column `head` of the joint answer.
 const JOINT: &str = "rig";
 
-/// Returns the names of a set of heads, as `hzn.Rig` names heads without a name; `None` if it is empty.
-fn names(set: u8) -> Option<String> {
-    let heads: Vec<String> = (0..u8::BITS).filter(|k| set >> k & 1 == 1).map(|k| format!("head{k}")).collect();
-    (!heads.is_empty()).then(|| heads.join(" "))
-}
-
-/// Returns the row of an epoch. Numbers that are no directions leave the row without an answer.
-pub(crate) fn joint_row(answer: &RigAnswer) -> Row {
+/// Returns the row of an epoch. `name` returns the name of a head by its number. Numbers that are no directions leave
+/// the row without an answer.
+pub fn joint_row(answer: &RigAnswer, name: impl Fn(u8) -> String) -> Row {
+    let names = |set: u8| {
+        let heads: Vec<String> = (0..8).filter(|k| set >> k & 1 == 1).map(&name).collect();
+        (!heads.is_empty()).then(|| heads.join(" "))
+    };
     let status = Status::ALL.iter().copied().find(|status| *status as u8 == answer.status).unwrap_or(Status::Rejected);
     let missing = answer.heads_expected & !answer.heads_seen;
     let without = answer.heads_seen & !answer.heads_answered & !answer.heads_repeated;
