@@ -105,11 +105,12 @@ impl Station {
         }
     }
 
-    /// Closes the outputs. `rest` are the bytes after the last packet, `name` is that of the stream.
+    /// Closes the outputs. `rest` are the bytes after the last packet, `name` is that of the stream. Returns whether
+    /// every byte belonged to a whole packet.
     ///
     /// # Errors
     /// An output cannot be written, or there were bytes but no packet.
-    pub fn finish(self, rest: &[u8], name: &str) -> Result<(), Error> {
+    pub fn finish(self, rest: &[u8], name: &str) -> Result<bool, Error> {
         let Self { mut counts, tell, sink, housekeeping } = self;
         let skip = match packet::scan(rest) {
             Scan::More { skip } => skip,
@@ -129,6 +130,6 @@ impl Station {
             let what = "no packet was found; is this the stream of a flight computer? (book/reference/telemetry.md)";
             return Err(Error::failed(format!("{name}: {what}")));
         }
-        Ok(())
+        Ok(counts.cut == 0 && counts.skipped == 0)
     }
 }

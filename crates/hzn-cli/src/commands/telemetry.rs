@@ -25,6 +25,8 @@ use crate::tell;
 ///   tcp:HOST:PORT              a connection to the flight computer
 ///   tcp-listen:HOST:PORT       a connection that the flight computer makes
 ///   serial:DEVICE[:BAUD]       a serial port, 115200 baud unless given
+///
+/// Exit codes: 0 every byte of the stream belongs to a packet, or a line was read; 3 the stream has broken packets.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Args {
@@ -91,8 +93,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     } else {
         station.take(&mut rest)?;
     }
-    station.finish(&rest, &name)?;
-    Ok(Exit::Done)
+    let is_whole = station.finish(&rest, &name)?;
+    // Noise is usual on a line, and Ctrl-C often ends it within a packet; a stream that was recorded can be sent again.
+    Ok(if is_whole || Address::is_address(&name) { Exit::Done } else { Exit::SomeUnreadable })
 }
 
 /// Returns a flag that Ctrl-C or a request to terminate sets.

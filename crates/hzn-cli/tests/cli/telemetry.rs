@@ -158,6 +158,25 @@ fn what_is_missing_refused_or_of_another_version_is_told() {
     assert!(column("axis_x").parse::<f64>().is_ok() && column("position_x_km").is_empty());
 }
 
+/// A bit that flipped, and a stream that ends within a packet: the other answers are there, and the exit code tells.
+#[test]
+fn a_damaged_stream_has_an_exit_code_of_its_own() {
+    let (place, answer) = disc(true);
+    let mut stream = Stream::default();
+    for k in 1..4 {
+        stream.add_picture(Cuc::since_start(1_000_000), &exposure(k), &answer);
+    }
+    let (whole, last) = (stream.bytes.clone(), stream.bytes.len() - 1);
+    let mut flipped = whole.clone();
+    flipped[30] ^= 4;
+    let noisy = [b"noise", &whole[..]].concat();
+    for (bytes, code, answers) in [(&whole[..], 0, 3), (&flipped, 3, 2), (&noisy, 3, 3), (&whole[..last], 3, 3)] {
+        place.write("sent.bin", bytes);
+        place.run(&["telemetry", "sent.bin", "-o", "sent.csv", "--force"]).expect(code);
+        assert_eq!(place.rows("sent.csv").len(), answers, "{code}");
+    }
+}
+
 /// The joint answer of a rig has the columns of `hzn run rig.toml`; the packets of its heads have other bases.
 #[test]
 fn joint_answers_become_the_rows_of_a_rig() {
