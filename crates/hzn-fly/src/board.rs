@@ -21,6 +21,7 @@ use hzn_run::engine::widen_report;
 use crate::camera::{Ended, Shot};
 use crate::head::{Counts, Head};
 use crate::joint::joint_row;
+use crate::keeper::Keeper;
 use crate::latency::Latency;
 use crate::link::Link;
 use crate::log::Log;
@@ -134,6 +135,15 @@ impl Linux {
     }
     pub(crate) fn heads(&self) -> &[Head] {
         &self.heads
+    }
+
+    /// Closes the files of the heads. Returns how many pictures were kept, and how many were lost.
+    pub(crate) fn finish_heads(&mut self) -> (u64, u64) {
+        let finish = |head: &mut Head| {
+            head.flash.end();
+            head.keeper.as_mut().map_or((0, 0), Keeper::finish)
+        };
+        self.heads.iter_mut().map(finish).fold((0, 0), |(kept, lost), (k, l)| (kept + k, lost + l))
     }
 
     fn head(&mut self) -> Option<&mut Head> {
@@ -252,6 +262,9 @@ impl Board for Linux {
         let selected = self.selected;
         if let Some(head) = self.head() {
             head.protection_factor = config.protection_factor(0);
+            if let Some(keeper) = &mut head.keeper {
+                keeper.set_config(config);
+            }
         }
         self.parts.log.set_config(selected, config);
     }
@@ -297,6 +310,9 @@ impl Board for Linux {
         let mut record = FrameRecord::new(row);
         record.candidates = CandidateEdge::from_report(&report);
         record.log = std::mem::take(&mut self.events);
+        if let Some((keeper, shot)) = head.keeper.as_mut().zip(head.current.as_ref()) {
+            keeper.see(exposure.picture, report.status, &record, &shot.pixels);
+        }
         self.parts.log.add(record)
     }
 }

@@ -16,9 +16,10 @@ use crate::camera::{Camera, Capture, DeviceCamera, Ended, Pipe, Samples, V4l2};
 use crate::error::Error;
 use crate::flash::Flash;
 use crate::head::{Counts, Feed, Head};
+use crate::keeper::{Keeper, Which};
 use crate::latency::{Latency, LatencySummary};
 use crate::link::{Address, Link, Patience};
-use crate::log::{Log, Sensors};
+use crate::log::{Limits, Log, Sensors};
 use crate::notify::Notify;
 use crate::prepare::{parameters_for, prepare_parameters};
 use crate::signals::Lines;
@@ -52,6 +53,8 @@ pub struct Settings {
     pub state: PathBuf,
     /// Most bytes of the log.
     pub log_bytes: u64,
+    /// Which pictures are kept, and the most bytes of them, for each head.
+    pub kept_pictures: Option<(Which, u64)>,
 }
 
 /// What happened in a flight.
@@ -61,6 +64,8 @@ pub struct Summary {
     pub counts: Counts,
     /// Epochs of a rig, and those with a joint answer.
     pub epochs: (u64, u64),
+    /// Pictures that were kept, and those that could not be.
+    pub kept: (u64, u64),
     /// Answers in the log, and answers that are missing there.
     pub logged: (u64, u64),
     /// Packets for which the line had no room.
@@ -79,10 +84,11 @@ pub(crate) fn fly(settings: &Settings, lines: Arc<Lines>, tell: Tell) -> Result<
     let given = settings.sensor.clone().map(parameters_for);
     let replaces = (settings.replaces_parameters, "sensor.toml");
     let config = prepare_parameters(given.as_ref(), replaces, &flash, &tell)?.sensor;
+    let keeper = settings.kept_pictures.map(|kept| Keeper::open(kept, &flash, &config, &tell)).transpose()?;
     let capture = Capture::start(open_camera(settings, &config, &tell)?).map_err(in_state)?;
     let sensors = Sensors { configs: vec![config], rig: None };
     let parts = open_parts(settings, sensors, lines, &tell)?;
-    let head = Head::new(None, Feed::Camera(capture), flash, tell);
+    let head = Head::new(None, Feed::Camera(capture), flash, keeper, tell);
     run(Linux::new(parts, vec![head], None))
 }
 
@@ -102,7 +108,8 @@ pub(crate) fn open_parts(
         }
     };
     let log_folder = settings.state.join("log");
-    let log = Log::open(&log_folder, settings.log_bytes, sensors, tell.clone())
+    let limits = Limits { bytes: settings.log_bytes, picture_bytes: 0 };
+    let log = Log::open(&log_folder, limits, sensors, tell.clone())
         .map_err(|e| Error::failed(format!("{}: {e}", log_folder.display())))?;
     let notify = Notify::from_environment();
     Ok(Parts { line, latency, log, lines, notify, tell: tell.clone() })
@@ -135,7 +142,7 @@ fn run(board: Linux) -> Result<Summary, Error> {
 
 /// Closes log and line. A computer that is shut down then waits for the end of power, or for a signal to stop.
 pub(crate) fn end(board: &mut Linux, is_shut_down: bool) -> Summary {
-    board.heads().iter().for_each(|head| head.flash.end());
+    let kept = board.finish_heads();
     let parts = board.parts();
     let logged = parts.log.finish();
     let dropped_packets = parts.line.as_ref().map_or(0, |(link, _)| {
@@ -157,6 +164,7 @@ pub(crate) fn end(board: &mut Linux, is_shut_down: bool) -> Summary {
         latency: parts.latency.summary(),
         counts: board.counts(),
         epochs: board.epochs(),
+        kept,
         ended: board.ended(|_| false).cloned(),
     }
 }
@@ -243,9 +251,15 @@ mod tests {
                 let samples = Samples::Raw("64x48:mono8".parse().unwrap());
                 let tell: Tell = Arc::new(|_: &str| ());
                 let sensors = Sensors { configs: vec![parameters.sensor.clone()], rig: None };
-                let log = Log::open(&dir.path().join("log"), 1 << 20, sensors, tell.clone()).unwrap();
+                let log = Log::open(
+                    &dir.path().join("log"),
+                    Limits { bytes: 1 << 20, picture_bytes: 0 },
+                    sensors,
+                    tell.clone(),
+                )
+                .unwrap();
                 let capture = Capture::start(Box::new(Pipe::new(pixels, samples))).unwrap();
-                let head = Head::new(None, Feed::Camera(capture), flash, tell.clone());
+                let head = Head::new(None, Feed::Camera(capture), flash, None, tell.clone());
                 let parts = Parts {
                     line: None,
                     latency: Arc::new(Latency::default()),

@@ -9,6 +9,7 @@ use hzn_mcap::RowMeta;
 
 use crate::camera::{Capture, Ended, FromCamera, Recording, Shot};
 use crate::flash::Flash;
+use crate::keeper::Keeper;
 use crate::tell::{Rarely, Tell};
 
 /// Pictures of a head that may wait for the end of their epoch.
@@ -53,6 +54,8 @@ pub(crate) struct Head {
     pub(crate) name: Option<String>,
     feed: Feed,
     pub(crate) flash: Flash,
+    /// Keeps pictures, if that is wanted.
+    pub(crate) keeper: Option<Keeper>,
     pub(crate) next: Option<Shot>,
     pub(crate) current: Option<Shot>,
     pub(crate) ended: Option<Ended>,
@@ -67,11 +70,12 @@ pub(crate) struct Head {
 }
 
 impl Head {
-    pub(crate) fn new(name: Option<String>, feed: Feed, flash: Flash, tell: Tell) -> Self {
+    pub(crate) fn new(name: Option<String>, feed: Feed, flash: Flash, keeper: Option<Keeper>, tell: Tell) -> Self {
         Self {
             name,
             feed,
             flash,
+            keeper,
             next: None,
             current: None,
             ended: None,

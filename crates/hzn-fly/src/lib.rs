@@ -13,6 +13,7 @@
 //! | [`camera`] | pictures from a pipe, a camera of Video4Linux 2, or a recording |
 //! | [`flash`] | the files that hold parameters and survive a crash |
 //! | [`log`] | the answers as recordings, within a share of the disk |
+//! | `keeper` | pictures that are kept with their answers |
 //! | `log_clock` | the time of the log |
 //! | `notify` | messages to systemd |
 //! | `signals` | the lines of the vehicle, and the wish to stop |
@@ -35,6 +36,8 @@ pub mod flight;
 #[cfg(target_os = "linux")]
 mod head;
 pub mod joint;
+#[cfg(target_os = "linux")]
+mod keeper;
 pub mod latency;
 pub mod link;
 #[cfg(target_os = "linux")]
@@ -58,5 +61,7 @@ pub mod tell;
 pub use error::Error;
 #[cfg(target_os = "linux")]
 pub use head::Counts;
+#[cfg(target_os = "linux")]
+pub use keeper::Which;
 #[cfg(target_os = "linux")]
 pub use start::fly;

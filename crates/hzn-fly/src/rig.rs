@@ -22,6 +22,7 @@ use crate::error::Error;
 use crate::flash::{self, Flash};
 use crate::flight::{Settings, Summary, check_input, check_raw, end, open_parts};
 use crate::head::{Feed, Head};
+use crate::keeper::Keeper;
 use crate::log::Sensors;
 use crate::prepare::{parameters_for, prepare_parameters};
 use crate::signals::Lines;
@@ -183,6 +184,7 @@ fn open_heads(prepared: Vec<Prepared>, settings: &Settings, tell: &Tell) -> Resu
     let mut heads = Vec::new();
     for Prepared { name, pictures, parameters, flash, recorded, .. } in prepared {
         let config = parameters.sensor;
+        let keeper = settings.kept_pictures.map(|kept| Keeper::open(kept, &flash, &config, tell)).transpose()?;
         let feed = match recorded {
             Some(OpenHead { source, frames, sensor, .. }) => {
                 let opened = Recording::open(name.clone(), source, frames, sensor.config, tell.clone());
@@ -193,7 +195,7 @@ fn open_heads(prepared: Vec<Prepared>, settings: &Settings, tell: &Tell) -> Resu
                 Feed::Camera(Capture::start(camera).map_err(Error::failed)?)
             }
         };
-        heads.push(Head::new(Some(name), feed, flash, tell.clone()));
+        heads.push(Head::new(Some(name), feed, flash, keeper, tell.clone()));
     }
     let first_s = heads.iter().filter_map(Head::upcoming_s).reduce(f64::min);
     let begin_s = first_s.and_then(|first_s| heads.iter_mut().filter_map(|head| head.begin_at(first_s)).last());

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use hzn_fly::Which;
 use hzn_fly::camera::Ended;
 use hzn_fly::flight::{Settings, Source, Summary};
 use hzn_fly::link::Address;
@@ -46,6 +47,14 @@ pub(super) struct Args {
     /// Largest size of the log in megabytes; beyond it, the oldest files are removed
     #[arg(long, value_name = "MB", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(2..1_000_000))]
     log_mb: u64,
+    /// Keep pictures with their answers (STATE/pictures/*.mcap), for `hzn run --flight`: every N-th, those without an
+    /// answer (refused), or both, as in 25,refused
+    #[arg(long, value_name = "N,refused")]
+    keep_pictures: Option<Which>,
+    /// Largest size of the kept pictures in megabytes, for each head; beyond it, the oldest files are removed
+    #[arg(long, value_name = "MB", default_value_t = 1000, requires = "keep_pictures",
+          value_parser = clap::value_parser!(u64).range(2..1_000_000))]
+    pictures_mb: u64,
 }
 
 pub(super) fn run(args: Args) -> Outcome {
@@ -78,6 +87,7 @@ pub(super) fn run(args: Args) -> Outcome {
         line: args.line,
         state,
         log_bytes: args.log_mb * 1_000_000,
+        kept_pictures: args.keep_pictures.map(|which| (which, args.pictures_mb * 1_000_000)),
     };
     let summary =
         hzn_fly::fly(&settings, tell::to_stderr()).map_err(|e| if e.is_usage { usage(e) } else { failed(e) })?;
@@ -111,6 +121,12 @@ fn tell_summary(summary: &Summary) {
     text += &format!("; {logged} in the log");
     if missing > 0 {
         text += &format!(", {missing} are missing there");
+    }
+    if let (kept @ 1.., _) | (kept, 1..) = summary.kept {
+        text += &format!("; {kept} pictures kept");
+    }
+    if summary.kept.1 > 0 {
+        text += &format!(", {} could not be kept", summary.kept.1);
     }
     if summary.dropped_packets > 0 {
         text += &format!("; {} packets had no room on the line", summary.dropped_packets);

@@ -224,6 +224,32 @@ fn bad_input_is_told() {
 }
 
 #[test]
+fn kept_pictures_have_the_logged_answers() {
+    let place = Place::new();
+    // The pictures 3, 7 and 11 are dark and have no answer.
+    let picture = |i: usize| if i % 4 == 3 { vec![0; 320 * 240] } else { limb(320, 240, i as f64 * 0.4).into_raw() };
+    let bytes: Vec<u8> = (0..14).flat_map(picture).collect();
+    let (code, said) = fly_on(&place, &bytes, &["-s", "in/sensor.toml", "--keep-pictures", "5,refused"]);
+    assert!(code == Some(0) && said.contains("14 pictures, 11 answers") && said.contains("6 pictures kept"), "{said}");
+    place.run(&["run", "state/pictures/fly-000001.mcap", "--flight", "-o", "again.csv"]).expect(0);
+    let (again, logged) = (place.rows("again.csv"), logged(&place));
+    let files: Vec<&str> = again.iter().map(|row| cell(row, "file")).collect();
+    let kept = [0, 3, 5, 7, 10, 11];
+    assert_eq!(files, kept.map(|n| format!("frame-{n:06}")));
+    for (n, row) in kept.iter().zip(&again) {
+        assert_eq!(answer(row, true), answer(&logged[*n], true), "picture {n}");
+    }
+    for (which, says) in [("0", "a number from 1 on"), ("all", "25,refused")] {
+        let (code, said) = fly_on(&place, &[], &["--keep-pictures", which]);
+        assert!(code == Some(2) && said.contains(says), "{said}");
+    }
+    place.write("big.toml", crate::common::SENSOR.replace("320", "2000").replace("240", "1500").as_bytes());
+    let big = ["--load", "-s", "big.toml", "--keep-pictures", "1", "--pictures-mb", "20"];
+    let (code, said) = fly_on(&place, &[], &big);
+    assert!(code == Some(2) && said.contains("pictures of 2000x1500 need at least --pictures-mb 25"), "{said}");
+}
+
+#[test]
 fn settings_that_cannot_be_are_told() {
     let place = Place::new();
     assert_eq!(fly_on(&place, &[], &["-s", "in/sensor.toml"]).0, Some(0));

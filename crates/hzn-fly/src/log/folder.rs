@@ -9,7 +9,7 @@ use hzn_mcap::{part_path, recover};
 use crate::tell::Tell;
 
 /// Parts into which the share of the disk is divided. When it is full, the oldest part is removed.
-const PARTS: u64 = 8;
+pub(super) const PARTS: u64 = 8;
 
 /// A folder with numbered recordings.
 #[derive(Debug)]

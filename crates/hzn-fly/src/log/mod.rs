@@ -18,12 +18,30 @@ use folder::Folder;
 
 /// Answers that wait for a slow disk: at 60 pictures a second, 17 s.
 const WAITING: usize = 1024;
+/// Pictures that wait for a slow disk. They take memory.
+const WAITING_PICTURES: usize = 8;
 /// Room in a file for one more answer. An answer has about 3 KB, and at most 16 candidates.
 const ANSWER_BYTES: u64 = 16 << 10;
 /// Smallest share of the disk. A file must hold some answers.
 pub const MIN_LIMIT_BYTES: u64 = 1 << 20;
 /// Time until another attempt after an error of the disk.
 const AGAIN: Duration = Duration::from_secs(5);
+
+/// What the files of a log may take.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Most bytes of all files; at least [`MIN_LIMIT_BYTES`], and [`Limits::least_bytes`].
+    pub bytes: u64,
+    /// Bytes of a picture that is kept with each answer; 0 without pictures.
+    pub picture_bytes: u64,
+}
+
+impl Limits {
+    /// Returns the smallest limit with room for a picture in each file.
+    pub fn least_bytes(picture_bytes: u64) -> u64 {
+        MIN_LIMIT_BYTES.max(folder::PARTS * (picture_bytes + picture_bytes / 64 + 2 * ANSWER_BYTES))
+    }
+}
 
 /// The log of answers. A thread writes it, so that a slow disk never holds up the flight loop.
 pub struct Log {
@@ -47,19 +65,21 @@ pub struct Sensors {
 
 impl Log {
     /// Opens the log in a folder, and closes the files that the last program left. The files need at most
-    /// `limit_bytes`, which must be at least [`MIN_LIMIT_BYTES`].
+    /// the bytes of `limits`.
     ///
     /// # Errors
     /// The folder cannot be made or read.
-    pub fn open(folder: &Path, limit_bytes: u64, sensors: Sensors, tell: Tell) -> io::Result<Self> {
-        let mut folder = Folder::open(folder, limit_bytes.max(MIN_LIMIT_BYTES))?;
+    pub fn open(folder: &Path, limits: Limits, sensors: Sensors, tell: Tell) -> io::Result<Self> {
+        let limit_bytes = limits.bytes.max(Limits::least_bytes(limits.picture_bytes));
+        let mut folder = Folder::open(folder, limit_bytes)?;
         folder.recover(&tell);
-        let (sender, answers) = bounded(WAITING);
+        let (sender, answers) = bounded(if limits.picture_bytes == 0 { WAITING } else { WAITING_PICTURES });
         let (lost, written) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
         let Sensors { configs, rig } = sensors;
         let (configs, fails) = (Arc::new(Mutex::new(configs)), Arc::new(AtomicBool::new(false)));
         let mut writing = Writing {
             folder,
+            record_bytes: limits.picture_bytes + ANSWER_BYTES,
             file: None,
             failed: None,
             lost: Arc::clone(&lost),
@@ -102,6 +122,8 @@ impl Log {
 /// The state of the thread.
 struct Writing {
     folder: Folder,
+    /// Room in a file for one more answer, with its picture.
+    record_bytes: u64,
     file: Option<Writer>,
     /// Time of the last error of the disk.
     failed: Option<Instant>,
@@ -132,7 +154,7 @@ impl Writing {
             self.lost.fetch_add(1, Ordering::Relaxed);
             return Ok(());
         }
-        let is_full = |file: &Writer| file.finished_bytes() + ANSWER_BYTES > self.folder.file_bytes();
+        let is_full = |file: &Writer| file.finished_bytes() + self.record_bytes > self.folder.file_bytes();
         if let Some(file) = self.file.as_mut().filter(|file| is_full(file)) {
             // What waits needs less room once it is compressed.
             file.flush()?;
@@ -223,6 +245,8 @@ mod tests {
 
     use super::*;
 
+    const LIMITS: Limits = Limits { bytes: MIN_LIMIT_BYTES, picture_bytes: 0 };
+
     fn sensors() -> Sensors {
         Sensors { configs: vec![Config::new(camera::Config::ideal(Model::Pinhole, 640, 480, 600.0))], rig: None }
     }
@@ -258,7 +282,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let (mut most, limit) = (0, MIN_LIMIT_BYTES);
         for start in [0, 1500] {
-            let mut log = Log::open(dir.path(), limit, sensors(), quiet()).unwrap();
+            let mut log = Log::open(dir.path(), LIMITS, sensors(), quiet()).unwrap();
             for index in start..start + 1500 {
                 while log.sender.as_ref().unwrap().is_full() {
                     thread::sleep(Duration::from_millis(1));
@@ -282,7 +306,7 @@ mod tests {
     #[test]
     fn what_a_crash_left_is_closed() {
         let dir = tempfile::tempdir().unwrap();
-        let mut log = Log::open(dir.path(), MIN_LIMIT_BYTES, sensors(), quiet()).unwrap();
+        let mut log = Log::open(dir.path(), LIMITS, sensors(), quiet()).unwrap();
         assert!((0..40).all(|index| log.add(record(index))));
         thread::sleep(2 * FLUSH_INTERVAL);
         // A copy of the folder now is what a crash leaves.
@@ -296,7 +320,7 @@ mod tests {
         let told = Arc::new(Mutex::new(Vec::<String>::new()));
         let list = Arc::clone(&told);
         let tell: Tell = Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned()));
-        let mut log = Log::open(after.path(), MIN_LIMIT_BYTES, sensors(), tell).unwrap();
+        let mut log = Log::open(after.path(), LIMITS, sensors(), tell).unwrap();
         log.add(record(40));
         log.finish();
         assert_eq!(indexes(after.path()), (0..=40).collect::<Vec<_>>());
@@ -308,7 +332,7 @@ mod tests {
     fn a_full_disk_costs_the_oldest_recordings_first() {
         let dir = tempfile::tempdir().unwrap();
         for start in [0, 10, 20] {
-            let mut log = Log::open(dir.path(), MIN_LIMIT_BYTES, sensors(), quiet()).unwrap();
+            let mut log = Log::open(dir.path(), LIMITS, sensors(), quiet()).unwrap();
             (start..start + 10).for_each(|index| assert!(log.add(record(index))));
             log.finish();
         }
@@ -344,7 +368,7 @@ mod tests {
         let told = Arc::new(Mutex::new(Vec::<String>::new()));
         let list = Arc::clone(&told);
         let tell: Tell = Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned()));
-        let mut log = Log::open(&folder, MIN_LIMIT_BYTES, sensors(), tell).unwrap();
+        let mut log = Log::open(&folder, LIMITS, sensors(), tell).unwrap();
         fs::remove_dir(&folder).unwrap();
         // The writer has a thread of its own, so nobody knows which answer is the first that the flight software is
         // told of.
