@@ -340,12 +340,14 @@ mod tests {
         let list = Arc::clone(&told);
         let mut writing = Writing {
             folder: Folder::open(dir.path(), MIN_LIMIT_BYTES).unwrap(),
+            record_bytes: ANSWER_BYTES,
             file: None,
             failed: None,
             lost: Arc::default(),
             written: Arc::default(),
             fails: Arc::default(),
-            config: Arc::new(Mutex::new(config())),
+            configs: Arc::new(Mutex::new(sensors().configs)),
+            rig: None,
             tell: Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned())),
         };
         let full = || Err(hzn_mcap::Error::DiskFull { folder: dir.path().into(), part: dir.path().join("x") });
