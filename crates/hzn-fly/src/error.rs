@@ -17,6 +17,10 @@ impl Error {
     pub(crate) fn failed(message: impl fmt::Display) -> Self {
         Self { is_usage: false, message: message.to_string() }
     }
+    /// Returns the same error with the name of the head.
+    pub(crate) fn in_head(self, name: &str) -> Self {
+        Self { message: format!("head {name}: {}", self.message), ..self }
+    }
 }
 
 impl fmt::Display for Error {

@@ -45,7 +45,7 @@ pub(crate) enum Feed {
     /// A thread that waits for a camera or a pipe.
     Camera(Capture),
     /// Pictures with times, which were taken before.
-    Recording(Recording),
+    Recording(Box<Recording>),
 }
 
 /// A camera with its parameters.

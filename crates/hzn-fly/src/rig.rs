@@ -129,7 +129,7 @@ fn prepare(path: &Path, rig: &file::Rig, settings: &Settings, tell: &Tell) -> Re
             q_vehicle_from_camera_wxyz: turn_after(rig.rig.mount.q_vehicle_from_rig_wxyz, mount.q_rig_from_camera_wxyz),
         });
         let replaces = (settings.replaces_parameters, "rig.toml and its sensor.toml");
-        let parameters = prepare_parameters(Some(&given), replaces, &flash, tell)?;
+        let parameters = prepare_parameters(Some(&given), replaces, &flash, tell).map_err(|e| e.in_head(&head.name))?;
         let (name, pictures) = (head.name.clone(), folder.join(&head.pictures));
         prepared.push(Prepared { name, pictures, parameters, limb_tilt_sigma_km, flash, recorded });
     }
@@ -188,7 +188,7 @@ fn open_heads(prepared: Vec<Prepared>, settings: &Settings, tell: &Tell) -> Resu
         let feed = match recorded {
             Some(OpenHead { source, frames, sensor, .. }) => {
                 let opened = Recording::open(name.clone(), source, frames, sensor.config, tell.clone());
-                Feed::Recording(opened.map_err(Error::usage)?)
+                Feed::Recording(Box::new(opened.map_err(Error::usage)?))
             }
             None => {
                 let camera = open_camera(&pictures, settings, &config, tell)?;

@@ -74,18 +74,17 @@ pub struct Height {
 }
 
 impl Height {
-    /// Returns the parts of the sigma with their names, the largest first.
-    fn parts_km(&self) -> [(&'static str, f64); 6] {
-        let mut parts = [
-            ("edge noise", self.statistical_km),
+    /// Returns the largest part of the sigma with its name.
+    fn largest_part_km(&self) -> (&'static str, f64) {
+        let parts = [
             ("scatter between pictures", self.scatter_km),
             ("a common shift of all edges", self.shift_km),
             ("a bend that all edges share", self.bend_km),
             ("the lens", self.lens_km),
             ("the local radius, because no position is known", self.radius_km),
         ];
-        parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-        parts
+        let noise = ("edge noise", self.statistical_km);
+        parts.into_iter().fold(noise, |most, part| if part.1 > most.1 { part } else { most })
     }
 }
 
@@ -207,8 +206,8 @@ impl Calibration {
         if self.chi2 > MAX_CHI2 {
             return Some(Refusal::Alarm { chi2: self.chi2, max_chi2: MAX_CHI2 });
         }
-        let parts_km = self.height.parts_km();
-        (self.height.sigma_km > DEFAULT_SIGMA_KM).then_some(Refusal::NoBetter { parts_km, max_km: DEFAULT_SIGMA_KM })
+        let (sigma_km, largest) = (self.height.sigma_km, self.height.largest_part_km());
+        (sigma_km > DEFAULT_SIGMA_KM).then_some(Refusal::NoBetter { sigma_km, largest, max_km: DEFAULT_SIGMA_KM })
     }
 
     /// Writes the values into a sensor that looks for the body, as [`super::into_sensor_toml`] does for the file.

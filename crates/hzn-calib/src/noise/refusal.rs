@@ -30,8 +30,10 @@ pub enum Refusal {
     },
     /// The limb height is less certain than that of a sensor without a calibration.
     NoBetter {
-        /// The parts of its 1-sigma with their names, in kilometres, the largest first.
-        parts_km: [(&'static str, f64); 6],
+        /// Its 1-sigma, in kilometres.
+        sigma_km: f64,
+        /// The largest part of it with its name, in kilometres.
+        largest: (&'static str, f64),
         /// 1-sigma without a calibration, in kilometres.
         max_km: f64,
     },
@@ -71,15 +73,11 @@ impl fmt::Display for Refusal {
                  {lens_km:.1} km, but at most {max_km:.1} km is useful. Calibrate the lens first, with a board \
                  (`hzn calibrate board`) or in flight (`hzn calibrate sky`)"
             ),
-            Self::NoBetter { parts_km, max_km } => {
-                let sigma_km = parts_km.iter().map(|(_, km)| km * km).sum::<f64>().sqrt();
-                let [(name, km), ..] = parts_km;
-                write!(
-                    f,
-                    "the limb height would have a sigma of {sigma_km:.1} km, most of it ({km:.1} km) from {name}: the \
-                     {max_km:.1} km of a sensor without a calibration are not worse"
-                )
-            }
+            Self::NoBetter { sigma_km, largest: (name, km), max_km } => write!(
+                f,
+                "the limb height would have a sigma of {sigma_km:.1} km, most of it ({km:.1} km) from {name}: the \
+                 {max_km:.1} km of a sensor without a calibration are not worse"
+            ),
             Self::Inconsistent { inconsistent, pictures } => write!(
                 f,
                 "{inconsistent} of {pictures} pictures measure limb heights that disagree with the others. Either \

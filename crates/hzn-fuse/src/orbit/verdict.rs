@@ -115,7 +115,7 @@ fn perigee_km(epochs: &[Epoch]) -> Option<f64> {
     let v = state.velocity_m_s.into_inner() + Vector3::new(0.0, 0.0, EARTH_RATE_RAD_S).cross(&x);
     let semi_axis_m = 1.0 / (2.0 / x.norm() - v.norm_squared() / GM_M3_S2);
     let eccentricity = (v.cross(&x.cross(&v)) / GM_M3_S2 - x.normalize()).norm();
-    (semi_axis_m > 0.0).then(|| (semi_axis_m * (1.0 - eccentricity) - EARTH_MEAN_RADIUS_M) * 1e-3)
+    (semi_axis_m > 0.0).then_some((semi_axis_m * (1.0 - eccentricity) - EARTH_MEAN_RADIUS_M) * 1e-3)
 }
 
 /// Returns a finding for each error of the whole flight that is far from what was told.
