@@ -1,8 +1,10 @@
 //! Measures what the camera adds while a rocket spins: the roll at despin without it, and with limb and Sun.
 
+mod rendered;
+
 use anyhow::{Context, anyhow};
 use hzn_fuse::flight::Wanted;
-use hzn_fuse::input::{Attitude, Body};
+use hzn_fuse::input::{Attitude, Body, Inputs};
 use hzn_fuse::settings::{ErrorSetting, Treatment};
 use hzn_fuse::simulated::{Errors, Moment, inputs};
 use hzn_fuse::truth::compare;
@@ -29,8 +31,7 @@ const DESPUN_S: f64 = YOYO_S + 2.0;
 const PICTURES: (f64, f64, u32) = (44.0, 58.0, 57);
 /// Number of flights, and the seed of the first.
 const FLIGHTS: (usize, u64) = (24, 9300);
-/// Errors of the directions (1-sigma about each of two axes), degrees. That of the limb was measured at five turns a
-/// second with default values; that of the Sun is assumed.
+/// Errors of the directions (1-sigma about each of two axes), degrees. Both are assumed.
 const LIMB_SIGMA_DEG: f64 = 0.14;
 const SUN_SIGMA_DEG: f64 = 0.05;
 /// Sigma of the attitude at lift-off, which the launcher gives, degrees.
@@ -98,10 +99,20 @@ struct Despun {
     roll_sigma_deg: f64,
 }
 
+/// Flies with drawn directions, or without any.
 fn fly(seed: u64, jitter_s: f64, with_camera: bool) -> anyhow::Result<Despun> {
     let scene = scene(seed, jitter_s)?;
     let mut errors = White { seed, count: 0 };
     let mut inputs = inputs(&scene, &mut errors, 0.0)?;
+    if !with_camera {
+        inputs.recordings.clear();
+    }
+    navigate(&scene, inputs, &settings(jitter_s))
+}
+
+/// Returns the errors at despin of a flight with these inputs, to which the launcher's attitude is added.
+fn navigate(scene: &Scenario, mut inputs: Inputs, settings: &Settings) -> anyhow::Result<Despun> {
+    let seed = scene.seed;
     let path = scene.path()?;
     let truth: Vec<_> = path.vehicle_rows([0.0, DESPUN_S + 1.0], 200.0).collect();
     let first = truth.first().context("no truth")?;
@@ -113,11 +124,8 @@ fn fly(seed: u64, jitter_s: f64, with_camera: bool) -> anyhow::Result<Despun> {
     let told = exact * Rotation::from_scaled_axis(error * sigma_rad);
     inputs.attitudes.push(Attitude { time_s: first.time_s, fixed_from_vehicle: Some(told), sigma_rad });
     inputs.imu.retain(|sample| sample.imu.time_s <= DESPUN_S + 0.5);
-    if !with_camera {
-        inputs.recordings.clear();
-    }
-    let fused = fuse(&inputs, &settings(jitter_s), Wanted { rate_hz: Some(200.0), ..Wanted::default() })
-        .map_err(|e| anyhow!("{e}"))?;
+    let fused =
+        fuse(&inputs, settings, Wanted { rate_hz: Some(200.0), ..Wanted::default() }).map_err(|e| anyhow!("{e}"))?;
     let misses = compare(&fused.epochs, &truth);
     let miss = misses.iter().rev().find(|m| m.time_s <= DESPUN_S).context("no solution at despin")?;
     let epoch = fused.epochs.iter().rev().find(|e| e.state.time_s <= DESPUN_S).context("no solution at despin")?;
@@ -145,7 +153,8 @@ pub(super) fn navigation_through_spin(effort: &Effort) -> anyhow::Result<Section
         "Until despin the vehicle makes {:.0} turns. With the gyros alone the roll would be lost: 2000 ppm of the \
          turns are {:.0}°. *No camera* is the filter with inertial unit and receiver. It does better than the gyros \
          alone; the likely reason, which was not tested, is the acceleration across the long axis, 3° from the \
-         direction of flight, that the receiver sees. The error of the Sun is assumed.",
+         direction of flight, that the receiver sees. Both errors of the directions are assumed; \
+         rendered pictures follow below.",
         turned_deg / 360.0,
         2e-3 * turned_deg
     ));
@@ -156,22 +165,30 @@ pub(super) fn navigation_through_spin(effort: &Effort) -> anyhow::Result<Section
             .into_par_iter()
             .map(|k| fly(FLIGHTS.1 + k, jitter_s, with_camera))
             .collect::<anyhow::Result<_>>()?;
-        let n = all.len().max(1) as f64;
-        let rms = |of: &dyn Fn(&Despun) -> f64| (all.iter().map(|d| of(d).powi(2)).sum::<f64>() / n).sqrt();
-        let within = all.iter().filter(|d| d.roll_deg.abs() <= 3.0 * d.roll_sigma_deg).count();
-        rows.push(vec![
-            if with_camera {
-                format!("limb and Sun, time stamps to {} ms", 1e3 * jitter_s)
-            } else {
-                "no camera".into()
-            },
-            deg(rms(&|d| d.roll_deg)),
-            deg(all.iter().map(|d| d.roll_deg.abs()).fold(0.0, f64::max)),
-            deg(rms(&|d| d.across_deg)),
-            deg(rms(&|d| d.roll_sigma_deg)),
-            format!("{within} of {}", all.len()),
-        ]);
+        let name = match with_camera {
+            true => format!("limb and Sun, time stamps to {} ms", 1e3 * jitter_s),
+            false => "no camera".into(),
+        };
+        rows.push(row(name, &all));
     }
-    s.table(["sensors", "roll error", "largest", "error across", "σ of the roll", "roll within 3σ"], rows);
+    s.table(HEAD, rows);
+    rendered::add(&mut s, effort)?;
     Ok(s)
+}
+
+const HEAD: [&str; 6] = ["sensors", "roll error", "largest", "error across", "σ of the roll", "roll within 3σ"];
+
+/// Returns the row of several flights.
+fn row(name: String, all: &[Despun]) -> Vec<String> {
+    let n = all.len().max(1) as f64;
+    let rms = |of: &dyn Fn(&Despun) -> f64| (all.iter().map(|d| of(d).powi(2)).sum::<f64>() / n).sqrt();
+    let within = all.iter().filter(|d| d.roll_deg.abs() <= 3.0 * d.roll_sigma_deg).count();
+    vec![
+        name,
+        deg(rms(&|d| d.roll_deg)),
+        deg(all.iter().map(|d| d.roll_deg.abs()).fold(0.0, f64::max)),
+        deg(rms(&|d| d.across_deg)),
+        deg(rms(&|d| d.roll_sigma_deg)),
+        format!("{within} of {}", all.len()),
+    ]
 }
