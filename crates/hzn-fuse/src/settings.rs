@@ -197,8 +197,8 @@ impl Default for Gnss {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Orbit {
-    /// Accelerations beyond the gravity to J4, as white noise, m/s²/√Hz: harmonics with the longitude are 3·10⁻⁵ m/s² in
-    /// low orbit and last some minutes, and drag above 400 km is less.
+    /// Accelerations beyond the gravity to J4, as white noise, m/s²/√Hz: harmonics with the longitude are 3·10⁻⁵ m/s²
+    /// in low orbit and last some minutes, and drag above 400 km is less.
     pub accel_noise_mps2_rthz: f64,
     /// Correlation time of the slow error of a limb, s, instead of that of the camera: in a quarter of an orbit another
     /// part of the limb, with another light and weather, comes into view.

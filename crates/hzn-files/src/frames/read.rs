@@ -199,6 +199,13 @@ struct BodyColumns {
     pole: [String; 3],
 }
 
+/// Returns how a position is written, for a column of latitude or longitude; `None` for another column.
+fn geodetic_hint(name: &str) -> Option<String> {
+    let name = name.trim().to_ascii_lowercase();
+    let is_angle = ["lat", "lon", "lng"].iter().any(|start| name.starts_with(start));
+    is_angle.then(|| "; a position is x_km, y_km, z_km (ECEF, WGS-84), and altitude_km alone is enough".to_owned())
+}
+
 impl Columns {
     /// Finds the columns by the header. Unknown columns give warnings.
     fn find(
@@ -210,8 +217,8 @@ impl Columns {
         let mut columns = HashMap::new();
         for (i, name) in header.iter().enumerate() {
             let Some(known) = known_column(name) else {
-                let hint =
-                    nearest(name, COLUMNS.iter().copied()).map(|n| format!("; did you mean {n}?")).unwrap_or_default();
+                let nearest = nearest(name, COLUMNS.iter().copied()).map(|n| format!("; did you mean {n}?"));
+                let hint = geodetic_hint(name).or(nearest).unwrap_or_default();
                 let what = format!("unknown column, not used{hint}");
                 warnings.push(Problem::new(path, what).at_line(1).in_field(name));
                 continue;

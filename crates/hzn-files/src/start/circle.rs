@@ -2,8 +2,6 @@
 
 use hzn_core::camera::Config;
 
-use super::facts::CameraFacts;
-
 /// Smallest angle off axis of a rim in the pictures that is written into the file. A smaller edge that is round about
 /// the picture's centre may be the Earth itself, which is as large from below 1000 km only.
 const MIN_SEEN_DEG: f64 = 60.0;
@@ -27,13 +25,14 @@ pub enum ImageCircle {
 
 impl ImageCircle {
     /// Returns the image circle of the lens, if it has one.
-    pub(super) fn choose(facts: &CameraFacts, camera: &Config, fov_deg: f64) -> Option<Self> {
+    /// `seen_px` is the radius of the rim in the pictures.
+    pub(super) fn choose(seen_px: Option<f64>, camera: &Config, fov_deg: f64) -> Option<Self> {
         if camera.model.is_planar() {
             return None;
         }
         let deg = |px: f64| (px / camera.fx_px).to_degrees();
-        let [width, height] = facts.size_px.map(f64::from);
-        let seen = facts.image_circle_px.map(deg).filter(|d| (MIN_SEEN_DEG..MAX_DEG).contains(d));
+        let [width, height] = [camera.width, camera.height].map(f64::from);
+        let seen = seen_px.map(deg).filter(|d| (MIN_SEEN_DEG..MAX_DEG).contains(d));
         let assumed = (deg(0.5 * width.hypot(height)) > MAX_DEG).then(|| (0.5 * fov_deg).min(MAX_DEG));
         seen.map(|theta_max_deg| Self::Seen { theta_max_deg })
             .or(assumed.map(|theta_max_deg| Self::Assumed { theta_max_deg }))

@@ -43,7 +43,7 @@ impl Exif {
     /// There is none; the text says why, if EXIF has one that is not used.
     pub(super) fn focal(&self, size: [f64; 2]) -> Result<Focal, Option<String>> {
         let (pitch, film) = (self.focal_by_pitch(size), self.focal_on_film(size));
-        let Some((pitch, sensor_mm)) = pitch else { return film.ok_or(None) };
+        let Some((pitch, sensor_mm)) = pitch else { return film.ok_or_else(|| self.without_sensor()) };
         if sensor_mm >= MIN_SENSOR_MM {
             return Ok(pitch);
         }
@@ -56,6 +56,16 @@ impl Exif {
                 pitch.from, size[0]
             ))),
         }
+    }
+
+    /// Says what a focal length without the size of the sensor still needs; `None` without a focal length.
+    fn without_sensor(&self) -> Option<String> {
+        let mm = sound(self.focal_mm)?;
+        Some(format!(
+            "EXIF has a focal length of {mm} mm, but not the width W of the camera's sensor: a pinhole has a field of \
+             view of 2 atan(W / {} mm)",
+            2.0 * mm
+        ))
     }
 
     /// Returns the focal length by the pitch of the pixels, and the longer side of the sensor in millimetres.

@@ -38,7 +38,8 @@ pub(super) struct Guess {
 }
 
 impl Guess {
-    /// Makes the guess for an ideal lens ([`Model::Pinhole`] or [`Model::Equidistant`]) and its focal length in columns.
+    /// Makes the guess for an ideal lens ([`Model::Pinhole`] or [`Model::Equidistant`]) and its focal length in
+    /// columns.
     pub(super) fn new(ideal: Model, size_px: [u32; 2], pixel_aspect: f64, focal: &Focal) -> Self {
         use Intrinsic::{CxPx, CyPx, FxPx, FyPx, K1, K2, P1, P2};
         let [width, height] = size_px.map(|n| u16::try_from(n).unwrap_or(u16::MAX));

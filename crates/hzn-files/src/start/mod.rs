@@ -69,7 +69,7 @@ pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
     let (focal, warnings, comparison) = choose_focal(known, exif, lens, width)?;
     let guess = Guess::new(lens, facts.size_px, facts.pixel_aspect, &focal);
     let fov_deg = fov_deg(lens, width, focal.px);
-    let circle = ImageCircle::choose(facts, &guess.camera, fov_deg);
+    let circle = ImageCircle::choose(facts.image_circle_px, &guess.camera, fov_deg);
     Ok(StartConfig {
         text: text::write_text(facts, &guess, &focal, fov_deg, circle, comparison.as_deref()),
         lens,

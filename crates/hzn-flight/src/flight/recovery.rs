@@ -23,7 +23,8 @@ const STABLE_US: u64 = 60_000_000;
 const ARMED_US: u64 = 10_000_000;
 /// A bit of the word with the sequence count of the last telecommand: there was one.
 const HAS_SEQUENCE: u32 = 1 << 16;
-/// Place of the sequence count of the last telecommand to the rig in this word, for the first head of a rig. A count has
+/// Place of the sequence count of the last telecommand to the rig in this word, for the first head of a rig. A count
+/// has
 /// 14 bits.
 const RIG_SEQUENCE_AT: u32 = 17;
 /// A bit of this word: there was a telecommand to the rig.

@@ -147,8 +147,8 @@ fn without_unit(
         return orbit::fuse(inputs, settings, mounts);
     }
     Err(Error::unusable(
-        "there is no sample of an inertial unit; give --imu FILE, or --solve for the orbit of a satellite from limbs and \
-         attitudes",
+        "there is no sample of an inertial unit; give --imu FILE, or --solve for the orbit of a satellite from limbs \
+         and attitudes",
     ))
 }
 

@@ -110,8 +110,16 @@ impl Gathered {
         if !raw && COMPANIONS.contains(&ending(input).as_str()) {
             // The shell expands `hzn run flight/*` to a list that contains these files.
             if alone {
+                // The programs of thermal arrays write tables.
+                let hint = match ending(input).as_str() {
+                    "csv" => {
+                        "; a table of temperatures becomes one with numpy.save(\"a.npy\", numpy.loadtxt(\"a.csv\", \
+                              delimiter=\",\"))"
+                    }
+                    _ => "",
+                };
                 return Err(unusable(format!(
-                    "{text}: is not a picture (PNG, JPEG, TIFF, PNM, BMP, WebP, FITS, NumPy)"
+                    "{text}: is not a picture (PNG, JPEG, TIFF, PNM, BMP, WebP, FITS, NumPy){hint}"
                 )));
             }
             return Ok(());

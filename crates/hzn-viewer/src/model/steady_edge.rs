@@ -203,18 +203,23 @@ mod tests {
 
     /// Returns an edge along a line, as border pixels and as points with a weight.
     fn edge(candidate: u32, from: [u16; 2], to: [u16; 2], weight: f64) -> Edge {
-        let at = |n: u16| [0, 1].map(|i| (from[i] * (100 - n) + to[i] * n) / 100);
-        let border: Vec<Pixel> = (0..=100).map(|n| Pixel { x: at(n)[0], y: at(n)[1] }).collect();
-        let points = border.iter().map(|p| [p.x.into(), p.y.into()]).collect();
-        Edge { candidate, weights: vec![weight; 101], points, border, ..Edge::default() }
+        // A border has every pixel.
+        let length = [0, 1].map(|i| from[i].abs_diff(to[i])).into_iter().max().unwrap_or(0).max(1);
+        let at = |n: u16, i: usize| {
+            let [from, to, n, length] = [from[i], to[i], n, length].map(f64::from);
+            (from + (to - from) * n / length).round() as u16
+        };
+        let border: Vec<Pixel> = (0..=length).map(|n| Pixel { x: at(n, 0), y: at(n, 1) }).collect();
+        let points: Vec<Point> = border.iter().map(|p| [p.x.into(), p.y.into()]).collect();
+        Edge { candidate, weights: vec![weight; points.len()], points, border, ..Edge::default() }
     }
 
     fn add(steady: &mut SteadyEdges, edges: &[Edge], chosen: Option<u32>) {
         steady.add(&EdgeCells::of(SIZE, std::iter::once((edges, chosen))));
     }
 
-    /// Counts 20 answers with a limb at a height that depends on the picture, and 20 pictures without an answer. Most of
-    /// these show a boom, but every `missing`-th does not.
+    /// Counts 20 answers with a limb at a height that depends on the picture, and 20 pictures without an answer. Most
+    /// of these show a boom, but every `missing`-th does not.
     fn seen(limb_y: impl Fn(u16) -> u16, missing: u16) -> SteadyEdges {
         let mut steady = SteadyEdges::default();
         for n in 0..20 {

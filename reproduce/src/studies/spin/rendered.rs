@@ -6,7 +6,7 @@ use hzn_sim::Scenario;
 
 use super::super::recordings::{self, untold};
 use super::super::setup::Effort;
-use super::{HEAD, YOYO_S, navigate, row, scene, settings};
+use super::flight::{HEAD, YOYO_S, navigate, row, scene, settings};
 use crate::fly::{HEADS, Sensor, cells, evaluate, fly};
 use crate::section::Section;
 
@@ -17,8 +17,8 @@ const FLIGHTS: (u64, usize) = (9301, 4);
 /// Random errors of the time stamps in these flights, s.
 const JITTER_S: f64 = 1e-4;
 
-/// Width and height of the rendered pictures are those of the scene divided by this: a picture in which everything moves
-/// by 74 pixels during the exposure takes a quarter of a minute to render.
+/// Width and height of the rendered pictures are those of the scene divided by this: a picture in which everything
+/// moves by 74 pixels during the exposure takes a quarter of a minute to render.
 const SMALLER: u16 = 3;
 
 /// Returns the flight with smaller pictures through the same lens.
@@ -47,9 +47,9 @@ fn directions(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
     let (first, flights, pictures) = LOOKS;
     let pictures = u32::try_from(effort.frames(pictures as usize))?;
     s.text(format!(
-        "**Directions of rendered pictures.** {pictures} pictures of each of the two cameras in {flights} flights (seeds \
-         from {first}), T+44 s to T+{YOYO_S:.0} s, before the vehicle is despun. A picture has a third of the scene's width and \
-         height. Exposure and readout are those of the \
+        "**Directions of rendered pictures.** {pictures} pictures of each of the two cameras in {flights} flights \
+         (seeds from {first}), T+44 s to T+{YOYO_S:.0} s, before the vehicle is despun. A picture has a third of the \
+         scene's width and height. Exposure and readout are those of the \
          scene: 2 ms and 20 ms, in which the vehicle turns by 3.6° and 36°. The sensor has its default settings: it \
          does not know the limb height (true: 25 km) and the noise. *No rates*: it does not know either that the \
          vehicle turns."
@@ -95,8 +95,8 @@ fn navigation(s: &mut Section, effort: &Effort) -> anyhow::Result<()> {
     }
     s.text(format!(
         "**The same flights with rendered pictures.** {count} flights (seeds from {first}) as in the first table, time \
-         stamps to {} ms, but each picture is rendered, in the smaller size, and the directions ({directions} of limb and Sun) are those \
-         of a sensor with default settings.",
+         stamps to {} ms, but each picture is rendered, in the smaller size, and the directions \
+         ({directions} of limb and Sun) are those of a sensor with default settings.",
         1e3 * JITTER_S
     ));
     s.table(HEAD, vec![row("limb and Sun of pictures".into(), &all)]);

@@ -1,9 +1,10 @@
 //! `hzn explain`: explains the processing of one picture, stage by stage.
 
+mod args;
 mod drawing;
 mod rig;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use hzn_core::Config;
@@ -16,33 +17,10 @@ use hzn_run::source::{self, Item, Source, ending};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
-use crate::setup::{self, InputArgs, SensorArgs};
+use crate::setup;
 use crate::tell::{self, one_line};
+pub(super) use args::Args;
 use drawing::Drawing;
-
-/// Show what happens to one picture: what is kept, what is dropped, and why
-#[derive(Debug, clap::Args)]
-pub(super) struct Args {
-    /// A picture; or a folder, video or MCAP together with --index; or a rig.toml, of which one epoch is explained
-    frame: PathBuf,
-    /// Number of the picture in a sequence, or of the epoch of a rig, from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    index: u64,
-    #[command(flatten)]
-    sensor: SensorArgs,
-    #[command(flatten)]
-    source: InputArgs,
-    /// Draw the result over the picture, into this PNG; of a rig, the pictures of all heads side by side
-    #[arg(long, value_name = "PNG")]
-    overlay: Option<PathBuf>,
-    /// Draw the overlay as a pinhole would see it, without the distortion of the lens: the limb is a conic section, and
-    /// is drawn beyond the picture, too. A direction down within 75 degrees of the optical axis is in view
-    #[arg(long, requires = "overlay")]
-    undistorted: bool,
-    /// Replace the PNG if it exists
-    #[arg(long, requires = "overlay")]
-    force: bool,
-}
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.overlay {

@@ -8,7 +8,7 @@ use hzn_run::overlay;
 use hzn_run::rig::{self, Epochs, HeadPlan, Opened, Plan, Request};
 use image::{RgbImage, imageops};
 
-use super::Args;
+use super::args::Args;
 use crate::commands::run::{Args as RunArgs, cores};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::{files, tell};

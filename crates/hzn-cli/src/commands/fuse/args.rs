@@ -54,7 +54,8 @@ pub(crate) struct Args {
     /// The attitude as a CCSDS attitude ephemeris message; it needs --utc
     #[arg(long, value_name = "FILE", requires = "utc")]
     pub(super) aem: Option<PathBuf>,
-    /// Position and velocity as a CCSDS orbit ephemeris message; it needs --utc, and --gnss if there is an inertial unit
+    /// Position and velocity as a CCSDS orbit ephemeris message; it needs --utc, and --gnss if there is an inertial
+    /// unit
     #[arg(long, value_name = "FILE", requires = "utc")]
     pub(super) oem: Option<PathBuf>,
     /// Version of the AEM: programs read the one of 2008, or that of 2024

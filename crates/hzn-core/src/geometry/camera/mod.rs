@@ -394,10 +394,11 @@ impl<T: Real> Camera<T> {
     /// (u, v). The modes are independent of each other; there are none for a lens that is known exactly.
     ///
     /// ```
-    /// use hzn_core::camera::{Camera, Config};
+    /// use hzn_core::camera::{Camera, Config, Model};
     /// use hzn_core::frames::UnitVec3;
     ///
-    /// let known_to_a_percent = Config { focal_sigma_percent: 1.0, ..Config::pinhole(640, 480, 500.0) };
+    /// let lens = Config::ideal(Model::Pinhole, 640, 480, 500.0);
+    /// let known_to_a_percent = Config { focal_sigma_percent: 1.0, ..lens };
     /// let camera = Camera::<f64>::try_new(&known_to_a_percent)?;
     /// let ray = UnitVec3::try_new([0.2, 0.0, 1.0]).unwrap();
     /// // The point is 100 px off the principal point, and a percent of it is 1 px.

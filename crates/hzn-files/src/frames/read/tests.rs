@@ -129,3 +129,10 @@ fn the_schema_has_every_column() {
         assert!(properties.contains_key(*column), "{column} is missing in book/reference/frames.schema.json");
     }
 }
+
+#[test]
+fn a_latitude_is_told_how_a_position_is_written() {
+    let read = read("file,lat,longitude_deg,lateral\na,1,2,3\n").unwrap();
+    let texts: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
+    assert_eq!(texts.iter().filter(|text| text.contains("x_km, y_km, z_km (ECEF")).count(), 3, "{texts:?}");
+}

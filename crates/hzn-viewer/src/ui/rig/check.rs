@@ -3,7 +3,7 @@
 use egui::{Color32, Rect, Sense, Ui, pos2, vec2};
 use egui_plot::{Line, LineStyle, PlotPoints, VLine};
 
-use super::{colour, use_colour};
+use super::colours::{colour, use_colour};
 use crate::ui::plots::{set_label, shared_plot};
 use crate::ui::rig_view::{RigView, Use};
 use crate::ui::theme;

@@ -1,40 +1,23 @@
 //! The window on a rig: the pictures of all heads at one epoch, the same on one sphere, and the check over time.
 
 mod check;
+mod colours;
 mod pictures;
 mod sphere;
 
-use egui::{Color32, Ui};
+use egui::Ui;
 use hzn_core::status::Status;
 
 use super::rig_view::{RigView, Use};
 use super::theme;
 use super::viewer::Viewer;
+use colours::use_colour;
 
 /// Width of the column with the sphere, in points, and its largest part of the window.
 const COLUMN: f32 = 340.0;
 const COLUMN_PART: f32 = 0.32;
 /// Part of the height that the plot of the check takes.
 const CHECK_PART: f32 = 0.27;
-
-/// Colour of the fourth head.
-const FOURTH: Color32 = Color32::from_rgb(160, 130, 240);
-
-/// Returns the colour of a head, which is the same in all parts of the window.
-fn colour(n: usize, dark: bool) -> Color32 {
-    // The lines of plots have three colours, and a rig has up to four heads.
-    if n % 4 == 3 { FOURTH } else { theme::line(n % 4, dark) }
-}
-
-/// Returns the colour of what an epoch does with a head.
-fn use_colour(of: Use, dark: bool) -> Color32 {
-    match of {
-        Use::Used => theme::diff(true, dark),
-        Use::Excluded => theme::diff(false, dark),
-        Use::Alone => theme::warning(dark),
-        Use::Nothing => Color32::GRAY,
-    }
-}
 
 /// Draws everything below the bar at the top.
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {

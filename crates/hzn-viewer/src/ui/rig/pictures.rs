@@ -2,7 +2,7 @@
 
 use egui::{Align2, Color32, FontId, Rect, Sense, Shape, Stroke, Ui, UiBuilder, pos2, vec2};
 
-use super::{colour, use_colour};
+use super::colours::{colour, use_colour};
 use crate::ui::rig_view::{RigView, Shown, Use};
 use crate::ui::theme;
 

@@ -6,7 +6,7 @@ use hzn_core::camera::Camera;
 use hzn_core::frames::{Cam, Rotation, UnitVec3, Vehicle};
 use hzn_core::pixel::ImagePoint;
 
-use super::colour;
+use super::colours::colour;
 use crate::ui::rig_view::{RigView, Use};
 use crate::ui::theme;
 

@@ -54,10 +54,7 @@ impl Viewer {
             Command::Mask => self.toggle_mask(),
             Command::Circle => self.toggle_circle(),
             Command::Layers => self.layers_hidden = !self.layers_hidden,
-            Command::Compare => match self.other.take() {
-                Some(_) => {}
-                None => self.compare_with_preset(Preset::default()),
-            },
+            Command::Compare => self.toggle_compare(),
             Command::ProcessAll => self.process_again(),
             Command::Rerun => {
                 if self.session.is_some() && count > 0 {
@@ -72,6 +69,13 @@ impl Viewer {
             Command::Theme => self.settings.dark = !self.settings.dark,
             Command::Palette => self.toggle_palette(),
             Command::Help => self.showing_help = !self.showing_help,
+        }
+    }
+
+    /// Compares with the default settings, or ends the comparison.
+    fn toggle_compare(&mut self) {
+        if self.other.take().is_none() {
+            self.compare_with_preset(Preset::default());
         }
     }
 
