@@ -1,5 +1,6 @@
 //! What is odd about the pictures of a run. It is counted while the run goes on, and told once at its end.
 
+mod one_place;
 mod rates;
 
 use hzn_core::body::PriorError;
@@ -8,6 +9,7 @@ use hzn_files::Frames;
 use hzn_run::engine::{BodyOutcome, Finished};
 use hzn_run::explain;
 
+pub(crate) use one_place::OnePlace;
 pub(crate) use rates::Rates;
 
 use crate::tell;

@@ -115,7 +115,7 @@ impl Row<'_> {
     fn number(&self, place: usize, column: &str) -> Result<f64, Problem> {
         let text = self.record.get(place).unwrap_or_default();
         let number = text.parse::<f64>().ok().filter(|x| x.is_finite());
-        number.ok_or_else(|| self.problem(column, format!("{text:?} is not a finite number")))
+        number.ok_or_else(|| self.problem(column, format!("{} is not a finite number", hzn_files::quoted(text))))
     }
 
     fn pixel(&self, places: [usize; 2], size_px: [u16; 2]) -> Result<[f64; 2], Problem> {

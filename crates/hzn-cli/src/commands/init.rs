@@ -239,8 +239,9 @@ fn tell_doubt(args: &Args, known: &CameraFacts, start: &StartConfig) -> Result<(
     if let Some(limb) = doubt_field_of_view(&request(args), known, start)? {
         let [kept, seen] = limb.pictures;
         tell::warning(format_args!(
-            "the limb in {kept} of {seen} pictures says {}, not {:.1} degrees: check the field of view and the kind of \
-             lens (that of a fisheye is not 2 atan(width / 2f)), or leave out --fov and take that of the limb",
+            "the limb in {kept} of {seen} pictures says {}, not {:.1} degrees: check the field of view, the kind of \
+             lens (that of a fisheye is not 2 atan(width / 2f)) and the altitude; if the altitude is right, leave out \
+             --fov to take that of the limb",
             limb.describe(known.size_px[0]),
             start.fov_deg
         ));

@@ -21,7 +21,7 @@ use hzn_run::{disk, explain};
 pub(super) use args::{Args, cores};
 
 use super::resume;
-use crate::doubts::{MissingPriors, MultiPageFiles, Rates, Times};
+use crate::doubts::{MissingPriors, MultiPageFiles, OnePlace, Rates, Times};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
@@ -159,6 +159,7 @@ struct Watch {
     missing: MissingPriors,
     times: Times,
     rates: Rates,
+    one_place: OnePlace,
     refusals: Refusals,
     multi_page: MultiPageFiles,
     masks: picture_folders::Masks,
@@ -180,6 +181,7 @@ impl Watch {
             missing: MissingPriors::default(),
             times: Times::default(),
             rates: Rates::default(),
+            one_place: OnePlace::default(),
             refusals: Refusals::default(),
             multi_page: MultiPageFiles::default(),
             masks: picture_folders::Masks::default(),
@@ -191,6 +193,7 @@ impl Watch {
         self.missing.count(frame);
         self.times.count(frame);
         self.rates.count(frame);
+        self.one_place.count(frame);
         self.refusals.count(frame);
         self.multi_page.count(frame);
         if !self.quiet {
@@ -223,6 +226,7 @@ impl Watch {
         self.missing.tell(frames);
         self.times.tell();
         self.rates.tell();
+        self.one_place.tell();
         self.multi_page.tell();
     }
 

@@ -9,6 +9,7 @@ use hzn_core::body::Kind;
 
 use super::data::{FrameData, Frames, Orientation, plain_name};
 use crate::nearest::nearest;
+use crate::quoted::quoted;
 use crate::{Problem, limited, time};
 
 /// Names of the columns that are read.
@@ -348,16 +349,18 @@ impl<'a> Row<'a> {
         match cell.parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(Some(x)),
             _ if cell.contains(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
-                Err(self.problem(column, &format!("{cell:?} has a decimal comma; write a point")))
+                Err(self.problem(column, &format!("{} has a decimal comma; write a point", quoted(cell))))
             }
-            _ => Err(self
-                .problem(column, &format!("{cell:?} is not a finite number; leave the cell empty if it is not known"))),
+            _ => Err(self.problem(
+                column,
+                &format!("{} is not a finite number; leave the cell empty if it is not known", quoted(cell)),
+            )),
         }
     }
 
     fn utc(&self) -> Result<Option<f64>, Problem> {
         let Some(cell) = self.cell("utc") else { return Ok(None) };
-        let what = format!("{cell:?} is not a UTC time; write it as 2020-11-20T08:30:00Z");
+        let what = format!("{} is not a UTC time; write it as 2020-11-20T08:30:00Z", quoted(cell));
         time::unix_seconds(cell).map(Some).ok_or_else(|| self.problem("utc", &what))
     }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use csv::StringRecord;
 use hzn_files::limited;
 use hzn_files::nearest;
+use hzn_files::quoted;
 
 use super::columns::Columns;
 use super::map::Map;
@@ -47,7 +48,7 @@ impl Table {
                 }
                 let name = header.get(*index).unwrap_or_default();
                 let value = text.parse::<f64>().map(|value| value * factor);
-                value.map_err(|_| Error::unusable(format!("{shown}:{line}: {name}: {text:?} is not a number")))
+                value.map_err(|_| Error::unusable(format!("{shown}:{line}: {name}: {} is not a number", quoted(text))))
             };
             rows.push(places.iter().map(number).collect::<Result<_, _>>()?);
             lines.push(line);

@@ -245,3 +245,18 @@ fn what_is_missing_is_named() {
     short.recordings[0].seen.truncate(3);
     assert!(error(&short, true).contains("at least 6"), "{}", error(&short, true));
 }
+
+/// A star tracker gives attitudes relative to the stars; the solve needs them relative to the Earth.
+#[test]
+fn inertial_attitudes_are_named() {
+    let (mut inputs, _) = simulate(ORBITS[0].1, 11, 5800.0);
+    for attitude in &mut inputs.attitudes {
+        let spin = Rotation3::from_axis_angle(&Vector3::z_axis(), SPIN * attitude.time_s);
+        let told = attitude.fixed_from_vehicle.unwrap().into_inner();
+        attitude.fixed_from_vehicle = Some((UnitQuaternion::from_rotation_matrix(&spin) * told).into());
+    }
+    let fused = solve(&inputs);
+    assert_eq!(fused.verdict.level(), Level::Contradicts);
+    let first = fused.verdict.likeliest().unwrap();
+    assert!(first.what.contains("relative to inertial axes"), "{first:?}");
+}

@@ -9,6 +9,7 @@ use hzn_run::rig::{self, Epochs, HeadPlan, Opened, Plan, Request};
 use image::{RgbImage, imageops};
 
 use super::args::Args;
+use super::picture::explain_item;
 use crate::commands::run::{Args as RunArgs, cores};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::{files, tell};
@@ -39,7 +40,7 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
             continue;
         };
         let data = item.take_prior(None);
-        let explained = super::explain_item(item, config, data.as_ref(), &format!("{name}: "), args)?;
+        let explained = explain_item(item, config, data.as_ref(), &format!("{name}: "), args)?;
         if explained.exit == Exit::SomeUnreadable {
             exit = Exit::SomeUnreadable;
         }
