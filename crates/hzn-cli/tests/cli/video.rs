@@ -74,6 +74,28 @@ fn videos_made_and_read_by_the_real_ffmpeg() {
     run(&place, "text.mp4").expect(2).says("ffprobe cannot read it");
 }
 
+/// A container says that a pixel is wider than high, as cameras with 1440 columns for 16:9 write it.
+#[test]
+fn pixels_that_are_not_square_are_told() {
+    if !decoder("pixels_that_are_not_square_are_told") {
+        return;
+    }
+    let place = Place::with_pictures(3);
+    let coding = ["-vf", "scale=240:240,setsar=4/3", "-c:v", "ffv1"];
+    make(&place, &["-framerate", "4"], "in/%04d.png", &coding, "wide.mkv");
+    place
+        .run(&["init", "wide.mkv", "--fov", "60", "--altitude", "400", "-o", "s.toml"])
+        .expect(0)
+        .says("1.333 times as wide as high");
+    let text = place.read("s.toml");
+    assert!(text.contains("fx_px = 207.8\nfy_px = 277.1\n"), "{text}");
+    let ran = place.run(&["run", "wide.mkv", "-s", "s.toml"]);
+    assert!(!ran.err.contains("wide as high") && !ran.err.contains("not square"), "{}", ran.err);
+    place.write("square.toml", text.replace("fy_px = 277.1", "fy_px = 207.8").as_bytes());
+    let ran = place.run(&["run", "wide.mkv", "-s", "square.toml"]);
+    assert!(ran.err.contains("set fy_px to 277.1"), "{}", ran.err);
+}
+
 /// These videos have data next to their frames, which ffprobe also lists.
 #[test]
 fn every_frame_has_its_own_time() {

@@ -192,3 +192,17 @@ fn an_image_circle_limits_a_fisheye_only() {
     let (circle, deg) = start(290.0, Model::Equidistant, None);
     assert!(matches!(circle, Some(ImageCircle::Assumed { .. })) && deg == Some(145.0), "{deg:?}");
 }
+
+#[test]
+fn pixels_that_are_not_square_have_two_focal_lengths() {
+    for pixel_aspect in [4.0 / 3.0, 16.0 / 11.0, 12.0 / 11.0, 40.0 / 33.0, 0.9] {
+        for (fov_deg, lens) in [(20.0, Model::Pinhole), (60.0, Model::Pinhole), (140.0, Model::Equidistant)] {
+            let facts =
+                CameraFacts { size_px: [240, 240], pixel_aspect, ..known(Some(fov_deg), Some(lens), Exif::default()) };
+            let text = write_sensor_toml(&facts).unwrap().text;
+            let camera = crate::sensor::parse(&text, Path::new("s.toml")).unwrap().config.camera;
+            let told = camera.fy_px / camera.fx_px;
+            assert!((told / pixel_aspect - 1.0).abs() < 2e-3, "{told} {pixel_aspect}");
+        }
+    }
+}

@@ -39,7 +39,7 @@ pub(super) fn write_text(
     if !guess.camera.model.is_planar() {
         text += &write_circle(circle, fov_deg);
     }
-    text += &write_covariance(guess, focal);
+    text += &write_covariance(guess, focal, facts.pixel_aspect);
     text += &write_body(facts.body, facts.altitude_km);
     if facts.body == Body::Earth {
         text += &write_tone(facts.tone);
@@ -121,7 +121,7 @@ fn write_circle(circle: Option<ImageCircle>, fov_deg: f64) -> String {
 }
 
 /// Writes the covariance of the guess, with a comment for each sigma.
-fn write_covariance(guess: &Guess, focal: &Focal) -> String {
+fn write_covariance(guess: &Guess, focal: &Focal, pixel_aspect: f64) -> String {
     let together = if focal.is_at_edge {
         "\n# A lens of another shape and the same field of view has another focal length, so that both change together."
     } else {
@@ -153,8 +153,10 @@ fn write_covariance(guess: &Guess, focal: &Focal) -> String {
         let names: Vec<String> = covariance.order.iter().map(|i| format!("\"{}\"", i.name())).collect();
         let _ = writeln!(t, "order = [{}]\nrows = [", names.join(", "));
         for row in &covariance.rows {
-            // The matrix stays positive definite with this number of digits.
-            let numbers: Vec<String> = row.iter().map(|x| format!("{x:.6e}")).collect();
+            // The matrix stays positive semidefinite with this number of digits. Two equal focal lengths have equal
+            // numbers; others that change together must be proportional to the last digit.
+            let digits = if pixel_aspect == 1.0 { 6 } else { 13 };
+            let numbers: Vec<String> = row.iter().map(|x| format!("{x:.digits$e}")).collect();
             let _ = writeln!(t, "    [{}],", numbers.join(", "));
         }
         t.push_str("]\n");
