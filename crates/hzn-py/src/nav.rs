@@ -113,7 +113,7 @@ pub(crate) fn fuse<'py>(
     let settings = settings(given)?;
     let mut inputs = Inputs::default();
     for path in &recordings {
-        let recording = input::recording(path).map_err(to_exception)?;
+        let recording = input::recording(path, None).map_err(to_exception)?;
         recording.lost.as_ref().map_or(Ok(()), |lost| errors::warn(py, lost))?;
         inputs.recordings.push(recording);
     }

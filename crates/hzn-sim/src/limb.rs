@@ -132,6 +132,9 @@ impl Outline<'_> {
     }
 }
 
+/// Number of azimuths that are looked at together. Over them, a limb of 6000 pixels radius bends by 0.1 pixels.
+const BLOCK: usize = 8;
+
 /// The limb of a scene through its lens.
 pub(crate) struct ProjectedLimb<'a> {
     scene: &'a Scene,
@@ -173,13 +176,13 @@ impl<'a> ProjectedLimb<'a> {
     }
 
     /// Returns the visible segments, with their ends located to better than a hundredth of a pixel. A segment shorter
-    /// than the step in azimuth, 2π/(4·(width + height)), may be missed.
+    /// than the step in azimuth, 2π/(4·(width + height)), may be missed; where the lens ends, one of [`BLOCK`] steps.
     pub(crate) fn visible_segments(&self) -> Vec<Segment> {
         // A limb that is a circle around the optical axis gets about two steps per pixel. Elsewhere the steps may be
         // longer, because the arc length is summed over chords.
         let steps = 4 * (usize::from(self.camera.width()) + usize::from(self.camera.height()));
         let azimuth = |i: usize| core::f64::consts::TAU * i as f64 / steps as f64;
-        let points: Vec<Option<ImagePoint<f64>>> = (0..steps).map(|i| self.project_visible(azimuth(i))).collect();
+        let points = self.sample_visible(steps, azimuth);
         // The loop starts at an invisible azimuth, so that it cuts no segment at azimuth zero. A limb without an
         // invisible azimuth is one segment of a full turn.
         let Some(start) = points.iter().position(Option::is_none) else {
@@ -200,6 +203,31 @@ impl<'a> ProjectedLimb<'a> {
             }
         }
         segments
+    }
+
+    /// Returns the visible ones of the points at `steps` azimuths. Most of a limb lies outside most pictures, so blocks
+    /// of azimuths whose two ends lie on the same side outside the picture are not looked at.
+    fn sample_visible(&self, steps: usize, azimuth: impl Fn(usize) -> f64) -> Vec<Option<ImagePoint<f64>>> {
+        let mut points = vec![None; steps];
+        let mut begin = self.project(azimuth(0));
+        for first in (0..steps).step_by(BLOCK) {
+            let after = (first + BLOCK).min(steps);
+            let end = self.project(azimuth(after));
+            if !self.is_outside(begin, end) {
+                for i in first..after {
+                    points[i] = self.project_visible(azimuth(i));
+                }
+            }
+            begin = end;
+        }
+        points
+    }
+
+    /// Returns true if two points near each other are both beyond the lens or on the same side outside the picture.
+    fn is_outside(&self, a: Option<ImagePoint<f64>>, b: Option<ImagePoint<f64>>) -> bool {
+        let (Some(a), Some(b)) = (a, b) else { return a.is_none() && b.is_none() };
+        let beside = |a: f64, b: f64, size: u16| a.max(b) < -0.5 || a.min(b) > f64::from(size) - 0.5;
+        beside(a.u, b.u, self.camera.width()) || beside(a.v, b.v, self.camera.height())
     }
 
     /// Returns the last visible azimuth between a visible and an invisible one.

@@ -249,7 +249,7 @@ mod unix {
         let place = Place::with_pictures(1);
         let one = bomb(1, 800, true);
         assert!(one.len() < 100_000, "{}", one.len());
-        for (name, file) in [("ours.mcap", one), ("other.mcap", bomb(1, 800, false)), ("many.mcap", bomb(60, 60, true))]
+        for (name, file) in [("ours.mcap", one), ("other.mcap", bomb(1, 800, false)), ("many.mcap", bomb(30, 60, true))]
         {
             place.write(name, &file);
             let ran = limited(&place, "ulimit -v 700000", &["info", name]);

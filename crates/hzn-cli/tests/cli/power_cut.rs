@@ -6,7 +6,7 @@
 //! Real file systems keep more, so this is the worst case.
 #![cfg(target_os = "linux")]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::process::Command;
 
@@ -150,6 +150,9 @@ impl Disk {
     }
 }
 
+/// What was recovered from each content so far. Most steps change one file, so most contents were seen before.
+type Seen = HashMap<Vec<u8>, Option<Vec<hzn_mcap::Row>>>;
+
 /// Returns the rows of a file that may be cut off anywhere, without processing times; `None` if it cannot be recovered.
 fn recovered(folder: &Path, ending: &str, bytes: &[u8]) -> Option<Vec<hzn_mcap::Row>> {
     let [file, out] = ["cut", "kept"].map(|name| folder.join(format!("{name}.{ending}")));
@@ -197,8 +200,16 @@ fn replay(place: &Place, out: &str, before: &[(&str, Vec<u8>)], steps: &[Step], 
     let ending = out.rsplit('.').next().unwrap();
     let whole = rows(&place.path(out));
     let folder = place.path("");
-    let kept_before =
-        before.iter().filter_map(|(_, bytes)| recovered(&folder, ending, bytes)).map(|rows| rows.len()).max();
+    let mut seen = Seen::new();
+    let mut recovered = |bytes: &[u8]| match seen.get(bytes) {
+        Some(rows) => rows.clone(),
+        None => {
+            let rows = recovered(&folder, ending, bytes);
+            seen.insert(bytes.to_vec(), rows.clone());
+            rows
+        }
+    };
+    let kept_before = before.iter().filter_map(|(_, bytes)| recovered(bytes)).map(|rows| rows.len()).max();
     let mut disk = Disk::with(before);
     // Number of rows that are surely on the disk.
     let (mut sure, mut checked) = (kept_before.unwrap_or(0), 0);
@@ -210,7 +221,7 @@ fn replay(place: &Place, out: &str, before: &[(&str, Vec<u8>)], steps: &[Step], 
         }
         if let (Step::Sync { fd }, true) = (step, durable)
             && let Some((Some(inode), _)) = disk.open.get(fd)
-            && let Some(rows) = recovered(&folder, ending, &disk.inodes[*inode].now)
+            && let Some(rows) = recovered(&disk.inodes[*inode].now)
             && disk.synced_names.values().any(|there| there == inode)
         {
             sure = sure.max(rows.len());
@@ -220,10 +231,10 @@ fn replay(place: &Place, out: &str, before: &[(&str, Vec<u8>)], steps: &[Step], 
             if let Some(bytes) = files.get(out)
                 && !before.iter().any(|(name, content)| *name == out && content == bytes)
             {
-                let rows = recovered(&folder, ending, bytes);
+                let rows = recovered(bytes);
                 assert_eq!(rows.as_ref(), Some(&whole), "{out}: a file with the final name is complete");
             }
-            let each = files.values().filter_map(|bytes| recovered(&folder, ending, bytes));
+            let each = files.values().filter_map(|bytes| recovered(bytes));
             let best = each.max_by_key(Vec::len).unwrap_or_default();
             assert_eq!(best, whole[..best.len()], "{out}: the rows that are kept are right");
             assert!(best.len() >= sure, "{out}: {} rows of {sure} are left after {step:?}", best.len());

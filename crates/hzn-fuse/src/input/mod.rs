@@ -19,8 +19,8 @@ pub use fix::{Fix, Receiver};
 pub use gnss::gnss;
 pub use imu::{Sample, imu};
 pub use map::Map;
-pub use mount::mount;
-pub use recording::{Body, Centre, Recording, Seen, recording};
+pub use mount::{is_sensor, mount};
+pub use recording::{Body, Centre, Recording, Seen, name_of, recording};
 
 /// Returns the rotation of a quaternion, scalar first; its length if that is not 1.
 fn rotation<A, B>(wxyz: [f64; 4]) -> Result<Rotation<A, B>, f64> {

@@ -48,6 +48,12 @@ pub fn mount(path: &Path) -> Result<Rotation<Cam, Vehicle>, Error> {
     }
 }
 
+/// Returns whether a file with a mount is a whole sensor.toml: it has a table `[camera]`.
+pub fn is_sensor(path: &Path) -> bool {
+    let text = limited::read_text(path, limited::SETTINGS_BYTES).unwrap_or_default();
+    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("camera"))
+}
+
 /// Returns the mount of a sensor.toml.
 pub(super) fn of_config(mount: Mount) -> Result<Rotation<Cam, Vehicle>, String> {
     of_quaternion(mount.q_vehicle_from_camera_wxyz)

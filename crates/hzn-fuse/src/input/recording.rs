@@ -5,6 +5,7 @@ use std::path::Path;
 
 use hzn_core::status::Status;
 use hzn_core::{Config, camera};
+use hzn_files::rig::JOINT;
 use hzn_mcap::Row;
 use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_run::results::Results;
@@ -104,17 +105,18 @@ pub struct Recording {
     pub impossible: Option<(usize, String)>,
 }
 
-/// Reads a recording of `hzn run`: .mcap, .csv or .jsonl.
+/// Reads a recording of `hzn run`: .mcap, .csv or .jsonl. Of a rig's results, the joint answers are taken. `told` is the
+/// sensor.toml that the pictures were processed with, for a recording that does not contain it.
 ///
 /// # Errors
 /// The file is not a recording, or its mount is not a rotation.
-pub fn recording(path: &Path) -> Result<Recording, Error> {
+pub fn recording(path: &Path, told: Option<&Path>) -> Result<Recording, Error> {
     let Results { rows, sensor_toml, lost, .. } = hzn_run::results::read(path)?;
     let config = match &sensor_toml {
-        None => None,
+        None => told.map(hzn_files::sensor::load).transpose().map_err(Error::unusable)?.map(|sensor| sensor.config),
         Some(text) => Some(hzn_files::sensor::parse(text, Path::new("sensor.toml")).map_err(Error::unusable)?.config),
     };
-    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = name_of(path);
     let shown = path.display();
     let recording =
         Recording::new(name, rows, config.as_ref()).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
@@ -126,18 +128,29 @@ pub fn recording(path: &Path) -> Result<Recording, Error> {
     Ok(recording)
 }
 
+/// Returns the name of the camera whose results are in a file: that of the file without its ending.
+pub fn name_of(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
 impl Recording {
-    /// Makes a recording from the rows of a camera, with the sensor.toml that they were made with, if it is known.
+    /// Makes a recording from the rows of a camera, with the sensor.toml that they were made with, if it is known. Of the
+    /// rows of a rig, the joint answers are taken: a sensor whose axes are those of the vehicle.
     ///
     /// # Errors
-    /// The mount is not a rotation, or the rows are those of a rig.
-    pub fn new(name: String, rows: Vec<Row>, config: Option<&Config>) -> Result<Self, Error> {
-        if rows.iter().any(|row| row.head.is_some()) {
-            let what = "these are results of a rig, whose axes are in several frames; give results of single cameras";
-            return Err(Error::unusable(what));
+    /// The mount is not a rotation, or the rows of a rig have no joint answer.
+    pub fn new(name: String, mut rows: Vec<Row>, config: Option<&Config>) -> Result<Self, Error> {
+        let is_rig = rows.iter().any(|row| row.head.is_some());
+        if is_rig {
+            // The heads' answers are parts of the joint one.
+            rows.retain(|row| row.head.as_deref() == Some(JOINT));
+            if rows.is_empty() {
+                return Err(Error::unusable("these are heads of a rig without its joint answers"));
+            }
         }
         let told = config.and_then(|c| c.mount).map(mount::of_config).transpose();
-        let mount = told.map_err(|e| Error::unusable(format!("sensor.toml: [mount] {e}")))?;
+        let told = told.map_err(|e| Error::unusable(format!("sensor.toml: [mount] {e}")))?;
+        let mount = if is_rig { Some(Rotation::identity()) } else { told };
         let limb_sigma_km = config.map(|c| {
             let bodies = c.each_body().iter().filter(|b| is_earth(b.kind.name()));
             bodies.map(|b| b.limb_height_sigma_km).fold(0.0, f64::max)

@@ -1,11 +1,13 @@
 //! Levenberg and Marquardt's steps to the most probable orbit.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::dynamics::Motion;
-use super::estimates::Estimates;
+use super::estimates::{Estimates, Places};
 use super::problem::{Problem, Weighed};
 use crate::error::Error;
 use crate::solve::Loss;
-use crate::sparse::{Factor, Marginals, Normal, Pattern};
+use crate::sparse::{Factor, Linear, Marginals, Normal, Pattern};
 
 /// Most steps of a loss, and the decrease of the cost that ends them: far below the change of 1 that a sigma of an
 /// unknown makes.
@@ -103,18 +105,60 @@ fn descend(
     }
 }
 
+/// The covariance of the estimates: what the measurements leave, and what the considered errors add.
+///
+/// Considered errors c with the covariance C move the estimates by K c, so they add K C Kᵀ (Schmidt 1966). They are not
+/// estimated: the derivative of an axis by the limb height changes by a tenth between pictures, and an estimate would
+/// take every error that changes alike for a limb height.
+pub(super) struct Covariances<'a> {
+    marginals: Marginals<'a>,
+    pattern: &'a Pattern,
+    /// For each considered error, by how much its sigma moves all unknowns.
+    moved: Vec<DVector<f64>>,
+}
+
+impl Covariances<'_> {
+    /// Returns the covariance of a block; `None` if the factor does not have it.
+    pub(super) fn of(&self, block: usize) -> Option<DMatrix<f64>> {
+        let mut covariance = self.marginals.block(block, block)?;
+        for moved in &self.moved {
+            let own = moved.rows(self.pattern.start(block), self.pattern.size(block));
+            covariance += own * own.transpose();
+        }
+        Some(covariance)
+    }
+}
+
 /// Calls a function with the covariance of the estimates: with the weights of the loss, or with all measurements
 /// whole.
-pub(super) fn with_marginals<R>(
+pub(super) fn with_covariances<R>(
     at: &Adjusted,
+    places: &Places,
     is_weighed: bool,
-    call: impl FnOnce(&Marginals<'_>, &Factor<'_>, &Pattern) -> R,
+    call: impl FnOnce(&Covariances<'_>, &Factor<'_>, &Pattern) -> R,
 ) -> Result<R, Error> {
     let pattern = pattern(&at.estimates, &at.errors)?;
     let mut factor = Factor::new(&pattern)?;
     factor
         .compute(&normal(&pattern, &at.errors, is_weighed), 0.0)
         .ok_or_else(|| Error::failed("--solve: the limbs do not determine the orbit; give more of them"))?;
-    let marginals = Marginals::new(&pattern, &factor);
-    Ok(call(&marginals, &factor, &pattern))
+    let moved = places.considered().map(|(which, sigma)| {
+        let by_one: Vec<Weighed> = at.errors.iter().filter_map(|e| by(e, at.estimates.shared_block(), which)).collect();
+        factor.step(&normal(&pattern, &by_one, is_weighed)) * sigma
+    });
+    let moved: Vec<_> = moved.collect();
+    let covariances = Covariances { marginals: Marginals::new(&pattern, &factor), pattern: &pattern, moved };
+    Ok(call(&covariances, &factor, &pattern))
+}
+
+/// Returns the derivatives of a sight, with that by one error of the whole flight in place of the error; `None` if it
+/// does not depend on it.
+fn by(error: &Weighed, shared: usize, which: usize) -> Option<Weighed> {
+    error.sight?;
+    let (_, matrix) = error.linear.derivatives.iter().find(|(block, _)| *block == shared)?;
+    let column = matrix.column(which);
+    (column.norm_squared() > 0.0).then(|| {
+        let linear = Linear { error: column.into_owned(), derivatives: error.linear.derivatives.clone() };
+        Weighed { linear, ..error.clone() }
+    })
 }

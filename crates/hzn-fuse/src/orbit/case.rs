@@ -7,7 +7,7 @@ use hzn_nav::options::{CameraOptions, Mode, Options, StartSigmas};
 use nalgebra::{DVector, Vector3};
 
 use super::adjust::{Adjusted, adjust};
-use super::estimates::{Estimates, Places};
+use super::estimates::{Estimates, FASTER, Places};
 use super::problem::Problem;
 use super::sights::{self, Attitudes, Sight};
 use super::start;
@@ -70,9 +70,10 @@ impl<'a> Case<'a> {
         Ok(Solution { sights, attitudes, adjusted })
     }
 
-    /// Returns the slow errors that follow each other, and that of each sight.
+    /// Returns the slow errors that follow each other, and the first of the two of each sight.
     fn slow_errors(&self, sights: &[Sight]) -> (Vec<Link>, Vec<Option<usize>>) {
         let has_slow = self.has_slow();
+        let time_s = self.settings.orbit.slow_error_time_s;
         let mut last: HashMap<usize, (usize, f64)> = HashMap::new();
         let mut links: Vec<Link> = Vec::new();
         let mut slow = Vec::with_capacity(sights.len());
@@ -81,12 +82,13 @@ impl<'a> Case<'a> {
                 slow.push(None);
                 continue;
             }
-            let index = links.len();
-            let correlation_s = self.settings.orbit.slow_error_time_s;
-            let before = last.insert(sight.camera, (index, sight.time_s));
-            let before = before.map(|(i, time_s)| (i, (sight.time_s - time_s) / correlation_s));
-            links.push(Link { before, index });
-            slow.push(Some(index));
+            let first = links.len();
+            let before = last.insert(sight.camera, (first, sight.time_s));
+            links.extend([time_s, time_s / FASTER].into_iter().enumerate().map(|(part, correlation_s)| Link {
+                before: before.map(|(i, time_s)| (i + part, (sight.time_s - time_s) / correlation_s)),
+                index: first + part,
+            }));
+            slow.push(Some(first));
         }
         (links, slow)
     }

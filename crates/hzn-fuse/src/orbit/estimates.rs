@@ -1,10 +1,24 @@
 //! The unknowns of an orbit.
 
 use hzn_nav::frames::{Cam, Rotation, Vehicle};
-use hzn_nav::options::{CameraOptions, Mode, Options};
+use hzn_nav::options::{Block, CameraOptions, Mode, Options};
 use nalgebra::{DVector, Vector3};
 
 use super::dynamics::Motion;
+
+/// Part of the variance of a slow error that each of its three parts has: one stays the same all flight, one changes
+/// with the time of `orbit.slow_error_time_s`, and one changes [`FASTER`] times as fast.
+///
+/// A covariance does not say for how long an error stays. The told height, the step from ground to air and the shading of
+/// the lens are the same in every picture of a camera that keeps its attitude to the horizon. Light and season change on
+/// the way around the Earth, and clouds and ground below the limb in a few pictures. One time for all would promise that
+/// the others average out. With one half for each, an error of one kind only is larger than told by at most the square
+/// root of two; the price is that a mixture is told larger than it is, by less than that.
+pub(super) const SHARE: f64 = 0.5;
+/// Share of its sigma within which a considered error is held.
+const HELD: f64 = 1e-4;
+/// How much faster the third part changes.
+pub(super) const FASTER: f64 = 10.0;
 
 /// Places of the errors that last the whole flight, with what was known of them before.
 #[derive(Debug, Clone, Default)]
@@ -13,8 +27,12 @@ pub(super) struct Places {
     pub(super) clocks: Vec<Option<usize>>,
     pub(super) height: Option<usize>,
     pub(super) latitude: Option<usize>,
-    /// 1-sigma of each: rad, s, km.
+    /// The part of the slow error that stays the same all flight, over its root, of the cameras that have one.
+    pub(super) lasting: Vec<Option<usize>>,
+    /// 1-sigma of each: rad, s, km, 1.
     pub(super) sigmas: Vec<f64>,
+    /// Whether each is considered: it keeps its told value, and its sigma is part of the covariance of the others.
+    pub(super) considered: Vec<bool>,
 }
 
 impl Places {
@@ -28,21 +46,35 @@ impl Places {
         }
         out.height = out.add(&options.limb_height, 1);
         out.latitude = out.add(&options.limb_latitude, 2);
+        for camera in cameras {
+            let lasting = out.add(&Block { mode: camera.slow_error, sigma: SHARE.sqrt() }, 3);
+            out.lasting.push(lasting);
+        }
         out
     }
 
     /// Adds an error with this number of components, unless it does not exist or is known exactly.
-    fn add(&mut self, block: &hzn_nav::options::Block, components: usize) -> Option<usize> {
+    fn add(&mut self, block: &Block, components: usize) -> Option<usize> {
         let exists = block.mode != Mode::Off && block.sigma > 0.0;
         let first = self.sigmas.len();
         exists.then(|| {
             self.sigmas.extend(std::iter::repeat_n(block.sigma, components));
+            self.considered.extend(std::iter::repeat_n(block.mode == Mode::Considered, components));
             first
         })
     }
 
     pub(super) fn len(&self) -> usize {
         self.sigmas.len()
+    }
+    /// Returns the sigmas with which the estimates are held at what was told.
+    pub(super) fn holding_sigmas(&self) -> Vec<f64> {
+        let all = self.sigmas.iter().zip(&self.considered);
+        all.map(|(sigma, is_considered)| if *is_considered { HELD * sigma } else { *sigma }).collect()
+    }
+    /// Returns the considered errors with their sigmas.
+    pub(super) fn considered(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.sigmas.iter().copied().enumerate().zip(&self.considered).filter(|(_, is)| **is).map(|(one, _)| one)
     }
 }
 
@@ -53,7 +85,7 @@ pub(super) struct Estimates {
     pub(super) times_s: Vec<f64>,
     pub(super) knots: Vec<Motion>,
     pub(super) shared: DVector<f64>,
-    /// The slow error of each sight over its root.
+    /// The two parts of the slow error that change, of each sight, over their roots.
     pub(super) slow: Vec<Vector3<f64>>,
     /// The error of each attitude of the star tracker, rad in ECEF.
     pub(super) attitudes: Vec<Vector3<f64>>,
@@ -121,6 +153,12 @@ impl Estimates {
     }
     pub(super) fn height_km(&self, places: &Places) -> f64 {
         self.one(places.height)
+    }
+    /// Returns the slow error of a sight over its root: the sum of its three parts. `index` is the first of the two that
+    /// change.
+    pub(super) fn slow(&self, places: &Places, camera: usize, index: usize) -> Vector3<f64> {
+        let changing: Vector3<f64> = self.slow.iter().skip(index).take(2).sum();
+        self.three(places.lasting.get(camera).copied().flatten()) + changing * SHARE.sqrt()
     }
     pub(super) fn latitude_km(&self, places: &Places) -> [f64; 2] {
         [self.one(places.latitude), self.one(places.latitude.map(|first| first + 1))]

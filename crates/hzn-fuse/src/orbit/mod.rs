@@ -15,10 +15,11 @@ mod start;
 mod verdict;
 
 use hzn_nav::frames::{Cam, Rotation, Vehicle};
+use hzn_nav::gravity::earth_rate;
 
 use crate::error::Error;
 use crate::input::Inputs;
-use crate::results::{Begin, Counts, Fused};
+use crate::results::{Begin, Counts, Epoch, Fused};
 use crate::settings::{Limb, Settings};
 use case::Case;
 
@@ -39,6 +40,7 @@ pub(crate) fn fuse(inputs: &Inputs, settings: &Settings, mounts: &[Rotation<Cam,
          can test"
             .to_owned(),
     ];
+    notes.extend(told(&case, &names, &epochs));
     if !solved.is_converged {
         notes.push(format!("--solve did not converge in {} steps", solved.steps));
     }
@@ -76,4 +78,23 @@ fn check(inputs: &Inputs, settings: &Settings) -> Result<(), Error> {
         ))),
         None => Ok(()),
     }
+}
+
+/// Returns what an error of the told mounts and clocks does to the position along the orbit. No limb and no attitude
+/// tells the three apart.
+fn told(case: &Case<'_>, names: &[String], epochs: &[Epoch]) -> Vec<String> {
+    let Some(state) = epochs.last().map(|epoch| epoch.state) else { return Vec::new() };
+    let speed_m_s = (state.velocity_m_s + earth_rate().cross(&state.position_m)).norm();
+    let sigma = |place: Option<usize>| place.and_then(|i| case.places.sigmas.get(i)).copied().unwrap_or(0.0);
+    let of_camera = |((name, mount), clock): ((&String, &Option<usize>), &Option<usize>)| {
+        let (mount_rad, clock_s) = (sigma(*mount), sigma(*clock));
+        format!(
+            "along the orbit, a position looks like an error of mount or clock: the told {:.3}° of the mount of {name} are \
+             {:.1} km, and the told {clock_s} s of its clock {:.1} km",
+            mount_rad.to_degrees(),
+            mount_rad * state.position_m.norm() * 1e-3,
+            clock_s * speed_m_s * 1e-3
+        )
+    };
+    names.iter().zip(&case.places.mounts).zip(&case.places.clocks).map(of_camera).collect()
 }

@@ -5,7 +5,7 @@ use hzn_nav::frames::{Cam, Fixed, Rotation, Vector, Vehicle};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
 use super::dynamics::{Motion, carried, carried_with_derivative, noise};
-use super::estimates::{Estimates, Places};
+use super::estimates::{Estimates, Places, SHARE};
 use super::sights::{Attitudes, Sight};
 use crate::input::Body;
 use crate::reference::limb_axis;
@@ -36,9 +36,9 @@ pub(super) struct Problem<'a> {
     pub(super) attitudes: &'a Attitudes,
     pub(super) told: &'a [Rotation<Cam, Vehicle>],
     pub(super) places: &'a Places,
-    /// The slow errors that follow each other, one for each sight of a camera that has them.
+    /// The slow errors that follow each other, two for each sight of a camera that has them.
     pub(super) links: &'a [Link],
-    /// The slow error of each sight.
+    /// The first slow error of each sight.
     pub(super) slow: &'a [Option<usize>],
     /// Accelerations that the dynamics do not have, m/s²/√Hz.
     pub(super) density: f64,
@@ -82,7 +82,7 @@ impl Problem<'_> {
             Weighed { sight: None, linear, weight: 1.0, cost }
         };
         let mut all = vec![known(first(estimates.knots.first()?, begin))];
-        let sigmas = DVector::from_column_slice(&self.places.sigmas);
+        let sigmas = DVector::from_vec(self.places.holding_sigmas());
         let by = DMatrix::from_diagonal(&sigmas.map(|s| 1.0 / s));
         all.push(known(Linear {
             error: estimates.shared.component_div(&sigmas),
@@ -174,14 +174,19 @@ impl Problem<'_> {
                 expected += by * coefficient;
             }
         }
+        let slow = self.slow.get(number).copied().flatten();
+        if let Some(slow) = slow {
+            put(self.places.lasting.get(sight.camera).copied().flatten(), dense(&(sight.across * sight.root)));
+            expected += sight.root * estimates.slow(self.places, sight.camera, slow);
+        }
         let by_position: SMatrix<f64, 3, 6> = by_position * by.fixed_rows::<3>(0);
         let mut derivatives = vec![(knot, dense(&(sight.across * by_position))), (estimates.shared_block(), by_shared)];
         for (row, share) in rows.into_iter().filter(|(row, share)| *share > 0.0 && *row < estimates.attitudes.len()) {
             derivatives.push((estimates.attitude_block(row), dense(&(sight.across * by_attitude * share))));
         }
-        if let Some(slow) = self.slow.get(number).copied().flatten() {
-            expected += sight.root * estimates.slow.get(slow)?;
-            derivatives.push((estimates.slow_block(slow), dense(&(sight.across * sight.root))));
+        if let Some(slow) = slow {
+            let by_changing = dense(&(sight.across * sight.root * SHARE.sqrt()));
+            derivatives.extend([slow, slow + 1].map(|i| (estimates.slow_block(i), by_changing.clone())));
         }
         let error = sight.across * (expected - sight.measured.as_inner());
         error.iter().all(|x| x.is_finite()).then(|| Linear { error: vector(&error), derivatives })

@@ -1,12 +1,14 @@
 //! The orbit with its covariance, and what was determined.
 
+use std::collections::BTreeMap;
+
 use hzn_nav::filter::Corrections;
 use hzn_nav::frames::{Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::gravity::earth_rate;
 use hzn_nav::strapdown::Nominal;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::adjust::with_marginals;
+use super::adjust::with_covariances;
 use super::case::{Case, Solution};
 use super::dynamics::{GM_M3_S2, Motion, carried_with_derivative, noise};
 use super::problem::position;
@@ -18,11 +20,12 @@ use crate::results::{CameraState, Determined, Epoch, Kind, Lowered, Orbit, Solve
 pub(super) fn report(case: &Case<'_>, solution: &Solution, names: &[String]) -> Result<(Vec<Epoch>, Solved), Error> {
     let at = &solution.adjusted;
     let missing = || Error::failed("--solve: a covariance is missing");
-    let (mut epochs, mut solved) = with_marginals(at, true, |marginals, factor, pattern| {
-        let own = |knot: usize| marginals.block(knot, knot);
-        let block = at.estimates.shared_block();
-        let shared = marginals.block(block, block)?;
-        let sigma = |i: usize| shared.get((i, i)).copied().unwrap_or(0.0).max(0.0).sqrt();
+    let (mut epochs, mut solved) = with_covariances(at, &case.places, true, |covariances, factor, pattern| {
+        let own = |knot: usize| covariances.of(knot);
+        let shared = covariances.of(at.estimates.shared_block())?;
+        let considered: BTreeMap<usize, f64> = case.places.considered().collect();
+        let estimated = |i: usize| shared.get((i, i)).copied().unwrap_or(0.0).max(0.0).sqrt();
+        let sigma = |i: usize| considered.get(&i).copied().unwrap_or_else(|| estimated(i));
         let cameras = cameras(case, solution, &sigma);
         let mut epochs = epochs(case, solution, &own, &cameras)?;
         let of_limb = |place: Option<usize>| place.map_or(0.0, sigma);
@@ -40,7 +43,7 @@ pub(super) fn report(case: &Case<'_>, solution: &Solution, names: &[String]) -> 
             cost: at.cost,
             determined: determined(case, solution, names, &sigma),
             lowered: lowered(solution),
-            sources: std::collections::BTreeMap::new(),
+            sources: BTreeMap::new(),
             orbit: None,
         };
         Some((epochs, solved))
@@ -52,8 +55,8 @@ pub(super) fn report(case: &Case<'_>, solution: &Solution, names: &[String]) -> 
         ..Corrections::default()
     };
     epochs.iter_mut().for_each(|epoch| epoch.corrections = corrections);
-    let bound = with_marginals(at, false, |marginals, _, _| {
-        self::epochs(case, solution, &|knot| marginals.block(knot, knot), &[])
+    let bound = with_covariances(at, &case.places, false, |covariances, _, _| {
+        self::epochs(case, solution, &|knot| covariances.of(knot), &[])
     })?
     .ok_or_else(missing)?;
     solved.orbit = orbit(&epochs, &bound);

@@ -4,6 +4,7 @@ mod common;
 mod common_part;
 mod flight;
 mod orbit;
+mod recordings;
 mod solve;
 mod tables;
 mod tracker;

@@ -18,11 +18,10 @@ const WHITE: f64 = 3e-4;
 const SLOW: f64 = 3e-4;
 const TRACKER: f64 = 5e-5;
 const MOUNT: f64 = 3.5e-4;
-/// Correlation time of the slow error, s.
-const SLOW_S: f64 = 1400.0;
-/// Sigma of the limb height, km, and seconds between two pictures.
+/// Sigma of the limb height, km.
 const HEIGHT_KM: f64 = 3.0;
-const STEP_S: f64 = 60.0;
+/// Steps of the integration of the truth, s.
+const DYNAMICS_S: f64 = 10.0;
 
 /// Kepler's elements at the start: semi-major axis (m), eccentricity, inclination, node, argument of the perigee and
 /// true anomaly (degrees).
@@ -34,6 +33,24 @@ const ORBITS: [(&str, Elements); 3] = [
     ("700 km, inclined", Elements([7.071e6, 0.001, 51.6, 130.0, 80.0, 200.0])),
     ("400 x 900 km", Elements([7.021e6, 0.0356, 63.4, 250.0, 110.0, 40.0])),
 ];
+
+/// What a flight has.
+#[derive(Clone, Copy)]
+struct Plan {
+    elements: Elements,
+    seed: u64,
+    span_s: f64,
+    /// Seconds between two pictures.
+    step_s: f64,
+    /// Correlation time of the slow error, s.
+    slow_s: f64,
+}
+
+impl Plan {
+    fn new(elements: Elements, seed: u64, span_s: f64) -> Self {
+        Self { elements, seed, span_s, step_s: 60.0, slow_s: 1400.0 }
+    }
+}
 
 /// Position and velocity in inertial axes, which are those of ECEF at time 0.
 type Truth = (Vector3<f64>, Vector3<f64>);
@@ -111,7 +128,8 @@ fn axis_of_limb(position_m: &Vector3<f64>) -> Vector3<f64> {
 }
 
 /// Simulates a flight: the inputs as a user has them, with the errors that the covariances tell.
-fn simulate(elements: Elements, seed: u64, span_s: f64) -> (Inputs, Vec<Place>) {
+fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
+    let Plan { elements, seed, span_s, step_s, slow_s } = plan;
     let mut draws = Draws(seed);
     let mut three = |sigma: f64| Vector3::from_fn(|_, _| sigma * draws.normal());
     let mount_error = three(MOUNT);
@@ -120,9 +138,9 @@ fn simulate(elements: Elements, seed: u64, span_s: f64) -> (Inputs, Vec<Place>) 
     let mut truth = elements.start();
     let mount = UnitQuaternion::from_euler_angles(0.4, -0.3, 0.2);
     let (mut seen, mut attitudes, mut places) = (Vec::new(), Vec::new(), Vec::new());
-    let keep = (-STEP_S / SLOW_S).exp();
-    for number in 0..(span_s / STEP_S) as usize {
-        let time_s = number as f64 * STEP_S;
+    let keep = (-step_s / slow_s).exp();
+    for number in 0..(span_s / step_s) as usize {
+        let time_s = number as f64 * step_s;
         let (x, v) = truth;
         let to_fixed = Rotation3::from_axis_angle(&Vector3::z_axis(), -SPIN * time_s);
         let position_m = to_fixed * x;
@@ -154,8 +172,8 @@ fn simulate(elements: Elements, seed: u64, span_s: f64) -> (Inputs, Vec<Place>) 
         attitudes.push(Attitude { time_s, fixed_from_vehicle: Some(told.into()), sigma_rad: TRACKER });
         places.push(Place { time_s, position_m, axes });
         slow = slow * keep + three(SLOW) * (1.0 - keep * keep).sqrt();
-        for i in 0..6 {
-            truth = step(truth, time_s + 10.0 * f64::from(i), 10.0);
+        for i in 0..(step_s / DYNAMICS_S) as u32 {
+            truth = step(truth, time_s + DYNAMICS_S * f64::from(i), DYNAMICS_S);
         }
     }
     let told_mount: Rotation<Cam, Vehicle> = mount.into();
@@ -203,7 +221,7 @@ fn the_error_is_that_of_the_bound() {
         let (mut count, mut bound) = (0.0, Vector3::zeros());
         let mut verdicts = Vec::new();
         for seed in 0..seeds {
-            let (inputs, places) = simulate(elements, 1000 + seed, 3.0 * 5800.0);
+            let (inputs, places) = simulate(Plan::new(elements, 1000 + seed, 3.0 * 5800.0));
             let fused = solve(&inputs);
             add(&mut sums, &fused, &places);
             count += fused.smoothed.len() as f64;
@@ -234,7 +252,7 @@ fn the_error_is_that_of_the_bound() {
 
 #[test]
 fn what_is_missing_is_named() {
-    let (inputs, _) = simulate(ORBITS[0].1, 7, 3000.0);
+    let (inputs, _) = simulate(Plan::new(ORBITS[0].1, 7, 3000.0));
     let error = |inputs: &Inputs, solved: bool| {
         fuse(inputs, &settings(), Wanted { solved, ..Wanted::default() }).unwrap_err().to_string()
     };
@@ -244,12 +262,61 @@ fn what_is_missing_is_named() {
     let mut short = inputs.clone();
     short.recordings[0].seen.truncate(3);
     assert!(error(&short, true).contains("at least 6"), "{}", error(&short, true));
+    let (arc, _) = simulate(Plan::new(ORBITS[0].1, 7, 500.0));
+    assert!(error(&arc, true).contains("the flight covers 0.07 of an orbit"), "{}", error(&arc, true));
+    let (rare, _) = simulate(Plan { step_s: 1500.0, ..Plan::new(ORBITS[0].1, 7, 15_000.0) });
+    assert!(error(&rare, true).contains("take pictures more often"), "{}", error(&rare, true));
+}
+
+/// Returns the sum of the squared errors of the position over their covariances, 3 is ideal, as a mean over a flight.
+fn nees(fused: &Fused, places: &[Place]) -> f64 {
+    let of = |epoch: &hzn_fuse::results::Epoch| {
+        let place = places.iter().find(|p| p.time_s == epoch.state.time_s).unwrap();
+        let error = epoch.state.position_m.into_inner() - place.position_m;
+        error.dot(&epoch.position_covariance_m2.as_inner().cholesky().unwrap().solve(&error))
+    };
+    fused.smoothed.iter().map(of).sum::<f64>() / fused.smoothed.len() as f64
+}
+
+/// Nobody knows for how long an error stays: in a few pictures, a part of the orbit, or all flight.
+#[test]
+fn an_error_of_any_time_is_covered() {
+    let seeds: u64 = std::env::var("HZN_FLIGHTS").ok().and_then(|n| n.parse().ok()).unwrap_or(2);
+    for (name, slow_s) in [("a few pictures", 140.0), ("a part of the orbit", 1400.0), ("all flight", 1e12)] {
+        let mut sum = 0.0;
+        for (_, elements) in ORBITS {
+            for seed in 0..seeds {
+                let (inputs, places) = simulate(Plan { slow_s, ..Plan::new(elements, 7000 + seed, 2.0 * 5800.0) });
+                let fused = solve(&inputs);
+                assert!(fused.verdict.level() != Level::Contradicts, "{name} {seed}: {:?}", fused.verdict);
+                sum += nees(&fused, &places) / (seeds as f64 * ORBITS.len() as f64);
+            }
+        }
+        println!("{name}: NEES {sum:.2} (ideal 3)");
+        assert!((0.5..6.0).contains(&sum), "{name}: {sum}");
+    }
+}
+
+/// Far from the Earth, pictures are rare, and the satellite hardly moves against the ground.
+#[test]
+fn high_orbits_need_few_pictures() {
+    let high = [
+        (7, "1400 km", [7.771e6, 0.001, 66.0, 20.0, 30.0, 0.0], 4.0 * 6900.0, 300.0),
+        (8, "geostationary", [4.2164e7, 0.0005, 0.5, 20.0, 30.0, 0.0], 86_400.0, 600.0),
+    ];
+    for (seed, name, elements, span_s, step_s) in high {
+        let (inputs, places) = simulate(Plan { step_s, ..Plan::new(Elements(elements), seed, span_s) });
+        let fused = solve(&inputs);
+        let nees = nees(&fused, &places);
+        println!("{name}: NEES {nees:.2} (ideal 3)");
+        assert!(fused.verdict.level() == Level::Consistent && nees < 12.0, "{name}: {nees} {:?}", fused.verdict);
+    }
 }
 
 /// A star tracker gives attitudes relative to the stars; the solve needs them relative to the Earth.
 #[test]
 fn inertial_attitudes_are_named() {
-    let (mut inputs, _) = simulate(ORBITS[0].1, 11, 5800.0);
+    let (mut inputs, _) = simulate(Plan::new(ORBITS[0].1, 11, 5800.0));
     for attitude in &mut inputs.attitudes {
         let spin = Rotation3::from_axis_angle(&Vector3::z_axis(), SPIN * attitude.time_s);
         let told = attitude.fixed_from_vehicle.unwrap().into_inner();

@@ -86,7 +86,10 @@ fn verdict(args: &Args, fused: &Fused, outputs: &Outputs<'_>) {
 fn inputs(args: &Args) -> Result<Inputs, Stop> {
     let mut inputs = Inputs::default();
     for path in &args.nadir {
-        let recording = input::recording(path)?;
+        // A table has no sensor.toml in it, as an MCAP recording has: it may come with the mount.
+        let name = input::name_of(path);
+        let of_camera = args.mount.iter().find(|(camera, _)| *camera == name).map(|(_, file)| Path::new(file));
+        let recording = input::recording(path, of_camera.filter(|file| input::is_sensor(file)))?;
         if let Some(lost) = recording.lost.as_ref().filter(|_| recording.rows.is_empty()) {
             return Err(unreadable(lost));
         }

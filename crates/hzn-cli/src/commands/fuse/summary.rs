@@ -158,7 +158,7 @@ fn orbit(orbit: &Orbit) -> [(String, String); 3] {
         ("  position, sigma".to_owned(), format!("{} km radial, along, across the orbit", km(orbit.sigma_m))),
         (
             "  Cramer-Rao bound".to_owned(),
-            format!("{} km: no estimator has a smaller sigma from these measurements", km(orbit.bound_m)),
+            format!("{} km: the least sigma for what was told of limb height, mounts and clocks", km(orbit.bound_m)),
         ),
     ]
 }
