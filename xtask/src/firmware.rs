@@ -112,6 +112,7 @@ pub(crate) fn is_the_same_elsewhere(clone: &Path) -> Outcome {
 /// Builds what the image tests need, then runs the tests and checks the C interface. With `--all` there are also the
 /// other images and the costs.
 pub(crate) fn test(steps: &mut Steps) -> Outcome {
+    steps.images.wait();
     build(steps.all)?;
     soft_double::check(&images_of(AN386.name).join("chain"))?;
     lint_and_document()?;
@@ -128,12 +129,17 @@ pub(crate) fn test(steps: &mut Steps) -> Outcome {
 /// The project that the guide builds from nothing.
 const OWN_FIRMWARE: &str = "examples/own-firmware";
 
-/// Builds the project of the guide as a user does, with its own profile, flags and lock, and runs it in QEMU. Its
-/// output must be the one that the guide shows. Its linker script has 192 KiB of RAM.
-fn run_own_firmware() -> Outcome {
+/// Builds the project of the guide as a user does, with its own profile, flags and lock. Returns the image.
+fn build_own_firmware() -> Result<PathBuf, Trouble> {
     let (mut command, built) = Toolchain::find()?.cargo_with_profile("release", "build", "firmware/own", &[]);
     steps::run(command.current_dir(root().join(OWN_FIRMWARE)))?;
-    let image = built.join("own-firmware");
+    Ok(built.join("own-firmware"))
+}
+
+/// Runs the project of the guide in QEMU. Its output must be the one that the guide shows. Its linker script has
+/// 192 KiB of RAM.
+fn run_own_firmware() -> Outcome {
+    let image = build_own_firmware()?;
     steps::run(Command::new("arm-none-eabi-size").arg(&image))?;
     let mut qemu = Command::new("timeout");
     qemu.args(["60", "qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "null"])
@@ -245,10 +251,20 @@ fn print_flash_by_feature() -> Outcome {
     Ok(())
 }
 
-/// `cargo xtask firmware [--write | --by-feature]`: builds the images and measures what they cost.
+/// Builds all that the step `firmware` of every check runs.
+fn build_ahead() -> Outcome {
+    build(false)?;
+    build_own_firmware()?;
+    build_c_library()
+}
+
+/// `cargo xtask firmware [--write | --build | --by-feature]`: builds the images and measures what they cost.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
     let go = || -> Outcome {
         std::env::set_current_dir(root())?;
+        if args.iter().any(|a| a == "--build") {
+            return build_ahead();
+        }
         if args.iter().any(|a| a == "--by-feature") {
             return print_flash_by_feature();
         }
@@ -289,9 +305,14 @@ fn check_no_panics(board: &str, image: &str) -> Outcome {
 /// Features and form of the library for C.
 const C_LIBRARY: [&str; 7] = ["--package", "hzn-c", "--lib", "--crate-type", "staticlib", "--features", "standalone"];
 
+/// Builds the library for C with the profile of the images.
+fn build_c_library() -> Outcome {
+    steps::run(cargo(&["rustc", "--profile", "flight"]).args(C_LIBRARY))
+}
+
 /// Builds the C example and the package for this machine. With `in_qemu` the example must give the same bits there.
 fn check_c_interface(in_qemu: bool) -> Outcome {
-    steps::run(cargo(&["rustc", "--profile", "flight"]).args(C_LIBRARY))?;
+    build_c_library()?;
     let c = root().join("firmware/hzn-c");
     let (example, include) = (c.join("example"), format!("-I{}", c.join("include").display()));
     let out = target().join("firmware/c");

@@ -17,6 +17,7 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod beside;
 mod c_package;
 mod campaign;
 mod demo;
@@ -65,6 +66,7 @@ const USAGE: &str =
                      The part `crates` compiles each published crate from its package, and runs only if it is named
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into book/results/firmware-cost.md;
+                     --build only builds the images that every check runs;
                      --by-feature prints only how much flash the methods of published systems take
   first-command      clones the committed state, runs the README's first command there, and prints its wall time and
                      processor time; what cargo downloads is downloaded before and not counted

@@ -7,6 +7,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::beside::Beside;
+
 /// Reason why a step did not succeed.
 pub(crate) enum Trouble {
     /// The step ran, and something is wrong.
@@ -84,6 +86,8 @@ impl Selection {
 pub(crate) struct Steps {
     /// Whether each step runs with all that it has, not with a small part of it.
     pub(crate) all: bool,
+    /// Build of the images for the boards, which the steps that need them wait for.
+    pub(crate) images: Beside,
     /// Whether a step that cannot run counts as a failure.
     strict: bool,
     began: Instant,
@@ -98,6 +102,8 @@ impl Steps {
     pub(crate) fn run(steps: &[Step], selection: &Selection) -> Result<(), String> {
         let mut running = Self {
             all: selection.all,
+            // A chosen step prints what it builds.
+            images: if selection.words.is_empty() { Beside::start() } else { Beside::default() },
             strict: std::env::var("CI").is_ok_and(|v| v == "true"),
             began: Instant::now(),
             done: Vec::new(),

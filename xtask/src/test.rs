@@ -43,7 +43,10 @@ const STEPS: &[Step] = &[
     }),
     every("documents", |_| steps::run(cargo(&["doc", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))),
     every("packages", |_| check_packages()),
-    every("flight build", |_| firmware::build_core()),
+    every("flight build", |steps| {
+        steps.images.wait();
+        firmware::build_core()
+    }),
     every("firmware", firmware::test),
     every("examples of hzn-core", |_| run_core_examples()),
     every("demo", |_| run_demo()),
