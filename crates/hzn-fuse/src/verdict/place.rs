@@ -25,6 +25,9 @@ const TOLD_APART_M: f64 = 5000.0;
 const FEWEST: usize = 5;
 /// Sigmas above which positions do not belong to one place.
 const APART: f64 = 4.0;
+/// Largest rest, as a share of the difference, that a lag leaves if it is the cause. A difference with any other cause
+/// points as well along the path once in a hundred times.
+const ALONG: f64 = 0.02;
 /// Largest difference of clocks that is looked for, s.
 const LAG_S: f64 = 60.0;
 
@@ -59,8 +62,12 @@ pub(super) fn place(recording: &Recording, fixes: &[Fix], settings: &Settings) -
     let fits = starts.filter_map(lag).filter(|fit| fit.lag_s.abs() <= LAG_S);
     let best = fits.min_by(|a, b| a.rest_m.total_cmp(&b.rest_m));
     let rest_m = median(now.iter().map(|m| m.miss_m.norm())).unwrap_or(0.0);
+    let speed_m_s = median(now.iter().map(|m| m.velocity_m_s.norm())).unwrap_or(0.0);
+    // A fit with a constant difference sees a lag by the bend of the path only. Where the lag alone explains nearly all,
+    // the difference has the direction of the path, and its length is as exact as what is left.
+    let sigma_s = |fit: &Lag| if fit.rest_m < ALONG * rest_m { fit.rest_m / speed_m_s } else { fit.sigma_s };
     if let Some(fit) = best
-        && fit.lag_s.abs() > APART * fit.sigma_s.hypot(clock_s)
+        && fit.lag_s.abs() > APART * sigma_s(&fit).hypot(clock_s)
         && fit.rest_m < TOLD_SIGMA_M.max(0.2 * rest_m)
     {
         return Place::Lag(fit.lag_s);

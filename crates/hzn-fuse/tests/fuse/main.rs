@@ -1,5 +1,6 @@
 //! Tests of the replay of whole flights.
 
+mod clocks;
 mod common;
 mod common_part;
 mod flight;

@@ -1,0 +1,95 @@
+//! The clock of a receiver against the positions that the pictures were processed with.
+
+use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M, geodetic};
+use hzn_fuse::finding::{Cause, Level, Verdict};
+use hzn_fuse::flight::Wanted;
+use hzn_fuse::input::{Attitude, Body, Fix, Inputs, Recording, Sample, Seen};
+use hzn_fuse::{Settings, fuse};
+use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
+use hzn_nav::gravity::EARTH_RATE_RAD_S;
+use hzn_nav::strapdown::Imu;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+const RADIUS_M: f64 = 6.86e6;
+const RATE_RAD_S: f64 = 1.1112e-3;
+/// Duration of the flight, s.
+const SPAN_S: i32 = 240;
+const SIGMA_RAD: f64 = 1e-3;
+
+/// Returns position, velocity and attitude of a satellite that looks down, in ECEF.
+fn motion(time_s: f64) -> (Vector<Fixed>, Vector<Fixed>, Rotation<Vehicle, Fixed>) {
+    let (sin, cos) = (RATE_RAD_S * time_s).sin_cos();
+    let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), 1.0);
+    let to_fixed = Rotation3::from_axis_angle(&Vector3::z_axis(), -EARTH_RATE_RAD_S * time_s) * tilt;
+    let [up, along, across] =
+        [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()].map(|axis| to_fixed * axis);
+    let position_m = up * RADIUS_M;
+    let velocity_m_s = along * (RADIUS_M * RATE_RAD_S) - Vector3::new(0.0, 0.0, EARTH_RATE_RAD_S).cross(&position_m);
+    let axes = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[along, -across, -up]));
+    (position_m.into(), velocity_m_s.into(), UnitQuaternion::from_rotation_matrix(&axes).into())
+}
+
+fn seen(row: usize) -> Seen {
+    let time_s = 3.5 * row as f64 + 10.0;
+    let (position_m, _, attitude) = motion(time_s);
+    let cone = LimbCone::try_new(position_m.xyz(), WGS84_A_M, WGS84_B_M).unwrap();
+    let reference: Vector<Fixed> = Vector3::from(cone.axis.xyz()).into();
+    // The camera looks along the vehicle's z.
+    let camera: Rotation<Cam, Vehicle> = Rotation::identity();
+    let axis: Vector<Cam> = camera.inverse() * (attitude.inverse() * reference);
+    Seen {
+        time_s,
+        body: Body::Limb,
+        axis,
+        covariance_rad2: Covariance::across(&axis, SIGMA_RAD * SIGMA_RAD),
+        common_rad2: None,
+        reference: Some(reference),
+        altitude_km: Some(geodetic(position_m.xyz(), WGS84_A_M, WGS84_B_M).0 * 1e-3),
+        by_limb_height: Vector::zeros(),
+        centre: None,
+        row,
+    }
+}
+
+/// Returns the verdict with a receiver whose times are late.
+fn verdict(late_s: f64) -> Verdict {
+    let imu = |i: i32| {
+        let (gyro_rad_s, accel_m_s2) = (Vector::new(0.0, -RATE_RAD_S, 0.0), Vector::zeros());
+        Sample { imu: Imu { time_s: f64::from(i) * 0.1, gyro_rad_s, accel_m_s2 }, saturated: false }
+    };
+    let fix = |i: i32| {
+        let (position_m, velocity_m_s, _) = motion(f64::from(i));
+        let (position_sigma_m, velocity_sigma_m_s) = (5.0, 0.1);
+        Fix { time_s: f64::from(i) + late_s, position_m, velocity_m_s, position_sigma_m, velocity_sigma_m_s }
+    };
+    let recording = Recording {
+        name: "cam".into(),
+        mount: Some(Rotation::identity()),
+        seen: (0..60).map(seen).collect(),
+        ..Recording::default()
+    };
+    let attitude = |i: i32| {
+        let time_s = f64::from(i) * 5.0 + 1.0;
+        Attitude { time_s, fixed_from_vehicle: Some(motion(time_s).2), sigma_rad: 1e-4 }
+    };
+    let inputs = Inputs {
+        imu: (0..SPAN_S * 10).map(imu).collect(),
+        gnss: (0..SPAN_S).map(fix).collect(),
+        attitudes: (0..SPAN_S / 5 - 1).map(attitude).collect(),
+        recordings: vec![recording],
+    };
+    fuse(&inputs, &Settings::default(), Wanted::default()).unwrap().verdict
+}
+
+/// The path of a satellite hardly bends in four minutes, so that a lag looks like a place that is ahead.
+#[test]
+fn a_second_of_a_clock_is_found_on_a_short_arc() {
+    let right = verdict(0.0);
+    assert_eq!(right.level(), Level::Consistent, "{right:?}");
+    for late_s in [-1.0, 1.0, 2.0] {
+        let wrong = verdict(late_s);
+        let first = wrong.likeliest().unwrap();
+        assert!(wrong.level() == Level::Contradicts && first.cause == Cause::ReceiverClock, "{late_s}: {wrong:?}");
+        assert!(first.what.contains(&format!("{:.1} s", late_s.abs())), "{first:?}");
+    }
+}
