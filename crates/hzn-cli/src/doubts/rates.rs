@@ -14,6 +14,9 @@ const MIN_PAIRS: usize = 5;
 const MAX_REST: f64 = 1.5;
 /// The rates are doubted only if the turn that they leave exceeds this many sigma of the noise of both answers.
 const MIN_SIGMAS: f64 = 3.0;
+/// Largest turn between two answers that is compared, rad. The rates at two pictures do not say how the camera turned
+/// through a larger one.
+const MAX_TURN_RAD: f64 = core::f64::consts::FRAC_PI_2;
 /// Fastest turn of the direction to a body in an orbit, rad/s, see `hzn_core::Sequence`: no rate of a camera says it.
 const ORBIT_RAD_S: f64 = 1.24e-3;
 
@@ -25,6 +28,8 @@ struct Rest {
     negated: f64,
     /// With nothing taken out.
     none: f64,
+    /// The turn that the rates say.
+    by_rates: f64,
 }
 
 /// An answer with time and rate.
@@ -63,7 +68,13 @@ impl Rates {
         let turn = (before.rate_rad_s + now.rate_rad_s) * (-0.5 * after_s);
         let rest = |factor: f64| (Rotation3::new(turn * factor) * before.axis).angle(&now.axis);
         let (told, none) = ((rest(1.0) - ORBIT_RAD_S * after_s).max(0.0), rest(0.0));
-        self.turns.push(Rest { told, in_degrees: rest(1f64.to_radians()), negated: rest(-1.0), none });
+        self.turns.push(Rest {
+            told,
+            in_degrees: rest(1f64.to_radians()),
+            negated: rest(-1.0),
+            none,
+            by_rates: turn.norm(),
+        });
         self.sigmas.push(before.noise_rad.hypot(now.noise_rad));
     }
 
@@ -79,6 +90,8 @@ impl Rates {
         }
         let cause = if MAX_REST * of(|r| r.in_degrees) < none {
             "are they in degrees per second? rate_x, rate_y, rate_z are rad/s"
+        } else if of(|r| r.by_rates) > MAX_TURN_RAD {
+            return None;
         } else if MAX_REST * of(|r| r.negated) < none {
             "do they have the opposite sign? They are the rotation of the camera, in its own axes"
         } else {
@@ -149,6 +162,8 @@ mod tests {
             let negated = said(rate, -1.0, 1e-3).unwrap();
             assert!(negated.contains("opposite sign"), "{rate:?}: {negated}");
         }
+        // The rates at two pictures do not say how the camera turned by three quarters of a circle.
+        assert_eq!(said([0.0, 135.0, 3.0], -1.0, 1e-3), None);
         // A satellite that keeps the Earth in view has the rate of its orbit, and its axis does not turn.
         let mut orbit = Rates::default();
         let axis = Vector3::new(0.0, 0.3, 0.95).normalize();

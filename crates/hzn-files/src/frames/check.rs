@@ -27,6 +27,9 @@ const MIN_SPEED_KM_S: f64 = 0.02;
 
 /// Largest plausible rate, in rad/s: ten turns a second, twice the spin of a sounding rocket (5 turns a second).
 const MAX_RATE_RAD_S: f64 = 10.0 * core::f64::consts::TAU;
+/// Largest plausible turn while a picture is read out, rad. A limb that moves as far has no place in the picture. A rocket
+/// that spins at 5 turns a second reaches it with a readout time of 3 ms.
+const MAX_TURN_RAD: f64 = 0.1;
 /// Fewest turns between rows that say something about the rates. With a faster turn than half a circle from row to row,
 /// one or two may disagree by chance.
 const MIN_TURNS: usize = 3;
@@ -74,7 +77,7 @@ impl Frames {
         warnings.extend(self.explain_unused_columns(config));
         warnings.extend(self.explain_unused_attitude(config));
         warnings.extend(self.suspect_milliseconds());
-        warnings.extend(self.suspect_rates());
+        warnings.extend(self.suspect_rates().or_else(|| self.suspect_turn_of_a_picture(config)));
         warnings.extend(self.explain_missing_rates(config));
         warnings
     }
@@ -109,6 +112,24 @@ impl Frames {
         }
         let row = self.rows.iter().find(|row| row.q_fixed_from_camera_wxyz.is_some())?;
         let what = "without a position, nothing uses qw, qx, qy, qz: add x_km, y_km, z_km";
+        Some(self.problem(row, what))
+    }
+
+    /// Returns one warning if a picture turns implausibly far while it is read out. Attitudes, where the table has them,
+    /// already confirmed the rates.
+    fn suspect_turn_of_a_picture(&self, config: &Config) -> Option<Problem> {
+        if self.rows.iter().any(|row| row.q_fixed_from_camera_wxyz.is_some()) {
+            return None;
+        }
+        let readout_s = config.camera.readout_s.abs();
+        let rate = |row: &FrameData| row.rate_rad_s.map_or(0.0, |[x, y, z]| x.hypot(y).hypot(z));
+        let row = self.rows.iter().find(|row| rate(row) * readout_s > MAX_TURN_RAD)?;
+        let what = format!(
+            "at {:.2} rad/s the camera turns by {:.1} deg within camera.readout_s = {readout_s}, which is implausibly \
+             far: is the rate in degrees per second? rate_x, rate_y, rate_z are rad/s",
+            rate(row),
+            (rate(row) * readout_s).to_degrees()
+        );
         Some(self.problem(row, what))
     }
 
@@ -363,6 +384,20 @@ mod tests {
         }
         let fast = flight(6.0, 6f64.to_degrees(), 0.1, false).unwrap_or_default();
         assert!(fast.contains("the rate is 343.8 rad/s, which is implausibly large: is it in degrees"), "{fast}");
+    }
+
+    #[test]
+    fn no_picture_turns_far_while_it_is_read_out() {
+        let mut camera = hzn_core::camera::Config::ideal(hzn_core::camera::Model::Pinhole, 64, 48, 60.0);
+        camera.readout_s = -0.03;
+        let told = |rate: f64| {
+            let table = format!("file,altitude_km,rate_x,rate_y,rate_z\na,400,0,0,{rate}\n");
+            read(&table).unwrap().check_sensor(&Config::new(camera.clone()))
+        };
+        // 5 deg/s in the wrong unit, and a fast turn in the right one.
+        let wrong = told(5.0);
+        assert!(wrong.len() == 1 && wrong[0].what.contains("turns by 8.6 deg within"), "{wrong:?}");
+        assert!(told(90f64.to_radians()).is_empty());
     }
 
     #[test]
