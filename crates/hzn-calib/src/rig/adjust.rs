@@ -19,6 +19,10 @@ pub(super) const FEWEST: usize = 5;
 /// An epoch whose χ² is beyond this number of sigmas does not count. One of a thousand good ones is left out.
 const LEFT_OUT_SIGMAS: f64 = 3.09;
 
+/// Largest χ² for each degree of freedom: errors that are twice as large as told. Larger ones are no noise, and a sigma
+/// that is widened for them means nothing.
+const LARGEST_CHI2: f64 = 4.0;
+
 /// The told mounts, and the sigmas that the adjustment begins with.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -62,6 +66,15 @@ pub enum Refused {
     Alone(usize),
     /// The steps do not end.
     NoConvergence,
+    /// Most epochs contradict every mount near the told ones, or too few are left.
+    Contradict {
+        /// Number of epochs that agree with each other.
+        used: usize,
+        /// Number of epochs that contradict them.
+        left_out: usize,
+        /// The only head without which the others agree.
+        head: Option<usize>,
+    },
 }
 
 impl fmt::Display for Refused {
@@ -72,6 +85,17 @@ impl fmt::Display for Refused {
             }
             Self::Alone(k) => write!(f, "head {} has no answer at an epoch at which another head has one", k + 1),
             Self::NoConvergence => f.write_str("the mounts do not converge: are they wrong by tens of degrees?"),
+            Self::Contradict { used, left_out, head } => {
+                write!(f, "the heads contradict each other ({left_out} epochs are left out, {used} count): ")?;
+                match head {
+                    Some(k) => write!(f, "without head {} the others agree; ", k + 1)?,
+                    None => {}
+                }
+                f.write_str(
+                    "a mount is wrong by more than an adjustment finds, heads are exchanged, a picture is mirrored, or a \
+                     clock is late",
+                )
+            }
         }
     }
 }
@@ -83,6 +107,36 @@ impl core::error::Error for Refused {}
 /// # Errors
 /// See [`Refused`].
 pub fn adjust(settings: &Settings, epochs: &[Epoch]) -> Result<Adjusted, Refused> {
+    adjust_all(settings, epochs).map_err(|why| match why {
+        Refused::Contradict { used, left_out, .. } => {
+            Refused::Contradict { used, left_out, head: the_wrong_head(settings, epochs) }
+        }
+        Refused::NoConvergence => match the_wrong_head(settings, epochs) {
+            Some(k) => Refused::Contradict { used: 0, left_out: epochs.len(), head: Some(k) },
+            None => Refused::NoConvergence,
+        },
+        other => other,
+    })
+}
+
+/// Returns the only head without which the others agree; `None` with two heads, which nothing tells apart.
+fn the_wrong_head(settings: &Settings, epochs: &[Epoch]) -> Option<usize> {
+    let heads = settings.told.len();
+    let agree_without = |k: &usize| {
+        let mut told = settings.told.clone();
+        told.remove(*k);
+        let others = epochs.iter().map(|epoch| {
+            let mut epoch = epoch.clone();
+            epoch.remove(*k);
+            epoch
+        });
+        adjust_all(&Settings { told, ..settings.clone() }, &others.collect::<Vec<_>>()).is_ok()
+    };
+    let mut all = (0..heads).filter(|_| heads > 2).filter(agree_without);
+    all.next().filter(|_| all.next().is_none())
+}
+
+fn adjust_all(settings: &Settings, epochs: &[Epoch]) -> Result<Adjusted, Refused> {
     let heads = settings.told.len();
     let together: Vec<&Epoch> = epochs.iter().filter(|epoch| epoch.iter().flatten().count() > 1).collect();
     if together.len() < FEWEST {
@@ -105,7 +159,13 @@ pub fn adjust(settings: &Settings, epochs: &[Epoch]) -> Result<Adjusted, Refused
         let largest = place.take(&moved);
         if step > STEPS_WITH_ALL && largest < SMALLEST_STEP_RAD {
             let reduced: Vec<Option<Reduced>> = together.iter().map(|epoch| place.reduce(epoch)).collect();
-            return Sums::new(settings, &reduced, &counts, false).finish(settings, place).ok_or(Refused::NoConvergence);
+            let sums = Sums::new(settings, &reduced, &counts, false);
+            let [used, left_out] = sums.epochs;
+            // The median of the epochs sets the scale, so a good flight leaves far fewer than half of them out.
+            if used < FEWEST || left_out > used || sums.ratio() > LARGEST_CHI2 {
+                return Err(Refused::Contradict { used, left_out, head: None });
+            }
+            return sums.finish(settings, place).ok_or(Refused::NoConvergence);
         }
     }
     Err(Refused::NoConvergence)
@@ -145,7 +205,7 @@ impl Sums {
             right: DVector::zeros(size),
             chi2: 0.0,
             freedom: 0,
-            epochs: [0, counts.iter().filter(|counts| !**counts).count()],
+            epochs: [0, reduced.iter().zip(counts).filter(|(r, counts)| !**counts || r.is_none()).count()],
         };
         for r in reduced.iter().zip(counts).filter_map(|(r, counts)| r.as_ref().filter(|_| *counts)) {
             let limit = scale * chi2(r.freedom, LEFT_OUT_SIGMAS);
@@ -182,13 +242,18 @@ impl Sums {
         Some((normal.cholesky()?.inverse(), right))
     }
 
+    /// Returns χ² for each degree of freedom.
+    fn ratio(&self) -> f64 {
+        self.chi2 / self.freedom.max(1) as f64
+    }
+
     fn step(&self, settings: &Settings, place: &Place) -> Option<DVector<f64>> {
         let (inverse, right) = self.solve(settings, place, 1.0)?;
         Some(inverse * right)
     }
 
     fn finish(self, settings: &Settings, place: Place) -> Option<Adjusted> {
-        let ratio = self.chi2 / self.freedom.max(1) as f64;
+        let ratio = self.ratio();
         let (inverse, _) = self.solve(settings, &place, ratio.max(1.0))?;
         let heads = settings.told.len();
         let turn = |k: usize| (place.mounts[k] * settings.told[k].inverse()).scaled_axis();

@@ -176,6 +176,43 @@ fn two_heads_do_not_say_which_of_them_has_turned() {
     assert_eq!(check(&adjusted, &told_rad2), Check::Contradict);
 }
 
+/// The worse a mount is, the fewer epochs agree with any mount near it: this is no sign that it holds.
+#[test]
+fn mounts_far_from_the_told_ones_are_found_or_refused() {
+    let mut rng = Draws(12);
+    let relative = |mounts: &[Rotation3<f64>]| mounts[0].inverse() * mounts[1];
+    for degrees in [25.0, 40.0, 90.0, 120.0, 180.0] {
+        for heads in [2, 3, 4] {
+            let told = ring(heads);
+            let mut truth = told.clone();
+            truth[1] = Rotation3::new(Vector3::new(0.0, f64::to_radians(degrees), 0.0)) * told[1];
+            match adjust(&settings(told), &flight(&mut rng, &truth, 40, 0.3)) {
+                Ok(found) => {
+                    let error = (relative(&found.mounts).inverse() * relative(&truth)).angle().to_degrees();
+                    assert!(error < 0.5, "{degrees} degrees, {heads} heads: {error}");
+                }
+                Err(Refused::Contradict { head, .. }) => assert!(head.is_none_or(|k| k == 1 && heads > 2)),
+                Err(Refused::NoConvergence) => {}
+                Err(other) => panic!("{degrees} degrees, {heads} heads: {other}"),
+            }
+        }
+    }
+}
+
+/// A head with the pictures of another flight.
+#[test]
+fn epochs_that_contradict_each_other_are_refused() {
+    let mut rng = Draws(13);
+    let told = ring(3);
+    let mut epochs = flight(&mut rng, &told, 40, 0.4);
+    for (epoch, other) in epochs.iter_mut().zip(flight(&mut rng, &told, 40, 0.4)) {
+        epoch[2] = other[2].clone();
+    }
+    let why = adjust(&settings(told), &epochs).unwrap_err();
+    assert!(matches!(why, Refused::Contradict { head: Some(2), .. }), "{why:?}");
+    assert!(why.to_string().contains("without head 3 the others agree"), "{why}");
+}
+
 #[test]
 fn flights_that_tell_nothing_are_refused() {
     let mut rng = Draws(4);
