@@ -6,8 +6,10 @@ the probability `p_limb`.
 
 decoy_pictures.py and decoy_more.py paint the edges, limb_pictures.py the limbs; all 640x480, in flights of three
 pictures. The sensor has default settings and gets the position, and in a second run an attitude with errors of 5
-degrees per axis as well. With --keep a campaign that was stopped continues after its last flight; if the program was
-built again, it processes the kept pictures again. With --check the program exits with 1 if the shares are too large.
+degrees per axis as well. In a third run it gets a position 3000 to 60000 km high, from where the Earth is a disc: most
+edges have no size of their own. The limbs of the kind `far` are rendered from there. With --keep a campaign that was
+stopped continues after its last flight; if the program was built again, it processes the kept pictures again. With
+--check the program exits with 1 if the shares are too large.
 
 --fit prints the weights of the evidence (crates/hzn-core/src/model/evidence.rs): a logistic regression on the answers
 of the kinds that are not in HELD_OUT, without the gate on p_limb. Ghosts that are softer than 0.8 scale heights of the
@@ -16,6 +18,7 @@ air are left out, because nothing tells them from a limb.
 
 import argparse
 import concurrent.futures
+import csv
 import json
 import math
 import pathlib
@@ -35,15 +38,18 @@ import limb_pictures
 # Kinds that took no part in the fit of the weights.
 HELD_OUT = ["cyclone", "foil", "plume", "river", "cable"]
 # decoy_more.py adds its kinds to those of decoy_pictures.py.
-KINDS = [*decoy_pictures.KINDS, *limb_pictures.CLASSES]
+LIMBS = limb_pictures.CLASSES | limb_pictures.FAR_CLASSES
+KINDS = [*decoy_pictures.KINDS, *LIMBS]
 # A ghost counts as sharp if the softness of its edge is below this many scale heights.
 SHARP = 0.8
 # Terms with a weight. Attitude and Sun are likelihood ratios already.
 TERMS = ["curvature", "half-angle", "gaps", "misfit", "sky", "faint-air", "bright-air", "faint-high-air", "layer",
          "second-edge", "flat", "mottled-sky"]
-# Shares of the false answers in the fit. The first is for all kinds but ghosts and airglow together.
-SHARES = {"other": 0.6, "ghost": 0.2, "airglow": 0.2}
-SENSORS = {"default": limb_campaign.POSITION, "with an attitude": limb_campaign.POSITION + limb_campaign.ATTITUDE}
+# Shares of the false answers in the fit. The first two are for all kinds but ghosts and airglow together, from the
+# altitude of the flight and from afar.
+SHARES = {"other": 0.3, "from afar": 0.3, "ghost": 0.2, "airglow": 0.2}
+SENSORS = {"default": limb_campaign.POSITION, "with an attitude": limb_campaign.POSITION + limb_campaign.ATTITUDE,
+           "from afar": limb_campaign.POSITION}
 # Expectation of the figures: share of the pictures without a limb that have an answer, and of lost true answers. The
 # limits of --check are those of a few flights, twice as wide, and one flight of three pictures more: they show the
 # same edge, so that they are answered together.
@@ -59,6 +65,29 @@ def evidence(hzn, folder, name):
     return [found.get(term, 0.0) for term in TERMS]
 
 
+def write_far(folder, kind, seed):
+    """Writes frames-far.csv: the same pictures from 3000 to 60000 km."""
+    rng = np.random.default_rng([777, seed, KINDS.index(kind)])
+    with (folder / "frames.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        position_km = np.array([float(row[f"{k}_km"]) for k in "xyz"])
+        altitude_km = math.exp(rng.uniform(*np.log(limb_pictures.FAR_ALTITUDES_KM)))
+        position_km *= (limb_pictures.MEAN_KM + altitude_km) / np.linalg.norm(position_km)
+        row |= {f"{k}_km": f"{x:.6f}" for k, x in zip("xyz", position_km)}
+    with (folder / "frames-far.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def sensors(kind, fit):
+    """Returns the names of the sensors that look at a kind."""
+    has_size = kind in LIMBS or kind in ("ghost", "airglow")
+    left_out = {"with an attitude"} if fit else set()
+    return [name for name in SENSORS if name not in left_out | ({"from afar"} if has_size else set())]
+
+
 def fly(hzn, root, kind, seed, fit):
     """Renders a flight and runs it. Returns one record per picture and sensor."""
     folder = root / f"{kind.replace(', ', '-').replace(' ', '-')}-{seed}"
@@ -67,16 +96,20 @@ def fly(hzn, root, kind, seed, fit):
     stamp = [program.st_size, program.st_mtime_ns]
     if kept.exists() and (before := json.loads(kept.read_text()))["program"] == stamp:
         return before["records"]
-    is_limb = kind in limb_pictures.CLASSES
+    is_limb = kind in LIMBS
     if not truth_file.exists():
         render = limb_pictures.render_flight if is_limb else decoy_pictures.render_flight
         truth = render(folder, seed, kind, decoy_pictures.PICTURES)
         truth_file.write_text(json.dumps({name: [list(axis), *rest] for name, (axis, *rest) in truth.items()}))
     truth = json.loads(truth_file.read_text())
     records = []
-    for sensor in ["default"] if fit else SENSORS:
+    for sensor in sensors(kind, fit):
+        table = "frames.csv"
+        if sensor == "from afar":
+            table = "frames-far.csv"
+            write_far(folder, kind, seed)
         # All answers without the gate, so that p_limb is seen; the gate refuses those below its limit.
-        for row in limb_campaign.process(hzn, folder, SENSORS[sensor], "[gates]\nmin_p_limb = 0\n"):
+        for row in limb_campaign.process(hzn, folder, SENSORS[sensor], "[gates]\nmin_p_limb = 0\n", table):
             name = pathlib.Path(row["file"]).name
             axis, *rest = truth[name]
             axis = np.array(axis)
@@ -95,14 +128,16 @@ def fly(hzn, root, kind, seed, fit):
 
 
 def family(record):
-    return record["kind"] if record["kind"] in SHARES else "other"
+    if record["kind"] in SHARES:
+        return record["kind"]
+    return "from afar" if record["sensor"] == "from afar" else "other"
 
 
 def fit(records):
     """Prints the weights of a logistic regression. Right and false answers have equal weights, false ones SHARES."""
     used = [r for r in records if r["answered"] and r["kind"] not in HELD_OUT and (r["kind"] != "ghost" or r["sharp"])]
     # A limb with a large error is a limb.
-    used = [r for r in used if r["right"] or r["kind"] not in limb_pictures.CLASSES]
+    used = [r for r in used if r["right"] or r["kind"] not in LIMBS]
     right = np.array([r["right"] for r in used])
     values = np.array([[*r["values"], 1.0] for r in used])
     total = 200.0
@@ -110,8 +145,9 @@ def fit(records):
     for name, share in SHARES.items():
         members = np.array([not r["right"] and family(r) == name for r in used])
         weight[members] = total * share / max(members.sum(), 1)
-    # Newton's method with a Gaussian prior of sigma 2 on each weight but the constant.
-    prior = np.diag([*np.full(len(TERMS), 0.25), 1e-6])
+    # Newton's method with a Gaussian prior of sigma 2 on each weight but the constant, and of sigma 1 on that of the
+    # sky: these limbs have little glare, and a lens with glare brightens the sky of a limb, too.
+    prior = np.diag([*(1.0 if term == "sky" else 0.25 for term in TERMS), 1e-6])
     solution = np.zeros(len(TERMS) + 1)
     for _ in range(50):
         p = 1 / (1 + np.exp(-values @ solution))
@@ -132,7 +168,7 @@ def table(records, limit):
     print("| pictures | sensor | pictures | false before the gate | false after it | right before | lost by the gate |")
     print("|---|---|---:|---:|---:|---:|---:|")
     for kind in KINDS:
-        for sensor in SENSORS:
+        for sensor in sensors(kind, False):
             rows = [r for r in records if r["kind"] == kind and r["sensor"] == sensor]
             parts = {kind: rows}
             if kind == "ghost":
@@ -145,7 +181,7 @@ def table(records, limit):
     shares = {}
     for sensor in SENSORS:
         rows = [r for r in records if r["sensor"] == sensor]
-        plain = [r for r in rows if r["kind"] not in limb_pictures.CLASSES and r["kind"] not in ("ghost", "airglow")]
+        plain = [r for r in rows if r["kind"] not in LIMBS and r["kind"] not in ("ghost", "airglow")]
         for name, part in (("kinds of the fit", [r for r in plain if r["kind"] not in HELD_OUT]),
                            ("kinds that were held out", [r for r in plain if r["kind"] in HELD_OUT])):
             passed = sum(r["answered"] and r["p"] >= limit for r in part)
@@ -163,7 +199,8 @@ def table(records, limit):
 def reliability(records, odds):
     """Prints how often the edge is the limb, by p_limb. Right and false answers are weighted so that their odds are the
     prior odds, and false answers have the SHARES of the fit; soft ghosts are left out."""
-    used = [r for r in records if r["answered"] and r["sensor"] == "default" and (r["kind"] != "ghost" or r["sharp"])]
+    used = [r for r in records if r["answered"] and r["sensor"] != "with an attitude"]
+    used = [r for r in used if r["kind"] != "ghost" or r["sharp"]]
     right = [r for r in used if r["right"]]
     groups = {name: [r for r in used if not r["right"] and family(r) == name] for name in SHARES}
     edges = [0.0, 0.1, 0.5, 0.75, 0.9, 0.99, 0.999, 1.0]

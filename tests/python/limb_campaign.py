@@ -43,10 +43,10 @@ def answers(hzn, folder, sensor):
     return process(hzn, folder, *SENSORS[sensor])
 
 
-def process(hzn, folder, columns, lines):
-    """Runs hzn with these columns of frames.csv and these further lines of sensor.toml. Returns the rows of its results."""
+def process(hzn, folder, columns, lines, table="frames.csv"):
+    """Runs hzn with these columns of a table and these further lines of sensor.toml. Returns the rows of its results."""
     (folder / "used.toml").write_text((folder / "sensor.toml").read_text() + lines)
-    with (folder / "frames.csv").open() as file:
+    with (folder / table).open() as file:
         rows = list(csv.DictReader(file))
     with (folder / "used.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, columns, extrasaction="ignore")

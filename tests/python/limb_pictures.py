@@ -41,6 +41,9 @@ CLASSES = {
     "day, overexposed": ((25.0, 80.0), (1.3, 3.0)),
     "low Sun": ((-5.0, 15.0), (0.45, 1.3)),
 }
+# The same for pictures from far away, where the Earth is a disc; and the altitudes of both, km.
+FAR_CLASSES = {"far": ((25.0, 80.0), (0.45, 3.0))}
+ALTITUDES_KM, FAR_ALTITUDES_KM = (70, 900), (3000, 60000)
 
 
 def unit(v):
@@ -382,15 +385,16 @@ def render_flight(folder, seed, kind, pictures, shade=False):
 
     The truth is the limb axis in the camera, and the number of limb pixels that sunlight reaches.
     """
-    elevations_deg, exposures = CLASSES[kind]
-    rng, errors = (np.random.default_rng([list(CLASSES).index(kind), seed, *more]) for more in ([], [1]))
+    classes = CLASSES | FAR_CLASSES
+    elevations_deg, exposures = classes[kind]
+    rng, errors = (np.random.default_rng([list(classes).index(kind), seed, *more]) for more in ([], [1]))
     folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     camera, world = draw_camera(rng, exposures), draw_world(rng)
     if shade:
         world.shade = ScatteredOnce(world.scale_height_km)
     rays, seen = camera.lens.rays()
-    altitude_km = math.exp(rng.uniform(math.log(70), math.log(900)))
+    altitude_km = math.exp(rng.uniform(*np.log(FAR_ALTITUDES_KM if kind in FAR_CLASSES else ALTITUDES_KM)))
     about = unit(rng.normal(size=3))
     sun_elevation, sun_azimuth = math.radians(rng.uniform(*elevations_deg)), rng.uniform(0, 2 * math.pi)
     rows, truth = ["file,x_km,y_km,z_km,sun_x,sun_y,sun_z,qw,qx,qy,qz,attitude_sigma_deg"], {}

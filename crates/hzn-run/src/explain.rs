@@ -327,10 +327,10 @@ pub fn evidence(
 /// Returns the meaning of a piece of evidence.
 fn evidence_text(term: evidence::Term) -> &'static str {
     match term {
-        evidence::Term::Curvature => "log of the curvature over its sigma",
+        evidence::Term::Curvature => "log of the curvature, or of the size of a small disc, over its sigma",
         evidence::Term::HalfAngle => "squared difference from the expected half-angle, in sigmas",
         evidence::Term::Gaps => "parts of the limb without edge, and of the edge without limb",
-        evidence::Term::Misfit => "log of the residuals over their noise",
+        evidence::Term::Misfit => "log of the residuals over those that a limb may have",
         evidence::Term::Sky => "brightness of the sky over that of the body",
         evidence::Term::FaintAir => "log of the light 1.5 scale heights up, if too faint for air",
         evidence::Term::BrightAir => "log of the light 1.5 scale heights up, if too bright for air",

@@ -112,7 +112,8 @@ fn photographs_of_the_limb_are_probable() {
         let expected = sensors.flight.expect(&Prior::default()).expect("the prior is possible");
         let flight = sensors.flight.process(&photograph.view(), &expected).solution.and_then(|s| s.p_limb);
         println!("{file}: {host:.4?} {flight:.4?}");
-        assert!(host.is_some_and(|p| p > 0.95) && flight.is_none_or(|p| p > 0.95), "{file}: {host:?}");
+        // The lens of OPS-SAT is not calibrated, and its limb has a half-angle 2.6 sigmas from the expected one.
+        assert!(host.is_some_and(|p| p > 0.9) && flight.is_none_or(|p| p > 0.9), "{file}: {host:?}");
     }
 }
 

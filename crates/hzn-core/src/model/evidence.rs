@@ -11,14 +11,22 @@ use crate::base::real::Real;
 // The numbers are fixed because they are the indices of the values.
 #[repr(u8)]
 pub enum Term {
-    /// How clearly the edge is curved: the logarithm of the cosine of its half-angle over the sigma of this cosine, 0
-    /// to 5. A straight edge has the cosine 0.
+    /// How clearly the edge has the curvature and the size of its cone: the logarithm of the smaller one of c and
+    /// 2 (1 − c) over the sigma of c, 0 to 5; c is the cosine of the fitted half-angle α.
+    ///
+    /// A straight edge has c = 0, and c/σ_c is the distance from it in sigmas, which for a short arc is its sagitta
+    /// over the error of the edge. A spot without a size has 1 − c = 0. For a small disc, 2 (1 − c) = α² and
+    /// σ_c = α σ_α, so that the value is the radius over its error: no disc is certain because it is small. Both errors
+    /// come from the residuals of the edge and their correlation. A chance edge may have any radius, evenly in its
+    /// logarithm; the likelihood ratio of the expected half-angle is then this ratio times exp(−z²/2), with z of the
+    /// next term. The weights that follow from this, 1 and −0.5, are close to the fitted ones.
     Curvature = 0,
     /// Squared difference between the fitted and the expected half-angle over its variance, at most 9.
     HalfAngle = 1,
     /// Part of the limb in view without edge points, plus the part of the edge's points that are no inliers.
     Gaps = 2,
-    /// Logarithm of the RMS residual over the noise from point to point.
+    /// Logarithm of the RMS residual over that which a limb may have from the noise of the edge, the sampling, and the
+    /// roughness of clouds, 0 or more; what an uncertain lens bends is taken out.
     Misfit = 3,
     /// Brightness of the sky over that of the body, 0 to 1.
     Sky = 4,
@@ -92,9 +100,9 @@ impl Term {
 
 /// Weights of the terms in their order, in hundredths. The values of attitude and Sun are likelihood ratios already.
 // Whole numbers: a flight computer without double precision would convert each number in software.
-const WEIGHTS_PERCENT: [i16; TERMS] = [64, -40, -203, -61, -52, 191, -340, 120, -184, -369, 234, -155, 100, 100];
+const WEIGHTS_PERCENT: [i16; TERMS] = [89, -57, -247, -192, -198, 143, -58, 66, -127, -268, 187, -29, 100, 100];
 /// The constant b.
-const CONSTANT: f64 = 2.49;
+const CONSTANT: f64 = 0.86;
 
 fn weight<T: Real>(percent: i16) -> T {
     T::from_i32(percent.into()) / T::from_i32(100)

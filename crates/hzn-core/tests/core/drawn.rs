@@ -271,10 +271,10 @@ fn what_lies_on_both_sides_of_an_edge_is_evidence() {
     let night = p_limb_of(&config, |km, _| layer(km) * if km < -95.0 { 0.6 } else { 1.0 });
     let without_end = p_limb_of(&config, |km, _| layer(km));
     assert!(odds(night) < 0.05 * odds(without_end), "layer {night} {without_end}");
-    // Ground beyond the edge is uneven.
-    let mottled = |km: f64, [u, _]: [f64; 2]| limb_light(km) + 0.05 * (1.0 + (u / 20.0).sin());
+    // Ground beyond the edge is uneven, and not dark.
+    let mottled = |km: f64, [u, _]: [f64; 2]| limb_light(km) + 0.11 * (1.0 + (u / 20.0).sin());
     let coast = p_limb_of(&config, mottled);
-    assert!(odds(coast) < 0.5 * odds(day), "mottled {coast} {day}");
+    assert!(odds(coast) < 0.8 * odds(day), "mottled {coast} {day}");
     // A thermal camera sees no sunlit air, so that none of it is evidence.
     let mut thermal = config.clone();
     thermal.body.sunlit = Some(false);
@@ -305,4 +305,44 @@ fn an_edge_without_air_is_an_unlikely_limb() {
     let disc = Disc { axis: unit([0.1, 0.8, 0.6]), half_angle_deg, brightness: 180.0 };
     let moon = process(&config, &draw(&config, &[disc], 5.0, 1.5));
     assert!(moon.solution.is_some_and(|s| s.p_limb.is_none()));
+}
+
+/// Draws an outline of the mean radius 22 px: `radius_px` is its radius by the angle. The Earth has this size from
+/// 36 000 km through a lens of 150 px.
+fn outline(radius_px: impl Fn(f64) -> f64) -> (Config, Vec<u8>) {
+    let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 320, 240, 150.0));
+    config.body.kind = Kind::EarthSphere;
+    (config.body.altitude_km, config.body.altitude_sigma_km) = (Some(37_000.0), 2000.0);
+    let mut noise = Noise(5);
+    let data = (0..320 * 240)
+        .map(|i| {
+            let [x, y] = [f64::from(i % 320) - 172.3, f64::from(i / 320) - 108.8];
+            let depth_px = radius_px(y.atan2(x)) - x.hypot(y);
+            (6.0 + 150.0 * (0.5 + depth_px).clamp(0.0, 1.0) + 1.5 * noise.normal()) as u8
+        })
+        .collect();
+    (config, data)
+}
+
+#[test]
+fn an_outline_with_corners_is_no_small_disc() {
+    // A regular polygon with this number of corners, whose mean radius is 22 px.
+    let polygon = |corners: f64| {
+        let half = core::f64::consts::PI / corners;
+        let mean = (core::f64::consts::FRAC_PI_4 + half / 2.0).tan().ln() / half;
+        outline(move |angle: f64| 22.0 / mean / ((angle + 20.0).rem_euclid(2.0 * half) - half).cos())
+    };
+    let (config, disc) = outline(|_| 22.0);
+    let disc = process(&config, &disc).solution.expect("a disc");
+    assert!(disc.rms_px < 0.15 && disc.p_limb.is_some_and(|p| p > 0.99), "{:?} {}", disc.p_limb, disc.rms_px);
+    let (config, pentagon) = polygon(5.0);
+    let report = process(&config, &pentagon);
+    assert!(report.solution.is_none(), "{:?}", report.solution);
+    assert!(report.candidates.iter().any(|c| c.verdict == Verdict::Residuals), "{:?}", report.candidates);
+    // What a gate cannot refuse is less probable.
+    let (config, octagon) = polygon(8.0);
+    if let Some(octagon) = process(&config, &octagon).solution {
+        let odds = |p: Option<f64>| p.map_or(0.0, |p| p / (1.0 - p));
+        assert!(odds(octagon.p_limb) < 0.2 * odds(disc.p_limb), "{:?} {:?}", octagon.p_limb, disc.p_limb);
+    }
 }

@@ -50,7 +50,8 @@ section! {
         /// largest distance of an inlier, this limit is raised by the same factor.
         ///
         /// A larger value answers pictures with a poor calibration or a rough limb, and may let edges pass that are no
-        /// limb.
+        /// limb. For a disc with a radius below 46 px the limit is smaller in proportion to the radius, down to a
+        /// quarter: an outline that departs from a circle by 4 % of its radius is a polygon or a patch of light.
         @112 max_rms_px: f64 = 2.0, [above 0.0];
         /// Largest difference between the fitted and the expected half-angle, in standard deviations.
         ///

@@ -4,6 +4,7 @@
 //! has the ground below it, with a second edge of its own.
 
 use super::case::Case;
+use super::lens;
 use super::places::{MAX_PLACES, Places, mean_brightness};
 use super::profile::{LEAST, Light, Values};
 use super::shape::Residuals;
@@ -16,8 +17,15 @@ use crate::model::evidence::{Evidence, Term};
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 
-/// Residuals below this count as equal, in pixels, because sampling and blur cause as much.
-const FLOOR_PX: f64 = 0.05;
+/// Error of an edge point on a clean edge, in pixels: sampling and blur cause as much. It is the default of
+/// `covariance.sigma_px`.
+const CLEAN_PX: f64 = 0.1;
+/// Variation of the height of the visible edge along one limb (1σ), in scale heights of the air: 1.1 km for the Earth.
+///
+/// Clouds and haze lie within the air, so that their heights scale with it. The residuals of limbs by day have a median
+/// of 0.6 to 0.8 km, and nine of ten are below 1.9 km (the seeds of the fit). The sigma of the limb height is no
+/// measure of this: it is the error of the mean height of the whole limb, and a calibration makes it smaller.
+const ROUGHNESS_SCALE_HEIGHTS: f64 = 0.15;
 /// Distance from the edge at which the light of the air is read, in scale heights.
 const SCALE_HEIGHTS: f64 = 1.5;
 /// Smallest scale height at which the air can be told from the blur, in pixels.
@@ -62,15 +70,14 @@ pub(super) fn weigh<T: Real, P: Pixels, O: Observer<T>>(
     let var_cos = fused.var_free_cos.filter(|_| !expected.free && expected.scale_height_m > T::ZERO)?;
     let (zero, one) = (T::ZERO, T::one());
     let mut evidence = Evidence::new();
-    let significance = fit.c / var_cos.sqrt();
+    let significance = fit.c.min(fit.k + fit.k) / var_cos.sqrt();
     evidence.set(Term::Curvature, significance.max(one).ln().min(T::from_f64(5.0)));
     let off = fit.c - expected.cos;
     let z2 = expected.variance_towards(fit.c, one).map_or(zero, |prior| off * off / (var_cos + prior));
     evidence.set(Term::HalfAngle, z2.min(T::from_f64(9.0)));
     let inliers = T::from_i32(fit.inliers as i32) / T::from_i32(case.points.max(1) as i32);
     evidence.set(Term::Gaps, (one - case.cover.share) + (one - inliers).max(zero));
-    let floor = T::from_f64(FLOOR_PX);
-    evidence.set(Term::Misfit, (residuals.rms_px.max(floor) / residuals.noise_px.max(floor)).ln());
+    evidence.set(Term::Misfit, misfit(case, places, residuals));
     // Of a picture that came row by row, only lit and dark pixels are left. A thermal picture shows no sunlit air.
     if !P::STREAMED && expected.is_in_sunlight {
         Looks::new(case, binary, places, sky).weigh(binary, places, &mut evidence);
@@ -88,6 +95,43 @@ pub(super) fn weigh<T: Real, P: Pixels, O: Observer<T>>(
         evidence.set(Term::Sun, ln_ratio_of_direction(T::from_f64(0.5)));
     }
     Some(evidence)
+}
+
+/// Returns the logarithm of the residuals over those that a limb may have; 0 where a limb may have as large ones.
+///
+/// A limb departs from its cone by the noise from point to point, by the sampling, and by the roughness of clouds and
+/// haze, which is a length at the limb and hence an angle of the picture: σ² = max(n, 0.1)² + (0.15 H/d)², with d
+/// metres at the limb per pixel. Near the Earth a pixel is some kilometres, and clouds cause residuals of a pixel.
+/// Where the Earth is a small disc, a pixel is hundreds of kilometres: no limb departs from its cone by a pixel there,
+/// but a chance curve does.
+///
+/// What the stated errors of the lens bend is taken out first. A lens that is known exactly has no such part.
+fn misfit<T: Real>(case: &Case<'_, T>, places: &Places<T>, residuals: &Residuals<'_, T>) -> T {
+    let is_exact = case.camera.intrinsic_modes().is_none();
+    let rms_px = if is_exact { residuals.rms_px } else { rms_without_lens_px(case, residuals) };
+    let scale_px = places
+        .get(places.len() / 2)
+        .map_or(T::ZERO, |middle| case.expected.scale_height_m * angle_by_m(case) / middle.by_px);
+    let rough = scale_px * T::from_f64(ROUGHNESS_SCALE_HEIGHTS);
+    let noise = residuals.noise_px.max(T::from_f64(CLEAN_PX));
+    (rms_px / (noise * noise + rough * rough).sqrt()).max(T::one()).ln()
+}
+
+/// Returns the RMS of the residuals without what the stated errors of the lens bend, in pixels.
+// Not inlined: the copy of the residuals would be on the stack of every judgement.
+#[inline(never)]
+fn rms_without_lens_px<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> T {
+    let mut shape = residuals.shape.clone();
+    let unbent = lens::unbend(case, residuals, &mut shape)
+        .map(|_| Residuals::new(residuals.curve, &shape, case.config).rms_px.min(residuals.rms_px));
+    unbent.unwrap_or(residuals.rms_px)
+}
+
+/// Returns the derivative of s·e by the height of the limb, 1/m. An angle is a height divided by the distance
+/// (R + d) cot α of the limb; that of s·e = cos ρ is sin ρ dρ.
+fn angle_by_m<T: Real>(case: &Case<'_, T>) -> T {
+    let (c, expected) = (case.fused.c, case.expected);
+    (T::one() - c * c).max(T::ZERO) / (c.max(T::from_f64(1e-6)) * (expected.radius_m + expected.limb_m).max(T::one()))
 }
 
 /// Returns the logarithm of the likelihood ratio of a direction. `against` is the likelihood of an edge that may give
@@ -115,13 +159,10 @@ impl<T: Real> Looks<T> {
         places: &Places<T>,
         sky: &Sky<T>,
     ) -> Self {
-        let (c, expected) = (case.fused.c, case.expected);
-        // An angle is a height divided by the distance (R + d) cot α of the limb; that of s·e = cos ρ is sin ρ dρ.
-        let by_m = (T::one() - c * c).max(T::ZERO)
-            / (c.max(T::from_f64(1e-6)) * (expected.radius_m + expected.limb_m).max(T::one()));
+        let expected = case.expected;
         let (altitude_m, _) = expected.altitude_and_sigma_m();
         let looks = Self {
-            light: Light { by_m, scale_height_m: expected.scale_height_m, sky: sky.median },
+            light: Light { by_m: angle_by_m(case), scale_height_m: expected.scale_height_m, sky: sky.median },
             shows_air: true,
             is_above_layer: altitude_m > expected.scale_height_m * T::from_f64(LAYER_SCALE_HEIGHTS),
         };
