@@ -183,6 +183,13 @@ fn finish(args: &Args, text: &str, known: &CameraFacts) -> Outcome {
     if known.pixel_aspect != 1.0 {
         tell::line(format_args!("the pixels are {:.3} times as wide as high, as the video says", known.pixel_aspect));
     }
+    if matches!(args.body, Body::Moon) {
+        tell::line(
+            "the Moon has no air, whose light tells a limb from other edges: answers have no p_limb and no \
+             protection_deg. Test sigma_max_deg and rms_px instead, and give an attitude in frames.csv if there is \
+             one: it refuses edges that are elsewhere (gates.max_attitude_sigma)",
+        );
+    }
     if !knows_altitudes(args, &sensor.config)? {
         tell::line(
             "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or \

@@ -21,13 +21,14 @@ use hzn_run::{disk, explain};
 pub(super) use args::{Args, cores};
 
 use super::resume;
-use crate::doubts::{MissingPriors, MultiPageFiles, OnePlace, Rates, Times};
+use crate::doubts::{Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Times};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
 use crate::setup::{self, stop_flag};
-use crate::{tell, what_fits};
+use crate::tell;
+use crate::what_fits::{self, WhatFits};
 
 pub(super) fn run(mut args: Args) -> Outcome {
     setup::list_stdin(&mut args.input, args.source.raw)?;
@@ -73,10 +74,12 @@ pub(super) fn run(mut args: Args) -> Outcome {
     output.finish()?;
     let lost = source.describe_loss().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
-    watch.tell(plan.frames.as_ref());
+    watch.tell(&plan);
+    let fits = watch.what_fits(args, &plan);
     if !args.quiet {
-        watch.sum_up(args, &plan, source.as_ref(), &summary, stored.frames);
+        watch.sum_up(args, &plan, source.as_ref(), fits.as_ref(), (&summary, stored.frames));
     }
+    watch.tell_doubt(fits.as_ref());
     let done = stored.frames + watch.progress.frames();
     // Ctrl-C is the only end of a run that waits for pictures.
     if end == End::Interrupted && watching.is_none() && total.is_none_or(|n| done < n) {
@@ -160,6 +163,7 @@ struct Watch {
     times: Times,
     rates: Rates,
     one_place: OnePlace,
+    improbable: Improbable,
     refusals: Refusals,
     multi_page: MultiPageFiles,
     masks: picture_folders::Masks,
@@ -182,6 +186,7 @@ impl Watch {
             times: Times::default(),
             rates: Rates::default(),
             one_place: OnePlace::default(),
+            improbable: Improbable::default(),
             refusals: Refusals::default(),
             multi_page: MultiPageFiles::default(),
             masks: picture_folders::Masks::default(),
@@ -194,6 +199,7 @@ impl Watch {
         self.times.count(frame);
         self.rates.count(frame);
         self.one_place.count(frame);
+        self.improbable.count(frame);
         self.refusals.count(frame);
         self.multi_page.count(frame);
         if !self.quiet {
@@ -222,16 +228,18 @@ impl Watch {
     }
 
     /// Tells what is odd about the pictures.
-    fn tell(&self, frames: Option<&Frames>) {
-        self.missing.tell(frames);
+    fn tell(&self, plan: &Plan) {
+        self.missing.tell(plan.frames.as_ref());
         self.times.tell();
         self.rates.tell();
         self.one_place.tell();
+        self.improbable.tell(&plan.config.gates);
         self.multi_page.tell();
     }
 
     /// Prints the summary, the commonest refusal, and the command that explains it.
-    fn sum_up(&self, args: &Args, plan: &Plan, source: &dyn Source, summary: &str, stored: u64) {
+    fn sum_up(&self, args: &Args, plan: &Plan, source: &dyn Source, fits: Option<&WhatFits>, done: (&str, u64)) {
+        let (summary, stored) = done;
         let before = match stored {
             0 => String::new(),
             n => format!(" (after {n} that were finished before)"),
@@ -249,18 +257,37 @@ impl Watch {
                 format!("; for an explanation and advice: {command}")
             });
             tell::line(format_args!("note: {found}{}{}", commonest.text, more.unwrap_or_default()));
-            let request = setup::request(&args.input, &args.sensor, &args.source).ok().filter(|_| commonest.is_size);
-            // A stream cannot be read twice.
-            let request = request.filter(|r| !r.inputs.iter().any(|input| source::is_stdin(input)));
-            let fits = request.and_then(|r| what_fits::in_pictures(&r, &plan.config, commonest.pictures));
-            fits.iter().for_each(|fits| tell::line(format_args!("note: {fits}")));
-            if fits.is_some() && commonest.pictures.len() >= DOUBTFUL_REFUSALS && self.progress.any_answered() {
-                tell::line(
-                    "note: the answers have the same lens and the same source of altitudes: if one of these is wrong, \
-                     they are wrong, too, and their sigma does not contain it",
-                );
-            }
+            fits.iter().for_each(|fits| tell::line(format_args!("note: {}", fits.text)));
         }
+    }
+
+    /// Looks again at some pictures that were refused for the size of their limb. A quiet run looks only if there are
+    /// answers to doubt.
+    fn what_fits(&self, args: &Args, plan: &Plan) -> Option<WhatFits> {
+        let commonest = self.refusals.commonest(&plan.config.gates).filter(|commonest| commonest.is_size)?;
+        let casts_doubt = commonest.pictures.len() >= DOUBTFUL_REFUSALS && self.progress.any_answered();
+        if self.quiet && !casts_doubt {
+            return None;
+        }
+        let request = setup::request(&args.input, &args.sensor, &args.source).ok()?;
+        // A stream cannot be read twice.
+        let is_stream = request.inputs.iter().any(|input| source::is_stdin(input));
+        if is_stream { None } else { what_fits::in_pictures(&request, &plan.config, commonest.pictures) }
+    }
+
+    /// Tells that the answers of the run are doubtful if the limb of refused pictures contradicts what the answers were
+    /// computed with.
+    // The rows are written by then, and none of them is better than the others.
+    fn tell_doubt(&self, fits: Option<&WhatFits>) {
+        let Some(fits) = fits.filter(|fits| fits.pictures >= DOUBTFUL_REFUSALS && self.progress.any_answered()) else {
+            return;
+        };
+        tell::warning(format_args!(
+            "the answers are doubtful: {} refused pictures show a limb of another size than expected ({}). If the \
+             lens or the altitude is wrong, the answers are wrong, too, and their sigma does not contain it: the \
+             answers have the same lens and the same source of altitudes",
+            fits.pictures, fits.text
+        ));
     }
 }
 

@@ -30,6 +30,22 @@ fn an_answer_farther_than_the_vehicle_can_turn_is_refused() {
     assert!(slow.iter().all(|(status, _)| status == "ok"), "{slow:?}");
 }
 
+/// An answer whose edge is more likely no limb has the status `ok` by default, and a program may read only this.
+#[test]
+fn improbable_answers_are_told_with_the_key_that_refuses_them() {
+    let place = Place::with_pictures(2);
+    let run = |more: &str| {
+        place.write("in/sensor.toml", format!("{SENSOR}\n[gates]\n{more}\n").as_bytes());
+        place.run(&["run", "in", "-q"]).expect(0)
+    };
+    assert!(!run("prior_odds = 1e9").err.contains("p_limb"));
+    let told = run("prior_odds = 1e-9");
+    assert!(told.err.contains("warning: 2 of 2 answers with status ok have a p_limb below 0.5"), "{}", told.err);
+    assert!(told.err.contains("gates.min_p_limb = 0.5 refuses them"), "{}", told.err);
+    let refused = run("prior_odds = 1e-9\nmin_p_limb = 0.5");
+    assert!(statuses(&refused.out).iter().all(|(status, _)| status == "rejected") && !refused.err.contains("p_limb"));
+}
+
 /// A continued run uses the last answer of the run that was interrupted.
 #[test]
 fn resume_goes_on_from_the_last_answer() {

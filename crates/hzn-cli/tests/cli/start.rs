@@ -210,6 +210,11 @@ fn a_refusal_for_the_half_angle_says_what_would_fit() {
     // The answers of the same run are wrong in the same way.
     let is_told = ran.err.contains("the answers have the same lens and the same source of altitudes");
     assert_eq!(is_told, rows.iter().any(|row| cell(row, "status") == "ok"), "{}", ran.err);
+    // A program that prints nothing else is told, too.
+    let quiet = place.run(&["run", "flight", "--sensor", "mine.toml", "-o", "q.csv", "-q"]).expect(0);
+    for text in [&ran.err, &quiet.err] {
+        assert_eq!(text.contains("warning: the answers are doubtful: "), is_told, "{text}");
+    }
     let picture = format!("flight/{}", cell(refused, "file").trim_start_matches("flight/"));
     let explained = place.run(&["explain", &picture, "--sensor", "mine.toml"]).expect(0);
     for text in [&ran.err, &explained.out] {

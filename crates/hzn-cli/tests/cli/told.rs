@@ -155,7 +155,7 @@ fn init_tells_what_its_file_will_tell() {
     init(&["--fov", "179.9", "--lens", "pinhole"]).expect(2).says("at most 150 degrees").says("--lens fisheye");
     init(&["--fov", "190"]).expect(2).says("a lens of this width is a fisheye; add --lens fisheye");
     let moon = init(&["--fov", "56", "--body", "moon", "--altitude", "100"]).expect(0).err;
-    assert!(!moon.contains("warning"), "{moon}");
+    assert!(!moon.contains("warning") && moon.contains("answers have no p_limb and no protection_deg"), "{moon}");
     let text = place.read("s.toml");
     assert!(text.contains("radius_km = 1737.4") && text.contains("limb_height_km = 0.0"), "{text}");
 }
