@@ -18,7 +18,8 @@ record! {
         status: u8,
         /// [`hzn_core::status::Stage`] as a number: the last stage that was entered.
         stage: u8,
-        /// Number of looks at the picture, each at another threshold.
+        /// Number of looks at the picture, each at another threshold. 0 with a direction: the limb was tracked, which
+        /// is found where the picture before has it.
         looks: u8,
         /// Threshold between dark and lit in counts; 0: not reached.
         level: u16,

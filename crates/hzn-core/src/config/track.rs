@@ -12,10 +12,10 @@ section! {
         /// one without an answer. Tracking shortens the calculation and changes answers by a part of their sigma,
         /// because fewer edge points are measured. It is for one body with a known distance; Sun and Moon, a body
         /// whose position is fitted, and a sensor with limits of its own in `[brightness]` are always searched fully.
-        @- full_every: u16 = 0, [0.0 to 65535.0];
+        @140 full_every: u16 = 0, [0.0 to 65535.0];
         /// Number of places along the predicted limb at which its edge is looked for; a larger number is more accurate
         /// and takes longer.
-        @- normals: u16 = 128, [32.0 to 2048.0];
+        @141 normals: u16 = 128, [32.0 to 2048.0];
     }
 }
 

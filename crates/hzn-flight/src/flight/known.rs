@@ -1,7 +1,7 @@
 //! What is known when a picture comes.
 
 use hzn_core::body::{Kind, Last};
-use hzn_core::{Prior, Sequence};
+use hzn_core::{Prior, Sequence, Tracker};
 
 use super::attitude::TimedAttitude;
 use super::navigation::Values;
@@ -18,6 +18,8 @@ pub(super) struct Known {
     pub(super) last: Option<(Last<f32>, u64)>,
     /// The earlier answer that answers are compared with, with the turn since then.
     pub(super) turns: Sequence<f32>,
+    /// Where the last picture has its limb, for `track.full_every`.
+    pub(super) tracker: Tracker<f32>,
     /// The time when the newest picture was exposed, µs since the start.
     pub(super) seen_us: Option<u64>,
     /// The threshold that the last picture proposes for the next one, in counts.

@@ -140,6 +140,8 @@ pub struct Flight<'a, B> {
     budget: BitBudget,
     /// Number of the last picture, from 1.
     number: u32,
+    /// Whether the next picture does not follow the last answer, so that its limb is not tracked.
+    is_gap: bool,
     /// Number of pictures since the last housekeeping packet, and its time.
     since_housekeeping: u16,
     housekeeping_us: u64,
@@ -230,6 +232,7 @@ impl<'a, B: Board> Flight<'a, B> {
             limiter: Limiter::new(),
             budget: BitBudget::new(),
             number: 0,
+            is_gap: true,
             since_housekeeping: 0,
             housekeeping_us: 0,
             detail: 0,
@@ -313,6 +316,7 @@ impl<'a, B: Board> Flight<'a, B> {
         let now_us = self.board.now_us();
         // Pictures were perhaps not taken in the mode before, so their period is not known.
         self.camera.start(now_us);
+        self.is_gap = true;
         self.send_event(Event::ModeChanged, from as u32, mode as u32);
         self.send_housekeeping();
     }

@@ -108,6 +108,7 @@ impl<B: Board> Flight<'_, B> {
         let is_accepted = sensor.is_ok();
         if let Ok(sensor) = sensor {
             self.sensor.set(sensor);
+            self.is_gap = true;
             self.board.note_sensor(&parameters.sensor);
         }
         is_accepted

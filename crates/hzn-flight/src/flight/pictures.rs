@@ -2,13 +2,13 @@
 
 use hzn_core::body::{Expected, Last};
 use hzn_core::status::Status;
-use hzn_core::{Prior, Report, Sequence, Step};
+use hzn_core::{Prior, Report, Sequence, Step, Tracker};
 use hzn_twice::KeptTwice;
 
 use super::{Flight, HeadBuffers, longest_edge};
 use crate::board::{Board, Picture};
 use crate::messages::{Event, Mode};
-use crate::view::{Seen, StuckPlaces, Viewer};
+use crate::view::{Before, Seen, StuckPlaces, Viewer};
 
 impl<B: Board> Flight<'_, B> {
     /// Sends an event if the camera should have sent a picture by now. Only flight mode expects pictures.
@@ -16,6 +16,7 @@ impl<B: Board> Flight<'_, B> {
         if self.mode == Mode::Flight
             && let Some(waited_us) = self.camera.becomes_silent(now_us)
         {
+            self.is_gap = true;
             let waited_ms = u32::try_from(waited_us / 1000).unwrap_or(u32::MAX);
             self.send_event(Event::CameraSilent, waited_ms, self.number);
         }
@@ -31,6 +32,8 @@ impl<B: Board> Flight<'_, B> {
         }
         // What changed since the last picture is made anew in time for this one.
         self.check_memory(None);
+        // A picture without an answer is a gap for the next one.
+        let is_gap = core::mem::replace(&mut self.is_gap, true) || picture.lost > 0;
         if self.mode == Mode::Safe {
             // There are no stored parameters any more, so that the sensor is that of another camera.
             self.state.refused = self.state.refused.saturating_add(1);
@@ -43,12 +46,14 @@ impl<B: Board> Flight<'_, B> {
         let Some(expected) = self.expect_limb(&prior) else { return };
         let mut expected = KeptTwice::new(expected);
         expected.complete();
+        let (mut tracker, step) = (self.tracker(is_gap), self.step_to(&prior, picture.exposure_us));
         let start = self.board.now_us();
         // The request stays until it is met, because this picture may be incomplete or stuck.
         let wanted = self.dump_edges;
         let edge = &mut self.buffers.edge;
         let Some(workspace) = self.workspace.as_deref_mut() else { return };
-        let mut viewer = Viewer::new(self.sensor.get(), expected.get(), workspace, edge, wanted);
+        let before = Before { expected: expected.get(), tracker: &mut tracker, step: &step };
+        let mut viewer = Viewer::new(self.sensor.get(), before, workspace, edge, wanted);
         self.board.show(&mut viewer);
         let seen = viewer.into_seen();
         let Some((mut report, stuck)) = self.accept(seen) else { return };
@@ -58,29 +63,35 @@ impl<B: Board> Flight<'_, B> {
             return;
         }
         // After the check, because a new copy of a changed value would hide the change.
-        let turns = self.compare_with_turn(&prior, &mut report, picture.exposure_us, stuck.is_none());
-        self.remember(&report, picture.exposure_us, stuck.is_none(), turns);
+        let turns = self.compare_with_turn(&step, &mut report, stuck.is_none());
+        self.remember(&report, picture.exposure_us, stuck.is_none(), (turns, tracker));
         // Without this, 3 of 5643 answers to such pictures were false, where the altitude is known to 100 km.
         if let Some(stuck) = stuck {
             self.state.stuck = self.state.stuck.saturating_add(1);
             self.send_event(Event::StuckPixels, stuck.stuck, stuck.places);
             return;
         }
+        self.is_gap = report.is_suspect;
         let done_us = self.board.now_us();
         let calculation_us = u32::try_from(done_us.saturating_sub(start)).unwrap_or(u32::MAX);
         // Before the packets are sent, because they have this number.
         self.count_picture(report.status, calculation_us);
         self.send_answer(&report, picture.exposure_us, done_us);
         if wanted {
-            self.dump_edges = false;
-            let HeadBuffers { line, edge, .. } = &mut *self.buffers;
-            let time = line.clock.at(picture.exposure_us);
-            longest_edge::send(edge, line, &mut self.board, time, self.number);
+            self.send_longest_edge(picture.exposure_us);
         }
         self.since_housekeeping = self.since_housekeeping.saturating_add(1);
         if self.since_housekeeping >= self.operations.get().housekeeping_every {
             self.send_housekeeping();
         }
+    }
+
+    /// Sends the edge that a command asked for.
+    fn send_longest_edge(&mut self, exposure_us: u64) {
+        self.dump_edges = false;
+        let HeadBuffers { line, edge, .. } = &mut *self.buffers;
+        let time = line.clock.at(exposure_us);
+        longest_edge::send(edge, line, &mut self.board, time, self.number);
     }
 
     /// Returns whether a picture with this number of bytes has the size of the camera. Refuses it otherwise.
@@ -111,9 +122,15 @@ impl<B: Board> Flight<'_, B> {
     }
 
     /// Remembers what a picture says about the next one: its threshold, and its direction if that may be believed.
-    fn remember(&mut self, report: &Report<f32>, exposure_us: u64, is_believed: bool, turns: Sequence<f32>) {
+    fn remember(
+        &mut self,
+        report: &Report<f32>,
+        exposure_us: u64,
+        is_believed: bool,
+        (turns, tracker): (Sequence<f32>, Tracker<f32>),
+    ) {
         let mut known = self.known.get().clone();
-        (known.turns, known.seen_us) = (turns, Some(exposure_us));
+        (known.turns, known.tracker, known.seen_us) = (turns, tracker, Some(exposure_us));
         // The threshold is kept in any case, because it comes from the whole picture. A stuck direction would let the
         // gate of the rate refuse the next, right one.
         known.level = report.next_level;
@@ -125,22 +142,32 @@ impl<B: Board> Flight<'_, B> {
         self.known.complete();
     }
 
+    /// Returns where the limb is looked for first, for `track.full_every`. It is empty for a picture that is searched
+    /// fully: after a gap, by its number as in `hzn run`, and if a command asked for it or for its edges.
+    fn tracker(&self, is_gap: bool) -> Tracker<f32> {
+        let full_every = self.sensor.get().config().track.full_every;
+        let is_full = is_gap || self.mode != Mode::Flight || self.dump_edges;
+        if is_full || self.number.is_multiple_of(full_every.into()) {
+            return Tracker::default();
+        }
+        self.known.get().tracker.clone()
+    }
+
+    /// Returns what is known of the turn since the picture before.
+    fn step_to(&self, prior: &Prior<f32>, exposure_us: u64) -> Step<f32> {
+        let before = self.known.get().seen_us;
+        let after_s = before.map(|before| exposure_us.wrapping_sub(before).cast_signed() as f32 * 1e-6);
+        Step::from_prior(prior, after_s)
+    }
+
     /// Compares the answer with the turn of the vehicle, see `gates.fixed_edge`. An event says if its edge stays in the
     /// picture. Returns what the next picture is compared with.
-    fn compare_with_turn(
-        &mut self,
-        prior: &Prior<f32>,
-        report: &mut Report<f32>,
-        exposure_us: u64,
-        is_believed: bool,
-    ) -> Sequence<f32> {
-        let known = self.known.get();
-        let mut turns = known.turns.clone();
-        let after_s = known.seen_us.map(|before| exposure_us.wrapping_sub(before).cast_signed() as f32 * 1e-6);
-        let (step, gates) = (Step::from_prior(prior, after_s), self.sensor.get().config().gates);
+    fn compare_with_turn(&mut self, step: &Step<f32>, report: &mut Report<f32>, is_believed: bool) -> Sequence<f32> {
+        let mut turns = self.known.get().turns.clone();
+        let gates = self.sensor.get().config().gates;
         if !is_believed {
-            turns.see(&step, None, &gates);
-        } else if turns.judge(&step, report, &gates) {
+            turns.see(step, None, &gates);
+        } else if turns.judge(step, report, &gates) {
             // The number that this picture will have.
             self.send_event(Event::FixedEdge, self.number.wrapping_add(1), u32::from(report.is_suspect));
         }

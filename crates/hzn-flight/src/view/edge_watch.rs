@@ -49,6 +49,13 @@ pub(super) struct EdgeWatch<'a> {
 }
 
 impl Observer<f32> for EdgeWatch<'_> {
+    fn begin_again(&self) {
+        if let (Ok(mut longest), Ok(mut stuck)) = (self.longest.try_borrow_mut(), self.stuck.try_borrow_mut()) {
+            longest.clear();
+            stuck.clear();
+        }
+    }
+
     fn look(&self, _number: u32, _level: u16) {
         // The candidates of another look have the same numbers.
         if let Ok(mut stuck) = self.stuck.try_borrow_mut() {

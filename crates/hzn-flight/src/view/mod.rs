@@ -15,5 +15,5 @@ mod viewer;
 pub(crate) use edge_watch::LongestEdge;
 pub use hzn_core::pipeline::ROWS_HELD;
 pub(crate) use stuck::StuckPlaces;
-pub(crate) use viewer::Seen;
+pub(crate) use viewer::{Before, Seen};
 pub use viewer::{Lists, RowMemory, RowView, Viewer};

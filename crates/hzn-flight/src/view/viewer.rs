@@ -5,7 +5,7 @@ use core::cell::RefCell;
 use hzn_core::body::Expected;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::pipeline::{RowBuffers, RowStream, RowStreamError};
-use hzn_core::{Report, Sensor, Workspace};
+use hzn_core::{Report, Sensor, Step, Tracker, Workspace};
 
 use super::edge_watch::{EdgeWatch, LongestEdge};
 use super::row_readout::{RowRuns, RowSample};
@@ -68,11 +68,22 @@ pub(crate) enum Seen {
     Whole(Report<f32>, Option<StuckPlaces>),
 }
 
+/// What the pictures before say about a picture.
+#[derive(Debug)]
+pub(crate) struct Before<'a> {
+    /// The expected limb.
+    pub(crate) expected: &'a Expected<f32>,
+    /// Where the limb was, if it is looked for there first.
+    pub(crate) tracker: &'a mut Tracker<f32>,
+    /// The turn since then.
+    pub(crate) step: &'a Step<f32>,
+}
+
 /// The view of one picture. The board shows it the pixels ([`Self::see`]), or the rows one by one ([`Self::rows`]).
 #[derive(Debug)]
 pub struct Viewer<'a> {
     sensor: &'a Sensor<f32>,
-    expected: &'a Expected<f32>,
+    before: Before<'a>,
     workspace: &'a mut Lists,
     edge: &'a mut LongestEdge,
     /// Whether the longest edge is wanted.
@@ -83,14 +94,14 @@ pub struct Viewer<'a> {
 impl<'a> Viewer<'a> {
     pub(crate) fn new(
         sensor: &'a Sensor<f32>,
-        expected: &'a Expected<f32>,
+        before: Before<'a>,
         workspace: &'a mut Lists,
         edge: &'a mut LongestEdge,
         wanted: bool,
     ) -> Self {
         edge.clear();
         // Nothing has been seen, so that a board that shows nothing is reported as a picture of wrong size.
-        Self { sensor, expected, workspace, edge, wanted, seen: Seen::Part(0) }
+        Self { sensor, before, workspace, edge, wanted, seen: Seen::Part(0) }
     }
     pub(crate) fn into_seen(self) -> Seen {
         self.seen
@@ -114,7 +125,8 @@ impl<'a> Viewer<'a> {
             longest: RefCell::new(&mut *self.edge),
             stuck: RefCell::new(StuckWatch::new(readout, Equality::sample(pixels), camera)),
         };
-        let report = self.sensor.process(self.workspace, &grey, self.expected, &watch);
+        let Before { expected, tracker, step } = &mut self.before;
+        let report = self.sensor.track(self.workspace, tracker, &grey, (expected, step), &watch);
         let stuck = watch.found(&report);
         self.seen = Seen::Whole(report, stuck);
     }
@@ -127,9 +139,11 @@ impl<'a> Viewer<'a> {
         memory: &'v mut RowMemory<WINDOW, HEIGHT, TURNS, POINTS>,
     ) -> Option<RowView<'v>> {
         let camera = self.sensor.camera();
+        // The rows of a limb that moves are not known before it is found, so these pictures are not tracked.
+        self.before.tracker.forget();
         // The step of the sample depends on the whole size, so that it must be known before the first row.
         memory.sample.begin(usize::from(camera.width()) * usize::from(camera.height()));
-        match self.sensor.rows(&mut memory.rows, 8, self.expected) {
+        match self.sensor.rows(&mut memory.rows, 8, self.before.expected) {
             Ok(stream) => Some(RowView {
                 level: stream.level(),
                 stream,

@@ -13,6 +13,7 @@ mod rig;
 mod rig_bench;
 mod rows;
 mod silence;
+mod tracking;
 
 use hzn_core::status::Status;
 use hzn_flight::Parameters;

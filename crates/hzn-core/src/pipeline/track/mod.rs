@@ -130,32 +130,60 @@ impl<T: Real> Sensor<T> {
         (expected, step): (&Expected<T>, &Step<T>),
         observer: &O,
     ) -> Report<T> {
-        if !(self.config.track.is_on() && self.has_size_of(picture) && self.can_track(expected)) {
-            tracker.forget();
-            return self.process(workspace, picture, expected, observer);
-        }
-        let (fx, fy) = self.camera.focal_px();
-        let reach_rad = T::from_i32(normals::REACH_PX.into()) * T::from_f64(2.0) / (fx + fy);
         let mut report = Report::empty();
-        let mut look = Look { lists: workspace.lists(), picture, expected, taken: &[], observer, report: &mut report };
-        if let Some((axis, threshold)) = tracker.predict(step, self.config.track.full_every, reach_rad) {
-            if self.look_along(look.reborrow(), &axis, threshold) {
-                // The picture itself was not looked at.
-                report.counters.looks = 0;
-                observer.leave();
-                tracker.keep(&report, step, threshold);
-                return report;
-            }
-            observer.begin_again();
-            *look.report = Report::empty();
+        let has_size = self.has_size_of(picture);
+        let is_on = has_size && self.config.track.is_on() && self.can_track(expected);
+        if !is_on {
+            tracker.forget();
         }
-        self.look_at_all(look.reborrow());
-        if let Some(threshold) = self.hold_threshold(look) {
-            tracker.keep(&report, step, threshold);
-            tracker.age = 0;
+        let mut look = Look { lists: workspace.lists(), picture, expected, taken: &[], observer, report: &mut report };
+        if has_size && !(is_on && self.find_again(look.reborrow(), tracker, step)) {
+            // The only call, so that an image that tracks has the code of the full search once.
+            self.look_at_all(look.reborrow());
+            if is_on {
+                self.begin_tracking(look, tracker, step);
+            }
         }
         observer.leave();
         report
+    }
+
+    /// Finds the limb where the last answer puts it. Otherwise returns false, with the report as it was.
+    #[inline(never)]
+    fn find_again<P: Pixels, O: Observer<T>>(
+        &self,
+        mut look: Look<'_, T, P, O>,
+        tracker: &mut Tracker<T>,
+        step: &Step<T>,
+    ) -> bool {
+        let (fx, fy) = self.camera.focal_px();
+        let reach_rad = T::from_i32(normals::REACH_PX.into()) * T::from_f64(2.0) / (fx + fy);
+        let predicted = tracker.predict(step, self.config.track.full_every, reach_rad);
+        let Some((axis, threshold)) = predicted else { return false };
+        let is_found = self.look_along(look.reborrow(), &axis, threshold);
+        if is_found {
+            // The picture itself was not looked at.
+            look.report.counters.looks = 0;
+            tracker.keep(look.report, step, threshold);
+        } else {
+            look.observer.begin_again();
+            *look.report = Report::empty();
+        }
+        is_found
+    }
+
+    /// Keeps the answer of a full search for the pictures after it.
+    #[inline(never)]
+    fn begin_tracking<P: Pixels, O: Observer<T>>(
+        &self,
+        mut look: Look<'_, T, P, O>,
+        tracker: &mut Tracker<T>,
+        step: &Step<T>,
+    ) {
+        if let Some(threshold) = self.hold_threshold(look.reborrow()) {
+            tracker.keep(look.report, step, threshold);
+            tracker.age = 0;
+        }
     }
 
     /// Returns whether the limb can be predicted, and whether an edge alone can be the answer.
