@@ -8,9 +8,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use hzn_core::Config;
+use hzn_flight::answer::PictureAnswer;
+use hzn_flight::assembly::Assembly;
+use hzn_flight::packet::{self, Apid, Scan};
 use hzn_flight::{Parameters, table};
 
 use crate::emulated::Board;
+
+/// Exponent of the time of an instruction in nanoseconds, where instructions are counted by the clock: 15 million of them
+/// take one second, so that the watchdog of two seconds does not end an expensive picture. A microsecond is 16.
+const SHIFT: u32 = 6;
 
 /// Flight image of a board, with its files.
 #[derive(Debug)]
@@ -72,6 +79,36 @@ impl Bench {
     pub fn run_with_shift(&self, line: &[u8], shift: u32) -> i32 {
         self.run_in_parts(&[(0, line)], shift)
     }
+    /// Flies over the pictures of the camera in flight mode, and ends after the last answer. Returns the answers, each with
+    /// the instructions from the picture to the answer. The packets are in `sent.bin`.
+    ///
+    /// # Panics
+    /// Panics if QEMU fails, or if the answers do not come within five minutes.
+    pub fn fly(&self, sensor: &Config, pictures: &[Vec<u8>]) -> Vec<(PictureAnswer, u64)> {
+        let mut parameters = Parameters::new(sensor.clone());
+        parameters.operations.boot_mode = 1;
+        self.write_copy_of(1, &parameters, 1);
+        self.write_frames(&pictures.iter().map(|picture| (picture.clone(), 0)).collect::<Vec<_>>());
+        let mut command = self.board.qemu(&self.board.image("flight"), SHIFT);
+        let command = command.args(["-serial", "file:sent.bin"]).current_dir(self.dir.path());
+        let mut child = command.spawn().expect("files and programs of this machine work");
+        let deadline = Instant::now() + Duration::from_secs(300);
+        let (answers, end) = loop {
+            std::thread::sleep(Duration::from_millis(50));
+            let (answers, end) = read_answers(&std::fs::read(self.path("sent.bin")).unwrap_or_default());
+            let has_ended = child.try_wait().expect("files and programs of this machine work").is_some();
+            if answers.len() >= pictures.len() || has_ended || Instant::now() > deadline {
+                break (answers, end);
+            }
+        };
+        let _ = child.kill();
+        let _ = child.wait();
+        assert_eq!(answers.len(), pictures.len(), "{}: answers are missing", self.board.name());
+        // The last packet may have been cut off.
+        let sent = std::fs::read(self.path("sent.bin")).expect("files and programs of this machine work");
+        std::fs::write(self.path("sent.bin"), &sent[..end]).expect("files and programs of this machine work");
+        answers
+    }
     /// Runs the image with parts of a line. A part is sent when the image has sent at least its number of bytes.
     ///
     /// # Panics
@@ -120,6 +157,18 @@ impl Bench {
         drop(feed.join());
         code
     }
+}
+
+/// Returns the answers in packets, each with its instructions, and the number of bytes of whole packets.
+fn read_answers(sent: &[u8]) -> (Vec<(PictureAnswer, u64)>, usize) {
+    let (mut answers, mut end, mut assembly) = (Vec::new(), 0, Assembly::default());
+    while let Scan::Packet { end: length, packet } = packet::scan(&sent[end..]) {
+        end += length;
+        let picture = Apid::from_number(packet.apid).and_then(|apid| assembly.take(apid, packet.user)).flatten();
+        let counted = picture.map(|p| (p.answer, (u64::from(p.exposure.calculation_us) * 1000) >> SHIFT));
+        answers.extend(counted);
+    }
+    (answers, end)
 }
 
 /// Returns a call of the `hzn` that the tests have built.

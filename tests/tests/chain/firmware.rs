@@ -8,6 +8,7 @@ use hzn_core::image::{Grey, Layout, Pixels};
 use hzn_core::status::Status;
 use hzn_core::threshold;
 use hzn_core::{Config, FlightHorizon, Prior, camera};
+use hzn_flight::answer::PictureAnswer;
 use hzn_flight::flight::{Buffers, Lists};
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_sim::{Disc, Sky};
@@ -225,6 +226,42 @@ fn an_exchange_over_the_line() {
         hzn_run(dir, &["telemetry", "sent.bin", "-o", "sent.mcap"]);
         hzn_run(dir, &["export", "sent.mcap", "-o", "again.csv"]);
         assert_eq!(answers(&bench.path("again.csv")), host);
+    }
+}
+
+/// Tests a sequence with tracking: the decoded telemetry must equal what `hzn run --flight` writes. Between the pictures
+/// of a rocket there are a dark one, a leap, and one that is nothing but stripes.
+#[test]
+#[ignore = "needs the images: cargo xtask firmware"]
+fn a_tracked_sequence_has_the_same_bits_as_here() {
+    // Ten pictures a second.
+    let mut flight = rocket(640, 480, 3800, 8);
+    flight.frames = [1200..1206, 2400..2407].into_iter().flatten().map(|i| flight.frames[i].clone()).collect();
+    flight.sensor.body.altitude_km = Some(220.0);
+    flight.sensor.body.altitude_sigma_km = 20.0;
+    flight.sensor.track.full_every = 6;
+    for board in Board::with_pictures() {
+        let bench = Bench::new(board);
+        let mut pictures: Vec<_> =
+            save_pictures(&flight, &bench.path("pictures")).into_iter().map(|(bytes, _)| bytes).collect();
+        for (place, picture) in [
+            (3, vec![12; 640 * 480]),
+            (9, (0..640 * 480).map(|i| if i % 640 / 9 % 2 == 0 { 20 } else { 200 }).collect::<Vec<u8>>()),
+        ] {
+            let file = bench.path("pictures").join(&flight.frames[place].file);
+            image::GrayImage::from_raw(640, 480, picture.clone()).unwrap().save(file).unwrap();
+            pictures[place] = picture;
+        }
+        std::fs::write(bench.path("pictures/sensor.toml"), toml::to_string(&flight.sensor).unwrap()).unwrap();
+        let there = bench.fly(&flight.sensor, &pictures);
+        hzn_run(bench.dir(), &["telemetry", "sent.bin", "-o", "sent.csv"]);
+        hzn_run(bench.dir(), &["run", "pictures", "--flight", "-o", "here.csv"]);
+        assert_eq!(answers(&bench.path("sent.csv")), answers(&bench.path("here.csv")), "{}", board.name());
+        let is_tracked = |(answer, _): &(PictureAnswer, u64)| answer.solved == 1 && answer.looks == 0;
+        let tracked: Vec<usize> = (0..there.len()).filter(|&i| is_tracked(&there[i])).collect();
+        println!("{}: tracked {tracked:?}", board.name());
+        // Blocks begin at 0, 6 and 12. Picture 3 is dark, at 6 the rocket leaps, and picture 9 has stripes.
+        assert_eq!(tracked, [1, 2, 5, 7, 8, 11], "{}", board.name());
     }
 }
 
