@@ -285,3 +285,48 @@ fn a_power_failure_closes_the_log_and_waits() {
     let (code, said) = flight.end();
     assert!(code == Some(0) && said.contains("1 pictures, 1 answers"), "{said}");
 }
+
+/// The limb of a sequence is tracked in the same pictures as by `hzn run`, with the same bits.
+#[test]
+fn a_tracked_flight_has_the_rows_of_a_run() {
+    let place = Place::new();
+    let sensor = crate::common::SENSOR.to_owned() + "\n[track]\nfull_every = 5\n";
+    place.write("in/sensor.toml", sensor.as_bytes());
+    let shift = |i: usize| i as f64 * 8.0 - if i >= 12 { 300.0 } else { 0.0 };
+    // Picture 3 is dark, and picture 12 is a leap.
+    let picture = |i: usize| if i == 3 { vec![20; 320 * 240] } else { limb(320, 240, shift(i)).into_raw() };
+    let pictures: Vec<Vec<u8>> = (0..16).map(picture).collect();
+    for (i, picture) in pictures.iter().enumerate() {
+        let image = image::GrayImage::from_raw(320, 240, picture.clone()).unwrap();
+        image.save(place.path(&format!("in/{i:04}.png"))).unwrap();
+    }
+    place.run(&["run", "in", "--flight", "-j", "3", "-o", "run.csv"]).expect(0);
+    let run = place.rows("run.csv");
+
+    let port = free_port();
+    let (listen, connect) = (format!("tcp-listen:127.0.0.1:{port}"), format!("tcp:127.0.0.1:{port}"));
+    let args = ["fly", "-", "-s", "in/sensor.toml", "--line", &listen, "--state", "state"];
+    let mut flight = Running::start(place.command(&args));
+    flight.wait_for("flight mode");
+    let mut ground = Running::start(place.command(&["telemetry", &connect, "-o", "sent.csv", "--send", "report"]));
+    ground.wait_for("report: done");
+    let mut pipe = flight.stdin();
+    // Without pauses, because a pause of a second on a busy machine would be a gap.
+    pipe.write_all(&pictures.concat()).unwrap();
+    drop(pipe);
+    let (code, said) = flight.end();
+    assert!(code == Some(0) && said.contains("16 pictures, 15 answers"), "{said}");
+    ground.signal(Signal::SIGINT);
+    assert_eq!(ground.end().0, Some(0));
+
+    let tracked = |rows: &[Vec<(String, String)>]| -> Vec<usize> {
+        (0..rows.len()).filter(|&i| cell(&rows[i], "tracked") == "true").collect()
+    };
+    assert_eq!(tracked(&run), [1, 2, 6, 7, 8, 9, 11, 13, 14]);
+    let (log, sent) = (logged(&place), place.rows("sent.csv"));
+    assert_eq!((tracked(&log), tracked(&sent)), (tracked(&run), tracked(&run)));
+    for (all, rows) in [(true, &log), (false, &sent)] {
+        let [there, here] = [rows, &run].map(|rows| rows.iter().map(|row| answer(row, all)).collect::<Vec<_>>());
+        assert_eq!(there, here);
+    }
+}
