@@ -15,8 +15,8 @@ use hzn_flight::{Parameters, table};
 
 use crate::emulated::Board;
 
-/// Exponent of the time of an instruction in nanoseconds, where instructions are counted by the clock: 15 million of them
-/// take one second, so that the watchdog of two seconds does not end an expensive picture. A microsecond is 16.
+/// Exponent of the time of an instruction in nanoseconds, where instructions are counted by the clock: 15 million of
+/// them take one second, so that the watchdog of two seconds does not end an expensive picture. A microsecond is 16.
 const SHIFT: u32 = 6;
 
 /// Flight image of a board, with its files.
@@ -79,8 +79,8 @@ impl Bench {
     pub fn run_with_shift(&self, line: &[u8], shift: u32) -> i32 {
         self.run_in_parts(&[(0, line)], shift)
     }
-    /// Flies over the pictures of the camera in flight mode, and ends after the last answer. Returns the answers, each with
-    /// the instructions from the picture to the answer. The packets are in `sent.bin`.
+    /// Flies over the pictures of the camera in flight mode, and ends after the last answer. Returns the answers, each
+    /// with the instructions from the picture to the answer. The packets are in `sent.bin`.
     ///
     /// # Panics
     /// Panics if QEMU fails, or if the answers do not come within five minutes.

@@ -229,8 +229,8 @@ fn an_exchange_over_the_line() {
     }
 }
 
-/// Tests a sequence with tracking: the decoded telemetry must equal what `hzn run --flight` writes. Between the pictures
-/// of a rocket there are a dark one, a leap, and one that is nothing but stripes.
+/// Tests a sequence with tracking: the decoded telemetry must equal what `hzn run --flight` writes. Between the
+/// pictures of a rocket there are a dark one, a leap, and one that is nothing but stripes.
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn a_tracked_sequence_has_the_same_bits_as_here() {
