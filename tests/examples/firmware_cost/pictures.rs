@@ -3,7 +3,7 @@
 use hzn_core::Preset;
 use hzn_core::threshold::Method;
 use hzn_core::{Config, Prior, camera};
-use hzn_sim::flight::rocket;
+use hzn_sim::flight::{Flight, rocket};
 use hzn_sim::{Disc, FlightFrame, Sky};
 use hzn_tests::emulated::Case;
 
@@ -20,6 +20,15 @@ pub(crate) struct Pictures {
     pub(crate) expensive: [(Vec<Case>, usize); 4],
     /// Frames for the sensor that takes rows, each group with its name.
     pub(crate) by_rows: [(&'static str, Vec<Case>); 2],
+    /// Sequences for the flight image, with tracking.
+    pub(crate) sequences: Vec<Sequence>,
+}
+
+/// Pictures in order, and their sensor.
+pub(crate) struct Sequence {
+    pub(crate) name: &'static str,
+    pub(crate) sensor: Config,
+    pub(crate) pictures: Vec<Vec<u8>>,
 }
 
 impl Pictures {
@@ -48,13 +57,52 @@ impl Pictures {
             }
             (kind, cases)
         });
-        Self { usual, expensive, by_rows }
+        Self { usual, expensive, by_rows, sequences: sequences() }
     }
+}
+
+/// Returns the sequences of the table.
+pub(crate) fn sequences() -> Vec<Sequence> {
+    let kinds = [("1920×1080 clean", true), ("1920×1080 cloudy", false)];
+    let mut sequences: Vec<Sequence> = kinds.map(|(name, clean)| sequence(name, clean)).into();
+    sequences.extend(hostile_sequence(&sequences));
+    sequences
+}
+
+/// Number of pictures of a sequence; the first one is searched fully.
+const IN_SEQUENCE: usize = 9;
+
+/// Returns the first seconds of a rocket's pictures at ten pictures a second, for a sensor that tracks.
+fn sequence(name: &'static str, clean: bool) -> Sequence {
+    let mut cases = frames_from(rocket(1920, 1080, 3800, 7), clean, IN_SEQUENCE);
+    let pictures = cases.iter_mut().map(|case| core::mem::take(&mut case.bytes)).collect();
+    let first = cases.swap_remove(0);
+    let mut sensor = first.sensor;
+    // The flight image has one altitude for the whole sequence.
+    sensor.body.altitude_km = first.prior.altitude_m.map(|m| f64::from(m) / 1e3);
+    sensor.body.altitude_sigma_km = 2.0;
+    sensor.track.full_every = 1000;
+    Sequence { name, sensor, pictures }
+}
+
+/// Returns the expensive pictures of an ordinary sensor, with a clear limb before each: its limb is looked for in vain.
+fn hostile_sequence(sequences: &[Sequence]) -> Option<Sequence> {
+    let Sequence { sensor, pictures, .. } = sequences.first()?;
+    let limb = pictures.first()?;
+    // Two of the most expensive ones of the table are among them.
+    let hostile = paint_expensive_pictures(24..36, &usual_sensors());
+    let pictures = hostile.into_iter().flat_map(|case| [limb.clone(), case.bytes]).collect();
+    Some(Sequence { name: "1920×1080, a limb and a hostile picture in turn", sensor: sensor.clone(), pictures })
 }
 
 /// Returns frames of a rocket's flight, clean or cloudy.
 fn frames(width: u16, height: u16, clean: bool, count: usize) -> Vec<Case> {
-    let mut flight = rocket(width, height, count * 2, 7);
+    frames_from(rocket(width, height, count * 2, 7), clean, count)
+}
+
+/// Returns the first frames of a flight that show the limb, clean or cloudy.
+fn frames_from(mut flight: Flight, clean: bool, count: usize) -> Vec<Case> {
+    let (width, height) = (flight.sensor.camera.width, flight.sensor.camera.height);
     // The lens is scaled by the diagonal, as in the benchmarks, so the image circle stays outside the picture.
     let (w, h) = (f64::from(width), f64::from(height));
     let lens = lens(width, height);

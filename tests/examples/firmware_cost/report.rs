@@ -3,10 +3,12 @@
 use std::process::Command;
 
 use hzn_core::status::Stage;
+use hzn_flight::answer::PictureAnswer;
 use hzn_tests::emulated::{Board, Case, Measured, answer_bytes, measure, measure_rows, run_chain};
+use hzn_tests::flight_image::Bench;
 use hzn_tests::stack_bound::stack_bound;
 
-use crate::pictures::Pictures;
+use crate::pictures::{Pictures, Sequence};
 
 const HEAD: &str = "# What the firmware costs
 
@@ -24,6 +26,9 @@ worst. Flash and the clean picture (also with 200 points kept) miss their goals;
 software takes about 9 KB more flash and nearly all of the time of `expect`: `expect` calculates the cone of an altitude
 or a position in double precision, once per picture. No other code that runs per picture uses it (`cargo xtask test`
 checks this).
+
+The tables *in a sequence* are of the flight image with `track.full_every`: from the picture to its answer, with the
+search for stuck pixels and the comparison of memory.
 ";
 
 /// Returns the whole report.
@@ -63,6 +68,7 @@ impl<'a> Measurement<'a> {
         out += &self.picture_table();
         out += &self.preparation_table();
         out += &self.row_table();
+        out += &sequence_table(self.board, &self.pictures.sequences);
         out += &self.memory_table()?;
         Ok(out)
     }
@@ -145,6 +151,28 @@ impl<'a> Measurement<'a> {
         out += &format!("| flight | {flash} | {ram} | {stack} | {bound} |\n");
         Ok(out)
     }
+}
+
+/// Returns the instructions of the flight image from a picture to its answer, with `track.full_every`.
+pub(crate) fn sequence_table(board: Board, sequences: &[Sequence]) -> String {
+    let head =
+        "| in a sequence | full searches, mean, thousand | full searches, worst | tracked, mean | tracked, worst |";
+    let mut out = format!("\n{head}\n|---|---|---|---|---|\n");
+    for sequence in sequences {
+        let answers = Bench::new(board).fly(&sequence.sensor, &sequence.pictures);
+        out += &format!("| {} |", sequence.name);
+        for wanted in [false, true] {
+            let is_tracked = |(answer, _): &&(PictureAnswer, u64)| answer.solved == 1 && answer.looks == 0;
+            let counts: Vec<u64> = answers.iter().filter(|a| is_tracked(a) == wanted).map(|a| a.1).collect();
+            let (sum, worst) = (counts.iter().sum::<u64>() as f64, counts.iter().max());
+            out += &match worst {
+                Some(&worst) => format!(" {:.0} | {:.0} |", sum / counts.len() as f64 / 1e3, worst as f64 / 1e3),
+                None => " none | none |".to_owned(),
+            };
+        }
+        out += "\n";
+    }
+    out
 }
 
 /// Line of the table, with instructions and work in thousands.
