@@ -13,6 +13,7 @@ mod doubts;
 pub mod exit;
 mod files;
 mod html;
+mod kind_of_file;
 mod progress;
 mod refusals;
 mod setup;

@@ -13,6 +13,7 @@ use hzn_run::sink::Target;
 use hzn_run::source::{Raw, is_stdin};
 
 use crate::exit::{Exit, Stop, usage};
+use crate::kind_of_file;
 use crate::tell;
 
 /// The arguments that select the sensor.
@@ -74,6 +75,9 @@ pub(crate) fn open(inputs: &[PathBuf], sensor: &SensorArgs, input: &InputArgs) -
 
 /// Opens a sequence as [`open`] does.
 pub(crate) fn open_request(request: &Request) -> Result<Opened, Stop> {
+    if let [one] = request.inputs.as_slice() {
+        kind_of_file::refuse_table(one, "a picture, a folder or a video")?;
+    }
     let opened = hzn_run::open::open(request)?;
     opened.warnings.iter().for_each(tell::warning);
     let source = opened.source.as_ref();

@@ -88,18 +88,21 @@ pub struct Case {
     pub file: String,
     /// The body's kind as in sensor.toml.
     pub body: String,
-    /// Time of the truth in seconds.
-    pub time_s: f64,
+    /// Time of the truth in seconds; `None` if the truth has no times.
+    pub time_s: Option<f64>,
     /// True if enough limb is in view for an answer.
     pub limb: bool,
     /// Name of the status.
     pub status: &'static str,
-    /// Altitude in kilometres; `None` for Sun and Moon.
+    /// Altitude in kilometres; `None` for Sun and Moon, and if the truth has none.
     pub altitude_km: Option<f64>,
     /// Angle between the optical axis and the body's direction, in degrees.
     pub off_axis_deg: f64,
     /// Length of the limb within the picture, lit or not, in pixels; `None` if the camera is not known.
     pub limb_in_view_px: Option<f64>,
+    /// The true axis in the camera frame.
+    #[serde(skip)]
+    pub truth_axis: [f64; 3],
     /// Error of the answer; `None` without an answer.
     pub miss: Option<Miss>,
     /// Error of the position; `None` without a position, or if the truth has none.
@@ -271,10 +274,11 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
         cases.push(Case {
             file: t.file.clone(),
             body: t.body.clone(),
-            time_s: t.time_s,
+            time_s: Some(t.time_s).filter(|t| t.is_finite()),
+            truth_axis: axis,
             limb: t.has_limb(),
             status: answer.status.name(),
-            altitude_km: (!is_in_sky(&t.body)).then_some(t.altitude_km),
+            altitude_km: (!is_in_sky(&t.body) && t.altitude_km.is_finite()).then_some(t.altitude_km),
             off_axis_deg: axis[0].hypot(axis[1]).atan2(axis[2]).to_degrees(),
             limb_in_view_px: camera.map(|c| limb_in_view_px(c, axis, t.half_angle_deg.to_radians())),
             miss: answer.found.and_then(|f| {

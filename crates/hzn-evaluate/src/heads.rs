@@ -35,7 +35,13 @@ pub fn are_joint(rows: &[Row]) -> bool {
 /// first head's picture, and another head's if that one has none, but an epoch is one row of the truth. A late head
 /// gives a second epoch near that row, so the epoch with the most heads is kept, and the nearest one of several.
 /// Returns the number of the others, which are removed.
-pub fn name_by_time(rows: &mut Vec<Row>, truth: &[Truth]) -> usize {
+///
+/// # Errors
+/// The truth has no times.
+pub fn name_by_time(rows: &mut Vec<Row>, truth: &[Truth]) -> Result<usize, &'static str> {
+    if truth.iter().any(|row| !row.time_s.is_finite()) {
+        return Err("time_s: this column is missing; joint answers are paired by time");
+    }
     let mut times: Vec<(f64, &str)> = truth.iter().map(|t| (t.time_s, t.file.as_str())).collect();
     times.sort_by(|a, b| a.0.total_cmp(&b.0));
     times.dedup_by(|a, b| a.0 == b.0);
@@ -67,7 +73,7 @@ pub fn name_by_time(rows: &mut Vec<Row>, truth: &[Truth]) -> usize {
     let before = rows.len();
     let mut is_kept = is_kept.into_iter();
     rows.retain(|_| is_kept.next().unwrap_or(true));
-    before - rows.len()
+    Ok(before - rows.len())
 }
 
 /// Returns what to tell the user about epochs that [`name_by_time`] removed; `None` if there are none.
@@ -108,7 +114,7 @@ mod tests {
         let truth = |file: &str, time_s: f64| Truth { file: file.into(), time_s, ..Truth::default() };
         let mut rows = vec![row(Some("rig"), "right-1", 1.04), row(Some("rig"), "left-2", 2.6)];
         let truth = [truth("left-0", 0.0), truth("left-1", 1.0), truth("left-2", 2.0)];
-        assert_eq!(name_by_time(&mut rows, &truth), 0);
+        assert_eq!(name_by_time(&mut rows, &truth).unwrap(), 0);
         assert_eq!(rows.iter().map(|row| row.file.as_str()).collect::<Vec<_>>(), ["left-1", "left-2"]);
         // A late head is an epoch of its own, before or after the one with the other heads.
         let with = |heads: &str, time_s| Row { heads_used: Some(heads.into()), ..row(Some("rig"), "a", time_s) };
@@ -121,7 +127,7 @@ mod tests {
             with("b", 2.1),
             row(Some("rig"), "a", 2.0),
         ];
-        assert_eq!(name_by_time(&mut rows, &truth), 4);
+        assert_eq!(name_by_time(&mut rows, &truth).unwrap(), 4);
         let left: Vec<_> = rows.iter().map(|row| (row.file.as_str(), row.time_s)).collect();
         assert_eq!(left, [("left-0", Some(0.0)), ("left-1", Some(1.1)), ("left-2", Some(2.1))]);
         assert!(describe_removed(4).is_some_and(|text| text.starts_with("4 epochs were left out")));

@@ -13,6 +13,7 @@
 
 mod case;
 mod classes;
+mod convention;
 pub mod heads;
 mod honesty;
 mod integrity;
@@ -23,6 +24,7 @@ mod summary;
 
 pub use case::{Answer, Case, MeasuredDirection, Mismatch, Miss, limb_in_view_px, pair};
 pub use classes::{ErrorClasses, WINDOW};
+pub use convention::describe_conventions;
 pub use honesty::{Honesty, Within};
 pub use integrity::{Integrity, IntegrityRange, share_interval};
 pub use means::{LENGTHS, Means};

@@ -207,7 +207,8 @@ fn is_horace_success(case: &Case) -> bool {
 
 /// Separates the errors about the camera's x and y axes of the answers, in order of time.
 fn classes(cases: &[&Case]) -> Option<[ErrorClasses; 2]> {
-    let mut answered: Vec<_> = cases.iter().filter_map(|c| Some((c.time_s, c.miss?.about_deg))).collect();
+    let mut answered: Vec<_> =
+        cases.iter().filter_map(|c| Some((c.time_s.unwrap_or(f64::NAN), c.miss?.about_deg))).collect();
     answered.sort_by(|a, b| a.0.total_cmp(&b.0));
     let about = |axis: usize| ErrorClasses::new(&answered.iter().map(|(_, e)| e[axis]).collect::<Vec<_>>());
     Some([about(0)?, about(1)?])

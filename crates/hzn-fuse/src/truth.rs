@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use hzn_files::separator_hint;
 use hzn_files::vehicle::VehicleRow;
 use hzn_nav::frames::{Fixed, Rotation, Vector, Vehicle};
 use nalgebra::{Quaternion, UnitQuaternion};
@@ -27,8 +28,12 @@ pub struct Miss {
 /// # Errors
 /// The file cannot be read, or is not a vehicle.csv.
 pub fn read(path: &Path) -> Result<Vec<VehicleRow>, Error> {
-    let refuse = |e: csv::Error| Error::unusable(format!("{}: {e}; a vehicle.csv is expected", path.display()));
-    csv::Reader::from_path(path).map_err(refuse)?.deserialize().collect::<Result<_, _>>().map_err(refuse)
+    let named = |e: csv::Error, hint: &str| {
+        Error::unusable(format!("{}: {e}; a vehicle.csv is expected{hint}", path.display()))
+    };
+    let mut reader = csv::Reader::from_path(path).map_err(|e| named(e, ""))?;
+    let hint = separator_hint(reader.headers().map_err(|e| named(e, ""))?);
+    reader.deserialize().collect::<Result<_, _>>().map_err(|e| named(e, &hint))
 }
 
 /// Returns the errors of all solutions that have a truth less than 0.2 s before and after them.

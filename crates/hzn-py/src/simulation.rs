@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera as Lens;
-use hzn_evaluate::{Answer, Evaluation, heads, pair};
+use hzn_evaluate::{Answer, Evaluation, describe_conventions, heads, pair};
 use hzn_files::truth::Truth;
 use hzn_run::results::Results;
 use hzn_sim::scenario::{FIT_PICTURES, Fit};
@@ -174,7 +174,7 @@ fn read_truth(truth: &Bound<'_, PyAny>) -> PyResult<Vec<Truth>> {
     match truth.extract::<PathBuf>() {
         Ok(path) => {
             let path = if path.is_dir() { path.join("truth.csv") } else { path };
-            hzn_files::truth::load(&path).map_err(errors::config)
+            hzn_files::truth::load_directions(&path).map_err(errors::config)
         }
         Err(_) => serde_json::from_value::<Vec<Truth>>(parameters::from_python(truth)?)
             .map_err(|e| errors::config(format!("truth: {e}"))),
@@ -201,7 +201,9 @@ pub(crate) fn evaluate<'py>(
             camera = camera.or(recorded.map(|s| s.config.camera));
             let mut rows = heads::select(rows, None).map_err(errors::config)?;
             if heads::are_joint(&rows) {
-                let removed = heads::describe_removed(heads::name_by_time(&mut rows, &truth));
+                let removed = heads::name_by_time(&mut rows, &truth);
+                let removed = removed.map_err(|why| errors::config(format!("truth: {why}")))?;
+                let removed = heads::describe_removed(removed);
                 removed.map_or(Ok(()), |what| errors::warn(py, what))?;
             }
             rows
@@ -230,12 +232,14 @@ pub(crate) fn evaluate<'py>(
             rows
         }
     };
-    let value = errors::detached(py, move || -> PyResult<Value> {
+    let (value, conventions) = errors::detached(py, move || -> PyResult<(Value, Vec<String>)> {
         let lens = camera.and_then(|c| Lens::<f64>::try_new(&c).ok());
         let answers: Vec<_> = rows.drain(..).map(|r| Answer::from(&r)).collect();
         let cases = pair(&answers, &truth, lens.as_ref()).map_err(errors::other)?;
-        Ok(json!({ "evaluations": Evaluation::by_body(&cases), "frames": cases }))
+        let conventions = describe_conventions(&cases);
+        Ok((json!({ "evaluations": Evaluation::by_body(&cases), "frames": cases }), conventions))
     })??;
+    conventions.iter().try_for_each(|what| errors::warn(py, what))?;
     parameters::to_python(py, &value)
 }
 

@@ -3,6 +3,7 @@
 use std::io::BufRead;
 use std::path::Path;
 
+use hzn_files::separator_hint;
 use hzn_mcap::{Contents, Reader, Row};
 
 use crate::checked_row::{from_csv, from_json};
@@ -28,6 +29,10 @@ pub struct Results {
 /// # Errors
 /// The file does not exist, is not a file of results of `hzn run`, or is broken.
 pub fn read(file: &Path) -> Result<Results, Error> {
+    if file.is_dir() {
+        let what = "is a folder; results of `hzn run` are expected: .mcap, .csv or .jsonl";
+        return Err(unusable(format!("{}: {what}", file.display())));
+    }
     if !file.is_file() {
         return Err(unusable(format!("{}: no such file", file.display())));
     }
@@ -92,6 +97,10 @@ fn numbered_rows(file: &Path, kind: &str) -> Result<NumberedRows, Error> {
         "csv" => {
             let mut reader = csv::Reader::from_path(file).map_err(failed)?;
             let header = reader.headers().map_err(failed)?.clone();
+            let separator = separator_hint(&header);
+            if !separator.is_empty() {
+                return Err(unusable(format!("{}:1: not a table of hzn results{separator}", file.display())));
+            }
             let row = move |(i, record): (usize, csv::Result<csv::StringRecord>)| {
                 // A text with a line break takes several lines.
                 let line = |record: &csv::StringRecord| record.position().map(csv::Position::line);

@@ -13,7 +13,7 @@
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
-use hzn_files::{Problem, limited, suggestion};
+use hzn_files::{Problem, limited, separator_hint, suggestion};
 
 /// Largest difference of the length of a unit vector from 1.
 const MAX_LENGTH_ERROR: f64 = 0.01;
@@ -70,7 +70,7 @@ pub fn parse(text: &str, path: &Path, size_px: [u16; 2]) -> Result<Vec<Points>, 
     let header = reader.headers().map_err(unreadable)?.clone();
     let place = |name: &str| header.iter().position(|h| h == name);
     if let Some(name) = header.iter().find(|h| !COLUMNS.contains(h)) {
-        let what = format!("unknown column{}", suggestion(name, &COLUMNS));
+        let what = format!("unknown column{}{}", suggestion(name, &COLUMNS), separator_hint(&header));
         return Err(Problem::new(path, what).at_line(1).in_field(name));
     }
     let needed = |name: &'static str| {

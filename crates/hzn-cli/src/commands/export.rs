@@ -11,6 +11,7 @@ use hzn_run::{disk, explain, overlay, results};
 use super::export_instruments;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::files;
+use crate::kind_of_file;
 use crate::setup::TableFormat;
 use crate::tell;
 
@@ -64,6 +65,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn export_rows(args: &Args) -> Outcome {
     let file = &args.file;
     let (kind, _) = source::check_exists(file)?;
+    kind_of_file::refuse_other_table(file)?;
     let pictures = args.images.is_some() || args.overlay.is_some();
     if args.output.is_none() && !pictures {
         return Err(usage(

@@ -19,12 +19,13 @@ use facts::Facts;
 use summary::Summary;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::kind_of_file;
 use crate::tell::{self, one_line};
 
 /// Say what a file is, and what it contains
 ///
 /// The file may be results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, rig.toml, fuse.toml,
-/// frames.csv, truth.csv, imu.csv, gnss.csv, a picture, or the folder of a bag of ROS 2.
+/// frames.csv, truth.csv, imu.csv, gnss.csv, a picture, a video, or the folder of a bag of ROS 2.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The file
@@ -53,6 +54,7 @@ fn one_file(file: &Path) -> Result<Described, Stop> {
         "mcap" => recording(file)?,
         "csv" | "jsonl" => (table(file, &kind)?, None),
         "toml" | "yaml" | "yml" => (sensor(file, &kind)?, None),
+        _ if source::is_video(file) => other::video(file)?,
         _ => (one_picture(file)?, None),
     })
 }
@@ -221,12 +223,17 @@ fn series(file: &Path, header: &csv::StringRecord) -> Result<Facts, Stop> {
     let has = |name: &str| header.iter().position(|column| column == name);
     let (kind, words) = match () {
         () if has("gyro_x_radps").is_some() => ("imu", "imu.csv, rates and accelerations of a simulated vehicle"),
-        () if has("x_m").is_some() && has("vx_mps").is_some() => {
+        () if has("x_m").is_some() && has("vx_mps").is_some() && has("qw").is_none() => {
             ("gnss", "gnss.csv, fixes of a simulated satellite receiver")
         }
         () => ("table", "table that hzn does not know (results, frames.csv, truth.csv, imu.csv, gnss.csv)"),
     };
+    let (words, command) = match kind_of_file::of_columns(header).filter(|_| kind == "table") {
+        Some((what, command)) => (what, Some(command)),
+        None => (words, None),
+    };
     let mut out = Facts::new(kind, words);
+    command.into_iter().for_each(|command| out.line("for", command.to_owned()));
     let number = |row: &csv::StringRecord, name: &str| has(name).and_then(|i| row.get(i)?.parse::<f64>().ok());
     let (mut rows, mut span, mut saturated) = (0u64, None::<(f64, f64)>, 0u64);
     for row in csv::Reader::from_path(file).map_err(failed)?.records() {

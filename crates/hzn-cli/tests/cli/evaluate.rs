@@ -117,6 +117,80 @@ fn other_times_and_a_missing_sensor_are_reported() {
     place.run(&["evaluate", "out.csv", "--truth", "t.csv", "-s", "bad.toml"]).expect(2).says("did you mean pinhole");
 }
 
+#[test]
+fn a_truth_of_directions_is_sufficient() {
+    let place = place();
+    let with_all = place.run(&["evaluate", "out.csv", "--truth", "in"]).expect(0).out;
+    let names: Vec<&str> = HEADER.trim().split(',').collect();
+    let keep = |name: &str| ["file", "body", "limb", "half_angle_deg"].contains(&name) || name.starts_with("axis_");
+    let kept = |line: &str| {
+        let cells = line.split(',').zip(&names).filter(|(_, name)| keep(name)).map(|(cell, _)| cell);
+        cells.collect::<Vec<_>>().join(",") + "\n"
+    };
+    let few: String = place.read("in/truth.csv").lines().map(kept).collect();
+    place.write("few.csv", few.as_bytes());
+    let args =
+        ["evaluate", "out.csv", "--truth", "few.csv", "-s", "in/sensor.toml", "-o", "few.json", "-o", "few.html"];
+    let with_few = place.run(&args).expect(0).out;
+    let numbers = |text: &str| text.lines().take_while(|line| !line.is_empty()).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(numbers(&with_few), numbers(&with_all));
+    let json: serde_json::Value = serde_json::from_str(&place.read("few.json")).unwrap();
+    assert!(json["frames"][0]["time_s"].is_null() && json["frames"][0]["altitude_km"].is_null());
+    place.write("semicolons.csv", few.replace(',', ";").as_bytes());
+    place
+        .run(&["evaluate", "out.csv", "--truth", "semicolons.csv"])
+        .expect(2)
+        .says("columns are separated by commas here, not by semicolons");
+}
+
+#[test]
+fn a_truth_of_another_convention_is_named() {
+    let place = place();
+    // Answers that differ, so that the conventions do.
+    let truth = place.read("in/truth.csv");
+    let told = |change: fn([f64; 3]) -> [f64; 3]| {
+        let line = |line: &str| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            let axis = [4, 5, 6].map(|i| cells[i].parse::<f64>());
+            if let [Ok(x), Ok(y), Ok(z)] = axis {
+                for (i, value) in change([x, y, z]).iter().enumerate() {
+                    cells[4 + i] = value.to_string();
+                }
+            }
+            cells.join(",") + "\n"
+        };
+        place.write("t.csv", truth.lines().map(line).collect::<String>().as_bytes());
+        place.run(&["evaluate", "out.csv", "--truth", "t.csv", "-s", "in/sensor.toml"]).expect(0).err
+    };
+    assert!(!told(|axis| axis).contains("as if"));
+    let opposite = told(|axis| axis.map(|x| -x));
+    assert!(opposite.contains("earth-sphere: the errors are as if the truth had the opposite sign"), "{opposite}");
+    let mirrored = told(|[x, y, z]| [x, -y, z]);
+    assert!(mirrored.contains("as if the y axis of the truth were mirrored"), "{mirrored}");
+}
+
+#[test]
+fn other_files_are_named_with_the_command_that_reads_them() {
+    let place = place();
+    place.write("vehicle.csv", b"time_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,qw,qx,qy,qz\n0,7e6,0,0,0,7e3,0,1,0,0,0\n");
+    place
+        .run(&["explain", "out.csv"])
+        .expect(2)
+        .says("out.csv: has results of hzn run, and a picture")
+        .says("hzn info");
+    place.run(&["run", "in/truth.csv"]).expect(2).says("has the truth of pictures (truth.csv)").says("hzn evaluate");
+    let vehicle = "has the truth of a vehicle (vehicle.csv), and a file of results of hzn run is needed here";
+    place.run(&["export", "vehicle.csv", "-o", "v.jsonl"]).expect(2).says(vehicle).says("hzn fuse --truth");
+    place.run(&["evaluate", "vehicle.csv", "--truth", "nowhere.csv"]).expect(2).says(vehicle);
+    place.run(&["evaluate", "in", "--truth", "nowhere.csv"]).expect(2).says("in: is a folder; results of `hzn run`");
+    place.run(&["evaluate", "in/sensor.toml", "--truth", "nowhere.csv"]).expect(2).says("results of `hzn run` are");
+    let described = place.run(&["info", "vehicle.csv"]).expect(0).out;
+    assert!(
+        described.contains("the truth of a vehicle") && described.contains("hzn fuse --truth reads it"),
+        "{described}"
+    );
+}
+
 /// A row that another program wrote is no answer if its numbers cannot be those of one.
 #[test]
 fn impossible_answers_are_refused_with_their_column() {

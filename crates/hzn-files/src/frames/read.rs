@@ -10,6 +10,7 @@ use hzn_core::body::Kind;
 use super::data::{FrameData, Frames, Orientation, plain_name};
 use crate::nearest::nearest;
 use crate::quoted::quoted;
+use crate::separator::separator_hint;
 use crate::{Problem, limited, time};
 
 /// Names of the columns that are read.
@@ -262,9 +263,7 @@ fn without_file_column(header: &StringRecord, path: &Path) -> Problem {
         return Problem::new(path, what);
     }
     let found: Vec<&str> = header.iter().collect();
-    let other = [(';', "semicolons"), ('\t', "tabs")].iter().find(|(c, _)| header.iter().any(|name| name.contains(*c)));
-    let hint =
-        other.map(|(_, what)| format!("; columns are separated by commas here, not by {what}")).unwrap_or_default();
+    let hint = separator_hint(header);
     let what =
         format!("the column `file` is missing (found: {}); it names the picture of each row{hint}", found.join(", "));
     Problem::new(path, what).at_line(1)

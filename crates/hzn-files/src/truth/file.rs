@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::row::Truth;
 use crate::limited;
+use crate::separator::separator_hint;
 
 /// The reason why a truth.csv cannot be used, displayed as `truth.csv:3: axis_x: …`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,38 +41,42 @@ impl core::error::Error for TruthError {}
 /// Fails if the file cannot be read or has no rows, if a column is missing, or if a cell is not a finite number. Also
 /// fails if an axis or a quaternion does not have unit length, or if a half-angle is not above 0° and below 90°.
 pub fn load(path: &Path) -> Result<Vec<Truth>, TruthError> {
-    let text = limited::read_text(path, limited::TABLE_BYTES).map_err(|e| {
+    parse(&read(path)?, path)
+}
+
+/// Reads a truth.csv as [`load`] does, but time, altitude and attitude may be missing, too: the directions are all that
+/// a comparison of answers needs. A number whose column is missing is NaN.
+///
+/// # Errors
+/// Fails like [`load`].
+pub fn load_directions(path: &Path) -> Result<Vec<Truth>, TruthError> {
+    parse_with(&read(path)?, path, &NEEDED)
+}
+
+fn read(path: &Path) -> Result<String, TruthError> {
+    limited::read_text(path, limited::TABLE_BYTES).map_err(|e| {
         let what = match e.kind() {
             std::io::ErrorKind::NotFound => "no such file".to_owned(),
             _ => format!("cannot be read: {e}"),
         };
         TruthError { path: path.to_owned(), line: None, column: None, what }
-    })?;
-    parse(&text, path)
+    })
 }
 
-/// Columns that a truth.csv must have.
-const REQUIRED: [&str; 13] = [
-    "file",
-    "time_s",
-    "body",
-    "limb",
-    "axis_x",
-    "axis_y",
-    "axis_z",
-    "half_angle_deg",
-    "altitude_km",
-    "qw",
-    "qx",
-    "qy",
-    "qz",
-];
+/// Columns that a comparison of answers with the truth needs.
+const NEEDED: [&str; 7] = ["file", "body", "limb", "axis_x", "axis_y", "axis_z", "half_angle_deg"];
+/// Columns that every truth.csv of hzn has beside them.
+const FURTHER: [&str; 6] = ["time_s", "altitude_km", "qw", "qx", "qy", "qz"];
 
 /// Parses the text of a truth.csv, like [`load`]; messages name `path`.
 ///
 /// # Errors
 /// Fails like [`load`].
 pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
+    parse_with(text, path, &[&NEEDED[..], &FURTHER[..]].concat())
+}
+
+fn parse_with(text: &str, path: &Path, required: &[&str]) -> Result<Vec<Truth>, TruthError> {
     let error = |line: Option<u64>, column: Option<&str>, what: String| TruthError {
         path: path.to_owned(),
         line,
@@ -82,8 +87,10 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let header = reader.headers().map_err(|e| error(Some(1), None, format!("not valid CSV: {e}")))?.clone();
-    if let Some(missing) = REQUIRED.into_iter().find(|name| !header.iter().any(|h| h == *name)) {
-        return Err(error(Some(1), Some(missing), "this column is missing; is it a truth.csv?".into()));
+    let has = |name: &str| header.iter().any(|h| h == name);
+    if let Some(missing) = required.iter().find(|name| !has(name)) {
+        let what = format!("this column is missing; is it a truth.csv?{}", separator_hint(&header));
+        return Err(error(Some(1), Some(missing), what));
     }
     let mut rows = Vec::new();
     for record in reader.records() {
@@ -99,7 +106,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
             }
             _ => error(line, None, e.to_string()),
         })?;
-        check(&row).map_err(|(column, what)| error(line, Some(column), what))?;
+        check(&row, has).map_err(|(column, what)| error(line, Some(column), what))?;
         rows.push(row);
     }
     if rows.is_empty() {
@@ -109,7 +116,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Truth>, TruthError> {
 }
 
 /// Fails for the first value that is out of its limits, with its column and a message.
-fn check(row: &Truth) -> Result<(), (&'static str, String)> {
+fn check(row: &Truth, has: impl Fn(&str) -> bool) -> Result<(), (&'static str, String)> {
     let numbers = [
         ("time_s", row.time_s),
         ("axis_x", row.axis_x),
@@ -122,7 +129,7 @@ fn check(row: &Truth) -> Result<(), (&'static str, String)> {
         ("qy", row.qy),
         ("qz", row.qz),
     ];
-    if let Some((name, x)) = numbers.into_iter().find(|(_, x)| !x.is_finite()) {
+    if let Some((name, x)) = numbers.into_iter().find(|(name, x)| has(name) && !x.is_finite()) {
         return Err((name, format!("{x} is not a finite number")));
     }
     let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -130,7 +137,8 @@ fn check(row: &Truth) -> Result<(), (&'static str, String)> {
     if !is_unit(&[row.axis_x, row.axis_y, row.axis_z]) {
         return Err(("axis_x, axis_y, axis_z", "must have length 1".into()));
     }
-    if !is_unit(&[row.qw, row.qx, row.qy, row.qz]) {
+    let has_attitude = ["qw", "qx", "qy", "qz"].into_iter().all(has);
+    if has_attitude && !is_unit(&[row.qw, row.qx, row.qy, row.qz]) {
         return Err(("qw, qx, qy, qz", "must have length 1".into()));
     }
     if !(row.half_angle_deg > 0.0 && row.half_angle_deg < 90.0) {

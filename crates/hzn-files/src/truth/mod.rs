@@ -3,7 +3,7 @@
 mod file;
 mod row;
 
-pub use file::{TruthError, load, parse};
+pub use file::{TruthError, load, load_directions, parse};
 pub use row::Truth;
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ pub struct Truth {
     /// Name of the picture's file, without its folder.
     pub file: String,
     /// Time in seconds.
+    #[serde(default = "missing")]
     pub time_s: f64,
     /// The body's kind as in sensor.toml.
     pub body: String,
@@ -26,6 +27,7 @@ pub struct Truth {
     /// principal half-angles.
     pub half_angle_deg: f64,
     /// Altitude of the camera above the surface in kilometres (geodetic for `earth`).
+    #[serde(default = "missing")]
     pub altitude_km: f64,
     /// Direction to the Sun in the camera frame, first component of the unit vector; empty if the scene has no Sun.
     pub sun_x: Option<f64>,
@@ -40,12 +42,16 @@ pub struct Truth {
     /// Third component of the direction to the Moon.
     pub moon_z: Option<f64>,
     /// Attitude as a quaternion from camera to ECEF (to body-fixed axes for an ellipsoid): scalar part.
+    #[serde(default = "missing")]
     pub qw: f64,
     /// First vector component of the attitude.
+    #[serde(default = "missing")]
     pub qx: f64,
     /// Second vector component of the attitude.
+    #[serde(default = "missing")]
     pub qy: f64,
     /// Third vector component of the attitude.
+    #[serde(default = "missing")]
     pub qz: f64,
     /// Vector from the camera to the centre of the body in the camera frame, first component, kilometres; empty in
     /// files of older versions.
@@ -61,6 +67,11 @@ pub struct Truth {
     /// the Sun itself, if the scene has no Sun, and in files of older versions.
     #[serde(default)]
     pub phase_deg: Option<f64>,
+}
+
+/// The value of a number whose column is missing.
+fn missing() -> f64 {
+    f64::NAN
 }
 
 impl Truth {

@@ -5,7 +5,7 @@ use std::path::Path;
 use csv::StringRecord;
 use hzn_files::limited;
 use hzn_files::nearest;
-use hzn_files::quoted;
+use hzn_files::{quoted, separator_hint};
 
 use super::columns::Columns;
 use super::map::Map;
@@ -71,7 +71,8 @@ impl Table {
         let table = self.columns.table;
         let name = self.columns.columns.iter().find(|c| c.quantity == *missing).map_or(*missing, |c| c.name);
         let how = format!("--map {table}:{missing}=COLUMN says which one it is");
-        Err(self.refused(format!("the column {name} is missing; the file has {}; {how}", self.header)))
+        let separator = separator_hint([self.header.as_str()]);
+        Err(self.refused(format!("the column {name} is missing; the file has {}{separator}; {how}", self.header)))
     }
 
     /// Returns the names of all columns of the file.

@@ -102,6 +102,11 @@ pub fn open(inputs: &[PathBuf], raw: Option<Raw>, topic: Option<&str>) -> Result
     Ok(Box::new(files::Files::open(inputs, raw)?))
 }
 
+/// Returns whether a file is a video by its ending.
+pub fn is_video(file: &Path) -> bool {
+    video::ENDINGS.contains(&ending(file).as_str())
+}
+
 /// Returns whether an input is standard input, which carries headerless pictures one after another.
 pub fn is_stdin(input: &Path) -> bool {
     input == Path::new("-")

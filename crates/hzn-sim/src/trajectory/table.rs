@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_files::limited;
+use hzn_files::{limited, separator_hint};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -55,7 +55,7 @@ impl Table {
         let mut turns = Vec::new();
         for (i, row) in reader.deserialize::<Row>().enumerate() {
             let line = i + 2;
-            let row = row.map_err(|e| wrong(format!("row {line}: {e}")))?;
+            let row = row.map_err(|e| wrong(format!("row {line}: {e}{}", separator_hint(text.lines().next()))))?;
             if points.last().is_some_and(|(t, _)| row.time_s <= *t) {
                 return Err(wrong(format!("row {line}: time_s must rise from row to row")));
             }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hzn_files::limited;
+use hzn_files::{limited, separator_hint};
 
 use crate::exit::{Stop, usage};
 
@@ -23,7 +23,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<(String, [f64; 3])>, Stop> {
     for (place, name) in places.iter_mut().zip(COLUMNS) {
         *place = header.iter().position(|c| c == name).ok_or_else(|| {
             let has = header.iter().collect::<Vec<_>>().join(", ");
-            usage(format!("{shown}: the column {name} is missing; the file has {has}"))
+            usage(format!("{shown}: the column {name} is missing; the file has {has}{}", separator_hint(&header)))
         })?;
     }
     let mut rows = Vec::new();

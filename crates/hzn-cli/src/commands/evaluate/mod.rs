@@ -8,7 +8,7 @@ mod worst;
 use std::path::{Path, PathBuf};
 
 use hzn_core::camera::Camera;
-use hzn_evaluate::{Answer, Evaluation, heads, pair};
+use hzn_evaluate::{Answer, Evaluation, describe_conventions, heads, pair};
 use hzn_files::truth::Truth;
 use hzn_mcap::Row;
 use hzn_run::disk;
@@ -17,6 +17,7 @@ use hzn_run::source::ending;
 
 use crate::exit::{Exit, Outcome, Stop, failed, unreadable, usage};
 use crate::files;
+use crate::kind_of_file;
 use crate::tell;
 use report::Report;
 
@@ -65,23 +66,22 @@ pub(super) fn run(args: &Args) -> Outcome {
             _ => return Err(usage(format!("{}: a report ends in .json or .html", path.display()))),
         }
     }
+    let Results { rows, sensor_toml, lost, .. } = read_results(&args.results)?;
     let truth_path = if args.truth.is_dir() { args.truth.join("truth.csv") } else { args.truth.clone() };
     let folder = truth_path.parent().unwrap_or(Path::new(""));
-    let truth = hzn_files::truth::load(&truth_path).map_err(usage)?;
+    let truth = hzn_files::truth::load_directions(&truth_path).map_err(usage)?;
     let sensor_path = args.sensor.clone().unwrap_or_else(|| folder.join("sensor.toml"));
     let mut read = hzn_files::files_of_sensor(&sensor_path);
     read.extend([args.results.clone(), truth_path.clone()]);
     read.extend(truth.iter().map(|t| folder.join(&t.file)));
     files::check_outputs(&read, &args.output, args.force)?;
-    let Results { rows, sensor_toml, lost, .. } = hzn_run::results::read(&args.results)?.checked()?;
-    if let Some(lost) = lost.as_ref().filter(|_| rows.is_empty()) {
-        return Err(unreadable(lost));
-    }
     let mut rows = heads::select(rows, args.head.as_deref()).map_err(usage)?;
     let are_joint = heads::are_joint(&rows);
     truth_of_rig(folder, are_joint, args.head.as_deref())?;
     if are_joint {
-        heads::describe_removed(heads::name_by_time(&mut rows, &truth)).iter().for_each(tell::warning);
+        let removed = heads::name_by_time(&mut rows, &truth);
+        let removed = removed.map_err(|why| usage(format!("{}: {why}", truth_path.display())))?;
+        heads::describe_removed(removed).iter().for_each(tell::warning);
     }
     let sensor = sensor(args.sensor.as_deref(), sensor_toml.as_deref(), folder)?;
     let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok()).filter(|_| !are_joint);
@@ -92,6 +92,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let cases = pair(&answers, &truth, camera.as_ref())
         .map_err(|e| usage(format!("{} does not match {}: {e}", truth_path.display(), args.results.display())))?;
     warn_of_other_times(&rows, &truth, are_joint);
+    describe_conventions(&cases).iter().for_each(tell::warning);
     let report = Report {
         results: args.results.display().to_string(),
         truth: truth_path.display().to_string(),
@@ -115,6 +116,16 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     lost.iter().for_each(tell::warning);
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// Reads the results. They come before the truth, so that a wrong file in their place is named first.
+fn read_results(path: &Path) -> Result<Results, Stop> {
+    kind_of_file::refuse_other_table(path)?;
+    let results = hzn_run::results::read(path)?.checked()?;
+    match &results.lost {
+        Some(lost) if results.rows.is_empty() => Err(unreadable(lost)),
+        _ => Ok(results),
+    }
 }
 
 fn sensor(sensor: Option<&Path>, recorded: Option<&str>, folder: &Path) -> Result<Option<hzn_core::Config>, Stop> {

@@ -75,16 +75,20 @@ fn charts(e: &Evaluation, frames: &[Case]) -> Vec<Chart> {
     let dots = |name: &str, x: &dyn Fn(&Case) -> Option<f64>, y: &dyn Fn(&Miss) -> f64| {
         Series::new(name, Style::Dots, cases.iter().filter_map(|(c, m)| Some((x(c)?, y(m)))))
     };
-    let mut out = vec![
-        Chart::new("Error and claimed sigma over time", "time [s]", "deg")
-            .with_series(dots("error", &|c| Some(c.time_s), &|m| m.angle_deg))
-            .with_series(dots("largest sigma", &|c| Some(c.time_s), &|m| m.sigma_max_deg)),
-        Chart::new("Error about the camera's axes", "time [s]", "deg")
-            .with_series(dots("about x", &|c| Some(c.time_s), &|m| m.about_deg[0]))
-            .with_series(dots("about y", &|c| Some(c.time_s), &|m| m.about_deg[1]))
-            .with_series(dots("about z", &|c| Some(c.time_s), &|m| m.about_deg[2])),
-        distribution(&cases),
-    ];
+    let mut out = Vec::new();
+    // A truth may have no times.
+    if cases.iter().any(|(c, _)| c.time_s.is_some()) {
+        out.extend([
+            Chart::new("Error and claimed sigma over time", "time [s]", "deg")
+                .with_series(dots("error", &|c| c.time_s, &|m| m.angle_deg))
+                .with_series(dots("largest sigma", &|c| c.time_s, &|m| m.sigma_max_deg)),
+            Chart::new("Error about the camera's axes", "time [s]", "deg")
+                .with_series(dots("about x", &|c| c.time_s, &|m| m.about_deg[0]))
+                .with_series(dots("about y", &|c| c.time_s, &|m| m.about_deg[1]))
+                .with_series(dots("about z", &|c| c.time_s, &|m| m.about_deg[2])),
+        ]);
+    }
+    out.push(distribution(&cases));
     out.extend(calibration(&cases));
     out.extend(stanford(e, frames));
     for group in &e.groups {

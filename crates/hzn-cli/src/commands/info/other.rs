@@ -29,6 +29,45 @@ pub(super) fn bag(folder: &Path) -> Result<(Facts, Option<String>), Stop> {
     Ok((out, pictures.describe_loss()))
 }
 
+/// Number of frames of a video that give its rate.
+const RATE_FRAMES: usize = 100;
+
+/// Describes a video. The second part names what cannot be read.
+pub(super) fn video(file: &Path) -> Result<(Facts, Option<String>), Stop> {
+    let mut frames = source::open(&[file.to_owned()], None, None)?;
+    let mut out = Facts::new("video", "video, for `hzn run FILE` and `hzn init FILE`");
+    if let Some((_, (width, height))) = frames.sizes().next() {
+        out.fact("size", format!("{width} x {height} px"), "width_px", width);
+        out.key("height_px", height);
+    }
+    match frames.total() {
+        Some(n) => out.fact("frames", n.to_string(), "frames", n),
+        None => out.line("frames", "their number is not in the container".to_owned()),
+    }
+    let aspect = frames.pixel_aspect();
+    if aspect != 1.0 {
+        let text = format!("{aspect:.4} times as wide as high; `hzn init` writes fx_px and fy_px for them");
+        out.line("pixels", text);
+    }
+    out.key("pixel_aspect", aspect);
+    let mut times: Vec<f64> = Vec::new();
+    while times.len() < RATE_FRAMES {
+        let Some(item) = frames.next() else { break };
+        let TimeSource::Container(Some(t)) = item?.time else { break };
+        times.push(t);
+    }
+    let mut steps: Vec<f64> = times.windows(2).filter_map(|w| Some(w.last()? - w.first()?)).collect();
+    steps.sort_by(f64::total_cmp);
+    if let Some(step_s) = steps.get(steps.len() / 2).filter(|step| **step > 0.0) {
+        let text = format!("{:.3} frames a second (the median of the first {} steps)", 1.0 / step_s, steps.len());
+        out.fact("rate", text, "rate_hz", 1.0 / step_s);
+    }
+    let notes = frames.notes();
+    notes.iter().for_each(|note| out.line("note", note.clone()));
+    out.key("notes", json!(notes));
+    Ok((out, frames.describe_loss()))
+}
+
 /// Describes the results of `hzn fuse`.
 pub(super) fn solution(read: &Solution) -> Facts {
     let mut out = Facts::new("navigation", "results of hzn fuse, for `hzn view`");

@@ -87,10 +87,8 @@ fn wrong_cells_name_row_and_column() {
     );
     assert!(read("file,sun_x,sun_y,sun_z\na,0,0,0\n").unwrap_err().contains("sun_x, sun_y, sun_z: has no direction"));
     // Spreadsheet programs of some countries write semicolons and decimal commas.
-    assert!(
-        read("file;altitude_km\r\na;1,5\r\n").unwrap_err().ends_with("separated by commas here, not by semicolons")
-    );
-    assert!(read("file\taltitude_km\n").unwrap_err().ends_with("not by tabs"));
+    assert!(read("file;altitude_km\r\na;1,5\r\n").unwrap_err().contains("separated by commas here, not by semicolons"));
+    assert!(read("file\taltitude_km\n").unwrap_err().contains("not by tabs"));
     assert!(
         read("file,altitude_km\na,\"400,5\"\n").unwrap_err().contains("\"400,5\" has a decimal comma; write a point")
     );
