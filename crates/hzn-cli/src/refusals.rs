@@ -63,6 +63,8 @@ pub(crate) struct Commonest<'a> {
     pub(crate) pictures: &'a [u64],
     /// Whether the body may have another size than expected.
     pub(crate) is_size: bool,
+    /// Whether an edge was found and refused.
+    pub(crate) is_edge: bool,
 }
 
 impl Refusals {
@@ -98,6 +100,7 @@ impl Refusals {
         Some(Commonest {
             text: format!("{} refused, {share} as {}", self.total, why.text(limits)),
             pictures: first,
+            is_edge: matches!(why, Why::Verdict(_)),
             is_size: matches!(why, Why::Verdict(Verdict::HalfAngle | Verdict::NoConsensus | Verdict::FewInliers)),
         })
     }

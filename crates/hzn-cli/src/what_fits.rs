@@ -1,38 +1,94 @@
-//! What would fit a limb of another size than expected: the sentence for the end of a run.
+//! What would make refused pictures answers: the sentences for the end of a run.
 
 use hzn_core::Config;
+use hzn_core::camera::Camera;
+use hzn_core::image::region::Region;
+use hzn_files::FrameData;
+use hzn_run::bars::find_bars;
 use hzn_run::diagnosis::{self, AnyCone, FitFacts};
 use hzn_run::open::{Request, open};
+use hzn_run::source::Picture;
 
 /// What refused pictures say about the size of the limb.
 pub(crate) struct WhatFits {
-    /// What would fit in the middle one of the pictures, in words.
+    /// What would fit them, in words.
     pub(crate) text: String,
     /// Number of pictures with a limb of another size than expected.
     pub(crate) pictures: usize,
 }
 
-/// Looks for a limb of any size in some refused pictures of a sequence, and says what would fit in the middle one of
-/// them. `None` if the pictures show no limb, or one of the expected size.
-pub(crate) fn in_pictures(request: &Request, config: &Config, indices: &[u64]) -> Option<WhatFits> {
-    // A sentence at the end of a run must not make the run fail, so that an error here only leaves it out.
-    let mut opened = open(request).ok()?;
-    let mut trial = AnyCone::new(config, request.flight).ok()?;
-    let camera = hzn_core::camera::Camera::try_new(&config.camera).ok()?;
-    let mut found: Vec<(String, FitFacts)> = Vec::new();
-    for index in 0..=*indices.iter().max()? {
-        let mut item = opened.source.next()?.ok()?;
-        if !indices.contains(&index) {
-            continue;
+/// What a second look at refused pictures found.
+#[derive(Default)]
+pub(crate) struct Again {
+    /// The black bars that no mask covers, in words.
+    pub(crate) bars: Option<String>,
+    pub(crate) fits: Option<WhatFits>,
+}
+
+/// Some refused pictures of a sequence, to look at again.
+pub(crate) struct RefusedPictures {
+    each: Vec<(String, Picture, Option<FrameData>)>,
+}
+
+impl RefusedPictures {
+    /// Reads the pictures with these numbers.
+    pub(crate) fn read(request: &Request, config: &Config, indices: &[u64]) -> Option<Self> {
+        // A sentence at the end of a run must not make the run fail, so that an error here only leaves it out.
+        let mut opened = open(request).ok()?;
+        let mut each = Vec::new();
+        for index in 0..=*indices.iter().max()? {
+            let mut item = opened.source.next()?.ok()?;
+            if !indices.contains(&index) {
+                continue;
+            }
+            let data = item.take_prior(opened.frames.as_ref());
+            if let Ok((picture, _)) = item.payload.decode(Some(config)) {
+                each.push((item.name, picture, data));
+            }
         }
-        let data = item.take_prior(opened.frames.as_ref());
-        let Ok((picture, _)) = item.payload.decode(Some(config)) else { continue };
-        let Ok(view) = picture.view(config.input.channel) else { continue };
-        let fit = diagnosis::find_misfit(&mut trial, config, &view, data.as_ref());
-        found.extend(fit.map(|fit| (item.name, fit)));
+        Some(Self { each })
     }
-    found.sort_by(|(_, a), (_, b)| a.fitted_deg.total_cmp(&b.fitted_deg));
-    let (name, fit) = found.get(found.len().checked_sub(1)? / 2)?;
-    let text = format!("in {name} {}", diagnosis::what_fits(fit, &camera, config.camera.width));
-    Some(WhatFits { text, pictures: found.len() })
+
+    /// Looks for a limb of any size, and says what would fit the median of the pictures. `None` if no picture shows a
+    /// limb, or if those that do show one of the expected size.
+    pub(crate) fn what_fits(&self, request: &Request, config: &Config) -> Option<WhatFits> {
+        let mut trial = AnyCone::new(config, request.flight).ok()?;
+        let camera = Camera::try_new(&config.camera).ok()?;
+        let mut found: Vec<FitFacts> = Vec::new();
+        for (_, picture, data) in &self.each {
+            let Ok(view) = picture.view(config.input.channel) else { continue };
+            found.extend(diagnosis::find_misfit(&mut trial, config, &view, data.as_ref()));
+        }
+        let fits = diagnosis::what_fits(&diagnosis::median_fit(&found)?, &camera, config.camera.width);
+        let text = match (self.each.as_slice(), found.len()) {
+            ([(name, ..)], _) => format!("in {name} {fits}"),
+            (each, n) => format!("in {n} of {} refused pictures that were looked at (median), {fits}", each.len()),
+        };
+        Some(WhatFits { text, pictures: found.len() })
+    }
+
+    /// Says which black bars the pictures have that no mask covers.
+    pub(crate) fn bars(&self, config: &Config) -> Option<String> {
+        let pictures: Vec<Picture> = self.each.iter().map(|(_, picture, _)| picture.clone()).collect();
+        let bars = find_bars(&pictures)?;
+        let (width, height) = (config.camera.width, config.camera.height);
+        let region = Region::<f64>::new(&config.mask, &Camera::try_new(&config.camera).ok()?);
+        let inside = |px: u32| px.saturating_sub(1) as u16;
+        let (right, bottom) = (width.checked_sub(1)?, height.checked_sub(1)?);
+        let sides = [
+            (bars.left_px, inside(bars.left_px), height / 2),
+            (bars.right_px, right.saturating_sub(inside(bars.right_px)), height / 2),
+            (bars.top_px, width / 2, inside(bars.top_px)),
+            (bars.bottom_px, width / 2, bottom.saturating_sub(inside(bars.bottom_px))),
+        ];
+        let is_free = sides.iter().any(|(px, x, y)| *px > 0 && region.contains(*x, *y) && !region.masked(*x, *y));
+        is_free.then(|| {
+            format!(
+                "the refused pictures have black bars, {}, whose borders are edges; mask them, as hzn init does: \
+                 [mask] polygons_px = {}",
+                bars.describe(),
+                bars.polygons_px([width, height].map(u32::from))
+            )
+        })
+    }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use hzn_core::Config;
 use hzn_core::camera::Model;
 use hzn_files::sensor;
-use hzn_files::start::{Body, CameraFacts, Exif, write_sensor_toml};
+use hzn_files::start::{Body, CameraFacts, write_sensor_toml};
 use hzn_run::open::Request;
 use hzn_run::source;
 use hzn_run::start::{LimbSays, measure_field_of_view, read_camera_facts};
@@ -42,11 +42,10 @@ pub(crate) fn make(py: Python<'_>, said: &Said<'_>) -> PyResult<Config> {
 /// Returns what is known about the camera, with the field of view from the limb if nothing else says it.
 fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
     let lens = said.lens.map(lens).transpose()?;
-    let body = match said.body {
-        "earth" => Body::Earth,
-        "moon" => Body::Moon,
-        other => return Err(errors::config(format!("body: {other:?} is refused: must be earth or moon"))),
-    };
+    let body = Body::from_name(said.body).ok_or_else(|| {
+        let names: Vec<&str> = Body::all().map(Body::name).collect();
+        errors::config(format!("body: {:?} is refused: must be one of {}", said.body, names.join(", ")))
+    })?;
     if let Some(km) = said.altitude_km.filter(|km| !(*km > 0.0 && km.is_finite())) {
         return Err(errors::config(format!("altitude_km: {km} is refused: must be above 0")));
     }
@@ -55,7 +54,7 @@ fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
             let mut source = source::open(std::slice::from_ref(path), None, None).map_err(errors::image)?;
             read_camera_facts(source.as_mut()).map_err(errors::image)?
         }
-        (None, Some((width, height))) => of_size([width, height]),
+        (None, Some((width, height))) => CameraFacts::of_size([width, height]),
         _ => return Err(errors::config("give either pictures or size=(width, height)")),
     };
     let mut known = CameraFacts { fov_deg: said.fov_deg, lens, altitude_km: said.altitude_km, body, ..read };
@@ -81,21 +80,6 @@ fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
         }
     }
     Ok(known)
-}
-
-fn of_size(size_px: [u32; 2]) -> CameraFacts {
-    CameraFacts {
-        size_px,
-        fov_deg: None,
-        lens: None,
-        exif: Exif::default(),
-        tone: None,
-        altitude_km: None,
-        body: Body::Earth,
-        measured: None,
-        image_circle_px: None,
-        pixel_aspect: 1.0,
-    }
 }
 
 fn lens(name: &str) -> PyResult<Model> {

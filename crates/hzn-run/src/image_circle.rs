@@ -6,7 +6,6 @@
 //! surroundings, but the Earth fills its circle.
 
 use crate::source::Picture;
-use crate::source::picture::Samples;
 
 /// Number of directions from the picture's centre.
 const DIRECTIONS: usize = 120;
@@ -75,23 +74,11 @@ fn level(picture: &Picture, x: u32, y: u32) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for y in y.saturating_sub(1)..(y + 2).min(picture.layout.height) {
         for x in x.saturating_sub(1)..(x + 2).min(picture.layout.width) {
-            sum += colours(picture, x, y);
+            sum += picture.brightness(x, y);
             count += 1.0;
         }
     }
     sum / count
-}
-
-/// Returns the sum of the colours of a pixel.
-fn colours(picture: &Picture, x: u32, y: u32) -> f64 {
-    let channels = usize::from(picture.layout.channels);
-    let from = y as usize * picture.layout.stride + x as usize * channels;
-    // A second or a fourth channel is transparency.
-    let colours = from..from + channels.max(1) - usize::from(channels.is_multiple_of(2));
-    match &picture.samples {
-        Samples::Bytes(d) => d.get(colours).unwrap_or_default().iter().map(|&v| f64::from(v)).sum(),
-        Samples::Words(d) => d.get(colours).unwrap_or_default().iter().map(|&v| f64::from(v)).sum(),
-    }
 }
 
 /// The levels of a picture along lines from its centre to its border, a pixel apart.
@@ -180,6 +167,7 @@ mod tests {
     use hzn_core::image::Layout;
 
     use super::*;
+    use crate::source::picture::Samples;
 
     const SIZE: u32 = 320;
 

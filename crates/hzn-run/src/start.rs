@@ -2,9 +2,10 @@
 //! ([`hzn_files::start`]).
 
 use hzn_files::FrameData;
-use hzn_files::start::{self, Body, CameraFacts, Exif, StartConfig};
+use hzn_files::start::{self, CameraFacts, Exif, StartConfig};
 
-use crate::diagnosis::{FieldOfView, find_field_of_view};
+use crate::bars::find_bars;
+use crate::diagnosis::{AnyCone, FieldOfView, Implied, find_any_fit, find_field_of_view, median_fit};
 use crate::error::{Error, unusable};
 use crate::image_circle::find_image_circle;
 use crate::open::{Request, frames_path, load_frames};
@@ -29,8 +30,8 @@ pub enum LimbSays {
     Nothing(usize),
 }
 
-/// Returns what the pictures say about their camera: size and tone, EXIF of the first one, and the image circle of a
-/// fisheye.
+/// Returns what the pictures say about their camera: size and tone, EXIF of the first one, the image circle of a
+/// fisheye, and black bars.
 ///
 /// # Errors
 /// No picture can be read, or the pictures have different sizes.
@@ -54,16 +55,12 @@ pub fn read_camera_facts(source: &mut dyn Source) -> Result<CameraFacts, Error> 
         }
     }
     Ok(CameraFacts {
-        size_px,
-        fov_deg: None,
-        lens: None,
         exif: exif.unwrap_or_default(),
         tone,
-        altitude_km: None,
-        body: Body::default(),
-        measured: None,
         image_circle_px: find_image_circle(&pictures),
+        bars: find_bars(&pictures),
         pixel_aspect,
+        ..CameraFacts::of_size(size_px)
     })
 }
 
@@ -88,6 +85,20 @@ fn one_size(source: &dyn Source) -> Result<[u32; 2], Error> {
 /// # Errors
 /// A file cannot be read.
 pub fn measure_field_of_view(request: &Request, known: &CameraFacts) -> Result<LimbSays, Error> {
+    let pictures = read_pictures(request, known)?;
+    if pictures.is_empty() {
+        return Ok(LimbSays::NoAltitude);
+    }
+    let mut found = find_field_of_view(&pictures, known);
+    Ok(match (found.len(), found.pop()) {
+        (1, Some(only)) => LimbSays::FieldOfView(only),
+        (0, _) | (_, None) => LimbSays::Nothing(pictures.len()),
+        (_, Some(last)) => LimbSays::LensDecides(found.into_iter().chain([last]).collect()),
+    })
+}
+
+/// Reads some pictures with an altitude, which is `known` or in frames.csv.
+fn read_pictures(request: &Request, known: &CameraFacts) -> Result<Vec<(Picture, Option<FrameData>)>, Error> {
     let mut source = source::open(&request.inputs, None, None)?;
     let frames = frames_path(request, source.as_ref()).map(|path| load_frames(&path, source.as_ref())).transpose()?;
     let knows = |data: &FrameData| data.position_km.is_some() || data.altitude_km.is_some();
@@ -112,15 +123,41 @@ pub fn measure_field_of_view(request: &Request, known: &CameraFacts) -> Result<L
             break;
         }
     }
-    if pictures.is_empty() {
-        return Ok(LimbSays::NoAltitude);
+    Ok(pictures)
+}
+
+/// What would make the limb in some pictures the expected one, if the field of view is right.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FittingAltitude {
+    /// The altitude that the pictures were given, the median, km.
+    pub given_km: f64,
+    /// The altitude that fits their limb, with its 1-sigma in one picture, km.
+    pub fitting_km: Implied,
+    /// Number of pictures with a limb.
+    pub pictures: usize,
+}
+
+/// Finds the altitude that fits the limb in some pictures with the field of view of `config`, which is a sensor.toml
+/// for them. `None` if they show no limb that says it.
+///
+/// # Errors
+/// A file cannot be read.
+pub fn find_altitude(
+    request: &Request,
+    known: &CameraFacts,
+    config: &hzn_core::Config,
+) -> Result<Option<FittingAltitude>, Error> {
+    let Ok(mut trial) = AnyCone::new(config, false) else { return Ok(None) };
+    let mut found = Vec::new();
+    for (picture, data) in read_pictures(request, known)? {
+        let Ok(view) = picture.view(config.input.channel) else { continue };
+        found.extend(find_any_fit(&mut trial, config, &view, data.as_ref()));
     }
-    let mut found = find_field_of_view(&pictures, known);
-    Ok(match (found.len(), found.pop()) {
-        (1, Some(only)) => LimbSays::FieldOfView(only),
-        (0, _) | (_, None) => LimbSays::Nothing(pictures.len()),
-        (_, Some(last)) => LimbSays::LensDecides(found.into_iter().chain([last]).collect()),
-    })
+    let fit = median_fit(&found);
+    Ok(fit.and_then(|fit| {
+        let fitting_km = fit.altitude_km.filter(|altitude| altitude.value > 0.0)?;
+        Some(FittingAltitude { given_km: fit.given_altitude_km?, fitting_km, pictures: found.len() })
+    }))
 }
 
 /// Compares a field of view that was told (or that of the EXIF) with that of the limb. Returns the latter if the two

@@ -2,14 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hzn_core::Config;
 use hzn_core::camera::Model;
 use hzn_files::start::{self, CameraFacts, ImageCircle, StartConfig};
 use hzn_files::{Problem, plausible};
-use hzn_run::diagnosis::FieldOfView;
+use hzn_run::diagnosis::{FieldOfView, Implied};
 use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
-use hzn_run::start::{LimbSays, doubt_field_of_view, measure_field_of_view, read_camera_facts};
+use hzn_run::start::{
+    FittingAltitude, LimbSays, doubt_field_of_view, find_altitude, measure_field_of_view, read_camera_facts,
+};
 use hzn_run::{disk, explain};
 
 use super::init_rig;
@@ -34,10 +37,11 @@ pub(super) struct Args {
     /// Kind of lens [default: pinhole, up to a field of view of 90 degrees]
     #[arg(long, requires = "pictures")]
     lens: Option<Lens>,
-    /// The body in the pictures
-    #[arg(long, default_value = "earth", requires = "pictures")]
-    body: Body,
-    /// Altitude of all pictures above WGS-84, or above the Moon, kilometres, if no frames.csv gives one
+    /// The body in the pictures; the Moon as seen from an orbit or a flight around it
+    #[arg(long, value_name = "NAME", default_value = "earth", value_parser = body_parser(), requires = "pictures")]
+    body: start::Body,
+    /// Altitude of all pictures above WGS-84, or above the mean radius of another body, kilometres, if no frames.csv
+    /// gives one
     #[arg(long, value_name = "KM", requires = "pictures")]
     altitude: Option<f64>,
     /// Write a rig.toml for several cameras (heads); the pictures are a folder for each head
@@ -54,22 +58,10 @@ pub(super) struct Args {
     force: bool,
 }
 
-/// The body in the pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Body {
-    /// The Earth
-    Earth,
-    /// The Moon, seen from an orbit or a flight around it
-    Moon,
-}
-
-impl From<Body> for start::Body {
-    fn from(body: Body) -> Self {
-        match body {
-            Body::Earth => Self::Earth,
-            Body::Moon => Self::Moon,
-        }
-    }
+/// Reads the name of a body.
+fn body_parser() -> impl TypedValueParser<Value = start::Body> {
+    PossibleValuesParser::new(start::Body::all().map(start::Body::name))
+        .try_map(|name| start::Body::from_name(&name).ok_or("no such body"))
 }
 
 /// The projection of the lens.
@@ -129,16 +121,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let start = start::write_sensor_toml(&known).map_err(usage)?;
     // What the file says is checked before it is written: a refused file helps nobody.
-    hzn_files::sensor::parse(&start.text, args.output())?;
+    let parsed = hzn_files::sensor::parse(&start.text, args.output())?;
     write(&start.text)?;
     start.warnings.iter().for_each(tell::warning);
-    if known.exif.turned {
-        tell::warning(
-            "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
-        );
-    }
+    tell_turn(&known);
     if known.has_focal() {
-        tell_doubt(args, &known, &start)?;
+        tell_doubt(args, &known, &start, &parsed.config)?;
     }
     if let Some(found) = &found {
         let [kept, seen] = found.pictures;
@@ -166,9 +154,19 @@ fn tell_circle(start: &StartConfig) {
              (theta_max_deg), which is masked; if it is the whole Earth in a camera that looks at the nadir, remove \
              that line"
         )),
+    tell_width(args, &known, start.lens);
         Some(ImageCircle::Assumed { theta_max_deg }) => tell::line(format_args!(
             "the corners lie too far off axis to be in the image: theta_max_deg = {theta_max_deg:.1} masks what is \
              beyond the sides"
+/// Says that the width is that of the stored picture, if the camera was turned.
+fn tell_turn(known: &CameraFacts) {
+    if known.exif.turned {
+        tell::warning(
+            "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
+        );
+    }
+}
+
         )),
         None => {}
     }
@@ -192,12 +190,30 @@ fn finish(args: &Args, text: &str, known: &CameraFacts) -> Outcome {
     }
     if !knows_altitudes(args, &sensor.config)? {
         tell::line(
+/// Says what the field of view refers to, if there are black bars beside the content.
+fn tell_width(args: &Args, known: &CameraFacts, lens: Model) {
+    let width = known.size_px[0];
+    let whole = |fov| known.bars?.whole_width_deg(lens, width, fov).map(|whole| (fov, whole));
+    if let Some((fov, whole)) = args.fov.and_then(whole) {
+        tell::warning(format_args!(
+            "--fov {fov} is the field of view over all {width} columns, with the bars; if it is that between the \
+             bars, write --fov {whole:.1}"
+        ));
+    }
+}
+
             "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or \
              --altitude KM",
         );
     }
     Ok(Exit::Done)
 }
+    if let Some(bars) = known.bars {
+        tell::line(format_args!(
+            "all pictures have black bars, {}: they are masked (mask.polygons_px)",
+            bars.describe()
+        ));
+    }
 
 /// Returns the text of the file with the calibration that a bag of ROS has beside its pictures; `None` without one, or
 /// if the command line says what the lens is.
@@ -241,18 +257,25 @@ fn knows_altitudes(args: &Args, config: &Config) -> Result<bool, Stop> {
     Ok(open::check_altitude(source.as_ref(), config, frames.as_ref()).is_ok())
 }
 
-/// Warns about a field of view that the limb contradicts.
-fn tell_doubt(args: &Args, known: &CameraFacts, start: &StartConfig) -> Result<(), Stop> {
-    if let Some(limb) = doubt_field_of_view(&request(args), known, start)? {
-        let [kept, seen] = limb.pictures;
-        tell::warning(format_args!(
-            "the limb in {kept} of {seen} pictures says {}, not {:.1} degrees: check the field of view, the kind of \
-             lens (that of a fisheye is not 2 atan(width / 2f)) and the altitude; if the altitude is right, leave out \
-             --fov to take that of the limb",
-            limb.describe(known.size_px[0]),
-            start.fov_deg
-        ));
-    }
+/// Warns about a field of view and an altitude that contradict each other by the limb.
+fn tell_doubt(args: &Args, known: &CameraFacts, start: &StartConfig, config: &Config) -> Result<(), Stop> {
+    let Some(limb) = doubt_field_of_view(&request(args), known, start)? else { return Ok(()) };
+    let [kept, seen] = limb.pictures;
+    let altitude = find_altitude(&request(args), known, config)?.map(|altitude| {
+        let FittingAltitude { given_km, fitting_km: Implied { value, sigma }, pictures } = altitude;
+        format!(
+            "; if the field of view is right, the altitude is {value:.0} +- {sigma:.0} km (median of {pictures}) and \
+             not {given_km:.0} km"
+        )
+    });
+    tell::warning(format_args!(
+        "the limb in {kept} of {seen} pictures contradicts the field of view or the altitude. If the altitude is \
+         right, the pictures are {}, not {:.1} degrees{}. Check both, and the kind of lens (the field of view of a \
+         fisheye is not 2 atan(width / 2f)); without --fov, that of the limb is taken",
+        limb.describe(known.size_px[0]),
+        start.fov_deg,
+        altitude.unwrap_or_default()
+    ));
     Ok(())
 }
 
@@ -288,7 +311,7 @@ fn known(args: &Args, source: &mut dyn Source) -> Result<CameraFacts, Stop> {
         fov_deg: args.fov,
         lens: args.lens.map(Model::from),
         altitude_km: args.altitude,
-        body: args.body.into(),
+        body: args.body,
         ..read_camera_facts(source)?
     })
 }

@@ -28,7 +28,7 @@ use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
 use crate::setup::{self, stop_flag};
 use crate::tell;
-use crate::what_fits::{self, WhatFits};
+use crate::what_fits::{Again, RefusedPictures, WhatFits};
 
 pub(super) fn run(mut args: Args) -> Outcome {
     setup::list_stdin(&mut args.input, args.source.raw)?;
@@ -75,11 +75,11 @@ pub(super) fn run(mut args: Args) -> Outcome {
     let lost = source.describe_loss().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
     watch.tell(&plan);
-    let fits = watch.what_fits(args, &plan);
+    let again = watch.look_again(args, &plan).unwrap_or_default();
     if !args.quiet {
-        watch.sum_up(args, &plan, source.as_ref(), fits.as_ref(), (&summary, stored.frames));
+        watch.sum_up(args, &plan, source.as_ref(), &again, (&summary, stored.frames));
     }
-    watch.tell_doubt(fits.as_ref());
+    watch.tell_doubt(again.fits.as_ref());
     let done = stored.frames + watch.progress.frames();
     // Ctrl-C is the only end of a run that waits for pictures.
     if end == End::Interrupted && watching.is_none() && total.is_none_or(|n| done < n) {
@@ -238,7 +238,7 @@ impl Watch {
     }
 
     /// Prints the summary, the commonest refusal, and the command that explains it.
-    fn sum_up(&self, args: &Args, plan: &Plan, source: &dyn Source, fits: Option<&WhatFits>, done: (&str, u64)) {
+    fn sum_up(&self, args: &Args, plan: &Plan, source: &dyn Source, again: &Again, done: (&str, u64)) {
         let (summary, stored) = done;
         let before = match stored {
             0 => String::new(),
@@ -257,22 +257,27 @@ impl Watch {
                 format!("; for an explanation and advice: {command}")
             });
             tell::line(format_args!("note: {found}{}{}", commonest.text, more.unwrap_or_default()));
-            fits.iter().for_each(|fits| tell::line(format_args!("note: {}", fits.text)));
+            again.bars.iter().for_each(|bars| tell::line(format_args!("note: {bars}")));
+            again.fits.iter().for_each(|fits| tell::line(format_args!("note: {}", fits.text)));
         }
     }
 
-    /// Looks again at some pictures that were refused for the size of their limb. A quiet run looks only if there are
-    /// answers to doubt.
-    fn what_fits(&self, args: &Args, plan: &Plan) -> Option<WhatFits> {
-        let commonest = self.refusals.commonest(&plan.config.gates).filter(|commonest| commonest.is_size)?;
-        let casts_doubt = commonest.pictures.len() >= DOUBTFUL_REFUSALS && self.progress.any_answered();
-        if self.quiet && !casts_doubt {
+    /// Looks again at some pictures that were refused for their edges. A quiet run looks only if there are answers to
+    /// doubt.
+    fn look_again(&self, args: &Args, plan: &Plan) -> Option<Again> {
+        let commonest = self.refusals.commonest(&plan.config.gates).filter(|commonest| commonest.is_edge)?;
+        let casts_doubt = commonest.is_size && commonest.pictures.len() >= DOUBTFUL_REFUSALS;
+        if self.quiet && !(casts_doubt && self.progress.any_answered()) {
             return None;
         }
         let request = setup::request(&args.input, &args.sensor, &args.source).ok()?;
         // A stream cannot be read twice.
-        let is_stream = request.inputs.iter().any(|input| source::is_stdin(input));
-        if is_stream { None } else { what_fits::in_pictures(&request, &plan.config, commonest.pictures) }
+        if request.inputs.iter().any(|input| source::is_stdin(input)) {
+            return None;
+        }
+        let refused = RefusedPictures::read(&request, &plan.config, commonest.pictures)?;
+        let fits = commonest.is_size.then(|| refused.what_fits(&request, &plan.config)).flatten();
+        Some(Again { bars: refused.bars(&plan.config), fits })
     }
 
     /// Tells that the answers of the run are doubtful if the limb of refused pictures contradicts what the answers were

@@ -226,6 +226,37 @@ fn a_refusal_for_the_half_angle_says_what_would_fit() {
     }
 }
 
+#[test]
+fn black_bars_are_masked_and_named() {
+    let place = Place::new();
+    let lens = &LENSES[4];
+    Flight { frames: 8, ..Flight::new(lens) }.render(&place);
+    let files = std::fs::read_dir(place.path("flight")).unwrap().map(|entry| entry.unwrap().path());
+    for path in files.filter(|path| path.extension().is_some_and(|ending| ending == "png")) {
+        let mut picture = image::open(&path).unwrap();
+        let blank = image::DynamicImage::new(320, 30, picture.color());
+        for y in [0, 210] {
+            image::imageops::replace(&mut picture, &blank, 0, y);
+        }
+        picture.save(&path).unwrap();
+    }
+    let told = place.run(&["init", "flight", "--fov", "75", "--altitude", "500", "-o", "bars.toml"]).expect(0).err;
+    assert!(told.contains("black bars, 30 rows above and 30 rows below: they are masked"), "{told}");
+    let text = place.read("bars.toml");
+    let masked = place.run(&["run", "flight", "--sensor", "bars.toml", "-o", "masked.csv"]).expect(0).err;
+    assert!(!masked.contains("black bars"), "{masked}");
+    // Without the mask the run names the bars, and what masks them.
+    let open: String =
+        text.lines().filter(|line| !line.starts_with("polygons_px")).map(|l| l.to_owned() + "\n").collect();
+    place.write("open.toml", open.as_bytes());
+    let ran = place.run(&["run", "flight", "--sensor", "open.toml", "-o", "open.csv"]).expect(0).err;
+    let advice = ran.split_once("black bars, 30 rows above and 30 rows below").expect(&ran).1;
+    let polygons = advice.split_once("polygons_px = ").unwrap().1.lines().next().unwrap();
+    assert!(text.contains(&format!("polygons_px = {polygons}\n")), "{ran}");
+    let answered = |file: &str| place.rows(file).iter().filter(|row| cell(row, "status") == "ok").count();
+    assert!(answered("masked.csv") >= 6 && answered("masked.csv") > answered("open.csv"), "{ran}");
+}
+
 /// Returns the field of view that `hzn init` finds in the folder `flight` without any knowledge, and its 1-sigma.
 fn found_fov(place: &Place) -> [f64; 2] {
     let ran = place.run(&["init", "flight", "-o", "found.toml", "--force"]).expect(0);
@@ -250,12 +281,23 @@ fn the_limb_gives_the_field_of_view() {
     let warning = told("77");
     assert!(warning.contains("degrees wide, as a fisheye, not 77.0 degrees"), "{warning}");
     for right in ["90", "92", "94"] {
-        assert!(!told(right).contains("check the field of view"), "{right}");
+        assert!(!told(right).contains("contradicts the field of view"), "{right}");
     }
     // An altitude is needed, from the table or from the command line.
     std::fs::remove_file(place.path("flight/frames.csv")).unwrap();
     place.run(&["init", "flight", "-o", "t.toml"]).expect(2).says("--fov").says("--altitude");
     place.run(&["init", "flight", "--altitude", "500", "-o", "t.toml"]).expect(0).says("degrees wide");
+    // A wrong altitude is told with the one that fits.
+    let args = ["init", "flight", "--fov", "92", "--lens", "fisheye", "--altitude", "700", "-o", "wrong.toml"];
+    let told = place.run(&args).expect(0).err;
+    let altitude = told.split_once("if the field of view is right, the altitude is ").expect(&told).1;
+    let (value, rest) = altitude.split_once(" +- ").unwrap();
+    assert!((value.parse::<f64>().unwrap() - 500.0).abs() < 60.0 && rest.contains("and not 700 km"), "{told}");
+    // The run names the median of the refused pictures, with their number.
+    let ran = place.run(&["run", "flight", "--sensor", "wrong.toml", "-o", "wrong.csv"]).expect(0).err;
+    if ran.contains("the limb fits ") {
+        assert!(ran.contains(" refused pictures that were looked at (median), the limb fits "), "{ran}");
+    }
 }
 
 /// A limb that is almost straight fits a pinhole and a narrower fisheye. One picture does not tell which is right.

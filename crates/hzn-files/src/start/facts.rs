@@ -3,6 +3,8 @@
 use hzn_core::camera::Model;
 use hzn_core::tone::Tone;
 
+use super::bars::Bars;
+use super::body::Body;
 use super::circle::ImageCircle;
 use super::exif::Exif;
 
@@ -11,7 +13,7 @@ use super::exif::Exif;
 pub struct CameraFacts {
     /// Columns and rows of its pictures.
     pub size_px: [u32; 2],
-    /// Stated field of view over the whole width, in degrees.
+    /// Stated field of view over the whole width, with bars, in degrees.
     pub fov_deg: Option<f64>,
     /// [`Model::Pinhole`] or [`Model::Equidistant`]. If it is missing, a pinhole is assumed. A stated field of view
     /// above 90 degrees requires it.
@@ -29,25 +31,33 @@ pub struct CameraFacts {
     /// Radius about the picture's centre beyond which no light arrives, in pixels, if the pictures show it. The file of
     /// a fisheye limits the lens to it.
     pub image_circle_px: Option<f64>,
+    /// Black bars that all pictures have along their sides, which the file masks.
+    pub bars: Option<Bars>,
     /// Width of a pixel over its height; 1 for nearly all cameras, but not for every video.
     pub pixel_aspect: f64,
 }
 
 impl CameraFacts {
+    /// Makes the facts of a camera of which only the size of the pictures is known.
+    pub fn of_size(size_px: [u32; 2]) -> Self {
+        Self {
+            size_px,
+            fov_deg: None,
+            lens: None,
+            exif: Exif::default(),
+            tone: None,
+            altitude_km: None,
+            body: Body::default(),
+            measured: None,
+            image_circle_px: None,
+            bars: None,
+            pixel_aspect: 1.0,
+        }
+    }
     /// Returns whether a stated field of view or EXIF gives the focal length.
     pub fn has_focal(&self) -> bool {
         self.fov_deg.is_some() || self.exif.focal(self.size_px.map(f64::from)).is_ok()
     }
-}
-
-/// The body in the pictures of a camera without a calibration.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Body {
-    /// The Earth.
-    #[default]
-    Earth,
-    /// The Moon as an orbiter or a lander sees it.
-    Moon,
 }
 
 /// A field of view that was measured on the limb in pictures.

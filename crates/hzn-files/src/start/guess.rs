@@ -2,6 +2,7 @@
 
 use hzn_core::camera::{Config, Covariance, Intrinsic, Model};
 
+use super::facts::CameraFacts;
 use super::focal::{Focal, SQRT_3};
 
 /// 1-sigma of the principal point, as a fraction of the width.
@@ -40,8 +41,9 @@ pub(super) struct Guess {
 impl Guess {
     /// Makes the guess for an ideal lens ([`Model::Pinhole`] or [`Model::Equidistant`]) and its focal length in
     /// columns.
-    pub(super) fn new(ideal: Model, size_px: [u32; 2], pixel_aspect: f64, focal: &Focal) -> Self {
+    pub(super) fn new(facts: &CameraFacts, ideal: Model, focal: &Focal) -> Self {
         use Intrinsic::{CxPx, CyPx, FxPx, FyPx, K1, K2, P1, P2};
+        let CameraFacts { size_px, pixel_aspect, .. } = *facts;
         let [width, height] = size_px.map(|n| u16::try_from(n).unwrap_or(u16::MAX));
         let model = if ideal == Model::Pinhole { Model::BrownConrady } else { Model::KannalaBrandt };
         let mut camera = Config::ideal(model, width, height, focal.px);
@@ -151,7 +153,7 @@ mod tests {
                     continue;
                 }
                 let focal = Focal::from_stated(ideal, 640.0, fov_deg).unwrap();
-                let mut camera = Guess::new(ideal, [640, 480], 1.0, &focal).camera;
+                let mut camera = Guess::new(&CameraFacts::of_size([640, 480]), ideal, &focal).camera;
                 let covariance = camera.covariance.as_mut().unwrap();
                 for value in covariance.rows.iter_mut().flatten() {
                     *value = format!("{value:.6e}").parse().unwrap();

@@ -19,6 +19,8 @@
 //! its crate LGPL). openMVG's has not changed since 2019. Cameras that write a focal length mostly also write the pitch
 //! of their pixels or the 35 mm equivalent.
 
+mod bars;
+mod body;
 mod circle;
 mod exif;
 mod facts;
@@ -30,9 +32,11 @@ mod text;
 
 use hzn_core::camera::{Config, Model};
 
+pub use bars::Bars;
+pub use body::Body;
 pub use circle::ImageCircle;
 pub use exif::Exif;
-pub use facts::{Body, CameraFacts, MeasuredFov, StartConfig};
+pub use facts::{CameraFacts, MeasuredFov, StartConfig};
 pub use focal::{focal_px, fov_deg};
 
 use focal::Focal;
@@ -67,7 +71,7 @@ pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
     });
     let known = stated.transpose()?.or(measured.filter(|_| exif.is_err()));
     let (focal, warnings, comparison) = choose_focal(known, exif, lens, width)?;
-    let guess = Guess::new(lens, facts.size_px, facts.pixel_aspect, &focal);
+    let guess = Guess::new(facts, lens, &focal);
     let fov_deg = fov_deg(lens, width, focal.px);
     let circle = ImageCircle::choose(facts.image_circle_px, &guess.camera, fov_deg);
     Ok(StartConfig {

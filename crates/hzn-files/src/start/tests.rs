@@ -7,18 +7,7 @@ use hzn_core::tone::Tone;
 use super::*;
 
 fn known(fov_deg: Option<f64>, lens: Option<Model>, exif: Exif) -> CameraFacts {
-    CameraFacts {
-        size_px: [4928, 2768],
-        fov_deg,
-        lens,
-        exif,
-        tone: None,
-        altitude_km: Some(418.0),
-        body: Body::Earth,
-        measured: None,
-        image_circle_px: None,
-        pixel_aspect: 1.0,
-    }
+    CameraFacts { fov_deg, lens, exif, altitude_km: Some(418.0), ..CameraFacts::of_size([4928, 2768]) }
 }
 
 /// The Nikon D4 on the ISS, 20 November 2020.
@@ -66,6 +55,23 @@ fn the_moon_has_no_air() {
     let body = &sensor.config.body;
     assert_eq!((body.mean_radius_km(), body.limb_height_km, body.clipped_height_km), (1737.4, 0.0, 0.0));
     assert!(sensor.warnings.is_empty(), "{:?}", sensor.warnings);
+}
+
+#[test]
+fn planets_and_moons_have_their_radii_and_limbs() {
+    for body in Body::all() {
+        let altitude_km = Some(500.0);
+        let facts = CameraFacts { body, altitude_km, ..known(Some(60.0), None, Exif::default()) };
+        let sensor = crate::sensor::parse(&write_sensor_toml(&facts).unwrap().text, Path::new("s.toml")).unwrap();
+        let written = &sensor.config.body;
+        if let Body::Other(kind) = body {
+            let own = hzn_core::body::Config::of_kind(kind, None);
+            assert_eq!((written.kind, written.limb_height_km), (kind, own.limb_height_km));
+            assert_eq!(written.mean_radius_km(), own.mean_radius_km());
+        }
+        assert_eq!(written.altitude_km, altitude_km, "{body:?}");
+        assert!(sensor.warnings.is_empty(), "{body:?}: {:?}", sensor.warnings);
+    }
 }
 
 #[test]

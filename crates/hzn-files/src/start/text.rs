@@ -6,8 +6,9 @@ use hzn_core::body::MOON_RADIUS_KM;
 use hzn_core::camera::{Config, Model};
 use hzn_core::tone::Tone;
 
+use super::body::Body;
 use super::circle::{self, ImageCircle};
-use super::facts::{Body, CameraFacts};
+use super::facts::CameraFacts;
 use super::focal::Focal;
 use super::guess::Guess;
 use crate::plausible::airless_limb;
@@ -44,6 +45,7 @@ pub(super) fn write_text(
     if facts.body == Body::Earth {
         text += &write_tone(facts.tone);
     }
+    text += &write_bars(facts);
     text
 }
 
@@ -63,6 +65,7 @@ pub(super) fn write_calibrated(facts: &CameraFacts, camera: &Config, from: &str)
     if facts.body == Body::Earth {
         text += &write_tone(facts.tone);
     }
+    text += &write_bars(facts);
     Ok(text)
 }
 
@@ -183,6 +186,17 @@ fn write_tone(tone: Option<Tone>) -> String {
     format!("{head}{line}")
 }
 
+/// Writes `[mask]` with the black bars of the pictures.
+fn write_bars(facts: &CameraFacts) -> String {
+    facts.bars.map_or_else(String::new, |bars| {
+        format!(
+            "\n[mask]\n# All pictures have black bars: {}. Their borders must not pass for a limb.\npolygons_px = {}\n",
+            bars.describe(),
+            bars.polygons_px(facts.size_px)
+        )
+    })
+}
+
 /// Writes `[body]` with the altitude, or with a comment that says where altitudes belong.
 fn write_body(body: Body, altitude_km: Option<f64>) -> String {
     let mut t = match body {
@@ -190,6 +204,10 @@ fn write_body(body: Body, altitude_km: Option<f64>) -> String {
             "\n[body]\nkind = \"earth\"                 # earth (WGS-84) | earth-sphere | sun | moon | sphere\n"
                 .to_owned()
         }
+        Body::Other(kind) => format!(
+            "\n[body]\nkind = \"{}\"                  # with its radii, and a limb height that fits it\n",
+            kind.name()
+        ),
         // `kind = "moon"` is the disc in the sky of the Earth.
         Body::Moon => format!(
             "\n[body]\nkind = \"sphere\"                # the Moon, from near it\nradius_km = {MOON_RADIUS_KM}\n\

@@ -344,7 +344,12 @@ class Sensor:
         fov_deg: float | None = None,
         lens: Literal["pinhole", "fisheye"] | None = None,
         altitude_km: float | None = None,
-        body: Literal["earth", "moon"] = "earth",
+        body: Literal[
+            "earth", "moon", "mercury", "venus", "mars", "jupiter", "saturn", "uranus",
+            "neptune", "pluto", "ceres", "vesta", "phobos", "deimos", "io", "europa",
+            "ganymede", "callisto", "mimas", "enceladus", "tethys", "dione", "rhea", "titan",
+            "iapetus", "miranda", "ariel", "umbriel", "titania", "oberon", "triton", "charon",
+        ] = "earth",
         flight: bool = False,
     ) -> Sensor:
         """Make a sensor for a camera without a calibration: the one that ``hzn init`` writes.
@@ -364,7 +369,7 @@ class Sensor:
         lens
             Kind of lens; without it, a pinhole up to a field of view of 90 degrees.
         altitude_km
-            Altitude of all pictures above WGS-84, or above the Moon, km.
+            Altitude of all pictures above WGS-84, or above the mean radius of another body, km.
         body
             The body in the pictures.
         flight

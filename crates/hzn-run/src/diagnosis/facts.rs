@@ -78,6 +78,34 @@ impl FitFacts {
     }
 }
 
+/// Returns the medians of what several pictures say; `None` without pictures. Some of the fits may be of clouds.
+///
+/// The altitude is the median of the given altitudes with the median of the corrections, because pictures have
+/// different altitudes. The sigmas are those of one picture: what all pictures share does not average out.
+pub fn median_fit(facts: &[FitFacts]) -> Option<FitFacts> {
+    let of = |get: &dyn Fn(&FitFacts) -> Option<f64>| median(&mut facts.iter().filter_map(get).collect::<Vec<_>>());
+    let implied = |get: &dyn Fn(&FitFacts) -> Option<Implied>| {
+        let value = of(&|f| Some(get(f)?.value))?;
+        Some(Implied { value, sigma: of(&|f| Some(get(f)?.sigma))? })
+    };
+    let given_altitude_km = of(&|f| f.given_altitude_km);
+    let correction = implied(&|f| f.implied(Suspect::Altitude));
+    Some(FitFacts {
+        expected_deg: of(&|f| Some(f.expected_deg))?,
+        fitted_deg: of(&|f| Some(f.fitted_deg))?,
+        fitted_sigma_deg: of(&|f| Some(f.fitted_sigma_deg))?,
+        expected_sigma_deg: of(&|f| Some(f.expected_sigma_deg))?,
+        sigmas: of(&|f| Some(f.sigmas))?,
+        is_trial: facts.iter().any(|f| f.is_trial),
+        given_altitude_km,
+        altitude_km: given_altitude_km
+            .zip(correction)
+            .map(|(km, Implied { value, sigma })| Implied { value: km + value, sigma }),
+        focal_factor: implied(&|f| f.focal_factor),
+        limb_height_km: implied(&|f| f.limb_height_km),
+    })
+}
+
 /// What all pictures say together about one quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Consensus {
@@ -204,6 +232,15 @@ mod tests {
         assert!(summary[1].disagreement > 5.0 && summary[1].pictures == 20);
         assert_eq!(typical_sigmas(all.iter()), Some(9.0));
         assert!(summarise([].iter()).is_empty());
+    }
+
+    #[test]
+    fn the_median_of_the_pictures_is_told() {
+        let all = [facts(200.0, 30.0, 0.9), facts(220.0, 32.0, 0.9), facts(260.0, -900.0, 3.0)];
+        let fit = median_fit(&all).unwrap();
+        assert_eq!((fit.given_altitude_km, fit.altitude_km.unwrap().value), (Some(220.0), 250.0));
+        assert_eq!(fit.focal_factor, Some(Implied { value: 0.9, sigma: 0.01 }));
+        assert_eq!(median_fit(&[]), None);
     }
 
     #[test]

@@ -18,9 +18,19 @@ pub fn find_misfit<P: Pixels>(
     picture: &P,
     data: Option<&FrameData>,
 ) -> Option<FitFacts> {
+    let is_misfit = |fit: &FitFacts| fit.sigmas.abs() > config.gates.max_half_angle_sigma;
+    find_any_fit(trial, config, picture, data).filter(is_misfit)
+}
+
+/// Looks for a limb of any size, and returns what it says. `trial` is made from `config`.
+pub fn find_any_fit<P: Pixels>(
+    trial: &mut AnyCone,
+    config: &Config,
+    picture: &P,
+    data: Option<&FrameData>,
+) -> Option<FitFacts> {
     let edge = trial.find(picture, data)?;
     let altitude_km = altitude_km(data, config.each_body().first()?);
     let camera = Camera::<f64>::try_new(&config.camera).ok()?;
-    let fit = fit_facts(&edge, edge.fitted.as_ref()?, &camera, altitude_km, true)?;
-    (fit.sigmas.abs() > config.gates.max_half_angle_sigma).then_some(fit)
+    fit_facts(&edge, edge.fitted.as_ref()?, &camera, altitude_km, true)
 }

@@ -17,9 +17,9 @@ mod misfit;
 mod words;
 
 pub use any_cone::{AnyCone, longest_edge};
-pub use facts::{Consensus, FitFacts, Implied, Suspect, is_limb_as_expected, summarise, typical_sigmas};
+pub use facts::{Consensus, FitFacts, Implied, Suspect, is_limb_as_expected, median_fit, summarise, typical_sigmas};
 pub use field_of_view::{FieldOfView, find_field_of_view};
 pub use implied::{find_fit, fit_facts};
 pub use joint::{Pair, Remedy, find_pair};
-pub use misfit::find_misfit;
+pub use misfit::{find_any_fit, find_misfit};
 pub use words::what_fits;

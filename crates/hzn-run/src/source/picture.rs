@@ -46,6 +46,18 @@ impl Picture {
         words.chunks_exact(channels).flat_map(|pixel| pixel.iter().take(bright)).copied().max()
     }
 
+    /// Returns the sum of the colours of a pixel, without transparency; 0 outside of the picture.
+    pub(crate) fn brightness(&self, x: u32, y: u32) -> f64 {
+        let channels = usize::from(self.layout.channels);
+        let from = y as usize * self.layout.stride + x as usize * channels;
+        // A second or a fourth channel is transparency.
+        let colours = from..from + channels.max(1) - usize::from(channels.is_multiple_of(2));
+        match &self.samples {
+            Samples::Bytes(d) => d.get(colours).unwrap_or_default().iter().map(|&v| f64::from(v)).sum(),
+            Samples::Words(d) => d.get(colours).unwrap_or_default().iter().map(|&v| f64::from(v)).sum(),
+        }
+    }
+
     /// Returns a digest of the samples and their arrangement. Pictures with the same digest are the same to the last
     /// bit: of a million different ones, two have the same digest with a probability of 10⁻⁷.
     pub fn digest(&self) -> u64 {

@@ -41,16 +41,11 @@ impl Wizard {
     /// The field of view is impossible for the lens, or EXIF has no focal length; the message says what to do.
     pub(super) fn write(&self) -> Result<(String, Vec<String>), String> {
         let facts = CameraFacts {
-            size_px: self.size_px,
             fov_deg: self.states_fov.then_some(self.fov_deg),
             lens: Some(if self.fisheye { Model::Equidistant } else { Model::Pinhole }),
             exif: self.exif.clone(),
-            tone: None,
             altitude_km: self.one_altitude.then_some(self.altitude_km),
-            body: start::Body::Earth,
-            measured: None,
-            image_circle_px: None,
-            pixel_aspect: 1.0,
+            ..CameraFacts::of_size(self.size_px)
         };
         let start = start::write_sensor_toml(&facts).map_err(|e| e.to_string())?;
         Ok((start.text, start.warnings))
