@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hzn_core::Config;
+use hzn_core::body::Kind;
 use hzn_core::camera::Model;
 use hzn_files::start::{self, CameraFacts, ImageCircle, StartConfig};
 use hzn_files::{Problem, plausible};
@@ -17,6 +18,7 @@ use hzn_run::{disk, explain};
 
 use super::init_rig;
 use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::files;
 use crate::tell;
 
 /// Write a sensor.toml to start from
@@ -50,12 +52,22 @@ pub(super) struct Args {
     /// With --rig: rotation from the camera to the rig as a quaternion, scalar first; once for each folder, in order
     #[arg(long, value_name = "W,X,Y,Z", requires = "rig", allow_hyphen_values = true)]
     mount: Vec<init_rig::Mount>,
+    /// With --rig: the mounts from a camchain of Kalibr (T_cn_cnm1) instead of --mount; its cameras are the folders, in
+    /// order, and the rig has the axes of the first camera
+    #[arg(long, value_name = "YAML", requires = "rig", conflicts_with = "mount")]
+    camchain: Option<PathBuf>,
     /// The file to write [default: sensor.toml, with --rig rig.toml]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Replace a file that exists
     #[arg(long)]
     force: bool,
+}
+
+/// Returns whether the body is one without air.
+fn has_no_air(config: &Config) -> bool {
+    let kind = config.body.kind;
+    kind == Kind::Moon || kind.planet().is_some_and(|planet| planet.scale_height_km == 0.0)
 }
 
 /// Reads the name of a body.
@@ -87,11 +99,17 @@ impl Args {
     fn output(&self) -> &Path {
         self.output.as_deref().unwrap_or(Path::new(if self.rig { "rig.toml" } else { "sensor.toml" }))
     }
+    /// Returns the mounts of the heads of a rig.
+    fn mounts(&self) -> Result<Vec<init_rig::Mount>, Stop> {
+        self.camchain.as_deref().map_or_else(|| Ok(self.mount.clone()), init_rig::of_camchain)
+    }
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
     if args.rig {
-        return init_rig::run(&args.pictures, &args.mount, args.output(), args.force);
+        let read: Vec<PathBuf> = args.camchain.iter().cloned().collect();
+        files::check_outputs(&read, &[args.output().to_owned()], args.force)?;
+        return init_rig::run(&args.pictures, &args.mounts()?, args.output());
     }
     if let Some(file) = args.pictures.iter().find(|p| source::ending(p) == "toml") {
         let name = file.display();
@@ -143,7 +161,17 @@ pub(super) fn run(args: &Args) -> Outcome {
         start.k1_sigma,
     ));
     tell_circle(&start);
+    tell_width(args, &known, start.lens);
     finish(args, &start.text, &known)
+}
+
+/// Says that the width is that of the stored picture, if the camera was turned.
+fn tell_turn(known: &CameraFacts) {
+    if known.exif.turned {
+        tell::warning(
+            "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
+        );
+    }
 }
 
 /// Says which image circle the file has.
@@ -154,42 +182,14 @@ fn tell_circle(start: &StartConfig) {
              (theta_max_deg), which is masked; if it is the whole Earth in a camera that looks at the nadir, remove \
              that line"
         )),
-    tell_width(args, &known, start.lens);
         Some(ImageCircle::Assumed { theta_max_deg }) => tell::line(format_args!(
             "the corners lie too far off axis to be in the image: theta_max_deg = {theta_max_deg:.1} masks what is \
              beyond the sides"
-/// Says that the width is that of the stored picture, if the camera was turned.
-fn tell_turn(known: &CameraFacts) {
-    if known.exif.turned {
-        tell::warning(
-            "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
-        );
-    }
-}
-
         )),
         None => {}
     }
 }
 
-/// Says what looks wrong in the written file, and what it needs.
-fn finish(args: &Args, text: &str, known: &CameraFacts) -> Outcome {
-    // The commands that read the file say the same, but then it is not clear which option was wrong.
-    let sensor = hzn_files::sensor::parse(text, args.output())?;
-    let is_known = |text: &String| known.pixel_aspect != 1.0 && text.contains(plausible::NOT_SQUARE);
-    sensor.warnings.iter().map(Problem::to_string).filter(|text| !is_known(text)).for_each(tell::warning);
-    if known.pixel_aspect != 1.0 {
-        tell::line(format_args!("the pixels are {:.3} times as wide as high, as the video says", known.pixel_aspect));
-    }
-    if matches!(args.body, Body::Moon) {
-        tell::line(
-            "the Moon has no air, whose light tells a limb from other edges: answers have no p_limb and no \
-             protection_deg. Test sigma_max_deg and rms_px instead, and give an attitude in frames.csv if there is \
-             one: it refuses edges that are elsewhere (gates.max_attitude_sigma)",
-        );
-    }
-    if !knows_altitudes(args, &sensor.config)? {
-        tell::line(
 /// Says what the field of view refers to, if there are black bars beside the content.
 fn tell_width(args: &Args, known: &CameraFacts, lens: Model) {
     let width = known.size_px[0];
@@ -202,18 +202,36 @@ fn tell_width(args: &Args, known: &CameraFacts, lens: Model) {
     }
 }
 
-            "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or \
-             --altitude KM",
-        );
-    }
-    Ok(Exit::Done)
-}
+/// Says what looks wrong in the written file, and what it needs.
+fn finish(args: &Args, text: &str, known: &CameraFacts) -> Outcome {
+    // The commands that read the file say the same, but then it is not clear which option was wrong.
+    let sensor = hzn_files::sensor::parse(text, args.output())?;
+    let is_known = |text: &String| known.pixel_aspect != 1.0 && text.contains(plausible::NOT_SQUARE);
+    sensor.warnings.iter().map(Problem::to_string).filter(|text| !is_known(text)).for_each(tell::warning);
     if let Some(bars) = known.bars {
         tell::line(format_args!(
             "all pictures have black bars, {}: they are masked (mask.polygons_px)",
             bars.describe()
         ));
     }
+    if known.pixel_aspect != 1.0 {
+        tell::line(format_args!("the pixels are {:.3} times as wide as high, as the video says", known.pixel_aspect));
+    }
+    if has_no_air(&sensor.config) {
+        tell::line(
+            "this body has no air, whose light tells a limb from other edges: answers have no p_limb and no \
+             protection_deg. Test sigma_max_deg and rms_px instead, and give an attitude in frames.csv if there is \
+             one: it refuses edges that are elsewhere (gates.max_attitude_sigma)",
+        );
+    }
+    if !knows_altitudes(args, &sensor.config)? {
+        tell::line(
+            "every picture needs an altitude: give a frames.csv next to them (columns file, altitude_km), or \
+             --altitude KM",
+        );
+    }
+    Ok(Exit::Done)
+}
 
 /// Returns the text of the file with the calibration that a bag of ROS has beside its pictures; `None` without one, or
 /// if the command line says what the lens is.

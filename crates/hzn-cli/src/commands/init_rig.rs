@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use hzn_files::camera_file;
 use hzn_files::rig::{self, Head, HeadMount, Rig};
 use hzn_run::disk;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
-use crate::files;
 use crate::tell;
 
 /// 1-sigma of a mount that somebody writes down, degrees: a drawing or a bracket is right to about a degree.
@@ -27,14 +28,25 @@ impl FromStr for Mount {
     }
 }
 
+/// Reads the mounts of the cameras of a camchain of Kalibr: the rig has the axes of the first camera.
+pub(super) fn of_camchain(file: &Path) -> Result<Vec<Mount>, Stop> {
+    let quaternion = |(_, rows): (String, [[f64; 3]; 3])| {
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_fn(|i, j| rows[i][j]));
+        // Kalibr's digits leave a matrix that is not quite a rotation.
+        let q = UnitQuaternion::from_rotation_matrix(&rotation).into_inner().normalize();
+        Mount([q.w, q.i, q.j, q.k])
+    };
+    Ok(camera_file::chain_mounts(file)?.into_iter().map(quaternion).collect())
+}
+
 /// Writes the rig.toml for folders of pictures, one for each head.
-pub(super) fn run(folders: &[PathBuf], mounts: &[Mount], output: &Path, force: bool) -> Outcome {
+pub(super) fn run(folders: &[PathBuf], mounts: &[Mount], output: &Path) -> Outcome {
     if mounts.len() != folders.len() {
         return Err(usage(format!(
             "--rig: {} folders and {} mounts: give --mount W,X,Y,Z for each folder in the same order, the rotation \
              from the camera to the rig as a quaternion, scalar first. It comes from the drawing, from Kalibr's \
-             T_cn_cnm1, or from `hzn calibrate mount`. Some degrees are good enough to begin with: `hzn calibrate rig` \
-             then finds the mounts from the limbs that the heads see together",
+             T_cn_cnm1 (--camchain reads it), or from `hzn calibrate mount`. Some degrees are good enough to begin \
+             with: `hzn calibrate rig` then finds the mounts from the limbs that the heads see together",
             folders.len(),
             mounts.len()
         )));
@@ -43,7 +55,6 @@ pub(super) fn run(folders: &[PathBuf], mounts: &[Mount], output: &Path, force: b
         let what = "the paths in it are relative to its folder; go there, and give its name alone";
         return Err(usage(format!("{}: {what}", output.display())));
     }
-    files::check_outputs(&[], &[output.to_owned()], force)?;
     let heads = folders.iter().zip(mounts).map(head).collect::<Result<_, Stop>>()?;
     let rig = Rig { rig: rig::Common::default(), heads };
     rig::check(&rig).map_err(|(key, what)| usage(format!("{key}: {what}")))?;

@@ -135,4 +135,20 @@ fn a_rig_begins_with_its_folders_and_mounts() {
     init(&good).expect(2).says("--force replaces it");
     init(&[&good[..], &["-o", "left/rig.toml"]].concat()).expect(2).says("give its name alone");
     place.run(&["init", "--rig", "none", "--mount", "1,0,0,0", "-o", "n.toml"]).expect(2).says("none: is no folder");
+    // The second camera is turned by 90 degrees about z against the first.
+    let pose = "  T_cn_cnm1:\n  - [0.0, -1.0, 0.0, 0.1]\n  - [1.0, 0.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, \
+                0.0, 0.0, 1.0]\n";
+    place.write("chain.yaml", format!("cam0:\n  camera_model: pinhole\ncam1:\n{pose}").as_bytes());
+    init(&["--camchain", "chain.yaml", "-o", "chain.yaml", "--force"]).expect(2).says("chain.yaml");
+    init(&["--camchain", "chain.yaml", "-o", "chain.toml"]).expect(0).says("chain.toml written");
+    let half = 0.5f64.sqrt();
+    for (found, expected) in
+        mounts(&place.read("chain.toml")).iter().zip([[1.0, 0.0, 0.0, 0.0], [half, 0.0, 0.0, -half]])
+    {
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+    }
+    place
+        .run(&["init", "--rig", "left", "--camchain", "chain.yaml", "-o", "n.toml"])
+        .expect(2)
+        .says("1 folders and 2 mounts");
 }

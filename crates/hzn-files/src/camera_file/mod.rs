@@ -29,6 +29,7 @@
 
 mod camchain;
 mod camera_matrix;
+mod chain_mounts;
 mod document;
 mod foreign;
 mod format;
@@ -53,6 +54,7 @@ mod write_ros;
 use hzn_core::camera::{Config, Model};
 
 pub use camera_matrix::camera_matrix;
+pub use chain_mounts::chain_mounts;
 pub use foreign::Foreign;
 pub use format::{Format, UnsupportedLens};
 pub use loaded::{CameraFile, Choice, Loaded};

@@ -49,18 +49,21 @@ pub fn to_imu(path: &Path, name: Option<&str>) -> Result<ToImu, Problem> {
         let what = "missing: kalibr_calibrate_imu_camera writes it, into the file camchain-imucam";
         return Err(refused("T_cam_imu", what));
     };
-    let Some(Ok(pose)) = matrix(pose).map(<[f64; 16]>::try_from) else {
-        return Err(refused("T_cam_imu", "a matrix of 4 rows with 4 finite numbers is expected"));
-    };
-    let rows: [[f64; 3]; 3] = core::array::from_fn(|i| core::array::from_fn(|j| pose[4 * i + j]));
-    if !is_rotation(&rows) {
-        return Err(refused("T_cam_imu", "its first three columns are not a rotation"));
-    }
+    let rows = rotation(pose).map_err(|what| refused("T_cam_imu", what))?;
     let timeshift_s = match camera.get("timeshift_cam_imu") {
         Some(shift) => Some(number(shift).ok_or_else(|| refused("timeshift_cam_imu", "a number is expected"))?),
         None => None,
     };
     Ok(ToImu { camera: (*name).clone(), camera_from_imu: rows, timeshift_s })
+}
+
+/// Returns the rows of the rotation in a pose of 4 x 4 numbers.
+pub(super) fn rotation(pose: &Value) -> Result<[[f64; 3]; 3], &'static str> {
+    let Some(Ok(pose)) = matrix(pose).map(<[f64; 16]>::try_from) else {
+        return Err("a matrix of 4 rows with 4 finite numbers is expected");
+    };
+    let rows: [[f64; 3]; 3] = core::array::from_fn(|i| core::array::from_fn(|j| pose[4 * i + j]));
+    if is_rotation(&rows) { Ok(rows) } else { Err("its first three columns are not a rotation") }
 }
 
 fn is_rotation(rows: &[[f64; 3]; 3]) -> bool {
