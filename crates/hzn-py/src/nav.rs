@@ -100,7 +100,7 @@ pub(crate) fn celestial(moon: bool, unix_s: f64) -> Three {
 pub(crate) fn fuse<'py>(
     py: Python<'py>,
     recordings: Vec<PathBuf>,
-    imu: PathBuf,
+    imu: Option<PathBuf>,
     gnss: Option<PathBuf>,
     attitude: Option<PathBuf>,
     mounts: BTreeMap<String, Rows>,
@@ -127,7 +127,7 @@ pub(crate) fn fuse<'py>(
         let recording = found.ok_or_else(|| errors::config(format!("clocks: there is no camera {name:?}")))?;
         recording.clock_offset_s = *offset_s;
     }
-    let read = read_tables(&mut inputs, [Some(&imu), gnss.as_ref(), attitude.as_ref()], &tables)?;
+    let read = read_tables(&mut inputs, [imu.as_ref(), gnss.as_ref(), attitude.as_ref()], &tables)?;
     let (smoothed, solved) = wanted;
     let wanted = Wanted { smoothed, solved, rate_hz: Some(rate_hz) };
     let fused = errors::detached(py, || hzn_fuse::fuse(&inputs, &settings, wanted))?.map_err(to_exception)?;
@@ -192,6 +192,10 @@ fn solution(solved: &Solved, cameras: &[String]) -> Value {
         "cost": solved.cost,
         "determined": solved.determined.iter().map(determined).collect::<Vec<_>>(),
         "lowered": solved.lowered.iter().map(lowered).collect::<Vec<_>>(),
+        "orbit": solved.orbit.map(|orbit| json!({
+            "semi_axis_m": orbit.semi_axis_m, "eccentricity": orbit.eccentricity,
+            "inclination_rad": orbit.inclination_rad, "sigma_m": orbit.sigma_m, "bound_m": orbit.bound_m,
+        })),
     })
 }
 

@@ -143,3 +143,43 @@ def test_solve_takes_the_whole_flight_at_once(tmp_path):
     w, x, y, z = (last[name] for name in ("qw", "qx", "qy", "qz"))
     column = [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)]
     assert np.allclose(column, truth[:, 0], atol=0.05)
+
+
+def write_orbit(folder, radius, pictures, step_s):
+    """Files of a satellite on a circular orbit over the equator that sees the limb straight below, for two orbits."""
+    spin, ratio = 7.292115e-5, 6378137.0 / radius
+    zonal = 1 + 1.5 * 1.08262668e-3 * ratio**2 + 15 / 8 * 1.61962e-6 * ratio**4
+    mean_motion = np.sqrt(3.986004418e14 / radius**3 * zonal)
+    places = []
+    with (folder / "stars.csv").open("w", newline="") as stars, (folder / "cam.csv").open("w", newline="") as file:
+        attitudes, rows = csv.writer(stars), csv.writer(file)
+        attitudes.writerow(["time_s", "qw", "qx", "qy", "qz", "sigma_deg"])
+        cov = [f"cov_{c}" for c in ("xx", "xy", "xz", "yy", "yz", "zz")]
+        rows.writerow(["index", "file", "time_s", "body", "status", "axis_x", "axis_y", "axis_z", *cov, "altitude_km", "detail"])
+        for k in range(pictures):
+            t = k * step_s
+            angle = (mean_motion - spin) * t
+            places.append(radius * np.array([np.cos(angle), np.sin(angle), 0.0]))
+            # The vehicle looks down along z and flies along x; at time 0 it is above (1, 0, 0).
+            c, s = np.cos(angle / 2), np.sin(angle / 2)
+            w, x, y, z = 0.5, -0.5, -0.5, 0.5
+            attitudes.writerow([t, c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w, 0.003])
+            rows.writerow([k, f"{k}.png", t, "earth", "ok", 0, 0, 1, 1e-7, 0, 0, 1e-7, 0, 0, (radius - 6378137.0) / 1e3, ""])
+    return places
+
+
+def test_solve_finds_an_orbit_without_an_inertial_unit(tmp_path):
+    radius = 6_878_137.0
+    places = write_orbit(tmp_path, radius, 190, 60.0)
+    off = {"mode": "off", "sigma": 0.0}
+    settings = {"camera": {"misalignment_deg": off, "clock_s": off}}
+    files = {"attitude": tmp_path / "stars.csv", "mounts": {"cam": np.eye(3)}, "settings": settings}
+    result = hzn.nav.solve([tmp_path / "cam.csv"], **files)
+    orbit = result["solved"]["orbit"]
+    assert abs(orbit["semi_axis_m"] - radius) < 2e4 and orbit["eccentricity"] < 0.01 and orbit["inclination_rad"] < 0.01
+    assert all(0 < bound <= 1.01 * sigma < 2e4 for bound, sigma in zip(orbit["bound_m"], orbit["sigma_m"], strict=True))
+    last = [state for state in result["states"] if state["phase"] == "smoothed"][-1]
+    assert np.linalg.norm(np.array([last["x_m"], last["y_m"], last["z_m"]]) - places[-1]) < 5e3
+    with pytest.raises(hzn.ConfigError, match="a receiver needs the samples of an inertial unit"):
+        (tmp_path / "gnss.csv").write_text("time_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps\n0,7e6,0,0,0,7e3,0\n1,7e6,7e3,0,0,7e3,0\n")
+        hzn.nav.solve([tmp_path / "cam.csv"], gnss=tmp_path / "gnss.csv", **files)

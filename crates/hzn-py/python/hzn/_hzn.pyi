@@ -1403,7 +1403,7 @@ def _wahba(directions: list[tuple[_Three, _Three, float]]) -> tuple[_Rows, _Rows
 def _celestial(moon: bool, unix_s: float) -> _Three: ...
 def _fuse_flight(
     recordings: list[str],
-    imu: str,
+    imu: str | None,
     gnss: str | None,
     attitude: str | None,
     mounts: dict[str, _Rows],

@@ -318,7 +318,7 @@ def fuse(
 def solve(
     recordings: Sequence[str | PathLike[str]],
     *,
-    imu: str | PathLike[str],
+    imu: str | PathLike[str] | None = None,
     gnss: str | PathLike[str] | None = None,
     attitude: str | PathLike[str] | None = None,
     mounts: Mapping[str, ArrayLike] | None = None,
@@ -334,10 +334,13 @@ def solve(
     biases and limb height, from all measurements together. A measurement that is too far off counts less and is not
     refused.
 
+    Without ``imu`` and ``gnss``, gravity joins the pictures of a satellite: limbs and the attitudes of a star tracker
+    then give its orbit.
+
     Parameters
     ----------
     recordings, imu, gnss, attitude, mounts, clocks, columns, utc, settings, rate_hz
-        The same as for `fuse`.
+        The same as for `fuse`; only here may ``imu`` be left out.
 
     Returns
     -------
@@ -346,7 +349,9 @@ def solve(
         ``unknowns``, ``knots``, ``steps``, ``is_converged`` and ``cost`` (before and after); ``determined`` is a list
         with ``name``, ``unit``, ``estimate``, ``sigma`` and ``before``, the sigma of what was known before: where
         ``sigma`` is far below it, the flight has determined the value. ``lowered`` is a list of the measurements that
-        count less: ``time_s``, ``camera``, ``kind``, ``sigmas``, ``weight``.
+        count less: ``time_s``, ``camera``, ``kind``, ``sigmas``, ``weight``. ``orbit`` is None with an inertial unit; else
+        a dictionary with ``semi_axis_m``, ``eccentricity`` and ``inclination_rad`` at the end, and ``sigma_m`` and
+        ``bound_m``: 1-sigma of the position radial, along and across the orbit, and its Cramér-Rao bound.
 
     Raises
     ------
@@ -360,7 +365,7 @@ def solve(
 
 def _replay(
     recordings: Sequence[str | PathLike[str]],
-    imu: str | PathLike[str],
+    imu: str | PathLike[str] | None,
     gnss: str | PathLike[str] | None,
     attitude: str | PathLike[str] | None,
     mounts: Mapping[str, ArrayLike] | None,
@@ -372,7 +377,7 @@ def _replay(
 ) -> dict[str, Any]:
     result: dict[str, Any] = _hzn._fuse_flight(
         [str(path) for path in recordings],
-        str(imu),
+        None if imu is None else str(imu),
         None if gnss is None else str(gnss),
         None if attitude is None else str(attitude),
         {name: _list(mount, (3, 3), f"mounts[{name!r}]") for name, mount in (mounts or {}).items()},
