@@ -87,9 +87,8 @@ impl fmt::Display for Refused {
             Self::NoConvergence => f.write_str("the mounts do not converge: are they wrong by tens of degrees?"),
             Self::Contradict { used, left_out, head } => {
                 write!(f, "the heads contradict each other ({left_out} epochs are left out, {used} count): ")?;
-                match head {
-                    Some(k) => write!(f, "without head {} the others agree; ", k + 1)?,
-                    None => {}
+                if let Some(k) = head {
+                    write!(f, "without head {} the others agree; ", k + 1)?;
                 }
                 f.write_str(
                     "a mount is wrong by more than an adjustment finds, heads are exchanged, a picture is mirrored, or a \
