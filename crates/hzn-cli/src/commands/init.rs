@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hzn_core::Config;
-use hzn_core::body::Kind;
 use hzn_core::camera::Model;
 use hzn_files::start::{self, CameraFacts, ImageCircle, StartConfig};
 use hzn_files::{Problem, plausible};
@@ -64,10 +63,13 @@ pub(super) struct Args {
     force: bool,
 }
 
-/// Returns whether the body is one without air.
-fn has_no_air(config: &Config) -> bool {
-    let kind = config.body.kind;
-    kind == Kind::Moon || kind.planet().is_some_and(|planet| planet.scale_height_km == 0.0)
+/// Returns whether a body has no air.
+fn has_no_air(body: start::Body) -> bool {
+    match body {
+        start::Body::Earth => false,
+        start::Body::Moon => true,
+        start::Body::Other(kind) => kind.planet().is_some_and(|planet| planet.scale_height_km == 0.0),
+    }
 }
 
 /// Reads the name of a body.
@@ -217,7 +219,7 @@ fn finish(args: &Args, text: &str, known: &CameraFacts) -> Outcome {
     if known.pixel_aspect != 1.0 {
         tell::line(format_args!("the pixels are {:.3} times as wide as high, as the video says", known.pixel_aspect));
     }
-    if has_no_air(&sensor.config) {
+    if has_no_air(args.body) {
         tell::line(
             "this body has no air, whose light tells a limb from other edges: answers have no p_limb and no \
              protection_deg. Test sigma_max_deg and rms_px instead, and give an attitude in frames.csv if there is \
