@@ -1,25 +1,23 @@
 //! A build beside the other steps.
 //!
-//! The images for the boards are linked with optimisation over all crates, on one processor and in folders of their own.
-//! The tests of each binary end with a few long ones, also on one processor. So the two take hardly longer together
-//! than the longer one alone.
+//! The images for the boards are linked with optimisation over all crates, on one processor and in folders of their
+//! own. The tests of each binary end with a few long ones, also on one processor. So the two take hardly longer
+//! together than the longer one alone.
 
 use std::fs::{self, File};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-
-use crate::machine::target;
 
 /// A running `cargo xtask firmware --build`, if there is one.
 #[derive(Default)]
 pub(crate) struct Beside(Option<(Child, PathBuf)>);
 
 impl Beside {
-    /// Starts the build. Where it cannot be started, the step that needs the images builds them.
-    pub(crate) fn start() -> Self {
+    /// Starts the build, whose output goes into a file of `folder`. Where it cannot be started, the step that needs the
+    /// images builds them.
+    pub(crate) fn start(folder: &Path) -> Self {
         let start = || {
-            let folder = target().join("xtask");
-            fs::create_dir_all(&folder)?;
+            fs::create_dir_all(folder)?;
             let log = folder.join("firmware.log");
             let out = File::create(&log)?;
             let mut build = Command::new(std::env::current_exe()?);

@@ -73,6 +73,11 @@ impl Selection {
         Ok(Self { all: !flags.is_empty(), words })
     }
 
+    /// Returns whether the tier selects the steps, and no word.
+    pub(crate) fn is_by_tier(&self) -> bool {
+        self.words.is_empty()
+    }
+
     /// Returns whether a step runs.
     fn has(&self, step: &Step) -> bool {
         if self.words.is_empty() {
@@ -98,12 +103,11 @@ pub(crate) struct Steps {
 
 impl Steps {
     /// Runs the selected steps, and prints which of them ran. Returns an error if a step failed, or if a step was left
-    /// out with `CI=true`.
-    pub(crate) fn run(steps: &[Step], selection: &Selection) -> Result<(), String> {
+    /// out with `CI=true`. `images` is a build that goes on beside them.
+    pub(crate) fn run(steps: &[Step], selection: &Selection, images: Beside) -> Result<(), String> {
         let mut running = Self {
             all: selection.all,
-            // A chosen step prints what it builds.
-            images: if selection.words.is_empty() { Beside::start() } else { Beside::default() },
+            images,
             strict: std::env::var("CI").is_ok_and(|v| v == "true"),
             began: Instant::now(),
             done: Vec::new(),

@@ -7,6 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use crate::beside::Beside;
 use crate::demo::{demo_dir, find_recordings, run_demo};
 use crate::dist::exclude_unpublished;
 use crate::machine::{apt_install, has, root, target};
@@ -72,7 +73,10 @@ const STEPS: &[Step] = &[
 /// Runs the steps that the arguments select.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
     std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
-    Steps::run(STEPS, &Selection::parse(args, STEPS)?)
+    let selection = Selection::parse(args, STEPS)?;
+    // A chosen step prints what it builds.
+    let images = if selection.is_by_tier() { Beside::start(&target().join("xtask")) } else { Beside::default() };
+    Steps::run(STEPS, &selection, images)
 }
 
 /// Runs the tests that take minutes. The step `firmware` runs those that need an image.

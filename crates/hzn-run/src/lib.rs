@@ -9,8 +9,8 @@
 //! the result over a picture, and [`explained`] describes what happened to it, in the words of [`explain`].
 //! [`diagnosis`] says what would make a refused limb the expected one. [`disk`] has the errors of files that cannot be
 //! written. [`terminal`] makes text from files safe for a terminal. [`start`] says what pictures tell about a camera
-//! without a calibration, [`bars`] finds black bars in them, and [`nadir`] turns the limb axis into the direction to the
-//! centre. [`mask`] draws what hides the stars.
+//! without a calibration, [`bars`] finds black bars in them, and [`nadir`] turns the limb axis into the direction to
+//! the centre. [`mask`] draws what hides the stars.
 //!
 //! [`record`] turns an answer into the row of the results; the feature `recordings` adds the files. Without it, a
 //! picture in memory goes through the same code without files, threads and clocks, as a browser has it.

@@ -91,8 +91,8 @@ impl fmt::Display for Refused {
                     write!(f, "without head {} the others agree; ", k + 1)?;
                 }
                 f.write_str(
-                    "a mount is wrong by more than an adjustment finds, heads are exchanged, a picture is mirrored, or a \
-                     clock is late",
+                    "a mount is wrong by more than an adjustment finds, heads are exchanged, a picture is mirrored, \
+                     or a clock is late",
                 )
             }
         }

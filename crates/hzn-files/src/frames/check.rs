@@ -27,8 +27,8 @@ const MIN_SPEED_KM_S: f64 = 0.02;
 
 /// Largest plausible rate, in rad/s: ten turns a second, twice the spin of a sounding rocket (5 turns a second).
 const MAX_RATE_RAD_S: f64 = 10.0 * core::f64::consts::TAU;
-/// Largest plausible turn while a picture is read out, rad. A limb that moves as far has no place in the picture. A rocket
-/// that spins at 5 turns a second reaches it with a readout time of 3 ms.
+/// Largest plausible turn while a picture is read out, rad. A limb that moves as far has no place in the picture. A
+/// rocket that spins at 5 turns a second reaches it with a readout time of 3 ms.
 const MAX_TURN_RAD: f64 = 0.1;
 /// Fewest turns between rows that say something about the rates. With a faster turn than half a circle from row to row,
 /// one or two may disagree by chance.
@@ -115,8 +115,8 @@ impl Frames {
         Some(self.problem(row, what))
     }
 
-    /// Returns one warning if a picture turns implausibly far while it is read out. Attitudes, where the table has them,
-    /// already confirmed the rates.
+    /// Returns one warning if a picture turns implausibly far while it is read out. Attitudes, where the table has
+    /// them, already confirmed the rates.
     fn suspect_turn_of_a_picture(&self, config: &Config) -> Option<Problem> {
         if self.rows.iter().any(|row| row.q_fixed_from_camera_wxyz.is_some()) {
             return None;

@@ -105,8 +105,8 @@ pub struct Recording {
     pub impossible: Option<(usize, String)>,
 }
 
-/// Reads a recording of `hzn run`: .mcap, .csv or .jsonl. Of a rig's results, the joint answers are taken. `told` is the
-/// sensor.toml that the pictures were processed with, for a recording that does not contain it.
+/// Reads a recording of `hzn run`: .mcap, .csv or .jsonl. Of a rig's results, the joint answers are taken. `told` is
+/// the sensor.toml that the pictures were processed with, for a recording that does not contain it.
 ///
 /// # Errors
 /// The file is not a recording, or its mount is not a rotation.
@@ -134,8 +134,8 @@ pub fn name_of(path: &Path) -> String {
 }
 
 impl Recording {
-    /// Makes a recording from the rows of a camera, with the sensor.toml that they were made with, if it is known. Of the
-    /// rows of a rig, the joint answers are taken: a sensor whose axes are those of the vehicle.
+    /// Makes a recording from the rows of a camera, with the sensor.toml that they were made with, if it is known. Of
+    /// the rows of a rig, the joint answers are taken: a sensor whose axes are those of the vehicle.
     ///
     /// # Errors
     /// The mount is not a rotation, or the rows of a rig have no joint answer.

@@ -9,11 +9,11 @@ use super::dynamics::Motion;
 /// Part of the variance of a slow error that each of its three parts has: one stays the same all flight, one changes
 /// with the time of `orbit.slow_error_time_s`, and one changes [`FASTER`] times as fast.
 ///
-/// A covariance does not say for how long an error stays. The told height, the step from ground to air and the shading of
-/// the lens are the same in every picture of a camera that keeps its attitude to the horizon. Light and season change on
-/// the way around the Earth, and clouds and ground below the limb in a few pictures. One time for all would promise that
-/// the others average out. With one half for each, an error of one kind only is larger than told by at most the square
-/// root of two; the price is that a mixture is told larger than it is, by less than that.
+/// A covariance does not say for how long an error stays. The told height, the step from ground to air and the shading
+/// of the lens are the same in every picture of a camera that keeps its attitude to the horizon. Light and season
+/// change on the way around the Earth, and clouds and ground below the limb in a few pictures. One time for all would
+/// promise that the others average out. With one half for each, an error of one kind only is larger than told by at
+/// most the square root of two; the price is that a mixture is told larger than it is, by less than that.
 pub(super) const SHARE: f64 = 0.5;
 /// Share of its sigma within which a considered error is held.
 const HELD: f64 = 1e-4;
@@ -154,8 +154,8 @@ impl Estimates {
     pub(super) fn height_km(&self, places: &Places) -> f64 {
         self.one(places.height)
     }
-    /// Returns the slow error of a sight over its root: the sum of its three parts. `index` is the first of the two that
-    /// change.
+    /// Returns the slow error of a sight over its root: the sum of its three parts. `index` is the first of the two
+    /// that change.
     pub(super) fn slow(&self, places: &Places, camera: usize, index: usize) -> Vector3<f64> {
         let changing: Vector3<f64> = self.slow.iter().skip(index).take(2).sum();
         self.three(places.lasting.get(camera).copied().flatten()) + changing * SHARE.sqrt()

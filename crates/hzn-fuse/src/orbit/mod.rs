@@ -89,8 +89,8 @@ fn told(case: &Case<'_>, names: &[String], epochs: &[Epoch]) -> Vec<String> {
     let of_camera = |((name, mount), clock): ((&String, &Option<usize>), &Option<usize>)| {
         let (mount_rad, clock_s) = (sigma(*mount), sigma(*clock));
         format!(
-            "along the orbit, a position looks like an error of mount or clock: the told {:.3}° of the mount of {name} are \
-             {:.1} km, and the told {clock_s} s of its clock {:.1} km",
+            "along the orbit, a position looks like an error of mount or clock: the told {:.3}° of the mount of \
+             {name} are {:.1} km, and the told {clock_s} s of its clock {:.1} km",
             mount_rad.to_degrees(),
             mount_rad * state.position_m.norm() * 1e-3,
             clock_s * speed_m_s * 1e-3

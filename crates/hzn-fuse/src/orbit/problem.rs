@@ -129,6 +129,11 @@ impl Problem<'_> {
         Some(Linear { error: vector(&error), derivatives: vec![(to - 1, dense(&(own * -by))), (to, dense(&own))] })
     }
 
+    /// Returns the first slow error of a sight.
+    fn slow_of(&self, number: usize) -> Option<usize> {
+        self.slow.get(number).copied().flatten()
+    }
+
     /// Returns the error of a sight from the motion at its time, with the motion's derivative by its knot.
     fn sighted(
         &self,
@@ -174,8 +179,7 @@ impl Problem<'_> {
                 expected += by * coefficient;
             }
         }
-        let slow = self.slow.get(number).copied().flatten();
-        if let Some(slow) = slow {
+        if let Some(slow) = self.slow_of(number) {
             put(self.places.lasting.get(sight.camera).copied().flatten(), dense(&(sight.across * sight.root)));
             expected += sight.root * estimates.slow(self.places, sight.camera, slow);
         }
@@ -184,9 +188,9 @@ impl Problem<'_> {
         for (row, share) in rows.into_iter().filter(|(row, share)| *share > 0.0 && *row < estimates.attitudes.len()) {
             derivatives.push((estimates.attitude_block(row), dense(&(sight.across * by_attitude * share))));
         }
-        if let Some(slow) = slow {
-            let by_changing = dense(&(sight.across * sight.root * SHARE.sqrt()));
-            derivatives.extend([slow, slow + 1].map(|i| (estimates.slow_block(i), by_changing.clone())));
+        if let Some(slow) = self.slow_of(number) {
+            let by = sight.across * sight.root * SHARE.sqrt();
+            derivatives.extend([slow, slow + 1].map(|i| (estimates.slow_block(i), dense(&by))));
         }
         let error = sight.across * (expected - sight.measured.as_inner());
         error.iter().all(|x| x.is_finite()).then(|| Linear { error: vector(&error), derivatives })

@@ -60,8 +60,8 @@ pub(super) fn knots(
     };
     let sparse = |time_s: f64, position: &Vector3<f64>| {
         Error::unusable(format!(
-            "--solve without an inertial unit: near {time_s:.0} s there are fewer than three pictures with a limb within \
-             {:.0} s before and after; take pictures more often",
+            "--solve without an inertial unit: near {time_s:.0} s there are fewer than three pictures with a limb \
+             within {:.0} s before and after; take pictures more often",
             LONG_WINDOW * period_s(position)
         ))
     };

@@ -63,8 +63,8 @@ pub(super) fn place(recording: &Recording, fixes: &[Fix], settings: &Settings) -
     let best = fits.min_by(|a, b| a.rest_m.total_cmp(&b.rest_m));
     let rest_m = median(now.iter().map(|m| m.miss_m.norm())).unwrap_or(0.0);
     let speed_m_s = median(now.iter().map(|m| m.velocity_m_s.norm())).unwrap_or(0.0);
-    // A fit with a constant difference sees a lag by the bend of the path only. Where the lag alone explains nearly all,
-    // the difference has the direction of the path, and its length is as exact as what is left.
+    // A fit with a constant difference sees a lag by the bend of the path only. Where the lag alone explains nearly
+    // all, the difference has the direction of the path, and its length is as exact as what is left.
     let sigma_s = |fit: &Lag| if fit.rest_m < ALONG * rest_m { fit.rest_m / speed_m_s } else { fit.sigma_s };
     if let Some(fit) = best
         && fit.lag_s.abs() > APART * sigma_s(&fit).hypot(clock_s)
