@@ -36,7 +36,7 @@ const ALLOWED_CONVERSIONS: [(&str, usize); 19] = [
     ("hzn_core::stages::gates::glow::is_likely", 1),
     ("hzn_core::stages::gates::lens::Rows<T>::fit", 1),
     ("hzn_core::stages::gates::lens::unbend", 1),
-    ("hzn_core::stages::gates::shape::Residuals<T>::new", 3),
+    ("hzn_core::stages::gates::shape::Residuals<T>::new", 4),
     ("hzn_core::stages::gates::size::is_possible_size", 7),
     ("hzn_core::stages::gates::size::min_arc", 1),
     ("hzn_core::stages::gates::sky::measure_sky", 1),

@@ -83,7 +83,7 @@ def test_a_start_by_the_size_alone(tmp_path, hzn_program):
         (dict(size=(320, 240)), "fov_deg=60, and lens=\"fisheye\" or lens=\"pinhole\""),
         (dict(size=(320, 240), fov_deg=120), "fov_deg=120: a lens of this width may be .* lens=\"fisheye\""),
         (dict(size=(320, 240), fov_deg=60, lens="fish"), "lens: \"fish\" is refused"),
-        (dict(size=(320, 240), fov_deg=60, body="mars"), "body: \"mars\" is refused"),
+        (dict(size=(320, 240), fov_deg=60, body="vulcan"), "body: \"vulcan\" is refused"),
         (dict(size=(320, 240), fov_deg=60, altitude_km=-1), "altitude_km: -1 is refused"),
     ],
 )
