@@ -150,7 +150,7 @@ impl Disk {
     }
 }
 
-/// What was recovered from each content so far. Most steps change one file, so most contents were seen before.
+/// The rows that were recovered from each content. A step changes one file, so most contents occur many times.
 type Seen = HashMap<Vec<u8>, Option<Vec<hzn_mcap::Row>>>;
 
 /// Returns the rows of a file that may be cut off anywhere, without processing times; `None` if it cannot be recovered.

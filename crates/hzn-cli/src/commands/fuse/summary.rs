@@ -158,7 +158,10 @@ fn orbit(orbit: &Orbit) -> [(String, String); 3] {
         ("  position, sigma".to_owned(), format!("{} km radial, along, across the orbit", km(orbit.sigma_m))),
         (
             "  Cramer-Rao bound".to_owned(),
-            format!("{} km: the least sigma for what was told of limb height, mounts and clocks", km(orbit.bound_m)),
+            format!(
+                "{} km: no smaller sigma is possible with the told limb height, mounts and clocks",
+                km(orbit.bound_m)
+            ),
         ),
     ]
 }
