@@ -38,6 +38,8 @@ pub struct Reader {
     scanner: Scanner<BufReader<File>>,
     path: PathBuf,
     sensor_toml: Option<String>,
+    /// Texts of the other attached `.toml` files, by name: those of a rig.
+    files: BTreeMap<String, String>,
     metadata: BTreeMap<String, String>,
     /// The first record after the head of the file.
     peeked: Option<Record>,
@@ -74,6 +76,7 @@ impl Reader {
             scanner: scanner.ok_or_else(|| Error::NotMcap { path: path.to_path_buf() })?,
             path: path.to_path_buf(),
             sensor_toml: None,
+            files: BTreeMap::new(),
             metadata: BTreeMap::new(),
             peeked: None,
             topics: BTreeMap::new(),
@@ -105,6 +108,10 @@ impl Reader {
     /// Returns the text of the attached sensor.toml.
     pub fn sensor_toml(&self) -> Option<&str> {
         self.sensor_toml.as_deref()
+    }
+    /// Returns the text of another attached file whose name ends in `.toml`, such as the `rig.toml` of a rig.
+    pub fn file(&self, name: &str) -> Option<&str> {
+        self.files.get(name).map(String::as_str)
     }
     /// Returns the metadata `hzn`: versions and settings of the run.
     pub fn metadata(&self) -> &BTreeMap<String, String> {
@@ -144,13 +151,21 @@ impl Reader {
                 self.foreign_reports.insert(id);
             }
         }
-        let mut f = Fields(&record.content);
+        let f = Fields(&record.content);
         match record.op {
             Op::ATTACHMENT => {
-                let text = f.attached(SENSOR_TOML).map(|data| String::from_utf8_lossy(data).into_owned());
-                self.sensor_toml = self.sensor_toml.take().or(text);
+                if let Some((name, data)) = f.attachment() {
+                    let text = || String::from_utf8_lossy(data).into_owned();
+                    match name {
+                        SENSOR_TOML => drop(self.sensor_toml.get_or_insert_with(text)),
+                        // Other programs attach files of any size.
+                        _ if name.ends_with(".toml") => drop(self.files.entry(name.to_owned()).or_insert_with(text)),
+                        _ => {}
+                    }
+                }
             }
             Op::METADATA => {
+                let mut f = f;
                 if let (Some("hzn"), Some(map)) = (f.text(), f.map()) {
                     self.metadata = map;
                 }

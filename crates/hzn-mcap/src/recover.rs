@@ -103,18 +103,23 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
         Origin::Other => return Err(Error::Foreign { path: part }),
     }
     let mut reader = Reader::open(&part, Contents::WithoutImages)?;
-    match reader.sensor_toml() {
-        // The file was cut off before the sensor.toml was written.
-        None => {
-            drop(lock);
-            return fresh();
-        }
-        Some(text) if text != options.sensor_toml => return Err(Error::OtherSensor { path: part }),
-        Some(_) => {}
+    let same = has_same_files(&reader, options);
+    if same == Some(false) {
+        return Err(Error::OtherSensor { path: part });
     }
     let mut last_index = None;
     for frame in &mut reader {
         last_index = Some(frame?.row.index);
+    }
+    match (same, last_index) {
+        // The file was cut off before its sensor was written.
+        (None, None) => {
+            drop(lock);
+            return fresh();
+        }
+        // It is the recording of a rig that is to be continued with one camera, or the other way round.
+        (None, Some(_)) => return Err(Error::OtherSensor { path: part }),
+        (Some(_), _) => {}
     }
     let mut copy_path = part.as_os_str().to_owned();
     copy_path.push(".new");
@@ -132,6 +137,16 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     }
     let (found, out) = copied?;
     Ok(Resumed { frames: found.frames, last_index, writer: Writer::with_container(out, path, &part, options) })
+}
+
+/// Returns whether a recording has the sensor of `options`, or the rig and its sensors. `None` if it lacks one of the
+/// files.
+fn has_same_files(reader: &Reader, options: &Options) -> Option<bool> {
+    if options.heads.is_empty() {
+        return Some(reader.sensor_toml()? == options.sensor_toml);
+    }
+    let mut all = options.files.iter().map(|(name, text)| Some(reader.file(name)? == text));
+    all.try_fold(true, |same, one| Some(same && one?))
 }
 
 /// The program that began a file.

@@ -35,6 +35,7 @@ mod resume;
 mod rewritten;
 mod rig;
 mod rig_mounts;
+mod rig_resume;
 mod run;
 mod sensitivity;
 mod shell;

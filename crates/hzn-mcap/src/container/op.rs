@@ -109,13 +109,17 @@ impl<'a> Fields<'a> {
         Some(map)
     }
     /// Returns the data of an attachment if it has this name.
-    pub(crate) fn attached(mut self, name: &str) -> Option<&'a [u8]> {
+    pub(crate) fn attached(self, name: &str) -> Option<&'a [u8]> {
+        self.attachment().filter(|(own, _)| *own == name).map(|(_, data)| data)
+    }
+
+    /// Reads an attachment: its name and its data.
+    pub(crate) fn attachment(mut self) -> Option<(&'a str, &'a [u8])> {
         // An attachment begins with two times.
         self.bytes(16)?;
-        let is = self.text()? == name;
+        let name = self.text()?;
         let (_media, size) = (self.text()?, self.u64()?);
-        let data = self.bytes(usize::try_from(size).ok()?)?;
-        is.then_some(data)
+        Some((name, self.bytes(usize::try_from(size).ok()?)?))
     }
 }
 

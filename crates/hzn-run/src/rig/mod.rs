@@ -12,6 +12,7 @@ mod levels;
 mod mounts;
 mod open;
 mod plan;
+mod resume;
 mod seen;
 mod sync;
 
@@ -19,4 +20,5 @@ pub use epochs::{Epoch, Epochs};
 pub use joint::Joiner;
 pub use open::{OpenHead, Opened, Request, open};
 pub use plan::{FinishedEpoch, HeadPlan, Plan, look, run};
+pub use resume::{Start, go_to, run_again_from};
 pub use seen::{Repeat, Seen};

@@ -8,6 +8,7 @@ use hzn_mcap::{FrameRecord, Row, Stamp};
 use super::epochs::{Epoch, Epochs};
 use super::joint::Joiner;
 use super::levels::Levels;
+use super::resume::Start;
 use super::seen::{Repeat, Seen};
 use crate::engine::{self, AnySensor, End, Finished, InOrder, Sink, Turns, Work, run_in_order};
 use crate::error::Error;
@@ -43,18 +44,20 @@ pub struct FinishedEpoch {
     pub repeats: Vec<Option<Repeat>>,
 }
 
-/// Runs all epochs. `seen` is called for each in order, after it is written.
+/// Runs all epochs from `start` on. `seen` is called for each in order, after it is written.
 ///
 /// # Errors
 /// The output cannot be written, or a source breaks off. Epochs that were written before remain.
 pub fn run(
     plan: &Plan,
     epochs: &mut Epochs,
+    start: Start,
     stop: &AtomicBool,
     output: &mut Outputs,
     seen: &mut dyn FnMut(&FinishedEpoch),
 ) -> Result<End, Error> {
-    let mut order = Order::new(plan);
+    let first = start.epoch();
+    let mut order = Order::new(plan, start);
     let write = |(index, mut heads): (u64, Vec<Option<Finished>>), output: &mut &mut Outputs| {
         let (joint, repeats) = order.join(index, &mut heads);
         output.write_heads(&records(plan, &joint, &mut heads))?;
@@ -62,7 +65,7 @@ pub fn run(
         Ok(())
     };
     let mut out = InOrder { sink: output, write, flush: |output: &mut &mut Outputs| output.flush() };
-    run_in_order(plan, plan.threads, || epochs.next(), 0, stop, &mut out)
+    run_in_order(plan, plan.threads(), || epochs.next(), first, stop, &mut out)
 }
 
 /// Runs all epochs without an output. `seen` is called for each in order.
@@ -75,14 +78,14 @@ pub fn look(
     stop: &AtomicBool,
     seen: &mut dyn FnMut(&FinishedEpoch),
 ) -> Result<End, Error> {
-    let mut order = Order::new(plan);
+    let mut order = Order::new(plan, Start::default());
     let write = |(index, mut heads): (u64, Vec<Option<Finished>>), _: &mut ()| {
         let (joint, repeats) = order.join(index, &mut heads);
         seen(&FinishedEpoch { joint, heads, repeats });
         Ok(())
     };
     let mut out = InOrder { sink: (), write, flush: |_: &mut ()| Ok(()) };
-    run_in_order(plan, plan.threads, || epochs.next(), 0, stop, &mut out)
+    run_in_order(plan, plan.threads(), || epochs.next(), 0, stop, &mut out)
 }
 
 /// What depends on the order of the epochs.
@@ -95,12 +98,14 @@ struct Order<'a> {
 }
 
 impl<'a> Order<'a> {
-    fn new(plan: &'a Plan) -> Self {
+    fn new(plan: &'a Plan, start: Start) -> Self {
+        let mut turns = start.turns;
+        turns.extend(plan.heads.iter().skip(turns.len()).map(|head| head.plan.turns.clone()));
         Self {
             plan,
-            turns: plan.heads.iter().map(|head| head.plan.turns.clone()).collect(),
+            turns,
             frozen: Frozen { last: vec![None; plan.heads.len()] },
-            levels: Levels::new(plan.heads.len()),
+            levels: start.levels.unwrap_or_else(|| Levels::new(plan.heads.len())),
         }
     }
 
@@ -142,6 +147,13 @@ fn records(plan: &Plan, joint: &Row, heads: &mut [Option<Finished>]) -> Vec<Vec<
         records.push(own.into_iter().flatten().map(named).collect());
     }
     records
+}
+
+impl Plan {
+    /// Returns the number of threads. A limb is tracked from the picture before, which has to be on the same thread.
+    fn threads(&self) -> usize {
+        if self.heads.iter().any(|head| head.plan.config.track.is_on()) { 1 } else { self.threads }
+    }
 }
 
 impl Work for Plan {

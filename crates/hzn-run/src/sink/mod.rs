@@ -13,7 +13,8 @@ use hzn_core::Config;
 use hzn_mcap::{Contents, FrameRecord, Options, Reader, part_path};
 
 pub use outputs::Outputs;
-pub use stored::StoredResults;
+pub(crate) use stored::StoredPicture;
+pub use stored::{StoredEpoch, StoredResults};
 
 pub use crate::record::{altitude_km, records, rows};
 
@@ -21,7 +22,7 @@ use crate::disk::{advice, cannot_write, refuse_existing};
 use crate::engine::{Finished, Sink};
 use crate::error::{Error, Remedy, failed, unusable};
 use crate::source::ending;
-use text::{Damage, Form, Text};
+use text::{Damage, Form, Grouping, Text};
 
 /// The treatment of an output that exists already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,7 +127,7 @@ pub fn open(path: &Path, existing: Existing, settings: Settings<'_>) -> Result<(
                     let _ = std::fs::rename(&part, path);
                     stop
                 };
-                return resume(path, &part, target, settings)
+                return resume(path, &part, target, settings, true)
                     .map_err(restore)
                     .and_then(|(kind, stored)| output(kind, stored, true));
             }
@@ -136,7 +137,7 @@ pub fn open(path: &Path, existing: Existing, settings: Settings<'_>) -> Result<(
                 let what = "exists together with the file of an unfinished run; remove one of them";
                 return Err(unusable(format!("{}: {what} ({})", path.display(), part.display())));
             }
-            let (kind, stored) = resume(path, &part, target, settings)?;
+            let (kind, stored) = resume(path, &part, target, settings, false)?;
             return output(kind, stored, false);
         }
     }
@@ -190,11 +191,20 @@ fn options(settings: Settings<'_>, force: bool) -> Options {
     options
 }
 
-fn resume(path: &Path, part: &Path, target: Target, settings: Settings<'_>) -> Result<(Kind, StoredResults), Error> {
+/// Continues an unfinished file; `is_whole` says that a run closed it.
+fn resume(
+    path: &Path,
+    part: &Path,
+    target: Target,
+    settings: Settings<'_>,
+    is_whole: bool,
+) -> Result<(Kind, StoredResults), Error> {
     let bodies = settings.config.each_body().len();
+    let is_rig = !settings.heads.is_empty();
     match text_form(target) {
         Some(form) => {
-            let resumed = Text::resume(path, part, form, Some(bodies), Damage::Refuse)
+            let rows = if is_rig { Grouping::Epochs { is_whole } } else { Grouping::Bodies(bodies) };
+            let resumed = Text::resume(path, part, form, rows, Damage::Refuse)
                 .and_then(|(text, stored, _)| Ok((text.with_durability(settings.durable)?, stored)));
             let (text, stored) = resumed.map_err(|e| match e.kind() {
                 std::io::ErrorKind::InvalidData => {
@@ -205,13 +215,14 @@ fn resume(path: &Path, part: &Path, target: Target, settings: Settings<'_>) -> R
             Ok((Kind::Text(text), stored))
         }
         None => {
-            let before = read_stored(part);
+            let before = read_stored(part, is_rig);
             let resumed = hzn_mcap::resume(path, &options(settings, false)).map_err(|e| match e {
                 hzn_mcap::Error::OtherSensor { .. } => unusable(e).with_remedy(Remedy::Restart),
                 hzn_mcap::Error::Foreign { .. } => unusable(e),
                 e => failed(e),
             })?;
-            let frames = resumed.frames / bodies as u64;
+            // An epoch is in one batch, so all of them are complete.
+            let frames = if is_rig { before.frames } else { resumed.frames / bodies as u64 };
             let stored = match resumed.frames {
                 0 => StoredResults::default(),
                 rows => StoredResults { frames, rows, ..before },
@@ -221,19 +232,24 @@ fn resume(path: &Path, part: &Path, target: Target, settings: Settings<'_>) -> R
     }
 }
 
-/// Reads the last row of a recording, and the last answers of its bodies.
-fn read_stored(part: &Path) -> StoredResults {
+/// Reads the last row of a recording, and the last answers of its bodies; with a rig, its epochs.
+fn read_stored(part: &Path, is_rig: bool) -> StoredResults {
     let mut stored = StoredResults::default();
     let Ok(reader) = Reader::open(part, Contents::WithoutImages) else { return stored };
+    let record = |stored: &mut StoredResults, rows: &[hzn_mcap::Row]| match is_rig {
+        true if rows.is_empty() => {}
+        true => stored.record_epoch(rows),
+        false => stored.record(rows),
+    };
     let mut rows: Vec<hzn_mcap::Row> = Vec::new();
     for frame in reader.filter_map(Result::ok) {
         if rows.first().is_some_and(|first| first.index != frame.row.index) {
-            stored.record(&rows);
+            record(&mut stored, &rows);
             rows.clear();
         }
         rows.push(frame.row);
     }
-    stored.record(&rows);
+    record(&mut stored, &rows);
     stored.last = rows.pop();
     stored
 }
@@ -397,7 +413,7 @@ pub fn recover_text(file: &Path, path: &Path, target: Target) -> std::io::Result
     if file != part {
         std::fs::copy(file, &part)?;
     }
-    let resumed = Text::resume(path, &part, form, None, Damage::KeepBefore);
+    let resumed = Text::resume(path, &part, form, Grouping::LikeFirst, Damage::KeepBefore);
     if resumed.is_err() && file != part {
         // An incomplete copy is of no use.
         let _ = std::fs::remove_file(&part);

@@ -17,6 +17,10 @@ pub struct Outputs {
     each: Vec<One>,
     /// Number of the picture that is written next.
     next: u64,
+    /// Number of the first epoch of a rig that is processed again, for comparison.
+    again_from: u64,
+    /// Whether this run has written something.
+    has_written: bool,
 }
 
 struct One {
@@ -55,7 +59,7 @@ impl Outputs {
             let what = "contains other results than the other outputs, so they are not of one run";
             return Err(unusable(format!("{}: {what}", other.name)).with_remedy(Remedy::Restart));
         }
-        Ok((Self { each, next: shortest.frames }, shortest))
+        Ok((Self { each, next: shortest.frames, again_from: 0, has_written: false }, shortest))
     }
 
     /// Refuses outputs that contradict each other, before anything is opened.
@@ -84,12 +88,35 @@ impl Outputs {
         paths.iter().any(|path| Output::wants_trace(Some(path)))
     }
 
-    /// Appends the records of an epoch of a rig, as [`Output::write_heads`] does.
+    /// Lets a continued run of a rig begin at an earlier epoch than the first that is missing. The epochs in between are
+    /// compared with what the outputs contain.
+    pub fn run_again_from(&mut self, epoch: u64) {
+        (self.next, self.again_from) = (epoch, epoch);
+    }
+
+    /// Returns whether anything was written to an output since it was opened.
+    pub fn has_written(&self) -> bool {
+        self.has_written
+    }
+
+    /// Appends the records of an epoch of a rig, as [`Output::write_heads`] does. An output that contains the epoch
+    /// already must have the same rows.
     ///
     /// # Errors
-    /// The disk fails.
+    /// The disk fails, or an output contains another result.
     pub fn write_heads(&mut self, heads: &[Vec<FrameRecord>]) -> Result<(), Error> {
-        self.each.iter_mut().try_for_each(|one| one.output.write_heads(heads))
+        // The joint answer also depends on the epoch before.
+        let with_joint = self.next == 0 || self.next > self.again_from;
+        for one in &mut self.each {
+            if self.next < one.stored.frames {
+                one.compare_epoch(self.next, heads, with_joint)?;
+            } else {
+                one.output.write_heads(heads)?;
+                self.has_written = true;
+            }
+        }
+        self.next += 1;
+        Ok(())
     }
 
     /// Closes the files and gives them their final names.
@@ -124,6 +151,27 @@ impl One {
         }
         let what = format!("contains another result of its picture {}, {}", frame.index, frame.name);
         Err(unusable(format!("{}: {what}", self.name)).with_remedy(Remedy::Restart))
+    }
+}
+
+impl One {
+    /// Compares the rows of an epoch with those that the output contains, with or without the joint answer, which is
+    /// the first.
+    fn compare_epoch(&self, index: u64, heads: &[Vec<FrameRecord>], with_joint: bool) -> Result<(), Error> {
+        let rows = || heads.iter().flatten().map(|record| &record.row);
+        let found = rows().map(sum).collect::<Result<Vec<u32>, _>>()?;
+        let stored = self.stored.sums_of_epoch(index);
+        let is_same = |(k, (a, b)): (usize, (&u32, &u32))| a == b || (k == 0 && !with_joint);
+        if stored.len() == found.len() && stored.iter().zip(&found).enumerate().all(is_same) {
+            return Ok(());
+        }
+        let file = rows().map(|row| row.file.as_str()).next().unwrap_or_default();
+        Err(unusable(format!(
+            "{}: its epoch {index}, {file}, now gives another result; give the rig.toml, sensors, tables, pictures and \
+             options that it was begun with",
+            self.name
+        ))
+        .with_remedy(Remedy::Restart))
     }
 }
 

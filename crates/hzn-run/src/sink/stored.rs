@@ -1,7 +1,11 @@
 //! The results that an output contains already.
 
+use std::ops::Range;
 use std::path::Path;
 use std::time::{Duration, SystemTime};
+
+use hzn_core::status::Status;
+use hzn_files::rig::JOINT;
 
 use crate::checked_row::sum;
 use crate::engine::{LastAnswer, StoredAnswer};
@@ -24,6 +28,8 @@ pub struct StoredResults {
     pub answers: Vec<Option<StoredAnswer>>,
     /// The time of each picture.
     pub times_s: Vec<Option<f64>>,
+    /// With a rig, its epochs; `answers`, `times_s` and `last_answers` are then empty.
+    pub epochs: Vec<StoredEpoch>,
     /// The time of the last write before the output was opened.
     pub written: Option<SystemTime>,
 }
@@ -46,6 +52,95 @@ impl StoredResults {
         for (answer, row) in self.last_answers.iter_mut().zip(rows) {
             *answer = LastAnswer::from_row(row).or(*answer);
         }
+    }
+}
+
+/// The rows of an epoch of a rig that an output contains: the joint answer first, then those of the heads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredEpoch {
+    /// Place of its first row among the sums, and number of its rows.
+    rows: Range<usize>,
+    heads: Vec<StoredHead>,
+}
+
+/// The picture of a head in a stored epoch.
+#[derive(Debug, Clone, PartialEq)]
+struct StoredHead {
+    /// Checksums of the names of the head and of its picture.
+    name: [u32; 2],
+    time_s: Option<f64>,
+    /// Whether it has an answer about its first body.
+    is_ok: bool,
+    answers: Vec<Option<StoredAnswer>>,
+}
+
+/// A picture of a head in the results of an earlier run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StoredPicture<'a> {
+    picture: u32,
+    /// Its time in seconds.
+    pub(crate) time_s: Option<f64>,
+    /// Whether it has an answer about the first body.
+    pub(crate) is_ok: bool,
+    /// The answer of each body.
+    pub(crate) answers: &'a [Option<StoredAnswer>],
+}
+
+impl StoredPicture<'_> {
+    /// Returns whether the picture has this name.
+    pub(crate) fn has_name(&self, name: &str) -> bool {
+        crc32fast::hash(name.as_bytes()) == self.picture
+    }
+}
+
+impl StoredEpoch {
+    /// Returns the picture of a head; `None` if it had none.
+    pub(crate) fn picture(&self, head: &str) -> Option<StoredPicture<'_>> {
+        let own = crc32fast::hash(head.as_bytes());
+        let found = self.heads.iter().find(|stored| stored.name[0] == own)?;
+        Some(StoredPicture {
+            picture: found.name[1],
+            time_s: found.time_s,
+            is_ok: found.is_ok,
+            answers: &found.answers,
+        })
+    }
+
+    /// Returns the number of heads that have a picture.
+    pub fn pictures(&self) -> usize {
+        self.heads.len()
+    }
+}
+
+impl StoredResults {
+    /// Records the rows of an epoch of a rig.
+    pub(super) fn record_epoch(&mut self, rows: &[hzn_mcap::Row]) {
+        let first = self.sums.len();
+        self.sums.extend(rows.iter().map(|row| sum(row).unwrap_or_default()));
+        let mut heads: Vec<StoredHead> = Vec::new();
+        for row in rows {
+            let Some(head) = row.head.as_deref().filter(|head| *head != JOINT) else { continue };
+            let name = [head, &row.file].map(|text| crc32fast::hash(text.as_bytes()));
+            let answer = StoredAnswer::from_row(row);
+            match heads.last_mut().filter(|last| last.name == name) {
+                Some(last) => last.answers.push(answer),
+                None => heads.push(StoredHead {
+                    name,
+                    time_s: row.time_s,
+                    is_ok: row.status == Status::Ok,
+                    answers: vec![answer],
+                }),
+            }
+        }
+        self.epochs.push(StoredEpoch { rows: first..self.sums.len(), heads });
+        self.frames += 1;
+        self.rows += rows.len() as u64;
+    }
+
+    /// Returns the checksums of the rows of an epoch.
+    pub(super) fn sums_of_epoch(&self, index: u64) -> &[u32] {
+        let rows = self.epochs.get(index as usize).map(|epoch| epoch.rows.clone());
+        rows.and_then(|rows| self.sums.get(rows)).unwrap_or_default()
     }
 }
 

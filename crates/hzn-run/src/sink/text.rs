@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use hzn_files::rig::JOINT;
 use hzn_mcap::Row;
 
 use super::stored::StoredResults;
@@ -24,6 +25,8 @@ pub(crate) struct Text {
     form: Form,
     /// Whether every flush waits for the disk.
     durable: bool,
+    /// Where the next row begins, in bytes, if the file is to be cut there first.
+    continue_at: Option<u64>,
 }
 
 enum Out {
@@ -50,7 +53,8 @@ const JSON_HEAD: &[u8] = b"{\"index\":";
 
 impl Text {
     pub(crate) fn stdout(form: Form) -> io::Result<Self> {
-        let mut text = Self { out: Out::Stdout(BufWriter::new(FileOnStdout::new())), form, durable: false };
+        let mut text =
+            Self { out: Out::Stdout(BufWriter::new(FileOnStdout::new())), form, durable: false, continue_at: None };
         if form == Form::Csv {
             text.out.writer().write_all(header().as_bytes())?;
         }
@@ -60,7 +64,7 @@ impl Text {
     fn from_file(file: File, path: &Path, part: &Path, form: Form) -> Self {
         let file = BufWriter::with_capacity(1 << 16, file);
         let out = Out::File { file, path: path.to_owned(), part: part.to_owned() };
-        Self { out, form, durable: false }
+        Self { out, form, durable: false, continue_at: None }
     }
 
     /// Decides whether every flush waits until the rows are on the disk.
@@ -85,13 +89,12 @@ impl Text {
         Ok(text)
     }
 
-    /// Continues after the last picture that has all of its rows. This number is `bodies`, or that of the first
-    /// picture. Without an unfinished file, begins a new one. Also returns what is known about a damaged row.
+    /// Continues after the last picture that has all of its rows, or after the last complete epoch of a rig. Without an unfinished file, begins a new one. Also returns what is known about a damaged row.
     pub(crate) fn resume(
         path: &Path,
         part: &Path,
         form: Form,
-        bodies: Option<usize>,
+        rows: Grouping,
         damage: Damage,
     ) -> io::Result<(Self, StoredResults, Option<String>)> {
         if !part.exists() {
@@ -100,7 +103,7 @@ impl Text {
         let mut file = hzn_mcap::open_part(part)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
-        let found = find_complete(&bytes, form, bodies)?;
+        let found = find_complete(&bytes, form, rows)?;
         if let (Some(why), Damage::Refuse) = (&found.damage, damage) {
             return Err(io::Error::new(io::ErrorKind::InvalidData, why.clone()));
         }
@@ -108,13 +111,27 @@ impl Text {
             drop(file);
             return Ok((Self::create(path, part, form)?, found.stored, found.damage));
         }
-        // The rest of the file is an incomplete row or picture.
-        file.set_len(found.end as u64)?;
-        file.seek(SeekFrom::End(0))?;
-        Ok((Self::from_file(file, path, part, form), found.stored, found.damage))
+        let mut text = Self::from_file(file, path, part, form);
+        // The rest of the file is an incomplete row or picture. That of a rig may be a complete epoch, which stays until
+        // the same epoch is there to replace it.
+        text.continue_at = Some(found.end as u64);
+        if !matches!(rows, Grouping::Epochs { .. }) {
+            text.cut()?;
+        }
+        Ok((text, found.stored, found.damage))
+    }
+
+    /// Cuts the file where the next row begins.
+    fn cut(&mut self) -> io::Result<()> {
+        if let (Some(at), Out::File { file, .. }) = (self.continue_at.take(), &mut self.out) {
+            file.get_ref().set_len(at)?;
+            file.seek(SeekFrom::End(0))?;
+        }
+        Ok(())
     }
 
     pub(crate) fn write(&mut self, row: &Row) -> io::Result<()> {
+        self.cut()?;
         let line = match self.form {
             Form::Csv => csv_line(row),
             Form::Jsonl => json_line(row),
@@ -140,6 +157,7 @@ impl Text {
     }
 
     pub(crate) fn finish(mut self) -> io::Result<()> {
+        self.cut()?;
         self.out.writer().flush()?;
         match &self.out {
             Out::File { file, path, part } => hzn_mcap::publish(file.get_ref(), part, path),
@@ -157,6 +175,18 @@ pub(crate) enum Damage {
     KeepBefore,
 }
 
+/// The rows that belong together: all of them are kept, or none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Grouping {
+    /// A picture has a row for each of these bodies.
+    Bodies(usize),
+    /// A picture has as many rows as the first one.
+    LikeFirst,
+    /// The rows of an epoch of a rig have its number. Their number varies, so the last epoch is complete for certain only
+    /// if the run ended by itself (`is_whole`).
+    Epochs { is_whole: bool },
+}
+
 /// The complete pictures of a table.
 struct Complete {
     stored: StoredResults,
@@ -169,11 +199,12 @@ struct Complete {
 /// Finds the complete pictures of `bodies` rows each, in the results of a run. A run writes its pictures in their
 /// order, without a gap; otherwise rows were removed or moved. If the number of bodies is unknown, it is the number of
 /// rows of the first picture, and the table may be a part of the results.
-fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<Complete> {
-    let is_run = bodies.is_some();
-    let bodies = match bodies {
-        Some(bodies) => bodies,
-        None => {
+fn find_complete(bytes: &[u8], form: Form, rows: Grouping) -> io::Result<Complete> {
+    let is_run = rows != Grouping::LikeFirst;
+    let bodies = match rows {
+        Grouping::Epochs { is_whole } => return find_epochs(bytes, form, is_whole),
+        Grouping::Bodies(bodies) => bodies,
+        Grouping::LikeFirst => {
             let mut first = Vec::new();
             each_row(bytes, form, |row, _| {
                 let same = first.first().is_none_or(|index| *index == row.index);
@@ -187,8 +218,7 @@ fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<
     let mut misplaced = None;
     let damage = each_row(bytes, form, |row, to| {
         if is_run && row.index != stored.frames {
-            let what = format!("picture {} is at the place of picture {}", row.index, stored.frames);
-            misplaced = Some(format!("{what}, so rows were removed or moved"));
+            misplaced = Some(misplacement(row.index, stored.frames));
             return false;
         }
         frame.push(row);
@@ -203,6 +233,40 @@ fn find_complete(bytes: &[u8], form: Form, bodies: Option<usize>) -> io::Result<
         true
     })?;
     Ok(Complete { stored, end, damage: damage.or(misplaced) })
+}
+
+fn misplacement(index: u64, place: u64) -> String {
+    format!("picture {index} is at the place of picture {place}, so rows were removed or moved")
+}
+
+/// Finds the complete epochs of a rig. Each begins with the row of its joint answer.
+fn find_epochs(bytes: &[u8], form: Form, is_whole: bool) -> io::Result<Complete> {
+    let (mut stored, mut end, mut epoch, mut epoch_end) = (StoredResults::default(), 0, Vec::<Row>::new(), 0);
+    let mut misplaced = None;
+    let damage = each_row(bytes, form, |row, to| {
+        let is_joint = row.head.as_deref() == Some(JOINT);
+        if is_joint && !epoch.is_empty() {
+            stored.record_epoch(&epoch);
+            epoch.clear();
+            end = epoch_end;
+        }
+        if row.index != stored.frames || is_joint != epoch.is_empty() {
+            misplaced = Some(match is_joint || !epoch.is_empty() {
+                true => misplacement(row.index, stored.frames),
+                false => format!("picture {} has no row of the {JOINT}: it is not the table of a rig", row.index),
+            });
+            return false;
+        }
+        epoch.push(row);
+        epoch_end = to;
+        true
+    })?;
+    let damage = damage.or(misplaced);
+    if is_whole && damage.is_none() && !epoch.is_empty() {
+        stored.record_epoch(&epoch);
+        end = epoch_end;
+    }
+    Ok(Complete { stored, end, damage })
 }
 
 /// Calls `visit` with every complete row and the offset of its end. Stops if `visit` returns false or a row is

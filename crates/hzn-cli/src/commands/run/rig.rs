@@ -1,12 +1,12 @@
 //! `hzn run rig.toml`: processes the pictures of several cameras that are one sensor.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hzn_core::status::Status;
 use hzn_run::engine::End;
-use hzn_run::rig::{self, Epochs, FinishedEpoch, HeadPlan, Opened, Plan, Request};
-use hzn_run::sink::{self, Outputs};
+use hzn_run::rig::{self, Epochs, FinishedEpoch, HeadPlan, Opened, Plan, Request, Start};
+use hzn_run::sink::{self, Outputs, StoredResults};
 use hzn_run::{disk, explain, source};
 
 use super::args::Args;
@@ -18,13 +18,14 @@ use crate::tell;
 
 pub(super) fn run(args: &Args, path: &Path) -> Outcome {
     check(args)?;
-    let opened = rig::open(&Request {
+    let request = Request {
         rig: path.to_owned(),
         frames: args.source.frames.clone(),
         raw: args.source.raw,
         altitude_km: args.sensor.altitude_km,
         flight: args.sensor.flight,
-    })?;
+    };
+    let opened = rig::open(&request)?;
     opened.warnings.iter().for_each(tell::warning);
     let files: Vec<_> = args.output.iter().filter(|path| !source::is_stdin(path)).cloned().collect();
     disk::refuse_inputs(&opened.files, &files)?;
@@ -33,19 +34,36 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
     }
     let plan = plan(args, &opened)?;
     let texts: Vec<_> = opened.heads.iter().map(|head| head.sensor.text.clone()).collect();
-    let total = opened.pictures();
-    let mut epochs = Epochs::new(opened.heads, opened.rig.rig.sync_s)?;
+    let (total, text) = (opened.pictures(), opened.text.clone());
+    let mut input = Input { request, tables: tables(&opened), epochs: epochs(opened)? };
     let heads: Vec<_> =
         plan.heads.iter().zip(texts).map(|(head, text)| (head.name.clone(), &head.plan.config, text)).collect();
     let Some((_, config, _)) = heads.first() else { return Err(usage(format!("{}: has no head", path.display()))) };
-    let settings =
-        sink::Settings { config, sensor_toml: &opened.text, durable: args.durable, ros: args.ros, heads: &heads };
-    let (mut output, _) = Outputs::open(&args.output, args.format.into(), args.existing(), settings)?;
-    let mut watch = Watch::new(args.quiet, total);
-    let end = rig::run(&plan, &mut epochs, &stop_flag(), &mut output, &mut |epoch| watch.see(epoch, &plan));
+    let settings = sink::Settings { config, sensor_toml: &text, durable: args.durable, ros: args.ros, heads: &heads };
+    let (mut output, stored) = Outputs::open(&args.output, args.format.into(), args.existing(), settings)?;
+    let start = match input.go_on(&plan, &stored) {
+        Ok(start) => start,
+        Err(stop) => {
+            output.put_back()?;
+            return Err(stop);
+        }
+    };
+    output.run_again_from(start.epoch());
+    let done = stored.epochs.iter().map(|epoch| epoch.pictures() as u64).sum();
+    let mut watch = Watch::new(args.quiet, total, (stored.frames, done));
+    let end =
+        rig::run(&plan, &mut input.epochs, start, &stop_flag(), &mut output, &mut |epoch| watch.see(epoch, &plan));
     let summary = watch.progress.summary(&[]);
-    let end = end?;
+    let end = match end {
+        Ok(end) => end,
+        Err(error) if stored.frames > 0 && !output.has_written() => {
+            output.put_back()?;
+            return Err(error.into());
+        }
+        Err(error) => return Err(error.into()),
+    };
     output.finish()?;
+    let epochs = input.epochs;
     let lost = epochs.describe_loss().filter(|_| end == End::Complete);
     lost.iter().chain(&epochs.warnings()).for_each(tell::warning);
     watch.missing.tell(None);
@@ -53,11 +71,50 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
         watch.sum_up(&summary);
     }
     if end == End::Interrupted {
-        tell::line(format_args!("interrupted after {}", explain::counted(watch.epochs, "epoch")));
+        tell::line(format_args!("interrupted after {}", explain::counted(watch.stored + watch.epochs, "epoch")));
         return Ok(Exit::Interrupted);
     }
     let is_unread = watch.progress.any_unprocessed() || watch.unreadable > 0 || lost.is_some();
     Ok(if is_unread { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// The pictures of the heads, which are read again where a run is continued.
+struct Input {
+    request: Request,
+    /// The files with the data of the pictures.
+    tables: Vec<PathBuf>,
+    epochs: Epochs,
+}
+
+impl Input {
+    /// Goes on to the place where a continued run begins. Without results it is the first epoch.
+    fn go_on(&mut self, plan: &Plan, stored: &StoredResults) -> Result<Start, Stop> {
+        if stored.frames == 0 {
+            return Ok(Start::default());
+        }
+        let from = rig::run_again_from(plan, &mut self.epochs, stored, &self.tables)?;
+        self.open_again()?;
+        if let Some(start) = rig::go_to(plan, &mut self.epochs, stored, from)? {
+            return Ok(start);
+        }
+        self.open_again()?;
+        Ok(Start::default())
+    }
+
+    fn open_again(&mut self) -> Result<(), Stop> {
+        self.epochs = epochs(rig::open(&self.request)?)?;
+        Ok(())
+    }
+}
+
+fn epochs(opened: Opened) -> Result<Epochs, Stop> {
+    Ok(Epochs::new(opened.heads, opened.rig.rig.sync_s)?)
+}
+
+/// Returns the tables of the vehicle and of the heads.
+fn tables(opened: &Opened) -> Vec<PathBuf> {
+    let own = opened.heads.iter().filter_map(|head| head.frames.as_ref());
+    opened.frames.as_deref().into_iter().chain(own).map(|frames| frames.path.clone()).collect()
 }
 
 /// Refuses the options that have no meaning for several cameras, or that are not built for them.
@@ -68,7 +125,6 @@ fn check(args: &Args) -> Result<(), Stop> {
         ("--overlay", args.overlay.is_some(), "draw the pictures of one head: hzn run FOLDER --overlay DIR"),
         ("--mask-pictures", args.mask_pictures.is_some(), "use one head: hzn run FOLDER --mask-pictures DIR"),
         ("--watch", args.watch, "watch the folder of one head"),
-        ("--resume", args.resume, "the run of a rig cannot be continued; --force starts again"),
     ];
     match refused.into_iter().find(|(_, is_given, _)| *is_given) {
         Some((option, _, what)) => Err(usage(format!("{option} is not possible with a rig.toml: {what}"))),
@@ -112,6 +168,8 @@ struct Watch {
     missing: MissingPriors,
     unreadable: u64,
     epochs: u64,
+    /// Number of epochs that the outputs contained before this run.
+    stored: u64,
     /// The statuses of the joint answers.
     joint: Counts,
     /// Number of epochs in which a head was excluded.
@@ -121,8 +179,10 @@ struct Watch {
 }
 
 impl Watch {
-    fn new(quiet: bool, pictures: Option<u64>) -> Self {
-        let progress = Progress::new(pictures, 0, quiet);
+    /// `done` has the numbers of epochs and of pictures that the outputs contain already.
+    fn new(quiet: bool, pictures: Option<u64>, done: (u64, u64)) -> Self {
+        let (stored, done) = done;
+        let progress = Progress::new(pictures, done, quiet);
         let missing = MissingPriors::default();
         Self {
             progress,
@@ -130,6 +190,7 @@ impl Watch {
             missing,
             unreadable: 0,
             epochs: 0,
+            stored,
             joint: Counts::default(),
             excluded: BTreeMap::new(),
             refused: BTreeMap::new(),
@@ -137,6 +198,9 @@ impl Watch {
     }
 
     fn see(&mut self, epoch: &FinishedEpoch, plan: &Plan) {
+        if epoch.joint.index < self.stored {
+            return;
+        }
         self.epochs += 1;
         if let Some(count) = self.joint.get_mut(epoch.joint.status as usize) {
             *count += 1;
@@ -164,7 +228,11 @@ impl Watch {
 
     fn sum_up(&self, summary: &str) {
         tell::line(summary);
-        tell::line(format_args!("{}: {}", explain::counted(self.epochs, "epoch"), count_text(&self.joint)));
+        let before = match self.stored {
+            0 => String::new(),
+            stored => format!(" (after {stored} that were finished before)"),
+        };
+        tell::line(format_args!("{}: {}{before}", explain::counted(self.epochs, "epoch"), count_text(&self.joint)));
         if let Some((why, epochs)) = self.refused.iter().max_by_key(|(_, epochs)| **epochs) {
             let epochs = explain::counted(*epochs, "epoch");
             tell::line(format_args!(
