@@ -14,11 +14,13 @@ mod open;
 mod plan;
 mod resume;
 mod seen;
+mod start;
 mod sync;
 
 pub use epochs::{Epoch, Epochs};
 pub use joint::Joiner;
 pub use open::{OpenHead, Opened, Request, open};
 pub use plan::{FinishedEpoch, HeadPlan, Plan, look, run};
-pub use resume::{Start, go_to, run_again_from};
+pub use resume::{go_to, run_again_from};
 pub use seen::{Repeat, Seen};
+pub use start::Start;

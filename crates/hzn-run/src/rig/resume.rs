@@ -1,36 +1,20 @@
 //! The begin of a run that continues an earlier one: what depends on the epochs before is as if they had just been run.
 //!
 //! The turns of the heads come from the rows. The checksums of the last pictures and the rows themselves come from a
-//! second run of the last epochs, which are compared with what the outputs contain. The brightness at the last limb of a
-//! head comes from that one picture.
+//! second run of the last epochs, which are compared with what the outputs contain. The brightness at the last limb of
+//! a head comes from that one picture.
 
 use std::path::{Path, PathBuf};
 
 use super::epochs::{Epoch, Epochs};
 use super::levels::Levels;
 use super::plan::{HeadPlan, Plan};
+use super::start::Start;
 use crate::engine::{Turns, Work, process_one};
 use crate::error::{Error, Remedy, unusable};
 use crate::explain::counted;
 use crate::sink::{StoredEpoch, StoredPicture, StoredResults};
 use crate::source::Payload;
-
-/// Where a run over a rig begins, with what it knows of the epochs before.
-#[derive(Debug, Clone, Default)]
-pub struct Start {
-    /// The number of the first epoch.
-    epoch: u64,
-    /// The turns of each head; empty at the begin of a sequence.
-    pub(super) turns: Vec<Turns>,
-    pub(super) levels: Option<Levels>,
-}
-
-impl Start {
-    /// Returns the number of the first epoch.
-    pub fn epoch(&self) -> u64 {
-        self.epoch
-    }
-}
 
 /// Returns the number of the epoch from which on a continued run processes the pictures again: the one before the last
 /// that the outputs contain, or before the first with a picture that was changed since. `tables` are the files with the

@@ -88,8 +88,8 @@ impl Outputs {
         paths.iter().any(|path| Output::wants_trace(Some(path)))
     }
 
-    /// Lets a continued run of a rig begin at an earlier epoch than the first that is missing. The epochs in between are
-    /// compared with what the outputs contain.
+    /// Lets a continued run of a rig begin at an earlier epoch than the first that is missing. The epochs in between
+    /// are compared with what the outputs contain.
     pub fn run_again_from(&mut self, epoch: u64) {
         (self.next, self.again_from) = (epoch, epoch);
     }

@@ -89,7 +89,8 @@ impl Text {
         Ok(text)
     }
 
-    /// Continues after the last picture that has all of its rows, or after the last complete epoch of a rig. Without an unfinished file, begins a new one. Also returns what is known about a damaged row.
+    /// Continues after the last picture that has all of its rows, or after the last complete epoch of a rig. Without an
+    /// unfinished file, begins a new one. Also returns what is known about a damaged row.
     pub(crate) fn resume(
         path: &Path,
         part: &Path,
@@ -112,8 +113,8 @@ impl Text {
             return Ok((Self::create(path, part, form)?, found.stored, found.damage));
         }
         let mut text = Self::from_file(file, path, part, form);
-        // The rest of the file is an incomplete row or picture. That of a rig may be a complete epoch, which stays until
-        // the same epoch is there to replace it.
+        // The rest of the file is an incomplete row or picture. That of a rig may be a complete epoch, which stays
+        // until the same epoch is there to replace it.
         text.continue_at = Some(found.end as u64);
         if !matches!(rows, Grouping::Epochs { .. }) {
             text.cut()?;
@@ -182,8 +183,8 @@ pub(crate) enum Grouping {
     Bodies(usize),
     /// A picture has as many rows as the first one.
     LikeFirst,
-    /// The rows of an epoch of a rig have its number. Their number varies, so the last epoch is complete for certain only
-    /// if the run ended by itself (`is_whole`).
+    /// The rows of an epoch of a rig have its number. Their number varies, so the last epoch is complete for certain
+    /// only if the run ended by itself (`is_whole`).
     Epochs { is_whole: bool },
 }
 

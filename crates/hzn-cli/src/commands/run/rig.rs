@@ -74,8 +74,7 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
         tell::line(format_args!("interrupted after {}", explain::counted(watch.stored + watch.epochs, "epoch")));
         return Ok(Exit::Interrupted);
     }
-    let is_unread = watch.progress.any_unprocessed() || watch.unreadable > 0 || lost.is_some();
-    Ok(if is_unread { Exit::SomeUnreadable } else { Exit::Done })
+    Ok(watch.exit(lost.is_some()))
 }
 
 /// The pictures of the heads, which are read again where a run is continued.
@@ -224,6 +223,12 @@ impl Watch {
             // The joint answer is about the first body.
             self.progress.count(frame.outcomes.iter().map(|outcome| outcome.status()).take(1));
         }
+    }
+
+    /// Returns the exit of a run that came to its end; `is_lossy` says that pictures could not be handed out.
+    fn exit(&self, is_lossy: bool) -> Exit {
+        let is_unread = self.progress.any_unprocessed() || self.unreadable > 0 || is_lossy;
+        if is_unread { Exit::SomeUnreadable } else { Exit::Done }
     }
 
     fn sum_up(&self, summary: &str) {
