@@ -1,5 +1,7 @@
 //! A rig of four heads: its joint answer, its telecommands, and heads that fail.
 
+use std::cell::RefCell;
+
 use hzn_core::Prior;
 use hzn_core::Sensor;
 use hzn_core::image::{Grey, Layout};
@@ -12,12 +14,13 @@ use hzn_flight::flight::Lists;
 use hzn_flight::flight::rig::{Rig, Setup};
 use hzn_flight::joint::{Outcome, RigAnswer};
 use hzn_flight::messages::{Code, Event, Function, Mode};
+use hzn_flight::packet::{self, Apid, Scan};
 use hzn_flight::table;
 
 use crate::bench::{HEIGHT, WIDTH};
 use crate::rig_bench::{
-    Shared, Taken, board, expose, expose_all, fly, mount, off_z_deg, parameters, picture, quiet_turn, ready, send,
-    set_mount, setup, take_sent,
+    Bench, Shared, Taken, board, expose, expose_all, fly, mount, off_z_deg, parameters, picture, quiet_turn, ready,
+    send, set_mount, setup, take_sent,
 };
 
 #[test]
@@ -332,4 +335,37 @@ fn an_impossible_setup_is_refused() {
     let bad = Setup { sigma_rad: -1.0, ..setup() };
     let refused = bad.check().map(drop).unwrap_err();
     assert_eq!((refused.field, refused.value), ("rig.mount.sigma_deg", -1.0));
+}
+
+/// The packet of the rig is outside the bit budget of its heads, so the line has to have room for one at each epoch.
+#[test]
+fn a_rig_packet_has_the_same_size_at_every_epoch() {
+    let sizes = |board: &RefCell<Bench>| {
+        let bytes = std::mem::take(&mut board.borrow_mut().sent);
+        let (mut rest, mut sizes) = (&bytes[..], Vec::new());
+        while let Scan::Packet { end, packet } = packet::scan(rest) {
+            if setup().base.subject(&packet) == Some(Apid::Rig) {
+                sizes.push(end);
+            }
+            rest = &rest[end..];
+        }
+        sizes
+    };
+    // A bit a second: the heads send one picture after the start, and none after it.
+    let heads = [0, 1, 2, 3].map(|k| {
+        let mut parameters = parameters(k);
+        parameters.operations.science_bits_s = Some(1.0);
+        parameters
+    });
+    let board = board(&heads);
+    fly(&board, |rig| {
+        for epoch in 1..5 {
+            expose_all(&board, epoch);
+            if epoch == 3 {
+                board.borrow_mut().cameras.iter_mut().for_each(|camera| camera.pictures[0].pixels.fill(epoch as u8));
+            }
+            rig.turn();
+            assert_eq!(sizes(&board), [134], "epoch {epoch}");
+        }
+    });
 }
