@@ -31,6 +31,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign pictures [FLIGHTS]
        cargo xtask campaign integrity [PICTURES [SEED [STATE]...]]
        cargo xtask campaign night [PICTURES [SEED]]
+       cargo xtask campaign rig [ATTITUDES [FLIGHTS]]
        cargo xtask campaign miri
        cargo xtask campaign paths
        cargo xtask campaign processors [PICTURES]
@@ -54,6 +55,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
         of its own, from SEED (700000) on, and counts errors above protection_deg
   night renders PICTURES (300) pictures of layers of airglow of each kind, from SEED (810000) on, and as many limbs by
         day with a wrong time and edges that are no limb, and counts the answers of body.night = \"airglow\"
+  rig   counts the errors of the coarse direction of a rig from ATTITUDES (1000) random attitudes, and those of the
+        mounts that hzn calibrate rig finds on FLIGHTS (300) flights
   miri  runs the tests of the flight software and of the C interface in Miri
   paths builds the images of the flight computer and the wheel in another folder; their bytes must be the same
   processors
@@ -84,6 +87,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
             integrity(number(200)?, number_at(2, 700_000)?, states).map_err(Trouble::into_message)
         }
         Some("night") => night(number(300)?, number_at(2, 810_000)?).map_err(Trouble::into_message),
+        Some("rig") => rig(number(1000)?, number_at(2, 300)?).map_err(Trouble::into_message),
         Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
         Some("miri") => miri::campaign().map_err(Trouble::into_message),
         Some("paths") => paths().map_err(Trouble::into_message),
@@ -123,6 +127,12 @@ pub(crate) fn artefacts(pictures: u64) -> Outcome {
 /// Fuses right flights, and wrong inputs on a twentieth of them.
 pub(crate) fn flights(count: u64) -> Outcome {
     steps::run(test("fuse", "verdict::").env("HZN_FLIGHTS", count.to_string()))
+}
+
+/// Counts the errors of what a rig says without a limb, and of its calibrated mounts.
+fn rig(attitudes: u64, flights: u64) -> Outcome {
+    let mut campaign = test("cli", "rig_campaign::");
+    steps::run(campaign.env("HZN_ATTITUDES", attitudes.to_string()).env("HZN_RIG_FLIGHTS", flights.to_string()))
 }
 
 /// Cuts the power after each step of runs of so many pictures.

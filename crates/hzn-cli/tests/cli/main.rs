@@ -34,6 +34,7 @@ mod rerun;
 mod resume;
 mod rewritten;
 mod rig;
+mod rig_campaign;
 mod rig_mounts;
 mod rig_resume;
 mod run;
