@@ -92,8 +92,8 @@ fn the_coarse_direction_from_any_attitude() {
         let [error, sigma] = [0, 1].map(|i| median(found.iter().map(|one| one[i])));
         let worst = found.iter().map(|[error, _]| *error).fold(0.0, f64::max);
         println!(
-            "{which}: {answered} epochs with an answer, {none} without a coarse direction, {} with one: {within} within 3 \
-             sigma, median error {error:.1}, largest {worst:.1}, median sigma {sigma:.1} degrees",
+            "{which}: {answered} epochs with an answer, {none} without a coarse direction, {} with one: {within} \
+             within 3 sigma, median error {error:.1}, largest {worst:.1}, median sigma {sigma:.1} degrees",
             found.len()
         );
         assert!(within * 100 >= found.len() * 99, "{which}: {within} of {} within 3 sigma", found.len());
@@ -143,8 +143,9 @@ fn calibrated_mounts_and_their_covariances() {
     }
     let pairs = errors.len() as f64;
     println!(
-        "calibrate rig: {flights} flights of {EPOCHS} epochs, {pairs} relative mounts: {within} of {all} components within \
-         3 sigma, NEES {:.2} (3 is ideal), median error {:.3}, before {:.3}, median sigma {:.3} degrees a component",
+        "calibrate rig: {flights} flights of {EPOCHS} epochs, {pairs} relative mounts: {within} of {all} components \
+         within 3 sigma, NEES {:.2} (3 is ideal), median error {:.3}, before {:.3}, median sigma {:.3} degrees \
+         a component",
         nees / pairs,
         median(errors.into_iter()),
         median(told_deg.into_iter()),
