@@ -71,7 +71,8 @@ verdicts! {
     Band = 19, "band";
     /// The axis contradicts the attitude of the prior.
     Attitude = 20, "attitude";
-    /// The Sun direction of the prior does not light this limb.
+    /// The Sun direction of the prior does not light this limb, or the picture shows within the limb that the Sun is
+    /// elsewhere.
     Sun = 21, "sun";
     /// The axis is farther from the last answer than the vehicle can have turned.
     Rate = 22, "rate";

@@ -4,6 +4,8 @@ mod architecture;
 mod common;
 mod dice;
 mod drawn;
+#[cfg(feature = "position")]
+mod lit_side;
 mod precision;
 #[cfg(all(feature = "dlr", feature = "erf", feature = "horace", feature = "zju"))]
 mod published;

@@ -21,6 +21,7 @@ mod indistinct;
 mod layer;
 mod lens;
 mod line;
+mod lit_side;
 mod night;
 mod no_consensus;
 mod no_sky;
@@ -104,6 +105,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     no_sky::refuse(case, &sky)?;
     night::refuse(case)?;
     sun::refuse(case)?;
+    lit_side::refuse(case, binary)?;
     faint::refuse(case, binary, &places)?;
     if case.expected.is_airglow {
         // A layer is a band.
