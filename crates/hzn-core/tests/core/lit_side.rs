@@ -27,6 +27,9 @@ fn sensor() -> Config {
     config
 }
 
+/// Brightness of a surface from the cosines of the angles to the Sun and to the camera.
+type Law = fn(f64, f64) -> f64;
+
 /// A picture of a body, with the direction to the Sun.
 struct Scene {
     picture: Vec<u8>,
@@ -34,9 +37,9 @@ struct Scene {
 }
 
 impl Scene {
-    /// Draws a body at a phase angle, lit from an azimuth, both in degrees. `law` gives the brightness from the cosines
-    /// of the angles to the Sun and to the camera. Dark ground is 0.6 times as bright as the rest.
-    fn draw(phase_deg: f64, azimuth_deg: f64, law: fn(f64, f64) -> f64) -> Self {
+    /// Draws a body at a phase angle, lit from an azimuth, both in degrees. Dark ground is 0.6 times as
+    /// bright as the rest.
+    fn draw(phase_deg: f64, azimuth_deg: f64, law: Law) -> Self {
         let (sin_azimuth, cos_azimuth) = azimuth_deg.to_radians().sin_cos();
         let (sin_phase, cos_phase) = phase_deg.to_radians().sin_cos();
         let sun = [sin_phase * cos_azimuth, sin_phase * sin_azimuth, -cos_phase];
@@ -88,8 +91,7 @@ impl Scene {
 }
 
 fn scenes() -> impl Iterator<Item = (String, Scene)> {
-    let laws: [(&str, fn(f64, f64) -> f64); 2] =
-        [("Lambert", |mu0, _| mu0), ("Lommel-Seeliger", |mu0, mu| 2.0 * mu0 / (mu0 + mu))];
+    let laws: [(&str, Law); 2] = [("Lambert", |mu0, _| mu0), ("Lommel-Seeliger", |mu0, mu| 2.0 * mu0 / (mu0 + mu))];
     laws.into_iter().flat_map(|(name, law)| {
         [10.0, 20.0, 25.0, 30.0, 35.0, 50.0, 75.0, 100.0].into_iter().enumerate().flat_map(move |(i, phase)| {
             let azimuths = (0..3).map(move |k| 17.0 * i as f64 + 120.0 * f64::from(k));
