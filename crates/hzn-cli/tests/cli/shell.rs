@@ -106,6 +106,23 @@ fn pictures_can_be_listed_on_standard_input() {
     with_stdin(place.command(&["run", "-"]), b"in/9.png\n").expect(2).says("in/9.png: no such file");
 }
 
+/// Another program may delete a picture after the list was made.
+#[test]
+fn a_missing_picture_of_a_list_is_a_row() {
+    let place = Place::with_pictures(2);
+    let list = b"in/0000.png\nin/gone.png\nin/0001.png\n";
+    let named = place.run(&["run", "in/0000.png", "in/gone.png", "in/0001.png"]).expect(3);
+    for ran in [named, with_stdin(place.command(&["run", "-"]), list).expect(3)] {
+        let ran = ran.says("unreadable: gone.png: no such file");
+        let found = without_time(&ran.out);
+        assert_eq!(found.iter().map(|row| cell(row, "status")).collect::<Vec<_>>(), ["ok", "unreadable", "ok"]);
+        assert_eq!(cell(&found[1], "detail"), "no such file");
+    }
+    // A list of which nothing is there, and a name that is no picture, are mistakes.
+    place.run(&["run", "in/8.png", "in/9.png"]).expect(2).says("in/8.png: no such file or folder");
+    place.run(&["run", "in/0000.png", "flight"]).expect(2).says("flight: no such file or folder");
+}
+
 #[test]
 fn headerless_pictures_can_come_on_standard_input() {
     let place = Place::with_pictures(2);

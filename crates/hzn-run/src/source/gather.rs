@@ -76,7 +76,12 @@ impl Gathered {
         for input in inputs {
             gathered.add(input, inputs.len() == 1, raw)?;
         }
-        if gathered.paths.is_empty() { Err(gathered.empty(inputs, raw)) } else { Ok(gathered) }
+        match gathered.paths.first() {
+            None => Err(gathered.empty(inputs, raw)),
+            // Nothing is there: the list is wrong as a whole, or it belongs to another folder.
+            Some(first) if gathered.paths.iter().all(|path| is_nothing(path)) => Err(missing(first)),
+            Some(_) => Ok(gathered),
+        }
     }
 
     /// Adds the files of one input; `alone` says that there is no other input.
@@ -95,8 +100,12 @@ impl Gathered {
             self.add_file(input, alone, raw)
         } else if text.contains(['*', '?', '[']) {
             self.add_pattern(&text, raw)
+        } else if !alone && (raw || PICTURES.contains(&ending(input).as_str())) {
+            // Another program may delete a picture between the list and the run. Its row says so, and the others count.
+            self.paths.push(input.to_owned());
+            Ok(())
         } else {
-            Err(unusable(format!("{text}: no such file or folder")))
+            Err(missing(input))
         }
     }
 
@@ -164,6 +173,15 @@ impl Gathered {
             _ => unusable(what),
         }
     }
+}
+
+/// Returns whether there is neither a file nor a link with this name.
+fn is_nothing(path: &Path) -> bool {
+    !path.exists() && !path.is_symlink()
+}
+
+fn missing(input: &Path) -> Error {
+    unusable(format!("{}: no such file or folder", input.display()))
 }
 
 /// Returns the pictures of a folder in order, and counts other files in `left_out`.
