@@ -91,8 +91,22 @@ fn check_altitude(body: &body::Config) -> Option<Implausible> {
     if let Some(what) = explain_unused_altitude(body.kind) {
         return Some(Implausible::new("body.altitude_km", what));
     }
-    let is_far = km > max_altitude_km(body.kind, body.mean_radius_km());
-    is_far.then(|| Implausible::new("body.altitude_km", format!("{km} km {}", suspect_metres(body.kind, km))))
+    let doubt = doubt_altitude(body.kind, body.mean_radius_km(), km)?;
+    Some(Implausible::new("body.altitude_km", doubt))
+}
+
+/// Returns what is to be doubted about an altitude in kilometres that is given for a body, such as "550000 km is
+/// implausibly large: is it in metres?"; `None` if it is usual.
+///
+/// ```
+/// use hzn_core::body::Kind;
+/// use hzn_files::plausible::doubt_altitude;
+///
+/// assert!(doubt_altitude(Kind::Earth, 6371.0, 550_000.0).is_some_and(|doubt| doubt.contains("metres")));
+/// assert_eq!(doubt_altitude(Kind::Earth, 6371.0, 550.0), None);
+/// ```
+pub fn doubt_altitude(body: body::Kind, radius_km: f64, km: f64) -> Option<String> {
+    (km > max_altitude_km(body, radius_km)).then(|| format!("{km} km {}", suspect_metres(body, km)))
 }
 
 /// Returns the doubt about an altitude above [`max_altitude_km`].

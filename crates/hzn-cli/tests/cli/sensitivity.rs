@@ -39,6 +39,29 @@ fn a_sweep_as_text_table_and_plot() {
 }
 
 #[test]
+fn an_altitude_in_metres_is_doubted() {
+    let place = Place::new();
+    for what in [&["sensitivity"][..], &["sensitivity", "yaw"], &["sensitivity", "visibility"]] {
+        let doubt = "warning: --altitude: 550000 km is implausibly large: is it in metres?";
+        place.run(&[what, &["--altitude", "550000"]].concat()).says(doubt);
+        let right = place.run(&[what, &["--altitude", "550"]].concat());
+        assert!(!right.err.contains("metres"), "{}", right.err);
+    }
+}
+
+#[test]
+fn the_limb_of_a_thermal_band_has_the_name_that_sensor_toml_has() {
+    let place = Place::new();
+    let sensitivity = ["sensitivity", "--altitude", "550", "--depression", "20"];
+    let told = |more: &[&str]| place.run(&[&sensitivity[..], more].concat());
+    let band = told(&["--limb", "window-8-14um"]).expect(0).out;
+    assert_eq!(band, told(&["--limb-height", "12", "--limb-height-sigma", "7"]).expect(0).out);
+    assert_ne!(band, told(&["--limb", "visible"]).expect(0).out);
+    told(&["--limb", "co2"]).expect(2).says("expected one of visible, co2-15um, window-8-14um");
+    told(&["--limb", "co2-15um", "--body", "moon"]).expect(2).says("--limb: only the Earth has the bands of its air");
+}
+
+#[test]
 fn several_quantities_are_combined() {
     let place = Place::new();
     let args = ["sensitivity", "--fov", "60,90", "--altitude", "100:300:100", "--body", "earth,moon", "--rows", "540"];

@@ -2,8 +2,11 @@
 
 use std::path::PathBuf;
 
+use hzn_core::body::Limb;
+
 use super::body::Body;
 use super::sweep::Values;
+use crate::exit::Stop;
 
 /// Predict the accuracy of a camera without pictures: sigma of the direction by field of view, altitude, resolution
 ///
@@ -40,6 +43,9 @@ pub(crate) struct Args {
     /// Bodies: earth, moon, sun, a planet or moon by name, or a radius in kilometres; several with commas
     #[arg(long, value_name = "BODY", value_delimiter = ',')]
     pub(super) body: Vec<Body>,
+    /// Limb of the Earth in a thermal band, as in `[body] limb` of a sensor.toml: it gives limb height and sigma
+    #[arg(long, value_name = "BAND", value_parser = parse_limb, conflicts_with_all = ["sensor", "limb_height"])]
+    pub(super) limb: Option<Limb>,
     /// Height of the visible limb, kilometres [default: that of a sensor.toml, 17 for the Earth]
     #[arg(long, value_name = "KM")]
     pub(super) limb_height: Option<Values>,
@@ -136,4 +142,22 @@ impl std::str::FromStr for Size {
             _ => Err("width and height must be whole numbers from 2 to 65535".into()),
         }
     }
+}
+
+impl Args {
+    /// Returns the bodies of `--body`, or else the Earth, with the limb of `--limb`.
+    pub(super) fn bodies(&self) -> Result<Vec<Body>, Stop> {
+        let named = if self.body.is_empty() { vec![Body::earth()] } else { self.body.clone() };
+        let limb = self.limb.unwrap_or_default();
+        named.into_iter().map(|body| body.with_limb(limb)).collect()
+    }
+}
+
+/// Parses a limb by the names that sensor.toml has.
+fn parse_limb(text: &str) -> Result<Limb, String> {
+    let known = || Limb::ALL.iter().filter(|limb| **limb != Limb::Height);
+    known().find(|limb| limb.name() == text).copied().ok_or_else(|| {
+        let names: Vec<_> = known().map(|limb| limb.name()).collect();
+        format!("expected one of {}; --limb-height gives another height", names.join(", "))
+    })
 }

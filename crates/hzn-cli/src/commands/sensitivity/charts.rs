@@ -4,20 +4,20 @@ use hzn_plot::{Chart, Series, Style};
 use hzn_sim::sensitivity::chart::{Vertical, Visibility};
 
 use super::args::Args;
-use super::body::Body;
+use super::body::{Body, doubt_altitudes};
 use super::study::Study;
 use super::table::Table;
 use crate::exit::{Stop, usage};
 
 /// Computes fields of view by altitude (Braun & Barf 2022, figures 6 and 7).
 pub(super) fn visibility(args: &Args) -> Result<Study, Stop> {
-    let body = match args.body.as_slice() {
-        [] => Body::earth(),
+    let body = match args.bodies()?.as_slice() {
         [one] => *one,
         _ => return Err(usage("--body: give one body for this chart")),
     };
     let altitudes =
         args.altitude.as_ref().map_or_else(|| (1..=60).map(|i| 50.0 * f64::from(i)).collect(), |v| v.0.clone());
+    doubt_altitudes(&[body], &altitudes);
     let limb_height_km = match args.limb_height.as_ref().map(|v| v.0.as_slice()) {
         None => body.limb_height_km,
         Some([one]) => *one,
@@ -58,8 +58,11 @@ pub(super) fn spherical_earth(args: &Args) -> Result<Study, Stop> {
     if !args.body.is_empty() {
         return Err(usage("--body: this chart is for the Earth (WGS-84); leave --body out"));
     }
+    let earth = args.limb.map(|limb| Body::earth().with_limb(limb)).transpose()?;
     let altitudes = args.altitude.as_ref().map_or_else(|| vec![100.0, 240.0, 600.0, 2000.0], |v| v.0.clone());
-    let limb_height_km = args.limb_height.as_ref().map_or(Ok(0.0), |v| match v.0.as_slice() {
+    doubt_altitudes(&[Body::earth()], &altitudes);
+    let own = earth.map_or(0.0, |body| body.limb_height_km);
+    let limb_height_km = args.limb_height.as_ref().map_or(Ok(own), |v| match v.0.as_slice() {
         [one] => Ok(*one),
         _ => Err(usage("--limb-height: give one value for this chart")),
     })?;

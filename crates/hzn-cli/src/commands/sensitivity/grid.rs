@@ -8,7 +8,7 @@ use hzn_core::camera::{self, Model};
 use hzn_sim::sensitivity::{Design, SensorPlace, Sigmas};
 
 use super::args::{Args, Lens, Size, What};
-use super::body::Body;
+use super::body::{Body, doubt_altitudes};
 use super::noise::{EdgeNoise, noise_of};
 use crate::exit::{Stop, usage};
 
@@ -35,9 +35,8 @@ impl<'a> Grid<'a> {
         let sensor = args.sensor.as_deref().map(|path| load(path, !args.body.is_empty())).transpose()?;
         let body = sensor.as_ref().map(|s| &s.body);
         let bodies = match (args.body.is_empty(), body) {
-            (false, _) => args.body.clone(),
             (true, Some(body)) => vec![Body::from_config(body)],
-            (true, None) => vec![Body::earth()],
+            _ => args.bodies()?,
         };
         if let Some(px) = args.sigma_px.filter(|px| !(*px > 0.0)) {
             return Err(usage(format!("--sigma-px: {px} is refused: must be above 0")));
@@ -55,6 +54,7 @@ impl<'a> Grid<'a> {
             (None, Some(km)) => vec![km],
             (None, None) => return Err(usage("--altitude: missing; give it in kilometres, such as --altitude 200")),
         };
+        doubt_altitudes(&bodies, &altitude);
         let mut axes = Vec::new();
         let mut axis = |column, label, values: &[f64]| axes.push(Axis { column, label, values: values.to_vec() });
         if sensor.is_none() {
