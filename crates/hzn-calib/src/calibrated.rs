@@ -201,8 +201,9 @@ impl fmt::Display for Warning {
             ),
             Self::OtherModel { model, rms_px, other, other_rms_px } => write!(
                 f,
-                "{other} explains the same points with an RMS of {other_rms_px:.3} px, {model} with {rms_px:.3} px; \
-                 the sigmas do not contain what a model cannot follow: calibrate with the model {other}",
+                "{other} explains the same points with an RMS of {other_rms_px:.3} px, {model} with {rms_px:.3} px, \
+                 which is no chance; the sigmas of the lens are at least the difference of the two. Calibrate with the \
+                 model {other}",
                 model = model.name(),
                 other = other.name()
             ),

@@ -61,14 +61,15 @@ pub fn calibrate(model: Model, size_px: [u16; 2], board: &Board, views: &[View])
 pub fn calibrate_planar(model: Model, size_px: [u16; 2], views: &[PlanarView]) -> Result<Calibrated, Refusal> {
     let mut fitted = fit(model, size_px, views)?;
     let bow = super::bow::bend(&mut fitted.adjusted);
-    let names = views.iter().map(|v| v.name.clone()).zip(fitted.places.iter().copied()).collect::<Vec<_>>();
-    let mut calibrated = finish(&fitted.adjusted, &names)?;
+    let named =
+        |fitted: &Fitted| views.iter().map(|v| v.name.clone()).zip(fitted.places.iter().copied()).collect::<Vec<_>>();
+    let mut calibrated = finish(&fitted.adjusted, &named(&fitted))?;
     calibrated.bow = bow;
     add_held_out(&mut calibrated, held_out_rms_px(&fitted, bow.is_some()));
     other_model::compare(model, &mut calibrated, |other| {
         let mut fitted = fit(other, size_px, views).ok()?;
         super::bow::bend(&mut fitted.adjusted);
-        Some(finish(&fitted.adjusted, &names).ok()?.rms_px)
+        finish(&fitted.adjusted, &named(&fitted)).ok()
     })?;
     Ok(calibrated)
 }

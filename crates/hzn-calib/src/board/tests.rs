@@ -272,3 +272,46 @@ fn corners_that_boards_do_not_reach_raise_a_warning() {
     assert!((found.covered_deg - circle).abs() < 2.2, "{circle} {}", found.covered_deg);
     assert!(found.warnings.iter().any(|w| matches!(w, Warning::CircleSet { .. })));
 }
+
+/// A lens of the right model is hardly ever called one of another, and a decentred lens is.
+#[test]
+fn another_model_is_named_beyond_chance() {
+    let is_named = |found: &Calibrated| found.warnings.iter().any(|w| matches!(w, Warning::OtherModel { .. }));
+    let lenses: Vec<Config> = lenses();
+    let mut alarms = Vec::new();
+    for set in 0..30_u64 {
+        let lens = &lenses[set as usize % lenses.len()];
+        let views = views(lens, 8 + set as usize % 13, 0.05, &mut Draws(40_000 + set));
+        let found = calibrate(lens.model, SIZE, &BOARD, &views).unwrap();
+        if is_named(&found) {
+            alarms.push((set, lens.model, found.warnings));
+        }
+    }
+    assert!(alarms.is_empty(), "{alarms:?}");
+    // The default model on a lens that is decentred more and more.
+    let decentred = |part: f64| {
+        let mut lens = lenses[4].clone();
+        lens.k = [-0.28, 0.09, 8e-4 * part, -5e-4 * part, -0.01].into_iter().collect();
+        lens
+    };
+    for (part, must_name) in [(0.25, false), (1.0, true)] {
+        let lens = decentred(part);
+        let (mut named, mut squares) = (0, 0.0);
+        for set in 0..4 {
+            let views = views(&lens, 12, 0.03, &mut Draws(50_000 + set));
+            let found = calibrate(Model::KannalaBrandt, SIZE, &BOARD, &views).unwrap();
+            named += usize::from(is_named(&found));
+            // Focal lengths and centre; the coefficients are of another model.
+            let covariance = found.camera.covariance.as_ref().unwrap();
+            let off = |n: usize| {
+                let which = covariance.order[n];
+                found.camera.intrinsic(which).unwrap() - lens.intrinsic(which).unwrap()
+            };
+            squares += (0..4).map(|n| off(n).powi(2) / covariance.rows[n][n]).sum::<f64>() / 16.0;
+            println!("{part}: RMS {:.3} px, lens {:.3} px, {:?}", found.rms_px, found.lens_sigma_px, found.warnings);
+        }
+        println!("{part}: named {named} of 4, NEES per parameter {squares:.2}");
+        assert!(!must_name || named == 4, "{part}: {named}");
+        assert!(squares < 4.0, "{part}: {squares}");
+    }
+}

@@ -107,11 +107,11 @@ pub fn calibrate(model: Model, size_px: [u16; 2], pictures: &[Points]) -> Result
         }
     }
     let mut calibrated = found.map_err(PointsRefusal::Lens)?;
-    let rms_px_of = |other| {
+    let calibrated_with = |other| {
         check(other, size_px, pictures).ok()?;
-        Some(fit(other, size_px, pictures).ok()?.rms_px)
+        fit(other, size_px, pictures).ok()
     };
-    other_model::compare(model, &mut calibrated, rms_px_of).map_err(PointsRefusal::Lens)?;
+    other_model::compare(model, &mut calibrated, calibrated_with).map_err(PointsRefusal::Lens)?;
     Ok(calibrated)
 }
 
