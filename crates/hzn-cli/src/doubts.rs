@@ -3,6 +3,7 @@
 mod improbable;
 mod one_place;
 mod rates;
+mod repeats;
 
 use hzn_core::body::PriorError;
 use hzn_core::status::Status;
@@ -13,6 +14,7 @@ use hzn_run::explain;
 pub(crate) use improbable::Improbable;
 pub(crate) use one_place::OnePlace;
 pub(crate) use rates::Rates;
+pub(crate) use repeats::Repeats;
 
 use crate::tell;
 

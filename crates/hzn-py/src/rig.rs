@@ -170,5 +170,6 @@ fn finished(name: String, data: FrameData, outcomes: Vec<BodyOutcome>) -> Finish
         tip: None,
         pages: 1,
         mask: None,
+        bytes: None,
     }
 }

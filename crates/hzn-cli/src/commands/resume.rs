@@ -45,10 +45,16 @@ pub(super) fn skip_stored(
         let before = turns.clone();
         again.replay(n, &item, &mut turns);
         if !(is_last || changed || changed_table.is_some()) {
+            // The last picture is compared with the bytes of the one before it.
+            if n + 2 == stored.frames {
+                turns.see_checksum(item.checksum(&plan.config));
+            }
             continue;
         }
         let picture = item.name.clone();
-        match again.gives_the_same(n, item, before)? {
+        let (same, checksum) = again.gives_the_same(n, item, before)?;
+        turns.see_checksum(checksum);
+        match same {
             Some(true) => {}
             // Without the pictures before it, a picture would give another result.
             None if !changed && changed_table.is_none() => {}
@@ -108,12 +114,12 @@ impl Again<'_> {
     }
 
     /// Returns whether a picture gives its stored rows again, after the answers and turns before it; `None` if that
-    /// also depends on the threshold of the pictures before it.
-    fn gives_the_same(&mut self, n: u64, item: Item, mut before: Turns) -> Result<Option<bool>, Stop> {
+    /// also depends on the threshold of the pictures before it. The other value is the checksum of the picture.
+    fn gives_the_same(&mut self, n: u64, item: Item, mut before: Turns) -> Result<(Option<bool>, Option<u32>), Stop> {
         // The limb of a picture in the middle of a block was tracked from the picture before it.
         let every = u64::from(self.plan.config.track.full_every);
         if self.plan.config.tracks() || (self.plan.config.track.is_on() && !n.is_multiple_of(every)) {
-            return Ok(None);
+            return Ok((None, item.checksum(&self.plan.config)));
         }
         let sensor = match &mut self.sensor {
             Some(sensor) => sensor,
@@ -126,6 +132,7 @@ impl Again<'_> {
         let rows: Vec<Row> = sink::rows(&processed, &self.plan.config);
         let sums = rows.iter().map(checked_row::sum).collect::<Result<Vec<u32>, _>>()?;
         let first = n as usize * rows.len();
-        Ok(Some(self.stored.sums.get(first..first + rows.len()) == Some(sums.as_slice())))
+        let same = self.stored.sums.get(first..first + rows.len()) == Some(sums.as_slice());
+        Ok((Some(same), processed.bytes.map(|bytes| bytes.checksum)))
     }
 }

@@ -21,7 +21,7 @@ use hzn_run::{disk, explain};
 pub(super) use args::{Args, cores};
 
 use super::resume;
-use crate::doubts::{Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Times};
+use crate::doubts::{Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Repeats, Times};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
@@ -164,6 +164,7 @@ struct Watch {
     rates: Rates,
     one_place: OnePlace,
     improbable: Improbable,
+    repeats: Repeats,
     refusals: Refusals,
     multi_page: MultiPageFiles,
     masks: picture_folders::Masks,
@@ -187,6 +188,7 @@ impl Watch {
             rates: Rates::default(),
             one_place: OnePlace::default(),
             improbable: Improbable::default(),
+            repeats: Repeats::default(),
             refusals: Refusals::default(),
             multi_page: MultiPageFiles::default(),
             masks: picture_folders::Masks::default(),
@@ -200,6 +202,7 @@ impl Watch {
         self.rates.count(frame);
         self.one_place.count(frame);
         self.improbable.count(frame);
+        self.repeats.count(frame);
         self.refusals.count(frame);
         self.multi_page.count(frame);
         if !self.quiet {
@@ -234,6 +237,7 @@ impl Watch {
         self.rates.tell();
         self.one_place.tell();
         self.improbable.tell(&plan.config.gates);
+        self.repeats.tell(&plan.config.gates, self.quiet);
         self.multi_page.tell();
     }
 

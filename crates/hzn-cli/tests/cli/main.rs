@@ -30,6 +30,7 @@ mod outputs;
 mod pictures;
 mod position_input;
 mod power_cut;
+mod repeats;
 mod rerun;
 mod resume;
 mod rewritten;

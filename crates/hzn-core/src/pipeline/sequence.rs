@@ -86,11 +86,27 @@ impl<T: Real> Sequence<T> {
         }
         let answer = report.solution.as_ref().map(|solution| (solution.axis, solution.noise_rad()));
         let is_fixed = self.see(step, answer, config);
-        match (is_fixed, config.fixed_edge) {
-            (true, FixedEdge::Refuse) => report.reject(Verdict::Fixed),
-            _ => report.is_suspect = is_fixed,
+        if is_fixed {
+            doubt(report, config);
         }
         is_fixed
+    }
+
+    /// Judges the answer to a picture that is the one before to the last bit although its time is another: the camera
+    /// or its recorder stands still, and the edge of the time before is in the picture, whether the vehicle turns or
+    /// not. It has the same effect as an edge that is fixed.
+    pub fn judge_repeat(&self, report: &mut Report<T>, config: &Config) {
+        if config.fixed_edge != FixedEdge::Off && report.solution.is_some() {
+            doubt(report, config);
+        }
+    }
+}
+
+/// Refuses an answer whose edge is fixed, or marks it as suspect.
+fn doubt<T: Real>(report: &mut Report<T>, config: &Config) {
+    match config.fixed_edge {
+        FixedEdge::Refuse => report.reject(Verdict::Fixed),
+        FixedEdge::Warn | FixedEdge::Off => report.is_suspect = true,
     }
 }
 

@@ -30,7 +30,7 @@ mod widen;
 pub use annotate::annotate;
 pub use answers::{Answered, Measured, measure_answers};
 pub use expected_limb::ExpectedLimb;
-pub use outcome::{BodyOutcome, Finished, Unprocessed};
+pub use outcome::{BodyOutcome, Bytes, Finished, Unprocessed};
 pub use plan::Plan;
 pub use pool::End;
 #[cfg(feature = "recordings")]

@@ -4,6 +4,7 @@
 
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::gates::FixedEdge;
+use hzn_core::status::Status;
 use hzn_core::{Config, Prior, Sequence, Step};
 use hzn_files::FrameData;
 use hzn_mcap::Row;
@@ -15,6 +16,8 @@ use super::outcome::{BodyOutcome, Finished};
 pub struct Turns {
     each: Vec<Sequence<f64>>,
     time_s: Option<f64>,
+    /// The checksum of the picture before.
+    checksum: Option<u32>,
 }
 
 /// An answer in the results of an earlier run.
@@ -38,17 +41,38 @@ impl StoredAnswer {
 impl Turns {
     /// Judges the answers of the next picture, see `gates.fixed_edge`.
     pub fn judge(&mut self, frame: &mut Finished, config: &Config) {
+        let repeats = self.see_bytes(frame);
         let Some(steps) = self.take_steps(frame.data.as_ref(), frame.time_s, config) else { return };
         for ((sequence, step), outcome) in self.each.iter_mut().zip(steps).zip(&mut frame.outcomes) {
             match outcome {
                 BodyOutcome { report: Ok(report), .. } => {
                     sequence.judge(&step, report, &config.gates);
+                    if repeats {
+                        sequence.judge_repeat(report, &config.gates);
+                    }
                 }
                 BodyOutcome { report: Err(_), .. } => {
                     sequence.see(&step, None, &config.gates);
                 }
             }
         }
+    }
+
+    /// Compares the bytes of the next picture with those of the picture before. Returns whether they are the same
+    /// although a time is told, which is another one: the camera or its recorder stands still. The noise of a camera
+    /// never repeats.
+    fn see_bytes(&mut self, frame: &mut Finished) -> bool {
+        let before = std::mem::replace(&mut self.checksum, frame.bytes.map(|bytes| bytes.checksum));
+        // A dark or clipped picture has no noise. It has no answer either, and keeps its own reason.
+        let is_answered = frame.outcomes.iter().any(|outcome| outcome.status() == Status::Ok);
+        let Some(bytes) = &mut frame.bytes else { return false };
+        bytes.repeats = is_answered && before == Some(bytes.checksum) && frame.time_s != self.time_s;
+        bytes.repeats && bytes.has_time
+    }
+
+    /// Takes the bytes of the picture before the next one, which an earlier run has processed.
+    pub fn see_checksum(&mut self, checksum: Option<u32>) {
+        self.checksum = checksum;
     }
 
     /// Takes the next picture from the results of an earlier run. An answer that this run refused is not in them, and
@@ -60,6 +84,7 @@ impl Turns {
         answers: &[Option<StoredAnswer>],
         config: &Config,
     ) {
+        self.checksum = None;
         let Some(steps) = self.take_steps(data, time_s, config) else { return };
         for ((sequence, step), answer) in self.each.iter_mut().zip(steps).zip(answers) {
             sequence.see(&step, answer.and_then(StoredAnswer::to_answer), &config.gates);

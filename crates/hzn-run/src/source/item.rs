@@ -1,5 +1,6 @@
 //! A picture on its way from the source to a thread, with the origin of its time.
 
+use hzn_core::Config;
 use hzn_files::{FrameData, Frames};
 use hzn_mcap::Stamp;
 
@@ -54,6 +55,11 @@ impl TimeSource {
 }
 
 impl Item {
+    /// Returns the checksum of the picture as a sensor sees it, see [`Picture::checksum`](super::Picture::checksum);
+    /// `None` if it cannot be read.
+    pub fn checksum(self, sensor: &Config) -> Option<u32> {
+        self.payload.decode(Some(sensor)).ok().map(|(picture, _)| picture.checksum())
+    }
     /// Returns the prior of the picture. A frames.csv replaces the prior from the source.
     pub fn take_prior(&mut self, frames: Option<&Frames>) -> Option<FrameData> {
         match frames {

@@ -70,6 +70,24 @@ impl Picture {
         hasher.finish()
     }
 
+    /// Returns a checksum of the samples. Two pictures of a camera with noise have the same one with a probability of
+    /// 2⁻³²; it takes a tenth of the time of [`Self::digest`].
+    pub fn checksum(&self) -> u32 {
+        match &self.samples {
+            Samples::Bytes(bytes) => crc32fast::hash(bytes),
+            Samples::Words(words) => {
+                let mut hasher = crc32fast::Hasher::new();
+                let mut block = [0_u8; 4096];
+                for part in words.chunks(block.len() / 2) {
+                    let bytes = block.chunks_exact_mut(2).zip(part);
+                    bytes.for_each(|(bytes, word)| bytes.copy_from_slice(&word.to_le_bytes()));
+                    hasher.update(block.get(..2 * part.len()).unwrap_or_default());
+                }
+                hasher.finalize()
+            }
+        }
+    }
+
     /// Returns advice for a picture without an answer whose upper bits are all unused, if the number of bits is not
     /// known.
     pub fn unused_bits(&self) -> Option<String> {

@@ -318,6 +318,7 @@ impl<'a> FrameInput<'a> {
             tip: None,
             pages: 1,
             mask: None,
+            bytes: None,
         }
     }
 }

@@ -1,0 +1,50 @@
+//! Counts pictures that repeat the picture before them to the last bit.
+
+use hzn_core::gates::{self, FixedEdge};
+use hzn_run::engine::Finished;
+use hzn_run::explain;
+
+use crate::tell;
+
+/// Counts pictures that repeat the picture before.
+#[derive(Default)]
+pub(crate) struct Repeats {
+    pictures: u64,
+    /// Those with a time that is told.
+    timed: u64,
+    first: Option<String>,
+}
+
+impl Repeats {
+    pub(crate) fn count(&mut self, frame: &Finished) {
+        let Some(bytes) = frame.bytes.filter(|bytes| bytes.repeats) else { return };
+        self.pictures += 1;
+        self.timed += u64::from(bytes.has_time);
+        self.first.get_or_insert_with(|| frame.name.clone());
+    }
+
+    /// Returns what repeats and what became of it.
+    fn describe(&self, gates: &gates::Config) -> Option<String> {
+        let first = self.first.as_ref()?;
+        let (pictures, each) =
+            (explain::counted(self.pictures, "picture"), if self.pictures == 1 { "is" } else { "are" });
+        let outcome = if self.timed == 0 {
+            "Without told times they may be copies; their answers say nothing new"
+        } else if gates.fixed_edge == FixedEdge::Refuse {
+            "Their times are others, so the camera or its recorder stood still, and their answers are refused (fixed)"
+        } else {
+            "Their times are others, so the camera or its recorder stood still: gates.fixed_edge = \"refuse\" refuses \
+             their answers"
+        };
+        Some(format!("{pictures} {each} the one before to the last bit (the first is {first}). {outcome}"))
+    }
+
+    /// Tells it. Copies without times are no fault, so a quiet run says nothing of them.
+    pub(crate) fn tell(&self, gates: &gates::Config, quiet: bool) {
+        match self.describe(gates) {
+            Some(what) if self.timed > 0 => tell::warning(what),
+            Some(what) if !quiet => tell::line(format_args!("note: {what}")),
+            _ => {}
+        }
+    }
+}
