@@ -25,8 +25,8 @@ const TOLD_APART_M: f64 = 5000.0;
 const FEWEST: usize = 5;
 /// Sigmas above which positions do not belong to one place.
 const APART: f64 = 4.0;
-/// Largest rest, as a share of the difference, that a lag leaves if it is the cause. A difference with any other cause
-/// points as well along the path once in a hundred times.
+/// Largest part of the mean difference across the path, as a share of the part along it, if a lag is the cause. A
+/// horizontal difference with any other cause points as well along the path once in a hundred times.
 const ALONG: f64 = 0.02;
 /// Largest difference of clocks that is looked for, s.
 const LAG_S: f64 = 60.0;
@@ -62,12 +62,10 @@ pub(super) fn place(recording: &Recording, fixes: &[Fix], settings: &Settings) -
     let fits = starts.filter_map(lag).filter(|fit| fit.lag_s.abs() <= LAG_S);
     let best = fits.min_by(|a, b| a.rest_m.total_cmp(&b.rest_m));
     let rest_m = median(now.iter().map(|m| m.miss_m.norm())).unwrap_or(0.0);
-    let speed_m_s = median(now.iter().map(|m| m.velocity_m_s.norm())).unwrap_or(0.0);
-    // A fit with a constant difference sees a lag by the bend of the path only. Where the lag alone explains nearly
-    // all, the difference has the direction of the path, and its length is as exact as what is left.
-    let sigma_s = |fit: &Lag| if fit.rest_m < ALONG * rest_m { fit.rest_m / speed_m_s } else { fit.sigma_s };
+    // A fit with a constant difference sees a lag by the bend of the path only, which a short arc hardly has.
+    let best = along_the_path(&limbs, recording.clock_offset_s, fixes).or(best);
     if let Some(fit) = best
-        && fit.lag_s.abs() > APART * sigma_s(&fit).hypot(clock_s)
+        && fit.lag_s.abs() > APART * fit.sigma_s.hypot(clock_s)
         && fit.rest_m < TOLD_SIGMA_M.max(0.2 * rest_m)
     {
         return Place::Lag(fit.lag_s);
@@ -88,6 +86,8 @@ pub(super) fn place(recording: &Recording, fixes: &[Fix], settings: &Settings) -
 struct Miss {
     /// Told minus measured, m.
     miss_m: Vector3<f64>,
+    /// The vertical.
+    up: Vector3<f64>,
     velocity_m_s: Vector3<f64>,
     /// The whole distance, m.
     distance_m: f64,
@@ -108,7 +108,8 @@ fn misses(limbs: &[&Seen], clock_s: f64, fixes: &[Fix], lag_s: f64) -> Option<Ve
         };
         let miss: Vector<_> = across - up * across.dot(&up) + up * higher_m;
         let distance_m = miss.norm();
-        Some(Miss { miss_m: weighted(miss), velocity_m_s: weighted(velocity_m_s), distance_m })
+        let (miss_m, velocity_m_s, up) = (weighted(miss), weighted(velocity_m_s), up.into_inner());
+        Some(Miss { miss_m, up, velocity_m_s, distance_m })
     };
     let all: Vec<Miss> = limbs.iter().filter_map(miss).collect();
     (all.len() >= FEWEST).then_some(all)
@@ -119,6 +120,34 @@ struct Lag {
     lag_s: f64,
     sigma_s: f64,
     rest_m: f64,
+}
+
+/// Returns the lag alone, without a constant difference, if it explains the horizontal difference: its mean has the
+/// direction of the path, and the length says the lag. The noise of the single positions is in the mean by its root of
+/// their number, so that the receiver's does not decide.
+fn along_the_path(limbs: &[&Seen], clock_s: f64, fixes: &[Fix]) -> Option<Lag> {
+    let mut lag_s = 0.0;
+    for _ in 0..4 {
+        let all = misses(limbs, clock_s, fixes, lag_s)?;
+        let sum = |of: &dyn Fn(&Miss) -> f64| all.iter().map(of).sum::<f64>();
+        let information = sum(&|m| m.velocity_m_s.norm_squared());
+        if !(information > 0.0) {
+            return None;
+        }
+        lag_s += sum(&|m| m.velocity_m_s.dot(&m.miss_m)) / information;
+    }
+    if lag_s.abs() > LAG_S {
+        return None;
+    }
+    let all = misses(limbs, clock_s, fixes, lag_s)?;
+    let n = all.len() as f64;
+    let across = |m: &Miss| m.miss_m - m.up * m.miss_m.dot(&m.up);
+    let mean_across = all.iter().map(across).sum::<Vector3<f64>>() / n;
+    let speed_m_s = median(all.iter().map(|m| m.velocity_m_s.norm()))?;
+    let left_m = mean_across.norm();
+    let rest_m = median(all.iter().map(|m| m.miss_m.norm()))?;
+    let is_along = left_m < ALONG * lag_s.abs() * speed_m_s;
+    is_along.then(|| Lag { lag_s, sigma_s: left_m.hypot(rest_m / n.sqrt()) / speed_m_s, rest_m })
 }
 
 /// Fits a lag and a constant difference, from a first lag on.

@@ -51,21 +51,35 @@ fn seen(row: usize) -> Seen {
     }
 }
 
+/// Returns an error of a position that looks like noise, m.
+fn noise_m(i: i32, sigma_m: f64) -> Vector<Fixed> {
+    // Sums of three even parts are nearly Gaussian.
+    let part = |k: i32| f64::from((i * 7919 + k * 104_729).rem_euclid(1009)) / 1009.0 - 0.5;
+    let axis = |k: i32| 2.0 * sigma_m * (part(3 * k) + part(3 * k + 1) + part(3 * k + 2));
+    Vector::new(axis(0), axis(1), axis(2))
+}
+
 /// Returns the verdict with a receiver whose times are late.
 fn verdict(late_s: f64) -> Verdict {
+    verdict_of(late_s, SPAN_S, 0.0)
+}
+
+/// Returns the verdict of a flight with a receiver whose times are late and whose positions have an error.
+fn verdict_of(late_s: f64, span_s: i32, sigma_m: f64) -> Verdict {
     let imu = |i: i32| {
         let (gyro_rad_s, accel_m_s2) = (Vector::new(0.0, -RATE_RAD_S, 0.0), Vector::zeros());
         Sample { imu: Imu { time_s: f64::from(i) * 0.1, gyro_rad_s, accel_m_s2 }, saturated: false }
     };
     let fix = |i: i32| {
-        let (position_m, velocity_m_s, _) = motion(f64::from(i));
+        let (exact_m, velocity_m_s, _) = motion(f64::from(i));
+        let position_m = exact_m + noise_m(i, sigma_m);
         let (position_sigma_m, velocity_sigma_m_s) = (5.0, 0.1);
         Fix { time_s: f64::from(i) + late_s, position_m, velocity_m_s, position_sigma_m, velocity_sigma_m_s }
     };
     let recording = Recording {
         name: "cam".into(),
         mount: Some(Rotation::identity()),
-        seen: (0..60).map(seen).collect(),
+        seen: (0..span_s as usize / 4).map(seen).collect(),
         ..Recording::default()
     };
     let attitude = |i: i32| {
@@ -73,9 +87,9 @@ fn verdict(late_s: f64) -> Verdict {
         Attitude { time_s, fixed_from_vehicle: Some(motion(time_s).2), sigma_rad: 1e-4 }
     };
     let inputs = Inputs {
-        imu: (0..SPAN_S * 10).map(imu).collect(),
-        gnss: (0..SPAN_S).map(fix).collect(),
-        attitudes: (0..SPAN_S / 5 - 1).map(attitude).collect(),
+        imu: (0..span_s * 10).map(imu).collect(),
+        gnss: (0..span_s).map(fix).collect(),
+        attitudes: (0..span_s / 5 - 1).map(attitude).collect(),
         recordings: vec![recording],
     };
     fuse(&inputs, &Settings::default(), Wanted::default()).unwrap().verdict
@@ -91,5 +105,22 @@ fn a_second_of_a_clock_is_found_on_a_short_arc() {
         let first = wrong.likeliest().unwrap();
         assert!(wrong.level() == Level::Contradicts && first.cause == Cause::ReceiverClock, "{late_s}: {wrong:?}");
         assert!(first.what.contains(&format!("{:.1} s", late_s.abs())), "{first:?}");
+    }
+}
+
+/// The noise of the receiver is larger than what a second of the clock adds to the vertical.
+#[test]
+fn a_second_of_a_clock_is_found_in_the_noise_of_a_receiver() {
+    for span_s in [60, 90, 120, 180] {
+        for sigma_m in [5.0, 10.0] {
+            let right = verdict_of(0.0, span_s, sigma_m);
+            assert_eq!(right.level(), Level::Consistent, "{span_s} s, {sigma_m} m: {right:?}");
+            for late_s in [-1.0, 1.0] {
+                let wrong = verdict_of(late_s, span_s, sigma_m);
+                let first = wrong.likeliest().map(|finding| finding.cause);
+                assert_eq!(first, Some(Cause::ReceiverClock), "{late_s} s of {span_s} s, {sigma_m} m: {wrong:?}");
+                assert_eq!(wrong.level(), Level::Contradicts, "{wrong:?}");
+            }
+        }
     }
 }
