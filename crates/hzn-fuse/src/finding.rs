@@ -62,6 +62,8 @@ pub enum Cause {
     Covariance,
     /// The limb height.
     LimbHeight,
+    /// The altitudes that the answers were made with.
+    Altitude,
     /// A recording without a usable measurement.
     Empty,
     /// The frame or the sense of the star tracker's attitudes.

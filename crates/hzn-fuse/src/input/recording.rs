@@ -85,6 +85,8 @@ pub struct Recording {
     pub camera: Option<camera::Config>,
     /// 1-sigma of the limb height that the sensor was told, km.
     pub limb_sigma_km: Option<f64>,
+    /// 1-sigma of the altitude that the sensor was told, km; `None` if no sensor.toml tells another than the default.
+    pub altitude_sigma_km: Option<f64>,
     /// Seconds that are added to the times of the recording to get those of the inertial unit.
     pub clock_offset_s: f64,
     /// The directions, in the order of the recording.
@@ -151,12 +153,20 @@ impl Recording {
         let told = config.and_then(|c| c.mount).map(mount::of_config).transpose();
         let told = told.map_err(|e| Error::unusable(format!("sensor.toml: [mount] {e}")))?;
         let mount = if is_rig { Some(Rotation::identity()) } else { told };
-        let limb_sigma_km = config.map(|c| {
-            let bodies = c.each_body().iter().filter(|b| is_earth(b.kind.name()));
-            bodies.map(|b| b.limb_height_sigma_km).fold(0.0, f64::max)
-        });
-        let mut recording =
-            Self { name, mount, camera: config.map(|c| c.camera.clone()), limb_sigma_km, ..Self::default() };
+        let largest = |of: fn(&hzn_core::body::Config) -> f64| {
+            config.map(|c| c.each_body().iter().filter(|b| is_earth(b.kind.name())).map(of).fold(0.0, f64::max))
+        };
+        let limb_sigma_km = largest(|b| b.limb_height_sigma_km);
+        let mut recording = Self {
+            name,
+            mount,
+            camera: config.map(|c| c.camera.clone()),
+            limb_sigma_km,
+            // The default stands for a position from a receiver; with a told altitude nobody has said it.
+            altitude_sigma_km: largest(|b| b.altitude_sigma_km)
+                .filter(|sigma_km| *sigma_km != hzn_core::body::Config::default().altitude_sigma_km),
+            ..Self::default()
+        };
         let mut known = HashSet::new();
         for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.status == Status::Ok) {
             let body = match row.body.as_str() {

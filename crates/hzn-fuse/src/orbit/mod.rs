@@ -12,6 +12,7 @@ mod problem;
 mod report;
 mod sights;
 mod start;
+mod told;
 mod verdict;
 
 use hzn_nav::frames::{Cam, Rotation, Vehicle};

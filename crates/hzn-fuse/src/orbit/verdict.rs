@@ -7,6 +7,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use super::case::{Case, Solution};
 use super::dynamics::GM_M3_S2;
 use super::problem::axis;
+use super::told;
 use crate::finding::{Cause, Finding, Level, Source, Verdict};
 use crate::input::Attitude;
 use crate::results::{Counts, Epoch};
@@ -100,11 +101,12 @@ pub(super) fn verdict(case: &Case<'_>, solution: &Solution, names: &[String], ep
             ),
         ));
     }
+    findings.extend(told::altitudes(case, solution, epochs));
     findings.extend(told_positions(solution, names, epochs));
     Verdict::new(findings)
 }
 
-fn finding(level: Level, (cause, source): (Cause, Source), what: String) -> Finding {
+pub(super) fn finding(level: Level, (cause, source): (Cause, Source), what: String) -> Finding {
     Finding { level, cause, source, what }
 }
 

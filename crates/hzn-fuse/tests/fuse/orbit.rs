@@ -1,7 +1,7 @@
 //! The orbit from limbs and attitudes alone: simulated orbits with drawn errors, against truth and bound.
 
 use hzn_core::ellipsoid::{LimbCone, WGS84_A_M, WGS84_B_M};
-use hzn_fuse::finding::Level;
+use hzn_fuse::finding::{Cause, Level};
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{Attitude, Body, Inputs, Recording, Seen};
 use hzn_fuse::settings::ErrorSetting;
@@ -20,6 +20,8 @@ const TRACKER: f64 = 5e-5;
 const MOUNT: f64 = 3.5e-4;
 /// Sigma of the limb height, km.
 const HEIGHT_KM: f64 = 3.0;
+/// Sigma of the told altitudes, km: more than their noise, because they are relative to a sphere.
+const ALTITUDE_KM: f64 = 8.0;
 /// Steps of the integration of the truth, s.
 const DYNAMICS_S: f64 = 10.0;
 
@@ -182,6 +184,7 @@ fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
         mount: Some(told_mount),
         seen,
         limb_sigma_km: Some(HEIGHT_KM),
+        altitude_sigma_km: Some(ALTITUDE_KM),
         ..Recording::default()
     };
     (Inputs { attitudes, recordings: vec![recording], ..Inputs::default() }, places)
@@ -326,4 +329,22 @@ fn inertial_attitudes_are_named() {
     assert_eq!(fused.verdict.level(), Level::Contradicts);
     let first = fused.verdict.likeliest().unwrap();
     assert!(first.what.contains("relative to inertial axes"), "{first:?}");
+}
+
+/// The period of the orbit gives its height, so told altitudes that are elsewhere contradict it.
+#[test]
+fn told_altitudes_elsewhere_are_found() {
+    for (off_km, word) in [(40.0, "above"), (-40.0, "below")] {
+        let (mut inputs, _) = simulate(Plan::new(ORBITS[2].1, 21, 2.0 * 5800.0));
+        for seen in &mut inputs.recordings[0].seen {
+            seen.altitude_km = seen.altitude_km.map(|km| km + off_km);
+        }
+        let fused = solve(&inputs);
+        let first = fused.verdict.likeliest().expect("a finding");
+        assert_eq!((first.level, first.cause), (Level::Contradicts, Cause::Altitude), "{first:?}");
+        assert!(first.what.contains(word), "{first:?}");
+        let number = first.what.split(" are ").nth(1).and_then(|s| s.split(' ').next()).unwrap();
+        let found_km: f64 = number.parse().unwrap();
+        assert!((found_km - 40.0).abs() < 12.0, "{first:?}");
+    }
 }
