@@ -7,7 +7,7 @@ use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::gravity::earth_rate;
 use hzn_nav::layout::{Layout, Place};
 use hzn_nav::strapdown::Nominal;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::finding::Verdict;
 use crate::input::Body;
@@ -40,6 +40,8 @@ pub struct Epoch {
     pub velocity_covariance_m2_s2: Covariance<Fixed>,
     /// Covariance of the position, m².
     pub position_covariance_m2: Covariance<Fixed>,
+    /// Covariance of position and velocity, by rows and columns, m²/s.
+    pub position_velocity_covariance_m2_s: Matrix3<f64>,
     /// Estimated errors of the instruments.
     pub corrections: Corrections,
     /// 1-sigma of the gyros' biases, rad/s; 0 if they do not exist.
@@ -85,6 +87,10 @@ impl Epoch {
             attitude_covariance_rad2: covariance(Layout::ATTITUDE).rotated(&to_vehicle),
             velocity_covariance_m2_s2: covariance(Layout::VELOCITY),
             position_covariance_m2: covariance(Layout::POSITION),
+            position_velocity_covariance_m2_s: filter
+                .covariance()
+                .fixed_view::<3, 3>(Layout::POSITION, Layout::VELOCITY)
+                .into_owned(),
             corrections: *filter.corrections(),
             gyro_bias_sigma_rad_s: sigmas(layout.gyro_bias),
             accel_bias_sigma_m_s2: sigmas(layout.accel_bias),

@@ -168,6 +168,7 @@ fn epoch(
         attitude_covariance_rad2: Covariance::isotropic(sigma_rad * sigma_rad),
         velocity_covariance_m2_s2: part(3),
         position_covariance_m2: part(0),
+        position_velocity_covariance_m2_s: covariance.fixed_view::<3, 3>(0, 3).into_owned(),
         corrections: Corrections::default(),
         gyro_bias_sigma_rad_s: Vector3::zeros(),
         accel_bias_sigma_m_s2: Vector3::zeros(),

@@ -99,6 +99,10 @@ fn epoch(problem: &Problem<'_>, estimates: &Estimates, knot: usize, known: &Know
         attitude_covariance_rad2: known.part(Layout::ATTITUDE).rotated(&to_vehicle),
         velocity_covariance_m2_s2: known.part(Layout::VELOCITY),
         position_covariance_m2: known.part(Layout::POSITION),
+        position_velocity_covariance_m2_s: known
+            .own
+            .fixed_view::<3, 3>(Layout::POSITION, Layout::VELOCITY)
+            .into_owned(),
         corrections: shared.corrections,
         gyro_bias_sigma_rad_s: known.sigmas(layout.gyro_bias),
         accel_bias_sigma_m_s2: known.sigmas(layout.accel_bias),

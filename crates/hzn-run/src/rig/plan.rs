@@ -169,8 +169,8 @@ impl Work for Plan {
         let heads = self.heads.iter().zip(sensors).zip(epoch.pictures);
         let one = |((head, sensor), picture): ((&HeadPlan, &mut AnySensor), Option<_>)| {
             let Some((number, item)) = picture else { return Ok(None) };
-            // The row has the number of the epoch, so that it stands with the rows of the other heads. `Frozen` looks for
-            // repeated pictures in all heads.
+            // The row has the number of the epoch, so that it stands with the rows of the other heads. Repeated
+            // pictures are found in all heads at once, by `Frozen`.
             head.plan.process(sensor, number, item).map(|frame| Some(Finished { index, bytes: None, ..frame }))
         };
         Ok((index, heads.map(one).collect::<Result<_, Error>>()?))

@@ -19,13 +19,13 @@ pub(crate) struct Args {
     pub(super) nadir: Vec<PathBuf>,
     /// Samples of the inertial unit: time_s, gyro_{x,y,z}_radps, accel_{x,y,z}_mps2, saturated. Without it, --solve
     /// finds the orbit of a satellite from limbs and a star tracker
-    #[arg(long, value_name = "CSV", required_unless_present_any = ["show_config", "solve"])]
+    #[arg(long, value_name = "CSV")]
     pub(super) imu: Option<PathBuf>,
     /// Fixes of the receiver: NMEA 0183, or a table with time_s and either x_m, y_m, z_m (ECEF) or lat_deg, lon_deg,
     /// height_m (above WGS-84). Velocities vx_mps, vy_mps, vz_mps, or v_north_mps, v_east_mps and v_down_mps or
     /// v_up_mps, and sigmas position_sigma_m, velocity_sigma_mps, horizontal_sigma_m, vertical_sigma_m may be left out.
     /// With a star tracker the attitude needs no receiver; the position is then not known
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["show_config", "attitude"])]
+    #[arg(long, value_name = "FILE")]
     pub(super) gnss: Option<PathBuf>,
     /// Attitudes of a star tracker: time_s, qw, qx, qy, qz (vehicle to ECEF), sigma_deg
     #[arg(long, value_name = "CSV")]
@@ -54,8 +54,8 @@ pub(crate) struct Args {
     /// The attitude as a CCSDS attitude ephemeris message; it needs --utc
     #[arg(long, value_name = "FILE", requires = "utc")]
     pub(super) aem: Option<PathBuf>,
-    /// Position and velocity as a CCSDS orbit ephemeris message; it needs --utc, and --gnss if there is an inertial
-    /// unit
+    /// Position and velocity with their covariance as a CCSDS orbit ephemeris message; it needs --utc, and --gnss if
+    /// there is an inertial unit
     #[arg(long, value_name = "FILE", requires = "utc")]
     pub(super) oem: Option<PathBuf>,
     /// Version of the AEM: programs read the one of 2008, or that of 2024

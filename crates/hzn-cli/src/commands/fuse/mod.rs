@@ -38,6 +38,14 @@ pub(super) fn run(args: &Args) -> Outcome {
     if !(args.rate > 0.0) {
         return Err(usage(format!("--rate {}: must be above 0", args.rate)));
     }
+    // A star tracker replaces the receiver, and gravity the inertial unit; a message of clap could not say so.
+    let orbit = "for the orbit of a satellite give --solve and --attitude FILE, and neither of the two";
+    if args.imu.is_none() && !args.solve {
+        return Err(usage(format!("--imu FILE is missing, and --gnss FILE or --attitude FILE goes with it; {orbit}")));
+    }
+    if args.gnss.is_none() && args.attitude.is_none() {
+        return Err(usage(format!("--gnss FILE or --attitude FILE is missing; {orbit}")));
+    }
     if args.oem.is_some() && args.imu.is_some() && args.gnss.is_none() {
         return Err(usage("--oem needs --gnss: without a receiver the inertial unit gives no position"));
     }
