@@ -99,7 +99,7 @@ fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
     };
     // The last state has its covariance, in km²: the lower triangle, whose diagonal is that of nav.csv.
     let column = |name: &str| states.lines().next().unwrap().split(',').position(|n| n == name).unwrap();
-    let row = states.lines().filter(|row| is_last(row)).last().unwrap();
+    let row = states.lines().rfind(|row| is_last(row)).unwrap();
     let cell = |name: &str| row.split(',').nth(column(name)).unwrap().parse::<f64>().unwrap();
     let lines: Vec<&str> = covariances.lines().collect();
     assert_eq!(lines.len(), ephemeris.lines().filter(|l| l.starts_with("2019")).count() * 8 + 1);
