@@ -77,25 +77,31 @@ pub enum Refused {
     },
 }
 
-impl fmt::Display for Refused {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Refused {
+    /// Returns the reason, with the names of the heads.
+    pub fn describe(&self, names: &[&str]) -> String {
+        let head = |k: usize| names.get(k).map_or_else(|| format!("head {}", k + 1), |name| (*name).to_owned());
         match self {
             Self::TooFew(epochs) => {
-                write!(f, "only {epochs} epochs have answers of two heads; at least {FEWEST} are needed")
+                format!("only {epochs} epochs have answers of two heads; at least {FEWEST} are needed")
             }
-            Self::Alone(k) => write!(f, "head {} has no answer at an epoch at which another head has one", k + 1),
-            Self::NoConvergence => f.write_str("the mounts do not converge: are they wrong by tens of degrees?"),
-            Self::Contradict { used, left_out, head } => {
-                write!(f, "the heads contradict each other ({left_out} epochs are left out, {used} count): ")?;
-                if let Some(k) = head {
-                    write!(f, "without head {} the others agree; ", k + 1)?;
-                }
-                f.write_str(
-                    "a mount is wrong by more than an adjustment finds, heads are exchanged, a picture is mirrored, \
-                     or a clock is late",
+            Self::Alone(k) => format!("{} has no answer at an epoch at which another head has one", head(*k)),
+            Self::NoConvergence => "the mounts do not converge: are they wrong by tens of degrees?".into(),
+            Self::Contradict { used, left_out, head: wrong } => {
+                let without = wrong.map(|k| format!("without {} the others agree; ", head(k))).unwrap_or_default();
+                format!(
+                    "the heads contradict each other ({left_out} epochs are left out, {used} count): {without}a mount \
+                     is wrong by more than an adjustment finds, heads are exchanged, a picture is mirrored, or a clock \
+                     is late"
                 )
             }
         }
+    }
+}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.describe(&[]))
     }
 }
 
@@ -324,7 +330,12 @@ impl Adjusted {
         let eigen = covariance.symmetric_eigen();
         core::array::from_fn(|i| {
             let sigma_rad = eigen.eigenvalues[i].max(0.0).sqrt();
-            (eigen.eigenvectors.column(i).into(), sigma_rad, sigma_rad < 0.5 * self.prior_rad)
+            (eigen.eigenvectors.column(i).into(), sigma_rad, self.is_determined(sigma_rad))
         })
+    }
+
+    /// Returns whether the data determine a turn with this 1-sigma.
+    pub(super) fn is_determined(&self, sigma_rad: f64) -> bool {
+        sigma_rad < 0.5 * self.prior_rad
     }
 }

@@ -11,8 +11,9 @@ const SIGMAS: f64 = 2.75;
 /// What a flight says about the told mounts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Check {
-    /// No turn is significant.
-    Holds,
+    /// No turn is significant. A turn by this angle, radians, would have been, about each axis that the flight
+    /// determines; infinite if it determines none.
+    Holds(f64),
     /// This head has turned, by this angle and with this 1-sigma, radians, against the others: without it they agree.
     Turned(usize, f64, f64),
     /// The mounts contradict each other, and no single head explains it.
@@ -26,11 +27,13 @@ pub enum Check {
 /// has turned.
 pub fn check(adjusted: &Adjusted, told_rad2: &[Matrix3<f64>]) -> Check {
     let all: Vec<usize> = (0..told_rad2.len()).collect();
-    if agree(adjusted, told_rad2, &all) {
-        return Check::Holds;
+    let compared = Compared::new(adjusted, told_rad2, &all);
+    if compared.agrees() {
+        return Check::Holds(compared.noticed_rad());
     }
     let without = |k: usize| all.iter().copied().filter(|j| *j != k).collect::<Vec<_>>();
-    let mut explaining = all.iter().copied().filter(|k| all.len() > 2 && agree(adjusted, told_rad2, &without(*k)));
+    let mut explaining =
+        all.iter().copied().filter(|k| all.len() > 2 && Compared::new(adjusted, told_rad2, &without(*k)).agrees());
     match (explaining.next(), explaining.next()) {
         (Some(k), None) => {
             let others = without(k);
@@ -65,21 +68,49 @@ fn with_told(adjusted: &Adjusted, told_rad2: &[Matrix3<f64>]) -> DMatrix<f64> {
     covariance
 }
 
-/// Returns whether the turns of some heads agree.
-fn agree(adjusted: &Adjusted, told_rad2: &[Matrix3<f64>], heads: &[usize]) -> bool {
-    let Some((first, others)) = heads.split_first().filter(|(_, others)| !others.is_empty()) else { return true };
-    let freedom = 3 * others.len();
-    let relative = DMatrix::from_fn(freedom, 3 * told_rad2.len(), |i, j| {
-        let (own, is_axis) = (others[i / 3], i % 3 == j % 3);
-        match (is_axis, j / 3) {
-            (true, k) if k == own => 1.0,
-            (true, k) if k == *first => -1.0,
-            _ => 0.0,
+/// The turns of some heads against the first of them, in the directions that the flight determines.
+///
+/// A turn in any other direction stays at its prior. It would only be one more degree of freedom, in which a turn that
+/// is seen could hide.
+struct Compared {
+    turn: DVector<f64>,
+    spread: DMatrix<f64>,
+}
+
+impl Compared {
+    fn new(adjusted: &Adjusted, told_rad2: &[Matrix3<f64>], heads: &[usize]) -> Self {
+        let (first, others) = heads.split_first().unwrap_or((&0, &[]));
+        let relative = DMatrix::from_fn(3 * others.len(), 3 * told_rad2.len(), |i, j| {
+            let (own, is_axis) = (others[i / 3], i % 3 == j % 3);
+            match (is_axis, j / 3) {
+                (true, k) if k == own => 1.0,
+                (true, k) if k == *first => -1.0,
+                _ => 0.0,
+            }
+        });
+        let eigen = (&relative * &adjusted.covariance * relative.transpose()).symmetric_eigen();
+        let is_determined = |i: &usize| adjusted.is_determined(eigen.eigenvalues[*i].max(0.0).sqrt());
+        let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(is_determined).collect();
+        let seen = eigen.eigenvectors.select_columns(&kept).transpose() * relative;
+        Self { turn: &seen * turns(adjusted), spread: &seen * with_told(adjusted, told_rad2) * seen.transpose() }
+    }
+
+    /// Returns the limit of χ².
+    fn limit(&self) -> f64 {
+        chi2(self.turn.len(), SIGMAS)
+    }
+
+    fn agrees(&self) -> bool {
+        // Without a covariance there is no contradiction that could be measured.
+        let Some(root) = self.spread.clone().cholesky().filter(|_| !self.turn.is_empty()) else { return true };
+        self.turn.dot(&root.solve(&self.turn)) <= self.limit()
+    }
+
+    /// Returns the turn that would be noticed about each axis.
+    fn noticed_rad(&self) -> f64 {
+        if self.turn.is_empty() {
+            return f64::INFINITY;
         }
-    });
-    let turn = &relative * turns(adjusted);
-    let spread = &relative * with_told(adjusted, told_rad2) * relative.transpose();
-    // Without a covariance there is no contradiction that could be measured.
-    let Some(root) = spread.cholesky() else { return true };
-    turn.dot(&root.solve(&turn)) <= chi2(freedom, SIGMAS)
+        (self.limit() * self.spread.symmetric_eigenvalues().max()).max(0.0).sqrt()
+    }
 }

@@ -99,8 +99,8 @@ impl fmt::Display for Refusal {
             }
             Self::Alarm { chi2, max_chi2 } => write!(
                 f,
-                "the limb heights of the pictures scatter more than their errors allow: chi-square is {chi2:.1} per \
-                 degree of freedom, but at most {max_chi2:.1} is consistent. Possible reasons that the model does not \
+                "the limb heights of the pictures scatter more than their errors allow: chi-square is {chi2:.2} per \
+                 degree of freedom, but at most {max_chi2:.2} is consistent. Possible reasons that the model does not \
                  have: a rolling shutter (camera.readout_s and rates), altitudes or times of other pictures, a lens \
                  that changes"
             ),

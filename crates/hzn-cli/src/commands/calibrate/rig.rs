@@ -92,13 +92,16 @@ pub(super) fn run(args: &Args) -> Outcome {
         radius_km: found.radius_km,
         independent: independent(&found.times_s, heads.limb_own_sigma_km, heads.limb_own_length_km),
     };
-    let adjusted = adjust(&settings, &found.epochs)
-        .map_err(|why| failed(format!("{}: of {}: {why}", args.rig.display(), counted(found.count, "epoch"))))?;
+    let adjusted = adjust(&settings, &found.epochs).map_err(|why| {
+        let heads: Vec<&str> = names.iter().map(|head| head.name.as_str()).collect();
+        let epochs = counted(found.count, "epoch");
+        failed(format!("{}: of {epochs}: {}", args.rig.display(), why.describe(&heads)))
+    })?;
     if args.check {
         let told_rad2: Vec<Matrix3<f64>> = names.iter().map(told_rad2).collect();
         let checked = check(&adjusted, &told_rad2);
         tell::result(rig_text::check_report(&names, &adjusted, &checked))?;
-        return Ok(if checked == Check::Holds { Exit::Done } else { Exit::Failed });
+        return Ok(if matches!(checked, Check::Holds(_)) { Exit::Done } else { Exit::Failed });
     }
     tell::result(rig_text::report(&names, &adjusted))?;
     if let Some(path) = &args.output {

@@ -14,7 +14,14 @@ pub(super) fn report(heads: &[Head], adjusted: &Adjusted) -> String {
 /// Returns the report of a check: the verdict, and what the pictures say.
 pub(super) fn check_report(heads: &[Head], adjusted: &Adjusted, check: &Check) -> String {
     let verdict = match check {
-        Check::Holds => "holds: the heads see one limb with the mounts of rig.toml, within their sigmas".into(),
+        Check::Holds(noticed_rad) if noticed_rad.is_finite() => format!(
+            "holds: the heads see one limb with the mounts of rig.toml, within their sigmas; a turn of one head by \
+             {:.2}° about any determined axis would have been noticed",
+            noticed_rad.to_degrees()
+        ),
+        Check::Holds(_) => {
+            "cannot tell: this flight determines no turn; turn the vehicle about other axes, or fly longer".into()
+        }
         Check::Turned(k, angle, sigma) => {
             let name = heads.get(*k).map_or("", |head| head.name.as_str());
             let (angle, sigma) = (angle.to_degrees(), sigma.to_degrees());
