@@ -68,16 +68,18 @@ pub(super) fn skip_stored(
                 let what = format!("the picture {picture} was changed since these results were written, and now gives");
                 return other(format!("{what} another result; give the pictures that it was begun with"));
             }
-            Some(false) => {
-                let which = if is_last { "its last picture, " } else { "its picture " };
-                return other(format!(
-                    "{which}{picture}, now gives another result; give the sensor.toml, frames.csv and options \
-                     (--altitude-km, --fps, --flight) that it was begun with"
-                ));
-            }
+            Some(false) => return other(another_result(&picture, is_last)),
         }
     }
     Ok(turns)
+}
+
+fn another_result(picture: &str, is_last: bool) -> String {
+    let which = if is_last { "its last picture, " } else { "its picture " };
+    format!(
+        "{which}{picture}, now gives another result; give the sensor.toml, frames.csv and options (--altitude-km, \
+         --fps, --flight) that it was begun with"
+    )
 }
 
 fn tell_changed(table: &Path) {

@@ -26,6 +26,7 @@ mod kept_inputs;
 mod mask;
 mod migrate;
 mod night;
+mod oem;
 mod outputs;
 mod pictures;
 mod position_input;

@@ -143,12 +143,10 @@ impl Recording {
     /// The mount is not a rotation, or the rows of a rig have no joint answer.
     pub fn new(name: String, mut rows: Vec<Row>, config: Option<&Config>) -> Result<Self, Error> {
         let is_rig = rows.iter().any(|row| row.head.is_some());
-        if is_rig {
-            // The heads' answers are parts of the joint one.
-            rows.retain(|row| row.head.as_deref() == Some(JOINT));
-            if rows.is_empty() {
-                return Err(Error::unusable("these are heads of a rig without its joint answers"));
-            }
+        // The heads' answers are parts of the joint one.
+        rows.retain(|row| !is_rig || row.head.as_deref() == Some(JOINT));
+        if is_rig && rows.is_empty() {
+            return Err(Error::unusable("these are heads of a rig without its joint answers"));
         }
         let told = config.and_then(|c| c.mount).map(mount::of_config).transpose();
         let told = told.map_err(|e| Error::unusable(format!("sensor.toml: [mount] {e}")))?;
@@ -157,14 +155,14 @@ impl Recording {
             config.map(|c| c.each_body().iter().filter(|b| is_earth(b.kind.name())).map(of).fold(0.0, f64::max))
         };
         let limb_sigma_km = largest(|b| b.limb_height_sigma_km);
+        let not_told_km = hzn_core::body::Config::default().altitude_sigma_km;
         let mut recording = Self {
             name,
             mount,
             camera: config.map(|c| c.camera.clone()),
             limb_sigma_km,
             // The default stands for a position from a receiver; with a told altitude nobody has said it.
-            altitude_sigma_km: largest(|b| b.altitude_sigma_km)
-                .filter(|sigma_km| *sigma_km != hzn_core::body::Config::default().altitude_sigma_km),
+            altitude_sigma_km: largest(|b| b.altitude_sigma_km).filter(|sigma_km| *sigma_km != not_told_km),
             ..Self::default()
         };
         let mut known = HashSet::new();

@@ -3,7 +3,6 @@
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
 
 use super::case::{Case, Solution};
-use super::verdict::finding;
 use crate::finding::{Cause, Finding, Level, Source};
 use crate::results::Epoch;
 
@@ -41,7 +40,7 @@ pub(super) fn altitudes(case: &Case<'_>, solution: &Solution, epochs: &[Epoch]) 
             off_km.abs()
         );
         let source = Source::Camera(recording.name.clone());
-        Some(finding(Level::Contradicts, (Cause::Altitude, source), what))
+        Some(Finding { level: Level::Contradicts, cause: Cause::Altitude, source, what })
     };
     case.inputs.recordings.iter().enumerate().filter_map(of_camera).collect()
 }

@@ -106,7 +106,7 @@ pub(super) fn verdict(case: &Case<'_>, solution: &Solution, names: &[String], ep
     Verdict::new(findings)
 }
 
-pub(super) fn finding(level: Level, (cause, source): (Cause, Source), what: String) -> Finding {
+fn finding(level: Level, (cause, source): (Cause, Source), what: String) -> Finding {
     Finding { level, cause, source, what }
 }
 

@@ -12,6 +12,7 @@ use hzn_mcap::Stamp;
 use super::sensor::Processed;
 use super::trace::Traces;
 use crate::mask::MaskOutcome;
+use crate::source::{Picture, TimeSource};
 
 /// A processed picture.
 #[derive(Debug)]
@@ -56,6 +57,13 @@ pub struct Bytes {
     pub has_time: bool,
     /// Whether the picture before has the same bytes and another time; known when the picture is judged.
     pub repeats: bool,
+}
+
+impl Bytes {
+    /// Returns what is known of a picture whose time has this origin.
+    pub(super) fn of(picture: &Picture, time: TimeSource) -> Self {
+        Self { checksum: picture.checksum(), has_time: !matches!(time, TimeSource::Count), repeats: false }
+    }
 }
 
 /// The outcome of one body in one picture.

@@ -11,7 +11,7 @@ use super::sensor::AnySensor;
 use super::trace::Traces;
 use crate::error::{Error, failed};
 use crate::overlay;
-use crate::source::{Held, Item, TimeSource};
+use crate::source::{Held, Item};
 
 /// Decodes and processes one picture, and writes its mask.
 ///
@@ -32,7 +32,6 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
     // It is dropped at the end of this function, after the picture.
     let mut held = Held::default();
     let decoded = item.payload.decode_holding(Some(&plan.config), &mut held);
-    let has_time = !matches!(time, TimeSource::Count);
     let exif = || decoded.as_ref().ok().and_then(|(p, _)| p.exif_time_s);
     let time_s = time.time_s(data.as_ref(), exif, index, plan.fps);
     let mut finished = Finished {
@@ -49,7 +48,7 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         tip: None,
         pages: decoded.as_ref().map_or(1, |(p, _)| p.pages),
         mask: None,
-        bytes: None,
+        bytes: decoded.as_ref().ok().map(|(picture, _)| Bytes::of(picture, time)),
     };
     let (picture, original) = match decoded {
         Ok(decoded) => decoded,
@@ -63,7 +62,6 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
             return Ok(without_picture(sensor, finished, &format!("{why} (input.channel in sensor.toml)")));
         }
     };
-    finished.bytes = Some(Bytes { checksum: picture.checksum(), has_time, repeats: false });
     let data = finished.data.as_ref();
     finished.glimpse = sensor.glimpse(&view);
     sensor.set_time(finished.time_s);

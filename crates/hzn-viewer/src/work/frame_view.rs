@@ -8,7 +8,7 @@ use std::time::Duration;
 use egui::{Color32, ColorImage};
 use hzn_core::camera::Camera;
 use hzn_core::covariance::ErrorBudget;
-use hzn_core::image::ImageView;
+use hzn_core::image::{ImageView, Pixels};
 use hzn_core::observer::Border;
 use hzn_core::pixel::ImagePoint;
 use hzn_core::real::Real;
@@ -434,7 +434,6 @@ pub(super) fn checked_view<'a>(picture: &'a Picture, config: &Config) -> Result<
 }
 
 fn touched_image(view: &ImageView<'_>, pixels: &HashSet<(u16, u16)>) -> ColorImage {
-    use hzn_core::image::Pixels;
     let (w, h) = match view {
         ImageView::Grey8(p) => (p.width(), p.height()),
         ImageView::Grey16(p) => (p.width(), p.height()),
