@@ -6,6 +6,8 @@ use hzn_fuse::simulated::{Errors, Moment, inputs, write};
 use hzn_nav::frames::{Cam, Covariance, Vector};
 use hzn_sim::Scenario;
 
+use crate::ccsds;
+
 /// Directions without errors that claim 0.05°.
 struct Exact;
 
@@ -25,7 +27,7 @@ pub(crate) fn flight(folder: &Path) {
 }
 
 /// Runs `hzn fuse` in a folder with these arguments after the two cameras.
-fn fuse(folder: &Path, args: &[&str]) -> (i32, String, String) {
+pub(crate) fn fuse(folder: &Path, args: &[&str]) -> (i32, String, String) {
     let cameras = ["--nadir", "left.csv", "--nadir", "right.csv", "--imu", "imu.csv", "--gnss", "gnss.csv"];
     bare(folder, &[&cameras[..], args].concat())
 }
@@ -44,16 +46,6 @@ pub(crate) fn bare(folder: &Path, args: &[&str]) -> (i32, String, String) {
 }
 
 pub(crate) const MOUNTS: [&str; 4] = ["--mount", "left=left.toml", "--mount", "right=right.toml"];
-
-/// The second version of the message has no keywords for what is fixed in it; the attitudes are the same.
-fn second_version_of_the_aem(at: &Path, args: &[&str]) {
-    let second = ["-o", "second.csv", "--aem", "second.aem", "--aem-version", "2.0"];
-    assert_eq!(fuse(at, &[args, &second].concat()).0, 0);
-    let [first, second] = ["nav.aem", "second.aem"].map(|name| std::fs::read_to_string(at.join(name)).unwrap());
-    assert!(second.starts_with("CCSDS_AEM_VERS = 2.0\n") && !second.contains("ATTITUDE_DIR"), "{}", &second[..500]);
-    let states = |text: &str| text.split_once("DATA_START").unwrap().1.to_owned();
-    assert_eq!(states(&first), states(&second));
-}
 
 #[test]
 fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
@@ -99,9 +91,9 @@ fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
         row.contains("smoothed") && cells.zip(&last).all(|(m, km)| (1e-3 * m - km).abs() < 2e-6)
     };
     let last_row = states.lines().rfind(|row| is_last(row)).unwrap();
-    crate::oem::has_the_covariance_of(covariances, states.lines().next().unwrap(), last_row);
+    ccsds::has_the_covariance_of(covariances, states.lines().next().unwrap(), last_row);
     assert!(oem.contains("REF_FRAME = ITRF-97") && last.len() == 6, "{last:?}");
-    second_version_of_the_aem(at, &[&MOUNTS[..], &more[2..3], &more[5..]].concat());
+    ccsds::second_version_of_the_aem(at, &[&MOUNTS[..], &more[2..3], &more[5..]].concat());
     let frames = read("left-frames.csv");
     let with_attitude = frames.lines().filter(|line| !line.ends_with(",,,")).count();
     assert!((50..75).contains(&with_attitude), "{with_attitude} of {}", frames.lines().count());

@@ -1,4 +1,8 @@
-//! The covariances of an orbit ephemeris message.
+//! The messages of CCSDS that `hzn fuse` writes.
+
+use std::path::Path;
+
+use crate::fuse::fuse;
 
 /// Compares the last covariance, in km², with that of a row of nav.csv: the lower triangle of position and velocity.
 pub(crate) fn has_the_covariance_of(covariances: &str, header: &str, row: &str) {
@@ -17,4 +21,14 @@ pub(crate) fn has_the_covariance_of(covariances: &str, header: &str, row: &str) 
         assert_eq!(numbers.len(), n + 1);
         assert!((numbers[n] * 1e6 / cell(name) - 1.0).abs() < 1e-3, "{name}: {numbers:?} {}", cell(name));
     }
+}
+
+/// The second version of the message has no keywords for what is fixed in it; the attitudes are the same.
+pub(crate) fn second_version_of_the_aem(at: &Path, args: &[&str]) {
+    let second = ["-o", "second.csv", "--aem", "second.aem", "--aem-version", "2.0"];
+    assert_eq!(fuse(at, &[args, &second].concat()).0, 0);
+    let [first, second] = ["nav.aem", "second.aem"].map(|name| std::fs::read_to_string(at.join(name)).unwrap());
+    assert!(second.starts_with("CCSDS_AEM_VERS = 2.0\n") && !second.contains("ATTITUDE_DIR"), "{}", &second[..500]);
+    let states = |text: &str| text.split_once("DATA_START").unwrap().1.to_owned();
+    assert_eq!(states(&first), states(&second));
 }
