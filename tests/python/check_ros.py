@@ -37,6 +37,9 @@ cy_px = 119.5
 kind = "earth-sphere"
 altitude_km = 400.0
 limb = "height"
+# The encodings show one picture again and again.
+[gates]
+fixed_edge = "off"
 """
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 # A number of seconds in double precision cannot hold these nanoseconds.

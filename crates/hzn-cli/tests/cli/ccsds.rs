@@ -4,8 +4,10 @@ use std::path::Path;
 
 use crate::fuse::fuse;
 
-/// Compares the last covariance, in km², with that of a row of nav.csv: the lower triangle of position and velocity.
-pub(crate) fn has_the_covariance_of(covariances: &str, header: &str, row: &str) {
+/// Compares the last covariance, in km², with that of a row of nav.csv (`states`): the lower triangle of position and
+/// velocity.
+pub(crate) fn has_the_covariance_of(covariances: &str, states: &str, row: &str) {
+    let header = states.lines().next().unwrap();
     let cell = |name: &str| {
         let column = header.split(',').position(|n| n == name).unwrap();
         row.split(',').nth(column).unwrap().parse::<f64>().unwrap()

@@ -90,8 +90,7 @@ fn a_flight_becomes_attitudes_a_report_and_files_for_others() {
         let cells = row.split(',').skip(place).take(3).map(|cell| cell.parse::<f64>().unwrap_or(f64::NAN));
         row.contains("smoothed") && cells.zip(&last).all(|(m, km)| (1e-3 * m - km).abs() < 2e-6)
     };
-    let last_row = states.lines().rfind(|row| is_last(row)).unwrap();
-    ccsds::has_the_covariance_of(covariances, states.lines().next().unwrap(), last_row);
+    ccsds::has_the_covariance_of(covariances, &states, states.lines().rfind(|row| is_last(row)).unwrap());
     assert!(oem.contains("REF_FRAME = ITRF-97") && last.len() == 6, "{last:?}");
     ccsds::second_version_of_the_aem(at, &[&MOUNTS[..], &more[2..3], &more[5..]].concat());
     let frames = read("left-frames.csv");

@@ -150,7 +150,6 @@ impl Recording {
         }
         let told = config.and_then(|c| c.mount).map(mount::of_config).transpose();
         let told = told.map_err(|e| Error::unusable(format!("sensor.toml: [mount] {e}")))?;
-        let mount = if is_rig { Some(Rotation::identity()) } else { told };
         let largest = |of: fn(&hzn_core::body::Config) -> f64| {
             config.map(|c| c.each_body().iter().filter(|b| is_earth(b.kind.name())).map(of).fold(0.0, f64::max))
         };
@@ -158,7 +157,7 @@ impl Recording {
         let not_told_km = hzn_core::body::Config::default().altitude_sigma_km;
         let mut recording = Self {
             name,
-            mount,
+            mount: if is_rig { Some(Rotation::identity()) } else { told },
             camera: config.map(|c| c.camera.clone()),
             limb_sigma_km,
             // The default stands for a position from a receiver; with a told altitude nobody has said it.
