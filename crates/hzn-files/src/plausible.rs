@@ -95,8 +95,8 @@ fn check_altitude(body: &body::Config) -> Option<Implausible> {
     Some(Implausible::new("body.altitude_km", doubt))
 }
 
-/// Returns what is to be doubted about an altitude in kilometres that is given for a body, such as "550000 km is
-/// implausibly large: is it in metres?"; `None` if it is usual.
+/// Returns the doubt about an altitude in kilometres above a body, such as "550000 km is implausibly large: is it in
+/// metres?"; `None` if the altitude is usual.
 ///
 /// ```
 /// use hzn_core::body::Kind;

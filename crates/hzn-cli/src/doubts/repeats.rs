@@ -31,9 +31,9 @@ impl Repeats {
         let outcome = if self.timed == 0 {
             "Without told times they may be copies; their answers say nothing new"
         } else if gates.fixed_edge == FixedEdge::Refuse {
-            "Their times are others, so the camera or its recorder stood still, and their answers are refused (fixed)"
+            "Their times differ, so the camera or its recorder stood still, and their answers are refused (fixed)"
         } else {
-            "Their times are others, so the camera or its recorder stood still: gates.fixed_edge = \"refuse\" refuses \
+            "Their times differ, so the camera or its recorder stood still: gates.fixed_edge = \"refuse\" refuses \
              their answers"
         };
         Some(format!("{pictures} {each} the one before to the last bit (the first is {first}). {outcome}"))

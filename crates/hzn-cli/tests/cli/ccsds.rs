@@ -25,7 +25,7 @@ pub(crate) fn has_the_covariance_of(covariances: &str, states: &str, row: &str) 
     }
 }
 
-/// The second version of the message has no keywords for what is fixed in it; the attitudes are the same.
+/// The second version of the message has fewer keywords and the same attitudes.
 pub(crate) fn second_version_of_the_aem(at: &Path, args: &[&str]) {
     let second = ["-o", "second.csv", "--aem", "second.aem", "--aem-version", "2.0"];
     assert_eq!(fuse(at, &[args, &second].concat()).0, 0);

@@ -6,7 +6,7 @@ use super::case::{Case, Solution};
 use crate::finding::{Cause, Finding, Level, Source};
 use crate::results::Epoch;
 
-/// Sigmas from which on a difference from what was told contradicts it: one right flight of 16 000 reaches them.
+/// A difference of so many sigmas contradicts what was told. One right flight of 16 000 reaches it.
 const SIGMAS: f64 = 4.0;
 
 /// Compares the altitudes that the answers were made with with those of the orbit, whose height comes from its period.

@@ -37,7 +37,7 @@ const RINGS: [f64; 2] = [0.5, 0.8];
 ///
 /// A difference of 0.4 of the mean is a ratio of 1.5 between both sides. So much, dark and bright ground can differ
 /// from hemisphere to hemisphere. A body at a phase angle below 25° is lit more evenly; its terminator is then within
-/// 6 % of the radius from the limb.
+/// 9 % of the radius from the limb.
 const LEAST_CONTRAST: f64 = 0.4;
 /// Number of standard deviations by which the picture must contradict the given Sun.
 const SIGMAS: f64 = 3.0;
