@@ -4,6 +4,8 @@ mod improbable;
 mod one_place;
 mod rates;
 mod repeats;
+mod shutter;
+mod spread;
 
 use hzn_core::body::PriorError;
 use hzn_core::status::Status;
@@ -15,6 +17,7 @@ pub(crate) use improbable::Improbable;
 pub(crate) use one_place::OnePlace;
 pub(crate) use rates::Rates;
 pub(crate) use repeats::Repeats;
+pub(crate) use shutter::Shutter;
 
 use crate::tell;
 

@@ -5,7 +5,7 @@ use hzn_core::camera::Camera;
 use hzn_core::image::region::Region;
 use hzn_files::FrameData;
 use hzn_run::bars::find_bars;
-use hzn_run::diagnosis::{self, AnyCone, FitFacts};
+use hzn_run::diagnosis::{self, AnyCone, FitFacts, RateFault, RateTrial};
 use hzn_run::open::{Request, open};
 use hzn_run::source::Picture;
 
@@ -25,18 +25,19 @@ pub(crate) struct Again {
     pub(crate) fits: Option<WhatFits>,
 }
 
-/// Some refused pictures of a sequence, to look at again.
-pub(crate) struct RefusedPictures {
+/// Some pictures of a sequence, to look at again.
+pub(crate) struct ReadAgain {
     each: Vec<(String, Picture, Option<FrameData>)>,
 }
 
-impl RefusedPictures {
+impl ReadAgain {
     /// Reads the pictures with these numbers.
     pub(crate) fn read(request: &Request, config: &Config, indices: &[u64]) -> Option<Self> {
         // A sentence at the end of a run must not make the run fail, so that an error here only leaves it out.
+        let last = *indices.iter().max()?;
         let mut opened = open(request).ok()?;
         let mut each = Vec::new();
-        for index in 0..=*indices.iter().max()? {
+        for index in 0..=last {
             let mut item = opened.source.next()?.ok()?;
             if !indices.contains(&index) {
                 continue;
@@ -47,6 +48,28 @@ impl RefusedPictures {
             }
         }
         Some(Self { each })
+    }
+
+    /// Says what is wrong with the rates of pictures that a rolling shutter took; `None` if nothing is.
+    pub(crate) fn rate_fault(&self, request: &Request, config: &Config) -> Option<String> {
+        let mut trial = RateTrial::new(config, request.flight).ok()?;
+        let mut gains = Vec::new();
+        for (_, picture, data) in &self.each {
+            let (Ok(view), Some(data)) = (picture.view(config.input.channel), data) else { continue };
+            gains.extend(trial.compare(&view, data));
+        }
+        let (fault, better) = diagnosis::find_rate_fault(&gains)?;
+        let cause = match fault {
+            RateFault::TooLarge => {
+                "rates that are 57 times smaller. Are they in degrees per second? rate_x, rate_y, rate_z are rad/s. \
+                 Large rates about other axes, or of other times, look alike"
+            }
+            RateFault::Negated => {
+                "the opposite rates. Do they or camera.readout_s have the wrong sign? rate_x, rate_y, rate_z are the \
+                 rotation of the camera, in its own axes"
+            }
+        };
+        Some(format!("{better} of {} pictures that were processed again fit better with {cause}", gains.len()))
     }
 
     /// Looks for a limb of any size, and says what would fit the median of the pictures. `None` if no picture shows a

@@ -21,14 +21,14 @@ use hzn_run::{disk, explain};
 pub(super) use args::{Args, cores};
 
 use super::resume;
-use crate::doubts::{Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Repeats, Times};
+use crate::doubts::{Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Repeats, Shutter, Times};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
 use crate::setup::{self, stop_flag};
 use crate::tell;
-use crate::what_fits::{Again, RefusedPictures, WhatFits};
+use crate::what_fits::{Again, ReadAgain, WhatFits};
 
 pub(super) fn run(mut args: Args) -> Outcome {
     setup::list_stdin(&mut args.input, args.source.raw)?;
@@ -80,6 +80,9 @@ pub(super) fn run(mut args: Args) -> Outcome {
         watch.sum_up(args, &plan, source.as_ref(), &again, (&summary, stored.frames));
     }
     watch.tell_doubt(again.fits.as_ref());
+    if end == End::Complete {
+        watch.tell_rate_fault(args, &plan);
+    }
     let done = stored.frames + watch.progress.frames();
     // Ctrl-C is the only end of a run that waits for pictures.
     if end == End::Interrupted && watching.is_none() && total.is_none_or(|n| done < n) {
@@ -165,6 +168,7 @@ struct Watch {
     one_place: OnePlace,
     improbable: Improbable,
     repeats: Repeats,
+    shutter: Shutter,
     refusals: Refusals,
     multi_page: MultiPageFiles,
     masks: picture_folders::Masks,
@@ -189,6 +193,7 @@ impl Watch {
             one_place: OnePlace::default(),
             improbable: Improbable::default(),
             repeats: Repeats::default(),
+            shutter: Shutter::default(),
             refusals: Refusals::default(),
             multi_page: MultiPageFiles::default(),
             masks: picture_folders::Masks::default(),
@@ -203,6 +208,7 @@ impl Watch {
         self.one_place.count(frame);
         self.improbable.count(frame);
         self.repeats.count(frame);
+        self.shutter.count(frame);
         self.refusals.count(frame);
         self.multi_page.count(frame);
         if !self.quiet {
@@ -274,12 +280,8 @@ impl Watch {
         if self.quiet && !(casts_doubt && self.progress.any_answered()) {
             return None;
         }
-        let request = setup::request(&args.input, &args.sensor, &args.source).ok()?;
-        // A stream cannot be read twice.
-        if request.inputs.iter().any(|input| source::is_stdin(input)) {
-            return None;
-        }
-        let refused = RefusedPictures::read(&request, &plan.config, commonest.pictures)?;
+        let request = request_again(args)?;
+        let refused = ReadAgain::read(&request, &plan.config, commonest.pictures)?;
         let fits = commonest.is_size.then(|| refused.what_fits(&request, &plan.config)).flatten();
         Some(Again { bars: refused.bars(&plan.config), fits })
     }
@@ -298,6 +300,23 @@ impl Watch {
             fits.pictures, fits.text
         ));
     }
+
+    /// Tells that the answers are doubtful if the pictures of a rolling shutter contradict their rates.
+    fn tell_rate_fault(&self, args: &Args, plan: &Plan) {
+        let config = &plan.config;
+        let Some(request) = request_again(args) else { return };
+        let read = |indices: Vec<u64>| ReadAgain::read(&request, config, &indices);
+        let rates = || read(self.shutter.pictures(config))?.rate_fault(&request, config);
+        if let Some(what) = rates() {
+            tell::warning(format_args!("the answers are doubtful: {what}"));
+        }
+    }
+}
+
+/// Returns the request to read the pictures again; `None` for a stream, which cannot be read twice.
+fn request_again(args: &Args) -> Option<Request> {
+    let request = setup::request(&args.input, &args.sensor, &args.source).ok()?;
+    (!request.inputs.iter().any(|input| source::is_stdin(input))).then_some(request)
 }
 
 /// Returns the result of a picture in one line, for example `0001.png: ok 0.031 deg in 4.2 ms`.

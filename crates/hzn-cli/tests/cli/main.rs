@@ -15,6 +15,7 @@ mod commands;
 mod common;
 mod corners;
 mod documents;
+mod doubts;
 mod evaluate;
 mod faults;
 mod fly;

@@ -6,7 +6,7 @@
 //! [`find_misfit`] returns what this limb says, as [`FitFacts`], and [`what_fits`] says it in words. [`summarise`]
 //! compares the pictures of a sequence, [`find_pair`] finds two wrong values, and [`is_limb_as_expected`] says whether
 //! nothing is wrong. [`find_field_of_view`] finds the field of view of a camera of which nothing is
-//! known.
+//! known. [`find_rate_fault`] says whether the pictures of a rolling shutter contradict their rates.
 
 mod any_cone;
 mod facts;
@@ -14,6 +14,7 @@ mod field_of_view;
 mod implied;
 mod joint;
 mod misfit;
+mod rates;
 mod words;
 
 pub use any_cone::{AnyCone, longest_edge};
@@ -22,4 +23,5 @@ pub use field_of_view::{FieldOfView, find_field_of_view};
 pub use implied::{find_fit, fit_facts};
 pub use joint::{Pair, Remedy, find_pair};
 pub use misfit::{find_any_fit, find_misfit};
+pub use rates::{Gains, RateFault, RateTrial, find_rate_fault};
 pub use words::what_fits;

@@ -1,0 +1,41 @@
+//! Flights whose answers are each plausible, and together contradict what was told.
+
+use crate::common::{Place, cell};
+
+/// A camera with a rolling shutter on a vehicle that tumbles.
+const TUMBLE: &str = "name = \"tumble\"\nutc = 2023-10-05T09:00:00Z\n[capture]\nfrom_s = 0.0\nto_s = 1500.0\n\
+                      frames = 40\n[camera]\nwidth = 320\nheight = 240\nmodel = \"pinhole\"\nfx_px = 220.0\n\
+                      fy_px = 220.0\ncx_px = 159.5\ncy_px = 119.5\n[trajectory.orbit]\nperigee_km = 550.0\n\
+                      inclination_deg = 97.6\nnode_deg = 160.0\n[attitude.tumble]\nrates_deg_s = RATES\n\
+                      [world.visible]\n[shutter]\nreadout_s = 0.05\n[detector]\npsf_sigma_px = 0.9\n\
+                      read_noise = 0.01\n";
+
+/// Returns what `hzn run` says of the pictures if the table has no attitudes, and the rates times a factor.
+fn with_rates(place: &Place, factor: f64) -> String {
+    let row = |row: &Vec<(String, String)>| {
+        let rates = ["rate_x", "rate_y", "rate_z"].map(|n| (factor * cell(row, n).parse::<f64>().unwrap()).to_string());
+        let told = ["file", "time_s", "x_km", "y_km", "z_km"].map(|name| cell(row, name));
+        format!("{},{}\n", told.join(","), rates.join(","))
+    };
+    let rows: String = place.rows("tumble/frames.csv").iter().map(row).collect();
+    place.write("rates.csv", format!("file,time_s,x_km,y_km,z_km,rate_x,rate_y,rate_z\n{rows}").as_bytes());
+    place.run(&["run", "tumble", "--frames", "rates.csv", "-q", "-o", "r.csv", "--force"]).expect(0).err
+}
+
+#[test]
+fn pictures_of_a_rolling_shutter_contradict_wrong_rates() {
+    let place = Place::new();
+    let simulate = |rates: &str| {
+        place.write("scene.toml", TUMBLE.replace("RATES", rates).as_bytes());
+        place.run(&["simulate", "scene.toml", "-o", "tumble", "-q", "--no-noise", "--force"]).expect(0);
+    };
+    // Too slow for the warning of the table: 3.3 degrees within a picture, if they were rad/s.
+    simulate("[0.5, -0.9, 0.6]");
+    let degrees = with_rates(&place, 1f64.to_degrees());
+    assert!(degrees.contains("the answers are doubtful: ") && degrees.contains("in degrees per second?"), "{degrees}");
+    assert!(!with_rates(&place, 1.0).contains("doubtful"));
+    simulate("[18.0, -12.0, 5.0]");
+    let negated = with_rates(&place, -1.0);
+    assert!(negated.contains("the answers are doubtful: ") && negated.contains("wrong sign?"), "{negated}");
+    assert!(!with_rates(&place, 1.0).contains("doubtful"));
+}
