@@ -40,6 +40,22 @@ pub(crate) enum TableFormat {
     Jsonl,
 }
 
+impl TableFormat {
+    /// Returns the format of a table on stdout.
+    pub(crate) fn or_csv(given: Option<Self>) -> Target {
+        given.unwrap_or(Self::Csv).into()
+    }
+
+    /// Tells that a format was given for files, which have the format of their ending.
+    pub(crate) fn tell_unused<'a>(given: Option<Self>, mut outputs: impl Iterator<Item = &'a PathBuf>) {
+        let Some(first) = outputs.next().filter(|_| given.is_some()) else { return };
+        if !is_stdin(first) && outputs.all(|path| !is_stdin(path)) {
+            let name = first.display();
+            tell::warning(format_args!("--format is for a table on stdout: {name} has the format of its ending"));
+        }
+    }
+}
+
 impl From<TableFormat> for Target {
     fn from(format: TableFormat) -> Self {
         match format {

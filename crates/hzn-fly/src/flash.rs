@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use hzn_flight::board::RETAINED_WORDS;
 use hzn_mcap::part_path;
 
+use crate::error::Error;
+
 /// Length of the identifier that the kernel gives each start of the computer.
 const BOOT_ID: usize = 36;
 /// Length of the file with the words: identifier, words, whether the program runs.
@@ -16,6 +18,17 @@ const RETAINED: usize = BOOT_ID + 4 * RETAINED_WORDS + 1;
 /// Returns the files that a folder holds for a reset: two copies of the parameters, and the words.
 pub fn files(folder: &Path) -> [PathBuf; 3] {
     [copy_path(folder, 1), copy_path(folder, 2), words_path(folder)]
+}
+
+/// Returns the error for a folder that cannot be opened, with advice if nothing can be written there.
+pub(crate) fn refused(folder: &Path, error: &io::Error) -> Error {
+    let advice = match error.kind() {
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "; parameters and log need a folder that can be written: --state names another one"
+        }
+        _ => "",
+    };
+    Error::failed(format!("{}: {error}{advice}", folder.display()))
 }
 
 fn copy_path(folder: &Path, copy: u8) -> PathBuf {

@@ -14,7 +14,7 @@ use hzn_run::source::raw::{Format, Raw};
 use crate::board::{Linux, Parts};
 use crate::camera::{Camera, Capture, DeviceCamera, Ended, Pipe, Samples, V4l2};
 use crate::error::Error;
-use crate::flash::Flash;
+use crate::flash::{self, Flash};
 use crate::head::{Counts, Feed, Head};
 use crate::keeper::{Keeper, Which};
 use crate::latency::{Latency, LatencySummary};
@@ -80,7 +80,7 @@ pub struct Summary {
 pub(crate) fn fly(settings: &Settings, lines: Arc<Lines>, tell: Tell) -> Result<Summary, Error> {
     let state = &settings.state;
     let in_state = |e: std::io::Error| Error::failed(format!("{}: {e}", state.display()));
-    let flash = Flash::open(state).map_err(in_state)?;
+    let flash = Flash::open(state).map_err(|e| flash::refused(state, &e))?;
     let given = settings.sensor.clone().map(parameters_for);
     let replaces = (settings.replaces_parameters, "sensor.toml");
     let config = prepare_parameters(given.as_ref(), replaces, &flash, &tell)?.sensor;

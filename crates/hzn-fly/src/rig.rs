@@ -121,7 +121,7 @@ fn prepare(path: &Path, rig: &file::Rig, settings: &Settings, tell: &Tell) -> Re
         let own = head.sensor.iter().map(|path| folder.join(path));
         let read: Vec<PathBuf> = std::iter::once(path.to_owned()).chain(own).collect();
         hzn_run::disk::refuse_inputs(&read, &flash::files(&state)).map_err(|e| Error::usage(e.to_string()))?;
-        let flash = Flash::open(&state).map_err(|e| Error::failed(format!("{}: {e}", state.display())))?;
+        let flash = Flash::open(&state).map_err(|e| flash::refused(&state, &e))?;
         let limb_tilt_sigma_km = sensor.body.limb_tilt_sigma_km;
         let mut given = parameters_for(sensor);
         given.operations.apid_base = base_of(k);

@@ -72,13 +72,54 @@ pub fn refuse_existing(path: &Path, force: bool) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes a file and checks that all of it arrived.
+/// Writes a file completely or not at all: into `NAME.part`, which is then renamed.
 ///
 /// # Errors
-/// The file cannot be written.
+/// The file cannot be written. An earlier file of the name is then unchanged.
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Error> {
-    let written = Checked::create(path).and_then(|mut file| file.write_all(bytes.as_ref()).and_then(|()| file.flush()));
-    written.map_err(|e| cannot_write(path, &e))
+    let into = |file: io::Result<Checked>| file?.write_whole(bytes.as_ref());
+    with_part(path, |part| into(Checked::create(part)).and_then(|()| std::fs::rename(part, target(path))))
+        .unwrap_or_else(|| into(Checked::create(path)))
+        .map_err(|e| cannot_write(path, &e))
+}
+
+/// Writes a text file as [`write`] does, and waits until the disk has it.
+///
+/// # Errors
+/// The errors are those of [`write`].
+pub fn write_whole(path: &Path, text: &str) -> Result<(), Error> {
+    let durable = |part: &Path| {
+        let mut file = File::create(part)?;
+        file.write_all(text.as_bytes())?;
+        hzn_mcap::publish(&file, part, &target(path))
+    };
+    with_part(path, durable)
+        .unwrap_or_else(|| Checked::create(path)?.write_whole(text.as_bytes()))
+        .map_err(|e| cannot_write(path, &e))
+}
+
+/// Writes a file by way of its `.part`, which is removed if that fails. Returns `None` for what cannot be renamed to: a
+/// device or a pipe, and a file in a folder in which no other can be made.
+fn with_part(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) -> Option<io::Result<()>> {
+    let known = std::fs::metadata(path).ok();
+    if known.as_ref().is_some_and(|known| !known.is_file()) {
+        return None;
+    }
+    let part = part_path(&target(path));
+    let written = write(&part);
+    if written.is_err() {
+        let _ = std::fs::remove_file(&part);
+    }
+    let no_room = |e: &io::Error| matches!(e.kind(), io::ErrorKind::PermissionDenied | io::ErrorKind::InvalidFilename);
+    match written {
+        Err(e) if known.is_some() && no_room(&e) => None,
+        written => Some(written),
+    }
+}
+
+/// Returns the file that a link leads to, so that a rename does not replace the link.
+fn target(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
 /// A file whose [`flush`](Write::flush) also returns the errors that the system tells only when a file is closed.
@@ -94,6 +135,11 @@ impl Checked {
     pub fn create(path: &Path) -> io::Result<Self> {
         File::create(path).map(Self)
     }
+
+    fn write_whole(mut self, bytes: &[u8]) -> io::Result<()> {
+        self.write_all(bytes)?;
+        self.flush()
+    }
 }
 
 impl Write for Checked {
@@ -105,19 +151,17 @@ impl Write for Checked {
     }
 }
 
-/// Writes a text file completely or not at all: into `NAME.part`, which is then renamed.
+/// Refuses a file in a folder that does not exist, before any work is done for it.
 ///
 /// # Errors
-/// The file cannot be written. An earlier file of the name is then unchanged.
-pub fn write_whole(path: &Path, text: &str) -> Result<(), Error> {
-    let part = part_path(path);
-    let written = std::fs::File::create(&part)
-        .and_then(|mut file| file.write_all(text.as_bytes()).map(|()| file))
-        .and_then(|file| hzn_mcap::publish(&file, &part, path));
-    written.map_err(|e| {
-        let _ = std::fs::remove_file(&part);
-        cannot_write(path, &e)
-    })
+/// There is no such folder.
+pub fn refuse_missing_folder(path: &Path) -> Result<(), Error> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder.map(std::fs::metadata) {
+        Some(Err(e)) => Err(unusable(advice(path, &e))),
+        Some(Ok(folder)) if !folder.is_dir() => Err(unusable(advice(path, &io::ErrorKind::NotADirectory.into()))),
+        _ => Ok(()),
+    }
 }
 
 /// Returns the error for a file that cannot be written, with advice.
@@ -158,5 +202,43 @@ pub(crate) fn run_advice(path: &Path, error: &std::io::Error) -> String {
             format!("{what}; finished pictures are kept; resume the run to continue after them")
         }
         _ => what,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_written_whole_or_stays_as_it_was() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        write(&at("a.toml"), "first").unwrap();
+        write_whole(&at("a.toml"), "second").unwrap();
+        assert_eq!(std::fs::read_to_string(at("a.toml")).unwrap(), "second");
+        // The part cannot be made, as on a full disk, because a folder has its name.
+        std::fs::create_dir(at("a.toml.part")).unwrap();
+        assert!(write(&at("a.toml"), "third").is_err() && write_whole(&at("a.toml"), "third").is_err());
+        assert_eq!(std::fs::read_to_string(at("a.toml")).unwrap(), "second");
+        std::fs::create_dir(at("b.toml.part")).unwrap();
+        assert!(write(&at("b.toml"), "new").is_err() && !at("b.toml").exists());
+        let names = std::fs::read_dir(dir.path()).unwrap().count();
+        assert_eq!(names, 3, "nothing else is left");
+        assert!(write(&at("no/c.toml"), "").unwrap_err().to_string().contains("the folder does not exist"));
+        assert!(refuse_missing_folder(&at("no/c.toml")).is_err() && refuse_missing_folder(&at("c.toml")).is_ok());
+        assert!(refuse_missing_folder(Path::new("c.toml")).is_ok() && refuse_missing_folder(&at("a.toml/c")).is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_devices_are_kept() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        write(&at("real"), "first").unwrap();
+        std::os::unix::fs::symlink("real", at("link")).unwrap();
+        write(&at("link"), "second").unwrap();
+        assert!(at("link").is_symlink() && std::fs::read_to_string(at("real")).unwrap() == "second");
+        write(Path::new("/dev/null"), "gone").unwrap();
+        write_whole(Path::new("/dev/null"), "gone").unwrap();
     }
 }

@@ -25,9 +25,9 @@ pub(super) struct Args {
     /// A table: .csv, .jsonl, or - for stdout
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Format of the table on stdout
-    #[arg(long, value_name = "FORMAT", default_value = "csv")]
-    format: TableFormat,
+    /// Format of the table on stdout; without it, csv
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<TableFormat>,
     /// The folder for the recorded pictures
     #[arg(long, value_name = "DIR")]
     images: Option<PathBuf>,
@@ -73,6 +73,7 @@ fn export_rows(args: &Args) -> Outcome {
              gnss.csv for a recording of ROS 2",
         ));
     }
+    TableFormat::tell_unused(args.format, args.output.iter());
     let to_file = args.output.as_ref().filter(|path| !source::is_stdin(path));
     if let Some(path) = to_file
         && sink::target(path)? == sink::Target::Mcap
@@ -133,7 +134,7 @@ fn counts_text(args: &Args, rows: u64, images: u64) -> String {
 
 fn open_table(args: &Args, path: &Path, existing: Existing) -> Result<RowFile, Stop> {
     let is_stdout = source::is_stdin(path);
-    Ok(if is_stdout { RowFile::on_stdout(args.format.into())? } else { RowFile::create(path, existing)? })
+    Ok(if is_stdout { RowFile::on_stdout(TableFormat::or_csv(args.format))? } else { RowFile::create(path, existing)? })
 }
 
 fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {

@@ -26,7 +26,7 @@ use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
 use crate::refusals::{Refusals, quoted, quoted_path};
-use crate::setup::{self, stop_flag};
+use crate::setup::{self, TableFormat, stop_flag};
 use crate::tell;
 use crate::what_fits::{Again, ReadAgain, WhatFits};
 
@@ -51,7 +51,7 @@ pub(super) fn run(mut args: Args) -> Outcome {
         ros: args.ros,
         heads: &[],
     };
-    let (mut output, stored) = Outputs::open(&args.output, args.format.into(), args.existing(), settings)?;
+    let (mut output, stored) = Outputs::open(&args.output, TableFormat::or_csv(args.format), args.existing(), settings)?;
     let plan = Plan { last: stored.last_answers.clone(), ..plan };
     if !args.quiet {
         tell_notes(&notes, stored.frames, plan.overlay.is_some() || plan.masks.is_some());
@@ -142,6 +142,7 @@ fn check_arguments(args: &Args) -> Result<(), Stop> {
     if args.no_images && !args.output.iter().any(|p| ending(p) == "mcap") {
         return Err(usage("--no-images: only an MCAP contains pictures; give -o out.mcap, or leave out --no-images"));
     }
+    TableFormat::tell_unused(args.format, args.output.iter());
     if args.ros && !args.output.iter().any(|p| ending(p) == "mcap") {
         return Err(usage("--ros: only an MCAP has messages of ROS; give -o out.mcap, or leave out --ros"));
     }

@@ -83,3 +83,32 @@ fn recover_on_a_full_disk_says_what_there_is() {
     assert!(!ran.err.contains("--resume"));
     assert_eq!(std::fs::read(place.path("a.mcap.part")).unwrap(), before);
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_leaves_no_empty_file() {
+    let place = Place::with_pictures(2);
+    let init = ["init", "in", "--fov", "56", "--altitude", "400", "-o", "s.toml"];
+    let explain = ["explain", "in/0000.png", "--overlay", "o.png"];
+    for (command, output) in [(&init[..], "s.toml"), (&explain[..], "o.png")] {
+        std::os::unix::fs::symlink("/dev/full", place.path(&format!("{output}.part"))).unwrap();
+        place.run(command).expect(1).says("the disk is full");
+        assert!(!place.path(output).exists(), "{output}");
+        // The next call finds nothing to replace.
+        place.run(command).expect(0);
+        assert!(std::fs::metadata(place.path(output)).unwrap().len() > 100, "{output}");
+    }
+}
+
+#[test]
+fn outputs_that_cannot_be_are_told_at_once() {
+    let place = Place::with_pictures(2);
+    let overlay = place.run(&["explain", "in/0000.png", "--overlay", "no/o.png"]).expect(2);
+    assert!(overlay.out.is_empty() && overlay.err.contains("no/o.png: the folder does not exist"), "{}", overlay.err);
+    let unused = "--format is for a table on stdout: a.csv has the format of its ending";
+    place.run(&["run", "in", "--format", "jsonl", "-o", "a.csv"]).expect(0).says(unused);
+    for args in [&["run", "in", "--format", "jsonl", "-o", "b.csv", "-o", "-"][..], &["run", "in", "-o", "c.csv"]] {
+        let ran = place.run(args).expect(0);
+        assert!(!ran.err.contains("--format"), "{}", ran.err);
+    }
+}

@@ -8,8 +8,8 @@ mod rig;
 use std::path::Path;
 
 use hzn_run::open::Opened;
-use hzn_run::overlay;
 use hzn_run::source::{self, Item, Source, ending};
+use hzn_run::{disk, overlay};
 
 use crate::exit::{Outcome, Stop, usage};
 use crate::files;
@@ -45,12 +45,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(exit)
 }
 
-/// Refuses an overlay that is not a PNG.
+/// Refuses an overlay that is not a PNG, or in a folder that does not exist.
 fn check_overlay(path: &Path) -> Result<(), Stop> {
-    if source::ending(path) == "png" {
-        return Ok(());
+    if source::ending(path) != "png" {
+        return Err(usage(format!("{}: the overlay's ending must be .png", path.display())));
     }
-    Err(usage(format!("{}: the overlay's ending must be .png", path.display())))
+    Ok(disk::refuse_missing_folder(path)?)
 }
 
 /// Returns picture number `index` of a sequence, counted from 0.

@@ -34,9 +34,9 @@ pub(crate) struct Args {
     /// Results: .mcap, .csv, .jsonl, or - for stdout; may be given several times; without it, a table on stdout
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Vec<PathBuf>,
-    /// Format of the results on stdout
-    #[arg(long, value_name = "FORMAT", default_value = "csv")]
-    pub(super) format: TableFormat,
+    /// Format of the results on stdout; without it, csv
+    #[arg(long, value_name = "FORMAT")]
+    pub(super) format: Option<TableFormat>,
     /// Replace an output that exists
     #[arg(long)]
     pub(super) force: bool,
@@ -84,7 +84,7 @@ impl Args {
             sensor: SensorArgs { sensor: None, altitude_km: None, flight: false },
             source: InputArgs { frames: None, fps: 1.0, raw: None, topic: None },
             output: vec![output.to_owned()],
-            format: TableFormat::Csv,
+            format: None,
             force: true,
             resume: false,
             durable: false,

@@ -13,7 +13,7 @@ use super::args::Args;
 use crate::doubts::MissingPriors;
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::progress::{Counts, Progress, count_text};
-use crate::setup::stop_flag;
+use crate::setup::{TableFormat, stop_flag};
 use crate::tell;
 
 pub(super) fn run(args: &Args, path: &Path) -> Outcome {
@@ -40,7 +40,8 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
         plan.heads.iter().zip(texts).map(|(head, text)| (head.name.clone(), &head.plan.config, text)).collect();
     let Some((_, config, _)) = heads.first() else { return Err(usage(format!("{}: has no head", path.display()))) };
     let settings = sink::Settings { config, sensor_toml: &text, durable: args.durable, ros: args.ros, heads: &heads };
-    let (mut output, stored) = Outputs::open(&args.output, args.format.into(), args.existing(), settings)?;
+    let (mut output, stored) =
+        Outputs::open(&args.output, TableFormat::or_csv(args.format), args.existing(), settings)?;
     let start = match input.go_on(&plan, &stored) {
         Ok(start) => start,
         Err(stop) => {
