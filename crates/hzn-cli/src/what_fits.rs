@@ -20,7 +20,7 @@ pub(crate) struct WhatFits {
 /// What a second look at refused pictures found.
 #[derive(Default)]
 pub(crate) struct Again {
-    /// The black bars that no mask covers, in words.
+    /// The bars that no mask covers, in words.
     pub(crate) bars: Option<String>,
     pub(crate) fits: Option<WhatFits>,
 }
@@ -90,7 +90,7 @@ impl ReadAgain {
         Some(WhatFits { text, pictures: found.len() })
     }
 
-    /// Says which black bars the pictures have that no mask covers.
+    /// Says which bars the pictures have that no mask covers.
     pub(crate) fn bars(&self, config: &Config) -> Option<String> {
         let pictures: Vec<Picture> = self.each.iter().map(|(_, picture, _)| picture.clone()).collect();
         let bars = find_bars(&pictures)?;
@@ -107,7 +107,7 @@ impl ReadAgain {
         let is_free = sides.iter().any(|(px, x, y)| *px > 0 && region.contains(*x, *y) && !region.masked(*x, *y));
         is_free.then(|| {
             format!(
-                "the refused pictures have black bars, {}, whose borders are edges; mask them, as hzn init does: \
+                "the refused pictures have {}, whose borders are edges; mask them, as hzn init does: \
                  [mask] polygons_px = {}",
                 bars.describe(),
                 bars.polygons_px([width, height].map(u32::from))

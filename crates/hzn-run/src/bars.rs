@@ -1,8 +1,10 @@
-//! Finds black bars along the sides of pictures, as letterboxing writes them. Where a bright body meets a bar, the
+//! Finds black bars along the sides of pictures, as letterboxing writes them, and white frames of scans and
+//! screenshots. Where a bright body meets a bar, the
 //! bar's border is a sharp edge, which may be joined with the limb.
 //!
 //! A bar is constant, the same in all pictures, and its border is straight along the side of the picture. A dark sky is
-//! not: it has noise, and the limb before it bends and moves.
+//! not: it has noise, and the limb before it bends and moves. An overexposed ground has no noise, and its limb may stay
+//! where it is, so that bright bars count only at two opposite sides.
 
 use hzn_files::start::Bars;
 
@@ -26,7 +28,7 @@ const STRAIGHT_PX: usize = 1;
 /// Lines across a side that are looked at.
 const LINES: u32 = 256;
 
-/// Returns the black bars of some pictures of one camera; `None` if they have no bars, or if too few pictures show it.
+/// Returns the bars of some pictures of one camera; `None` if they have no bars, or if too few pictures show it.
 pub fn find_bars(pictures: &[Picture]) -> Option<Bars> {
     let first = pictures.first().filter(|_| pictures.len() >= MIN_PICTURES)?;
     let size = |p: &Picture| (p.layout.width, p.layout.height);
@@ -34,10 +36,23 @@ pub fn find_bars(pictures: &[Picture]) -> Option<Bars> {
         return None;
     }
     let contrast = contrast(pictures)?;
-    let at = |side| width_px(pictures, side, contrast).unwrap_or(0);
-    let bars =
-        Bars { left_px: at(Side::Left), right_px: at(Side::Right), top_px: at(Side::Top), bottom_px: at(Side::Bottom) };
-    (bars != Bars::default()).then_some(bars)
+    let bars = |bright| {
+        let at = |side| width_px(pictures, side, contrast, bright).unwrap_or(0);
+        let [left_px, right_px, top_px, bottom_px] = [Side::Left, Side::Right, Side::Top, Side::Bottom].map(at);
+        Bars { left_px, right_px, top_px, bottom_px, bright }
+    };
+    let black = bars(false);
+    if black != Bars::default() {
+        return Some(black);
+    }
+    let mut frame = bars(true);
+    if frame.left_px == 0 || frame.right_px == 0 {
+        (frame.left_px, frame.right_px) = (0, 0);
+    }
+    if frame.top_px == 0 || frame.bottom_px == 0 {
+        (frame.top_px, frame.bottom_px) = (0, 0);
+    }
+    (frame != Bars { bright: true, ..Bars::default() }).then_some(frame)
 }
 
 /// Returns the difference between the bright and the darkest parts of all pictures.
@@ -81,14 +96,15 @@ impl Side {
     }
 }
 
-/// Returns the width of the bar at a side; `None` if there is none.
-fn width_px(pictures: &[Picture], side: Side, contrast: f64) -> Option<u32> {
+/// Returns the width of the bar at a side, which is brighter than its content or darker; `None` if there is none.
+fn width_px(pictures: &[Picture], side: Side, contrast: f64, bright: bool) -> Option<u32> {
     let (length, across) = side.lengths(pictures.first()?);
     let lines: Vec<u32> = (0..length).step_by((length / LINES).max(1) as usize).collect();
     let ground = side.level(pictures.first()?, length / 2, 0);
     // The depth at which the content begins, for each line of a picture.
     let begins = |picture: &Picture| -> Vec<Option<u32>> {
-        let is_content = |along, depth: &u32| side.level(picture, along, *depth) > ground + CONTENT * contrast;
+        let sign = if bright { -1.0 } else { 1.0 };
+        let is_content = |along, depth: &u32| (side.level(picture, along, *depth) - ground) * sign > CONTENT * contrast;
         lines.iter().map(|along| (0..across / 2).find(|depth| is_content(*along, depth))).collect()
     };
     let each: Vec<Vec<Option<u32>>> = pictures.iter().map(begins).collect();
@@ -133,7 +149,8 @@ mod tests {
                 let random = ((i + 977 * k).wrapping_mul(2_654_435_761) >> 24) as u8;
                 let sky = if noise == 0 { 0 } else { random % noise };
                 let ground = if f64::from(y) > horizon(k, f64::from(x)) { 150 + random % 32 } else { sky };
-                samples.push(if is_bar { 0 } else { ground });
+                let bar = if bars.bright { 255 } else { 0 };
+                samples.push(if is_bar { bar } else { ground });
             }
             Picture::new(Samples::Bytes(samples), Layout::packed(SIZE[0], SIZE[1], 1, 8))
         };
@@ -146,7 +163,7 @@ mod tests {
 
     #[test]
     fn bars_are_found_where_the_content_touches_them() {
-        let bars = Bars { top_px: 0, bottom_px: 30, left_px: 40, right_px: 40 };
+        let bars = Bars { bottom_px: 30, left_px: 40, right_px: 40, ..Bars::default() };
         let found = find_bars(&flight(bars, 6, turning)).unwrap();
         assert_eq!(found, bars);
         // The whole content is bright in some pictures.
@@ -155,6 +172,17 @@ mod tests {
         // Bars that differ.
         let bars = Bars { bottom_px: 3, ..Bars::default() };
         assert_eq!(find_bars(&flight(bars, 0, turning)), Some(bars));
+    }
+
+    #[test]
+    fn a_white_frame_is_found_and_an_overexposed_ground_is_none() {
+        let frame = Bars { top_px: 12, bottom_px: 12, left_px: 12, right_px: 12, bright: true };
+        assert_eq!(find_bars(&flight(frame, 6, turning)), Some(frame));
+        let sides = Bars { left_px: 9, right_px: 5, bright: true, ..Bars::default() };
+        assert_eq!(find_bars(&flight(sides, 20, turning)), Some(sides));
+        // The straight limb of an overexposed ground that stays where it is.
+        let ground = Bars { bottom_px: 90, bright: true, ..Bars::default() };
+        assert_eq!(find_bars(&flight(ground, 20, |_, _| 1e3)), None);
     }
 
     #[test]

@@ -192,7 +192,7 @@ fn tell_circle(start: &StartConfig) {
     }
 }
 
-/// Says what the field of view refers to, if there are black bars beside the content.
+/// Says what the field of view refers to, if there are bars beside the content.
 fn tell_width(args: &Args, known: &CameraFacts, lens: Model) {
     let width = known.size_px[0];
     let whole = |fov| known.bars?.whole_width_deg(lens, width, fov).map(|whole| (fov, whole));
@@ -211,10 +211,7 @@ fn finish(args: &Args, text: &str, known: &CameraFacts) -> Outcome {
     let is_known = |text: &String| known.pixel_aspect != 1.0 && text.contains(plausible::NOT_SQUARE);
     sensor.warnings.iter().map(Problem::to_string).filter(|text| !is_known(text)).for_each(tell::warning);
     if let Some(bars) = known.bars {
-        tell::line(format_args!(
-            "all pictures have black bars, {}: they are masked (mask.polygons_px)",
-            bars.describe()
-        ));
+        tell::line(format_args!("all pictures have {}: they are masked (mask.polygons_px)", bars.describe()));
     }
     if known.pixel_aspect != 1.0 {
         tell::line(format_args!("the pixels are {:.3} times as wide as high, as the video says", known.pixel_aspect));

@@ -1,4 +1,4 @@
-//! Black bars along the sides of the pictures, as letterboxing writes them.
+//! Black bars along the sides of the pictures, as letterboxing writes them, and white frames of scans and screenshots.
 //!
 //! The principal point stays in the middle of the whole picture: letterboxing adds equal bars on two sides, and a bar
 //! beside a sky that is as black in all pictures is not seen.
@@ -9,7 +9,7 @@ use hzn_core::camera::Model;
 /// Rows and columns of the content next to a bar that are masked with it: scaling mixes them with the bar.
 const BLENDED_PX: f64 = 1.0;
 
-/// The widths of the black bars along the four sides of the pictures, in pixels; 0 where there is none.
+/// The widths of the bars along the four sides of the pictures, in pixels; 0 where there is none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Bars {
     /// Columns at the left side.
@@ -20,11 +20,14 @@ pub struct Bars {
     pub top_px: u32,
     /// Rows at the lower side.
     pub bottom_px: u32,
+    /// Whether they are brighter than the content, as a white frame is.
+    pub bright: bool,
 }
 
 impl Bars {
-    /// Returns the bars in words, as `60 rows above and 60 rows below`.
+    /// Returns the bars in words, as `black bars, 60 rows above and 60 rows below`.
     pub fn describe(&self) -> String {
+        let kind = if self.bright { "a bright frame" } else { "black bars" };
         let sides = [
             (self.top_px, "row", "above"),
             (self.bottom_px, "row", "below"),
@@ -33,7 +36,7 @@ impl Bars {
         ];
         let there = sides.iter().filter(|(px, ..)| *px > 0);
         let words = there.map(|(px, line, place)| format!("{px} {line}{} {place}", if *px == 1 { "" } else { "s" }));
-        words.collect::<Vec<_>>().join(" and ")
+        format!("{kind}, {}", words.collect::<Vec<_>>().join(" and "))
     }
 
     /// Returns `mask.polygons_px` that covers the bars, as a TOML array, for pictures of this size.
@@ -70,7 +73,7 @@ mod tests {
     #[test]
     fn bars_have_words_and_polygons() {
         let bars = Bars { top_px: 60, bottom_px: 1, ..Bars::default() };
-        assert_eq!(bars.describe(), "60 rows above and 1 row below");
+        assert_eq!(bars.describe(), "black bars, 60 rows above and 1 row below");
         let polygons = "[[[-0.5, -0.5], [99.5, -0.5], [99.5, 60.5], [-0.5, 60.5]], \
                         [[-0.5, 197.5], [99.5, 197.5], [99.5, 199.5], [-0.5, 199.5]]]";
         assert_eq!(bars.polygons_px([100, 200]), polygons);

@@ -31,7 +31,7 @@ pub struct CameraFacts {
     /// Radius about the picture's centre beyond which no light arrives, in pixels, if the pictures show it. The file of
     /// a fisheye limits the lens to it.
     pub image_circle_px: Option<f64>,
-    /// Black bars that all pictures have along their sides, which the file masks.
+    /// Black bars, or a bright frame, that all pictures have along their sides, which the file masks.
     pub bars: Option<Bars>,
     /// Width of a pixel over its height; 1 for nearly all cameras, but not for every video.
     pub pixel_aspect: f64,

@@ -186,11 +186,11 @@ fn write_tone(tone: Option<Tone>) -> String {
     format!("{head}{line}")
 }
 
-/// Writes `[mask]` with the black bars of the pictures.
+/// Writes `[mask]` with the bars of the pictures.
 fn write_bars(facts: &CameraFacts) -> String {
     facts.bars.map_or_else(String::new, |bars| {
         format!(
-            "\n[mask]\n# All pictures have black bars: {}. Their borders must not pass for a limb.\npolygons_px = {}\n",
+            "\n[mask]\n# All pictures have {}. Their borders must not pass for a limb.\npolygons_px = {}\n",
             bars.describe(),
             bars.polygons_px(facts.size_px)
         )
