@@ -52,6 +52,8 @@ const MOON_ALTITUDES_KM: std::ops::Range<f64> = 340_000.0..420_000.0;
 /// Largest relative difference of a radius from the Earth's for a sphere that stands for the Earth. Its semi-axes
 /// differ by 0.3 %.
 const MAX_EARTH_DIFFERENCE: f64 = 0.02;
+/// Smallest part of the width of a picture that a large disc fills.
+const LEAST_DISC: f64 = 0.3;
 /// Number of pixels in a row and in a column of the picture that the check of the mask looks at.
 const MASK_SAMPLES: u16 = 32;
 
@@ -67,7 +69,10 @@ pub fn find_implausible(config: &Config) -> Vec<Implausible> {
     found.extend(check_mask(config));
     let several = !config.bodies.is_empty();
     for (which, body) in (0u8..).zip(config.each_body()) {
-        found.extend(check_body(body).map(|implausible| Implausible { body: several.then_some(which), ..implausible }));
+        found.extend(
+            check_body(body, &config.camera)
+                .map(|implausible| Implausible { body: several.then_some(which), ..implausible }),
+        );
     }
     found
 }
@@ -82,16 +87,24 @@ pub(crate) fn max_altitude_km(body: body::Kind, radius_km: f64) -> f64 {
     }
 }
 
-fn check_body(body: &body::Config) -> Option<Implausible> {
-    check_altitude(body).or_else(|| check_air(body))
+fn check_body(body: &body::Config, camera: &camera::Config) -> Option<Implausible> {
+    check_altitude(body, camera).or_else(|| check_air(body))
 }
 
-fn check_altitude(body: &body::Config) -> Option<Implausible> {
+/// Returns whether the whole disc of a body at an altitude is in the picture and large in it. Such a camera was made for
+/// this distance; a camera near the body has a field of view that is much wider than such a disc.
+pub(crate) fn is_for_the_disc(camera: &camera::Config, radius_km: f64, km: f64) -> bool {
+    let disc_deg = (radius_km / (radius_km + km)).asin().to_degrees();
+    half_width_deg(camera).is_some_and(|half| (LEAST_DISC * half..=half).contains(&disc_deg))
+}
+
+fn check_altitude(body: &body::Config, camera: &camera::Config) -> Option<Implausible> {
     let km = body.altitude_km?;
     if let Some(what) = explain_unused_altitude(body.kind) {
         return Some(Implausible::new("body.altitude_km", what));
     }
-    let doubt = doubt_altitude(body.kind, body.mean_radius_km(), km)?;
+    let radius_km = body.mean_radius_km();
+    let doubt = doubt_altitude(body.kind, radius_km, km).filter(|_| !is_for_the_disc(camera, radius_km, km))?;
     Some(Implausible::new("body.altitude_km", doubt))
 }
 
@@ -389,7 +402,7 @@ mod tests {
         let sphere = |radius_km, limb_height_km| {
             let kind = body::Kind::Sphere;
             let body = body::Config { kind, radius_km: Some(radius_km), limb_height_km, ..body::Config::default() };
-            check_body(&body).map(|d| d.what).unwrap_or_default()
+            check_body(&body, &wide()).map(|d| d.what).unwrap_or_default()
         };
         let moon = sphere(1737.4, 17.0);
         assert!(moon.contains("a body without air has limb_height_km = 0.0, limb_height_sigma_km = 5.2, "), "{moon}");
@@ -409,12 +422,34 @@ mod tests {
         assert_eq!(with(&box_of(0.0, 0.0, 640.0, 400.0)) + &with(&box_of(600.0, 0.0, 100.0, 100.0)), "");
     }
 
+    /// A camera for the Earth from near.
+    fn wide() -> camera::Config {
+        camera(Model::Pinhole, [640, 480], [600.0; 2], [319.5, 239.5], &[])
+    }
+
+    #[test]
+    fn a_camera_for_a_far_disc_is_far_away() {
+        // 0.61 degrees, with the Earth of 0.49 degrees from the Lagrangian point, and the Moon from the Earth.
+        let telescope = camera(Model::Pinhole, [2048, 2048], [192_360.0; 2], [1023.5; 2], &[]);
+        let at = |camera: &camera::Config, kind, km| {
+            let radius_km = (kind == body::Kind::Sphere).then_some(1737.4);
+            let body = body::Config { kind, radius_km, altitude_km: Some(km), ..body::Config::default() };
+            check_altitude(&body, camera)
+        };
+        assert_eq!(at(&telescope, body::Kind::Earth, 1_480_000.0), None);
+        assert_eq!(at(&telescope, body::Kind::Sphere, 380_000.0), None);
+        // The disc would be larger than the picture, or a dot in it.
+        assert!(at(&telescope, body::Kind::Earth, 550_000.0).is_some());
+        assert!(at(&wide(), body::Kind::Earth, 1_480_000.0).is_some());
+        assert!(at(&wide(), body::Kind::Earth, 550_000.0).is_some());
+    }
+
     #[test]
     fn altitudes_in_metres_and_of_the_moon_are_reported() {
         let with = |kind, km| {
             let radius_km = (kind == body::Kind::Sphere).then_some(1737.4);
             let body = body::Config { kind, radius_km, altitude_km: Some(km), ..body::Config::default() };
-            check_altitude(&body).map(|d| d.what).unwrap_or_default()
+            check_altitude(&body, &wide()).map(|d| d.what).unwrap_or_default()
         };
         assert_eq!(with(body::Kind::Earth, 35_786.0) + &with(body::Kind::Sphere, 100.0), "");
         assert!(with(body::Kind::Earth, 230_000.0).ends_with("is it in metres?"));
