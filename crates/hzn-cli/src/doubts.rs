@@ -1,5 +1,6 @@
 //! What is odd about the pictures of a run. It is counted while the run goes on, and told once at its end.
 
+mod altitudes;
 mod improbable;
 mod one_place;
 mod rates;
@@ -13,6 +14,7 @@ use hzn_files::Frames;
 use hzn_run::engine::{BodyOutcome, Finished};
 use hzn_run::explain;
 
+pub(crate) use altitudes::Altitudes;
 pub(crate) use improbable::Improbable;
 pub(crate) use one_place::OnePlace;
 pub(crate) use rates::Rates;

@@ -5,8 +5,11 @@ use hzn_core::camera::Camera;
 use hzn_core::image::region::Region;
 use hzn_files::FrameData;
 use hzn_run::bars::find_bars;
-use hzn_run::diagnosis::{self, AnyCone, FitFacts, RateFault, RateTrial};
+use hzn_run::diagnosis::{self, AnyCone, FitFacts, RateFault, RateTrial, Said};
+use hzn_run::engine::AnySensor;
+use hzn_run::engine::trace::Traces;
 use hzn_run::open::{Request, open};
+use hzn_run::record;
 use hzn_run::source::Picture;
 
 /// What refused pictures say about the size of the limb.
@@ -70,6 +73,28 @@ impl ReadAgain {
             }
         };
         Some(format!("{better} of {} pictures that were processed again fit better with {cause}", gains.len()))
+    }
+
+    /// Says which altitude or lens the half-angles of all answers together show; `None` if they agree with those told.
+    pub(crate) fn contradiction(&self, request: &Request, config: &Config) -> Option<String> {
+        let mut sensor = AnySensor::new(config, request.flight).ok()?;
+        let camera = Camera::try_new(&config.camera).ok()?;
+        let bodies = config.each_body();
+        let (mut said, mut altitudes_km) = (Vec::new(), Vec::new());
+        for (_, picture, data) in &self.each {
+            let Ok(view) = picture.view(config.input.channel) else { continue };
+            let traces = Traces::new(bodies.len());
+            let processed = sensor.process(&view, data.as_ref(), Some(&traces));
+            let report = processed.first().and_then(|processed| processed.report.as_ref().ok());
+            let Some((report, trace)) = report.zip(traces.each.first()) else { continue };
+            said.extend(Said::of(report, &trace.edges(), &config.camera, data.as_ref()));
+            altitudes_km.extend(record::altitude_km(data.as_ref(), bodies.first()?));
+        }
+        altitudes_km.sort_by(f64::total_cmp);
+        let altitude_km = altitudes_km.get(altitudes_km.len() / 2).copied();
+        let found = diagnosis::contradictions(&said);
+        let what = diagnosis::contradiction(&found, altitude_km, &camera, config.camera.width)?;
+        Some(format!("each of {} answers agrees with the limb that is expected, but {what}", said.len()))
     }
 
     /// Looks for a limb of any size, and says what would fit the median of the pictures. `None` if no picture shows a

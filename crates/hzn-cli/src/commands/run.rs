@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use hzn_core::Config;
 use hzn_core::config::Orient;
 use hzn_files::frames::Unused;
 use hzn_files::{FrameData, Frames, Sensor};
@@ -21,7 +22,7 @@ use hzn_run::{disk, explain};
 pub(super) use args::{Args, cores};
 
 use super::resume;
-use crate::doubts::{Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Repeats, Shutter, Times};
+use crate::doubts::{Altitudes, Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Repeats, Shutter, Times};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
@@ -51,7 +52,8 @@ pub(super) fn run(mut args: Args) -> Outcome {
         ros: args.ros,
         heads: &[],
     };
-    let (mut output, stored) = Outputs::open(&args.output, TableFormat::or_csv(args.format), args.existing(), settings)?;
+    let (mut output, stored) =
+        Outputs::open(&args.output, TableFormat::or_csv(args.format), args.existing(), settings)?;
     let plan = Plan { last: stored.last_answers.clone(), ..plan };
     if !args.quiet {
         tell_notes(&notes, stored.frames, plan.overlay.is_some() || plan.masks.is_some());
@@ -67,7 +69,9 @@ pub(super) fn run(mut args: Args) -> Outcome {
     let mut watch = Watch::new(Progress::new(total, stored.frames, args.quiet), args.quiet);
     let stop = watching.clone().unwrap_or_else(stop_flag);
     tell::detail(|| format!("threads: {}", plan.threads));
-    let end = engine::run(&plan, source.as_mut(), stored.frames, &stop, &mut output, &mut |frame| watch.see(frame));
+    let end = engine::run(&plan, source.as_mut(), stored.frames, &stop, &mut output, &mut |frame| {
+        watch.see(frame, &plan.config);
+    });
     let bodies: Vec<&str> = plan.config.each_body().iter().map(|b| b.kind.name()).collect();
     let summary = watch.progress.summary(&bodies);
     let end = end?;
@@ -79,9 +83,9 @@ pub(super) fn run(mut args: Args) -> Outcome {
     if !args.quiet {
         watch.sum_up(args, &plan, source.as_ref(), &again, (&summary, stored.frames));
     }
-    watch.tell_doubt(again.fits.as_ref());
+    let is_told = watch.tell_doubt(again.fits.as_ref());
     if end == End::Complete {
-        watch.tell_rate_fault(args, &plan);
+        watch.tell_contradictions(args, &plan, is_told);
     }
     let done = stored.frames + watch.progress.frames();
     // Ctrl-C is the only end of a run that waits for pictures.
@@ -170,6 +174,7 @@ struct Watch {
     improbable: Improbable,
     repeats: Repeats,
     shutter: Shutter,
+    altitudes: Altitudes,
     refusals: Refusals,
     multi_page: MultiPageFiles,
     masks: picture_folders::Masks,
@@ -195,6 +200,7 @@ impl Watch {
             improbable: Improbable::default(),
             repeats: Repeats::default(),
             shutter: Shutter::default(),
+            altitudes: Altitudes::default(),
             refusals: Refusals::default(),
             multi_page: MultiPageFiles::default(),
             masks: picture_folders::Masks::default(),
@@ -202,7 +208,7 @@ impl Watch {
         }
     }
 
-    fn see(&mut self, frame: &Finished) {
+    fn see(&mut self, frame: &Finished, config: &Config) {
         self.missing.count(frame);
         self.times.count(frame);
         self.rates.count(frame);
@@ -210,6 +216,7 @@ impl Watch {
         self.improbable.count(frame);
         self.repeats.count(frame);
         self.shutter.count(frame);
+        self.altitudes.count(frame, config);
         self.refusals.count(frame);
         self.multi_page.count(frame);
         if !self.quiet {
@@ -288,11 +295,11 @@ impl Watch {
     }
 
     /// Tells that the answers of the run are doubtful if the limb of refused pictures contradicts what the answers were
-    /// computed with.
+    /// computed with. Returns whether it told it.
     // The rows are written by then, and none of them is better than the others.
-    fn tell_doubt(&self, fits: Option<&WhatFits>) {
+    fn tell_doubt(&self, fits: Option<&WhatFits>) -> bool {
         let Some(fits) = fits.filter(|fits| fits.pictures >= DOUBTFUL_REFUSALS && self.progress.any_answered()) else {
-            return;
+            return false;
         };
         tell::warning(format_args!(
             "the answers are doubtful: {} refused pictures show a limb of another size than expected ({}). If the \
@@ -300,15 +307,19 @@ impl Watch {
              answers have the same lens and the same source of altitudes",
             fits.pictures, fits.text
         ));
+        true
     }
 
-    /// Tells that the answers are doubtful if the pictures of a rolling shutter contradict their rates.
-    fn tell_rate_fault(&self, args: &Args, plan: &Plan) {
+    /// Looks again at some pictures, and tells that the answers are doubtful if they contradict their rates, or all
+    /// together what was told of altitude and lens.
+    fn tell_contradictions(&self, args: &Args, plan: &Plan, is_told: bool) {
         let config = &plan.config;
         let Some(request) = request_again(args) else { return };
         let read = |indices: Vec<u64>| ReadAgain::read(&request, config, &indices);
         let rates = || read(self.shutter.pictures(config))?.rate_fault(&request, config);
-        if let Some(what) = rates() {
+        let limb = || read(self.altitudes.pictures())?.contradiction(&request, config);
+        // Wrong rates change the half-angles, too.
+        if let Some(what) = rates().or_else(|| if is_told { None } else { limb() }) {
             tell::warning(format_args!("the answers are doubtful: {what}"));
         }
     }

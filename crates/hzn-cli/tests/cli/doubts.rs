@@ -1,6 +1,7 @@
 //! Flights whose answers are each plausible, and together contradict what was told.
 
 use crate::common::{Place, cell};
+use crate::start::{Flight, Lens};
 
 /// A camera with a rolling shutter on a vehicle that tumbles.
 const TUMBLE: &str = "name = \"tumble\"\nutc = 2023-10-05T09:00:00Z\n[capture]\nfrom_s = 0.0\nto_s = 1500.0\n\
@@ -38,4 +39,27 @@ fn pictures_of_a_rolling_shutter_contradict_wrong_rates() {
     let negated = with_rates(&place, -1.0);
     assert!(negated.contains("the answers are doubtful: ") && negated.contains("wrong sign?"), "{negated}");
     assert!(!with_rates(&place, 1.0).contains("doubtful"));
+}
+
+#[test]
+fn all_answers_together_contradict_a_wrong_altitude() {
+    let place = Place::new();
+    let lens = &Lens { name: "pinhole", guess: "pinhole", fov_deg: 60.0, k: &[0.0] };
+    Flight { frames: 16, altitude_km: 900.0, seed: 23, ..Flight::new(lens) }.render(&place);
+    // Nothing but the command line says an altitude.
+    std::fs::remove_file(place.path("flight/frames.csv")).unwrap();
+    let told = |altitude: &str, fov: &str| {
+        let guess = ["--fov", fov, "--lens", lens.guess, "--altitude", altitude];
+        let init = [&["init", "flight", "-o", "mine.toml", "--force"], &guess[..]].concat();
+        place.run(&init).expect(0);
+        place.run(&["run", "flight", "--sensor", "mine.toml", "-q"]).expect(0).err
+    };
+    for (altitude, fov) in [("900", "60"), ("900", "58.5"), ("880", "62")] {
+        let right = told(altitude, fov);
+        assert!(!right.contains("doubtful"), "{altitude} km, {fov} deg: {right}");
+    }
+    let low = told("720", "60");
+    assert!(low.contains("the answers are doubtful: "), "{low}");
+    let km = low.split_once("an altitude of ").expect(&low).1.split_once(" km instead of 720 km").expect(&low).0;
+    assert!((km.parse::<f64>().unwrap() / 900.0 - 1.0).abs() < 0.1, "{low}");
 }

@@ -6,7 +6,8 @@
 //! [`find_misfit`] returns what this limb says, as [`FitFacts`], and [`what_fits`] says it in words. [`summarise`]
 //! compares the pictures of a sequence, [`find_pair`] finds two wrong values, and [`is_limb_as_expected`] says whether
 //! nothing is wrong. [`find_field_of_view`] finds the field of view of a camera of which nothing is
-//! known. [`find_rate_fault`] says whether the pictures of a rolling shutter contradict their rates.
+//! known. [`find_rate_fault`] says whether the pictures of a rolling shutter contradict their rates, and
+//! [`contradictions`] whether all answers together contradict altitude and lens.
 
 mod any_cone;
 mod facts;
@@ -15,6 +16,7 @@ mod implied;
 mod joint;
 mod misfit;
 mod rates;
+mod together;
 mod words;
 
 pub use any_cone::{AnyCone, longest_edge};
@@ -24,4 +26,5 @@ pub use implied::{find_fit, fit_facts};
 pub use joint::{Pair, Remedy, find_pair};
 pub use misfit::{find_any_fit, find_misfit};
 pub use rates::{Gains, RateFault, RateTrial, find_rate_fault};
-pub use words::what_fits;
+pub use together::{Contradiction, Fault, Said, contradictions};
+pub use words::{contradiction, what_fits};

@@ -4,6 +4,7 @@ use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
 
 use super::facts::{FitFacts, Implied};
+use super::together::{Contradiction, Fault};
 
 /// Says which half-angle the limb has, and which altitude or field of view would make it the expected one: `the limb
 /// fits 78.6 +- 0.8 deg, expected 75.1 deg: altitude 146 +- 25 km, or a field of view of 91.0 deg at 240 km`. `width`
@@ -27,6 +28,36 @@ pub fn what_fits(fit: &FitFacts, camera: &Camera<f64>, width: u16) -> String {
         (Some(one), None) | (None, Some(one)) => format!("{limb}: {one}"),
         (None, None) => limb,
     }
+}
+
+/// Says which values would explain the half-angles of all answers. `altitude_km` is the median of those that the
+/// pictures were processed with; `width` and `camera` are those of the pictures.
+pub fn contradiction(
+    found: &[Contradiction],
+    altitude_km: Option<f64>,
+    camera: &Camera<f64>,
+    width: u16,
+) -> Option<String> {
+    let sigmas = found.first()?.sigmas;
+    let one = |found: &Contradiction| {
+        Some(match found.fault {
+            Fault::Altitude => {
+                format!("an altitude of {:.0} km instead of {:.0} km", altitude_km? + found.size, altitude_km?)
+            }
+            Fault::FieldOfView => {
+                let [right, told] = [found.size.exp(), 1.0].map(|factor| field_of_view_deg(camera, width, factor));
+                format!("a field of view of {:.1} deg instead of {:.1} deg", right?, told?)
+            }
+            Fault::Aspect => format!(
+                "a ratio fx_px/fy_px that is {:.2} times as large, as in pictures that were scaled to another shape",
+                found.size.exp()
+            ),
+        })
+    };
+    let each: Vec<String> = found.iter().filter_map(one).collect();
+    (!each.is_empty()).then(|| {
+        format!("their half-angles together are {sigmas:.1} sigma off. What would explain them: {}", each.join("; or "))
+    })
 }
 
 /// Returns the field of view over the width of the picture in degrees if both focal lengths are multiplied by `factor`;
