@@ -244,7 +244,7 @@ mod tests {
     fn flight(normal: &mut Normal, pictures: usize, alike: f64, km: f64) -> Vec<Said> {
         let errors: [f64; 4] = std::array::from_fn(|_| normal.draw());
         let one = |i: usize| {
-            let side = if i % 2 == 0 { 1.0 } else { -0.7 } * (1.0 + 0.1 * (i % 5) as f64);
+            let side = if i.is_multiple_of(2) { 1.0 } else { -0.7 } * (1.0 + 0.1 * (i % 5) as f64);
             let (lens, expected_sigma) = (vec![0.02 * side, 0.008 * side * side], 0.004);
             let (own_sigma, by_km) = (0.004 + 0.003 * (i % 3) as f64, 2.7e-4);
             let own = alike.sqrt() * errors[3] + (1.0 - alike).sqrt() * normal.draw();
