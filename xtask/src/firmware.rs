@@ -77,9 +77,9 @@ impl Board {
     }
 }
 
-/// Builds hzn-core without default features.
-pub(crate) fn build_core() -> Outcome {
-    let (mut command, _) = Toolchain::find()?.cargo("build", M4.dir, &["--package", "hzn-core"]);
+/// Checks that hzn-core compiles without the features that the images add. They link it, so this makes no code.
+pub(crate) fn check_core() -> Outcome {
+    let (mut command, _) = Toolchain::find()?.cargo("check", M4.dir, &["--package", "hzn-core"]);
     steps::run(configure_for_firmware(&mut command, M4.flags))
 }
 
@@ -109,29 +109,31 @@ pub(crate) fn is_the_same_elsewhere(clone: &Path) -> Outcome {
     steps::compare_bytes("stm32h743 flight", &here, &there)
 }
 
-/// Builds what the image tests need, then runs the tests and checks the C interface. With `--all` there are also the
-/// other images and the costs.
+/// Builds what the image tests need, then runs the tests. With `--all` there are also the other images, the costs, the
+/// project of the guide, and the package for C.
 pub(crate) fn test(steps: &mut Steps) -> Outcome {
     steps.images.wait();
     build(steps.all)?;
     soft_double::check(&images_of(AN386.name).join("chain"))?;
-    lint_and_document()?;
+    lint(steps.all)?;
     build_tests()?;
     if steps.all {
         test_every_image(steps)?;
+        run_own_firmware()?;
+        check_c_interface()
     } else {
         test_images_once(steps)?;
+        own_firmware("check").map(|_| ())
     }
-    run_own_firmware()?;
-    check_c_interface(steps.all)
 }
 
 /// The project that the guide builds from nothing.
 const OWN_FIRMWARE: &str = "examples/own-firmware";
 
-/// Builds the project of the guide as a user does, with its own profile, flags and lock. Returns the image.
-fn build_own_firmware() -> Result<PathBuf, Trouble> {
-    let (mut command, built) = Toolchain::find()?.cargo_with_profile("release", "build", "firmware/own", &[]);
+/// Builds the project of the guide as a user does, with its own profile, flags and lock, or only checks it. Returns the
+/// image.
+fn own_firmware(verb: &str) -> Result<PathBuf, Trouble> {
+    let (mut command, built) = Toolchain::find()?.cargo_with_profile("release", verb, "firmware/own", &[]);
     steps::run(command.current_dir(root().join(OWN_FIRMWARE)))?;
     Ok(built.join("own-firmware"))
 }
@@ -139,7 +141,7 @@ fn build_own_firmware() -> Result<PathBuf, Trouble> {
 /// Runs the project of the guide in QEMU. Its output must be the one that the guide shows. Its linker script has
 /// 192 KiB of RAM.
 fn run_own_firmware() -> Outcome {
-    let image = build_own_firmware()?;
+    let image = own_firmware("build")?;
     steps::run(Command::new("arm-none-eabi-size").arg(&image))?;
     let mut qemu = Command::new("timeout");
     qemu.args(["60", "qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "null"])
@@ -192,23 +194,16 @@ fn run_image_tests(steps: &mut Steps, board: &str, filters: &[&str]) -> Outcome 
     steps.count_tests(command.args(filters).env("HZN_BOARD", board))
 }
 
-/// Runs the lints, the documentation build and the tests of the firmware workspace. A test checks that the C header
-/// agrees with the library.
-fn lint_and_document() -> Outcome {
-    let on_this_machine = |verb: &str, more: &[&str]| {
-        let mut command = cargo(&[verb, "--package", "hzn-c"]);
-        steps::run(command.args(more).env("RUSTDOCFLAGS", "-D warnings"))
-    };
-    on_this_machine("test", &["--quiet"])?;
-    on_this_machine("clippy", &["--all-targets", "--", "-D", "warnings"])?;
-    on_this_machine("doc", &["--no-deps"])?;
+/// Runs the lints of the images, or of those that every check runs. The steps of the whole workspace have those of
+/// hzn-c.
+fn lint(every_image: bool) -> Outcome {
     let toolchain = Toolchain::find()?;
     if matches!(toolchain, Toolchain::Debian) {
         println!("lints of the images are skipped: Debian's Rust has no clippy for the target");
         return Ok(());
     }
     // The flags of a core change no lint, so all boards are checked with those of one.
-    BOARDS.iter().try_for_each(|board| {
+    BOARDS.iter().filter(|board| every_image || !board.always.is_empty()).try_for_each(|board| {
         let board = Board { core: M4, ..*board };
         board.build(toolchain, "clippy", M4.dir, &root(), &["--", "-D", "warnings"]).map(|_| ())
     })
@@ -254,8 +249,7 @@ fn print_flash_by_feature() -> Outcome {
 /// Builds all that the step `firmware` of every check runs.
 fn build_ahead() -> Outcome {
     build(false)?;
-    build_own_firmware()?;
-    build_c_library()
+    own_firmware("check").map(|_| ())
 }
 
 /// `cargo xtask firmware [--write | --build | --by-feature]`: builds the images and measures what they cost.
@@ -305,14 +299,10 @@ fn check_no_panics(board: &str, image: &str) -> Outcome {
 /// Features and form of the library for C.
 const C_LIBRARY: [&str; 7] = ["--package", "hzn-c", "--lib", "--crate-type", "staticlib", "--features", "standalone"];
 
-/// Builds the library for C with the profile of the images.
-fn build_c_library() -> Outcome {
-    steps::run(cargo(&["rustc", "--profile", "flight"]).args(C_LIBRARY))
-}
-
-/// Builds the C example and the package for this machine. With `in_qemu` the example must give the same bits there.
-fn check_c_interface(in_qemu: bool) -> Outcome {
-    build_c_library()?;
+/// Builds the C example and the package for this machine. In QEMU the example must give the same bits.
+fn check_c_interface() -> Outcome {
+    // With the profile of the images.
+    steps::run(cargo(&["rustc", "--profile", "flight"]).args(C_LIBRARY))?;
     let c = root().join("firmware/hzn-c");
     let (example, include) = (c.join("example"), format!("-I{}", c.join("include").display()));
     let out = target().join("firmware/c");
@@ -327,11 +317,9 @@ fn check_c_interface(in_qemu: bool) -> Outcome {
     )?;
     let host = output_of(&mut Command::new(out.join("host")))?;
     println!("{host}");
-    if in_qemu {
-        let emulated = run_c_example_in_qemu(&example, &flags, &out)?;
-        if host != emulated {
-            return Err(Trouble::Failed(format!("the C example prints another result in QEMU:\n{emulated}")));
-        }
+    let emulated = run_c_example_in_qemu(&example, &flags, &out)?;
+    if host != emulated {
+        return Err(Trouble::Failed(format!("the C example prints another result in QEMU:\n{emulated}")));
     }
     crate::c_package::check(&c, &target(), &out)
 }

@@ -46,7 +46,7 @@ const STEPS: &[Step] = &[
     every("packages", |_| check_packages()),
     every("flight build", |steps| {
         steps.images.wait();
-        firmware::build_core()
+        firmware::check_core()
     }),
     every("firmware", firmware::test),
     every("examples of hzn-core", |_| run_core_examples()),
