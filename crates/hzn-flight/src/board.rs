@@ -86,6 +86,24 @@ pub trait Board {
     fn read_copy(&mut self, copy: u8, into: &mut [u8]);
     /// Writes copy 1 or 2 of the parameters. Returns false if the memory refuses.
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool;
+    /// Returns whether keys were ever put into the memory of this board. Telecommands then need a trailer
+    /// ([`crate::authentication`]), and a key that is missing or damaged closes the line.
+    // Asked apart from the keys, because a damaged memory must not look like a board that never had any.
+    fn has_keys(&mut self) -> bool {
+        false
+    }
+    /// Reads the key at this place, from 0 to [`crate::authentication::KEYS`] - 1.
+    fn read_key(&mut self, _place: u8, _into: &mut [u8; crate::authentication::KEY_BYTES]) {}
+    /// Reads the counter that was written last for the key at this place; `None` if it is missing or damaged. The tool
+    /// that stores a key also stores the counter 0.
+    fn read_counter(&mut self, _place: u8) -> Option<u64> {
+        None
+    }
+    /// Writes the counter for the key at this place, so that it survives a reset and a power cut. Returns false if the
+    /// memory refuses.
+    fn write_counter(&mut self, _place: u8, _counter: u64) -> bool {
+        false
+    }
     /// Takes note of the parameters of the sensor that is in use from now on, for a log, for example: at the start,
     /// after a telecommand, and after the repair of a memory error.
     fn note_sensor(&mut self, _config: &Config) {}

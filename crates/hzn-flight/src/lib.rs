@@ -25,6 +25,7 @@
 //! | [`flight`] | the loop |
 //! | [`view`] | the two ways in which a board shows a picture |
 //! | [`table`] | the parameters as bytes with a checksum |
+//! | [`authentication`] | telecommands that only the owner of a secret can make |
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -35,6 +36,7 @@ extern crate std;
 pub mod answer;
 pub mod assembly;
 pub mod attitude;
+pub mod authentication;
 pub mod board;
 pub mod bytes;
 pub mod cuc;

@@ -48,6 +48,14 @@ numbered_enum! {
         NoPulse = 11 => "no pulse within the last 1.5 s",
         /// The time is TAI, and the clock is not correlated.
         NoClock = 12 => "the clock is not correlated",
+        /// The computer has keys, and the telecommand has no trailer ([`crate::authentication`]).
+        NoTrailer = 13 => "not authenticated",
+        /// No key of the computer gives the code of the trailer.
+        Stranger = 14 => "the code of the trailer is wrong",
+        /// The counter of the trailer is not above the last one, or not above those that were reserved before a reset.
+        Replay = 15 => "the counter of the trailer was used or reserved before",
+        /// The keys or a counter in the memory of the computer cannot be used.
+        Closed = 16 => "the keys of the computer cannot be used",
     }
 }
 

@@ -118,19 +118,29 @@ pub fn write(
     body.bytes(&time.map_or([0; TIME], Cuc::to_bytes));
     user(&mut body);
     let len = body.finish()?;
-    let command = u16::from(apid == Apid::Command);
+    let header = primary_header(base, apid, sequence, len.checked_sub(TIME)?)?;
     let mut head = Writer::new(out);
     head.bytes(&SYNC);
-    head.u16(command << 12 | 1 << 11 | base.apid(apid));
-    head.u16(UNSEGMENTED << 14 | sequence & 0x3FFF);
-    // CCSDS 133.0-B counts from 0, because no packet is without data: 0 means one byte.
-    head.u16(u16::try_from(len + CRC - 1).ok()?);
+    head.bytes(&header);
     head.finish()?;
     let end = SYNC.len() + HEADER + len;
     let crc = CRC16.checksum(out.get(SYNC.len()..end)?);
     out.get_mut(end..end + CRC)?.copy_from_slice(&crc.to_be_bytes());
     // A longer packet is not sent, because `length` would refuse it at the receiver.
     (end + CRC <= MAX_BYTES).then_some(end + CRC)
+}
+
+/// Returns the primary header of a packet with so many bytes of user data; `None` if they do not fit into its length.
+pub(crate) fn primary_header(base: ApidBase, apid: Apid, sequence: u16, user_bytes: usize) -> Option<[u8; HEADER]> {
+    let mut header = [0; HEADER];
+    let command = u16::from(apid == Apid::Command);
+    let mut out = Writer::new(&mut header);
+    out.u16(command << 12 | 1 << 11 | base.apid(apid));
+    out.u16(UNSEGMENTED << 14 | sequence & 0x3FFF);
+    // CCSDS 133.0-B counts from 0, because no packet is without data: 0 means one byte.
+    out.u16(u16::try_from(TIME + user_bytes + CRC - 1).ok()?);
+    out.finish()?;
+    Some(header)
 }
 
 /// A received packet.

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use crossbeam_channel::{Receiver, Select};
 use hzn_core::{Config, Report};
 use hzn_flight::Parameters;
+use hzn_flight::authentication::KEY_BYTES;
 use hzn_flight::board::{BUILD, Board, Image, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::Reader;
 use hzn_flight::flight::rig::RigBoard;
@@ -22,6 +23,7 @@ use crate::camera::{Ended, Shot};
 use crate::head::{Counts, Head};
 use crate::joint::joint_row;
 use crate::keeper::Keeper;
+use crate::key_file::Keys;
 use crate::latency::Latency;
 use crate::link::Link;
 use crate::log::Log;
@@ -41,6 +43,7 @@ pub(crate) struct Parts {
     pub(crate) latency: Arc<Latency>,
     pub(crate) log: Log,
     pub(crate) lines: Arc<Lines>,
+    pub(crate) keys: Keys,
     pub(crate) notify: Notify,
     pub(crate) tell: Tell,
 }
@@ -257,6 +260,18 @@ impl Board for Linux {
     }
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool {
         self.head().is_some_and(|head| head.write_copy(copy, bytes))
+    }
+    fn has_keys(&mut self) -> bool {
+        self.parts.keys.is_used()
+    }
+    fn read_key(&mut self, place: u8, into: &mut [u8; KEY_BYTES]) {
+        self.parts.keys.read(place, into);
+    }
+    fn read_counter(&mut self, place: u8) -> Option<u64> {
+        self.parts.keys.counter(place)
+    }
+    fn write_counter(&mut self, place: u8, counter: u64) -> bool {
+        self.parts.keys.write_counter(place, counter)
     }
     fn note_sensor(&mut self, config: &Config) {
         let selected = self.selected;

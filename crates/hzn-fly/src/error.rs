@@ -18,6 +18,7 @@ impl Error {
         Self { is_usage: false, message: message.to_string() }
     }
     /// Returns the same error with the name of the head.
+    #[cfg(target_os = "linux")]
     pub(crate) fn in_head(self, name: &str) -> Self {
         Self { message: format!("head {name}: {}", self.message), ..self }
     }

@@ -17,6 +17,7 @@ use crate::error::Error;
 use crate::flash::{self, Flash};
 use crate::head::{Counts, Feed, Head};
 use crate::keeper::{Keeper, Which};
+use crate::key_file::Keys;
 use crate::latency::{Latency, LatencySummary};
 use crate::link::{Address, Link, Patience};
 use crate::log::{Limits, Log, Sensors};
@@ -49,6 +50,8 @@ pub struct Settings {
     pub replaces_parameters: bool,
     /// The line for telecommands and telemetry; without it, there is only the log.
     pub line: Option<Address>,
+    /// The files of the keys of telecommands, at most two; without them, every telecommand is taken.
+    pub keys: Vec<PathBuf>,
     /// The folder for parameters and log.
     pub state: PathBuf,
     /// Most bytes of the log.
@@ -112,7 +115,8 @@ pub(crate) fn open_parts(
     let log = Log::open(&log_folder, limits, sensors, tell.clone())
         .map_err(|e| Error::failed(format!("{}: {e}", log_folder.display())))?;
     let notify = Notify::from_environment();
-    Ok(Parts { line, latency, log, lines, notify, tell: tell.clone() })
+    let keys = Keys::new(&settings.keys, tell);
+    Ok(Parts { line, latency, log, lines, keys, notify, tell: tell.clone() })
 }
 
 fn run(board: Linux) -> Result<Summary, Error> {
@@ -265,6 +269,7 @@ mod tests {
                     latency: Arc::new(Latency::default()),
                     log,
                     lines: Arc::new(Lines::default()),
+                    keys: Keys::default(),
                     notify: Notify::from_environment(),
                     tell,
                 };

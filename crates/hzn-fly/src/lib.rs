@@ -27,7 +27,6 @@
 mod board;
 #[cfg(target_os = "linux")]
 pub mod camera;
-#[cfg(target_os = "linux")]
 mod error;
 #[cfg(target_os = "linux")]
 pub mod flash;
@@ -38,6 +37,7 @@ mod head;
 pub mod joint;
 #[cfg(target_os = "linux")]
 mod keeper;
+pub mod key_file;
 pub mod latency;
 pub mod link;
 #[cfg(target_os = "linux")]
@@ -56,8 +56,6 @@ mod signals;
 mod start;
 pub mod tell;
 
-#[cfg(target_os = "linux")]
-#[cfg(target_os = "linux")]
 pub use error::Error;
 #[cfg(target_os = "linux")]
 pub use head::Counts;

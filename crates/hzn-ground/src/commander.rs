@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use hzn_flight::messages::{Acknowledge, Code};
 use hzn_flight::packet::ApidBase;
+use hzn_fly::key_file::Signer;
 use hzn_fly::tell::Tell;
 
 use crate::encode::{encode, write_packet};
@@ -19,6 +20,9 @@ const LONGEST: Duration = Duration::from_secs(3);
 pub struct Commander {
     tell: Tell,
     base: ApidBase,
+    signer: Option<Signer>,
+    /// Whether a refusal for the counter has led to a larger one.
+    has_skipped: bool,
     sequence: u16,
     has_sent: bool,
     /// Whether a packet was acknowledged, or refused for its sequence count.
@@ -72,9 +76,24 @@ impl Commander {
     /// # Errors
     /// A command is refused, see [`encode`].
     pub fn new(base: ApidBase, sequence: u16, commands: &[String], tell: Tell) -> Result<Self, Error> {
-        let mut new = Self { tell, base, sequence, has_sent: false, knows_sequence: false, waiting: VecDeque::new() };
+        let mut new = Self {
+            tell,
+            base,
+            signer: None,
+            has_skipped: false,
+            sequence,
+            has_sent: false,
+            knows_sequence: false,
+            waiting: VecDeque::new(),
+        };
         commands.iter().try_for_each(|text| new.add(text))?;
         Ok(new)
+    }
+
+    /// Makes the packets from now on have the trailer of a key.
+    #[must_use]
+    pub fn signed_by(self, signer: Option<Signer>) -> Self {
+        Self { signer, ..self }
     }
 
     /// Returns the APIDs of the flight computer.
@@ -110,10 +129,14 @@ impl Commander {
     /// Returns the packet to send now, if there is one.
     ///
     /// # Errors
-    /// A packet is too long.
+    /// A packet is too long, or the counter of the key cannot be kept.
     pub fn next(&mut self, now: Instant) -> Result<Option<Vec<u8>>, Error> {
         let Some(first) = self.waiting.front_mut().filter(|first| first.sent.is_none()) else { return Ok(None) };
-        let bytes = write_packet(self.base, self.sequence, &first.text, &first.user)?;
+        let sealed = match &mut self.signer {
+            Some(signer) => &signer.seal(self.base, self.sequence, &first.user).map_err(Error::unusable)?,
+            None => &first.user,
+        };
+        let bytes = write_packet(self.base, self.sequence, &first.text, sealed)?;
         first.sent = Some(Sent { sequence: self.sequence, at: now });
         self.sequence = (self.sequence + 1) & 0x3FFF;
         self.has_sent = true;
@@ -129,6 +152,15 @@ impl Commander {
         // Later packets follow one that was taken, so that their refusal has another cause: a second ground station.
         if a.code == Code::Sequence as u8 && !self.knows_sequence {
             (first.sent, self.sequence, self.knows_sequence) = (None, (a.detail + 1) & 0x3FFF, true);
+            return None;
+        }
+        // After a reset the computer refuses the counters that it had reserved. None of its own is above these.
+        if a.code == Code::Replay as u8
+            && !self.has_skipped
+            && let Some(signer) = &mut self.signer
+            && signer.skip_reserved().is_ok()
+        {
+            (first.sent, self.has_skipped) = (None, true);
             return None;
         }
         self.knows_sequence = true;

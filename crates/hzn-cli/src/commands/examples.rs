@@ -121,11 +121,16 @@ hzn camera convert sensor.toml --to opencv -o camera.yaml     into a file of Ope
 camera | hzn fly - -s sensor.toml --raw 640x480:mono8    pictures of another program",
     ),
     (
+        "key",
+        "hzn key vehicle.key --spacecraft 42 --number 1   a new key, and its counter
+hzn key vehicle.key                              what the key is for, without its secret",
+    ),
+    (
         "telemetry",
         "hzn telemetry stream.bin -o answers.csv             a received file, as a table
 hzn telemetry udp:0.0.0.0:5006,10.0.0.1:5005 --screen   a line, on the whole terminal",
     ),
-    ("telecommand", "hzn telecommand status \"set gates.max_rms_px 2.5\" -o commands.bin"),
+    ("telecommand", "hzn telecommand report \"set gates.max_rms_px 2.5\" -o commands.bin"),
     (
         "view",
         "hzn view flight/          the pictures of a folder, with their edges and points

@@ -41,6 +41,10 @@ pub(super) struct Args {
     /// it, there is only the log
     #[arg(long, value_name = "LINE")]
     line: Option<Address>,
+    /// The key of telecommands, a file that `hzn key` makes, with its counter beside it; a second one for the change to
+    /// another key. Telecommands of others are then refused
+    #[arg(long, value_name = "FILE", num_args = 1..=2)]
+    key: Vec<PathBuf>,
     /// The folder for parameters and log; without it, $STATE_DIRECTORY (of systemd), or ./hzn-fly
     #[arg(long, value_name = "DIR")]
     state: Option<PathBuf>,
@@ -85,6 +89,7 @@ pub(super) fn run(args: Args) -> Outcome {
         sensor: sensor.map(|sensor| sensor.config),
         replaces_parameters: args.load,
         line: args.line,
+        keys: args.key,
         state,
         log_bytes: args.log_mb * 1_000_000,
         kept_pictures: args.keep_pictures.map(|which| (which, args.pictures_mb * 1_000_000)),

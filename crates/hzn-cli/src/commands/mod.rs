@@ -16,6 +16,7 @@ mod ground;
 mod info;
 mod init;
 mod init_rig;
+mod key;
 mod lens_model;
 mod man;
 mod migrate;
@@ -80,6 +81,7 @@ enum Command {
     Camera(camera::Args),
     #[cfg(target_os = "linux")]
     Fly(fly::Args),
+    Key(key::Args),
     Telemetry(telemetry::Args),
     Telecommand(telecommand::Args),
     View(view::Args),
@@ -123,6 +125,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Camera(args) => camera::run(&args),
         #[cfg(target_os = "linux")]
         Command::Fly(args) => fly::run(args),
+        Command::Key(args) => key::run(&args),
         Command::Telemetry(args) => telemetry::run(&args),
         Command::Telecommand(args) => telecommand::run(&args),
         Command::View(args) => view::run(&args),

@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
+use hzn_fly::key_file::Signer;
 use hzn_fly::link::{Address, Patience};
 use hzn_ground::{Commander, Incoming, encode, loaded_files, write_packet};
 use hzn_run::disk;
 
 use crate::apid::ApidArgs;
-use crate::exit::{Exit, Outcome};
+use crate::exit::{Exit, Outcome, failed, usage};
 use crate::files;
 use crate::tell;
 
@@ -47,6 +48,10 @@ pub(super) struct Args {
     /// Sequence count of the first command, 0 to 16383
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(..16384))]
     sequence: u16,
+    /// The key of the flight computer (`hzn key`); its counter is kept beside it. With -o or standard output, counters
+    /// that a reset of the computer may have reserved are left out
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
     #[command(flatten)]
     apids: ApidArgs,
     /// Replace an output that exists
@@ -56,15 +61,24 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let tell = tell::to_stderr();
+    let mut signer = args.key.as_deref().map(Signer::open).transpose().map_err(usage)?;
     if let Some(address) = &args.to {
-        let commander = Commander::new(args.apids.apid_base, args.sequence, &args.commands, tell.clone())?;
+        let commander =
+            Commander::new(args.apids.apid_base, args.sequence, &args.commands, tell.clone())?.signed_by(signer);
         let is_done = Incoming::open(address, Patience::Fails)?.command(commander, &tell)?;
         return Ok(if is_done { Exit::Done } else { Exit::Failed });
+    }
+    if let Some(signer) = &mut signer {
+        signer.skip_reserved().map_err(failed)?;
     }
     let mut out = Vec::new();
     let mut sequence = args.sequence;
     for command in &args.commands {
         for user in encode(command, &tell)? {
+            let user = match &mut signer {
+                Some(signer) => signer.seal(args.apids.apid_base, sequence, &user).map_err(failed)?,
+                None => user,
+            };
             out.extend(write_packet(args.apids.apid_base, sequence, command, &user)?);
             sequence = (sequence + 1) & 0x3FFF;
         }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use hzn_files::limited;
+use hzn_fly::key_file::Signer;
 use hzn_fly::link::{Address, Patience};
 use hzn_ground::{Commander, Incoming, Station, loaded_files, xtce};
 use hzn_run::disk;
@@ -42,6 +43,9 @@ pub(super) struct Args {
     /// A command to send, as for `hzn telecommand`; each waits for the acknowledgement of the one before
     #[arg(long, value_name = "COMMAND")]
     send: Vec<String>,
+    /// The key of the flight computer for the commands (`hzn key`)
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
     /// The file for the answers: .csv, .jsonl or .mcap
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -84,7 +88,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut station = Station::new(base, output, housekeeping, args.force, tell.clone())?;
     let mut rest = bytes;
     if let Some(live) = live {
-        let commander = Commander::new(base, 0, &args.send, tell.clone())?;
+        let signer = args.key.as_deref().map(Signer::open).transpose().map_err(usage)?;
+        let commander = Commander::new(base, 0, &args.send, tell.clone())?.signed_by(signer);
         rest = if args.screen {
             show(live, &mut station, commander)?
         } else {

@@ -4,10 +4,11 @@
 //! line may own it, and because the line may return the packets of this computer.
 
 use super::Flight;
+use crate::authentication::{Admitted, Gate};
 use crate::board::Board;
 use crate::bytes::Reader;
 use crate::inbox::{Filled, Inbox};
-use crate::messages::{Acknowledge, Code, Event, Function};
+use crate::messages::{Acknowledge, Code, Event, Function, Housekeeping};
 use crate::packet::{Apid, MAX_BYTES};
 
 /// Most bytes that are read in a turn. More bytes wait in the memory of the serial port.
@@ -22,6 +23,20 @@ pub(super) const MAX_EFFORT: usize = 2 * MAX_BYTES;
 #[inline(always)]
 pub(super) fn may_hold_packet(filled: Filled, is_done: bool, effort: usize) -> bool {
     filled != Filled::Full && !is_done && effort < MAX_EFFORT
+}
+
+/// What belongs to the line to the computer.
+#[derive(Debug)]
+pub(super) struct Uplink {
+    pub(super) inbox: Inbox,
+    pub(super) gate: Gate,
+}
+
+impl Uplink {
+    /// Makes an uplink of all zeros.
+    pub(super) const fn new() -> Self {
+        Self { inbox: Inbox::new(), gate: Gate::new() }
+    }
 }
 
 /// A packet that was received.
@@ -41,11 +56,11 @@ impl<B: Board> Flight<'_, B> {
     pub(super) fn listen(&mut self) {
         let now_us = self.board.now_us();
         // Given back below, because handling a packet needs the rest of the loop.
-        let Some(inbox) = self.inbox.take() else { return };
-        inbox.reset_effort();
+        let Some(uplink) = self.uplink.take() else { return };
+        uplink.inbox.reset_effort();
         let (mut bytes, mut is_done) = (0, false);
         loop {
-            let board = &mut self.board;
+            let (board, inbox) = (&mut self.board, &mut uplink.inbox);
             let most = (MAX_READ - bytes).min(MAX_EFFORT.saturating_sub(inbox.effort()));
             if most == 0 {
                 break;
@@ -54,8 +69,8 @@ impl<B: Board> Flight<'_, B> {
             // Without this, and with pauses that were not always noticed, 59 of 200 339 telecommands were lost.
             let (count, filled) = inbox.fill(now_us, most, is_done, || board.receive());
             bytes += count;
-            while may_hold_packet(filled, is_done, inbox.effort()) {
-                match self.handle_packet(inbox, now_us) {
+            while may_hold_packet(filled, is_done, uplink.inbox.effort()) {
+                match self.handle_packet(uplink, now_us) {
                     Some(is_command) => is_done = is_command,
                     None => break,
                 }
@@ -64,16 +79,16 @@ impl<B: Board> Flight<'_, B> {
                 break;
             }
         }
-        self.inbox = Some(inbox);
+        self.uplink = Some(uplink);
         self.limiter.add_received(bytes as u16);
     }
 
     /// Handles a packet that has arrived. Returns whether it was a telecommand; `None` if there is no packet.
-    fn handle_packet(&mut self, inbox: &mut Inbox, now_us: u64) -> Option<bool> {
+    fn handle_packet(&mut self, uplink: &mut Uplink, now_us: u64) -> Option<bool> {
         let base = self.buffers.line.base();
         // The memory for packets that are sent is free now.
         let room = &mut self.buffers.line.out;
-        let received = inbox.next(now_us, |packet| {
+        let received = uplink.inbox.next(now_us, |packet| {
             let Some(packet) = packet else { return Received::Broken };
             if base.subject(&packet) != Some(Apid::Command) {
                 return Received::Foreign;
@@ -87,7 +102,9 @@ impl<B: Board> Flight<'_, B> {
             Received::Broken => self.note_broken_packet(),
             Received::Foreign => self.state.foreign = self.state.foreign.saturating_add(1),
             Received::Command { sequence, bytes } => {
-                self.handle_command(sequence, bytes);
+                let user = self.buffers.line.out.get(..bytes).unwrap_or_default();
+                let admitted = uplink.gate.admit(&mut self.board, base, sequence, user);
+                self.handle_admitted(sequence, admitted);
                 return Some(true);
             }
         }
@@ -102,7 +119,7 @@ impl<B: Board> Flight<'_, B> {
 
     /// Carries out and acknowledges a telecommand, whose user data are in the memory for packets that are sent.
     #[inline(never)]
-    pub(super) fn handle_command(&mut self, sequence: u16, bytes: usize) {
+    fn handle_command(&mut self, sequence: u16, bytes: usize) {
         // The data are copied, because the command may use every buffer.
         let user = self.buffers.line.out;
         let mut from = Reader::new(user.get(..bytes).unwrap_or_default());
@@ -127,6 +144,38 @@ impl<B: Board> Flight<'_, B> {
         self.acknowledge(number, sequence, code);
         // A new base is valid from the next packet on, so that the acknowledgement comes from the old one.
         self.buffers.line.set_base(self.operations.get().base());
+    }
+
+    /// Handles a telecommand whose sender was looked at. Its user data are in the memory for packets that are sent.
+    pub(super) fn handle_admitted(&mut self, sequence: u16, admitted: Admitted) {
+        match admitted {
+            Admitted::Taken(bytes) => self.handle_command(sequence, bytes),
+            Admitted::Anonymous => self.answer_anonymous(sequence),
+            Admitted::Refused(code) => self.refuse_stranger(sequence, code),
+        }
+    }
+
+    /// Carries out `ping` or `report` of somebody without a key. Its sequence count does not count: a stranger could
+    /// otherwise move the window away from that of the operator.
+    fn answer_anonymous(&mut self, sequence: u16) {
+        let number = self.buffers.line.out.first().copied().unwrap_or(0);
+        // A stranger could otherwise fill the line with answers.
+        if !self.may_answer(Acknowledge::BYTES + Housekeeping::BYTES) {
+            return;
+        }
+        self.detail = 0;
+        let code = match Function::from_number(number) {
+            Some(function) => self.carry_out(function, &mut Reader::new(&[])),
+            None => Code::Unknown,
+        };
+        self.acknowledge(number, sequence, code);
+    }
+
+    /// Refuses a telecommand that is not authenticated. Nothing but a counter changes.
+    fn refuse_stranger(&mut self, sequence: u16, code: Code) {
+        let number = self.buffers.line.out.first().copied().unwrap_or(0);
+        self.detail = 0;
+        self.acknowledge(number, sequence, code);
     }
 
     /// Returns whether a sequence count is within the window after that of the last telecommand that was taken.

@@ -28,7 +28,6 @@ use hzn_core::Sensor;
 use hzn_twice::KeptTwice;
 
 use crate::board::Board;
-use crate::inbox::Inbox;
 use crate::messages::{Event, Housekeeping, Mode};
 use crate::operations::Operations;
 use crate::store::{self, Loaded};
@@ -63,13 +62,14 @@ use budget::BitBudget;
 use camera_watch::CameraWatch;
 use known::Known;
 use line::Line;
+use listen::Uplink;
 use recovery::Recovery;
 use reports::Limiter;
 
 /// The memory of the flight software in addition to the lists of a picture; keep it in a `static`.
 #[derive(Debug)]
 pub struct Buffers {
-    inbox: Inbox,
+    uplink: Uplink,
     own: HeadBuffers,
 }
 
@@ -82,7 +82,7 @@ impl Default for Buffers {
 impl Buffers {
     /// Makes buffers of all zeros.
     pub const fn new() -> Self {
-        Self { inbox: Inbox::new(), own: HeadBuffers::new() }
+        Self { uplink: Uplink::new(), own: HeadBuffers::new() }
     }
 }
 
@@ -117,7 +117,7 @@ pub struct Flight<'a, B> {
     board: B,
     buffers: &'a mut HeadBuffers,
     /// `None` in a rig, which listens for its heads.
-    inbox: Option<&'a mut Inbox>,
+    uplink: Option<&'a mut Uplink>,
     /// `None` if a rig lends the lists for each turn, because its heads share them.
     workspace: Option<&'a mut Lists>,
     // Kept twice, because they are used for the whole flight: every answer after a flipped bit would be wrong.
@@ -163,20 +163,20 @@ impl<'a, B: Board> Flight<'a, B> {
     // Not inlined, like the other large functions, so that each can use the same part of the stack.
     #[inline(never)]
     pub fn start(board: B, buffers: &'a mut Buffers, workspace: &'a mut Lists) -> Option<Self> {
-        let Buffers { inbox, own } = buffers;
-        Self::start_with(board, own, Some(inbox), Some(workspace))
+        let Buffers { uplink, own } = buffers;
+        Self::start_with(board, own, Some(uplink), Some(workspace))
     }
 
     #[inline(always)]
     fn start_with(
         mut board: B,
         buffers: &'a mut HeadBuffers,
-        inbox: Option<&'a mut Inbox>,
+        uplink: Option<&'a mut Uplink>,
         workspace: Option<&'a mut Lists>,
     ) -> Option<Self> {
         let recovery = Recovery::begin(&mut board);
         let loaded = store::load(&mut board, &mut buffers.table, recovery.choice());
-        Self::new(board, buffers, (inbox, workspace), recovery, &loaded)
+        Self::new(board, buffers, (uplink, workspace), recovery, &loaded)
     }
 
     /// Sends the events of the start, runs the self-checks and enters the first mode.
@@ -193,7 +193,7 @@ impl<'a, B: Board> Flight<'a, B> {
     fn new(
         mut board: B,
         buffers: &'a mut HeadBuffers,
-        (inbox, workspace): (Option<&'a mut Inbox>, Option<&'a mut Lists>),
+        (uplink, workspace): (Option<&'a mut Uplink>, Option<&'a mut Lists>),
         recovery: Recovery,
         loaded: &Loaded,
     ) -> Option<Self> {
@@ -217,7 +217,7 @@ impl<'a, B: Board> Flight<'a, B> {
             sensor: KeptTwice::new(Sensor::new(&loaded.parameters.sensor).ok()?),
             board,
             buffers,
-            inbox,
+            uplink,
             workspace,
             operations: KeptTwice::new(loaded.parameters.operations.clone()),
             is_not_stored: loaded.copy == 0,

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use hzn_core::{Config, Report, pixel};
+use hzn_flight::authentication::{KEY_BYTES, KEYS};
 use hzn_flight::board::{Board, Image, Picture, RETAINED_WORDS};
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::cuc::Cuc;
@@ -20,6 +21,29 @@ pub(crate) const HEIGHT: usize = 480;
 
 /// Memory for the rows of a picture.
 pub(crate) type Rows = RowMemory<{ ROWS_HELD as usize * WIDTH }, HEIGHT, 8192, 2560>;
+
+/// The memory of a board for keys.
+#[derive(Clone)]
+pub(crate) struct KeyMemory {
+    pub(crate) stored: [[u8; KEY_BYTES]; KEYS],
+    pub(crate) counters: [Option<u64>; KEYS],
+    pub(crate) is_write_protected: bool,
+    /// Whether the memory says that it has written, and keeps the old counter.
+    pub(crate) forgets: bool,
+    pub(crate) writes: u32,
+}
+
+impl Default for KeyMemory {
+    fn default() -> Self {
+        Self {
+            stored: [[0xFF; KEY_BYTES]; KEYS],
+            counters: [None; KEYS],
+            is_write_protected: false,
+            forgets: false,
+            writes: 0,
+        }
+    }
+}
 
 #[derive(Default)]
 pub(crate) struct Bench {
@@ -49,6 +73,8 @@ pub(crate) struct Bench {
     pub(crate) noted: Option<Config>,
     /// Number of writes of a copy of the parameters.
     pub(crate) writes: u32,
+    /// `None`: the board never had keys.
+    pub(crate) keys: Option<KeyMemory>,
 }
 
 impl Board for Bench {
@@ -105,6 +131,25 @@ impl Board for Bench {
         // The memory is erased before it is written.
         self.copies[usize::from(copy) - 1] = bytes[..n].to_vec();
         n == bytes.len()
+    }
+    fn has_keys(&mut self) -> bool {
+        self.keys.is_some()
+    }
+    fn read_key(&mut self, place: u8, into: &mut [u8; KEY_BYTES]) {
+        if let Some(keys) = &self.keys {
+            *into = keys.stored[usize::from(place)];
+        }
+    }
+    fn read_counter(&mut self, place: u8) -> Option<u64> {
+        self.keys.as_ref()?.counters[usize::from(place)]
+    }
+    fn write_counter(&mut self, place: u8, counter: u64) -> bool {
+        let Some(keys) = &mut self.keys else { return false };
+        keys.writes += 1;
+        if !keys.is_write_protected && !keys.forgets {
+            keys.counters[usize::from(place)] = Some(counter);
+        }
+        !keys.is_write_protected
     }
     fn note_sensor(&mut self, config: &Config) {
         self.noted = Some(config.clone());

@@ -1,6 +1,7 @@
 //! Tests the flight software on a board that is made of vectors.
 
 mod attitude;
+mod authentication;
 mod bench;
 mod clock;
 mod damage;

@@ -4,12 +4,13 @@ use hzn_core::Prior;
 
 use super::{Rig, RigBoard};
 use crate::attitude::turned_back;
+use crate::authentication::Admitted;
 use crate::board::Board;
 use crate::bytes::Reader;
 use crate::flight::attitude::{TimedAttitude, read_attitude};
 use crate::flight::navigation::{Values, read_navigation, read_prior};
 use crate::flight::{Flight, listen};
-use crate::messages::{Acknowledge, Code, Function, Mode};
+use crate::messages::{Acknowledge, Code, Function, Housekeeping, Mode};
 use crate::packet::{Apid, ApidBase, MAX_BYTES};
 
 /// A packet that was received.
@@ -28,10 +29,10 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
     /// Takes the bytes that have arrived, and handles at most one telecommand, like the loop of one head.
     pub(super) fn listen(&mut self) {
         let now_us = self.now_us();
-        self.buffers.inbox.reset_effort();
+        self.buffers.uplink.inbox.reset_effort();
         let (mut bytes, mut is_done) = (0, false);
         loop {
-            let (board, inbox) = (&mut self.board, &mut self.buffers.inbox);
+            let (board, inbox) = (&mut self.board, &mut self.buffers.uplink.inbox);
             let most = (listen::MAX_READ - bytes).min(listen::MAX_EFFORT.saturating_sub(inbox.effort()));
             if most == 0 {
                 break;
@@ -39,7 +40,7 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
             let receive = || board.as_deref_mut()?.receive();
             let (count, filled) = inbox.fill(now_us, most, is_done, receive);
             bytes += count;
-            while listen::may_hold_packet(filled, is_done, self.buffers.inbox.effort()) {
+            while listen::may_hold_packet(filled, is_done, self.buffers.uplink.inbox.effort()) {
                 match self.handle_packet(now_us) {
                     Some(is_command) => is_done = is_command,
                     None => break,
@@ -61,9 +62,9 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
         for (place, base) in bases.iter_mut().zip(core::iter::once(self.setup.base).chain(heads)) {
             *place = Some(base);
         }
-        let super::RigBuffers { line, inbox } = &mut *self.buffers;
+        let super::RigBuffers { line, uplink } = &mut *self.buffers;
         let room = &mut line.out;
-        let received = inbox.next(now_us, |packet| {
+        let received = uplink.inbox.next(now_us, |packet| {
             let Some(packet) = packet else { return Received::Broken };
             let is_of = |base: &&ApidBase| base.subject(&packet) == Some(Apid::Command);
             let Some(base) = bases.iter().flatten().find(is_of) else { return Received::Foreign };
@@ -81,10 +82,16 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
                 self.with_head(0, |first| first.state.foreign = first.state.foreign.saturating_add(1));
             }
             Received::Command { base, sequence, bytes } => {
+                let user = line.out.get(..bytes).unwrap_or_default();
+                // One gate for all heads, so that one counter belongs to a key.
+                let admitted = match self.board.as_deref_mut() {
+                    Some(board) => uplink.gate.admit(board, base, sequence, user),
+                    None => Admitted::Refused(Code::Closed),
+                };
                 if base == self.setup.base {
-                    self.handle_command(sequence, bytes);
+                    self.handle_command(sequence, admitted);
                 } else {
-                    self.pass_on(base, sequence, bytes);
+                    self.pass_on(base, sequence, admitted);
                 }
                 return Some(true);
             }
@@ -93,20 +100,24 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
     }
 
     /// Lets the head with this base carry out and acknowledge a telecommand.
-    fn pass_on(&mut self, base: ApidBase, sequence: u16, bytes: usize) {
+    fn pass_on(&mut self, base: ApidBase, sequence: u16, admitted: Admitted) {
         let is_meant = |flight: &Flight<'_, _>| flight.buffers.line.base() == base && flight.mode != Mode::ShutDown;
         let Some(k) = self.heads.loops.iter().position(is_meant) else { return };
         let room = self.buffers.line.out;
         self.with_head(k, |flight| {
             flight.check_operations();
             flight.buffers.line.out = room;
-            flight.handle_command(sequence, bytes);
+            flight.handle_admitted(sequence, admitted);
         });
     }
 
     /// Carries out and acknowledges a telecommand to the rig.
     #[inline(never)]
-    fn handle_command(&mut self, sequence: u16, bytes: usize) {
+    fn handle_command(&mut self, sequence: u16, admitted: Admitted) {
+        let bytes = match admitted {
+            Admitted::Taken(bytes) => bytes,
+            Admitted::Anonymous | Admitted::Refused(_) => 1,
+        };
         let user: [u8; MAX_BYTES] = self.buffers.line.out;
         let mut from = Reader::new(user.get(..bytes).unwrap_or_default());
         let number = from.u8().unwrap_or(0);
@@ -115,15 +126,24 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
         let last_sequence = self.loops().next().and_then(|first| first.recovery.rig_sequence());
         let ahead = last_sequence.map(|last| sequence.wrapping_sub(last) & 0x3FFF);
         let is_replay = window > 0 && ahead.is_some_and(|ahead| !(1..=window).contains(&ahead));
-        let (code, detail) = match Function::from_number(number) {
+        let (code, detail) = match (admitted, Function::from_number(number)) {
+            (Admitted::Refused(code), _) => (code, 0),
+            // Its sequence count does not count, see `Flight::answer_anonymous`.
+            (Admitted::Anonymous, Some(function)) => {
+                let bytes = Acknowledge::BYTES + N * Housekeeping::BYTES;
+                if self.with_head(0, |first| first.may_answer(bytes)) != Some(true) {
+                    return;
+                }
+                self.carry_out(function, from)
+            }
             _ if is_replay => (Code::Sequence, last_sequence.unwrap_or(0)),
-            Some(function) => {
+            (_, Some(function)) => {
                 let now_us = self.now_us();
                 // Before it is carried out: after a reset in the middle its replay is refused, too.
                 self.with_head(0, |first| first.recovery.note_rig_sequence(&mut first.board, sequence, now_us));
                 self.carry_out(function, from)
             }
-            None => (Code::Unknown, 0),
+            (_, None) => (Code::Unknown, 0),
         };
         let record = Acknowledge { function: number, sequence, code: code as u8, detail };
         let may_answer =

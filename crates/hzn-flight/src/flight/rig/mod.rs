@@ -27,9 +27,9 @@ use hzn_core::rig::{self, Answered, Common, Limb, MOST_HEADS, Mount};
 use hzn_twice::KeptTwice;
 
 use super::line::Line;
+use super::listen::Uplink;
 use super::{Flight, HeadBuffers, Lists};
 use crate::board::Board;
-use crate::inbox::Inbox;
 use crate::joint::RigAnswer;
 use crate::messages::Mode;
 use crate::packet::{Apid, ApidBase};
@@ -124,7 +124,7 @@ struct Joining {
 #[derive(Debug)]
 pub struct RigBuffers {
     line: Line,
-    inbox: Inbox,
+    uplink: Uplink,
 }
 
 impl Default for RigBuffers {
@@ -136,7 +136,7 @@ impl Default for RigBuffers {
 impl RigBuffers {
     /// Makes buffers of all zeros.
     pub const fn new() -> Self {
-        Self { line: Line::new(), inbox: Inbox::new() }
+        Self { line: Line::new(), uplink: Uplink::new() }
     }
 }
 
