@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hzn_fly::key_file::Signer;
+use hzn_fly::key_file::{Signer, counter_path};
 use hzn_fly::link::{Address, Patience};
 use hzn_ground::{Commander, Incoming, encode, loaded_files, write_packet};
 use hzn_run::disk;
@@ -61,6 +61,11 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let tell = tell::to_stderr();
+    let mut read = loaded_files(&args.commands);
+    read.extend(args.key.iter().flat_map(|key| [key.clone(), counter_path(key)]));
+    if let Some(path) = &args.output {
+        files::check_outputs(&read, std::slice::from_ref(path), args.force)?;
+    }
     let mut signer = args.key.as_deref().map(Signer::open).transpose().map_err(usage)?;
     if let Some(address) = &args.to {
         let commander =
@@ -85,7 +90,6 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     match &args.output {
         Some(path) => {
-            files::check_outputs(&loaded_files(&args.commands), std::slice::from_ref(path), args.force)?;
             disk::write(path, out)?;
             Ok(Exit::Done)
         }

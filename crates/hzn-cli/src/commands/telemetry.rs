@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use hzn_files::limited;
-use hzn_fly::key_file::Signer;
+use hzn_fly::key_file::{Signer, counter_path};
 use hzn_fly::link::{Address, Patience};
 use hzn_ground::{Commander, Incoming, Station, loaded_files, xtce};
 use hzn_run::disk;
@@ -77,6 +77,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage(format!("{name}: --screen and --send need a line, such as tcp:HOST:PORT")));
     }
     let mut read_files = loaded_files(&args.send);
+    read_files.extend(args.key.iter().flat_map(|key| [key.clone(), counter_path(key)]));
     if live.is_none() {
         read_files.push(file.to_owned());
     }

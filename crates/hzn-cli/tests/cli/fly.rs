@@ -201,6 +201,60 @@ fn fly_on(place: &Place, bytes: &[u8], args: &[&str]) -> (Option<i32>, String) {
 }
 
 #[test]
+fn a_computer_with_a_key_refuses_strangers_and_replays() {
+    let place = Place::new();
+    place.run(&["key", "ground.key", "--spacecraft", "42"]).expect(0).says("key 1 of spacecraft 42; counter 0");
+    std::fs::create_dir(place.path("air")).unwrap();
+    for ending in ["key", "key.counter"] {
+        std::fs::copy(place.path(&format!("ground.{ending}")), place.path(&format!("air/air.{ending}"))).unwrap();
+    }
+    place.run(&["key", "other.key", "--spacecraft", "42"]).expect(0);
+    let port = free_port();
+    let (listen, connect) = (format!("tcp-listen:127.0.0.1:{port}"), format!("tcp:127.0.0.1:{port}"));
+    let args = ["fly", "-", "-s", "in/sensor.toml", "--line", &listen, "--state", "state", "--key", "air/air.key"];
+    let send = |key: Option<&str>, text: &str| {
+        let key = key.map(|key| ["--key", key]);
+        let args: Vec<&str> =
+            ["telecommand", "--to", &connect, text].into_iter().chain(key.into_iter().flatten()).collect();
+        place.run(&args)
+    };
+    let mut first = Running::start(place.command(&args));
+    first.wait_for("flight mode");
+    send(None, "mode safe").expect(1).says("mode safe: not authenticated");
+    send(None, "ping").expect(0).says("ping: done");
+    send(Some("other.key"), "mode safe").expect(1).says("the code of the trailer is wrong");
+    send(Some("ground.key"), "mode standby").expect(0).says("mode standby: done");
+    first.signal(Signal::SIGKILL);
+    first.end();
+    let mut second = Running::start(place.command(&args));
+    second.wait_for("flight mode");
+    // The counters that were reserved before the crash are refused, and the ground goes on behind them.
+    send(Some("ground.key"), "mode standby").expect(0).says("mode standby: done");
+    // A replay of the packet that was sent, as bytes.
+    place.run(&["telecommand", "mode safe", "--key", "ground.key", "-o", "safe.bin"]).expect(0);
+    let replay = || {
+        let mut line = std::net::TcpStream::connect(("127.0.0.1", port)).unwrap();
+        line.write_all(&std::fs::read(place.path("safe.bin")).unwrap()).unwrap();
+        std::thread::sleep(Duration::from_millis(600));
+    };
+    replay();
+    second.wait_for("standby to safe mode");
+    send(Some("ground.key"), "mode standby").expect(0);
+    replay();
+    second.wait_for("telecommand rejected (15, 1)");
+    second.signal(Signal::SIGTERM);
+    let (code, said) = second.end();
+    assert_eq!((code, said.matches("to safe mode").count()), (Some(0), 1), "{said}");
+    // A damaged key closes the line, and the flight begins nevertheless.
+    std::fs::write(place.path("air/air.key"), "damaged").unwrap();
+    let mut third = Running::start(place.command(&args));
+    third.wait_for("air.key: is no key, or is damaged");
+    third.wait_for("flight mode");
+    send(Some("ground.key"), "mode standby").expect(1).says("the keys of the computer cannot be used");
+    send(None, "ping").expect(0);
+}
+
+#[test]
 fn bad_input_is_told() {
     let place = Place::new();
     let picture = limb(320, 240, 0.0).into_raw();

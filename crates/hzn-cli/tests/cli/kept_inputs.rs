@@ -156,6 +156,8 @@ const CASES: &[Case] = &[
     ("t.bin", &["telemetry", "t.bin", "--housekeeping", "t.bin", "--force"]),
     ("f.csv", &["telemetry", "f.csv", "-o", "./f.csv", "--force"]),
     ("in/sensor.toml", &["telecommand", "load in/sensor.toml", "-o", "in/sensor.toml", "--force"]),
+    ("f.csv", &["telecommand", "ping", "--key", "f.csv", "-o", "f.csv", "--force"]),
+    ("f.csv", &["telemetry", "t.bin", "--key", "f.csv", "-o", "f.csv", "--force"]),
     ("lens.csv", &["telecommand", "ping", "load lens.toml", "-o", "lens.csv", "--force"]),
     #[cfg(target_os = "linux")]
     ("state/parameters-1.bin", &["fly", "-", "--sensor", "state/parameters-1.bin", "--state", "state"]),
@@ -163,7 +165,7 @@ const CASES: &[Case] = &[
 
 /// The commands that write no file, or read none that the user names; and `migrate`, whose task is to rewrite its
 /// input.
-const WITHOUT: &[&str] = &["info", "view", "completions", "demo", "help", "migrate", "man"];
+const WITHOUT: &[&str] = &["info", "view", "completions", "demo", "help", "migrate", "man", "key"];
 
 /// Returns a folder with an input of each kind, and links to them.
 fn place() -> Place {
