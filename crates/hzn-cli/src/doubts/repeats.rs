@@ -1,4 +1,4 @@
-//! Counts pictures that repeat the picture before them to the last bit.
+//! Counts pictures that repeat one of the last pictures to the last bit.
 
 use hzn_core::gates::{self, FixedEdge};
 use hzn_run::engine::Finished;
@@ -6,7 +6,7 @@ use hzn_run::explain;
 
 use crate::tell;
 
-/// Counts pictures that repeat the picture before.
+/// Counts pictures that repeat an earlier one.
 #[derive(Default)]
 pub(crate) struct Repeats {
     pictures: u64,
@@ -26,8 +26,8 @@ impl Repeats {
     /// Returns what repeats and what became of it.
     fn describe(&self, gates: &gates::Config) -> Option<String> {
         let first = self.first.as_ref()?;
-        let (pictures, each) =
-            (explain::counted(self.pictures, "picture"), if self.pictures == 1 { "is" } else { "are" });
+        let (pictures, repeat) =
+            (explain::counted(self.pictures, "picture"), if self.pictures == 1 { "repeats" } else { "repeat" });
         let outcome = if self.timed == 0 {
             "Without told times they may be copies; their answers say nothing new"
         } else if gates.fixed_edge == FixedEdge::Refuse {
@@ -36,7 +36,7 @@ impl Repeats {
             "Their times differ, so the camera or its recorder stood still: gates.fixed_edge = \"refuse\" refuses \
              their answers"
         };
-        Some(format!("{pictures} {each} the one before to the last bit (the first is {first}). {outcome}"))
+        Some(format!("{pictures} {repeat} an earlier one to the last bit (the first is {first}). {outcome}"))
     }
 
     /// Tells it. Copies without times are no fault, so a quiet run says nothing of them.

@@ -41,5 +41,5 @@ pub use process::process_one;
 pub use sensor::{AnySensor, LastAnswer, Processed, check_frames, find_refused};
 pub use sequence::{Sink, process_alone, run};
 pub use trace::{Trace, Traces, Watch};
-pub use turns::{StoredAnswer, Turns};
+pub use turns::{REMEMBERED, StoredAnswer, Turns};
 pub use widen::widen_report;

@@ -43,11 +43,11 @@ pub struct Finished {
     pub pages: u32,
     /// What became of the mask, if the plan asks for masks.
     pub mask: Option<MaskOutcome>,
-    /// The bytes of the picture, if it could be read and is compared with the picture before.
+    /// The bytes of the picture, if it could be read and is compared with those before.
     pub bytes: Option<Bytes>,
 }
 
-/// What the bytes of a picture say about the picture before, with the same bytes or not.
+/// What the bytes of a picture say about the pictures before, with the same bytes or not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bytes {
     /// The checksum of the samples.
@@ -55,7 +55,7 @@ pub struct Bytes {
     /// Whether the time of the picture is told. A time that only counts the pictures does not say that a picture with
     /// the same bytes is another one.
     pub has_time: bool,
-    /// Whether the picture before has the same bytes and another time; known when the picture is judged.
+    /// Whether one of the last pictures has the same bytes and another time; known when the picture is judged.
     pub repeats: bool,
 }
 

@@ -8,6 +8,7 @@ use super::pool::{End, InOrder, Work, run_in_order};
 use super::process::process_one;
 use super::sensor::AnySensor;
 use crate::error::Error;
+use crate::mask::MaskOutcome;
 use crate::source::{Item, Source};
 
 /// The destination of processed pictures, in order.
@@ -40,12 +41,26 @@ pub fn run(
     let mut turns = plan.turns.clone();
     let write = |mut frame: Finished, sink: &mut &mut dyn Sink| {
         turns.judge(&mut frame, &plan.config);
+        take_back_mask(plan, &mut frame)?;
         sink.write(&mut frame)?;
         seen(&frame);
         Ok(())
     };
     let mut out = InOrder { sink, write, flush: |sink: &mut &mut dyn Sink| sink.flush() };
     run_in_order(plan, plan.threads, || source.next(), first, stop, &mut out)
+}
+
+/// Removes the mask of a picture whose answer was refused after the mask was written: only the sequence of the pictures
+/// shows that a limb is fixed in them.
+fn take_back_mask(plan: &Plan, frame: &mut Finished) -> Result<(), Error> {
+    let has_answer = frame.answers().first().is_some_and(Option::is_some);
+    if let Some(masks) = plan.masks.as_ref().filter(|_| !has_answer)
+        && matches!(frame.mask, Some(MaskOutcome::Written(_)))
+    {
+        masks.remove(&frame.name)?;
+        frame.mask = Some(MaskOutcome::Missing("no answer".into()));
+    }
+    Ok(())
 }
 
 /// Processes one picture without a sequence, on this thread. The result is that of the first picture of a run.

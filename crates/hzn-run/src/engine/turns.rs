@@ -2,6 +2,8 @@
 //!
 //! It comes after the threads, where results are in order again: the rows are then the same for any number of threads.
 
+use std::collections::VecDeque;
+
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::gates::FixedEdge;
 use hzn_core::status::Status;
@@ -11,13 +13,16 @@ use hzn_mcap::Row;
 
 use super::outcome::{BodyOutcome, Finished};
 
+/// Number of pictures whose bytes are compared with those of the next one: more than a camera or a recorder has buffers.
+pub const REMEMBERED: usize = 32;
+
 /// The answers of earlier pictures, one for each body, with the turn of the vehicle since then.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Turns {
     each: Vec<Sequence<f64>>,
     time_s: Option<f64>,
-    /// The checksum of the picture before.
-    checksum: Option<u32>,
+    /// The checksums of the last pictures, with their times, the newest last.
+    checksums: VecDeque<(u32, Option<f64>)>,
 }
 
 /// An answer in the results of an earlier run.
@@ -58,21 +63,32 @@ impl Turns {
         }
     }
 
-    /// Compares the bytes of the next picture with those of the picture before. Returns whether they are the same
-    /// although a time is told, which is another one: the camera or its recorder stands still. The noise of a camera
-    /// never repeats.
+    /// Compares the bytes of the next picture with those of the last [`REMEMBERED`] ones. Returns whether they are the
+    /// same as one of these although a time is told, which is another one: the camera or its recorder stands still, or
+    /// gives old buffers again. The noise of a camera never repeats.
     fn see_bytes(&mut self, frame: &mut Finished) -> bool {
-        let before = std::mem::replace(&mut self.checksum, frame.bytes.map(|bytes| bytes.checksum));
         // A dark or clipped picture has no noise. It has no answer either, and keeps its own reason.
         let is_answered = frame.outcomes.iter().any(|outcome| outcome.status() == Status::Ok);
         let Some(bytes) = &mut frame.bytes else { return false };
-        bytes.repeats = is_answered && before == Some(bytes.checksum) && frame.time_s != self.time_s;
-        bytes.repeats && bytes.has_time
+        let is_same = |(checksum, time_s): &(u32, Option<f64>)| *checksum == bytes.checksum && *time_s != frame.time_s;
+        bytes.repeats = is_answered && self.checksums.iter().any(is_same);
+        let repeats = bytes.repeats && bytes.has_time;
+        self.remember(bytes.checksum, frame.time_s);
+        repeats
     }
 
-    /// Takes the bytes of the picture before the next one, which an earlier run has processed.
+    /// Takes the bytes of the picture that was replayed last, which an earlier run has processed.
     pub fn see_checksum(&mut self, checksum: Option<u32>) {
-        self.checksum = checksum;
+        if let Some(checksum) = checksum {
+            self.remember(checksum, self.time_s);
+        }
+    }
+
+    fn remember(&mut self, checksum: u32, time_s: Option<f64>) {
+        if self.checksums.len() == REMEMBERED {
+            self.checksums.pop_front();
+        }
+        self.checksums.push_back((checksum, time_s));
     }
 
     /// Takes the next picture from the results of an earlier run. An answer that this run refused is not in them, and
@@ -84,7 +100,6 @@ impl Turns {
         answers: &[Option<StoredAnswer>],
         config: &Config,
     ) {
-        self.checksum = None;
         let Some(steps) = self.take_steps(data, time_s, config) else { return };
         for ((sequence, step), answer) in self.each.iter_mut().zip(steps).zip(answers) {
             sequence.see(&step, answer.and_then(StoredAnswer::to_answer), &config.gates);

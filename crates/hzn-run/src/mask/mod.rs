@@ -249,10 +249,19 @@ impl MaskFolder {
                 crate::disk::write(&path, bytes)?;
                 Ok(MaskOutcome::Written(covered.without))
             }
-            Err(why) => match std::fs::remove_file(&path) {
-                Err(e) if e.kind() != ErrorKind::NotFound => Err(crate::disk::cannot_write(&path, &e)),
-                _ => Ok(MaskOutcome::Missing(why)),
-            },
+            Err(why) => self.remove(name).map(|()| MaskOutcome::Missing(why)),
+        }
+    }
+
+    /// Removes the mask of the picture `name`, if there is one.
+    ///
+    /// # Errors
+    /// The file cannot be removed.
+    pub(crate) fn remove(&self, name: &str) -> Result<(), Error> {
+        let path = self.folder.join(file_name(name));
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != ErrorKind::NotFound => Err(crate::disk::cannot_write(&path, &e)),
+            _ => Ok(()),
         }
     }
 }
