@@ -35,7 +35,7 @@ const STEPS: &[Step] = &[
     every("lints", |_| steps::run(cargo(&["clippy", "--all-targets"]).args(["--", "-D", "warnings"]))),
     // Video input needs a decoder. Without one, its tests pass without a check, which would go unseen.
     every("ffmpeg", |_| if has("ffmpeg") { Ok(()) } else { apt_install(&["ffmpeg"]) }),
-    every("tests", |steps| steps.cargo_test(&[])),
+    every("tests", test_workspace),
     every("tests of hzn-core alone", test_core_alone),
     every("undefined behaviour", |steps| miri::test(steps.all)),
     every("feature sets of hzn-core", |_| {
@@ -77,6 +77,15 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
     // A chosen step prints what it builds.
     let images = if selection.is_by_tier() { Beside::start(&target().join("xtask")) } else { Beside::default() };
     Steps::run(STEPS, &selection, images)
+}
+
+/// Runs the tests of the workspace. With `--all` they take the whole of what they otherwise take a part of.
+fn test_workspace(steps: &mut Steps) -> Outcome {
+    let mut tests = cargo(&["test", "--no-fail-fast"]);
+    if steps.all {
+        tests.env("HZN_ALL", "1");
+    }
+    steps.count_tests(&mut tests)
 }
 
 /// Runs the tests that take minutes. The step `firmware` runs those that need an image.

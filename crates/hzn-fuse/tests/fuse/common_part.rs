@@ -2,7 +2,7 @@
 //!
 //! `HZN_FLIGHTS=60 cargo test --test fuse common_part:: -- --nocapture` prints NEES and RMS over 60 flights.
 
-use crate::common::{Slow, scene};
+use crate::common::{Slow, flights, scene};
 use hzn_files::vehicle::VehicleRow;
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::Inputs;
@@ -11,8 +11,8 @@ use hzn_fuse::{Settings, fuse, truth};
 
 /// First seed of the flights.
 const FIRST_SEED: u64 = 83_000;
-/// Flights without the variable.
-const FEW: u64 = 6;
+/// Number of flights from which on two filters are compared: the errors of fewer differ by more than the filters.
+const ENOUGH: u64 = 6;
 /// 1-sigma of the slow error and of the white noise of a direction, degrees.
 const SIGMAS_DEG: [f64; 2] = [0.06, 0.08];
 
@@ -59,7 +59,7 @@ impl Figures {
 
 #[test]
 fn the_rest_of_the_covariance_is_white_noise() {
-    let flights = std::env::var("HZN_FLIGHTS").map_or(FEW, |n| n.parse().expect("HZN_FLIGHTS is a number"));
+    let flights = flights(2, ENOUGH);
     let [mut told, mut untold] = [Figures::default(), Figures::default()];
     for seed in FIRST_SEED..FIRST_SEED + flights {
         let scene = scene(seed);
@@ -78,5 +78,6 @@ fn the_rest_of_the_covariance_is_white_noise() {
     println!("the common part is the slow error: {after:.3?}\nthe whole covariance is the slow error: {before:.3?}");
     // The innovations are those of the noise that was drawn; with all of it in the slow error they are too large.
     assert!((0.8..1.2).contains(&after[2]) && (after[2] - 1.0).abs() < (before[2] - 1.0).abs(), "{after:?} {before:?}");
-    assert!((1.0..5.0).contains(&after[0]) && after[1] < before[1] * 1.02, "{after:?} {before:?}");
+    assert!((1.0..5.0).contains(&after[0]), "{after:?} {before:?}");
+    assert!(flights < ENOUGH || after[1] < before[1] * 1.02, "{after:?} {before:?}");
 }

@@ -57,6 +57,12 @@ impl Errors for Slow {
     }
 }
 
+/// Returns a number of flights: that of the variable `HZN_FLIGHTS`, or `all` with `cargo xtask test --all`, or `few`.
+pub(crate) fn flights(few: u64, all: u64) -> u64 {
+    let default = if std::env::var_os("HZN_ALL").is_some() { all } else { few };
+    std::env::var("HZN_FLIGHTS").map_or(default, |n| n.parse().expect("HZN_FLIGHTS is a number"))
+}
+
 /// The scene `atek` with another seed, and pictures every two seconds.
 pub(crate) fn scene(seed: u64) -> Scenario {
     let mut scene = Scenario::builtin("atek").unwrap();
