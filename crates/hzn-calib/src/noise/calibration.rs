@@ -21,7 +21,7 @@ const DEFAULT_SIGMA_KM: f64 = 2.0 * MAX_SIGMA_KM;
 /// middle of an edge by fractions of a pixel, even if the edge is smooth.
 const MIN_SHIFT_PX: f64 = 0.1;
 /// Largest mean square of the residuals over their variances without an alarm.
-const MAX_CHI2: f64 = 2.0;
+pub(super) const MAX_CHI2: f64 = 2.0;
 /// Largest distance of a picture's limb height from the median of all, in sigmas. A picture farther away has another
 /// edge and is excluded.
 const MAX_DEVIATION_SIGMAS: f64 = 6.0;

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::words::above;
+
 /// Why a calibration is refused. It is displayed with the measured number, its limit, and a remedy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Refusal {
@@ -73,23 +75,29 @@ impl fmt::Display for Refusal {
                  {lens_km:.1} km, but at most {max_km:.1} km is useful. Calibrate the lens first, with a board \
                  (`hzn calibrate board`) or in flight (`hzn calibrate sky`)"
             ),
-            Self::NoBetter { sigma_km, largest: (name, km), max_km } => write!(
-                f,
-                "the limb height would have a sigma of {sigma_km:.1} km, most of it ({km:.1} km) from {name}: the \
-                 {max_km:.1} km of a sensor without a calibration are not worse"
-            ),
+            Self::NoBetter { sigma_km, largest: (name, km), max_km } => {
+                let [sigma_km, max_km] = above(*sigma_km, *max_km);
+                write!(
+                    f,
+                    "the limb height would have a sigma of {sigma_km} km, most of it ({km:.1} km) from {name}: the \
+                     {max_km} km of a sensor without a calibration are not worse"
+                )
+            }
             Self::Inconsistent { inconsistent, pictures } => write!(
                 f,
                 "{inconsistent} of {pictures} pictures measure limb heights that disagree with the others. Either \
                  edges are wrong, or altitudes belong to other pictures; examine some of them with `hzn explain`"
             ),
-            Self::Alarm { chi2, max_chi2 } => write!(
-                f,
-                "the limb heights of the pictures scatter more than their errors allow: chi-square is {chi2:.1} per \
-                 degree of freedom, but at most {max_chi2:.1} is consistent. Possible reasons that the model does not \
-                 have: a rolling shutter (camera.readout_s and rates), altitudes or times of other pictures, a lens \
-                 that changes"
-            ),
+            Self::Alarm { chi2, max_chi2 } => {
+                let [chi2, max_chi2] = above(*chi2, *max_chi2);
+                write!(
+                    f,
+                    "the limb heights of the pictures scatter more than their errors allow: chi-square is {chi2} per \
+                     degree of freedom, but at most {max_chi2} is consistent. Possible reasons that the model does \
+                     not have: a rolling shutter (camera.readout_s and rates), altitudes or times of other pictures, \
+                     a lens that changes"
+                )
+            }
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use hzn_core::camera::{Config, Covariance, Intrinsic};
 
-use super::calibration::Calibration;
+use super::calibration::{Calibration, MAX_CHI2};
+use crate::words::above;
 
 /// 1-sigma from which on a focal length is not determined: it could as well be nothing.
 const UNKNOWN_PERCENT: f64 = 100.0;
@@ -42,10 +43,8 @@ pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<
             e.length_px
         ),
     ));
-    lines.push((
-        "chi-square",
-        format!("{:.2} a degree of freedom; 1 is ideal, a value above 2 is an alarm", calibration.chi2),
-    ));
+    let [chi2, _] = above(calibration.chi2, MAX_CHI2);
+    lines.push(("chi-square", format!("{chi2} a degree of freedom; 1 is ideal, a value above 2 is an alarm")));
     if let Some(f) = &calibration.focal {
         let sure = f.percent.abs() > 3.0 * f.sigma_percent;
         // Another shape of the lens changes the half-angle as another focal length does.

@@ -5,8 +5,8 @@ use core::fmt;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
 use super::epoch::Epoch;
-use super::quantile::chi2;
 use super::reduced::{OF_HEAD, Place, Reduced};
+use crate::quantile::chi2;
 
 /// Number of steps; a wrong mount of ten degrees needs six.
 const STEPS: usize = 30;

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::adjust::Adjusted;
-use super::quantile::chi2;
+use crate::quantile::chi2;
 
 /// Sigmas of the limit: told mounts that are right are refused in 0.3 % of the cases.
 const SIGMAS: f64 = 2.75;

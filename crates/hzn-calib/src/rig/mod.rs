@@ -17,7 +17,6 @@
 mod adjust;
 mod check;
 mod epoch;
-mod quantile;
 mod reduced;
 #[cfg(test)]
 mod tests;

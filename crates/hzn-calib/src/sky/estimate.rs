@@ -2,7 +2,9 @@
 
 use hzn_core::body;
 use hzn_core::camera::Config;
+use nalgebra::{DMatrix, Matrix2};
 
+use super::conflict::Conflict;
 pub use super::fit::MIN_PICTURES;
 use super::fit::{Fit, Fitted};
 use super::layout::Layout;
@@ -13,7 +15,7 @@ use super::unknowns::{LimbPrior, Unknowns};
 use super::view::View;
 
 /// Largest mean square of the deviations over their variances without an alarm.
-const MAX_CHI2: f64 = 2.0;
+pub(super) const MAX_CHI2: f64 = 2.0;
 
 /// One picture in the calibration.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +55,8 @@ pub struct Estimate {
     pub shift_sigma_px: [f64; 2],
     /// Mean square of the pictures' deviations over their variances without the scatter; `None` for a single picture.
     pub chi2: Option<f64>,
+    /// Focal length and limb height against what was known of them before the flight.
+    pub conflict: Conflict,
     /// What the flight makes observable.
     pub observability: Observability,
     /// The pictures, in order.
@@ -78,6 +82,7 @@ pub fn estimate(
         Parameters::new(unknowns, &fit.changes(), &covariance, fit.rms_px().max(1.0)).ok_or(Refusal::Singular)?;
     let height_variance = fit.solution.covariance[(Layout::HEIGHT, Layout::HEIGHT)];
     let shift = fit.layout.first_common();
+    let conflict = conflict(&fit, unknowns, body, &covariance);
     Ok(Estimate {
         camera: lens.camera,
         parameters: lens.list,
@@ -88,6 +93,7 @@ pub fn estimate(
         scatter_km: (fit.counted().len() >= MIN_PICTURES).then_some(fit.solution.scatter_km),
         shift_sigma_px: [fit.common_px[0], fit.solution.covariance[(shift, shift)].sqrt()],
         chi2: chi2(&fit),
+        conflict,
         observability,
         pictures: pictures(&fit, views),
     })
@@ -104,11 +110,29 @@ impl Estimate {
         })
     }
 
-    /// Returns the alarm if the pictures do not agree with each other.
+    /// Returns the alarm if the pictures do not agree with each other, or not with what was known before.
     pub fn alarm(&self) -> Option<Refusal> {
-        let chi2 = self.chi2.filter(|chi2| *chi2 > MAX_CHI2)?;
-        Some(Refusal::Alarm { chi2, max_chi2: MAX_CHI2 })
+        if let Some(chi2) = self.chi2.filter(|chi2| *chi2 > MAX_CHI2) {
+            return Some(Refusal::Alarm { chi2, max_chi2: MAX_CHI2 });
+        }
+        self.conflict.is_significant().then(|| Refusal::Conflict {
+            conflict: self.conflict,
+            focal_percent: self.conflict.focal_sigmas * self.focal_sigma_before_percent,
+            height_km: [self.limb_before.km, self.height_km[0]],
+        })
     }
+}
+
+/// Compares focal length and limb height with what was known of them. `intrinsics` is the covariance of the lens.
+fn conflict(fit: &Fit, unknowns: &Unknowns, body: &body::Config, intrinsics: &DMatrix<f64>) -> Conflict {
+    let scale = unknowns.scale_weights();
+    let (first, n) = (fit.layout.first_intrinsic(), fit.layout.intrinsics);
+    let covariance = &fit.solution.covariance;
+    let focal = 1e4 * (scale.transpose() * intrinsics * &scale)[(0, 0)];
+    let both = 100.0 * covariance.view((Layout::HEIGHT, first), (1, n)).transpose().dot(&scale);
+    let shift = [100.0 * scale.dot(&fit.changes()), fit.solution.values[Layout::HEIGHT] - fit.limb.km];
+    let after = Matrix2::new(focal, both, both, covariance[(Layout::HEIGHT, Layout::HEIGHT)]);
+    Conflict::new(body, fit.limb, unknowns.focal_sigma_percent(), shift, after)
 }
 
 /// Returns the mean square of the deviations of the limb heights over their variances from edge noise.

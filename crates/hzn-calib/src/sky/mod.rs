@@ -14,6 +14,7 @@
 //! [`estimate_track`] estimates the lens from the track of the Sun or the Moon instead.
 
 mod check;
+mod conflict;
 mod estimate;
 mod fit;
 mod layout;
@@ -36,6 +37,7 @@ mod words;
 mod write;
 
 pub use check::{Check, DEFAULT_DETECT_PERCENT, Deviation, Verdict, check};
+pub use conflict::Conflict;
 pub use estimate::{Estimate, MIN_PICTURES, Picture, estimate};
 pub use mount::{Mount, MountRefusal, estimate_mount};
 pub use observable::Observability;

@@ -9,7 +9,7 @@ use super::view::View;
 
 /// Number of times that the pictures are processed at most. The first lens may be several percent wrong, and with it
 /// the choice of the edge points.
-const PASSES: usize = 3;
+const PASSES: usize = 5;
 /// The pictures are processed again if the focal length changes by more than this, in percent: the edge points at the
 /// border of a wide picture then move by about a pixel.
 const PROCESS_AGAIN_PERCENT: f64 = 0.2;
@@ -35,20 +35,45 @@ pub fn estimate_in_passes<E>(
     let focal_sigma_percent = unknowns.focal_sigma_percent();
     let mut used = camera::Config { covariance: None, focal_sigma_percent, ..sensor.camera.clone() };
     let mut before_percent = 0.0;
+    let mut most = 0;
     for pass in 1..=PASSES {
         let Some(views) = process(&used)? else { return Ok(None) };
-        let estimate = match estimate(unknowns, body, &views, limb) {
+        let found = estimate(unknowns, body, &views, limb);
+        if let Some(lost) = lost(&found, before_percent, [most, views.len()]) {
+            return Ok(Some(Err(lost)));
+        }
+        let estimate = match found {
             Ok(estimate) => estimate,
             Err(why) => return Ok(Some(Err(why))),
         };
         let [percent, sigma] = estimate.focal_percent;
-        if pass == PASSES || (percent - before_percent).abs() <= PROCESS_AGAIN_PERCENT {
+        let moved_percent = (percent - before_percent).abs();
+        if moved_percent <= PROCESS_AGAIN_PERCENT || (pass == PASSES && moved_percent <= sigma) {
             return Ok(Some(Ok((estimate, views))));
         }
-        again([percent, sigma]);
+        if pass < PASSES {
+            again([percent, sigma]);
+        }
         before_percent = percent;
-        let focal_sigma_percent = sigma.max(PROCESS_AGAIN_PERCENT);
+        most = views.len().max(most);
+        // The new lens may still be wrong by as much as it moved: a limb of another size than it expects is no reason
+        // to refuse a picture.
+        let focal_sigma_percent = sigma.max(moved_percent).max(PROCESS_AGAIN_PERCENT);
         used = camera::Config { covariance: None, focal_sigma_percent, ..estimate.camera.clone() };
     }
-    Ok(None)
+    Ok(Some(Err(Refusal::NotSettled { passes: PASSES })))
+}
+
+/// Returns the refusal if the pictures have lost their answers with the lens that they asked for: more than half of
+/// them, or so many that nothing is estimated any more.
+fn lost(found: &Result<Estimate, Refusal>, percent: f64, answered: [usize; 2]) -> Option<Refusal> {
+    let [before, after] = answered;
+    let why = match found {
+        _ if before == 0 => return None,
+        Err(Refusal::TooFew { .. }) => None,
+        Err(why) => Some(Box::new(why.clone())),
+        Ok(_) if 2 * after < before => None,
+        Ok(_) => return None,
+    };
+    Some(Refusal::Lost { percent, answered, why })
 }

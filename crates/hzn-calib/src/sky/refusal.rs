@@ -2,6 +2,15 @@
 
 use std::fmt;
 
+use super::conflict::Conflict;
+use crate::words::above;
+
+/// What to do if the lens of sensor.toml is probably more wrong than its sigmas.
+const OTHER_LENS: &str = "The lens of sensor.toml is probably more wrong than its sigmas, or of another family \
+                          (camera.model): make the sensor.toml again with another field of view or family (`hzn init \
+                          --fov`, `--lens`), or with `hzn init` without --fov, which finds the field of view in the \
+                          pictures";
+
 /// Why a calibration from the sky is refused. It is displayed with the measured number, its limit, and a remedy.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Refusal {
@@ -47,6 +56,63 @@ pub enum Refusal {
         /// Largest value that is consistent.
         max_chi2: f64,
     },
+    /// The pictures disagree with what was known of focal length and limb height.
+    Conflict {
+        /// The shifts against their sigmas.
+        conflict: Conflict,
+        /// Change of the focal length by the flight, in percent.
+        focal_percent: f64,
+        /// Limb height before and after the flight, in kilometres.
+        height_km: [f64; 2],
+    },
+    /// Each time that the pictures are processed with the lens that they asked for, they ask for another one.
+    NotSettled {
+        /// Number of times.
+        passes: usize,
+    },
+    /// The pictures ask for another lens, and lose their answers with it.
+    Lost {
+        /// Change of the focal length with which the pictures were processed, in percent.
+        percent: f64,
+        /// Number of pictures with an answer before and with that lens.
+        answered: [usize; 2],
+        /// What the estimate with that lens says, if it is not the number of answers.
+        why: Option<Box<Refusal>>,
+    },
+}
+
+fn write_conflict(
+    f: &mut fmt::Formatter<'_>,
+    conflict: &Conflict,
+    focal_percent: f64,
+    [before_km, height_km]: [f64; 2],
+) -> fmt::Result {
+    let Conflict { focal_sigmas, height_sigmas, chi2, max_chi2, range_km: [low, high], outside_sigmas } = conflict;
+    f.write_str("the pictures disagree with what was known before the flight. ")?;
+    if chi2 > max_chi2 {
+        let [chi2, max_chi2] = above(*chi2, *max_chi2);
+        write!(
+            f,
+            "The focal length changes by {focal_percent:+.1} %, which is {:.1} of its sigmas, and the limb height from \
+             {before_km:.1} km to {height_km:.1} km, {:.1} of its sigmas (with the error of the altitude): the sum of \
+             the squares is {chi2}, but at most {max_chi2} is consistent. ",
+            focal_sigmas.abs(),
+            height_sigmas.abs()
+        )?;
+    }
+    if *outside_sigmas > 0.0 {
+        let where_km = if height_km < 0.0 { "below the surface" } else { "above the surface" };
+        write!(
+            f,
+            "A limb {:.1} km {where_km} is not possible: it is expected between {low:.0} km and {high:.0} km. ",
+            height_km.abs()
+        )?;
+    }
+    write!(
+        f,
+        "Both errors look alike in the pictures, so that neither value is sure. {OTHER_LENS}. Or the altitudes \
+               are wrong (body.altitude_km, frames.csv): check their unit and their zero"
+    )
 }
 
 impl fmt::Display for Refusal {
@@ -68,7 +134,8 @@ impl fmt::Display for Refusal {
             Self::NotConverged { steps } => write!(
                 f,
                 "the fit does not converge in {steps} steps. The focal length of sensor.toml may be more than 10 % \
-                 wrong, or altitudes belong to other pictures"
+                 wrong, its lens may be of another family (camera.model: a fisheye is no pinhole; `hzn init --lens`), \
+                 or altitudes belong to other pictures"
             ),
             Self::Inconsistent { inconsistent, pictures } => write!(
                 f,
@@ -97,13 +164,33 @@ impl fmt::Display for Refusal {
                     )
                 }
             }
-            Self::Alarm { chi2, max_chi2 } => write!(
+            Self::Alarm { chi2, max_chi2 } => {
+                let [chi2, max_chi2] = above(*chi2, *max_chi2);
+                write!(
+                    f,
+                    "the limb heights of the pictures scatter more than their errors allow: chi-square is {chi2} per \
+                     degree of freedom, but at most {max_chi2} is consistent. Possible reasons that the model does \
+                     not have: a rolling shutter (camera.readout_s and rates), altitudes or times of other pictures, \
+                     a lens that changes"
+                )
+            }
+            Self::Conflict { conflict, focal_percent, height_km } => {
+                write_conflict(f, conflict, *focal_percent, *height_km)
+            }
+            Self::NotSettled { passes } => write!(
                 f,
-                "the limb heights of the pictures scatter more than their errors allow: chi-square is {chi2:.2} per \
-                 degree of freedom, but at most {max_chi2:.2} is consistent. Possible reasons that the model does not \
-                 have: a rolling shutter (camera.readout_s and rates), altitudes or times of other pictures, a lens \
-                 that changes"
+                "the pictures were processed {passes} times with the lens that they asked for, and asked for another \
+                 one each time. {OTHER_LENS}"
             ),
+            Self::Lost { percent, answered: [before, after], why } => {
+                write!(
+                    f,
+                    "the pictures ask for a focal length that differs by {percent:+.1} %. With the lens of sensor.toml, \
+                     {before} of them have an answer, and with that lens {after}"
+                )?;
+                why.as_ref().map_or(Ok(()), |why| write!(f, "; {why}"))?;
+                write!(f, ". {OTHER_LENS}")
+            }
         }
     }
 }

@@ -6,7 +6,10 @@ use hzn_core::camera::{Camera, Config, Intrinsic, Model};
 use hzn_core::frames::Rotation;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
-use super::{Found, LimbPrior, Picture, Refusal, Unknowns, Verdict, View, check, estimate, into_sensor_toml, mount};
+use super::{
+    Determined, Found, LimbPrior, Picture, Refusal, Unknowns, Verdict, View, check, estimate, estimate_in_passes,
+};
+use super::{into_sensor_toml, mount};
 use crate::draws::Draws;
 use crate::noise::tests::{Noise, earth, limb, solution};
 
@@ -332,4 +335,74 @@ fn campaign_row(fov: f64, altitude_km: [f64; 2], limb: LimbPrior) {
         off[1],
         off[2]
     );
+}
+
+/// A flight at one altitude: focal length and limb height look alike in its pictures.
+fn level_flight(seed: u64) -> Flight {
+    Flight { altitude_km: [478.0, 482.0], pictures: 16, off_axis: [0.9, 1.1], ..Flight::new(lens(60.0), seed) }
+}
+
+#[test]
+fn a_start_that_contradicts_the_pictures_is_refused() {
+    let (mut written, mut inside, mut far_refused) = (0, 0, 0);
+    for seed in 0..12 {
+        let flight = level_flight(7100 + seed);
+        let views = flight.views();
+        for percent in [-15.0, -10.0, -5.0, 5.0, 10.0, 15.0] {
+            let told = Config { focal_sigma_percent: 4.0, ..with_focal(&flight.lens, percent) };
+            let found = match estimate(&Unknowns::new(&told, &[]), &flight.body(), &views, DEFAULT) {
+                Ok(found) if found.alarm().is_none() && found.undetermined().is_none() => found,
+                Ok(found) if f64::abs(percent) > 6.0 && found.alarm().is_some() => {
+                    assert!(matches!(found.alarm(), Some(Refusal::Conflict { .. })));
+                    far_refused += usize::from(percent.abs() > 12.0);
+                    continue;
+                }
+                _ => continue,
+            };
+            let is_focal = |p: &&Determined| p.which == Intrinsic::FxPx && p.determined;
+            if !found.parameters.iter().any(|p| is_focal(&p)) {
+                continue;
+            }
+            written += 1;
+            let miss = found.camera.fx_px / flight.lens.fx_px - 1.0;
+            inside += usize::from(100.0 * miss.abs() <= 3.0 * found.focal_percent[1]);
+        }
+    }
+    // Nearly four sigmas off: all but a few are refused. What is written is right within three sigmas.
+    assert!(far_refused >= 20 && written >= 20, "{far_refused} of 24 refused, {written} written");
+    assert!(inside as f64 >= 0.97 * f64::from(written), "{inside} of {written}");
+}
+
+#[test]
+fn a_start_within_its_sigma_is_no_contradiction() {
+    let alarms = (0..40).filter(|seed| {
+        let mut draws = Draws(0x51_7cc1 + 2 * seed + 1);
+        (0..10).for_each(|_| _ = draws.uniform());
+        let limb_km = 17.0 + 7.0 * draws.normal();
+        let flight = Flight { limb_km, ..level_flight(7300 + seed) };
+        let told = Config { focal_sigma_percent: 4.0, ..with_focal(&flight.lens, 4.0 * draws.normal()) };
+        let found = estimate(&Unknowns::new(&told, &[]), &flight.body(), &flight.views(), DEFAULT);
+        found.is_ok_and(|found| found.alarm().is_some())
+    });
+    // One in a hundred is expected.
+    assert!(alarms.count() <= 2);
+}
+
+#[test]
+fn a_lens_with_which_the_answers_are_lost_is_no_lens() {
+    let flight = level_flight(7500);
+    let told = Config { focal_sigma_percent: 10.0, ..with_focal(&flight.lens, 8.0) };
+    let sensor = hzn_core::Config { body: flight.body(), ..hzn_core::Config::new(told.clone()) };
+    let unknowns = Unknowns::new(&told, &[]);
+    let mut passes = 0;
+    let process = |used: &Config| {
+        passes += 1;
+        // The sigma of the lens is as large as its step, so that a limb of the old size is still accepted.
+        assert!(passes == 1 || used.focal_sigma_percent > 5.0, "{}", used.focal_sigma_percent);
+        Ok::<_, ()>(Some(if passes == 1 { flight.views() } else { Vec::new() }))
+    };
+    let found = estimate_in_passes(&sensor, &flight.body(), &unknowns, DEFAULT, process, |_| ()).unwrap().unwrap();
+    let why = found.unwrap_err();
+    assert!(matches!(why, Refusal::Lost { answered: [_, 0], why: None, .. }), "{why:?}");
+    assert!(why.to_string().contains("`hzn init` without --fov"), "{why}");
 }

@@ -3,11 +3,12 @@
 use hzn_core::camera::Intrinsic;
 
 use super::check::{Check, Deviation, Verdict};
-use super::estimate::{Estimate, MIN_PICTURES};
+use super::estimate::{Estimate, MAX_CHI2, MIN_PICTURES};
 use super::mount::{Mount, MountRefusal};
 use super::observable::Observability;
 use super::parameters::Determined;
 use super::track::Track;
+use crate::words::above;
 
 /// A mount, or why there is none.
 type MountResult = Result<Mount, MountRefusal>;
@@ -126,8 +127,19 @@ fn add_limb(lines: &mut Lines, estimate: &Estimate) {
     lines
         .add("common shift", format!("of all edges: ± {before_px:.2} px assumed, ± {after_px:.2} px after the flight"));
     if let Some(chi2) = estimate.chi2 {
-        lines.add("chi-square", format!("{chi2:.2} a degree of freedom; 1 is ideal, a value above 2 is an alarm"));
+        let [chi2, _] = above(chi2, MAX_CHI2);
+        lines.add("chi-square", format!("{chi2} a degree of freedom; 1 is ideal, a value above 2 is an alarm"));
     }
+    let c = &estimate.conflict;
+    let [chi2, limit] = above(c.chi2, c.max_chi2);
+    lines.add(
+        "priors",
+        format!(
+            "focal length {:+.1} and limb height {:+.1} of their sigmas before the flight; the sum of the squares is \
+             {chi2}, and a value above {limit} is an alarm",
+            c.focal_sigmas, c.height_sigmas
+        ),
+    );
 }
 
 fn add_observability(lines: &mut Lines, o: &Observability) {
