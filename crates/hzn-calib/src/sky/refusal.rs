@@ -81,6 +81,34 @@ pub enum Refusal {
     },
 }
 
+fn write_undetermined(
+    f: &mut fmt::Formatter<'_>,
+    focal_percent: f64,
+    before_percent: f64,
+    with_known_limb_percent: f64,
+) -> fmt::Result {
+    write!(
+        f,
+        "the flight gives the focal length to ± {focal_percent:.2} %, and before it was known to ± \
+                     {before_percent:.2} %; a value is written if its sigma is at most half of that before. "
+    )?;
+    if with_known_limb_percent < 0.5 * focal_percent {
+        write!(
+            f,
+            "With the limb height known exactly, it would be ± {with_known_limb_percent:.2} %: reduce \
+                         limb_height_sigma_km or altitude_sigma_km of [body], whichever is larger, by a better limb \
+                         height or better altitudes; or take pictures from a wider range of altitudes and \
+                         directions"
+        )
+    } else {
+        write!(
+            f,
+            "Even with the limb height known exactly, it would be ± {with_known_limb_percent:.2} %: take \
+                         more pictures, or pictures with a longer limb"
+        )
+    }
+}
+
 fn write_conflict(
     f: &mut fmt::Formatter<'_>,
     conflict: &Conflict,
@@ -143,26 +171,7 @@ impl fmt::Display for Refusal {
                  edges are wrong, or altitudes belong to other pictures; examine some of them with `hzn explain`"
             ),
             Self::Undetermined { focal_percent, before_percent, with_known_limb_percent } => {
-                write!(
-                    f,
-                    "the flight gives the focal length to ± {focal_percent:.2} %, and before it was known to ± \
-                     {before_percent:.2} %; a value is written if its sigma is at most half of that before. "
-                )?;
-                if *with_known_limb_percent < 0.5 * focal_percent {
-                    write!(
-                        f,
-                        "With the limb height known exactly, it would be ± {with_known_limb_percent:.2} %: reduce \
-                         limb_height_sigma_km or altitude_sigma_km of [body], whichever is larger, by a better limb \
-                         height or better altitudes; or take pictures from a wider range of altitudes and \
-                         directions"
-                    )
-                } else {
-                    write!(
-                        f,
-                        "Even with the limb height known exactly, it would be ± {with_known_limb_percent:.2} %: take \
-                         more pictures, or pictures with a longer limb"
-                    )
-                }
+                write_undetermined(f, *focal_percent, *before_percent, *with_known_limb_percent)
             }
             Self::Alarm { chi2, max_chi2 } => {
                 let [chi2, max_chi2] = above(*chi2, *max_chi2);
