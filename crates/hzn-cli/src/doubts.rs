@@ -1,6 +1,7 @@
 //! What is odd about the pictures of a run. It is counted while the run goes on, and told once at its end.
 
 mod altitudes;
+mod contradictions;
 mod improbable;
 mod one_place;
 mod rates;
@@ -15,6 +16,7 @@ use hzn_run::engine::{BodyOutcome, Finished};
 use hzn_run::explain;
 
 pub(crate) use altitudes::Altitudes;
+pub(crate) use contradictions::Contradictions;
 pub(crate) use improbable::Improbable;
 pub(crate) use one_place::OnePlace;
 pub(crate) use rates::Rates;

@@ -49,9 +49,16 @@ impl Improbable {
     /// Tells it, also in a quiet run, because a program that reads only the statuses takes such answers. Nothing is
     /// left to say if the gate is at or above this probability.
     pub(crate) fn tell(&self, gates: &gates::Config) {
-        if let Some(what) = self.describe().filter(|_| gates.min_p_limb < EVEN) {
-            tell::warning(what);
-        }
+        self.told(gates).iter().for_each(tell::warning);
+    }
+
+    /// Tells it of a head of a rig.
+    pub(crate) fn tell_of_head(&self, name: &str, gates: &gates::Config) {
+        self.told(gates).iter().for_each(|what| tell::warning(format_args!("{name}: {what}")));
+    }
+
+    fn told(&self, gates: &gates::Config) -> Option<String> {
+        self.describe().filter(|_| gates.min_p_limb < EVEN)
     }
 }
 

@@ -8,10 +8,16 @@ const HEADS: [&str; 4] = ["front", "right", "back", "left"];
 
 /// Simulates the scene `ring` with small pictures, and a vehicle that turns.
 fn turning(frames: &str) -> Place {
+    turning_for(frames, "5670.0")
+}
+
+/// Renders the same scene until this time in seconds.
+fn turning_for(frames: &str, to_s: &str) -> Place {
     let place = Place::new();
     let scene = place.run(&["simulate", "ring", "--show"]).expect(0).out;
     let scene = scene.replace("width = 640\nheight = 480", "width = 320\nheight = 240").replace("554.0", "277.0");
     let scene = scene.replace("319.5", "159.5").replace("239.5", "119.5");
+    let scene = scene.replace("to_s = 5670.0", &format!("to_s = {to_s}"));
     let scene = scene.replace("[66.0, 70.0]", "[48.0, 88.0]").replace("[-3.0, 3.0]", "[-20.0, 20.0]");
     place.write("ring.toml", scene.as_bytes());
     place.run(&["simulate", "ring.toml", "-o", "ring", "--frames", frames, "--no-noise", "-q"]).expect(0);
@@ -151,4 +157,24 @@ fn a_rig_begins_with_its_folders_and_mounts() {
         .run(&["init", "--rig", "left", "--camchain", "chain.yaml", "-o", "n.toml"])
         .expect(2)
         .says("1 folders and 2 mounts");
+}
+
+#[test]
+fn mounts_that_the_joint_answer_refuses_do_not_hold() {
+    // In twelve seconds, all epochs see one weather of the limb, and no turn of a degree is significant.
+    let place = turning_for("24", "12.0");
+    let good = place.read("ring/rig.toml");
+    let (sin, cos) = 0.5f64.to_radians().sin_cos();
+    let wrong = product([cos, 0.6 * sin, 0.0, 0.8 * sin], mounts(&good)[1]);
+    let told = good.split("q_rig_from_camera_wxyz = [").nth(2).unwrap().split(']').next().unwrap();
+    let wrong = wrong.map(|x| format!("{x:?}")).join(", ");
+    place.write("ring/wrong.toml", good.replace(told, &wrong).as_bytes());
+    let check = |rig: &str| place.run(&["calibrate", "rig", rig, "-q", "--check"]);
+    let out = check("ring/wrong.toml").expect(1).out;
+    assert!(out.starts_with("mounts         does not hold: in ") && out.contains("rig.false_alarm"), "{out}");
+    // The run says it in the same words, although it is quiet.
+    let run = |rig: &str, out: &str| place.run(&["run", rig, "-q", "-o", out]).expect(0);
+    run("ring/wrong.toml", "w.csv").says("the answers are doubtful: the heads contradict each other in ");
+    assert!(check("ring/rig.toml").expect(0).out.starts_with("mounts         holds"));
+    assert!(!run("ring/rig.toml", "r.csv").err.contains("doubtful"));
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hzn_calib::rig::{Adjusted, Check, Epoch, Settings, Sighting, adjust, check};
+use hzn_core::status::Status;
 use hzn_files::rig::{Head, HeadMount};
 use hzn_run::disk;
 use hzn_run::engine::{self, End, Turns};
@@ -12,6 +13,7 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use super::rig_text;
 use crate::commands::run::cores;
+use crate::doubts::Contradictions;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::files;
 use crate::progress::Progress;
@@ -28,7 +30,8 @@ use crate::tell;
 /// The heads see a turn about the direction to the Earth only while the vehicle turns under it. The report names the
 /// turns that the pictures do not determine. With --check, nothing is adjusted: the command says whether the told
 /// mounts still hold within their sigmas, and which head has turned if three or more heads tell it. Exit code 0 for
-/// `holds`, 1 for `does not hold`.
+/// `holds`, 1 for `does not hold`. Mounts do not hold either if the joint answer of `hzn run` refuses more epochs, or
+/// excludes a head from more of them, than chance explains with `false_alarm` of rig.toml.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The rig.toml
@@ -81,6 +84,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage(format!("{}: one head has no mount relative to another one", args.rig.display())));
     }
     let (names, heads) = (opened.rig.heads.clone(), opened.rig.rig);
+    let false_alarm = heads.false_alarm;
     let Some(found) = look(args, opened)? else {
         tell::line("interrupted; nothing was measured");
         return Ok(Exit::Interrupted);
@@ -100,8 +104,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.check {
         let told_rad2: Vec<Matrix3<f64>> = names.iter().map(told_rad2).collect();
         let checked = check(&adjusted, &told_rad2);
-        tell::result(rig_text::check_report(&names, &adjusted, &checked))?;
-        return Ok(if matches!(checked, Check::Holds(_)) { Exit::Done } else { Exit::Failed });
+        // The joint answer compares the heads with the told mounts, too, and may refuse what the turns leave open.
+        let refused = found.contradictions.describe(false_alarm);
+        tell::result(rig_text::check_report(&names, &adjusted, &checked, refused.as_deref()))?;
+        let holds = matches!(checked, Check::Holds(_)) && refused.is_none();
+        return Ok(if holds { Exit::Done } else { Exit::Failed });
     }
     tell::result(rig_text::report(&names, &adjusted))?;
     if let Some(path) = &args.output {
@@ -129,6 +136,7 @@ struct Found {
     times_s: Vec<f64>,
     count: u64,
     radius_km: f64,
+    contradictions: Contradictions,
 }
 
 /// Processes the pictures. `None` if the run was interrupted.
@@ -159,13 +167,22 @@ fn look(args: &Args, opened: Opened) -> Result<Option<Found>, Stop> {
     let mut epochs = Epochs::new(opened.heads, sync_s)?;
     let mut progress = Progress::new(total, 0, args.quiet);
     let radius_km = plan.joiner.limb().radius_km;
-    let mut found = Found { epochs: Vec::new(), times_s: Vec::new(), count: 0, radius_km };
+    let mut found = Found {
+        epochs: Vec::new(),
+        times_s: Vec::new(),
+        count: 0,
+        radius_km,
+        contradictions: Contradictions::default(),
+    };
     let end = rig::look(&plan, &mut epochs, &stop_flag(), &mut |epoch| {
         found.count += 1;
         for frame in epoch.heads.iter().flatten() {
             progress.count(frame.outcomes.iter().map(|outcome| outcome.status()).take(1));
         }
         found.times_s.extend(epoch.joint.time_s);
+        // A head that repeats a picture is excluded, too, and says nothing about its mount.
+        let excluded = epoch.joint.heads_excluded.is_some() && epoch.repeats.iter().all(Option::is_none);
+        found.contradictions.count(epoch.joint.status == Status::Ok, &epoch.joint.detail, excluded);
         found.epochs.push(sightings(epoch, &plan, &mounts));
     })?;
     progress.finish();

@@ -12,8 +12,14 @@ pub(super) fn report(heads: &[Head], adjusted: &Adjusted) -> String {
 }
 
 /// Returns the report of a check: the verdict, and what the pictures say.
-pub(super) fn check_report(heads: &[Head], adjusted: &Adjusted, check: &Check) -> String {
+/// `refused` says that the joint answer refuses more epochs than chance explains.
+pub(super) fn check_report(heads: &[Head], adjusted: &Adjusted, check: &Check, refused: Option<&str>) -> String {
     let verdict = match check {
+        Check::Holds(_) if refused.is_some() => format!(
+            "does not hold: {}. No turn of one head is significant, so the sigmas of the mounts may be too small, or a \
+             lens, a clock or pictures of a head are wrong",
+            refused.unwrap_or_default()
+        ),
         Check::Holds(noticed_rad) if noticed_rad.is_finite() => format!(
             "holds: the heads see one limb with the mounts of rig.toml, within their sigmas; a turn of one head by \
              {:.2}° about any determined axis would have been noticed",

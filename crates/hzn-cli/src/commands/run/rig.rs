@@ -10,7 +10,7 @@ use hzn_run::sink::{self, Outputs, StoredResults};
 use hzn_run::{disk, explain, source};
 
 use super::args::Args;
-use crate::doubts::MissingPriors;
+use crate::doubts::{Contradictions, Improbable, MissingPriors};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::progress::{Counts, Progress, count_text};
 use crate::setup::{TableFormat, stop_flag};
@@ -35,6 +35,7 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
     let plan = plan(args, &opened)?;
     let texts: Vec<_> = opened.heads.iter().map(|head| head.sensor.text.clone()).collect();
     let (total, text) = (opened.pictures(), opened.text.clone());
+    let false_alarm = opened.rig.rig.false_alarm;
     let mut input = Input { request, tables: tables(&opened), epochs: epochs(opened)? };
     let heads: Vec<_> =
         plan.heads.iter().zip(texts).map(|(head, text)| (head.name.clone(), &head.plan.config, text)).collect();
@@ -67,10 +68,7 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
     let epochs = input.epochs;
     let lost = epochs.describe_loss().filter(|_| end == End::Complete);
     lost.iter().chain(&epochs.warnings()).for_each(tell::warning);
-    watch.missing.tell(None);
-    if !args.quiet {
-        watch.sum_up(&summary);
-    }
+    watch.tell(&plan, &summary, false_alarm);
     if end == End::Interrupted {
         tell::line(format_args!("interrupted after {}", explain::counted(watch.stored + watch.epochs, "epoch")));
         return Ok(Exit::Interrupted);
@@ -149,18 +147,6 @@ fn plan(args: &Args, opened: &Opened) -> Result<Plan, Stop> {
 /// Number of pictures that are reported one by one.
 const MAX_LISTED: u64 = 20;
 
-/// How the reason of an epoch begins whose heads contradict each other.
-const INCONSISTENT: &str = "inconsistent";
-/// Number and share of such epochs from which on the others are doubtful, too. By chance it is below 0.3 %.
-const DOUBTFUL_EPOCHS: u64 = 3;
-const DOUBTFUL_SHARE: f64 = 0.03;
-
-/// Returns whether the answers of the other epochs are doubtful after this number of contradictions.
-fn casts_doubt(contradicting: u64, joint: &Counts) -> bool {
-    let (epochs, answers) = (joint.iter().sum::<u64>() as f64, joint[Status::Ok as usize]);
-    contradicting >= DOUBTFUL_EPOCHS && contradicting as f64 > DOUBTFUL_SHARE * epochs && answers > 0
-}
-
 /// Counts and messages while the run goes on.
 struct Watch {
     progress: Progress,
@@ -174,6 +160,9 @@ struct Watch {
     joint: Counts,
     /// Number of epochs in which a head was excluded.
     excluded: BTreeMap<String, u64>,
+    contradictions: Contradictions,
+    /// Answers of each head whose edge is more likely no limb.
+    improbable: Vec<Improbable>,
     /// Number of epochs that the heads together refuse, by the reason.
     refused: BTreeMap<String, u64>,
 }
@@ -193,6 +182,8 @@ impl Watch {
             stored,
             joint: Counts::default(),
             excluded: BTreeMap::new(),
+            contradictions: Contradictions::default(),
+            improbable: Vec::new(),
             refused: BTreeMap::new(),
         }
     }
@@ -204,6 +195,12 @@ impl Watch {
         self.epochs += 1;
         if let Some(count) = self.joint.get_mut(epoch.joint.status as usize) {
             *count += 1;
+        }
+        let excluded = epoch.joint.heads_excluded.is_some();
+        self.contradictions.count(epoch.joint.status == Status::Ok, &epoch.joint.detail, excluded);
+        self.improbable.resize_with(plan.heads.len(), Improbable::default);
+        for (frame, improbable) in epoch.heads.iter().zip(&mut self.improbable) {
+            frame.iter().for_each(|frame| improbable.count(frame));
         }
         if epoch.joint.status == Status::Rejected {
             let why = epoch.joint.detail.split(';').next().unwrap_or_default();
@@ -232,7 +229,20 @@ impl Watch {
         if is_unread { Exit::SomeUnreadable } else { Exit::Done }
     }
 
-    fn sum_up(&self, summary: &str) {
+    /// Tells what is odd about the answers, and sums them up.
+    fn tell(&self, plan: &Plan, summary: &str, false_alarm: f64) {
+        self.missing.tell(None);
+        for (improbable, head) in self.improbable.iter().zip(&plan.heads) {
+            improbable.tell_of_head(&head.name, &head.plan.config.gates);
+        }
+        if !self.quiet {
+            self.sum_up(summary, false_alarm);
+        }
+        // It is told in a quiet run, too: a program that reads only the statuses takes the other answers.
+        self.contradictions.describe_doubt(false_alarm).iter().for_each(tell::warning);
+    }
+
+    fn sum_up(&self, summary: &str, false_alarm: f64) {
         tell::line(summary);
         let before = match self.stored {
             0 => String::new(),
@@ -245,42 +255,16 @@ impl Watch {
                 "note: {epochs} rejected as {why} (column detail; the heads' own rows are below it)"
             ));
         }
-        let contradict = |(why, epochs): (&String, &u64)| why.starts_with(INCONSISTENT).then_some(*epochs);
-        let contradicting: u64 = self.refused.iter().filter_map(contradict).sum();
-        let answers = self.joint[Status::Ok as usize];
-        if contradicting >= DOUBTFUL_EPOCHS && answers == 0 {
+        if self.contradictions.is_in_all(false_alarm) {
             tell::line(
                 "note: the heads contradict each other in every epoch: are the mounts in rig.toml those of these heads \
                  (not exchanged, not inverted, q_vehicle_from_camera_wxyz with the scalar first), are the pictures of \
                  each head its own and not mirrored, and do all heads have the same clock?",
             );
         }
-        if casts_doubt(contradicting, &self.joint) {
-            tell::line(
-                "note: the heads contradict each other far more often than by chance: an error of a mount that is just \
-                 below the limit is in the other answers, too; check the mounts before you use them",
-            );
-        }
         for (head, epochs) in &self.excluded {
             let epochs = explain::counted(*epochs, "epoch");
             tell::line(format_args!("note: head {head} was excluded in {epochs} (column heads_excluded)"));
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn contradictions_cast_doubt_on_the_other_answers() {
-        let doubtful = |ok, rejected| {
-            let mut joint = Counts::default();
-            (joint[Status::Ok as usize], joint[Status::Rejected as usize]) = (ok, rejected);
-            casts_doubt(rejected, &joint)
-        };
-        assert!(doubtful(22, 8) && doubtful(60, 3));
-        // Chance, a single event, and no answer at all.
-        assert!(!doubtful(1000, 3) && !doubtful(20, 2) && !doubtful(0, 4));
     }
 }
