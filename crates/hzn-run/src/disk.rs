@@ -83,10 +83,10 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Error> {
         .map_err(|e| cannot_write(path, &e))
 }
 
-/// Writes a text file as [`write`] does, and waits until the disk has it.
+/// Writes a text file as [`write()`] does, and waits until the disk has it.
 ///
 /// # Errors
-/// The errors are those of [`write`].
+/// The errors are those of [`write()`].
 pub fn write_whole(path: &Path, text: &str) -> Result<(), Error> {
     let durable = |part: &Path| {
         let mut file = File::create(part)?;
