@@ -53,6 +53,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let tables: Vec<(Instrument, &Path)> =
         tables.into_iter().filter_map(|(which, path)| Some((which, path.as_deref()?))).collect();
     if tables.is_empty() {
+        TableFormat::tell_unused(args.format, args.output.iter());
         return export_rows(args);
     }
     if args.output.is_some() || args.images.is_some() || args.overlay.is_some() {
@@ -73,7 +74,6 @@ fn export_rows(args: &Args) -> Outcome {
              gnss.csv for a recording of ROS 2",
         ));
     }
-    TableFormat::tell_unused(args.format, args.output.iter());
     let to_file = args.output.as_ref().filter(|path| !source::is_stdin(path));
     if let Some(path) = to_file
         && sink::target(path)? == sink::Target::Mcap

@@ -52,8 +52,8 @@ pub(super) fn run(mut args: Args) -> Outcome {
         ros: args.ros,
         heads: &[],
     };
-    let (mut output, stored) =
-        Outputs::open(&args.output, TableFormat::or_csv(args.format), args.existing(), settings)?;
+    let format = TableFormat::or_csv(args.format);
+    let (mut output, stored) = Outputs::open(&args.output, format, args.existing(), settings)?;
     let plan = Plan { last: stored.last_answers.clone(), ..plan };
     if !args.quiet {
         tell_notes(&notes, stored.frames, plan.overlay.is_some() || plan.masks.is_some());
@@ -69,11 +69,9 @@ pub(super) fn run(mut args: Args) -> Outcome {
     let mut watch = Watch::new(Progress::new(total, stored.frames, args.quiet), args.quiet);
     let stop = watching.clone().unwrap_or_else(stop_flag);
     tell::detail(|| format!("threads: {}", plan.threads));
-    let end = engine::run(&plan, source.as_mut(), stored.frames, &stop, &mut output, &mut |frame| {
-        watch.see(frame, &plan.config);
-    });
-    let bodies: Vec<&str> = plan.config.each_body().iter().map(|b| b.kind.name()).collect();
-    let summary = watch.progress.summary(&bodies);
+    let mut see = |frame: &Finished| watch.see(frame, &plan.config);
+    let end = engine::run(&plan, source.as_mut(), stored.frames, &stop, &mut output, &mut see);
+    let summary = watch.summary(&plan.config);
     let end = end?;
     output.finish()?;
     let lost = source.describe_loss().filter(|_| end == End::Complete);
@@ -83,10 +81,7 @@ pub(super) fn run(mut args: Args) -> Outcome {
     if !args.quiet {
         watch.sum_up(args, &plan, source.as_ref(), &again, (&summary, stored.frames));
     }
-    let is_told = watch.tell_doubt(again.fits.as_ref());
-    if end == End::Complete {
-        watch.tell_contradictions(args, &plan, is_told);
-    }
+    watch.tell_doubts(args, &plan, again.fits.as_ref(), end);
     let done = stored.frames + watch.progress.frames();
     // Ctrl-C is the only end of a run that waits for pictures.
     if end == End::Interrupted && watching.is_none() && total.is_none_or(|n| done < n) {
@@ -292,6 +287,20 @@ impl Watch {
         let refused = ReadAgain::read(&request, &plan.config, commonest.pictures)?;
         let fits = commonest.is_size.then(|| refused.what_fits(&request, &plan.config)).flatten();
         Some(Again { bars: refused.bars(&plan.config), fits })
+    }
+
+    /// Returns the counts of the statuses, in words.
+    fn summary(&self, config: &Config) -> String {
+        let bodies: Vec<&str> = config.each_body().iter().map(|b| b.kind.name()).collect();
+        self.progress.summary(&bodies)
+    }
+
+    /// Tells what makes the answers doubtful. An interrupted run does not look at its pictures again.
+    fn tell_doubts(&self, args: &Args, plan: &Plan, fits: Option<&WhatFits>, end: End) {
+        let is_told = self.tell_doubt(fits);
+        if end == End::Complete {
+            self.tell_contradictions(args, plan, is_told);
+        }
     }
 
     /// Tells that the answers of the run are doubtful if the limb of refused pictures contradicts what the answers were
