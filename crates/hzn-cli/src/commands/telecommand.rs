@@ -68,8 +68,13 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let mut signer = args.key.as_deref().map(Signer::open).transpose().map_err(usage)?;
     if let Some(address) = &args.to {
-        let commander =
-            Commander::new(args.apids.apid_base, args.sequence, &args.commands, tell.clone())?.signed_by(signer);
+        let commander = Commander::new(args.apids.apid_base, args.sequence, &args.commands, tell.clone());
+        let commander = commander.inspect_err(|_| {
+            if args.commands.len() > 1 {
+                tell::line("note: no command was sent: all of them are checked first");
+            }
+        })?;
+        let commander = commander.signed_by(signer);
         let is_done = Incoming::open(address, Patience::Fails)?.command(commander, &tell)?;
         return Ok(if is_done { Exit::Done } else { Exit::Failed });
     }

@@ -241,3 +241,15 @@ fn the_dictionary_is_that_of_the_records() {
     assert_eq!(moved, packets.replace("binaryValue=\"19C0\"", "binaryValue=\"1B00\""));
     place.run(&["telemetry"]).expect(2).says("<FILE|LINE>");
 }
+
+#[test]
+fn no_command_is_sent_if_one_of_several_is_wrong() {
+    let place = Place::new();
+    let send = |commands: &[&str]| {
+        let ran = place.run(&[&["telecommand"], commands, &["--to", "udp:127.0.0.1:0,127.0.0.1:9"]].concat());
+        assert!(ran.err.contains("track.normals"), "{}", ran.err);
+        ran.err.contains("note: no command was sent: all of them are checked first")
+    };
+    assert!(send(&["set track.full_every 0", "set track.normals 5000"]));
+    assert!(!send(&["set track.normals 5000"]));
+}
