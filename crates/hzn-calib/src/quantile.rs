@@ -6,8 +6,8 @@ pub(crate) fn chi2(freedom: usize, z: f64) -> f64 {
     wilson_hilferty(freedom as f64, z)
 }
 
-/// Returns the same limit for a sum of squares of independent normal deviates with weights, by a χ² of the same mean and
-/// variance (Satterthwaite 1946). A single weight gives a limit that is right to 3 %.
+/// Returns the same limit for a sum of squares of independent normal deviates with weights, by a χ² of the same mean
+/// and variance (Satterthwaite 1946). A single weight gives a limit that is right to 3 %.
 pub(crate) fn weighted_chi2(weights: &[f64], z: f64) -> f64 {
     let sum: f64 = weights.iter().sum();
     let squares: f64 = weights.iter().map(|w| w * w).sum();

@@ -1,7 +1,7 @@
 //! Whether the pictures disagree with what was known before the flight.
 //!
-//! For a prior x ~ N(x₀, P₀) and an estimate with the covariance P, the shift d = x − x₀ has the covariance P₀ − P. Then
-//! dᵀP₀⁻¹d is a sum of squares of independent normal deviates with the weights λ, the eigenvalues of 1 − P₀⁻¹P. A
+//! For a prior x ~ N(x₀, P₀) and an estimate with the covariance P, the shift d = x − x₀ has the covariance P₀ − P.
+//! Then dᵀP₀⁻¹d is a sum of squares of independent normal deviates with the weights λ, the eigenvalues of 1 − P₀⁻¹P. A
 //! weight is near 1 in a direction that the flight determines, and near 0 where the prior stays.
 
 use hzn_core::body;

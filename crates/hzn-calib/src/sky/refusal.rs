@@ -194,8 +194,8 @@ impl fmt::Display for Refusal {
             Self::Lost { percent, answered: [before, after], why } => {
                 write!(
                     f,
-                    "the pictures ask for a focal length that differs by {percent:+.1} %. With the lens of sensor.toml, \
-                     {before} of them have an answer, and with that lens {after}"
+                    "the pictures ask for a focal length that differs by {percent:+.1} %. With the lens of \
+                     sensor.toml, {before} of them have an answer, and with that lens {after}"
                 )?;
                 why.as_ref().map_or(Ok(()), |why| write!(f, "; {why}"))?;
                 write!(f, ". {OTHER_LENS}")

@@ -4,10 +4,11 @@
 //! line may own it, and because the line may return the packets of this computer.
 
 use super::Flight;
-use crate::authentication::{Admitted, Gate};
+use super::gate::Admitted;
+use super::uplink::Uplink;
 use crate::board::Board;
 use crate::bytes::Reader;
-use crate::inbox::{Filled, Inbox};
+use crate::inbox::Filled;
 use crate::messages::{Acknowledge, Code, Event, Function, Housekeeping};
 use crate::packet::{Apid, MAX_BYTES};
 
@@ -23,20 +24,6 @@ pub(super) const MAX_EFFORT: usize = 2 * MAX_BYTES;
 #[inline(always)]
 pub(super) fn may_hold_packet(filled: Filled, is_done: bool, effort: usize) -> bool {
     filled != Filled::Full && !is_done && effort < MAX_EFFORT
-}
-
-/// What belongs to the line to the computer.
-#[derive(Debug)]
-pub(super) struct Uplink {
-    pub(super) inbox: Inbox,
-    pub(super) gate: Gate,
-}
-
-impl Uplink {
-    /// Makes an uplink of all zeros.
-    pub(super) const fn new() -> Self {
-        Self { inbox: Inbox::new(), gate: Gate::new() }
-    }
 }
 
 /// A packet that was received.

@@ -6,6 +6,7 @@
 //! | `recovery` | counts of resets, detection of lift-off |
 //! | `mode_changes` | the mode after a reset, at lift-off, at the end of the flight |
 //! | `listen` | the telecommand that arrives, and its acknowledgement |
+//! | `uplink`, `gate` | the line that it comes from, and whether its sender may command |
 //! | `telecommands` | the functions of telecommands |
 //! | `parameter_commands` | the functions that read and change parameters |
 //! | `pictures` | the way of a picture to its science packet |
@@ -39,6 +40,7 @@ mod attitude;
 mod budget;
 mod camera_watch;
 mod clock;
+mod gate;
 mod housekeeping;
 mod known;
 mod line;
@@ -56,15 +58,16 @@ pub mod rig;
 mod science;
 mod self_check;
 mod telecommands;
+mod uplink;
 mod validity;
 
 use budget::BitBudget;
 use camera_watch::CameraWatch;
 use known::Known;
 use line::Line;
-use listen::Uplink;
 use recovery::Recovery;
 use reports::Limiter;
+use uplink::Uplink;
 
 /// The memory of the flight software in addition to the lists of a picture; keep it in a `static`.
 #[derive(Debug)]

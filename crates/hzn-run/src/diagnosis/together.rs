@@ -39,8 +39,8 @@ const STEP: f64 = 0.01;
 /// Steps of the derivatives by an error of the lens, in its sigmas, if those of one sigma to both sides are not
 /// possible.
 const STEPS: [f64; 4] = [1.0, -1.0, 0.1, -0.1];
-/// Root mean square of the square of a normal number, √3. The sigmas of a guessed lens are so large that its errors bend
-/// the half-angles: they also move them by their squares.
+/// Root mean square of the square of a normal number, √3. The sigmas of a guessed lens are so large that its errors
+/// bend the half-angles: they also move them by their squares.
 const RMS_OF_SQUARE: f64 = 1.732_050_807_568_877_2;
 /// The part of the variance of a half-angle that is at least a picture's own.
 const LEAST_OWN: f64 = 0.05;

@@ -13,7 +13,8 @@ use hzn_mcap::Row;
 
 use super::outcome::{BodyOutcome, Finished};
 
-/// Number of pictures whose bytes are compared with those of the next one: more than a camera or a recorder has buffers.
+/// Number of pictures whose bytes are compared with those of the next one: more than a camera or a recorder has
+/// buffers.
 pub const REMEMBERED: usize = 32;
 
 /// The answers of earlier pictures, one for each body, with the turn of the vehicle since then.

@@ -4,10 +4,10 @@ use hzn_core::Prior;
 
 use super::{Rig, RigBoard};
 use crate::attitude::turned_back;
-use crate::authentication::Admitted;
 use crate::board::Board;
 use crate::bytes::Reader;
 use crate::flight::attitude::{TimedAttitude, read_attitude};
+use crate::flight::gate::Admitted;
 use crate::flight::navigation::{Values, read_navigation, read_prior};
 use crate::flight::{Flight, listen};
 use crate::messages::{Acknowledge, Code, Function, Housekeeping, Mode};

@@ -27,7 +27,7 @@ use hzn_core::rig::{self, Answered, Common, Limb, MOST_HEADS, Mount};
 use hzn_twice::KeptTwice;
 
 use super::line::Line;
-use super::listen::Uplink;
+use super::uplink::Uplink;
 use super::{Flight, HeadBuffers, Lists};
 use crate::board::Board;
 use crate::joint::RigAnswer;
