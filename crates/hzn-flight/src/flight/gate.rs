@@ -39,13 +39,7 @@ impl Gate {
     /// Judges a telecommand. `user` are its user data, with the trailer if it has one.
     // Not inlined, because the hash needs a stack of its own.
     #[inline(never)]
-    pub(super) fn admit(
-        &mut self,
-        board: &mut impl Board,
-        base: ApidBase,
-        sequence: u16,
-        user: &[u8],
-    ) -> Admitted {
+    pub(super) fn admit(&mut self, board: &mut impl Board, base: ApidBase, sequence: u16, user: &[u8]) -> Admitted {
         if !board.has_keys() {
             return Admitted::Taken(user.len());
         }
