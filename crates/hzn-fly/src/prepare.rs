@@ -24,7 +24,13 @@ pub(crate) fn prepare_parameters(
     tell: &Tell,
 ) -> Result<Parameters, Error> {
     let has_copies = flash.has_copies();
-    if let Some(given) = given.filter(|_| !has_copies || replaces) {
+    let has_none = newest(flash).is_none();
+    if let Some(given) = given.filter(|_| has_none || replaces) {
+        if has_copies && !replaces {
+            // The defaults of the loop are those of another camera, so that every picture would be refused.
+            let what = "no copy of the parameters can be used";
+            tell(&format!("warning: {}: {what}; those of {origin} are stored again", flash.folder().display()));
+        }
         store(given, flash)?;
     }
     if given.is_none() && !has_copies {
@@ -48,6 +54,12 @@ pub(crate) fn prepare_parameters(
         tell(&format!("warning: body.altitude_km is not set: {what}"));
     }
     Ok(newest)
+}
+
+/// Stores another base of the APIDs, and leaves the other parameters as they are.
+pub(crate) fn store_base(parameters: &mut Parameters, base: u16, flash: &Flash) -> Result<(), Error> {
+    parameters.operations.apid_base = base;
+    store(parameters, flash)
 }
 
 /// Returns the newest valid copy of the parameters, and its generation.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use hzn_core::config::Mount;
+use hzn_core::rig::MOST_HEADS;
 use hzn_files::rig::{self as file, turn_after};
 use hzn_flight::Parameters;
 use hzn_flight::flight::rig::{Heads, Rig, RigBuffers, Setup};
@@ -24,7 +25,7 @@ use crate::flight::{Settings, Summary, check_input, check_raw, end, open_parts};
 use crate::head::{Feed, Head};
 use crate::keeper::Keeper;
 use crate::log::Sensors;
-use crate::prepare::{parameters_for, prepare_parameters};
+use crate::prepare::{parameters_for, prepare_parameters, store_base};
 use crate::signals::Lines;
 use crate::tell::Tell;
 
@@ -46,10 +47,10 @@ struct Prepared {
 /// Flies the heads of a rig.toml until the pictures of all of them end or a signal stops the program.
 pub(crate) fn fly(path: &Path, settings: &Settings, lines: Arc<Lines>, tell: &Tell) -> Result<Summary, Error> {
     let rig = file::load(path).map_err(|e| Error::usage(e.to_string()))?;
-    let prepared = prepare(path, &rig, settings, tell)?;
+    let mut prepared = prepare(path, &rig, settings, tell)?;
     let mut setup = setup(&rig);
     setup.limb_tilt_sigma_km = setup.limb_tilt_sigma_km.or(prepared.first().and_then(|head| head.limb_tilt_sigma_km));
-    check_bases(&prepared, setup.base)?;
+    separate_bases(&mut prepared, setup.base, tell)?;
     let text = fs::read_to_string(path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
     let sensors = Sensors {
         configs: prepared.iter().map(|head| head.parameters.sensor.clone()).collect(),
@@ -91,19 +92,21 @@ fn base_of(k: usize) -> u16 {
     ApidBase::DEFAULT.number() + ApidBase::STEP * (1 + k as u16)
 }
 
-/// Refuses heads that the line cannot tell apart.
-fn check_bases(heads: &[Prepared], rig: ApidBase) -> Result<(), Error> {
+/// Gives a head another base if the line cannot tell it apart from an earlier head or from the rig: a telecommand may
+/// have set it, and one head must not keep the others from flying.
+fn separate_bases(heads: &mut [Prepared], rig: ApidBase, tell: &Tell) -> Result<(), Error> {
     let base = |head: &Prepared| head.parameters.operations.apid_base;
-    for (k, head) in heads.iter().enumerate() {
-        let other = heads.iter().take(k).find(|other| base(other) == base(head)).map(|other| other.name.as_str());
-        if let Some(other) = other.or_else(|| (base(head) == rig.number()).then_some("the rig")) {
-            return Err(Error::usage(format!(
-                "{}: line.apid_base = {} is also that of {other}; --load stores {}",
-                head.flash.folder().display(),
-                base(head),
-                base_of(k)
-            )));
-        }
+    for k in 0..heads.len() {
+        let (before, rest) = heads.split_at_mut(k);
+        let Some((head, after)) = rest.split_first_mut() else { break };
+        let other = before.iter().find(|other| base(other) == base(head)).map(|other| other.name.as_str());
+        let Some(other) = other.or_else(|| (base(head) == rig.number()).then_some("the rig")) else { continue };
+        let is_free =
+            |wanted: &u16| *wanted != rig.number() && before.iter().chain(&*after).all(|h| base(h) != *wanted);
+        let Some(free) = (k..).map(base_of).take(2 * MOST_HEADS + 1).find(is_free) else { continue };
+        let (folder, old) = (head.flash.folder().display().to_string(), base(head));
+        tell(&format!("warning: {folder}: line.apid_base = {old} is also that of {other}; {free} is stored instead"));
+        store_base(&mut head.parameters, free, &head.flash)?;
     }
     Ok(())
 }

@@ -102,6 +102,23 @@ fn recorded_heads_fly_as_they_run() {
     }
 }
 
+/// Both copies of one head are lost, and another head has the APIDs of the first one.
+#[test]
+fn the_parameters_of_one_head_do_not_ground_the_others() {
+    let place = ring("2");
+    place.run(&["fly", "ring/rig.toml", "--state", "state"]).expect(0);
+    for copy in ["parameters-1.bin", "parameters-2.bin"] {
+        fs::write(place.path(&format!("state/right/{copy}")), [0; 300]).unwrap();
+        fs::copy(place.path(&format!("state/front/{copy}")), place.path(&format!("state/left/{copy}"))).unwrap();
+    }
+    let said = place.run(&["fly", "ring/rig.toml", "--state", "state"]).expect(0);
+    let said = said.says("state/right: no copy of the parameters can be used; those of rig.toml");
+    said.says("line.apid_base = 272 is also that of front; 320 is stored instead").says("2 epochs");
+    // The next start has nothing to mend.
+    let again = place.run(&["fly", "ring/rig.toml", "--state", "state"]).expect(0);
+    assert!(!again.err.contains("stored again") && !again.err.contains("stored instead"), "{}", again.err);
+}
+
 /// Two heads with named pipes; the second one is silent after three epochs.
 #[test]
 fn a_silent_head_costs_only_itself() {
