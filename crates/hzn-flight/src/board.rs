@@ -82,6 +82,12 @@ pub trait Board {
     /// [`Viewer::rows`], as the camera sends them. Called at most once for a picture.
     // Not part of `next_picture`, because size and prior are checked before, and rows are refused before they come.
     fn show(&mut self, viewer: &mut Viewer<'_>);
+    /// Returns whether the picture that was shown last is an earlier one to the last bit: the camera stands still, or
+    /// gives an old buffer again. The noise of a camera never repeats. Its answer is then judged as `gates.fixed_edge`
+    /// says. A board that cannot tell returns false.
+    fn repeats_picture(&mut self) -> bool {
+        false
+    }
     /// Reads copy 1 or 2 of the parameters from memory.
     fn read_copy(&mut self, copy: u8, into: &mut [u8]);
     /// Writes copy 1 or 2 of the parameters. Returns false if the memory refuses.

@@ -248,9 +248,14 @@ impl Board for Linux {
         self.head()?.next_picture(now_us, at_us)
     }
     fn show(&mut self, viewer: &mut Viewer<'_>) {
-        if let Some(shot) = self.head().and_then(|head| head.current.as_ref()) {
+        let Some(head) = self.head() else { return };
+        head.see_shown();
+        if let Some(shot) = &head.current {
             viewer.see(&shot.pixels);
         }
+    }
+    fn repeats_picture(&mut self) -> bool {
+        self.head().is_some_and(|head| head.repeats)
     }
     fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
         match self.head() {

@@ -6,6 +6,7 @@ use crossbeam_channel::{Receiver, TryRecvError};
 use hzn_core::status::Status;
 use hzn_flight::board::Picture;
 use hzn_mcap::RowMeta;
+use hzn_run::engine::REMEMBERED;
 
 use crate::camera::{Capture, Ended, FromCamera, Recording, Shot};
 use crate::flash::Flash;
@@ -59,6 +60,10 @@ pub(crate) struct Head {
     pub(crate) next: Option<Shot>,
     pub(crate) current: Option<Shot>,
     pub(crate) ended: Option<Ended>,
+    /// The checksums of the last pictures that were shown, the newest last.
+    shown: VecDeque<u32>,
+    /// Whether the picture that was shown last is one of those before it.
+    pub(crate) repeats: bool,
     /// Multiple of sigma that is the protection level.
     pub(crate) protection_factor: Option<f64>,
     counts: Counts,
@@ -79,6 +84,8 @@ impl Head {
             next: None,
             current: None,
             ended: None,
+            shown: VecDeque::new(),
+            repeats: false,
             protection_factor: None,
             counts: Counts::default(),
             handed_out: 0,
@@ -181,6 +188,17 @@ impl Head {
             self.give_back(before);
         }
         Some(picture)
+    }
+
+    /// Compares the picture that is shown with those before it.
+    pub(crate) fn see_shown(&mut self) {
+        let Some(shot) = &self.current else { return };
+        let checksum = crc32fast::hash(&shot.pixels);
+        self.repeats = self.shown.contains(&checksum);
+        if self.shown.len() == REMEMBERED {
+            self.shown.pop_front();
+        }
+        self.shown.push_back(checksum);
     }
 
     /// Returns the name of the picture that was handed out last.

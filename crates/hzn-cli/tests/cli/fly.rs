@@ -259,7 +259,7 @@ fn a_computer_with_a_key_refuses_strangers_and_replays() {
 fn bad_input_is_told() {
     let place = Place::new();
     let picture = limb(320, 240, 0.0).into_raw();
-    let three = [&picture[..], &picture, &picture[..1000]].concat();
+    let three = [&picture[..], &limb(320, 240, 1.0).into_raw(), &picture[..1000]].concat();
     let (code, said) = fly_on(&place, &picture, &[]);
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("no parameters are stored yet: give --sensor FILE once"), "{said}");
@@ -302,6 +302,21 @@ fn kept_pictures_have_the_logged_answers() {
     let big = ["--load", "-s", "big.toml", "--keep-pictures", "1", "--pictures-mb", "20"];
     let (code, said) = fly_on(&place, &[], &big);
     assert!(code == Some(2) && said.contains("pictures of 2000x1500 need at least --pictures-mb 25"), "{said}");
+}
+
+/// A camera that stands still, and one that gives two buffers in turn.
+#[test]
+fn old_pictures_have_no_answer() {
+    for shown in [[0, 1, 2, 2, 2, 3], [0, 1, 2, 1, 2, 3]] {
+        let place = Place::new();
+        let bytes: Vec<u8> = shown.iter().flat_map(|&i| limb(320, 240, f64::from(i)).into_raw()).collect();
+        let (code, said) = fly_on(&place, &bytes, &["-s", "in/sensor.toml"]);
+        assert_eq!((code, said.matches("fixed in the picture").count()), (Some(0), 2), "{said}");
+        for (i, row) in logged(&place).iter().enumerate() {
+            let is_new = !shown[..i].contains(&shown[i]);
+            assert_eq!(cell(row, "status") == "ok", is_new, "{shown:?} {i}: {row:?}");
+        }
+    }
 }
 
 #[test]

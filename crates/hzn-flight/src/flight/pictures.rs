@@ -1,6 +1,7 @@
 //! The way of a picture from memory to its science packet, and the event of a picture that does not come.
 
 use hzn_core::body::{Expected, Last};
+use hzn_core::gates::FixedEdge;
 use hzn_core::status::Status;
 use hzn_core::{Prior, Report, Sequence, Step, Tracker};
 use hzn_twice::KeptTwice;
@@ -160,14 +161,22 @@ impl<B: Board> Flight<'_, B> {
         Step::from_prior(prior, after_s)
     }
 
-    /// Compares the answer with the turn of the vehicle, see `gates.fixed_edge`. An event says if its edge stays in the
-    /// picture. Returns what the next picture is compared with.
+    /// Compares the answer with the turn of the vehicle and the picture with earlier ones, see `gates.fixed_edge`. An
+    /// event says if its edge stays in the picture. Returns what the next picture is compared with.
     fn compare_with_turn(&mut self, step: &Step<f32>, report: &mut Report<f32>, is_believed: bool) -> Sequence<f32> {
         let mut turns = self.known.get().turns.clone();
         let gates = self.sensor.get().config().gates;
+        // Asked for each picture, because the board may remember it then.
+        let repeats = self.board.repeats_picture() && report.solution.is_some();
         if !is_believed {
             turns.see(step, None, &gates);
-        } else if turns.judge(step, report, &gates) {
+            return turns;
+        }
+        let is_fixed = turns.judge(step, report, &gates);
+        if repeats {
+            turns.judge_repeat(report, &gates);
+        }
+        if is_fixed || repeats && gates.fixed_edge != FixedEdge::Off {
             // The number that this picture will have.
             self.send_event(Event::FixedEdge, self.number.wrapping_add(1), u32::from(report.is_suspect));
         }
