@@ -86,7 +86,7 @@ verdicts! {
     /// All evidence together makes it too improbable that the edge is the limb.
     Unlikely = 26, "unlikely";
     /// The candidate won, but its edge stays in the picture while the vehicle turns: it belongs to the window, the lens
-    /// or the vehicle. Or the picture is the one before to the last bit.
+    /// or the vehicle. Or the picture is an earlier one to the last bit.
     Fixed = 27, "fixed";
     /// It is night, `body.night` asks for the airglow, and the edge is not the outer edge of its layer: below it the
     /// light does not become less.

@@ -92,7 +92,7 @@ impl<T: Real> Sequence<T> {
         is_fixed
     }
 
-    /// Judges the answer to a picture that is the one before to the last bit although its time is another: the camera
+    /// Judges the answer to a picture that is an earlier one to the last bit although its time is another: the camera
     /// or its recorder stands still, and the edge of the time before is in the picture, whether the vehicle turns or
     /// not. It has the same effect as an edge that is fixed.
     pub fn judge_repeat(&self, report: &mut Report<T>, config: &Config) {
