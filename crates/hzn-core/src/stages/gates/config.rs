@@ -162,8 +162,8 @@ section! {
         /// nothing is compared. The first picture of a sequence has nothing to be compared with, and nor has a vehicle
         /// that turns more slowly than an orbit turns the direction to the body, 0.07° per second.
         ///
-        /// `hzn run` and `hzn fly` treat a picture in the same way that is one of the 32 before to the last bit although
-        /// its time is told and another one: the camera or its recorder stands still.
+        /// `hzn run` and `hzn fly` treat a picture in the same way that is one of the 32 before to the last bit
+        /// although its time is told and another one: the camera or its recorder stands still.
         @133 fixed_edge: FixedEdge = FixedEdge::Refuse, [choice];
         /// Evidence for an edge that is fixed in the picture from which `fixed_edge` acts, in standard deviations.
         ///
