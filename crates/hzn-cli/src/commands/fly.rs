@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use hzn_flight::authentication::KEYS;
 use hzn_fly::Which;
 use hzn_fly::camera::Ended;
 use hzn_fly::flight::{Settings, Source, Summary};
@@ -41,9 +42,9 @@ pub(super) struct Args {
     /// it, there is only the log
     #[arg(long, value_name = "LINE")]
     line: Option<Address>,
-    /// The key of telecommands, a file that `hzn key` makes, with its counter beside it; a second one for the change to
+    /// The key of telecommands, a file that `hzn key` makes, with its counter beside it; given twice for the change to
     /// another key. Telecommands of others are then refused
-    #[arg(long, value_name = "FILE", num_args = 1..=2)]
+    #[arg(long, value_name = "FILE")]
     key: Vec<PathBuf>,
     /// The folder for parameters and log; without it, $STATE_DIRECTORY (of systemd), or ./hzn-fly
     #[arg(long, value_name = "DIR")]
@@ -64,6 +65,9 @@ pub(super) struct Args {
 pub(super) fn run(args: Args) -> Outcome {
     if let Some(Address::Udp { remote: None, .. }) = &args.line {
         return Err(usage("--line: udp needs the ground's address too, as in udp:0.0.0.0:5001,192.168.1.2:5000"));
+    }
+    if args.key.len() > KEYS {
+        return Err(usage(format!("--key: {} keys are given, but a computer has at most {KEYS}", args.key.len())));
     }
     let is_rig = args.source.is_file() && hzn_files::rig::is_rig(&args.source);
     if is_rig && args.sensor.is_some() {
