@@ -330,6 +330,10 @@ fn settings_that_cannot_be_are_told() {
     let (code, said) = fly_on(&place, &[], &["--line", "udp:127.0.0.1:5001"]);
     assert!(code == Some(2) && said.contains("udp needs the ground's address too"), "{said}");
     place.run(&["fly", "/dev/no-camera", "--state", "state"]).expect(1).says("/dev/no-camera");
+    // Each --key takes one file, so that the source may follow it.
+    let key = ["--key", "a.key"];
+    place.run(&[&["fly"], &key[..], &["/dev/no-camera", "--state", "state"]].concat()).expect(1).says("/dev/no-camera");
+    place.run(&[&["fly"], &key[..], &key, &key, &["-"]].concat()).expect(2).says("a computer has at most 2");
     place.run(&["telemetry", "in", "--screen"]).expect(2).says("need a line");
     place.run(&["telecommand", "--to", "tcp:127.0.0.1:1", "ping"]).expect(1).says("nobody listens there");
     place.run(&["telemetry", "tcp:127.0.0.1"]).expect(2).says("must be HOST:PORT");
