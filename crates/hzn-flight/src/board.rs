@@ -3,6 +3,7 @@
 use hzn_core::{Config, Report};
 
 use crate::messages::Exposure;
+use crate::packet::ApidBase;
 use crate::table::CRC32;
 use crate::view::Viewer;
 
@@ -108,6 +109,11 @@ pub trait Board {
     /// Writes the counter for the key at this place, so that it survives a reset and a power cut. Returns false if the
     /// memory refuses.
     fn write_counter(&mut self, _place: u8, _counter: u64) -> bool {
+        false
+    }
+    /// Returns whether another computer on the line has this base, so that a telecommand must not set it. A board that
+    /// cannot tell returns false; in a rig, the loop of the rig tells each head.
+    fn is_base_taken(&mut self, _base: ApidBase) -> bool {
         false
     }
     /// Takes note of the parameters of the sensor that is in use from now on, for a log, for example: at the start,

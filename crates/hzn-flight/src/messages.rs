@@ -56,6 +56,8 @@ numbered_enum! {
         Replay = 15 => "the counter of the trailer was used or reserved before",
         /// The keys or a counter in the memory of the computer cannot be used.
         Closed = 16 => "the keys of the computer cannot be used",
+        /// The function is for one head of a rig, and the telecommand is to the rig.
+        OneHead = 17 => "for one head: send it to the APID base of the head",
     }
 }
 

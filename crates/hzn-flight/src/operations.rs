@@ -25,6 +25,9 @@ macro_rules! operations {
         }
 
         impl Operations {
+    /// Number of `line.apid_base`.
+    pub(crate) const APID_BASE: u16 = 302;
+
             /// The numbers of the parameters.
             pub const NUMBERS: &'static [u16] = &[$($number),*];
 
@@ -67,7 +70,7 @@ operations! {
     // With 5 s the computer is heard from within ten seconds, even if one packet is lost.
     @301 "telemetry.housekeeping_s" housekeeping_s: u16 = 5, [1.0, 3600.0];
     /// APID of housekeeping, a multiple of 16. The other APIDs have fixed distances from it.
-    @302 "line.apid_base" apid_base: u16 = 256, [0.0, 1792.0];
+    @302 "line.apid_base" apid_base: u16 = 256, [16.0, 1792.0];
     /// A telecommand is taken if its sequence count is 1 to this number above that of the last one; 0: any count.
     // At most half of the 16 384 counts, so that a replay of one of the last 8191 telecommands is refused.
     @303 "line.sequence_window" sequence_window: u16 = 0, [0.0, 8192.0];
@@ -93,7 +96,8 @@ impl Operations {
             (!is_good).then_some((id, value))
         };
         // Limits cannot say that a number is a multiple of 16, so the base has a check of its own.
-        let base = (ApidBase::try_new(self.apid_base).is_none()).then_some((302, f64::from(self.apid_base)));
+        let base = f64::from(self.apid_base);
+        let base = ApidBase::try_new(self.apid_base).is_none().then_some((Self::APID_BASE, base));
         Self::NUMBERS.iter().find_map(out_of_limits).or(base)
     }
 

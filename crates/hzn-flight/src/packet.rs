@@ -10,6 +10,9 @@
 //!     2  CRC-16 (CCITT, start FFFF) from the primary header to the end of the user data
 //! ```
 
+use core::fmt;
+use core::str::FromStr;
+
 use crate::bytes::{Reader, Writer};
 use crate::cuc::Cuc;
 use crate::numbered::numbered_enum;
@@ -78,12 +81,16 @@ impl ApidBase {
     pub const DEFAULT: Self = Self(Apid::Housekeeping as u16);
     /// Distance between two bases: a computer has at most 16 subjects.
     pub const STEP: u16 = 16;
+    /// Smallest base: the APID 0 belongs to the time packets of the space link (CCSDS 301.0-B).
+    pub const MIN: u16 = 0x10;
     /// Largest base: the APIDs of telecommands must be below 0x7FF, which marks idle packets.
     pub const MAX: u16 = 0x700;
 
-    /// Makes a base; `None` if the number is above [`Self::MAX`] or not a multiple of [`Self::STEP`].
+    /// Makes a base; `None` if the number is not within [`Self::MIN`] and [`Self::MAX`], or not a multiple of
+    /// [`Self::STEP`].
     pub const fn try_new(number: u16) -> Option<Self> {
-        if number <= Self::MAX && number.is_multiple_of(Self::STEP) { Some(Self(number)) } else { None }
+        let is_base = number >= Self::MIN && number <= Self::MAX && number.is_multiple_of(Self::STEP);
+        if is_base { Some(Self(number)) } else { None }
     }
     /// Returns the number of the base, which is the APID of housekeeping.
     pub const fn number(self) -> u16 {
@@ -99,6 +106,32 @@ impl ApidBase {
         // The type counts, because a telecommand of one base has the APID of housekeeping of the base 0xC0 above it. A
         // segment is refused, because a part of a telecommand would be carried out as a whole one.
         (packet.is_command == (apid == Apid::Command) && packet.is_whole).then_some(apid)
+    }
+}
+
+/// The text is no base.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NoBase;
+
+impl fmt::Display for NoBase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (min, max, step) = (ApidBase::MIN, ApidBase::MAX, ApidBase::STEP);
+        write!(f, "it must be a multiple of {step} from {min:#x} to {max:#x}")
+    }
+}
+
+impl core::error::Error for NoBase {}
+
+impl FromStr for ApidBase {
+    type Err = NoBase;
+
+    /// Reads a decimal number, or a hexadecimal one such as `0x110`.
+    fn from_str(text: &str) -> Result<Self, NoBase> {
+        let number = match text.strip_prefix("0x") {
+            Some(digits) => u16::from_str_radix(digits, 16).ok(),
+            None => text.parse().ok(),
+        };
+        number.and_then(Self::try_new).ok_or(NoBase)
     }
 }
 

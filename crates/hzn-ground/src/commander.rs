@@ -4,8 +4,9 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::time::{Duration, Instant};
 
-use hzn_flight::messages::{Acknowledge, Code};
+use hzn_flight::messages::{Acknowledge, Code, Function};
 use hzn_flight::packet::ApidBase;
+use hzn_flight::parameters::Parameters;
 use hzn_fly::key_file::Signer;
 use hzn_fly::tell::Tell;
 
@@ -165,6 +166,10 @@ impl Commander {
         }
         self.knows_sequence = true;
         let (is_last, is_done) = (first.is_last, a.code == Code::Done as u8);
+        if let Some(base) = set_base(&first.user).filter(|_| is_done) {
+            self.base = base;
+            (self.tell)(&format!("note: the computer listens to --apid-base {:#x} from now on", base.number()));
+        }
         if is_done && !is_last {
             self.waiting.pop_front();
             return None;
@@ -191,9 +196,19 @@ impl Commander {
     }
 }
 
+/// Returns the APID base that a telecommand sets; `None` if it sets none.
+fn set_base(user: &[u8]) -> Option<ApidBase> {
+    let (function, values) = user.split_first()?;
+    let sets = [Function::SetParameters, Function::TryParameters].map(|function| function as u8);
+    let wanted = Parameters::number_of("line.apid_base")?.to_be_bytes();
+    let entries = values.get(1..).filter(|_| sets.contains(function))?;
+    let entry = entries.chunks_exact(10).rfind(|entry| entry.starts_with(&wanted))?;
+    let value = f64::from_be_bytes(entry.get(2..)?.try_into().ok()?);
+    ApidBase::try_new(value as u16).filter(|base| f64::from(base.number()) == value)
+}
+
 #[cfg(test)]
 mod tests {
-    use hzn_flight::messages::Function;
     use hzn_flight::packet::{self, Scan};
 
     use super::*;
@@ -227,6 +242,20 @@ mod tests {
         let mode = commander.expired(ms(3009)).unwrap();
         assert_eq!((mode.to_string().as_str(), mode.is_done()), ("mode flight: no acknowledgement within 3 s", false));
         assert!(commander.is_idle() && commander.add("mode fly").is_err());
+    }
+
+    #[test]
+    fn commands_after_another_base_go_to_that_base() {
+        let texts = ["set line.apid_base 288 boot.mode 1", "ping"].map(str::to_owned);
+        let mut commander = Commander::new(ApidBase::DEFAULT, 0, &texts, silent()).unwrap();
+        let now = Instant::now();
+        let apid = |bytes: &[u8]| match packet::scan(bytes) {
+            Scan::Packet { packet, .. } => packet.apid,
+            _ => panic!(),
+        };
+        assert_eq!(apid(&commander.next(now).unwrap().unwrap()), 0x1C0);
+        assert!(commander.take(&ack(Function::SetParameters, 0, 0), now).unwrap().is_done());
+        assert_eq!((commander.base().number(), apid(&commander.next(now).unwrap().unwrap())), (0x120, 0x1E0));
     }
 
     #[test]

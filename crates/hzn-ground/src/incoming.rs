@@ -142,6 +142,7 @@ impl Incoming {
             }
             let seen = station.take_seen();
             self.command_next(&mut commander, &seen)?.iter().for_each(|answered| tell(&answered.to_string()));
+            station.follow(commander.base());
             self.take_notices().iter().for_each(|notice| tell(notice));
             station.flush_if_due()?;
         }
@@ -168,6 +169,7 @@ impl Incoming {
                 is_done &= answered.is_done();
                 tell(&answered.to_string());
             }
+            station.follow(commander.base());
             self.take_notices().iter().for_each(|notice| tell(notice));
             // The values that a command has read.
             for seen in &seen {

@@ -47,6 +47,11 @@ impl Station {
         Self { counts: StreamCounts::new(base, None), tell: Arc::new(|_| ()), sink: None, housekeeping: None }
     }
 
+    /// Takes the packets of this computer from now on, because a telecommand has given it another base.
+    pub fn follow(&mut self, base: ApidBase) {
+        self.counts.base = base;
+    }
+
     /// Makes the station tell nothing but the counts at the end; [`Station::take_seen`] has the rest.
     pub fn mute(&mut self) {
         self.counts.tell = None;

@@ -41,7 +41,7 @@ pub enum Seen {
 /// Counts of a stream, and the log lines for the next answer.
 #[derive(Default)]
 pub struct StreamCounts {
-    base: ApidBase,
+    pub(crate) base: ApidBase,
     /// Number of packets.
     pub packets: u64,
     /// Number of answers to pictures.

@@ -305,7 +305,7 @@ fn a_telecommand_has_values_that_can_be() {
     place.run(&["telecommand", "known -5"]).expect(2).says("the altitude -5 km is refused: must be above 0");
     place.run(&["telecommand", "known 230 1e40 0 0"]).expect(2).says("not a finite number of kilometres");
     assert!(refused("limits.max_work 2e6").contains("to 983040"));
-    assert!(refused("line.apid_base 5000").contains("from 0 to 1792"));
+    assert!(refused("line.apid_base 5000").contains("from 16 to 1792"));
     place.run(&["telecommand", "ping", "--apid-base", "0x101"]).expect(2).says("multiple of 16");
     place.run(&["telecommand", "navigate 1 2 3"]).expect(2).says("9 or 12 numbers");
     let half = "navigate 5 60 NaN 6608 nan 0 0 7300 0";

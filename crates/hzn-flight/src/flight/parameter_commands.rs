@@ -7,6 +7,7 @@ use super::self_check::NO_PARAMETERS;
 use crate::board::Board;
 use crate::bytes::Reader;
 use crate::messages::{Code, Event, MAX_READ, ParameterValue};
+use crate::operations::Operations;
 use crate::packet::Apid;
 use crate::parameters::{Parameters, Refused};
 use crate::store;
@@ -86,6 +87,10 @@ impl<B: Board> Flight<'_, B> {
             // Checked before anything is replaced, so that a refusal changes nothing.
             if let Err(refused) = parameters.check() {
                 return self.refuse_parameter(refused);
+            }
+            // Two computers with one base would both carry out what is meant for one, and could not be parted again.
+            if self.board.is_base_taken(parameters.operations.base()) {
+                return self.refuse(Code::Refused, Operations::APID_BASE);
             }
             if is_sensor_new && !self.renew_sensor(parameters) {
                 return Code::Refused;

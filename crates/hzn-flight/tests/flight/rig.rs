@@ -201,7 +201,18 @@ fn telecommands_mean_one_head_or_all() {
         // The parameters of all heads are not the same, so that the rig refuses them.
         send(&board, 0x100, 2, Function::SetParameters, one);
         quiet_turn(&board, rig);
-        assert_eq!(take_sent(&board).answers, [(0x100, Code::Refused)]);
+        assert_eq!(take_sent(&board).answers, [(0x100, Code::OneHead)]);
+        // A base of another computer would make two of one address, and 0 is that of time packets.
+        for (base, refused) in [(0x130, true), (0x100, true), (0, true), (0x110, false)] {
+            send(&board, 0x110, 9, Function::TryParameters, |w| {
+                w.u8(1);
+                w.u16(302);
+                w.f64(f64::from(base));
+            });
+            quiet_turn(&board, rig);
+            let code = if refused { Code::Refused } else { Code::Done };
+            assert_eq!(take_sent(&board).answers, [(0x110, code)], "{base:#x}");
+        }
         send(&board, 0x100, 3, Function::SetMode, |w| w.u8(Mode::Standby as u8));
         quiet_turn(&board, rig);
         let sent = take_sent(&board);

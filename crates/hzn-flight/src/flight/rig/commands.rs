@@ -1,6 +1,7 @@
 //! The telecommands of a rig: those to one head, and those to all.
 
 use hzn_core::Prior;
+use hzn_core::rig::MOST_HEADS;
 
 use super::{Rig, RigBoard};
 use crate::attitude::turned_back;
@@ -58,7 +59,7 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
     /// Handles a packet that has arrived. Returns whether it was a telecommand; `None` if there is no packet.
     fn handle_packet(&mut self, now_us: u64) -> Option<bool> {
         let heads = self.heads.loops.iter().map(|flight| flight.buffers.line.base());
-        let mut bases = [None; 1 + hzn_core::rig::MOST_HEADS];
+        let mut bases = [None; 1 + MOST_HEADS];
         for (place, base) in bases.iter_mut().zip(core::iter::once(self.setup.base).chain(heads)) {
             *place = Some(base);
         }
@@ -104,7 +105,12 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
         let is_meant = |flight: &Flight<'_, _>| flight.buffers.line.base() == base && flight.mode != Mode::ShutDown;
         let Some(k) = self.heads.loops.iter().position(is_meant) else { return };
         let room = self.buffers.line.out;
+        let mut taken = [Some(self.setup.base); 1 + MOST_HEADS];
+        for (j, place) in taken.iter_mut().skip(1).enumerate() {
+            *place = self.heads.loops.get(j).filter(|_| j != k).map(|other| other.buffers.line.base());
+        }
         self.with_head(k, |flight| {
+            flight.board.taken_bases = taken;
             flight.check_operations();
             flight.buffers.line.out = room;
             flight.handle_admitted(sequence, admitted);
@@ -163,7 +169,7 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
             | Function::StageParameters
             | Function::CommitParameters
             | Function::ReadParameters
-            | Function::DumpEdges => return (Code::Refused, 0),
+            | Function::DumpEdges => return (Code::OneHead, 0),
             _ => {}
         }
         let mut outcome = (Code::Done, 0);

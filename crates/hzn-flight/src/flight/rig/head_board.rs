@@ -1,11 +1,13 @@
 //! The part of a board that belongs to one head.
 
+use hzn_core::rig::MOST_HEADS;
 use hzn_core::status::Status;
 use hzn_core::{Config, Report, Solution};
 
 use crate::board::{Board, Image, Picture, RETAINED_WORDS};
 use crate::joint::RigAnswer;
 use crate::messages::Exposure;
+use crate::packet::ApidBase;
 use crate::view::Viewer;
 
 /// A board with several cameras.
@@ -50,11 +52,13 @@ pub struct HeadBoard<'a, B> {
     head: u8,
     /// The answer of this turn.
     pub(super) answer: Option<HeadAnswer>,
+    /// The bases of the rig and of the other heads, which a telecommand to this head must not set.
+    pub(super) taken_bases: [Option<ApidBase>; 1 + MOST_HEADS],
 }
 
 impl<'a, B: RigBoard> HeadBoard<'a, B> {
     pub(super) fn new(head: u8, lent: Option<&'a mut B>) -> Self {
-        Self { lent, head, answer: None }
+        Self { lent, head, answer: None, taken_bases: [None; 1 + MOST_HEADS] }
     }
 
     /// Calls a function of the board for this head. Without the board, which a loop always has, it returns `otherwise`.
@@ -105,6 +109,9 @@ impl<B: RigBoard> Board for HeadBoard<'_, B> {
     }
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool {
         self.with(false, |board| board.write_copy(copy, bytes))
+    }
+    fn is_base_taken(&mut self, base: ApidBase) -> bool {
+        self.taken_bases.contains(&Some(base))
     }
     fn note_sensor(&mut self, config: &Config) {
         self.with((), |board| board.note_sensor(config));
