@@ -20,7 +20,7 @@ use crate::keeper::{Keeper, Which};
 use crate::key_file::Keys;
 use crate::latency::{Latency, LatencySummary};
 use crate::link::{Address, Link, Patience};
-use crate::log::{Limits, Log, Sensors};
+use crate::log::{Limits, Log, Sensors, Spare};
 use crate::notify::Notify;
 use crate::prepare::{parameters_for, prepare_parameters};
 use crate::signals::Lines;
@@ -87,10 +87,11 @@ pub(crate) fn fly(settings: &Settings, lines: Arc<Lines>, tell: Tell) -> Result<
     let given = settings.sensor.clone().map(parameters_for);
     let replaces = (settings.replaces_parameters, "sensor.toml");
     let config = prepare_parameters(given.as_ref(), replaces, &flash, &tell)?.sensor;
-    let keeper = settings.kept_pictures.map(|kept| Keeper::open(kept, &flash, &config, &tell)).transpose()?;
+    let spare = Spare::default();
+    let keeper = settings.kept_pictures.map(|kept| Keeper::open(kept, &flash, &config, &spare, &tell)).transpose()?;
     let capture = Capture::start(open_camera(settings, &config, &tell)?).map_err(in_state)?;
     let sensors = Sensors { configs: vec![config], rig: None };
-    let parts = open_parts(settings, sensors, lines, &tell)?;
+    let parts = open_parts(settings, sensors, spare, lines, &tell)?;
     let head = Head::new(None, Feed::Camera(capture), flash, keeper, tell);
     run(Linux::new(parts, vec![head], None))
 }
@@ -99,6 +100,7 @@ pub(crate) fn fly(settings: &Settings, lines: Arc<Lines>, tell: Tell) -> Result<
 pub(crate) fn open_parts(
     settings: &Settings,
     sensors: Sensors,
+    spare: Spare,
     lines: Arc<Lines>,
     tell: &Tell,
 ) -> Result<Parts, Error> {
@@ -112,7 +114,7 @@ pub(crate) fn open_parts(
     };
     let log_folder = settings.state.join("log");
     let limits = Limits { bytes: settings.log_bytes, picture_bytes: 0 };
-    let log = Log::open(&log_folder, limits, sensors, tell.clone())
+    let log = Log::open(&log_folder, limits, sensors, spare, tell.clone())
         .map_err(|e| Error::failed(format!("{}: {e}", log_folder.display())))?;
     let notify = Notify::from_environment();
     let keys = Keys::new(&settings.keys, tell);
@@ -259,6 +261,7 @@ mod tests {
                     &dir.path().join("log"),
                     Limits { bytes: 1 << 20, picture_bytes: 0 },
                     sensors,
+                    Spare::default(),
                     tell.clone(),
                 )
                 .unwrap();

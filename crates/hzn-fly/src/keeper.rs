@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use hzn_core::Config;
 use hzn_core::status::Status;
@@ -10,7 +11,7 @@ use hzn_mcap::{EncodedImage, FrameRecord, ImageFormat};
 
 use crate::error::Error;
 use crate::flash::Flash;
-use crate::log::{Limits, Log, Sensors};
+use crate::log::{Limits, Log, Sensors, Spare};
 use crate::tell::{Rarely, Tell};
 
 /// Which pictures are kept: every n-th, those without an answer, or both.
@@ -65,7 +66,10 @@ pub(crate) struct Keeper {
     which: Which,
     size: (u32, u32),
     log: Log,
+    /// Its folder is one of these.
+    spare: Spare,
     lost: Rarely,
+    tell: Tell,
 }
 
 impl Keeper {
@@ -74,6 +78,7 @@ impl Keeper {
         (which, bytes): (Which, u64),
         flash: &Flash,
         config: &Config,
+        spare: &Spare,
         tell: &Tell,
     ) -> Result<Self, Error> {
         let size = (u32::from(config.camera.width), u32::from(config.camera.height));
@@ -86,9 +91,13 @@ impl Keeper {
         }
         let folder = flash.folder().join("pictures");
         let sensors = Sensors { configs: vec![config.clone()], rig: None };
-        let log = Log::open(&folder, Limits { bytes, picture_bytes }, sensors, tell.clone())
+        let limits = Limits { bytes, picture_bytes };
+        let (name, tell_all) = (folder.display().to_string(), tell.clone());
+        let tell_of_folder: Tell = Arc::new(move |line: &str| tell_all(&format!("{name}: {line}")));
+        let log = Log::open(&folder, limits, sensors, Spare::default(), tell_of_folder)
             .map_err(|e| Error::failed(format!("{}: {e}", folder.display())))?;
-        Ok(Self { which, size, log, lost: Rarely::new(tell.clone()) })
+        spare.add(&folder);
+        Ok(Self { which, size, log, spare: spare.clone(), lost: Rarely::new(tell.clone()), tell: tell.clone() })
     }
 
     /// Takes note of another sensor, which a telecommand has set.
@@ -101,6 +110,12 @@ impl Keeper {
     pub(crate) fn see(&mut self, picture: u32, status: Status, record: &FrameRecord, pixels: &[u8]) {
         let (width, height) = self.size;
         if !self.which.has(picture, status) || pixels.len() as u64 != u64::from(width) * u64::from(height) {
+            return;
+        }
+        if self.spare.is_needed() {
+            if self.log.close() {
+                (self.tell)("pictures are no longer kept, because the disk is full and the log needs it");
+            }
             return;
         }
         let mut record = record.clone();

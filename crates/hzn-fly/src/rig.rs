@@ -24,7 +24,7 @@ use crate::flash::{self, Flash};
 use crate::flight::{Settings, Summary, check_input, check_raw, end, open_parts};
 use crate::head::{Feed, Head};
 use crate::keeper::Keeper;
-use crate::log::Sensors;
+use crate::log::{Sensors, Spare};
 use crate::prepare::{parameters_for, prepare_parameters, store_base};
 use crate::signals::Lines;
 use crate::tell::Tell;
@@ -56,8 +56,9 @@ pub(crate) fn fly(path: &Path, settings: &Settings, lines: Arc<Lines>, tell: &Te
         configs: prepared.iter().map(|head| head.parameters.sensor.clone()).collect(),
         rig: Some((prepared.iter().map(|head| head.name.clone()).collect(), text)),
     };
-    let (heads, begin_s) = open_heads(prepared, settings, tell)?;
-    let board = Linux::new(open_parts(settings, sensors, lines, tell)?, heads, begin_s);
+    let spare = Spare::default();
+    let (heads, begin_s) = open_heads(prepared, settings, &spare, tell)?;
+    let board = Linux::new(open_parts(settings, sensors, spare, lines, tell)?, heads, begin_s);
     match rig.heads.len() {
         1 => run::<1>(board, &setup),
         2 => run::<2>(board, &setup),
@@ -183,11 +184,16 @@ fn is_live(pictures: &Path) -> bool {
 
 /// Opens the pictures of the heads. Also returns the time in seconds at which the clock of the flight begins if they
 /// are recorded.
-fn open_heads(prepared: Vec<Prepared>, settings: &Settings, tell: &Tell) -> Result<(Vec<Head>, Option<f64>), Error> {
+fn open_heads(
+    prepared: Vec<Prepared>,
+    settings: &Settings,
+    spare: &Spare,
+    tell: &Tell,
+) -> Result<(Vec<Head>, Option<f64>), Error> {
     let mut heads = Vec::new();
     for Prepared { name, pictures, parameters, flash, recorded, .. } in prepared {
         let config = parameters.sensor;
-        let keeper = settings.kept_pictures.map(|kept| Keeper::open(kept, &flash, &config, tell)).transpose()?;
+        let keeper = settings.kept_pictures.map(|kept| Keeper::open(kept, &flash, &config, spare, tell)).transpose()?;
         let feed = match recorded {
             Some(OpenHead { source, frames, sensor, .. }) => {
                 let opened = Recording::open(name.clone(), source, frames, sensor.config, tell.clone());

@@ -48,18 +48,7 @@ impl Folder {
 
     /// Returns the recordings, the oldest first.
     fn entries(&self) -> Vec<Entry> {
-        let mut entries: Vec<Entry> = Vec::new();
-        for file in fs::read_dir(&self.path).into_iter().flatten().flatten() {
-            let name = file.file_name().to_string_lossy().into_owned();
-            let base = name.trim_end_matches(".part");
-            let is_finished = base == name;
-            let number = base.strip_prefix("fly-").and_then(|n| n.strip_suffix(".mcap")).and_then(|n| n.parse().ok());
-            if let (Some(number), Ok(meta)) = (number, file.metadata()) {
-                entries.push(Entry { number, path: file.path(), bytes: meta.len(), is_finished });
-            }
-        }
-        entries.sort_by_key(|entry| entry.number);
-        entries
+        entries(&self.path)
     }
 
     /// Removes the oldest recordings until there is room for one more within the share of the disk. Returns the path of
@@ -127,4 +116,30 @@ impl Folder {
             }
         }
     }
+}
+
+/// Returns the recordings of a folder, the oldest first.
+fn entries(folder: &Path) -> Vec<Entry> {
+    let mut entries: Vec<Entry> = Vec::new();
+    for file in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = file.file_name().to_string_lossy().into_owned();
+        let base = name.trim_end_matches(".part");
+        let is_finished = base == name;
+        let number = base.strip_prefix("fly-").and_then(|n| n.strip_suffix(".mcap")).and_then(|n| n.parse().ok());
+        if let (Some(number), Ok(meta)) = (number, file.metadata()) {
+            entries.push(Entry { number, path: file.path(), bytes: meta.len(), is_finished });
+        }
+    }
+    entries.sort_by_key(|entry| entry.number);
+    entries
+}
+
+/// Removes the finished recording with the smallest number in one of these folders; `with_unfinished`, also one that is
+/// not finished, if there is no other. Returns its name.
+pub(super) fn remove_oldest_of(folders: &[PathBuf], with_unfinished: bool) -> Option<String> {
+    let all = folders.iter().flat_map(|folder| entries(folder));
+    let oldest = all.filter(|entry| entry.is_finished || with_unfinished);
+    let oldest = oldest.min_by_key(|entry| (!entry.is_finished, entry.number))?;
+    fs::remove_file(&oldest.path).ok()?;
+    Some(oldest.path.display().to_string())
 }

@@ -1,6 +1,7 @@
 //! The answers on the disk: recordings that a crash cannot spoil, and that never need more than their share of it.
 
 mod folder;
+mod spare;
 
 use std::io;
 use std::path::Path;
@@ -15,6 +16,7 @@ use hzn_mcap::{FLUSH_INTERVAL, FrameRecord, Options, Writer};
 
 use crate::tell::Tell;
 use folder::Folder;
+pub(crate) use spare::Spare;
 
 /// Answers that wait for a slow disk: at 60 pictures a second, 17 s.
 const WAITING: usize = 1024;
@@ -25,7 +27,7 @@ const ANSWER_BYTES: u64 = 16 << 10;
 /// Smallest share of the disk. A file must hold some answers.
 pub const MIN_LIMIT_BYTES: u64 = 1 << 20;
 /// Time until another attempt after an error of the disk.
-const AGAIN: Duration = Duration::from_secs(5);
+const AGAIN: Duration = Duration::from_secs(1);
 
 /// What the files of a log may take.
 #[derive(Debug, Clone, Copy)]
@@ -65,11 +67,11 @@ pub struct Sensors {
 
 impl Log {
     /// Opens the log in a folder, and closes the files that the last program left. The files need at most
-    /// the bytes of `limits`.
+    /// the bytes of `limits`. When the disk is full, recordings of `spare` are removed first.
     ///
     /// # Errors
     /// The folder cannot be made or read.
-    pub fn open(folder: &Path, limits: Limits, sensors: Sensors, tell: Tell) -> io::Result<Self> {
+    pub(crate) fn open(folder: &Path, limits: Limits, sensors: Sensors, spare: Spare, tell: Tell) -> io::Result<Self> {
         let limit_bytes = limits.bytes.max(Limits::least_bytes(limits.picture_bytes));
         let mut folder = Folder::open(folder, limit_bytes)?;
         folder.recover(&tell);
@@ -87,6 +89,7 @@ impl Log {
             fails: Arc::clone(&fails),
             configs: Arc::clone(&configs),
             rig,
+            spare,
             tell,
         };
         let thread = thread::Builder::new().name("log".into()).spawn(move || writing.run(&answers))?;
@@ -107,6 +110,12 @@ impl Log {
         let is_lost = matches!(sent, Some(Err(TrySendError::Full(_))));
         self.lost.fetch_add(is_lost.into(), Ordering::Relaxed);
         !is_lost && !self.fails.load(Ordering::Relaxed)
+    }
+
+    /// Makes the thread write what waits and close the file, without waiting for it. Returns false if that was done
+    /// before.
+    pub(crate) fn close(&mut self) -> bool {
+        self.sender.take().is_some()
     }
 
     /// Writes what waits, and closes the file. Returns how many answers are in the log, and how many were lost.
@@ -132,6 +141,7 @@ struct Writing {
     fails: Arc<AtomicBool>,
     configs: Arc<Mutex<Vec<Config>>>,
     rig: Option<(Vec<String>, String)>,
+    spare: Spare,
     tell: Tell,
 }
 
@@ -195,8 +205,9 @@ impl Writing {
         let Err(e) = outcome else { return };
         self.file = None;
         let is_full = matches!(e, hzn_mcap::Error::DiskFull { .. });
-        // Others may fill the disk, too. The newest answers are worth more than the oldest.
-        if let Some(oldest) = Some(()).filter(|()| is_full).and_then(|()| self.folder.remove_oldest()) {
+        // Others may fill the disk, too. Answers are worth more than pictures, and the newest more than the oldest.
+        let removed = || self.spare.remove_oldest().or_else(|| self.folder.remove_oldest());
+        if let Some(oldest) = is_full.then(removed).flatten() {
             (self.tell)(&format!("the disk is full: the oldest recording {oldest} was removed"));
         } else {
             if self.failed.is_none() {
@@ -282,7 +293,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let (mut most, limit) = (0, MIN_LIMIT_BYTES);
         for start in [0, 1500] {
-            let mut log = Log::open(dir.path(), LIMITS, sensors(), quiet()).unwrap();
+            let mut log = Log::open(dir.path(), LIMITS, sensors(), Spare::default(), quiet()).unwrap();
             for index in start..start + 1500 {
                 while log.sender.as_ref().unwrap().is_full() {
                     thread::sleep(Duration::from_millis(1));
@@ -306,7 +317,7 @@ mod tests {
     #[test]
     fn what_a_crash_left_is_closed() {
         let dir = tempfile::tempdir().unwrap();
-        let mut log = Log::open(dir.path(), LIMITS, sensors(), quiet()).unwrap();
+        let mut log = Log::open(dir.path(), LIMITS, sensors(), Spare::default(), quiet()).unwrap();
         assert!((0..40).all(|index| log.add(record(index))));
         thread::sleep(2 * FLUSH_INTERVAL);
         // A copy of the folder now is what a crash leaves.
@@ -320,7 +331,7 @@ mod tests {
         let told = Arc::new(Mutex::new(Vec::<String>::new()));
         let list = Arc::clone(&told);
         let tell: Tell = Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned()));
-        let mut log = Log::open(after.path(), LIMITS, sensors(), tell).unwrap();
+        let mut log = Log::open(after.path(), LIMITS, sensors(), Spare::default(), tell).unwrap();
         log.add(record(40));
         log.finish();
         assert_eq!(indexes(after.path()), (0..=40).collect::<Vec<_>>());
@@ -332,10 +343,17 @@ mod tests {
     fn a_full_disk_costs_the_oldest_recordings_first() {
         let dir = tempfile::tempdir().unwrap();
         for start in [0, 10, 20] {
-            let mut log = Log::open(dir.path(), LIMITS, sensors(), quiet()).unwrap();
+            let mut log = Log::open(dir.path(), LIMITS, sensors(), Spare::default(), quiet()).unwrap();
             (start..start + 10).for_each(|index| assert!(log.add(record(index))));
             log.finish();
         }
+        let pictures = tempfile::tempdir().unwrap();
+        let mut log = Log::open(pictures.path(), LIMITS, sensors(), Spare::default(), quiet()).unwrap();
+        log.add(record(0));
+        log.finish();
+        fs::write(pictures.path().join("fly-000002.mcap.part"), b"a recording that is being written").unwrap();
+        let spare = Spare::default();
+        spare.add(pictures.path());
         let told = Arc::new(Mutex::new(Vec::<String>::new()));
         let list = Arc::clone(&told);
         let mut writing = Writing {
@@ -348,17 +366,21 @@ mod tests {
             fails: Arc::default(),
             configs: Arc::new(Mutex::new(sensors().configs)),
             rig: None,
+            spare: spare.clone(),
             tell: Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned())),
         };
         let full = || Err(hzn_mcap::Error::DiskFull { folder: dir.path().into(), part: dir.path().join("x") });
-        for (first, count, fails) in [(10, 20, false), (20, 10, false), (20, 10, true)] {
+        // The pictures go first: the finished ones, then the one that could not be finished.
+        for (first, count, fails) in [(0, 30, false), (0, 30, false), (10, 20, false), (20, 10, false), (20, 10, true)]
+        {
             writing.take_outcome(full());
+            assert!(spare.is_needed() && !pictures.path().join("fly-000001.mcap").exists());
             let kept = indexes(dir.path());
             assert_eq!((kept[0], kept.len(), writing.fails.load(Ordering::Relaxed)), (first, count, fails));
         }
         let told = told.lock().unwrap();
         assert!(
-            told[0].contains("the oldest recording") && told[2].contains("the disk is full; the flight"),
+            told[0].contains("the oldest recording") && told[4].contains("the disk is full; the flight"),
             "{told:?}"
         );
     }
@@ -370,7 +392,7 @@ mod tests {
         let told = Arc::new(Mutex::new(Vec::<String>::new()));
         let list = Arc::clone(&told);
         let tell: Tell = Arc::new(move |line: &str| list.lock().unwrap().push(line.to_owned()));
-        let mut log = Log::open(&folder, LIMITS, sensors(), tell).unwrap();
+        let mut log = Log::open(&folder, LIMITS, sensors(), Spare::default(), tell).unwrap();
         fs::remove_dir(&folder).unwrap();
         // The writer has a thread of its own, so nobody knows which answer is the first that the flight software is
         // told of.
