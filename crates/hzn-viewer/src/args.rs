@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Parser;
+use hzn_flight::packet::ApidBase;
 use hzn_run::source::Raw;
 
 use crate::measure::Kind;
 use crate::ui::Situation;
+use crate::work::Computer;
 use crate::work::open::Request;
 
 /// Shows what the sensor found in each picture, and tunes its parameters live.
@@ -49,6 +51,12 @@ pub struct Args {
     /// Show new pictures as they come: of one folder, or of a recording that another program writes
     #[arg(long)]
     pub follow: bool,
+    /// The key of the flight computer (`hzn key`), for its telecommands; its counter is kept beside it
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// `line.apid_base` of the flight computer, such as 0x100
+    #[arg(long, value_name = "APID", default_value = "0x100")]
+    pub apid_base: ApidBase,
     /// Index of the first picture to show, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub frame: usize,
@@ -86,6 +94,7 @@ impl Args {
             truth: self.truth.clone(),
             fps: self.fps,
             raw: self.raw,
+            computer: Computer { base: self.apid_base, key: self.key.clone() },
             frame: self.frame,
             follow: self.follow,
         }

@@ -1,12 +1,15 @@
 //! The line to a flight computer: a thread reads its packets and sends telecommands, with the code of the ground
 //! station.
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use crossbeam_channel::{Receiver, Sender, bounded};
+use hzn_flight::authentication::TRAILER_BYTES;
 use hzn_flight::packet::ApidBase;
+use hzn_fly::key_file::Signer;
 use hzn_fly::link::{Address, Patience};
 use hzn_fly::tell::Tell;
 use hzn_ground::{Came, Commander, Incoming, Station, encode, write_packet};
@@ -18,32 +21,50 @@ use crate::model::live::{Counts, Live, SentState};
 /// Telecommands that wait for the thread.
 const WAITING: usize = 16;
 
+/// The computer at the other end of a line.
+#[derive(Debug, Clone, Default)]
+pub struct Computer {
+    /// Its APIDs.
+    pub base: ApidBase,
+    /// The file with the key of its telecommands; without it they have no trailer.
+    pub key: Option<PathBuf>,
+}
+
 /// A line that is open. It is closed when the handle is dropped.
 pub struct Line {
     name: String,
+    computer: Computer,
     live: Arc<Mutex<Live>>,
     commands: Sender<String>,
     stop: Arc<AtomicBool>,
 }
 
 impl Line {
-    /// Opens a line. The other end of `tcp` may come later; a port or a device of this computer must be there.
+    /// Opens a line to a computer. The other end of `tcp` may come later; a port or a device of this computer must be there.
     ///
     /// # Errors
-    /// The text is no address, the port is in use, or the device does not exist.
-    pub fn open(address: &str, wake: Wake) -> Result<Self, String> {
+    /// The text is no address, the port is in use, the device does not exist, or the key cannot be read.
+    pub fn open(address: &str, computer: &Computer, wake: Wake) -> Result<Self, String> {
         let address: Address = address.parse()?;
+        // Before the line is opened, so that a wrong file does not take the port.
+        let signer = computer.key.as_deref().map(Signer::open).transpose().map_err(|e| e.to_string())?;
         let incoming = Incoming::open(&address, Patience::Waits).map_err(|e| e.to_string())?;
         let (commands, typed) = bounded(WAITING);
-        let line = Self { name: incoming.name().to_owned(), live: Arc::default(), commands, stop: Arc::default() };
+        let line = Self {
+            name: incoming.name().to_owned(),
+            computer: computer.clone(),
+            live: Arc::default(),
+            commands,
+            stop: Arc::default(),
+        };
         let thread = Thread {
             incoming,
             typed,
             live: Arc::clone(&line.live),
             stop: Arc::clone(&line.stop),
             wake,
-            commander: commander()?,
-            station: Station::quiet(ApidBase::DEFAULT),
+            commander: commander(computer.base)?.signed_by(signer),
+            station: Station::quiet(computer.base),
         };
         let begun = std::thread::Builder::new().name("line".into()).spawn(move || thread.run());
         begun.map_err(|e| format!("{}: {e}", line.name))?;
@@ -60,11 +81,21 @@ impl Line {
         self.live.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Returns the packets of a telecommand as text, with a sequence count of 0 and without the trailer of a key.
+    ///
+    /// # Errors
+    /// The text is no telecommand, or a value of it is refused.
+    pub fn preview(&self, text: &str) -> Result<String, String> {
+        let shown = preview(self.computer.base, text)?;
+        let trailer = self.computer.key.as_ref().map(|_| format!(" + a trailer of {TRAILER_BYTES}"));
+        Ok(shown + &trailer.unwrap_or_default())
+    }
+
     /// Sends a telecommand. The list of telecommands says what becomes of it.
     pub fn send(&self, text: &str) {
         let mut live = self.live();
         live.send(text);
-        if let Err(why) = preview(text) {
+        if let Err(why) = self.preview(text) {
             live.refuse_last(why);
         } else if self.commands.try_send(text.to_owned()).is_err() {
             live.refuse_last("too many telecommands wait".to_owned());
@@ -78,19 +109,15 @@ impl Drop for Line {
     }
 }
 
-fn commander() -> Result<Commander, String> {
-    Commander::new(ApidBase::DEFAULT, 0, &[], Arc::new(|_| ())).map_err(|e| e.to_string())
+fn commander(base: ApidBase) -> Result<Commander, String> {
+    Commander::new(base, 0, &[], Arc::new(|_| ())).map_err(|e| e.to_string())
 }
 
-/// Returns the packets of a telecommand as text, with a sequence count of 0.
-///
-/// # Errors
-/// The text is no telecommand, or a value of it is refused.
-pub fn preview(text: &str) -> Result<String, String> {
+fn preview(base: ApidBase, text: &str) -> Result<String, String> {
     let silent: Tell = Arc::new(|_| ());
     let packets = encode(text, &silent).map_err(|e| e.to_string())?;
     let first = packets.first().map_or(&[][..], |user| user.as_slice());
-    let bytes = write_packet(ApidBase::DEFAULT, 0, text, first).map_err(|e| e.to_string())?;
+    let bytes = write_packet(base, 0, text, first).map_err(|e| e.to_string())?;
     let hex: Vec<String> = bytes.iter().take(40).map(|b| format!("{b:02x}")).collect();
     let more = if bytes.len() > hex.len() { " …" } else { "" };
     let count = match packets.len() {
@@ -132,6 +159,7 @@ impl Thread {
         }
         let seen = self.station.take_seen();
         let answered = self.incoming.command_next(&mut self.commander, &seen)?;
+        self.station.follow(self.commander.base());
         let notices = self.incoming.take_notices();
         let is_news = came == Came::Bytes || !answered.is_empty() || !notices.is_empty();
         let (counts, now) = (self.station.counts(), Instant::now());
@@ -172,17 +200,20 @@ mod tests {
 
     #[test]
     fn a_telecommand_is_shown_as_it_is_sent() {
-        let shown = preview("ping").unwrap();
+        let shown = preview(ApidBase::DEFAULT, "ping").unwrap();
         assert!(shown.starts_with("1 packet of ") && shown.contains("1a cf fc 1d"), "{shown}");
-        let refused = preview("pign").unwrap_err();
+        let refused = preview(ApidBase::DEFAULT, "pign").unwrap_err();
         assert!(refused.contains("did you mean \"ping\"?"), "{refused}");
-        assert!(preview("").is_err());
+        assert!(preview(ApidBase::DEFAULT, "").is_err());
     }
 
     #[test]
     fn a_line_that_cannot_be_opened_says_why() {
-        let error = |text: &str| Line::open(text, Arc::new(|| {})).err().unwrap();
+        let error = |text: &str| Line::open(text, &Computer::default(), Arc::new(|| {})).err().unwrap();
         assert!(error("tcp:nowhere").contains("must be HOST:PORT"));
         assert!(error("udp:192.0.2.1:5000").contains("no such address"));
+        let stranger = Computer { key: Some("no/such.key".into()), ..Computer::default() };
+        let refused = Line::open("udp:127.0.0.1:0", &stranger, Arc::new(|| {})).err().unwrap();
+        assert!(refused.contains("no/such.key"), "{refused}");
     }
 }

@@ -35,7 +35,7 @@ pub mod trials;
 pub use engine::{Engine, FrameRequest, Setup};
 pub use frame_view::{BodyResult, FrameView};
 pub use job::Job;
-pub use line::Line;
+pub use line::{Computer, Line};
 
 use std::sync::Arc;
 

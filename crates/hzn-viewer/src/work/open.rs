@@ -13,10 +13,10 @@ use hzn_mcap::{Index, Row};
 use hzn_run::open;
 use hzn_run::source::{self, Raw, Source, TimeSource};
 
-use super::Wake;
 use super::entry::entry_of;
 use super::frame_joiner::FrameJoiner;
 use super::frames_table::FramesTable;
+use super::{Computer, Wake};
 use crate::model::{Entry, Fingerprint, Place};
 
 /// Request to open a sequence, with the files that belong to it.
@@ -34,6 +34,8 @@ pub struct Request {
     pub fps: Option<f64>,
     /// Size and format of headerless pictures.
     pub raw: Option<Raw>,
+    /// The flight computer, if the input is its line.
+    pub computer: Computer,
     /// Index of the picture to begin with, from 0.
     pub frame: usize,
     /// Waits for further pictures of a folder or a recording that grows.

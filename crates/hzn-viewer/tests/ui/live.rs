@@ -192,12 +192,6 @@ fn a_line_that_breaks_comes_back() {
 fn a_telecommand_waits_for_its_acknowledgement() {
     let mut window = window();
     let (_listener, mut stream) = window_on_line(&mut window);
-    let type_text = |window: &mut Window, text: &str| {
-        window.get_by_role_and_label(Role::TextInput, "Telecommand").focus();
-        window.run_steps(2);
-        window.get_by_role_and_label(Role::TextInput, "Telecommand").type_text(text);
-        window.run_steps(2);
-    };
     type_text(&mut window, "pin");
     assert!(window.query_by_label_contains("did you mean \"ping\"?").is_some());
     type_text(&mut window, "g");
@@ -219,6 +213,37 @@ fn a_telecommand_waits_for_its_acknowledgement() {
     window.key_press(Key::Enter);
     window.run_steps(3);
     assert!(has(window.state(), |l| l.sent.len(), 1));
+}
+
+fn type_text(window: &mut Window, text: &str) {
+    window.get_by_role_and_label(Role::TextInput, "Telecommand").focus();
+    window.run_steps(2);
+    window.get_by_role_and_label(Role::TextInput, "Telecommand").type_text(text);
+    window.run_steps(2);
+}
+
+#[test]
+fn a_telecommand_has_the_trailer_of_the_key() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("ground.key");
+    let key = hzn_fly::key_file::create(&path, 7, 1).unwrap();
+    let base = ApidBase::try_new(0x120).unwrap();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let mut window = window();
+    let computer = hzn_viewer::work::Computer { base, key: Some(path) };
+    let inputs = vec![format!("tcp:{}", listener.local_addr().unwrap()).into()];
+    window.state_mut().open(Request { inputs, computer, ..Request::default() });
+    let (mut stream, _) = listener.accept().unwrap();
+    window.run_steps(3);
+    type_text(&mut window, "ping");
+    assert!(window.query_by_label_contains(" + a trailer of 25").is_some());
+    window.key_press(Key::Enter);
+    window.run_steps(2);
+    let mut bytes = [0; 256];
+    let n = stream.read(&mut bytes).unwrap();
+    let Scan::Packet { packet, .. } = scan(&bytes[..n]) else { panic!("no packet was sent") };
+    assert_eq!(base.subject(&packet), Some(Apid::Command));
+    assert!(key.is_right(base, packet.sequence, packet.user));
 }
 
 #[test]

@@ -8,7 +8,6 @@ use crate::model::live::SentState;
 use crate::ui::live_view::Typed;
 use crate::ui::theme;
 use crate::work::Line;
-use crate::work::line::preview;
 
 /// Part of the column that the telecommands take; the messages have the rest.
 const PART: f32 = 0.5;
@@ -22,7 +21,7 @@ pub(super) fn show(typed: &mut Typed, line: &Line, ui: &mut Ui) {
         let edit = ui.add(edit).labelled_by(label.id);
         if edit.changed() {
             // A file that `load` names is read, so this is not done in every frame of the window.
-            typed.preview = (!typed.text.trim().is_empty()).then(|| preview(&typed.text));
+            typed.preview = (!typed.text.trim().is_empty()).then(|| line.preview(&typed.text));
         }
         let is_entered = edit.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
         let is_valid = matches!(typed.preview, Some(Ok(_)));

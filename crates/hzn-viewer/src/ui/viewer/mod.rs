@@ -242,7 +242,7 @@ impl Viewer {
         if let [one] = request.inputs.as_slice()
             && Address::is_address(&one.to_string_lossy())
         {
-            return self.open_line(&one.to_string_lossy());
+            return self.open_line(&one.to_string_lossy(), &request.computer);
         }
         if let [one] = request.inputs.as_slice()
             && self.open_if_rig(one)
