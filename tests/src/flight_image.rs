@@ -23,6 +23,7 @@ const SHIFT: u32 = 6;
 #[derive(Debug)]
 pub struct Bench {
     board: Board,
+    image: &'static str,
     dir: tempfile::TempDir,
 }
 
@@ -32,7 +33,14 @@ impl Bench {
     /// # Panics
     /// Panics if a temporary folder cannot be made.
     pub fn new(board: Board) -> Self {
-        Self { board, dir: tempfile::tempdir().expect("a temporary folder can be made") }
+        Self { board, image: "flight", dir: tempfile::tempdir().expect("a temporary folder can be made") }
+    }
+    /// Makes a flight image whose telecommands need a key, with an empty folder: the key is missing.
+    ///
+    /// # Panics
+    /// Panics if a temporary folder cannot be made.
+    pub fn with_keys(board: Board) -> Self {
+        Self { image: "flight-keys", ..Self::new(board) }
     }
     /// Returns the folder of the files.
     pub fn dir(&self) -> &Path {
@@ -89,7 +97,7 @@ impl Bench {
         parameters.operations.boot_mode = 1;
         self.write_copy_of(1, &parameters, 1);
         self.write_frames(&pictures.iter().map(|picture| (picture.clone(), 0)).collect::<Vec<_>>());
-        let mut command = self.board.qemu(&self.board.image("flight"), SHIFT);
+        let mut command = self.board.qemu(&self.board.image(self.image), SHIFT);
         let command = command.args(["-serial", "file:sent.bin"]).current_dir(self.dir.path());
         let mut child = command.spawn().expect("files and programs of this machine work");
         let deadline = Instant::now() + Duration::from_secs(300);
@@ -115,7 +123,7 @@ impl Bench {
     /// Panics if QEMU fails or the image does not end within two minutes.
     pub fn run_in_parts(&self, parts: &[(u64, &[u8])], shift: u32) -> i32 {
         let sent = std::fs::File::create(self.path("sent.bin")).expect("files and programs of this machine work");
-        let mut command = self.board.qemu(&self.board.image("flight"), shift);
+        let mut command = self.board.qemu(&self.board.image(self.image), shift);
         let mut child = command
             .args(["-serial", "stdio"])
             .current_dir(self.dir.path())

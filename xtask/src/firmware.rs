@@ -87,7 +87,8 @@ pub(crate) fn check_core() -> Outcome {
 fn build(every_image: bool) -> Outcome {
     apt_install(&["qemu-system-arm", "binutils-arm-none-eabi", "gcc-arm-none-eabi"])?;
     let toolchain = Toolchain::find()?;
-    BOARDS.iter().try_for_each(|b| b.build_images(toolchain, if every_image { b.images } else { b.always }))
+    BOARDS.iter().try_for_each(|b| b.build_images(toolchain, if every_image { b.images } else { b.always }))?;
+    if every_image { build_image_with_keys() } else { Ok(()) }
 }
 
 /// Builds the images of a clone of this repository, and compares their bytes with the images here.
@@ -171,13 +172,13 @@ fn test_images_once(steps: &mut Steps) -> Outcome {
 /// Runs every image, builds those that no emulator can run, and compares the costs with those of the page.
 fn test_every_image(steps: &mut Steps) -> Outcome {
     soft_double::check(&images_of(AN386.name).join("measure"))?;
-    build_flight_image(METHODS)?;
+    build_flight_image(&core_features(METHODS))?;
     let vendor_port = build_vendor_port(M7.dir, &root())?;
     steps::run(Command::new(target().join("debug/examples/stack_bound")).arg(vendor_port))?;
     run_image_tests(
         steps,
         "",
-        &["firmware::", "line_cost::", "navigation::", "recovery::", "rig_image::", "silence::"],
+        &["authenticated::", "firmware::", "line_cost::", "navigation::", "recovery::", "rig_image::", "silence::"],
     )?;
     compare_costs("--check")
 }
@@ -212,9 +213,21 @@ fn lint(every_image: bool) -> Outcome {
 /// Every feature that adds methods to hzn-core.
 const METHODS: &[&str] = &["dlr", "zju", "horace", "erf"];
 
-/// Builds the flight image of an M7 with features of hzn-core. The linker shows that none of its methods can panic.
-fn build_flight_image(features: &[&str]) -> Result<PathBuf, Trouble> {
-    let chosen: Vec<String> = features.iter().map(|f| format!("hzn-core/{f}")).chain([AN500.name.to_owned()]).collect();
+/// Returns features of hzn-core, as the images name them.
+fn core_features(features: &[&str]) -> Vec<String> {
+    features.iter().map(|feature| format!("hzn-core/{feature}")).collect()
+}
+
+/// Builds the flight image of an M7 whose telecommands need a key. It has the name `flight-keys`.
+fn build_image_with_keys() -> Outcome {
+    let built = build_flight_image(&["keys".to_owned()])?;
+    fs::copy(built, images_of(AN500.name).join("flight-keys"))?;
+    check_no_panics(AN500.name, "flight-keys")
+}
+
+/// Builds the flight image of an M7 with more features. The linker shows that nothing in it can panic.
+fn build_flight_image(features: &[String]) -> Result<PathBuf, Trouble> {
+    let chosen = [&[AN500.name.to_owned()], features].concat();
     let args = ["--package", "hzn-mps2", "--bin", "flight", "--features", &chosen.join(",")];
     let (mut command, built) = Toolchain::find()?.cargo("build", M7.dir, &args);
     steps::run(configure_for_firmware(&mut command, M7.flags))?;
@@ -236,7 +249,7 @@ fn print_flash_by_feature() -> Outcome {
     let each = METHODS.iter().map(core::slice::from_ref);
     for features in core::iter::once(&[][..]).chain(each).chain([METHODS]) {
         let named: Vec<String> = features.iter().map(|f| format!("`{f}`")).collect();
-        let size = output_of(Command::new("arm-none-eabi-size").arg(build_flight_image(features)?))?;
+        let size = output_of(Command::new("arm-none-eabi-size").arg(build_flight_image(&core_features(features))?))?;
         let numbers = size.lines().nth(1).unwrap_or_default().split_whitespace().take(2);
         let flash: u64 = numbers.filter_map(|n| n.parse::<u64>().ok()).sum();
         let name = if named.is_empty() { "none: the `hzn` chain".to_owned() } else { named.join(", ") };

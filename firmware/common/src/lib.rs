@@ -6,6 +6,7 @@
 //! | [`flash`] | the memory of the parameters, in files of the host |
 //! | [`host`] | files of the computer that emulates the board, by semihosting |
 //! | [`image`] | the program in flash |
+//! | [`keys`] | the keys of telecommands, in files of the host |
 //! | [`watermark`] | the largest use of the stack |
 
 #![no_std]
@@ -14,6 +15,7 @@ pub mod camera;
 pub mod flash;
 pub mod host;
 pub mod image;
+pub mod keys;
 pub mod watermark;
 
 use core::panic::PanicInfo;

@@ -97,6 +97,22 @@ impl Board for Mps2 {
     fn write_copy(&mut self, copy: u8, bytes: &[u8]) -> bool {
         self.flash.write_copy(copy, bytes)
     }
+    #[cfg(feature = "keys")]
+    fn has_keys(&mut self) -> bool {
+        true
+    }
+    #[cfg(feature = "keys")]
+    fn read_key(&mut self, place: u8, into: &mut [u8; hzn_flight::authentication::KEY_BYTES]) {
+        hzn_firmware::keys::read(place, into);
+    }
+    #[cfg(feature = "keys")]
+    fn read_counter(&mut self, place: u8) -> Option<u64> {
+        hzn_firmware::keys::read_counter(place)
+    }
+    #[cfg(feature = "keys")]
+    fn write_counter(&mut self, place: u8, counter: u64) -> bool {
+        hzn_firmware::keys::write_counter(place, counter)
+    }
     fn stack_bytes(&mut self) -> u32 {
         watermark::stack_bytes()
     }

@@ -2,6 +2,7 @@
 
 mod accuracy_table;
 mod artefacts;
+mod authenticated;
 mod discs;
 mod faint;
 mod firmware;
