@@ -42,6 +42,7 @@ const UNPUBLISHED: &[&str] = &[
     "hzn-setup",
     "hzn-stm32f405",
     "hzn-stm32h743",
+    "hzn-supply",
 ];
 
 /// Returns the arguments of cargo that leave out the packages that are not published.
@@ -292,7 +293,7 @@ impl Dist {
     }
 
     fn list_parts(&self) -> Outcome {
-        let sbom = ["run", "--quiet", "--package", "hzn-fuzz", "--example", "sbom", "--"];
+        let sbom = ["run", "--quiet", "--package", "hzn-supply", "--"];
         let lists = fresh(&self.work().join("sbom"))?;
         steps::run(cargo(&sbom).arg(&lists))?;
         for product in ["hzn-cli", "hzn-py"] {

@@ -23,7 +23,7 @@ pub(crate) fn run(args: &[String]) -> Outcome {
             arg => folder = arg,
         }
     }
-    let sbom = ["run", "--quiet", "--package", "hzn-fuzz", "--example", "sbom"];
+    let sbom = ["run", "--quiet", "--package", "hzn-supply"];
     steps::run(cargo(&sbom).args(["--", folder]))?;
     if has("cargo-deny") {
         steps::run(Command::new(steps::cargo_program()).args(["deny", "check", "licenses", "bans", "sources"]))?;

@@ -2,13 +2,12 @@
 //!
 //! Each function of [`TARGETS`] takes any bytes, gives them to one part of the program as a file, a picture or a
 //! stream, and panics if a promise is broken. `fuzz/` runs them under libFuzzer (`cargo xtask campaign fuzz`); the test
-//! of this crate replays the corpora that libFuzzer found. [`supply`] says what hzn is built from.
+//! of this crate replays the corpora that libFuzzer found.
 
 mod files;
 mod flight;
 mod input;
 mod picture;
-pub mod supply;
 mod texts;
 
 /// A function that takes any bytes.

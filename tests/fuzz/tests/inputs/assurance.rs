@@ -1,6 +1,6 @@
 //! The pages about hazards and about reliability name tests. Each of them exists.
 
-use hzn_fuzz::supply::root;
+use hzn_supply::root;
 
 #[test]
 fn every_test_that_is_named_exists() {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use hzn_fuzz::supply::{self, Package};
+use hzn_supply::{self as supply, Package};
 
 /// Returns whether an SPDX expression allows one of these licences: every part that `AND` joins needs one choice.
 fn is_allowed(expression: &str, allowed: &BTreeSet<String>) -> bool {

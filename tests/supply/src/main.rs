@@ -1,10 +1,10 @@
 //! Writes the CycloneDX list of parts (SBOM) of the command, the wheel and the firmware into a folder.
 //!
-//! `cargo run -p hzn-fuzz --example sbom -- FOLDER`
+//! `cargo run -p hzn-supply -- FOLDER`
 
 use std::path::PathBuf;
 
-use hzn_fuzz::supply::{PRODUCTS, sbom};
+use hzn_supply::{PRODUCTS, sbom};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: sbom FOLDER")?);
