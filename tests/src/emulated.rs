@@ -8,6 +8,7 @@ use hzn_core::{Config, FlightHorizon, Prior};
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::{Parameters, table};
+use hzn_host::Compiled;
 
 /// Board that QEMU emulates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -140,7 +141,7 @@ impl Case {
         let layout = Layout::packed(camera.width.into(), camera.height.into(), 1, 8);
         let picture = Grey::try_new(&self.bytes, layout).expect("the picture is whole");
         let expected = horizon.expect(&self.prior).expect("the prior is possible");
-        PictureAnswer::from_report(&horizon.process(&picture, &expected))
+        PictureAnswer::from_report(&horizon.find(&picture, &expected))
     }
 
     fn write(&self, out: &mut Vec<u8>) {

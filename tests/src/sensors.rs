@@ -1,11 +1,12 @@
 //! Runs both precisions of the sensor with one call.
 
 use hzn_core::body::Kind;
-use hzn_core::image::Pixels;
-use hzn_core::observer::{Observer, Unobserved};
+use hzn_core::image::{ImageView, Pixels};
+use hzn_core::observer::Observer;
 use hzn_core::real::Real;
 use hzn_core::status::Status;
 use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Prior, Report};
+use hzn_host::Compiled;
 use hzn_sim::{Globe, Scene};
 use nalgebra::{Matrix3, Vector3};
 
@@ -57,10 +58,15 @@ impl Sensors {
     }
 
     /// Returns the answers of both sensors (f64, f32), or the status if there is no answer.
-    pub fn both(&mut self, picture: &impl Pixels, scene: &Scene) -> (Result<Answer, Status>, Result<Answer, Status>) {
+    pub fn both<'a>(
+        &mut self,
+        picture: impl Into<ImageView<'a>>,
+        scene: &Scene,
+    ) -> (Result<Answer, Status>, Result<Answer, Status>) {
+        let picture = picture.into();
         (
-            process(&mut self.host, picture, &prior_of_scene(scene)),
-            process(&mut self.flight, picture, &prior_of_scene(scene)),
+            process(&mut self.host, &picture, &prior_of_scene(scene)),
+            process(&mut self.flight, &picture, &prior_of_scene(scene)),
         )
     }
 }
@@ -81,12 +87,19 @@ pub fn prior_of_scene<T: Real>(scene: &Scene) -> Prior<T> {
 ///
 /// # Errors
 /// Returns the status if it is not `ok`.
-pub fn process<T: Real, const P: usize, const B: usize, const W: usize>(
+///
+/// # Panics
+/// Panics if the prior is impossible or the report contradicts itself.
+pub fn process<'a, T: Real, const P: usize, const B: usize, const W: usize>(
     horizon: &mut Horizon<T, P, B, W>,
-    picture: &impl Pixels,
+    picture: impl Into<ImageView<'a>>,
     prior: &Prior<T>,
-) -> Result<Answer, Status> {
-    process_observed(horizon, picture, prior, &Unobserved)
+) -> Result<Answer, Status>
+where
+    Horizon<T, P, B, W>: Compiled<Scalar = T>,
+{
+    let expected = horizon.expect(prior).expect("the prior is possible");
+    answer(&horizon.find(picture, &expected))
 }
 
 /// Does the same as [`process`] with an observer.
@@ -100,10 +113,17 @@ pub fn process_observed<T: Real, const P: usize, const B: usize, const W: usize>
     horizon: &mut Horizon<T, P, B, W>,
     picture: &impl Pixels,
     prior: &Prior<T>,
-    observer: &impl Observer<T>,
-) -> Result<Answer, Status> {
+    observer: &dyn Observer<T>,
+) -> Result<Answer, Status>
+where
+    Horizon<T, P, B, W>: Compiled<Scalar = T>,
+{
     let expected = horizon.expect(prior).expect("the prior is possible");
-    let report = horizon.process_observed(picture, &expected, observer);
+    answer(&horizon.find_observed(picture, &expected, observer))
+}
+
+/// Returns the answer of a report, or its status.
+fn answer<T: Real>(report: &Report<T>) -> Result<Answer, Status> {
     assert_eq!(
         report.status == Status::Ok,
         report.solution.is_some(),
@@ -114,7 +134,7 @@ pub fn process_observed<T: Real, const P: usize, const B: usize, const W: usize>
         let verdicts = report.candidates.iter().map(|c| format!("{} points {:?}", c.points, c.verdict));
         println!("{:?}: {}", report.status, verdicts.collect::<Vec<_>>().join(", "));
     }
-    Answer::from_report(&report).ok_or(report.status)
+    Answer::from_report(report).ok_or(report.status)
 }
 
 impl Answer {

@@ -2,6 +2,7 @@
 //! `fly [rocket|payload|leo] [width] [count] [seed] [sigma of a prior attitude in degrees]`.
 
 use hzn_core::{HostHorizon, camera::Config};
+use hzn_host::Compiled;
 use hzn_sim::flight::{leo_infrared, rocket};
 
 fn main() {
@@ -24,7 +25,7 @@ fn main() {
         let picture = frame.render().expect("the scene is valid");
         let prior = prior_deg.map_or_else(|| frame.prior(), |deg| frame.prior_with_attitude(deg.to_radians()));
         let expected = horizon.expect(&prior).expect("the position is outside the Earth");
-        let report = horizon.process(&picture.view(), &expected);
+        let report = horizon.find(&picture.view(), &expected);
         let listed: Vec<&str> = report.candidates.iter().map(|c| c.verdict.name()).collect();
         let status = report.status.name();
         let Some(solution) = report.solution else {

@@ -2,6 +2,7 @@
 
 use anyhow::anyhow;
 use hzn_core::{Config, HostHorizon, Prior, threshold};
+use hzn_host::Compiled;
 use hzn_plot::{Chart, Series, Style};
 use hzn_sim::{FlightFrame, Picture, Scenario};
 use rayon::prelude::*;
@@ -38,7 +39,7 @@ fn look(
     let view = picture.view();
     let prior = Prior { level: *next, ..frame.prior() };
     let expected = horizon.expect(&prior)?;
-    let report = horizon.process(&view, &expected);
+    let report = horizon.find(&view, &expected);
     *next = report.next_level;
     let full = f64::from(hzn_core::image::Pixels::full_scale(&view));
     flown.levels.push((frame.time_s, f64::from(report.level) / full));

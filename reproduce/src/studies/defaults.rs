@@ -6,6 +6,7 @@ use hzn_core::body;
 use hzn_core::camera::Camera;
 use hzn_core::{Config, HostHorizon};
 use hzn_evaluate::Case;
+use hzn_host::Compiled;
 use hzn_sim::scenario::Fit;
 use hzn_sim::{Flight, FlightFrame, Picture, Scenario};
 use rayon::prelude::*;
@@ -68,7 +69,7 @@ impl Rendered {
                 let known = hzn_core::Prior { rate_rad_s: known.rate_rad_s.filter(|_| rates), ..known };
                 let expected = horizon.expect(&known).ok()?;
                 let points = PointRecorder::default();
-                let solution = horizon.process_observed(&picture.view(), &expected, &points).solution?;
+                let solution = horizon.find_observed(&picture.view(), &expected, &points).solution?;
                 let points = points.candidate_points(solution.candidate);
                 Sighting::measure(&frame.file, &camera, &wide.body, &known, &points, &solution)
             },

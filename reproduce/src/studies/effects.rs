@@ -8,6 +8,7 @@ use hzn_sim::{Optics, Scenario, World};
 use hzn_calib::noise;
 use hzn_core::HostHorizon;
 use hzn_core::camera::Camera;
+use hzn_host::Compiled;
 use rayon::prelude::*;
 
 use super::defaults::{Outcome, Rendered};
@@ -178,7 +179,7 @@ fn heights_km(flight: &Rendered) -> anyhow::Result<[f64; 2]> {
             let known = hzn_core::Prior { rate_rad_s: None, ..known };
             let expected = horizon.expect(&known).ok()?;
             let watch = noise::PointRecorder::default();
-            let solution = horizon.process_observed(&picture.view(), &expected, &watch).solution?;
+            let solution = horizon.find_observed(&picture.view(), &expected, &watch).solution?;
             let points = watch.candidate_points(solution.candidate);
             let sighting = noise::Sighting::measure(&frame.file, &camera, &wide.body, &known, &points, &solution)?;
             let (rays, shares): (Vec<_>, Vec<_>) = noise::shares(&turning, &points, &solution)?.into_iter().unzip();

@@ -4,6 +4,7 @@ use anyhow::{Context, anyhow};
 use hzn_calib::noise::{self, PointRecorder};
 use hzn_calib::sky::{self, Estimate, LimbPrior, Unknowns, View};
 use hzn_core::{Config, HostHorizon, camera};
+use hzn_host::Compiled;
 use hzn_sim::scenario::Fit;
 use hzn_sim::{Flight, FlightFrame, Picture, Scenario};
 use rayon::prelude::*;
@@ -64,7 +65,7 @@ impl Rendered {
                 let known = hzn_core::Prior { fixed_from_camera: None, ..frame.prior() };
                 let expected = horizon.expect(&known).ok()?;
                 let points = PointRecorder::default();
-                let solution = horizon.process_observed(&picture.view(), &expected, &points).solution?;
+                let solution = horizon.find_observed(&picture.view(), &expected, &points).solution?;
                 Some(View::new(&frame.file, points.candidate_points(solution.candidate), known, &solution))
             },
         );

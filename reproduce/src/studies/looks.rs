@@ -9,6 +9,7 @@ use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::image::{Channel, Grey, ImageView, Layout};
 use hzn_core::threshold::{self, Method};
 use hzn_core::{Config, HostHorizon, Prior};
+use hzn_host::Compiled;
 use hzn_sim::Scenario;
 use hzn_sim::painted::LensWithDiscs;
 use rayon::prelude::*;
@@ -76,7 +77,7 @@ fn find_discs_under_circle(number: u32) -> anyhow::Result<Vec<(bool, bool)>> {
             let mut horizon = HostHorizon::boxed(&config)?;
             let layout = Layout::packed(with_discs.lens.width.into(), with_discs.lens.height.into(), 1, 8);
             let expected = horizon.expect(&Prior::default())?;
-            let report = horizon.process(&Grey::try_new(&data, layout)?, &expected);
+            let report = horizon.find(&Grey::try_new(&data, layout)?, &expected);
             let right = report.solution.is_some_and(|found| found.axis.angle_rad(&axis).to_degrees() < 0.2);
             out.push((whole, right));
         }
@@ -242,7 +243,7 @@ impl Photograph {
         let layout = Layout::packed(self.rgb.width(), self.rgb.height(), 3, 8);
         let view = ImageView::from_bytes(self.rgb.as_raw(), layout, Channel::Mean)?;
         let expected = horizon.expect(&Prior::default())?;
-        Ok(horizon.process(&view, &expected).solution.map(|s| MeasuredAxis {
+        Ok(horizon.find(&view, &expected).solution.map(|s| MeasuredAxis {
             axis: s.axis.xyz(),
             sigma_deg: s.covariance.sigma_max_rad().to_degrees(),
             rms_px: s.rms_px,

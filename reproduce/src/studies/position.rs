@@ -3,6 +3,7 @@
 use hzn_core::camera::{Config as CameraConfig, Model};
 use hzn_core::{Config, HostHorizon, Prior, body};
 use hzn_evaluate::{Answer, Case, Evaluation, MeasuredPosition, pair};
+use hzn_host::Compiled;
 use hzn_sim::{Detector, Ellipsoid, Reflection, Scene, Surface, Trials};
 
 use super::setup::{Effort, halton};
@@ -85,7 +86,7 @@ fn fly(name: &str, first_seed: u64, focal_px: f64, pictures: usize) -> anyhow::R
         let file = format!("{name}-{seed}");
         let picture = scene.render()?;
         let expected = horizon.expect(&prior(&scene, about))?;
-        let report = horizon.process(&picture.view(), &expected);
+        let report = horizon.find(&picture.view(), &expected);
         let solution = report.solution.as_ref();
         answers.push(Answer {
             file: file.clone(),

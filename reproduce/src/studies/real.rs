@@ -7,6 +7,7 @@ use anyhow::Context;
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::image::{Channel, ImageView, Layout};
 use hzn_core::{HostHorizon, Prior, Report, Solution};
+use hzn_host::Compiled;
 use serde::Deserialize;
 
 use super::setup::Effort;
@@ -93,7 +94,7 @@ fn process(path: &Path) -> anyhow::Result<Report<f64>> {
     let layout = Layout::packed(rgb.width(), rgb.height(), 3, 8);
     let view = ImageView::from_bytes(rgb.as_raw(), layout, Channel::Mean)?;
     let expected = horizon.expect(&prior)?;
-    Ok(horizon.process(&view, &expected))
+    Ok(horizon.find(&view, &expected))
 }
 
 /// Errors of an answer where there is a truth.

@@ -2,12 +2,13 @@
 
 use hzn_core::body::{Kind, Prior};
 use hzn_core::camera::{self, Model};
-use hzn_core::image::{Channel, Grey, ImageView, Layout, Pixels};
+use hzn_core::image::{Channel, Grey, ImageView, Layout};
 use hzn_core::pipeline::{ROWS_HELD, RowBuffers};
 use hzn_core::real::Real;
 use hzn_core::status::Status;
 use hzn_core::threshold::Method;
 use hzn_core::{Config, FlightHorizon, FlightWorkspace, HostHorizon, Preset, Report, Sensor};
+use hzn_host::Compiled;
 
 use crate::input::Input;
 
@@ -57,20 +58,20 @@ fn prior<T: Real>(input: &mut Input<'_>) -> Prior<T> {
     Prior { altitude_m, attitude_sigma_rad, position_m: vector(input), rate_rad_s: vector(input), ..Prior::default() }
 }
 
-fn process(config: &Config, picture: &impl Pixels, mut input: Input<'_>) {
+fn process(config: &Config, picture: &ImageView<'_>, mut input: Input<'_>) {
     if let Ok(mut host) = HostHorizon::boxed(config)
         && let Ok(expected) = host.expect(&prior(&mut input))
     {
-        let report = host.process(picture, &expected);
+        let report = host.find(picture, &expected);
         check(&report);
-        let again = host.process(picture, &expected);
+        let again = host.find(picture, &expected);
         assert_eq!(report.counters, again.counters, "the same picture gives the same report");
-        host.process_each(picture, &[expected; 2]).iter().for_each(check);
+        host.find_each(picture, &[expected; 2]).iter().for_each(check);
     }
     if let Ok(mut flight) = FlightHorizon::boxed(config)
         && let Ok(expected) = flight.expect(&prior(&mut input))
     {
-        check(&flight.process(picture, &expected));
+        check(&flight.find(picture, &expected));
     }
 }
 
@@ -134,7 +135,7 @@ pub(crate) fn any_rows(bytes: &[u8]) {
     let streamed = stream.finish(&mut Box::new(FlightWorkspace::new()), &hzn_core::observer::Unobserved);
     check(&streamed);
     let whole = Grey::try_new(&data, Layout::packed(WIDTH as u32, HEIGHT as u32, 1, 8)).expect("a whole picture");
-    let report = FlightHorizon::boxed(&config).map(|mut flight| flight.process(&whole, &expected));
+    let report = FlightHorizon::boxed(&config).map(|mut flight| flight.find(&whole, &expected));
     if let Ok(report) = report
         && (streamed.counters.dropped, streamed.counters.cut_points) == (0, 0)
         && streamed.status != Status::Truncated

@@ -5,6 +5,7 @@ use hzn_core::status::Status;
 use hzn_core::{Config, HostHorizon};
 use hzn_core::{observer::Observer, report::Candidate};
 use hzn_evaluate::Miss;
+use hzn_host::Compiled;
 use hzn_sim::error::SceneError;
 use hzn_sim::globe::Globe;
 use hzn_sim::picture::Picture;
@@ -81,12 +82,12 @@ pub fn process_trial(
     trial: &Trial,
     picture: &Picture,
     prior: PriorKnowledge,
-    observer: &impl Observer<f64>,
+    observer: &dyn Observer<f64>,
 ) -> Result<Outcome, SceneError> {
     horizon.configure(config)?;
     let prior = trial.prior(prior.attitude_sigma_deg);
     let expected = horizon.expect(&prior).map_err(|_| SceneError::Pose)?;
-    let report = horizon.process_observed(&picture.view(), &expected, observer);
+    let report = horizon.find_observed(&picture.view(), &expected, observer);
     let truth = &trial.truth;
     let found = report.solution.as_ref().and_then(|s| {
         Some(Detection {

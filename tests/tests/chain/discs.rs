@@ -8,6 +8,7 @@ use hzn_core::pixel::ImagePoint;
 use hzn_core::real::Real;
 use hzn_core::status::Status;
 use hzn_core::{Config, HostHorizon, Preset, Prior};
+use hzn_host::Compiled;
 use hzn_sim::pose::position_m;
 use hzn_sim::{Detector, Light, Look, Pose, Scene, Visible, World};
 use hzn_tests::disc::{Disc, direction, distance_px};
@@ -174,7 +175,7 @@ fn the_level_follows_the_limb_of_the_picture_before() {
         let data = disc.paint(&config, 3);
         let picture = Grey::try_new(&data, Layout::packed(640, 480, 1, 8)).unwrap();
         let expected = sensors.host.expect(&Prior::default()).unwrap();
-        let report = sensors.host.process(&picture, &expected);
+        let report = sensors.host.find(&picture, &expected);
         assert_eq!(report.status, Status::Ok, "{brightness}");
         // The next threshold is halfway between the sky at 8 counts and the disc.
         let next = report.next_level.unwrap();
@@ -187,7 +188,7 @@ fn the_level_follows_the_limb_of_the_picture_before() {
     sensors.host.configure(&config).unwrap();
     let dark = vec![8u8; 640 * 480];
     let expected = sensors.host.expect(&Prior::default()).unwrap();
-    let report = sensors.host.process(&Grey::try_new(&dark, Layout::packed(640, 480, 1, 8)).unwrap(), &expected);
+    let report = sensors.host.find(&Grey::try_new(&dark, Layout::packed(640, 480, 1, 8)).unwrap(), &expected);
     assert_eq!((report.status, report.next_level), (Status::NoLimb, None));
 }
 
@@ -228,7 +229,7 @@ fn earth_and_moon_in_one_picture() {
         let picture = scene.render().unwrap();
         let known = Prior { position_m: Some(pose.position_m), ..prior_with_sun(Some(sun)) };
         let expected = [0, 1].map(|which| horizon.expect_body(which, &known).unwrap());
-        let reports = horizon.process_each(&picture.view(), &expected);
+        let reports = horizon.find_each(&picture.view(), &expected);
         for (report, (kind, limit_deg)) in reports.iter().zip([(Kind::Earth, 0.1), (Kind::Moon, 0.016)]) {
             let truth = scene.body_truth(kind, "", 0.0).unwrap();
             let solution = report.solution.as_ref().unwrap_or_else(|| panic!("{kind:?} at {u} {v}: {}", report.status));

@@ -5,6 +5,7 @@ use hzn_core::camera::{Config as Camera, Model};
 use hzn_core::image::{Channel, ImageView, Layout};
 use hzn_core::verdict::Verdict;
 use hzn_core::{Config, Report, status::Status, threshold};
+use hzn_host::Compiled;
 use hzn_sim::pose::position_m;
 use hzn_sim::{Look, Pose, Scene};
 use hzn_tests::{Sensors, prior_of_scene};
@@ -38,7 +39,7 @@ fn process(scene: &Scene, counts_per_px: f64) -> Report<f64> {
     sensor.retry.levels.clear();
     let mut host = Sensors::new(&sensor).host;
     let expected = host.expect(&prior_of_scene(scene)).unwrap();
-    host.process(&view, &expected).clone()
+    host.find(&view, &expected).clone()
 }
 
 #[test]

@@ -10,6 +10,7 @@ use hzn_core::threshold;
 use hzn_core::{Config, FlightHorizon, Prior, camera};
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::flight::{Buffers, Lists};
+use hzn_host::Compiled;
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_sim::{Disc, Sky};
 use hzn_tests::emulated::{Board, Case, answer_bytes, measure, measure_rows, run_chain, run_example};
@@ -136,7 +137,7 @@ fn the_flight_loop_takes_rows_on_a_small_board() {
     flight.sensor.body.altitude_sigma_km = 60.0;
     let bench = Bench::new(Board::Stm32F405);
     let mut pictures = save_pictures(&flight, &bench.path("pictures"));
-    std::fs::write(bench.path("pictures/sensor.toml"), toml::to_string(&flight.sensor).unwrap()).unwrap();
+    std::fs::write(bench.path("pictures/sensor.toml"), hzn_files::sensor::to_text(&flight.sensor).unwrap()).unwrap();
     // One picture has the wrong size: its rows are left out.
     pictures.insert(4, (vec![7; 1000], 0));
     bench.write_frames(&pictures);
@@ -218,7 +219,7 @@ fn an_exchange_over_the_line() {
         let mut after = before;
         after.consensus.threshold_px = 2.5;
         after.covariance.sigma_px = 0.2;
-        std::fs::write(bench.path("pictures/sensor.toml"), toml::to_string(&after).unwrap()).unwrap();
+        std::fs::write(bench.path("pictures/sensor.toml"), hzn_files::sensor::to_text(&after).unwrap()).unwrap();
         hzn_run(dir, &["run", "pictures", "--flight", "-o", "here.csv"]);
         let (sent, host) = (answers(&bench.path("sent.csv")), answers(&bench.path("here.csv")));
         assert_eq!(sent.len(), 10);
@@ -252,7 +253,8 @@ fn a_tracked_sequence_has_the_same_bits_as_here() {
             image::GrayImage::from_raw(640, 480, picture.clone()).unwrap().save(file).unwrap();
             pictures[place] = picture;
         }
-        std::fs::write(bench.path("pictures/sensor.toml"), toml::to_string(&flight.sensor).unwrap()).unwrap();
+        std::fs::write(bench.path("pictures/sensor.toml"), hzn_files::sensor::to_text(&flight.sensor).unwrap())
+            .unwrap();
         let there = bench.fly(&flight.sensor, &pictures);
         hzn_run(bench.dir(), &["telemetry", "sent.bin", "-o", "sent.csv"]);
         hzn_run(bench.dir(), &["run", "pictures", "--flight", "-o", "here.csv"]);
@@ -379,7 +381,7 @@ fn the_sensor_alone_answers_with_the_same_bits() {
         let mut horizon = FlightHorizon::boxed(&sensor).unwrap();
         let picture = Grey::try_new(&case.bytes, Layout::packed(1920, 1080, 1, 8)).unwrap();
         let expected = horizon.expect(&case.prior).unwrap();
-        let report = horizon.process(&picture, &expected);
+        let report = horizon.find(&picture, &expected);
         let direction = report.solution.as_ref().map_or([0; 9], |s| {
             let ([x, y, z], [[xx, xy, xz], [_, yy, yz], [_, _, zz]]) = (s.axis.xyz(), s.covariance.rows());
             [x, y, z, xx, xy, xz, yy, yz, zz].map(f32::to_bits)

@@ -5,6 +5,7 @@ use hzn_core::camera::{self, Model};
 use hzn_core::frames::{Cam, Fixed, Rotation, UnitVec3};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::{Config, HostHorizon, Prior, Report, body};
+use hzn_host::Compiled;
 use hzn_sim::{Look, Pose};
 
 /// Distance from the centre of the Earth, above the equator, and the semi-axes of WGS-84; km.
@@ -74,7 +75,7 @@ impl Disc {
             ..Prior::default()
         };
         let picture = Grey::try_new(&self.data, Layout::packed(WIDTH.into(), WIDTH.into(), 1, 8)).unwrap();
-        let report = horizon.process(&picture, &horizon.expect(&prior).unwrap());
+        let report = horizon.find(&picture, &horizon.expect(&prior).unwrap());
         // Above the equator the axis of the limb points to the centre of the Earth.
         let down = UnitVec3::<Fixed, f64>::try_new([-1.0, 0.0, 0.0]).unwrap();
         let axis = self.fixed_from_camera.inverse().apply(&down);

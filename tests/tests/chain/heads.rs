@@ -4,6 +4,7 @@ use hzn_core::camera::{Config as Camera, Model};
 use hzn_core::frames::{Rotation, UnitVec3, Vehicle};
 use hzn_core::rig::{Config as RigConfig, Head, Joint, Rig};
 use hzn_core::{Config, Prior, body};
+use hzn_host::Compiled;
 use hzn_sim::pose::position_m;
 use hzn_sim::{Clouds, Detector, Disc, Look, Pose, Profile, Scene};
 use hzn_tests::{Sensors, prior_of_scene};
@@ -65,7 +66,7 @@ fn fly(km_to_pole: f64, tilt_deg: f64) -> Errors {
             let mut horizon = Sensors::new(&sensor(&scene)).host;
             let prior: Prior<f64> = prior_of_scene(&scene);
             let expected = horizon.expect(&prior).unwrap();
-            let report = horizon.process(&scene.render().unwrap().view(), &expected);
+            let report = horizon.find(&scene.render().unwrap().view(), &expected);
             let Some(solution) = report.solution else { continue };
             let mount = Rotation::assume_from_quaternion(scene.pose.q_fixed_from_camera_wxyz).unwrap();
             let told = scene.truth("", 0.0).unwrap();

@@ -9,6 +9,7 @@ use hzn_core::observer::{Observer, Unobserved};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_core::{Config, HostHorizon, Prior, Report, body};
+use hzn_host::Compiled;
 
 /// Distances from NAIF kernels, kilometres.
 const PICTURES: [(&str, f64); 2] =
@@ -26,13 +27,13 @@ fn process(config: &Config, file: &str) -> Report<f64> {
     process_observed(config, file, &Unobserved)
 }
 
-fn process_observed(config: &Config, file: &str, observer: &impl Observer<f64>) -> Report<f64> {
+fn process_observed(config: &Config, file: &str, observer: &dyn Observer<f64>) -> Report<f64> {
     let frames = hzn_files::frames::load(&folder().join("frames.csv")).unwrap_or_else(|e| panic!("{e}"));
     let mut horizon = HostHorizon::boxed(config).unwrap();
     let expected = horizon.expect(&frames.get(file).unwrap().to_prior(None)).unwrap();
     let picture = image::open(folder().join(file)).unwrap().into_luma8();
     let layout = Layout::packed(picture.width(), picture.height(), 1, 8);
-    horizon.process_observed(&Grey::try_new(picture.as_raw(), layout).unwrap(), &expected, observer)
+    horizon.find_observed(&Grey::try_new(picture.as_raw(), layout).unwrap(), &expected, observer)
 }
 
 #[test]
@@ -70,7 +71,7 @@ fn the_terminator_is_no_limb_without_the_sun() {
             let picture = image::open(folder().join(file)).unwrap().into_luma8();
             let layout = Layout::packed(picture.width(), picture.height(), 1, 8);
             let grey = Grey::try_new(picture.as_raw(), layout).unwrap();
-            let report = horizon.process(&grey, &horizon.expect(&prior).unwrap());
+            let report = horizon.find(&grey, &horizon.expect(&prior).unwrap());
             let Some(position) = report.solution.and_then(|s| s.position) else { continue };
             let [x, y, z] = position.centre_m;
             let [xx, xy, xz, yy, yz, zz] = position.covariance_m2;
@@ -99,7 +100,7 @@ fn the_terminator_of_a_flat_disc_is_no_limb_without_attitude_and_sun() {
         let picture = image::open(folder().join(file)).unwrap().into_luma8();
         let layout = Layout::packed(picture.width(), picture.height(), 1, 8);
         let grey = Grey::try_new(picture.as_raw(), layout).unwrap();
-        let report = horizon.process(&grey, &horizon.expect(&prior).unwrap());
+        let report = horizon.find(&grey, &horizon.expect(&prior).unwrap());
         let Some(solution) = report.solution.filter(|_| report.status == Status::Ok) else { continue };
         answered += 1;
         let off: Vec<f64> = solution.axis.xyz().iter().zip(right.axis.xyz()).map(|(a, b)| a - b).collect();

@@ -8,6 +8,7 @@ use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
 use hzn_core::threshold::{self, Method};
 use hzn_core::{Config, HostHorizon, Prior, Report};
+use hzn_host::Compiled;
 use hzn_sim::painted::LensWithDiscs;
 use hzn_sim::pose::position_m;
 use hzn_sim::{Clouds, Light, Look, Pose, Scene, Visible};
@@ -33,7 +34,7 @@ fn fixed_threshold_config(lens: &camera::Config, altitude_km: f64, level: f64) -
 fn process_picture(horizon: &mut HostHorizon, data: &[u8], lens: &camera::Config) -> Report<f64> {
     let picture = Grey::try_new(data, Layout::packed(lens.width.into(), lens.height.into(), 1, 8)).unwrap();
     let expected = horizon.expect(&Prior::default()).unwrap();
-    horizon.process(&picture, &expected)
+    horizon.find(&picture, &expected)
 }
 
 /// Tests random discs under an image circle, each at ten thresholds; at least half of the outline is in view. A disc
@@ -78,7 +79,7 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
         let why = || {
             let mut horizon = HostHorizon::boxed(sensor).unwrap();
             let expected = horizon.expect(&Prior::default()).unwrap();
-            format!("{:?}", horizon.process(&p.view(), &expected).candidates)
+            format!("{:?}", horizon.find(&p.view(), &expected).candidates)
         };
         let (host, flight) = (
             host.unwrap_or_else(|s| panic!("{s}: {}", why())),
@@ -143,7 +144,7 @@ fn look_at(scene: &Scene, levels: &[f64]) -> (Report<f64>, UnitVec3<Cam, f64>) {
     config.retry.levels = levels.iter().copied().collect();
     let mut horizon = HostHorizon::boxed(&config).unwrap();
     let expected = horizon.expect(&hzn_tests::prior_of_scene(scene)).unwrap();
-    (horizon.process(&picture.view(), &expected), axis)
+    (horizon.find(&picture.view(), &expected), axis)
 }
 
 /// Tests discs that are seen from far above and lit from the side, with bright clouds over dark ground. Otsu's
@@ -237,7 +238,7 @@ fn a_thermal_array_answers_by_default() {
         let answer = process(&mut sensor, &picture, &prior);
         if let Err(status) = answer {
             let expected = sensor.expect(&prior).unwrap();
-            println!("{seed}: {status}, {:?}", sensor.process(&picture, &expected).candidates);
+            println!("{seed}: {status}, {:?}", sensor.find(&picture, &expected).candidates);
         }
         tally.add(answer.as_ref().ok(), [truth.axis_x, truth.axis_y, truth.axis_z]);
         if let Ok(bound) = process(&mut known, &picture, &prior) {

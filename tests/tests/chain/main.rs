@@ -3,6 +3,7 @@
 mod accuracy_table;
 mod artefacts;
 mod authenticated;
+mod compiled;
 mod discs;
 mod faint;
 mod firmware;

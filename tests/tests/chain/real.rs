@@ -4,6 +4,7 @@
 
 use hzn_core::Prior;
 use hzn_core::status::Status;
+use hzn_host::Compiled;
 use hzn_tests::real::{Photograph, PointRecorder, Points, steepest_offset_px};
 use hzn_tests::sensors::{process, process_observed};
 use hzn_tests::{Answer, Sensors};
@@ -108,9 +109,9 @@ fn photographs_of_the_limb_are_probable() {
         let photograph = Photograph::load(file);
         let mut sensors = Sensors::new(&photograph.sensor);
         let expected = sensors.host.expect(&Prior::default()).expect("the prior is possible");
-        let host = sensors.host.process(&photograph.view(), &expected).solution.and_then(|s| s.p_limb);
+        let host = sensors.host.find(&photograph.view(), &expected).solution.and_then(|s| s.p_limb);
         let expected = sensors.flight.expect(&Prior::default()).expect("the prior is possible");
-        let flight = sensors.flight.process(&photograph.view(), &expected).solution.and_then(|s| s.p_limb);
+        let flight = sensors.flight.find(&photograph.view(), &expected).solution.and_then(|s| s.p_limb);
         println!("{file}: {host:.4?} {flight:.4?}");
         // The lens of OPS-SAT is not calibrated, and its limb has a half-angle 2.6 sigmas from the expected one.
         assert!(host.is_some_and(|p| p > 0.9) && flight.is_none_or(|p| p > 0.9), "{file}: {host:?}");

@@ -8,6 +8,7 @@ use hzn_flight::bytes::Reader;
 use hzn_flight::joint::{Outcome, RigAnswer};
 use hzn_flight::packet::{self, Apid, ApidBase, Scan};
 use hzn_flight::{Parameters, answer::PictureAnswer};
+use hzn_host::Compiled;
 use hzn_sim::pose::position_m;
 use hzn_sim::{Detector, Look, Pose, Profile, Samples, Scene};
 use hzn_tests::emulated::{Board, measure_rig};
@@ -65,7 +66,7 @@ fn four_heads_have_the_bits_and_the_cost_of_four_heads() {
         let mut horizon = FlightHorizon::boxed(&p.sensor).expect("valid");
         let expected = horizon.expect(&Prior::default()).expect("the altitude is a parameter");
         let picture = Grey::try_new(bytes, Layout::packed(640, 480, 1, 8)).expect("the picture is whole");
-        horizon.process(&picture, &expected).solution.expect("an answer")
+        horizon.find(&picture, &expected).solution.expect("an answer")
     });
     let mounts = heads.each_ref().map(|(p, _)| {
         let q = p.sensor.mount.expect("a mount").q_vehicle_from_camera_wxyz.map(|x| x as f32);

@@ -2,6 +2,7 @@
 
 use hzn_core::body::{self, Kind};
 use hzn_core::{Config, FlightHorizon, HostHorizon, Prior, Report};
+use hzn_host::Compiled;
 use hzn_sim::{FlightFrame, Scenario};
 
 /// Pictures of a tumbling satellite: bright clouds, the Sun with its reflections, and nothing at all, by turns.
@@ -45,12 +46,12 @@ fn neither_a_cloud_nor_a_reflection_is_the_sun() {
             // The Sun is first here, but the Earth that hides it is looked for before.
             let both = |which: usize| host.expect_body(which, &prior(frame)).unwrap();
             let reports = [both(1), both(0)];
-            let reports = host.process_each(&picture.view(), &reports);
+            let reports = host.find_each(&picture.view(), &reports);
             assert_eq!(reports.len(), 2);
             check(frame, &reports[0], &mut found);
             let both = [0, 1].map(|which| flight.expect_body(which, &prior(frame)).unwrap());
             let mut ignored = 0;
-            check(frame, &flight.process_each(&picture.view(), &both)[1], &mut ignored);
+            check(frame, &flight.find_each(&picture.view(), &both)[1], &mut ignored);
         }
     }
     println!("{found} of {in_view} Suns found");

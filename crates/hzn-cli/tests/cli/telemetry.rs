@@ -9,6 +9,7 @@ use hzn_flight::cuc::Cuc;
 use hzn_flight::joint::RigAnswer;
 use hzn_flight::messages::{Acknowledge, Code, Event, EventRecord, Exposure, Function, Severity};
 use hzn_flight::packet::{self, Apid, ApidBase};
+use hzn_host::Compiled;
 use image::{GrayImage, Luma};
 
 /// A stream of telemetry.
@@ -63,7 +64,7 @@ fn disc(position: bool) -> (Place, PictureAnswer) {
     let mut horizon = FlightHorizon::boxed(&config).unwrap();
     let grey = Grey::try_new(picture.as_raw(), Layout::packed(320, 240, 1, 8)).unwrap();
     let expected = horizon.expect(&Prior::default()).unwrap();
-    (place, PictureAnswer::from_report(&horizon.process(&grey, &expected)))
+    (place, PictureAnswer::from_report(&horizon.find(&grey, &expected)))
 }
 
 fn exposure(picture: u32) -> Exposure {

@@ -45,6 +45,32 @@ impl<'a> ImageView<'a> {
     }
 }
 
+impl<'a> From<&Self> for ImageView<'a> {
+    fn from(picture: &Self) -> Self {
+        *picture
+    }
+}
+impl<'a> From<&Grey<'a, u8>> for ImageView<'a> {
+    fn from(picture: &Grey<'a, u8>) -> Self {
+        Self::Grey8(*picture)
+    }
+}
+impl<'a> From<&Grey<'a, u16>> for ImageView<'a> {
+    fn from(picture: &Grey<'a, u16>) -> Self {
+        Self::Grey16(*picture)
+    }
+}
+impl<'a> From<&Colour<'a, u8>> for ImageView<'a> {
+    fn from(picture: &Colour<'a, u8>) -> Self {
+        Self::Colour8(*picture)
+    }
+}
+impl<'a> From<&Colour<'a, u16>> for ImageView<'a> {
+    fn from(picture: &Colour<'a, u16>) -> Self {
+        Self::Colour16(*picture)
+    }
+}
+
 // The kind is matched at every read, so that one compiled pipeline serves all four. A flight computer avoids the match:
 // it uses the kinds themselves.
 macro_rules! forward {

@@ -45,7 +45,7 @@ fn a_table_takes_the_limb_height_of_a_told_sensor() {
     out.flush().unwrap();
     let mut config = Config::new(Camera::ideal(Model::Pinhole, 640, 480, 500.0));
     config.body.limb_height_sigma_km = 2.5;
-    std::fs::write(&sensor, toml::to_string(&config).unwrap()).unwrap();
+    std::fs::write(&sensor, hzn_files::sensor::to_text(&config).unwrap()).unwrap();
     assert_eq!(recording(&table, None).unwrap().limb_sigma_km, None);
     let told = recording(&table, Some(&sensor)).unwrap();
     assert_eq!((told.limb_sigma_km, told.seen.len()), (Some(2.5), 3));

@@ -12,7 +12,6 @@
 
 mod annotate;
 mod answers;
-mod clock;
 mod expected_limb;
 mod outcome;
 mod plan;

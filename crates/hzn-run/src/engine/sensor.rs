@@ -11,11 +11,12 @@ use hzn_core::real::Real;
 use hzn_core::rig::Glimpse;
 use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Observer, Prior, Report, Step, Tracker};
 use hzn_files::{FrameData, Frames, Problem};
+use hzn_host::{Clock, Compiled, Task};
 use hzn_nav::ephemeris;
 
 use super::expected_limb::ExpectedLimb;
 use super::prior::prior;
-use super::trace::{Clock, Traces, Watch};
+use super::trace::{Traces, Watch};
 use super::widen::widen_report;
 
 enum Kind {
@@ -238,24 +239,14 @@ impl AnySensor {
         self.watch(view, data, watch)
     }
 
-    /// Processes a picture without a record. The usual kinds of pictures have their own compiled pipelines; with the
-    /// enum, every pixel costs a branch.
+    /// Processes a picture without a record, by the compiled pipeline of its kind.
     fn process_unwatched(&mut self, view: &ImageView<'_>, data: Option<&FrameData>) -> Vec<Processed> {
         let (now_s, after_s) = self.take_time(data);
         let before = Before { last: &self.last, now_s, after_s };
-        let processed = match (&mut self.kind, view) {
-            (Kind::Host(h, t), ImageView::Grey8(p)) => run_unwatched(h, t, p, data, before),
-            (Kind::Host(h, t), ImageView::Grey16(p)) => run_unwatched(h, t, p, data, before),
-            (Kind::Host(h, t), ImageView::Colour8(p)) => run_unwatched(h, t, p, data, before),
-            (Kind::Host(h, t), ImageView::Colour16(p)) => run_unwatched(h, t, p, data, before),
-            (Kind::Flight(h, t), ImageView::Grey8(p)) => run_unwatched(h, t, p, data, before),
-            // Kinds that few cameras of a flight computer have share the pipeline of the watched pictures.
-            (Kind::Flight(h, t), view) => {
-                let clock = Clock::default();
-                let read = |index| view.read(index);
-                let picture = Indirect::new(view, &read);
-                run(h, t, &picture, data, before, &(&clock as &dyn Observer<f32>), &clock)
-            }
+        let clock = Clock::default();
+        let processed = match &mut self.kind {
+            Kind::Host(h, t) => run(h, t, Shown::Plain(*view, &clock), data, before, &clock),
+            Kind::Flight(h, t) => run(h, t, Shown::Plain(*view, &clock), data, before, &clock),
         };
         self.conclude(processed, data, now_s)
     }
@@ -263,13 +254,16 @@ impl AnySensor {
     /// Processes a picture with picture and observer behind pointers, so that every kind of both uses the same compiled
     /// pipeline.
     fn watch<P: Pixels>(&mut self, picture: &P, data: Option<&FrameData>, watch: &dyn Watch) -> Vec<Processed> {
+        let read = |index| picture.read(index);
+        self.watch_indirect(Indirect::new(picture, &read), data, watch)
+    }
+
+    fn watch_indirect(&mut self, picture: Indirect<'_>, data: Option<&FrameData>, watch: &dyn Watch) -> Vec<Processed> {
         let (now_s, after_s) = self.take_time(data);
         let before = Before { last: &self.last, now_s, after_s };
-        let read = |index| picture.read(index);
-        let picture = Indirect::new(picture, &read);
         let processed = match &mut self.kind {
-            Kind::Host(h, t) => run(h, t, &picture, data, before, &(watch as &dyn Observer<f64>), watch),
-            Kind::Flight(h, t) => run(h, t, &picture, data, before, &(watch as &dyn Observer<f32>), watch),
+            Kind::Host(h, t) => run(h, t, Shown::Observed(picture, watch), data, before, watch),
+            Kind::Flight(h, t) => run(h, t, Shown::Observed(picture, watch), data, before, watch),
         };
         self.conclude(processed, data, now_s)
     }
@@ -356,26 +350,23 @@ fn bodies<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>
     horizon.sensor().map_or(&[], |sensor| sensor.config().each_body())
 }
 
-fn run_unwatched<P: Pixels, T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
-    horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
-    tracker: &mut Tracker<T>,
-    picture: &P,
-    data: Option<&FrameData>,
-    before: Before<'_>,
-) -> Vec<Processed> {
-    let clock = Clock::default();
-    run(horizon, tracker, picture, data, before, &clock, &clock)
+/// A picture, with the observer that sees it being processed.
+enum Shown<'a, T> {
+    Plain(ImageView<'a>, &'a Clock),
+    Observed(Indirect<'a>, &'a dyn Observer<T>),
 }
 
-fn run<P: Pixels, T: Real + Into<f64>, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
+fn run<T: Real + Into<f64>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
     horizon: &mut Horizon<T, POINTS, BLOCKS, WORDS>,
     tracker: &mut Tracker<T>,
-    picture: &P,
+    picture: Shown<'_, T>,
     data: Option<&FrameData>,
     before: Before<'_>,
-    observer: &O,
     watch: &dyn Watch,
-) -> Vec<Processed> {
+) -> Vec<Processed>
+where
+    Horizon<T, POINTS, BLOCKS, WORDS>: Compiled<Scalar = T>,
+{
     let Before { last, now_s, after_s } = before;
     let mut step = None;
     let expect = |(which, last): (usize, &Option<LastAnswer>)| {
@@ -387,16 +378,16 @@ fn run<P: Pixels, T: Real + Into<f64>, O: Observer<T>, const POINTS: usize, cons
     };
     let expected: Vec<_> = last.iter().enumerate().map(expect).collect();
     let known: Vec<_> = expected.iter().filter_map(|e| e.as_ref().ok().copied()).collect();
-    let reports = match (step, last.len(), &known[..]) {
-        (Some(step), 1, [known]) => {
-            // The clocks of the bodies begin here.
-            observer.body(0);
-            [horizon.track_observed(tracker, picture, (known, &step), observer)].into_iter().collect()
-        }
+    let task = match (&step, last.len(), &known[..]) {
+        (Some(step), 1, [known]) => Task::Track(tracker, known, step),
         _ => {
             tracker.forget();
-            horizon.process_each_observed(picture, &known, observer)
+            Task::Each(&known)
         }
+    };
+    let reports = match picture {
+        Shown::Plain(view, clock) => horizon.perform(view, task, clock),
+        Shown::Observed(picture, observer) => horizon.perform_observed(picture, task, observer),
     };
     let times = watch.times();
     let mut done = reports.iter().zip(times);

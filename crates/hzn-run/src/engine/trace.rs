@@ -12,8 +12,8 @@ use hzn_core::real::Real;
 use hzn_core::report::Candidate;
 use hzn_core::status::Stage;
 use hzn_core::{Observer, Solution};
+use hzn_host::Clock;
 
-use super::clock;
 use super::widen::{widen_candidate, widen_solution};
 
 /// One candidate edge.
@@ -116,7 +116,7 @@ impl Trace {
     }
 
     fn switch(&self, next: Option<Stage>) {
-        let now = clock::now();
+        let now = hzn_host::now();
         if let Some(((stage, since), now)) = self.running.get().zip(now) {
             let mut times = self.times.get();
             times[stage as usize] += now - since;
@@ -132,25 +132,9 @@ pub trait Watch: Observer<f32> + Observer<f64> {
     fn times(&self) -> Vec<Duration>;
 }
 
-/// An observer that measures only the time spent on each body.
-#[derive(Debug, Clone, Default)]
-pub struct Clock {
-    since: Cell<Option<Instant>>,
-    times: RefCell<Vec<Duration>>,
-}
-
 impl Watch for Clock {
     fn times(&self) -> Vec<Duration> {
-        self.times.borrow().clone()
-    }
-}
-
-impl<T> Observer<T> for Clock {
-    fn body(&self, _: u8) {
-        self.since.set(clock::now());
-    }
-    fn leave(&self) {
-        self.times.borrow_mut().push(self.since.get().map_or(Duration::ZERO, |since| since.elapsed()));
+        Clock::times(self)
     }
 }
 

@@ -18,9 +18,9 @@ use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Camera};
 use hzn_core::covariance::{self, Noise};
 use hzn_core::frames::UnitVec3;
-use hzn_core::image::{Indirect, Pixels};
 use hzn_core::pixel::ImagePoint;
-use hzn_core::{Config, HostHorizon, Observer};
+use hzn_core::{Config, HostHorizon};
+use hzn_host::Compiled;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Scenario, ScenarioError};
@@ -283,10 +283,7 @@ fn process_all<'a>(
         };
         let Ok(expected) = horizon.expect(&prior) else { continue };
         let points = PointRecorder::default();
-        let view = picture.view();
-        let read = |index| view.read(index);
-        let watch: &dyn Observer<f64> = &points;
-        let report = horizon.process_observed(&Indirect::new(&view, &read), &expected, &watch);
+        let report = horizon.find_observed(&picture.view(), &expected, &points);
         let (Some(solution), Some(axis), true) = (report.solution, truth.axis(), truth.has_limb()) else { continue };
         let points = points.candidate_points(solution.candidate);
         let p = solution.covariance.rows();

@@ -257,3 +257,10 @@ fn a_view_is_the_picture_of_the_flight_without_its_vehicle_and_motion() {
     let refused = jupiter.view(&jupiter.camera, far, unix_s, 0).unwrap_err().to_string();
     assert!(refused.contains("ellipsoid.sun"), "{refused}");
 }
+
+#[test]
+fn scenes_are_written_and_read() {
+    let scene = &crate::flight::rocket(320, 180, 2, 1).with_payload().frames[1].scene;
+    let text = toml::to_string(scene).unwrap();
+    assert_eq!(&toml::from_str::<Scene>(&text).unwrap(), scene);
+}

@@ -195,5 +195,6 @@ fn what_does_not_belong_together_is_named() {
     let wrong = jupiter(&|s| s.known.range_sigma_km = Some(-1.0));
     assert!(wrong.starts_with("[known] range_sigma_km: -1 is refused"), "{wrong}");
     let text = BUILTIN.iter().find(|b| b.0 == "saturn").unwrap().2.replace("opacity", "opaque");
-    assert!(toml::from_str::<Scenario>(&text).unwrap_err().to_string().contains("unknown field `opaque`"));
+    let unknown = Scenario::parse(&text, "scene.toml".as_ref()).unwrap_err().to_string();
+    assert!(unknown.contains("opaque: unknown key; did you mean opacity?"), "{unknown}");
 }

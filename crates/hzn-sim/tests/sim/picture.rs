@@ -168,10 +168,3 @@ fn truth_and_frames_have_the_columns_of_their_files() {
     );
     assert!((frame.row().altitude_km - 600.0).abs() < 1e-6 && frame.row().x_km.hypot(frame.row().y_km) > 1000.0);
 }
-
-#[test]
-fn scenes_are_written_and_read() {
-    let scene = &flight::rocket(320, 180, 2, 1).with_payload().frames[1].scene;
-    let text = toml::to_string(scene).unwrap();
-    assert_eq!(&toml::from_str::<Scene>(&text).unwrap(), scene);
-}

@@ -3,6 +3,7 @@
 use hzn_core::body::{self, Kind};
 use hzn_core::camera::{self, Model};
 use hzn_core::{Config, HostHorizon, Prior, covariance};
+use hzn_host::Compiled;
 use hzn_sim::pose::position_m;
 use hzn_sim::sensitivity::{Design, Sigmas, ThirdAxis, reference};
 use hzn_sim::{Look, Pose, Scene};
@@ -154,7 +155,7 @@ fn the_sensor_reports_what_the_design_says() {
         let picture = scene.render().unwrap();
         let mut horizon = HostHorizon::boxed(&config).unwrap();
         let expected = horizon.expect(&Prior::default()).unwrap();
-        let report = horizon.process(&picture.view(), &expected);
+        let report = horizon.find(&picture.view(), &expected);
         let reported = report.solution.unwrap().covariance.sigma_max_rad().to_degrees();
         let largest = promised.fused.pitch_deg.max(promised.fused.roll_deg);
         assert!((reported / largest - 1.0).abs() < 0.03, "{model:?}: {reported} {largest}");

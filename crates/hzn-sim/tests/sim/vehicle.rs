@@ -41,7 +41,7 @@ fn check(scene: &Scenario) -> Path {
     let mut compared = 0;
     for one in scene.by_camera() {
         // scene.toml of the camera's folder is a scene of its own.
-        let mut alone: Scenario = toml::from_str(&toml::to_string(&one).unwrap()).unwrap();
+        let mut alone = Scenario::parse(&one.to_text().unwrap(), "scene.toml".as_ref()).unwrap();
         if let (Trajectory::Table(alone), Trajectory::Table(one)) = (&mut alone.trajectory, &one.trajectory) {
             alone.text.clone_from(&one.text);
         }

@@ -19,7 +19,7 @@ fn write(flight: &Flight, folder: &Path) {
         writeln!(table, "{},{},{x},{y},{z}", frame.file, frame.time_s).unwrap();
     }
     std::fs::write(folder.join("frames.csv"), table).unwrap();
-    std::fs::write(folder.join("sensor.toml"), toml::to_string(&flight.sensor).unwrap()).unwrap();
+    std::fs::write(folder.join("sensor.toml"), hzn_files::sensor::to_text(&flight.sensor).unwrap()).unwrap();
 }
 
 fn calibrated(window: &mut Window, entry: &str) {

@@ -48,7 +48,7 @@ fn write(flight: &Flight, wrong: &[Wrong], folder: &Path) {
         writeln!(table, "{},{},{}", frame.file, frame.time_s, frame.row().altitude_km + shift_km).unwrap();
     }
     std::fs::write(folder.join("frames.csv"), table).unwrap();
-    std::fs::write(folder.join("sensor.toml"), toml::to_string(&sensor).unwrap()).unwrap();
+    std::fs::write(folder.join("sensor.toml"), hzn_files::sensor::to_text(&sensor).unwrap()).unwrap();
 }
 
 /// Returns what the frames say in the window, the best cause first.

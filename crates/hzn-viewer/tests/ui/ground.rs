@@ -27,7 +27,7 @@ fn write(folder: &Path, has_attitude: bool) {
         table.push('\n');
     }
     std::fs::write(folder.join("frames.csv"), table).unwrap();
-    std::fs::write(folder.join("sensor.toml"), toml::to_string(&flight.sensor).unwrap()).unwrap();
+    std::fs::write(folder.join("sensor.toml"), hzn_files::sensor::to_text(&flight.sensor).unwrap()).unwrap();
 }
 
 #[test]
