@@ -1,6 +1,6 @@
 //! The functions that a board provides. A port is one implementation of this trait.
 
-use hzn_core::{Config, Report};
+use hzn_core::{Config, Report, Solution};
 
 use crate::messages::Exposure;
 use crate::packet::ApidBase;
@@ -83,10 +83,10 @@ pub trait Board {
     /// [`Viewer::rows`], as the camera sends them. Called at most once for a picture.
     // Not part of `next_picture`, because size and prior are checked before, and rows are refused before they come.
     fn show(&mut self, viewer: &mut Viewer<'_>);
-    /// Returns whether the picture that was shown last is an earlier one to the last bit: the camera stands still, or
-    /// gives an old buffer again. The noise of a camera never repeats. Its answer is then judged as `gates.fixed_edge`
-    /// says. A board that cannot tell returns false.
-    fn repeats_picture(&mut self) -> bool {
+    /// Returns whether the picture that was shown last is an earlier one to the last bit, or at least along the limb
+    /// that was found in it: the camera stands still, or gives an old buffer again. The noise of a camera never
+    /// repeats. Its answer is then judged as `gates.fixed_edge` says. A board that cannot tell returns false.
+    fn repeats_picture(&mut self, _limb: Option<&Solution<f32>>) -> bool {
         false
     }
     /// Reads copy 1 or 2 of the parameters from memory.

@@ -6,7 +6,8 @@ use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crossbeam_channel::{Receiver, Select};
-use hzn_core::{Config, Report};
+use hzn_core::camera::Camera;
+use hzn_core::{Config, Report, Solution};
 use hzn_flight::Parameters;
 use hzn_flight::authentication::KEY_BYTES;
 use hzn_flight::board::{BUILD, Board, Image, Picture, RETAINED_WORDS};
@@ -254,8 +255,8 @@ impl Board for Linux {
             viewer.see(&shot.pixels);
         }
     }
-    fn repeats_picture(&mut self) -> bool {
-        self.head().is_some_and(|head| head.repeats)
+    fn repeats_picture(&mut self, limb: Option<&Solution<f32>>) -> bool {
+        self.head().is_some_and(|head| head.repeats(limb))
     }
     fn read_copy(&mut self, copy: u8, into: &mut [u8]) {
         match self.head() {
@@ -281,6 +282,7 @@ impl Board for Linux {
     fn note_sensor(&mut self, config: &Config) {
         let selected = self.selected;
         if let Some(head) = self.head() {
+            head.camera = Camera::try_new(&config.camera).ok();
             head.protection_factor = config.protection_factor(0);
             if let Some(keeper) = &mut head.keeper {
                 keeper.set_config(config);

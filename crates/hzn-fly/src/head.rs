@@ -3,10 +3,13 @@
 use std::collections::VecDeque;
 
 use crossbeam_channel::{Receiver, TryRecvError};
+use hzn_core::Solution;
+use hzn_core::camera::Camera;
+use hzn_core::image::Layout;
 use hzn_core::status::Status;
 use hzn_flight::board::Picture;
 use hzn_mcap::RowMeta;
-use hzn_run::engine::REMEMBERED;
+use hzn_run::engine::{REMEMBERED, Tiles, widen_solution};
 
 use crate::camera::{Capture, Ended, FromCamera, Recording, Shot};
 use crate::flash::Flash;
@@ -60,10 +63,10 @@ pub(crate) struct Head {
     pub(crate) next: Option<Shot>,
     pub(crate) current: Option<Shot>,
     pub(crate) ended: Option<Ended>,
-    /// The checksums of the last pictures that were shown, the newest last.
-    shown: VecDeque<u32>,
-    /// Whether the picture that was shown last is one of those before it.
-    pub(crate) repeats: bool,
+    /// The checksums of the last pictures that were shown, the newest last; those of the tiles if the lens is known.
+    shown: VecDeque<(u32, Option<Tiles>)>,
+    /// The lens, once the parameters are known.
+    pub(crate) camera: Option<Camera<f64>>,
     /// Multiple of sigma that is the protection level.
     pub(crate) protection_factor: Option<f64>,
     counts: Counts,
@@ -85,7 +88,7 @@ impl Head {
             current: None,
             ended: None,
             shown: VecDeque::new(),
-            repeats: false,
+            camera: None,
             protection_factor: None,
             counts: Counts::default(),
             handed_out: 0,
@@ -190,15 +193,29 @@ impl Head {
         Some(picture)
     }
 
-    /// Compares the picture that is shown with those before it.
+    /// Remembers the picture that is shown.
     pub(crate) fn see_shown(&mut self) {
         let Some(shot) = &self.current else { return };
-        let checksum = crc32fast::hash(&shot.pixels);
-        self.repeats = self.shown.contains(&checksum);
-        if self.shown.len() == REMEMBERED {
+        let tiles = self.camera.as_ref().map(|camera| {
+            let layout = Layout::packed(camera.width().into(), camera.height().into(), 1, 8);
+            Tiles::of_bytes(&shot.pixels, layout)
+        });
+        if self.shown.len() > REMEMBERED {
             self.shown.pop_front();
         }
-        self.shown.push_back(checksum);
+        self.shown.push_back((crc32fast::hash(&shot.pixels), tiles));
+    }
+
+    /// Returns whether the picture that was shown last is one of those before it, at least along its limb.
+    pub(crate) fn repeats(&self, limb: Option<&Solution<f32>>) -> bool {
+        let mut pictures = self.shown.iter().rev();
+        let Some((checksum, tiles)) = pictures.next() else { return false };
+        let now = tiles.as_ref().zip(self.camera.as_ref()).zip(limb);
+        let limb = now.map(|((tiles, camera), limb)| (tiles, tiles.on_limb(&widen_solution(limb), camera)));
+        pictures.any(|(other, other_tiles)| {
+            let both = limb.as_ref().zip(other_tiles.as_ref());
+            other == checksum || both.is_some_and(|((tiles, limb), other)| tiles.repeat(limb, other))
+        })
     }
 
     /// Returns the name of the picture that was handed out last.

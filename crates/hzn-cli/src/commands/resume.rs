@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_mcap::Row;
 use hzn_run::checked_row;
-use hzn_run::engine::{self, AnySensor, Plan, REMEMBERED, Turns};
+use hzn_run::engine::{self, AnySensor, Plan, REMEMBERED, Sums, Turns};
 use hzn_run::sink::{self, StoredResults};
 use hzn_run::source::{Item, Payload, Source};
 
@@ -47,13 +47,13 @@ pub(super) fn skip_stored(
         if !(is_last || changed || changed_table.is_some()) {
             // The pictures after these are compared with their bytes.
             if n + REMEMBERED as u64 >= stored.frames {
-                turns.see_checksum(item.checksum(&plan.config));
+                turns.see_sums(sums(item, plan));
             }
             continue;
         }
         let picture = item.name.clone();
-        let (same, checksum) = again.gives_the_same(n, item, before)?;
-        turns.see_checksum(checksum);
+        let (same, sums) = again.gives_the_same(n, item, before)?;
+        turns.see_sums(sums);
         match same {
             Some(true) => {}
             // Without the pictures before it, a picture would give another result.
@@ -87,6 +87,11 @@ fn tell_changed(table: &Path) {
     tell::line(format_args!("note: {} {what}", table.display()));
 }
 
+/// Returns the checksums of a picture as the sensor sees it; `None` if it cannot be read.
+fn sums(item: Item, plan: &Plan) -> Option<Sums> {
+    item.decode(&plan.config).as_ref().map(Sums::of)
+}
+
 /// Returns the file of a picture that has a file of its own.
 fn file_of(item: &Item) -> Option<&PathBuf> {
     match &item.payload {
@@ -116,12 +121,12 @@ impl Again<'_> {
     }
 
     /// Returns whether a picture gives its stored rows again, after the answers and turns before it; `None` if that
-    /// also depends on the threshold of the pictures before it. The other value is the checksum of the picture.
-    fn gives_the_same(&mut self, n: u64, item: Item, mut before: Turns) -> Result<(Option<bool>, Option<u32>), Stop> {
+    /// also depends on the threshold of the pictures before it. The other value has the checksums of the picture.
+    fn gives_the_same(&mut self, n: u64, item: Item, mut before: Turns) -> Result<(Option<bool>, Option<Sums>), Stop> {
         // The limb of a picture in the middle of a block was tracked from the picture before it.
         let every = u64::from(self.plan.config.track.full_every);
         if self.plan.config.tracks() || (self.plan.config.track.is_on() && !n.is_multiple_of(every)) {
-            return Ok((None, item.checksum(&self.plan.config)));
+            return Ok((None, sums(item, &self.plan)));
         }
         let sensor = match &mut self.sensor {
             Some(sensor) => sensor,
@@ -132,9 +137,9 @@ impl Again<'_> {
         let mut processed = engine::process_one(&self.plan, sensor, n, item)?;
         before.judge(&mut processed, &self.plan.config);
         let rows: Vec<Row> = sink::rows(&processed, &self.plan.config);
-        let sums = rows.iter().map(checked_row::sum).collect::<Result<Vec<u32>, _>>()?;
+        let row_sums = rows.iter().map(checked_row::sum).collect::<Result<Vec<u32>, _>>()?;
         let first = n as usize * rows.len();
-        let same = self.stored.sums.get(first..first + rows.len()) == Some(sums.as_slice());
-        Ok((Some(same), processed.bytes.map(|bytes| bytes.checksum)))
+        let same = self.stored.sums.get(first..first + rows.len()) == Some(row_sums.as_slice());
+        Ok((Some(same), processed.bytes.map(|bytes| bytes.sums)))
     }
 }

@@ -1,7 +1,7 @@
-//! Counts pictures that repeat one of the last pictures to the last bit.
+//! Counts pictures that repeat one of the last pictures to the last bit, at least along the limb.
 
 use hzn_core::gates::{self, FixedEdge};
-use hzn_run::engine::Finished;
+use hzn_run::engine::{self, Finished};
 use hzn_run::explain;
 
 use crate::tell;
@@ -10,6 +10,8 @@ use crate::tell;
 #[derive(Default)]
 pub(crate) struct Repeats {
     pictures: u64,
+    /// Those that repeat only the limb, with other pixels elsewhere.
+    limbs: u64,
     /// Those with a time that is told.
     timed: u64,
     first: Option<String>,
@@ -17,8 +19,11 @@ pub(crate) struct Repeats {
 
 impl Repeats {
     pub(crate) fn count(&mut self, frame: &Finished) {
-        let Some(bytes) = frame.bytes.filter(|bytes| bytes.repeats) else { return };
+        let Some(bytes) = frame.bytes.as_ref().filter(|bytes| bytes.repeats != engine::Repeats::Nothing) else {
+            return;
+        };
         self.pictures += 1;
+        self.limbs += u64::from(bytes.repeats == engine::Repeats::Limb);
         self.timed += u64::from(bytes.has_time);
         self.first.get_or_insert_with(|| frame.name.clone());
     }
@@ -36,7 +41,14 @@ impl Repeats {
             "Their times differ, so the camera or its recorder stood still: gates.fixed_edge = \"refuse\" refuses \
              their answers"
         };
-        Some(format!("{pictures} {repeat} an earlier one to the last bit (the first is {first}). {outcome}"))
+        let part = if self.limbs == 0 {
+            String::new()
+        } else if self.limbs == self.pictures {
+            " along the limb, though not elsewhere".into()
+        } else {
+            format!(", {} of them along the limb only", self.limbs)
+        };
+        Some(format!("{pictures} {repeat} an earlier one to the last bit{part} (the first is {first}). {outcome}"))
     }
 
     /// Tells it. Copies without times are no fault, so a quiet run says nothing of them.

@@ -319,6 +319,31 @@ fn old_pictures_have_no_answer() {
     }
 }
 
+/// A camera that stands still, but counts its pictures in the first pixel, has the rows of a run, without answers.
+#[test]
+fn an_old_limb_with_a_counter_has_no_answer() {
+    let place = Place::new();
+    let picture = |i: u8| {
+        let mut picture = limb(320, 240, f64::from(i.min(2)));
+        picture.get_pixel_mut(0, 0).0[0] = i;
+        picture
+    };
+    let bytes: Vec<u8> = (0..6).flat_map(|i| picture(i).into_raw()).collect();
+    let mut table = String::from("file,time_s\n");
+    for i in 0..6 {
+        picture(i).save(place.path(&format!("in/{i:04}.png"))).unwrap();
+        table += &format!("{i:04}.png,{i}\n");
+    }
+    place.write("in/frames.csv", table.as_bytes());
+    place.run(&["run", "in", "--flight", "-o", "run.csv"]).expect(0);
+    let (code, said) = fly_on(&place, &bytes, &["-s", "in/sensor.toml"]);
+    assert_eq!((code, said.matches("fixed in the picture").count()), (Some(0), 3), "{said}");
+    let (run, flown) = (place.rows("run.csv"), logged(&place));
+    let of = |rows: &[Vec<(String, String)>]| rows.iter().map(|row| cell(row, "status").to_owned()).collect::<Vec<_>>();
+    assert_eq!(of(&run), ["ok", "ok", "ok", "rejected", "rejected", "rejected"]);
+    assert_eq!(of(&flown), of(&run));
+}
+
 #[test]
 fn settings_that_cannot_be_are_told() {
     let place = Place::new();

@@ -58,6 +58,69 @@ fn old_buffers_have_no_answer() {
     }
 }
 
+/// Returns a picture with its own noise, as a camera has it; `shift` moves the limb.
+fn noisy(shift: f64, seed: u32) -> image::GrayImage {
+    let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(7);
+    let mut picture = limb(320, 240, shift);
+    for pixel in picture.pixels_mut() {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        pixel.0[0] += (state >> 24) as u8 % 4;
+    }
+    picture
+}
+
+/// Changes a picture that was shown before, number `i` of the sequence.
+type Change = fn(&mut image::GrayImage, u8);
+
+fn sequence(shown: impl Fn(u8) -> image::GrayImage) -> (Vec<String>, String) {
+    let place = Place::new();
+    let mut table = String::from("file,time_s\n");
+    for i in 0..8 {
+        shown(i).save(place.path(&format!("in/{i:04}.png"))).unwrap();
+        table += &format!("{i:04}.png,{i}.5\n");
+    }
+    place.write("in/frames.csv", table.as_bytes());
+    let run = place.run(&["run", "in", "-q"]).expect(0);
+    let flight = place.run(&["run", "in", "-q", "--flight"]).expect(0);
+    assert_eq!(statuses(&flight.out), statuses(&run.out), "--flight");
+    (statuses(&run.out), run.err)
+}
+
+/// A camera that stands still with a counter in a pixel, a burnt-in clock, a row of telemetry, or a new upper part.
+#[test]
+fn an_old_limb_in_a_picture_that_is_new_elsewhere_has_no_answer() {
+    let counter: Change = |picture, i| picture.get_pixel_mut(0, 0).0[0] = i;
+    let clock: Change = |picture, i| (0..60).for_each(|k| picture.get_pixel_mut(4 + k % 20, 4 + k / 20).0[0] = 9 * i);
+    let telemetry: Change = |picture, i| (0..32).for_each(|x| picture.get_pixel_mut(x, 0).0[0] ^= i);
+    // The limb lies in the rows 105 to 130.
+    let upper: Change = |picture, i| {
+        let new = noisy(3.0 * f64::from(i), 40 + u32::from(i));
+        (0..80 * 320).for_each(|k| picture.put_pixel(k % 320, k / 320, *new.get_pixel(k % 320, k / 320)));
+    };
+    for (what, change) in [("counter", counter), ("clock", clock), ("telemetry", telemetry), ("upper part", upper)] {
+        let frozen = |i: u8| (3..6).contains(&i);
+        let (statuses, err) = sequence(|i| {
+            let of = if frozen(i) { 2 } else { i };
+            let mut picture = noisy(3.0 * f64::from(of), of.into());
+            change(&mut picture, i);
+            picture
+        });
+        for (i, status) in (0..).zip(&statuses) {
+            assert_eq!(status.starts_with("rejected") && status.contains("fixed"), frozen(i), "{what} {i}: {status}");
+            assert_eq!(status.trim() == "ok", !frozen(i), "{what} {i}: {status}");
+        }
+        assert!(err.contains("warning: 3 pictures repeat an earlier one to the last bit along the limb"), "{err}");
+    }
+}
+
+/// A vehicle that keeps the limb at one place in the picture is no camera that stands still: its pictures have noise.
+#[test]
+fn a_limb_at_rest_has_answers() {
+    let (statuses, err) = sequence(|i| noisy(0.0, i.into()));
+    assert!(statuses.iter().all(|status| status.trim() == "ok"), "{statuses:?}");
+    assert!(!err.contains("repeat"), "{err}");
+}
+
 /// A picture whose answer the sequence refuses has no mask, nor that of an earlier run.
 #[test]
 fn a_repeated_picture_has_no_mask() {
@@ -98,11 +161,24 @@ fn a_continued_run_finds_the_same_repeats() {
     let place = frozen(true);
     place.run(&["run", "in", "-o", "whole.csv"]).expect(0);
     let text = place.read("whole.csv");
+    continued(&place, &text);
+    for i in 3..6 {
+        let path = place.path(&format!("in/{i:04}.png"));
+        let mut picture = image::open(&path).unwrap().to_luma8();
+        picture.get_pixel_mut(0, 0).0[0] = i;
+        picture.save(path).unwrap();
+    }
+    place.run(&["run", "in", "-o", "whole.csv", "--force"]).expect(0);
+    assert_eq!(statuses(&place.read("whole.csv")), statuses(&text), "with a counter");
+    continued(&place, &text);
+}
+
+fn continued(place: &Place, text: &str) {
     for rows in 1..8 {
         let begun: String = text.split_inclusive('\n').take(1 + rows).collect();
         place.write("part.csv.part", begun.as_bytes());
         place.run(&["run", "in", "-o", "part.csv", "--resume"]).expect(0);
-        assert_eq!(statuses(&place.read("part.csv")), statuses(&text), "after {rows} rows");
+        assert_eq!(statuses(&place.read("part.csv")), statuses(text), "after {rows} rows");
         std::fs::remove_file(place.path("part.csv")).unwrap();
     }
 }

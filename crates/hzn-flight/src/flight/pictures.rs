@@ -167,7 +167,7 @@ impl<B: Board> Flight<'_, B> {
         let mut turns = self.known.get().turns.clone();
         let gates = self.sensor.get().config().gates;
         // Asked for each picture, because the board may remember it then.
-        let repeats = self.board.repeats_picture() && report.solution.is_some();
+        let repeats = self.board.repeats_picture(report.solution.as_ref()) && report.solution.is_some();
         if !is_believed {
             turns.see(step, None, &gates);
             return turns;

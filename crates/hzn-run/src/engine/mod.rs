@@ -22,6 +22,7 @@ mod sensor;
 mod sequence;
 #[cfg(test)]
 mod tests;
+mod tiles;
 pub mod trace;
 mod turns;
 mod widen;
@@ -29,7 +30,7 @@ mod widen;
 pub use annotate::annotate;
 pub use answers::{Answered, Measured, measure_answers};
 pub use expected_limb::ExpectedLimb;
-pub use outcome::{BodyOutcome, Bytes, Finished, Unprocessed};
+pub use outcome::{BodyOutcome, Bytes, Finished, Repeats, Sums, Unprocessed};
 pub use plan::Plan;
 pub use pool::End;
 #[cfg(feature = "recordings")]
@@ -39,6 +40,7 @@ pub(crate) use prior::prior;
 pub use process::process_one;
 pub use sensor::{AnySensor, LastAnswer, Processed, check_frames, find_refused};
 pub use sequence::{Sink, process_alone, run};
+pub use tiles::Tiles;
 pub use trace::{Trace, Traces, Watch};
 pub use turns::{REMEMBERED, StoredAnswer, Turns};
-pub use widen::widen_report;
+pub use widen::{widen_report, widen_solution};

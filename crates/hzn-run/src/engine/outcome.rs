@@ -1,8 +1,10 @@
 //! The outcome of a picture: a report for each body, or the reason why there is none.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use hzn_core::body::PriorError;
+use hzn_core::camera::Camera;
 use hzn_core::rig::Glimpse;
 use hzn_core::status::Status;
 use hzn_core::{Report, Solution};
@@ -10,6 +12,7 @@ use hzn_files::FrameData;
 use hzn_mcap::Stamp;
 
 use super::sensor::Processed;
+use super::tiles::Tiles;
 use super::trace::Traces;
 use crate::mask::MaskOutcome;
 use crate::source::{Picture, TimeSource};
@@ -48,21 +51,61 @@ pub struct Finished {
 }
 
 /// What the bytes of a picture say about the pictures before, with the same bytes or not.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bytes {
-    /// The checksum of the samples.
-    pub checksum: u32,
+    /// The checksums of the samples.
+    pub sums: Sums,
+    /// The tiles on the limb of each body.
+    pub(super) limbs: Vec<Vec<usize>>,
     /// Whether the time of the picture is told. A time that only counts the pictures does not say that a picture with
     /// the same bytes is another one.
     pub has_time: bool,
-    /// Whether one of the last pictures has the same bytes and another time; known when the picture is judged.
-    pub repeats: bool,
+    /// What of the picture one of the last pictures has, too, at another time; known when the picture is judged.
+    pub repeats: Repeats,
+}
+
+/// The checksums of a picture: of all samples, and of small parts of the picture.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sums {
+    /// The checksum of the samples.
+    pub checksum: u32,
+    /// The checksums of its tiles; `None` for a frame of a video.
+    pub(super) tiles: Option<Arc<Tiles>>,
+}
+
+/// What is the same in an earlier picture, to the last bit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Repeats {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// The picture along the limb. Elsewhere, some of it is new.
+    Limb,
+    /// The whole picture.
+    All,
+}
+
+impl Sums {
+    /// Returns the checksums of a decoded picture.
+    pub fn of(picture: &Picture) -> Self {
+        Self { checksum: picture.checksum(), tiles: Tiles::of_picture(picture).map(Arc::new) }
+    }
 }
 
 impl Bytes {
     /// Returns what is known of a picture whose time has this origin.
     pub(super) fn of(picture: &Picture, time: TimeSource) -> Self {
-        Self { checksum: picture.checksum(), has_time: !matches!(time, TimeSource::Count), repeats: false }
+        let has_time = !matches!(time, TimeSource::Count);
+        Self { sums: Sums::of(picture), limbs: Vec::new(), has_time, repeats: Repeats::Nothing }
+    }
+
+    /// Takes the limbs that were found in the picture.
+    pub(super) fn see_limbs(&mut self, outcomes: &[BodyOutcome], camera: &Camera<f64>) {
+        let on_limb = |outcome: &BodyOutcome| {
+            let limb = outcome.report.as_ref().ok()?.solution.as_ref()?;
+            Some(self.sums.tiles.as_ref()?.on_limb(limb, camera))
+        };
+        self.limbs = outcomes.iter().map(|outcome| on_limb(outcome).unwrap_or_default()).collect();
     }
 }
 

@@ -66,6 +66,10 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
     finished.glimpse = sensor.glimpse(&view);
     sensor.set_time(finished.time_s);
     finished.outcomes = sensor.process(&view, data, traces.as_ref()).into_iter().map(BodyOutcome::from).collect();
+    if let Some(bytes) = &mut finished.bytes {
+        // Without the rate: the flight computer compares the same tiles.
+        bytes.see_limbs(&finished.outcomes, &sensor.camera_of(None));
+    }
     if finished.outcomes.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
         finished.tip = picture.unused_bits();
     }

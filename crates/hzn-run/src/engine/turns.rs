@@ -11,7 +11,7 @@ use hzn_core::{Config, Prior, Sequence, Step};
 use hzn_files::FrameData;
 use hzn_mcap::Row;
 
-use super::outcome::{BodyOutcome, Finished};
+use super::outcome::{BodyOutcome, Finished, Repeats, Sums};
 
 /// Number of pictures whose bytes are compared with those of the next one: more than a camera or a recorder has
 /// buffers.
@@ -23,7 +23,7 @@ pub struct Turns {
     each: Vec<Sequence<f64>>,
     time_s: Option<f64>,
     /// The checksums of the last pictures, with their times, the newest last.
-    checksums: VecDeque<(u32, Option<f64>)>,
+    earlier: VecDeque<(Sums, Option<f64>)>,
 }
 
 /// An answer in the results of an earlier run.
@@ -49,11 +49,12 @@ impl Turns {
     pub fn judge(&mut self, frame: &mut Finished, config: &Config) {
         let repeats = self.see_bytes(frame);
         let Some(steps) = self.take_steps(frame.data.as_ref(), frame.time_s, config) else { return };
-        for ((sequence, step), outcome) in self.each.iter_mut().zip(steps).zip(&mut frame.outcomes) {
+        let each = self.each.iter_mut().zip(steps).zip(&mut frame.outcomes);
+        for (which, ((sequence, step), outcome)) in each.enumerate() {
             match outcome {
                 BodyOutcome { report: Ok(report), .. } => {
                     sequence.judge(&step, report, &config.gates);
-                    if repeats {
+                    if repeats.get(which).is_some_and(|repeats| *repeats != Repeats::Nothing) {
                         sequence.judge_repeat(report, &config.gates);
                     }
                 }
@@ -64,32 +65,42 @@ impl Turns {
         }
     }
 
-    /// Compares the bytes of the next picture with those of the last [`REMEMBERED`] ones. Returns whether they are the
-    /// same as one of these although a time is told, which is another one: the camera or its recorder stands still, or
-    /// gives old buffers again. The noise of a camera never repeats.
-    fn see_bytes(&mut self, frame: &mut Finished) -> bool {
+    /// Compares the bytes of the next picture with those of the last [`REMEMBERED`] ones. Returns for each body whether
+    /// they are the same as in one of these, at least along its limb, although a time is told, which is another one:
+    /// the camera or its recorder stands still, or gives old buffers again. The noise of a camera never repeats.
+    fn see_bytes(&mut self, frame: &mut Finished) -> Vec<Repeats> {
         // A dark or clipped picture has no noise. It has no answer either, and keeps its own reason.
         let is_answered = frame.outcomes.iter().any(|outcome| outcome.status() == Status::Ok);
-        let Some(bytes) = &mut frame.bytes else { return false };
-        let is_same = |(checksum, time_s): &(u32, Option<f64>)| *checksum == bytes.checksum && *time_s != frame.time_s;
-        bytes.repeats = is_answered && self.checksums.iter().any(is_same);
-        let repeats = bytes.repeats && bytes.has_time;
-        self.remember(bytes.checksum, frame.time_s);
-        repeats
+        let Some(bytes) = &mut frame.bytes else { return Vec::new() };
+        let at_other_times = || self.earlier.iter().filter(|(_, time_s)| *time_s != frame.time_s);
+        let of_limb = |limb: &Vec<usize>| {
+            if at_other_times().any(|(earlier, _)| earlier.checksum == bytes.sums.checksum) {
+                return Repeats::All;
+            }
+            let Some(now) = &bytes.sums.tiles else { return Repeats::Nothing };
+            let mut earlier = at_other_times().filter_map(|(earlier, _)| earlier.tiles.as_ref());
+            if earlier.any(|earlier| now.repeat(limb, earlier)) { Repeats::Limb } else { Repeats::Nothing }
+        };
+        let repeats: Vec<Repeats> = if is_answered { bytes.limbs.iter().map(of_limb).collect() } else { Vec::new() };
+        bytes.repeats = repeats.iter().copied().max().unwrap_or_default();
+        let sums = bytes.sums.clone();
+        let has_time = bytes.has_time;
+        self.remember(sums, frame.time_s);
+        if has_time { repeats } else { Vec::new() }
     }
 
     /// Takes the bytes of the picture that was replayed last, which an earlier run has processed.
-    pub fn see_checksum(&mut self, checksum: Option<u32>) {
-        if let Some(checksum) = checksum {
-            self.remember(checksum, self.time_s);
+    pub fn see_sums(&mut self, sums: Option<Sums>) {
+        if let Some(sums) = sums {
+            self.remember(sums, self.time_s);
         }
     }
 
-    fn remember(&mut self, checksum: u32, time_s: Option<f64>) {
-        if self.checksums.len() == REMEMBERED {
-            self.checksums.pop_front();
+    fn remember(&mut self, sums: Sums, time_s: Option<f64>) {
+        if self.earlier.len() == REMEMBERED {
+            self.earlier.pop_front();
         }
-        self.checksums.push_back((checksum, time_s));
+        self.earlier.push_back((sums, time_s));
     }
 
     /// Takes the next picture from the results of an earlier run. An answer that this run refused is not in them, and

@@ -30,7 +30,8 @@ pub(super) fn widen_candidate<T: Real + Into<f64>>(c: &Candidate<T>) -> Candidat
     }
 }
 
-pub(super) fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Solution<f64> {
+/// Converts a solution to f64.
+pub fn widen_solution<T: Real + Into<f64>>(s: &Solution<T>) -> Solution<f64> {
     Solution {
         axis: s.axis.to_f64(),
         covariance: Cov3::from_upper(s.covariance.upper_rad2.map(Into::into)),

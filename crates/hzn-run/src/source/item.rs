@@ -5,6 +5,7 @@ use hzn_files::{FrameData, Frames};
 use hzn_mcap::Stamp;
 
 use super::payload::Payload;
+use super::picture::Picture;
 
 /// One picture before it is decoded.
 #[derive(Debug)]
@@ -55,10 +56,9 @@ impl TimeSource {
 }
 
 impl Item {
-    /// Returns the checksum of the picture as a sensor sees it, see [`Picture::checksum`](super::Picture::checksum);
-    /// `None` if it cannot be read.
-    pub fn checksum(self, sensor: &Config) -> Option<u32> {
-        self.payload.decode(Some(sensor)).ok().map(|(picture, _)| picture.checksum())
+    /// Returns the picture as a sensor sees it; `None` if it cannot be read.
+    pub fn decode(self, sensor: &Config) -> Option<Picture> {
+        self.payload.decode(Some(sensor)).ok().map(|(picture, _)| picture)
     }
     /// Returns the prior of the picture. A frames.csv replaces the prior from the source.
     pub fn take_prior(&mut self, frames: Option<&Frames>) -> Option<FrameData> {

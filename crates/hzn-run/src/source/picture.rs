@@ -30,12 +30,21 @@ pub struct Picture {
     pub orientation: Orientation,
     /// Number of pictures in the file; this is the first of them.
     pub pages: u32,
+    /// Whether it is a frame of a video, in which a part of an earlier frame may be copied.
+    pub is_video_frame: bool,
 }
 
 impl Picture {
     /// Makes a picture that does not come from a file.
     pub fn new(samples: Samples, layout: Layout) -> Self {
-        Self { samples, layout, exif_time_s: None, orientation: Orientation::NoTransforms, pages: 1 }
+        Self {
+            samples,
+            layout,
+            exif_time_s: None,
+            orientation: Orientation::NoTransforms,
+            pages: 1,
+            is_video_frame: false,
+        }
     }
 
     /// Returns the largest sample of a picture of words, without the transparency channel.

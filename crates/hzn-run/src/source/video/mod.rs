@@ -247,7 +247,8 @@ impl Source for Video {
         } else {
             Samples::Words(data.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect())
         };
-        let picture = Picture::new(samples, Layout::packed(self.width, self.height, self.channels, self.bits));
+        let layout = Layout::packed(self.width, self.height, self.channels, self.bits);
+        let picture = Picture { is_video_frame: true, ..Picture::new(samples, layout) };
         let name = format!("{}#{:06}", self.stem, self.index);
         let time = self.times.next();
         self.index += 1;
