@@ -8,6 +8,7 @@ mod rates;
 mod repeats;
 mod shutter;
 mod spread;
+mod told_sun;
 
 use hzn_core::body::PriorError;
 use hzn_core::status::Status;
@@ -22,6 +23,7 @@ pub(crate) use one_place::OnePlace;
 pub(crate) use rates::Rates;
 pub(crate) use repeats::Repeats;
 pub(crate) use shutter::Shutter;
+pub(crate) use told_sun::ToldSun;
 
 use crate::tell;
 

@@ -171,5 +171,6 @@ fn finished(name: String, data: FrameData, outcomes: Vec<BodyOutcome>) -> Finish
         pages: 1,
         mask: None,
         bytes: None,
+        brightness_by_sun: None,
     }
 }

@@ -65,7 +65,9 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
             s.max_attitude_sigma
         ),
         Verdict::Sun => {
-            "the given Sun does not light this limb (gates.max_unlit); a thermal camera sets body.sunlit = false".into()
+            "the given Sun does not light this limb (gates.max_unlit): are its sign and frame right? A thermal camera \
+             sets body.sunlit = false"
+                .into()
         }
         Verdict::Fixed => "suspect: fixed in the picture, while the vehicle turns (gates.fixed_edge)".into(),
         Verdict::Rate => "the axis is farther from the last answer than it can turn (gates.max_rate_deg_s)".into(),
@@ -289,8 +291,8 @@ const VERDICT_TIPS: &[(&[Verdict], &str)] = &[
     ),
     (
         &[Verdict::Sun],
-        "the limb is on the night side of the given Sun: check sun_x, sun_y, sun_z (in the camera); for a thermal \
-         camera set body.sunlit = false",
+        "the limb is on the night side of the given Sun: check the sign and the frame of sun_x, sun_y, sun_z \
+         (from the camera to the Sun, in the axes of the camera); for a thermal camera set body.sunlit = false",
     ),
 ];
 

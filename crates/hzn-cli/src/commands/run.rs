@@ -22,7 +22,9 @@ use hzn_run::{disk, explain};
 pub(super) use args::{Args, cores};
 
 use super::resume;
-use crate::doubts::{Altitudes, Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Repeats, Shutter, Times};
+use crate::doubts::{
+    Altitudes, Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Repeats, Shutter, Times, ToldSun,
+};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
@@ -168,6 +170,7 @@ struct Watch {
     one_place: OnePlace,
     improbable: Improbable,
     repeats: Repeats,
+    told_sun: ToldSun,
     shutter: Shutter,
     altitudes: Altitudes,
     refusals: Refusals,
@@ -194,6 +197,7 @@ impl Watch {
             one_place: OnePlace::default(),
             improbable: Improbable::default(),
             repeats: Repeats::default(),
+            told_sun: ToldSun::default(),
             shutter: Shutter::default(),
             altitudes: Altitudes::default(),
             refusals: Refusals::default(),
@@ -210,6 +214,7 @@ impl Watch {
         self.one_place.count(frame);
         self.improbable.count(frame);
         self.repeats.count(frame);
+        self.told_sun.count(frame);
         self.shutter.count(frame);
         self.altitudes.count(frame, config);
         self.refusals.count(frame);
@@ -247,6 +252,7 @@ impl Watch {
         self.one_place.tell();
         self.improbable.tell(&plan.config.gates);
         self.repeats.tell(&plan.config.gates, self.quiet);
+        self.told_sun.tell();
         self.multi_page.tell();
     }
 

@@ -51,6 +51,7 @@ mod telemetry;
 mod temperature;
 mod terminal;
 mod told;
+mod told_sun;
 mod tone;
 mod track;
 mod video;

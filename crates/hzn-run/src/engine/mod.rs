@@ -23,6 +23,7 @@ mod sequence;
 #[cfg(test)]
 mod tests;
 mod tiles;
+mod told_sun;
 pub mod trace;
 mod turns;
 mod widen;

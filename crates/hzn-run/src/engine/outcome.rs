@@ -48,6 +48,9 @@ pub struct Finished {
     pub mask: Option<MaskOutcome>,
     /// The bytes of the picture, if it could be read and is compared with those before.
     pub bytes: Option<Bytes>,
+    /// Correlation of the brightness of the first body with the height of the told Sun over its surface, from -1 to 1,
+    /// where that Sun lights it; `None` unless there is an answer, and day and night are in view.
+    pub brightness_by_sun: Option<f64>,
 }
 
 /// What the bytes of a picture say about the pictures before, with the same bytes or not.

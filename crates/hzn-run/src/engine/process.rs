@@ -1,5 +1,6 @@
 //! The processing of one picture: decoding, the sensor, the drawing, the overlay.
 
+use hzn_core::Config;
 use hzn_core::camera::Camera;
 use hzn_core::status::Status;
 use hzn_mcap::Annotations;
@@ -8,10 +9,11 @@ use super::annotate::annotate;
 use super::outcome::{BodyOutcome, Bytes, Finished};
 use super::plan::Plan;
 use super::sensor::AnySensor;
+use super::told_sun;
 use super::trace::Traces;
 use crate::error::{Error, failed};
 use crate::overlay;
-use crate::source::{Held, Item};
+use crate::source::{Held, Item, Picture};
 
 /// Decodes and processes one picture, and writes its mask.
 ///
@@ -49,6 +51,7 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         pages: decoded.as_ref().map_or(1, |(p, _)| p.pages),
         mask: None,
         bytes: decoded.as_ref().ok().map(|(picture, _)| Bytes::of(picture, time)),
+        brightness_by_sun: None,
     };
     let (picture, original) = match decoded {
         Ok(decoded) => decoded,
@@ -70,6 +73,7 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         // Without the rate: the flight computer compares the same tiles.
         bytes.see_limbs(&finished.outcomes, &sensor.camera_of(None));
     }
+    finished.brightness_by_sun = brightness_by_sun(&plan.config, &picture, &sensor.camera_of(data), &finished);
     if finished.outcomes.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
         finished.tip = picture.unused_bits();
     }
@@ -89,6 +93,14 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         finished.picture = Some(original.map_or_else(png, Ok)?);
     }
     Ok(finished)
+}
+
+/// Returns whether the first body becomes brighter towards the Sun that was told, see [`told_sun`].
+fn brightness_by_sun(config: &Config, picture: &Picture, camera: &Camera<f64>, finished: &Finished) -> Option<f64> {
+    let sun = finished.data.as_ref()?.sun_camera?;
+    let is_lit = config.each_body().first()?.is_sunlit();
+    let limb = finished.answers().first().copied().flatten().filter(|_| is_lit)?;
+    told_sun::brightness_by_sun(picture, camera, limb, sun)
 }
 
 /// Finishes a picture that cannot be read. It is a gap in the sequence, after which no limb is tracked.

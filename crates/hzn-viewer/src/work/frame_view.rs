@@ -319,6 +319,7 @@ impl<'a> FrameInput<'a> {
             pages: 1,
             mask: None,
             bytes: None,
+            brightness_by_sun: None,
         }
     }
 }

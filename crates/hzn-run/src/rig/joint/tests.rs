@@ -82,6 +82,7 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
         pages: 1,
         mask: None,
         bytes: None,
+        brightness_by_sun: None,
     }
 }
 
