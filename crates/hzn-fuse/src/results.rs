@@ -105,6 +105,12 @@ impl Epoch {
         }
     }
 
+    /// Returns the 1-sigma of the position along the velocity, m.
+    pub fn along_sigma_m(&self) -> f64 {
+        let along = self.state.velocity_m_s.into_inner().try_normalize(0.0).unwrap_or_else(Vector3::x);
+        (along.dot(&(self.position_covariance_m2.as_inner() * along))).max(0.0).sqrt()
+    }
+
     /// Returns the 1-sigma of the attitude about the axes of the vehicle, rad.
     pub fn attitude_sigma_rad(&self) -> Vector3<f64> {
         self.attitude_covariance_rad2.as_inner().diagonal().map(|v| v.max(0.0).sqrt())
@@ -317,6 +323,30 @@ pub struct Solved {
     pub orbit: Option<Orbit>,
 }
 
+/// The receiver's times against the positions that a recording was made with.
+///
+/// The solution's position is that of the receiver at the receiver's time, so that a receiver that is late puts it as
+/// many metres behind as the vehicle flies in this time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReceiverLag {
+    /// Number of the recording.
+    pub camera: usize,
+    /// Time by which the receiver is late, s.
+    pub lag_s: f64,
+    /// Its 1-sigma, s.
+    pub sigma_s: f64,
+    /// Speed of the vehicle against the Earth, m/s.
+    pub speed_m_s: f64,
+}
+
+impl ReceiverLag {
+    /// Returns whether the lag is more than three sigma from zero, and moves the position by more than three of
+    /// `position_sigma_m`.
+    pub(crate) fn matters(&self, position_sigma_m: f64) -> bool {
+        self.lag_s.abs() > 3.0 * self.sigma_s.hypot(position_sigma_m / self.speed_m_s)
+    }
+}
+
 /// The results of a flight.
 #[derive(Debug, Clone, Default)]
 pub struct Fused {
@@ -339,6 +369,8 @@ pub struct Fused {
     pub triads: Vec<Triad>,
     /// How the whole flight was solved at once, if it was; its solutions are those of `smoothed`.
     pub solved: Option<Solved>,
+    /// The receiver's times against the positions of each recording that has them.
+    pub receiver_lags: Vec<ReceiverLag>,
     /// What happened to the data.
     pub counts: Counts,
     /// Whether the inputs agree with each other.

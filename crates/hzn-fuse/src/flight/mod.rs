@@ -107,6 +107,7 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     fused.counts = counts;
     notes.append(&mut fused.notes);
     fused.notes = notes;
+    fused.receiver_lags = verdict::receiver_lags(inputs);
     fused.verdict = verdict::verdict(findings, &fused, &given);
     Ok(fused)
 }

@@ -3,9 +3,11 @@
 //! Positions compare the receiver with each camera, thrust compares it with the inertial unit, and the directions
 //! compare the cameras with the inertial unit. Two comparisons say which clock is wrong.
 
-use super::place::{Place, place};
+use super::place::{Place, lag, place};
+use super::receiver::median;
 use crate::finding::{Cause, Finding, Level, Source};
 use crate::input::Inputs;
+use crate::results::{CameraState, Fused, ReceiverLag};
 use crate::settings::Settings;
 
 /// Smallest lag of the inertial unit that counts, s: two steps of its search.
@@ -47,6 +49,50 @@ pub(super) fn test(inputs: &Inputs, settings: &Settings, force_lag_s: Option<f64
     let each = inputs.recordings.iter().zip(&places);
     findings.extend(each.filter_map(|(recording, place)| of_one(&recording.name, place)));
     findings
+}
+
+/// Returns the lag of the receiver against the positions of each recording that determines it.
+pub(super) fn receiver_lags(inputs: &Inputs) -> Vec<ReceiverLag> {
+    let each = inputs.recordings.iter().enumerate();
+    each.filter_map(|(camera, recording)| lag(camera, recording, &inputs.gnss)).collect()
+}
+
+/// Tests lags that the clocks of the cameras would allow. These do not help: the position is the receiver's, and
+/// nothing estimates its clock. A lag is only without harm if it is the camera's own, and the filter found it.
+pub(super) fn test_small(fused: &Fused) -> Option<Finding> {
+    let position_m = median(fused.epochs.iter().map(|epoch| epoch.along_sigma_m()))?;
+    let last = fused.smoothed.last().filter(|_| fused.solved.is_some()).or(fused.epochs.last())?;
+    let is_harmful = |lag: &&ReceiverLag| {
+        lag.matters(position_m) && !last.cameras.get(lag.camera).is_some_and(|camera| is_of_camera(lag, camera))
+    };
+    let harmful: Vec<&ReceiverLag> = fused.receiver_lags.iter().filter(is_harmful).collect();
+    let surest = harmful.iter().min_by(|a, b| a.sigma_s.total_cmp(&b.sigma_s))?;
+    let ReceiverLag { lag_s, sigma_s, speed_m_s, camera } = **surest;
+    let is_one = fused.receiver_lags.len() > harmful.len();
+    let name = fused.cameras.get(camera).filter(|_| is_one);
+    let (whose, cause, source) = match name {
+        Some(name) => (name.as_str(), Cause::CameraClock, Source::Camera(name.clone())),
+        None => ("all recordings", Cause::ReceiverClock, Source::Receiver),
+    };
+    let word = if lag_s > 0.0 { "late" } else { "early" };
+    let what = format!(
+        "the receiver is {:.3} s {word} (sigma {sigma_s:.3} s) against the positions in {whose}: {:.2} km along the path, \
+         while the sigma of the solution's position is {:.3} km there. This position is the receiver's, so that it is \
+         wrong if its clock is not that of the inertial unit ({:+.3} s more in --clock gnss would agree). Otherwise \
+         the recordings were made with the positions of other times",
+        lag_s.abs(),
+        lag_s.abs() * speed_m_s * 1e-3,
+        position_m * 1e-3,
+        -lag_s
+    );
+    Some(Finding { level: Level::Doubtful, ..finding(cause, source, what) })
+}
+
+/// Returns whether the filter has found the lag as the error of a camera's clock, whose recording has the positions of
+/// the true times.
+fn is_of_camera(lag: &ReceiverLag, camera: &CameraState) -> bool {
+    let (own_s, sigma_s) = (camera.clock_s, camera.clock_sigma_s);
+    sigma_s > 0.0 && own_s.abs() > 3.0 * sigma_s && (own_s - lag.lag_s).abs() < 3.0 * sigma_s.hypot(lag.sigma_s)
 }
 
 fn finding(cause: Cause, source: Source, what: String) -> Finding {

@@ -31,7 +31,7 @@ use nalgebra::Matrix3;
 
 use crate::finding::{Cause, Finding, Level, Source, Verdict};
 use crate::input::{Inputs, Recording, Sample};
-use crate::results::Fused;
+use crate::results::{Fused, ReceiverLag};
 use crate::settings::Settings;
 use force::Force;
 use motion::Reckoning;
@@ -96,9 +96,18 @@ fn without_measurement(recording: &Recording) -> Finding {
     Finding { level: Level::Doubtful, cause: Cause::Empty, source: Source::Camera(name.clone()), what }
 }
 
+/// Returns the receiver's times against the positions of the recordings.
+pub(crate) fn receiver_lags(inputs: &Inputs) -> Vec<ReceiverLag> {
+    clocks::receiver_lags(inputs)
+}
+
 /// Returns the verdict, with what the inputs already showed.
 pub(crate) fn verdict(mut of_inputs: Vec<Finding>, fused: &Fused, given: &Given<'_>) -> Verdict {
     of_inputs.extend(given.inputs.recordings.iter().filter(|r| r.seen.is_empty()).map(without_measurement));
+    let is_known = |f: &Finding| f.source == Source::Receiver || f.cause == Cause::CameraClock;
+    if !of_inputs.iter().any(is_known) {
+        of_inputs.extend(clocks::test_small(fused));
+    }
     of_inputs.extend(solution::test(fused, given.cameras, given.options));
     Verdict::new(of_inputs)
 }

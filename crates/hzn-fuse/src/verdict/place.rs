@@ -11,6 +11,7 @@ use super::motion::receiver_at;
 use super::receiver::median;
 use crate::input::{Body, Fix, Recording, Seen};
 use crate::reference::limb_axis;
+use crate::results::ReceiverLag;
 use crate::settings::Settings;
 
 /// 1-sigma of a told altitude, m: the default of `body.altitude_sigma_km`.
@@ -28,8 +29,13 @@ const APART: f64 = 4.0;
 /// Largest part of the mean difference across the path, as a share of the part along it, if a lag is the cause. A
 /// horizontal difference with any other cause points as well along the path once in a hundred times.
 const ALONG: f64 = 0.02;
+/// Sigmas of the mean difference across the path that are noise.
+const NOISE: f64 = 3.0;
 /// Largest difference of clocks that is looked for, s.
 const LAG_S: f64 = 60.0;
+/// 1-sigma of the limb's axis from outside, rad: the recordings and the receiver have it for limb heights that are 10 km
+/// apart.
+const AXIS_SIGMA_RAD: f64 = 5e-6;
 
 /// How the positions of a recording lie against those of the receiver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,21 +56,14 @@ pub(super) fn place(recording: &Recording, fixes: &[Fix], settings: &Settings) -
     let limbs: Vec<&Seen> = recording.seen.iter().filter(|s| s.body == Body::Limb && s.reference.is_some()).collect();
     // The clocks may differ by what the filter expects, and the receiver has an error of its own.
     let clock_s = settings.camera(&recording.name).clock_s.sigma;
-    let lag = |from_s: f64| fitted(&limbs, recording.clock_offset_s, fixes, from_s);
     let Some(now) = misses(&limbs, recording.clock_offset_s, fixes, 0.0) else { return Place::Agrees };
     let sigma_m = |speed_m_s: f64| TOLD_SIGMA_M.hypot(clock_s * speed_m_s).hypot(settings.gnss.position_sigma_m);
     let share = |all: &[Miss]| {
         let apart = all.iter().filter(|m| m.miss_m.norm() > APART * sigma_m(m.velocity_m_s.norm())).count();
         apart as f64 / all.len() as f64
     };
-    // A straight fit finds small lags; the grid finds those for which the vehicle moves on a curve.
-    let starts = (-12..=12).map(|k| LAG_S / 12.0 * f64::from(k));
-    let fits = starts.filter_map(lag).filter(|fit| fit.lag_s.abs() <= LAG_S);
-    let best = fits.min_by(|a, b| a.rest_m.total_cmp(&b.rest_m));
     let rest_m = median(now.iter().map(|m| m.miss_m.norm())).unwrap_or(0.0);
-    // A fit with a constant difference sees a lag by the bend of the path only, which a short arc hardly has.
-    let best = along_the_path(&limbs, recording.clock_offset_s, fixes).or(best);
-    if let Some(fit) = best
+    if let Some(fit) = best_lag(&limbs, recording.clock_offset_s, fixes)
         && fit.lag_s.abs() > APART * fit.sigma_s.hypot(clock_s)
         && fit.rest_m < TOLD_SIGMA_M.max(0.2 * rest_m)
     {
@@ -81,6 +80,30 @@ pub(super) fn place(recording: &Recording, fixes: &[Fix], settings: &Settings) -
     }
 }
 
+/// Returns the time by which the receiver is late against the positions of a recording, with what is known of its
+/// sigma; `None` if the recording does not have them, or if they lie apart in a way that no lag explains.
+pub(super) fn lag(camera: usize, recording: &Recording, fixes: &[Fix]) -> Option<ReceiverLag> {
+    let limbs: Vec<&Seen> = recording.seen.iter().filter(|s| s.body == Body::Limb && s.reference.is_some()).collect();
+    let fit = best_lag(&limbs, recording.clock_offset_s, fixes)?;
+    let speed_m_s =
+        median(limbs.iter().filter_map(|s| Some(receiver_at(fixes, s.time_s + recording.clock_offset_s)?.1.norm())))?;
+    // Positions that the user calls coarse may be ahead of the vehicle.
+    let told_m = recording.altitude_sigma_km.map_or(0.0, |km| km * 1e3);
+    let sigma_s = fit.sigma_s.hypot(told_m / speed_m_s);
+    sigma_s.is_finite().then_some(ReceiverLag { camera, lag_s: fit.lag_s, sigma_s, speed_m_s })
+}
+
+/// Returns the lag that explains the differences best.
+fn best_lag(limbs: &[&Seen], clock_s: f64, fixes: &[Fix]) -> Option<Lag> {
+    // A fit with a constant difference sees a lag by the bend of the path only, which a short arc hardly has.
+    along_the_path(limbs, clock_s, fixes).or_else(|| {
+        // A straight fit finds small lags; the grid finds those for which the vehicle moves on a curve.
+        let starts = (-12..=12).map(|k| LAG_S / 12.0 * f64::from(k));
+        let fits = starts.filter_map(|from_s| fitted(limbs, clock_s, fixes, from_s));
+        fits.filter(|fit| fit.lag_s.abs() <= LAG_S).min_by(|a, b| a.rest_m.total_cmp(&b.rest_m))
+    })
+}
+
 /// The told position of a picture against that of the receiver. The components across the vertical count by the ratio
 /// of the sigmas.
 struct Miss {
@@ -91,6 +114,8 @@ struct Miss {
     velocity_m_s: Vector3<f64>,
     /// The whole distance, m.
     distance_m: f64,
+    /// The receiver's distance from the Earth's centre, m.
+    radius_m: f64,
 }
 
 /// Returns the differences, with the receiver's positions of a later time; `None` if there are too few.
@@ -109,7 +134,7 @@ fn misses(limbs: &[&Seen], clock_s: f64, fixes: &[Fix], lag_s: f64) -> Option<Ve
         let miss: Vector<_> = across - up * across.dot(&up) + up * higher_m;
         let distance_m = miss.norm();
         let (miss_m, velocity_m_s, up) = (weighted(miss), weighted(velocity_m_s), up.into_inner());
-        Some(Miss { miss_m, up, velocity_m_s, distance_m })
+        Some(Miss { miss_m, up, velocity_m_s, distance_m, radius_m: position_m.norm() })
     };
     let all: Vec<Miss> = limbs.iter().filter_map(miss).collect();
     (all.len() >= FEWEST).then_some(all)
@@ -146,8 +171,11 @@ fn along_the_path(limbs: &[&Seen], clock_s: f64, fixes: &[Fix]) -> Option<Lag> {
     let speed_m_s = median(all.iter().map(|m| m.velocity_m_s.norm()))?;
     let left_m = mean_across.norm();
     let rest_m = median(all.iter().map(|m| m.miss_m.norm()))?;
-    let is_along = left_m < ALONG * lag_s.abs() * speed_m_s;
-    is_along.then(|| Lag { lag_s, sigma_s: left_m.hypot(rest_m / n.sqrt()) / speed_m_s, rest_m })
+    // Across the path, nothing may be left but the errors of the single positions and of the limb's axis.
+    let radius_m = median(all.iter().map(|m| m.radius_m))?;
+    let error_m = (rest_m / n.sqrt()).hypot(AXIS_SIGMA_RAD * radius_m * TOLD_SIGMA_M / BELOW_SIGMA_M);
+    let is_along = left_m < (ALONG * lag_s.abs() * speed_m_s).max(NOISE * error_m);
+    is_along.then(|| Lag { lag_s, sigma_s: left_m.hypot(error_m) / speed_m_s, rest_m })
 }
 
 /// Fits a lag and a constant difference, from a first lag on.

@@ -16,6 +16,9 @@ const RATE_RAD_S: f64 = 1.1112e-3;
 const SPAN_S: i32 = 240;
 const SIGMA_RAD: f64 = 1e-3;
 
+/// How far a satellite nods about its y axis, rad, and how fast, rad/s.
+const NOD: [f64; 2] = [0.2, 0.1];
+
 /// Returns position, velocity and attitude of a satellite that looks down, in ECEF.
 fn motion(time_s: f64) -> (Vector<Fixed>, Vector<Fixed>, Rotation<Vehicle, Fixed>) {
     let (sin, cos) = (RATE_RAD_S * time_s).sin_cos();
@@ -66,6 +69,11 @@ fn verdict(late_s: f64) -> Verdict {
 
 /// Returns the verdict of a flight with a receiver whose times are late and whose positions have an error.
 fn verdict_of(late_s: f64, span_s: i32, sigma_m: f64) -> Verdict {
+    fuse(&flight(late_s, span_s, sigma_m), &Settings::default(), Wanted::default()).unwrap().verdict
+}
+
+/// Returns what such a flight recorded.
+fn flight(late_s: f64, span_s: i32, sigma_m: f64) -> Inputs {
     let imu = |i: i32| {
         let (gyro_rad_s, accel_m_s2) = (Vector::new(0.0, -RATE_RAD_S, 0.0), Vector::zeros());
         Sample { imu: Imu { time_s: f64::from(i) * 0.1, gyro_rad_s, accel_m_s2 }, saturated: false }
@@ -86,13 +94,12 @@ fn verdict_of(late_s: f64, span_s: i32, sigma_m: f64) -> Verdict {
         let time_s = f64::from(i) * 5.0 + 1.0;
         Attitude { time_s, fixed_from_vehicle: Some(motion(time_s).2), sigma_rad: 1e-4 }
     };
-    let inputs = Inputs {
+    Inputs {
         imu: (0..span_s * 10).map(imu).collect(),
         gnss: (0..span_s).map(fix).collect(),
         attitudes: (0..span_s / 5 - 1).map(attitude).collect(),
         recordings: vec![recording],
-    };
-    fuse(&inputs, &Settings::default(), Wanted::default()).unwrap().verdict
+    }
 }
 
 /// The path of a satellite hardly bends in four minutes, so that a lag looks like a place that is ahead.
@@ -122,5 +129,53 @@ fn a_second_of_a_clock_is_found_in_the_noise_of_a_receiver() {
                 assert_eq!(wrong.level(), Level::Contradicts, "{wrong:?}");
             }
         }
+    }
+}
+
+/// The cameras' clocks may be 0.2 s off, but nothing estimates the receiver's, and the position is the receiver's.
+#[test]
+fn a_receiver_that_is_less_late_than_a_camera_may_be_is_not_consistent() {
+    for span_s in [40, 120, 240] {
+        for late_s in [-0.7, -0.05, 0.2, 0.5] {
+            let fused = fuse(&flight(late_s, span_s, 5.0), &Settings::default(), Wanted::default()).unwrap();
+            let first = fused.verdict.likeliest().unwrap_or_else(|| panic!("{late_s} s of {span_s} s: consistent"));
+            assert_eq!((fused.verdict.level(), first.cause), (Level::Doubtful, Cause::ReceiverClock), "{first:?}");
+            let [lag] = fused.receiver_lags.as_slice() else { panic!("{:?}", fused.receiver_lags) };
+            assert!((lag.lag_s - late_s).abs() < 3.0 * lag.sigma_s && lag.sigma_s < 0.01, "{late_s}: {lag:?}");
+        }
+    }
+}
+
+/// A camera whose clock is late has the positions of the true times if they came with the pictures. If the vehicle turns
+/// enough, the filter finds the clock; otherwise nobody knows which clock is wrong.
+#[test]
+fn a_camera_whose_clock_the_filter_finds_says_nothing_against_the_receiver() {
+    for (nods, level) in [(true, Level::Consistent), (false, Level::Doubtful)] {
+        let mut inputs = flight(0.0, SPAN_S, 5.0);
+        let nod = |time_s: f64| NOD[0] * (NOD[1] * time_s).sin();
+        let turn = |time_s: f64| Rotation::from_scaled_axis(Vector::new(0.0, nod(time_s), 0.0));
+        if nods {
+            for sample in &mut inputs.imu {
+                sample.imu.gyro_rad_s += Vector::new(0.0, NOD[0] * NOD[1] * (NOD[1] * sample.imu.time_s).cos(), 0.0);
+            }
+            for attitude in &mut inputs.attitudes {
+                attitude.fixed_from_vehicle = Some(motion(attitude.time_s).2 * turn(attitude.time_s));
+            }
+        }
+        for seen in &mut inputs.recordings[0].seen {
+            if nods {
+                let turn: Rotation<Cam, Cam> = Rotation::from_scaled_axis(Vector::new(0.0, nod(seen.time_s), 0.0));
+                seen.axis = turn.inverse() * seen.axis;
+            }
+            seen.time_s += 0.3;
+        }
+        let fused = fuse(&inputs, &Settings::default(), Wanted::default()).unwrap();
+        assert_eq!(
+            fused.verdict.level(),
+            level,
+            "{nods}: {:?} {:?}",
+            fused.verdict,
+            fused.epochs.last().unwrap().cameras
+        );
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hzn_files::vehicle::VehicleRow;
 use hzn_fuse::Fused;
 use hzn_fuse::finding::Level;
-use hzn_fuse::results::{Counts, Determined, Epoch, Kind, Orbit, Solved};
+use hzn_fuse::results::{Counts, Determined, Epoch, Kind, Orbit, ReceiverLag, Solved};
 use hzn_fuse::truth::{self, Miss};
 
 use crate::exit::Stop;
@@ -57,6 +57,12 @@ pub(super) fn lines(fused: &Fused, truth: Option<&[VehicleRow]>) -> Vec<(String,
                 );
             }
         }
+    }
+    for ReceiverLag { camera, lag_s, sigma_s, speed_m_s } in &fused.receiver_lags {
+        let name = fused.cameras.get(*camera).map_or("", String::as_str);
+        let away_m = lag_s.abs() * speed_m_s;
+        let text = format!("{lag_s:+.3} s late, 3 sigma {:.3}; {away_m:.0} m along the path", 3.0 * sigma_s);
+        line(&format!("receiver against {name}"), text);
     }
     for (name, Tally { taken, refused, nis, freedom }) in tallies(fused) {
         let mean = nis / (taken + refused).max(1) as f64;
