@@ -138,7 +138,7 @@ fn process_picture(
     let expected = (0..truths.len()).map(|which| horizon.expect_body(which, &known)).collect::<Result<Vec<_>, _>>();
     let expected = expected.with_context(|| frame.file.clone())?;
     let begun = Instant::now();
-    let reports = horizon.find_each(&picture.view(), &expected);
+    let reports = horizon.find_each(picture.view(), &expected);
     let elapsed_us = begun.elapsed().as_secs_f64() * 1e6;
     let answer = |(report, truth): (&Report<f64>, &Truth)| Answer {
         file: frame.file.clone(),

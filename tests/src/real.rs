@@ -26,6 +26,16 @@ pub struct Photograph {
     pub rgb: RgbImage,
 }
 
+/// Reads a picture file. The decoders of memory are compiled in `image`, those of `image::open` would be compiled in
+/// each crate that calls it.
+///
+/// # Panics
+/// Panics if the file cannot be read.
+pub fn read_picture(path: &Path) -> image::DynamicImage {
+    let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    image::load_from_memory(&bytes).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
 impl Photograph {
     /// Loads the picture `file` of the folder `tests/data/real`, and the `.toml` of the same name next to it.
     ///
@@ -34,7 +44,7 @@ impl Photograph {
     pub fn load(file: &str) -> Self {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/real").join(file);
         let sensor = hzn_files::sensor::load(&path.with_extension("toml")).unwrap_or_else(|e| panic!("{e}"));
-        let rgb = image::open(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).into_rgb8();
+        let rgb = read_picture(&path).into_rgb8();
         Self { name: file.replace('/', "-").replace(['.'], "-"), sensor: sensor.config, rgb }
     }
 

@@ -65,8 +65,8 @@ impl Sensors {
     ) -> (Result<Answer, Status>, Result<Answer, Status>) {
         let picture = picture.into();
         (
-            process(&mut self.host, &picture, &prior_of_scene(scene)),
-            process(&mut self.flight, &picture, &prior_of_scene(scene)),
+            process(&mut self.host, picture, &prior_of_scene(scene)),
+            process(&mut self.flight, picture, &prior_of_scene(scene)),
         )
     }
 }

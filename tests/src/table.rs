@@ -109,7 +109,7 @@ pub fn measure((sensor, scenes): &(Config, Vec<Scene>)) -> [Tally; 2] {
         let position: Prior<f64> = crate::prior_of_scene(scene);
         let attitude = Prior { fixed_from_camera: scene.pose.disturbed(error_rad).fixed_from_camera(), ..position };
         for (tally, known) in tallies.iter_mut().zip([attitude, position]) {
-            let answer = process(&mut sensors.host, &picture.view(), &known);
+            let answer = process(&mut sensors.host, picture.view(), &known);
             tally.add(answer.ok().as_ref(), [truth.axis_x, truth.axis_y, truth.axis_z]);
         }
     }

@@ -25,7 +25,7 @@ fn main() {
         let picture = frame.render().expect("the scene is valid");
         let prior = prior_deg.map_or_else(|| frame.prior(), |deg| frame.prior_with_attitude(deg.to_radians()));
         let expected = horizon.expect(&prior).expect("the position is outside the Earth");
-        let report = horizon.find(&picture.view(), &expected);
+        let report = horizon.find(picture.view(), &expected);
         let listed: Vec<&str> = report.candidates.iter().map(|c| c.verdict.name()).collect();
         let status = report.status.name();
         let Some(solution) = report.solution else {

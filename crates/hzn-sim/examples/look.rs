@@ -38,7 +38,7 @@ fn main() {
         picture.save(&folder.join(&frame.file)).expect("the picture can be written");
         let truth = frame.scene.body_truth(kind, &frame.file, frame.time_s).expect("the scene is valid");
         let expected = horizon.expect(&frame.prior()).expect("the position is outside the Earth");
-        let report = horizon.find(&picture.view(), &expected);
+        let report = horizon.find(picture.view(), &expected);
         let px = frame.scene.visible_px(kind).expect("the scene is valid");
         print!(
             "{} {:.0} s, {:.0} km, {px:.0} px of limb, exposure {:.2}, {took:.0?}: {}",

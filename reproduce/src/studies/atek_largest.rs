@@ -37,7 +37,7 @@ fn dlr(one: &Scenario) -> anyhow::Result<Config> {
         let expected = horizon.expect(&frame.prior())?;
         let view = picture.view();
         let full = f64::from(hzn_core::image::Pixels::full_scale(&view));
-        levels.push(f64::from(horizon.find(&view, &expected).level) / full);
+        levels.push(f64::from(horizon.find(view, &expected).level) / full);
     }
     levels.sort_by(f64::total_cmp);
     config.threshold.level = levels.get(levels.len() / 2).copied().ok_or_else(|| anyhow!("no pictures"))?;

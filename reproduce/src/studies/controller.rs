@@ -39,7 +39,7 @@ fn look(
     let view = picture.view();
     let prior = Prior { level: *next, ..frame.prior() };
     let expected = horizon.expect(&prior)?;
-    let report = horizon.find(&view, &expected);
+    let report = horizon.find(view, &expected);
     *next = report.next_level;
     let full = f64::from(hzn_core::image::Pixels::full_scale(&view));
     flown.levels.push((frame.time_s, f64::from(report.level) / full));

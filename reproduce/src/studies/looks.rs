@@ -243,7 +243,7 @@ impl Photograph {
         let layout = Layout::packed(self.rgb.width(), self.rgb.height(), 3, 8);
         let view = ImageView::from_bytes(self.rgb.as_raw(), layout, Channel::Mean)?;
         let expected = horizon.expect(&Prior::default())?;
-        Ok(horizon.find(&view, &expected).solution.map(|s| MeasuredAxis {
+        Ok(horizon.find(view, &expected).solution.map(|s| MeasuredAxis {
             axis: s.axis.xyz(),
             sigma_deg: s.covariance.sigma_max_rad().to_degrees(),
             rms_px: s.rms_px,

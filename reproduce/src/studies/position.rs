@@ -86,7 +86,7 @@ fn fly(name: &str, first_seed: u64, focal_px: f64, pictures: usize) -> anyhow::R
         let file = format!("{name}-{seed}");
         let picture = scene.render()?;
         let expected = horizon.expect(&prior(&scene, about))?;
-        let report = horizon.find(&picture.view(), &expected);
+        let report = horizon.find(picture.view(), &expected);
         let solution = report.solution.as_ref();
         answers.push(Answer {
             file: file.clone(),

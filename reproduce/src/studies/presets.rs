@@ -91,7 +91,7 @@ fn median_threshold(flight: &Flight) -> anyhow::Result<f64> {
     for frame in flight.frames.iter().step_by(step) {
         let picture: Picture = frame.render()?;
         let expected = horizon.expect(&frame.prior())?;
-        let report = horizon.find(&picture.view(), &expected);
+        let report = horizon.find(picture.view(), &expected);
         levels.push(f64::from(report.level) / f64::from(picture.view().full_scale()));
     }
     levels.sort_by(f64::total_cmp);

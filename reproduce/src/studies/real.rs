@@ -94,7 +94,7 @@ fn process(path: &Path) -> anyhow::Result<Report<f64>> {
     let layout = Layout::packed(rgb.width(), rgb.height(), 3, 8);
     let view = ImageView::from_bytes(rgb.as_raw(), layout, Channel::Mean)?;
     let expected = horizon.expect(&prior)?;
-    Ok(horizon.find(&view, &expected))
+    Ok(horizon.find(view, &expected))
 }
 
 /// Errors of an answer where there is a truth.

@@ -14,7 +14,7 @@ where
     H::Scalar: std::fmt::Debug,
 {
     let clock = Clock::default();
-    let plain = format!("{:?}", horizon.find(&view, expected));
+    let plain = format!("{:?}", horizon.find(view, expected));
     let observed = format!("{:?}", horizon.find_observed(&view, expected, &Unobserved));
     let each = horizon.perform(view, Task::Each(std::slice::from_ref(expected)), &clock);
     ([plain, observed, format!("{:?}", each[0])], clock.times().len())
@@ -41,7 +41,7 @@ fn every_kind_of_picture_has_the_same_report_with_an_observer() {
         let mut sensors = Sensors::new(&flight.sensor);
         let prior = flight.frames[1].prior();
         let expected = sensors.host.expect(&prior).unwrap();
-        assert_eq!(sensors.host.find(&view, &expected).status, Status::Ok, "{i}");
+        assert_eq!(sensors.host.find(view, &expected).status, Status::Ok, "{i}");
         let (host, times) = reports(&mut *sensors.host, view, &expected);
         assert!(host.iter().all(|r| *r == host[0]) && times == 1, "{i}: {host:?}");
         let single = |v: [f64; 3]| v.map(|x| x as f32);
@@ -52,7 +52,7 @@ fn every_kind_of_picture_has_the_same_report_with_an_observer() {
             ..Prior::default()
         };
         let expected = sensors.flight.expect(&prior).unwrap();
-        assert_eq!(sensors.flight.find(&view, &expected).status, Status::Ok, "{i}");
+        assert_eq!(sensors.flight.find(view, &expected).status, Status::Ok, "{i}");
         let (flight, times) = reports(&mut *sensors.flight, view, &expected);
         assert!(flight.iter().all(|r| *r == flight[0]) && times == 1, "{i}: {flight:?}");
     }

@@ -229,7 +229,7 @@ fn earth_and_moon_in_one_picture() {
         let picture = scene.render().unwrap();
         let known = Prior { position_m: Some(pose.position_m), ..prior_with_sun(Some(sun)) };
         let expected = [0, 1].map(|which| horizon.expect_body(which, &known).unwrap());
-        let reports = horizon.find_each(&picture.view(), &expected);
+        let reports = horizon.find_each(picture.view(), &expected);
         for (report, (kind, limit_deg)) in reports.iter().zip([(Kind::Earth, 0.1), (Kind::Moon, 0.016)]) {
             let truth = scene.body_truth(kind, "", 0.0).unwrap();
             let solution = report.solution.as_ref().unwrap_or_else(|| panic!("{kind:?} at {u} {v}: {}", report.status));

@@ -39,7 +39,7 @@ fn process(scene: &Scene, counts_per_px: f64) -> Report<f64> {
     sensor.retry.levels.clear();
     let mut host = Sensors::new(&sensor).host;
     let expected = host.expect(&prior_of_scene(scene)).unwrap();
-    host.find(&view, &expected).clone()
+    host.find(view, &expected).clone()
 }
 
 #[test]

@@ -19,7 +19,7 @@ fn matrix(rows: [[f64; 3]; 3]) -> Matrix3<f64> {
 fn answer(config: &Config, picture: &hzn_sim::Picture, prior: &Prior<f64>) -> (Solution<f64>, f64) {
     let mut sensor = Sensors::new(config).host;
     let expected = sensor.expect(prior).unwrap();
-    let report = sensor.find(&picture.view(), &expected);
+    let report = sensor.find(picture.view(), &expected);
     (report.solution.expect("the limb is in view"), expected.half_angle_rad().cos())
 }
 

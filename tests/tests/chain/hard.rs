@@ -41,7 +41,7 @@ fn assert_found(what: &str, scene: &Scene, sensor: &Config, limits_deg: [f64; 2]
 /// Returns how many of both precisions answer. Asserts that their errors are at most `limits_deg` (f64, f32) and at
 /// most five sigma.
 fn assert_found_or_refused(what: &str, scene: &Scene, sensor: &Config, limits_deg: [f64; 2]) -> usize {
-    let (host, flight) = Sensors::new(sensor).both(&scene.render().unwrap().view(), scene);
+    let (host, flight) = Sensors::new(sensor).both(scene.render().unwrap().view(), scene);
     let mut answers = 0;
     for ((kind, answer), limit_deg) in [("f64", host), ("f32", flight)].into_iter().zip(limits_deg) {
         let Ok(a) = answer else { continue };

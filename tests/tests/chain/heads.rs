@@ -66,7 +66,7 @@ fn fly(km_to_pole: f64, tilt_deg: f64) -> Errors {
             let mut horizon = Sensors::new(&sensor(&scene)).host;
             let prior: Prior<f64> = prior_of_scene(&scene);
             let expected = horizon.expect(&prior).unwrap();
-            let report = horizon.find(&scene.render().unwrap().view(), &expected);
+            let report = horizon.find(scene.render().unwrap().view(), &expected);
             let Some(solution) = report.solution else { continue };
             let mount = Rotation::assume_from_quaternion(scene.pose.q_fixed_from_camera_wxyz).unwrap();
             let told = scene.truth("", 0.0).unwrap();

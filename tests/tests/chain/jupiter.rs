@@ -10,6 +10,7 @@ use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_core::{Config, HostHorizon, Prior, Report, body};
 use hzn_host::Compiled;
+use hzn_tests::real::read_picture;
 
 /// Distances from NAIF kernels, kilometres.
 const PICTURES: [(&str, f64); 2] =
@@ -31,7 +32,7 @@ fn process_observed(config: &Config, file: &str, observer: &dyn Observer<f64>) -
     let frames = hzn_files::frames::load(&folder().join("frames.csv")).unwrap_or_else(|e| panic!("{e}"));
     let mut horizon = HostHorizon::boxed(config).unwrap();
     let expected = horizon.expect(&frames.get(file).unwrap().to_prior(None)).unwrap();
-    let picture = image::open(folder().join(file)).unwrap().into_luma8();
+    let picture = read_picture(&folder().join(file)).into_luma8();
     let layout = Layout::packed(picture.width(), picture.height(), 1, 8);
     horizon.find_observed(&Grey::try_new(picture.as_raw(), layout).unwrap(), &expected, observer)
 }
@@ -68,7 +69,7 @@ fn the_terminator_is_no_limb_without_the_sun() {
             let mut horizon = HostHorizon::boxed(&config).unwrap();
             let known: Prior<f64> = frames.get(file).unwrap().to_prior(None);
             let prior = Prior { sun: None, altitude_m: Some((told * range_km - 71_492.0) * 1e3), ..known };
-            let picture = image::open(folder().join(file)).unwrap().into_luma8();
+            let picture = read_picture(&folder().join(file)).into_luma8();
             let layout = Layout::packed(picture.width(), picture.height(), 1, 8);
             let grey = Grey::try_new(picture.as_raw(), layout).unwrap();
             let report = horizon.find(&grey, &horizon.expect(&prior).unwrap());
@@ -97,7 +98,7 @@ fn the_terminator_of_a_flat_disc_is_no_limb_without_attitude_and_sun() {
         plain.body = body::Config::of_kind(body::Kind::Jupiter, None);
         let mut horizon = HostHorizon::boxed(&plain).unwrap();
         let prior = Prior { altitude_m: Some((range_km - 69_911.0) * 1e3), ..Prior::default() };
-        let picture = image::open(folder().join(file)).unwrap().into_luma8();
+        let picture = read_picture(&folder().join(file)).into_luma8();
         let layout = Layout::packed(picture.width(), picture.height(), 1, 8);
         let grey = Grey::try_new(picture.as_raw(), layout).unwrap();
         let report = horizon.find(&grey, &horizon.expect(&prior).unwrap());

@@ -73,13 +73,13 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     let answer = |sensor: &Config| {
         let sensors = &mut Sensors::new(sensor);
         let [host, flight] = [
-            process(&mut sensors.host, &p.view(), &Prior::default()),
-            process(&mut sensors.flight, &p.view(), &Prior::default()),
+            process(&mut sensors.host, p.view(), &Prior::default()),
+            process(&mut sensors.flight, p.view(), &Prior::default()),
         ];
         let why = || {
             let mut horizon = HostHorizon::boxed(sensor).unwrap();
             let expected = horizon.expect(&Prior::default()).unwrap();
-            format!("{:?}", horizon.find(&p.view(), &expected).candidates)
+            format!("{:?}", horizon.find(p.view(), &expected).candidates)
         };
         let (host, flight) = (
             host.unwrap_or_else(|s| panic!("{s}: {}", why())),
@@ -105,7 +105,7 @@ fn a_dark_frame_and_a_wide_haze_leave_the_answer_alone() {
     // fewer than half of the points are inliers.
     p.sensor.retry.frame_px = 0;
     p.sensor.threshold = threshold::Config { method: Method::Fixed, level: 0.08, ..p.sensor.threshold };
-    let with = process(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default());
+    let with = process(&mut Sensors::new(&p.sensor).host, p.view(), &Prior::default());
     assert!(
         with.is_err() || with.is_ok_and(|a| 2 * a.inliers < a.points && a.error_deg(axes[0]) < a.sigma_deg()),
         "{with:?}"
@@ -144,7 +144,7 @@ fn look_at(scene: &Scene, levels: &[f64]) -> (Report<f64>, UnitVec3<Cam, f64>) {
     config.retry.levels = levels.iter().copied().collect();
     let mut horizon = HostHorizon::boxed(&config).unwrap();
     let expected = horizon.expect(&hzn_tests::prior_of_scene(scene)).unwrap();
-    (horizon.find(&picture.view(), &expected), axis)
+    (horizon.find(picture.view(), &expected), axis)
 }
 
 /// Tests discs that are seen from far above and lit from the side, with bright clouds over dark ground. Otsu's

@@ -20,7 +20,7 @@ fn fly(flight: &Flight, preset: Preset, change: impl Fn(&mut Config)) -> Tally {
     let mut tally = Tally::default();
     for frame in &flight.frames {
         let truth = frame.truth().unwrap();
-        let answer = process(&mut sensors.host, &frame.render().unwrap().view(), &frame.prior());
+        let answer = process(&mut sensors.host, frame.render().unwrap().view(), &frame.prior());
         if let Err(status) = &answer {
             println!("{}: {status}", frame.file);
         }
@@ -146,7 +146,7 @@ fn a_limb_beyond_ninety_degrees() {
         config.body = scene.body.clone();
         let truth = scene.truth("", 0.0).unwrap();
         let mut sensors = Sensors::new(&config);
-        let (host, flight) = sensors.both(&scene.render().unwrap().view(), &scene);
+        let (host, flight) = sensors.both(scene.render().unwrap().view(), &scene);
         for answer in [host.unwrap(), flight.unwrap()] {
             let error = answer.error_deg([truth.axis_x, truth.axis_y, truth.axis_z]);
             assert!(error < 0.05, "{}: {error}°", preset.name());

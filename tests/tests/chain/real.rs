@@ -26,7 +26,7 @@ fn process_both(photograph: &Photograph) -> BothAnswers {
     let mut sensors = Sensors::new(&photograph.sensor);
     let watch = PointRecorder::default();
     let host = process_observed(&mut sensors.host, &photograph.view(), &Prior::default(), &watch);
-    let flight = process(&mut sensors.flight, &photograph.view(), &Prior::default());
+    let flight = process(&mut sensors.flight, photograph.view(), &Prior::default());
     let points = watch.points();
     photograph.write_overlay(host.as_ref().ok(), &points);
     for (kind, answer) in [("host", &host), ("flight", &flight)] {
@@ -61,7 +61,7 @@ fn change_with_threshold_deg(photograph: &Photograph, axis: [f64; 3]) -> f64 {
     let moved = [0.8, 1.2].map(|scale| {
         let mut sensor = photograph.sensor.clone();
         sensor.threshold.scale = scale;
-        let answer = process(&mut Sensors::new(&sensor).host, &photograph.view(), &Prior::default());
+        let answer = process(&mut Sensors::new(&sensor).host, photograph.view(), &Prior::default());
         answer.map_or(f64::INFINITY, |a| a.error_deg(axis))
     });
     println!("{}: {moved:.4?}° with the level at 80 % and 120 %", photograph.name);
@@ -109,9 +109,9 @@ fn photographs_of_the_limb_are_probable() {
         let photograph = Photograph::load(file);
         let mut sensors = Sensors::new(&photograph.sensor);
         let expected = sensors.host.expect(&Prior::default()).expect("the prior is possible");
-        let host = sensors.host.find(&photograph.view(), &expected).solution.and_then(|s| s.p_limb);
+        let host = sensors.host.find(photograph.view(), &expected).solution.and_then(|s| s.p_limb);
         let expected = sensors.flight.expect(&Prior::default()).expect("the prior is possible");
-        let flight = sensors.flight.find(&photograph.view(), &expected).solution.and_then(|s| s.p_limb);
+        let flight = sensors.flight.find(photograph.view(), &expected).solution.and_then(|s| s.p_limb);
         println!("{file}: {host:.4?} {flight:.4?}");
         // The lens of OPS-SAT is not calibrated, and its limb has a half-angle 2.6 sigmas from the expected one.
         assert!(host.is_some_and(|p| p > 0.9) && flight.is_none_or(|p| p > 0.9), "{file}: {host:?}");
@@ -122,7 +122,7 @@ fn photographs_of_the_limb_are_probable() {
 fn iss_limb_is_the_same_at_both_sizes() {
     let answers = ["full/iss-limb-2020-11-20.jpg", "iss-limb-2020-11-20.jpg"].map(|file| {
         let p = Photograph::load(file);
-        process(&mut Sensors::new(&p.sensor).host, &p.view(), &Prior::default()).expect("the limb is found")
+        process(&mut Sensors::new(&p.sensor).host, p.view(), &Prior::default()).expect("the limb is found")
     });
     // Both answers must agree within the claimed sigmas. They differ, because haze that spans more pixels is cut at
     // another depth.
@@ -188,7 +188,7 @@ fn airglow_is_no_limb() {
     // The edge of the airglow has the form of a limb. Only the light above it shows what it is.
     let mut night = Photograph::load("iss030e102170-night.jpg");
     night.sensor.gates.max_glow = 1e6;
-    let believed = process(&mut Sensors::new(&night.sensor).host, &night.view(), &Prior::default());
+    let believed = process(&mut Sensors::new(&night.sensor).host, night.view(), &Prior::default());
     let error_deg = believed.expect("the airglow passes the other gates").error_deg(NIGHT_AXIS);
     assert!(error_deg > 2.0, "{error_deg}°");
 }

@@ -26,7 +26,7 @@ fn fly(flight: &Flight) -> Flown {
         let truth = frame.truth().unwrap();
         let axis = [truth.axis_x, truth.axis_y, truth.axis_z];
         let picture = frame.render().unwrap();
-        let (host, small) = sensors.both(&picture.view(), &frame.scene);
+        let (host, small) = sensors.both(picture.view(), &frame.scene);
         out.host.add(host.as_ref().ok(), axis);
         out.flight.add(small.as_ref().ok(), axis);
         if let (Ok(a), Ok(b)) = (host, small) {
@@ -111,7 +111,7 @@ fn white_noise_against_the_bound() {
                 scene.seed = seed;
                 let picture = scene.render().unwrap();
                 let answer =
-                    hzn_tests::sensors::process(&mut sensors.host, &picture.view(), &hzn_tests::prior_of_scene(&scene))
+                    hzn_tests::sensors::process(&mut sensors.host, picture.view(), &hzn_tests::prior_of_scene(&scene))
                         .unwrap();
                 let [x, y, z] = answer.axis;
                 errors.push([x - truth.axis_x, y - truth.axis_y, z - truth.axis_z].map(f64::to_degrees));
@@ -183,7 +183,7 @@ fn fly_with_attitude(flight: &Flight) -> Tally {
     for frame in &flight.frames {
         let truth = frame.truth().unwrap();
         let known = frame.prior_with_attitude(5f64.to_radians());
-        let answer = process(&mut sensors.host, &frame.render().unwrap().view(), &known);
+        let answer = process(&mut sensors.host, frame.render().unwrap().view(), &known);
         tally.add(answer.as_ref().ok(), [truth.axis_x, truth.axis_y, truth.axis_z]);
     }
     println!("{} with prior: {tally}", flight.name);
@@ -224,7 +224,7 @@ fn sky_and_clouds_are_not_answered() {
             assert!(!scene.truth("", 0.0).unwrap().has_limb());
             assert_refused(
                 &format!("{depression_deg}° down, {i}"),
-                sensors.both(&scene.render().unwrap().view(), &scene),
+                sensors.both(scene.render().unwrap().view(), &scene),
             );
         }
     }
@@ -262,7 +262,7 @@ fn pictures_of_nothing_are_not_answered() {
         add("gradient".into(), &|x, _| (x * 255 / w) as u8);
         for (name, data) in pictures {
             let view = ImageView::from_bytes(&data, Layout::packed(w, h, 1, 8), Channel::Mean).unwrap();
-            assert_refused(&name, sensors.both(&view, &scene));
+            assert_refused(&name, sensors.both(view, &scene));
         }
     }
 }

@@ -46,12 +46,12 @@ fn neither_a_cloud_nor_a_reflection_is_the_sun() {
             // The Sun is first here, but the Earth that hides it is looked for before.
             let both = |which: usize| host.expect_body(which, &prior(frame)).unwrap();
             let reports = [both(1), both(0)];
-            let reports = host.find_each(&picture.view(), &reports);
+            let reports = host.find_each(picture.view(), &reports);
             assert_eq!(reports.len(), 2);
             check(frame, &reports[0], &mut found);
             let both = [0, 1].map(|which| flight.expect_body(which, &prior(frame)).unwrap());
             let mut ignored = 0;
-            check(frame, &flight.find_each(&picture.view(), &both)[1], &mut ignored);
+            check(frame, &flight.find_each(picture.view(), &both)[1], &mut ignored);
         }
     }
     println!("{found} of {in_view} Suns found");

@@ -27,7 +27,7 @@ fn count(flights: &[(Flight, Vec<Picture>)], error_km: f64, body_of: impl Fn(&Co
         for (frame, picture) in flown.frames.iter().zip(pictures) {
             let altitude_m = Some(1e3 * (frame.row().altitude_km + error_km));
             let expected = sensor.expect(&Prior { altitude_m, ..Prior::default() }).unwrap();
-            let report = sensor.find(&picture.view(), &expected);
+            let report = sensor.find(picture.view(), &expected);
             let Some(solution) = report.solution.filter(|_| report.status == Status::Ok) else { continue };
             let error_rad = error_rad(frame, solution.axis.xyz());
             let sigmas = error_rad / solution.covariance.sigma_max_rad();

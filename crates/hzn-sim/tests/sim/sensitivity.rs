@@ -155,7 +155,7 @@ fn the_sensor_reports_what_the_design_says() {
         let picture = scene.render().unwrap();
         let mut horizon = HostHorizon::boxed(&config).unwrap();
         let expected = horizon.expect(&Prior::default()).unwrap();
-        let report = horizon.find(&picture.view(), &expected);
+        let report = horizon.find(picture.view(), &expected);
         let reported = report.solution.unwrap().covariance.sigma_max_rad().to_degrees();
         let largest = promised.fused.pitch_deg.max(promised.fused.roll_deg);
         assert!((reported / largest - 1.0).abs() < 0.03, "{model:?}: {reported} {largest}");

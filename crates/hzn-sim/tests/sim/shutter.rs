@@ -24,7 +24,7 @@ fn error(scene: &Scene, told: bool) -> Option<[f64; 2]> {
     let mut horizon = HostHorizon::boxed(&config).unwrap();
     let expected = horizon.expect(&frame).unwrap();
     let picture = scene.render().unwrap();
-    let solution = horizon.find(&picture.view(), &expected).solution?;
+    let solution = horizon.find(picture.view(), &expected).solution?;
     let truth = scene.truth("", 0.0).unwrap();
     let truth = UnitVec3::try_new([truth.axis_x, truth.axis_y, truth.axis_z]).unwrap();
     let error_rad = solution.axis.angle_rad(&truth);
