@@ -54,6 +54,9 @@ pub struct Reader {
     complete: bool,
     inflation: Inflation,
     broken_chunks: u64,
+    /// Whether the last record was a chunk that cannot be read.
+    is_broken: bool,
+    bytes_after_end: u64,
     unknown_compression: Option<String>,
     /// Channels with the topic of the reports, but with another schema.
     foreign_reports: BTreeSet<u16>,
@@ -88,6 +91,8 @@ impl Reader {
             complete: false,
             inflation: Inflation::default(),
             broken_chunks: 0,
+            is_broken: false,
+            bytes_after_end: 0,
             unknown_compression: None,
             foreign_reports: BTreeSet::new(),
             unread_reports: 0,
@@ -125,6 +130,11 @@ impl Reader {
     /// [`Self::unknown_compression`] has a name.
     pub fn broken_chunks(&self) -> u64 {
         self.broken_chunks
+    }
+    /// Returns the number of bytes behind the end of the recording, which are not read; valid after the last frame.
+    /// Programs that append files leave a second recording there.
+    pub fn bytes_after_end(&self) -> u64 {
+        self.bytes_after_end
     }
     /// Returns the name of a compression that hzn does not know, if chunks so far have one.
     pub fn unknown_compression(&self) -> Option<&str> {
@@ -188,6 +198,7 @@ impl Reader {
             Ok(read) => read,
             Err(fault) => {
                 self.broken_chunks += 1;
+                self.is_broken = true;
                 if let ChunkFault::Compression(name) = fault {
                     self.unknown_compression.get_or_insert(name);
                 }
@@ -250,10 +261,16 @@ impl Reader {
     }
 
     fn step(&mut self) -> Result<bool, Error> {
+        let read = |source| Error::Read { path: self.path.clone(), source };
+        let lost_bytes = self.scanner.lost_bytes();
         let record = match self.peeked.take() {
             Some(record) => Some(record),
-            None => self.scanner.next().map_err(|source| Error::Read { path: self.path.clone(), source })?,
+            None => self.scanner.next().map_err(read)?,
         };
+        // A chunk that reaches into a gap was counted already.
+        let is_gap = self.scanner.lost_bytes() > lost_bytes && !self.is_broken;
+        self.broken_chunks += u64::from(is_gap);
+        self.is_broken = false;
         let Some(record) = record else { return Ok(false) };
         match record.op {
             Op::CHUNK => self.read_chunk(&record)?,
@@ -264,6 +281,7 @@ impl Reader {
             }
             Op::DATA_END => {
                 self.complete = true;
+                self.bytes_after_end = self.scanner.bytes_after_end().map_err(read)?;
                 return Ok(false);
             }
             _ => self.read_declaration(&record),

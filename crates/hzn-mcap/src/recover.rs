@@ -23,6 +23,8 @@ pub struct Recovered {
     pub broken_chunks: u64,
     /// Number of bytes at the end of the file that are not kept: an incomplete record, or pictures without a result.
     pub dropped_bytes: u64,
+    /// Bytes behind the end of the recording, which are not read; see [`crate::Reader::bytes_after_end`].
+    pub bytes_after_end: u64,
 }
 
 /// A recording that is continued.
@@ -195,16 +197,23 @@ fn copy_frames(
         report_channels: BTreeSet::new(),
         waiting: Vec::new(),
         inflation: Inflation::default(),
+        is_broken: false,
         unknown_compression: None,
     };
     let mut kept_to = scanner.position();
+    let mut lost_bytes = 0;
     while let Some(record) = scanner.next().map_err(read)? {
+        // A chunk that reaches into a gap was counted already.
+        let is_gap = scanner.lost_bytes() > lost_bytes && !copier.is_broken;
+        copier.found.broken_chunks += u64::from(is_gap);
+        (lost_bytes, copier.is_broken) = (scanner.lost_bytes(), false);
         if !wanted(scanner.position(), size) {
             return Err(Error::Stopped { path: input.to_path_buf() });
         }
         if record.op == Op::DATA_END {
             copier.found.was_complete = true;
             copier.write_waiting().map_err(write)?;
+            copier.found.bytes_after_end = scanner.bytes_after_end().map_err(read)?;
             kept_to = size;
             break;
         }
@@ -215,7 +224,7 @@ fn copy_frames(
             return Err(Error::Compression { path: input.to_path_buf(), compression });
         }
     }
-    Ok(Recovered { dropped_bytes: size.saturating_sub(kept_to), ..copier.found })
+    Ok(Recovered { dropped_bytes: size.saturating_sub(kept_to) + lost_bytes, ..copier.found })
 }
 
 /// Copies a recording, record by record.
@@ -227,6 +236,8 @@ struct FrameCopier<'a> {
     /// Parts of frames, which wait for their reports.
     waiting: Vec<Part>,
     inflation: Inflation,
+    /// Whether the last record was a chunk that cannot be read.
+    is_broken: bool,
     unknown_compression: Option<String>,
 }
 
@@ -248,7 +259,10 @@ impl FrameCopier<'_> {
                     return self.add_part(Part::Chunk(chunk), reports as u64);
                 }
                 Err(ChunkFault::Compression(name)) => self.unknown_compression = Some(name),
-                Err(ChunkFault::Damaged(_)) => self.found.broken_chunks += 1,
+                Err(ChunkFault::Damaged(_)) => {
+                    self.found.broken_chunks += 1;
+                    self.is_broken = true;
+                }
             },
             Op::MESSAGE => {
                 let reports = Message::parse(&record.content).filter(|m| self.is_report(m)).iter().count();

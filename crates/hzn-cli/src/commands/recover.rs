@@ -58,7 +58,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         sink::Target::Mcap => recording(file, &path)?,
         target => table(file, &path, target)?,
     };
-    let dropped = if lost > 0 { format!(", {lost} bytes of unfinished pictures dropped") } else { String::new() };
+    let dropped = if lost > 0 { format!(", {lost} bytes without whole pictures dropped") } else { String::new() };
     tell::line(format_args!("{}: {} kept{dropped}", path.display(), explain::counted(rows, "row")));
     if unfinished && args.output.is_none() && file.exists() {
         // Its results are in the new file. Next to it, the old file would look like another unfinished run.
@@ -112,6 +112,9 @@ fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> 
     hzn_mcap::rename(&recovering, path)?;
     if found.broken_chunks > 0 {
         tell::warning(format_args!("{} damaged parts were left out; their pictures are missing", found.broken_chunks));
+    }
+    if found.bytes_after_end > 0 {
+        tell::warning(source::describe_rest(file, found.bytes_after_end));
     }
     Ok((found.frames, found.dropped_bytes))
 }

@@ -85,6 +85,25 @@ fn missing_content_of_a_recording_is_reported() {
 }
 
 #[test]
+fn bytes_that_are_not_read_are_counted() {
+    let place = place();
+    let whole = std::fs::read(place.path("out.mcap")).unwrap();
+    place.write("joined.mcap", &[&whole[..], &whole].concat());
+    let rest = format!("the last {} bytes were not read", whole.len());
+    place.run(&["info", "joined.mcap"]).expect(3).says(&rest);
+    place.run(&["export", "joined.mcap", "-o", "joined.csv"]).expect(3).says(&rest);
+    place.run(&["recover", "joined.mcap", "-o", "first.mcap"]).expect(0).says(&rest);
+    // A hole costs the pictures that it touches, and none after it.
+    let picture = std::fs::read(place.path("in/0000.png")).unwrap();
+    let at = whole.windows(picture.len()).position(|w| w == picture).unwrap();
+    place.write("holed.mcap", &[&whole[..at + 100], &whole[at + 110..]].concat());
+    place.run(&["run", "out.mcap", "-o", "all.csv"]).expect(0);
+    place.run(&["run", "holed.mcap", "-o", "some.csv"]).expect(3).says("1 damaged part was left out");
+    let [all, some] = ["all.csv", "some.csv"].map(|name| place.read(name).lines().count());
+    assert!(some + 1 >= all - 1, "{some} of {all}");
+}
+
+#[test]
 fn an_incomplete_recording_is_reported_wherever_it_is_read() {
     let place = place();
     let whole = std::fs::read(place.path("out.mcap")).unwrap();

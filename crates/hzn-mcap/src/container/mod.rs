@@ -9,6 +9,7 @@ mod chunk;
 mod inflation;
 mod op;
 mod scan;
+mod search;
 mod write;
 
 pub(crate) use channel::{Channel, Schemas};

@@ -1,10 +1,10 @@
 //! Reads records one after the other from a file that may end anywhere.
 
 use std::collections::BTreeSet;
-use std::io::{self, Read, Seek};
+use std::io::{self, Read, Seek, SeekFrom};
 
 use super::op::{Fields, Op};
-use super::{MAGIC, MAX_RECORD_BYTES};
+use super::{MAGIC, MAX_RECORD_BYTES, search};
 
 /// One record as it is in the file.
 #[derive(Debug)]
@@ -13,12 +13,17 @@ pub(crate) struct Record {
     pub(crate) content: Vec<u8>,
 }
 
-/// Reads records in file order with the memory of one record. It ends without an error where the file ends or is not
-/// valid any more. [`Scanner::position`] then returns the size of the valid part.
+/// Reads records in file order with the memory of one record. Where bytes are missing or damaged, it goes on with the
+/// next chunk. It ends without an error where the file ends, or where nothing valid follows. [`Scanner::position`] then
+/// returns the size of the valid part.
 #[derive(Debug)]
 pub(crate) struct Scanner<R> {
     source: R,
     position: u64,
+    /// Place of the record that was returned last.
+    last: u64,
+    /// Bytes that were left out between valid parts.
+    lost_bytes: u64,
     /// Channels whose messages are left out.
     skipped: BTreeSet<u16>,
 }
@@ -32,7 +37,9 @@ impl<R: Read + Seek> Scanner<R> {
             Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
             Err(e) => return Err(e),
         }
-        Ok((magic == MAGIC).then_some(Self { source, position: MAGIC.len() as u64, skipped: BTreeSet::new() }))
+        let position = MAGIC.len() as u64;
+        let skipped = BTreeSet::new();
+        Ok((magic == MAGIC).then_some(Self { source, position, last: position, lost_bytes: 0, skipped }))
     }
 
     /// Leaves out the messages of a channel. They are not read if they are outside of chunks, or in an uncompressed
@@ -46,8 +53,39 @@ impl<R: Read + Seek> Scanner<R> {
         self.position
     }
 
+    /// Returns the number of bytes so far that belong to no record.
+    pub(crate) fn lost_bytes(&self) -> u64 {
+        self.lost_bytes
+    }
+
+    /// Returns the number of bytes behind the end of a recording, whose last record was returned just now: another
+    /// recording may have been appended.
+    pub(crate) fn bytes_after_end(&mut self) -> io::Result<u64> {
+        while let Some(record) = self.next_here()? {
+            if record.op == Op::FOOTER {
+                let end = self.position + MAGIC.len() as u64;
+                return Ok(self.source.seek(SeekFrom::End(0))?.saturating_sub(end));
+            }
+        }
+        Ok(0)
+    }
+
     /// Reads the next record; `None` at the end of the valid part.
     pub(crate) fn next(&mut self) -> io::Result<Option<Record>> {
+        if let Some(record) = self.next_here()? {
+            return Ok(Some(record));
+        }
+        // If bytes are missing in a record, it reaches into those that follow it.
+        let from = self.last + 1;
+        let Some(found) = search::next_chunk(&mut self.source, from)? else { return Ok(None) };
+        self.source.seek(SeekFrom::Start(found))?;
+        self.lost_bytes += found.abs_diff(self.position);
+        self.position = found;
+        self.next_here()
+    }
+
+    /// Reads the record at the position; `None` if there is none.
+    fn next_here(&mut self) -> io::Result<Option<Record>> {
         loop {
             let mut head = [0; 9];
             if !self.fill(&mut head)? {
@@ -61,6 +99,7 @@ impl<R: Read + Seek> Scanner<R> {
                 return Ok(None);
             }
             if !self.skipped.is_empty() && self.skip_content(op, length)? {
+                self.last = self.position;
                 self.position += 9 + length;
                 continue;
             }
@@ -70,6 +109,7 @@ impl<R: Read + Seek> Scanner<R> {
             if content.len() as u64 != length {
                 return Ok(None);
             }
+            self.last = self.position;
             self.position += 9 + length;
             return Ok(Some(Record { op, content }));
         }
@@ -140,8 +180,6 @@ impl<R: Read + Seek> Scanner<R> {
 
 #[cfg(test)]
 mod tests {
-    use std::io::SeekFrom;
-
     use super::*;
     use crate::container::{ChunkBuilder, Container};
 
@@ -230,6 +268,35 @@ mod tests {
         let (kinds, bytes) = scan(out.finish().unwrap());
         assert_eq!(kinds.iter().filter(|op| **op == Op::MESSAGE).count(), 2);
         assert!(bytes < 1_000, "{bytes}");
+    }
+
+    #[test]
+    fn a_hole_costs_the_chunks_that_it_touches() {
+        let whole = file(20, true);
+        let (kinds, _) = scan(whole.clone());
+        for (at, bytes) in [(3 * PICTURE_BYTES, 5_000), (7 * PICTURE_BYTES, 70_000), (21 * PICTURE_BYTES + 777, 1)] {
+            let holed = [&whole[..at], &whole[at + bytes..]].concat();
+            let mut scanner = Scanner::try_new(io::Cursor::new(holed)).unwrap().unwrap();
+            let mut chunks = 0;
+            while let Some(record) = scanner.next().unwrap() {
+                let parsed = super::super::Chunk::parse(&record, &mut super::super::Inflation::default());
+                chunks += usize::from(record.op == Op::CHUNK && parsed.is_ok());
+            }
+            // Of the 40 chunks with pictures or reports, the one with the hole is lost, and at most the next.
+            assert!((38..40).contains(&chunks), "{chunks}");
+            assert!(scanner.lost_bytes() < 6 * PICTURE_BYTES as u64, "{}", scanner.lost_bytes());
+        }
+        assert!(kinds.contains(&Op::DATA_END));
+    }
+
+    #[test]
+    fn bytes_after_the_end_are_counted() {
+        let (first, second) = (file(2, true), file(1, true));
+        for (whole, rest) in [(first.clone(), 0), ([&first[..], &second].concat(), second.len() as u64)] {
+            let mut scanner = Scanner::try_new(io::Cursor::new(whole)).unwrap().unwrap();
+            while scanner.next().unwrap().is_some_and(|record| record.op != Op::DATA_END) {}
+            assert_eq!(scanner.bytes_after_end().unwrap(), rest);
+        }
     }
 
     #[test]

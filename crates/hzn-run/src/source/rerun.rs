@@ -129,6 +129,15 @@ fn unknown_compression(name: &str) -> String {
     format!("its data are compressed with {name:?}; write it again with zstd, with lz4 or without compression")
 }
 
+/// Says that a recording has bytes behind its end, which are not read.
+pub fn describe_rest(path: &Path, bytes: u64) -> String {
+    let name = path.display();
+    format!(
+        "{name}: the last {bytes} bytes were not read: they come after the end of the recording, as a second one that \
+         was appended; `tail -c {bytes} {name}` gives them alone"
+    )
+}
+
 /// Describes what is missing in a recording that was read to its end. `done` says what was done with the rest.
 pub fn describe_loss(reader: &Reader, path: &Path, done: &str) -> Option<String> {
     let name = path.display();
@@ -141,6 +150,9 @@ pub fn describe_loss(reader: &Reader, path: &Path, done: &str) -> Option<String>
         return Some(format!(
             "{name}: {messages} on /hzn/report {what}; keep the schema when the file is written again"
         ));
+    }
+    if reader.bytes_after_end() > 0 {
+        return Some(describe_rest(path, reader.bytes_after_end()));
     }
     match reader.broken_chunks() {
         0 if reader.is_complete() => None,
