@@ -37,7 +37,7 @@ impl Prior {
         }
         let data = FrameData {
             time_s,
-            utc_s: time_s,
+            utc_s: utc(time_s),
             altitude_km: number(altitude_km),
             position_km: numbers(position_km),
             q_fixed_from_camera_wxyz: numbers(attitude).map(check_attitude).transpose()?,
@@ -89,4 +89,11 @@ pub(crate) fn check_attitude(q: [f64; 4]) -> PyResult<[f64; 4]> {
         return Ok(q);
     }
     Err(errors::config("attitude: a quaternion (w, x, y, z) of length 1 is expected"))
+}
+
+/// Returns the UTC of a picture in seconds since 1970, if its time is one. A smaller number counts from the begin of a
+/// flight or a recording: as a UTC it would be in 1970, and would tell the wrong Sun.
+pub(crate) fn utc(time_s: Option<f64>) -> Option<f64> {
+    const YEAR_S: f64 = 365.0 * 86_400.0;
+    time_s.filter(|time_s| !(0.0..YEAR_S).contains(time_s))
 }

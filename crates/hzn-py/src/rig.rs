@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors;
-use crate::prior::Prior;
+use crate::prior::{Prior, utc};
 use crate::read::Read;
 use crate::report::Report;
 use crate::sensor::Sensor;
@@ -119,7 +119,7 @@ impl Rig {
             known.tell_doubts(py, &state.config)?;
             let read = Read::from_object(py, &state, &image)?;
             let data = FrameData { time_s: known.data.time_s.or(read.time_s), ..known.data.clone() };
-            let data = FrameData { utc_s: data.time_s, ..data }.seen_by_camera(q_vehicle_from_camera_wxyz);
+            let data = FrameData { utc_s: utc(data.time_s), ..data }.seen_by_camera(q_vehicle_from_camera_wxyz);
             let (report, processed) = read.process(py, &state, &data, bits, false)?;
             let outcomes = processed.into_iter().map(Into::into).collect();
             let glimpse = Some(read.glimpse(&state, bits)?);

@@ -17,7 +17,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::camera::Camera;
 use crate::expected::Expected;
 use crate::image::{Array, View};
-use crate::prior::Prior;
+use crate::prior::{Prior, utc};
 use crate::read::{Read, Shown};
 use crate::report::Report;
 use crate::state::State;
@@ -184,7 +184,7 @@ impl Sensor {
         let Prior { data } = known;
         let read = Read::from_object(py, &state, image)?;
         let time_s = data.time_s.or(read.time_s);
-        let data = FrameData { time_s, utc_s: time_s, ..data };
+        let data = FrameData { time_s, utc_s: utc(time_s), ..data };
         Ok(read.process(py, &state, &data, bits, detail)?.0)
     }
 

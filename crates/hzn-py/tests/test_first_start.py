@@ -229,3 +229,13 @@ def test_the_photograph_of_the_station_in_four_lines(pyplot, tmp_path):
     # The camera of the demo is fitted to the limb; a field of view that is known to 5 % agrees with it.
     demo = hzn.Sensor.from_toml(PHOTOGRAPH.with_name("iss.toml")).process(PHOTOGRAPH)
     assert angle_deg(report.axis, demo.axis) < 3 * report.sigma_max_deg
+
+
+def test_a_time_since_the_start_of_the_flight_is_no_utc():
+    """Ten seconds of a flight are not 1 January 1970, when it was night here."""
+    sensor = hzn.Sensor(camera=SMALL, body={"kind": "earth"}, input={"tone": "linear"})
+    position, rotation = pose(10.0, 10.0, 500.0)
+    image = hzn.render(sensor, position, quaternion(rotation), NOON)
+    bare, timed, dated = (sensor.process(image, position_km=position, time_s=t) for t in (None, 10.0, NOON))
+    assert (timed.status, timed.sigma_max_deg, timed.time_s) == (bare.status, bare.sigma_max_deg, 10.0)
+    assert dated.ok and dated.sigma_max_deg != bare.sigma_max_deg

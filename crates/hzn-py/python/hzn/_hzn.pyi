@@ -498,7 +498,9 @@ class Sensor:
         sun
             Direction to the Sun in the camera frame, shape (3,).
         time_s
-            UTC in seconds since 1970. With a position, Sun and Moon get `Report.axis_fixed`.
+            UTC in seconds since 1970, or the time since the start of a flight or a recording: from 0 up to a year
+            (31 536 000 s) it is no UTC, and the Sun is not known from it. With a position and a UTC, Sun and Moon get
+            `Report.axis_fixed`.
         camera_temperature_c
             Temperature of the camera, °C. With ``camera.temperature`` the picture has the lens of this temperature.
         bits
