@@ -1,8 +1,10 @@
 //! What would make refused pictures answers: the sentences for the end of a run.
 
-use hzn_core::Config;
+use hzn_calib::noise;
+use hzn_calib::sky::{self, LimbPrior, View};
 use hzn_core::camera::Camera;
 use hzn_core::image::region::Region;
+use hzn_core::{Config, Prior};
 use hzn_files::FrameData;
 use hzn_run::bars::find_bars;
 use hzn_run::diagnosis::{self, AnyCone, FitFacts, RateFault, RateTrial, Said};
@@ -95,6 +97,48 @@ impl ReadAgain {
         let found = diagnosis::contradictions(&said);
         let what = diagnosis::contradiction(&found, altitude_km, &camera, config.camera.width)?;
         Some(format!("each of {} answers agrees with the limb that is expected, but {what}", said.len()))
+    }
+
+    /// Says where the limb in different places of the pictures shows the principal point, if that is not where it was
+    /// told to be. It is the test of `hzn calibrate check`, at the same limit.
+    pub(crate) fn centre_fault(&self, request: &Request, config: &Config) -> Option<String> {
+        let limb = LimbPrior::of_sensor(config, false)?;
+        // Answers must not be refused because of an error of the lens that is to be found.
+        let mut used = noise::config_for_calibration(config)?;
+        used.camera.covariance = None;
+        used.camera.focal_sigma_percent = config.camera.focal_sigma_percent.max(10.0 * sky::DEFAULT_DETECT_PERCENT);
+        let mut sensor = AnySensor::new(&used, request.flight).ok()?;
+        let view = |(name, picture, data): &(String, Picture, Option<FrameData>)| {
+            let traces = Traces::new(1);
+            let view = picture.view(config.input.channel).ok()?;
+            let processed = sensor.process(&view, data.as_ref(), Some(&traces));
+            let solution = processed.first()?.report.as_ref().ok()?.solution.as_ref()?;
+            let edges = traces.each.first()?.edges();
+            let edge = edges.iter().find(|edge| edge.candidate == solution.candidate)?;
+            let points = edge.points.iter().copied().zip(edge.weights.iter().copied()).collect();
+            let prior = data.as_ref().map_or_else(Prior::default, |data| data.to_prior(None));
+            Some(View::new(name, points, prior, solution))
+        };
+        let views: Vec<View> = self.each.iter().filter_map(view).collect();
+        let check = sky::check(&config.camera, &used.body, &views, limb, sky::DEFAULT_DETECT_PERCENT).ok()?;
+        // A focal length or a limb height that disagrees moves the principal point, too.
+        if check.focal.is_significant() {
+            return None;
+        }
+        let camera = &config.camera;
+        let told = [("cx_px", camera.cx_px), ("cy_px", camera.cy_px)].into_iter().zip(&check.centre_px);
+        let wrong = told.filter(|(_, found)| found.is_significant());
+        let ((key, told_px), found) = wrong.max_by(|a, b| a.1.sigmas.abs().total_cmp(&b.1.sigmas.abs()))?;
+        Some(format!(
+            "the limb, at different places of {} pictures, shows the principal point at {key} = {:.1} ± {:.1}, and \
+             {told_px:.1} is told ({:.1} sigma). Are the pictures a part of larger ones (cropped, a window of the \
+             detector)? cx_px and cy_px are then those of the larger picture, minus the first column and row of the \
+             part. `hzn calibrate check` says more",
+            views.len(),
+            told_px + found.value,
+            found.sigma,
+            found.sigmas.abs()
+        ))
     }
 
     /// Looks for a limb of any size, and says what would fit the median of the pictures. `None` if no picture shows a

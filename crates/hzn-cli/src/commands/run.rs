@@ -333,8 +333,14 @@ impl Watch {
         let read = |indices: Vec<u64>| ReadAgain::read(&request, config, &indices);
         let rates = || read(self.shutter.pictures(config))?.rate_fault(&request, config);
         let limb = || read(self.altitudes.pictures())?.contradiction(&request, config);
+        // Refused pictures of another size do not say whether the principal point is their cause.
+        let centre = || {
+            let is_worth_it = is_told || self.altitudes.are_at_several_places();
+            if is_worth_it { read(self.altitudes.with_edge())?.centre_fault(&request, config) } else { None }
+        };
         // Wrong rates change the half-angles, too.
-        if let Some(what) = rates().or_else(|| if is_told { None } else { limb() }) {
+        let what = rates().or_else(|| if is_told { None } else { limb() }).or_else(centre);
+        if let Some(what) = what {
             tell::warning(format_args!("the answers are doubtful: {what}"));
         }
     }

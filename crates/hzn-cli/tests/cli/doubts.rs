@@ -63,3 +63,25 @@ fn all_answers_together_contradict_a_wrong_altitude() {
     let km = low.split_once("an altitude of ").expect(&low).1.split_once(" km instead of 720 km").expect(&low).0;
     assert!((km.parse::<f64>().unwrap() / 900.0 - 1.0).abs() < 0.1, "{low}");
 }
+
+/// The principal point of a picture that was cut out of a larger one, or that was told wrong.
+#[test]
+fn the_limb_at_several_places_contradicts_a_wrong_principal_point() {
+    let place = Place::new();
+    let lens = &Lens { name: "pinhole", guess: "pinhole", fov_deg: 60.0, k: &[0.0] };
+    Flight { frames: 24, seed: 41, ..Flight::new(lens) }.render(&place);
+    let sensor = place.read("flight/sensor.toml");
+    let told = |cx: &str, cy: &str| {
+        let text = sensor.replace("cx_px = 159.5", &format!("cx_px = {cx}")).replace("cy_px = 119.5", cy);
+        assert!(text != sensor || cx == "159.5", "{sensor}");
+        place.write("told.toml", text.as_bytes());
+        place.run(&["run", "flight", "--sensor", "told.toml", "-q"]).expect(0).err
+    };
+    for (cx, cy) in [("159.5", "cy_px = 119.5"), ("160.5", "cy_px = 118.7")] {
+        let right = told(cx, cy);
+        assert!(!right.contains("doubtful"), "{cx}: {right}");
+    }
+    let wrong = told("174.5", "cy_px = 119.5");
+    let found = wrong.split_once("the principal point at cx_px = ").expect(&wrong).1.split_once(' ').expect(&wrong).0;
+    assert!((found.parse::<f64>().unwrap() - 159.5).abs() < 8.0, "{wrong}");
+}
