@@ -2,9 +2,11 @@
 
 use hzn_calib::noise;
 use hzn_calib::sky::{self, LimbPrior, View};
+use hzn_core::body::Kind;
 use hzn_core::camera::Camera;
 use hzn_core::image::region::Region;
-use hzn_core::{Config, Prior};
+use hzn_core::{Config, Prior, Solution};
+use hzn_evaluate::{Sighting, find_attitude_convention};
 use hzn_files::FrameData;
 use hzn_run::bars::find_bars;
 use hzn_run::diagnosis::{self, AnyCone, FitFacts, RateFault, RateTrial, Said};
@@ -30,9 +32,20 @@ pub(crate) struct Again {
     pub(crate) fits: Option<WhatFits>,
 }
 
+/// 1-sigma of an attitude whose cell is empty, degrees.
+const ATTITUDE_SIGMA_DEG: f64 = 5.0;
+
 /// Some pictures of a sequence, to look at again.
 pub(crate) struct ReadAgain {
-    each: Vec<(String, Picture, Option<FrameData>)>,
+    each: Vec<Look>,
+}
+
+/// A picture with its name and its data.
+struct Look {
+    name: String,
+    picture: Picture,
+    data: Option<FrameData>,
+    time_s: Option<f64>,
 }
 
 impl ReadAgain {
@@ -48,8 +61,9 @@ impl ReadAgain {
                 continue;
             }
             let data = item.take_prior(opened.frames.as_ref());
+            let time_s = data.as_ref().and_then(|data| data.time_s);
             if let Ok((picture, _)) = item.payload.decode(Some(config)) {
-                each.push((item.name, picture, data));
+                each.push(Look { name: item.name, picture, data, time_s });
             }
         }
         Some(Self { each })
@@ -59,7 +73,7 @@ impl ReadAgain {
     pub(crate) fn rate_fault(&self, request: &Request, config: &Config) -> Option<String> {
         let mut trial = RateTrial::new(config, request.flight).ok()?;
         let mut gains = Vec::new();
-        for (_, picture, data) in &self.each {
+        for Look { picture, data, .. } in &self.each {
             let (Ok(view), Some(data)) = (picture.view(config.input.channel), data) else { continue };
             gains.extend(trial.compare(&view, data));
         }
@@ -77,13 +91,49 @@ impl ReadAgain {
         Some(format!("{better} of {} pictures that were processed again fit better with {cause}", gains.len()))
     }
 
+    /// Returns the answer to each picture without its attitude, for the first body.
+    fn answers(&self, request: &Request, config: &Config) -> Vec<(&Look, &FrameData, Solution<f64>)> {
+        let Ok(mut sensor) = AnySensor::new(config, request.flight) else { return Vec::new() };
+        let bodies = config.each_body().len();
+        let mut all = Vec::new();
+        for look in &self.each {
+            let (Ok(view), Some(data)) = (look.picture.view(config.input.channel), &look.data) else { continue };
+            // An answer that was refused says nothing about the next one.
+            sensor.remember(&vec![None; bodies]);
+            let free = FrameData { q_fixed_from_camera_wxyz: None, ..data.clone() };
+            let processed = sensor.process(&view, Some(&free), None);
+            let report = processed.into_iter().next().and_then(|first| first.report.ok());
+            all.extend(report.and_then(|report| report.solution).map(|solution| (look, data, solution)));
+        }
+        all
+    }
+
+    /// Says in which convention the attitudes or positions of the pictures are that contradict their limbs; `None` if
+    /// nothing simple explains it.
+    pub(crate) fn attitude_convention(&self, request: &Request, config: &Config) -> Option<String> {
+        let sighting = |(look, data, solution): &(&Look, &FrameData, Solution<f64>)| {
+            let told_deg = data.attitude_sigma_deg.unwrap_or(ATTITUDE_SIGMA_DEG);
+            Some(Sighting {
+                axis: solution.axis.xyz(),
+                sigma_rad: solution.covariance.sigma_max_rad().hypot(told_deg.to_radians()),
+                time_s: look.time_s.unwrap_or(0.0),
+                q_fixed_from_camera_wxyz: data.q_fixed_from_camera_wxyz?,
+                position_km: data.position_km?,
+            })
+        };
+        let all: Vec<Sighting> = self.answers(request, config).iter().filter_map(sighting).collect();
+        let mount = config.mount.map(|mount| mount.q_vehicle_from_camera_wxyz);
+        let is_earth = config.each_body().first()?.kind == Kind::Earth;
+        find_attitude_convention(&all, mount, is_earth)
+    }
+
     /// Says which altitude or lens the half-angles of all answers together show; `None` if they agree with those told.
     pub(crate) fn contradiction(&self, request: &Request, config: &Config) -> Option<String> {
         let mut sensor = AnySensor::new(config, request.flight).ok()?;
         let camera = Camera::try_new(&config.camera).ok()?;
         let bodies = config.each_body();
         let (mut said, mut altitudes_km) = (Vec::new(), Vec::new());
-        for (_, picture, data) in &self.each {
+        for Look { picture, data, .. } in &self.each {
             let Ok(view) = picture.view(config.input.channel) else { continue };
             let traces = Traces::new(bodies.len());
             let processed = sensor.process(&view, data.as_ref(), Some(&traces));
@@ -108,7 +158,7 @@ impl ReadAgain {
         used.camera.covariance = None;
         used.camera.focal_sigma_percent = config.camera.focal_sigma_percent.max(10.0 * sky::DEFAULT_DETECT_PERCENT);
         let mut sensor = AnySensor::new(&used, request.flight).ok()?;
-        let view = |(name, picture, data): &(String, Picture, Option<FrameData>)| {
+        let view = |Look { name, picture, data, .. }: &Look| {
             let traces = Traces::new(1);
             let view = picture.view(config.input.channel).ok()?;
             let processed = sensor.process(&view, data.as_ref(), Some(&traces));
@@ -147,13 +197,13 @@ impl ReadAgain {
         let mut trial = AnyCone::new(config, request.flight).ok()?;
         let camera = Camera::try_new(&config.camera).ok()?;
         let mut found: Vec<FitFacts> = Vec::new();
-        for (_, picture, data) in &self.each {
+        for Look { picture, data, .. } in &self.each {
             let Ok(view) = picture.view(config.input.channel) else { continue };
             found.extend(diagnosis::find_misfit(&mut trial, config, &view, data.as_ref()));
         }
         let fits = diagnosis::what_fits(&diagnosis::median_fit(&found)?, &camera, config.camera.width);
         let text = match (self.each.as_slice(), found.len()) {
-            ([(name, ..)], _) => format!("in {name} {fits}"),
+            ([Look { name, .. }], _) => format!("in {name} {fits}"),
             (each, n) => format!("in {n} of {} refused pictures that were looked at (median), {fits}", each.len()),
         };
         Some(WhatFits { text, pictures: found.len() })
@@ -161,7 +211,7 @@ impl ReadAgain {
 
     /// Says which bars the pictures have that no mask covers.
     pub(crate) fn bars(&self, config: &Config) -> Option<String> {
-        let pictures: Vec<Picture> = self.each.iter().map(|(_, picture, _)| picture.clone()).collect();
+        let pictures: Vec<Picture> = self.each.iter().map(|look| look.picture.clone()).collect();
         let bars = find_bars(&pictures)?;
         let (width, height) = (config.camera.width, config.camera.height);
         let region = Region::<f64>::new(&config.mask, &Camera::try_new(&config.camera).ok()?);

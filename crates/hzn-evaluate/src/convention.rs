@@ -7,11 +7,11 @@ use nalgebra::{Matrix3, Vector3};
 use crate::case::Case;
 
 /// Errors are looked at if their median is larger than this many of their sigmas.
-const LARGE_SIGMAS: f64 = 3.0;
+pub(crate) const LARGE_SIGMAS: f64 = 3.0;
 /// A convention explains the errors if it makes their median smaller by this factor.
-const SMALLER: f64 = 5.0;
+pub(crate) const SMALLER: f64 = 5.0;
 /// Fewest answers: a rotation has three unknowns, and each answer gives two numbers.
-const MIN_ANSWERS: usize = 3;
+pub(crate) const MIN_ANSWERS: usize = 3;
 
 /// Returns what would make the truth of each body fit its answers, as warnings; none for bodies whose errors are not
 /// large, or are not explained by anything simple.
@@ -54,11 +54,10 @@ fn find_convention(cases: &[&Case]) -> Option<String> {
             return Some(told(format!("each row of the truth belonged to the {what} picture"), after));
         }
     }
-    let turn = rotation(&pairs)?;
+    let turn = rotation_between(pairs.iter().map(|p| (p.answer, p.truth)))?;
     let after = with(&turn);
-    let angle_deg = ((turn.trace() - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
-    let about = Vector3::new(turn[(2, 1)] - turn[(1, 2)], turn[(0, 2)] - turn[(2, 0)], turn[(1, 0)] - turn[(0, 1)]);
-    let about = about.try_normalize(1e-12)?;
+    let (about, angle_rad) = axis_and_angle(&turn)?;
+    let angle_deg = angle_rad.to_degrees();
     // The sum with 0 makes a negative zero positive.
     let [x, y, z] = <[f64; 3]>::from(about).map(|x| (100.0 * x).round() / 100.0 + 0.0);
     explains(after).then(|| {
@@ -94,9 +93,16 @@ fn shifted(cases: &[&Case], step: isize) -> Option<f64> {
     (errors.len() >= MIN_ANSWERS).then(|| median(errors.into_iter()))
 }
 
-/// Returns the rotation from truth to answer with the least squared errors (Wahba's problem, by singular values).
-fn rotation(pairs: &[Pair]) -> Option<Matrix3<f64>> {
-    let attitude_profile: Matrix3<f64> = pairs.iter().map(|p| p.answer * p.truth.transpose()).sum();
+/// Returns axis and angle of a rotation, rad; `None` for one by nothing or by half a turn.
+pub(crate) fn axis_and_angle(turn: &Matrix3<f64>) -> Option<(Vector3<f64>, f64)> {
+    let about = Vector3::new(turn[(2, 1)] - turn[(1, 2)], turn[(0, 2)] - turn[(2, 0)], turn[(1, 0)] - turn[(0, 1)]);
+    Some((about.try_normalize(1e-12)?, ((turn.trace() - 1.0) / 2.0).clamp(-1.0, 1.0).acos()))
+}
+
+/// Returns the rotation to the first directions of pairs from the second ones with the least squared errors (Wahba's
+/// problem, by singular values).
+pub(crate) fn rotation_between(pairs: impl Iterator<Item = (Vector3<f64>, Vector3<f64>)>) -> Option<Matrix3<f64>> {
+    let attitude_profile: Matrix3<f64> = pairs.map(|(to, from)| to * from.transpose()).sum();
     let svd = attitude_profile.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
     let sign = (u.determinant() * v_t.determinant()).signum();
@@ -145,11 +151,11 @@ impl Axes {
     }
 }
 
-fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+pub(crate) fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.cross(b).norm().atan2(a.dot(b))
 }
 
-fn median(values: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)

@@ -11,6 +11,7 @@
 //! picture that was not answered counts as unanswered. An answer to a picture without a limb in view counts as a false
 //! answer.
 
+mod attitudes;
 mod case;
 mod classes;
 mod convention;
@@ -22,6 +23,7 @@ mod position;
 mod quantile;
 mod summary;
 
+pub use attitudes::{Sighting, find_attitude_convention};
 pub use case::{Answer, Case, MeasuredDirection, Mismatch, Miss, limb_in_view_px, pair};
 pub use classes::{ErrorClasses, WINDOW};
 pub use convention::describe_conventions;

@@ -34,6 +34,7 @@ pub mod png;
 mod problem;
 mod quoted;
 pub mod rig;
+pub mod rotations;
 pub mod sensor;
 mod separator;
 pub mod start;

@@ -23,7 +23,7 @@ pub(super) use args::{Args, cores};
 
 use super::resume;
 use crate::doubts::{
-    Altitudes, Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Repeats, Shutter, Times, ToldSun,
+    Altitudes, Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Refused, Repeats, Shutter, Times, ToldSun,
 };
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
@@ -173,6 +173,7 @@ struct Watch {
     told_sun: ToldSun,
     shutter: Shutter,
     altitudes: Altitudes,
+    refused: Refused,
     refusals: Refusals,
     multi_page: MultiPageFiles,
     masks: picture_folders::Masks,
@@ -200,6 +201,7 @@ impl Watch {
             told_sun: ToldSun::default(),
             shutter: Shutter::default(),
             altitudes: Altitudes::default(),
+            refused: Refused::default(),
             refusals: Refusals::default(),
             multi_page: MultiPageFiles::default(),
             masks: picture_folders::Masks::default(),
@@ -217,6 +219,7 @@ impl Watch {
         self.told_sun.count(frame);
         self.shutter.count(frame);
         self.altitudes.count(frame, config);
+        self.refused.count(frame);
         self.refusals.count(frame);
         self.multi_page.count(frame);
         if !self.quiet {
@@ -325,12 +328,21 @@ impl Watch {
         true
     }
 
+    /// Looks again at pictures that contradict their attitudes, and tells which convention would make them agree.
+    fn tell_refused(&self, request: &Request, config: &Config) {
+        let read = |indices: Vec<u64>| ReadAgain::read(request, config, &indices);
+        if let Some(what) = read(self.refused.of_attitude()).and_then(|r| r.attitude_convention(request, config)) {
+            tell::warning(format_args!("the refused pictures agree with each other if {what}"));
+        }
+    }
+
     /// Looks again at some pictures, and tells that the answers are doubtful if they contradict their rates, or all
     /// together what was told of altitude and lens.
     fn tell_contradictions(&self, args: &Args, plan: &Plan, is_told: bool) {
         let config = &plan.config;
         let Some(request) = request_again(args) else { return };
         let read = |indices: Vec<u64>| ReadAgain::read(&request, config, &indices);
+        self.tell_refused(&request, config);
         let rates = || read(self.shutter.pictures(config))?.rate_fault(&request, config);
         let limb = || read(self.altitudes.pictures())?.contradiction(&request, config);
         // Refused pictures of another size do not say whether the principal point is their cause.

@@ -13,6 +13,7 @@ mod campaign;
 mod ccsds;
 mod commands;
 mod common;
+mod conventions;
 mod corners;
 mod documents;
 mod doubts;

@@ -76,7 +76,11 @@ impl Frames {
         }
         warnings.extend(self.explain_unused_columns(config));
         warnings.extend(self.explain_unused_attitude(config));
-        warnings.extend(self.suspect_milliseconds());
+        let milliseconds = self.suspect_milliseconds();
+        // Positions say nothing about their axes if the times have another unit.
+        let is_earth = bodies.first().is_some_and(|body| body.kind == Kind::Earth) && milliseconds.is_none();
+        warnings.extend(milliseconds);
+        warnings.extend(is_earth.then(|| self.suspect_inertial_positions()).flatten());
         warnings.extend(self.suspect_rates().or_else(|| self.suspect_turn_of_a_picture(config)));
         warnings.extend(self.explain_missing_rates(config));
         warnings
@@ -285,7 +289,7 @@ fn from_rotation_vector([x, y, z]: [f64; 3]) -> [f64; 4] {
 }
 
 /// Returns the middle value; 0 without values.
-fn median(mut values: Vec<f64>) -> f64 {
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or_default()
 }

@@ -17,6 +17,7 @@
 
 mod check;
 mod data;
+mod inertial;
 mod read;
 
 pub use check::altitude_at_km;

@@ -1,6 +1,7 @@
 //! Faults that have no size: inverted or exchanged mounts, quaternions in another order, pictures in another
 //! orientation, attitudes in another frame. Each changes the problem as if the user had mended it.
 
+use hzn_files::rotations::Written;
 use nalgebra::{DVector, Quaternion, UnitQuaternion, Vector3};
 
 use super::problem::{Problem, about_pole};
@@ -124,7 +125,8 @@ impl Fault {
 
 /// Returns the rotation that was meant if its quaternion x, y, z, w was read as w, x, y, z.
 fn with_scalar_first(read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize(Quaternion::new(read.k, read.w, read.i, read.j))
+    let [w, x, y, z] = Written::ScalarLast.meant([read.w, read.i, read.j, read.k]);
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
 }
 
 fn each_mount(problem: &mut Problem, cameras: &[usize], mended: impl Fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>) {
