@@ -16,6 +16,8 @@ use hzn_run::open::{Request, open};
 use hzn_run::record;
 use hzn_run::source::Picture;
 
+use crate::doubts::{Answer, Rates};
+
 /// What refused pictures say about the size of the limb.
 pub(crate) struct WhatFits {
     /// What would fit them, in words.
@@ -40,8 +42,9 @@ pub(crate) struct ReadAgain {
     each: Vec<Look>,
 }
 
-/// A picture with its name and its data.
+/// A picture with its number, its name and its data.
 struct Look {
+    index: u64,
     name: String,
     picture: Picture,
     data: Option<FrameData>,
@@ -63,7 +66,7 @@ impl ReadAgain {
             let data = item.take_prior(opened.frames.as_ref());
             let time_s = data.as_ref().and_then(|data| data.time_s);
             if let Ok((picture, _)) = item.payload.decode(Some(config)) {
-                each.push(Look { name: item.name, picture, data, time_s });
+                each.push(Look { index, name: item.name, picture, data, time_s });
             }
         }
         Some(Self { each })
@@ -125,6 +128,25 @@ impl ReadAgain {
         let mount = config.mount.map(|mount| mount.q_vehicle_from_camera_wxyz);
         let is_earth = config.each_body().first()?.kind == Kind::Earth;
         find_attitude_convention(&all, mount, is_earth)
+    }
+
+    /// Says what is wrong with the rates of pictures that were refused because their edge does not move as the rates
+    /// say; `None` if nothing is.
+    pub(crate) fn turn_fault(&self, request: &Request, config: &Config) -> Option<String> {
+        let answer = |(look, data, solution): &(&Look, &FrameData, Solution<f64>)| {
+            let (time_s, rate_rad_s) = (look.time_s?, data.rate_rad_s?.into());
+            let (axis, noise_rad) = (solution.axis.xyz().into(), solution.noise_rad());
+            Some((look.index, Answer { time_s, rate_rad_s, axis, noise_rad }))
+        };
+        let all: Vec<(u64, Answer)> = self.answers(request, config).iter().filter_map(answer).collect();
+        let mut rates = Rates::default();
+        for pair in all.windows(2) {
+            let [(before, a), (after, b)] = pair else { continue };
+            if before + 1 == *after {
+                rates.add(a, b);
+            }
+        }
+        rates.contradiction(config.mount.map(|mount| mount.q_vehicle_from_camera_wxyz))
     }
 
     /// Says which altitude or lens the half-angles of all answers together show; `None` if they agree with those told.

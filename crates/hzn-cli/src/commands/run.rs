@@ -251,7 +251,7 @@ impl Watch {
     fn tell(&self, plan: &Plan) {
         self.missing.tell(plan.frames.as_ref());
         self.times.tell();
-        self.rates.tell();
+        self.rates.tell(mount_of(&plan.config));
         self.one_place.tell();
         self.improbable.tell(&plan.config.gates);
         self.repeats.tell(&plan.config.gates, self.quiet);
@@ -328,11 +328,21 @@ impl Watch {
         true
     }
 
-    /// Looks again at pictures that contradict their attitudes, and tells which convention would make them agree.
+    /// Looks again at pictures that contradict their attitudes or rates, and tells which convention or unit would make
+    /// them agree.
     fn tell_refused(&self, request: &Request, config: &Config) {
         let read = |indices: Vec<u64>| ReadAgain::read(request, config, &indices);
         if let Some(what) = read(self.refused.of_attitude()).and_then(|r| r.attitude_convention(request, config)) {
             tell::warning(format_args!("the refused pictures agree with each other if {what}"));
+        }
+        let pairs = self.refused.pairs().into_iter().flat_map(|later| [later.saturating_sub(1), later]);
+        // A table whose answers contradict its rates was told already.
+        let is_told = self.rates.contradiction(mount_of(config)).is_some();
+        let turns = || read(pairs.collect())?.turn_fault(request, config);
+        if let Some(what) = (!is_told).then(turns).flatten() {
+            tell::warning(format_args!(
+                "gates.fixed_edge refuses pictures whose edge moves, but not as rate_x, rate_y, rate_z say: {what}"
+            ));
         }
     }
 
@@ -356,6 +366,10 @@ impl Watch {
             tell::warning(format_args!("the answers are doubtful: {what}"));
         }
     }
+}
+
+fn mount_of(config: &Config) -> Option<[f64; 4]> {
+    config.mount.map(|mount| mount.q_vehicle_from_camera_wxyz)
 }
 
 /// Returns the request to read the pictures again; `None` for a stream, which cannot be read twice.

@@ -1,4 +1,4 @@
-//! Tables whose attitudes or positions are in another convention: the run names it.
+//! Tables whose attitudes, positions or rates are in another convention or unit: the run names it.
 
 use crate::common::{Place, limb};
 
@@ -96,4 +96,23 @@ fn attitudes_in_another_convention_are_named() {
     let with_mount = format!("{sensor}\n[mount]\nq_vehicle_from_camera_wxyz = [{w}, {x}, {y}, {z}]\n");
     place.write("in/sensor.toml", with_mount.as_bytes());
     named("the attitudes are those of the vehicle", said(&place, of_vehicle));
+}
+
+/// A camera that nods by 1.5 degrees a second.
+#[test]
+fn rates_of_another_unit_or_about_other_axes_are_named() {
+    let place = place();
+    let said = |rate: [f64; 3]| {
+        let [x, y, z] = rate;
+        let row = |i: u32| format!("{i:04}.png,{i},{x},{y},{z}\n");
+        let rows: String = (0..PICTURES).map(row).collect();
+        place.write("in/frames.csv", format!("file,time_s,rate_x,rate_y,rate_z\n{rows}").as_bytes());
+        place.run(&["run", "in", "-o", "a.csv", "--force"]).expect(0)
+    };
+    let right = said([1.5f64.to_radians(), 0.0, 0.0]).err;
+    assert!(!right.contains("the rates miss"), "{right}");
+    let degrees = said([1.5, 0.0, 0.0]).err;
+    assert!(degrees.contains("are they in degrees per second?"), "{degrees}");
+    let vehicle = said([0.0, 0.0, 1.5f64.to_radians()]).err;
+    assert!(vehicle.contains("about axes that are turned by"), "{vehicle}");
 }
