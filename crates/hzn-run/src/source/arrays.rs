@@ -3,6 +3,7 @@
 use std::io::{Cursor, Read, Seek};
 
 use hzn_core::image::Layout;
+use hzn_files::png::Contents;
 use hzn_mcap::words_from_floats;
 
 use super::limits::{MAX_BYTES, check_size};
@@ -184,7 +185,8 @@ fn fits(head: &[u8]) -> Result<Array, String> {
 }
 
 /// Returns width and height of a TIFF whose grey samples have 32 or 64 bits. `None` for every other TIFF.
-pub(super) fn wide_tiff_size(contents: impl Read + Seek) -> Option<(u32, u32)> {
+// Each type of reader would compile the decoder again, so all of them come as this one.
+pub(super) fn wide_tiff_size(contents: &mut dyn Contents) -> Option<(u32, u32)> {
     let mut decoder = tiff::decoder::Decoder::new(contents).ok()?;
     matches!(decoder.colortype().ok()?, tiff::ColorType::Gray(32 | 64)).then(|| decoder.dimensions().ok())?
 }
@@ -199,7 +201,8 @@ pub(super) fn decode_wide_tiff(
     held: &mut Held,
 ) -> Option<Result<Picture, String>> {
     use tiff::decoder::DecodingResult;
-    let (width, height) = wide_tiff_size(Cursor::new(bytes))?;
+    let mut contents = Cursor::new(bytes);
+    let (width, height) = wide_tiff_size(&mut contents)?;
     let mut read = || {
         check_size(width, height, expected)?;
         let pixels = u64::from(width) * u64::from(height);
@@ -211,7 +214,9 @@ pub(super) fn decode_wide_tiff(
         let mut limits = tiff::decoder::Limits::default();
         limits.decoding_buffer_size = 8 * pixels as usize;
         limits.intermediate_buffer_size = 8 * pixels as usize;
-        let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).map_err(failed)?.with_limits(limits);
+        contents.set_position(0);
+        let contents: &mut dyn Contents = &mut contents;
+        let mut decoder = tiff::decoder::Decoder::new(contents).map_err(failed)?.with_limits(limits);
         let values: Vec<f64> = match decoder.read_image().map_err(failed)? {
             DecodingResult::F32(values) => values.into_iter().map(f64::from).collect(),
             DecodingResult::F64(values) => values,
@@ -311,7 +316,7 @@ mod tests {
         let mut encoder = tiff::encoder::TiffEncoder::new(&mut file).unwrap();
         encoder.write_image::<tiff::encoder::colortype::Gray32Float>(2, 1, &[0.25, 0.75]).unwrap();
         let bytes = file.into_inner();
-        assert_eq!(wide_tiff_size(Cursor::new(&bytes)), Some((2, 1)));
+        assert_eq!(wide_tiff_size(&mut Cursor::new(&bytes)), Some((2, 1)));
         let picture = decode_wide_tiff(&bytes, None, &mut Held::default()).unwrap().unwrap();
         assert_eq!(words(picture), [8192, 57344]);
         let refused = decode_wide_tiff(&bytes, Some((3, 1)), &mut Held::default()).unwrap();

@@ -74,5 +74,8 @@ pub(super) fn read_size_from(mut contents: impl Read + Seek) -> Option<(u32, u32
     }
     contents.rewind().ok()?;
     let size = picture_reader(&mut contents).ok()?.into_dimensions().ok();
-    size.or_else(|| arrays::wide_tiff_size(contents.rewind().map(|()| contents).ok()?))
+    size.or_else(|| {
+        contents.rewind().ok()?;
+        arrays::wide_tiff_size(&mut contents)
+    })
 }
