@@ -64,11 +64,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
             "the axis is more than {} sigma from the given attitude (gates.max_attitude_sigma)",
             s.max_attitude_sigma
         ),
-        Verdict::Sun => {
-            "the given Sun does not light this limb (gates.max_unlit): are its sign and frame right? A thermal camera \
-             sets body.sunlit = false"
-                .into()
-        }
+        Verdict::Sun => "the given Sun does not light this limb (gates.max_unlit): check its sign and frame".into(),
         Verdict::Fixed => "suspect: fixed in the picture, while the vehicle turns (gates.fixed_edge)".into(),
         Verdict::Rate => "the axis is farther from the last answer than it can turn (gates.max_rate_deg_s)".into(),
     }

@@ -69,14 +69,8 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
     finished.glimpse = sensor.glimpse(&view);
     sensor.set_time(finished.time_s);
     finished.outcomes = sensor.process(&view, data, traces.as_ref()).into_iter().map(BodyOutcome::from).collect();
-    if let Some(bytes) = &mut finished.bytes {
-        // Without the rate: the flight computer compares the same tiles.
-        bytes.see_limbs(&finished.outcomes, &sensor.camera_of(None));
-    }
-    finished.brightness_by_sun = brightness_by_sun(&plan.config, &picture, &sensor.camera_of(data), &finished);
-    if finished.outcomes.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
-        finished.tip = picture.unused_bits();
-    }
+    look_at_pixels(plan, sensor, &picture, &mut finished);
+    let data = finished.data.as_ref();
     if let Some(traces) = traces.as_ref().filter(|_| plan.trace || plan.overlay.is_some()) {
         // The drawing is made here, because in the single writing thread it would delay all other threads.
         let drawing = draw(&finished.outcomes, traces, &sensor.camera_of(data));
@@ -93,6 +87,19 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         finished.picture = Some(original.map_or_else(png, Ok)?);
     }
     Ok(finished)
+}
+
+/// Takes what the pixels say beyond the answers: along the limbs, towards the Sun, and if there is no answer.
+fn look_at_pixels(plan: &Plan, sensor: &AnySensor, picture: &Picture, finished: &mut Finished) {
+    if let Some(bytes) = &mut finished.bytes {
+        // Without the rate: the flight computer compares the same tiles.
+        bytes.see_limbs(&finished.outcomes, &sensor.camera_of(None));
+    }
+    let camera = sensor.camera_of(finished.data.as_ref());
+    finished.brightness_by_sun = brightness_by_sun(&plan.config, picture, &camera, finished);
+    if finished.outcomes.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
+        finished.tip = picture.unused_bits();
+    }
 }
 
 /// Returns whether the first body becomes brighter towards the Sun that was told, see [`told_sun`].
