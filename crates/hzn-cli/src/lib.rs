@@ -14,6 +14,7 @@ pub mod exit;
 mod files;
 mod html;
 mod kind_of_file;
+mod limbs_of_rig;
 mod progress;
 mod refusals;
 mod setup;

@@ -22,5 +22,5 @@ mod reduced;
 mod tests;
 
 pub use adjust::{Adjusted, Refused, Settings, adjust};
-pub use check::{Check, check};
+pub use check::{Check, check, noticed};
 pub use epoch::{Epoch, Sighting};

@@ -81,7 +81,21 @@ fn mounts_are_found_from_the_limbs_that_the_heads_see_together() {
     assert!(checked.starts_with("mounts         does not hold: right has turned by 0."), "{checked}");
     let checked = place.run(&["calibrate", "rig", "ring/rig.toml", "-q", "--check"]).expect(0).out;
     assert!(checked.starts_with("mounts         holds"), "{checked}");
+    // What would have been noticed is told for each head and axis.
+    let axes = checked.lines().filter(|line| line.contains("about x, y, z of its camera: ")).count();
+    assert_eq!(axes, 4, "{checked}");
     calibrate(&["--prior-deg", "0"]).expect(2).says("--prior-deg");
+    two_heads(&place);
+}
+
+/// Two heads whose mounts are right are not doubted.
+fn two_heads(place: &Place) {
+    let mut rig = hzn_files::rig::load(&place.path("ring/rig.toml")).unwrap();
+    rig.heads.retain(|head| head.name == "front" || head.name == "right");
+    rig.heads.iter_mut().for_each(|head| head.mount.as_mut().unwrap().sigma_deg = 0.01);
+    place.write("ring/two.toml", hzn_files::rig::to_text(&rig).unwrap().as_bytes());
+    let right = place.run(&["run", "ring/two.toml", "-o", "two.csv", "-q", "--force"]).expect(0).err;
+    assert!(!right.contains("doubtful"), "{right}");
 }
 
 #[test]

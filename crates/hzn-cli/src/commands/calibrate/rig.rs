@@ -2,20 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_calib::rig::{Adjusted, Check, Epoch, Settings, Sighting, adjust, check};
+use hzn_calib::rig::{Adjusted, Check, check, noticed};
 use hzn_core::status::Status;
-use hzn_files::rig::{Head, HeadMount};
+use hzn_files::rig::HeadMount;
 use hzn_run::disk;
 use hzn_run::engine::{self, End, Turns};
 use hzn_run::explain::counted;
-use hzn_run::rig::{self, Epochs, FinishedEpoch, HeadPlan, Opened, Plan, Request, Seen};
-use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use hzn_run::rig::{self, Epochs, HeadPlan, Opened, Plan, Request};
+use nalgebra::UnitQuaternion;
 
 use super::rig_text;
 use crate::commands::run::cores;
 use crate::doubts::Contradictions;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::files;
+use crate::limbs_of_rig::{LimbsOfRig, PRIOR_DEG};
 use crate::progress::Progress;
 use crate::setup::stop_flag;
 use crate::tell;
@@ -47,7 +48,7 @@ pub(super) struct Args {
     #[arg(long)]
     check: bool,
     /// 1-sigma of each mount about each axis before the adjustment, in degrees
-    #[arg(long, value_name = "DEG", default_value_t = 5.0)]
+    #[arg(long, value_name = "DEG", default_value_t = PRIOR_DEG)]
     prior_deg: f64,
     /// frames.csv of the vehicle; without it, the one next to rig.toml
     #[arg(long, value_name = "CSV")]
@@ -62,9 +63,6 @@ pub(super) struct Args {
     #[arg(short, long)]
     quiet: bool,
 }
-
-/// Speed of the point below a vehicle in low orbit, km/s, with which the limb passes its weather.
-const GROUND_SPEED_KM_S: f64 = 7.0;
 
 pub(super) fn run(args: &Args) -> Outcome {
     if !(args.prior_deg > 0.0 && args.prior_deg <= 90.0) {
@@ -83,30 +81,27 @@ pub(super) fn run(args: &Args) -> Outcome {
     if opened.heads.len() < 2 {
         return Err(usage(format!("{}: one head has no mount relative to another one", args.rig.display())));
     }
-    let (names, heads) = (opened.rig.heads.clone(), opened.rig.rig);
-    let false_alarm = heads.false_alarm;
+    let (names, false_alarm) = (opened.rig.heads.clone(), opened.rig.rig.false_alarm);
     let Some(found) = look(args, opened)? else {
         tell::line("interrupted; nothing was measured");
         return Ok(Exit::Interrupted);
     };
-    let settings = Settings {
-        told: names.iter().map(told).collect(),
-        prior_rad: args.prior_deg.to_radians(),
-        own_sigma_km: heads.limb_own_sigma_km,
-        radius_km: found.radius_km,
-        independent: independent(&found.times_s, heads.limb_own_sigma_km, heads.limb_own_length_km),
-    };
-    let adjusted = adjust(&settings, &found.epochs).map_err(|why| {
+    let adjusted = found.limbs.adjust(args.prior_deg).map_err(|why| {
         let heads: Vec<&str> = names.iter().map(|head| head.name.as_str()).collect();
         let epochs = counted(found.count, "epoch");
         failed(format!("{}: of {epochs}: {}", args.rig.display(), why.describe(&heads)))
     })?;
     if args.check {
-        let told_rad2: Vec<Matrix3<f64>> = names.iter().map(told_rad2).collect();
+        let told_rad2 = found.limbs.told_rad2();
         let checked = check(&adjusted, &told_rad2);
         // The joint answer compares the heads with the told mounts, too, and may refuse what the turns leave open.
         let refused = found.contradictions.describe(false_alarm);
-        tell::result(rig_text::check_report(&names, &adjusted, &checked, refused.as_deref()))?;
+        tell::result(rig_text::check_report(
+            &names,
+            &adjusted,
+            (&checked, &noticed(&adjusted, &told_rad2)),
+            refused.as_deref(),
+        ))?;
         let holds = matches!(checked, Check::Holds(_)) && refused.is_none();
         return Ok(if holds { Exit::Done } else { Exit::Failed });
     }
@@ -130,18 +125,17 @@ fn check_output(args: &Args, opened: &Opened) -> Result<(), Stop> {
     Ok(())
 }
 
-/// The cones of a run.
+/// The limbs of a run.
 struct Found {
-    epochs: Vec<Epoch>,
-    times_s: Vec<f64>,
+    limbs: LimbsOfRig,
     count: u64,
-    radius_km: f64,
     contradictions: Contradictions,
 }
 
 /// Processes the pictures. `None` if the run was interrupted.
 fn look(args: &Args, opened: Opened) -> Result<Option<Found>, Stop> {
-    let (joiner, total, mounts) = (opened.joiner()?, opened.pictures(), opened.rig.heads.clone());
+    let (joiner, total) = (opened.joiner()?, opened.pictures());
+    let limbs = LimbsOfRig::new(opened.rig.heads.clone(), opened.rig.rig, &joiner);
     let sync_s = opened.rig.rig.sync_s;
     let head = |head: &rig::OpenHead| HeadPlan {
         name: head.name.clone(),
@@ -166,64 +160,20 @@ fn look(args: &Args, opened: Opened) -> Result<Option<Found>, Stop> {
     let plan = Plan { heads, joiner, threads, keep_pictures: false };
     let mut epochs = Epochs::new(opened.heads, sync_s)?;
     let mut progress = Progress::new(total, 0, args.quiet);
-    let radius_km = plan.joiner.limb().radius_km;
-    let mut found = Found {
-        epochs: Vec::new(),
-        times_s: Vec::new(),
-        count: 0,
-        radius_km,
-        contradictions: Contradictions::default(),
-    };
+    let mut found = Found { limbs, count: 0, contradictions: Contradictions::default() };
     let end = rig::look(&plan, &mut epochs, &stop_flag(), &mut |epoch| {
         found.count += 1;
         for frame in epoch.heads.iter().flatten() {
             progress.count(frame.outcomes.iter().map(|outcome| outcome.status()).take(1));
         }
-        found.times_s.extend(epoch.joint.time_s);
         // A head that repeats a picture is excluded, too, and says nothing about its mount.
         let excluded = epoch.joint.heads_excluded.is_some() && epoch.repeats.iter().all(Option::is_none);
         found.contradictions.count(epoch.joint.status == Status::Ok, &epoch.joint.detail, excluded);
-        found.epochs.push(sightings(epoch, &plan, &mounts));
+        found.limbs.add(epoch, &plan.joiner, false);
     })?;
     progress.finish();
     epochs.warnings().iter().for_each(tell::warning);
     Ok((end == End::Complete).then_some(found))
-}
-
-/// Returns what the heads see at an epoch, at the time of its first picture.
-fn sightings(epoch: &FinishedEpoch, plan: &Plan, mounts: &[Head]) -> Epoch {
-    let frames = epoch.heads.iter().zip(&epoch.repeats);
-    let seen: Vec<Seen<'_>> = frames.map(|(frame, repeats)| Seen::new(frame.as_ref(), *repeats)).collect();
-    let start_s = epoch.heads.iter().find_map(|frame| frame.as_ref()?.time_s);
-    let cones = plan.joiner.cones(&seen).into_iter();
-    let one = |((cone, frame), head): ((Option<_>, &Option<engine::Finished>), &Head)| {
-        let frame = frame.as_ref()?;
-        let rate = frame.data.as_ref().and_then(|data| data.rate_rad_s).map_or_else(Vector3::zeros, Vector3::from);
-        let late_s = start_s.zip(frame.time_s).map_or(0.0, |(start_s, own_s)| start_s - own_s);
-        // A direction that stays where it is turns backwards in the axes of the rig.
-        Sighting::new(&cone?, Rotation3::new(told(head) * rate * -late_s))
-    };
-    cones.zip(&epoch.heads).zip(mounts).map(one).collect()
-}
-
-fn told(head: &Head) -> Rotation3<f64> {
-    let [w, x, y, z] = head.mount.map_or([1.0, 0.0, 0.0, 0.0], |mount| mount.q_rig_from_camera_wxyz);
-    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix()
-}
-
-fn told_rad2(head: &Head) -> Matrix3<f64> {
-    let [xx, xy, xz, yy, yz, zz] = head.mount.map_or([0.0; 6], |mount| mount.covariance_rad2());
-    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-}
-
-/// Returns which part of the epochs is independent: those within one length of the limb's weather see the same one.
-fn independent(times_s: &[f64], sigma_km: f64, length_km: f64) -> f64 {
-    let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    match steps.get(steps.len() / 2) {
-        Some(step) if sigma_km > 0.0 => (step * GROUND_SPEED_KM_S / length_km).min(1.0),
-        _ => 1.0,
-    }
 }
 
 fn write(args: &Args, path: &Path, adjusted: &Adjusted) -> Result<(), Stop> {

@@ -12,20 +12,26 @@ pub(super) fn report(heads: &[Head], adjusted: &Adjusted) -> String {
 }
 
 /// Returns the report of a check: the verdict, and what the pictures say.
-/// `refused` says that the joint answer refuses more epochs than chance explains.
-pub(super) fn check_report(heads: &[Head], adjusted: &Adjusted, check: &Check, refused: Option<&str>) -> String {
+/// `noticed` has the turn of each head about each axis of its camera that would have been noticed, radians. `refused`
+/// says that the joint answer refuses more epochs than chance explains.
+pub(super) fn check_report(
+    heads: &[Head],
+    adjusted: &Adjusted,
+    (check, noticed): (&Check, &[[f64; 3]]),
+    refused: Option<&str>,
+) -> String {
     let verdict = match check {
         Check::Holds(_) if refused.is_some() => format!(
             "does not hold: {}. No turn of one head is significant, so the sigmas of the mounts may be too small, or a \
              lens, a clock or pictures of a head are wrong",
             refused.unwrap_or_default()
         ),
-        Check::Holds(noticed_rad) if noticed_rad.is_finite() => format!(
-            "holds: the heads see one limb with the mounts of rig.toml, within their sigmas; a turn of one head by \
-             {:.2}° about any determined axis would have been noticed",
-            noticed_rad.to_degrees()
-        ),
-        Check::Holds(_) => {
+        Check::Holds(true) => {
+            "holds: the heads see one limb with the mounts of rig.toml, within their sigmas; smaller \
+                               turns than those below would not have been noticed"
+                .into()
+        }
+        Check::Holds(false) => {
             "cannot tell: this flight determines no turn; turn the vehicle about other axes, or fly longer".into()
         }
         Check::Turned(k, angle, sigma) => {
@@ -38,7 +44,18 @@ pub(super) fn check_report(heads: &[Head], adjusted: &Adjusted, check: &Check, r
         }
         Check::Contradict => "does not hold: the heads contradict each other, and no single head explains it".into(),
     };
-    format!("{:<14} {}\n{}", "mounts", one_line(&verdict), report(heads, adjusted))
+    let blind = heads.iter().zip(noticed).filter(|_| *check != Check::Holds(false)).map(|(head, turns)| {
+        let [x, y, z] = turns.map(turn_deg);
+        format!("{:<14} {}\n", head.name, one_line(format!("about x, y, z of its camera: {x}, {y}, {z}")))
+    });
+    let blind: String = blind.collect();
+    let title = if blind.is_empty() { "" } else { "a turn of one head alone is noticed from these angles on\n" };
+    format!("{:<14} {}\n{}{title}{blind}", "mounts", one_line(&verdict), report(heads, adjusted))
+}
+
+/// Returns a turn in words. Beyond a quarter of a circle, nothing is small any more.
+fn turn_deg(rad: f64) -> String {
+    if rad < core::f64::consts::FRAC_PI_2 { format!("{:.2}°", rad.to_degrees()) } else { "never".to_owned() }
 }
 
 fn lines(heads: &[Head], adjusted: &Adjusted) -> Vec<(String, String)> {

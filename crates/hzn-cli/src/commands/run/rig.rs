@@ -12,6 +12,7 @@ use hzn_run::{disk, explain, source};
 use super::args::Args;
 use crate::doubts::{Contradictions, Improbable, MissingPriors};
 use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::limbs_of_rig::LimbsOfRig;
 use crate::progress::{Counts, Progress, count_text};
 use crate::setup::{TableFormat, stop_flag};
 use crate::tell;
@@ -35,7 +36,7 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
     let plan = plan(args, &opened)?;
     let texts: Vec<_> = opened.heads.iter().map(|head| head.sensor.text.clone()).collect();
     let (total, text) = (opened.pictures(), opened.text.clone());
-    let false_alarm = opened.rig.rig.false_alarm;
+    let (mounts, common, false_alarm) = (opened.rig.heads.clone(), opened.rig.rig, opened.rig.rig.false_alarm);
     let mut input = Input { request, tables: tables(&opened), epochs: epochs(opened)? };
     let heads: Vec<_> =
         plan.heads.iter().zip(texts).map(|(head, text)| (head.name.clone(), &head.plan.config, text)).collect();
@@ -52,7 +53,8 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
     };
     output.run_again_from(start.epoch());
     let done = stored.epochs.iter().map(|epoch| epoch.pictures() as u64).sum();
-    let mut watch = Watch::new(args.quiet, total, (stored.frames, done));
+    let limbs = LimbsOfRig::new(mounts, common, &plan.joiner);
+    let mut watch = Watch::new(args.quiet, total, (stored.frames, done), limbs);
     let end =
         rig::run(&plan, &mut input.epochs, start, &stop_flag(), &mut output, &mut |epoch| watch.see(epoch, &plan));
     let summary = watch.progress.summary(&[]);
@@ -146,6 +148,8 @@ fn plan(args: &Args, opened: &Opened) -> Result<Plan, Stop> {
 
 /// Number of pictures that are reported one by one.
 const MAX_LISTED: u64 = 20;
+/// Most epochs whose limbs are compared with the mounts at the end, evenly spread.
+const MOST_EPOCHS: usize = 2000;
 
 /// Counts and messages while the run goes on.
 struct Watch {
@@ -165,11 +169,13 @@ struct Watch {
     improbable: Vec<Improbable>,
     /// Number of epochs that the heads together refuse, by the reason.
     refused: BTreeMap<String, u64>,
+    /// What the heads see together, to compare it with the mounts at the end.
+    limbs: LimbsOfRig,
 }
 
 impl Watch {
     /// `done` has the numbers of epochs and of pictures that the outputs contain already.
-    fn new(quiet: bool, pictures: Option<u64>, done: (u64, u64)) -> Self {
+    fn new(quiet: bool, pictures: Option<u64>, done: (u64, u64), limbs: LimbsOfRig) -> Self {
         let (stored, done) = done;
         let progress = Progress::new(pictures, done, quiet);
         let missing = MissingPriors::default();
@@ -185,6 +191,7 @@ impl Watch {
             contradictions: Contradictions::default(),
             improbable: Vec::new(),
             refused: BTreeMap::new(),
+            limbs,
         }
     }
 
@@ -198,6 +205,8 @@ impl Watch {
         }
         let excluded = epoch.joint.heads_excluded.is_some();
         self.contradictions.count(epoch.joint.status == Status::Ok, &epoch.joint.detail, excluded);
+        self.limbs.add(epoch, &plan.joiner, true);
+        self.limbs.thin_out(MOST_EPOCHS);
         self.improbable.resize_with(plan.heads.len(), Improbable::default);
         for (frame, improbable) in epoch.heads.iter().zip(&mut self.improbable) {
             frame.iter().for_each(|frame| improbable.count(frame));
@@ -239,7 +248,19 @@ impl Watch {
             self.sum_up(summary, false_alarm);
         }
         // It is told in a quiet run, too: a program that reads only the statuses takes the other answers.
-        self.contradictions.describe_doubt(false_alarm).iter().for_each(tell::warning);
+        let doubt = self.contradictions.describe_doubt(false_alarm);
+        doubt.iter().for_each(tell::warning);
+        // Each epoch may hide an error that is the same in all.
+        if doubt.is_none() && self.joint[Status::Ok as usize] > 0 {
+            let what = self.limbs.contradiction().map(|what| {
+                format!(
+                    "the answers are doubtful: over the whole run the heads contradict the mounts of rig.toml, although \
+                     each epoch alone hides it: {what}. The sigma of the answers does not contain it: see `hzn calibrate \
+                     rig --check`"
+                )
+            });
+            what.iter().for_each(tell::warning);
+        }
     }
 
     fn sum_up(&self, summary: &str, false_alarm: f64) {
