@@ -9,6 +9,7 @@ use hzn_run::disk;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 use crate::exit::{Exit, Outcome, Stop, usage};
+use crate::refusals::quoted_path;
 use crate::tell;
 
 /// 1-sigma of a mount that somebody writes down, degrees: a drawing or a bracket is right to about a degree.
@@ -66,6 +67,13 @@ pub(super) fn run(folders: &[PathBuf], mounts: &[Mount], output: &Path) -> Outco
     tell::line(format_args!(
         "{name} written; hzn calibrate rig {name} -o calibrated.toml  finds the mounts in a flight"
     ));
+    for folder in folders.iter().filter(|folder| !folder.join("sensor.toml").exists()) {
+        let shown = quoted_path(folder);
+        tell::line(format_args!(
+            "note: {} has no sensor.toml yet, and each head needs one: hzn init {shown} --fov DEG -o {shown}/sensor.toml",
+            folder.display()
+        ));
+    }
     Ok(Exit::Done)
 }
 

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::common::{Place, cell, rows};
+use crate::common::{Place, SENSOR, cell, rows};
 
 const HEADS: [&str; 4] = ["front", "right", "back", "left"];
 
@@ -96,6 +96,10 @@ fn two_heads(place: &Place) {
     place.write("ring/two.toml", hzn_files::rig::to_text(&rig).unwrap().as_bytes());
     let right = place.run(&["run", "ring/two.toml", "-o", "two.csv", "-q", "--force"]).expect(0).err;
     assert!(!right.contains("doubtful"), "{right}");
+    // Mounts that would be less sure than the told ones are not written.
+    let again = ["calibrate", "rig", "ring/two.toml", "-q", "-o", "ring/two-found.toml"];
+    place.run(&again).expect(1).says("give --prior-deg 0.01");
+    assert!(!place.path("ring/two-found.toml").exists());
 }
 
 #[test]
@@ -148,7 +152,11 @@ fn a_rig_begins_with_its_folders_and_mounts() {
     init(&["--mount", "1,0,0", "--mount", "1,0,0,0"]).expect(2).says("expected the four numbers");
     init(&["--mount", "1,0,0,0", "--mount", "1,1,0,0"]).expect(2).says("the quaternion's squared length must be 1");
     let good = ["--mount", "1,0,0,0", "--mount=-0.6,0,0,0.8"];
-    init(&good).expect(0).says("rig.toml written");
+    // A head without a sensor.toml cannot run, and the next step says so.
+    init(&good).expect(0).says("rig.toml written").says("hzn init left --fov DEG").says("hzn init right --fov DEG");
+    place.write("left/sensor.toml", SENSOR.as_bytes());
+    let ran = init(&[&good[..], &["--force"]].concat()).expect(0).says("hzn init right --fov DEG");
+    assert!(!ran.err.contains("hzn init left"), "{}", ran.err);
     assert_eq!(mounts(&place.read("rig.toml")), [[1.0, 0.0, 0.0, 0.0], [-0.6, 0.0, 0.0, 0.8]]);
     let rig = hzn_files::rig::load(&place.path("rig.toml")).unwrap();
     assert_eq!((rig.heads[1].name.as_str(), rig.heads[1].mount.unwrap().sigma_deg), ("right", 1.0));

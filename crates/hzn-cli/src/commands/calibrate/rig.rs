@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use hzn_calib::rig::{Adjusted, Check, check, noticed};
 use hzn_core::status::Status;
-use hzn_files::rig::HeadMount;
+use hzn_files::rig::{Head, HeadMount};
 use hzn_run::disk;
 use hzn_run::engine::{self, End, Turns};
 use hzn_run::explain::counted;
 use hzn_run::rig::{self, Epochs, HeadPlan, Opened, Plan, Request};
-use nalgebra::UnitQuaternion;
+use nalgebra::{Matrix3, UnitQuaternion};
 
 use super::rig_text;
 use crate::commands::run::cores;
@@ -107,6 +107,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     tell::result(rig_text::report(&names, &adjusted))?;
     if let Some(path) = &args.output {
+        refuse_wider(&names, &adjusted, &found.limbs.told_rad2())?;
         write(args, path, &adjusted)?;
     }
     Ok(Exit::Done)
@@ -174,6 +175,26 @@ fn look(args: &Args, opened: Opened) -> Result<Option<Found>, Stop> {
     progress.finish();
     epochs.warnings().iter().for_each(tell::warning);
     Ok((end == End::Complete).then_some(found))
+}
+
+/// Refuses to write mounts whose sigmas are all larger than those of rig.toml: the joint answers would be less sure.
+fn refuse_wider(heads: &[Head], adjusted: &Adjusted, told_rad2: &[Matrix3<f64>]) -> Result<(), Stop> {
+    let sigma_deg = |p: &Matrix3<f64>| (p.trace() / 3.0).sqrt().to_degrees();
+    let both: Vec<[f64; 2]> =
+        told_rad2.iter().enumerate().map(|(k, told)| [sigma_deg(told), sigma_deg(&adjusted.block(k))]).collect();
+    // Told mounts that are wrong, or that have no sigma, are no better.
+    let is_told = both.iter().all(|[told, _]| *told > 0.0) && matches!(check(adjusted, told_rad2), Check::Holds(_));
+    if !is_told || both.iter().any(|[told, found]| found < told) {
+        return Ok(());
+    }
+    let each = heads.iter().zip(&both).map(|(head, [told, found])| format!("{} {told:.2} -> {found:.2}", head.name));
+    let largest = both.iter().map(|[told, _]| *told).fold(0.0, f64::max);
+    Err(failed(format!(
+        "nothing is written: the pictures do not determine the mounts better than rig.toml tells them (1-sigma of each \
+         head, deg: {}); give --prior-deg {largest:.2}, which keeps what rig.toml knows of the other turns, or turn the \
+         vehicle about other axes",
+        each.collect::<Vec<_>>().join(", ")
+    )))
 }
 
 fn write(args: &Args, path: &Path, adjusted: &Adjusted) -> Result<(), Stop> {
