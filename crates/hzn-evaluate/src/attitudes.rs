@@ -233,10 +233,10 @@ mod tests {
         (0..20).map(one).collect()
     }
 
-    fn said(
-        change: impl Fn(f64, UnitQuaternion<f64>, Vector3<f64>) -> ([f64; 4], Vector3<f64>),
-        mount: Option<[f64; 4]>,
-    ) -> Option<String> {
+    /// Makes the quaternion and the position of a table from time, attitude and position.
+    type Change<'a> = &'a dyn Fn(f64, UnitQuaternion<f64>, Vector3<f64>) -> ([f64; 4], Vector3<f64>);
+
+    fn said(change: Change<'_>, mount: Option<[f64; 4]>) -> Option<String> {
         let sighting = |(i, (attitude, position, seen)): (usize, (UnitQuaternion<f64>, Vector3<f64>, Vector3<f64>))| {
             let time_s = 6.0 * i as f64;
             let (q_fixed_from_camera_wxyz, position) = change(time_s, attitude, position);
@@ -253,10 +253,8 @@ mod tests {
 
     #[test]
     fn common_conventions_are_named() {
-        assert_eq!(said(|_, q, p| (wxyz(q), p), None), None);
-        let found = |change: &dyn Fn(f64, UnitQuaternion<f64>, Vector3<f64>) -> ([f64; 4], Vector3<f64>)| {
-            said(change, None).unwrap_or_default()
-        };
+        assert_eq!(said(&|_, q, p| (wxyz(q), p), None), None);
+        let found = |change: Change<'_>| said(change, None).unwrap_or_default();
         assert!(found(&|_, q, p| ([q.i, q.j, q.k, q.w], p)).starts_with("the quaternions have the scalar last"));
         assert!(found(&|_, q, p| (wxyz(q.inverse()), p)).starts_with("the quaternions are inverted:"));
         assert!(found(&|_, q, p| (wxyz(q), -p)).starts_with("the positions have the opposite sign"));
@@ -284,9 +282,9 @@ mod tests {
     fn the_vehicles_attitudes_are_named_with_and_without_the_mount() {
         let mount = UnitQuaternion::from_euler_angles(0.4, -1.0, 2.0);
         let vehicle = |_: f64, q: UnitQuaternion<f64>, p: Vector3<f64>| (wxyz(q * mount.inverse()), p);
-        let known = said(vehicle, Some(wxyz(mount))).unwrap();
+        let known = said(&vehicle, Some(wxyz(mount))).unwrap();
         assert!(known.starts_with("the attitudes are those of the vehicle"), "{known}");
-        let unknown = said(vehicle, None).unwrap();
+        let unknown = said(&vehicle, None).unwrap();
         assert!(unknown.contains(&format!("turned by {:.0}", mount.angle().to_degrees())), "{unknown}");
     }
 
@@ -295,6 +293,6 @@ mod tests {
         let other = |t: f64, q: UnitQuaternion<f64>, p: Vector3<f64>| {
             (wxyz(q * UnitQuaternion::from_euler_angles(t * t, 0.7 * t, (t + 0.3).powi(3))), p)
         };
-        assert_eq!(said(other, None), None);
+        assert_eq!(said(&other, None), None);
     }
 }
