@@ -10,6 +10,7 @@
 
 use std::path::{Path, PathBuf};
 
+use hzn_files::unix_lines::UnixLines;
 use hzn_files::{Problem, limited};
 use serde::{Deserialize, Serialize};
 
@@ -73,7 +74,7 @@ pub fn read(path: &Path) -> Result<Vec<(String, Residual)>, Problem> {
     let refuse = |what: String| Problem::new(path, what);
     let text = limited::read_text(path, limited::TABLE_BYTES).map_err(|e| refuse(format!("cannot be read: {e}")))?;
     let mut out = Vec::new();
-    for line in csv::Reader::from_reader(text.as_bytes()).deserialize::<Line>() {
+    for line in csv::Reader::from_reader(UnixLines::new(text.as_bytes())).deserialize::<Line>() {
         let l = line.map_err(|e| {
             let at = e.position().map(csv::Position::line);
             let problem = refuse(format!("{e}; write the table again with `hzn calibrate … -o residuals.csv`"));

@@ -232,6 +232,15 @@ fn base_name(file: &str) -> &str {
     file.rsplit(['/', '\\']).next().unwrap_or(file)
 }
 
+/// Returns the body of the truth if the answers are about a sphere and the truth about one body by its name: a
+/// sensor.toml has `sphere` for a moon or a planet whose radius it tells.
+fn only_body<'a>(answers: &[Answer], truth: &'a [Truth]) -> Option<&'a str> {
+    let first = truth.first()?.body.as_str();
+    let is_sphere = answers.iter().all(|a| a.body == Kind::Sphere.name());
+    let is_one = truth.iter().all(|t| t.body == first) && !first.starts_with(Kind::Earth.name());
+    (is_sphere && is_one).then_some(first)
+}
+
 /// Pairs every answer with the truth of its picture and body, in the order of the truth. Truths about bodies without
 /// any answer are skipped. `camera` is needed only for [`Case::limb_in_view_px`].
 ///
@@ -239,8 +248,9 @@ fn base_name(file: &str) -> &str {
 /// Fails if there are no answers, and for the first answer or truth that has no counterpart or occurs twice.
 pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -> Result<Vec<Case>, Mismatch> {
     let mut by_name: HashMap<(&str, &str), &Answer> = HashMap::new();
+    let only = only_body(answers, truth);
     for a in answers {
-        let (file, body) = (base_name(&a.file), a.body.as_str());
+        let (file, body) = (base_name(&a.file), only.unwrap_or(a.body.as_str()));
         if by_name.insert((file, body), a).is_some() {
             return Err(Mismatch::Twice { file: file.into(), body: body.into(), among: "among the results" });
         }
@@ -254,7 +264,7 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
         bodies.push(&t.body);
     }
     for a in answers {
-        let (file, body) = (base_name(&a.file).to_owned(), a.body.clone());
+        let (file, body) = (base_name(&a.file).to_owned(), only.unwrap_or(a.body.as_str()).to_owned());
         match true_bodies.get(file.as_str()).map(Vec::as_slice) {
             None => return Err(Mismatch::NoTruth { file, body }),
             Some(bodies) if bodies.contains(&body.as_str()) => {}
@@ -266,7 +276,7 @@ pub fn pair(answers: &[Answer], truth: &[Truth], camera: Option<&Camera<f64>>) -
         return Err(Mismatch::Empty);
     }
     let mut cases = Vec::with_capacity(answers.len());
-    for t in truth.iter().filter(|t| answers.iter().any(|a| a.body == t.body)) {
+    for t in truth.iter().filter(|t| only.is_some() || answers.iter().any(|a| a.body == t.body)) {
         let Some(answer) = by_name.get(&(t.file.as_str(), t.body.as_str())) else {
             return Err(Mismatch::NoAnswer { file: t.file.clone(), body: t.body.clone() });
         };

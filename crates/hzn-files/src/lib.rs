@@ -41,6 +41,7 @@ pub mod start;
 pub mod template;
 pub mod time;
 pub mod truth;
+pub mod unix_lines;
 pub mod utc;
 pub mod vehicle;
 

@@ -4,6 +4,7 @@ use std::io::BufRead;
 use std::path::Path;
 
 use hzn_files::separator_hint;
+use hzn_files::unix_lines::UnixLines;
 use hzn_mcap::{Contents, Reader, Row};
 
 use crate::checked_row::{from_csv, from_json};
@@ -95,7 +96,7 @@ fn numbered_rows(file: &Path, kind: &str) -> Result<NumberedRows, Error> {
     let refuse = move |line: u64, why: String| failed(format!("{name}:{line}: not a row of hzn results: {why}"));
     match kind {
         "csv" => {
-            let mut reader = csv::Reader::from_path(file).map_err(failed)?;
+            let mut reader = csv::Reader::from_reader(UnixLines::new(std::fs::File::open(file)?));
             let header = reader.headers().map_err(failed)?.clone();
             let separator = separator_hint(&header);
             if !separator.is_empty() {

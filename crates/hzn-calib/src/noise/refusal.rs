@@ -73,7 +73,10 @@ impl fmt::Display for Refusal {
                 f,
                 "the lens in sensor.toml is not known well enough: its sigmas move the limb height of all pictures by \
                  {lens_km:.1} km, but at most {max_km:.1} km is useful. Calibrate the lens first, with a board \
-                 (`hzn calibrate board`) or in flight (`hzn calibrate sky`)"
+                 (`hzn calibrate board`), or in flight (`hzn calibrate sky`). If its sigmas are from sky already, it \
+                 needs about {:.0} times as many pictures, or turns that bring the limb to other parts of the picture \
+                 and other altitudes; the same pictures do not tell more",
+                (lens_km / max_km).powi(2).ceil()
             ),
             Self::NoBetter { sigma_km, largest: (name, km), max_km } => {
                 let [sigma_km, max_km] = above(*sigma_km, *max_km);

@@ -298,6 +298,8 @@ fn what_the_lens_may_change_belongs_to_the_sigma_of_the_height() {
     // The lens of a data sheet.
     let refused = with(2.9).unwrap_err();
     assert!(matches!(refused, Refusal::Lens { lens_km, .. } if lens_km > 3.5), "{refused}");
+    // After `sky` with the same pictures, the user must know what else would do.
+    assert!(refused.to_string().contains("times as many pictures"), "{refused}");
 }
 
 const SENSOR: &str = "# mine\npreset = \"hzn\"\n\n[camera]\nwidth = 960\nheight = 720\nmodel = \"equidistant\"\nfx_px \

@@ -13,6 +13,7 @@
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
+use hzn_files::unix_lines::UnixLines;
 use hzn_files::{Problem, limited, separator_hint, suggestion};
 
 /// Largest difference of the length of a unit vector from 1.
@@ -61,7 +62,8 @@ pub fn load(path: &Path, size_px: [u16; 2]) -> Result<Vec<Points>, Problem> {
 /// # Errors
 /// The errors are those of [`load`].
 pub fn parse(text: &str, path: &Path, size_px: [u16; 2]) -> Result<Vec<Points>, Problem> {
-    let mut reader = ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+    let mut reader =
+        ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(UnixLines::new(text.as_bytes()));
     let unreadable = |e: csv::Error| {
         let line = e.position().and_then(|p| usize::try_from(p.line()).ok());
         let problem = Problem::new(path, format!("not a valid table: {e}"));

@@ -1,5 +1,6 @@
 //! The estimate of a lens that may be several percent wrong: the pictures are processed again with the estimated lens.
 
+use hzn_core::camera::Camera;
 use hzn_core::{Config, body, camera};
 
 use super::estimate::{Estimate, estimate};
@@ -60,6 +61,10 @@ pub fn estimate_in_passes<E>(
         // to refuse a picture.
         let focal_sigma_percent = sigma.max(moved_percent).max(PROCESS_AGAIN_PERCENT);
         used = camera::Config { covariance: None, focal_sigma_percent, ..estimate.camera.clone() };
+        // It would be refused as if the user had written it.
+        if let Err(why) = Camera::<f64>::try_new(&used) {
+            return Ok(Some(Err(Refusal::Impossible { why: why.to_string() })));
+        }
     }
     Ok(Some(Err(Refusal::NotSettled { passes: PASSES })))
 }

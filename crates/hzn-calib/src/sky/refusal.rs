@@ -26,6 +26,11 @@ pub enum Refusal {
         /// The reason.
         why: String,
     },
+    /// The lens that the pictures ask for is not possible.
+    Impossible {
+        /// The reason.
+        why: String,
+    },
     /// The normal equations have no solution.
     Singular,
     /// The steps of the fit do not end.
@@ -156,6 +161,11 @@ impl fmt::Display for Refusal {
                  pictures, or state limb_height_km and limb_height_sigma_km in [body]"
             ),
             Self::Lens { why } => write!(f, "the lens is not valid: {why}"),
+            Self::Impossible { why } => write!(
+                f,
+                "the lens that the pictures ask for is not possible: {why}. These are numbers of the estimate, and not \
+                 of sensor.toml. {OTHER_LENS}"
+            ),
             Self::Singular => f.write_str(
                 "the equations have no solution; check [camera.covariance] and the altitudes of the pictures",
             ),

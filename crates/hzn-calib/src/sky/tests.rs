@@ -405,4 +405,7 @@ fn a_lens_with_which_the_answers_are_lost_is_no_lens() {
     let why = found.unwrap_err();
     assert!(matches!(why, Refusal::Lost { answered: [_, 0], why: None, .. }), "{why:?}");
     assert!(why.to_string().contains("`hzn init` without --fov"), "{why}");
+    // Numbers that the user never wrote are told as such.
+    let impossible = Refusal::Impossible { why: "camera.k = -0.2: the lens is monotone".into() }.to_string();
+    assert!(impossible.contains("camera.k = -0.2") && impossible.contains("not of sensor.toml"), "{impossible}");
 }

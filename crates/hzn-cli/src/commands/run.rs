@@ -429,12 +429,15 @@ fn explain_command(args: &Args, source: &dyn Source, frame: u64) -> String {
 }
 
 fn warn_of_missing_pictures(frames: &Frames) {
-    let Unused { rows, first } = &frames.unused;
+    let Unused { rows, first, other_names } = &frames.unused;
     for row in first {
         tell::warning(frames.problem(row, "no such picture in the folder; the row is not used"));
     }
     if let Some(more) = rows.checked_sub(first.len()).filter(|n| *n > 0) {
         let rows = explain::counted(more as u64, "further row");
         tell::warning(format_args!("{}: {rows} without a picture in the folder", frames.path.display()));
+    }
+    if let Some(how) = other_names {
+        tell::warning(format_args!("{}: {how}; the column file has the names as in the folder", frames.path.display()));
     }
 }

@@ -60,6 +60,32 @@ fn wrong_rows_of_frames_csv() {
     let ran = with("file,altitude_km\n0000.png,400\n0001.png,400\n0009.png,400\n").expect(0);
     assert_eq!(without_time(&ran.out).len(), 2);
     ran.says("warning: in/frames.csv:4: 0009.png: no such picture in the folder");
+    // Line ends of Windows do not change the number of the line.
+    let wide = "file,x_km,y_km,z_km\r\n0000.png,6771000,0,0\r\n";
+    with(wide).expect(0).says("warning: in/frames.csv:2: 0000.png: the position is at");
+    let sigma = with("file,altitude_km,altitude_sigma_km\n0000.png,400,1\n").expect(0).err;
+    assert!(sigma.contains("altitude_sigma_km: unknown column") && sigma.contains("body.altitude_sigma_km"), "{sigma}");
+    with("file,altitude_km\nC:\\in\\0000.PNG,400\n")
+        .expect(0)
+        .says("the names match those of the pictures if upper and lower case do not count");
+    with("file,altitude_km\nin/0000.png,400\n").expect(0).says("pictures without their folders; the column file has");
+}
+
+#[test]
+fn one_wrong_entry_of_a_list_is_told_alone() {
+    let place = Place::with_pictures(3);
+    let ran = place.run(&["run", "in/0000.png", "in", "in/0001.png"]).expect(3);
+    let statuses: Vec<String> = without_time(&ran.out).iter().map(|row| cell(row, "status").to_owned()).collect();
+    assert_eq!(statuses, ["ok", "unreadable", "ok"]);
+    ran.says("unreadable: ");
+    place.run(&["run", "in", "in"]).expect(2).says("a folder cannot be combined with other inputs");
+    // A calibration says which of its pictures do not count.
+    let list = ["in/0000.png", "in/0001.png", "in/0009.png", "-s", "in/sensor.toml", "-q"];
+    for command in ["noise", "sky", "check"] {
+        let ran = place.run(&[&["calibrate", command], &list[..]].concat());
+        assert!(ran.code != 0, "{command}");
+        ran.says("warning: 1 picture could not be read and does not count: 0009.png (");
+    }
 }
 
 #[test]

@@ -95,6 +95,16 @@ fn what_does_not_fit_is_named() {
     against(&format!("{truth}more.png,6,earth-sphere,1,0,0,1,70,400,,,,,,,1,0,0,0\n"))
         .says("more.png (earth-sphere) has a row in the truth but none among the results");
     against(&truth.replace("earth-sphere", "moon")).says("the results are about earth-sphere, the truth about moon");
+    // A sphere is any body whose radius sensor.toml tells, as `hzn init --body moon` writes it.
+    let sensor = place.read("in/sensor.toml").replace("\"earth-sphere\"", "\"sphere\"\nradius_km = 6371.0");
+    place.write("sphere.toml", sensor.as_bytes());
+    place.run(&["run", "in", "-s", "sphere.toml", "-o", "sphere.csv", "-q"]);
+    place.write("moon.csv", truth.replace("earth-sphere", "moon").as_bytes());
+    place.run(&["evaluate", "sphere.csv", "--truth", "moon.csv"]).expect(0);
+    place
+        .run(&["evaluate", "sphere.csv", "--truth", "in"])
+        .expect(2)
+        .says("about sphere, the truth about earth-sphere");
     against(&truth.replace("70.38", "wide")).says("t.csv:2: half_angle_deg: invalid float literal");
     against(&truth.replace("axis_y", "axis")).says("t.csv:1: axis_y: this column is missing");
     against(HEADER).says("t.csv: has no rows");

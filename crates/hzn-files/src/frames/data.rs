@@ -189,6 +189,8 @@ pub struct Unused {
     pub rows: usize,
     /// The first of them, at most [`Self::LISTED`].
     pub first: Vec<FrameData>,
+    /// How their names would be those of pictures, in words; `None` if they would not be.
+    pub other_names: Option<String>,
 }
 
 impl Unused {

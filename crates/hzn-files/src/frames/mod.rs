@@ -18,6 +18,7 @@
 mod check;
 mod data;
 mod inertial;
+mod names;
 mod read;
 
 pub use check::altitude_at_km;

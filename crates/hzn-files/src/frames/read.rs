@@ -8,9 +8,11 @@ use csv::StringRecord;
 use hzn_core::body::Kind;
 
 use super::data::{FrameData, Frames, Orientation, plain_name};
+use super::names;
 use crate::nearest::nearest;
 use crate::quoted::quoted;
 use crate::separator::separator_hint;
+use crate::unix_lines::UnixLines;
 use crate::{Problem, limited, time};
 
 /// Names of the columns that are read.
@@ -81,7 +83,10 @@ pub fn load_vehicle(path: &Path) -> Result<Frames, Problem> {
 /// The errors are those of [`load`].
 pub fn load_for(path: &Path, pictures: impl IntoIterator<Item = String>) -> Result<Frames, Problem> {
     let pictures: HashSet<String> = pictures.into_iter().map(|name| plain_name(&name).to_owned()).collect();
-    read(open(path)?, path, Belongs::ToPicture, |file| pictures.contains(plain_name(file)))
+    let mut frames = read(open(path)?, path, Belongs::ToPicture, |file| pictures.contains(plain_name(file)))?;
+    let others: Vec<&str> = frames.unused.first.iter().map(|row| row.file.as_str()).collect();
+    frames.unused.other_names = names::describe(&others, pictures.iter().map(String::as_str));
+    Ok(frames)
 }
 
 fn open(path: &Path) -> Result<impl Read + use<>, Problem> {
@@ -143,7 +148,8 @@ fn read(
     is_wanted: impl Fn(&str) -> bool,
 ) -> Result<Frames, Problem> {
     // The reader skips the byte-order mark that spreadsheet programs write first.
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(contents);
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(UnixLines::new(contents));
     let header = reader.headers().map_err(|e| translate_csv_error(&e, path))?.clone();
     let mut frames = Frames::new(path);
     let columns = Columns::find(&header, path, belongs, &mut frames.warnings)?;
@@ -208,6 +214,14 @@ fn geodetic_hint(name: &str) -> Option<String> {
     is_angle.then(|| "; a position is x_km, y_km, z_km (ECEF, WGS-84), and altitude_km alone is enough".to_owned())
 }
 
+/// Returns where the sigma of an altitude or a position is told; `None` for another column.
+fn sigma_hint(name: &str) -> Option<String> {
+    let name = name.trim().to_ascii_lowercase();
+    let is_of = ["altitude", "position", "alt_"].iter().any(|start| name.starts_with(start));
+    (is_of && name.contains("sigma"))
+        .then(|| "; one for all pictures is body.altitude_sigma_km in sensor.toml".to_owned())
+}
+
 impl Columns {
     /// Finds the columns by the header. Unknown columns give warnings.
     fn find(
@@ -220,7 +234,7 @@ impl Columns {
         for (i, name) in header.iter().enumerate() {
             let Some(known) = known_column(name) else {
                 let nearest = nearest(name, COLUMNS.iter().copied()).map(|n| format!("; did you mean {n}?"));
-                let hint = geodetic_hint(name).or(nearest).unwrap_or_default();
+                let hint = geodetic_hint(name).or_else(|| sigma_hint(name)).or(nearest).unwrap_or_default();
                 let what = format!("unknown column, not used{hint}");
                 warnings.push(Problem::new(path, what).at_line(1).in_field(name));
                 continue;

@@ -85,7 +85,8 @@ fn parse_with(text: &str, path: &Path, required: &[&str]) -> Result<Vec<Truth>, 
     };
     // Spreadsheets begin the file with a byte-order mark.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(crate::unix_lines::UnixLines::new(text.as_bytes()));
     let header = reader.headers().map_err(|e| error(Some(1), None, format!("not valid CSV: {e}")))?.clone();
     let has = |name: &str| header.iter().any(|h| h == name);
     if let Some(missing) = required.iter().find(|name| !has(name)) {

@@ -5,6 +5,7 @@ use std::path::Path;
 use csv::StringRecord;
 use hzn_files::limited;
 use hzn_files::nearest;
+use hzn_files::unix_lines::UnixLines;
 use hzn_files::{quoted, separator_hint};
 
 use super::columns::Columns;
@@ -33,7 +34,8 @@ impl Table {
         let shown = path.display().to_string();
         let refuse = |e: csv::Error| Error::unusable(format!("{shown}: {e}"));
         let file = limited::open(path, MAX_BYTES).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
+        let mut reader =
+            csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(UnixLines::new(file));
         let header = reader.headers().map_err(refuse)?.clone();
         let places = places(&header, columns, map).map_err(|e| Error::unusable(format!("{shown}: {e}")))?;
         let (mut rows, mut lines) = (Vec::new(), Vec::new());

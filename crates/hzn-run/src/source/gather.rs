@@ -80,6 +80,12 @@ impl Gathered {
             None => Err(gathered.empty(inputs, raw)),
             // Nothing is there: the list is wrong as a whole, or it belongs to another folder.
             Some(first) if gathered.paths.iter().all(|path| is_nothing(path)) => Err(missing(first)),
+            Some(first) if gathered.paths.iter().all(|path| path.is_dir() || is_nothing(path)) && inputs.len() > 1 => {
+                Err(unusable(format!(
+                    "{}: a folder cannot be combined with other inputs; give one folder, or only files",
+                    first.display()
+                )))
+            }
             Some(_) => Ok(gathered),
         }
     }
@@ -87,12 +93,11 @@ impl Gathered {
     /// Adds the files of one input; `alone` says that there is no other input.
     fn add(&mut self, input: &Path, alone: bool, raw: bool) -> Result<(), Error> {
         let text = input.to_string_lossy();
-        if input.is_dir() {
-            if !alone {
-                return Err(unusable(format!(
-                    "{text}: a folder cannot be combined with other inputs; give one folder, or only files"
-                )));
-            }
+        if input.is_dir() && !alone {
+            // Its row says that it cannot be read, as that of a missing picture does, and the others count.
+            self.paths.push(input.to_owned());
+            Ok(())
+        } else if input.is_dir() {
             self.folder = Some(input.to_owned());
             self.paths.extend(list_folder(input, raw, &mut self.left_out)?);
             Ok(())

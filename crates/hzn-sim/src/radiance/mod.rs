@@ -52,7 +52,10 @@ type NumberedRow = (u64, Row);
 
 /// Reads the rows of a CSV file and checks each of them.
 fn read_rows(text: &str) -> Result<Vec<NumberedRow>, String> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(hzn_files::unix_lines::UnixLines::new(text.as_bytes()));
     // The reader knows the line of a row only while it is at this row.
     let header = reader.headers().map_err(|e| e.to_string())?.clone();
     let mut rows = Vec::new();

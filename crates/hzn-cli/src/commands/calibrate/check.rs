@@ -59,11 +59,11 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line("interrupted; nothing was measured");
         return Ok(Exit::Interrupted);
     };
-    found.tell_copies();
+    found.tell_left_out();
     let input = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
     let camera = &sensor.config.camera;
     let check = sky::check(camera, &found.plan.config.body, &found.views, limb, args.detect_percent)
         .map_err(|why| failed(format!("{input}: of {}: {why}", counted(found.count, "picture"))))?;
     tell::result(sky_text::check_report(&check, found.count))?;
-    Ok(if check.verdict == Verdict::DoesNotHold { Exit::Failed } else { Exit::Done })
+    Ok(found.unread.exit(if check.verdict == Verdict::DoesNotHold { Exit::Failed } else { Exit::Done }))
 }

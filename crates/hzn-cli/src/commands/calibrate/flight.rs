@@ -6,11 +6,12 @@ use hzn_calib::noise;
 use hzn_files::{Frames, Sensor};
 pub(super) use hzn_run::engine::Answered;
 use hzn_run::engine::{self, Finished, Measured, Plan, Turns};
+use hzn_run::explain::counted;
 use hzn_run::open::{self, Opened, Request, SensorChoice};
 use hzn_run::source::{Source, ending};
 
 use crate::commands::run::cores;
-use crate::exit::{Stop, usage};
+use crate::exit::{Exit, Stop, usage};
 use crate::progress::Progress;
 use crate::setup::{self, InputArgs, SensorArgs, stop_flag};
 use crate::tell;
@@ -62,6 +63,33 @@ pub(super) fn plan(input: &InputArgs, flight: bool, jobs: Option<u16>, frames: O
     }
 }
 
+/// The pictures that could not be read, with the reasons.
+#[derive(Debug, Default)]
+pub(super) struct Unread(Vec<String>);
+
+/// Most of them that are named.
+const MAX_NAMED: usize = 5;
+
+impl Unread {
+    /// Says which pictures could not be read.
+    pub(super) fn tell(&self) {
+        let Some(more) = self.0.len().checked_sub(1) else { return };
+        let named: Vec<&str> = self.0.iter().take(MAX_NAMED).map(String::as_str).collect();
+        let end = if more >= MAX_NAMED { ", ..." } else { "" };
+        tell::warning(format_args!(
+            "{} could not be read and {}: {}{end}",
+            counted(self.0.len() as u64, "picture"),
+            if more == 0 { "does not count" } else { "do not count" },
+            named.join(", ")
+        ));
+    }
+
+    /// Returns the exit of a command that ends so: a result without these pictures is no full one.
+    pub(super) fn exit(&self, exit: Exit) -> Exit {
+        if self.0.is_empty() || exit != Exit::Done { exit } else { Exit::SomeUnreadable }
+    }
+}
+
 /// Processes the flight and measures each answer: one for a body and picture. Pictures that are copies of others are
 /// left out. Returns `None` if the run was interrupted.
 pub(super) fn measure_answers<T>(
@@ -69,11 +97,15 @@ pub(super) fn measure_answers<T>(
     source: &mut dyn Source,
     progress: &mut Progress,
     measure: impl FnMut(Answered<'_>) -> Option<T>,
-) -> Result<Option<Measured<T>>, Stop> {
-    let seen = |frame: &Finished| progress.count(frame.outcomes.iter().map(engine::BodyOutcome::status));
+) -> Result<Option<(Measured<T>, Unread)>, Stop> {
+    let mut unread = Unread::default();
+    let seen = |frame: &Finished| {
+        progress.count(frame.outcomes.iter().map(engine::BodyOutcome::status));
+        unread.0.extend(frame.unreadable().map(|why| format!("{} ({why})", frame.name)));
+    };
     let measured = engine::measure_answers(plan, source, &stop_flag(), seen, measure)?;
     progress.finish();
-    Ok(measured)
+    Ok(measured.map(|measured| (measured, unread)))
 }
 
 /// Says which pictures are copies, and returns the measurements.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use hzn_files::unix_lines::UnixLines;
 use hzn_files::{limited, separator_hint};
 
 use crate::exit::{Stop, usage};
@@ -17,7 +18,8 @@ const COLUMNS: [&str; 4] = ["file", "accel_x_mps2", "accel_y_mps2", "accel_z_mps
 pub(super) fn read(path: &Path) -> Result<Vec<(String, [f64; 3])>, Stop> {
     let shown = path.display();
     let file = limited::open(path, limited::CAMERA_FILE_BYTES).map_err(|e| usage(format!("{shown}: {e}")))?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(UnixLines::new(file));
     let header = reader.headers().map_err(|e| usage(format!("{shown}: {e}")))?.clone();
     let mut places = [0; 4];
     for (place, name) in places.iter_mut().zip(COLUMNS) {

@@ -64,11 +64,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut progress = Progress::new(source.total(), 0, args.quiet);
     let body = &plan.config.body;
     let measure = |a: Answered<'_>| Sighting::measure(a.name, &camera, body, &a.prior, &a.points, a.solution);
-    let Some(sightings) = flight::measure_answers(&plan, source.as_mut(), &mut progress, measure)? else {
+    let Some((sightings, unread)) = flight::measure_answers(&plan, source.as_mut(), &mut progress, measure)? else {
         tell::line("interrupted; nothing was measured");
         return Ok(Exit::Interrupted);
     };
     let sightings = flight::without_copies(sightings);
+    unread.tell();
     let input = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
     let pictures = progress.frames();
     let calibration = Calibration::new(&plan.config.body, &sightings)
@@ -90,5 +91,5 @@ pub(super) fn run(args: &Args) -> Outcome {
     if sensors.is_empty() && !args.quiet {
         tell::line("note: -o sensor.toml writes these keys into a copy of the sensor.toml");
     }
-    Ok(Exit::Done)
+    Ok(unread.exit(Exit::Done))
 }

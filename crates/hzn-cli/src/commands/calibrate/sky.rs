@@ -27,13 +27,15 @@ pub(super) struct Pictures {
     pub(super) count: u64,
     /// Which pictures were left out as copies of others, in words.
     copies: Option<String>,
+    pub(super) unread: flight::Unread,
     pub(super) plan: Plan,
 }
 
 impl Pictures {
-    /// Says which pictures are copies of others.
-    pub(super) fn tell_copies(&self) {
+    /// Says which pictures are copies of others, and which could not be read.
+    pub(super) fn tell_left_out(&self) {
         self.copies.iter().for_each(tell::warning);
+        self.unread.tell();
     }
 }
 
@@ -58,7 +60,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     let mount = args.mount.then(|| sky::estimate_mount(&estimate, &pictures.plan.config.body, &pictures.views));
     tell::result(sky_text::report(&estimate, pictures.count, mount.as_ref()))?;
-    write(args, &sensor, &estimate, mount, &input)
+    Ok(pictures.unread.exit(write(args, &sensor, &estimate, mount, &input)?))
 }
 
 /// Loads the sensor for a flight, with notes for the user.
@@ -98,7 +100,7 @@ fn measure(
     };
     let found = sky::estimate_in_passes(&sensor.config, &wide.config.body, unknowns, limb, process, again)?;
     let (Some(found), Some(pictures)) = (found, last) else { return Ok(None) };
-    pictures.tell_copies();
+    pictures.tell_left_out();
     let refused = |why| failed(format!("{input} ({}): {why}", counted(pictures.count, "picture")));
     let (estimate, views) = found.map_err(refused)?;
     Ok(Some((Pictures { views, ..pictures }, estimate)))
@@ -123,8 +125,9 @@ pub(super) fn views(
         Some(View::new(a.name, a.points, Prior { sun: sun.or(a.prior.sun), ..a.prior }, a.solution))
     };
     let views = flight::measure_answers(&plan, source.as_mut(), &mut progress, view)?;
-    Ok(views.map(|measured| Pictures {
+    Ok(views.map(|(measured, unread)| Pictures {
         copies: measured.copies_in_words(),
+        unread,
         views: measured.answers,
         count: progress.frames(),
         plan,

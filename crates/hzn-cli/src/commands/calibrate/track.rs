@@ -44,11 +44,12 @@ pub(super) fn run(args: &Args, sensor: &Sensor) -> Outcome {
         let name = format!("{} ({})", a.name, kind.name());
         Some(Sight { name, point_px: [point.u, point.v], direction: direction(kind, a.data?)? })
     };
-    let Some(sights) = flight::measure_answers(&plan, source.as_mut(), &mut progress, sight)? else {
+    let Some((sights, unread)) = flight::measure_answers(&plan, source.as_mut(), &mut progress, sight)? else {
         tell::line("interrupted; nothing was measured");
         return Ok(Exit::Interrupted);
     };
     let sights = flight::without_copies(sights);
+    unread.tell();
     let pictures = counted(progress.frames(), "picture");
     let track =
         sky::estimate_track(&unknowns, &sights).map_err(|why| failed(format!("{input}: of {pictures}: {why}")))?;
@@ -58,7 +59,7 @@ pub(super) fn run(args: &Args, sensor: &Sensor) -> Outcome {
         let title = format!("Lens from the track of Sun or Moon: {input}");
         hzn_run::disk::write_whole(path, &page::simple(&title, &lines, &[])?)?;
     }
-    write(args, sensor, &track, &input)
+    Ok(unread.exit(write(args, sensor, &track, &input)?))
 }
 
 /// Returns the direction to the body in the nominal camera frame: the column of the Sun, or the ephemeris with the
