@@ -87,10 +87,9 @@ pub(super) fn lag(camera: usize, recording: &Recording, fixes: &[Fix]) -> Option
     let fit = best_lag(&limbs, recording.clock_offset_s, fixes)?;
     let speed_m_s =
         median(limbs.iter().filter_map(|s| Some(receiver_at(fixes, s.time_s + recording.clock_offset_s)?.1.norm())))?;
-    // Positions that the user calls coarse may be ahead of the vehicle.
-    let told_m = recording.altitude_sigma_km.map_or(0.0, |km| km * 1e3);
-    let sigma_s = fit.sigma_s.hypot(told_m / speed_m_s);
-    sigma_s.is_finite().then_some(ReceiverLag { camera, lag_s: fit.lag_s, sigma_s, speed_m_s })
+    // Coarse positions differ across the path, too, and that is in the sigma of the fit.
+    let Lag { lag_s, sigma_s, .. } = fit;
+    sigma_s.is_finite().then_some(ReceiverLag { camera, lag_s, sigma_s, speed_m_s })
 }
 
 /// Returns the lag that explains the differences best.
