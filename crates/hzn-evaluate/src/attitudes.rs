@@ -237,13 +237,14 @@ mod tests {
     type Change<'a> = &'a dyn Fn(f64, UnitQuaternion<f64>, Vector3<f64>) -> ([f64; 4], Vector3<f64>);
 
     fn said(change: Change<'_>, mount: Option<[f64; 4]>) -> Option<String> {
-        let sighting = |(i, (attitude, position, seen)): (usize, (UnitQuaternion<f64>, Vector3<f64>, Vector3<f64>))| {
-            let time_s = 6.0 * i as f64;
+        type Place = (UnitQuaternion<f64>, Vector3<f64>, Vector3<f64>);
+        let sighting = |(i, (attitude, position, seen)): (u32, Place)| {
+            let time_s = 6.0 * f64::from(i);
             let (q_fixed_from_camera_wxyz, position) = change(time_s, attitude, position);
             let (axis, position_km) = (seen.into(), position.into());
             Sighting { axis, sigma_rad: 0.01, time_s, q_fixed_from_camera_wxyz, position_km }
         };
-        let all: Vec<Sighting> = flight().into_iter().enumerate().map(sighting).collect();
+        let all: Vec<Sighting> = (0..).zip(flight()).map(sighting).collect();
         find_attitude_convention(&all, mount, true)
     }
 

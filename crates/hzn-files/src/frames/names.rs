@@ -52,7 +52,6 @@ pub(super) fn describe<'a>(names: &[&str], pictures: impl Iterator<Item = &'a st
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::frames::load_for;
 
     #[test]
