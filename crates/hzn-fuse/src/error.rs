@@ -9,7 +9,10 @@ pub enum Error {
     #[error("{0}")]
     Unusable(String),
     /// No solution is possible, and the inputs contradict each other. Nothing was written.
-    #[error("the inputs contradict each other, probably because {}. With them there is no solution: {why}", .finding.what)]
+    #[error(
+        "the inputs contradict each other, probably because {}. With them there is no solution: {why}",
+        .finding.what
+    )]
     Contradicts {
         /// Why there is no solution.
         why: String,

@@ -118,8 +118,8 @@ impl Compared {
 }
 
 /// Returns the turn of each head about x, y and z of its camera, radians, with which the check would reach its limit,
-/// if nothing else were wrong: half of such turns are noticed, and nearly all that are 1.5 times as large. An axis about
-/// which the pictures say nothing has an infinite one.
+/// if nothing else were wrong: half of such turns are noticed, and nearly all that are 1.5 times as large. An axis
+/// about which the pictures say nothing has an infinite one.
 pub fn noticed(adjusted: &Adjusted, told_rad2: &[Matrix3<f64>]) -> Vec<[f64; 3]> {
     let all: Vec<usize> = (0..told_rad2.len()).collect();
     let compared = Compared::new(adjusted, told_rad2, &all);

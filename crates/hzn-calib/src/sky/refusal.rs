@@ -151,10 +151,9 @@ fn write_conflict(
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::TooFew { answered: 0, .. } => write!(
-                f,
-                "no picture has an answer with a limb and an altitude; examine some pictures with `hzn explain`"
-            ),
+            Self::TooFew { answered: 0, .. } => {
+                f.write_str("no picture has an answer with a limb and an altitude; examine some with `hzn explain`")
+            }
             Self::TooFew { answered, min_pictures } => write!(
                 f,
                 "{answered} pictures have an answer, but a free limb height needs at least {min_pictures}; take more \
@@ -166,9 +165,9 @@ impl fmt::Display for Refusal {
                 "the lens that the pictures ask for is not possible: {why}. These are numbers of the estimate, and not \
                  of sensor.toml. {OTHER_LENS}"
             ),
-            Self::Singular => f.write_str(
-                "the equations have no solution; check [camera.covariance] and the altitudes of the pictures",
-            ),
+            Self::Singular => {
+                f.write_str("the equations have no solution; check [camera.covariance] and the altitudes")
+            }
             Self::NotConverged { steps } => write!(
                 f,
                 "the fit does not converge in {steps} steps. The focal length of sensor.toml may be more than 10 % \
@@ -202,13 +201,12 @@ impl fmt::Display for Refusal {
                  one each time. {OTHER_LENS}"
             ),
             Self::Lost { percent, answered: [before, after], why } => {
+                let why = why.as_ref().map_or_else(String::new, |why| format!("; {why}"));
                 write!(
                     f,
                     "the pictures ask for a focal length that differs by {percent:+.1} %. With the lens of \
-                     sensor.toml, {before} of them have an answer, and with that lens {after}"
-                )?;
-                why.as_ref().map_or(Ok(()), |why| write!(f, "; {why}"))?;
-                write!(f, ". {OTHER_LENS}")
+                     sensor.toml, {before} of them have an answer, and with that lens {after}{why}. {OTHER_LENS}"
+                )
             }
         }
     }

@@ -70,7 +70,8 @@ pub(super) fn run(folders: &[PathBuf], mounts: &[Mount], output: &Path) -> Outco
     for folder in folders.iter().filter(|folder| !folder.join("sensor.toml").exists()) {
         let shown = quoted_path(folder);
         tell::line(format_args!(
-            "note: {} has no sensor.toml yet, and each head needs one: hzn init {shown} --fov DEG -o {shown}/sensor.toml",
+            "note: {} has no sensor.toml yet, and each head needs one: \
+             hzn init {shown} --fov DEG -o {shown}/sensor.toml",
             folder.display()
         ));
     }

@@ -1,7 +1,7 @@
 //! Finds positions that are relative to inertial axes instead of the Earth's.
 //!
-//! A vehicle in free fall has the acceleration of gravity only in axes that do not turn. In the axes of the Earth that of
-//! Coriolis and the centrifugal one come to it, about 1 m/s² in low orbit.
+//! A vehicle in free fall has the acceleration of gravity only in axes that do not turn. In the axes of the Earth that
+//! of Coriolis and the centrifugal one come to it, about 1 m/s² in low orbit.
 
 use super::check::median;
 use super::data::Frames;

@@ -33,8 +33,8 @@ const ALONG: f64 = 0.02;
 const NOISE: f64 = 3.0;
 /// Largest difference of clocks that is looked for, s.
 const LAG_S: f64 = 60.0;
-/// 1-sigma of the limb's axis from outside, rad: the recordings and the receiver have it for limb heights that are 10 km
-/// apart.
+/// 1-sigma of the limb's axis from outside, rad: the recordings and the receiver have it for limb heights that are
+/// 10 km apart.
 const AXIS_SIGMA_RAD: f64 = 5e-6;
 
 /// How the positions of a recording lie against those of the receiver.

@@ -149,8 +149,8 @@ fn a_receiver_that_is_less_late_than_a_camera_may_be_is_not_consistent() {
     }
 }
 
-/// A camera whose clock is late has the positions of the true times if they came with the pictures. If the vehicle turns
-/// enough, the filter finds the clock; otherwise nobody knows which clock is wrong.
+/// A camera whose clock is late has the positions of the true times if they came with the pictures. If the vehicle
+/// turns enough, the filter finds the clock; otherwise nobody knows which clock is wrong.
 #[test]
 fn a_camera_whose_clock_the_filter_finds_says_nothing_against_the_receiver() {
     for (nods, level) in [(true, Level::Consistent), (false, Level::Doubtful)] {

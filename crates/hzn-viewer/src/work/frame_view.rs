@@ -435,12 +435,7 @@ pub(super) fn checked_view<'a>(picture: &'a Picture, config: &Config) -> Result<
 }
 
 fn touched_image(view: &ImageView<'_>, pixels: &HashSet<(u16, u16)>) -> ColorImage {
-    let (w, h) = match view {
-        ImageView::Grey8(p) => (p.width(), p.height()),
-        ImageView::Grey16(p) => (p.width(), p.height()),
-        ImageView::Colour8(p) => (p.width(), p.height()),
-        ImageView::Colour16(p) => (p.width(), p.height()),
-    };
+    let (w, h) = (view.width(), view.height());
     let mut image = ColorImage::filled([usize::from(w), usize::from(h)], Color32::TRANSPARENT);
     for &(x, y) in pixels {
         if let Some(pixel) = image.pixels.get_mut(usize::from(y) * usize::from(w) + usize::from(x)) {

@@ -40,7 +40,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// Opens a line to a computer. The other end of `tcp` may come later; a port or a device of this computer must be there.
+    /// Opens a line to a computer. The other end of `tcp` may come later; a port or a device must be there.
     ///
     /// # Errors
     /// The text is no address, the port is in use, the device does not exist, or the key cannot be read.

@@ -191,8 +191,8 @@ fn refuse_wider(heads: &[Head], adjusted: &Adjusted, told_rad2: &[Matrix3<f64>])
     let largest = both.iter().map(|[told, _]| *told).fold(0.0, f64::max);
     Err(failed(format!(
         "nothing is written: the pictures do not determine the mounts better than rig.toml tells them (1-sigma of each \
-         head, deg: {}); give --prior-deg {largest:.2}, which keeps what rig.toml knows of the other turns, or turn the \
-         vehicle about other axes",
+         head, deg: {}); give --prior-deg {largest:.2}, which keeps what rig.toml knows of the other turns, or turn \
+         the vehicle about other axes",
         each.collect::<Vec<_>>().join(", ")
     )))
 }

@@ -254,9 +254,9 @@ impl Watch {
         if doubt.is_none() && self.joint[Status::Ok as usize] > 0 {
             let what = self.limbs.contradiction().map(|what| {
                 format!(
-                    "the answers are doubtful: over the whole run the heads contradict the mounts of rig.toml, although \
-                     each epoch alone hides it: {what}. The sigma of the answers does not contain it: see `hzn calibrate \
-                     rig --check`"
+                    "the answers are doubtful: over the whole run the heads contradict the mounts of rig.toml, \
+                     although each epoch alone hides it: {what}. The sigma of the answers does not contain it: see \
+                     `hzn calibrate rig --check`"
                 )
             });
             what.iter().for_each(tell::warning);
