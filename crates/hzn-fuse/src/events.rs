@@ -5,6 +5,7 @@ use hzn_nav::strapdown::Imu;
 use crate::error::Error;
 use crate::input::{Inputs, Sample};
 use crate::results::Counts;
+use crate::standing;
 
 /// A measurement, by its place in the inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,8 +26,9 @@ pub(crate) enum Source {
     Attitude(usize),
 }
 
-/// Returns the samples whose numbers are finite and whose times rise, and counts the others.
-pub(crate) fn clean(samples: &[Sample], max_step_s: f64, counts: &mut Counts) -> Vec<Sample> {
+/// Returns the samples whose numbers are finite and whose times rise, and counts the others. Samples of a channel that
+/// stands still are marked as saturated.
+pub(crate) fn clean(samples: &[Sample], max_step_s: f64, counts: &mut Counts, notes: &mut Vec<String>) -> Vec<Sample> {
     let mut out: Vec<Sample> = Vec::with_capacity(samples.len());
     counts.samples = samples.len();
     for sample in samples {
@@ -45,6 +47,7 @@ pub(crate) fn clean(samples: &[Sample], max_step_s: f64, counts: &mut Counts) ->
         counts.saturated += usize::from(sample.saturated);
         out.push(*sample);
     }
+    standing::mark(&mut out, max_step_s, counts, notes);
     out
 }
 

@@ -35,6 +35,7 @@ pub mod sink;
 pub mod smooth;
 pub mod solve;
 pub mod sparse;
+mod standing;
 pub mod start;
 mod track;
 pub mod truth;

@@ -225,8 +225,10 @@ pub struct Counts {
     pub samples_out_of_order: usize,
     /// Gaps between samples.
     pub gaps: usize,
-    /// Samples with a channel at its limit.
+    /// Samples with a channel at its limit: as the file says, or as their equal numbers show.
     pub saturated: usize,
+    /// Samples that repeat an earlier one to the last digit, because the unit stood still.
+    pub frozen: usize,
     /// Measurements before the start.
     pub before_start: usize,
     /// Measurements outside the time of the inertial unit.

@@ -59,8 +59,8 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
     if inputs.imu.is_empty() {
         return without_unit(inputs, settings, &mounts, wanted);
     }
-    let mut counts = Counts::default();
-    let samples = clean(&inputs.imu, settings.imu.max_step_s, &mut counts);
+    let (mut counts, mut notes) = (Counts::default(), Vec::new());
+    let samples = clean(&inputs.imu, settings.imu.max_step_s, &mut counts, &mut notes);
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
         return Err(Error::unusable("the inertial unit has no finite sample"));
     };
@@ -68,7 +68,6 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
         without_receiver(inputs, settings)?;
     }
     let span_s = [first.imu.time_s, last.imu.time_s];
-    let mut notes = Vec::new();
     if !inputs.has_receiver() {
         notes.push(
             "without a receiver the position is not known: the attitude against ECEF (qw to qz) holds, but yaw, pitch \
@@ -124,7 +123,7 @@ pub fn with_problem<R>(
 ) -> Result<R, Error> {
     let mounts = mounts(&inputs.recordings)?;
     let mut counts = Counts::default();
-    let samples = clean(&inputs.imu, settings.imu.max_step_s, &mut counts);
+    let samples = clean(&inputs.imu, settings.imu.max_step_s, &mut counts, &mut Vec::new());
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
         return Err(Error::unusable("the inertial unit has no finite sample"));
     };

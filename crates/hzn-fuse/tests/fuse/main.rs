@@ -7,6 +7,7 @@ mod flight;
 mod orbit;
 mod recordings;
 mod solve;
+mod standing;
 mod tables;
 mod tracker;
 mod two_bodies;

@@ -221,6 +221,7 @@ fn counts(counts: &Counts) -> Vec<(String, String)> {
         ("  out of order", counts.samples_out_of_order),
         ("  gaps before them", counts.gaps),
         ("  saturated", counts.saturated),
+        ("  frozen", counts.frozen),
         ("before the start", counts.before_start),
         ("outside the samples", counts.outside),
         ("without a reference", counts.without_reference),
