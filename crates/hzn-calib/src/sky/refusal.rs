@@ -148,17 +148,21 @@ fn write_conflict(
     )
 }
 
+fn write_too_few(f: &mut fmt::Formatter<'_>, answered: usize, min_pictures: usize) -> fmt::Result {
+    write!(
+        f,
+        "{answered} pictures have an answer, but a free limb height needs at least {min_pictures}; take more pictures, \
+         or state limb_height_km and limb_height_sigma_km in [body]"
+    )
+}
+
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooFew { answered: 0, .. } => {
                 f.write_str("no picture has an answer with a limb and an altitude; examine some with `hzn explain`")
             }
-            Self::TooFew { answered, min_pictures } => write!(
-                f,
-                "{answered} pictures have an answer, but a free limb height needs at least {min_pictures}; take more \
-                 pictures, or state limb_height_km and limb_height_sigma_km in [body]"
-            ),
+            Self::TooFew { answered, min_pictures } => write_too_few(f, *answered, *min_pictures),
             Self::Lens { why } => write!(f, "the lens is not valid: {why}"),
             Self::Impossible { why } => write!(
                 f,

@@ -77,9 +77,9 @@ pub(super) fn test_small(fused: &Fused) -> Option<Finding> {
     let word = if lag_s > 0.0 { "late" } else { "early" };
     let what = format!(
         "the receiver is {:.3} s {word} (sigma {sigma_s:.3} s) against the positions in {whose}: {:.2} km along the \
-         path, while the sigma of the solution's position is {:.3} km there. This position is the receiver's, so that \
-         it is wrong if its clock is not that of the inertial unit ({:+.3} s more in --clock gnss would agree). Otherwise \
-         the recordings were made with the positions of other times",
+         path, while the sigma of the solution's position is {:.3} km there. This position is the receiver's, so \
+         that it is wrong if its clock is not that of the inertial unit ({:+.3} s more in --clock gnss would agree). \
+         Otherwise the recordings were made with the positions of other times",
         lag_s.abs(),
         lag_s.abs() * speed_m_s * 1e-3,
         position_m * 1e-3,
