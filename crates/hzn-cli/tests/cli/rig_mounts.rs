@@ -66,7 +66,9 @@ fn mounts_are_found_from_the_limbs_that_the_heads_see_together() {
     let told = good.split("q_rig_from_camera_wxyz = [").nth(2).unwrap().split(']').next().unwrap();
     place.write("ring/wrong.toml", good.replace(told, &list(wrong)).as_bytes());
     let calibrate = |more: &[&str]| place.run(&[&["calibrate", "rig", "ring/wrong.toml", "-q"], more].concat());
-    let out = calibrate(&["-o", "ring/found.toml"]).expect(0).out;
+    // A wrong lens would look the same, and these mounts would hide it.
+    let doubt = "warning: the mount told in rig.toml does not hold: right has turned by 0.";
+    let out = calibrate(&["-o", "ring/found.toml"]).expect(0).says(doubt).out;
     assert!(out.contains("epochs") && out.contains("right          turned by"), "{out}");
     let found = mounts(&place.read("ring/found.toml"));
     let (before, after) = (largest_deg(&mounts(&place.read("ring/wrong.toml")), &truth), largest_deg(&found, &truth));

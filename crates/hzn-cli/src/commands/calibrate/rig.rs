@@ -106,6 +106,9 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Ok(if holds { Exit::Done } else { Exit::Failed });
     }
     tell::result(rig_text::report(&names, &adjusted))?;
+    if let Some(why) = rig_text::contradicts_told(&names, &check(&adjusted, &found.limbs.told_rad2())) {
+        tell::warning(why);
+    }
     if let Some(path) = &args.output {
         refuse_wider(&names, &adjusted, &found.limbs.told_rad2())?;
         write(args, path, &adjusted)?;

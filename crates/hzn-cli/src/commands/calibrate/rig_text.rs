@@ -11,16 +11,9 @@ pub(super) fn report(heads: &[Head], adjusted: &Adjusted) -> String {
     lines(heads, adjusted).iter().map(|(name, value)| format!("{name:<14} {}\n", one_line(value))).collect()
 }
 
-/// Returns the report of a check: the verdict, and what the pictures say.
-/// `noticed` has the turn of each head about each axis of its camera that would have been noticed, radians. `refused`
-/// says that the joint answer refuses more epochs than chance explains.
-pub(super) fn check_report(
-    heads: &[Head],
-    adjusted: &Adjusted,
-    (check, noticed): (&Check, &[[f64; 3]]),
-    refused: Option<&str>,
-) -> String {
-    let verdict = match check {
+/// Says whether the told mounts hold. `refused` says what the joint answers of a run have against them.
+fn verdict(heads: &[Head], check: &Check, refused: Option<&str>) -> String {
+    match check {
         Check::Holds(_) if refused.is_some() => format!(
             "does not hold: {}. No turn of one head is significant, so the sigmas of the mounts may be too small, or a \
              lens, a clock or pictures of a head are wrong",
@@ -43,7 +36,31 @@ pub(super) fn check_report(
             "does not hold: the two heads contradict each other, and nothing says which of them has turned".into()
         }
         Check::Contradict => "does not hold: the heads contradict each other, and no single head explains it".into(),
+    }
+}
+
+/// Says that the pictures contradict the told mounts, which a calibration would hide; `None` if they agree.
+pub(super) fn contradicts_told(heads: &[Head], check: &Check) -> Option<String> {
+    let does_not_hold = match check {
+        Check::Holds(_) => return None,
+        Check::Turned(..) | Check::Contradict => verdict(heads, check, None),
     };
+    Some(format!(
+        "the mount told in rig.toml {does_not_hold}. The wrong lens of a head looks like a turn, too, and with these \
+         mounts `hzn run` would not see it: try `hzn calibrate check` with the pictures of each head first"
+    ))
+}
+
+/// Returns the report of a check: the verdict, and what the pictures say.
+/// `noticed` has the turn of each head about each axis of its camera that would have been noticed, radians. `refused`
+/// says that the joint answer refuses more epochs than chance explains.
+pub(super) fn check_report(
+    heads: &[Head],
+    adjusted: &Adjusted,
+    (check, noticed): (&Check, &[[f64; 3]]),
+    refused: Option<&str>,
+) -> String {
+    let verdict = verdict(heads, check, refused);
     let blind = heads.iter().zip(noticed).filter(|_| *check != Check::Holds(false)).map(|(head, turns)| {
         let [x, y, z] = turns.map(turn_deg);
         format!("{:<14} {}\n", head.name, one_line(format!("about x, y, z of its camera: {x}, {y}, {z}")))
