@@ -27,6 +27,7 @@ pub mod input;
 mod orbit;
 pub mod read_back;
 mod reference;
+mod repeats;
 pub mod results;
 pub mod settings;
 #[cfg(feature = "simulated")]

@@ -41,8 +41,12 @@ pub(super) fn first_attitude(
     let mut bodies: Vec<Body> = Vec::new();
     let mut contradicts = false;
     let mut without_reference: Vec<Body> = Vec::new();
+    let mut without_place: Vec<f64> = Vec::new();
     for event in flight.events {
-        let Some(fix) = place_near(flight.inputs, event.time_s) else { continue };
+        let Some(fix) = place_near(flight.inputs, event.time_s) else {
+            without_place.extend(matches!(event.source, Source::Attitude(_)).then_some(event.time_s));
+            continue;
+        };
         let found = match event.source {
             Source::Gnss(_) => None,
             Source::Attitude(index) => {
@@ -82,7 +86,21 @@ pub(super) fn first_attitude(
         let begin = Begin { time_s: event.time_s, directions, chi2 };
         return Ok(found_at(begin, attitude, covariance_rad2, &fix, &flight.inputs.gnss, settings));
     }
+    if let ([first_s, ..], false) = (without_place.as_slice(), contradicts) {
+        return Err(without_position(*first_s, without_place.len(), &flight.inputs.gnss));
+    }
     Err(no_attitude(&bodies, &without_reference, contradicts, settings))
+}
+
+/// Says why the attitudes of a star tracker do not begin a flight: the receiver has no position there.
+fn without_position(first_s: f64, count: usize, fixes: &[Fix]) -> Error {
+    let times = fixes.iter().map(|fix| fix.time_s).filter(|t| t.is_finite());
+    let [from_s, to_s] = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], t| [a.min(t), b.max(t)]);
+    Error::unusable(format!(
+        "no first attitude: the star tracker has {count}, the first at {first_s:.1} s, but the receiver has no position \
+         within {FIX_S} s of one (its fixes are from {from_s:.1} to {to_s:.1} s). Give attitudes or directions at times \
+         with a position, or leave out --gnss for the attitude alone"
+    ))
 }
 
 /// Says why there is no first attitude.

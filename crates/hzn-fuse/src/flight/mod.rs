@@ -14,6 +14,7 @@ use crate::events::{clean, events};
 use crate::finding::{Finding, Level, Verdict};
 use crate::input::{Inputs, Recording};
 use crate::orbit;
+use crate::repeats;
 use crate::results::{Counts, Fused};
 use crate::settings::{ErrorSetting, Limb, Settings, Treatment};
 use crate::smooth::{MAX_EPOCHS, smooth};
@@ -60,6 +61,8 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
         return without_unit(inputs, settings, &mounts, wanted);
     }
     let (mut counts, mut notes) = (Counts::default(), Vec::new());
+    let without_repeats = repeats::without(inputs, settings, &mut counts, &mut notes);
+    let inputs = without_repeats.as_ref().unwrap_or(inputs);
     let samples = clean(&inputs.imu, settings.imu.max_step_s, &mut counts, &mut notes);
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
         return Err(Error::unusable("the inertial unit has no finite sample"));

@@ -55,7 +55,7 @@ pub(crate) struct Given<'a> {
 pub(crate) fn of_inputs(given: &Given<'_>) -> Vec<Finding> {
     let Given { inputs, samples, settings, .. } = given;
     let max_step_s = settings.imu.max_step_s;
-    if let Some(finding) = samples::test(samples, max_step_s) {
+    if let Some(finding) = samples::test(samples, inputs, max_step_s) {
         // Without the right times nothing else can be compared.
         return vec![finding];
     }

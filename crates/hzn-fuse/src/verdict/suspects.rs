@@ -263,9 +263,28 @@ fn words_of_errors(problem: &Problem, tried: &Tried, first: usize, name: &str) -
             let scale = three * 100.0;
             format!("the gyros' scale is probably off by {:.1} {:.1} {:.1} %", scale.x, scale.y, scale.z)
         }
-        Cause::TrackerFrame => format!("the star tracker is probably turned by {off_deg:.2} deg against the vehicle"),
+        Cause::TrackerFrame => words_of_tracker(problem, off_deg),
         _ => format!("the inertial unit, or all mounts together, are probably turned by {off_deg:.1} deg"),
     }
+}
+
+/// Says what a star tracker that looks turned may be. While the vehicle turns, a wrong clock does the same, and told
+/// errors that are too small make a turn of a right one.
+fn words_of_tracker(problem: &Problem, off_deg: f64) -> String {
+    let turned = format!("the star tracker is probably turned by {off_deg:.2} deg against the vehicle");
+    let (Some(first), Some(last)) = (problem.tracked.first(), problem.tracked.last()) else { return turned };
+    let rate_deg_s = if last.time_s > first.time_s {
+        (last.integrals.turned_rad - first.integrals.turned_rad).to_degrees() / (last.time_s - first.time_s)
+    } else {
+        first.integrals.rate_rad_s.norm().to_degrees()
+    };
+    let by_clock_s = off_deg / rate_deg_s;
+    let clock = if by_clock_s < LAG_S.0 {
+        format!(", or its clock is {by_clock_s:.1} s off, which is as much at a mean rate of {rate_deg_s:.2} deg/s")
+    } else {
+        String::new()
+    };
+    format!("{turned}{clock}, or its sigma_deg is told too small")
 }
 
 /// Names the rates that fit.

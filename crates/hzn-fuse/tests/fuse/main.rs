@@ -6,6 +6,7 @@ mod common_part;
 mod flight;
 mod orbit;
 mod recordings;
+mod repeats;
 mod solve;
 mod standing;
 mod tables;
