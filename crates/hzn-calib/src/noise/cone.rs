@@ -10,7 +10,7 @@ use hzn_core::camera::{Camera, INTRINSICS};
 use hzn_core::ellipsoid::LimbCone;
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 /// Largest number of iterations of the fit, which starts at the pipeline's answer.
 const ITERATIONS: usize = 8;
@@ -99,6 +99,47 @@ impl Cone {
             }
         }
         Self::evaluate(&edge_points, e, c, azimuth)
+    }
+
+    /// Returns the cone of a limb whose `cos` α is known, for the derivatives of the fitted cos α by the lens.
+    ///
+    /// The axis is fitted with this half-angle, and the points are replaced by their feet, the nearest points of that
+    /// limb. At the free half-angle and at the points themselves, a derivative has the noise of the picture: a noisy
+    /// half-angle comes with a derivative in proportion to it, and a regression of the one over the other finds a slope
+    /// where there is none.
+    pub(crate) fn of_known_limb(
+        camera: &Camera<f64>,
+        points: &[([f64; 2], f64)],
+        axis: [f64; 3],
+        cos: f64,
+        azimuth: Option<&Azimuth>,
+    ) -> Option<Self> {
+        let mut e = Vector3::from(axis);
+        let located = locate_edge_points(camera, points);
+        for _ in 0..ITERATIONS {
+            let cone = Self::evaluate(&located, e, cos, azimuth)?;
+            let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+            for row in &cone.rows {
+                // The row of the axis alone, without the mean that belongs to the free cos α.
+                let h = Vector2::new(row.h.x + cone.to_cos.x / row.slope, row.h.y + cone.to_cos.y / row.slope);
+                normal += h * h.transpose() * row.weight;
+                right += h * (row.weight * row.r_px);
+            }
+            let step = normal.try_inverse()? * right;
+            let (b1, b2) = basis(&e);
+            e = (e + b1 * step.x + b2 * step.y).try_normalize(1e-12)?;
+            if step.norm() < 1e-13 {
+                break;
+            }
+        }
+        let found = Self::evaluate(&located, e, cos, azimuth)?;
+        let foot = |(row, p): (&Row, &EdgePoint)| {
+            let along = p.derivatives.map(|derivative| e.dot(&derivative) / row.slope * row.r_px);
+            let centre = camera.principal_point();
+            ([centre.u + p.off_px[0] + along[0], centre.v + p.off_px[1] + along[1]], p.weight)
+        };
+        let feet: Vec<_> = found.rows.iter().zip(&located).map(foot).collect();
+        Self::evaluate(&locate_edge_points(camera, &feet), e, cos, azimuth)
     }
 
     /// Computes the rows and the normal equations at an axis and cos α.

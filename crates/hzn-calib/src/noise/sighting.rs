@@ -11,7 +11,7 @@ use hzn_core::{Prior, Solution};
 use nalgebra::Vector3;
 
 use super::bend::{self, SHAPES};
-use super::cone::{Azimuth, Cone, basis};
+use super::cone::{Azimuth, Cone, Row, basis};
 use super::edge::{self, Scores};
 use super::lag::Lags;
 
@@ -43,9 +43,11 @@ pub struct Sighting {
     pub km_per_px: f64,
     /// Change of the limb height by a bend of the whole edge with an RMS of one pixel, in kilometres.
     pub km_per_bend_px: f64,
-    /// Change of the limb height per relative change of the focal length, in kilometres.
+    /// Change of the limb height per relative change of the focal length, in kilometres, for a limb of the height that
+    /// the sensor expects. The noise of the picture is not in it.
     pub km_per_focal: f64,
-    /// Change of the limb height by each 1-sigma mode of the lens in sensor.toml, in kilometres; 0 beyond their number.
+    /// Change of the limb height by each 1-sigma mode of the lens in sensor.toml, in kilometres, for the same limb; 0
+    /// beyond their number.
     pub(super) km_by_lens: [f64; INTRINSICS],
     /// Weighted RMS distance of the edge points from the limb, in pixels.
     pub rms_px: f64,
@@ -114,6 +116,10 @@ impl Sighting {
         let apparent_m = geometry.limb_m + geometry.distance_m * (sin - geometry.sin_expected);
         let (height_km, slope) = body.kind.height_below_air_km(apparent_m / 1e3, geometry.altitude_m / 1e3);
         let by_cos_m = -geometry.distance_m * cone.cos / sin * slope;
+        let expected_cos = (1.0 - geometry.sin_expected * geometry.sin_expected).sqrt();
+        let expected = Cone::of_known_limb(camera, points, solution.axis.xyz(), expected_cos, azimuth.as_ref())?;
+        let by_expected_cos_m = -geometry.distance_m * expected_cos / geometry.sin_expected * slope;
+        let by_lens_km = |signal: &dyn Fn(&Row) -> f64| by_expected_cos_m * expected.change_of_cos(signal) / 1e3;
         let scores = edge::score_models(&cone)?;
         let noise = edge::variance_of_cos(&cone, &scores);
         let variance_cos = noise + geometry.variance_of_harmonic(&cone, azimuth.as_ref().map(|_| attitude_sigma));
@@ -125,8 +131,8 @@ impl Sighting {
             km_per_px: by_cos_m.abs() * cone.cos_per_px().max(cone.change_of_cos(|_| 1.0).abs()) / 1e3,
             km_per_bend_px: by_cos_m.abs() * cone.change_of_cos(|row| bend::bend_shape(row.along)).abs() / 1e3,
             shapes_px: bend::shapes_px(&cone),
-            km_per_focal: by_cos_m * cone.change_of_cos(|row| row.by_focal_px) / 1e3,
-            km_by_lens: core::array::from_fn(|k| by_cos_m * cone.change_of_cos(|row| row.by_lens_px[k]) / 1e3),
+            km_per_focal: by_lens_km(&|row| row.by_focal_px),
+            km_by_lens: core::array::from_fn(|k| by_lens_km(&|row| row.by_lens_px[k])),
             rms_px: cone.rms_px(),
             arc_px: cone.arc_px(),
             correlation_px: edge::equivalent_length_px(&cone, cone.rms_px(), noise),

@@ -270,7 +270,8 @@ fn a_longer_focal_length_raises_the_limb_as_predicted() {
     let longer =
         Camera::try_new(&camera::Config { fx_px: config.fx_px * 1.001, fy_px: config.fy_px * 1.001, ..config.clone() });
     let radius = earth().mean_radius_km();
-    let alpha = ((radius + 20.0) / (radius + 200.0)).asin();
+    // The limb of the height that the sensor expects.
+    let alpha = ((radius + 15.0) / (radius + 200.0)).asin();
     let axis = Vector3::new(0.1, alpha.sin(), alpha.cos()).normalize();
     let points = limb(&camera, axis, &|_| alpha.cos(), Noise(1e-4, 10.0, 0.5), &mut Draws(10));
     let prior = Prior { altitude_m: Some(200e3), ..Prior::default() };
@@ -280,6 +281,60 @@ fn a_longer_focal_length_raises_the_limb_as_predicted() {
     let (before, after) = (at(&camera), at(&longer.unwrap()));
     let grown = after.limb_height_km - before.limb_height_km;
     assert!((grown / (before.km_per_focal * 1e-3) - 1.0).abs() < 0.02, "{grown} {}", before.km_per_focal);
+}
+
+/// At one altitude, the change of a picture's limb height by the focal length differs from picture to picture mainly by
+/// the place of the limb in it. If the noise of the picture were in that change, too, right lenses would be blamed.
+#[test]
+fn right_lenses_are_not_blamed() {
+    let brown = camera::Config {
+        k: [-0.2, 0.05, 0.0, 0.0, 0.0].into_iter().collect(),
+        ..camera::Config::ideal(Model::BrownConrady, 240, 180, 190.0)
+    };
+    let lenses = [
+        camera::Config::ideal(Model::Pinhole, 240, 180, 190.0),
+        brown,
+        camera::Config::ideal(Model::KannalaBrandt, 240, 180, 190.0),
+    ];
+    for config in lenses {
+        let camera = Camera::try_new(&config).unwrap();
+        let (radius, mut squares, flights) = (earth().mean_radius_km(), 0.0, 12);
+        for seed in 0..flights {
+            let mut draws = Draws(100 + seed);
+            let each = (0..35).filter_map(|k| {
+                let altitude_km = 713.0 + 0.1 * f64::from(k);
+                let alpha = ((radius + 17.0) / (radius + altitude_km)).asin();
+                let roll = 0.4 * (0.2 * f64::from(k)).sin();
+                let below = alpha + 0.15 * (0.31 * f64::from(k)).sin();
+                let axis = Vector3::new(roll.sin() * below.sin(), roll.cos() * below.sin(), below.cos());
+                let points = limb(&camera, axis, &|_| alpha.cos(), Noise(0.12, 20.0, 0.5), &mut draws);
+                let prior = Prior { altitude_m: Some(altitude_km * 1e3), ..Prior::default() };
+                Sighting::measure("p", &camera, &earth(), &prior, &points, &solution(axis, alpha))
+            });
+            let sightings: Vec<Sighting> = each.collect();
+            assert_eq!(sightings.len(), 35);
+            let focal = Calibration::new(&earth(), &sightings).unwrap().focal.unwrap();
+            squares += (focal.percent / focal.sigma_percent).powi(2) / flights as f64;
+        }
+        assert!(squares < 2.0, "{:?}: {squares:.2}", config.model);
+    }
+}
+
+#[test]
+fn a_focal_length_beyond_what_a_line_can_mean_has_no_percentage() {
+    let mut c = Calibration::new(&earth(), &flight(16, 90.0, 18.7, 0.5, Noise(0.3, 40.0, 0.5), 11)).unwrap();
+    let mut told = |percent, sigma_percent| {
+        c.focal = c.focal.map(|f| super::Focal { percent, sigma_percent, ..f });
+        let lines = super::lines(&c, "16 pictures", &camera(90.0));
+        lines.into_iter().find(|(name, _)| *name == "focal length").unwrap().1
+    };
+    assert!(
+        told(-3.0, 0.5).starts_with("-3.00 % ± 0.50 %") && told(-3.0, 0.5).ends_with("check the camera's calibration")
+    );
+    for (percent, sigma) in [(-54.1, 12.3), (-17.8, 2.5), (0.5, 12.0), (0.0, f64::NAN)] {
+        let line = told(percent, sigma);
+        assert!(line.starts_with("not determined: ") && !line.contains("check the camera"), "{line}");
+    }
 }
 
 #[test]

@@ -2,11 +2,13 @@
 
 use hzn_core::camera::{Config, Covariance, Intrinsic};
 
-use super::calibration::{Calibration, MAX_CHI2};
+use super::calibration::{Calibration, Focal, MAX_CHI2};
 use crate::words::above;
 
-/// 1-sigma from which on a focal length is not determined: it could as well be nothing.
-const UNKNOWN_PERCENT: f64 = 100.0;
+/// Largest difference of the focal length, and its largest 1-sigma, in percent. The heights are linear in it, with the
+/// slope at the told focal length. That slope itself changes by a few times the relative difference, so that beyond a
+/// tenth a percentage would mean nothing.
+const LINEAR_PERCENT: f64 = 10.0;
 
 /// Returns the lines of a report: name and value. `pictures` is the number of all pictures in words.
 pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<(&'static str, String)> {
@@ -46,26 +48,34 @@ pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<
     let [chi2, _] = above(calibration.chi2, MAX_CHI2);
     lines.push(("chi-square", format!("{chi2} a degree of freedom; 1 is ideal, a value above 2 is an alarm")));
     if let Some(f) = &calibration.focal {
-        let sure = f.percent.abs() > 3.0 * f.sigma_percent;
-        // Another shape of the lens changes the half-angle as another focal length does.
-        let hint = match camera.covariance.as_ref().is_some_and(has_shape) {
-            true => {
-                "; its sigma is for the shape of the lens in sensor.toml, which is not certain: `hzn calibrate sky` \
-                     estimates both"
-            }
-            false if sure => "; check the camera's calibration",
-            false => "",
-        };
-        let what = "from that of sensor.toml, with a free limb height; not applied";
-        let told = if f.sigma_percent < UNKNOWN_PERCENT {
-            format!("{:+.2} % ± {:.2} % {what}{hint}", f.percent, f.sigma_percent)
-        } else {
-            "not determined: the pictures do not separate it from the limb height".to_owned()
-        };
-        lines.push(("focal length", told));
+        lines.push(("focal length", focal(f, camera)));
         lines.push(("", format!("0.1 % of it is {:.2} km of limb height", f.km_per_permille.abs())));
     }
     lines
+}
+
+/// Says by how much the focal length differs, if the estimate can mean that.
+fn focal(f: &Focal, camera: &Config) -> String {
+    if !(f.sigma_percent < LINEAR_PERCENT) {
+        return "not determined: the pictures do not separate it from the limb height".to_owned();
+    }
+    if f.percent.abs() > LINEAR_PERCENT {
+        return format!(
+            "not determined: the pictures ask for a difference of more than {LINEAR_PERCENT:.0} %, which this estimate \
+             cannot measure; `hzn calibrate check` compares the focal length with the flight"
+        );
+    }
+    // Another shape of the lens changes the half-angle as another focal length does.
+    let hint = if camera.covariance.as_ref().is_some_and(has_shape) {
+        "; its sigma is for the shape of the lens in sensor.toml, which is not certain: `hzn calibrate sky` estimates \
+         both"
+    } else if f.percent.abs() > 3.0 * f.sigma_percent {
+        "; check the camera's calibration"
+    } else {
+        ""
+    };
+    let what = "from that of sensor.toml, with a free limb height; not applied";
+    format!("{:+.2} % ± {:.2} % {what}{hint}", f.percent, f.sigma_percent)
 }
 
 /// Returns whether a coefficient of the lens has a sigma.
