@@ -147,7 +147,15 @@ fn without_unit(
     wanted: Wanted,
 ) -> Result<Fused, Error> {
     if wanted.solved {
-        return orbit::fuse(inputs, settings, mounts);
+        let (mut counts, mut notes) = (Counts::default(), Vec::new());
+        let without_repeats = repeats::without(inputs, settings, &mut counts, &mut notes);
+        let mut fused = orbit::fuse(without_repeats.as_ref().unwrap_or(inputs), settings, mounts)?;
+        notes.append(&mut fused.notes);
+        fused.notes = notes;
+        for ((source, why), count) in counts.unusable {
+            fused.counts.add_unusable(source, why, count);
+        }
+        return Ok(fused);
     }
     Err(Error::unusable(
         "there is no sample of an inertial unit; give --imu FILE, or --solve for the orbit of a satellite from limbs \

@@ -331,6 +331,19 @@ fn inertial_attitudes_are_named() {
     assert!(first.what.contains("relative to inertial axes"), "{first:?}");
 }
 
+/// A table of attitudes that was appended to itself tells nothing new.
+#[test]
+fn attitudes_that_are_there_twice_count_once() {
+    let (mut inputs, _) = simulate(Plan::new(ORBITS[0].1, 12, 5800.0));
+    let once = solve(&inputs);
+    let n = inputs.attitudes.len();
+    inputs.attitudes.extend_from_within(..);
+    let twice = solve(&inputs);
+    assert_eq!(twice.smoothed, once.smoothed);
+    let words = format!("attitude: {n} of {} rows are copies of others", 2 * n);
+    assert!(twice.notes.iter().any(|note| note.contains(&words)), "{:?}", twice.notes);
+}
+
 /// The period of the orbit gives its height, so told altitudes that are elsewhere contradict it.
 #[test]
 fn told_altitudes_elsewhere_are_found() {
