@@ -10,6 +10,8 @@
 //! Azimuth and elevation are angles of a right-handed frame with z forward, x to the right and y down: the unit vector
 //! is (cos e sin a, −sin e, cos e cos a). So the azimuth grows to the right and the elevation upwards.
 
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
@@ -39,6 +41,66 @@ pub struct Points {
     pub points: Vec<Point>,
 }
 
+/// A table of points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// The points by picture.
+    pub pictures: Vec<Points>,
+    /// Number of rows that were left out, because an earlier row of the same picture has the same numbers.
+    pub copied_rows: usize,
+    /// Pictures that were left out, because all points of an earlier one are the same to the last bit: the name of each
+    /// with that of the earlier one.
+    pub copied_pictures: Vec<[String; 2]>,
+}
+
+impl Table {
+    /// Returns what was left out in words, a line each.
+    ///
+    /// A measurement that is there twice says nothing new, and would only make the sigmas of the lens smaller.
+    pub fn copies_in_words(&self) -> Vec<String> {
+        let rows = (self.copied_rows > 0).then(|| {
+            format!(
+                "{} rows are earlier rows of the same picture to the last bit; each point counts once",
+                self.copied_rows
+            )
+        });
+        let picture = |[copy, first]: &[String; 2]| {
+            format!("all points of {copy} are those of {first} to the last bit; the picture counts once")
+        };
+        rows.into_iter().chain(self.copied_pictures.iter().map(picture)).collect()
+    }
+
+    /// Takes each point of a picture, and each picture, only once.
+    fn without_copies(mut pictures: Vec<Points>) -> Self {
+        let bits =
+            |p: &Point| [p.at_px[0], p.at_px[1], p.direction[0], p.direction[1], p.direction[2]].map(f64::to_bits);
+        let mut copied_rows = 0;
+        for picture in &mut pictures {
+            let mut seen = HashSet::new();
+            let before = picture.points.len();
+            picture.points.retain(|p| seen.insert(bits(p)));
+            copied_rows += before - picture.points.len();
+        }
+        let mut first: HashMap<Vec<[u64; 5]>, String> = HashMap::new();
+        let mut copied_pictures = Vec::new();
+        pictures.retain(|picture| {
+            let mut all: Vec<_> = picture.points.iter().map(bits).collect();
+            all.sort_unstable();
+            match first.entry(all) {
+                Entry::Occupied(earlier) => {
+                    copied_pictures.push([picture.name.clone(), earlier.get().clone()]);
+                    false
+                }
+                Entry::Vacant(place) => {
+                    place.insert(picture.name.clone());
+                    true
+                }
+            }
+        });
+        Self { pictures, copied_rows, copied_pictures }
+    }
+}
+
 /// Columns of the directions.
 #[derive(Debug, Clone, Copy)]
 enum Direction {
@@ -51,7 +113,7 @@ enum Direction {
 /// # Errors
 /// The file cannot be read, a column is missing, or a row has an impossible value. The error names the line and the
 /// column.
-pub fn load(path: &Path, size_px: [u16; 2]) -> Result<Vec<Points>, Problem> {
+pub fn load(path: &Path, size_px: [u16; 2]) -> Result<Table, Problem> {
     let text = limited::read_text(path, limited::TABLE_BYTES)
         .map_err(|e| Problem::new(path, format!("cannot be read: {e}")))?;
     parse(&text, path, size_px)
@@ -61,7 +123,7 @@ pub fn load(path: &Path, size_px: [u16; 2]) -> Result<Vec<Points>, Problem> {
 ///
 /// # Errors
 /// The errors are those of [`load`].
-pub fn parse(text: &str, path: &Path, size_px: [u16; 2]) -> Result<Vec<Points>, Problem> {
+pub fn parse(text: &str, path: &Path, size_px: [u16; 2]) -> Result<Table, Problem> {
     let mut reader =
         ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(UnixLines::new(text.as_bytes()));
     let unreadable = |e: csv::Error| {
@@ -100,7 +162,10 @@ pub fn parse(text: &str, path: &Path, size_px: [u16; 2]) -> Result<Vec<Points>, 
             None => groups.push(Points { name: name.to_owned(), points: vec![point] }),
         }
     }
-    if groups.is_empty() { Err(Problem::new(path, "the table has no rows")) } else { Ok(groups) }
+    if groups.is_empty() {
+        return Err(Problem::new(path, "the table has no rows"));
+    }
+    Ok(Table::without_copies(groups))
 }
 
 struct Row<'a> {

@@ -116,15 +116,40 @@ fn a_wrong_table_is_refused_with_the_correction() {
     assert_eq!(few, "there are 4 points, but this model needs at least 8; measure more points");
 }
 
+/// The same measurements again say nothing new: neither the lens nor its sigmas may change.
+#[test]
+fn copies_of_rows_and_of_pictures_count_once() {
+    let lens = infrared();
+    let points = rotator(&lens, 12.0, 0.01, 0.05, &mut Draws(21)).points;
+    let row =
+        |p: &Point| format!("{},{},{},{},{}\n", p.at_px[0], p.at_px[1], p.direction[0], p.direction[1], p.direction[2]);
+    let rows = |file: &str| points.iter().map(|p| format!("{file},{}", row(p))).collect::<String>();
+    let read =
+        |rows: &str| table::parse(&format!("file,u_px,v_px,x,y,z\n{rows}"), Path::new("p.csv"), [384, 288]).unwrap();
+    let once = read(&rows("a.png"));
+    assert!(once.copies_in_words().is_empty());
+    let again = read(&(rows("a.png").repeat(6) + &rows("b.png")));
+    assert_eq!((again.copied_rows, again.pictures.len()), (5 * points.len(), 1));
+    assert_eq!(again.pictures, once.pictures);
+    let words = again.copies_in_words();
+    assert!(words[0].contains(&format!("{} rows are earlier rows", 5 * points.len())), "{words:?}");
+    assert!(words[1].starts_with("all points of b.png are those of a.png to the last bit"), "{words:?}");
+    // The same source a nanopixel further is another measurement.
+    let [u, v] = points[0].at_px;
+    let other = row(&Point { at_px: [u + 1e-9, v], ..points[0] });
+    assert_eq!(read(&(rows("a.png") + "a.png," + &other)).copied_rows, 0);
+}
+
 #[test]
 fn the_table_is_checked_line_by_line() {
     let read = |text: &str| table::parse(text, Path::new("p.csv"), [640, 480]);
     let good = read("file,u_px,v_px,azimuth_deg,elevation_deg\na.png,1,2,90,0\n# a comment\nb.png,3,4,0,90\n").unwrap();
+    let good = good.pictures;
     assert_eq!(good.len(), 2);
     assert!(
         (good[0].points[0].direction[0] - 1.0).abs() < 1e-12 && (good[1].points[0].direction[1] + 1.0).abs() < 1e-12
     );
-    assert_eq!(read("u_px,v_px,x,y,z\n1,2,0,0,1.001\n").unwrap()[0].points[0].direction, [0.0, 0.0, 1.0]);
+    assert_eq!(read("u_px,v_px,x,y,z\n1,2,0,0,1.001\n").unwrap().pictures[0].points[0].direction, [0.0, 0.0, 1.0]);
     let error = |text: &str| read(text).unwrap_err().to_string();
     assert!(
         error("u_px,v_px,azimut_deg,elevation_deg\n")

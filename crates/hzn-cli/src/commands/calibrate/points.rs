@@ -11,6 +11,7 @@ use super::lens_text::Reasons;
 use crate::commands::lens_model;
 use crate::exit::{Exit, Outcome, failed};
 use crate::files;
+use crate::tell;
 
 /// Calibrate a camera from points with known directions: a rotator with a collimator, or stars
 ///
@@ -64,9 +65,12 @@ impl FromStr for Size {
 pub(super) fn run(args: &Args) -> Outcome {
     check_endings(&args.output)?;
     files::check_outputs(std::slice::from_ref(&args.table), &args.output, args.force)?;
-    let pictures = points::table::load(&args.table, args.size.0)?;
+    let table = points::table::load(&args.table, args.size.0)?;
     let name = args.table.display().to_string();
-    let calibrated = points::calibrate(args.model, args.size.0, &pictures)
+    if !args.quiet {
+        table.copies_in_words().iter().for_each(|note| tell::line(format_args!("note: {name}: {note}")));
+    }
+    let calibrated = points::calibrate(args.model, args.size.0, &table.pictures)
         .map_err(|why| failed(format!("{name}: no camera is written: {why}")))?;
     write_all(&calibrated, &Reasons::new(), &args.output, &name, args.quiet)?;
     Ok(Exit::Done)
