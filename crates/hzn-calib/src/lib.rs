@@ -22,6 +22,7 @@ mod draws;
 mod finish;
 mod ideal;
 pub mod lens_error;
+mod limb_prior;
 pub mod noise;
 mod other_model;
 pub mod points;

@@ -12,6 +12,7 @@ use super::lag;
 use super::latitude::{Profile, fit_profile};
 use super::refusal::Refusal;
 use super::sighting::Sighting;
+use crate::limb_prior::{LimbPrior, TWO_SIDED, has_air};
 
 /// Smallest number of pictures with an answer. With fewer pictures the scatter is not known to a quarter.
 pub const MIN_PICTURES: usize = 12;
@@ -155,6 +156,8 @@ pub struct Calibration {
     pub pictures: Vec<Picture>,
     /// Correlation of the residuals by distance along the edge: (pixels, correlation).
     pub correlation: Vec<(f64, f64)>,
+    /// Why the height is not to be believed; `None` before [`Self::compare_with`], or if it may be right.
+    doubt: Option<Refusal>,
 }
 
 impl Calibration {
@@ -198,13 +201,38 @@ impl Calibration {
             focal: fit_focal(&profile, &consistent),
             pictures: sightings.iter().map(picture).collect(),
             correlation: lag::correlation(consistent.iter().map(|s| &s.lags)),
+            doubt: None,
         })
     }
 
-    /// Returns the alarm if the pictures do not agree with each other, or if the height is no gain.
+    /// Compares the height with the air of the body, and with what `sensor` tells of the limb height. The flight was
+    /// measured with a far wider prior ([`config_for_calibration`]). [`Self::alarm`] then has the result.
+    ///
+    /// A limb below the surface of a body with air is not possible, whatever its sigma. A height that differs from the
+    /// told one by more than 2.58 sigmas of both together happens to one right flight in a hundred.
+    pub fn compare_with(&mut self, sensor: &Config) {
+        let Some(body) = sensor.each_body().iter().find(|b| b.kind == self.body) else { return };
+        let Some(told) = LimbPrior::of_sensor(sensor, false) else { return };
+        let Height { km, sigma_km, .. } = self.height;
+        let sigmas = (km - told.km).abs() / sigma_km.hypot(told.sigma_km).max(1e-9);
+        let high_km = told.possible_km(body)[1];
+        self.doubt = if has_air(body) && km < 0.0 {
+            Some(Refusal::BelowSurface { km, sigma_km, high_km })
+        } else if sigmas > TWO_SIDED {
+            Some(Refusal::Told { km: [km, sigma_km], told_km: [told.km, told.sigma_km], sigmas })
+        } else {
+            None
+        };
+    }
+
+    /// Returns the alarm if the pictures do not agree with each other or with what was known before, or if the height
+    /// is no gain.
     pub fn alarm(&self) -> Option<Refusal> {
         if self.chi2 > MAX_CHI2 {
             return Some(Refusal::Alarm { chi2: self.chi2, max_chi2: MAX_CHI2 });
+        }
+        if self.doubt.is_some() {
+            return self.doubt;
         }
         let (sigma_km, largest) = (self.height.sigma_km, self.height.largest_part_km());
         (sigma_km > DEFAULT_SIGMA_KM).then_some(Refusal::NoBetter { sigma_km, largest, max_km: DEFAULT_SIGMA_KM })

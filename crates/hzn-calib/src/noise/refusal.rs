@@ -2,7 +2,13 @@
 
 use std::fmt;
 
+use crate::limb_prior::TWO_SIDED;
 use crate::words::above;
+
+/// Usual causes of an impossible limb height.
+const CAUSES: &str = "Usual causes are wrong altitudes (body.altitude_km, frames.csv: check their unit and their \
+                      zero), a wrong lens (`hzn calibrate check` compares it with the flight), and clouds or light that bend \
+                      all edges alike: take pictures of other places, and with the vehicle turned";
 
 /// Why a calibration is refused. It is displayed with the measured number, its limit, and a remedy.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +51,24 @@ pub enum Refusal {
         inconsistent: usize,
         /// Number of all pictures.
         pictures: usize,
+    },
+    /// The limb height is below the surface of a body with air.
+    BelowSurface {
+        /// The limb height, in kilometres.
+        km: f64,
+        /// Its 1-sigma, in kilometres.
+        sigma_km: f64,
+        /// Highest limb height that is expected, in kilometres.
+        high_km: f64,
+    },
+    /// The limb height disagrees with that of sensor.toml.
+    Told {
+        /// Limb height of the pictures and its 1-sigma, in kilometres.
+        km: [f64; 2],
+        /// Limb height of sensor.toml and its 1-sigma with the error of the altitude, in kilometres.
+        told_km: [f64; 2],
+        /// Their difference in sigmas of both together.
+        sigmas: f64,
     },
     /// The pictures' limb heights scatter more than their errors allow.
     Alarm {
@@ -90,6 +114,19 @@ impl fmt::Display for Refusal {
                 f,
                 "{inconsistent} of {pictures} pictures measure limb heights that disagree with the others. Either \
                  edges are wrong, or altitudes belong to other pictures; examine some of them with `hzn explain`"
+            ),
+            Self::BelowSurface { km, sigma_km, high_km } => write!(
+                f,
+                "the pictures measure a limb height of {km:.1} km ± {sigma_km:.1} km. A limb {:.1} km below the surface \
+                 is not possible: it is expected between 0 km and {high_km:.0} km. {CAUSES}",
+                km.abs()
+            ),
+            Self::Told { km: [km, sigma_km], told_km: [told_km, told_sigma_km], sigmas } => write!(
+                f,
+                "the pictures measure a limb height of {km:.1} km ± {sigma_km:.1} km, but sensor.toml tells \
+                 {told_km:.1} km ± {told_sigma_km:.1} km (with the error of the altitude): they differ by {sigmas:.1} \
+                 sigmas, and at most {TWO_SIDED} are consistent. {CAUSES}. If the told height is not that of this \
+                 camera's wavelengths, tell a limb_height_km with a limb_height_sigma_km in [body] that includes the right one"
             ),
             Self::Alarm { chi2, max_chi2 } => {
                 let [chi2, max_chi2] = above(*chi2, *max_chi2);

@@ -156,6 +156,30 @@ fn pictures_that_contradict_each_other_raise_the_alarm() {
 }
 
 #[test]
+fn a_height_that_the_air_cannot_have_or_that_is_told_otherwise_is_refused() {
+    let at = |limb_km: f64, told: [f64; 2]| {
+        let mut found = Calibration::new(&earth(), &flight(24, 90.0, limb_km, 0.3, Noise(0.2, 20.0, 0.7), 13)).unwrap();
+        assert!(found.alarm().is_none(), "{:?}", found.alarm());
+        let mut sensor = Config::new(camera(90.0));
+        (sensor.body, sensor.body.altitude_sigma_km) = (earth(), 0.0);
+        sensor.body.tell_limb_height(told[0], told[1]);
+        found.compare_with(&sensor);
+        found.alarm()
+    };
+    assert_eq!(at(18.7, [16.5, 3.0]), None);
+    assert_eq!(at(18.7, [15.0, 7.0]), None);
+    let below = at(-6.3, [15.0, 30.0]).unwrap();
+    assert!(matches!(below, Refusal::BelowSurface { km, .. } if km < -3.0), "{below}");
+    assert!(below.to_string().contains("km below the surface is not possible"), "{below}");
+    let told = at(3.0, [16.5, 3.0]).unwrap();
+    assert!(matches!(told, Refusal::Told { sigmas, .. } if sigmas > 2.58), "{told}");
+    assert!(told.to_string().contains("but sensor.toml tells 16.5 km ± 3.0 km"), "{told}");
+    // The limb of a body without air lies at its surface.
+    let moon = body::Config { kind: Kind::Sphere, ..earth() };
+    assert!(crate::limb_prior::has_air(&earth()) && !crate::limb_prior::has_air(&moon));
+}
+
+#[test]
 fn what_pictures_do_not_determine_is_refused_with_the_number() {
     let noise = Noise(0.3, 40.0, 0.5);
     let few = Calibration::new(&earth(), &flight(11, 90.0, 18.7, 0.0, noise, 5)).unwrap_err();

@@ -13,8 +13,9 @@ use super::fit::Fit;
 use super::layout::Layout;
 use super::observable::Observability;
 use super::refusal::Refusal;
-use super::unknowns::{LimbPrior, Unknowns};
+use super::unknowns::Unknowns;
 use super::view::View;
+use crate::limb_prior::LimbPrior;
 
 /// Error of the focal length that a check detects unless another is stated, in percent.
 pub const DEFAULT_DETECT_PERCENT: f64 = 0.3;

@@ -7,15 +7,11 @@
 use hzn_core::body;
 use nalgebra::{Matrix2, Vector2};
 
-use super::unknowns::LimbPrior;
+use crate::limb_prior::{LimbPrior, TWO_SIDED};
 use crate::quantile;
 
 /// Sigmas above which prior and pictures disagree: one right flight in a hundred is refused.
 const SIGMAS: f64 = 2.33;
-/// Sigmas of a normal deviate, two-sided, with the same probability.
-const TWO_SIDED: f64 = 2.58;
-/// Sigmas of a limb height that nobody measured within which the limb of a body is looked for.
-const RANGE: f64 = 3.0;
 
 /// The shifts of focal length and limb height against their priors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +48,7 @@ impl Conflict {
         let known = Matrix2::from_diagonal(&scale.map(|s| f64::from(u8::from(s > 0.0))));
         let gained = known - Matrix2::from_diagonal(&scale) * after * Matrix2::from_diagonal(&scale);
         let weights = gained.symmetric_eigenvalues().map(|w| w.clamp(0.0, 1.0));
-        let range_km = range_km(body, limb);
+        let range_km = limb.possible_km(body);
         let outside_km = (range_km[0] - height_km).max(height_km - range_km[1]).max(0.0);
         let sigma_km = after[(1, 1)].sqrt().hypot(body.altitude_sigma_km);
         Self {
@@ -69,15 +65,4 @@ impl Conflict {
     pub fn is_significant(&self) -> bool {
         self.chi2 > self.max_chi2 || self.outside_sigmas > TWO_SIDED
     }
-}
-
-/// Returns the limb heights that are possible: those of the body without a measurement, and those that are told.
-fn range_km(body: &body::Config, limb: LimbPrior) -> [f64; 2] {
-    let unmeasured = body::Config::of_kind(body.kind, body.radii_km);
-    let own = [unmeasured.limb_height_km, unmeasured.limb_height_sigma_km];
-    // The prior has the error of the altitude as well.
-    let told = [limb.km, if limb.sigma_km.is_finite() { limb.sigma_km } else { 0.0 }];
-    let all = [own, told].into_iter();
-    let low = all.clone().map(|[km, sigma]| km - RANGE * sigma).fold(f64::INFINITY, f64::min);
-    [low, all.map(|[km, sigma]| km + RANGE * sigma).fold(f64::NEG_INFINITY, f64::max)]
 }

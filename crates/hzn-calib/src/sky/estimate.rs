@@ -11,8 +11,9 @@ use super::layout::Layout;
 use super::observable::Observability;
 use super::parameters::{Determined, Parameters};
 use super::refusal::Refusal;
-use super::unknowns::{LimbPrior, Unknowns};
+use super::unknowns::Unknowns;
 use super::view::View;
+use crate::limb_prior::LimbPrior;
 
 /// Largest mean square of the deviations over their variances without an alarm.
 pub(super) const MAX_CHI2: f64 = 2.0;

@@ -8,8 +8,9 @@ use super::layout::Layout;
 use super::linear::{self, EdgeNoise, Model, Reduced};
 use super::refusal::Refusal;
 use super::system::{self, PriorEquations, Solution};
-use super::unknowns::{LimbPrior, Unknowns};
+use super::unknowns::Unknowns;
 use super::view::View;
+use crate::limb_prior::LimbPrior;
 use crate::noise::bend::common_bend_px;
 use crate::noise::sighting::Geometry;
 

@@ -36,6 +36,7 @@ mod view;
 mod words;
 mod write;
 
+pub use crate::limb_prior::LimbPrior;
 pub use check::{Check, DEFAULT_DETECT_PERCENT, Deviation, Verdict, check};
 pub use conflict::Conflict;
 pub use estimate::{Estimate, MIN_PICTURES, Picture, estimate};
@@ -45,7 +46,7 @@ pub use parameters::Determined;
 pub use passes::{Estimated, estimate_in_passes};
 pub use refusal::Refusal;
 pub use track::{Sight, Track, TrackRefusal, estimate_track};
-pub use unknowns::{LimbPrior, Parameter, Unknowns};
+pub use unknowns::{Parameter, Unknowns};
 pub use view::View;
 pub use words::{check_lines, lines, track_lines};
 pub use write::{Found, FoundMount, Written, into_sensor_toml};

@@ -2,7 +2,8 @@
 
 use super::fit::Fit;
 use super::layout::Layout;
-use super::unknowns::{LimbPrior, Unknowns};
+use super::unknowns::Unknowns;
+use crate::limb_prior::LimbPrior;
 
 /// How well the flight separates the focal length from the limb height.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,8 +5,9 @@ use hzn_core::{Config, body, camera};
 
 use super::estimate::{Estimate, estimate};
 use super::refusal::Refusal;
-use super::unknowns::{LimbPrior, Unknowns};
+use super::unknowns::Unknowns;
 use super::view::View;
+use crate::limb_prior::LimbPrior;
 
 /// Number of times that the pictures are processed at most. The first lens may be several percent wrong, and with it
 /// the choice of the edge points.

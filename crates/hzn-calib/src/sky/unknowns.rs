@@ -28,33 +28,6 @@ pub enum Parameter {
     K1,
 }
 
-/// The limb height as it is known before the flight.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LimbPrior {
-    /// Height in kilometres.
-    pub km: f64,
-    /// 1-sigma in kilometres; infinite if the height is not known.
-    pub sigma_km: f64,
-}
-
-impl LimbPrior {
-    /// Returns the limb height of a sensor as a prior, or one that is not known with `free`; `None` if the sensor looks
-    /// only for Sun and Moon. The error of the altitude moves the limb by the same amount.
-    pub fn of_sensor(sensor: &hzn_core::Config, free: bool) -> Option<Self> {
-        let body = sensor.each_body().iter().find(|b| !b.half_angle_is_free())?;
-        let rows = &body.limb_height_by_latitude_km;
-        let heights = || rows.iter().map(|[_, km]| *km);
-        let (km, spread_km) = if rows.is_empty() {
-            (body.limb_height_km, 0.0)
-        } else {
-            let [low, high] = [heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max)];
-            (0.5 * (low + high), 0.5 * (high - low))
-        };
-        let sigma_km = body.limb_height_sigma_km.hypot(spread_km).hypot(body.altitude_sigma_km);
-        Some(Self { km, sigma_km: if free { f64::INFINITY } else { sigma_km } })
-    }
-}
-
 /// The intrinsic parameters of a lens that are estimated, with their values and covariance before the flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unknowns {

@@ -197,7 +197,8 @@ impl Run {
         let sighting =
             |a: engine::Answered<'_>| Sighting::measure(a.name, &camera, &wide.body, &a.prior, &a.points, a.solution);
         let Some(sightings) = self.measure(wide.clone(), sighting)? else { return Ok(None) };
-        let found = noise::Calibration::new(&wide.body, &sightings).map_err(|why| self.refused(&why))?;
+        let mut found = noise::Calibration::new(&wide.body, &sightings).map_err(|why| self.refused(&why))?;
+        found.compare_with(&self.task.config);
         let written = noise::into_sensor_toml(&self.task.sensor_toml, &found, &self.task.sequence.title)?;
         let lines = noise::lines(&found, &self.pictures(), &wide.camera);
         let height = |p: &noise::Picture| HeightOf { km: p.km, sigma_km: p.sigma_km, counts: p.counts };

@@ -72,8 +72,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     unread.tell();
     let input = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
     let pictures = progress.frames();
-    let calibration = Calibration::new(&plan.config.body, &sightings)
+    let mut calibration = Calibration::new(&plan.config.body, &sightings)
         .map_err(|why| failed(format!("{input} ({}): {why}", explain::counted(pictures, "picture"))))?;
+    calibration.compare_with(&sensor.config);
     let written = noise::into_sensor_toml(&sensor.text, &calibration, &input).map_err(failed)?;
     tell::result(text::report(&calibration, pictures, &plan.config.camera))?;
     for path in args.output.iter().filter(|p| ending(p) == "html") {
