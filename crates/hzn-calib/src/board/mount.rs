@@ -45,10 +45,51 @@ pub struct BoardMount {
     pub covariance_rad2: Matrix3<f64>,
     /// RMS of the angle between the direction up of the accelerometers and that of the board, per axis, rad.
     pub rms_rad: f64,
+    /// Largest angle of a direction up from the mean of all, rad: how far the vehicle was tilted.
+    pub largest_tilt_rad: f64,
     /// Name and angle of each picture, rad.
     pub residuals_rad: Vec<(String, f64)>,
     /// Names of the pictures whose board has no pose.
     pub without_pose: Vec<String>,
+}
+
+/// Names of the vehicle's axes, with their directions.
+const AXES: [(&str, [f64; 3]); 6] = [
+    ("+x", [1.0, 0.0, 0.0]),
+    ("-x", [-1.0, 0.0, 0.0]),
+    ("+y", [0.0, 1.0, 0.0]),
+    ("-y", [0.0, -1.0, 0.0]),
+    ("+z", [0.0, 0.0, 1.0]),
+    ("-z", [0.0, 0.0, -1.0]),
+];
+
+impl BoardMount {
+    /// Says where the camera looks in the axes of the vehicle, and where the top of its picture is.
+    ///
+    /// A reader must compare this with the vehicle. A table of accelerations with left-handed axes (two of them
+    /// exchanged, or one with the wrong sign) fits as well as a right one: mirrored directions up are turned ones with
+    /// the opposite direction up on the board, which is unknown. The mount is then wrong by half a turn.
+    pub fn axes_in_words(&self) -> String {
+        let towards = |axis: Vector3<f64>| {
+            let in_vehicle = self.vehicle_from_camera * axis;
+            let (name, cos) = AXES
+                .map(|(name, direction)| (name, in_vehicle.dot(&Vector3::from(direction))))
+                .into_iter()
+                .fold(("", f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best });
+            format!("{name} ({:.0} deg from it)", cos.clamp(-1.0, 1.0).acos().to_degrees())
+        };
+        format!(
+            "in the axes of the vehicle, the camera looks along {}, and the top of the picture is towards {}",
+            towards(Vector3::z()),
+            towards(-Vector3::y())
+        )
+    }
+}
+
+/// Returns the largest angle of a direction up from the mean of all, in rad.
+fn largest_tilt_rad(poses: &[Pose]) -> f64 {
+    let mean: Vector3<f64> = poses.iter().map(|p| p.up).sum();
+    poses.iter().map(|p| p.up.angle(&mean)).fold(0.0, f64::max)
 }
 
 /// Why there is no mount.
@@ -120,6 +161,7 @@ pub fn mount(lens: &Config, board: &Board, tilts: &[Tilt], bias_rad: f64) -> Res
         vehicle_from_camera,
         covariance_rad2,
         rms_rad: (squares / freedom).sqrt(),
+        largest_tilt_rad: largest_tilt_rad(&poses),
         residuals_rad: poses.iter().map(angle).collect(),
         without_pose,
     })
@@ -303,6 +345,37 @@ mod tests {
         // χ² with 3 degrees of freedom; the scatter of few residuals makes it a little larger.
         let nees = squares / f64::from(runs);
         assert!((2.0..4.5).contains(&nees), "{nees}");
+    }
+
+    #[test]
+    fn small_tilts_have_a_sigma_that_is_right() {
+        let lens = Config::ideal(Model::Equidistant, 1280, 960, 700.0);
+        let (mut draws, mut squares, mut written) = (Draws(6), 0.0, 0);
+        for _ in 0..60 {
+            let truth = Rotation3::new(Vector3::from_fn(|_, _| draws.normal()));
+            let Ok(found) = mount(&lens, &BOARD, &tilts(&truth, &lens, 12, 0.06, &mut draws), 0.0) else { continue };
+            let error = (truth.inverse() * found.vehicle_from_camera).scaled_axis();
+            squares += (error.transpose() * found.covariance_rad2.try_inverse().unwrap() * error)[(0, 0)];
+            written += 1;
+            assert!((0.03..0.1).contains(&found.largest_tilt_rad), "{}", found.largest_tilt_rad);
+        }
+        let nees = squares / f64::from(written);
+        assert!(written > 30 && (2.0..4.5).contains(&nees), "{nees} of {written}");
+    }
+
+    /// The residuals of left-handed accelerations are those of right ones; only the words show the difference.
+    #[test]
+    fn left_handed_accelerations_show_in_the_words_alone() {
+        let lens = Config::ideal(Model::Equidistant, 1280, 960, 700.0);
+        // The camera looks along the vehicle's x, with the top of the picture towards z.
+        let truth = Rotation3::from_matrix(&Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0));
+        let right = tilts(&truth, &lens, 12, 0.4, &mut Draws(7));
+        let left = right.iter().map(|t| Tilt { up: [-t.up[0], t.up[1], t.up[2]], ..t.clone() }).collect::<Vec<_>>();
+        let [right, left] = [right, left].map(|tilts| mount(&lens, &BOARD, &tilts, 0.0).unwrap());
+        assert!((left.rms_rad / right.rms_rad - 1.0).abs() < 1e-3, "{} {}", left.rms_rad, right.rms_rad);
+        let words = [&right, &left].map(BoardMount::axes_in_words);
+        assert!(words[0].contains("looks along +x (0 deg") && words[0].contains("towards +z (0 deg"), "{words:?}");
+        assert!(words[1].contains("looks along +x (0 deg") && words[1].contains("towards -z (0 deg"), "{words:?}");
     }
 
     #[test]

@@ -242,6 +242,9 @@ fn of_flight(file: &Path, told: &Path, name: &str) -> Result<Found, Stop> {
     })
 }
 
+/// Tilt that the guide asks for is 20 degrees or more; half of it is far too small, in degrees.
+const ADVISED_TILT_DEG: f64 = 10.0;
+
 fn of_board(
     input: &[PathBuf],
     board: BoardSize,
@@ -275,6 +278,14 @@ fn of_board(
     let found = board::mount(camera, &board, &tilts, bias_mg * 1e-3)
         .map_err(|why| failed(format!("no mount is written: {why}")))?;
     tell::result(report(&found))?;
+    let what = "compare the line `axes` with the vehicle: accelerations with two axes exchanged, or with one wrong \
+                sign, leave the same residuals, and the mount is then wrong by half a turn";
+    tell::line(format_args!("note: {what}"));
+    let tilt_deg = found.largest_tilt_rad.to_degrees();
+    if tilt_deg < ADVISED_TILT_DEG {
+        let what = "tilts of 20 deg and more make the sigma of the mount far smaller";
+        tell::warning(format_args!("the vehicle was tilted by {tilt_deg:.1} deg only: {what}"));
+    }
     Ok(Some(Found {
         vehicle_from_camera: found.vehicle_from_camera,
         sigma_deg: [0, 1, 2].map(|i| found.covariance_rad2[(i, i)].sqrt().to_degrees()),
@@ -290,6 +301,8 @@ fn report(found: &BoardMount) -> String {
         found.residuals_rad.len(),
         found.rms_rad.to_degrees()
     );
+    out.push_str(&format!("                 up to {:.1} deg from their mean\n", found.largest_tilt_rad.to_degrees()));
+    out.push_str(&format!("axes             {}\n", found.axes_in_words()));
     for (name, angle) in &found.residuals_rad {
         out.push_str(&format!("  {:<40} {:.3} deg\n", tell::one_line(name), angle.to_degrees()));
     }
