@@ -29,7 +29,7 @@ const POWER: f64 = 1.645;
 pub enum Verdict {
     /// The flight agrees with the calibration, and it would have shown an error of the stated size.
     Holds,
-    /// The flight disagrees with the calibration.
+    /// The flight disagrees with the calibration, or its pictures contradict each other.
     DoesNotHold,
     /// The flight agrees with the calibration, but it would not have shown an error of the stated size.
     CannotTell,
@@ -98,8 +98,21 @@ pub struct Check {
     pub height_km: [f64; 2],
     /// What the flight makes observable.
     pub observability: Observability,
+    /// Mean square of the pictures' deviations over their variances without the scatter; `None` for a single picture.
+    /// Pictures above [`Self::MAX_CHI2`] contradict each other: no lens explains them all.
+    pub chi2: Option<f64>,
     /// Number of pictures that count, and of pictures whose limb height disagrees.
     pub pictures: [usize; 2],
+}
+
+impl Check {
+    /// Largest mean square without an alarm. It is the limit of [`super::estimate`], too.
+    pub const MAX_CHI2: f64 = super::estimate::MAX_CHI2;
+
+    /// Returns the mean square of the deviations if the pictures contradict each other.
+    pub fn contradiction(&self) -> Option<f64> {
+        self.chi2.filter(|chi2| *chi2 > Self::MAX_CHI2)
+    }
 }
 
 /// Tests a calibration with the views of a flight. `limb` is the limb height before the flight, and `detect_percent` is
@@ -129,7 +142,9 @@ pub fn check(
     let value = percent.dot(&fit.changes());
     let focal = Deviation::new(value, variance(&flown, &percent), variance(&claimed.covariance, &percent), freedom);
     let centre_px = test_centre(&claimed, &fit, &systematic, freedom).ok_or(Refusal::Singular)?;
-    let verdict = if focal.is_significant() || centre_px.iter().any(Deviation::is_significant) {
+    let chi2 = super::estimate::chi2(&fit);
+    let contradicts = chi2.is_some_and(|chi2| chi2 > Check::MAX_CHI2);
+    let verdict = if contradicts || focal.is_significant() || centre_px.iter().any(Deviation::is_significant) {
         Verdict::DoesNotHold
     } else if focal.detectable <= detect_percent {
         Verdict::Holds
@@ -144,6 +159,7 @@ pub fn check(
         detect_percent,
         height_km: [fit.solution.values[height], fit.solution.covariance[(height, height)].sqrt()],
         observability,
+        chi2,
         pictures: [counted, fit.pictures.len() - counted],
     })
 }

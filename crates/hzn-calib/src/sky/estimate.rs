@@ -137,7 +137,7 @@ fn conflict(fit: &Fit, unknowns: &Unknowns, body: &body::Config, intrinsics: &DM
 }
 
 /// Returns the mean square of the deviations of the limb heights over their variances from edge noise.
-fn chi2(fit: &Fit) -> Option<f64> {
+pub(super) fn chi2(fit: &Fit) -> Option<f64> {
     let counted: Vec<&Fitted> = fit.pictures.iter().filter(|p| p.counts).collect();
     let freedom = counted.len().checked_sub(1).filter(|n| *n > 0)? as f64;
     let weights: f64 = counted.iter().map(|p| p.height_km[1].powi(-2)).sum();

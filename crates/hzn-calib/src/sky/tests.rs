@@ -159,6 +159,26 @@ fn a_check_holds_or_not_or_cannot_tell() {
     assert_eq!(few.verdict, Verdict::CannotTell);
 }
 
+/// Pictures through two lenses: the mean agrees with the calibration, and no single lens explains them.
+#[test]
+fn pictures_that_contradict_each_other_do_not_hold() {
+    let flight = Flight { scatter_km: 0.0, ..Flight::new(lens(90.0), 1004) };
+    let zoomed = Flight { lens: with_focal(&flight.lens, 2.0), ..flight.clone() };
+    let shorter = Flight { lens: with_focal(&flight.lens, -2.0), ..flight.clone() };
+    let [longer, shorter] = [zoomed.views(), shorter.views()];
+    let each = longer.into_iter().zip(shorter).enumerate();
+    let mixed: Vec<View> = each.map(|(k, (a, b))| if k % 2 == 0 { a } else { b }).collect();
+    let right = Config { centre_sigma_px: 3.0, focal_sigma_percent: 2.0, ..flight.lens.clone() };
+    let of = |views: &[View]| check(&right, &flight.body(), views, KNOWN, 0.3).unwrap();
+    let found = of(&mixed);
+    assert_eq!(found.verdict, Verdict::DoesNotHold, "{found:?}");
+    assert!(found.contradiction().is_some(), "{:?}", found.chi2);
+    let lines = super::check_lines(&found, "40 pictures");
+    assert!(lines[0].1.starts_with("does not hold: the pictures contradict each other: chi-square is"), "{lines:?}");
+    assert!(lines.iter().any(|(name, _)| name == "chi-square"), "{lines:?}");
+    assert!(of(&flight.views()).contradiction().is_none());
+}
+
 #[test]
 fn noise_of_the_points_does_not_make_the_focal_length_longer() {
     // In small pictures a common bend of the edges looks almost like another focal length. The difference is then found

@@ -195,6 +195,13 @@ pub fn check_lines(check: &Check, pictures: &str) -> Vec<(String, String)> {
     for (name, deviation) in ["cx_px", "cy_px"].into_iter().zip(&check.centre_px) {
         lines.add(name, describe(deviation, "px"));
     }
+    if let Some(chi2) = check.chi2 {
+        let [chi2, limit] = above(chi2, Check::MAX_CHI2);
+        lines.add(
+            "chi-square",
+            format!("{chi2} a degree of freedom; 1 is ideal, and above {limit} the calibration does not hold"),
+        );
+    }
     let [counted_pictures, left_out] = check.pictures;
     lines.add("pictures", format!("{pictures}, {counted_pictures} count, {left_out} outliers left out"));
     let [km, sigma] = check.height_km;
@@ -219,9 +226,18 @@ fn detectable(focal: &Deviation) -> String {
     if focal.detectable < 100.0 { format!("{:.2} %", focal.detectable) } else { "100 %".to_owned() }
 }
 
-/// Names the most significant difference.
+/// Names the most significant difference, or the contradiction between the pictures.
 fn significant(check: &Check) -> String {
     let [u, v] = &check.centre_px;
+    let differs = [&check.focal, u, v].iter().any(|d| d.is_significant());
+    if let Some(chi2) = check.contradiction().filter(|_| !differs) {
+        let [chi2, limit] = above(chi2, Check::MAX_CHI2);
+        return format!(
+            "the pictures contradict each other: chi-square is {chi2} per degree of freedom, but at most {limit} is \
+             consistent, so that no lens explains all of them. Possible reasons: a lens that focuses or zooms, a \
+             rolling shutter (camera.readout_s and rates), altitudes or times of other pictures"
+        );
+    }
     let each = [("the focal length", "%", &check.focal), ("cx_px", "px", u), ("cy_px", "px", v)];
     let strongest = each.into_iter().max_by(|a, b| a.2.sigmas.abs().total_cmp(&b.2.sigmas.abs()));
     strongest.map_or_else(String::new, |(name, unit, d)| {
