@@ -148,6 +148,14 @@ pub enum Warning {
         /// 1-sigma of the lens from the corners alone, px.
         alone_px: f64,
     },
+    /// The two focal lengths differ, as those of a camera with square pixels do not: a print that is longer in one
+    /// direction looks the same.
+    Aspect {
+        /// fy over fx.
+        ratio: f64,
+        /// 1-sigma of the ratio.
+        sigma: f64,
+    },
     /// Another lens model explains the same points better.
     OtherModel {
         /// The model of the calibration.
@@ -198,6 +206,12 @@ impl fmt::Display for Warning {
                 "the pictures disagree about the lens: 1 sigma is {between_px:.3} px between pictures, but \
                  {alone_px:.3} px from the noise of the corners; the camera has the larger one. Usual causes: a board \
                  that is not flat, a lens that focuses or zooms, cut or stabilised pictures, another lens model"
+            ),
+            Self::Aspect { ratio, sigma } => write!(
+                f,
+                "fy is {ratio:.4} ± {sigma:.4} of fx, but the pixels of most cameras are square, with a ratio of 1. A \
+                 board whose squares are longer in one direction looks the same, and printers make such boards: \
+                 measure its rows and its columns with a ruler. If they differ, fx and fy are both wrong"
             ),
             Self::OtherModel { model, rms_px, other, other_rms_px } => write!(
                 f,

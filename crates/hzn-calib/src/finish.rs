@@ -25,6 +25,8 @@ const MAX_LENS_SIGMA: f64 = 3.0;
 /// Ratio of the 1-sigma of the lens between pictures to that from the corners alone above which there is a warning: the
 /// pictures then disagree by more than half of their told error on account of something that is not the corners' noise.
 const MAX_BETWEEN: f64 = 2.0;
+/// Sigmas of the ratio of the focal lengths from 1 above which there is a warning: one right calibration in 370 has it.
+const MAX_ASPECT_SIGMAS: f64 = 3.0;
 /// Angle between `theta_max_deg` and the end of monotony that a camera demands, and a little more, in degrees.
 const MONOTONE_MARGIN_DEG: f64 = 2.1;
 
@@ -79,6 +81,7 @@ pub(crate) fn finish(adjusted: &Adjusted, views: &[Named]) -> Result<Calibrated,
         camera: config,
     };
     calibrated.warnings.extend(find_doubts(&calibrated));
+    calibrated.warnings.extend(aspect(&adjusted.config, &covariance).filter(|_| has_board(blocks)));
     Ok(calibrated)
 }
 
@@ -182,6 +185,21 @@ fn tilt_deg(block: &Block) -> Option<f64> {
     let n = block.observations.len() as f64;
     let middle = block.observations.iter().map(|o| o.place).sum::<Vector3<f64>>() / n;
     Some((block.rotation * Vector3::z()).angle(&block.direction(&middle)).to_degrees())
+}
+
+/// Returns whether the points are those of a target, whose sides are known only by its print.
+fn has_board(blocks: &[Block]) -> bool {
+    blocks.iter().any(|block| block.translation.is_some())
+}
+
+/// Returns the warning if the focal lengths differ by more than their errors. Their places are the first two of every
+/// model.
+fn aspect(config: &Config, covariance: &DMatrix<f64>) -> Option<Warning> {
+    let ratio = config.fy_px / config.fx_px;
+    let (fx, fy) = (1.0 / config.fx_px, 1.0 / config.fy_px);
+    let relative = covariance[(0, 0)] * fx * fx + covariance[(1, 1)] * fy * fy - 2.0 * covariance[(0, 1)] * fx * fy;
+    let sigma = ratio * relative.max(0.0).sqrt();
+    ((ratio - 1.0).abs() > MAX_ASPECT_SIGMAS * sigma).then_some(Warning::Aspect { ratio, sigma })
 }
 
 fn find_doubts(c: &Calibrated) -> Vec<Warning> {

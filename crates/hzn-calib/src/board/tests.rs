@@ -37,6 +37,8 @@ struct Faults {
     bow_mm: [f64; 2],
     /// 1-sigma of the focal length from picture to picture, as a part of it: a lens that focuses again.
     focus: f64,
+    /// By how much the rows of the print are longer than its columns, as a part.
+    stretch: f64,
 }
 
 /// Returns views of a flat board all over the picture. A corner outside the picture is not seen.
@@ -63,7 +65,8 @@ fn faulty_views(lens: &Config, count: usize, noise_px: f64, faults: Faults, draw
             let (column, row) = (n % BOARD.columns, n / BOARD.columns);
             let [x, y] = BOARD.place_mm(column, row);
             let depth_mm = faults.bow_mm[0] * (x / 120.0 - 1.0).powi(2) + faults.bow_mm[1] * (y / 75.0 - 1.0).powi(2);
-            let point = rotation * Vector3::new(x - 120.0, y - 75.0, depth_mm) + ray * distance_mm;
+            let along = (x - 120.0) * (1.0 + faults.stretch);
+            let point = rotation * Vector3::new(along, y - 75.0, depth_mm) + ray * distance_mm;
             let p = equation.project(point.into())?.point;
             camera.project(&UnitVec3::try_new(point.into())?)?;
             let inside = p.u > 0.0 && p.v > 0.0 && p.u < f64::from(SIZE[0]) - 1.0 && p.v < f64::from(SIZE[1]) - 1.0;
@@ -163,6 +166,21 @@ fn a_bent_board_is_found() {
     // A flat board stays flat: the limit lets one of a thousand through.
     let (_, flat) = errors_with_faults(lens, 20, Faults::default());
     assert!(flat.iter().filter(|c| c.bow.is_some()).count() <= 1);
+}
+
+/// A print that is longer in one direction gives a camera with square pixels two focal lengths.
+#[test]
+fn a_print_that_is_longer_in_one_direction_is_named() {
+    let square = Config { fy_px: lenses()[1].fx_px, ..lenses()[1].clone() };
+    let named = |stretch: f64, set| {
+        let faults = Faults { stretch, ..Faults::default() };
+        let found = calibrate(square.model, SIZE, &BOARD, &faulty_views(&square, 12, 0.1, faults, &mut Draws(set)));
+        let words: Vec<String> = found.unwrap().warnings.iter().map(ToString::to_string).collect();
+        words.iter().any(|w| w.contains("whose squares are longer in one direction"))
+    };
+    let stretched = (0..4).filter(|set| named(0.03, 7000 + set)).count();
+    let right = (0..8).filter(|set| named(0.0, 7100 + set)).count();
+    assert!(stretched == 4 && right <= 1, "{stretched} of 4, {right} of 8");
 }
 
 #[test]
