@@ -7,8 +7,8 @@ use crate::words::above;
 
 /// Usual causes of an impossible limb height.
 const CAUSES: &str = "Usual causes are wrong altitudes (body.altitude_km, frames.csv: check their unit and their \
-                      zero), a wrong lens (`hzn calibrate check` compares it with the flight), and clouds or light that bend \
-                      all edges alike: take pictures of other places, and with the vehicle turned";
+                      zero), a wrong lens (`hzn calibrate check` compares it with the flight), and clouds or light \
+                      that bend all edges alike: take pictures of other places, and with the vehicle turned";
 
 /// Why a calibration is refused. It is displayed with the measured number, its limit, and a remedy.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -117,8 +117,8 @@ impl fmt::Display for Refusal {
             ),
             Self::BelowSurface { km, sigma_km, high_km } => write!(
                 f,
-                "the pictures measure a limb height of {km:.1} km ± {sigma_km:.1} km. A limb {:.1} km below the surface \
-                 is not possible: it is expected between 0 km and {high_km:.0} km. {CAUSES}",
+                "the pictures measure a limb height of {km:.1} km ± {sigma_km:.1} km. A limb {:.1} km below the \
+                 surface is not possible: it is expected between 0 km and {high_km:.0} km. {CAUSES}",
                 km.abs()
             ),
             Self::Told { km: [km, sigma_km], told_km: [told_km, told_sigma_km], sigmas } => write!(
@@ -126,7 +126,8 @@ impl fmt::Display for Refusal {
                 "the pictures measure a limb height of {km:.1} km ± {sigma_km:.1} km, but sensor.toml tells \
                  {told_km:.1} km ± {told_sigma_km:.1} km (with the error of the altitude): they differ by {sigmas:.1} \
                  sigmas, and at most {TWO_SIDED} are consistent. {CAUSES}. If the told height is not that of this \
-                 camera's wavelengths, tell a limb_height_km with a limb_height_sigma_km in [body] that includes the right one"
+                 camera's wavelengths, tell a limb_height_km with a limb_height_sigma_km in [body] that includes the \
+                 right one"
             ),
             Self::Alarm { chi2, max_chi2 } => {
                 let [chi2, max_chi2] = above(*chi2, *max_chi2);

@@ -97,9 +97,9 @@ fn without_position(first_s: f64, count: usize, fixes: &[Fix]) -> Error {
     let times = fixes.iter().map(|fix| fix.time_s).filter(|t| t.is_finite());
     let [from_s, to_s] = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], t| [a.min(t), b.max(t)]);
     Error::unusable(format!(
-        "no first attitude: the star tracker has {count}, the first at {first_s:.1} s, but the receiver has no position \
-         within {FIX_S} s of one (its fixes are from {from_s:.1} to {to_s:.1} s). Give attitudes or directions at times \
-         with a position, or leave out --gnss for the attitude alone"
+        "no first attitude: the star tracker has {count}, the first at {first_s:.1} s, but the receiver has no \
+         position within {FIX_S} s of one (its fixes are from {from_s:.1} to {to_s:.1} s). Give attitudes or \
+         directions at times with a position, or leave out --gnss for the attitude alone"
     ))
 }
 

@@ -37,7 +37,8 @@ pub(super) fn test(samples: &[Sample], inputs: &Inputs, max_step_s: f64) -> Opti
         cause: Cause::SampleTimes,
         source: Source::Imu,
         what: format!(
-            "the samples of the inertial unit are {median_s:.3} s apart (median), so most of them count as gaps: {guess}"
+            "the samples of the inertial unit are {median_s:.3} s apart (median), so most of them count as gaps: \
+             {guess}"
         ),
     })
 }
