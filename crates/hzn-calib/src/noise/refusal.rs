@@ -79,6 +79,22 @@ pub enum Refusal {
     },
 }
 
+/// Writes that the height of the pictures is not the told one; each height has its sigma.
+fn write_told(
+    f: &mut fmt::Formatter<'_>,
+    [km, sigma_km]: [f64; 2],
+    [told_km, told_sigma_km]: [f64; 2],
+    sigmas: f64,
+) -> fmt::Result {
+    write!(
+        f,
+        "the pictures measure a limb height of {km:.1} km ± {sigma_km:.1} km, but sensor.toml tells {told_km:.1} km ± \
+         {told_sigma_km:.1} km (with the error of the altitude): they differ by {sigmas:.1} sigmas, and at most \
+         {TWO_SIDED} are consistent. {CAUSES}. If the told height is not that of this camera's wavelengths, tell a \
+         limb_height_km with a limb_height_sigma_km in [body] that includes the right one"
+    )
+}
+
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -121,14 +137,7 @@ impl fmt::Display for Refusal {
                  surface is not possible: it is expected between 0 km and {high_km:.0} km. {CAUSES}",
                 km.abs()
             ),
-            Self::Told { km: [km, sigma_km], told_km: [told_km, told_sigma_km], sigmas } => write!(
-                f,
-                "the pictures measure a limb height of {km:.1} km ± {sigma_km:.1} km, but sensor.toml tells \
-                 {told_km:.1} km ± {told_sigma_km:.1} km (with the error of the altitude): they differ by {sigmas:.1} \
-                 sigmas, and at most {TWO_SIDED} are consistent. {CAUSES}. If the told height is not that of this \
-                 camera's wavelengths, tell a limb_height_km with a limb_height_sigma_km in [body] that includes the \
-                 right one"
-            ),
+            Self::Told { km, told_km, sigmas } => write_told(f, *km, *told_km, *sigmas),
             Self::Alarm { chi2, max_chi2 } => {
                 let [chi2, max_chi2] = above(*chi2, *max_chi2);
                 write!(
