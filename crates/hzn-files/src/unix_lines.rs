@@ -2,7 +2,8 @@
 
 use std::io::{self, Read};
 
-/// A reader that leaves out each carriage return before a line feed.
+/// A reader that leaves out each carriage return before a line feed, except within double quotes: a quoted cell keeps
+/// its text.
 ///
 /// The CSV reader takes the line feed of `\r\n` for the begin of the next record, so that it counts one line too few.
 ///
@@ -10,8 +11,8 @@ use std::io::{self, Read};
 /// use std::io::Read;
 ///
 /// let mut text = String::new();
-/// hzn_files::unix_lines::UnixLines::new("a\r\nb\rc\r\n".as_bytes()).read_to_string(&mut text)?;
-/// assert_eq!(text, "a\nb\rc\n");
+/// hzn_files::unix_lines::UnixLines::new("a\r\nb\rc\r\n\"d\r\n\"\r\n".as_bytes()).read_to_string(&mut text)?;
+/// assert_eq!(text, "a\nb\rc\n\"d\r\n\"\n");
 /// # Ok::<(), std::io::Error>(())
 /// ```
 #[derive(Debug)]
@@ -19,12 +20,13 @@ pub struct UnixLines<R> {
     inner: R,
     /// A carriage return was read, and what follows it not yet.
     is_held: bool,
+    is_quoted: bool,
 }
 
 impl<R: Read> UnixLines<R> {
     /// Reads from another reader.
     pub fn new(inner: R) -> Self {
-        Self { inner, is_held: false }
+        Self { inner, is_held: false, is_quoted: false }
     }
 }
 
@@ -42,7 +44,9 @@ impl<R: Read> Read for UnixLines<R> {
                 if self.is_held && *byte != b'\n' {
                     out.push(b'\r');
                 }
-                self.is_held = *byte == b'\r';
+                // A doubled quote within a cell ends and begins it again.
+                self.is_quoted ^= *byte == b'"';
+                self.is_held = *byte == b'\r' && !self.is_quoted;
                 if !self.is_held {
                     out.push(*byte);
                 }

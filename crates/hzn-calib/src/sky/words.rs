@@ -199,7 +199,7 @@ pub fn check_lines(check: &Check, pictures: &str) -> Vec<(String, String)> {
         let [chi2, limit] = above(chi2, Check::MAX_CHI2);
         lines.add(
             "chi-square",
-            format!("{chi2} a degree of freedom; 1 is ideal, and above {limit} the calibration does not hold"),
+            format!("{chi2} a degree of freedom; 1 is ideal; above {limit} the pictures contradict each other"),
         );
     }
     let [counted_pictures, left_out] = check.pictures;

@@ -21,7 +21,8 @@ const MAX_TURN_RAD: f64 = core::f64::consts::FRAC_PI_2;
 /// Fastest turn of the direction to a body in an orbit, rad/s, see `hzn_core::Sequence`: no rate of a camera says it.
 const ORBIT_RAD_S: f64 = 1.24e-3;
 
-/// Rates about other axes explain the turns if they leave less than this share of what the told ones leave.
+/// Rates with the opposite sign or about other axes explain the turns if they leave less than this share of what the
+/// told ones leave.
 const EXPLAINED: f64 = 1.0 / 3.0;
 
 /// An answer with time and rate.
@@ -91,7 +92,7 @@ impl Rates {
             "are they in degrees per second? rate_x, rate_y, rate_z are rad/s".to_owned()
         } else if is_worse && by_rates > MAX_TURN_RAD {
             return None;
-        } else if is_worse && MAX_REST * of(&own, -1.0) < none {
+        } else if is_worse && of(&own, -1.0) < EXPLAINED * none {
             "do they have the opposite sign? They are the rotation of the camera, in its own axes".to_owned()
         } else if of_vehicle.is_some() {
             "rates about the axes of the vehicle, turned by [mount], explain it: rate_x, rate_y, rate_z are about the \

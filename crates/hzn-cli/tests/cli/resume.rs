@@ -93,7 +93,7 @@ fn recover_closes_what_a_crash_left() {
         let file = std::fs::OpenOptions::new().write(true).open(&part).unwrap();
         file.set_len(std::fs::metadata(&part).unwrap().len() - 3).unwrap();
         let ran =
-            place.run(&["recover", &format!("{out}.part")]).expect(0).says(" bytes of unfinished pictures dropped");
+            place.run(&["recover", &format!("{out}.part")]).expect(0).says(" bytes without whole pictures dropped");
         let kept = ran.err.split_whitespace().nth(1).unwrap().to_owned();
         place.run(&["export", out, "-o", "kept.csv", "--force"]).expect(0).says(&format!("{kept} rows"));
         place.run(&["info", out]).expect(0);
