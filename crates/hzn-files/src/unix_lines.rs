@@ -18,7 +18,7 @@ use std::io::{self, Read};
 #[derive(Debug)]
 pub struct UnixLines<R> {
     inner: R,
-    /// A carriage return was read, and what follows it not yet.
+    /// The last byte was a carriage return, which is given out only if no line feed follows.
     is_held: bool,
     is_quoted: bool,
 }

@@ -54,7 +54,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Returns what was left out in words, a line each.
+    /// Says what was left out; one line for each kind.
     ///
     /// A measurement that is there twice says nothing new, and would only make the sigmas of the lens smaller.
     pub fn copies_in_words(&self) -> Vec<String> {
