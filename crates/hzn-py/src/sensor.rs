@@ -80,7 +80,7 @@ impl Sensor {
                         body = "earth", flight = false))]
     fn start(
         py: Python<'_>,
-        pictures: Option<PathBuf>,
+        pictures: Option<start::Pictures>,
         size: Option<(u32, u32)>,
         fov_deg: Option<f64>,
         lens: Option<&str>,
@@ -88,6 +88,7 @@ impl Sensor {
         body: &str,
         flight: bool,
     ) -> PyResult<Self> {
+        let pictures = pictures.map(start::Pictures::into_paths).unwrap_or_default();
         let config = start::make(py, &start::Said { pictures, size, fov_deg, lens, altitude_km, body })?;
         Self::from_config(config, flight)
     }

@@ -8,14 +8,33 @@ use hzn_files::sensor;
 use hzn_files::start::{Body, CameraFacts, write_sensor_toml};
 use hzn_run::open::Request;
 use hzn_run::source;
-use hzn_run::start::{LimbSays, measure_field_of_view, read_camera_facts};
+use hzn_run::start::{LimbSays, describe_doubt, measure_field_of_view, read_camera_facts};
 use pyo3::prelude::*;
 
 use crate::errors;
 
+/// The pictures of a camera, as Python gives them.
+#[derive(FromPyObject)]
+pub(crate) enum Pictures {
+    /// A file, a folder, a pattern, a video or a recording.
+    One(PathBuf),
+    /// Several of them.
+    Many(Vec<PathBuf>),
+}
+
+impl Pictures {
+    /// Returns all paths.
+    pub(crate) fn into_paths(self) -> Vec<PathBuf> {
+        match self {
+            Self::One(path) => vec![path],
+            Self::Many(paths) => paths,
+        }
+    }
+}
+
 /// What Python says about a camera.
 pub(crate) struct Said<'a> {
-    pub(crate) pictures: Option<PathBuf>,
+    pub(crate) pictures: Vec<PathBuf>,
     pub(crate) size: Option<(u32, u32)>,
     pub(crate) fov_deg: Option<f64>,
     pub(crate) lens: Option<&'a str>,
@@ -36,7 +55,18 @@ pub(crate) fn make(py: Python<'_>, said: &Said<'_>) -> PyResult<Config> {
             "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
         )?;
     }
+    if known.has_focal() && !said.pictures.is_empty() {
+        let request = said.request();
+        let doubt = errors::detached(py, || describe_doubt(&request, &known, &start, &parsed.config))?;
+        doubt.map_err(errors::image)?.iter().try_for_each(|doubt| errors::warn(py, in_python(doubt)))?;
+    }
     Ok(parsed.config)
+}
+
+impl Said<'_> {
+    fn request(&self) -> Request {
+        Request { inputs: self.pictures.clone(), ..Request::default() }
+    }
 }
 
 /// Returns what is known about the camera, with the field of view from the limb if nothing else says it.
@@ -49,18 +79,19 @@ fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
     if let Some(km) = said.altitude_km.filter(|km| !(*km > 0.0 && km.is_finite())) {
         return Err(errors::config(format!("altitude_km: {km} is refused: must be above 0")));
     }
-    let read = match (&said.pictures, said.size) {
-        (Some(path), None) => {
-            let mut source = source::open(std::slice::from_ref(path), None, None).map_err(errors::image)?;
+    let read = match (said.pictures.as_slice(), said.size) {
+        ([], Some((width, height))) => CameraFacts::of_size([width, height]),
+        (paths @ [_, ..], None) => {
+            let mut source = source::open(paths, None, None).map_err(errors::image)?;
             read_camera_facts(source.as_mut()).map_err(errors::image)?
         }
-        (None, Some((width, height))) => CameraFacts::of_size([width, height]),
         _ => return Err(errors::config("give either pictures or size=(width, height)")),
     };
     let mut known = CameraFacts { fov_deg: said.fov_deg, lens, altitude_km: said.altitude_km, body, ..read };
-    let Some(path) = said.pictures.clone().filter(|_| !known.has_focal()) else { return Ok(known) };
-    let request = Request { inputs: vec![path], ..Request::default() };
-    match measure_field_of_view(&request, &known).map_err(errors::image)? {
+    if said.pictures.is_empty() || known.has_focal() {
+        return Ok(known);
+    }
+    match measure_field_of_view(&said.request(), &known).map_err(errors::image)? {
         LimbSays::FieldOfView(found) => (known.lens, known.measured) = (Some(found.lens), Some(found.measured)),
         // `write_sensor_toml` says what is missing.
         LimbSays::NoAltitude => {}
@@ -92,6 +123,7 @@ fn lens(name: &str) -> PyResult<Model> {
 
 /// Returns a message of `hzn init` with the names of Python's arguments instead of options.
 fn in_python(message: &str) -> String {
-    let named = message.replace("--fov ", "fov_deg=").replace("--altitude ", "altitude_km=");
+    let named = message.replace("without --fov,", "without fov_deg,").replace("--fov ", "fov_deg=");
+    let named = named.replace("--altitude ", "altitude_km=");
     named.replace("--lens fisheye", "lens=\"fisheye\"").replace("--lens pinhole", "lens=\"pinhole\"")
 }

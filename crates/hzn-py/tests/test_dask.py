@@ -7,6 +7,7 @@ import shutil
 import signal
 import threading
 import time
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -209,6 +210,9 @@ def test_what_an_archive_refuses(client, archive, small, tmp_path):
     out = str(tmp_path)
     for urls, sensor, more, what in [
         ([], small, {}, "urls"),
+        # A text is a sequence of letters, and each would be a picture.
+        (str(tmp_path / "flight"), small, {}, "urls: '.*flight' is one URL or path; give a list"),
+        (tmp_path / "flight", small, {}, "is one URL or path"),
         (archive, small, {"format": "xml"}, "format: 'xml' .* parquet, csv or mcap"),
         (archive, small, {"shard_frames": 0}, "shard_frames"),
         (archive, hzn.Sensor(camera=SMALL, threshold={"method": "track"}), {}, "track"),
@@ -220,7 +224,7 @@ def test_what_an_archive_refuses(client, archive, small, tmp_path):
         ({"attitude": [2, 0, 0, 0]}, "attitude: a quaternion"),
         ({"altitude_km": -9000.0}, "altitude_km must be"),
         ({"altitude_km": "high"}, "must be real number"),
-        ({"altitude": 400.0}, "altitude"),
+        ({"altitude": 400.0}, "got an unexpected keyword argument 'altitude'"),
     ]:
         with pytest.raises(hzn.ConfigError, match=f"{archive[1]}: .*{what}"):
             process_archive([archive[0], (archive[1], known)], small, client=client, out=out)
@@ -332,6 +336,14 @@ def test_texts_of_csv_are_no_formulas(tmp_path, small):
         assert next(csv.DictReader(file))["file"] == "'=lost.png"
     failed = _shards._unprocessed(fsspec.filesystem("file"), path)
     assert [row["file"] for row in failed] == ["=lost.png"] and failed[0]["detail"].startswith("-why")
+
+
+def test_a_picture_may_be_a_path(client, archive, small, tmp_path):
+    as_text = process_archive(archive[:2], small, client=client, out=str(tmp_path / "text"))
+    pictures = [Path(archive[0]), (Path(archive[1]), {})]
+    as_path = process_archive(pictures, small, client=client, out=str(tmp_path / "path"))
+    assert [os.path.basename(url) for url in as_path.shards] == [os.path.basename(url) for url in as_text.shards]
+    assert columns(as_path)["file"] == archive[:2]
 
 
 def test_what_is_known_may_be_of_numpy(client, archive, small, tmp_path):

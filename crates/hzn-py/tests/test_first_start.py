@@ -100,6 +100,18 @@ def test_one_picture_does_not_tell_the_kind_of_lens():
     assert "--" not in str(refused.value)
 
 
+def test_a_field_of_view_that_the_limb_contradicts():
+    """The photograph is 38 degrees wide; a list of pictures is one camera, as a folder is."""
+    with pytest.warns(UserWarning, match="the limb in 1 of 1 pictures contradicts the field of view") as warned:
+        hzn.Sensor.start([PHOTOGRAPH], fov_deg=20, altitude_km=418)
+    assert all("--" not in str(one.message) for one in warned)
+    assert hzn.Sensor.start([str(PHOTOGRAPH)], fov_deg=38, altitude_km=418) == hzn.Sensor.start(
+        PHOTOGRAPH, fov_deg=38, altitude_km=418
+    )
+    with pytest.raises(hzn.ConfigError, match="give either pictures or size"):
+        hzn.Sensor.start([], fov_deg=38)
+
+
 def test_pictures_that_are_not_there(tmp_path):
     with pytest.raises(hzn.ImageError, match="none.jpg"):
         hzn.Sensor.start(tmp_path / "none.jpg", fov_deg=60)

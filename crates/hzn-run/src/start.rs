@@ -128,13 +128,13 @@ fn read_pictures(request: &Request, known: &CameraFacts) -> Result<Vec<(Picture,
 
 /// What would make the limb in some pictures the expected one, if the field of view is right.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FittingAltitude {
+struct FittingAltitude {
     /// The altitude that the pictures were given, the median, km.
-    pub given_km: f64,
+    given_km: f64,
     /// The altitude that fits their limb, with its 1-sigma in one picture, km.
-    pub fitting_km: Implied,
+    fitting_km: Implied,
     /// Number of pictures with a limb.
-    pub pictures: usize,
+    pictures: usize,
 }
 
 /// Finds the altitude that fits the limb in some pictures with the field of view of `config`, which is a sensor.toml
@@ -142,7 +142,7 @@ pub struct FittingAltitude {
 ///
 /// # Errors
 /// A file cannot be read.
-pub fn find_altitude(
+fn find_altitude(
     request: &Request,
     known: &CameraFacts,
     config: &hzn_core::Config,
@@ -160,12 +160,43 @@ pub fn find_altitude(
     }))
 }
 
+/// Says in words that the limb contradicts the field of view (that was told, or that of the EXIF) or the altitude, with
+/// the values that would fit. `config` is the sensor that was made from `start`. `None` if they agree, or if the limb
+/// says nothing.
+///
+/// # Errors
+/// A file cannot be read.
+pub fn describe_doubt(
+    request: &Request,
+    known: &CameraFacts,
+    start: &StartConfig,
+    config: &hzn_core::Config,
+) -> Result<Option<String>, Error> {
+    let Some(limb) = doubt_field_of_view(request, known, start)? else { return Ok(None) };
+    let [kept, seen] = limb.pictures;
+    let altitude = find_altitude(request, known, config)?.map(|altitude| {
+        let FittingAltitude { given_km, fitting_km: Implied { value, sigma }, pictures } = altitude;
+        format!(
+            "; if the field of view is right, the altitude is {value:.0} +- {sigma:.0} km (median of {pictures}) and \
+             not {given_km:.0} km"
+        )
+    });
+    Ok(Some(format!(
+        "the limb in {kept} of {seen} pictures contradicts the field of view or the altitude. If the altitude is \
+         right, the pictures are {}, not {:.1} degrees{}. Check both, and the kind of lens (the field of view of a \
+         fisheye is not 2 atan(width / 2f)); without --fov, that of the limb is taken",
+        limb.describe(known.size_px[0]),
+        start.fov_deg,
+        altitude.unwrap_or_default()
+    )))
+}
+
 /// Compares a field of view that was told (or that of the EXIF) with that of the limb. Returns the latter if the two
 /// disagree; `None` if they agree, or if the limb says nothing.
 ///
 /// # Errors
 /// A file cannot be read.
-pub fn doubt_field_of_view(
+fn doubt_field_of_view(
     request: &Request,
     known: &CameraFacts,
     start: &StartConfig,

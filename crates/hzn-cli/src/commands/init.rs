@@ -7,12 +7,10 @@ use hzn_core::Config;
 use hzn_core::camera::Model;
 use hzn_files::start::{self, CameraFacts, ImageCircle, StartConfig};
 use hzn_files::{Problem, plausible};
-use hzn_run::diagnosis::{FieldOfView, Implied};
+use hzn_run::diagnosis::FieldOfView;
 use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
-use hzn_run::start::{
-    FittingAltitude, LimbSays, doubt_field_of_view, find_altitude, measure_field_of_view, read_camera_facts,
-};
+use hzn_run::start::{LimbSays, describe_doubt, measure_field_of_view, read_camera_facts};
 use hzn_run::{disk, explain};
 
 use super::init_rig;
@@ -146,7 +144,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     start.warnings.iter().for_each(tell::warning);
     tell_turn(&known);
     if known.has_focal() {
-        tell_doubt(args, &known, &start, &parsed.config)?;
+        describe_doubt(&request(args), &known, &start, &parsed.config)?.iter().for_each(tell::warning);
     }
     if let Some(found) = &found {
         let [kept, seen] = found.pictures;
@@ -272,28 +270,6 @@ fn knows_altitudes(args: &Args, config: &Config) -> Result<bool, Stop> {
     let path = open::frames_path(&request, source.as_ref());
     let frames = path.map(|path| open::load_frames(&path, source.as_ref())).transpose()?;
     Ok(open::check_altitude(source.as_ref(), config, frames.as_ref()).is_ok())
-}
-
-/// Warns about a field of view and an altitude that contradict each other by the limb.
-fn tell_doubt(args: &Args, known: &CameraFacts, start: &StartConfig, config: &Config) -> Result<(), Stop> {
-    let Some(limb) = doubt_field_of_view(&request(args), known, start)? else { return Ok(()) };
-    let [kept, seen] = limb.pictures;
-    let altitude = find_altitude(&request(args), known, config)?.map(|altitude| {
-        let FittingAltitude { given_km, fitting_km: Implied { value, sigma }, pictures } = altitude;
-        format!(
-            "; if the field of view is right, the altitude is {value:.0} +- {sigma:.0} km (median of {pictures}) and \
-             not {given_km:.0} km"
-        )
-    });
-    tell::warning(format_args!(
-        "the limb in {kept} of {seen} pictures contradicts the field of view or the altitude. If the altitude is \
-         right, the pictures are {}, not {:.1} degrees{}. Check both, and the kind of lens (the field of view of a \
-         fisheye is not 2 atan(width / 2f)); without --fov, that of the limb is taken",
-        limb.describe(known.size_px[0]),
-        start.fov_deg,
-        altitude.unwrap_or_default()
-    ));
-    Ok(())
 }
 
 fn request(args: &Args) -> Request {

@@ -338,7 +338,7 @@ class Sensor:
 
     @staticmethod
     def start(
-        pictures: _Path | None = None,
+        pictures: _Path | Sequence[_Path] | None = None,
         *,
         size: tuple[int, int] | None = None,
         fov_deg: float | None = None,
@@ -359,9 +359,10 @@ class Sensor:
         Parameters
         ----------
         pictures
-            Pictures of the camera: a file, a folder, a pattern, a video or a recording. They give the size, the curve
-            between light and counts, and the focal length by their EXIF; or else the limb in them gives the field of
-            view, for which an altitude must be known.
+            Pictures of the camera: a file, a folder, a pattern, a video or a recording, or a list of them. They give
+            the size, the curve between light and counts, and the focal length by their EXIF; or else the limb in them
+            gives the field of view, for which an altitude must be known. A warning says if the limb contradicts the
+            field of view or the altitude.
         size
             Width and height of the picture, pixels, if there are no pictures yet.
         fov_deg
@@ -385,7 +386,7 @@ class Sensor:
         Warns
         -----
         UserWarning
-            EXIF contradicts the field of view, or the camera was turned.
+            EXIF or the limb in the pictures contradicts the field of view, or the camera was turned.
 
         Examples
         --------

@@ -27,7 +27,8 @@ from ._shards import FORMATS, Done, Task, digest, make
 if TYPE_CHECKING:
     from distributed import Client
 
-Url: TypeAlias = str | tuple[str, Mapping[str, Any]]
+_Path: TypeAlias = str | os.PathLike[str]
+Url: TypeAlias = _Path | tuple[_Path, Mapping[str, Any]]
 
 # Shards that wait for each thread of the cluster. With fewer, a thread may wait for the client; more fill its memory.
 _WAITING = 4
@@ -96,11 +97,17 @@ def process_archive(
     Raises
     ------
     ConfigError
-        There are no pictures; the sensor or an option is invalid; or an altitude, position or attitude is impossible.
+        There are no pictures, or a single URL is given for their list; the sensor or an option is invalid; or an altitude, position or attitude is impossible.
         The pictures of a list are checked before anything is processed, those of a generator when they are read.
     Exception
         A shard failed after all retries. The other shards are written, and the next run makes the missing ones.
     """
+    if isinstance(urls, (str, bytes, os.PathLike)):
+        # A text is a sequence of letters, and each would be taken as a picture.
+        raise ConfigError(
+            f"urls: {os.fspath(urls)!r} is one URL or path; give a list of those of the pictures, for example "
+            "sorted(pathlib.Path(folder).glob('*.png'))"
+        )
     _check_options(sensor, format, shard_frames)
     total = len(urls) if isinstance(urls, Sequence) else None
     if total is not None:
@@ -156,12 +163,14 @@ def _check_options(sensor: Sensor, format: str, shard_frames: int) -> None:
 
 def _check(sensor: Sensor, url: Url) -> tuple[str, dict[str, Any]]:
     """Return a picture and what is known of it; refuse what is impossible."""
-    url, known = (url, {}) if isinstance(url, str) else (url[0], dict(url[1]))
+    path, known = (url, {}) if isinstance(url, (str, os.PathLike)) else (url[0], dict(url[1]))
+    name = os.fspath(path)
     try:
         _check_prior(sensor, _Prior(**known))
     except (ConfigError, TypeError) as error:
-        raise ConfigError(f"{url}: {error}") from None
-    return url, known
+        what = str(error).removeprefix("_Prior.__new__() ")
+        raise ConfigError(f"{name}: {what}") from None
+    return name, known
 
 
 @dataclass
