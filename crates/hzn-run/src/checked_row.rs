@@ -15,6 +15,9 @@ use crate::error::{Error, failed};
 /// Name of the column with the checksum.
 pub const COLUMN: &str = "crc32";
 
+/// What to do with a table whose last row ends early.
+pub(crate) const IF_CUT: &str = "if the file was cut off, `hzn recover FILE` keeps its complete rows";
+
 /// Returns the first line of a CSV.
 pub(crate) fn header() -> String {
     format!("{},{COLUMN}\n", Row::COLUMNS.join(","))
@@ -100,7 +103,10 @@ pub(crate) fn from_json(line: &[u8]) -> Result<Row, String> {
     }
     // Bytes of columns that are not known would not be looked at.
     let line = core::str::from_utf8(line).map_err(|e| e.to_string())?;
-    let row: Row = serde_json::from_str(line).map_err(|e| e.to_string())?;
+    let row: Row = serde_json::from_str(line).map_err(|e| match e.classify() {
+        serde_json::error::Category::Eof => format!("it ends early; {IF_CUT}"),
+        _ => e.to_string(),
+    })?;
     let sum: Sum = serde_json::from_str(line).map_err(|e| e.to_string())?;
     check(row, sum.crc32.as_deref())
 }

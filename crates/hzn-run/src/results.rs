@@ -7,7 +7,7 @@ use hzn_files::separator_hint;
 use hzn_files::unix_lines::UnixLines;
 use hzn_mcap::{Contents, Reader, Row};
 
-use crate::checked_row::{from_csv, from_json};
+use crate::checked_row::{IF_CUT, from_csv, from_json};
 use crate::error::{Error, failed, unusable};
 pub use crate::possible::find_impossible;
 use crate::source::{describe_recording_loss, ending};
@@ -102,11 +102,16 @@ fn numbered_rows(file: &Path, kind: &str) -> Result<NumberedRows, Error> {
             if !separator.is_empty() {
                 return Err(unusable(format!("{}:1: not a table of hzn results{separator}", file.display())));
             }
+            if let Some(name) = ["file", "status"].into_iter().find(|name| !header.iter().any(|column| column == *name))
+            {
+                let what = format!("{}:1: not a table of hzn results: it has no column `{name}`", file.display());
+                return Err(failed(what));
+            }
             let row = move |(i, record): (usize, csv::Result<csv::StringRecord>)| {
                 // A text with a line break takes several lines.
                 let line = |record: &csv::StringRecord| record.position().map(csv::Position::line);
                 let line = record.as_ref().ok().and_then(line).unwrap_or(i as u64 + 2);
-                let read = record.map_err(|e| e.to_string()).and_then(|record| from_csv(&record, &header));
+                let read = record.map_err(|e| in_words(&e)).and_then(|record| from_csv(&record, &header));
                 read.map(|row| (line, row)).map_err(|why| refuse(line, why))
             };
             Ok(drop_incomplete(Box::new(reader.into_records().enumerate().map(row)), file))
@@ -120,6 +125,20 @@ fn numbered_rows(file: &Path, kind: &str) -> Result<NumberedRows, Error> {
             Ok(drop_incomplete(Box::new(lines.enumerate().map(row)), file))
         }
         _ => Err(unusable(format!("{}: .mcap, .csv or .jsonl is expected", file.display()))),
+    }
+}
+
+/// Says what is wrong with a row that is no row of a table. A copy that was cut off ends with such a row.
+fn in_words(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } if len < expected_len => {
+            format!("it has {len} of {expected_len} cells; {IF_CUT}")
+        }
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("it has {len} cells, but the header has {expected_len} columns")
+        }
+        csv::ErrorKind::Utf8 { .. } => "it is not UTF-8 text".to_owned(),
+        _ => error.to_string(),
     }
 }
 

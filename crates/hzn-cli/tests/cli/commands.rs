@@ -252,8 +252,29 @@ fn wrong_usage_is_2() {
     place.run(&["recover", "in/0000.png"]).expect(2).says("is not a file of results");
     place.write("other.csv", b"a,b\n1,2\n");
     place.run(&["recover", "other.csv"]).expect(1).says("other.csv: does not have the columns");
-    place.run(&["export", "other.csv", "-o", "x.csv"]).expect(1).says("other.csv:2: not a row of hzn results");
+    place.run(&["export", "other.csv", "-o", "x.csv"]).expect(1).says("other.csv:1: not a table of hzn results");
     assert!(!place.path("other.recovered.csv.part").exists());
+}
+
+/// A copy that was cut off says which command keeps its rows, and does not pass for an empty table.
+#[test]
+fn cut_tables_name_the_command_that_keeps_their_rows() {
+    let place = Place::with_pictures(3);
+    for kind in ["csv", "jsonl"] {
+        let (whole, cut) = (format!("all.{kind}"), format!("cut.{kind}"));
+        place.run(&["run", "in", "-o", &whole]).expect(0);
+        let text = std::fs::read(place.path(&whole)).unwrap();
+        place.write(&cut, &text[..text.len() - 40]);
+        for command in [&["export", &cut, "-o", &format!("{kind}-out.csv")][..], &["info", &cut]] {
+            place.run(command).expect(1).says("not a row of hzn results").says("`hzn recover FILE` keeps");
+        }
+        place.run(&["recover", &cut]).expect(0).says("2 rows kept");
+    }
+    for (name, text) in [("empty.csv", &b""[..]), ("head.csv", b"index,file,ti")] {
+        place.write(name, text);
+        let out = place.run(&["export", name, "-o", &format!("{name}-out.csv")]).expect(1);
+        out.says("not a table of hzn results: it has no column");
+    }
 }
 
 #[test]
