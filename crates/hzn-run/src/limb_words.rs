@@ -31,8 +31,21 @@ pub(crate) fn limb_in_words(
     let raised_km = body.raised_by_air_km(altitude_km);
     if raised_km >= 0.005 {
         words += &format!(", raised by {raised_km:.2} km, because the air below the camera bends light");
+        if let Some(wider_deg) = widened_deg(body, [height, altitude_km], raised_km) {
+            words += &format!(
+                " (half-angle + {wider_deg:.2} deg; without this, altitude_est_km would be {raised_km:.1} km too low)"
+            );
+        }
     }
     words
+}
+
+/// Returns how much wider the cone of the limb is because the limb appears raised. `None` for a camera below the limb.
+fn widened_deg(body: &body::Config, [limb_km, altitude_km]: [f64; 2], raised_km: f64) -> Option<f64> {
+    let radius_km = body.mean_radius_km();
+    let half_angle = |limb_km: f64| ((radius_km + limb_km) / (radius_km + altitude_km)).asin();
+    let wider_deg = (half_angle(limb_km + raised_km) - half_angle(limb_km)).to_degrees();
+    wider_deg.is_finite().then_some(wider_deg)
 }
 
 #[cfg(test)]
@@ -65,5 +78,8 @@ mod tests {
         body = body::Config { limb: Limb::Height, limb_height_km: 0.0, ..body };
         let balloon = limb_in_words(&body, &input, None, 30.0);
         assert!(balloon.starts_with("limb at 0 +- 7 km, raised by 1.7"), "{balloon}");
+        // 0.16 degrees, as a ray through the U.S. Standard Atmosphere gives.
+        let wider = "(half-angle + 0.16 deg; without this, altitude_est_km would be 1.7 km too low)";
+        assert!(balloon.ends_with(wider), "{balloon}");
     }
 }
