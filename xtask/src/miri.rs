@@ -45,7 +45,7 @@ pub(crate) fn campaign() -> Outcome {
         return Err(Trouble::Missing("needs rustup toolchain install nightly --component miri,rust-src".into()));
     }
     steps::run(&mut miri(&["--package", "hzn-flight", "--lib"]))?;
-    steps::run(miri(&["--package", "hzn-c", "--test", "flips"]).env("HZN_FLIPS", "20"))
+    steps::run(miri(&["--package", "hzn-c", "--test", "c", "flips"]).env("HZN_FLIPS", "20"))
 }
 
 /// Returns a run of tests in Miri. They may read files and the clock.

@@ -1,8 +1,8 @@
 //! Replays the committed inputs of the fuzzing target `c_interface`, and damaged copies of them.
 
-mod any_calls;
-
 use std::path::Path;
+
+use crate::any_calls;
 
 #[test]
 fn every_committed_input_and_its_damaged_copies_pass() {
