@@ -5,7 +5,9 @@
 `cargo xtask reproduce limb-heights` makes the environment. Each flight has the air of NRLMSIS of its own day, hour,
 longitude and solar activity, at latitudes that the table of hzn-core does not have, and weather of 1.5 km over 1000 km.
 `--filters` draws the filter of each camera; without it, all have that of the table. The sensors know the band, UTC
-and the position, or 40 +- 7 km. The lens is exact, there is no attitude, and the noise model is the default.
+and the position, or 40 +- 7 km, or the height by latitude of the air that was drawn: what no table can know better, because
+only the weather is left. `--weather 0` leaves that out, too. The lens is exact, there is no attitude, and the noise model is
+the default.
 
 The camera is that of the scene `leo-infrared`, whose pixels are 26 km wide at the limb; its edge noise hides the error of
 the height. `--sharp` has pixels of 5 km, a quarter of the noise, and always a limb in view.
@@ -26,11 +28,13 @@ sys.path.append(str(pathlib.Path(__file__).parents[2] / "reproduce" / "limb_heig
 import limb_heights as model  # noqa: E402
 
 LATITUDES = [-90, -80, -62, -50, -37, -22, -8, 8, 22, 37, 50, 62, 80, 90]
-TOLD = {"band": 'limb = "co2-15um"\n', "40 +- 7 km": "limb_height_km = 40.0\nlimb_height_sigma_km = 7.0\n"}
+OWN = "own air"
+TOLD = {"band": 'limb = "co2-15um"\n', "40 +- 7 km": "limb_height_km = 40.0\nlimb_height_sigma_km = 7.0\n", OWN: ""}
 
 
 def write_radiance(path, table, draw, date, weights):
-    """Writes the radiance of one day by latitude and tangent height, 0.75 of full scale at the largest."""
+    """Writes the radiance of one day by latitude and tangent height, 0.75 of full scale at the largest. Returns the lines of
+    sensor.toml with the limb height by latitude."""
     longitude, activity = draw.uniform(-180, 180), draw.uniform(70, 180)
     profiles = []
     for latitude in LATITUDES:
@@ -43,6 +47,9 @@ def write_radiance(path, table, draw, date, weights):
             # Below the lowest tangent height the disc is as bright as there: the band is opaque.
             for height, value in [(0.0, profile[0]), *zip(model.TANGENTS_KM, profile)]:
                 out.write(f"{latitude},{height},{value * scale:.6f}\n")
+    heights = [[latitude, round(float(model.half_level_km(p)), 3)] for latitude, p in zip(LATITUDES, profiles)]
+    # The sigma of the band's table without its climate.
+    return f'limb = "height"\nlimb_height_by_latitude_km = {heights}\nlimb_height_sigma_km = 2.2\n'
 
 
 def hzn(program, *arguments):
@@ -56,19 +63,20 @@ SHARP = {r"(f[xy]_px) = .*": r"\1 = 500.0", "read_noise = .*": "read_noise = 0.0
          "off_nadir_deg = .*": "off_nadir_deg = [50.0, 80.0]"}
 
 
-def fly(program, folder, seed, table, any_filter, frames, sharp):
+def fly(program, folder, seed, table, any_filter, frames, sharp, weather_km):
     draw = np.random.default_rng(seed)
     year, month, day, hour = (int(draw.integers(*limits)) for limits in ((2015, 2024), (1, 13), (1, 29), (0, 24)))
     date = f"{year}-{month:02d}-{day:02d}T{hour:02d}:00"
     filters = model.filters(table)
     name = draw.choice(list(filters)) if any_filter else "14 to 16 um"
-    write_radiance(folder / "radiance.csv", table, draw, date, filters[name])
+    own = write_radiance(folder / "radiance.csv", table, draw, date, filters[name])
     text = hzn(program, "simulate", "leo-infrared", "--show")
     text = re.sub(r"utc = .*", f"utc = {date}:00Z", text)
     text = re.sub(r"node_deg = .*", f"node_deg = {draw.uniform(0, 360):.1f}", text)
     text = text.replace("[world.infrared]\n", '[world.infrared]\ntable = "radiance.csv"\n', 1)
-    weather = f"[world.infrared.weather]\nsigma_km = 1.5\nlength_km = 1000.0\nseed = {seed}\n\n"
-    text = text.replace("[detector]", weather + "[detector]")
+    if weather_km > 0:
+        weather = f"[world.infrared.weather]\nsigma_km = {weather_km}\nlength_km = 1000.0\nseed = {seed}\n\n"
+        text = text.replace("[detector]", weather + "[detector]")
     for old, new in SHARP.items() if sharp else ():
         text = re.sub(old, new, text)
     text = re.sub(r"\[world\.infrared\.clouds\]\n([a-z_]+ = .*\n)+", "", text)
@@ -80,7 +88,7 @@ def fly(program, folder, seed, table, any_filter, frames, sharp):
     with open(pictures / "truth.csv") as file:
         truth = {row["file"]: row for row in csv.DictReader(file)}
     found = {}
-    for told, keys in TOLD.items():
+    for told, keys in {**TOLD, OWN: own}.items():
         path = folder / f"{told[:2]}.toml"
         path.write_text(sensor.replace("[body]\n", "[body]\nsunlit = false\n" + keys))
         out = folder / f"{told[:2]}.csv"
@@ -108,6 +116,7 @@ def main():
     arguments.add_argument("--frames", type=int, default=40)
     arguments.add_argument("--filters", action="store_true")
     arguments.add_argument("--sharp", action="store_true", help="a camera with finer pixels and less noise")
+    arguments.add_argument("--weather", type=float, default=1.5, metavar="KM", help="1 sigma of the weather (1.5)")
     chosen = arguments.parse_args()
     table = model.Absorption()
     all_found, pictures = {told: [] for told in TOLD}, 0
@@ -115,7 +124,8 @@ def main():
         def one(seed):
             folder = pathlib.Path(work) / str(seed)
             folder.mkdir()
-            return fly(chosen.hzn, folder, seed, table, chosen.filters, chosen.frames, chosen.sharp)
+            return fly(chosen.hzn, folder, seed, table, chosen.filters, chosen.frames, chosen.sharp,
+                       chosen.weather)
 
         for name, found, count in pool.map(one, range(chosen.first_seed, chosen.first_seed + chosen.flights)):
             pictures += count

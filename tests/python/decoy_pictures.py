@@ -17,8 +17,6 @@ import limb_pictures as limb
 
 WIDTH, HEIGHT = 640, 480
 PICTURES = 3
-# Scale height of the layers of airglow, as a part of the thickness that is drawn.
-THICKNESS = 1.0
 # The pictures with a limb that belong to this campaign have the same size.
 limb.WIDTH, limb.HEIGHT = WIDTH, HEIGHT
 V, U = np.mgrid[0:HEIGHT, 0:WIDTH].astype(np.float32)
@@ -147,20 +145,31 @@ def other_disc(rng, _):
                                                              10 ** rng.uniform(-0.3, 0.7))
 
 
+def chapman(rng, thickness=1.0):
+    """Draws one layer of airglow: its part of the light, peak and scale height, km. `thickness` multiplies the latter."""
+    return [(1.0, rng.uniform(85, 105), rng.uniform(3, 12) * thickness)]
+
+
+# Draws the layers of airglow of a picture.
+LAYERS = chapman
+
+
 def airglow(rng, scene):
-    """The night side: a layer of airglow (Chapman) above ground that is dark, lit by the Moon, or by cities."""
+    """The night side: layers of airglow (Chapman) above ground that is dark, lit by the Moon, or by cities."""
     lines = scene.rays.reshape(-1, 3) @ scene.rotation.T
     p, q = scene.position_km / limb.AXES_KM, lines / limb.AXES_KM
     a, b, c = (q * q).sum(1), q @ p, p @ p - 1
     hit = (b * b > a * c) & (b < 0)
     nearest = np.maximum(-b / a, 0)
     tangent = np.where(b < 0, (np.linalg.norm(p + q * nearest[:, None], axis=1) - 1) * limb.MEAN_KM, 1e4)
-    peak, thick = rng.uniform(85, 105), rng.uniform(3, 12) * THICKNESS
+    layers = LAYERS(rng)
     heights = np.linspace(-600, 160, 761)
-    # The integral along a line of sight with this tangent height, in steps of 2 km of height above the layer's foot.
-    level = np.arange(peak - 4 * thick, peak + 8 * thick, 0.5)
-    z = (level - peak) / thick
-    emission = np.exp(1 - z - np.exp(-z))
+    # The integral along a line of sight with this tangent height, in steps of 0.5 km of height.
+    level = np.arange(min(p - 4 * h for _, p, h in layers), max(p + 8 * h for _, p, h in layers), 0.5)
+    emission = np.zeros_like(level)
+    for part, peak, thick in layers:
+        z = (level - peak) / thick
+        emission += part * np.exp(1 - z - np.exp(-z))
     brightness = np.zeros_like(heights)
     for i, h in enumerate(heights):
         above = level > h

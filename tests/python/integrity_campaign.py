@@ -72,16 +72,16 @@ STATES = {
 }
 
 
-def add_midnight(folder):
-    """Adds the column utc: local midnight in winter. Returns whether the latitude has a night then."""
+def add_time(folder, is_noon=False):
+    """Adds the column utc: local midnight in winter, or noon in summer. Returns whether the latitude has a night then."""
     with (folder / "frames.csv").open() as file:
         rows = list(csv.DictReader(file))
     for row in rows:
         x, y, z = (float(row[f"{k}_km"]) for k in "xyz")
         latitude_deg = math.degrees(math.atan2(z, math.hypot(x, y)))
-        seconds = round(-math.degrees(math.atan2(y, x)) * 240) % 86400
+        seconds = round(-math.degrees(math.atan2(y, x)) * 240 + 43200 * is_noon) % 86400
         clock = f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
-        row["utc"] = f"2026-{'12-21' if z > 0 else '06-21'}T{clock}Z"
+        row["utc"] = f"2026-{'12-21' if (z > 0) != is_noon else '06-21'}T{clock}Z"
     with (folder / "frames.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, rows[0].keys())
         writer.writeheader()
@@ -95,7 +95,7 @@ def measure(hzn, name, seed):
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         kind, axis, limb_px = state.render(folder, seed)
-        if name == "night" and not add_midnight(folder):
+        if name == "night" and not add_time(folder):
             return []
         for sensor, (columns, text) in state.sensors.items():
             # All answers without the gate on p_limb, whose effect the table has.

@@ -423,4 +423,5 @@ def render_flight(folder, seed, kind, pictures, shade=False):
         rows.append(",".join([name, *(f"{n:.9f}" for n in numbers)]))
     (folder / "frames.csv").write_text("\n".join(rows) + "\n")
     (folder / "sensor.toml").write_text(sensor_toml(rng, camera.lens))
+    (folder / "tone").write_text("srgb" if camera.srgb else "linear")
     return truth

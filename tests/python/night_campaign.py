@@ -1,12 +1,14 @@
-"""Runs hzn with night = "airglow" on pictures of another program: layers of airglow, and edges that must not be answered.
+"""Runs hzn with night = "airglow" on pictures of another program: layers of airglow, and edges that are none.
 
     python night_campaign.py --hzn target/release/hzn --pictures 300 --first-seed 810000
 
-The layers (decoy_pictures.py) are Chapman layers with peaks from 85 to 105 km, 3 to 12 km thick, above ground that is dark,
-lit by the Moon, or by cities; once their thickness is the scale height of the Chapman profile, and once its full width at
-half of the emission. Every picture is a flight of its own, with another lens. The sensor gets the position, the time
-(midnight in winter), and in one of two runs the tone of the picture. The other pictures are limbs by day (limb_pictures.py)
-with a time that is wrong, midnight, and edges that are no limb, at midnight.
+The layers (decoy_pictures.py) are Chapman layers above ground that is dark, lit by the Moon, or by cities. Two kinds have
+peaks from 85 to 105 km, 3 to 12 km thick: once as the scale height of the Chapman profile, once as its full width at half of
+the emission. `557.7 nm` is the green line of oxygen alone, `broad` what a camera without a filter sees: hydroxyl, sodium, and
+two systems of oxygen, each with a peak and a full width from published ranges, in any proportion. Every picture is a flight of
+its own, with another lens. The sensor gets the position, the time (midnight in winter), and in one of two runs the tone of the
+picture. The other pictures are limbs by day (limb_pictures.py) with the right time (noon in summer) or a wrong one (midnight),
+lines of city lights, and edges that are no limb, at midnight.
 """
 
 import argparse
@@ -27,20 +29,47 @@ COLUMNS = limb_campaign.POSITION + ["utc"]
 NIGHT = 'night = "airglow"\n'
 # Full width at half maximum of exp(1 - z - exp(-z)), in z.
 WIDTH_OF_CHAPMAN = 2.446
-DAY, NO_LIMB = "day at a wrong time", "no limb"
-LAYERS = {"layer, thickness = scale height": 1.0, "layer, thickness = full width": 1 / WIDTH_OF_CHAPMAN}
-KINDS = {DAY: list(limb_pictures.CLASSES), NO_LIMB: integrity_campaign.NO_LIMB}
+# Peak and full width at half of the emission, km: hydroxyl, sodium, the atmospheric bands of oxygen, the green line of oxygen
+# (Baker & Stair, Physica Scripta 37 (1988) 611; Khomich, Semenov & Shefov, Airglow as an Indicator, Springer 2008).
+HYDROXYL, SODIUM, BANDS, GREEN = ((84, 90), (6, 11)), ((88, 94), (7, 12)), ((92, 97), (7, 12)), ((94, 100), (6, 12))
+
+
+def emit(rng, kind):
+    """Draws a layer of one kind: its peak and scale height, km."""
+    peak, width = kind
+    return rng.uniform(*peak), rng.uniform(*width) / WIDTH_OF_CHAPMAN
+
+
+LAYERS = {
+    "layer, thickness = scale height": decoy_pictures.chapman,
+    "layer, thickness = full width": lambda rng: decoy_pictures.chapman(rng, 1 / WIDTH_OF_CHAPMAN),
+    "layer, 557.7 nm": lambda rng: [(1.0, *emit(rng, GREEN))],
+    "layer, broad": lambda rng: [(rng.uniform(0, 1), *emit(rng, kind)) for kind in (HYDROXYL, SODIUM, BANDS, GREEN)],
+}
+
+
+def city_line(rng, _):
+    """A line of city lights along a coast or a road, on dark ground or under the Moon."""
+    dark = rng.choice([0.005, 0.05]) * np.clip(1 + 0.4 * decoy_pictures.pattern(rng, 1.0), 0.1, None)
+    lights = np.clip(decoy_pictures.pattern(rng, rng.uniform(0, 0.6)) + rng.uniform(0, 2), 0, None)
+    away = decoy_pictures.arc(rng, 0.5, 8) + rng.uniform(0, 6) * decoy_pictures.pattern(rng, 1.5)
+    return dark + rng.uniform(0.2, 0.8) * lights * np.exp(-((away / rng.uniform(1, 12)) ** 2))
+
+
+decoy_pictures.KINDS["city line"] = city_line
+DAY_LIMBS = list(limb_pictures.CLASSES)
+DAY, NOON, CITY, NO_LIMB = "day at a wrong time", "day at noon", "a line of cities", "no limb"
+KINDS = {DAY: DAY_LIMBS, NOON: DAY_LIMBS, CITY: ["city line"], NO_LIMB: integrity_campaign.NO_LIMB}
 
 
 def run(hzn, name, seed):
     """Renders one picture and runs hzn. Returns the name and, per run, the error and its square over the covariance."""
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        if name in LAYERS:
-            decoy_pictures.THICKNESS = LAYERS[name]
+        decoy_pictures.LAYERS = LAYERS.get(name, decoy_pictures.chapman)
         kinds = KINDS.get(name, ["airglow"])
         axis, *_ = integrity_campaign.render(folder, seed, kinds[seed % len(kinds)])
-        if not integrity_campaign.add_midnight(folder):
+        if not integrity_campaign.add_time(folder, is_noon=name == NOON):
             return None
         runs = {"unknown": NIGHT}
         tone = folder / "tone"
@@ -49,7 +78,9 @@ def run(hzn, name, seed):
         found = {}
         for told, lines in runs.items():
             (row,) = limb_campaign.process(hzn, folder, COLUMNS, lines)
-            found[told] = limb_campaign.miss(row, axis) if row["status"] == "ok" else None
+            # By day the key changes nothing: an answer is that of the limb.
+            is_answer = row["status"] == "ok" and (name != NOON or row["detail"] == "airglow")
+            found[told] = limb_campaign.miss(row, axis) if is_answer else None
         return name, seed, found
 
 

@@ -3,7 +3,9 @@
 //! visual inspection.
 
 use hzn_core::Prior;
+use hzn_core::body::Night;
 use hzn_core::status::Status;
+use hzn_core::tone::Tone;
 use hzn_host::Compiled;
 use hzn_tests::real::{Photograph, PointRecorder, Points, steepest_offset_px};
 use hzn_tests::sensors::{process, process_observed};
@@ -191,6 +193,21 @@ fn airglow_is_no_limb() {
     let believed = process(&mut Sensors::new(&night.sensor).host, night.view(), &Prior::default());
     let error_deg = believed.expect("the airglow passes the other gates").error_deg(NIGHT_AXIS);
     assert!(error_deg > 2.0, "{error_deg}°");
+}
+
+/// Both photographs show aurora above the airglow, so the outermost edge is not that of the layer. They
+/// are refused at midnight with `night = "airglow"`, too.
+#[test]
+fn airglow_below_aurora_is_not_answered_wrong() {
+    for file in ["iss030e102170-night.jpg", "iss030e130515-night.jpg"] {
+        let mut p = Photograph::load(file);
+        p.sensor.body.night = Night::Airglow;
+        p.sensor.set_tone(Tone::Srgb);
+        let at_night =
+            Prior { position_m: Some([6_765_570.0, 0.0, 0.0]), sun_elevation_rad: Some(-1.2), ..Prior::default() };
+        let answer = process(&mut Sensors::new(&p.sensor).host, p.view(), &at_night);
+        assert!(answer.is_err(), "{file}: {answer:?}");
+    }
 }
 
 #[test]
