@@ -40,7 +40,7 @@ pub enum Refused {
     TooLate,
     /// It is newer than the newest inertial sample by more than the lag: its clock is another one.
     FromTheFuture,
-    /// The list is full.
+    /// The list is full. The new measurement is refused instead of an older one, because the older ones are due first.
     Full,
     /// Its time is not finite.
     NotFinite,
@@ -170,6 +170,8 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
             Some(newest) if imu.time_s < newest => self.counts.out_of_order += 1,
             _ => {
                 self.newest_s = Some(imu.time_s);
+                // A full ring shortens the lag instead of losing a sample, because a turn that is lost is never
+                // integrated.
                 if self.waiting == S {
                     self.take_oldest(&mut done);
                 }
@@ -227,7 +229,7 @@ impl<const N: usize, const S: usize, const M: usize> Delayed<N, S, M> {
         Ok(())
     }
 
-    /// Takes everything that waits, for the end of a recording.
+    /// Takes everything that waits, for the end of a recording: no newer sample would make it due.
     pub fn finish(&mut self, mut done: impl FnMut(f64, &Measurement, Outcome)) {
         while self.waiting > 0 {
             self.take_oldest(&mut done);
@@ -313,6 +315,7 @@ fn remove_first<T>(list: &mut [T], entries: &mut usize) {
 
 /// Returns the sample at a part of the way between two.
 fn mix(from: &Imu, to: &Imu, part: f64) -> Imu {
+    // Linear, because a strapdown step also takes rate and force as linear between two samples.
     let between = |a: Vector<Vehicle>, b: Vector<Vehicle>| a + (b - a) * part;
     Imu {
         time_s: from.time_s + (to.time_s - from.time_s) * part,

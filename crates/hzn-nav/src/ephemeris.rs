@@ -1,6 +1,7 @@
 //! Positions of Sun and Moon in ECEF.
 //!
-//! Both come from short series in the equinox of date. They are rotated by Greenwich apparent sidereal time, which uses
+//! Both come from short series in the equinox of date instead of an ephemeris in a file, because a flight computer has
+//! neither the file nor the memory for it. They are rotated by Greenwich apparent sidereal time, which uses
 //! the same equinox, so no precession matrix is needed. UTC is used as UT1, which moves both by up to 0.004°.
 //!
 //! | body | series | accuracy 2000–2040 |

@@ -290,6 +290,7 @@ impl<A, B> Rotation<A, B> {
     /// finite.
     pub fn assume_from_quaternion([w, x, y, z]: [f64; 4]) -> Option<Self> {
         let rotation = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).map(Self::assume);
+        // Asked after the division, because the length of a quaternion with an infinite number passes the limit above.
         rotation.filter(Self::is_finite)
     }
     /// Returns the quaternion `q_B_from_A_wxyz`, scalar first.

@@ -85,7 +85,8 @@ impl Layout {
             let misalignment = layout.place(camera.misalignment, 3);
             let mut slow_errors = [None; MAX_BODIES];
             for place in slow_errors.iter_mut().take(camera.bodies) {
-                // The sigma comes with each direction, so the block has none of its own.
+                // The sigma comes with each direction, so the block has none of its own. There are three components,
+                // although a direction has two, because the plane across it moves through the picture.
                 *place = layout.place(Block { mode: camera.slow_error, sigma: 1.0 }, 3);
             }
             let clock = layout.place(camera.clock, 1);

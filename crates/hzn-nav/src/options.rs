@@ -171,6 +171,7 @@ impl Default for Options {
         Self {
             imu: ImuOptions::default(),
             start: StartSigmas::default(),
+            // 7 km, because the sensor assumes the same of a limb without a calibration (`body.limb_height_sigma_km`).
             limb_height: Block::considered(7.0),
             // It takes several orbits to estimate the change with the latitude, so it does not help a rocket.
             limb_latitude: Block { mode: Mode::Off, sigma: 0.0 },

@@ -45,6 +45,8 @@ pub fn first_attitude(seen: &[Seen<'_>; 2]) -> Option<Wahba> {
         reference: s.reference,
         sigma_rad: libm::hypot(libm::hypot(s.sigma_rad, s.camera.misalignment.sigma), s.camera.white_rad),
     };
+    // Davenport's method instead of TRIAD, because it has a covariance and a χ². TRIAD meets the first direction
+    // exactly, so two directions that contradict each other would look right.
     let [first, second] = seen;
     davenport(&[direction(first), direction(second)])
 }

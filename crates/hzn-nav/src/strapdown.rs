@@ -71,10 +71,14 @@ impl Nominal {
             accel_m_s2: (from.accel_m_s2 + to.accel_m_s2) * 0.5,
         };
         let after = |part: f64, sample: &Imu| {
+            // The Earth turns about an axis of ECEF, and the vehicle about one of its own: therefore one turn
+            // multiplies from the left and the other from the right.
             let turn = turn(&from.gyro_rad_s, &sample.gyro_rad_s, part * dt);
             Rotation::from_scaled_axis(earth_rate() * (-part * dt)) * self.attitude * turn
         };
+        // The end alone gets its length back, because only its rounding goes on into the next step.
         let (half_way, attitude) = (after(0.5, &middle), after(1.0, to).renormalized());
+        // Known before the four stages, because forces and attitudes depend on neither velocity nor position.
         let forces = [
             self.attitude * from.accel_m_s2,
             half_way * middle.accel_m_s2,

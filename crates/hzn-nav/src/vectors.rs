@@ -46,6 +46,7 @@ pub fn triad<V, R>(first: &Direction<V, R>, second: &Direction<V, R>) -> Option<
     let base = |a: &Vector3<f64>, b: &Vector3<f64>| {
         let t1 = a.try_normalize(0.0)?;
         let across = t1.cross(&b.try_normalize(0.0)?);
+        // The sine of the angle is the length of the product, so that its length is the test of the separation.
         let t2 = across.try_normalize(libm::sin(MIN_SEPARATION_RAD))?;
         Some(Matrix3::from_columns(&[t1, t2, t1.cross(&t2)]))
     };
@@ -106,7 +107,8 @@ pub fn davenport<V, R>(directions: &[Direction<V, R>]) -> Option<Wahba<V, R>> {
     // The weights get the sum 1, so that the numbers of Davenport's matrix are near 1, whatever the sigmas are.
     let b = b / total;
     let attitude = Rotation::from(best_rotation(&b)?);
-    // The weakest axis must be known to better than the separation of two directions would allow.
+    // The weakest axis must be known to better than the separation of two directions would allow. Two directions of
+    // equal weights at the angle θ leave it with the share sin²(θ/2) of the weight, therefore half of the angle below.
     let covariance_rad2 = information.try_inverse()?.into();
     let weakest = information.symmetric_eigenvalues().min() / total;
     let sine = libm::sin(0.5 * MIN_SEPARATION_RAD);
@@ -133,6 +135,7 @@ fn best_rotation(b: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
             k[(i + 1, j + 1)] = s[(i, j)] - if i == j { trace } else { 0.0 };
         }
     }
+    // With a limit of iterations, because the loop without one could run on for numbers that do not converge.
     let eigen = SymmetricEigen::try_new(k, 1e-15, 200)?;
     let q = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
     let quaternion = nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]);

@@ -49,6 +49,7 @@ impl<const N: usize> Filter<N> {
             height = by_height * self.corrections.limb_height_km;
         }
         if let Some((place, terms)) = self.limb_latitude() {
+            // A tilt is an angle, so that it moves the centre by more the farther away the centre is.
             let range_m = predicted.norm();
             for (i, (term, coefficient)) in terms.iter().zip(self.corrections.limb_latitude_km).enumerate() {
                 let by_coefficient =
@@ -60,6 +61,8 @@ impl<const N: usize> Filter<N> {
         // The white noise of a camera is an angle, so it grows with the distance.
         let white = own.options.white_rad * predicted.norm();
         let noise = covariance + Matrix3::identity() * (white * white);
+        // All three components count, instead of the two across as for a direction: the distance has a variance of its
+        // own.
         self.update((*centre_m - predicted - height).into_inner(), &by_errors, &noise)
     }
 }

@@ -6,6 +6,7 @@
 /// Returns the value that chi-square with 1, 2 or 3 degrees of freedom exceeds with this probability.
 pub fn chi2_limit(freedom: usize, probability: f64) -> f64 {
     let probability = probability.clamp(1e-15, 0.5);
+    // 100 is above every limit, because three degrees of freedom exceed only 73 with the smallest probability.
     let (mut low, mut high) = (0.0, 100.0);
     // The count is fixed, so that the loop always ends. Eighty halvings of 100 are more than a double resolves.
     for _ in 0..80 {

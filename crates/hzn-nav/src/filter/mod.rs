@@ -2,8 +2,9 @@
 //!
 //! The nominal state (attitude, velocity, position, and the corrections of the instruments) is integrated with the
 //! inertial samples. The filter holds the covariance of its errors: truth minus estimate, the attitude as a rotation
-//! vector in ECEF. Errors that are *considered* keep their estimate, and their rows of the gain are 0 (Schmidt 1966).
-//! The covariance is updated in Joseph's form.
+//! vector in ECEF. It is that of the errors, because a quaternion has four numbers for three degrees of freedom, so
+//! that a covariance of it would be singular. Errors that are *considered* keep their estimate, and their rows of the
+//! gain are 0 (Schmidt 1966). The covariance is updated in Joseph's form.
 
 mod blocks;
 mod centre;
@@ -151,6 +152,8 @@ pub struct Filter<const N: usize> {
     options: Options,
     layout: Layout,
     covariance: SMatrix<f64, N, N>,
+    /// Without corrections, because an update changes them after the sample came: the next step begins with the new
+    /// ones.
     last_imu: Option<Imu>,
     /// How long the samples have been saturated or missing without a break, at most the time of [`predict`], s.
     gap_s: f64,
@@ -215,6 +218,7 @@ impl<const N: usize> Filter<N> {
         fill(vehicle(Layout::ATTITUDE), start.attitude_rad);
         fill(vehicle(Layout::VELOCITY), start.velocity_m_s);
         fill(vehicle(Layout::POSITION), start.position_m);
+        // The slow errors are not among these, because their variance comes with the first direction.
         let blocks = [
             (layout.accel_bias, imu.accel_bias),
             (layout.accel_scale, imu.accel_scale),

@@ -62,13 +62,15 @@ impl<const N: usize> Filter<N> {
     }
 
     /// Does the same as [`Filter::predict`], and multiplies the transition of the errors from the left onto
-    /// `transition`.
+    /// `transition`: a smoother keeps one state for each measurement and not for each sample, so that it needs the
+    /// product of all samples between two measurements.
     pub fn predict_recorded(&mut self, imu: &Imu, saturated: bool, transition: &mut SMatrix<f64, N, N>) -> Step {
         self.predict_into(imu, saturated, Some(transition))
     }
 
     /// Prepares the slow error of the camera for a direction, as [`Filter::update_direction`] does before the update,
-    /// and multiplies the change onto `transition`.
+    /// and multiplies the change onto `transition`, because the change is a part of the way from one measurement to the
+    /// next.
     ///
     /// # Errors
     /// See [`Unusable`].

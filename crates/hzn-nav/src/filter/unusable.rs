@@ -1,6 +1,8 @@
 //! Why a measurement is not usable.
 
-/// Why the filter cannot use a measurement. The state does not change then.
+/// Why the filter cannot use a measurement. The state does not change then. Each reason has its own value, so that a
+/// program can count them by source: a count without reasons hid that rounding cost 35 of the 90 directions of a
+/// flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Unusable {
     /// The filter has no camera of this number.

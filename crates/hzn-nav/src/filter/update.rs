@@ -41,11 +41,15 @@ impl<const N: usize> Filter<N> {
         }
         let cross: SMatrix<f64, N, M> = self.covariance * by_errors.transpose();
         let covariance = by_errors * cross + noise;
+        // Cholesky's factor exists only for a positive definite matrix, so that the inverse is checked without a
+        // further test.
         let inverse = covariance.cholesky().ok_or(Unusable::Innovation)?.inverse();
         let nis = value.dot(&(inverse * value));
         if !nis.is_finite() {
             return Err(Unusable::Innovation);
         }
+        // The covariance has the considered errors, too. Without them, right measurements would be refused more often
+        // than the probability says, because these errors are never corrected.
         let taken = nis <= chi2_limit(M, self.options.gate_probability);
         if taken {
             // The gain comes from the full covariance, so that the considered errors count as uncertainty of the

@@ -68,6 +68,7 @@ impl Planet {
     /// Returns the semi-axes along the body-fixed x, y and z axis, kilometres: those of the sensor
     /// ([`hzn_core::body::Planet`]).
     pub fn radii_km(&self) -> [f64; 3] {
+        // The sensor has the table, so that a scene and the sensor that looks at it cannot have different radii.
         let kind = Kind::ALL.iter().find(|kind| kind.name() == self.name);
         kind.and_then(|kind| kind.planet()).map_or([MOON_RADIUS_KM; 3], |planet| planet.radii_km)
     }
