@@ -85,6 +85,10 @@ pub(crate) fn score<T: Real>(case: &Case<'_, T>) -> T {
 /// The order decides which verdict an edge gets that several gates refuse, and what a refusal costs: first the gates
 /// that compare numbers, then those that look at the picture, then those that fit other curves to the points.
 ///
+/// The gates are a list of calls and no table of pointers. They need different things, which are measured only when the
+/// gates before have passed: places and sky, then the curve and its residuals. And a call through a pointer hides from
+/// the compiler which function it calls, so that the images for a flight computer linked a panic path.
+///
 /// # Errors
 /// Returns the verdict of the first gate that refuses the edge.
 pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
