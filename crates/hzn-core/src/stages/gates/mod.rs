@@ -86,8 +86,8 @@ pub(crate) fn score<T: Real>(case: &Case<'_, T>) -> T {
 /// that compare numbers, then those that look at the picture, then those that fit other curves to the points.
 ///
 /// The gates are a list of calls and no table of pointers. They need different things, which are measured only when the
-/// gates before have passed: places and sky, then the curve and its residuals. And a call through a pointer hides from
-/// the compiler which function it calls, so that the images for a flight computer linked a panic path.
+/// gates before have passed: places and sky, then the curve and its residuals. A table would also link a panic path
+/// into the images for a flight computer.
 ///
 /// # Errors
 /// Returns the verdict of the first gate that refuses the edge.
