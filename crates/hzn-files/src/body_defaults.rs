@@ -95,7 +95,7 @@ mod tests {
         assert_eq!((own.limb_height_km, own.clipped_height_km), (0.0, 0.0));
         assert!((own.limb_height_sigma_km - 33.5e-3).abs() < 1e-9);
         // The told height is that of the pictures, whatever their tone.
-        let toned = body("[input]\ntone = \"srgb\"\n[body]\nkind = \"jupiter\"\n");
+        let toned = body(&format!("[input]\ntone = \"srgb\"\n{AT_THRESHOLD}[body]\nkind = \"jupiter\"\n"));
         assert!((toned.limb_height_km - 102.9).abs() < 0.05, "{}", toned.limb_height_km);
         let told = body("[input]\ntone = 2.2\n[body]\nkind = \"jupiter\"\nlimb_height_km = 80\n");
         assert_eq!(told.limb_height_km, 80.0);
@@ -103,11 +103,16 @@ mod tests {
         assert_eq!((earth.limb_height_km, earth.limb_height_sigma_km), (17.0, 7.0));
     }
 
+    /// Edges at the threshold are at half of the counts. All others are at half of the light.
+    const AT_THRESHOLD: &str = "[edge_points]\nsub_pixel = \"none\"\n";
+
     #[test]
     fn a_tone_moves_the_default_height_only() {
         use hzn_core::body::Limb;
         let of = |text: &str| {
-            let body = body(text);
+            let located = body(text);
+            assert!(located.limb == Limb::Height || located.limb_height_km == 17.0, "{text}");
+            let body = body(&format!("{AT_THRESHOLD}{text}"));
             (body.limb, (body.limb_height_km * 10.0).round() / 10.0, body.limb_height_sigma_km)
         };
         assert_eq!(of("[input]\ntone = \"srgb\"\n"), (Limb::Visible, 23.4, 7.0));

@@ -59,8 +59,8 @@ mod tests {
         let mut body = body::Config::default();
         assert_eq!(limb_in_words(&body, &Input::default(), None, 400.0), "limb at 17 +- 7 km");
         let input = Input { tone: Some(Tone::Srgb), ..Input::default() };
-        body.follow_tone(Tone::Srgb);
-        assert_eq!(limb_in_words(&body, &input, None, 400.0), "limb at 23.363 +- 7 km in pictures of tone srgb");
+        body.follow_tone(Tone::Srgb, 0.214);
+        assert_eq!(limb_in_words(&body, &input, None, 400.0), "limb at 23.365 +- 7 km in pictures of tone srgb");
         let mut thermal = body::Config { limb: Limb::Window, ..body::Config::default() };
         thermal.follow_band();
         let words = limb_in_words(&thermal, &input, None, 400.0);

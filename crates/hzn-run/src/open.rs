@@ -305,8 +305,8 @@ pub fn complete(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<Stri
     Ok(notes)
 }
 
-/// Takes the tone that the pictures say, if the sensor does not state it. Returns a note if the limb height follows,
-/// or if the pictures differ.
+/// Takes the tone that the pictures say, if the sensor does not state it. Returns a note if the limb height or the place
+/// of the edges follows, or if the pictures differ.
 fn complete_tone(source: &dyn Source, sensor: &mut Sensor) -> Option<String> {
     if sensor.config.input.tone.is_some() {
         return None;
@@ -326,11 +326,18 @@ fn complete_tone(source: &dyn Source, sensor: &mut Sensor) -> Option<String> {
     // A recorded sensor states the tone, because recorded pictures may be in another format.
     let value = tone.word().map_or_else(|| tone.gamma().into(), toml_edit::Value::from);
     sensor.text = source::with_key(&sensor.text, "input", "tone", value);
-    let raised = before.each_body().iter().zip(sensor.config.each_body()).find(|(old, new)| old != new)?.1;
+    let changed = before.each_body().iter().zip(sensor.config.each_body()).find(|(old, new)| old != new);
+    let is_curved = tone.light_at_half().is_some_and(|light| light != 0.5);
+    let limb = match changed {
+        Some((_, body)) => {
+            format!(", and the limb is expected at {:.1} +- {:.1} km", body.limb_height_km, body.limb_height_sigma_km)
+        }
+        None if is_curved => ", and edges are located at half of the light".to_owned(),
+        None => return None,
+    };
     Some(format!(
-        "the pictures are {kind}: their tone is taken as {tone}, and the limb is expected at {:.1} +- {:.1} km; if \
-         they have another one, set tone = ... in [input] of sensor.toml",
-        raised.limb_height_km, raised.limb_height_sigma_km
+        "the pictures are {kind}: their tone is taken as {tone}{limb}; if they have another one, set tone = ... in \
+         [input] of sensor.toml"
     ))
 }
 

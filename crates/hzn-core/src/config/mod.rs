@@ -101,13 +101,15 @@ section! {
         /// picture's [`Layout`](crate::image::Layout).
         @- bits: Option<u8> = None, [8.0 to 16.0]
             { unset: "from the file; for 16-bit words, determined from the pictures", example: "12" };
-        /// Curve between light and counts, a word or a gamma; the limb height follows from it.
+        /// Curve between light and counts, a word or a gamma; with it an edge is located at half of the light.
         ///
-        /// Half of the counts of a photograph (sRGB) is a fifth of the light, so the limb appears 6.4 km higher than in
-        /// a linear picture. A file says its curve in most cases: JPEG (sRGB), video (BT.709), raw data and samples of
-        /// 12 to 16 bits (linear), a PNG with the chunk sRGB, gAMA or cICP. A grey PNG of 8 bits does not: those of
-        /// industrial cameras are usually linear, those of telephones are not.
-        @- tone: Option<Tone> = None, [choice]
+        /// Half of the counts of a photograph (sRGB) is a fifth of the light. If the curve is unknown, the limb of a
+        /// photograph appears 6.4 km higher, and a blurred edge 0.8 standard deviations of the blur too far out. With
+        /// `edge_points.sub_pixel = "none"` the edge is at the threshold, and the limb height follows from the tone. A
+        /// file says its curve in most cases: JPEG (sRGB), video (BT.709), raw data and samples of 12 to 16 bits
+        /// (linear), a PNG with the chunk sRGB, gAMA or cICP. A grey PNG of 8 bits does not: those of industrial cameras
+        /// are usually linear, those of telephones are not.
+        @44 tone: Option<Tone> = None, [choice]
             { unset: "from the file, else `unknown`", example: "\"linear\"" };
         /// Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
         /// picture.
@@ -172,7 +174,10 @@ impl Config {
     /// ([`body::Config::follow_tone`]).
     pub fn set_tone(&mut self, tone: Tone) {
         self.input.tone = Some(tone);
-        self.each_body_mut().iter_mut().for_each(|body| body.follow_tone(tone));
+        // Only this method has no level of its own: its points are at the threshold, which is half of the counts.
+        let in_counts = self.edge_points.sub_pixel == edge_points::SubPixel::None;
+        let light = tone.light_at_half().filter(|_| in_counts).unwrap_or(0.5);
+        self.each_body_mut().iter_mut().for_each(|body| body.follow_tone(tone, light));
     }
     /// Returns the threshold parameters of body number `which`, from 0: those of the body, or else those of the sensor.
     /// If a Sun among several bodies has no threshold parameters, it uses those of the preset `sun`, because every

@@ -2,11 +2,13 @@
 
 use crate::base::error::ConfigError;
 use crate::base::keys::{Choice, Form, Value, check_number};
+use crate::base::real::Real;
 
 /// The curve between light and counts. Counts and light are fractions of full scale.
 ///
-/// The edge of a limb lies where the counts are half of those inside it. With another curve than a straight line this
-/// is not half of the light: a limb in a picture for the eye appears higher.
+/// The edge of a limb lies where the light is half of that inside it. If the curve is known, half of the light is found
+/// in the counts. If it is unknown, the edge is taken at half of the counts: in a picture for the eye this is a fifth of
+/// the light, so the limb appears higher, and a blurred edge lies outside of the true one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Tone {
@@ -22,19 +24,47 @@ pub enum Tone {
     Unknown,
 }
 
+/// A tone as a power law: the light is proportional to (counts + `offset`)^`gamma`, with both as fractions of full
+/// scale.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Curve<T> {
+    offset: T,
+    gamma: T,
+}
+
+impl<T: Real> Curve<T> {
+    /// Returns the light of `counts` as a multiple of the light of `reference`. Both are fractions of full scale.
+    pub(crate) fn light_over(&self, counts: T, reference: T) -> T {
+        (self.gamma * ((counts + self.offset) / (reference + self.offset)).ln()).exp()
+    }
+
+    /// Returns the counts whose light is the mean of that of two counts. All of them are fractions of full scale.
+    pub(crate) fn mid_level(&self, bright: T, dim: T) -> T {
+        let (b, d) = (bright + self.offset, dim + self.offset);
+        // The power of the quotient neither overflows nor loses digits. No light has the logarithm minus infinity.
+        let half = (T::one() + (self.gamma * (d / b).ln()).exp()) * T::from_f64(0.5);
+        b * (half.ln() / self.gamma).exp() - self.offset
+    }
+}
+
 /// The words in sensor.toml, with their meanings. A number is a gamma.
 const WORDS: [(Tone, Choice); 4] = [
     (
         Tone::Linear,
-        word("linear", "Counts are proportional to the light, as in raw pictures and those of industrial cameras."),
+        word("linear", 1, "Counts are proportional to the light, as in raw pictures and those of industrial cameras."),
     ),
-    (Tone::Srgb, word("srgb", "The curve of sRGB: photographs, and nearly every JPEG.")),
-    (Tone::Bt709, word("bt709", "The curve of BT.709: video.")),
-    (Tone::Unknown, word("unknown", "The curve is unknown, so the limb height has its wider sigma.")),
+    (Tone::Srgb, word("srgb", SRGB, "The curve of sRGB: photographs, and nearly every JPEG.")),
+    (Tone::Bt709, word("bt709", BT709, "The curve of BT.709: video.")),
+    (Tone::Unknown, word("unknown", UNKNOWN, "The curve is unknown: an edge is at half of the counts.")),
 ];
 
-const fn word(name: &'static str, doc: &'static str) -> Choice {
-    Choice { name, doc, feature: None, is_built: true, flight: None }
+/// The numbers in flight of the words that are no gamma: all of them are outside of the limits of a gamma.
+const UNKNOWN: u16 = 0;
+const SRGB: u16 = 10;
+const BT709: u16 = 11;
+
+const fn word(name: &'static str, number: u16, doc: &'static str) -> Choice {
+    Choice { name, doc, feature: None, is_built: true, flight: Some(number) }
 }
 
 impl Tone {
@@ -56,6 +86,18 @@ impl Tone {
             Self::Gamma(gamma) => Some(libm::pow(0.5, gamma)),
             Self::Unknown => None,
         }
+    }
+
+    /// Returns the curve as a power law, if counts are known not to be proportional to the light.
+    pub(crate) fn curve<T: Real>(self) -> Option<Curve<T>> {
+        // The straight part of sRGB and BT.709 near black is left out: at its end the light is 0.3 % and 1.8 %.
+        let (offset, gamma) = match self {
+            Self::Srgb => (0.055, 2.4),
+            Self::Bt709 => (0.099, 1.0 / 0.45),
+            Self::Gamma(gamma) => (0.0, gamma),
+            Self::Linear | Self::Unknown => return None,
+        };
+        Some(Curve { offset: T::from_f64(offset), gamma: T::from_f64(gamma) })
     }
 
     /// Returns the word in sensor.toml; `None` for a gamma, which is a number there.
@@ -90,6 +132,30 @@ impl core::fmt::Display for Tone {
 impl Value for Tone {
     const FORM: Form = Form::WordOrNumber;
     const CHOICES: &'static [Choice] = &[WORDS[0].1, WORDS[1].1, WORDS[2].1, WORDS[3].1];
+    /// Returns a gamma, 1 for linear counts, or the number of a word.
+    fn number(&self, _place: u16) -> f64 {
+        match self {
+            Self::Unknown => UNKNOWN.into(),
+            Self::Linear => 1.0,
+            Self::Gamma(gamma) => *gamma,
+            Self::Srgb => SRGB.into(),
+            Self::Bt709 => BT709.into(),
+        }
+    }
+    fn set_number(&mut self, _place: u16, number: f64) -> Option<()> {
+        let is = |word: u16| number == f64::from(word);
+        *self = match number {
+            _ if is(UNKNOWN) => Self::Unknown,
+            1.0 => Self::Linear,
+            _ if is(SRGB) => Self::Srgb,
+            _ if is(BT709) => Self::Bt709,
+            gamma => Self::Gamma(Some(gamma).filter(|gamma| gamma.is_finite())?),
+        };
+        Some(())
+    }
+    fn empty() -> Option<Self> {
+        Some(Self::Unknown)
+    }
     fn check(&self, path: &'static str, _low: f64, _above: bool, _high: f64) -> Result<(), ConfigError> {
         match self {
             // Displays and cameras have 1 to 3; a value outside of these limits is another quantity.
@@ -159,5 +225,37 @@ mod tests {
         assert!(Tone::from_word("log").is_none() && Tone::Gamma(2.2).word().is_none());
         assert!(Tone::Gamma(0.1).check("input.tone", 0.0, false, 0.0).is_err());
         assert!(Tone::Gamma(f64::NAN).check("input.tone", 0.0, false, 0.0).is_err());
+    }
+
+    #[test]
+    fn numbers_in_flight_are_read_back() {
+        for tone in [Tone::Linear, Tone::Srgb, Tone::Bt709, Tone::Gamma(2.2), Tone::Unknown] {
+            let mut read = Tone::Linear;
+            assert_eq!(read.set_number(0, tone.number(0)), Some(()));
+            assert_eq!(read, tone);
+        }
+        let mut left_out = Some(Tone::Srgb);
+        assert_eq!((left_out.set_number(0, f64::NAN), left_out), (Some(()), None));
+        assert_eq!(Tone::Linear.set_number(0, f64::INFINITY), None);
+    }
+
+    #[test]
+    fn the_mid_level_has_the_mean_of_both_lights() {
+        let srgb = |counts: f64| libm::pow((counts + 0.055) / 1.055, 2.4);
+        let bt709 = |counts: f64| libm::pow((counts + 0.099) / 1.099, 1.0 / 0.45);
+        let cube = |counts: f64| counts * counts * counts;
+        let curves: [(Tone, &dyn Fn(f64) -> f64); 3] =
+            [(Tone::Srgb, &srgb), (Tone::Bt709, &bt709), (Tone::Gamma(3.0), &cube)];
+        for (tone, light) in curves {
+            let curve = tone.curve::<f64>().unwrap();
+            for (bright, dim) in [(1.0, 0.0), (1.0, 0.9), (0.5, 0.1), (0.1, 0.0), (0.05, 0.04)] {
+                let level = curve.mid_level(bright, dim);
+                assert!((light(level) - 0.5 * (light(bright) + light(dim))).abs() < 1e-12, "{tone} {bright} {dim}");
+                let single = tone.curve::<f32>().unwrap().mid_level(bright as f32, dim as f32);
+                assert!((f64::from(single) - level).abs() < 1e-6, "{tone} {bright} {dim}");
+                assert!((curve.light_over(level, bright) * light(bright) - light(level)).abs() < 1e-12, "{tone}");
+            }
+        }
+        assert!(Tone::Linear.curve::<f64>().is_none() && Tone::Unknown.curve::<f64>().is_none());
     }
 }

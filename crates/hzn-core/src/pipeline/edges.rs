@@ -157,7 +157,8 @@ impl<T: Real> Edges<T> {
     /// Locates the edge points of a border, as the stage `edge_points` does.
     pub fn pick<P: Pixels>(sensor: &Sensor<T>, picture: &P, level: u16, border: &[Pixel]) -> Self {
         let binary = BinaryPicture::new(picture, sensor.region(), level, &Unobserved)
-            .with_blooming(sensor.config().body.blooms());
+            .with_blooming(sensor.config().body.blooms())
+            .with_tone(sensor.config().input.tone);
         let mut blocks = vec![Block::<T>::default(); border.len().div_ceil(LANES)];
         let made =
             edge_points::locate_edge_points(&binary, &sensor.config().edge_points, border, 0, &mut blocks, u32::MAX);

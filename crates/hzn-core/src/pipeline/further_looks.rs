@@ -82,6 +82,7 @@ impl<T: Real> Sensor<T> {
             let split = |region| {
                 BinaryPicture::new(picture, region, level, observer)
                     .with_blooming(expected.blooms())
+                    .with_tone(config.input.tone)
                     .with_contrast(first.contrast)
             };
             if within.is_none() {

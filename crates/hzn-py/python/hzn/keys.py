@@ -112,8 +112,8 @@ class Input(TypedDict, total=False):
     """Significant bits of a sample, if the file's words have room for more. Values: 8 to 16. Default: from the file;
     for 16-bit words, determined from the pictures."""
     tone: Literal["linear", "srgb", "bt709", "unknown"] | float | None
-    """Curve between light and counts, a word or a gamma; the limb height follows from it. Default: from the file,
-    else ``unknown``."""
+    """Curve between light and counts, a word or a gamma; with it an edge is located at half of the light. Default:
+    from the file, else ``unknown``."""
     orient: Literal["as-stored", "exif", "rotate-90", "rotate-180", "rotate-270"]
     """Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated
     picture. Default: "as-stored"."""
@@ -418,8 +418,8 @@ class Body(TypedDict, total=False):
     limb: Literal["visible", "co2-15um", "window-8-14um", "height"]
     """Where the limb height comes from. Default: "visible"."""
     limb_height_km: float
-    """Height of the visible limb above the surface, km; 17 km is right for a cloudless limb in sunlight at 550 nm,
-    and ``input.tone`` raises it. Values: −50 to 500 km. Default: 17.0."""
+    """Height of the visible limb above the surface, km; 17 km is right for a cloudless limb in sunlight at 550 nm.
+    Values: −50 to 500 km. Default: 17.0."""
     limb_height_sigma_km: float
     """1σ of the limb height, km; 7 km spans the visible wavelengths and usual tones. Values: 0 to 10000 km. Default:
     7.0."""
@@ -431,7 +431,8 @@ class Body(TypedDict, total=False):
     "refuse"."""
     airglow_height_km: float
     """Height of the outer edge of the airglow above the surface, km; for ``night = "airglow"``. At this height it
-    has half of its counts in the picture. Values: 60 to 400 km. Default: 106.0."""
+    has half of its light in the picture if ``input.tone`` is known, and else half of its counts. Values: 60 to 400
+    km. Default: 106.0."""
     airglow_height_sigma_km: float
     """1σ of ``airglow_height_km``, km. Values: 0 to 10000 km. Default: 8.0."""
     limb_height_harmonic_sigma_km: float | None

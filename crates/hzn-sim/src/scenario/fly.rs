@@ -50,7 +50,6 @@ impl Scenario {
         sensor.camera.readout_s = self.shutter.readout_s;
         let body = |kind: Kind| hzn_core::body::Config {
             altitude_sigma_km: self.known.position_sigma_km.max(0.05),
-            limb_height_km: self.limb_height_in_picture_km(kind),
             ..self.body_config(kind)
         };
         let body = |kind: Kind| match &self.world {

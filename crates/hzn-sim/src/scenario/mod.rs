@@ -418,18 +418,6 @@ impl Scenario {
         let sunlit = shines.then_some(false);
         body::Config { kind, limb_height_km, limb_height_by_latitude_km, sunlit, ..body::Config::default() }
     }
-
-    /// Returns the height where the limb has half of its counts in the picture: the simulated limb is higher in a
-    /// picture for the eye than in a linear one.
-    fn limb_height_in_picture_km(&self, kind: Kind) -> f64 {
-        let tone = hzn_core::tone::Tone::from(self.detector.tone);
-        match (&self.world, kind, tone.light_at_half()) {
-            (World::Visible(w), Kind::Earth | Kind::EarthSphere, Some(light)) => {
-                w.air.height_km(light, [1.0 / 3.0; 3], EARTH_MEAN_RADIUS_M / 1e3)
-            }
-            _ => self.body_config(kind).limb_height_km,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@ use crate::base::keys::choices;
 choices! {
     /// The source of the limb height.
     pub enum Limb {
-        /// The visible limb: its height follows from `input.tone` unless `limb_height_km` has another value than the
-        /// default.
+        /// The visible limb: its sigma follows from `input.tone`, and where edges are at half of the counts, its height
+        /// does, unless they have other values than the defaults.
         @- Visible = "visible";
         /// The limb in the band of CO2 at 15 µm, of a thermal camera with such a filter: a table by month and latitude,
         /// for a time (UTC) and a position; without them its mean, 40 km, with a wider sigma.

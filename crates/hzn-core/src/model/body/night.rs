@@ -6,7 +6,6 @@
 
 use super::{Config, Kind, Limb, Night};
 use crate::base::error::{ConfigError, Limit, require};
-use crate::model::tone::Tone;
 
 /// Mean and 1-sigma of the height of the peak: evenly distributed from 85 to 105 km.
 const PEAK_KM: [f64; 2] = [95.0, 5.77];
@@ -15,18 +14,20 @@ const THICKNESS_KM: [f64; 2] = [7.5, 2.6];
 /// Height of the edge above the peak in thicknesses, at half of the light, and its change with the logarithm of the
 /// light. The test of this module computes both.
 const EDGE: [f64; 2] = [0.94, 1.20];
-/// Returns the height of the edge of the layer and its 1-sigma in pictures of this tone, kilometres; `None` if the tone
-/// is unknown.
-fn edge_km(tone: Tone) -> Option<[f64; 2]> {
-    let above = EDGE[0] + EDGE[1] * libm::log(0.5 / tone.light_at_half()?);
-    Some([PEAK_KM[0] + THICKNESS_KM[0] * above, libm::hypot(PEAK_KM[1], THICKNESS_KM[1] * above)])
+/// Returns the height of the edge of the layer and its 1-sigma, kilometres, where this part of the light is left.
+fn edge_km(light: f64) -> [f64; 2] {
+    let above = EDGE[0] + EDGE[1] * libm::log(0.5 / light);
+    [PEAK_KM[0] + THICKNESS_KM[0] * above, libm::hypot(PEAK_KM[1], THICKNESS_KM[1] * above)]
 }
 
 impl Config {
-    /// Sets the height of the edge of the airglow, and its sigma, to those in pictures of this tone, each if it is
-    /// still the default, if the sensor searches for it.
-    pub(super) fn follow_tone_at_night(&mut self, tone: Tone) {
-        let Some([height, sigma]) = edge_km(tone).filter(|_| self.night == Night::Airglow) else { return };
+    /// Sets the height of the edge of the airglow, and its sigma, to those where this part of the light is left, each if
+    /// it is still the default, if the sensor searches for it.
+    pub(super) fn follow_tone_at_night(&mut self, light: f64) {
+        if self.night != Night::Airglow {
+            return;
+        }
+        let [height, sigma] = edge_km(light);
         let default = Self::default();
         if self.airglow_height_km == default.airglow_height_km {
             self.airglow_height_km = height;
@@ -63,6 +64,7 @@ impl Config {
 mod tests {
     use super::*;
     use crate::model::body::{Expected, Prior};
+    use crate::model::tone::Tone;
 
     /// Height of the edge and its sigma for an unknown tone, as the keys have it.
     const UNKNOWN_TONE_KM: [f64; 2] = [106.0, 8.0];
@@ -94,7 +96,7 @@ mod tests {
                 assert!((layer - constants).abs() < 0.15, "{peak} {thick} {tone}: {layer} {constants}");
             }
         }
-        let [linear, srgb] = [Tone::Linear, Tone::Srgb].map(|tone| edge_km(tone).unwrap());
+        let [linear, srgb] = [Tone::Linear, Tone::Srgb].map(|tone| edge_km(tone.light_at_half().unwrap()));
         let near = |[a, b]: [f64; 2], [c, d]: [f64; 2]| (a - c).abs() < 0.5 && (b - d).abs() < 0.1;
         assert!(near(linear, [102.0, 6.3]) && near(srgb, [109.7, 7.7]), "{linear:?} {srgb:?}");
         let mean = 0.5 * (linear[0] + srgb[0]);
@@ -130,13 +132,13 @@ mod tests {
     #[test]
     fn a_height_that_was_set_stays() {
         let height = |mut body: Config, tone| {
-            body.follow_tone(tone);
+            body.follow_tone(tone, 0.5);
             [body.airglow_height_km, body.airglow_height_sigma_km]
         };
         let night = Config { night: Night::Airglow, ..Config::default() };
         assert_eq!(height(Config::default(), Tone::Srgb), UNKNOWN_TONE_KM);
         assert_eq!(height(night.clone(), Tone::Unknown), UNKNOWN_TONE_KM);
-        assert_eq!(Some(height(night.clone(), Tone::Srgb)), edge_km(Tone::Srgb));
+        assert_eq!(height(night.clone(), Tone::Srgb), edge_km(0.5));
         let told = Config { airglow_height_km: 98.0, airglow_height_sigma_km: 3.0, ..night };
         assert_eq!(height(told, Tone::Srgb), [98.0, 3.0]);
     }

@@ -1,4 +1,4 @@
-//! The height of the visible limb, which depends on the tone of the pictures.
+//! The height of the visible limb, which depends on what is known of the light at the edge.
 
 use super::{Config, Kind, Limb};
 use crate::model::tone::Tone;
@@ -14,17 +14,20 @@ const SIGMA_KM: f64 = 4.6;
 impl Config {
     /// Sets the height of the visible limb to that in pictures of this tone, if [`Self::limb`] is [`Limb::Visible`] and
     /// if the height is still the default; and the sigma, too, if it is still the default. A height that somebody
-    /// measured or set already is that of the pictures.
+    /// measured or set already is that of the pictures. `light` is the part of the light inside the limb at which its
+    /// edge is located: a half if the edge is located with the tone, [`Tone::light_at_half`] if it is located in counts.
     ///
-    /// The light of the air falls by a factor of e over its scale height h. If half of the counts is the fraction l of
-    /// the light, the limb lies h ln(0.5/l) higher than the limb at half of the light. Overexposure follows the same
-    /// law, and comes on top unchanged: full scale at 1/B of the light moves both limbs by h ln B.
-    pub fn follow_tone(&mut self, tone: Tone) {
-        self.follow_tone_at_night(tone);
+    /// The light of the air falls by a factor of e over its scale height h. At the fraction l of the light the limb lies
+    /// h ln(0.5/l) higher than at half of the light. Overexposure follows the same law, and comes on top unchanged: full
+    /// scale at 1/B of the light moves both limbs by h ln B.
+    pub fn follow_tone(&mut self, tone: Tone, light: f64) {
+        if tone == Tone::Unknown {
+            return;
+        }
+        self.follow_tone_at_night(light);
         let scale_height_km = self.scale_height_km();
         let default = Self::of_kind(self.kind, self.radii_km);
         let is_default = self.limb_height_km == default.limb_height_km && self.limb_height_by_latitude_km.is_empty();
-        let Some(light) = tone.light_at_half() else { return };
         if self.limb != Limb::Visible || !is_default || !(scale_height_km > 0.0) {
             return;
         }
@@ -42,12 +45,28 @@ mod tests {
 
     fn height(body: Config, tone: Tone) -> [f64; 2] {
         let mut body = body;
-        body.follow_tone(tone);
+        body.follow_tone(tone, 0.5);
+        [body.limb_height_km, body.limb_height_sigma_km]
+    }
+
+    /// Returns the same for an edge at half of the counts.
+    fn height_at_half_of_counts(mut body: Config, tone: Tone) -> [f64; 2] {
+        body.follow_tone(tone, tone.light_at_half().unwrap_or(f64::NAN));
         [body.limb_height_km, body.limb_height_sigma_km]
     }
 
     #[test]
-    fn the_limb_of_a_photograph_is_higher() {
+    fn the_limb_at_half_of_the_light_has_one_height() {
+        let earth = Config::default();
+        assert_eq!(height(earth.clone(), Tone::Linear), [17.0, 4.6]);
+        for tone in [Tone::Unknown, Tone::Srgb, Tone::Bt709, Tone::Gamma(2.2)] {
+            assert_eq!(height(earth.clone(), tone), [17.0, 7.0], "{tone}");
+        }
+    }
+
+    #[test]
+    fn the_limb_of_a_photograph_is_higher_at_half_of_its_counts() {
+        let height = height_at_half_of_counts;
         let earth = Config::default();
         assert_eq!(height(earth.clone(), Tone::Linear), [17.0, 4.6]);
         assert_eq!(height(earth.clone(), Tone::Unknown), [17.0, 7.0]);
@@ -62,6 +81,7 @@ mod tests {
 
     #[test]
     fn a_height_that_was_set_stays() {
+        let height = height_at_half_of_counts;
         let told = |limb, km| Config { limb, limb_height_km: km, ..Config::default() };
         assert_eq!(height(told(Limb::Height, 17.0), Tone::Srgb), [17.0, 7.0]);
         assert_eq!(height(told(Limb::Visible, 18.9), Tone::Srgb), [18.9, 7.0]);
@@ -76,9 +96,9 @@ mod tests {
         let moon = Config::of_kind(Kind::Charon, None);
         assert_eq!(height(moon.clone(), Tone::Srgb), [moon.limb_height_km, moon.limb_height_sigma_km]);
         let mut twice = Config::default();
-        twice.follow_tone(Tone::Srgb);
+        twice.follow_tone(Tone::Srgb, 0.2);
         let once = twice.clone();
-        twice.follow_tone(Tone::Srgb);
+        twice.follow_tone(Tone::Srgb, 0.2);
         assert_eq!(twice, once);
     }
 }

@@ -324,7 +324,9 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
     /// Measures the edge points of a row. The rows around it must have arrived.
     fn measure(&mut self, y: u16, level: u16, region: &Region<T>) {
         let config = &self.sensor.config.edge_points;
-        let binary = BinaryPicture::new(&self.window, region, level, &Unobserved).with_blooming(self.expected.blooms());
+        let binary = BinaryPicture::new(&self.window, region, level, &Unobserved)
+            .with_blooming(self.expected.blooms())
+            .with_tone(self.sensor.config.input.tone);
         self.runs.each_border(y, |x| {
             if region.contains(x, y) && self.points.wants(x, y) {
                 let found = edge_points::locate_streamed_point(&binary, config, Pixel { x, y });

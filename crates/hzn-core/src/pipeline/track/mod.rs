@@ -261,7 +261,9 @@ impl<T: Real> Sensor<T> {
         level: u16,
         contrast: T,
     ) -> BinaryPicture<'a, T, P, O> {
-        BinaryPicture::new(look.picture, &self.region, level, look.observer).with_contrast(contrast)
+        BinaryPicture::new(look.picture, &self.region, level, look.observer)
+            .with_contrast(contrast)
+            .with_tone(self.config.input.tone)
     }
 
     /// Finds the border pixels of the edge along a predicted limb, and where the threshold lies between its two sides.

@@ -17,6 +17,7 @@ use crate::geometry::pixel::Pixel;
 use crate::image::Pixels;
 use crate::image::region::Region;
 use crate::model::observer::Observer;
+use crate::model::tone::{Curve, Tone};
 use crate::model::work;
 use core::cell::Cell;
 
@@ -43,6 +44,8 @@ pub(crate) struct BinaryPicture<'a, T, P, O> {
     pub(crate) blooms: bool,
     /// Smallest local contrast, in counts, for which an edge point has its own mid-level.
     pub(crate) least_contrast: i32,
+    /// The curve between light and counts, if it is known and no straight line.
+    pub(crate) curve: Option<Curve<T>>,
     /// Cost of a read of the mask, in the unit of the work budget.
     mask: u32,
     /// Cost of the reads since the last payment to the budget.
@@ -113,7 +116,18 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         let moves = core::array::from_fn(|i| Move::new(i as u8, picture));
         let mask = region.mask_cost();
         let least_contrast = (i32::from(picture.full_scale()) / FULL_SCALE_PART).max(LEAST_CONTRAST);
-        Self { picture, region, level, observer, blooms: false, least_contrast, mask, owed: Cell::new(0), moves }
+        Self {
+            picture,
+            region,
+            level,
+            observer,
+            blooms: false,
+            least_contrast,
+            curve: None,
+            mask,
+            owed: Cell::new(0),
+            moves,
+        }
     }
 
     /// Reduces the smallest contrast of edge points to 1/16 of `contrast`, which is the contrast between the dark and
@@ -123,6 +137,11 @@ impl<'a, T: Real, P: Pixels, O: Observer<T>> BinaryPicture<'a, T, P, O> {
         let own = (contrast / T::from_i32(CONTRAST_PART)).to_i32();
         let least = if own > 0 && self.picture.full_scale() > 255 { own.max(LEAST_CONTRAST) } else { i32::MAX };
         Self { least_contrast: self.least_contrast.min(least), ..self }
+    }
+
+    /// Locates edge points at half of the light, if the tone of the picture is known.
+    pub(crate) fn with_tone(self, tone: Option<Tone>) -> Self {
+        Self { curve: tone.and_then(Tone::curve), ..self }
     }
 
     pub(crate) fn with_blooming(self, blooms: bool) -> Self {

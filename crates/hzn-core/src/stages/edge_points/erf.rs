@@ -5,7 +5,7 @@
 //! the Cramér-Rao bound of the patch. The levels are means over the plateaus on both sides. The width σ is fitted, too.
 //! This costs no accuracy, because the derivative by σ is odd about the edge and the derivative by the offset is even.
 
-use super::patch::{HALF, Patch, brightness};
+use super::patch::{HALF, Patch, light};
 use crate::base::linalg::{V3, invert_spd3};
 use crate::base::real::Real;
 use crate::geometry::pixel::{ImagePoint, Pixel};
@@ -108,21 +108,21 @@ fn levels<T: Real, P: Pixels, O: Observer<T>>(
     let begins = (edge.sigma * T::from_f64(widths)).max(T::from_f64(least)).min(T::from_f64(most));
     let half = T::from_f64(0.5);
     let mean = |sign: T| -> Option<T> {
-        let (mut sum, mut count) = (0, 0);
+        let (mut sum, mut count) = (T::ZERO, 0);
         for k in 0..DEEP {
             let across = edge.offset + sign * (begins + T::from_i32(k));
             for j in -ALONG..=ALONG {
                 let along = T::from_i32(j);
                 let dx = (across * edge.n[0] - along * edge.n[1] + half).floor().to_i32();
                 let dy = (across * edge.n[1] + along * edge.n[0] + half).floor().to_i32();
-                if let Some(value) = brightness(binary, x + dx, y + dy) {
+                if let Some(value) = light(binary, x + dx, y + dy) {
                     sum += value;
                     count += 1;
                 }
             }
         }
         // With fewer than five pixels the mean would have too much noise.
-        (count > ALONG).then(|| T::from_i32(sum) / T::from_i32(count))
+        (count > ALONG).then(|| sum / T::from_i32(count))
     };
     let (bright, dim) = (mean(T::one())?, mean(-T::one())?);
     let least = (i32::from(binary.picture.full_scale()) / 64).max(2);

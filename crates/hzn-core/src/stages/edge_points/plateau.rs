@@ -4,6 +4,7 @@ use super::reads::{Around, Line, UNSEEN, Walk};
 use crate::base::real::Real;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
+use crate::model::tone::Curve;
 
 /// Largest distance up to which a plateau is searched for, in steps.
 pub(super) const REACH: i32 = 10;
@@ -84,6 +85,17 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         }
     }
 
+    /// Returns twice the level of the edge between two plateaus, in units of [`Line::smoothed`]: the mean of their
+    /// light, or of their counts if the tone of the picture is unknown.
+    #[inline(always)]
+    fn mid2(&self, bright: i32, dim: i32) -> i32 {
+        let binary = self.around.binary;
+        match &binary.curve {
+            None => bright + dim,
+            Some(curve) => mid2_of_light(curve, bright, dim, binary.picture.full_scale()),
+        }
+    }
+
     /// Locates the crossing of the mid-level. The arguments are the smoothed brightness one step to the lit side, here,
     /// and one step to the dark side.
     #[inline(always)]
@@ -98,7 +110,7 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         let contrast = bright - dim;
         let level4 = i32::from(binary.level) * 4;
         let (mid2, fallback) = if contrast >= 4 * binary.least_contrast {
-            (bright + dim, false)
+            (self.mid2(bright, dim), false)
         } else if first_lit > first_dark {
             (2 * level4.max(first_dark + 1).min(first_lit), true)
         } else {
@@ -131,4 +143,15 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         let clipped = bright >= 4 * (full - full / CLIPPED_PART);
         Some(Crossing { part, mid2, fallback, clipped, rising: inner <= -REACH })
     }
+}
+
+/// Returns twice the counts whose light is the mean of that of two plateaus, in units of [`Line::smoothed`].
+// A blurred edge is a mixture of the light of both sides, so half of the light lies at the true edge, however wide the
+// blur is.
+#[inline(never)]
+fn mid2_of_light<T: Real>(curve: &Curve<T>, bright: i32, dim: i32, full_scale: u16) -> i32 {
+    let full = T::from_i32(4 * i32::from(full_scale));
+    let level = curve.mid_level(T::from_i32(bright) / full, T::from_i32(dim) / full) * full;
+    // The sum is positive, so that the cast rounds to the nearest value.
+    (level * T::from_i32(2) + T::from_f64(0.5)).to_i32()
 }

@@ -4,6 +4,8 @@ use super::*;
 use crate::image::region::Region;
 use crate::image::{Grey, Layout};
 use crate::model::observer::Unobserved;
+use crate::model::tone::Tone;
+use std::format;
 use std::vec::Vec;
 
 /// Makes a picture of a straight edge between two plateaus, blurred over `width_px` and lit where
@@ -19,9 +21,13 @@ fn picture(n: [f64; 2], offset: f64, width_px: f64, dim: f64, bright: f64) -> Ve
 }
 
 fn points(data: &[u8], config: &Config, level: u16) -> Vec<(f64, f64)> {
+    points_of_tone(data, config, level, None)
+}
+
+fn points_of_tone(data: &[u8], config: &Config, level: u16, tone: Option<Tone>) -> Vec<(f64, f64)> {
     let grey = Grey::try_new(data, Layout::packed(100, 100, 1, 8)).unwrap();
     let region = Region::<f64>::whole(100, 100);
-    let binary = BinaryPicture::new(&grey, &region, level, &Unobserved);
+    let binary = BinaryPicture::new(&grey, &region, level, &Unobserved).with_tone(tone);
     let border: Vec<Pixel> = (0..100u16)
         .flat_map(|y| (0..100u16).map(move |x| Pixel { x, y }))
         .filter(|p| (20..80).contains(&p.x) && (20..80).contains(&p.y))
@@ -55,6 +61,64 @@ fn linear_finds_the_local_mid_level_whatever_the_level() {
                 }
             }
         }
+    }
+}
+
+/// Makes the picture of an edge that is blurred by `sigma_px`, in sRGB counts.
+fn in_srgb(n: [f64; 2], offset: f64, sigma_px: f64, dim: f64, bright: f64) -> Vec<u8> {
+    (0..100 * 100)
+        .map(|i| {
+            let d = f64::from(i % 100) * n[0] + f64::from(i / 100) * n[1] - offset;
+            let light = dim + (bright - dim) * 0.5 * (1.0 + libm::erf(d / (sigma_px * core::f64::consts::SQRT_2)));
+            let counts = if light > 0.003_130_8 { 1.055 * light.powf(1.0 / 2.4) - 0.055 } else { 12.92 * light };
+            (255.0 * counts + 0.5) as u8
+        })
+        .collect()
+}
+
+/// Blur mixes the light of both sides, so the true edge is at half of the light, however wide the blur is. Half of the
+/// counts is 0.79 standard deviations of the blur farther out, before a dark sky.
+#[test]
+fn the_edge_of_a_known_tone_is_at_half_of_the_light() {
+    let methods = [
+        (SubPixel::Linear, 0.3, true),
+        (SubPixel::Erf, 0.1, cfg!(feature = "erf")),
+        (SubPixel::Zernike, 0.2, cfg!(feature = "zju")),
+    ];
+    for (sub_pixel, most, _) in methods.into_iter().filter(|(.., is_built)| *is_built) {
+        let config = Config { sub_pixel, ..Config::default() };
+        for (nx, ny) in [(1.0, 0.0), (0.0, -1.0), (0.8, 0.6), (-0.6, 0.8)] {
+            for (sigma_px, dim, bright) in [(0.8, 0.0, 0.9), (1.5, 0.01, 0.5), (3.0, 0.0, 0.7)] {
+                // The moments of a small window are those of a sharp edge.
+                if sub_pixel == SubPixel::Zernike && sigma_px > 1.0 {
+                    continue;
+                }
+                let offset = 50.3 * nx + 49.8 * ny;
+                let data = in_srgb([nx, ny], offset, sigma_px, dim, bright);
+                // Towards the dark is negative.
+                let [known, unknown] = [Some(Tone::Srgb), None].map(|tone| {
+                    let all = points_of_tone(&data, &config, 60, tone);
+                    all.iter().map(|(u, v)| u * nx + v * ny - offset).sum::<f64>() / all.len() as f64
+                });
+                let what = format!("{sub_pixel:?} {nx} {ny} blur {sigma_px}: {known:.3}, in counts {unknown:.3}");
+                std::println!("{what}");
+                assert!(known.abs() < most * sigma_px, "{what}");
+                assert!(unknown < known - 0.3 * sigma_px, "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn linear_counts_and_an_unknown_tone_have_the_same_points() {
+    let data = picture([0.8, 0.6], 70.3, 3.0, 20.0, 220.0);
+    let of = |tone| points_of_tone(&data, &Config::default(), 100, tone);
+    for tone in [Tone::Linear, Tone::Unknown] {
+        assert_eq!(of(Some(tone)), of(None));
+    }
+    // A gamma of 1 is linear, too.
+    for (one, other) in of(Some(Tone::Gamma(1.0))).into_iter().zip(of(None)) {
+        assert!((one.0 - other.0).hypot(one.1 - other.1) < 1e-2, "{one:?} {other:?}");
     }
 }
 

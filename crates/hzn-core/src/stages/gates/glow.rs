@@ -18,6 +18,12 @@ const SIGMAS: f64 = 3.0;
 const SCALE_HEIGHTS: f64 = 2.0 * 2.4;
 /// Allowance for the blur of the picture, in pixels. A Gaussian blur of 3.5 px leaves an eighth of a step there.
 const BLUR_PX: f64 = 4.0;
+/// The same for an edge at half of the light in pictures that are not linear: half of the counts lies higher, by the
+/// first number in scale heights of the air, and by a part of the blur. A Gaussian blur that leaves an eighth of the
+/// counts of sRGB 4 px above half of the counts leaves it here above half of the light.
+// In sRGB half of the counts is 0.214 of the light, ln(0.5/0.214) scale heights or 0.79 standard deviations of a blur
+// higher. An eighth of the counts is 0.0144 of the light, 2.19 standard deviations from the middle.
+const CURVED: [f64; 2] = [0.85, BLUR_PX * 2.19 / (2.19 - 0.79)];
 /// Farthest place at which the brightness of the sky is read, and the nearest that counts, as multiples of the distance
 /// at which the air is dark.
 const FARTHEST: f64 = 8.0;
@@ -39,9 +45,9 @@ fn is_below<T: Real>(expected: &Expected<T>) -> bool {
 }
 
 /// Returns the angle above the limb at which the air is dark, in radians; `None` for a body without known air.
-fn dark_angle<T: Real>(sin: T, c: T, expected: &Expected<T>) -> Option<T> {
+fn dark_angle<T: Real>(sin: T, c: T, expected: &Expected<T>, scale_heights: f64) -> Option<T> {
     let height_m =
-        expected.limb_sigma_parts_m[0] * T::from_f64(SIGMAS) + expected.scale_height_m * T::from_f64(SCALE_HEIGHTS);
+        expected.limb_sigma_parts_m[0] * T::from_f64(SIGMAS) + expected.scale_height_m * T::from_f64(scale_heights);
     // An angle is a height divided by the distance (R + d) cot α of the limb.
     let by_height = sin / (c.max(T::from_f64(1e-6)) * (expected.radius_m + expected.limb_m));
     (expected.scale_height_m > T::ZERO).then_some(height_m * by_height)
@@ -64,8 +70,10 @@ pub(crate) fn is_likely<T: Real, P: Pixels, O: Observer<T>>(
     }
     let (c, most) = (case.fused.c, T::from_f64(case.config.max_glow));
     let sin = (T::one() - c * c).max(T::ZERO).sqrt();
-    let Some(dark) = dark_angle(sin, c, case.expected) else { return false };
-    let blur = T::from_f64(BLUR_PX);
+    let (scale_heights, blur_px) =
+        if binary.curve.is_some() { (SCALE_HEIGHTS + CURVED[0], CURVED[1]) } else { (SCALE_HEIGHTS, BLUR_PX) };
+    let Some(dark) = dark_angle(sin, c, case.expected, scale_heights) else { return false };
+    let blur = T::from_f64(blur_px);
     let (mut body, mut air, mut sky) = (Counts::new(), Counts::new(), Counts::new());
     for place in places {
         let at = |inwards_px: T| mean_brightness(place, inwards_px, binary);
