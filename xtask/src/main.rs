@@ -12,6 +12,7 @@
 //!                        types of Python
 //! cargo xtask first-command
 //!                        measures what the README's first command costs on a clean clone
+//! cargo xtask site       builds the site and checks its links; the page in the browser is part of it
 //! cargo xtask viewer     makes the picture of the viewer's window in the documents, or pictures of all situations
 //! ```
 #![forbid(unsafe_code)]
@@ -33,6 +34,7 @@ mod parts;
 mod processors;
 mod python;
 mod reproduce;
+mod site;
 mod situations;
 mod soft_double;
 mod steps;
@@ -44,7 +46,7 @@ mod wheel;
 use std::process::ExitCode;
 
 const USAGE: &str =
-    "usage: cargo xtask <test|bench|reproduce|campaign|dist|firmware|first-command|keys|viewer> [OPTION]...
+    "usage: cargo xtask <test|bench|reproduce|campaign|dist|firmware|first-command|keys|page|site|viewer> [OPTION]...
 
   test [--all] [STEP]...
                      runs the steps of every check, or all steps whose name contains one of the words; --all runs the
@@ -73,6 +75,8 @@ const USAGE: &str =
   keys               writes the tables of book/reference/sensor-toml.md, the template, the JSON schema and the
                      Python types (hzn.keys) from the keys in hzn-core
   page               builds the page with the sensor in the browser into target/xtask/page
+  site               builds the site (the book, its notebooks, and that page) into target/xtask/site, and checks its
+                     links and its search
   viewer             makes book/images/viewer.png again; needs `cargo xtask test demo` first
   viewer situations  makes pictures of the window into target/xtask/situations, in four sizes and two themes";
 
@@ -90,6 +94,7 @@ fn main() -> ExitCode {
         "dist" => dist::run(rest),
         "firmware" => firmware::run(rest),
         "page" => page::run(),
+        "site" => site::run(),
         "first-command" => first_command::run(),
         "keys" => write_keys(),
         "viewer" => viewer::run(rest),

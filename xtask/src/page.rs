@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::machine::{has, output, root, target};
+use crate::site;
 use crate::steps::{self, Outcome, Trouble, cargo};
 use crate::test_build::build_tests;
 
@@ -70,25 +71,5 @@ pub(crate) fn test() -> Outcome {
     let mut check = Command::new("python3");
     check.arg("tests/python/check_page.py").args(["--browser", browser, "--page"]).arg(&page);
     steps::run(check.arg("--hzn").arg(target().join("debug/hzn")).arg("--out").arg(target().join("xtask/page-test")))?;
-    put_into_site(&page)
-}
-
-/// Makes the page a part of the site, which the step `wheel` builds.
-fn put_into_site(page: &Path) -> Outcome {
-    let site = target().join("xtask/python-site");
-    if !site.exists() {
-        println!("there is no site in {}: `cargo xtask test wheel` builds it", site.display());
-        return Ok(());
-    }
-    for folder in ["", "examples"] {
-        let (from, to) = (page.join(folder), site.join("app").join(folder));
-        fs::create_dir_all(&to)?;
-        for entry in fs::read_dir(from)? {
-            let entry = entry?;
-            if entry.file_type()?.is_file() {
-                fs::copy(entry.path(), to.join(entry.file_name()))?;
-            }
-        }
-    }
-    Ok(())
+    site::add_page(&page)
 }

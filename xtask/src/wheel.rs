@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::machine::{root, target};
-use crate::python;
 use crate::steps::{self, Outcome, Trouble};
+use crate::{python, site};
 
 const CRATE: &str = "crates/hzn-py";
 /// Profile with the settings of the tests, and the feature with which their dependencies fit: what the tests have
@@ -14,8 +14,7 @@ const CRATE: &str = "crates/hzn-py";
 const AS_IN_THE_TESTS: &[&str] = &["--profile", "dev", "--features", "as-in-the-tests"];
 const RELEASE: &[&str] = &["--profile", "release"];
 
-/// Builds the wheel, installs it into a separate environment, and checks stubs, behaviour, notebooks, documents and the
-/// search in them.
+/// Builds the wheel, installs it into a separate environment, and checks stubs, behaviour, notebooks and the site.
 /// `hzn` is the program of the same build. The build of the site executes one notebook, or with `every_notebook` all.
 pub(crate) fn run_step(hzn: &Path, every_notebook: bool) -> Outcome {
     let folder = Path::new(CRATE);
@@ -33,15 +32,12 @@ pub(crate) fn run_step(hzn: &Path, every_notebook: bool) -> Outcome {
     let pytest = ["pytest", "-q", "-p", "no:cacheprovider", "--durations", "10", "--ignore"];
     steps::run(module(&pytest).arg(tests.join("tools")).arg(&tests))?;
     // The site takes its reference from the docstrings. Its notebooks are executed during the build.
-    let config = fs::canonicalize("mkdocs.yml")?;
-    let mut site = module(&["mkdocs", "build", "--strict", "--quiet", "--config-file"]);
-    site.env("NO_MKDOCS_2_WARNING", "1");
-    if !every_notebook {
-        site.env("HZN_UNEXECUTED", "methods.ipynb");
-    }
-    let built = scratch.join("python-site");
-    steps::run(site.arg(config).arg("--site-dir").arg(&built))?;
-    steps::run(Command::new(&python).arg("tests/python/check_search.py").arg(built))
+    site::build(&python, every_notebook)
+}
+
+/// Installs the wheel where the site is built, and returns the Python that has both.
+pub(crate) fn install_for_site() -> Result<PathBuf, Trouble> {
+    install_wheel(AS_IN_THE_TESTS)
 }
 
 /// Runs the examples with Basilisk and Rerun, and compares positions with those of Basilisk. The environment is a
