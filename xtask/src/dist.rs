@@ -1,16 +1,18 @@
 //! Makes the files of a release: the program as an archive and as a Debian package, the wheel with the library and the
 //! program, the lists of parts, and their checksums.
 
+mod trial;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::machine::{has, output, root, target};
+use crate::machine::{output, root, target};
 use crate::python;
 use crate::steps::{self, Outcome, Trouble, cargo, cargo_program};
 
 const USAGE: &str = "usage: cargo xtask dist [--target TRIPLE] [--profile NAME] [PART]...
-  without PART, all of: program, archive, deb, wheel, parts, sums, try; `crates` runs only if it is named";
+  without PART, all of: program, archive, deb, wheel, musl-wheel, parts, sums, try; `crates` runs only if it is named";
 
 /// Makes a part.
 type Make = fn(&Dist) -> Outcome;
@@ -22,6 +24,7 @@ const PARTS: &[(&str, Make)] = &[
     ("archive", Dist::make_archive),
     ("deb", Dist::make_deb),
     ("wheel", Dist::make_wheel),
+    ("musl-wheel", Dist::make_musl_wheel),
     ("parts", Dist::list_parts),
     ("sums", Dist::write_sums),
     ("try", Dist::try_files),
@@ -96,6 +99,18 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
     left_out.iter().for_each(|line| println!("{line}"));
     let strict = std::env::var("CI").is_ok_and(|v| v == "true");
     if strict && !left_out.is_empty() { Err(left_out.join("\n")) } else { Ok(()) }
+}
+
+/// Makes the files of a release for this machine and tries them. Then makes the program for the other processor, and
+/// compares its answers.
+pub(crate) fn try_release() -> Outcome {
+    let failed = |why| Trouble::Failed(why);
+    run(&[]).map_err(failed)?;
+    if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
+        return Ok(());
+    }
+    let other = ["--target", "aarch64-unknown-linux-musl", "program", "archive", "try"];
+    run(&other.map(str::to_owned)).map_err(failed)
 }
 
 impl Dist {
@@ -238,12 +253,22 @@ impl Dist {
         self.pack("archive", &[&folder, &self.out().join(format!("{}.{ending}", self.name()))])
     }
 
+    /// Returns Debian's name of the processor.
+    fn debian_processor(&self) -> Result<&'static str, Trouble> {
+        match (self.is_linux(), self.processor()) {
+            (true, "x86_64") => Ok("amd64"),
+            (true, "aarch64") => Ok("arm64"),
+            _ => Err(Trouble::Missing("it is only for Linux on x86_64 and aarch64".into())),
+        }
+    }
+
+    /// Returns the path of the Debian package.
+    fn deb(&self) -> Result<PathBuf, Trouble> {
+        Ok(self.out().join(format!("hzn_{}_{}.deb", self.version, self.debian_processor()?)))
+    }
+
     fn make_deb(&self) -> Outcome {
-        let processor = match (self.is_linux(), self.processor()) {
-            (true, "x86_64") => "amd64",
-            (true, "aarch64") => "arm64",
-            _ => return Err(Trouble::Missing("it is only for Linux on x86_64 and aarch64".into())),
-        };
+        let processor = self.debian_processor()?;
         let program = self.built()?;
         let folder = fresh(&self.work().join("deb"))?;
         let usr = folder.join("root/usr");
@@ -269,26 +294,44 @@ impl Dist {
         );
         write(&folder.join("debian/control"), control.as_bytes())?;
         fs::create_dir_all(self.out())?;
-        self.pack("deb", &[&folder, &self.out().join(format!("hzn_{}_{processor}.deb", self.version))])
+        self.pack("deb", &[&folder, &self.deb()?])
+    }
+
+    /// Returns the folder of a finished wheel.
+    fn wheels(&self, standard: &str) -> PathBuf {
+        self.work().join("wheels").join(self.processor()).join(standard)
     }
 
     /// Makes the wheel. On Linux its library needs only the GLIBC of manylinux2014, and the program is the static one.
     fn make_wheel(&self) -> Outcome {
+        self.make_wheel_for(&self.triple.replace("-linux-musl", "-linux-gnu"), "manylinux2014")
+    }
+
+    /// Makes the wheel for systems whose C library is musl, such as Alpine.
+    fn make_musl_wheel(&self) -> Outcome {
+        if !self.is_linux() {
+            return Err(Trouble::Missing("it is only for Linux".into()));
+        }
+        self.make_wheel_for(&self.triple.replace("-linux-gnu", "-linux-musl"), "musllinux_1_2")
+    }
+
+    fn make_wheel_for(&self, triple: &str, standard: &str) -> Outcome {
         let program = self.built()?;
-        let wheels = fresh(&self.work().join("wheels"))?;
+        let wheels = fresh(&self.wheels(standard))?;
+        self.need_target(triple)?;
         let mut maturin = self.tool("python");
-        maturin.args(["-m", "maturin", "build", "--locked", "--profile", &self.profile]);
+        maturin.args(["-m", "maturin", "build", "--locked", "--profile", &self.profile, "--target", triple]);
         maturin.args(["--manifest-path", "crates/hzn-py/Cargo.toml", "--out"]).arg(&wheels);
-        maturin.arg("--target-dir").arg(self.work().join("build"));
-        let library = self.triple.replace("-linux-musl", "-linux-gnu");
-        self.need_target(&library)?;
-        maturin.args(["--target", &library]);
+        // A library for musl is not linked as the static program is: neither replaces what the other has compiled.
+        let folder = if standard.starts_with("musl") { "build-musl-wheel" } else { "build" };
+        maturin.arg("--target-dir").arg(self.work().join(folder));
         if self.is_linux() {
-            maturin.args(["--zig", "--compatibility", "manylinux2014"]);
+            maturin.args(["--zig", "--compatibility", standard]);
         }
         steps::run(&mut maturin)?;
         let wheel = only_file(&wheels)?;
         self.pack("wheel", &[&wheel, &program])?;
+        self.check_glibc(&wheel)?;
         copy(&wheel, &self.out().join(wheel.file_name().unwrap_or_default()))
     }
 
@@ -305,48 +348,6 @@ impl Dist {
 
     fn write_sums(&self) -> Outcome {
         self.pack("sums", &[&self.out()])
-    }
-
-    /// Runs the files as their users do: the program in an empty root folder, the wheel in a new environment.
-    fn try_files(&self) -> Outcome {
-        if self.processor() != self.host.split('-').next().unwrap_or_default() {
-            return Err(Trouble::Missing(format!("these files run only on {}", self.processor())));
-        }
-        let program = self.built()?;
-        let empty = fresh(&self.work().join("empty"))?;
-        copy(&program, &empty.join("hzn"))?;
-        let is_root = output(Command::new("id").arg("-u")).is_some_and(|id| id == "0");
-        if self.is_linux() && is_root && has("chroot") {
-            // PATH is only for chroot itself: the empty folder has nothing that it could name.
-            let path = std::env::var_os("PATH").unwrap_or_default();
-            let mut alone = Command::new("chroot");
-            steps::run(alone.arg(&empty).args(["/hzn", "demo"]).env_clear().env("PATH", path))?;
-        } else {
-            steps::run(Command::new(&program).arg("demo").current_dir(&empty))?;
-        }
-        self.try_wheel()
-    }
-
-    fn try_wheel(&self) -> Outcome {
-        let wheels = self.work().join("wheels");
-        let wheel = only_file(&wheels).map_err(|_| Trouble::Missing("needs: cargo xtask dist wheel".into()))?;
-        if self.is_linux() {
-            let newest = output(self.tool("python").args(["xtask/pack.py", "glibc"]).arg(&wheel)).unwrap_or_default();
-            println!("the wheel needs GLIBC {newest}");
-            let minor = newest.strip_prefix("2.").and_then(|rest| rest.split('.').next()?.parse::<u32>().ok());
-            if minor.is_none_or(|minor| minor > 17) {
-                return Err(Trouble::Failed(format!("the wheel needs GLIBC {newest}; manylinux2014 has 2.17")));
-            }
-        }
-        let environment = fresh(&self.work().join("venv"))?;
-        steps::run(self.tool("python").args(["-m", "venv"]).arg(&environment))?;
-        let bin = environment.join(if cfg!(windows) { "Scripts" } else { "bin" });
-        let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
-        steps::run(Command::new(bin.join("python")).args(pip).arg(&wheel))?;
-        let away = fresh(&self.work().join("away"))?;
-        steps::run(Command::new(bin.join("hzn")).arg("demo").current_dir(&away))?;
-        let first = "import hzn; print(hzn.simulate('rocket-clean', frames=2)[1].image.shape, hzn.__version__)";
-        steps::run(Command::new(bin.join("python")).args(["-c", first]).current_dir(&away))
     }
 }
 

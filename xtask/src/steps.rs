@@ -205,7 +205,7 @@ impl fmt::Display for Cost {
 }
 
 /// Returns the processor time of all programs that this one has run to their end, s. Linux tells it in hundredths.
-fn processor_seconds() -> Option<f64> {
+pub(crate) fn processor_seconds() -> Option<f64> {
     let line = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The name of the program, in brackets, may contain spaces. Fields 16 and 17 of proc(5) are user and system time.
     let fields: Vec<_> = line.rsplit(')').next()?.split_whitespace().collect();

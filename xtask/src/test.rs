@@ -9,7 +9,7 @@ use std::process::Command;
 
 use crate::beside::Beside;
 use crate::demo::{demo_dir, find_recordings, run_demo};
-use crate::dist::exclude_unpublished;
+use crate::dist::{self, exclude_unpublished};
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{self, Outcome, Selection, Step, Steps, Tier, cargo};
 use crate::test_build::build_tests;
@@ -62,6 +62,7 @@ const STEPS: &[Step] = &[
     }),
     long("Basilisk and Rerun", |_| wheel::try_other_tools()),
     long("page in the browser", |_| page::test()),
+    long("files of a release", |_| dist::try_release()),
     long("ignored tests", run_ignored_tests),
     long("killed runs", |_| campaign::kill(1000)),
     long("flipped bits", |_| campaign::flips(20_000)),
