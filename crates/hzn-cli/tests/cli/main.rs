@@ -14,6 +14,8 @@ mod ccsds;
 mod commands;
 mod common;
 mod conventions;
+#[cfg(target_os = "linux")] // where the program keeps the names of its functions
+mod copies;
 mod corners;
 mod documents;
 mod doubts;
