@@ -3,6 +3,7 @@
 use super::Expected;
 use crate::base::real::Real;
 use crate::geometry::cone::Azimuth;
+use crate::geometry::ellipsoid::LimbCone;
 use crate::geometry::frames::{Cam, UnitVec3};
 
 impl<T: Real> Expected<T> {
@@ -21,6 +22,19 @@ impl<T: Real> Expected<T> {
             cot2_east: cone.cot2_east,
             cot2_meridian: cone.cot2_meridian,
             mean_cos: self.cos,
+        })
+    }
+
+    /// Returns the cone of the ellipsoid for a limb whose mean cone has another half-angle, with this cosine and sine:
+    /// both of its half-angles change as the mean one does, so that the shape about it stays.
+    pub(super) fn ellipsoid_at(&self, cos: T, sin: T) -> Option<LimbCone<T>> {
+        let cot2 = |cos: T, sin: T| cos * cos / (sin * sin);
+        let change = cot2(cos, sin) - cot2(self.cos, self.sin);
+        let moved = |cot2: T| (cot2 + change).max(T::ZERO);
+        self.ellipsoid.map(|cone| LimbCone {
+            cot2_east: moved(cone.cot2_east),
+            cot2_meridian: moved(cone.cot2_meridian),
+            ..cone
         })
     }
 
@@ -52,6 +66,30 @@ mod tests {
     use crate::geometry::ellipsoid::{WGS84_A_M, WGS84_B_M};
     use crate::geometry::frames::Rotation;
     use crate::model::body::{Config, Prior};
+
+    #[test]
+    fn clipping_raises_the_limb_all_around_and_keeps_its_shape() {
+        let body = Config { clipped_height_km: 25.0, ..Config::default() };
+        let attitude = Rotation::assume_from_quaternion([0.5, -0.5, 0.5, 0.5]).unwrap();
+        let frame = Prior {
+            position_m: Some([4.9e6, 1.0e6, 4.6e6]),
+            fixed_from_camera: Some(attitude),
+            attitude_sigma_rad: Some(0.01),
+            ..Prior::default()
+        };
+        let expected = Expected::<f64>::new(&body, &frame).unwrap();
+        let clipped = expected.clipped(1.0);
+        let raised_rad = clipped.half_angle_rad() - expected.half_angle_rad();
+        assert!(raised_rad > 0.008, "{raised_rad}");
+        let cone = expected.ellipsoid.unwrap();
+        let axis = attitude.inverse().apply(&cone.axis);
+        let east = attitude.inverse().apply(&cone.east);
+        let north = UnitVec3::assume_unit(east.v().cross(axis.v()));
+        for ray in [&east, &north] {
+            let [before, after] = [expected, clipped].map(|expected| expected.limb_offset_rad(&axis, ray));
+            assert!(before.abs() > 1e-4 && (after - before).abs() < 0.05 * before.abs(), "{before} {after}");
+        }
+    }
 
     #[test]
     fn the_offset_is_that_of_the_ellipsoids_cone() {

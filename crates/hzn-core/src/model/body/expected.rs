@@ -324,6 +324,7 @@ impl<T: Real> Expected<T> {
             sin,
             sigma_cos: scale * root(&limb_sigma_parts_m),
             limb_sigma_parts_m,
+            ellipsoid: self.ellipsoid_at(cos, sin),
             unknown_harmonics_cos: [
                 root(&[first, scale * apart, scale * sigma * T::from_f64(core::f64::consts::FRAC_1_SQRT_2)]),
                 second,
