@@ -20,6 +20,7 @@ mod expected;
 mod image;
 mod locate;
 mod made;
+mod mask;
 mod nav;
 mod notebook;
 mod numbered;

@@ -49,6 +49,7 @@ impl Report {
             row,
             shown: None,
             bits: None,
+            seen: None,
         }
     }
 

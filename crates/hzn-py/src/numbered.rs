@@ -23,5 +23,6 @@ pub(crate) fn number(py: Python<'_>, report: &Report, index: u64) -> PyResult<Re
         nadir: report.nadir,
         shown: report.shown.as_ref().map(|shown| shown.clone_ref(py)),
         bits: report.bits,
+        seen: report.seen.clone(),
     })
 }

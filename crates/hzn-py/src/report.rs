@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
 use hzn_mcap::{Annotations, CandidateEdge, FrameRecord, Row};
@@ -14,6 +13,7 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::camera::Camera;
 use crate::cells::{candidate, symmetric, table, vector};
+use crate::mask::Seen;
 use crate::pickled::{Detail, Pickled};
 use crate::read::Shown;
 use crate::{drawing, errors, notebook, parameters};
@@ -41,6 +41,8 @@ pub(crate) struct Report {
     pub(crate) nadir: Option<Nadir>,
     pub(crate) shown: Option<Shown>,
     pub(crate) bits: Option<u8>,
+    /// What a mask needs, of a picture that was processed here.
+    pub(crate) seen: Option<Arc<Seen>>,
 }
 
 impl Report {
@@ -77,29 +79,6 @@ impl Report {
     /// Returns this report and those of the other bodies.
     pub(crate) fn each(&self) -> impl Iterator<Item = &Self> {
         std::iter::once(self).chain(self.others.iter().map(Py::get))
-    }
-
-    pub(crate) fn drawing(&self) -> &Annotations {
-        self.drawing.get_or_init(|| {
-            if let Some(detail) = &self.detail {
-                return detail.drawing.clone();
-            }
-            let fitted = || {
-                if let Some(solution) = &self.placed {
-                    return Some(hzn_run::overlay::draw_limb(solution, &self.camera.as_ref()?.lens));
-                }
-                let axis = UnitVec3::try_new(self.row.axis()?)?;
-                Some(hzn_run::overlay::draw_cone(&axis, self.half_angle_rad?, &self.camera.as_ref()?.lens))
-            };
-            fitted().unwrap_or_default()
-        })
-    }
-
-    /// Returns the annotations of all bodies.
-    pub(crate) fn drawing_of_all(&self) -> Annotations {
-        let mut all = Annotations::default();
-        self.each().for_each(|r| all.add(r.drawing().clone()));
-        all
     }
 
     /// Returns the record for a recording.
@@ -382,6 +361,12 @@ impl Report {
         let rgb = picture.map(|p| drawing::draw_bare(py, &p, this.bits, this.camera.as_deref())).transpose()?;
         let size = this.camera.as_ref().map(|camera| (camera.config.width, camera.config.height));
         py.import("hzn._plot")?.getattr("plot")?.call1((slf, rgb, size, ax))
+    }
+
+    #[doc = doc!("Report.mask")]
+    #[pyo3(signature = (margin_deg = 0.0))]
+    fn mask<'py>(&self, py: Python<'py>, margin_deg: f64) -> PyResult<Option<Bound<'py, PyArray2<u8>>>> {
+        self.draw_mask(py, margin_deg)
     }
 
     #[doc = doc!("Report.to_dict")]

@@ -336,7 +336,9 @@ impl<'py> Read<'py> {
         if reports.iter().all(|report| !report.is_answer()) {
             warn_of_unused_bits(py, &array, bits)?;
         }
-        Ok((Report::from_bodies(py, reports)?.with_picture(Shown::new(self, state), bits), processed))
+        let answers = processed.iter().map(|p| p.report.as_ref().ok()?.solution.as_ref());
+        let report = Report::from_bodies(py, reports)?.with_answers(state, answers, Some(data));
+        Ok((report.with_picture(Shown::new(self, state), bits), processed))
     }
 }
 

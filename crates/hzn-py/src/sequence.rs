@@ -160,7 +160,7 @@ fn default_plan(state: &State, frames: Option<hzn_files::Frames>) -> Plan {
     }
 }
 
-fn process_item(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: source::Item) -> PyResult<Report> {
+fn process_item(py: Python<'_>, state: &Arc<State>, plan: &Plan, index: u64, item: source::Item) -> PyResult<Report> {
     let finished = errors::detached(py, || state.lend(|sensor| engine::process_one(plan, sensor, index, item)))??;
     let finished: Finished = finished.map_err(|e| errors::other(format!("{e:#}")))?;
     let rows = hzn_run::sink::rows(&finished, &plan.config);
@@ -168,5 +168,6 @@ fn process_item(py: Python<'_>, state: &State, plan: &Plan, index: u64, item: so
         Ok(found) => Report::new(row, found, None, &state.camera).with_nadir(finished.data.as_ref()),
         Err(_) => Report::from_row(row),
     };
-    Report::from_bodies(py, rows.into_iter().zip(&finished.outcomes).map(report))
+    let all = Report::from_bodies(py, rows.into_iter().zip(&finished.outcomes).map(report))?;
+    Ok(all.with_answers(state, finished.answers().into_iter(), finished.data.as_ref()))
 }

@@ -852,6 +852,31 @@ class Report:
             The picture does not have the size of the camera's picture, or its file cannot be read.
         """
 
+    def mask(self, margin_deg: float = 0.0) -> NDArray[np.uint8] | None:
+        """Return the mask for a star tracker: 255 where a body may cover a part of the pixel, 0 in the sky.
+
+        It covers the body, with its night side, out to three sigmas of the fitted limb, further bodies that were found,
+        and Sun and Moon in a known direction. It is the mask of ``hzn run --mask-pictures``. A warning names a body of
+        the sensor that was not found and whose direction is not known.
+
+        Parameters
+        ----------
+        margin_deg
+            The outlines are moved outwards by this angle, for the glare of the Sun or for light in the air. 0 to 90.
+
+        Returns
+        -------
+        numpy.ndarray or None
+            Shape (height, width), uint8; None without an answer.
+
+        Raises
+        ------
+        HznError
+            The report was pickled or comes from a recording; or the arc is too short for the outline of its ellipsoid.
+        ConfigError
+            The margin is out of range.
+        """
+
     def to_dict(self) -> dict[str, Any]:
         """Return the row that ``hzn run`` would write, by column; None for an empty cell."""
 
