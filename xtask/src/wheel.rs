@@ -29,8 +29,9 @@ pub(crate) fn run_step(hzn: &Path, every_notebook: bool) -> Outcome {
     let stubs = ["mypy.stubtest", "hzn", "--concise", "--allowlist"];
     steps::run(module(&stubs).arg(tests.join("stubtest.txt")))?;
     steps::run(module(&["mypy", "--strict", "--no-error-summary"]).arg(tests.join("typed.py")))?;
-    let pytest = ["pytest", "-q", "-p", "no:cacheprovider", "--durations", "10", "--ignore"];
-    steps::run(module(&pytest).arg(tests.join("tools")).arg(&tests))?;
+    let pytest = ["pytest", "-q", "-p", "no:cacheprovider", "--durations", "10"];
+    let others = ["tools", "stars"].map(|folder| format!("--ignore={}", tests.join(folder).display()));
+    steps::run(module(&pytest).args(others).arg(&tests))?;
     // The site takes its reference from the docstrings. Its notebooks are executed during the build.
     site::build(&python, every_notebook)
 }
@@ -40,14 +41,25 @@ pub(crate) fn install_for_site() -> Result<PathBuf, Trouble> {
     install_wheel(AS_IN_THE_TESTS)
 }
 
-/// Runs the examples with Basilisk and Rerun, and compares positions with those of Basilisk. The environment is a
-/// separate one, because Basilisk needs older packages.
+/// The solver that names the stars of a picture.
+const STAR_SOLVER: &str = "cedar-solve==0.5.1";
+
+/// Runs the examples with Basilisk, Rerun and the solver of stars, and compares positions with those of Basilisk. Each has
+/// an environment of its own, because they need older packages.
 pub(crate) fn try_other_tools() -> Outcome {
     let tests = fs::canonicalize(Path::new(CRATE).join("tests/tools"))?;
     build_wheel(AS_IN_THE_TESTS)?;
     let python = python::prepare_environment("tools", &tests.join("requirements.txt"))?;
     install(&python, &find_wheel(&wheels())?)?;
     let pytest = ["-m", "pytest", "-q", "-p", "no:cacheprovider"];
+    steps::run(Command::new(&python).args(pytest).arg(tests).current_dir(make_scratch()?))?;
+    // cedar-solve needs an older NumPy than Basilisk. It asks for a Pillow that has no wheel for today's interpreters, but
+    // works with a newer one, so it comes without its own choice of packages.
+    let tests = fs::canonicalize(Path::new(CRATE).join("tests/stars"))?;
+    let python = python::prepare_environment("stars", &tests.join("requirements.txt"))?;
+    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"];
+    steps::run(Command::new(&python).args(pip).arg(STAR_SOLVER))?;
+    install(&python, &find_wheel(&wheels())?)?;
     steps::run(Command::new(&python).args(pytest).arg(tests).current_dir(make_scratch()?))
 }
 
