@@ -1,5 +1,6 @@
 //! What is odd about the pictures of a run. It is counted while the run goes on, and told once at its end.
 
+mod airglow;
 mod altitudes;
 mod contradictions;
 mod improbable;
@@ -18,6 +19,7 @@ use hzn_files::Frames;
 use hzn_run::engine::{BodyOutcome, Finished};
 use hzn_run::explain;
 
+pub(crate) use airglow::Airglow;
 pub(crate) use altitudes::Altitudes;
 pub(crate) use contradictions::Contradictions;
 pub(crate) use improbable::Improbable;

@@ -59,7 +59,11 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Layer => "at night, the light below the edge does not become less: it is no layer of airglow".into(),
         Verdict::Faint => "the brightness hardly changes across the edge, as in twilight".into(),
         Verdict::Unlikely => format!("its probability to be the limb is below {} (gates.min_p_limb)", s.min_p_limb),
-        Verdict::Glow => "light reaches high above the edge: it is airglow or aurora (gates.max_glow)".into(),
+        Verdict::Glow => {
+            "light reaches high above the edge (gates.max_glow): at night it is airglow or aurora, by day \
+                          an overexposed body, haze on the lens, or stray light"
+                .into()
+        }
         Verdict::Attitude => format!(
             "the axis is more than {} sigma from the given attitude (gates.max_attitude_sigma)",
             s.max_attitude_sigma
@@ -284,6 +288,11 @@ const VERDICT_TIPS: &[(&[Verdict], &str)] = &[
         &[Verdict::Night],
         "it is night below the camera: check utc and x_km, y_km, z_km; for a thermal camera set body.sunlit = false; \
          gates.max_unlit = 1 takes the risk that the edge is airglow",
+    ),
+    (
+        &[Verdict::Glow],
+        "light reaches high above the edge: by day, expose shorter until the body is below full scale, and keep stray \
+         light from the lens; a larger gates.max_glow passes more of it, but at night airglow, too",
     ),
     (
         &[Verdict::Sun],

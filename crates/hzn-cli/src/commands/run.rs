@@ -23,7 +23,8 @@ pub(super) use args::{Args, cores};
 
 use super::resume;
 use crate::doubts::{
-    Altitudes, Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Refused, Repeats, Shutter, Times, ToldSun,
+    Airglow, Altitudes, Improbable, MissingPriors, MultiPageFiles, OnePlace, Rates, Refused, Repeats, Shutter, Times,
+    ToldSun,
 };
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
@@ -172,6 +173,7 @@ struct Watch {
     repeats: Repeats,
     told_sun: ToldSun,
     shutter: Shutter,
+    airglow: Airglow,
     altitudes: Altitudes,
     refused: Refused,
     refusals: Refusals,
@@ -200,6 +202,7 @@ impl Watch {
             repeats: Repeats::default(),
             told_sun: ToldSun::default(),
             shutter: Shutter::default(),
+            airglow: Airglow::default(),
             altitudes: Altitudes::default(),
             refused: Refused::default(),
             refusals: Refusals::default(),
@@ -218,6 +221,7 @@ impl Watch {
         self.repeats.count(frame);
         self.told_sun.count(frame);
         self.shutter.count(frame);
+        self.airglow.count(frame, config);
         self.altitudes.count(frame, config);
         self.refused.count(frame);
         self.refusals.count(frame);
@@ -268,6 +272,7 @@ impl Watch {
         };
         tell::line(format_args!("{summary}{before}"));
         self.masks.tell();
+        self.airglow.tell();
         if let Some(further) = self.refusals.further() {
             tell::line(format_args!("note: {further}"));
         }

@@ -15,11 +15,18 @@ enum Shown {
     Layer(f64),
     /// A disc without structure, whose edge has the height of the airglow.
     Disc,
+    /// A disc whose edge has the height of the limb by day.
+    Day,
 }
 
 /// Returns the light along a line of sight with this tangent height.
 fn light(tangent_km: f64, shown: Shown) -> f64 {
-    let Shown::Layer(ground) = shown else { return f64::from(u8::from(tangent_km < 102.0)) * 0.5 };
+    let disc = |top_km: f64| f64::from(u8::from(tangent_km < top_km)) * 0.5;
+    let ground = match shown {
+        Shown::Layer(ground) => ground,
+        Shown::Disc => return disc(102.0),
+        Shown::Day => return disc(17.0),
+    };
     let emission = |height_km: f64| {
         let z = (height_km - 97.0) / 5.0;
         (1.0 - z - (-z).exp()).exp()
@@ -32,11 +39,16 @@ fn light(tangent_km: f64, shown: Shown) -> f64 {
 
 /// Renders a picture, and writes it with a time at this place.
 fn place(shown: Shown, utc: &str, keys: &str) -> Place {
+    place_with_lens(shown, 700.0, utc, keys)
+}
+
+/// Does the same for a focal length in pixels.
+fn place_with_lens(shown: Shown, focal_px: f64, utc: &str, keys: &str) -> Place {
     let place = Place::new();
     let profile: Vec<f64> = (-800..300).map(|km| light(f64::from(km), shown)).collect();
     let (sin, cos) = DOWN_DEG.to_radians().sin_cos();
     let pixel = |x: u32, y: u32| {
-        let [u, v] = [(f64::from(x) - 239.5) / 700.0, (f64::from(y) - 179.5) / 700.0];
+        let [u, v] = [(f64::from(x) - 239.5) / focal_px, (f64::from(y) - 179.5) / focal_px];
         let along = (v * sin + cos) / (u * u + v * v + 1.0).sqrt();
         let tangent_km = DISTANCE_KM * (1.0 - along * along).sqrt() - 6371.0088;
         let at = tangent_km.clamp(-799.0, 298.0) + 800.0;
@@ -46,7 +58,8 @@ fn place(shown: Shown, utc: &str, keys: &str) -> Place {
     };
     std::fs::create_dir_all(place.path("in")).unwrap();
     image::GrayImage::from_fn(480, 360, pixel).save(place.path("in/a.png")).unwrap();
-    place.write("in/sensor.toml", format!("{SENSOR}{keys}").as_bytes());
+    let sensor = SENSOR.replace("700.0", &format!("{focal_px:?}"));
+    place.write("in/sensor.toml", format!("{sensor}{keys}").as_bytes());
     place.write("in/frames.csv", format!("file,utc,x_km,y_km,z_km\na.png,{utc},{DISTANCE_KM},0,0\n").as_bytes());
     place
 }
@@ -94,4 +107,19 @@ fn an_edge_that_is_no_layer_is_refused_at_night() {
 fn airglow_is_only_for_the_earth_in_visible_light() {
     let thermal = place(Shown::Disc, MIDNIGHT, &format!("{AIRGLOW}limb = \"co2-15um\"\n"));
     thermal.run(&["run", "in"]).expect(2).says("airglow is for the Earth in visible light");
+}
+
+/// A long lens sees so little of the curvature that airglow would pass as well; only a time says that it is day.
+#[test]
+fn a_short_arc_without_a_time_has_a_note_about_airglow() {
+    let noon = "2026-12-21T12:00:00Z";
+    let told = |focal_px: f64, utc: &str, keys: &str| {
+        let ran = place_with_lens(Shown::Day, focal_px, utc, keys).run(&["run", "in"]).expect(0);
+        assert_eq!(cell(&without_time(&ran.out)[0], "status"), "ok", "{focal_px} {utc}");
+        ran.err.contains("too short to tell the limb from the airglow")
+    };
+    assert!(told(4000.0, "", ""));
+    for (focal_px, utc, keys) in [(4000.0, noon, ""), (300.0, "", ""), (4000.0, "", "sunlit = false\n")] {
+        assert!(!told(focal_px, utc, keys), "{focal_px} {utc} {keys}");
+    }
 }

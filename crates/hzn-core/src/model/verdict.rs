@@ -77,7 +77,8 @@ verdicts! {
     /// The axis is farther from the last answer than the vehicle can have turned.
     Rate = 22, "rate";
     /// The candidate won, but light reaches higher above the fitted limb than air does. The edge belongs to airglow or
-    /// aurora, or it cannot be told from one that does, so the picture has no answer.
+    /// aurora, or it cannot be told from one that does, as in an overexposed picture of the day that blooms; so the
+    /// picture has no answer.
     Glow = 23, "glow";
     /// The brightness hardly changes across the fitted limb: the edge is a contour line of light that fades slowly.
     Faint = 24, "faint";
