@@ -94,7 +94,7 @@ fn main() -> ExitCode {
         "dist" => dist::run(rest),
         "firmware" => firmware::run(rest),
         "page" => page::run(),
-        "site" => site::run(),
+        "site" => build_site(),
         "first-command" => first_command::run(),
         "keys" => write_keys(),
         "viewer" => viewer::run(rest),
@@ -114,6 +114,15 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Builds the whole site, checks it, and prints where it is.
+fn build_site() -> Result<(), String> {
+    std::env::set_current_dir(machine::root()).map_err(|e| e.to_string())?;
+    let page = || wheel::build_site().and_then(|()| page::build());
+    page().and_then(|page| site::add_page(&page)).map_err(steps::Trouble::into_message)?;
+    println!("{0} is the site: python3 -m http.server -d {0}", site::folder().display());
+    Ok(())
 }
 
 /// Writes the documents that are derived from the keys of sensor.toml.

@@ -4,9 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::machine::{root, target};
-use crate::steps::{self, Outcome, Trouble};
-use crate::{page, wheel};
+use crate::machine::target;
+use crate::steps::{self, Outcome};
 
 /// Programs that the book links to, outside of its folder.
 const PROGRAMS: &str = "crates/hzn-py/examples";
@@ -16,19 +15,6 @@ const PAGE: &str = "app";
 /// Returns the folder of the site.
 pub(crate) fn folder() -> PathBuf {
     target().join("xtask").join("site")
-}
-
-/// Builds the whole site, checks it, and prints where it is.
-pub(crate) fn run() -> Result<(), String> {
-    std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
-    let go = || -> Outcome {
-        let python = wheel::install_for_site()?;
-        build(&python, true)?;
-        add_page(&page::build()?)?;
-        println!("{} is the site: python3 -m http.server -d {}", folder().display(), folder().display());
-        Ok(())
-    };
-    go().map_err(Trouble::into_message)
 }
 
 /// Builds the site without the page of the sensor, and checks it. `python` has the wheel, from which the reference

@@ -36,16 +36,16 @@ pub(crate) fn run_step(hzn: &Path, every_notebook: bool) -> Outcome {
     site::build(&python, every_notebook)
 }
 
-/// Installs the wheel where the site is built, and returns the Python that has both.
-pub(crate) fn install_for_site() -> Result<PathBuf, Trouble> {
-    install_wheel(AS_IN_THE_TESTS)
+/// Builds the site with all notebooks executed, and without the page of the sensor.
+pub(crate) fn build_site() -> Outcome {
+    site::build(&install_wheel(AS_IN_THE_TESTS)?, true)
 }
 
 /// The solver that names the stars of a picture.
 const STAR_SOLVER: &str = "cedar-solve==0.5.1";
 
-/// Runs the examples with Basilisk, Rerun and the solver of stars, and compares positions with those of Basilisk. Each has
-/// an environment of its own, because they need older packages.
+/// Runs the examples with Basilisk, Rerun and the solver of stars, and compares positions with those of Basilisk. The
+/// environments are separate ones, because these need older packages.
 pub(crate) fn try_other_tools() -> Outcome {
     let tests = fs::canonicalize(Path::new(CRATE).join("tests/tools"))?;
     build_wheel(AS_IN_THE_TESTS)?;
@@ -53,8 +53,8 @@ pub(crate) fn try_other_tools() -> Outcome {
     install(&python, &find_wheel(&wheels())?)?;
     let pytest = ["-m", "pytest", "-q", "-p", "no:cacheprovider"];
     steps::run(Command::new(&python).args(pytest).arg(tests).current_dir(make_scratch()?))?;
-    // cedar-solve needs an older NumPy than Basilisk. It asks for a Pillow that has no wheel for today's interpreters, but
-    // works with a newer one, so it comes without its own choice of packages.
+    // cedar-solve needs an older NumPy than Basilisk. It asks for a Pillow that has no wheel for today's interpreters,
+    // but works with a newer one, so it comes without its own choice of packages.
     let tests = fs::canonicalize(Path::new(CRATE).join("tests/stars"))?;
     let python = python::prepare_environment("stars", &tests.join("requirements.txt"))?;
     let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"];

@@ -1,5 +1,5 @@
-//! Runs the files of a release as their users do: the program in an empty root folder, the wheel in a new environment of
-//! each Python that this machine has.
+//! Runs the files of a release as their users do: the program in an empty root folder, the wheel in a new environment
+//! of each Python that this machine has.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 /// The function of the pipeline that takes one edge through all stages, as it is written among the symbols.
 const EDGE: &[u8] = b"10judge_edge17h";
-/// The copies that are needed. In hzn-host: four kinds of pictures and pictures with an observer in double precision, grey
-/// bytes and pictures with an observer in single precision. Two are those of the flight software.
+/// The copies that are needed. In hzn-host: four kinds of pictures and pictures with an observer in double precision,
+/// grey bytes and pictures with an observer in single precision. Two are those of the flight software.
 const COPIES: usize = 9;
 
 #[test]
