@@ -41,6 +41,8 @@ mod size;
 mod sky;
 mod straight;
 mod sun;
+#[cfg(test)]
+mod tests;
 mod turn;
 mod uncertain;
 mod unlikely;
