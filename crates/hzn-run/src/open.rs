@@ -305,8 +305,8 @@ pub fn complete(source: &mut dyn Source, sensor: &mut Sensor) -> Result<Vec<Stri
     Ok(notes)
 }
 
-/// Takes the tone that the pictures say, if the sensor does not state it. Returns a note if the limb height or the place
-/// of the edges follows, or if the pictures differ.
+/// Takes the tone that the pictures say, if the sensor does not state it. Returns a note if the limb height or the
+/// place of the edges follows, or if the pictures differ.
 fn complete_tone(source: &dyn Source, sensor: &mut Sensor) -> Option<String> {
     if sensor.config.input.tone.is_some() {
         return None;

@@ -107,8 +107,8 @@ section! {
         /// photograph appears 6.4 km higher, and a blurred edge 0.8 standard deviations of the blur too far out. With
         /// `edge_points.sub_pixel = "none"` the edge is at the threshold, and the limb height follows from the tone. A
         /// file says its curve in most cases: JPEG (sRGB), video (BT.709), raw data and samples of 12 to 16 bits
-        /// (linear), a PNG with the chunk sRGB, gAMA or cICP. A grey PNG of 8 bits does not: those of industrial cameras
-        /// are usually linear, those of telephones are not.
+        /// (linear), a PNG with the chunk sRGB, gAMA or cICP. A grey PNG of 8 bits does not: those of industrial
+        /// cameras are usually linear, those of telephones are not.
         @44 tone: Option<Tone> = None, [choice]
             { unset: "from the file, else `unknown`", example: "\"linear\"" };
         /// Rotation of a picture before it is processed; the camera's size and calibration are those of the rotated

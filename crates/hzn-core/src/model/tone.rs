@@ -7,8 +7,8 @@ use crate::base::real::Real;
 /// The curve between light and counts. Counts and light are fractions of full scale.
 ///
 /// The edge of a limb lies where the light is half of that inside it. If the curve is known, half of the light is found
-/// in the counts. If it is unknown, the edge is taken at half of the counts: in a picture for the eye this is a fifth of
-/// the light, so the limb appears higher, and a blurred edge lies outside of the true one.
+/// in the counts. If it is unknown, the edge is taken at half of the counts: in a picture for the eye this is a fifth
+/// of the light, so the limb appears higher, and a blurred edge lies outside of the true one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Tone {

@@ -170,8 +170,8 @@ fn write_covariance(guess: &Guess, focal: &Focal, pixel_aspect: f64) -> String {
 /// Writes `[input]` with the tone of the pictures, or asks for it. A body without air has the same limb in any tone.
 fn write_tone(tone: Option<Tone>) -> String {
     let head = "\n[input]\n# The curve between light and counts, with which an edge is located at half of the light: \
-                \"linear\" as most\n# industrial cameras write it, \"srgb\" for pictures for the eye, \"bt709\" for video, or a \
-                gamma.\n";
+                \"linear\" as most\n# industrial cameras write it, \"srgb\" for pictures for the eye, \"bt709\" for \
+                video, or a gamma.\n";
     let line = match tone {
         Some(tone) => {
             let value = tone.word().map_or_else(|| format!("{:.3}", tone.gamma()), |word| format!("{word:?}"));

@@ -101,17 +101,17 @@ section! {
         /// Height of the visible limb above the surface, km; 17 km is right for a cloudless limb in sunlight at 550 nm.
         ///
         /// At this height the limb has half of its light in the picture if `input.tone` is known, and else half of its
-        /// counts. With the default value, if `limb` is `visible`, and with `edge_points.sub_pixel = "none"`, the height
-        /// follows from the tone: 23.4 km for a photograph, whose half of the counts is a fifth of the light. A value
-        /// that is too high makes the expected cone too wide.
+        /// counts. With the default value, if `limb` is `visible`, and with `edge_points.sub_pixel = "none"`, the
+        /// height follows from the tone: 23.4 km for a photograph, whose half of the counts is a fifth of the light. A
+        /// value that is too high makes the expected cone too wide.
         // The default was 10 ± 2 km before, with 1 px over 300 px of edge noise: the mean NEES of `rocket-clean` was 11
         // instead of 0.55.
         @34 limb_height_km: f64 = 17.0, [-50.0 to 500.0];
         /// 1σ of the limb height, km; 7 km spans the visible wavelengths and usual tones.
         ///
         /// The height is 24 km at 440 nm and 12 km at 650 nm. Where the tone is not known, half of the counts is a
-        /// quarter to three quarters of the limb's light. In linear pictures the default becomes 4.6 km. A larger sigma gives the expected half-angle
-        /// less weight.
+        /// quarter to three quarters of the limb's light. In linear pictures the default becomes 4.6 km. A larger sigma
+        /// gives the expected half-angle less weight.
         @35 limb_height_sigma_km: f64 = 7.0, [0.0 to 1e4];
         /// 1σ of a tilt of the limb, km: the amplitude of a height that varies with the azimuth like a cosine, along
         /// each of two axes.

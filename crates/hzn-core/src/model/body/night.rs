@@ -21,8 +21,8 @@ fn edge_km(light: f64) -> [f64; 2] {
 }
 
 impl Config {
-    /// Sets the height of the edge of the airglow, and its sigma, to those where this part of the light is left, each if
-    /// it is still the default, if the sensor searches for it.
+    /// Sets the height of the edge of the airglow, and its sigma, to those where this part of the light is left, each
+    /// if it is still the default, if the sensor searches for it.
     pub(super) fn follow_tone_at_night(&mut self, light: f64) {
         if self.night != Night::Airglow {
             return;

@@ -15,11 +15,12 @@ impl Config {
     /// Sets the height of the visible limb to that in pictures of this tone, if [`Self::limb`] is [`Limb::Visible`] and
     /// if the height is still the default; and the sigma, too, if it is still the default. A height that somebody
     /// measured or set already is that of the pictures. `light` is the part of the light inside the limb at which its
-    /// edge is located: a half if the edge is located with the tone, [`Tone::light_at_half`] if it is located in counts.
+    /// edge is located: a half if the edge is located with the tone, [`Tone::light_at_half`] if it is located in
+    /// counts.
     ///
-    /// The light of the air falls by a factor of e over its scale height h. At the fraction l of the light the limb lies
-    /// h ln(0.5/l) higher than at half of the light. Overexposure follows the same law, and comes on top unchanged: full
-    /// scale at 1/B of the light moves both limbs by h ln B.
+    /// The light of the air falls by a factor of e over its scale height h. At the fraction l of the light the limb
+    /// lies h ln(0.5/l) higher than at half of the light. Overexposure follows the same law, and comes on top
+    /// unchanged: full scale at 1/B of the light moves both limbs by h ln B.
     pub fn follow_tone(&mut self, tone: Tone, light: f64) {
         if tone == Tone::Unknown {
             return;

@@ -30,8 +30,8 @@ impl<T: Real> Patch<T> {
     }
 }
 
-/// Reads the light of a pixel, in counts of a linear picture in which the threshold of the picture has the same value; or
-/// its counts, if the tone of the picture is unknown. `None` beyond the region and under a mask.
+/// Reads the light of a pixel, in counts of a linear picture in which the threshold of the picture has the same value;
+/// or its counts, if the tone of the picture is unknown. `None` beyond the region and under a mask.
 // A blurred step is a step of light. In other counts it is not symmetric, and its middle lies elsewhere.
 pub(super) fn light<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
