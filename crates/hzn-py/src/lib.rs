@@ -15,6 +15,7 @@ mod calibration;
 mod camera;
 mod cells;
 mod drawing;
+mod drawn;
 mod errors;
 mod expected;
 mod image;

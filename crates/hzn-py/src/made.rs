@@ -8,6 +8,7 @@ use hzn_run::engine::Trace;
 use hzn_run::nadir::Nadir;
 
 use crate::camera::Camera;
+use crate::mask::Seen;
 use crate::pickled::Detail;
 use crate::report::Report;
 
@@ -32,6 +33,11 @@ impl Report {
     /// Corrects the direction to the centre with what was given with the picture.
     pub(crate) fn with_nadir(self, known: Option<&FrameData>) -> Self {
         Self { nadir: Nadir::from_answer(&self.row, known), ..self }
+    }
+
+    /// Keeps what its mask needs.
+    pub(crate) fn with_seen(self, seen: Seen) -> Self {
+        Self { seen: Some(Arc::new(seen)), ..self }
     }
 
     /// Makes a report from a row alone, for example of a picture that could not be read.

@@ -10,7 +10,6 @@ use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
 use crate::errors;
-use crate::report::Report;
 use crate::state::State;
 
 /// What the mask of a picture needs: the answer of each body, and what was given with the picture.
@@ -20,38 +19,19 @@ pub(crate) struct Seen {
     data: Option<FrameData>,
 }
 
-impl Report {
-    /// Remembers what the mask needs.
-    pub(crate) fn with_answers<'a>(
-        self,
+impl Seen {
+    /// Keeps what the mask needs.
+    pub(crate) fn new<'a>(
         state: &Arc<State>,
         answers: impl Iterator<Item = Option<&'a Solution<f64>>>,
         data: Option<&FrameData>,
     ) -> Self {
-        let seen =
-            Seen { state: Arc::clone(state), answers: answers.map(|a| a.copied()).collect(), data: data.cloned() };
-        Self { seen: Some(Arc::new(seen)), ..self }
+        Self { state: Arc::clone(state), answers: answers.map(|a| a.copied()).collect(), data: data.cloned() }
     }
 
     /// Draws the mask, as `hzn run --mask-pictures` does.
-    pub(crate) fn draw_mask<'py>(
-        &self,
-        py: Python<'py>,
-        margin_deg: f64,
-    ) -> PyResult<Option<Bound<'py, PyArray2<u8>>>> {
-        if !(0.0..=90.0).contains(&margin_deg) {
-            return Err(errors::config(format!("margin_deg: {margin_deg} is outside of its range, from 0 to 90")));
-        }
-        if !self.is_answer() {
-            return Ok(None);
-        }
-        let lost = || {
-            errors::other(
-                "the mask is drawn only from the report that processed the picture, and for all bodies at once: not \
-                 from a pickle, a recording, or Report.others",
-            )
-        };
-        let Seen { state, answers, data } = &**self.seen.as_ref().ok_or_else(lost)?;
+    pub(crate) fn draw<'py>(&self, py: Python<'py>, margin_deg: f64) -> PyResult<Bound<'py, PyArray2<u8>>> {
+        let Self { state, answers, data } = self;
         let data = data.as_ref();
         let answers: Vec<Option<&Solution<f64>>> = answers.iter().map(Option::as_ref).collect();
         let drawn = errors::detached(py, || {
@@ -69,6 +49,22 @@ impl Report {
         }
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let array = Array2::from_shape_vec((height, width), picture.into_raw()).map_err(errors::image)?;
-        Ok(Some(array.into_pyarray(py)))
+        Ok(array.into_pyarray(py))
     }
+}
+
+/// Refuses a margin that is no angle from 0 to 90 degrees.
+pub(crate) fn check_margin(margin_deg: f64) -> PyResult<()> {
+    if (0.0..=90.0).contains(&margin_deg) {
+        return Ok(());
+    }
+    Err(errors::config(format!("margin_deg: {margin_deg} is outside of its range, from 0 to 90")))
+}
+
+/// Returns the error of a report that has not processed its picture.
+pub(crate) fn lost() -> PyErr {
+    errors::other(
+        "the mask is drawn only from the report that processed the picture, and for all bodies at once: not from a \
+         pickle, a recording, or Report.others",
+    )
 }

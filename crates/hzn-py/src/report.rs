@@ -16,7 +16,7 @@ use crate::cells::{candidate, symmetric, table, vector};
 use crate::mask::Seen;
 use crate::pickled::{Detail, Pickled};
 use crate::read::Shown;
-use crate::{drawing, errors, notebook, parameters};
+use crate::{drawing, errors, mask, notebook, parameters};
 
 /// Return type of `__reduce__` for pickle: a function and its arguments.
 type Reduced = (Py<PyAny>, (Py<PyBytes>, Vec<Py<Report>>));
@@ -366,7 +366,9 @@ impl Report {
     #[doc = doc!("Report.mask")]
     #[pyo3(signature = (margin_deg = 0.0))]
     fn mask<'py>(&self, py: Python<'py>, margin_deg: f64) -> PyResult<Option<Bound<'py, PyArray2<u8>>>> {
-        self.draw_mask(py, margin_deg)
+        mask::check_margin(margin_deg)?;
+        let seen = || self.seen.as_ref().ok_or_else(mask::lost);
+        self.is_answer().then(|| seen()?.draw(py, margin_deg)).transpose()
     }
 
     #[doc = doc!("Report.to_dict")]

@@ -17,6 +17,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::camera::Camera;
 use crate::expected::Expected;
 use crate::image::{Array, View};
+use crate::mask::Seen;
 use crate::prior::{Prior, utc};
 use crate::read::{Read, Shown};
 use crate::report::Report;
@@ -337,7 +338,7 @@ impl<'py> Read<'py> {
             warn_of_unused_bits(py, &array, bits)?;
         }
         let answers = processed.iter().map(|p| p.report.as_ref().ok()?.solution.as_ref());
-        let report = Report::from_bodies(py, reports)?.with_answers(state, answers, Some(data));
+        let report = Report::from_bodies(py, reports)?.with_seen(Seen::new(state, answers, Some(data)));
         Ok((report.with_picture(Shown::new(self, state), bits), processed))
     }
 }

@@ -13,6 +13,7 @@ use hzn_run::{Error, Kind};
 use pyo3::prelude::*;
 
 use crate::errors;
+use crate::mask::Seen;
 use crate::prior::Prior;
 use crate::report::Report;
 use crate::sensor::Sensor;
@@ -169,5 +170,5 @@ fn process_item(py: Python<'_>, state: &Arc<State>, plan: &Plan, index: u64, ite
         Err(_) => Report::from_row(row),
     };
     let all = Report::from_bodies(py, rows.into_iter().zip(&finished.outcomes).map(report))?;
-    Ok(all.with_answers(state, finished.answers().into_iter(), finished.data.as_ref()))
+    Ok(all.with_seen(Seen::new(state, finished.answers().into_iter(), finished.data.as_ref())))
 }
