@@ -141,8 +141,10 @@ impl Limb {
     }
 }
 
+type Gate = fn(&Case<'_, f64>) -> Result<(), Verdict>;
+
 /// The gates that ask neither the picture nor the residuals.
-const BY_NUMBERS: [fn(&Case<'_, f64>) -> Result<(), Verdict>; 17] = [
+const BY_NUMBERS: [Gate; 17] = [
     no_consensus::refuse,
     few_inliers::refuse,
     short_arc::refuse,
