@@ -15,6 +15,7 @@ mod files;
 mod html;
 mod kind_of_file;
 mod limbs_of_rig;
+mod origin;
 mod progress;
 mod refusals;
 mod setup;

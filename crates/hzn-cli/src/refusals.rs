@@ -7,6 +7,7 @@ use hzn_core::verdict::Verdict;
 use hzn_core::{Report, gates};
 use hzn_run::engine::Finished;
 use hzn_run::explain;
+pub(crate) use hzn_run::provenance::quoted;
 
 /// The reason why a body was not found in a picture: the verdict on the best candidate, or the status if there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,16 +105,6 @@ impl Refusals {
             is_size: matches!(why, Why::Verdict(Verdict::HalfAngle | Verdict::NoConsensus | Verdict::FewInliers)),
         })
     }
-}
-
-/// Quotes a word of a command line if a shell would interpret it.
-pub(crate) fn quoted(word: &Path) -> String {
-    let text = word.to_string_lossy();
-    let plain = |c: char| c.is_ascii_alphanumeric() || "_./:=@%+,-".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        return text.into_owned();
-    }
-    format!("'{}'", text.replace('\'', r"'\''"))
 }
 
 /// Quotes a path so that no program takes it for an option.

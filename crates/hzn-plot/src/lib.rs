@@ -21,6 +21,14 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(60, 60, 60),
 ];
 
+/// Colours of expected values, and of marks for what has no value.
+const IDEAL: RGBColor = RGBColor(150, 150, 150);
+const MARKS: RGBColor = RGBColor(110, 110, 110);
+/// Height of a row of the legend, its left end, and an estimate of the width of a letter, in pixels.
+const LEGEND_ROW: u32 = 18;
+const LEGEND_LEFT: u32 = 76;
+const LETTER: u32 = 7;
+
 /// The outcome of drawing onto a text.
 type Drawn = Result<(), DrawingAreaErrorKind<io::Error>>;
 
@@ -33,6 +41,8 @@ pub enum Style {
     Ideal,
     /// One dot for each point.
     Dots,
+    /// A short grey mark at the lower edge of the plot for each x, for what has no value; y is not used.
+    Marks,
 }
 
 /// Points with a name.
@@ -92,26 +102,22 @@ impl Chart {
     /// # Errors
     /// There is nothing to draw: no point is finite.
     pub fn svg(&self) -> Result<String, Error> {
-        let range = |value: fn(&(f64, f64)) -> f64| {
-            let values = self.series.iter().flat_map(|s| &s.points).filter(|p| is_drawable(p)).map(value);
+        let range = |values: &mut dyn Iterator<Item = f64>| {
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
         };
-        let (x, y) = (range(|p| p.0), range(|p| p.1));
-        if !(x.0 <= x.1) {
+        let (marks, valued): (Vec<_>, Vec<_>) = self.series.iter().partition(|s| s.style == Style::Marks);
+        let points = || valued.iter().flat_map(|s| &s.points).filter(|p| is_drawable(p));
+        let marked = marks.iter().flat_map(|s| &s.points).map(|p| p.0).filter(|x| x.is_finite());
+        let y = range(&mut points().map(|p| p.1));
+        if !(y.0 <= y.1) {
             return Err(Error::new(&self.title, Kind::Empty));
         }
-        let x = margin(x);
-        // The legend has the top of the chart to itself.
-        let named = self.series.iter().filter(|s| !s.name.is_empty()).count();
-        // The share of the plot that the legend covers, of which 90 px of the picture are no part. Room is in shares of
-        // the values, so it is larger: the values have only what the legend leaves.
-        let share = ((named as f64 * 18.0 + 10.0) / f64::from(self.size.1.max(100) - 90)).min(0.7);
-        let room = if named > 0 { share / (1.0 - share) } else { 0.0 };
+        let x = margin(range(&mut points().map(|p| p.0).chain(marked)));
         // Values that are never negative, such as errors and sigmas, start at zero, so that small differences do not
         // look large.
         let (low, high) = margin(if y.0 >= 0.0 { (0.0, y.1) } else { y });
         let low = if y.0 >= 0.0 { 0.0 } else { low };
-        self.draw(x, low..high + room * (high - low))
+        self.draw(x, low..high)
     }
 
     fn draw(&self, x: (f64, f64), y: Range<f64>) -> Result<String, Error> {
@@ -125,9 +131,17 @@ impl Chart {
         let font = |size: u32| ("sans-serif", size);
         let root = backend.into_drawing_area();
         root.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&root)
-            .caption(&self.title, font(17))
+        let named: Vec<(&Series, RGBColor)> = self.coloured().filter(|(s, _)| !s.name.is_empty()).collect();
+        let places = legend_places(&named, self.size.0);
+        let height = places.last().map_or(0, |[_, y]| y + LEGEND_ROW);
+        let (legend, plot) = root.titled(&self.title, font(17))?.split_vertically(height);
+        for ((series, colour), [x, y]) in named.iter().zip(&places) {
+            draw_entry(&legend, series, *colour, [*x, *y])?;
+        }
+        let (low, high) = (y.start, y.end);
+        let mut chart = ChartBuilder::on(&plot)
             .margin(12)
+            .margin_top(6)
             .margin_right(20)
             .x_label_area_size(44)
             .y_label_area_size(64)
@@ -143,44 +157,75 @@ impl Chart {
             .x_label_formatter(&|v| number(*v))
             .y_label_formatter(&|v| number(*v))
             .draw()?;
-        let mut colours = COLOURS.iter().cycle();
-        for series in &self.series {
-            let (style, dots) = match series.style {
-                Style::Ideal => (BLACK.mix(0.45).stroke_width(1), false),
-                Style::Line => (colours.next().unwrap_or(&BLACK).stroke_width(2), false),
-                Style::Dots => (colours.next().unwrap_or(&BLACK).mix(0.75).filled(), true),
-            };
-            let annotation = if dots {
-                chart.draw_series(series.points.iter().filter(|p| is_drawable(p)).map(|p| Circle::new(*p, 3, style)))?
-            } else {
-                for part in series.points.split(|p| !is_drawable(p)) {
-                    chart.draw_series(LineSeries::new(part.iter().copied(), style))?;
+        for (series, colour) in self.coloured() {
+            let points = || series.points.iter().copied();
+            match series.style {
+                Style::Dots => {
+                    let dot = |p| Circle::new(p, 3, colour.mix(0.75).filled());
+                    chart.draw_series(points().filter(is_drawable).map(dot))?;
                 }
-                // All parts of a line share one legend entry.
-                chart.draw_series(LineSeries::new([], style))?
-            };
-            if !series.name.is_empty() {
-                annotation.label(series.name.as_str()).legend(move |(x, y)| {
-                    if dots {
-                        Circle::new((x + 8, y), 3, style).into_dyn()
-                    } else {
-                        PathElement::new([(x, y), (x + 16, y)], style).into_dyn()
+                Style::Marks => {
+                    let top = low + 0.05 * (high - low);
+                    let mark = |(x, _)| PathElement::new([(x, low), (x, top)], colour.stroke_width(1));
+                    chart.draw_series(points().filter(|p| p.0.is_finite()).map(mark))?;
+                }
+                Style::Line | Style::Ideal => {
+                    let width = if series.style == Style::Line { 2 } else { 1 };
+                    for part in series.points.split(|p| !is_drawable(p)) {
+                        chart.draw_series(LineSeries::new(part.iter().copied(), colour.stroke_width(width)))?;
                     }
-                });
+                }
             }
-        }
-        if self.series.iter().any(|s| !s.name.is_empty()) {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .label_font(font(12))
-                .background_style(WHITE.mix(0.85))
-                .border_style(BLACK.mix(0.2))
-                .draw()?;
         }
         root.present()?;
         Ok(())
     }
+
+    /// Returns the series with their colours: grey for expected values and for marks.
+    fn coloured(&self) -> impl Iterator<Item = (&Series, RGBColor)> {
+        let mut colours = COLOURS.iter().cycle();
+        self.series.iter().map(move |series| match series.style {
+            Style::Ideal => (series, IDEAL),
+            Style::Marks => (series, MARKS),
+            Style::Line | Style::Dots => (series, colours.next().copied().unwrap_or(BLACK)),
+        })
+    }
+}
+
+/// Returns the place of each entry of the legend in the strip between title and plot, row by row, in pixels. The
+/// letters of a reader's program are not known, so that the widths are estimates with room to spare.
+fn legend_places(named: &[(&Series, RGBColor)], width: u32) -> Vec<[u32; 2]> {
+    let [mut x, mut y] = [LEGEND_LEFT, 0];
+    let mut places = Vec::new();
+    for (series, _) in named {
+        let wide = 24 + LETTER * series.name.chars().count() as u32 + 14;
+        if x > LEGEND_LEFT && x + wide > width {
+            (x, y) = (LEGEND_LEFT, y + LEGEND_ROW);
+        }
+        places.push([x, y]);
+        x += wide;
+    }
+    places
+}
+
+/// Draws an entry of the legend: a sample of the series and its name.
+fn draw_entry(
+    area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    series: &Series,
+    colour: RGBColor,
+    at: [u32; 2],
+) -> Drawn {
+    let [x, y] = at.map(|x| x as i32);
+    let middle = y + LEGEND_ROW as i32 / 2;
+    match series.style {
+        Style::Dots => area.draw(&Circle::new((x + 10, middle), 3, colour.mix(0.75).filled()))?,
+        Style::Marks => {
+            area.draw(&PathElement::new([(x + 10, middle - 5), (x + 10, middle + 5)], colour.stroke_width(1)))?;
+        }
+        Style::Line => area.draw(&PathElement::new([(x, middle), (x + 18, middle)], colour.stroke_width(2)))?,
+        Style::Ideal => area.draw(&PathElement::new([(x, middle), (x + 18, middle)], colour.stroke_width(1)))?,
+    }
+    area.draw(&Text::new(series.name.clone(), (x + 24, middle - 6), ("sans-serif", 12)))
 }
 
 /// Returns whether a point can be drawn.
@@ -224,23 +269,40 @@ mod tests {
         assert_eq!(svg.matches("<circle").count(), 3, "two points and the legend's");
     }
 
-    /// The largest value of many series is at the right, where the legend is.
+    fn value(line: &str, key: &str) -> f64 {
+        let (_, rest) = line.split_once(&format!(" {key}=\"")).unwrap();
+        rest.split('"').next().unwrap().parse().unwrap()
+    }
+
+    /// The legend stands between the title and the plot, whatever its length.
     #[test]
-    fn the_legend_covers_no_value() {
-        for count in [1, 3, 5, 6] {
+    fn the_legend_is_outside_of_the_axes() {
+        for count in [1, 3, 6, 20] {
             let dot = |i: u32| Series::new(format!("series {i}"), Style::Dots, [(0.0, 0.0), (9.0, f64::from(i + 1))]);
             let svg = (0..count).fold(Chart::new("t", "x", "y"), |chart, i| chart.with_series(dot(i))).svg().unwrap();
-            let value = |line: &str, key: &str| -> f64 {
-                let (_, rest) = line.split_once(&format!(" {key}=\"")).unwrap();
-                rest.split('"').next().unwrap().parse().unwrap()
-            };
-            let circles = || svg.lines().filter(|line| line.starts_with("<circle"));
-            // The dots of the legend are in the picture, too: they are the last ones.
-            let dots = circles().take(2 * count as usize).map(|line| value(line, "cy")).fold(f64::INFINITY, f64::min);
-            let frame = svg.lines().rev().find(|line| line.starts_with("<rect")).unwrap();
-            let legend = value(frame, "y") + value(frame, "height");
-            assert!(dots > legend, "{count}: {dots} and {legend}");
+            // The dots of the legend are drawn first.
+            let circles: Vec<f64> =
+                svg.lines().filter(|line| line.starts_with("<circle")).map(|line| value(line, "cy")).collect();
+            let (legend, dots) = circles.split_at(count as usize);
+            let lowest = legend.iter().copied().fold(0.0, f64::max);
+            assert!(dots.iter().all(|y| *y > lowest + 5.0), "{count}: {circles:?}");
+            let names = svg.lines().filter(|line| line.starts_with("series ")).count();
+            assert_eq!(names, count as usize, "every name is listed: {svg}");
         }
+    }
+
+    #[test]
+    fn marks_need_no_value_and_take_no_colour() {
+        let chart = Chart::new("t", "time", "deg")
+            .with_series(Series::new("no answer", Style::Marks, [(3.0, f64::NAN), (12.0, f64::NAN)]))
+            .with_series(Series::new("error", Style::Dots, [(0.0, 1.0), (9.0, 2.0)]));
+        let svg = chart.svg().unwrap();
+        let marks = svg.lines().filter(|line| line.starts_with("<polyline") && line.contains("#6E6E6E")).count();
+        assert_eq!(marks, 3, "two marks and the legend's: {svg}");
+        assert!(svg.contains("#0072B2"), "the first colour is that of the values: {svg}");
+        assert!(!svg.contains("NaN"), "{svg}");
+        let none = Chart::new("t", "x", "y").with_series(Series::new("", Style::Marks, [(3.0, 0.0)]));
+        assert!(none.svg().unwrap_err().to_string().contains("nothing to draw"));
     }
 
     #[test]

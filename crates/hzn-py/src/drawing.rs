@@ -29,17 +29,16 @@ pub(crate) fn to_array(py: Python<'_>, drawn: RgbImage) -> PyResult<Bound<'_, Py
     Ok(Array3::from_shape_vec((height, width, 3), drawn.into_raw()).map_err(errors::image)?.into_pyarray(py))
 }
 
-/// Returns the picture in colour with annotations and a title. `camera` took the picture that they belong to.
+/// Returns the picture in colour with annotations. `camera` took the picture that they belong to.
 pub(crate) fn draw(
     py: Python<'_>,
     image: &Bound<'_, PyAny>,
     annotations: &Annotations,
-    title: &str,
     bits: Option<u8>,
     camera: Option<&Camera>,
 ) -> PyResult<RgbImage> {
     let picture = check(image, bits, camera)?;
-    errors::detached(py, || overlay::draw_annotations(picture.to_rgb(), annotations, title))
+    errors::detached(py, || overlay::draw_plain(picture.to_rgb(), annotations, &[]))
 }
 
 /// Refuses a picture of another size than that of its camera.

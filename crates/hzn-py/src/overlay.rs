@@ -15,6 +15,6 @@ pub(crate) fn overlay<'py>(
     report: &Report,
     bits: Option<u8>,
 ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-    let drawn = drawing::draw(py, image, &report.drawing_of_all(), &report.title(), bits, report.camera.as_deref())?;
+    let drawn = drawing::draw(py, image, &report.drawing_of_all(), bits, report.camera.as_deref())?;
     drawing::to_array(py, drawn)
 }

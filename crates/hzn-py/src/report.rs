@@ -67,7 +67,7 @@ impl Report {
         self.shown.as_ref().map_or(Ok(None), |shown| shown.picture(py))
     }
 
-    /// Returns the first line of the legend of an overlay.
+    /// Returns the status, of several bodies with their names.
     pub(crate) fn title(&self) -> String {
         if self.others.is_empty() {
             return self.row.status.name().to_owned();
@@ -428,8 +428,7 @@ impl Report {
         // A file that is gone leaves the numbers, which are worth showing.
         let image = self.picture(py).unwrap_or_default();
         let jpeg = image.map(|image| {
-            let rgb =
-                drawing::draw(py, &image, &self.drawing_of_all(), &self.title(), self.bits, self.camera.as_deref())?;
+            let rgb = drawing::draw(py, &image, &self.drawing_of_all(), self.bits, self.camera.as_deref())?;
             errors::detached(py, || notebook::to_jpeg(&rgb))?
         });
         Ok(notebook::to_html(jpeg.transpose()?, self.each().map(|report| &report.row)))

@@ -207,7 +207,7 @@ def test_detail_and_overlay(sensor):
     assert abs(image[int(round(column[1])), int(round(column[0]))].astype(int) - 110) < 100
     drawn = hzn.overlay(image, report)
     assert drawn.shape == (240, 320, 3) and drawn.dtype == np.uint8
-    assert (drawn == [240, 228, 66]).all(axis=2).any()
+    assert (abs(drawn.astype(int) - [240, 228, 66]) < 70).all(axis=2).any(), "the limb, whose edges are smooth"
     plain = sensor.process(image)
     with pytest.raises(hzn.HznError, match="detail=True"):
         plain.inliers

@@ -39,6 +39,7 @@ pub mod open;
 pub mod overlay;
 #[cfg(feature = "recordings")]
 mod possible;
+pub mod provenance;
 pub mod record;
 #[cfg(feature = "recordings")]
 pub mod results;

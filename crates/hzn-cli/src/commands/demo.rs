@@ -6,11 +6,13 @@ use std::time::Instant;
 use hzn_evaluate::{Answer, Evaluation, pair};
 use hzn_files::truth::Truth;
 use hzn_mcap::{Contents, Reader, Row};
+use hzn_run::overlay::caption::Caption;
 use hzn_run::{disk, explain, overlay, sink};
 use hzn_sim::Flight;
 
 use super::{evaluate, run as sequence};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
+use crate::origin::Origin;
 use crate::setup::clear_rendered;
 use crate::tell::{self, one_line};
 
@@ -191,15 +193,20 @@ fn read_rows(path: &Path) -> Result<Vec<Row>, Stop> {
 fn draw(recording: &Path, folder: &Path, count: usize) -> Result<usize, Stop> {
     let total = read_rows(recording)?.len();
     let mut drawn = 0;
-    for (i, frame) in Reader::open(recording, Contents::All).map_err(failed)?.enumerate() {
-        let frame = frame.map_err(failed)?;
+    let mut reader = Reader::open(recording, Contents::All).map_err(failed)?;
+    let mut origin = Origin::default();
+    for i in 0.. {
+        let Some(frame) = reader.next().transpose().map_err(failed)? else { break };
         // The n-th of `count` pictures is the first of its share.
         if drawn >= count || (i * count) / total.max(1) < drawn {
             continue;
         }
         let Some(image) = frame.image else { continue };
         let (picture, _) = hzn_run::source::Payload::from_recorded(image).decode(None).map_err(failed)?;
-        let image = overlay::draw_annotations(picture.to_rgb(), &frame.annotations, frame.row.status.name());
+        let rows = std::slice::from_ref(&frame.row);
+        let caption = Caption::new(&frame.row.file, frame.row.time_s, rows, &frame.annotations);
+        let caption = caption.with_provenance(origin.of(&reader, None));
+        let image = overlay::draw(picture.to_rgb(), &frame.annotations, &[], &caption);
         overlay::save(&image, &folder.join(overlay::file_name(&frame.row.file)))?;
         drawn += 1;
     }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use hzn_mcap::{Contents, FrameRecord, ImageFormat, Reader};
 use hzn_run::instruments::Instrument;
+use hzn_run::overlay::caption::Caption;
 use hzn_run::sink::{self, Existing, RowFile};
 use hzn_run::source::{self, ending};
 use hzn_run::{disk, explain, overlay, results};
@@ -12,6 +13,7 @@ use super::export_instruments;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::files;
 use crate::kind_of_file;
+use crate::origin::Origin;
 use crate::setup::TableFormat;
 use crate::tell;
 
@@ -91,19 +93,19 @@ fn export_rows(args: &Args) -> Outcome {
     }
     let existing = if args.force { Existing::Replace } else { Existing::Refuse };
     let mut table = args.output.as_deref().map(|path| open_table(args, path, existing)).transpose()?;
-    let (mut rows, mut images) = (0u64, 0u64);
-    let mut lost = None;
+    let (mut rows, mut images, mut lost) = (0u64, 0u64, None);
     if kind == "mcap" {
         let contents = if pictures { Contents::All } else { Contents::WithoutImages };
         let mut reader = Reader::open(file, contents).map_err(failed)?;
-        for frame in reader.by_ref() {
-            let frame = frame.map_err(failed)?;
+        let mut origin = Origin::default();
+        while let Some(frame) = reader.next().transpose().map_err(failed)? {
             rows += 1;
             if let Some(table) = &mut table {
                 table.write(&frame.row)?;
             }
-            if pictures && write_pictures(args, frame)? {
-                images += 1;
+            if pictures {
+                let line = origin.of(&reader, frame.row.head.as_deref());
+                images += u64::from(write_pictures(args, frame, &line)?);
             }
         }
         lost = source::describe_recording_loss(&reader, file, "exported");
@@ -137,7 +139,8 @@ fn open_table(args: &Args, path: &Path, existing: Existing) -> Result<RowFile, S
     Ok(if is_stdout { RowFile::on_stdout(TableFormat::or_csv(args.format))? } else { RowFile::create(path, existing)? })
 }
 
-fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {
+/// Writes the picture of a frame. `provenance` is the last line of the caption of an overlay.
+fn write_pictures(args: &Args, frame: FrameRecord, provenance: &str) -> Result<bool, Stop> {
     let Some(image) = frame.image else { return Ok(false) };
     let name = frame.row.file.clone();
     // The pictures of two heads of a rig may have the same names.
@@ -161,7 +164,9 @@ fn write_pictures(args: &Args, frame: FrameRecord) -> Result<bool, Stop> {
         let path = own(folder)?.join(overlay::file_name(&name));
         disk::refuse_existing(&path, args.force)?;
         let picture = decode(&image, &name)?;
-        let drawn = overlay::draw_annotations(picture.to_rgb(), &frame.annotations, frame.row.status.name());
+        let rows = std::slice::from_ref(&frame.row);
+        let caption = Caption::new(&name, frame.row.time_s, rows, &frame.annotations).with_provenance(provenance);
+        let drawn = overlay::draw(picture.to_rgb(), &frame.annotations, &[], &caption);
         overlay::save(&drawn, &path)?;
     }
     Ok(true)

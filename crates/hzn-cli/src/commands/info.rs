@@ -11,7 +11,7 @@ use hzn_core::Config;
 use hzn_fuse::read_back;
 use hzn_mcap::{Contents, Reader, Row};
 use hzn_run::source::{self, decode, ending};
-use hzn_run::{checked_row, explain};
+use hzn_run::{checked_row, explain, provenance};
 use hzn_sim::Scenario;
 use serde_json::{Value, json};
 
@@ -98,6 +98,9 @@ fn recording(file: &Path) -> Result<Described, Stop> {
         let c = &sensor.config.camera;
         let text = format!("{} x {} px, {}", c.width, c.height, c.model.name());
         out.fact("camera", text, "camera", camera_json(&sensor.config)?);
+        if let Some(hash) = provenance::hash(&sensor.config) {
+            out.fact("sensor hash", hash.clone(), "sensor_hash", hash);
+        }
     }
     // An unfinished file without broken parts is not damaged: its run still goes on, or --resume continues it.
     let unfinished = ending(file) == "part" && reader.broken_chunks() == 0 && reader.unread_reports() == 0;
@@ -291,7 +294,11 @@ fn sensor(file: &Path, kind: &str) -> Result<Facts, Stop> {
     }
     let sensor = hzn_files::sensor::load(file)?;
     sensor.warnings.iter().for_each(tell::warning);
-    calibration(Facts::new("sensor", "sensor.toml"), &sensor.config)
+    let mut out = Facts::new("sensor", "sensor.toml");
+    if let Some(hash) = provenance::hash(&sensor.config) {
+        out.fact("hash", format!("{hash} (overlays and reports name it)"), "hash", hash);
+    }
+    calibration(out, &sensor.config)
 }
 
 fn scene(scenario: &Scenario) -> Result<Facts, Stop> {

@@ -39,10 +39,11 @@ fn disc() -> Place {
     place
 }
 
-/// Returns the pixels of a colour that are below the legend.
+/// Returns the pixels of the picture, without its caption, that have about this colour: lines have smooth edges.
 fn places(drawn: &RgbImage, colour: [u8; 3]) -> Vec<[f64; 2]> {
-    let below = drawn.enumerate_pixels().filter(|(_, y, p)| *y > 75 && p.0 == colour);
-    below.map(|(x, y, _)| [f64::from(x), f64::from(y)]).collect()
+    let is_like = |p: &image::Rgb<u8>| p.0.iter().zip(colour).all(|(a, b)| a.abs_diff(b) < 70);
+    let alike = drawn.enumerate_pixels().filter(|(_, y, p)| *y < 240 && is_like(p));
+    alike.map(|(x, y, _)| [f64::from(x), f64::from(y)]).collect()
 }
 
 #[test]
@@ -66,7 +67,8 @@ fn explain_shows_every_stage() {
         assert!(out.contains(word), "{word} in {out}");
     }
     let overlay = image::open(place.path("o.png")).unwrap();
-    assert_eq!((overlay.width(), overlay.height()), (320, 240));
+    let caption = hzn_run::overlay::caption::height_px(320, 240);
+    assert_eq!((overlay.width(), overlay.height()), (320, 240 + caption), "a caption is below the picture");
     image::GrayImage::from_pixel(320, 240, image::Luma([9])).save(place.path("in/black.png")).unwrap();
     let out = place.run(&["explain", "in/black.png"]).expect(0).out;
     assert!(out.contains("try         "), "{out}");

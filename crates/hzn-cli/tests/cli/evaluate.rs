@@ -53,6 +53,11 @@ fn a_run_against_its_truth_as_text_json_and_page() {
     let page = place.read("r.html");
     let command = "<code>hzn evaluate out.mcap --truth in/truth.csv -o r.json -o r.html</code>";
     assert!(page.contains(command) && page.contains(&format!("hzn {}", env!("CARGO_PKG_VERSION"))));
+    let facts: serde_json::Value =
+        serde_json::from_str(&place.run(&["info", "out.mcap", "--json"]).expect(0).out).unwrap();
+    let sensor = facts["sensor_hash"].as_str().unwrap();
+    assert!(page.contains(&format!("sensor {sensor}, {command}")), "the sensor of the recording is named");
+    assert!(page.contains("prefers-color-scheme:dark"), "the page has dark colours");
     assert!(page.matches("<svg").count() >= 4 && page.contains("data:image/jpeg;base64,"));
     // The Stanford diagram as picture and table.
     for text in ["below the line: misleading", "<td>above 1: misleading</td><td>0</td><td>0</td>"] {

@@ -35,6 +35,7 @@ mod outputs;
 mod pictures;
 mod position_input;
 mod power_cut;
+mod provenance;
 mod repeats;
 mod rerun;
 mod resume;

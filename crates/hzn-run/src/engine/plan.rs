@@ -8,6 +8,7 @@ use hzn_files::Frames;
 use super::sensor::LastAnswer;
 use super::turns::Turns;
 use crate::mask::MaskFolder;
+use crate::overlay::OverlayFolder;
 
 /// The settings of a run, for every picture.
 #[derive(Debug, Clone)]
@@ -29,7 +30,7 @@ pub struct Plan {
     /// Hand the picture to the sink.
     pub keep_picture: bool,
     /// Draw an overlay of every picture into this folder.
-    pub overlay: Option<std::path::PathBuf>,
+    pub overlay: Option<OverlayFolder>,
     /// Write a mask of every answered picture into this folder.
     pub masks: Option<Arc<MaskFolder>>,
     /// The last answers of the run that this one continues, one for each body.

@@ -12,8 +12,10 @@ use super::sensor::AnySensor;
 use super::told_sun;
 use super::trace::Traces;
 use crate::error::{Error, failed};
-use crate::overlay;
+use crate::overlay::OverlayFolder;
 use crate::source::{Held, Item, Picture};
+#[cfg(feature = "recordings")]
+use crate::{overlay, overlay::caption::Caption, record};
 
 /// Decodes and processes one picture, and writes its mask.
 ///
@@ -75,9 +77,7 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         // The drawing is made here, because in the single writing thread it would delay all other threads.
         let drawing = draw(&finished.outcomes, traces, &sensor.camera_of(data));
         if let Some(folder) = &plan.overlay {
-            let title = status_text(&finished.outcomes, plan);
-            let image = overlay::draw_annotations(picture.to_rgb(), &drawing, &title);
-            overlay::save(&image, &folder.join(overlay::file_name(&finished.name)))?;
+            write_overlay(plan, folder, &picture, &finished, &drawing)?;
         }
         finished.drawing = drawing;
     }
@@ -126,14 +126,24 @@ fn draw(outcomes: &[BodyOutcome], traces: &Traces, camera: &Camera<f64>) -> Anno
     drawing
 }
 
-/// Returns the statuses of the bodies in words.
-fn status_text(outcomes: &[BodyOutcome], plan: &Plan) -> String {
-    match outcomes {
-        [one] => one.status().name().to_owned(),
-        several => {
-            let bodies = plan.config.each_body().iter().map(|b| b.kind.name());
-            let each: Vec<String> = bodies.zip(several).map(|(body, f)| format!("{body} {}", f.status())).collect();
-            each.join(", ")
-        }
-    }
+/// Writes the overlay of a picture.
+#[cfg(feature = "recordings")]
+fn write_overlay(
+    plan: &Plan,
+    folder: &OverlayFolder,
+    picture: &Picture,
+    finished: &Finished,
+    drawing: &Annotations,
+) -> Result<(), Error> {
+    let rows = record::rows(finished, &plan.config);
+    let caption = Caption::new(&finished.name, finished.time_s, &rows, drawing);
+    let caption = caption.with_scale(plan.config.camera.fx_px).with_provenance(&folder.provenance);
+    let image = overlay::draw(picture.to_rgb(), drawing, &[], &caption);
+    overlay::save(&image, &folder.path.join(overlay::file_name(&finished.name)))
+}
+
+/// Refuses an overlay: its letters are not built in.
+#[cfg(not(feature = "recordings"))]
+fn write_overlay(_: &Plan, _: &OverlayFolder, _: &Picture, _: &Finished, _: &Annotations) -> Result<(), Error> {
+    Err(failed("an overlay needs the feature `recordings` of hzn-run"))
 }

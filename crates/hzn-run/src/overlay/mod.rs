@@ -1,12 +1,18 @@
 //! Pictures with everything drawn over them that led to the answer.
 //!
-//! The colours are those of a recording's annotations.
+//! The colours are those of a recording's annotations. What is said about a picture stands below it, so that nothing
+//! hides the limb.
 
 pub mod canvas;
+#[cfg(feature = "recordings")]
+pub mod caption;
+mod colours;
+#[cfg(feature = "recordings")]
+pub mod letters;
 pub mod limb;
 pub mod undistorted;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hzn_core::Solution;
 use hzn_core::camera::Camera;
@@ -14,14 +20,24 @@ use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::pixel::ImagePoint;
 use image::RgbImage;
 
-use canvas::{Canvas, Colour};
+use canvas::Canvas;
+pub use colours::edge_colour;
 use hzn_mcap::Annotations;
-use hzn_mcap::palette::{AXIS, EDGE, INLIER, LIMB, REJECTED};
+use hzn_mcap::palette::{AXIS, INLIER, LIMB, REJECTED};
+#[cfg(feature = "recordings")]
+use {caption::Caption, letters::Letters};
 
 use crate::error::{Error, failed};
 use crate::terminal::is_obeyed;
 
-const TRUTH: Colour = [230, 159, 0];
+/// The folder into which a run draws every picture.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OverlayFolder {
+    /// The folder; it must exist.
+    pub path: PathBuf,
+    /// Last line of the captions, see [`crate::provenance::line`].
+    pub provenance: String,
+}
 
 /// Returns the file name of the overlay of a picture: its name, with `.png` added unless it ends in it. Two pictures
 /// never get the same name, so what separates folders, and `%` itself, is written as `%` and two hexadecimal digits.
@@ -67,34 +83,28 @@ fn fnv_1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// Draws annotations (pixel centres at integers) with a legend that begins with `title`.
-pub fn draw_annotations(image: RgbImage, drawing: &Annotations, title: &str) -> RgbImage {
-    draw_with_truth(image, drawing, &[], title)
+/// Draws annotations (pixel centres at integers) and the true limb, with a caption below the picture.
+#[cfg(feature = "recordings")]
+pub fn draw(image: RgbImage, drawing: &Annotations, true_limb: &[Vec<[f64; 2]>], caption: &Caption) -> RgbImage {
+    caption::add(&Letters::default(), &draw_plain(image, drawing, true_limb), caption)
 }
 
-/// Draws annotations as [`draw_annotations`] does, and the true limb with them.
-pub fn draw_with_truth(image: RgbImage, drawing: &Annotations, true_limb: &[Vec<[f64; 2]>], title: &str) -> RgbImage {
-    let mut canvas = Canvas { image: draw_plain(image, drawing, true_limb) };
-    legend(&mut canvas, drawing, !true_limb.is_empty(), title);
-    canvas.image
-}
-
-/// Draws annotations and the true limb without a legend.
+/// Draws annotations and the true limb without a caption.
 pub fn draw_plain(image: RgbImage, drawing: &Annotations, true_limb: &[Vec<[f64; 2]>]) -> RgbImage {
     let mut canvas = Canvas { image };
     let (w, h) = (canvas.image.width(), canvas.image.height());
     // The pen is wide enough to be visible when the whole picture is shown on a screen of about 1600 px.
     let pen = (f64::from(w.max(h)) / 800.0).max(1.0);
-    for edge in &drawing.edges {
+    for (candidate, edge) in drawing.edges.iter().enumerate() {
         for p in edge {
-            canvas.disc(*p, pen * 0.8, EDGE);
+            canvas.disc(*p, pen * 0.8, edge_colour(candidate));
         }
     }
     for limb in &drawing.limb {
-        canvas.polyline(limb, pen * 3.2, LIMB);
+        canvas.polyline(limb, pen * 3.4, LIMB);
     }
     for limb in true_limb {
-        canvas.polyline(limb, pen * 1.2, TRUTH);
+        canvas.polyline(limb, pen * 1.2, colours::TRUTH);
     }
     // Points are drawn over the line and are narrower, so that both remain visible.
     for p in &drawing.rejected {
@@ -140,34 +150,6 @@ fn draw_axis_and(axis: &UnitVec3<Cam, f64>, limb: Vec<Vec<[f64; 2]>>, camera: &C
         limb,
         axes: camera.project(axis).filter(inside).map(|p| [p.u, p.v]).into_iter().collect(),
         ..Annotations::default()
-    }
-}
-
-fn legend(canvas: &mut Canvas, drawing: &Annotations, truth: bool, title: &str) {
-    let (w, h) = (canvas.image.width(), canvas.image.height());
-    let scale = (w.max(h) / 600).max(1);
-    let line = 11 * scale;
-    let mut entries = vec![(title.to_owned(), [255, 255, 255])];
-    let mut add = |there: bool, text: String, colour: Colour| {
-        if there {
-            entries.push((text, colour));
-        }
-    };
-    add(!drawing.edges.is_empty(), format!("edges {}", drawing.edges.len()), EDGE);
-    add(!drawing.inliers.is_empty(), format!("inliers {}", drawing.inliers.len()), INLIER);
-    add(!drawing.rejected.is_empty(), format!("rejected {}", drawing.rejected.len()), REJECTED);
-    add(!drawing.limb.is_empty(), "fitted limb".into(), LIMB);
-    add(truth, "true limb".into(), TRUTH);
-    add(!drawing.axes.is_empty(), "axis".into(), AXIS);
-    let widest = entries.iter().map(|(t, _)| t.len()).max().unwrap_or(0) as u32 * 8 * scale;
-    let (box_w, box_h) = (widest + 4 * scale, entries.len() as u32 * line + 3 * scale);
-    // A legend that covers most of a small picture is left out.
-    if box_w > w / 2 || box_h > h / 2 {
-        return;
-    }
-    canvas.shade(0, 0, box_w, box_h);
-    for (i, (text, colour)) in entries.iter().enumerate() {
-        canvas.text(2 * scale, 3 * scale + i as u32 * line, text, scale, *colour);
     }
 }
 

@@ -34,19 +34,10 @@ pub(super) const CIRCLE: Color32 = Color32::from_rgb(140, 170, 200);
 /// Pixels that were read.
 pub(super) const TOUCHED: Color32 = Color32::from_rgb(204, 121, 167);
 
-/// Candidate edges, in turn. None of the colours is that of another overlay.
-const EDGES: [Color32; 6] = [
-    Color32::from_rgb(86, 180, 233),
-    Color32::from_rgb(150, 130, 220),
-    Color32::from_rgb(196, 164, 132),
-    Color32::from_rgb(160, 176, 70),
-    Color32::from_rgb(100, 214, 204),
-    Color32::from_rgb(120, 140, 196),
-];
-
-/// Returns the colour of a candidate edge, by its number.
+/// Returns the colour of a candidate edge, by its number: that of overlays.
 pub(super) fn edge(candidate: u32) -> Color32 {
-    EDGES.get(candidate as usize % EDGES.len()).copied().unwrap_or(Color32::WHITE)
+    let [r, g, b] = hzn_run::overlay::edge_colour(candidate as usize);
+    Color32::from_rgb(r, g, b)
 }
 
 /// Returns the colour of the line number `n` of a plot.

@@ -1,26 +1,23 @@
 //! A picture that plotters draws on. Its letters are those of the window, so a drawing is the same on every computer.
 
-use std::cell::RefCell;
 use std::convert::Infallible;
 
-use egui::Color32;
+use hzn_run::overlay::letters::Letters;
 use image::{Rgb, RgbImage};
 use plotters_backend::text_anchor::{HPos, VPos};
 use plotters_backend::{BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind};
 
-use super::caption::Writer;
-
 /// A picture that plotters draws on.
 pub(super) struct Canvas<'a> {
     image: &'a mut RgbImage,
-    writer: RefCell<Writer>,
+    letters: Letters,
 }
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
 impl<'a> Canvas<'a> {
     pub(super) fn new(image: &'a mut RgbImage) -> Self {
-        Self { image, writer: RefCell::default() }
+        Self { image, letters: Letters::default() }
     }
 
     fn blend(&mut self, [x, y]: [i64; 2], colour: BackendColor) {
@@ -104,8 +101,7 @@ impl DrawingBackend for Canvas<'_> {
         let above = part(matches!(anchor.v_pos, VPos::Top), matches!(anchor.v_pos, VPos::Center));
         let at = [x as f32 - left * width as f32, y as f32 - above * height as f32];
         let (r, g, b) = style.color().rgb;
-        let size = style.size() as f32;
-        self.writer.borrow_mut().write(self.image, at, text, size, f32::INFINITY, Color32::from_rgb(r, g, b));
+        self.letters.write(self.image, at, text, style.size() as f32, [r, g, b]);
         Ok(())
     }
 
@@ -114,7 +110,7 @@ impl DrawingBackend for Canvas<'_> {
         text: &str,
         style: &T,
     ) -> Result<(u32, u32), DrawingErrorKind<Infallible>> {
-        let [width, height] = self.writer.borrow_mut().measure(text, style.size() as f32);
+        let [width, height] = self.letters.measure(text, style.size() as f32).map(|x| x.ceil() as u32);
         Ok((width, height))
     }
 }

@@ -6,20 +6,20 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 
-use egui::Color32;
 use hzn_core::Config;
 use hzn_core::camera::Camera;
-use hzn_core::status::Status;
 use hzn_files::FrameData;
 use hzn_files::truth::Truth;
 use hzn_mcap::{Annotations, Row};
 use hzn_run::engine::AnySensor;
+use hzn_run::overlay::caption::{self, Caption, Entry};
+use hzn_run::overlay::letters::Letters;
 use hzn_run::overlay::{self, canvas::Canvas};
+use hzn_run::provenance;
 use hzn_run::sink::{Existing, RowFile as Table};
 use hzn_run::source::{Picture, Source};
 use image::RgbImage;
 
-use super::caption::{self, Caption, Writer};
 use super::frame_view::{FrameInput, FrameView, Outcome, process_frame};
 use super::job::{Done, JobError, Progress};
 use super::sequence_source::SequenceSource;
@@ -60,16 +60,12 @@ pub fn annotations(outcome: &Outcome, layers: &[Layer]) -> Annotations {
 
 /// Returns the caption of a picture: its name, time, status and reason, the legend of what is drawn, and a scale.
 fn describe(name: &str, time_s: Option<f64>, outcome: Option<&Outcome>, drawing: &Annotations) -> Caption {
-    use hzn_mcap::palette::{AXIS, EDGE, INLIER, LIMB, REJECTED};
-    let mut text = name.to_owned();
-    text.extend(time_s.map(|t| format!(", {t:.3} s")));
-    let Some(outcome) = outcome else { return Caption { text, ..Caption::default() } };
+    let caption = Caption::new(name, time_s, &[], drawing);
+    let Some(outcome) = outcome else { return caption };
+    let mut text = caption.text.clone();
     for body in &outcome.bodies {
-        let row = &body.row;
-        let reason = body.cause.and_then(|c| c.reason).map(|r| format!(" ({})", r.name())).unwrap_or_default();
-        text += &format!("; {}: {}{reason}", row.body, row.status);
-        text.extend(row.sigma_max_deg.map(|s| format!(", 3σ {:.4}°", 3.0 * s)));
-        text.extend(row.rms_px.map(|rms| format!(", RMS {rms:.2} px")));
+        let reason = body.cause.and_then(|c| c.reason).map(|r| r.name());
+        text += &format!("; {}", caption::answer(&body.row, reason));
         let ends = [outcome.config.camera.width, outcome.config.camera.height].map(|n| f64::from(n) - 0.5);
         let is_inside = |p: [f64; 2]| p.iter().zip(ends).all(|(x, end)| (-0.5..end).contains(x));
         if !body.axis.is_some_and(is_inside) {
@@ -77,21 +73,10 @@ fn describe(name: &str, time_s: Option<f64>, outcome: Option<&Outcome>, drawing:
             let z = body.solution().map(|s| s.axis.xyz()[2].clamp(-1.0, 1.0));
             text.extend(z.map(|z| format!(", axis {:.1}° off the optical axis", z.acos().to_degrees())));
         }
-        if row.status != Status::Ok && body.cause.is_none() && !row.detail.is_empty() {
-            text += &format!(" ({})", row.detail);
-        }
     }
-    let entries = [
-        ("edges", drawing.edges.is_empty(), EDGE),
-        ("outliers", drawing.rejected.is_empty(), REJECTED),
-        ("inliers", drawing.inliers.is_empty(), INLIER),
-        ("fitted limb", drawing.limb.is_empty(), LIMB),
-        ("axis", drawing.axes.is_empty(), AXIS),
-    ];
-    let legend = entries.iter().filter(|(_, none, _)| !none).map(|(name, _, c)| ((*name).to_owned(), *c)).collect();
-    // The bar is as long as 5° are near the optical axis.
-    let camera = &outcome.config.camera;
-    Caption { text, legend, scale: Some((camera.fx_px * 5f64.to_radians().tan(), "5°".to_owned())) }
+    let hash = provenance::hash(&outcome.config);
+    let line = provenance::line(hash.as_deref(), &provenance::command("hzn view"));
+    Caption { text, ..caption }.with_scale(outcome.config.camera.fx_px).with_provenance(line)
 }
 
 /// A picture that is drawn, and what is known about it.
@@ -106,15 +91,15 @@ struct Drawn<'a> {
 
 impl Drawn<'_> {
     /// Draws the layers that are switched on, with a caption below the picture.
-    fn draw(&self, writer: &mut Writer, layers: &[Layer]) -> RgbImage {
+    fn draw(&self, letters: &Letters, layers: &[Layer]) -> RgbImage {
         let drawing = self.outcome.map(|o| annotations(o, layers)).unwrap_or_default();
         let mut caption = describe(self.name, self.time_s, self.outcome, &drawing);
         let mut canvas = Canvas { image: overlay::draw_plain(self.picture.to_rgb(), &drawing, &[]) };
         if let Some(outcome) = self.outcome {
             self.draw_mask(&mut canvas, outcome, layers, &mut caption);
-            self.draw_sky(&mut canvas, writer, outcome, layers);
+            self.draw_sky(&mut canvas, letters, outcome, layers);
         }
-        writer.add(&canvas.image, &caption)
+        caption::add(letters, &canvas.image, &caption)
     }
 
     /// Width of a thin line: it is visible if the whole picture is shown on a screen.
@@ -128,35 +113,34 @@ impl Drawn<'_> {
         for polygon in polygons.filter(|_| layers.contains(&Layer::Mask)) {
             let closed: Vec<[f64; 2]> = polygon.iter().chain(polygon.first()).copied().collect();
             canvas.polyline(&closed, 1.5 * self.pen(), MASK);
-            if caption.legend.iter().all(|(name, _)| name != "mask") {
-                caption.legend.push(("mask".to_owned(), MASK));
+            if caption.legend.iter().all(|entry| entry.name != "mask") {
+                caption.legend.push(Entry { name: "mask".to_owned(), colours: vec![MASK] });
             }
         }
     }
 
-    fn draw_sky(&self, canvas: &mut Canvas, writer: &mut Writer, outcome: &Outcome, layers: &[Layer]) {
+    fn draw_sky(&self, canvas: &mut Canvas, letters: &Letters, outcome: &Outcome, layers: &[Layer]) {
         let camera = Camera::try_new(&outcome.config.camera).ok().filter(|_| layers.contains(&Layer::Sky));
         let Some(camera) = camera else { return };
         for place in sky::places(self.data, self.truth, &outcome.bodies, &camera) {
-            self.draw_place(canvas, writer, place.at, 9.0, &place.name);
+            self.draw_place(canvas, letters, place.at, 9.0, &place.name);
         }
         for star in stars::places(self.data, &outcome.bodies, &camera) {
-            self.draw_place(canvas, writer, star.at, 5.0, star.name);
+            self.draw_place(canvas, letters, star.at, 5.0, star.name);
         }
     }
 
     /// Draws a circle with a name next to it.
-    fn draw_place(&self, canvas: &mut Canvas, writer: &mut Writer, at: [f64; 2], radius: f64, name: &str) {
+    fn draw_place(&self, canvas: &mut Canvas, letters: &Letters, at: [f64; 2], radius: f64, name: &str) {
         let radius = radius * self.pen();
         let around = |i: u32| {
             let (s, c) = (f64::from(i) / 48.0 * std::f64::consts::TAU).sin_cos();
             [at[0] + radius * c, at[1] + radius * s]
         };
         canvas.polyline(&(0..=48).map(around).collect::<Vec<_>>(), self.pen(), SKY);
-        let [r, g, b] = SKY;
         let corner = [at[0] + 1.4 * radius, at[1] - 7.0 * self.pen()].map(|x| x as f32);
         let size = 14.0 * self.pen() as f32;
-        writer.write(&mut canvas.image, corner, name, size, f32::INFINITY, Color32::from_rgb(r, g, b));
+        letters.write(&mut canvas.image, corner, name, size, SKY);
     }
 }
 
@@ -178,7 +162,7 @@ pub fn save_picture(
     let outcome = frame_view.answers.first().map(|o| &**o);
     let FrameView { name, time_s, data, .. } = frame_view;
     let drawn = Drawn { picture, name, time_s: *time_s, data: data.as_ref(), truth, outcome };
-    let image = drawn.draw(&mut Writer::default(), layers);
+    let image = drawn.draw(&Letters::default(), layers);
     let bytes = overlay::png(&image).map_err(|e| format!("{}: {e:#}", path.display()))?;
     atomic_file::write(path, &bytes)?;
     Ok(Done::Written(path.to_owned()))
@@ -284,7 +268,7 @@ impl Video {
         let known: Vec<_> = self.sequence.entries.iter().map(|e| e.data.clone()).collect();
         let total = known.len() as u64;
         let mut source = SequenceSource::new(self.sequence)?;
-        let mut writer = Writer::default();
+        let letters = Letters::default();
         for (index, data) in known.iter().enumerate() {
             progress.report(index as u64, total)?;
             let item = source.next().ok_or_else(|| "the sequence ends before its last picture".to_owned())?;
@@ -298,7 +282,7 @@ impl Video {
                     let truth = self.truth.get(name).and_then(|all| all.first());
                     let outcome = Some(&outcome);
                     let drawn = Drawn { picture: &picture, name, time_s, data: data.as_ref(), truth, outcome };
-                    let image = drawn.draw(&mut writer, &self.layers);
+                    let image = drawn.draw(&letters, &self.layers);
                     if image.dimensions() == size { image } else { RgbImage::new(size.0, size.1) }
                 }
                 Err(_) => RgbImage::new(size.0, size.1),

@@ -3,7 +3,6 @@
 pub mod background;
 pub mod calibration;
 mod canvas;
-pub mod caption;
 pub mod check;
 pub mod coast;
 pub mod companion;

@@ -18,6 +18,16 @@ const HEADING: u32 = 34;
 /// Width of the labels left of a plot, and height of those below the last one.
 const LEFT: u32 = 76;
 const BELOW: u32 = 46;
+/// Height of the line about version, command and sensor.
+const FOOT: u32 = 22;
+/// Height of the title of a plot and of a row of its legend, width of a sample, and an estimate of the width of a
+/// letter: those of a reader's program are not known.
+const TITLE: u32 = 20;
+const LEGEND_ROW: u32 = 16;
+const SAMPLE: u32 = 18;
+const LETTER: u32 = 7;
+/// Letters of the last line that fit into the width.
+const FOOT_LETTERS: usize = 130;
 /// Pixels of a PNG in a unit: 2700 pixels are 300 per inch on a page that is 23 cm wide.
 const PNG_SCALE: u32 = 3;
 /// The PNG is drawn this much larger and then made smaller, which gives lines and letters smooth edges.
@@ -48,6 +58,8 @@ pub struct PlotSheet {
     pub axis: &'static str,
     /// First and last place on the horizontal axis.
     pub ends: [f64; 2],
+    /// Version, command and sensor, below the plots.
+    pub provenance: String,
     /// Pictures without an answer, from and to.
     pub refused: Vec<[f64; 2]>,
     /// The plots from top to bottom.
@@ -76,7 +88,7 @@ pub fn save(sheet: &PlotSheet, path: &Path) -> Result<Done, JobError> {
 fn size(sheet: &PlotSheet) -> Result<[u32; 2], String> {
     match sheet.rows.len() as u32 {
         0 => Err("no chosen plot has a value".into()),
-        count => Ok([WIDTH, HEADING + count * PLOT + BELOW]),
+        count => Ok([WIDTH, HEADING + count * PLOT + BELOW + FOOT]),
     }
 }
 
@@ -112,6 +124,9 @@ fn draw<B: DrawingBackend>(sheet: &PlotSheet, root: &Area<B>, scale: u32) -> Res
             draw_row(sheet, row, &area, is_last, scale)?;
             rest = below;
         }
+        let faint = BLACK.mix(0.6);
+        let foot = ("sans-serif", 11 * scale).into_text_style(root).color(&faint);
+        rest.draw_text(&shortened(&sheet.provenance), &foot, ((LEFT * scale) as i32, 0))?;
         root.present()
     };
     all().map_err(|e| format!("the plots cannot be drawn: {e}"))
@@ -129,8 +144,18 @@ fn draw_row<B: DrawingBackend>(
     let room = (0.08 * (high - low)).max(1e-6 * high.abs()).max(1e-9);
     let [first, last] = sheet.ends;
     let font = |size: u32| ("sans-serif", size * scale);
-    let mut chart = ChartBuilder::on(area)
-        .caption(&row.title, font(14))
+    let entries = legend(row);
+    let height = entries.last().map_or(TITLE, |[_, y]| y + LEGEND_ROW + 4);
+    let (title, plot) = area.split_vertically(height * scale);
+    title.draw_text(&row.title, &font(14).into_text_style(&title), ((LEFT * scale) as i32, 2 * scale as i32))?;
+    for (n, ((name, _), [x, y])) in row.lines.iter().zip(&entries).enumerate() {
+        let [x, y] = [x, y].map(|v| (v * scale) as i32);
+        let (middle, end) = (y + (LEGEND_ROW * scale / 2) as i32, x + (SAMPLE * scale) as i32);
+        let style = COLOURS[n % COLOURS.len()].stroke_width(2 * scale);
+        title.draw(&PathElement::new([(x, middle), (end, middle)], style))?;
+        title.draw_text(name, &font(12).into_text_style(&title), (end + 6 * scale as i32, y + scale as i32))?;
+    }
+    let mut chart = ChartBuilder::on(&plot)
         .margin_right(16 * scale)
         .y_label_area_size(LEFT * scale)
         .x_label_area_size(if is_last { BELOW * scale } else { 0 })
@@ -146,26 +171,46 @@ fn draw_row<B: DrawingBackend>(
     mesh.axis_style(BLACK.stroke_width(scale)).bold_line_style(BLACK.mix(0.15).stroke_width(scale));
     mesh.set_all_tick_mark_size(5 * scale);
     mesh.x_desc(if is_last { sheet.axis } else { "" }).draw()?;
-    for (n, (name, parts)) in row.lines.iter().enumerate() {
+    for (n, (_, parts)) in row.lines.iter().enumerate() {
         let style = COLOURS[n % COLOURS.len()].stroke_width(2 * scale);
-        for (k, part) in parts.iter().enumerate() {
+        for part in parts {
             let points = part.iter().map(|p| (p[0], p[1]));
             if let [one] = part.as_slice() {
                 chart.draw_series([Circle::new((one[0], one[1]), 2 * scale, style.filled())])?;
             }
-            let line = chart.draw_series(LineSeries::new(points, style))?;
-            if k == 0 && row.lines.len() > 1 {
-                let length = 18 * scale as i32;
-                line.label(name).legend(move |(x, y)| PathElement::new([(x, y), (x + length, y)], style));
-            }
+            chart.draw_series(LineSeries::new(points, style))?;
         }
     }
-    if row.lines.len() > 1 {
-        let mut legend = chart.configure_series_labels();
-        legend.legend_area_size(24 * scale).margin(6 * scale).label_font(font(12));
-        legend.background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.2).stroke_width(scale)).draw()?;
-    }
     Ok(())
+}
+
+/// Returns the place of each entry of the legend, which stands behind the title and above the plot, in units. One line
+/// needs no legend.
+fn legend(row: &PlotRow) -> Vec<[u32; 2]> {
+    if row.lines.len() < 2 {
+        return Vec::new();
+    }
+    let width = |text: &str| LETTER * text.chars().count() as u32;
+    let first = LEFT + width(&row.title) + 3 * SAMPLE;
+    let [mut x, mut y] = [first, 2];
+    let mut places = Vec::new();
+    for (name, _) in &row.lines {
+        let wide = SAMPLE + 6 + width(name) + 14;
+        if x > first && x + wide > WIDTH {
+            (x, y) = (first, y + LEGEND_ROW);
+        }
+        places.push([x, y]);
+        x += wide;
+    }
+    places
+}
+
+/// Returns the last line, cut where it would leave the drawing.
+fn shortened(line: &str) -> String {
+    match line.char_indices().nth(FOOT_LETTERS) {
+        Some((at, _)) => line.get(..at).unwrap_or(line).to_owned() + "…",
+        None => line.to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -186,11 +231,12 @@ mod tests {
             heading: "flight.mcap".into(),
             axis: "time, s",
             ends: [0.0, 4.0],
+            provenance: "hzn 0.1.0, sensor 0123456789ab, hzn view flight.mcap".into(),
             refused: vec![[1.5, 2.5]],
             rows,
         };
         let text = svg(&sheet).unwrap();
-        for word in ["flight.mcap", "3 sigma [°]", "Axis", "time, s"] {
+        for word in ["flight.mcap", "3 sigma [°]", "Axis", "time, s", "sensor 0123456789ab"] {
             assert!(text.contains(word), "{word}");
         }
         let drawn = |colour: &str| text.matches(&format!("stroke=\"{colour}\"")).count();
@@ -204,7 +250,7 @@ mod tests {
 
         // The picture has the same lines in the same colours, and letters above and below them.
         let picture = png(&sheet).unwrap();
-        assert_eq!(picture.dimensions(), (3 * WIDTH, 3 * (HEADING + 2 * PLOT + BELOW)));
+        assert_eq!(picture.dimensions(), (3 * WIDTH, 3 * (HEADING + 2 * PLOT + BELOW + FOOT)));
         let has = |colour: RGBColor| picture.pixels().filter(|p| p.0 == [colour.0, colour.1, colour.2]).count();
         assert!(has(COLOURS[0]) > 1000 && has(COLOURS[1]) > 1000, "{} {}", has(COLOURS[0]), has(COLOURS[1]));
         let ink = |from: u32, to: u32| {

@@ -27,7 +27,7 @@ fn the_picture_is_saved_as_it_is_shown() {
     said(&mut window, "Written");
     let saved = image::open(&png).unwrap().to_rgb8();
     let (width, height) = (u32::from(WIDTH), u32::from(HEIGHT));
-    let caption = hzn_viewer::work::caption::height_px(width, height);
+    let caption = hzn_run::overlay::caption::height_px(width, height);
     assert_eq!(saved.dimensions(), (width, height + caption), "a caption is below the picture");
     // The saved picture shows the fitted limb in its place.
     let limb = frame_view(&window).answers[0].bodies[0].limb.concat();

@@ -7,7 +7,7 @@ use hzn_core::camera::{Config, Equation, Intrinsic};
 use hzn_plot::{Chart, Series, Style};
 
 use super::lens_text::{self, Reasons};
-use crate::html::{STYLE, escape, provenance};
+use crate::html::{DARK, STYLE, escape, provenance};
 
 /// Width of the pictures of the frame, in pixels of the page.
 const WIDTH: f64 = 640.0;
@@ -32,7 +32,7 @@ pub(super) fn html(calibrated: &Calibrated, reasons: &Reasons, pictures: &str) -
         calibrated.warnings.iter().map(|w| format!("<p class=\"warning\">{}</p>", escape(&w.to_string()))).collect();
     Ok(format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Camera calibration</title>\
-         <style>{STYLE}{MORE_STYLE}</style>\
+         <style>{STYLE}{MORE_STYLE}{DARK}</style>\
          <h1>Camera calibration: {}</h1>{warnings}<table>{lens}</table><div class=\"plots\"><figure>{}\
          <figcaption><b>Residuals</b>, measured minus projected, enlarged. The orange line in the corner is {:.3} px \
          long; grey points are outliers. Neighbours that point the same way show an error of the lens model.\
@@ -46,7 +46,7 @@ pub(super) fn html(calibrated: &Calibrated, reasons: &Reasons, pictures: &str) -
         radial(calibrated).svg()?,
         uncertainty(calibrated).svg()?,
         by_distance(calibrated).svg()?,
-        provenance(),
+        provenance(&[]),
     ))
 }
 

@@ -78,7 +78,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let written = noise::into_sensor_toml(&sensor.text, &calibration, &input).map_err(failed)?;
     tell::result(text::report(&calibration, pictures, &plan.config.camera))?;
     for path in args.output.iter().filter(|p| ending(p) == "html") {
-        let html = page::html(&calibration, pictures, &input, &plan.config.camera)?;
+        let html = page::html(&calibration, pictures, &input, &plan.config)?;
         disk::write(path, html)?;
     }
     if let Some(alarm) = calibration.alarm() {

@@ -1,27 +1,38 @@
 //! The report as one page of HTML that needs no other file.
 
 use hzn_calib::noise::{self, Calibration};
-use hzn_core::camera::Config;
+use hzn_core::Config;
 use hzn_plot::{Chart, Series, Style};
 use hzn_run::explain::counted;
 
-use crate::html::{STYLE, escape, provenance};
+use crate::html::{DARK, STYLE, escape, provenance};
+
+/// Returns the hash of the sensor that a calibration began with.
+fn hash(sensor: &Config) -> Vec<String> {
+    hzn_run::provenance::hash(sensor).into_iter().collect()
+}
 
 /// Returns a page with a title, lines of name and value, and plots.
-pub(super) fn simple(title: &str, lines: &[(String, String)], charts: &[Chart]) -> anyhow::Result<String> {
+pub(super) fn simple(
+    title: &str,
+    lines: &[(String, String)],
+    charts: &[Chart],
+    sensor: &Config,
+) -> anyhow::Result<String> {
     let row =
         |(name, value): &(String, String)| format!("<tr><td>{}</td><td>{}</td></tr>", escape(name), escape(value));
     let rows: String = lines.iter().map(row).collect();
     let plots = charts.iter().map(Chart::svg).collect::<Result<String, _>>()?;
     Ok(format!(
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{STYLE}</style>\
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{STYLE}{DARK}</style>\
          <h1>{0}</h1><table>{rows}</table><div class=\"plots\">{plots}</div>{1}</html>\n",
         escape(title),
-        provenance()
+        provenance(&hash(sensor))
     ))
 }
 
-pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str, camera: &Config) -> anyhow::Result<String> {
+pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str, sensor: &Config) -> anyhow::Result<String> {
+    let camera = &sensor.camera;
     let rows: String = noise::lines(calibration, &counted(pictures, "picture"), camera)
         .iter()
         .map(|(name, value)| format!("<tr><td>{name}</td><td>{}</td></tr>", escape(value)))
@@ -29,12 +40,12 @@ pub(super) fn html(calibration: &Calibration, pictures: u64, flight: &str, camer
     let alarm = calibration.alarm().map(|a| format!("<p><b>{}</b></p>", escape(&a.to_string()))).unwrap_or_default();
     Ok(format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Limb height and \
-            noise</title><style>{STYLE}</style>\
+            noise</title><style>{STYLE}{DARK}</style>\
          <h1>Limb height and noise: {}</h1>{alarm}<table>{rows}</table><div class=\"plots\">{}{}</div>{}</html>\n",
         escape(flight),
         heights(calibration).svg()?,
         correlation(calibration).svg()?,
-        provenance()
+        provenance(&hash(sensor))
     ))
 }
 

@@ -147,6 +147,7 @@ fn write(
             &format!("Lens from the limb: {input}"),
             &sky::lines(estimate, &counted(estimate.pictures.len() as u64, "picture"), mount.as_ref()),
             &[sky_text::heights(estimate)],
+            &sensor.config,
         )?;
         disk::write_whole(path, &html)?;
     }

@@ -57,7 +57,7 @@ pub(super) fn run(args: &Args, sensor: &Sensor) -> Outcome {
     tell::result(sky_text::join(&lines))?;
     for path in args.output.iter().filter(|p| ending(p) == "html") {
         let title = format!("Lens from the track of Sun or Moon: {input}");
-        hzn_run::disk::write_whole(path, &page::simple(&title, &lines, &[])?)?;
+        hzn_run::disk::write_whole(path, &page::simple(&title, &lines, &[], &sensor.config)?)?;
     }
     Ok(unread.exit(write(args, sensor, &track, &input)?))
 }

@@ -4,6 +4,7 @@ use hzn_core::camera::{Camera, Config, Equation};
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use hzn_run::overlay::canvas::{Canvas, Colour};
+use hzn_run::overlay::letters::Letters;
 use image::{Rgb, RgbImage};
 
 use super::field::{end_rad, field_of_view};
@@ -18,8 +19,8 @@ const RIGHT_PX: u32 = 170;
 const LINE_PX: u32 = 24;
 /// Largest number of lines of the legend.
 const LEGEND: u32 = 5;
-/// Pixels of a letter: 8 dots of this size.
-const LETTER: u32 = 2;
+/// Size of the letters in pixels.
+const LETTER_PX: f32 = 17.0;
 
 const WHITE: Colour = [255, 255, 255];
 const BLACK: Colour = [0, 0, 0];
@@ -33,6 +34,7 @@ const SCALE: [Colour; 5] = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201
 struct Map<'a> {
     config: &'a Config,
     canvas: Canvas,
+    letters: Letters,
     scale: f64,
     width: u32,
     height: u32,
@@ -45,7 +47,7 @@ pub(super) fn draw(config: &Config, title: &str) -> Result<RgbImage, Stop> {
     let side = |pixels: u16| ((f64::from(pixels) * scale).round() as u32).max(1);
     let (width, height) = (side(config.width), side(config.height));
     let image = RgbImage::from_pixel(width + RIGHT_PX, height + TOP_PX + LEGEND * LINE_PX + 12, Rgb([20, 20, 20]));
-    let mut map = Map { config, canvas: Canvas { image }, scale, width, height };
+    let mut map = Map { config, canvas: Canvas { image }, letters: Letters::default(), scale, width, height };
     map.fill(&camera);
     map.contours(&camera);
     let limit_deg = monotone::limit_deg(config);
@@ -70,18 +72,22 @@ pub(super) fn draw(config: &Config, title: &str) -> Result<RgbImage, Stop> {
     map.text_centred(title, 14);
     for (i, line) in legend.iter().enumerate() {
         let y = TOP_PX + height + 12 + LINE_PX * i as u32;
-        map.canvas.text(8, y, &shorten(line, width + RIGHT_PX), LETTER, WHITE);
+        map.text(8, y, &map.shorten(line, width + RIGHT_PX));
     }
     Ok(map.canvas.image)
 }
 
-/// Shortens a text to a width in pixels.
-fn shorten(text: &str, width: u32) -> String {
-    let most = (width.saturating_sub(16) / (8 * LETTER)) as usize;
-    if text.chars().count() <= most { text.to_owned() } else { text.chars().take(most).collect() }
-}
-
 impl Map<'_> {
+    /// Shortens a text to a width in pixels.
+    fn shorten(&self, text: &str, width: u32) -> String {
+        self.letters.wrap(text, LETTER_PX, width.saturating_sub(16) as f32, 1).concat()
+    }
+
+    /// Writes a text with its top left corner at a place.
+    fn text(&mut self, x: u32, y: u32, text: &str) {
+        self.letters.write(&mut self.canvas.image, [x as f32, y as f32], text, LETTER_PX, WHITE);
+    }
+
     /// Returns the place of an image point on the map.
     fn place(&self, p: ImagePoint<f64>) -> [f64; 2] {
         [(p.u + 0.5) * self.scale - 0.5, (p.v + 0.5) * self.scale - 0.5 + f64::from(TOP_PX)]
@@ -121,9 +127,9 @@ impl Map<'_> {
         for i in 0..=4u32 {
             let part = f64::from(i) / 4.0;
             let y = TOP_PX + ((1.0 - part) * f64::from(rows.saturating_sub(16))) as u32;
-            self.canvas.text(left + 32, y, &format!("{:.4}", min + part * (max - min)), LETTER, WHITE);
+            self.text(left + 32, y, &format!("{:.4}", min + part * (max - min)));
         }
-        self.canvas.text(left, TOP_PX - 24, "deg a px", LETTER, WHITE);
+        self.text(left, TOP_PX - 24, "deg a px");
     }
 
     /// Draws lines of equal angle off axis, with labels.
@@ -149,7 +155,8 @@ impl Map<'_> {
 
     /// Writes a label where a ring has most space in the picture.
     fn label(&mut self, ring: &[[f64; 2]], text: &str) {
-        let (letter, half) = (8.0 * f64::from(LETTER), text.len() as f64 * 4.0 * f64::from(LETTER));
+        let [width, height] = self.letters.measure(text, LETTER_PX).map(f64::from);
+        let (letter, half) = (height, 0.5 * width);
         let (right, bottom) = (f64::from(self.width), f64::from(TOP_PX + self.height));
         let room =
             |p: &&[f64; 2]| (p[0] - half).min(right - p[0] - half).min(p[1] - f64::from(TOP_PX)).min(bottom - p[1]);
@@ -160,8 +167,8 @@ impl Map<'_> {
             return;
         }
         let (x, y) = ((p[0] - half) as u32, (p[1] - 0.5 * letter) as u32);
-        self.canvas.shade(x.saturating_sub(3), y.saturating_sub(3), 2 * half as u32 + 6, letter as u32 + 4);
-        self.canvas.text(x, y, text, LETTER, WHITE);
+        self.canvas.shade(x.saturating_sub(3), y.saturating_sub(1), width as u32 + 6, letter as u32 + 2);
+        self.text(x, y, text);
     }
 
     /// Draws a ring at an angle off axis from the equation of the lens. Returns whether it is in the picture.
@@ -191,9 +198,9 @@ impl Map<'_> {
     }
 
     fn text_centred(&mut self, text: &str, y: u32) {
-        let text = shorten(text, self.width);
-        let width = text.chars().count() as u32 * 8 * LETTER;
-        self.canvas.text(self.width.saturating_sub(width) / 2, y, &text, LETTER, WHITE);
+        let text = self.shorten(text, self.width);
+        let width = self.letters.measure(&text, LETTER_PX)[0] as u32;
+        self.text(self.width.saturating_sub(width) / 2, y, &text);
     }
 }
 

@@ -84,6 +84,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         heads::describe_removed(removed).iter().for_each(tell::warning);
     }
     let sensor = sensor(args.sensor.as_deref(), sensor_toml.as_deref(), folder)?;
+    let sensors: Vec<String> = sensor.iter().filter_map(hzn_run::provenance::hash).collect();
     let camera = sensor.and_then(|s| Camera::<f64>::try_new(&s.camera).ok()).filter(|_| !are_joint);
     if camera.is_none() && !are_joint {
         tell::line("note: no sensor.toml is available (--sensor): the length of limb in view is left out");
@@ -98,6 +99,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         truth: truth_path.display().to_string(),
         evaluations: Evaluation::by_body(&cases),
         frames: cases,
+        sensors,
     };
     let worst = worst::select(&report.frames, args.worst);
     for path in &args.output {

@@ -7,7 +7,7 @@ use hzn_plot::{Chart, Series, Style};
 use super::report::Report;
 use super::text;
 use super::worst::Drawn;
-use crate::html::{escape, provenance};
+use crate::html::{DARK, escape, provenance};
 
 const STYLE: &str = "\
 body{font:15px/1.5 system-ui,sans-serif;max-width:1360px;margin:2rem auto;padding:0 1rem;color:#222}\
@@ -61,8 +61,11 @@ pub(super) fn html(report: &Report, worst: &[Drawn]) -> anyhow::Result<String> {
         }
         body.push_str("</div>");
     }
-    let head = format!("<meta charset=\"utf-8\"><title>hzn evaluate</title><style>{STYLE}</style>");
-    Ok(format!("<!doctype html><html lang=\"en\"><head>{head}</head><body>{body}{}</body></html>\n", provenance()))
+    let head = format!("<meta charset=\"utf-8\"><title>hzn evaluate</title><style>{STYLE}{DARK}</style>");
+    Ok(format!(
+        "<!doctype html><html lang=\"en\"><head>{head}</head><body>{body}{}</body></html>\n",
+        provenance(&report.sensors)
+    ))
 }
 
 /// Returns the charts of one body.
@@ -75,17 +78,27 @@ fn charts(e: &Evaluation, frames: &[Case]) -> Vec<Chart> {
     let dots = |name: &str, x: &dyn Fn(&Case) -> Option<f64>, y: &dyn Fn(&Miss) -> f64| {
         Series::new(name, Style::Dots, cases.iter().filter_map(|(c, m)| Some((x(c)?, y(m)))))
     };
+    // Pictures that show the limb and have no answer have no error either; their places are marked.
+    let missed = |x: &dyn Fn(&Case) -> Option<f64>| {
+        let without = frames.iter().filter(|c| c.body == e.body && c.limb && c.miss.is_none());
+        let marks: Vec<(f64, f64)> = without.filter_map(|c| Some((x(c)?, f64::NAN))).collect();
+        // An empty name is not listed.
+        let name = if marks.is_empty() { String::new() } else { format!("no answer ({})", marks.len()) };
+        Series::new(name, Style::Marks, marks)
+    };
     let mut out = Vec::new();
     // A truth may have no times.
     if cases.iter().any(|(c, _)| c.time_s.is_some()) {
         out.extend([
             Chart::new("Error and claimed sigma over time", "time [s]", "deg")
                 .with_series(dots("error", &|c| c.time_s, &|m| m.angle_deg))
-                .with_series(dots("largest sigma", &|c| c.time_s, &|m| m.sigma_max_deg)),
+                .with_series(dots("largest sigma", &|c| c.time_s, &|m| m.sigma_max_deg))
+                .with_series(missed(&|c| c.time_s)),
             Chart::new("Error about the camera's axes", "time [s]", "deg")
                 .with_series(dots("about x", &|c| c.time_s, &|m| m.about_deg[0]))
                 .with_series(dots("about y", &|c| c.time_s, &|m| m.about_deg[1]))
-                .with_series(dots("about z", &|c| c.time_s, &|m| m.about_deg[2])),
+                .with_series(dots("about z", &|c| c.time_s, &|m| m.about_deg[2]))
+                .with_series(missed(&|c| c.time_s)),
         ]);
     }
     out.push(distribution(&cases));
@@ -100,7 +113,8 @@ fn charts(e: &Evaluation, frames: &[Case]) -> Vec<Chart> {
         out.push(
             Chart::new(format!("Error by {}", group.name), format!("{} [{}]", group.name, group.unit), "deg")
                 .with_series(dots("error", x, &|m| m.angle_deg))
-                .with_series(dots("largest sigma", x, &|m| m.sigma_max_deg)),
+                .with_series(dots("largest sigma", x, &|m| m.sigma_max_deg))
+                .with_series(missed(x)),
         );
     }
     out

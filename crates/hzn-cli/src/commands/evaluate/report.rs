@@ -10,4 +10,7 @@ pub(super) struct Report {
     pub(super) truth: String,
     pub(super) evaluations: Vec<Evaluation>,
     pub(super) frames: Vec<Case>,
+    /// Hashes of the sensors, for the last line of the page.
+    #[serde(skip)]
+    pub(super) sensors: Vec<String>,
 }

@@ -7,6 +7,7 @@ use hzn_core::camera::Camera;
 use hzn_evaluate::Case;
 use hzn_files::truth::Truth;
 use hzn_mcap::{Annotations, Contents, Reader};
+use hzn_run::overlay::caption::{self, Caption};
 use hzn_run::overlay::{self, limb};
 use hzn_run::source::{Payload, ending};
 use image::RgbImage;
@@ -65,7 +66,12 @@ pub(super) fn draw(
             limb::lines([t.axis_x, t.axis_y, t.axis_z], t.half_angle_deg.to_radians(), camera)
         });
         let jpeg = match recorded.pictures.get(&case.file).cloned().or_else(read_file) {
-            Some(image) => Some(encode(overlay::draw_with_truth(image, &drawing, &true_limb, case.status))?),
+            Some(image) => {
+                let text = format!("{}; {}: {}", case.file, case.body, case.status);
+                let caption = Caption { text, legend: caption::legend(&drawing), ..Caption::default() };
+                let caption = if true_limb.is_empty() { caption } else { caption.with_truth() };
+                Some(encode(overlay::draw(image, &drawing, &true_limb, &caption))?)
+            }
             None => None,
         };
         Ok(Drawn { caption: worst_line(case), jpeg })

@@ -4,6 +4,7 @@ use hzn_core::Solution;
 use hzn_core::camera::Camera;
 use hzn_mcap::Annotations;
 use hzn_run::engine::Trace;
+use hzn_run::overlay::caption::{Caption, legend};
 use hzn_run::overlay::undistorted::Undistorted;
 use hzn_run::source::Picture;
 use hzn_run::{engine, explain, overlay};
@@ -31,10 +32,11 @@ impl Drawing {
         &self,
         picture: &Picture,
         lens: Option<&Camera<f64>>,
-        title: &str,
+        caption: &Caption,
     ) -> Result<image::RgbImage, Stop> {
         let Some(lens) = lens else {
-            return Ok(overlay::draw_annotations(picture.to_rgb(), &self.annotations, title));
+            let caption = Caption { legend: legend(&self.annotations), ..caption.clone() };
+            return Ok(overlay::draw(picture.to_rgb(), &self.annotations, &[], &caption));
         };
         let axes: Vec<_> = self.answers.iter().map(|s| s.axis).collect();
         let undistorted = Undistorted::new(lens, &axes)
@@ -45,6 +47,8 @@ impl Drawing {
             tell::line(format_args!("undistorted: {}", explain::section_text(answer, !limb.axes.is_empty())));
             drawing.add(limb);
         }
-        Ok(overlay::draw_annotations(undistorted.picture(&picture.to_rgb()), &drawing, title))
+        // A pinhole has another scale than the lens.
+        let caption = Caption { legend: legend(&drawing), scale: None, ..caption.clone() };
+        Ok(overlay::draw(undistorted.picture(&picture.to_rgb()), &drawing, &[], &caption))
     }
 }

@@ -4,8 +4,11 @@ use std::time::{Duration, Instant};
 
 use hzn_core::Config;
 use hzn_files::FrameData;
+use hzn_mcap::{Row, RowMeta};
 use hzn_run::engine::{AnySensor, Traces, Unprocessed};
 use hzn_run::explained::{PictureToExplain, Work};
+use hzn_run::overlay::caption::{self, Caption};
+use hzn_run::provenance;
 use hzn_run::source::Item;
 
 use super::args::Args;
@@ -57,8 +60,7 @@ fn explain(picture: &PictureToExplain<'_>, title: &str, args: &Args, decoding: D
     let times = sensor.process(&view, data, None);
     let traces = Traces::new(config.each_body().len());
     let mut drawing = Drawing::default();
-    let mut statuses = Vec::new();
-    let several = config.each_body().len() > 1;
+    let mut answers = Vec::new();
     let processed = sensor.process(&view, data, Some(&traces)).into_iter().zip(times);
     let mut exit = Exit::Done;
     for (which, ((processed, time), half_angle)) in processed.zip(half_angles).enumerate() {
@@ -71,7 +73,7 @@ fn explain(picture: &PictureToExplain<'_>, title: &str, args: &Args, decoding: D
                 let Unprocessed { status, why, .. } = why.into();
                 let text = one_line(format_args!("{file}: {name}: {status}: {why}"));
                 tell::result(format_args!("{between}{text}\n"))?;
-                statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
+                answers.push(format!("{name}: {status} ({why})"));
                 exit = Exit::SomeUnreadable;
                 continue;
             }
@@ -84,12 +86,14 @@ fn explain(picture: &PictureToExplain<'_>, title: &str, args: &Args, decoding: D
         // The camera includes the rate of rotation, so that the drawing fits each row of a rolling shutter.
         let camera = sensor.camera_of(data);
         drawing.add(trace, report.solution.as_ref(), &camera);
-        let status = report.status;
-        statuses.push(if several { format!("{name} {status}") } else { status.name().to_owned() });
+        let meta = RowMeta { index: 0, file: String::new(), time_s: None, body: name.to_owned(), altitude_km: None };
+        answers.push(caption::answer(&Row::from_report(&meta, &report, None), None));
     }
     let camera = sensor.camera_of(data);
-    let title = format!("{title}{}", statuses.join(", "));
-    let over = |_| drawing.over(pixels, args.undistorted.then_some(&camera), &title);
+    let provenance = provenance::line(provenance::hash(config).as_deref(), &provenance::command("hzn"));
+    let caption = Caption { text: format!("{title}{file}; {}", answers.join("; ")), ..Caption::default() };
+    let caption = caption.with_scale(config.camera.fx_px).with_provenance(provenance);
+    let over = |_| drawing.over(pixels, args.undistorted.then_some(&camera), &caption);
     let drawing = args.overlay.as_ref().map(over).transpose()?;
     Ok(Explained { exit, drawing })
 }

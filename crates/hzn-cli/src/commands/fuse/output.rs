@@ -14,6 +14,7 @@ use super::args::{Args, names};
 use super::page;
 use crate::exit::{Stop, failed, usage};
 use crate::files;
+use crate::origin::sensors;
 
 /// The files that are written.
 pub(super) struct Outputs<'a> {
@@ -84,7 +85,11 @@ impl<'a> Outputs<'a> {
             sink::write_innovations(fused, create(&self.innovations())?)?;
         }
         if let Some(path) = &args.report {
-            let page = page::html(fused, &self.results.display().to_string())?;
+            let page = page::html(
+                fused,
+                &self.results.display().to_string(),
+                &sensors(args.nadir.iter().map(PathBuf::as_path)),
+            )?;
             disk::write(path, page)?;
         }
         for (camera, file) in &args.write_frames {

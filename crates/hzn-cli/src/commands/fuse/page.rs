@@ -8,7 +8,7 @@ use hzn_plot::{Chart, Series, Style};
 use nalgebra::Vector3;
 
 use super::summary;
-use crate::html::{STYLE, escape, provenance};
+use crate::html::{DARK, STYLE, escape, provenance};
 
 /// Rules of style in addition to those of all reports.
 const MORE_STYLE: &str = ".plots{grid-template-columns:repeat(auto-fit,minmax(520px,1fr));margin:1.5rem 0}\
@@ -17,8 +17,8 @@ const MORE_STYLE: &str = ".plots{grid-template-columns:repeat(auto-fit,minmax(52
 /// Axes of a frame.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Returns the page.
-pub(super) fn html(fused: &Fused, results: &str) -> anyhow::Result<String> {
+/// Returns the page. `sensors` are the hashes of the sensors of the cameras.
+pub(super) fn html(fused: &Fused, results: &str, sensors: &[String]) -> anyhow::Result<String> {
     let row =
         |(name, value): (String, String)| format!("<tr><td>{}</td><td>{}</td></tr>", escape(&name), escape(&value));
     let table: String = summary::lines(fused, None).into_iter().map(row).collect();
@@ -31,10 +31,10 @@ pub(super) fn html(fused: &Fused, results: &str) -> anyhow::Result<String> {
     }
     Ok(format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>hzn fuse</title>\
-         <style>{STYLE}{MORE_STYLE}</style><h1>Attitude and position: {}</h1>{notes}<table>{table}</table>\
+         <style>{STYLE}{MORE_STYLE}{DARK}</style><h1>Attitude and position: {}</h1>{notes}<table>{table}</table>\
          <div class=\"plots\">{plots}</div>{}</html>\n",
         escape(results),
-        provenance()
+        provenance(sensors)
     ))
 }
 

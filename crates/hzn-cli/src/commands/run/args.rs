@@ -6,6 +6,8 @@ use std::sync::Arc;
 use hzn_files::{Frames, Sensor};
 use hzn_run::engine::{Plan, Turns};
 use hzn_run::mask::MaskFolder;
+use hzn_run::overlay::OverlayFolder;
+use hzn_run::provenance;
 use hzn_run::sink::{Existing, Outputs};
 
 use crate::exit::{Stop, usage};
@@ -118,6 +120,10 @@ impl Args {
         let threads = if sensor.config.tracks() { 1 } else { self.jobs.map_or_else(cores, usize::from) };
         let masks = self.mask_pictures.as_deref();
         let masks = masks.map(|folder| MaskFolder::new(folder, &sensor.config, self.mask_margin_deg)).transpose();
+        let overlay = self.overlay.clone().map(|path| {
+            let hash = provenance::hash(&sensor.config);
+            OverlayFolder { path, provenance: provenance::line(hash.as_deref(), &provenance::command("hzn")) }
+        });
         Ok(Plan {
             masks: masks.map_err(usage)?.map(Arc::new),
             config: sensor.config,
@@ -128,7 +134,7 @@ impl Args {
             trace,
             keep_traces: false,
             keep_picture: trace && !self.no_images,
-            overlay: self.overlay.clone(),
+            overlay,
             last: Vec::new(),
             turns: Turns::default(),
         })

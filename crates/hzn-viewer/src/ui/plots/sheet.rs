@@ -1,6 +1,7 @@
 //! The chosen plots, for a file.
 
 use hzn_fuse::sink::Phase;
+use hzn_run::provenance;
 
 use super::axis::polylines;
 use super::navigation;
@@ -34,7 +35,9 @@ pub(in crate::ui) fn sheet(viewer: &Viewer) -> PlotSheet {
     rows.extend(navigation(viewer, &axis));
     let heading = format!("{}, {} pictures; grey: without an answer", viewer.sequence.stem(), count);
     let refused = refused(viewer, &axis).into_iter().map(|(_, ends)| ends).collect();
-    PlotSheet { heading, axis: axis.label(), ends: axis.ends(), refused, rows }
+    let hash = viewer.session.as_ref().and_then(|session| provenance::hash(session.config()?));
+    let provenance = provenance::line(hash.as_deref(), &provenance::command("hzn view"));
+    PlotSheet { heading, axis: axis.label(), ends: axis.ends(), provenance, refused, rows }
 }
 
 /// Returns the chosen plots of the results of `hzn fuse`.

@@ -1,0 +1,224 @@
+//! The caption below a picture: what the picture is and its answer, the legend, a scale, and where it comes from.
+
+use hzn_core::status::Status;
+use hzn_mcap::palette::{AXIS, INLIER, LIMB, REJECTED};
+use hzn_mcap::{Annotations, Row};
+use image::{Rgb, RgbImage};
+
+use super::canvas::Colour;
+use super::colours::{TRUTH, edge_colour};
+use super::letters::{Letters, fill};
+
+const GROUND: Colour = [16, 18, 22];
+const INK: Colour = [236, 238, 242];
+const FAINT: Colour = [160, 166, 176];
+/// Lines of the text at the top of the caption.
+const TEXT_LINES: u32 = 2;
+/// Width of a whole legend with a scale, in heights of a line.
+const LEGEND_WIDTH: u32 = 46;
+/// Size of the letters, and of those of the last line, in heights of a line.
+const LETTER: f32 = 0.74;
+const SMALL: f32 = 0.6;
+
+/// An entry of the legend.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// What is drawn.
+    pub name: String,
+    /// Its colours; candidate edges have several.
+    pub colours: Vec<Colour>,
+}
+
+/// A caption.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Caption {
+    /// Sentence about the picture; it takes up to two lines.
+    pub text: String,
+    /// Entries of the legend.
+    pub legend: Vec<Entry>,
+    /// Length of a bar in pixels, and what it stands for.
+    pub scale: Option<(f64, String)>,
+    /// Version, command and sensor that made the picture.
+    pub provenance: String,
+}
+
+impl Caption {
+    /// Makes the caption of a picture from its name, its time and the results of its bodies, with the legend of what is
+    /// drawn over it.
+    pub fn new(name: &str, time_s: Option<f64>, rows: &[Row], drawing: &Annotations) -> Self {
+        let mut text = name.to_owned();
+        text.extend(time_s.map(|t| format!(", {t:.3} s")));
+        rows.iter().for_each(|row| text += &format!("; {}", answer(row, None)));
+        Self { text, legend: legend(drawing), ..Self::default() }
+    }
+
+    /// Adds the true limb to the legend.
+    #[must_use]
+    pub fn with_truth(mut self) -> Self {
+        self.legend.push(Entry { name: "true limb".into(), colours: vec![TRUTH] });
+        self
+    }
+
+    /// Adds a bar that is as long as 5° near the optical axis of a camera with this focal length.
+    #[must_use]
+    pub fn with_scale(self, fx_px: f64) -> Self {
+        Self { scale: Some((fx_px * 5f64.to_radians().tan(), "5°".to_owned())), ..self }
+    }
+
+    /// Adds the line about version, command and sensor.
+    #[must_use]
+    pub fn with_provenance(self, line: impl Into<String>) -> Self {
+        Self { provenance: line.into(), ..self }
+    }
+}
+
+/// Returns the answer to a picture in words: body, status, reason, 3σ and RMS. `reason` replaces the detail of a
+/// picture without an answer.
+pub fn answer(row: &Row, reason: Option<&str>) -> String {
+    let mut text = format!("{}: {}", row.body, row.status);
+    text.extend(row.sigma_max_deg.map(|s| format!(", 3σ {:.4}°", 3.0 * s)));
+    text.extend(row.rms_px.map(|rms| format!(", RMS {rms:.2} px")));
+    let detail = Some(row.detail.as_str()).filter(|detail| !detail.is_empty());
+    let why = reason.or(detail).filter(|_| row.status != Status::Ok);
+    text.extend(why.map(|why| format!(" ({why})")));
+    text
+}
+
+/// Returns the legend of what is drawn.
+pub fn legend(drawing: &Annotations) -> Vec<Entry> {
+    let edges = drawing.edges.len();
+    let several = (0..edges.min(6)).map(edge_colour).collect();
+    let entry = |name: &str, count: usize, colours: Vec<Colour>| {
+        let counted = if count > 0 { format!("{name} {count}") } else { name.to_owned() };
+        Entry { name: counted, colours }
+    };
+    let entries = [
+        (edges > 0, entry("edges", edges, several)),
+        (!drawing.inliers.is_empty(), entry("inliers", drawing.inliers.len(), vec![INLIER])),
+        (!drawing.rejected.is_empty(), entry("outliers", drawing.rejected.len(), vec![REJECTED])),
+        (!drawing.limb.is_empty(), entry("fitted limb", 0, vec![LIMB])),
+        (!drawing.axes.is_empty(), entry("axis", 0, vec![AXIS])),
+    ];
+    entries.into_iter().filter(|(there, _)| *there).map(|(_, entry)| entry).collect()
+}
+
+/// Returns the height of a line in pixels for a picture of this size.
+fn line_px(width: u32, height: u32) -> u32 {
+    (width.max(height) / 48).clamp(15, 96)
+}
+
+/// Returns the number of lines of the legend: a narrow picture needs several.
+fn legend_lines(width: u32, line: u32) -> u32 {
+    (LEGEND_WIDTH * line).div_ceil(width.max(1)).clamp(1, 4)
+}
+
+/// Returns the height that a caption adds to a picture, in pixels. It does not depend on the text, so that all pictures
+/// of a video have one size.
+pub fn height_px(width: u32, height: u32) -> u32 {
+    let line = line_px(width, height);
+    (TEXT_LINES + legend_lines(width, line) + 1) * line + line / 4
+}
+
+/// Returns the picture with a caption below it.
+pub fn add(letters: &Letters, picture: &RgbImage, caption: &Caption) -> RgbImage {
+    let (w, h) = picture.dimensions();
+    let line = line_px(w, h);
+    let mut out = RgbImage::from_pixel(w, h + height_px(w, h), Rgb(GROUND));
+    image::imageops::replace(&mut out, picture, 0, 0);
+    let left = line / 3;
+    let room = w.saturating_sub(2 * left) as f32;
+    let [size, small] = [LETTER, SMALL].map(|part| part * line as f32);
+    let mut y = h + line / 4;
+    for text in letters.wrap(&caption.text, size, room, TEXT_LINES as usize) {
+        letters.write(&mut out, [left as f32, y as f32], &text, size, INK);
+        y += line;
+    }
+    let top = h + line / 4 + TEXT_LINES * line;
+    add_legend(letters, &mut out, caption, [left, top], line);
+    let last = (top + legend_lines(w, line) * line) as f32;
+    for text in letters.wrap(&caption.provenance, small, room, 1) {
+        letters.write(&mut out, [left as f32, last], &text, small, FAINT);
+    }
+    out
+}
+
+/// Writes legend and scale, in as many lines as the height of the caption has for them.
+fn add_legend(letters: &Letters, out: &mut RgbImage, caption: &Caption, [left, top]: [u32; 2], line: u32) {
+    let (w, size) = (out.width(), LETTER * line as f32);
+    let last = top + (legend_lines(w, line) - 1) * line;
+    let [mut x, mut y] = [left, top];
+    // Goes to the next line if an entry does not fit into this one.
+    let mut place = |width: u32| -> Option<[u32; 2]> {
+        if x > left && x + width > w {
+            (x, y) = (left, y + line);
+        }
+        let at = [x, y];
+        x += width + line;
+        (y <= last).then_some(at)
+    };
+    let width_px = |text: &str| letters.measure(text, size)[0].ceil() as u32;
+    for Entry { name, colours } in &caption.legend {
+        let part = (line / 2 / (colours.len().max(1) as u32)).max(line / 6).max(1);
+        let boxes = part * colours.len() as u32;
+        let Some([x, y]) = place(boxes + line / 5 + width_px(name)) else { return };
+        for (n, colour) in (0..).zip(colours) {
+            fill(out, [x + n * part, y + line / 4], [part, line / 2], *colour);
+        }
+        let ink = if let [one] = colours.as_slice() { *one } else { INK };
+        letters.write(out, [(x + boxes + line / 5) as f32, y as f32], name, size, ink);
+    }
+    if let Some((length, what)) = &caption.scale {
+        let length = (length.round() as u32).min(w / 4);
+        let Some([x, y]) = place(length + line / 4 + width_px(what)) else { return };
+        fill(out, [x, y + line / 2], [length, (line / 10).max(2)], INK);
+        letters.write(out, [(x + length + line / 4) as f32, y as f32], what, size, INK);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn caption() -> Caption {
+        Caption {
+            text: "flight/0001.png, 12.500 s: rejected, half-angle".into(),
+            legend: vec![Entry { name: "fitted limb".into(), colours: vec![LIMB] }],
+            scale: Some((87.0, "5°".into())),
+            provenance: "sensor 0123456789ab, hzn 0.1.0, hzn run flight".into(),
+        }
+    }
+
+    #[test]
+    fn letters_and_legend_are_below_the_picture() {
+        let picture = RgbImage::from_pixel(640, 480, Rgb([7, 7, 7]));
+        let out = add(&Letters::default(), &picture, &caption());
+        assert_eq!(out.dimensions(), (640, 480 + height_px(640, 480)));
+        assert!((0..480).all(|y| (0..640).all(|x| out.get_pixel(x, y).0 == [7, 7, 7])), "the picture stays");
+        let below = |test: fn(&Rgb<u8>) -> bool| out.rows().skip(480).flatten().filter(|p| test(p)).count();
+        assert!(below(|p| p.0[0] > 150 && p.0[2] > 150) > 200, "letters");
+        assert!(below(|p| p.0 == LIMB) > 30, "legend");
+        assert!(below(|p| p.0[0] > 60 && p.0[0] < 180) > 100, "the letters have smooth edges");
+        let without = Caption { provenance: String::new(), ..caption() };
+        assert_ne!(out, add(&Letters::default(), &picture, &without), "the last line is written");
+    }
+
+    #[test]
+    fn a_caption_of_a_tiny_picture_stays_within_it() {
+        let tiny = RgbImage::new(30, 20);
+        assert_eq!(add(&Letters::default(), &tiny, &caption()).width(), 30);
+    }
+
+    #[test]
+    fn a_narrow_picture_has_its_whole_legend() {
+        let names = ["edges 22", "inliers 512", "outliers 40", "fitted limb", "axis", "true limb"];
+        let colours = |n: usize| vec![[10 + n as u8, 200, 255]];
+        let legend = names.iter().enumerate().map(|(n, name)| Entry { name: (*name).into(), colours: colours(n) });
+        let caption = Caption { legend: legend.collect(), ..caption() };
+        for width in [240, 320, 640] {
+            let out = add(&Letters::default(), &RgbImage::new(width, 240), &caption);
+            for n in 0..names.len() {
+                assert!(out.pixels().any(|p| p.0 == colours(n)[0]), "{width}: {}", names[n]);
+            }
+        }
+    }
+}
