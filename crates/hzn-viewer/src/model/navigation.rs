@@ -165,7 +165,13 @@ impl Navigation {
         if self.cameras.is_empty() {
             return from <= last + step && *first <= to + step;
         }
-        let room = (SAME_TIME * step).max(LEAST_ROOM_S);
+        // Pictures that are far apart must not take the times of a camera that takes many meanwhile.
+        let mut own = self.camera_times_s.clone();
+        own.sort_by(f64::total_cmp);
+        own.dedup();
+        let own_step = own.last().zip(own.first()).filter(|_| own.len() > 1);
+        let own_step = own_step.map_or(step, |(last, first)| (last - first) / (own.len() - 1) as f64);
+        let room = (SAME_TIME * step.min(own_step)).max(LEAST_ROOM_S);
         let during = || self.camera_times_s.iter().filter(|t| (first - room..=last + room).contains(*t));
         let is_at_a_picture = |t: &&f64| {
             let after = sorted.partition_point(|x| x < *t);
@@ -235,6 +241,8 @@ mod tests {
         assert!(nav.is_of("flight", &[60.5, 70.0, 80.0, 90.0]) && nav.is_of("left", &[7.0]));
         // The ends are the same, and the pictures between them are others.
         assert!(!nav.is_of("flight", &[60.0, 67.5, 75.0, 82.5, 90.0]));
+        // The cameras took several pictures about the time of the first of these.
+        assert!(!nav.is_of("flight", &[60.0, 5060.0, 10060.0]));
         assert!(!nav.is_of("flight", &[560.0, 570.0]) && !nav.is_of("flight", &[]));
         let without = Navigation::new(Path::new("nav.csv"), &Solution { innovations: Vec::new(), ..solution(&[5.0]) });
         assert!(without.is_of("flight", &[4.0, 6.0]) && !without.is_of("flight", &[40.0, 41.0]));

@@ -33,6 +33,11 @@ pub const QUANTITIES: &[Quantity] = &[
     always("Axis", "", &[("x", |r, _| r.axis_x), ("y", |r, _| r.axis_y), ("z", |r, _| r.axis_z)]),
     always("3 sigma", "°", &[("3σ", |r, _| Some(3.0 * r.sigma_max_deg?))]),
     optional("Error (truth)", "°", &[("error", error_deg), ("3σ", |r, t| t.and(Some(3.0 * r.sigma_max_deg?)))]),
+    optional(
+        "Error over σ (truth)",
+        "",
+        &[("error/σ", error_sigmas), ("3σ", |r, t| error_sigmas(r, t).and(Some(3.0)))],
+    ),
     always("RMS", "px", &[("rms", |r, _| r.rms_px)]),
     optional("Probability of the limb", "", &[("p", |r, _| r.p_limb)]),
     optional(
@@ -47,6 +52,15 @@ pub const QUANTITIES: &[Quantity] = &[
     ),
     always("Half-angle", "°", &[("fitted", |r, _| r.half_angle_deg)]),
     always("Altitude", "km", &[("estimated", |r, _| r.altitude_est_km), ("given", |r, _| r.altitude_km)]),
+    optional(
+        "Fit − expected over σ",
+        "",
+        &[
+            ("altitude", altitude_sigmas),
+            ("+3σ", |r, t| altitude_sigmas(r, t).and(Some(3.0))),
+            ("−3σ", |r, t| altitude_sigmas(r, t).and(Some(-3.0))),
+        ],
+    ),
     optional(
         "Position",
         "km",
@@ -75,6 +89,13 @@ pub const QUANTITIES: &[Quantity] = &[
     always("Roll, pitch", "°", &[("roll", |r, _| r.roll_deg), ("pitch", |r, _| r.pitch_deg)]),
     always("Processing", "µs", &[("processing", |r, _| r.elapsed_us)]),
 ];
+
+/// Returns by how many sigmas the altitude from the free half-angle differs from the given one. The half-angle depends
+/// on the altitude alone, so its difference from the expected one counts as many sigmas.
+fn altitude_sigmas(row: &Row, _: Option<&Truth>) -> Option<f64> {
+    let sigma_km = row.altitude_est_sigma_km.filter(|sigma| *sigma > 0.0)?;
+    Some((row.altitude_est_km? - row.altitude_km?) / sigma_km)
+}
 
 /// Returns the distance to the centre of the body, from a result with a position.
 fn range_km(row: &Row, _: Option<&Truth>) -> Option<f64> {
@@ -169,6 +190,21 @@ mod tests {
         let e = 0.004f64;
         assert!((sigmas_from(&row, [0.0, e.sin(), e.cos()]).unwrap() - 4.0).abs() < 1e-6);
         assert!((sigmas_from(&row, [e.sin(), 0.0, e.cos()]).unwrap() - 0.4).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_free_fit_counts_in_its_own_sigma() {
+        let meta = hzn_mcap::RowMeta {
+            index: 0,
+            file: "a".into(),
+            time_s: None,
+            body: "earth".into(),
+            altitude_km: Some(240.0),
+        };
+        let mut row = Row::unprocessed(&meta, hzn_core::status::Status::Ok, "");
+        assert_eq!(altitude_sigmas(&row, None), None);
+        (row.altitude_est_km, row.altitude_est_sigma_km) = (Some(228.0), Some(4.0));
+        assert_eq!(altitude_sigmas(&row, None), Some(-3.0));
     }
 
     #[test]

@@ -157,6 +157,8 @@ pub struct Settings {
     pub plots: bool,
     /// Names of the quantities that are plotted.
     pub plotted: Vec<String>,
+    /// Quantities whose values are all above zero are plotted on a logarithmic scale.
+    pub log_plots: bool,
     /// Files and folders that were opened last, the newest first.
     pub recent: Vec<PathBuf>,
     /// Width and height of the window, in points.
@@ -192,6 +194,7 @@ impl Default for Settings {
             stages: true,
             plots: true,
             plotted: ["3 sigma", "RMS"].map(str::to_owned).to_vec(),
+            log_plots: false,
             recent: Vec::new(),
             window: [1440.0, 900.0],
             side_width: 208.0,

@@ -68,6 +68,24 @@ pub(super) fn escape(ctx: &egui::Context) -> bool {
     !is_covered && !ctx.text_edit_focused() && ctx.input(|i| i.key_pressed(Key::Escape))
 }
 
+/// Draws changed lines below the headings of their sections; they scroll if they are higher than `height`.
+pub(super) fn changed_lines(ui: &mut egui::Ui, sections: &[(String, Vec<String>)], height: f32) {
+    if sections.is_empty() {
+        ui.label("Nothing has changed.");
+    }
+    let dark = ui.visuals().dark_mode;
+    egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
+        for (section, lines) in sections {
+            ui.strong(if section.is_empty() { "top of the file" } else { section });
+            for line in lines {
+                let colour = theme::diff(line.starts_with('+'), dark);
+                ui.add(egui::Label::new(RichText::new(line).monospace().color(colour)).wrap());
+            }
+            ui.add_space(4.0);
+        }
+    });
+}
+
 /// Shows the differences from the saved file, below the headings of their sections.
 fn diff(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect) {
     if !viewer.showing_diff {
@@ -78,20 +96,7 @@ fn diff(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect) {
     let mut open = true;
     let window = egui::Window::new("Unsaved changes").open(&mut open).default_pos(placement::beside(picture));
     window.default_width(520.0_f32.min(picture.width() - 40.0)).show(ctx, |ui| {
-        if sections.is_empty() {
-            ui.label("Nothing has changed.");
-        }
-        let dark = ui.visuals().dark_mode;
-        egui::ScrollArea::vertical().max_height(400.0).show(ui, |ui| {
-            for (section, lines) in &sections {
-                ui.strong(if section.is_empty() { "top of the file" } else { section });
-                for line in lines {
-                    let colour = theme::diff(line.starts_with('+'), dark);
-                    ui.add(egui::Label::new(RichText::new(line).monospace().color(colour)).wrap());
-                }
-                ui.add_space(4.0);
-            }
-        });
+        changed_lines(ui, &sections, 400.0);
     });
     viewer.showing_diff = open && !escape(ctx);
 }

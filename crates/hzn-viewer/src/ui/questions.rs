@@ -4,10 +4,11 @@ use std::path::Path;
 
 use egui::{Id, Modal, RichText, Ui};
 
+use super::dialogs::changed_lines;
 use super::path_dialog::Purpose;
 use super::viewer::{Leave, Viewer, replaced};
-use crate::model::FileChange;
 use crate::model::autosave::absolute;
+use crate::model::{FileChange, Session};
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     if let Some(leave) = &viewer.changes.question {
@@ -58,6 +59,7 @@ fn changed_file(viewer: &mut Viewer, ctx: &egui::Context, change: FileChange) {
     let home = viewer.session.as_ref().map(|s| absolute(s.home())).unwrap_or_default();
     let exists = change == FileChange::Changed;
     let (mut reload, mut overwrite, mut cancel) = (false, false, false);
+    let sections = viewer.session.as_ref().filter(|_| viewer.changes.shows_difference).map(Session::differs_from_file);
     let shown = Modal::new(Id::unique("changed file")).show(ctx, |ui| {
         ui.set_max_width(460.0);
         ui.heading(if exists { "The file has changed" } else { "The file was removed" });
@@ -68,6 +70,15 @@ fn changed_file(viewer: &mut Viewer, ctx: &egui::Context, change: FileChange) {
         if exists {
             ui.label("“Reload” shows the text of the file; undo brings the text of this window back.");
             ui.label("“Overwrite” writes the text of this window; the text of the file is lost.");
+            ui.toggle_value(&mut viewer.changes.shows_difference, "Show the difference");
+            match &sections {
+                Some(Ok(sections)) => {
+                    ui.weak("“−” is the file, “+” is this window:");
+                    changed_lines(ui, sections, 240.0);
+                }
+                Some(Err(why)) => drop(ui.label(why.to_string())),
+                None => {}
+            }
         }
         ui.add_space(8.0);
         ui.horizontal(|ui| {

@@ -1,9 +1,10 @@
 //! Draws the form for a first sensor.toml.
 
 use egui::{DragValue, Id, Modal, Ui};
+use hzn_files::start::Body;
 
 use super::viewer::Viewer;
-use super::wizard_form::Wizard;
+use super::wizard_form::{Wizard, sigmas};
 use super::{number, theme};
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
@@ -17,8 +18,12 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
         ui.add_space(6.0);
         questions(ui, &mut wizard);
         ui.add_space(6.0);
-        if let Err(why) = &outcome {
-            ui.colored_label(theme::warning(ui.visuals().dark_mode), why);
+        match &outcome {
+            Ok((text, _)) => {
+                let what = "The sensor.toml has these sigmas of what is not known:";
+                ui.label(format!("{what} {}.", sigmas(text).join(", ")));
+            }
+            Err(why) => drop(ui.colored_label(theme::warning(ui.visuals().dark_mode), why)),
         }
         ui.horizontal(|ui| {
             make = ui.add_enabled(outcome.is_ok(), egui::Button::new("Make sensor.toml")).clicked();
@@ -58,6 +63,13 @@ fn questions(ui: &mut Ui, wizard: &mut Wizard) {
             number::drag(ui, drag).labelled_by(label.id);
             ui.end_row();
         }
+        ui.label("body");
+        egui::ComboBox::from_id_salt("body").selected_text(wizard.body.name()).show_ui(ui, |ui| {
+            for body in Body::all() {
+                ui.selectable_value(&mut wizard.body, body, body.name());
+            }
+        });
+        ui.end_row();
         ui.label("altitude");
         ui.horizontal(|ui| {
             ui.selectable_value(&mut wizard.one_altitude, true, "one for all pictures");

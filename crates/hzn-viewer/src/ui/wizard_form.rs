@@ -1,7 +1,7 @@
 //! The form that makes a first sensor.toml from the pictures, a field of view and an altitude.
 
 use hzn_core::camera::Model;
-use hzn_files::start::{self, CameraFacts, Exif};
+use hzn_files::start::{self, Body, CameraFacts, Exif};
 
 /// The answers of the user, and what the picture itself says.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +17,7 @@ pub(super) struct Wizard {
     /// All pictures have one altitude; otherwise frames.csv has them.
     pub(super) one_altitude: bool,
     pub(super) altitude_km: f64,
+    pub(super) body: Body,
 }
 
 impl Wizard {
@@ -32,6 +33,7 @@ impl Wizard {
             has_altitudes,
             one_altitude: !has_altitudes,
             altitude_km: 400.0,
+            body: Body::default(),
         }
     }
 
@@ -45,11 +47,19 @@ impl Wizard {
             lens: Some(if self.fisheye { Model::Equidistant } else { Model::Pinhole }),
             exif: self.exif.clone(),
             altitude_km: self.one_altitude.then_some(self.altitude_km),
+            body: self.body,
             ..CameraFacts::of_size(self.size_px)
         };
         let start = start::write_sensor_toml(&facts).map_err(|e| e.to_string())?;
         Ok((start.text, start.warnings))
     }
+}
+
+/// Returns the sigmas that a text of a sensor.toml has: each line without its comment.
+pub(super) fn sigmas(text: &str) -> Vec<&str> {
+    let key = |line: &str| line.split('=').next().unwrap_or_default().trim().to_owned();
+    let is_sigma = |line: &&str| !line.trim_start().starts_with('#') && key(line).contains("sigma");
+    text.lines().filter(is_sigma).map(|line| line.split('#').next().unwrap_or(line).trim()).collect()
 }
 
 #[cfg(test)]
@@ -69,6 +79,12 @@ mod tests {
         let config = session.config().unwrap();
         assert!((config.camera.fx_px - 320.0).abs() < 0.5, "half of the width is at 45 degrees");
         assert_eq!(config.body.altitude_km, Some(400.0));
+        let written = sigmas(&text);
+        assert!(written.iter().any(|line| line.starts_with("focal_sigma_percent")), "{written:?} {text}");
+        wizard.body = Body::from_name("mars").unwrap();
+        let (on_mars, _) = wizard.write().unwrap();
+        let session = Session::new(&on_mars, Path::new("sensor.toml"), None);
+        assert_eq!(session.config().unwrap().body.kind.name(), "mars");
         wizard.fov_deg = 200.0;
         assert!(wizard.write().unwrap_err().contains("200"));
         let exif = Exif { focal_mm: Some(24.0), focal_35mm_mm: Some(24.0), ..Exif::default() };

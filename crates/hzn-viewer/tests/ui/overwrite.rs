@@ -164,6 +164,15 @@ fn a_file_that_another_program_changed_is_reloaded_or_overwritten_as_the_user_sa
     assert_eq!((on_disk(), text(&window)), (theirs.clone(), ours.clone()));
     assert!(!asks(&window));
 
+    // The difference shows the line of the file and that of the window.
+    save(&mut window);
+    assert!(!shows(&window, "altitude_km = 300.0"));
+    click(&mut window, "Show the difference");
+    window.run_steps(3);
+    let lines = ["altitude_km = 300.0", "altitude_km = 240.0"];
+    assert!(lines.iter().all(|line| window.query_by_label_contains(line).is_some()));
+    click(&mut window, "Cancel");
+
     // The window takes the text of the file, and undo brings its own back.
     save(&mut window);
     click(&mut window, "Reload");
@@ -189,6 +198,26 @@ fn a_file_that_another_program_changed_is_reloaded_or_overwritten_as_the_user_sa
     std::fs::write(&file, text(&window)).unwrap();
     save(&mut window);
     assert!(!asks(&window) && !window.state().session().unwrap().is_changed());
+}
+
+#[test]
+fn a_window_without_changes_takes_the_changed_file_when_the_user_comes_back() {
+    let (dir, mut window) = window_on_flight();
+    let file = dir.path().join("sensor.toml");
+    let theirs = SENSOR.replace("altitude_km = 240.0", "altitude_km = 300.0");
+    std::fs::write(&file, &theirs).unwrap();
+    window.event(egui::Event::WindowFocused(true));
+    settled(&mut window);
+    assert_eq!(text(&window), theirs);
+    assert!(!window.state().session().unwrap().is_changed());
+
+    // Changes of the window stay, whatever happens to the file.
+    scale_to(&mut window, 1.5);
+    let ours = text(&window);
+    std::fs::write(&file, SENSOR).unwrap();
+    window.event(egui::Event::WindowFocused(true));
+    settled(&mut window);
+    assert_eq!(text(&window), ours);
 }
 
 #[test]

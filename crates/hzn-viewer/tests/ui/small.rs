@@ -188,6 +188,21 @@ fn the_time_line_and_the_plots_have_one_axis() {
 }
 
 #[test]
+fn plots_of_positive_values_have_a_logarithmic_scale() {
+    let (_dir, pictures) = folder();
+    let mut window = window_on(&pictures);
+    until(&mut window, "not processed", |v| v.processed() == 4 && !v.is_working());
+    window.state_mut().settings_mut().plotted = vec!["3 sigma".to_owned()];
+    window.run_steps(3);
+    assert!(shows(&window, "3 sigma [°]") && !shows(&window, ", log"));
+    for is_log in [true, false] {
+        window.get_by_label("log").click();
+        window.run_steps(3);
+        assert_eq!(shows(&window, "3 sigma [°], log"), is_log);
+    }
+}
+
+#[test]
 fn a_comparison_names_its_keys_and_ends_with_its_pictures() {
     let (dir, pictures) = folder();
     std::fs::write(pictures.join("sensor.toml"), SENSOR.replace("altitude_km = 240.0", "altitude_km = 900.0")).unwrap();

@@ -316,6 +316,15 @@ impl Session {
         }
     }
 
+    /// Returns the lines in which the text of the session differs from that of its file, by section.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn differs_from_file(&self) -> Result<Vec<(String, Vec<String>)>, Problem> {
+        let text = read_file(self.path.as_deref().unwrap_or(&self.home))?;
+        Ok(self.sheet.diff_by_section(&Sheet::new(text)))
+    }
+
     /// Reads the file again, as one step, so that undo brings the text of the window back.
     ///
     /// # Errors

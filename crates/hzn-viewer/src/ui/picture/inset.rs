@@ -13,6 +13,8 @@ use crate::work::frame_view::{BodyResult, Outcome};
 /// Largest width of the map in points, and its largest part of the picture.
 const SIZE: f32 = 170.0;
 const PART: f32 = 0.28;
+/// Width of a map in points that has room for the long text below it.
+const LONG_TEXT: f32 = 150.0;
 /// Points on a side of the picture's border, and around the limb.
 const SIDE: usize = 24;
 const AROUND: usize = 120;
@@ -48,12 +50,8 @@ pub(super) fn draw(viewer: &Viewer, painter: &Painter, frame_view: &FrameView, o
         painter.text(at, align, text, FontId::proportional(10.5), colour);
     };
     let foot = map.frame.center_bottom() - vec2(0.0, 4.0);
-    text(
-        foot,
-        Align2::CENTER_BOTTOM,
-        &format!("{:.0}° around the optical axis", map.most_deg),
-        Color32::from_gray(190),
-    );
+    let what = if map.frame.width() < LONG_TEXT { "off axis" } else { "around the optical axis" };
+    text(foot, Align2::CENTER_BOTTOM, &format!("{:.0}° {what}", map.most_deg), Color32::from_gray(190));
 }
 
 struct Map {

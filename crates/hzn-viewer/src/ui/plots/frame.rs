@@ -48,12 +48,22 @@ pub(in crate::ui) fn shared_plot<'a>(id: impl egui::AsIdSalt, height: f32) -> Pl
         .y_grid_spacer(move |input| {
             ticks(input, if height < 90.0 { 3.0 } else { 4.0 }, f64::from(height / LABEL_HEIGHT))
         })
-        .custom_y_axes(vec![
-            AxisHints::new_y()
-                .formatter(|mark, _| tick_label(mark.value, mark.step_size))
-                .min_thickness(LABELS_WIDTH)
-                .tick_label_font(FontId::proportional(LABEL_SIZE))
-                // A low plot has labels, too.
-                .label_spacing(Rangef::new(7.0, 10.0)),
-        ])
+        .custom_y_axes(vec![value_axis(false)])
+}
+
+/// Returns the axis of the values. On a logarithmic one the plot has the logarithms to the base of 10, and the labels
+/// have the values.
+pub(super) fn value_axis(is_log: bool) -> AxisHints<'static> {
+    AxisHints::new_y()
+        .formatter(move |mark, _| {
+            if !is_log {
+                return tick_label(mark.value, mark.step_size);
+            }
+            let value = 10f64.powf(mark.value);
+            tick_label(value, 0.5 * value * mark.step_size)
+        })
+        .min_thickness(LABELS_WIDTH)
+        .tick_label_font(FontId::proportional(LABEL_SIZE))
+        // A low plot has labels, too.
+        .label_spacing(Rangef::new(7.0, 10.0))
 }

@@ -117,6 +117,9 @@ fn quantity_choice(viewer: &mut Viewer, ui: &mut Ui, offered: &[&str]) {
                 }
             }
         }
+        let hint = "Logarithmic scale, of quantities whose values are all above zero";
+        ui.separator();
+        ui.toggle_value(&mut viewer.settings.log_plots, RichText::new("log").size(12.5)).on_hover_text(hint);
         // The time line below shows the times of the frames as they are.
         if viewer.sequence.entries.iter().find_map(|e| e.time_s).is_some_and(|start| start != 0.0) {
             ui.weak(RichText::new("· time since the first picture").size(12.0));

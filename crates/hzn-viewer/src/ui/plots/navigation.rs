@@ -47,7 +47,7 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &NavQuantity, axis: &
     let at = viewer.hovered_frame.unwrap_or(viewer.playback.frame());
     heading(ui, &title, &legend, &values_text(viewer, nav, quantity, at));
     let values_of = |i: usize| values_text(viewer, nav, quantity, i);
-    frame_plot(viewer, ui, quantity.name, axis, range, height, &values_of, |ui, column| {
+    frame_plot(viewer, ui, quantity.name, axis, range, false, height, &values_of, |ui, column| {
         for (phase, style) in
             [(Phase::Back, Style::Faint), (Phase::Smoothed, Style::Dashed), (Phase::Filter, Style::Plain)]
         {
@@ -115,7 +115,7 @@ pub(super) fn innovations(viewer: &Viewer, ui: &mut Ui, axis: &TimeAxis, height:
     let inside = nav.innovations.iter().flat_map(|s| &s.components);
     let inside = inside.filter(|c| axis.place_of_time(c.time_s).is_some()).map(|c| c.sigmas.abs());
     let most = inside.fold(4.0, f64::max).min(MOST_SIGMAS) * 1.05;
-    frame_plot(viewer, ui, INNOVATIONS, axis, [-most, most], height, &|_| String::new(), |ui, column| {
+    frame_plot(viewer, ui, INNOVATIONS, axis, [-most, most], false, height, &|_| String::new(), |ui, column| {
         for y in [-3.0, 3.0] {
             ui.hline(HLine::new("3σ", y).color(theme::REJECTED.gamma_multiply(0.6)).allow_hover(false));
         }

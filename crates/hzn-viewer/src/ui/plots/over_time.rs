@@ -6,7 +6,7 @@ use hzn_core::status::Status;
 use hzn_mcap::Row;
 
 use super::axis::{axis_labels, polylines, robust_range, tick_label, unwrap_deg, widen};
-use super::frame::{heading, set_label, shared_plot};
+use super::frame::{heading, set_label, shared_plot, value_axis};
 use crate::model::quantity::{Quantity, RowValue};
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
@@ -149,10 +149,15 @@ pub(super) type Pointed = Option<(usize, bool)>;
 pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, axis: &TimeAxis, height: f32) -> Pointed {
     let dark = ui.visuals().dark_mode;
     let count = viewer.sequence.len();
-    let [earlier, other, current] = [Source::Earlier, Source::Other, Source::Current]
+    let mut sources = [Source::Earlier, Source::Other, Source::Current]
         .map(|source| quantity.lines.iter().map(|(_, of)| series(viewer, quantity, *of, source)).collect::<Vec<_>>());
+    let is_log = viewer.settings.log_plots && sources.iter().flatten().flatten().flatten().all(|x| *x > 0.0);
+    if is_log {
+        sources.iter_mut().flatten().flatten().flatten().for_each(|x| *x = x.log10());
+    }
+    let [earlier, other, current] = sources;
     let range = |lines: &[Vec<Option<f64>>]| robust_range(lines.iter().flatten().copied().flatten());
-    let title = title(quantity);
+    let title = title(quantity) + if is_log { ", log" } else { "" };
     let ranges = [range(&current), range(&earlier), range(&other)];
     let Some([low, high]) = ranges.into_iter().flatten().reduce(widen) else {
         heading(ui, &title, &[], "");
@@ -166,7 +171,7 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, axis: &Tim
     let at = viewer.hovered_frame.unwrap_or(viewer.playback.frame());
     let legend = legend(quantity, ranges[1].is_some(), ranges[2].is_some(), dark);
     heading(ui, &title, &legend, &values_of(at));
-    frame_plot(viewer, ui, quantity.name, axis, [low, high], height, &values_of, |ui, column| {
+    frame_plot(viewer, ui, quantity.name, axis, [low, high], is_log, height, &values_of, |ui, column| {
         let sources = [(&earlier, Style::Faint), (&other, Style::Dashed), (&current, Style::Plain)];
         for (lines, style) in sources {
             for (n, ((name, _), values)) in quantity.lines.iter().zip(lines).enumerate() {
@@ -213,6 +218,7 @@ pub(super) fn frame_plot(
     name: &str,
     axis: &TimeAxis,
     [low, high]: [f64; 2],
+    is_log: bool,
     height: f32,
     values_of: &dyn Fn(usize) -> String,
     contents: impl FnOnce(&mut PlotUi<'_>, f64),
@@ -220,6 +226,7 @@ pub(super) fn frame_plot(
     let dark = ui.visuals().dark_mode;
     let plot = with_axis(shared_plot(("plot", name), height), axis)
         .show_axes([false, true])
+        .custom_y_axes(vec![value_axis(is_log)])
         .include_y(low)
         .include_y(high)
         .allow_boxed_zoom(true)

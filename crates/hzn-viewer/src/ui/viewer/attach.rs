@@ -80,9 +80,11 @@ impl Viewer {
             return self.take_navigation(navigation);
         }
         let (file, folder, cameras) = (&navigation.file, navigation.folder.display(), of_cameras(&navigation));
+        // A name without a folder is that of a file in the folder in which the window was started.
+        let place = if navigation.folder.as_os_str().is_empty() { String::new() } else { format!(" in {folder}") };
         let span = navigation.span_s().map(|[from, to]| format!(", {from:.1} to {to:.1} s")).unwrap_or_default();
         self.add_note(format!(
-            "{file} in {folder}{cameras}{span} is of other pictures than these and is not shown. To see it, open it \
+            "{file}{place}{cameras}{span} is of other pictures than these and is not shown. To see it, open it \
              (File, Open file…)."
         ));
     }

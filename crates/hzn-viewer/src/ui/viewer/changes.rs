@@ -26,6 +26,8 @@ pub(in crate::ui) struct Changes {
     pub(in crate::ui) after_save: Option<Leave>,
     /// Another program changed the file that is to be saved, and the user is asked what to do.
     pub(in crate::ui) of_file: Option<FileChange>,
+    /// The question about this file also shows how its text differs.
+    pub(in crate::ui) shows_difference: bool,
     /// The window may close: there is nothing to lose, or the user answered.
     pub(in crate::ui) may_close: bool,
     /// A session of a window that ended with changes, and its file.

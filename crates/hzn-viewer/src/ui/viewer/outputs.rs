@@ -36,7 +36,7 @@ impl Viewer {
 
     /// Takes the answer "Overwrite" to the question about a file that another program changed.
     pub(in crate::ui) fn overwrite_file(&mut self) {
-        self.changes.of_file = None;
+        (self.changes.of_file, self.changes.shows_difference) = (None, false);
         if let Some(path) = self.session.as_ref().and_then(|s| s.path()).map(Path::to_owned) {
             self.save_to(&path);
         }
@@ -57,7 +57,17 @@ impl Viewer {
 
     /// Takes the answer "Cancel" to the same question. What waited for the saved file does not happen.
     pub(in crate::ui) fn cancel_save(&mut self) {
-        (self.changes.of_file, self.changes.after_save) = (None, None);
+        (self.changes.of_file, self.changes.after_save, self.changes.shows_difference) = (None, None, false);
+    }
+
+    /// Reads a sensor.toml again that another program changed while the window has no changes of its own, when the user
+    /// comes back to the window.
+    pub(super) fn reload_unchanged(&mut self, ctx: &egui::Context) {
+        let comes_back = ctx.input(|i| i.events.contains(&egui::Event::WindowFocused(true)));
+        let session = self.session.as_ref().filter(|session| comes_back && !session.is_changed());
+        if !self.changes.is_asking() && session.is_some_and(|s| s.file_change() == Some(FileChange::Changed)) {
+            self.reload_file();
+        }
     }
 
     /// Takes the answer of the system's dialog for paths.

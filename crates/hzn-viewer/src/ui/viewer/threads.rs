@@ -51,6 +51,7 @@ impl Viewer {
         self.poll_companions();
         self.take_finished_jobs();
         self.poll_path_dialog();
+        self.reload_unchanged(ctx);
     }
 
     /// Waits a short time for the answer to the last request, after the panels were drawn. A slow answer comes with a
