@@ -12,6 +12,7 @@
 //!                        types of Python
 //! cargo xtask first-command
 //!                        measures what the README's first command costs on a clean clone
+//! cargo xtask pictures   makes the documents' pictures with overlays
 //! cargo xtask site       builds the site and checks its links; the page in the browser is part of it
 //! cargo xtask viewer     makes the picture of the viewer's window in the documents, or pictures of all situations
 //! ```
@@ -31,6 +32,7 @@ mod machine;
 mod miri;
 mod page;
 mod parts;
+mod pictures;
 mod processors;
 mod python;
 mod reproduce;
@@ -46,7 +48,7 @@ mod wheel;
 use std::process::ExitCode;
 
 const USAGE: &str =
-    "usage: cargo xtask <test|bench|reproduce|campaign|dist|firmware|first-command|keys|page|site|viewer> [OPTION]...
+    "usage: cargo xtask <test|bench|reproduce|campaign|dist|firmware|first-command|keys|page|pictures|site|viewer> [OPTION]...
 
   test [--all] [STEP]...
                      runs the steps of every check, or all steps whose name contains one of the words; --all runs the
@@ -75,6 +77,8 @@ const USAGE: &str =
   keys               writes the tables of book/reference/sensor-toml.md, the template, the JSON schema and the
                      Python types (hzn.keys) from the keys in hzn-core
   page               builds the page with the sensor in the browser into target/xtask/page
+  pictures           makes the documents' pictures with overlays again: those of the gallery, the photograph on the
+                     first page, and the map of a lens; needs ffmpeg
   site               builds the site (the book, its notebooks, and that page) into target/xtask/site, and checks its
                      links and its search
   viewer             makes book/images/viewer.png again; needs `cargo xtask test demo` first
@@ -97,6 +101,7 @@ fn main() -> ExitCode {
         "site" => build_site(),
         "first-command" => first_command::run(),
         "keys" => write_keys(),
+        "pictures" => pictures::run(),
         "viewer" => viewer::run(rest),
         "help" | "-h" | "--help" => {
             println!("{USAGE}");

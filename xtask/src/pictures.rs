@@ -1,0 +1,91 @@
+//! Makes the documents' pictures with overlays and the map of a lens with the present program.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use crate::machine::{has, root, target};
+use crate::steps::{self, Trouble, show};
+use crate::test_build::build_tests;
+
+/// Photographs in tests/data/real, and the pictures in book/images that are made from them.
+const PHOTOGRAPHS: [(&str, &str); 8] = [
+    ("iss-limb-2020-11-20.jpg", "iss-limb"),
+    ("iss064e002941-solar-array.jpg", "gallery/solar-array"),
+    ("opssat-2020-08-16.png", "gallery/ops-sat"),
+    ("jupiter/jupiter-cassini-n1352037683.png", "gallery/jupiter"),
+    ("pluto-pia19948.jpg", "gallery/pluto"),
+    ("sun-hmi-continuum-2023-01-31.png", "gallery/sun"),
+    ("iss073e0293986-aurora.jpg", "gallery/aurora"),
+    ("iss030e102170-night.jpg", "gallery/night"),
+];
+
+/// Scenes of `hzn simulate` with further options, the index of the picture that is shown, and the picture in
+/// book/images.
+const SCENES: [(&str, &[&str], &str, &str); 5] = [
+    ("rocket", &["--frames", "6"], "1", "gallery/rocket"),
+    ("full-disc", &["--frames", "4"], "1", "gallery/full-disc"),
+    ("leo-infrared", &["--frames", "4"], "1", "gallery/infrared"),
+    ("sun-moon", &["--frames", "4"], "1", "gallery/sun-moon"),
+    ("saturn", &["--frames", "4", "--no-noise"], "1", "gallery/saturn"),
+];
+
+/// Width of the pictures in the documents, in pixels: the caption stays readable.
+const WIDTH: &str = "720";
+
+/// `cargo xtask pictures`: makes the pictures again.
+pub(crate) fn run() -> Result<(), String> {
+    std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
+    make().map_err(Trouble::into_message)
+}
+
+fn make() -> Result<(), Trouble> {
+    if !has("ffmpeg") {
+        return Err(Trouble::Failed("the pictures are reduced with ffmpeg: install it".into()));
+    }
+    build_tests()?;
+    let folder = target().join("xtask").join("pictures");
+    fs::create_dir_all(&folder)?;
+    for (photograph, name) in PHOTOGRAPHS {
+        let file = Path::new("tests/data/real").join(photograph);
+        let beside = file.with_file_name("sensor.toml");
+        let sensor = if beside.exists() { beside } else { file.with_extension("toml") };
+        hzn(&folder, &["explain", &file.to_string_lossy(), "--sensor", &sensor.to_string_lossy()], name)?;
+    }
+    for (scene, options, index, name) in SCENES {
+        let flight = folder.join(scene);
+        if !flight.exists() {
+            let mut command = Command::new(target().join("debug/hzn"));
+            command.args(["simulate", scene, "-q", "-o"]).arg(&flight).args(options);
+            steps::run(&mut command)?;
+        }
+        hzn(&folder, &["explain", &flight.to_string_lossy(), "--index", index], name)?;
+    }
+    let (lens, map) = (folder.join("leo-infrared/sensor.toml"), folder.join("camera-map.png"));
+    let mut command = Command::new(target().join("debug/hzn"));
+    command.args(["camera", "show"]).arg(&lens).arg("--picture").arg(&map).arg("--force");
+    steps::run(command.stdout(Stdio::null()))?;
+    reduce(&map, "camera-map")
+}
+
+/// Draws a picture with `hzn`, and writes it reduced into book/images.
+fn hzn(folder: &Path, args: &[&str], name: &str) -> Result<(), Trouble> {
+    let drawn = folder.join(name.replace('/', "-")).with_extension("png");
+    let mut command = Command::new(target().join("debug/hzn"));
+    command.args(args).arg("--overlay").arg(&drawn).arg("--force").stdout(Stdio::null());
+    show(&command);
+    // A refused picture has an overlay, too.
+    command.status()?;
+    reduce(&drawn, name)
+}
+
+/// Writes a picture into book/images, not wider than [`WIDTH`].
+fn reduce(drawn: &Path, name: &str) -> Result<(), Trouble> {
+    let kept = format!("book/images/{name}.jpg");
+    let filter = format!("scale='min({WIDTH},iw)':-1:flags=area");
+    let mut reduce = Command::new("ffmpeg");
+    reduce.args(["-v", "error", "-y", "-i"]).arg(drawn).args(["-vf", &filter, "-q:v", "4", &kept]);
+    steps::run(&mut reduce)?;
+    println!("written: {kept}");
+    Ok(())
+}
