@@ -48,7 +48,7 @@ mod wheel;
 use std::process::ExitCode;
 
 const USAGE: &str =
-    "usage: cargo xtask <test|bench|reproduce|campaign|dist|firmware|first-command|keys|page|pictures|site|viewer> [OPTION]...
+    "usage: cargo xtask COMMAND [OPTION]...; COMMAND is one of these:
 
   test [--all] [STEP]...
                      runs the steps of every check, or all steps whose name contains one of the words; --all runs the

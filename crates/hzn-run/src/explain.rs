@@ -59,11 +59,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Layer => "at night, the light below the edge does not become less: it is no layer of airglow".into(),
         Verdict::Faint => "the brightness hardly changes across the edge, as in twilight".into(),
         Verdict::Unlikely => format!("its probability to be the limb is below {} (gates.min_p_limb)", s.min_p_limb),
-        Verdict::Glow => {
-            "light reaches high above the edge (gates.max_glow): at night it is airglow or aurora, by day \
-                          an overexposed body, haze on the lens, or stray light"
-                .into()
-        }
+        Verdict::Glow => GLOW.into(),
         Verdict::Attitude => format!(
             "the axis is more than {} sigma from the given attitude (gates.max_attitude_sigma)",
             s.max_attitude_sigma
@@ -73,6 +69,9 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Rate => "the axis is farther from the last answer than it can turn (gates.max_rate_deg_s)".into(),
     }
 }
+
+const GLOW: &str = "light reaches high above the edge (gates.max_glow): at night it is airglow or aurora, by day an \
+                    overexposed body, haze on the lens, or stray light";
 
 fn residuals_text(max_rms_px: f64) -> String {
     format!(
