@@ -47,8 +47,7 @@ mod wheel;
 
 use std::process::ExitCode;
 
-const USAGE: &str =
-    "usage: cargo xtask COMMAND [OPTION]...; COMMAND is one of these:
+const USAGE: &str = "usage: cargo xtask COMMAND [OPTION]...; COMMAND is one of these:
 
   test [--all] [STEP]...
                      runs the steps of every check, or all steps whose name contains one of the words; --all runs the
