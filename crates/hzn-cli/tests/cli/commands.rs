@@ -147,7 +147,8 @@ fn overlays_of_a_run() {
     }
     // The limb reaches from one side to the other, and points lie on it.
     for x in (0..320).step_by(16).map(f64::from) {
-        assert!(limb.iter().any(|p| p[0] == x), "no limb in column {x}");
+        // Points lie densely on the line, and cover its middle.
+        assert!(limb.iter().any(|p| (p[0] - x).abs() <= 8.0), "no limb about column {x}");
         assert!(inliers.iter().any(|p| (p[0] - x).abs() <= 2.0), "no inliers about column {x}");
     }
     assert!(places(&drawn, palette::AXIS).is_empty());
