@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 use crate::firmware;
 use crate::machine::{root, target};
 use crate::steps::{self, Outcome, Trouble, cargo};
-use crate::{miri, parts, processors, python, wheel};
+use crate::{miri, mutants, parts, processors, python, wheel};
 
 /// The triple that the fuzzing program is built for. With a named target, build scripts are not instrumented.
 const HOST: &str = "x86_64-unknown-linux-gnu";
@@ -36,6 +36,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign paths
        cargo xtask campaign processors [PICTURES]
        cargo xtask campaign parts [FOLDER] [--advisories FOLDER]
+       cargo xtask campaign mutants [--sample N] [--seed S] [--again] [--page FILE]
 
   fuzz  runs every target (or those that are named) under libFuzzer for N seconds (60); --keep adds the inputs with
         new coverage to fuzz/corpus
@@ -63,7 +64,10 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
         compares the answers to PICTURES (2000) on aarch64 and big-endian powerpc64, in QEMU, with those of this machine
   parts writes the CycloneDX lists of parts (SBOM) of command, wheel and firmware into FOLDER (target/sbom), and runs
         cargo-deny if it is installed; --advisories looks the parts up in a copy of the RustSec database (the folder
-        that contains crates/), and lists parts that are yanked or older than the newest version";
+        that contains crates/), and lists parts that are yanked or older than the newest version
+  mutants
+        draws N (200) small changes of the core's stages and pipeline with the seed S (1), and counts how many its tests
+        notice; continues after a stop; --again tries the others again, --page writes the figures into a page";
 
 /// Runs one campaign.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
@@ -91,6 +95,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
         Some("miri") => miri::campaign().map_err(Trouble::into_message),
         Some("paths") => paths().map_err(Trouble::into_message),
+        Some("mutants") => mutants::run(&args[1..]).map_err(Trouble::into_message),
         Some("parts") => parts::run(&args[1..]).map_err(Trouble::into_message),
         _ => Err(USAGE.to_owned()),
     };

@@ -30,6 +30,7 @@ mod first_command;
 mod flight_build;
 mod machine;
 mod miri;
+mod mutants;
 mod page;
 mod parts;
 mod pictures;
@@ -61,7 +62,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND [OPTION]...; COMMAND is one of t
                      compares samplers of outliers on simulated edge points
   reproduce [STUDY]...
                      measures the numbers of book/results/reproduction.md again and writes the file (see --help there)
-  campaign <fuzz|kill|long|flips|parts> [ARG]...
+  campaign <fuzz|kill|long|flips|mutants|parts> [ARG]...
                      looks for faults, and lists what hzn is built from (see book/results/reliability.md)
   dist [--target TRIPLE] [PART]...
                      makes the files of a release in target/dist: the static program as an archive and as a Debian

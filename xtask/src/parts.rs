@@ -64,7 +64,10 @@ fn audit_program() -> Result<PathBuf, Trouble> {
 /// Returns the database as a git repository, which cargo-audit expects. The given folder is not changed.
 fn repository(database: &Path) -> Result<PathBuf, Trouble> {
     if !database.join("crates").is_dir() {
-        return Err(failed(format!("{}: does not contain the folder crates of the database", database.display())));
+        return Err(failed(format!(
+            "{}: does not contain the folder crates of the database; unpack its archive first",
+            database.display()
+        )));
     }
     if database.join(".git").exists() {
         return Ok(database.to_owned());
