@@ -148,7 +148,7 @@ fn bits_of_headerless_words_and_of_transparent_ones() {
 fn bits_of_sensor_toml_are_used() {
     let place = Place::new();
     words(0.0, |v| v << 2).save(place.path("in/low.png")).unwrap();
-    let told = |bits: u8| format!("{}{NO_TONE}[input]\nbits = {bits}\n", crate::common::SENSOR);
+    let told = |bits: u8| format!("{}{NO_TONE}bits = {bits}\n", crate::common::SENSOR);
     place.write("in/sensor.toml", told(10).as_bytes());
     let off = angle_deg(axes(&place, &["run", "in"])[0], plain(0.0));
     assert!(off < 1e-3, "{off}");

@@ -307,7 +307,7 @@ fn one_colour_of_a_video_and_its_rotation() {
         let colours = image::RgbImage::from_fn(320, 240, |x, y| image::Rgb([230, 230, grey.get_pixel(x, y).0[0]]));
         colours.save(place.path(&format!("in/{i}.png"))).unwrap();
     }
-    let sensor = |more: &str| place.write("in/sensor.toml", format!("{SENSOR}{NO_TONE}[input]\n{more}").as_bytes());
+    let sensor = |more: &str| place.write("in/sensor.toml", format!("{SENSOR}{NO_TONE}{more}").as_bytes());
     sensor("channel = \"blue\"\n");
     let pictures = axes(&place, &["run", "in"]);
     for (name, coding) in [

@@ -22,8 +22,9 @@ pub const SENSOR: &str = "preset = \"hzn\"\n\n[camera]\nwidth = 320\nheight = 24
                           fy_px = 300.0\ncx_px = 159.5\ncy_px = 119.5\n\n[body]\nkind = \"earth-sphere\"\naltitude_km \
                           = 400.0\n";
 
-/// The line after [`SENSOR`] that makes the limb height independent of the tone.
-pub const NO_TONE: &str = "limb = \"height\"\n";
+/// The lines after [`SENSOR`] that make edge and limb height independent of what a file says of its tone. More keys of
+/// the section `input` may follow.
+pub const NO_TONE: &str = "limb = \"height\"\n[input]\ntone = \"unknown\"\n";
 
 /// Returns a picture of a smooth bright body below its limb; `shift` moves it by 0.05 degrees per unit.
 pub fn limb(width: u32, height: u32, shift: f64) -> image::GrayImage {
