@@ -4,7 +4,7 @@ use egui::{DragValue, Id, Modal, Ui};
 use hzn_files::start::Body;
 
 use super::viewer::Viewer;
-use super::wizard_form::{Wizard, sigmas};
+use super::wizard_form::Wizard;
 use super::{number, theme};
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
@@ -19,10 +19,7 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
         questions(ui, &mut wizard);
         ui.add_space(6.0);
         match &outcome {
-            Ok((text, _)) => {
-                let what = "The sensor.toml has these sigmas of what is not known:";
-                ui.label(format!("{what} {}.", sigmas(text).join(", ")));
-            }
+            Ok(start) => drop(ui.label(Wizard::sigmas_in_words(start))),
             Err(why) => drop(ui.colored_label(theme::warning(ui.visuals().dark_mode), why)),
         }
         ui.horizontal(|ui| {
@@ -31,7 +28,7 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
         });
     });
     match outcome {
-        Ok((text, warnings)) if make => viewer.begin_session(&text, warnings),
+        Ok(start) if make => viewer.begin_session(&start.text, start.warnings),
         _ if cancel || shown.should_close() => {}
         _ => viewer.wizard = Some(wizard),
     }

@@ -1,7 +1,7 @@
 //! The form that makes a first sensor.toml from the pictures, a field of view and an altitude.
 
 use hzn_core::camera::Model;
-use hzn_files::start::{self, Body, CameraFacts, Exif};
+use hzn_files::start::{self, Body, CameraFacts, Exif, StartConfig};
 
 /// The answers of the user, and what the picture itself says.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,11 +37,11 @@ impl Wizard {
         }
     }
 
-    /// Returns the text of the sensor.toml with its warnings.
+    /// Returns the sensor.toml with its warnings.
     ///
     /// # Errors
     /// The field of view is impossible for the lens, or EXIF has no focal length; the message says what to do.
-    pub(super) fn write(&self) -> Result<(String, Vec<String>), String> {
+    pub(super) fn write(&self) -> Result<StartConfig, String> {
         let facts = CameraFacts {
             fov_deg: self.states_fov.then_some(self.fov_deg),
             lens: Some(if self.fisheye { Model::Equidistant } else { Model::Pinhole }),
@@ -50,16 +50,19 @@ impl Wizard {
             body: self.body,
             ..CameraFacts::of_size(self.size_px)
         };
-        let start = start::write_sensor_toml(&facts).map_err(|e| e.to_string())?;
-        Ok((start.text, start.warnings))
+        start::write_sensor_toml(&facts).map_err(|e| e.to_string())
     }
-}
 
-/// Returns the sigmas that a text of a sensor.toml has: each line without its comment.
-pub(super) fn sigmas(text: &str) -> Vec<&str> {
-    let key = |line: &str| line.split('=').next().unwrap_or_default().trim().to_owned();
-    let is_sigma = |line: &&str| !line.trim_start().starts_with('#') && key(line).contains("sigma");
-    text.lines().filter(is_sigma).map(|line| line.split('#').next().unwrap_or(line).trim()).collect()
+    /// Says which sigmas this sensor.toml has, because the values are guesses.
+    pub(super) fn sigmas_in_words(start: &StartConfig) -> String {
+        let written = start.text.lines().find_map(|line| line.strip_prefix("altitude_sigma_km = "));
+        let of_altitude = written.and_then(|value| value.split(' ').next());
+        let of_altitude = of_altitude.map_or_else(String::new, |km| format!(", the altitude ± {km} km"));
+        format!(
+            "Focal length {:.0} px ± {:.1} %, k1 = 0 ± {:.2}, principal point ± {:.0} px{of_altitude} (1 sigma).",
+            start.focal_px, start.focal_sigma_percent, start.k1_sigma, start.centre_sigma_px
+        )
+    }
 }
 
 #[cfg(test)]
@@ -73,17 +76,18 @@ mod tests {
         let mut wizard = Wizard::new([640, 480], Exif::default(), false);
         assert!(wizard.states_fov, "this picture has no EXIF");
         wizard.fov_deg = 90.0;
-        let (text, _) = wizard.write().unwrap();
-        let session = Session::new(&text, Path::new("sensor.toml"), None);
+        let start = wizard.write().unwrap();
+        let session = Session::new(&start.text, Path::new("sensor.toml"), None);
         assert!(session.problem().is_none(), "{:?}", session.problem());
         let config = session.config().unwrap();
         assert!((config.camera.fx_px - 320.0).abs() < 0.5, "half of the width is at 45 degrees");
         assert_eq!(config.body.altitude_km, Some(400.0));
-        let written = sigmas(&text);
-        assert!(written.iter().any(|line| line.starts_with("focal_sigma_percent")), "{written:?} {text}");
+        let words = Wizard::sigmas_in_words(&start);
+        assert!(words.starts_with("Focal length 320 px ± ") && words.contains("the altitude ± 8.0 km"), "{words}");
+        assert!(start.text.contains("altitude_sigma_km = 8.0"), "{}", start.text);
         wizard.body = Body::from_name("mars").unwrap();
-        let (on_mars, _) = wizard.write().unwrap();
-        let session = Session::new(&on_mars, Path::new("sensor.toml"), None);
+        let on_mars = wizard.write().unwrap();
+        let session = Session::new(&on_mars.text, Path::new("sensor.toml"), None);
         assert_eq!(session.config().unwrap().body.kind.name(), "mars");
         wizard.fov_deg = 200.0;
         assert!(wizard.write().unwrap_err().contains("200"));

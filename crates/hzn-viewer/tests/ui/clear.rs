@@ -107,7 +107,7 @@ fn the_text_at_the_foot_of_the_picture_lies_over_nothing() {
         let picture = window.get_by_label("Picture 0.png").rect();
         window.event(egui::Event::PointerMoved(picture.center()));
         window.run_steps(10);
-        let foot = place_of(&window, |text| text.contains("off axis"));
+        let foot = place_of(&window, |text| text.contains("ray ("));
         let message = place_of(&window, |text| text.contains("residuals.csv:2"));
         assert!(message.bottom() < foot.top(), "{message:?} {foot:?}");
         let badge = place_of(&window, |text| text.ends_with('%') && text.len() < 8);
