@@ -102,6 +102,14 @@ fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
                 found.iter().map(|one| one.describe(known.size_px[0])).collect::<Vec<_>>().join(", but ")
             )));
         }
+        LimbSays::Uncertain(found) => {
+            return Err(errors::config(format!(
+                "fov_deg: is not given, the pictures have no usable EXIF, and what the limb says is too uncertain to \
+                 start from: {}; add more pictures, or the field of view over the whole width, for example \
+                 fov_deg=60",
+                found.describe(known.size_px[0])
+            )));
+        }
         LimbSays::Nothing(pictures) => {
             return Err(errors::config(format!(
                 "fov_deg: is not given, the pictures have no usable EXIF, and the limb in {pictures} of them does not \

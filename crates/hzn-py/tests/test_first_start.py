@@ -98,12 +98,21 @@ def test_one_picture_does_not_tell_the_kind_of_lens():
     with pytest.raises(hzn.ConfigError, match="as a fisheye, but .* as a pinhole; add lens=") as refused:
         hzn.Sensor.start(PHOTOGRAPH, altitude_km=418)
     assert "--" not in str(refused.value)
+    # Whoever says the kind learns that the picture is not enough, instead of that it says nothing.
+    with pytest.raises(hzn.ConfigError, match="too uncertain to start from: .* as a pinhole; add more pictures"):
+        hzn.Sensor.start(PHOTOGRAPH, lens="pinhole", altitude_km=418)
 
 
-def test_a_field_of_view_that_the_limb_contradicts():
-    """The photograph is 38 degrees wide; a list of pictures is one camera, as a folder is."""
-    with pytest.warns(UserWarning, match="the limb in 1 of 1 pictures contradicts the field of view") as warned:
-        hzn.Sensor.start([PHOTOGRAPH], fov_deg=20, altitude_km=418)
+def test_a_field_of_view_that_the_limb_contradicts(tmp_path):
+    """The pictures are 74.6 degrees wide; a list of pictures is one camera, as a folder is."""
+    sensor = hzn.Sensor(camera=SMALL, body={"kind": "earth"}, input={"tone": "linear"})
+    paths = []
+    for i in range(6):
+        position, rotation = pose(-30 + 9 * i, 10.0, 500.0, azimuth_deg=50 * i, roll_deg=7 * i)
+        paths.append(tmp_path / f"{i}.pgm")
+        paths[-1].write_bytes(pgm(hzn.render(sensor, position, quaternion(rotation), NOON + 10 * i)))
+    with pytest.warns(UserWarning, match="of 6 pictures contradicts the field of view") as warned:
+        hzn.Sensor.start(paths, fov_deg=35, altitude_km=500)
     assert all("--" not in str(one.message) for one in warned)
     assert hzn.Sensor.start([str(PHOTOGRAPH)], fov_deg=38, altitude_km=418) == hzn.Sensor.start(
         PHOTOGRAPH, fov_deg=38, altitude_km=418

@@ -24,6 +24,8 @@ pub enum LimbSays {
     FieldOfView(FieldOfView),
     /// The limb says another field of view for each kind of lens, and does not tell the kind.
     LensDecides(Vec<FieldOfView>),
+    /// The field of view that the limb says is too uncertain to start from.
+    Uncertain(FieldOfView),
     /// No altitude is known for any picture, so the limb says nothing.
     NoAltitude,
     /// The limb in this number of pictures does not say it.
@@ -91,7 +93,8 @@ pub fn measure_field_of_view(request: &Request, known: &CameraFacts) -> Result<L
     }
     let mut found = find_field_of_view(&pictures, known);
     Ok(match (found.len(), found.pop()) {
-        (1, Some(only)) => LimbSays::FieldOfView(only),
+        (1, Some(only)) if only.is_certain() => LimbSays::FieldOfView(only),
+        (1, Some(only)) => LimbSays::Uncertain(only),
         (0, _) | (_, None) => LimbSays::Nothing(pictures.len()),
         (_, Some(last)) => LimbSays::LensDecides(found.into_iter().chain([last]).collect()),
     })

@@ -28,11 +28,11 @@ pub(crate) fn write_sensor_toml(known: &Known, picture: &[u8]) -> Result<Value, 
     if !facts.has_focal() && altitude_km.is_some() {
         let (decoded, _) = Payload::Encoded(picture.to_vec()).decode(None)?;
         match find_field_of_view(&[(decoded, None)], &facts).as_slice() {
-            [found] => {
+            [found] if found.is_certain() => {
                 (facts.lens, facts.measured) = (Some(found.lens), Some(found.measured));
                 from = "the limb in the picture";
             }
-            [] => {}
+            [] | [_] => {}
             several => {
                 let each = several.iter().map(|one| one.describe(facts.size_px[0])).collect::<Vec<_>>();
                 return Err(format!(

@@ -286,6 +286,11 @@ fn limb_fov(args: &Args, known: &CameraFacts) -> Result<Option<FieldOfView>, Sto
              --lens pinhole, more pictures, or the field of view over the whole width, for example --fov 60",
             found.iter().map(|one| one.describe(known.size_px[0])).collect::<Vec<_>>().join(", but ")
         ))),
+        LimbSays::Uncertain(found) => Err(usage(format!(
+            "the field of view is not known (no --fov, no usable EXIF), and what the limb says is too uncertain to \
+             start from: {}; add more pictures, or the field of view over the whole width, for example --fov 60",
+            found.describe(known.size_px[0])
+        ))),
         LimbSays::Nothing(pictures) => Err(usage(format!(
             "the field of view is not known (no --fov, no usable EXIF), and the limb in {} does not say it; \
              add the field of view over the whole width, for example --fov 60, and --lens fisheye or --lens pinhole",

@@ -54,6 +54,11 @@ pub struct FieldOfView {
 }
 
 impl FieldOfView {
+    /// Returns whether this is enough for a sensor to start from.
+    pub fn is_certain(&self) -> bool {
+        0.01 * self.measured.focal_sigma_percent <= MAX_COMMON_SIGMA
+    }
+
     /// Returns the field of view with its 1-sigma and the kind of lens as a text, for pictures of this width.
     pub fn describe(&self, width_px: u32) -> String {
         let Self { lens, measured, .. } = self;
@@ -94,7 +99,8 @@ impl Said {
 /// not known, both kinds are tried.
 ///
 /// Returns one field of view, one for each kind of lens if the pictures do not tell the kind and the kinds disagree, or
-/// none if no picture shows a limb whose curvature says enough.
+/// none if no picture shows a limb whose curvature says something. A single one may be uncertain
+/// ([`FieldOfView::is_certain`]).
 pub fn find_field_of_view(pictures: &[(Picture, Option<FrameData>)], known: &CameraFacts) -> Vec<FieldOfView> {
     let lenses = known.lens.map_or(vec![Model::Equidistant, Model::Pinhole], |lens| vec![lens]);
     let width_px = f64::from(known.size_px[0]);
@@ -125,12 +131,10 @@ pub fn find_field_of_view(pictures: &[(Picture, Option<FrameData>)], known: &Cam
             None => best.sigma = f64::INFINITY,
         }
     }
-    let is_certain = |(_, c): &(Model, Combined)| c.sigma <= MAX_COMMON_SIGMA;
     match found.as_slice() {
-        [best, ..] if is_certain(best) => vec![described(best)],
-        // Each is the answer to whoever says the kind of lens.
-        [_, _] => each,
-        _ => Vec::new(),
+        [best, ..] if described(best).is_certain() => vec![described(best)],
+        // With two kinds of lens, each is the answer to whoever says the kind.
+        _ => each,
     }
 }
 
