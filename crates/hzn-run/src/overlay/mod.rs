@@ -101,7 +101,8 @@ pub fn draw_plain(image: RgbImage, drawing: &Annotations, true_limb: &[Vec<[f64;
         }
     }
     for limb in &drawing.limb {
-        canvas.polyline(limb, pen * 3.4, LIMB);
+        // In a small picture, points that lie densely would cover a thinner line.
+        canvas.polyline(limb, (pen * 3.4).max(5.0), LIMB);
     }
     for limb in true_limb {
         canvas.polyline(limb, pen * 1.2, colours::TRUTH);
