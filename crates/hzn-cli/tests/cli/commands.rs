@@ -142,8 +142,9 @@ fn overlays_of_a_run() {
     place.run(&["run", "in", "--overlay", "drawn", "-q"]).expect(0);
     let drawn = image::open(place.path("drawn/0000.png")).unwrap().into_rgb8();
     let (limb, inliers) = (places(&drawn, palette::LIMB), places(&drawn, palette::INLIER));
+    // The line of the limb is five pixels wide.
     for [x, y] in limb.iter().chain(&inliers) {
-        assert!((y - true_row(*x)).abs() <= 2.0, "{x}, {y}: the limb is in row {}", true_row(*x));
+        assert!((y - true_row(*x)).abs() <= 3.0, "{x}, {y}: the limb is in row {}", true_row(*x));
     }
     // The limb reaches from one side to the other, and points lie on it.
     for x in (0..320).step_by(16).map(f64::from) {
