@@ -2,8 +2,8 @@
 
 use hzn_core::body::{self, Kind};
 
-/// Limit of a difference between a flight and what was known before, in sigmas. One right flight in a hundred exceeds
-/// it, because the normal distribution has 1 % on both sides of it.
+/// Largest difference between a flight and what was known before, in sigmas. One right flight in a hundred has a larger
+/// one, because the normal distribution has 1 % outside of ± 2.58.
 pub(crate) const TWO_SIDED: f64 = 2.58;
 /// Sigmas of a limb height that nobody measured within which the limb of a body is looked for.
 const RANGE: f64 = 3.0;

@@ -54,7 +54,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Says what was left out; one line for each kind.
+    /// Returns a line of text for each kind of copy that was left out.
     ///
     /// A measurement that is there twice says nothing new, and would only make the sigmas of the lens smaller.
     pub fn copies_in_words(&self) -> Vec<String> {
