@@ -2,6 +2,7 @@
 
 mod architecture;
 mod common;
+mod decisions;
 mod dice;
 mod drawn;
 #[cfg(feature = "position")]
@@ -11,6 +12,7 @@ mod precision;
 mod published;
 mod rig;
 mod rows;
+mod stages;
 mod total;
 mod track;
 mod uncertain_lens;

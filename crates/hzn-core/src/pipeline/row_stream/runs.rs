@@ -76,9 +76,7 @@ impl<'a> Runs<'a> {
                 // Inside a run only the first and last pixel have a dark neighbour in their own row.
                 let at_end = if x == start { x } else { end - 1 };
                 let next = beside.iter_mut().flatten().map(|row| row.next_near(x)).fold(at_end, u16::min);
-                if next < end {
-                    found(next);
-                }
+                found(next);
                 x = next.saturating_add(1);
             }
         }

@@ -83,6 +83,14 @@ fn dark_noise_is_measured_on_any_background() {
 
 /// Tests Otsu's threshold against its definition, on all samples of six pixels from seven brightnesses.
 #[test]
+fn an_edge_is_no_dark_noise() {
+    // Every second column is lit, so that each pair of neighbours has a lit pixel.
+    let data: Vec<u16> = (0..64 * 64).map(|i| if i % 2 == 0 { 10 } else { 210 }).collect();
+    let picture = Grey::try_new(&data[..], Layout::packed(64, 64, 1, 8)).unwrap();
+    assert_eq!(dark_noise::<f64, _, _>(&picture, &Region::whole(64, 64), 110, 7, &Unobserved), 0.0);
+}
+
+#[test]
 fn every_small_sample_has_the_threshold_of_the_definition() {
     const VALUES: [u16; 7] = [0, 3, 4, 60, 61, 200, 255];
     let mut found = 0;
