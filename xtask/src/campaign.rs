@@ -37,6 +37,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign processors [PICTURES]
        cargo xtask campaign parts [FOLDER] [--advisories FOLDER]
        cargo xtask campaign mutants [--sample N] [--seed S] [--again] [--page FILE]
+       cargo xtask campaign coverage [--again] [--page FILE]
 
   fuzz  runs every target (or those that are named) under libFuzzer for N seconds (60); --keep adds the inputs with
         new coverage to fuzz/corpus
@@ -67,7 +68,10 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
         that contains crates/), and lists parts that are yanked or older than the newest version
   mutants
         draws N (200) small changes of the core's stages and pipeline with the seed S (1), and counts how many its tests
-        notice; continues after a stop; --again tries the others again, --page writes the figures into a page";
+        notice; continues after a stop; --again tries the others again, --page writes the figures into a page
+  coverage
+        counts the lines and branches of each crate that the tests run; --again takes the counts of the last run, --page
+        writes the table into a page";
 
 /// Runs one campaign.
 pub(crate) fn run(args: &[String]) -> Result<(), String> {
@@ -96,6 +100,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("miri") => miri::campaign().map_err(Trouble::into_message),
         Some("paths") => paths().map_err(Trouble::into_message),
         Some("mutants") => mutants::run(&args[1..]).map_err(Trouble::into_message),
+        Some("coverage") => mutants::coverage(&args[1..]).map_err(Trouble::into_message),
         Some("parts") => parts::run(&args[1..]).map_err(Trouble::into_message),
         _ => Err(USAGE.to_owned()),
     };

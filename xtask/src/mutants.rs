@@ -1,4 +1,4 @@
-//! Measures the tests themselves: which changes of the code they notice.
+//! Measures the tests themselves: which changes of the code they notice, and which lines they run.
 
 use std::process::Command;
 
@@ -21,4 +21,9 @@ pub(crate) fn run(args: &[String]) -> Outcome {
     let mut command = Command::new("python3");
     command.arg("tests/python/mutants.py").args(args);
     steps::run(&mut command)
+}
+
+/// Counts the lines and branches that the tests run. The script names the tools that are missing.
+pub(crate) fn coverage(args: &[String]) -> Outcome {
+    steps::run(Command::new("python3").arg("tests/python/line_coverage.py").args(args))
 }

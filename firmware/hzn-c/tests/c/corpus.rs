@@ -15,11 +15,13 @@ fn every_committed_input_and_its_damaged_copies_pass() {
         println!("{}", path.display());
         let bytes = std::fs::read(&path).unwrap();
         any_calls::call(&bytes);
-        for bit in 0..8 * bytes.len() {
+        // Miri takes seconds for each call.
+        let step = if cfg!(miri) { 4 * bytes.len().max(1) } else { 1 };
+        for bit in (0..8 * bytes.len()).step_by(step) {
             let mut damaged = bytes.clone();
             damaged[bit / 8] ^= 1 << (bit % 8);
             any_calls::call(&damaged);
         }
-        (0..bytes.len()).for_each(|end| any_calls::call(&bytes[..end]));
+        (0..bytes.len()).step_by(step).for_each(|end| any_calls::call(&bytes[..end]));
     }
 }
