@@ -95,6 +95,18 @@ fn of_two_limbs_the_much_better_one_is_believed() {
 }
 
 #[test]
+fn limbs_of_another_size_are_refused() {
+    let mut config = config();
+    config.body.altitude_km = Some(4.0 * config.body.altitude_km.unwrap());
+    // Whether one or two edges are fitted, the picture has edges that are no limb.
+    for centres in [&[[160.3, 180.2]][..], &[[160.3, 180.2], [470.8, 175.4]]] {
+        let halves: Vec<Half> = centres.iter().map(|&centre_px| Half { centre_px, wave_px: 0.0 }).collect();
+        let report = process(&config, &draw(&halves));
+        assert_eq!(report.status, Status::Rejected, "{:?}", report.candidates);
+    }
+}
+
+#[test]
 fn an_overexposed_limb_is_answered() {
     let mut config = config();
     config.body.kind = Kind::EarthSphere;

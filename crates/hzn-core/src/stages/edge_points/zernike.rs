@@ -207,6 +207,21 @@ mod tests {
     }
 
     #[test]
+    fn the_steepest_pixel_is_that_of_three_rows() {
+        use crate::image::{Grey, Layout, region::Region};
+        use crate::model::observer::Unobserved;
+
+        // The outer rows have the edge between the columns 3 and 4, and the middle row alone has it a column later.
+        let rows = [[0u8, 0, 0, 0, 90, 90, 90, 90], [0, 0, 0, 0, 20, 60, 100, 100], [0, 0, 0, 0, 90, 90, 90, 90]];
+        let data = rows.concat();
+        let region = Region::<f64>::whole(8, 3);
+        let picture = Grey::try_new(&data[..], Layout::packed(8, 3, 1, 8)).unwrap();
+        let binary = BinaryPicture::new(&picture, &region, 45, &Unobserved);
+        assert_eq!(steepest(&binary, 4, 1), Some((4, 1)));
+        assert_eq!(steepest(&binary, 3, 1), Some((4, 1)));
+    }
+
+    #[test]
     fn a_flat_window_has_no_edge() {
         let flat = Patch { rows: [[77.0f32; SIDE]; SIDE] };
         assert!(edge(&flat).is_none());

@@ -78,3 +78,24 @@ fn is_flat<T: Real, P: Pixels>(picture: &P, region: &Region<T>, x: u16, y: u16) 
     let right = (1..RUN).take_while(|&k| x.checked_add(k).is_some_and(is_same)).count();
     left + right + 1 >= usize::from(RUN)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{Grey, Layout};
+
+    #[test]
+    fn a_run_of_eight_equal_pixels_is_flat_and_one_of_seven_is_not() {
+        let (run, width) = (usize::from(RUN), 32);
+        for (length, is_run) in [(run, true), (run - 1, false)] {
+            // The neighbours of the run alternate, so that no other pixels are equal.
+            let row: std::vec::Vec<u16> =
+                (0..width).map(|x| if (10..10 + length).contains(&x) { 100 } else { 20 + x as u16 % 2 }).collect();
+            let picture = Grey::try_new(&row[..], Layout::packed(width as u32, 1, 1, 8)).unwrap();
+            let region = Region::<f64>::whole(width as u16, 1);
+            for x in 10..10 + length {
+                assert_eq!(is_flat(&picture, &region, x as u16, 0), is_run, "{length} at {x}");
+            }
+        }
+    }
+}

@@ -131,6 +131,10 @@ fn bins_widen_without_losing_a_pixel() {
         assert!(histogram.bin(v.into()).is_some_and(|k| histogram.bins[k] > 0));
     }
     assert_eq!((histogram.shift, histogram.first), (8, 0));
+    // The first value is in the middle of the bins, so that noise about it keeps bins of one count.
+    let mut histogram = Histogram::new();
+    [30_000, 29_900, 30_100].into_iter().for_each(|v| histogram.count(v));
+    assert_eq!(histogram.shift, 0);
 }
 
 #[test]
@@ -141,4 +145,6 @@ fn a_small_body_is_found_by_the_finer_sample() {
         .collect();
     let found = level(&data, 8, Brightness::default(), Config::default()).unwrap();
     assert!((90..=110).contains(&found.level), "{}", found.level);
+    let lower = level(&data, 8, Brightness::default(), Config { scale: 0.5, ..Config::default() }).unwrap();
+    assert!((45..=55).contains(&lower.level), "{}", lower.level);
 }
