@@ -13,6 +13,10 @@ const DOWN_DEG: f64 = 72.0;
 enum Shown {
     /// A layer with its peak at 97 km, 5 km thick, above ground of this brightness.
     Layer(f64),
+    /// The same layer above dark ground, but it ends within the picture, as a line of cities does.
+    Ends,
+    /// The same layer with light that is different from place to place.
+    Uneven,
     /// A disc without structure, whose edge has the height of the airglow.
     Disc,
     /// A disc whose edge has the height of the limb by day.
@@ -24,6 +28,7 @@ fn light(tangent_km: f64, shown: Shown) -> f64 {
     let disc = |top_km: f64| f64::from(u8::from(tangent_km < top_km)) * 0.5;
     let ground = match shown {
         Shown::Layer(ground) => ground,
+        Shown::Ends | Shown::Uneven => 0.01,
         Shown::Disc => return disc(102.0),
         Shown::Day => return disc(17.0),
     };
@@ -35,6 +40,15 @@ fn light(tangent_km: f64, shown: Shown) -> f64 {
     // Behind the ground no light is seen: half of the line is left.
     let glow = (0..1600).map(|km| emission(way(km))).sum::<f64>() / 1000.0;
     if tangent_km < 0.0 { glow * 0.5 + ground } else { glow }
+}
+
+/// Returns the part of the light that is left in a column of the picture.
+fn along(x: u32, shown: Shown) -> f64 {
+    match shown {
+        Shown::Ends if x < 90 => 0.0,
+        Shown::Uneven => 0.6 + 0.4 * (f64::from(x) / 6.0).sin(),
+        _ => 1.0,
+    }
 }
 
 /// Renders a picture, and writes it with a time at this place.
@@ -54,7 +68,7 @@ fn place_with_lens(shown: Shown, focal_px: f64, utc: &str, keys: &str) -> Place 
         let at = tangent_km.clamp(-799.0, 298.0) + 800.0;
         let (k, part) = (at as usize, at.fract());
         let brightness = profile[k] * (1.0 - part) + profile[k + 1] * part;
-        image::Luma([(8.0 + 240.0 * brightness.min(1.0)) as u8])
+        image::Luma([(8.0 + 240.0 * (brightness * along(x, shown)).min(1.0)) as u8])
     };
     std::fs::create_dir_all(place.path("in")).unwrap();
     image::GrayImage::from_fn(480, 360, pixel).save(place.path("in/a.png")).unwrap();
@@ -121,5 +135,14 @@ fn a_short_arc_without_a_time_has_a_note_about_airglow() {
     assert!(told(4000.0, "", ""));
     for (focal_px, utc, keys) in [(4000.0, noon, ""), (300.0, "", ""), (4000.0, "", "sunlit = false\n")] {
         assert!(!told(focal_px, utc, keys), "{focal_px} {utc} {keys}");
+    }
+}
+
+#[test]
+fn a_line_that_ends_or_has_uneven_light_is_no_airglow() {
+    for shown in [Shown::Ends, Shown::Uneven] {
+        let refused = place(shown, MIDNIGHT, AIRGLOW);
+        let rows = without_time(&refused.run(&["run", "in"]).expect(0).out);
+        assert_eq!(cell(&rows[0], "status"), "rejected", "{rows:?}");
     }
 }

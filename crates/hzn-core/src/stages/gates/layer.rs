@@ -1,11 +1,15 @@
 //! Gate: the edge of the airglow is that of a layer. Below it the light becomes less again, down to the ground, whose
-//! own edge may be seen in moonlight. The ground itself, clouds and the lights of cities have no such trough.
+//! own edge may be seen in moonlight. The ground itself, clouds and the lights of most cities have no such trough.
+//!
+//! A line of cities along a coast has one. But nothing stands above the layer, so that its edge is seen along the whole
+//! limb, and a line of sight runs through 700 km of it, so that its light changes little along a picture. A line of
+//! cities has gaps, or lights of every brightness.
 //!
 //! The gate `glow` asks for no light beyond the edge. Where the picture ends next to the edge, the layer may be outside
 //! of it, and the edge that of the ground; so the sky beyond the edge must be in view.
 
 use super::case::{Case, refuse_if};
-use super::places::{MAX_PLACES, Place, Places, mean_brightness};
+use super::places::{MAX_PLACES, Place, Places, inliers, mean_brightness, place_of};
 use super::sky::Sky;
 use crate::base::median;
 use crate::base::real::Real;
@@ -34,6 +38,13 @@ const LAST_DARK: usize = 8;
 /// that show it. The layer is as bright everywhere along a picture; ground and clouds are not.
 const TROUGH_OF_PLACE: f64 = 0.92;
 const EVERYWHERE: f64 = 0.9;
+/// Number of places at which the light of the layer is compared, the smallest light of a place as a part of their
+/// median, and the smallest part of the places that have it.
+// Waves change the light of a layer by some tens of percent. Of 91 drawn layers, whose light is that of their geometry
+// and the noise, the darkest twentieth of the places has 0.75 of the median or more.
+const COMPARED: usize = 48;
+const EVEN: f64 = 0.5;
+const MOST_EVEN: f64 = 0.95;
 /// First place at which the light may rise again to half of the depth of the trough. The edge of a layer is at least
 /// 85 km above the ground, and the air above the ground shines in moonlight up to 28 km.
 const FIRST_RISE: usize = 6;
@@ -60,6 +71,7 @@ pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
     let is_sky_shown =
         |place: &&Place<T>| mean_brightness(place, -step_px(place) * T::from_f64(SKY_STEPS), binary).is_some();
     let is_layer = !P::STREAMED
+        && case.cover.share >= T::from_f64(EVERYWHERE)
         && places.iter().filter(is_sky_shown).count() >= LEAST
         && profile(case, binary, places)
             .is_some_and(|light| has_trough(&light, sky) && is_everywhere(&light, case, binary, places, sky));
@@ -127,7 +139,29 @@ fn is_everywhere<T: Real, P: Pixels, O: Observer<T>>(
         looks += 1;
         dark += i32::from(trough < bright * T::from_f64(TROUGH_OF_PLACE));
     }
-    looks >= LEAST as i32 && T::from_i32(dark) >= T::from_i32(looks) * T::from_f64(EVERYWHERE)
+    looks >= LEAST as i32
+        && T::from_i32(dark) >= T::from_i32(looks) * T::from_f64(EVERYWHERE)
+        && is_even(most.0, case, binary, sky)
+}
+
+/// Returns whether the layer is about as bright at all places, at the depth at which the profile is brightest.
+fn is_even<T: Real, P: Pixels, O: Observer<T>>(
+    depth: i32,
+    case: &Case<'_, T>,
+    binary: &BinaryPicture<'_, T, P, O>,
+    sky: &Sky<T>,
+) -> bool {
+    let inwards = step(case) * T::from_i32(depth);
+    let mut lights = heapless::Vec::<u16, COMPARED>::new();
+    for (block, lane) in inliers(case.blocks, case.fit.inliers, COMPARED) {
+        let _ = place_of(block, lane, &case.fused.e, case.camera)
+            .and_then(|place| mean_brightness(&place, inwards / place.by_px, binary))
+            .map(|light| lights.push(light));
+    }
+    let above_sky = |light: T| (light - sky.median).max(T::ZERO);
+    let least = above_sky(T::from_i32(median::median_of_counts(&lights).into())) * T::from_f64(EVEN);
+    let even = lights.iter().filter(|&&light| above_sky(T::from_i32(light.into())) >= least).count();
+    T::from_i32(even as i32) >= T::from_i32(lights.len() as i32) * T::from_f64(MOST_EVEN)
 }
 
 /// Returns whether the light becomes less below the edge, and does not rise again too early.

@@ -46,12 +46,17 @@ pub(super) type Places<T> = heapless::Vec<Place<T>, MAX_PLACES>;
 pub(super) fn along_limb<T: Real>(e: &V3<T>, blocks: &[Block<T>], count: u32, camera: &Camera<T>) -> Places<T> {
     let mut places = Places::new();
     inliers(blocks, count, MAX_PLACES).for_each(|(block, lane)| {
-        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { return };
-        let [gu, gv] = block.gradient_at(lane, e);
-        let by_px = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
-        let _ = places.push(Place { from: [from.u, from.v], inwards: [gu / by_px, gv / by_px], by_px });
+        let _ = place_of(block, lane, e, camera).map(|place| places.push(place));
     });
     places
+}
+
+/// Returns the place on the limb about `e` at an edge point.
+pub(super) fn place_of<T: Real>(block: &Block<T>, lane: usize, e: &V3<T>, camera: &Camera<T>) -> Option<Place<T>> {
+    let from = camera.project(&UnitVec3::assume_unit(block.ray(lane)))?;
+    let [gu, gv] = block.gradient_at(lane, e);
+    let by_px = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
+    Some(Place { from: [from.u, from.v], inwards: [gu / by_px, gv / by_px], by_px })
 }
 
 /// Returns the mean brightness of nine pixels at this distance inwards of a place, in pixels; `None` outside of the
