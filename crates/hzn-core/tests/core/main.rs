@@ -4,6 +4,8 @@ mod architecture;
 mod common;
 mod decisions;
 mod dice;
+#[cfg(all(feature = "dlr", feature = "erf", feature = "position", feature = "zju"))]
+mod digits;
 mod drawn;
 #[cfg(feature = "position")]
 mod lit_side;
