@@ -1,5 +1,7 @@
 //! Work on separate threads, so that the window does not wait: opening, decoding, processing and exporting.
 
+#[cfg(test)]
+mod answers;
 pub mod background;
 pub mod calibration;
 mod canvas;

@@ -82,3 +82,47 @@ fn from_ephemeris(data: &FrameData, place: impl Fn(f64) -> ephemeris::Place) -> 
     let seen = place(data.utc_s?).seen_from(data.position_km?.map(|km| km * 1e3).into());
     Some(turn.apply(&seen.direction.to_unit()?).xyz())
 }
+
+#[cfg(test)]
+mod tests {
+    use hzn_core::camera::{Config, Model};
+
+    use super::*;
+    use crate::work::answers::answer;
+
+    /// Returns the place of a body of the sky that is 10 degrees off the axis of the Earth's cone of 60 degrees.
+    fn place(kind: Kind, body: Kind, altitude_km: f64, off_deg: f64) -> SkyPlace {
+        let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, 640, 480, 300.0)).unwrap();
+        let towards = |deg: f64| [deg.to_radians().sin(), 0.0, deg.to_radians().cos()];
+        let [x, y, z] = towards(off_deg);
+        let mut truth = Truth::default();
+        if kind == Kind::Sun {
+            (truth.sun_x, truth.sun_y, truth.sun_z) = (Some(x), Some(y), Some(z));
+        } else {
+            (truth.moon_x, truth.moon_y, truth.moon_z) = (Some(x), Some(y), Some(z));
+        }
+        let bodies = [std::sync::Arc::new(answer(body, [0.0, 0.0, 1.0], 30f64.to_radians(), altitude_km))];
+        let places = places(None, Some(&truth), &bodies, &camera);
+        assert_eq!(places.len(), 1, "{places:?}");
+        places[0].clone()
+    }
+
+    #[test]
+    fn sun_and_moon_within_the_limb_are_behind_the_earth() {
+        for (kind, title) in [(Kind::Sun, "Sun"), (Kind::Moon, "Moon")] {
+            let behind = place(kind, Kind::EarthSphere, 400.0, 10.0);
+            assert_eq!((behind.name, behind.is_hidden), (format!("{title}, behind the Earth"), true));
+            let beside = place(kind, Kind::EarthSphere, 400.0, 35.0);
+            assert_eq!((beside.name.as_str(), beside.is_hidden), (title, false));
+        }
+    }
+
+    /// Beyond its own orbit, the camera may see the Moon in front of the Earth. The Sun is always behind it.
+    #[test]
+    fn far_away_the_moon_may_be_in_front_of_the_earth() {
+        assert!(!place(Kind::Moon, Kind::Earth, 400_000.0, 10.0).is_hidden);
+        assert!(place(Kind::Sun, Kind::Earth, 400_000.0, 10.0).is_hidden);
+        assert!(!place(Kind::Moon, Kind::Moon, 400.0, 10.0).is_hidden, "the Moon does not hide itself");
+        assert!(!place(Kind::Sun, Kind::Sun, 400.0, 10.0).is_hidden);
+    }
+}
